@@ -3,6 +3,8 @@
 //! A [`Workbench`] is an app with [`RigPlugins`] and a rig in it. It drives the same plugins as the window, and waits
 //! for their background work.
 
+mod held_values;
+mod node_lookup;
 pub mod posing;
 
 use std::{

@@ -24,7 +24,7 @@ use crate::{
     rig::{
         Rig, SourceError, TagData, TagKind, Uid,
         feature::{FeatureKinds, undecided_choices},
-        template::{self, PartOrigin},
+        template::{self, PartOrigin, Template},
     },
     solve::program::{CompileOptions, RigProgram},
 };
@@ -145,11 +145,9 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
         }
     };
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes));
-    let (mut rig, mut remarks, mut origins) = (template.rig.clone(), template.notes.clone(), BTreeMap::new());
-    match PartFiles::new(&RealDisk).put_together(path, &text, template) {
-        Ok(template) => (rig, remarks, origins) = (template.rig, template.notes, template.origins),
-        Err(fault) => faults.push(fault),
-    }
+    let (template, of_parts) = PartFiles::new(&RealDisk).survey(path, &text, template);
+    faults.extend(of_parts);
+    let Template { rig, notes: remarks, origins, .. } = template;
     let explicit = template::explicit(&text);
     let places = SourceText::new(&explicit);
     let CommandProblems { listed: commands, problems, commands: failing } =
@@ -217,7 +215,7 @@ struct CommandProblems {
 
 fn problems_of_commands(rig: &Rig, places: &SourceText, origins: &BTreeMap<Uid, PartOrigin>) -> CommandProblems {
     let locate = |error: &BuildError| match origins.get(&error.command) {
-        Some(origin) => places.locate_in_part(rig, error, *origin),
+        Some(origin) => places.locate_in_part(rig, error, origin),
         None => places.locate(rig, error),
     };
     let modules = Arc::new(modules::all());

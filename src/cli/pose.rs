@@ -11,7 +11,7 @@ use crate::{
     files::{FileKind, RealDisk, load_project, store_model, store_rig},
     headless::{
         Workbench,
-        posing::{ControlWrite, PoseError},
+        posing::{ControlWrite, HeldValue, PoseError},
     },
     plugins::commands::BuildStep,
     rig::{Rig, RigEdit, bake::baked, operations::Operation},
@@ -107,7 +107,8 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     let mut rig = read(args, &mut report)?;
     args.steps.parts.apply(&mut rig)?;
     let mut bench = Workbench::with_rig(SEED, rig);
-    run_steps(&mut bench, &args.steps, &writes)?;
+    let held = run_steps(&mut bench, &args.steps, &writes)?;
+    report.notes(held);
     let nodes = bench.nodes()?;
     let error = nodes.iter().map(|node| node.entity.translation.distance(node.program.translation)).fold(0.0, f32::max);
     report.line(format!("{} nodes; entities and program differ by {error:e} at most", nodes.len()));
@@ -136,7 +137,13 @@ pub(super) fn parsed(steps: &PoseSteps) -> Result<Vec<ControlWrite>, Failure> {
 
 /// Builds the rig, writes values, throws switches, which keep that pose, writes the values again, for the controls that the
 /// switches moved, and simulates frames.
-pub(super) fn run_steps(bench: &mut Workbench, steps: &PoseSteps, writes: &[ControlWrite]) -> Result<(), Failure> {
+///
+/// Returns the values that locks and limits hold.
+pub(super) fn run_steps(
+    bench: &mut Workbench,
+    steps: &PoseSteps,
+    writes: &[ControlWrite],
+) -> Result<Vec<HeldValue>, Failure> {
     if let Some(error) = bench.build(BuildStep::All).error {
         return Err(Failure::Input(Box::new(error)));
     }
@@ -146,9 +153,9 @@ pub(super) fn run_steps(bench: &mut Workbench, steps: &PoseSteps, writes: &[Cont
         let (name, value) = switch.split_once('=').ok_or_else(wrong)?;
         switches.push((name.trim(), value.trim()));
     }
-    bench.pose_through(writes, &switches)?;
+    let held = bench.pose_through(writes, &switches)?;
     bench.frames(steps.frames);
-    Ok(())
+    Ok(held)
 }
 
 fn read(args: &PoseArgs, report: &mut Report) -> Result<Rig, Failure> {

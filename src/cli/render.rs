@@ -164,7 +164,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
         let writes = pose::parsed(&args.steps)?;
         args.steps.parts.apply(&mut scene.rig)?;
         let mut bench = Workbench::with_rig(SEED, scene.rig);
-        pose::run_steps(&mut bench, &args.steps, &writes)?;
+        report.notes(pose::run_steps(&mut bench, &args.steps, &writes)?);
         scene.rig = bench.posed_document()?;
         state = Some(bench.runtime()?.state().clone());
     }

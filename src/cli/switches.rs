@@ -6,8 +6,9 @@ use clap::Args;
 
 use super::Failure;
 use crate::rig::{
-    Rig, RigEdit,
-    feature::{CombinedFeature, FeatureError, choose_switch, features_named, set_feature, set_switch},
+    Rig, RigEdit, Uid,
+    feature::{CombinedFeature, FeatureError, choose_switch, commands_of, features_named, set_feature, set_switch},
+    nearest::listed,
 };
 
 /// Switches of features and local groups.
@@ -44,7 +45,7 @@ fn switch_feature(rig: &mut Rig, wish: &str) -> Result<(), Failure> {
         Some((feature, switch)) if features_named(rig, name).is_err() => (feature, Some(switch)),
         _ => (name, None),
     };
-    let features = of_group(rig, name).map_err(wrong)?;
+    let features = of_group(rig, wish, name)?;
     let switches: BTreeSet<String> =
         features.iter().flat_map(|feature| &feature.switches).map(|switch| switch.name.clone()).collect();
     let is_known = |switch: &str| switches.contains(switch);
@@ -74,15 +75,30 @@ fn switch_feature(rig: &mut Rig, wish: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The features that `NAME` or `GROUP:NAME` means.
-fn of_group(rig: &Rig, name: &str) -> Result<Vec<CombinedFeature>, FeatureError> {
+/// The features that `NAME` or `GROUP:NAME` means: of a group are those that it bears, and those whose commands are on its
+/// joints.
+fn of_group(rig: &Rig, wish: &str, name: &str) -> Result<Vec<CombinedFeature>, Failure> {
+    let wrong = |error: FeatureError| Failure::Usage(format!("--feature {wish}: {error}"));
     let found = features_named(rig, name);
-    let Some((group, inner)) = name.split_once(':').filter(|_| found.is_err()) else { return found };
-    let in_group = |feature: &CombinedFeature| {
-        feature.key.group.and_then(|uid| rig.group(uid)).is_some_and(|of_feature| of_feature.name == group)
+    let Some((group, inner)) = name.split_once(':').filter(|_| found.is_err()) else { return found.map_err(wrong) };
+    let named = features_named(rig, inner).map_err(wrong)?;
+    let name_of = |uid: Option<Uid>| uid.and_then(|uid| rig.group(uid)).map(|group| group.name.as_str());
+    let has_commands = |feature: &CombinedFeature| {
+        let mut commands = feature.tags.iter().flat_map(|tag| commands_of(rig, *tag));
+        commands.any(|(joint, _)| name_of(rig.joint(joint).and_then(|joint| joint.data.group)) == Some(group))
     };
-    let inside: Vec<CombinedFeature> = features_named(rig, inner)?.into_iter().filter(in_group).collect();
-    if inside.is_empty() { found } else { Ok(inside) }
+    let borne = named.iter().filter(|feature| name_of(feature.key.group) == Some(group));
+    let mut inside: Vec<CombinedFeature> = borne.cloned().collect();
+    if inside.is_empty() {
+        inside = named.iter().filter(|feature| has_commands(feature)).cloned().collect();
+    }
+    if inside.is_empty() {
+        let groups: BTreeSet<&str> = named.iter().filter_map(|feature| name_of(feature.key.group)).collect();
+        let groups = if groups.is_empty() { "no group".to_owned() } else { listed(&Vec::from_iter(groups), "and") };
+        let reason = format!("the group \"{group}\" has no feature \"{inner}\"; it is in {groups}");
+        return Err(Failure::Usage(format!("--feature {wish}: {reason}")));
+    }
+    Ok(inside)
 }
 
 fn switch_group(rig: &mut Rig, wish: &str) -> Result<(), Failure> {

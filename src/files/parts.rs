@@ -202,6 +202,17 @@ impl<'a> PartFiles<'a> {
         template.with_parts(text, &mut |part| self.part(&folder.join(part), part), &mirror)
     }
 
+    /// Puts those parts into a template that can be had and fit, and tells all that is wrong with the others.
+    pub fn survey(&mut self, path: &Path, text: &str, template: Template) -> (Template, Vec<SourceError>) {
+        if template.parts.is_empty() {
+            return (template, Vec::new());
+        }
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let modules = self.modules.clone();
+        let mirror = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
+        template.survey_parts(text, &mut |part| self.part(&folder.join(part), part), &mirror)
+    }
+
     /// Every part instance of a template with its part, [fitted](PartInstance::fitted).
     ///
     /// # Errors

@@ -2,10 +2,14 @@
 
 use std::{str::FromStr, sync::Arc, time::Duration};
 
-use bevy::{math::EulerRot, prelude::*, time::TimeUpdateStrategy};
+use bevy::{prelude::*, time::TimeUpdateStrategy};
 use serde_json::{Value, json};
 
-use super::{Workbench, WorkbenchError};
+pub use super::held_values::HeldValue;
+use super::{
+    Workbench, WorkbenchError,
+    held_values::{NodeWrite, rotation},
+};
 use crate::{
     mesh::model::Trs,
     plugins::{
@@ -16,11 +20,7 @@ use crate::{
         schema::Attributes,
     },
     processor::{Exclusion, FindError, RunReport},
-    rig::{
-        AttributeKind, BuiltNode, Matching, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid,
-        feature::off_at,
-        nearest::{did_you_mean, listed},
-    },
+    rig::{AttributeKind, BuiltNode, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::listed},
     solve::program::ProgramError,
 };
 
@@ -52,10 +52,20 @@ pub enum WriteValue {
 
 impl WriteValue {
     /// Name of the attribute that is set; `None` for a channel of a control.
-    fn attribute(&self) -> Option<&str> {
+    pub(super) fn attribute(&self) -> Option<&str> {
         match self {
             Self::Attribute(name, _) | Self::AttributeText(name, _) => Some(name),
             Self::Translate(_) | Self::Rotate(_) | Self::Scale(_) => None,
+        }
+    }
+
+    /// Name of the channel or attribute that is set.
+    pub(super) fn channel(&self) -> &str {
+        match self {
+            Self::Translate(_) => "translate",
+            Self::Rotate(_) => "rotate",
+            Self::Scale(_) => "scale",
+            Self::Attribute(name, _) | Self::AttributeText(name, _) => name,
         }
     }
 
@@ -137,6 +147,22 @@ pub enum PoseError {
         value: String,
         /// Possible values, as a list in words.
         known: String,
+    },
+    /// A value out of all proportion to the rig.
+    #[error("{value} for \"{node}\" is out of all proportion to the rig; write numbers up to {most}")]
+    OutOfRange {
+        /// The node.
+        node: String,
+        /// Requested value.
+        value: String,
+        /// Largest number that is taken.
+        most: f32,
+    },
+    /// A pose in which a node has no finite place.
+    #[error("the pose puts \"{node}\" at no finite place; write smaller values")]
+    NotFinite {
+        /// The node.
+        node: String,
     },
     /// A reference finds no node.
     #[error(transparent)]
@@ -246,31 +272,40 @@ impl Workbench {
     /// # Errors
     /// See [`PoseError`]; nothing is written then.
     pub fn pose(&mut self, writes: &[ControlWrite]) -> Result<(), PoseError> {
-        self.pose_through(writes, &[])
+        self.pose_through(writes, &[]).map(drop)
     }
 
     /// Writes values as [`pose`](Self::pose) does, then sets switches, each given by name and value, which keep that pose as
-    /// [`switch`](Self::switch) does, then writes the values once more, for controls that the switches moved.
+    /// [`switch`](Self::switch) does, then writes the values once more, for controls that the switches moved. Returns the values
+    /// that locks and limits hold.
     ///
     /// # Errors
     /// See [`PoseError`].
-    pub fn pose_through(&mut self, writes: &[ControlWrite], switches: &[(&str, &str)]) -> Result<(), PoseError> {
+    pub fn pose_through(
+        &mut self,
+        writes: &[ControlWrite],
+        switches: &[(&str, &str)],
+    ) -> Result<Vec<HeldValue>, PoseError> {
         self.runtime()?;
-        let mut found = Vec::with_capacity(writes.len());
+        let mut found: Vec<NodeWrite> = Vec::with_capacity(writes.len());
         for write in writes {
             let node = self.find_node(&write.node, &write.value)?;
             let value = write.value.on(&node)?;
             found.push((self.entity(node.uid).ok_or(PoseError::NotBuilt)?, node, value));
         }
+        self.check_range(&found)?;
         self.write_values(&found)?;
         for (name, value) in switches {
             self.switch(name, value)?;
         }
-        if switches.is_empty() { Ok(()) } else { self.write_values(&found) }
+        if !switches.is_empty() {
+            self.write_values(&found)?;
+        }
+        self.held_values(&found)
     }
 
     /// Writes values to entities, and runs one frame.
-    fn write_values(&mut self, values: &[(Entity, BuiltNode, WriteValue)]) -> Result<(), PoseError> {
+    fn write_values(&mut self, values: &[NodeWrite]) -> Result<(), PoseError> {
         let program = Arc::clone(self.runtime()?.state().program());
         for (entity, node, value) in values {
             let (entity, world) = (*entity, self.app.world_mut());
@@ -286,10 +321,7 @@ impl Workbench {
             let before = PoseOffset::between(&rest, &transform);
             let offset = match *value {
                 WriteValue::Translate(translation) => PoseOffset { translation, ..before },
-                WriteValue::Rotate(degrees) => {
-                    let [x, y, z] = degrees.to_array().map(f32::to_radians);
-                    PoseOffset { rotation: Quat::from_euler(EulerRot::XYZ, x, y, z), ..before }
-                }
+                WriteValue::Rotate(degrees) => PoseOffset { rotation: rotation(degrees), ..before },
                 WriteValue::Scale(scale) => PoseOffset { scale, ..before },
                 WriteValue::Attribute(..) | WriteValue::AttributeText(..) => before,
             };
@@ -344,88 +376,6 @@ impl Workbench {
         let world = self.app.world();
         let joint = world.get::<JointEntities>(self.rig)?.get(node);
         joint.or_else(|| world.get::<BuiltEntities>(self.rig)?.get(node))
-    }
-
-    /// Node that a write refers to. A name wins over a label. Among controls with the same label the one in effect
-    /// wins: the goal of a limb while it follows inverse kinematics, else the forward control.
-    fn find_node(&self, name: &str, value: &WriteValue) -> Result<BuiltNode, PoseError> {
-        let built = self.built().ok_or(PoseError::NotBuilt)?;
-        let state = self.runtime()?.state();
-        let (what, is_meant): (&'static str, Box<dyn Fn(&BuiltNode) -> bool>) = match value.attribute() {
-            Some(_) => ("node", Box::new(|node: &BuiltNode| !node.attributes.is_empty())),
-            None => ("control", Box::new(|node: &BuiltNode| node.kind == NodeType::Control)),
-        };
-        let of_kind = || built.nodes.iter().filter(|node| is_meant(node));
-        let mut found: Vec<&BuiltNode> = if name.starts_with('@') {
-            let processor = self.processor().ok_or(PoseError::NotBuilt)?;
-            let uids = processor.builder().find(self.rig(), name)?;
-            uids.iter().filter_map(|uid| built.node(*uid)).filter(|node| is_meant(node)).collect()
-        } else {
-            let named: Vec<&BuiltNode> = of_kind().filter(|node| *node.name == *name).collect();
-            if named.is_empty() {
-                of_kind().filter(|node| node.label.as_deref() == Some(name)).collect()
-            } else {
-                named
-            }
-        };
-        if let Some(attribute) = value.attribute() {
-            let with: Vec<&BuiltNode> = found
-                .iter()
-                .copied()
-                .filter(|node| node.attributes.iter().any(|known| *known.name == *attribute))
-                .collect();
-            if with.is_empty()
-                && let Some(node) = found.first()
-            {
-                let known = did_you_mean(attribute, node.attributes.iter().map(|attribute| attribute.name.to_string()));
-                let (node, attribute) = (node.name.to_string(), attribute.to_owned());
-                return Err(PoseError::NoAttribute { node, attribute, known });
-            }
-            found = with;
-        }
-        if found.len() > 1 {
-            // The goal of a foot is a node of its own, which the control carries.
-            let carrier = |goal: Uid| {
-                let mut at = built.nodes.iter().position(|node| node.uid == goal);
-                while let Some(node) = at.map(|at| &built.nodes[at]).filter(|node| node.kind != NodeType::Control) {
-                    at = node.parent;
-                }
-                at.map(|at| built.nodes[at].uid)
-            };
-            let in_effect = |node: &Uid| {
-                let mut of = built.switches.iter().filter_map(|switch| match &switch.matching {
-                    Matching::IkFk { fk, goal, .. } => {
-                        let is_goal = carrier(*goal) == Some(*node);
-                        let on = state.attribute(switch.control, &switch.attribute).unwrap_or_default() >= 0.5;
-                        (is_goal || fk.contains(node)).then_some(on == is_goal)
-                    }
-                    Matching::Space { .. } => None,
-                });
-                of.next_back()
-            };
-            let active: Vec<&BuiltNode> =
-                found.iter().copied().filter(|node| in_effect(&node.uid) == Some(true)).collect();
-            if active.len() == 1 {
-                found = active;
-            }
-        }
-        match found[..] {
-            [node] => Ok(node.clone()),
-            [] => {
-                if let Some(off) = self.processor().and_then(|processor| processor.builder().off_named(name)) {
-                    return Err(PoseError::Off { name: name.to_owned(), off });
-                }
-                let names =
-                    of_kind().flat_map(|node| [Some(node.name.to_string()), node.label.as_deref().map(str::to_owned)]);
-                let nearest = did_you_mean(name, names.flatten());
-                Err(PoseError::NoNode { what, name: name.to_owned(), nearest })
-            }
-            _ => {
-                let names: Vec<&str> = found.iter().map(|node| &*node.name).collect();
-                let off = off_at(self.rig(), name).map_or_else(String::new, |off| format!(" ({off})"));
-                Err(PoseError::Ambiguous { name: name.to_owned(), candidates: names.join(", "), off })
-            }
-        }
     }
 }
 

@@ -39,7 +39,8 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
         repaired.extend(repaired_by_default(rig, &error));
         problems.push(error);
     }
-    problems.extend(further_problems(rig, &running, &mut builder, repaired));
+    problems.extend(further_problems(rig, &running, &mut builder, &mut repaired));
+    problems.extend(problems_behind(rig, &problems, &repaired, &mut builder));
     let places: HashMap<Uid, usize> = order.into_iter().enumerate().map(|(place, tag)| (tag, place)).collect();
     problems.sort_by_key(|error| places.get(&error.command).copied());
     problems
@@ -81,35 +82,36 @@ struct Repaired {
     only_ranges: bool,
 }
 
-/// A command whose number is out of range, with the default in place of that number.
+/// A command with a wrong value, with the default in place of that value.
 fn repaired_by_default(rig: &Rig, error: &BuildError) -> Option<Repaired> {
-    let BuildProblem::Module(ModuleError::OutOfRange { parameter, .. }) = &error.problem else { return None };
     let (_, tag) = rig.find_tag(error.command)?;
     let TagKind::Command { params, .. } = &tag.kind else { return None };
-    let params = without_field(params, field_of(parameter))?;
-    Some(Repaired { command: error.command, params, only_ranges: false })
+    let params = without_field(params, value_at_fault(&error.problem, params)?)?;
+    let only_ranges = !matches!(error.problem, BuildProblem::Module(ModuleError::OutOfRange { .. }));
+    Some(Repaired { command: error.command, params, only_ranges })
 }
 
-/// Problems of commands that are found when these run without the parameters whose faults are known. `running` is the
-/// rig without all commands that fail.
-fn further_problems(rig: &Rig, running: &Rig, builder: &mut Builder, repaired: Vec<Repaired>) -> Vec<BuildError> {
+/// Problems of commands that are found when these run without the parameters whose faults are known, which are left out of
+/// `repaired`. `running` is the rig without all commands that fail.
+fn further_problems(rig: &Rig, running: &Rig, builder: &mut Builder, repaired: &mut [Repaired]) -> Vec<BuildError> {
     let mut found = Vec::new();
     let mut runs = 0;
-    for mut next in repaired {
+    for next in repaired {
         while runs < MOST
-            && let Some(trial) = with_params(rig, running, &next)
+            && let Some(trial) = with_params(rig, running, next)
         {
             runs += 1;
             builder.sync(&trial);
             let Some(error) = builder.run_all().error.filter(|error| error.command == next.command) else { break };
-            let left = match &error.problem {
+            let left = match value_at_fault(&error.problem, &next.params) {
+                Some(field) => without_field(&next.params, field),
                 // A number that the text does not say is a default that fits no other value: no fault of its own.
-                BuildProblem::Module(ModuleError::OutOfRange { parameter, .. }) => {
-                    let Some(left) = without_field(&next.params, field_of(parameter)) else { break };
-                    Some(left)
+                None if next.only_ranges
+                    || matches!(error.problem, BuildProblem::Module(ModuleError::OutOfRange { .. })) =>
+                {
+                    break;
                 }
-                _ if next.only_ranges => break,
-                _ => None,
+                None => None,
             };
             found.push(error);
             let Some(params) = left else { break };
@@ -117,6 +119,43 @@ fn further_problems(rig: &Rig, running: &Rig, builder: &mut Builder, repaired: V
         }
     }
     found
+}
+
+/// Problems of commands that wait for others that fail: those of values that they say themselves, found with the others
+/// running as far as they can be read.
+fn problems_behind(rig: &Rig, known: &[BuildError], repaired: &[Repaired], builder: &mut Builder) -> Vec<BuildError> {
+    let failing: HashSet<Uid> = known.iter().map(|error| error.command).collect();
+    if repaired.is_empty() {
+        return Vec::new();
+    }
+    let mut trial = rig.clone();
+    trial.disable_tags(&failing);
+    for next in repaired {
+        trial = with_params(rig, &trial, next).unwrap_or(trial);
+    }
+    let mut found = Vec::new();
+    for _ in 0..MOST {
+        builder.sync(&trial);
+        let Some(error) = builder.run_all().error else { break };
+        let Some((_, tag)) = trial.find_tag(error.command) else { break };
+        let TagKind::Command { params, .. } = &tag.kind else { break };
+        let is_new = !failing.contains(&error.command) && value_at_fault(&error.problem, params).is_some();
+        trial.disable_tags(&HashSet::from([error.command]));
+        found.extend(is_new.then_some(error));
+    }
+    found
+}
+
+/// Name of the parameter whose value is wrong whatever else there is: one that the text says, without a reference in it.
+fn value_at_fault<'p>(problem: &'p BuildProblem, params: &str) -> Option<&'p str> {
+    let BuildProblem::Module(ModuleError::OutOfRange { parameter, .. } | ModuleError::Parameter { parameter, .. }) =
+        problem
+    else {
+        return None;
+    };
+    let name = field_of(parameter);
+    let field = fields(params).into_iter().find(|field| field.depth == 1 && field.name == name)?;
+    (!params[field.value..field.end].contains("\"@")).then_some(name)
 }
 
 /// The running rig together with a repaired command; `None` if that command is not there.
@@ -224,31 +263,22 @@ impl<'a> SourceText<'a> {
         }
     }
 
-    /// The place of a problem of a command that a part brought: in the parameter that the instance's change gives it, else
-    /// at the change or at the instance.
-    pub fn locate_in_part(&self, rig: &Rig, error: &BuildError, origin: PartOrigin) -> SourceError {
+    /// The place of a problem of a command that a part brought: the parameter that the instance gives it, else the instance.
+    pub fn locate_in_part(&self, rig: &Rig, error: &BuildError, origin: &PartOrigin) -> SourceError {
         let problem = match &error.problem {
             BuildProblem::Parameters(inner) => inner.message.clone(),
             other => other.to_string(),
         };
-        let message = format!("{} on joint {}: {problem}", error.module, error.joint_label);
-        let fields = &self.fields;
-        let is_instance = |field: &&Field| {
-            field.depth == 3 && field.name == "part" && self.explicit.in_source(field.start) == origin.offset
-        };
-        let Some(instance) = fields.iter().find(is_instance) else { return self.at(0, message) };
-        let list = fields.iter().position(|field| field.bracket == instance.bracket && field.name == "changes");
-        let is_subject =
-            |field: &&Field| field.parent == list && list.is_some() && matches!(field.name, "tag" | "joint");
-        let change = origin.change.and_then(|number| fields.iter().filter(is_subject).nth(number));
-        let params = change.and_then(|change| {
-            let at = fields.iter().position(|field| field.bracket == change.bracket && field.name == "params")?;
-            let faulty = faulty_parameter(rig, error);
-            let is_faulty = |field: &&Field| field.parent == Some(at) && Some(field.name) == faulty.as_deref();
-            let named = fields.iter().find(is_faulty);
-            Some(named.unwrap_or(&fields[at]))
+        let PartOrigin { title, offset } = origin;
+        let message = format!("part \"{title}\": {} on joint {}: {problem}", error.module, error.joint_label);
+        let source = self.explicit.source();
+        let fields = fields(source);
+        let params = fields.iter().position(|field| field.start == *offset && field.name == "params");
+        let faulty = params.and_then(|params| {
+            let name = faulty_parameter(rig, error)?;
+            fields.iter().find(|field| field.parent == Some(params) && field.name == name)
         });
-        self.at(params.or(change).unwrap_or(instance).start, message)
+        SourceError::at(source, faulty.map_or(*offset, |field| field.start), message)
     }
 
     /// The place where a joint, group or tag with that uid is declared, or of its field of that name, if it has one.

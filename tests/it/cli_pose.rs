@@ -412,6 +412,9 @@ fn wrong_inputs_are_refused_and_write_nothing() {
         ("lifd.rotate=(0,0,0)", 1, "lift"),
         ("base.trun=1", 1, "turn"),
         ("lift.turn=1", 1, "lift"),
+        ("hook.turn=1", 1, "\"hook\" has no attribute \"turn\"; it has none"),
+        ("lift.translate=(1e20,0,0)", 1, "out of all proportion to the rig; write numbers up to"),
+        ("lift.scale=(1e6,1,1)", 1, "out of all proportion"),
         ("hook.rotate=(0,0,0)", 1, "control"),
         ("@joint hook.rotate=(0,0,0)", 1, "control"),
         ("@joint nothing.rotate=(0,0,0)", 1, "nothing"),
@@ -438,6 +441,8 @@ fn wrong_inputs_are_refused_and_write_nothing() {
         (vec![&biped, "--feature", "ik=off", "--switch", "arm_r=fk"], 1, "the feature ik is off; turn it on"),
         (vec![&biped, "--feature", "ik=off", "--set", "hand_r.rotate=(0,0,9)"], 1, "ik is off"),
         (vec![crane, "--group", "arm=off", "--set", "lift.rotate=(0,0,9)"], 1, "in the group arm, which is off"),
+        (vec![&biped, "--feature", "fingers=curl=off", "--set", "thumb_01_l.curl=1"], 1, "fingers:curl"),
+        (vec![&biped, "--feature", "leg_l:fingers=off"], 2, "the group \"leg_l\" has no feature \"fingers\"; it is in"),
     ]);
     let names = |folder: &Path| -> BTreeSet<String> {
         let entries = fs::read_dir(folder).unwrap();
@@ -459,6 +464,48 @@ fn wrong_inputs_are_refused_and_write_nothing() {
     let answer = rigsmith(folder.path(), &["pose", crane, "-o", crane, "--in-place"]);
     assert_eq!(answer.code, 0, "{}", answer.err);
     assert!(fs::read_to_string(folder.path().join(crane)).unwrap() != CRANE);
+}
+
+/// Locks and limits hold what is set, which is told with the value that holds.
+#[test]
+fn held_values_are_told() {
+    let folder = folder();
+    let biped = bundled("biped");
+    let notes = |sets: &[&str]| -> Vec<String> {
+        let sets = sets.iter().flat_map(|set| ["--set", set]);
+        let json = pose(folder.path(), &biped, &sets.collect::<Vec<_>>());
+        json["notes"].as_array().unwrap().iter().map(|note| note.as_str().unwrap().to_owned()).collect()
+    };
+    for (set, held) in [
+        ("arm_settings_l.ik_fk=7", "arm_settings_l.ik_fk=7 is held at 1"),
+        ("arm_settings_l.translate=(1,0,0)", "arm_settings_l.translate=(1,0,0) is held at (0,0,0)"),
+    ] {
+        let told = notes(&[set]);
+        assert!(told.iter().any(|note| note.starts_with(held)), "{set}: {told:?}");
+    }
+    assert_eq!(notes(&["hand_ik_l.translate=(0,0.1,0)", "hand_ik_l.rotate=(0,0,30)"]), Vec::<String>::new());
+    // The last of several values counts.
+    assert_eq!(notes(&["arm_settings_l.ik_fk=7", "arm_settings_l.ik_fk=1"]), Vec::<String>::new());
+}
+
+/// The uid of a node, as --json gives it, names it.
+#[test]
+fn nodes_are_named_by_their_uids() {
+    let folder = folder();
+    let json = pose(folder.path(), "crane.rig.ron", &[]);
+    let uid = node(&json, "lift")["uid"].as_str().unwrap().to_owned();
+    let by_uid = pose(folder.path(), "crane.rig.ron", &["--set", &format!("{uid}.rotate=(0,0,30)")]);
+    let by_name = pose(folder.path(), "crane.rig.ron", &["--set", "lift.rotate=(0,0,30)"]);
+    assert_eq!(by_uid["nodes"], by_name["nodes"]);
+}
+
+/// A feature is named by the group that bears it, and by the group on whose joints it acts.
+#[test]
+fn features_of_one_limb_are_named_by_either_group() {
+    let folder = folder();
+    let nodes = |feature: &str| pose(folder.path(), &bundled("biped"), &["--feature", feature])["nodes"].clone();
+    assert_eq!(nodes("hand_l:fingers=off"), nodes("arm_l:fingers=off"));
+    assert_ne!(nodes("hand_l:fingers=off"), nodes("hand_r:fingers=off"));
 }
 
 #[cfg(feature = "render")]

@@ -15,6 +15,8 @@ mod cli_animate;
 #[cfg(feature = "cli")]
 mod cli_build;
 #[cfg(feature = "cli")]
+mod cli_check;
+#[cfg(feature = "cli")]
 mod cli_face;
 #[cfg(feature = "cli")]
 mod cli_outputs;

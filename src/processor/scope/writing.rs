@@ -72,7 +72,7 @@ impl BuildScope<'_> {
         let name = &attribute.name;
         let mut list = self.attributes(node).to_vec();
         if name.trim().is_empty() {
-            return Err(ModuleError::other("an attribute needs a name"));
+            return Err(ModuleError::parameter("name", "an attribute needs a name"));
         }
         if list.iter().any(|known| known.name == *name) {
             let node = self.name(node);
@@ -81,7 +81,10 @@ impl BuildScope<'_> {
         if let AttributeKind::Number { min: Some(min), max: Some(max) } = attribute.kind
             && min > max
         {
-            return Err(ModuleError::other(format!("\"{name}\" goes from {min} to {max}: exchange the two")));
+            return Err(ModuleError::parameter(
+                "min",
+                format!("\"{name}\" goes from {min} to {max}: exchange the two"),
+            ));
         }
         let limit = self.world.limits.attributes;
         if list.len() >= limit {

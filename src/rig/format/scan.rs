@@ -3,6 +3,8 @@
 //! The RON reader reports errors of a text but not the place of each value. One pass over the text finds every `name:
 //! value` pair, so that an error about a value that is only invalid together with others names its line.
 
+use std::ops::Range;
+
 /// A `name: value` pair of a RON text.
 pub(crate) struct Field<'a> {
     /// The name.
@@ -73,6 +75,30 @@ fn end_at(fields: &mut [Field], field: Option<usize>, end: usize) {
     if let Some(field) = field.and_then(|field| fields.get_mut(field)) {
         field.end = end;
     }
+}
+
+/// Elements of lists around a place, the innermost first, each with white space before it and without the comma behind it.
+pub(crate) fn elements_around(text: &str, offset: usize) -> Vec<Range<usize>> {
+    let mut found = Vec::new();
+    // Open brackets, with the start of the element that goes on in lists.
+    let mut open: Vec<Option<usize>> = Vec::new();
+    let mut close = |start: Option<usize>, end: usize| {
+        found.extend(start.map(|start| start..end).filter(|element| element.contains(&offset)));
+    };
+    for token in tokens(text) {
+        match token.text {
+            "[" => open.push(Some(token.start + 1)),
+            "(" | "{" => open.push(None),
+            ")" | "]" | "}" => close(open.pop().flatten(), token.start),
+            "," => {
+                if let Some(Some(start)) = open.last_mut() {
+                    close(Some(std::mem::replace(start, token.start + 1)), token.start);
+                }
+            }
+            _ => {}
+        }
+    }
+    found
 }
 
 /// Start of the last bracket or string that is open at the end of a text whose brackets fit otherwise: such a text is cut

@@ -28,7 +28,7 @@ mod text_patch;
 mod tidy;
 mod write;
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
@@ -170,15 +170,26 @@ pub struct Template {
     pub instances: Vec<PartInstance>,
     /// Instances of the commands that come of parts.
     pub origins: BTreeMap<Uid, PartOrigin>,
+    /// References in parameters that are bound to nothing, a sentence each. Those of a template that was read without faults
+    /// are among its notes instead.
+    pub unbound: Vec<String>,
     /// Notes about content that the reader ignored (fields of a newer format, a wrong joint count), a sentence each.
     pub notes: Vec<String>,
 }
 
-/// Where a command comes from that a part brought.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+impl Template {
+    /// The template with the references that are bound to nothing among its notes.
+    fn with_unbound_told(mut self) -> Self {
+        self.notes.append(&mut self.unbound);
+        self
+    }
+}
+
+/// Origin of a command that a part brought.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartOrigin {
-    /// Place of the part instance in the template's text, in bytes.
+    /// Name of the part instance.
+    pub title: Arc<str>,
+    /// Place in the template's text, in bytes, of the parameters that the instance gives the command, else of the instance.
     pub offset: usize,
-    /// Number of the last change of the instance that gives the command parameters, counted from 0.
-    pub change: Option<usize>,
 }

@@ -71,6 +71,15 @@ pub struct PartInstance {
 /// Gives the parameters of a module for the other side of the character; `None` if it does not know the module.
 pub type MirrorParams<'a> = &'a dyn Fn(&str, &str) -> Option<String>;
 
+/// What comes of putting a part into a rig.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PutPart {
+    /// Notes, a sentence each.
+    pub notes: Vec<String>,
+    /// Options and changes of the instance that do not fit the part; changes with their number.
+    pub faults: Vec<(Option<usize>, PartError)>,
+}
+
 impl PartInstance {
     /// Name for messages.
     pub fn title(&self) -> &str {
@@ -83,10 +92,11 @@ impl PartInstance {
         Uid::derived([own.as_str(), source.as_str()])
     }
 
-    /// Puts the part, of which `fitted` is what comes here, into a rig, below a socket if there is one. Returns notes.
+    /// Puts the part, of which `fitted` is what comes here, into a rig, below a socket if there is one. Options and changes
+    /// that do not fit the part are among the faults, and are left out.
     ///
     /// # Errors
-    /// Joints that are not there, a part that needs more of them, unknown features, tags or options.
+    /// Joints that are not there, a part that needs more of them, unknown features.
     pub fn put_into(
         &self,
         rig: &mut Rig,
@@ -94,8 +104,12 @@ impl PartInstance {
         fitted: &Rig,
         mirror: MirrorParams,
         socket: Option<&PartSocket>,
-    ) -> Result<Vec<String>, PartError> {
-        let options = self.option_changes(part, mirror)?;
+    ) -> Result<PutPart, PartError> {
+        let mut faults = Vec::new();
+        let options = self.option_changes(part, mirror).unwrap_or_else(|error| {
+            faults.push((None, error));
+            Vec::new()
+        });
         let part = fitted;
         let mut uids = UidSource::seeded(self.uid.0);
         let mut draft = Draft::new(rig, &mut uids, None);
@@ -109,10 +123,13 @@ impl PartInstance {
         let bindings = BTreeMap::new();
         drop_part(&mut draft, part, &joints, &bindings, &mut |_, uid| self.uid_of(uid))?;
         self.turn_off(&mut draft, part)?;
-        for change in options.iter().chain(&self.changes) {
-            self.change(&mut draft, part, &joints, change)?;
+        let changes = self.changes.iter().enumerate().map(|(number, change)| (Some(number), change));
+        for (number, change) in options.iter().map(|option| (None, option)).chain(changes) {
+            let done = self.change(&mut draft, part, &joints, change);
+            faults.extend(done.err().map(|error| (number, error)));
         }
-        Ok(draft.finish().notes.into_iter().map(|note| format!("part {}: {note}", self.title())).collect())
+        let notes = draft.finish().notes.into_iter().map(|note| format!("part {}: {note}", self.title())).collect();
+        Ok(PutPart { notes, faults })
     }
 
     /// Sockets of the part as they are in `rig`, under the instance's name. The part need not be in the rig yet.

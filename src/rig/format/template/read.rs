@@ -2,10 +2,11 @@
 
 mod inputs;
 mod parts;
+mod survey;
 
 use std::{
-    borrow::Cow,
     collections::{BTreeMap, HashMap, HashSet},
+    ops::Range,
 };
 
 use bevy::math::{Quat, Vec3};
@@ -28,6 +29,8 @@ use crate::rig::{
     reference::{bind_names, refresh_names},
 };
 
+pub use survey::survey_template;
+
 const TEMPLATE: Format = Format { what: "template", number: FORMAT, known: known_names };
 
 /// The text of a template's bytes.
@@ -41,82 +44,6 @@ pub fn text_of(bytes: &[u8]) -> Result<&str, SourceError> {
 /// Reads a template. An error anywhere refuses the whole template.
 pub fn read_template(bytes: &[u8]) -> Result<Template, SourceError> {
     read_text(text_of(bytes)?, 1)
-}
-
-/// Reads a template as far as it goes, to tell all that is wrong with it: with every fault of its structure, in the
-/// order of the text, and without what is at fault (a joint without its group, say).
-///
-/// # Errors
-/// A text that cannot be read as a template at all, with the faults that were found before that.
-pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec<SourceError>> {
-    let source = text_of(bytes).map_err(|error| vec![error])?;
-    if let Some(fault) = SourceError::cut_short(source) {
-        return Err(vec![fault]);
-    }
-    let explicit = explicit(source);
-    let (text, mut notes, mut faults) = (&*explicit.text, Vec::new(), Vec::new());
-    let in_source = |faults: Vec<SourceError>| {
-        let mut all: Vec<SourceError> = faults.into_iter().map(|fault| explicit.fault(fault)).collect();
-        all.extend(explicit.faults.iter().cloned());
-        all.sort_by_key(|fault| fault.offset);
-        all
-    };
-    let fields = scan::fields(text);
-    let readable = TEMPLATE.readable(text, &fields, 1, &mut notes).map_err(|error| in_source(vec![error]))?;
-    // In a file of a newer format they are notes.
-    let unknown = if matches!(readable, Cow::Borrowed(_)) { TEMPLATE.unknown(&fields) } else { Vec::new() };
-    for field in &unknown {
-        let message = format!("there is no field `{}` here; remove it or correct its name", field.name);
-        faults.push(SourceError::at(text, field.start, message));
-    }
-    let known = if unknown.is_empty() { readable } else { Cow::Owned(blanked(text, &unknown)) };
-    let file = match read_without_faulty(text, &known, &fields, unknown, &mut faults) {
-        Some(file) => file,
-        None => return Err(in_source(faults)),
-    };
-    let template = build(&Places { text, fields: &fields }, file, notes, &mut faults);
-    Ok((in_text(&explicit, template), in_source(faults)))
-}
-
-/// Largest number of bytes that are parsed again for the sake of further faults.
-const REPARSED: usize = 64 << 20;
-
-/// The file without the fields whose values are of a wrong type, each of which is a fault; `None` where one of them cannot
-/// be left out. `left_out` are the fields that `known` already lacks.
-fn read_without_faulty<'a>(
-    text: &str,
-    known: &str,
-    fields: &'a [Field<'a>],
-    mut left_out: Vec<&'a Field<'a>>,
-    faults: &mut Vec<SourceError>,
-) -> Option<TemplateFile> {
-    let mut readable = Cow::Borrowed(known);
-    for _ in 0..=(REPARSED / text.len().max(1)).clamp(1, 200) {
-        let error = match ron_options().from_str(&readable) {
-            Ok(file) => return Some(file),
-            Err(error) => error,
-        };
-        // The lack of a field that was left out is no fault of its own.
-        if let ron::Error::MissingStructField { field, .. } = &error.code
-            && left_out.iter().any(|left| left.name == *field)
-        {
-            return None;
-        }
-        // Offsets in bytes are the same in both texts, columns are not.
-        let fault = SourceError::from_ron(&readable, &error);
-        let fault = SourceError::at(text, fault.offset, fault.message);
-        let at = fault.offset;
-        faults.push(fault);
-        let around = fields.iter().filter(|field| field.value <= at && at < field.end);
-        let innermost = around.max_by_key(|field| field.start)?;
-        if left_out.iter().any(|left| left.start == innermost.start) {
-            return None;
-        }
-        left_out.push(innermost);
-        left_out.sort_by_key(|field| field.start);
-        readable = Cow::Owned(blanked(known, &left_out));
-    }
-    None
 }
 
 /// Reads a template that stands in another file, where its first line has the number `first_line`.
@@ -135,10 +62,10 @@ fn read_explicit(explicit: &Explicit, first_line: usize) -> Result<Template, Sou
     let known = TEMPLATE.readable(text, &fields, first_line, &mut notes)?;
     let file = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
     let mut faults = Vec::new();
-    let template = build(&Places { text, fields: &fields }, file, notes, &mut faults);
+    let template = build(&Places { text, fields: &fields, left_out: &[] }, file, notes, &mut faults);
     match faults.into_iter().next() {
         Some(fault) => Err(fault),
-        None => Ok(in_text(explicit, template)),
+        None => Ok(in_text(explicit, template).with_unbound_told()),
     }
 }
 
@@ -210,10 +137,11 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
     add_poses(&mut rig, file.poses, &mut |uid, nth, field, message| {
         faults.push(places.error(uid, nth, field, message));
     });
+    let mut unbound = Vec::new();
     if instances.is_empty() {
         parts::place_sockets(&rig, &mut sockets, places.text, faults);
         // References may name what parts bring.
-        bind_references(&mut rig, &mut notes);
+        bind_references(&mut rig, &mut unbound);
         if file.features.is_some_and(|features| feature_summaries(&rig) != sorted(features)) {
             notes.push("the header lists other features than the tags; saving corrects it".to_owned());
         }
@@ -221,7 +149,17 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
             notes.push("the header says other needs than the part has; saving corrects it".to_owned());
         }
     }
-    Template { rig, chains, sockets, options, parts: instances, instances: Vec::new(), origins: BTreeMap::new(), notes }
+    Template {
+        rig,
+        chains,
+        sockets,
+        options,
+        parts: instances,
+        instances: Vec::new(),
+        origins: BTreeMap::new(),
+        unbound,
+        notes,
+    }
 }
 
 /// Adds uids to references that people wrote as names alone, and updates the names beside uids.
@@ -272,13 +210,17 @@ fn add_joints(
             continue;
         }
         for (what, other) in [("parent", &mut joint.parent), ("mirror", &mut joint.mirror)] {
-            if let Some(other) = other.take_if(|other| !known.contains(other)) {
+            if let Some(other) = other.take_if(|other| !known.contains(other))
+                && !places.is_left_out(other)
+            {
                 faults.push(places.error(uid, 0, what, format!(
                     "joint {uid} names the {what} {other}, which is not in the file; correct it or leave the field out"
                 )));
             }
         }
-        if let Some(group) = joint.group.take_if(|group| rig.group(*group).is_none()) {
+        if let Some(group) = joint.group.take_if(|group| rig.group(*group).is_none())
+            && !places.is_left_out(group)
+        {
             faults.push(places.error(
                 uid,
                 0,
@@ -313,6 +255,7 @@ fn add_joints(
             }
             if let TagKind::Command { feature, .. } = &mut tag.kind
                 && let Some(missing) = feature.take_if(|feature| !features.contains(feature))
+                && !places.is_left_out(missing)
             {
                 faults.push(places.error(
                     tag.uid,
@@ -371,11 +314,12 @@ fn add_joints(
         // What is left stands below itself: the first of it becomes a root.
         let Some(uid) = order[next..].iter().find(|uid| data.contains_key(uid)).copied() else { return };
         next += order[next..].iter().take_while(|other| **other != uid).count();
+        let name = data.get(&uid).and_then(|joint| joint.label.clone()).unwrap_or_else(|| uid.to_string());
         faults.push(places.error(
             uid,
             0,
             "parent",
-            format!("joint {uid} is its own ancestor; give one joint of the cycle another parent"),
+            format!("joint {name} is its own ancestor; give one joint of the cycle another parent"),
         ));
         stack.push((None, uid));
     }
@@ -406,9 +350,21 @@ fn tag_from(tag: TagFile) -> TagData {
 struct Places<'a> {
     text: &'a str,
     fields: &'a [Field<'a>],
+    /// Elements of lists that are not read, because they are at fault.
+    left_out: &'a [Range<usize>],
 }
 
 impl Places<'_> {
+    /// True if something with that uid is declared in an element that is not read.
+    fn is_left_out(&self, uid: Uid) -> bool {
+        let digits = uid.to_string();
+        let declares = |field: &&Field| {
+            field.name == "uid" && self.text[field.value..field.end].trim_start_matches([' ', '"']).starts_with(&digits)
+        };
+        let is_inside = |field: &&Field| self.left_out.iter().any(|range| range.contains(&field.start));
+        self.fields.iter().filter(declares).any(|field| is_inside(&field))
+    }
+
     fn used_twice(&self, uid: Uid) -> SourceError {
         self.error(uid, 1, "uid", format!("uid {uid} is used twice; give the second a uid of its own"))
     }

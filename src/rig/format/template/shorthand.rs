@@ -11,7 +11,7 @@ mod declarations;
 use std::{borrow::Cow, collections::HashMap, ops::Range};
 
 use crate::rig::{
-    Uid, degrees,
+    Uid, UidError, degrees,
     format::{
         source::SourceError,
         template::quoted,
@@ -47,7 +47,12 @@ struct Piece {
     is_copy: bool,
 }
 
-impl Explicit<'_> {
+impl<'a> Explicit<'a> {
+    /// Source of the text.
+    pub fn source(&self) -> &'a str {
+        self.source
+    }
+
     /// Place in the source of a place in the text, in bytes.
     pub fn in_source(&self, offset: usize) -> usize {
         let Some(number) = self.pieces.partition_point(|piece| piece.start <= offset).checked_sub(1) else {
@@ -238,11 +243,22 @@ impl<'d, 'a> Writer<'d, 'a> {
     }
 
     fn say_uid(&mut self, declaration: &Declaration) {
-        let node = self.tree().node(declaration.node);
-        if !declaration.is_written && node.bracket == Some('(') && self.tree().field(declaration.node, "uid").is_none()
-        {
+        let tree = self.tree();
+        let node = tree.node(declaration.node);
+        if declaration.is_written || node.bracket != Some('(') {
+            return;
+        }
+        let said = format!("\"{}\"", declaration.uid);
+        if let Some(field) = tree.field(declaration.node, "uid") {
+            let message = match tree.string(declaration.node, "uid") {
+                Some(text) => UidError(text.into()).to_string(),
+                None => format!("{} is no uid; write 16 hexadecimal digits in quotes", tree.written(field.value)),
+            };
+            self.faults.push(SourceError::at(tree.text, tree.node(field.value).range.start, message));
+            self.replace(field.value, said);
+        } else {
             let comma = if node.items.is_empty() { "" } else { ", " };
-            self.put(node.inside..node.inside, format!("uid: \"{}\"{comma}", declaration.uid));
+            self.put(node.inside..node.inside, format!("uid: {said}{comma}"));
         }
     }
 

@@ -20,7 +20,10 @@ use super::{
 };
 use crate::rig::{
     RestTransform, Rig, RigEdit, SourceError, TagData, TagKind, Uid, degrees,
-    format::{scan::Field, source::ron_text},
+    format::{
+        scan::{Field, fields},
+        source::ron_text,
+    },
     label::mirrored_label,
     part::{MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption, PartSocket},
 };
@@ -306,15 +309,44 @@ fn rotation_of(text: &str) -> Result<Quat, PartChangeError> {
     Ok(Quat::from_xyzw(x, y, z, w))
 }
 
+/// Places in a template's text of its part instances and of their changes.
+struct InstancePlaces<'a> {
+    fields: Vec<Field<'a>>,
+}
+
+impl InstancePlaces<'_> {
+    /// Places of the changes of the instance at a place, each with its parameters if it has any.
+    fn changes(&self, instance: usize) -> Vec<(usize, Option<usize>)> {
+        let fields = &self.fields;
+        let list = fields.iter().find(|field| field.start == instance).and_then(|instance| {
+            fields.iter().position(|field| field.bracket == instance.bracket && field.name == "changes")
+        });
+        let is_subject =
+            |field: &&Field| field.parent == list && list.is_some() && matches!(field.name, "tag" | "joint");
+        let params = |subject: &Field| {
+            fields
+                .iter()
+                .find(|field| field.bracket == subject.bracket && field.name == "params")
+                .map(|field| field.start)
+        };
+        fields.iter().filter(is_subject).map(|subject| (subject.start, params(subject))).collect()
+    }
+}
+
 impl PartInstance {
-    /// Origins of the commands that come of the instance; `fitted` is what comes of the part.
-    fn origins(&self, fitted: &Rig) -> Vec<(Uid, PartOrigin)> {
-        let changes = self.changes.iter().enumerate().filter(|(_, change)| change.params.is_some());
+    /// Origins of the commands that come of the instance; `fitted` is what comes of the part, and `places` are those of the
+    /// changes.
+    fn origins(&self, fitted: &Rig, places: &[(usize, Option<usize>)]) -> Vec<(Uid, PartOrigin)> {
+        let changes = self.changes.iter().zip(places).filter(|(change, _)| change.params.is_some());
         let changed: HashMap<Uid, usize> = changes
-            .filter_map(|(number, change)| Some((self.find_tag(fitted, change.tag.as_deref()?).ok()?, number)))
+            .filter_map(|(change, place)| Some((self.find_tag(fitted, change.tag.as_deref()?).ok()?, place.1?)))
             .collect();
+        let title: Arc<str> = self.title().into();
         let tags = fitted.walk().flat_map(|joint| &joint.data.tags);
-        let origin = |tag: &TagData| PartOrigin { offset: self.offset, change: changed.get(&tag.uid).copied() };
+        let origin = |tag: &TagData| PartOrigin {
+            title: title.clone(),
+            offset: changed.get(&tag.uid).copied().unwrap_or(self.offset),
+        };
         tags.map(|tag| (self.uid_of(tag.uid), origin(tag))).collect()
     }
 }
@@ -325,46 +357,70 @@ impl Template {
     /// # Errors
     /// A part that cannot be had or does not fit, with its place in `source`, the text of the template.
     pub fn with_parts<E: fmt::Display + From<PartError>>(
-        mut self,
+        self,
         source: &str,
         part: &mut dyn FnMut(&str) -> Result<Arc<Part>, E>,
         mirror: MirrorParams,
     ) -> Result<Self, SourceError> {
+        let (template, faults) = self.survey_parts(source, part, mirror);
+        match faults.into_iter().next() {
+            Some(fault) => Err(fault),
+            None => Ok(template.with_unbound_told()),
+        }
+    }
+
+    /// The template with those of its parts that can be had and fit, and all that is wrong with its instances, as
+    /// [`with_parts`](Self::with_parts) tells the first. What a part lacks that another should have brought is no fault of its
+    /// own.
+    pub fn survey_parts<E: fmt::Display + From<PartError>>(
+        mut self,
+        source: &str,
+        part: &mut dyn FnMut(&str) -> Result<Arc<Part>, E>,
+        mirror: MirrorParams,
+    ) -> (Self, Vec<SourceError>) {
         let mut of_parts: Vec<PartSocket> = Vec::new();
+        let (mut faults, mut is_one_missing) = (Vec::new(), false);
+        let places = InstancePlaces { fields: fields(source) };
         for instance in std::mem::take(&mut self.parts) {
-            let put = part(&instance.part).and_then(|part| {
+            let message = |error: &dyn fmt::Display| format!("part \"{}\": {error}", instance.title());
+            let put = part(&instance.part).map_err(|error| (message(&error), false)).and_then(|part| {
+                let told = |error: PartError| (message(&E::from(error.clone())), error.is_of_host());
                 let among = self.sockets.iter().chain(&of_parts);
                 let socket = instance.socket.as_deref().map(|name| PartSocket::find(name, among, &self.rig));
-                let socket = socket.transpose().map_err(PartError::from)?;
-                let fitted = instance.fitted(&part, mirror)?;
+                let socket = socket.transpose().map_err(|error| told(error.into()))?;
+                let fitted = instance.fitted(&part, mirror).map_err(told)?;
                 let brought = instance.sockets_in(&self.rig, &part, &fitted);
-                let notes = instance.put_into(&mut self.rig, &part, &fitted, mirror, socket.as_ref())?;
-                Ok((notes, brought, instance.origins(&fitted)))
+                let told_put = instance.put_into(&mut self.rig, &part, &fitted, mirror, socket.as_ref());
+                Ok((told_put.map_err(told)?, brought, fitted))
             });
             match put {
-                Ok((notes, brought, origins)) => {
-                    self.notes.extend(notes);
+                Ok((put, brought, fitted)) => {
+                    self.notes.extend(put.notes);
                     of_parts.extend(brought);
-                    self.origins.extend(origins);
+                    let changes = places.changes(instance.offset);
+                    self.origins.extend(instance.origins(&fitted, &changes));
+                    faults.extend(put.faults.into_iter().map(|(change, error)| {
+                        let change = change.and_then(|number| changes.get(number));
+                        let at = change.map_or(instance.offset, |(start, _)| *start);
+                        SourceError::at(source, at, message(&E::from(error)))
+                    }));
+                    self.instances.push(instance);
                 }
-                Err(error) => {
-                    let message = format!("part \"{}\": {error}", instance.title());
-                    return Err(SourceError::at(source, instance.offset, message));
+                Err((message, is_of_host)) => {
+                    if !(is_of_host && is_one_missing) {
+                        faults.push(SourceError::at(source, instance.offset, message));
+                    }
+                    is_one_missing = true;
                 }
             }
-            self.instances.push(instance);
         }
-        let mut faults = Vec::new();
         place_sockets(&self.rig, &mut self.sockets, source, &mut faults);
-        if let Some(fault) = faults.into_iter().next() {
-            return Err(fault);
-        }
         self.sockets.extend(of_parts);
         if !self.instances.is_empty() {
             pair_sides(&mut self.rig);
         }
-        bind_references(&mut self.rig, &mut self.notes);
-        Ok(self)
+        bind_references(&mut self.rig, &mut self.unbound);
+        (self, faults)
     }
 }
 

@@ -1,0 +1,160 @@
+//! `rigsmith check` on files with faults of several kinds: each is told once, at its line, and no fault hides another.
+
+use std::{fs, path::Path};
+
+use crate::cli_build::rigsmith;
+
+/// Checks a file in which the comment at the end of a line is what is told of it: nothing else is told, and nothing twice.
+#[track_caller]
+fn tells_what_it_says(folder: &Path, name: &str, text: &str) {
+    fs::write(folder.join(name), text).unwrap();
+    let answer = rigsmith(folder, &["check", name, "--json"]);
+    assert_eq!(answer.code, 1, "{}{}", answer.out, answer.err);
+    let file = answer.json()["files"][0].clone();
+    let told: Vec<(usize, String)> = file["problems"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|problem| (problem["line"].as_u64().unwrap() as usize, problem["message"].as_str().unwrap().to_owned()))
+        .collect();
+    let mut count = 0;
+    for (number, line) in text.lines().enumerate().map(|(number, line)| (number + 1, line)) {
+        for wanted in line.split("// ").skip(1) {
+            count += 1;
+            let found = told.iter().any(|(line, message)| *line == number && message.contains(wanted.trim()));
+            assert!(found, "line {number}: {wanted}: {told:#?}");
+        }
+    }
+    assert_eq!(told.len(), count, "each once: {told:#?}");
+    let remarks = file["remarks"].to_string();
+    assert!(!remarks.contains("stays as it is"), "told twice: {remarks}");
+}
+
+const PART: &str = r#"(
+    format: 2,
+    name: "ok",
+    kind: "part",
+    joints: [(label: "g", tags: [control(creation: (name: "grip"), size: 0.5)])],
+)"#;
+
+/// Every part instance is looked at, and the place is that of the instance's change.
+#[test]
+fn parts_hide_no_faults() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("ok.rig.ron"), PART).unwrap();
+    let text = r#"(
+    format: 2,
+    name: "host",
+    joints: [
+        (
+            label: "body",
+            tags: [
+                control(at: "@joint qq"), // there is no joint "qq"
+            ],
+        ),
+    ],
+    parts: [
+        (part: "missing.rig.ron", name: "two", parent: "body"), // part "two": there is no file
+        (part: "missing2.rig.ron", name: "three", parent: "body"), // part "three": there is no file
+        (part: "ok.rig.ron", name: "k", parent: "body", prefix: "x_", options: {"x": 3}), // part "k": the part has no option "x"
+        (
+            part: "ok.rig.ron",
+            name: "k2",
+            parent: "body",
+            prefix: "y_",
+            changes: [
+                (tag: "control/nn", params: (size: 1.0)), // part "k2": the part has no tag "control/nn"
+                (joint: "mm", translation: (0, 0, 0)), // part "k2": the part has no joint "mm"
+                (
+                    tag: "control/grip",
+                    params: (
+                        size: -1.0, // part "k2": control on joint y_g: size: is -1
+                        at: "@joint g + @joint bodyy", // there is no joint "bodyy"; did you mean "body"?
+                    ),
+                ),
+            ],
+        ),
+        (part: "ok.rig.ron", name: "k3", parent: "body", prefix: "z_"),
+    ],
+)"#;
+    tells_what_it_says(folder.path(), "host.rig.ron", text);
+}
+
+/// A change whose names are those of the part and of the host, all but one: the one is told, not the others.
+#[test]
+fn one_wrong_name_in_a_change_is_told_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = include_str!("../../assets/templates/biped.rig.ron").replace(
+        r#"spaces: "@command null/world + @command null/chest + @joint hips + @joint head","#,
+        r#"spaces: "@command null/world + @command null/chest + @joint hips + @joint haed", // there is no joint "haed""#,
+    );
+    assert_eq!(text.matches("haed").count(), 4, "both arms, each with what is told");
+    // Other comments of the template are no expectations.
+    let text: Vec<String> = text
+        .lines()
+        .map(|line| if line.contains("haed") { line.to_owned() } else { line.split("//").next().unwrap().to_owned() })
+        .collect();
+    tells_what_it_says(folder.path(), "biped.rig.ron", &text.join("\n"));
+}
+
+/// What cannot be read is left out, and the rest is built.
+#[test]
+fn faults_of_the_structure_hide_no_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = r#"(
+    format: 2,
+    name: "x",
+    groups: [(name: "g")],
+    joints: [
+        (
+            label: "a",
+            group: "zz", // there is no local group "zz"
+            translation: (inf, 0, 0), // not finite
+            uid: "zz", // "zz" is no uid
+            tags: [
+                control(at: "@joint qq"), // there is no joint "qq"
+                (x: 1), // there is no field `x` // Expected
+                twist(start: "@joint a", end: "@joint b", count: 0), // count: is 0
+                Feature(kind: 3, name: "f"), // Expected string
+            ],
+        ),
+        (
+            label: "b", parent: "a" translation: (0, 1, 0), // Expected comma
+            tags: [control(shape: "nosuch", at: "@joint nobody")], // there is no shape "nosuch" // there is no joint "nobody"
+        ),
+        (label: "c", parent: "b", translation: (0, 1)), // Expected a tuple of size 3
+        (label: "d", parent: "d"), // joint d is its own ancestor
+        "e", // Expected opening
+    ],
+)"#;
+    tells_what_it_says(folder.path(), "x.rig.ron", text);
+}
+
+/// Commands that need another, which fails, are told by what they say themselves.
+#[test]
+fn a_command_that_fails_hides_no_faults_of_those_behind_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = r#"(
+    format: 2,
+    name: "x",
+    joints: [
+        (
+            label: "a",
+            tags: [
+                control(
+                    size: -1.0, // size: is -1
+                    creation: (name: "q"),
+                ),
+                attribute(
+                    node: "@command control/q role:control",
+                    name: "g",
+                    min: 3.0, // "g" goes from 3 to 1
+                    max: 1.0,
+                ),
+                attribute(node: "@command control/q role:control", name: "h"),
+            ],
+        ),
+    ],
+)"#;
+    tells_what_it_says(folder.path(), "x.rig.ron", text);
+}
