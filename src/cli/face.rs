@@ -46,10 +46,10 @@ pub(super) struct FaceArgs {
     /// Seed of the first centroids; the same seed gives the same bytes
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Without pairs of bones on both sides
+    /// Place the bones of both sides apart, not in pairs
     #[arg(long)]
     no_symmetry: bool,
-    /// Without bones for jaw and eyes
+    /// Leave out the bones of jaw and eyes
     #[arg(long)]
     skin_only: bool,
     /// Take the whole mesh for a head, even if it looks like a body

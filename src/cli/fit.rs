@@ -35,7 +35,7 @@ pub(super) struct FitArgs {
     /// The template: biped, quadruped, bird or a .rig.ron; the one whose limbs the mesh shows if left out
     #[arg(long, value_name = "NAME|FILE")]
     template: Option<PathBuf>,
-    /// Up in the mesh: x, y, z, -x, -y or -z; found if left out
+    /// Up direction in the mesh: x, y, z, -x, -y or -z; found if left out
     #[arg(long, value_name = "AXIS", value_parser = super::face::axis, allow_hyphen_values = true)]
     up: Option<Vec3>,
     /// Direction in which the figure faces; found if left out
@@ -65,9 +65,9 @@ pub(super) struct FitArgs {
 enum SymmetryArg {
     /// Symmetric if mesh and pose are
     Auto,
-    /// Always
+    /// Symmetric in any case
     On,
-    /// Never
+    /// Left and right fitted apart
     Off,
 }
 

@@ -118,7 +118,7 @@ impl RigModule for AimModule {
 }
 
 impl AimModule {
-    /// From where the aim alone would turn a node to how it is turned.
+    /// Rotation of a node beyond the one that the aim alone would give it.
     fn offset(
         &self,
         scope: &mut BuildScope<'_>,

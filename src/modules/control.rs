@@ -50,10 +50,10 @@ pub fn side_color(side: Side) -> [f32; 3] {
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ControlAxes {
-    /// Like those of its node.
+    /// Directions of the axes of its node.
     #[default]
     Node,
-    /// Like those of the rig.
+    /// Directions of the axes of the rig.
     Rig,
 }
 

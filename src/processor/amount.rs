@@ -17,7 +17,7 @@ use crate::{
 #[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Amount {
-    /// Always this.
+    /// Number that stays the same in every frame.
     Value(f32),
     /// Value of the attribute of that name; its opposite if the name begins with [`OPPOSITE`](Self::OPPOSITE).
     Attribute(String),

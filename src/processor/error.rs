@@ -43,7 +43,7 @@ pub enum ModuleError {
         /// Switch that is off.
         off: Exclusion,
     },
-    /// Anything else.
+    /// Problem of another kind, in words.
     #[error("{0}")]
     Other(String),
     /// More than [`BuildLimits`](super::BuildLimits) allows.
@@ -72,7 +72,7 @@ impl ModuleError {
         Self::Reference { parameter: parameter.into(), reference: references.to_string(), problem: problem.into() }
     }
 
-    /// Anything else.
+    /// A problem of another kind, in words.
     pub fn other(problem: impl Into<String>) -> Self {
         Self::Other(problem.into())
     }
@@ -81,7 +81,7 @@ impl ModuleError {
 /// Problem of a command.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BuildProblem {
-    /// Nobody registered the module.
+    /// No module is registered under the name.
     #[error("there is no module \"{module}\"{nearest}; register it, or disable the tag")]
     NoModule {
         /// The name.
