@@ -56,7 +56,7 @@ parameters! {
         pub along: Axis = Axis::Y,
         /// The axis that points up as far as the bone allows.
         pub up_axis: Axis = Axis::Z,
-        /// direction: up is a direction of the rig; plane: across the plane in which the chain bends; node: to a node.
+        /// Meaning of up, direction: one of the rig; plane: across the plane in which the chain bends; node: to a node.
         pub up: UpMode = UpMode::Direction,
         /// Up direction in the rig's space; used where a chain is straight, too.
         pub direction: Vec3 = Vec3::Z,
