@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 use super::{
     ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, SEED,
     progress::{Progress, spinning},
+    report::counted,
 };
 use crate::{
     algo::face::{
@@ -315,8 +316,9 @@ fn describe(report: &mut Report, placed: &FaceReport) {
     let [head, all] = placed.points;
     if placed.is_part {
         report.notes.push(format!(
-            "the mesh is more than a head: the face was placed in its head part ({head} of {all} points); \
-             --whole takes all of it for a head"
+            "the mesh is more than a head: the face was placed in its head part ({head} of {}); \
+             --whole takes all of it for a head",
+            counted(all, "point", "points")
         ));
     }
     if !placed.certain {
@@ -330,18 +332,22 @@ fn describe(report: &mut Report, placed: &FaceReport) {
     }
     if placed.folds > placed.tolerated_folds {
         report.notes.push(format!(
-            "{} triangles fold over in the six expressions at full strength; try another --seed or density",
-            placed.folds
+            "{} over in the six expressions at full strength; try another --seed or density",
+            counted(placed.folds, "triangle folds", "triangles fold")
         ));
     }
     let skin = placed.bones.iter().filter(|bone| bone.kind == FaceBoneKind::Skin).count();
-    report
-        .line(format!("groups: face {face}, middle {middle}, back {back} points; facial mask {} points", placed.mask));
     report.line(format!(
-        "{skin} facial bones, {} of jaw and eyes; square error {:.4} after {} rounds",
+        "groups: face {face}, middle {middle}, back {}; facial mask {}",
+        counted(back, "point", "points"),
+        counted(placed.mask, "point", "points")
+    ));
+    report.line(format!(
+        "{}, {} of jaw and eyes; square error {:.4} after {}",
+        counted(skin, "facial bone", "facial bones"),
         placed.bones.len() - skin,
         placed.square_error,
-        placed.rounds
+        counted(placed.rounds, "round", "rounds")
     ));
     if let Some(error) = placed.fit_error {
         report.line(format!("fitted to the shapes with an error of {error:.5} (root mean square)"));

@@ -13,6 +13,7 @@ use super::{
     ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
     binding::bind,
     progress::{Progress, spinning},
+    report::counted,
 };
 use crate::{
     algo::fit_template::FitSymmetry,
@@ -169,9 +170,9 @@ fn describe(report: &mut Report, fitted: &FitReport) {
     let doubtful = fit.joints.iter().filter(|joint| joint.confidence < FitReport::DOUBTFUL).count();
     let choice = if fitted.choice.is_empty() { String::new() } else { format!(" ({})", fitted.choice) };
     report.line(format!(
-        "{}{choice}: {} joints, {doubtful} doubtful, confidence {:.2}, {} ms",
+        "{}{choice}: {}, {doubtful} doubtful, confidence {:.2}, {} ms",
         fitted.template,
-        fit.joints.len(),
+        counted(fit.joints.len(), "joint", "joints"),
         fit.confidence,
         fitted.time.as_millis()
     ));
