@@ -25,7 +25,7 @@ pub enum ModuleError {
         problem: String,
     },
     /// A number outside of its range, whatever the other parameters are.
-    #[error("{parameter}: is {value}; write {needed}")]
+    #[error("{parameter}: is {}; write {needed}", number_text(*value))]
     OutOfRange {
         /// The parameter.
         parameter: String,
@@ -59,6 +59,12 @@ pub enum ModuleError {
     /// Nodes and constraints that drive each other in a circle.
     #[error("these drive each other in a circle: {0}; remove one of the constraints, or let it follow something else")]
     Cycle(String),
+}
+
+/// Text of a number for people: with an exponent where it would have many zeros.
+pub(super) fn number_text(number: f32) -> String {
+    let is_plain = number == 0.0 || !number.is_finite() || (1e-4..1e7).contains(&number.abs());
+    if is_plain { number.to_string() } else { format!("{number:e}") }
 }
 
 impl ModuleError {

@@ -400,6 +400,8 @@ fn mistakes_say_what_to_do() {
             format!("(driver: \"{}\", driver_channel: RotateX, output: \"@this\")", knob(100)),
             &["output", "what is driven"],
         ),
+        ("pole_vector", "(distance: 0.0)".into(), &["distance: is 0; write a number above 0"]),
+        ("pole_vector", "(distance: -1e-9)".into(), &["distance: is -1e-9; write a number above 0"]),
         ("morph", "()".into(), &["morph", "empty"]),
         ("expression", "(text: \"a + \", output: \"@this\", output_channel: RotateX)".into(), &["text", "column"]),
         (
