@@ -1,5 +1,5 @@
-//! From a click to a skinned face: the heads of the test data and one of them subdivided, at several densities, and what
-//! the six expressions move.
+//! Faces, from a click to the skinned face: the heads of the test data and one of them subdivided, at several
+//! densities, and what the six expressions move.
 //!
 //! Prints a line for people and one JSON line for each. Times are medians of several runs through the plugins, the edit
 //! of the rig included.

@@ -106,7 +106,7 @@ struct Gate {
 type Wake = Box<dyn Fn() + Send + Sync>;
 
 impl std::fmt::Debug for Gate {
-    /// Without the token.
+    /// Debug text without the token.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Gate").field("address", &self.address).field("folders", &self.folders).finish_non_exhaustive()
     }

@@ -84,7 +84,7 @@ pub fn cut(a: f64, b: f64, k: f64) -> f64 {
     intersect(a, -b, k)
 }
 
-/// From 0 at `from` to 1 at `to`, with flat ends.
+/// Smooth step from 0 at `from` to 1 at `to`, with flat ends.
 pub fn ease(from: f64, to: f64, x: f64) -> f64 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)

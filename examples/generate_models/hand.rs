@@ -61,7 +61,7 @@ pub struct Hand {
     /// The frames of each finger's joints and of its tip; X along the bone, Y out of its back.
     pub fingers: [[Frame; 4]; 5],
     palm: Loft,
-    /// With nails, tendons and creases.
+    /// True for a hand with nails, tendons and creases.
     detailed: bool,
 }
 
@@ -189,7 +189,7 @@ impl Hand {
 pub const OPEN: HandPose =
     HandPose { spread: [38.0, 11.0, 2.5, -7.0, -18.0], curl: [[0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]] };
 
-/// At rest: fingers slightly bent, more towards the little finger.
+/// Hand at rest: fingers slightly bent, more towards the little finger.
 pub const RELAXED: HandPose = HandPose {
     spread: [34.0, 5.0, 0.5, -4.0, -9.5],
     curl: [[4.0, 12.0, 14.0], [12.0, 17.0, 10.0], [15.0, 20.0, 11.0], [17.0, 22.0, 12.0], [18.0, 22.0, 12.0]],

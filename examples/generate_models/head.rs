@@ -23,7 +23,7 @@ pub struct Head {
     face: Loft,
     neck: Loft,
     ear: Frame,
-    /// With open eyes, nostrils and lips; otherwise the calm face of a mannequin.
+    /// True for open eyes, nostrils and lips; otherwise the calm face of a mannequin.
     detailed: bool,
 }
 

@@ -1,4 +1,4 @@
-//! From raw quads to a finished surface: vertices on the field's zero, evenly spread, mirrored, and checked.
+//! Refinement of raw quads to a finished surface: vertices on the field's zero, evenly spread, mirrored, and checked.
 
 use std::collections::BTreeMap;
 

@@ -56,16 +56,16 @@ pub enum FitSymmetry {
     /// Symmetric if mesh and pose are.
     #[default]
     Auto,
-    /// Always.
+    /// Symmetric in any case.
     On,
-    /// Never.
+    /// Left and right fitted apart.
     Off,
 }
 
 /// Wishes of a person for a fit; directions and positions are in the mesh's space.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FitSettings {
-    /// Up; found if not given.
+    /// Up direction; found if not given.
     pub up: Option<Vec3>,
     /// Direction in which the figure faces; found if not given.
     pub forward: Option<Vec3>,

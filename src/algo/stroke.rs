@@ -164,7 +164,7 @@ pub enum StrokeNote {
         /// Number of volumes.
         of: u32,
     },
-    /// Some inner joints were left out because the mesh has a gap at their places.
+    /// Inner joints were left out because the mesh has a gap at their places.
     JointsLeftOut {
         /// Number of joints left out.
         count: usize,

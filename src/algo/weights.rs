@@ -146,7 +146,7 @@ pub struct Locks<'a> {
 /// Reason why there are no weights.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WeightError {
-    /// There is nothing to bind to.
+    /// No joint to bind to.
     #[error("the rig has no joints; place at least one before binding")]
     NoJoints,
     /// A point that is not a number.

@@ -12,7 +12,8 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, build, positive, progress::spinning, skin,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, build, positive, progress::spinning,
+    report::counted, skin,
 };
 use crate::{
     files::{
@@ -206,9 +207,11 @@ fn read_clips(args: &AnimateArgs, bench: &mut Workbench, report: &mut Report) ->
     report.notes(read.notes.iter().cloned());
     let bound = read.onto(bench.rig(), bench.built());
     if !bound.missing.is_empty() {
-        report
-            .notes
-            .push(format!("{} nodes of the clips are not in the rig; their keys have no effect", bound.missing.len()));
+        report.notes.push(counted(
+            bound.missing.len(),
+            "node of the clips is not in the rig; its keys have no effect",
+            "nodes of the clips are not in the rig; their keys have no effect",
+        ));
     }
     if bound.clips.is_empty() {
         return Err(Failure::Input(format!("`{}` has no clips", args.clip.display()).into()));
@@ -265,11 +268,11 @@ fn moved(
     let program = Arc::clone(bench.runtime()?.state().program());
     let feet = measure_feet(bench.rig(), &program, &clip, &map.target, &stances);
     report.line(format!(
-        "{} keys instead of {} ({:.1} : 1); feet stand {} times, slide {:.2} % and are off the ground by {:.2} % of the height at most",
-        keys[1],
+        "{} instead of {} ({:.1} : 1); feet stand {}, slide {:.2} % and are off the ground by {:.2} % of the height at most",
+        counted(keys[1], "key", "keys"),
         keys[0],
         keys[0] as f32 / keys[1].max(1) as f32,
-        feet.stances,
+        counted(feet.stances, "time", "times"),
         feet.slide,
         feet.ankle,
     ));
@@ -294,9 +297,9 @@ fn describe_map(map: &JointMap, motion: &Motion, rig: &Rig, report: &mut Report)
     mapped.extend(map.pairs.iter().map(|(from, to)| json!({ "from": source(&[*from]), "to": target(&[*to]) })));
     let (from, to) = (map.unmapped_source(motion), map.unmapped_target(rig));
     report.line(format!(
-        "{} bones are mapped; {} joints of the motion and {} of the rig are not",
-        mapped.len(),
-        from.len(),
+        "{} mapped; {} of the motion and {} of the rig are not",
+        counted(mapped.len(), "bone is", "bones are"),
+        counted(from.len(), "joint", "joints"),
         to.len()
     ));
     report.set("found_by", json!(map.found_by));
@@ -320,10 +323,11 @@ fn describe(clips: &[RigClip], report: &mut Report) {
     for clip in clips {
         let tracks: usize = clip.layers.iter().map(|layer| layer.tracks.len()).sum();
         report.line(format!(
-            "clip \"{}\": {:.2} s, {tracks} tracks, {} keys",
+            "clip \"{}\": {:.2} s, {}, {}",
             clip.name,
             clip.duration(),
-            clip.key_count()
+            counted(tracks, "track", "tracks"),
+            counted(clip.key_count(), "key", "keys")
         ));
     }
     report.set("clips", clips.iter().map(clip).collect::<Vec<_>>());
@@ -350,9 +354,10 @@ fn exported(
         let done = bake_clip(program, clip, &nodes, rate, &tolerance);
         let keys: usize = done.channels.iter().map(|channel| channel.times.len()).sum();
         report.line(format!(
-            "animation \"{}\": {} channels, {keys} keys at {rate} frames a second",
+            "animation \"{}\": {}, {} at {rate} frames a second",
             done.name,
-            done.channels.len()
+            counted(done.channels.len(), "channel", "channels"),
+            counted(keys, "key", "keys")
         ));
         baked.push(done);
     }

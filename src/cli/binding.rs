@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use super::{Failure, Report, progress::Progress};
+use super::{Failure, Report, progress::Progress, report::counted};
 use crate::{
     algo::weights::{IdleReason, WeightSettings},
     headless::Workbench,
@@ -110,8 +110,13 @@ fn separated(list: &str, is_name: impl Fn(&str) -> bool) -> Vec<&str> {
 fn describe(report: &mut Report, names: &JointNames, bound: &SkinningReport, claims: &[Uid]) {
     let weights = &bound.weights;
     report.line(format!(
-        "{} points weighted: {} over the surface, {} through voxels, {} filled, {} by the nearest bone, {} given",
-        weights.points, weights.by_surface, weights.by_voxels, weights.by_fill, weights.by_nearest, weights.given
+        "{} weighted: {} over the surface, {} through voxels, {} filled, {} by the nearest bone, {} given",
+        counted(weights.points, "point", "points"),
+        weights.by_surface,
+        weights.by_voxels,
+        weights.by_fill,
+        weights.by_nearest,
+        weights.given
     ));
     report.set(
         "weights",
@@ -156,13 +161,14 @@ fn rigid_lines(names: &JointNames, parts: &[RigidPart]) -> Vec<String> {
         by_joint.entry(names.of(part.joint)).or_default().push(part);
     }
     let line = |(joint, parts): (&String, &Vec<&RigidPart>)| {
-        let names = parts.iter().map(|part| format!("{} ({} points)", part.name, part.points));
+        let names = parts.iter().map(|part| format!("{} ({})", part.name, counted(part.points, "point", "points")));
         format!("moving as one with {joint}: {}", shortened(names))
     };
     let mut lines: Vec<String> = by_joint.iter().take(LINES).map(line).collect();
     let rest: usize = by_joint.values().skip(LINES).map(Vec::len).sum();
     if rest > 0 {
-        lines.push(format!("moving as one with {} other joints: {rest} parts", by_joint.len() - LINES));
+        let joints = counted(by_joint.len() - LINES, "other joint", "other joints");
+        lines.push(format!("moving as one with {joints}: {}", counted(rest, "part", "parts")));
     }
     lines
 }
@@ -172,10 +178,6 @@ fn idle_lines(names: &JointNames, idle: &[IdleJoint], claims: &[Uid]) -> Vec<Str
     let of = |reason: &str| -> Vec<&IdleJoint> {
         let is_one = |idle: &&IdleJoint| reason_word(idle.reason).0 == reason && !claims.contains(&idle.joint);
         idle.iter().filter(is_one).collect()
-    };
-    let name = |idle: &&IdleJoint| match idle.reason {
-        IdleReason::Outside { distance } => format!("{} ({distance:.3} away)", names.of(idle.joint)),
-        _ => names.of(idle.joint),
     };
     let kinds = [
         ("outside", "hold no skin, outside of the mesh"),
@@ -187,7 +189,36 @@ fn idle_lines(names: &JointNames, idle: &[IdleJoint], claims: &[Uid]) -> Vec<Str
     let claimed = idle.iter().filter(|idle| claims.contains(&idle.joint)).collect();
     groups.push(("hold no skin although they claim it, all of it is nearer to other joints", claimed));
     let groups = groups.iter().filter(|(_, joints)| !joints.is_empty());
-    groups.map(|(text, joints)| format!("{text}: {}", shortened(joints.iter().map(name)))).collect()
+    groups.map(|(text, joints)| format!("{text}: {}", shortened(named_once(names, joints).into_iter()))).collect()
+}
+
+/// Each name of some joints once, in their order: with the number of joints if several have the name, and with their
+/// distances from the mesh if they lie outside of it.
+fn named_once(names: &JointNames, joints: &[&IdleJoint]) -> Vec<String> {
+    let mut by_name: Vec<(String, Vec<&IdleJoint>)> = Vec::new();
+    for &joint in joints {
+        let name = names.of(joint.joint);
+        match by_name.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, group)) => group.push(joint),
+            None => by_name.push((name, vec![joint])),
+        }
+    }
+    let text = |(name, group): (String, Vec<&IdleJoint>)| {
+        let distances = group.iter().filter_map(|idle| reason_word(idle.reason).1);
+        let nearest = distances.clone().fold(f32::INFINITY, f32::min);
+        let furthest = distances.fold(f32::NEG_INFINITY, f32::max);
+        let mut remarks = Vec::new();
+        if group.len() > 1 {
+            remarks.push(counted(group.len(), "joint", "joints"));
+        }
+        if nearest < furthest {
+            remarks.push(format!("{nearest:.3} to {furthest:.3} away"));
+        } else if nearest.is_finite() {
+            remarks.push(format!("{nearest:.3} away"));
+        }
+        if remarks.is_empty() { name } else { format!("{name} ({})", remarks.join(", ")) }
+    };
+    by_name.into_iter().map(text).collect()
 }
 
 /// The first of some names, and the number of the others.

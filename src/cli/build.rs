@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, binding::bind, convert::mark_joints,
-    explanation::Explanation, skin, switches::SwitchArgs,
+    explanation::Explanation, report::counted, skin, switches::SwitchArgs,
 };
 use crate::{
     files::{FileKind, RealDisk, load_model, store_model, store_rig},
@@ -76,11 +76,12 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     }
     let created = built.nodes.iter().filter(|node| node.origin.is_some()).count();
     report.line(format!(
-        "{} of {} commands, {} joints, {created} created nodes, {} constraints",
+        "{} of {}, {}, {}, {}",
         outcome.cursor,
-        builder.len(),
-        rig.len(),
-        built.constraints.len()
+        counted(builder.len(), "command", "commands"),
+        counted(rig.len(), "joint", "joints"),
+        counted(created, "created node", "created nodes"),
+        counted(built.constraints.len(), "constraint", "constraints")
     ));
     report.set("commands_done", outcome.cursor);
     report.set("nodes", built.nodes.len());

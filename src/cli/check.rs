@@ -9,7 +9,7 @@ use std::{
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Report, explanation::Explanation, skin::load_rig};
+use super::{Failure, Report, explanation::Explanation, report::counted, skin::load_rig};
 use crate::{
     files::{
         FileKind, LoadError, PartFiles, RealDisk, load_animation, load_gestures, load_model, load_motion, load_project,
@@ -139,7 +139,11 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     let (template, mut faults) = match template::survey_template(&bytes) {
         Ok(surveyed) => surveyed,
         Err(faults) => {
-            found.error = Some(format!("{} is no template that can be read: {}", path.display(), counted(&faults)));
+            found.error = Some(format!(
+                "{} is no template that can be read: {}",
+                path.display(),
+                counted(faults.len(), "fault", "faults")
+            ));
             found.problems = faults;
             return Ok(());
         }
@@ -179,25 +183,17 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
         (failing, "command cannot be built", "commands cannot be built"),
     ];
     let told = told.into_iter().filter(|(count, ..)| *count > 0);
-    let told: Vec<String> =
-        told.map(|(count, one, many)| format!("{count} {}", if count == 1 { one } else { many })).collect();
+    let told: Vec<String> = told.map(|(count, one, many)| counted(count, one, many)).collect();
     found.error = (!told.is_empty()).then(|| told.join(", "));
     found.remarks = remarks;
     found.remarks.extend(remarks_on_rig(&rig));
     let unlisted = problems - commands.len() + unknown_kinds - kinds.len() + undecided_count - choices.len();
     if unlisted > 0 {
-        found.remarks.push(format!("{unlisted} more problems are not listed"));
+        found.remarks.push(format!("{} not listed", counted(unlisted, "more problem is", "more problems are")));
     }
     found.problems = faults.into_iter().chain(kinds).chain(choices).chain(commands).collect();
     found.problems.sort_by_key(|problem| problem.offset);
     Ok(())
-}
-
-fn counted(faults: &[SourceError]) -> String {
-    match faults.len() {
-        1 => "1 fault".to_owned(),
-        count => format!("{count} faults"),
-    }
 }
 
 /// The most problems of one kind whose places are looked for and listed.
@@ -271,19 +267,24 @@ fn remarks_on_model(model: &Model) -> Vec<String> {
     let mut used: Vec<u32> = triangles.iter().map(|triangle| island_of[triangle[0] as usize]).collect();
     used.sort_unstable();
     used.dedup();
-    let mut say = |number: usize, what: &str| {
+    let mut say = |number: usize, one: &str, many: &str| {
         if number > 0 {
-            remarks.push(format!("{number} {what}"));
+            remarks.push(counted(number, one, many));
         }
     };
-    say(model.points.len() - count, "points lie exactly on others (seams, unwelded faces)");
-    say(flat, "triangles have two corners at one place");
-    say(open, "edges have one face only (holes, borders)");
-    say(shared, "edges have more than two faces");
-    say(if used.len() > 1 { used.len() } else { 0 }, "separate islands");
+    let coincident = model.points.len() - count;
+    say(
+        coincident,
+        "point lies exactly on another (seams, unwelded faces)",
+        "points lie exactly on others (seams, unwelded faces)",
+    );
+    say(flat, "triangle has two corners at one place", "triangles have two corners at one place");
+    say(open, "edge has one face only (holes, borders)", "edges have one face only (holes, borders)");
+    say(shared, "edge has more than two faces", "edges have more than two faces");
+    say(if used.len() > 1 { used.len() } else { 0 }, "separate island", "separate islands");
     if let Some(weights) = &model.weights {
         let unweighted = (0..weights.len()).filter(|point| weights.of(*point).len() == 0).count();
-        say(unweighted, "points have no weights");
+        say(unweighted, "point has no weights", "points have no weights");
     }
     remarks
 }
@@ -299,12 +300,12 @@ fn remarks_on_rig(rig: &Rig) -> Vec<String> {
         remarks.push(format!("labels used more than once: {}", doubled.join(", ")));
     }
     if unlabelled > 0 {
-        remarks.push(format!("{unlabelled} joints have no label"));
+        remarks.push(counted(unlabelled, "joint has no label", "joints have no label"));
     }
     let short =
         rig.walk().filter(|joint| joint.parent.is_some() && joint.data.rest.translation.length() == 0.0).count();
     if short > 0 {
-        remarks.push(format!("{short} joints lie exactly on their parent"));
+        remarks.push(counted(short, "joint lies exactly on its parent", "joints lie exactly on their parent"));
     }
     remarks
 }

@@ -8,7 +8,7 @@ use std::{
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::{Failure, InPlaceArgs, Report, SEED, update::load};
+use super::{Failure, InPlaceArgs, Report, SEED, report::counted, update::load};
 use crate::{
     files::{RealDisk, stem, store_rig, store_rig_over},
     rig::{
@@ -118,7 +118,8 @@ pub(super) fn merge(args: &MergeArgs) -> Result<Report, Failure> {
         run(&mut rig, &operation, &mut uids, &mut report)?;
     }
     write(&args.output, &rig, &[&args.rigs[0]], &mut report)?;
-    report.line(format!("{} joints of {} rigs", rig.len(), rigs.len()));
+    let joints = counted(rig.len(), "joint", "joints");
+    report.line(format!("{joints} of {}", counted(rigs.len(), "rig", "rigs")));
     Ok(report)
 }
 
@@ -177,8 +178,9 @@ pub(super) fn inject(args: &InjectArgs) -> Result<Report, Failure> {
         Operation::Tags(TagOperation::Drop { part: Arc::new(template), joints, bindings: Default::default() });
     run(&mut rig, &operation, &mut uids, &mut report)?;
     write(&args.output, &rig, &[&args.rig], &mut report)?;
-    report.line(format!("{} tags injected", count(&rig) - before));
-    report.set("tags", count(&rig) - before);
+    let tags = count(&rig) - before;
+    report.line(format!("{} injected", counted(tags, "tag", "tags")));
+    report.set("tags", tags);
     report.set("joints_left", json!({ "template": left.0, "rig": left.1 }));
     Ok(report)
 }
@@ -205,7 +207,7 @@ pub(super) fn extract(args: &ExtractArgs) -> Result<Report, Failure> {
     }
     report.notes(store_rig(&RealDisk, &args.output, &out)?);
     report.notes.extend(left.iter().cloned());
-    report.line(format!("wrote {}: {} joints", args.output.display(), out.len()));
+    report.line(format!("wrote {}: {}", args.output.display(), counted(out.len(), "joint", "joints")));
     report.set("joints", out.len());
     report.set("left", Value::from(left));
     Ok(report)

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Failure, Report, SEED, WindowError, binding::bind};
+use super::{Failure, Report, SEED, WindowError, binding::bind, report::counted};
 use crate::{
     algo::weights::WeightSettings,
     files::{ReadError, RealDisk, read_capped, save_atomic},
@@ -35,7 +35,12 @@ pub(super) fn run(reason: Option<&WindowError>) -> Result<Report, Failure> {
     for answer in bench.gestures(gestures).iter().filter(|answer| !answer.done) {
         report.notes.push(format!("gesture {} ({}): {}", answer.number, answer.gesture, answer.message));
     }
-    report.line(format!("sketched {} joints with {strokes} gestures into {faces} faces", bench.rig().len()));
+    report.line(format!(
+        "sketched {} with {} into {}",
+        counted(bench.rig().len(), "joint", "joints"),
+        counted(strokes, "gesture", "gestures"),
+        counted(faces, "face", "faces")
+    ));
     let template = write_template(bench.rig());
     save_new(Path::new("biped.rig.ron"), template.as_bytes(), "the template", &mut report)?;
     bind(&mut bench, WeightSettings::default(), &[], Vec::new(), &mut report)?;

@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 use super::{
     ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, SEED,
     progress::{Progress, spinning},
+    report::counted,
 };
 use crate::{
     algo::face::{
@@ -46,10 +47,10 @@ pub(super) struct FaceArgs {
     /// Seed of the first centroids; the same seed gives the same bytes
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Without pairs of bones on both sides
+    /// Place the bones of both sides apart, not in pairs
     #[arg(long)]
     no_symmetry: bool,
-    /// Without bones for jaw and eyes
+    /// Leave out the bones of jaw and eyes
     #[arg(long)]
     skin_only: bool,
     /// Take the whole mesh for a head, even if it looks like a body
@@ -315,8 +316,9 @@ fn describe(report: &mut Report, placed: &FaceReport) {
     let [head, all] = placed.points;
     if placed.is_part {
         report.notes.push(format!(
-            "the mesh is more than a head: the face was placed in its head part ({head} of {all} points); \
-             --whole takes all of it for a head"
+            "the mesh is more than a head: the face was placed in its head part ({head} of {}); \
+             --whole takes all of it for a head",
+            counted(all, "point", "points")
         ));
     }
     if !placed.certain {
@@ -330,18 +332,22 @@ fn describe(report: &mut Report, placed: &FaceReport) {
     }
     if placed.folds > placed.tolerated_folds {
         report.notes.push(format!(
-            "{} triangles fold over in the six expressions at full strength; try another --seed or density",
-            placed.folds
+            "{} over in the six expressions at full strength; try another --seed or density",
+            counted(placed.folds, "triangle folds", "triangles fold")
         ));
     }
     let skin = placed.bones.iter().filter(|bone| bone.kind == FaceBoneKind::Skin).count();
-    report
-        .line(format!("groups: face {face}, middle {middle}, back {back} points; facial mask {} points", placed.mask));
     report.line(format!(
-        "{skin} facial bones, {} of jaw and eyes; square error {:.4} after {} rounds",
+        "groups: face {face}, middle {middle}, back {}; facial mask {}",
+        counted(back, "point", "points"),
+        counted(placed.mask, "point", "points")
+    ));
+    report.line(format!(
+        "{}, {} of jaw and eyes; square error {:.4} after {}",
+        counted(skin, "facial bone", "facial bones"),
         placed.bones.len() - skin,
         placed.square_error,
-        placed.rounds
+        counted(placed.rounds, "round", "rounds")
     ));
     if let Some(error) = placed.fit_error {
         report.line(format!("fitted to the shapes with an error of {error:.5} (root mean square)"));

@@ -13,6 +13,7 @@ use super::{
     ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
     binding::bind,
     progress::{Progress, spinning},
+    report::counted,
 };
 use crate::{
     algo::fit_template::FitSymmetry,
@@ -35,7 +36,7 @@ pub(super) struct FitArgs {
     /// The template: biped, quadruped, bird or a .rig.ron; the one whose limbs the mesh shows if left out
     #[arg(long, value_name = "NAME|FILE")]
     template: Option<PathBuf>,
-    /// Up in the mesh: x, y, z, -x, -y or -z; found if left out
+    /// Up direction in the mesh: x, y, z, -x, -y or -z; found if left out
     #[arg(long, value_name = "AXIS", value_parser = super::face::axis, allow_hyphen_values = true)]
     up: Option<Vec3>,
     /// Direction in which the figure faces; found if left out
@@ -65,9 +66,9 @@ pub(super) struct FitArgs {
 enum SymmetryArg {
     /// Symmetric if mesh and pose are
     Auto,
-    /// Always
+    /// Symmetric in any case
     On,
-    /// Never
+    /// Left and right fitted apart
     Off,
 }
 
@@ -169,9 +170,9 @@ fn describe(report: &mut Report, fitted: &FitReport) {
     let doubtful = fit.joints.iter().filter(|joint| joint.confidence < FitReport::DOUBTFUL).count();
     let choice = if fitted.choice.is_empty() { String::new() } else { format!(" ({})", fitted.choice) };
     report.line(format!(
-        "{}{choice}: {} joints, {doubtful} doubtful, confidence {:.2}, {} ms",
+        "{}{choice}: {}, {doubtful} doubtful, confidence {:.2}, {} ms",
         fitted.template,
-        fit.joints.len(),
+        counted(fit.joints.len(), "joint", "joints"),
         fit.confidence,
         fitted.time.as_millis()
     ));

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Report, progress::spinning, sketch::describe_rig};
+use super::{Failure, Report, progress::spinning, report::counted, sketch::describe_rig};
 use crate::{
     files::{
         FileKind, RealDisk, load_animation, load_gestures, load_model, load_motion, load_project, load_rig_text,
@@ -90,7 +90,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         }
         Some(FileKind::Project) => {
             let project = spinning("reading", || load_project(&RealDisk, path))?;
-            report.line(format!("project \"{}\": {} meshes", project.name, project.meshes.len()));
+            report.line(format!("project \"{}\": {}", project.name, counted(project.meshes.len(), "mesh", "meshes")));
             report.set("kind", "project");
             report.set("name", project.name);
             report.notes(project.notes);
@@ -98,8 +98,9 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
                 report.line(format!("mesh {}", mesh.path.display()));
             }
             for rig in &project.rigs {
-                let (posed, stored) = (rig.pose().len(), rig.stored_poses().len());
-                report.line(format!("rig \"{}\": {posed} joints posed, {stored} stored poses", rig.about().name));
+                let posed = counted(rig.pose().len(), "joint", "joints");
+                let stored = counted(rig.stored_poses().len(), "stored pose", "stored poses");
+                report.line(format!("rig \"{}\": {posed} posed, {stored}", rig.about().name));
                 describe_joints(&mut report, rig);
             }
         }
@@ -107,7 +108,11 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             let skin = load_skin(&RealDisk, path)?;
             let (points, joints) = (skin.weights().len(), skin.joints().len());
             let copy = if skin.mesh().is_some() { "with" } else { "without" };
-            report.line(format!("weights of {points} points over {joints} joints, {copy} a copy of the mesh"));
+            report.line(format!(
+                "weights of {} over {}, {copy} a copy of the mesh",
+                counted(points, "point", "points"),
+                counted(joints, "joint", "joints")
+            ));
             report.set("kind", "skin");
             report.set("points", points);
             report.set("joints", joints);
@@ -118,8 +123,8 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             report.notes(read.notes);
             for clip in &read.clips {
                 let tracks: usize = clip.layers.iter().map(|layer| layer.tracks.len()).sum();
-                let (seconds, keys) = (clip.duration(), clip.key_count());
-                report.line(format!("clip \"{}\": {seconds:.2} s, {tracks} tracks, {keys} keys", clip.name));
+                let (tracks, keys) = (counted(tracks, "track", "tracks"), counted(clip.key_count(), "key", "keys"));
+                report.line(format!("clip \"{}\": {:.2} s, {tracks}, {keys}", clip.name, clip.duration()));
             }
             report.set("kind", "animation");
             report.set("clips", read.clips.len());
@@ -127,7 +132,11 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         Some(FileKind::Bvh) => {
             let motion = load_motion(&RealDisk, path)?;
             let (joints, frames, seconds) = (motion.joints.len(), motion.frames(), motion.duration());
-            report.line(format!("motion of {joints} joints: {frames} frames, {seconds:.2} s"));
+            report.line(format!(
+                "motion of {}: {}, {seconds:.2} s",
+                counted(joints, "joint", "joints"),
+                counted(frames, "frame", "frames")
+            ));
             report.notes(motion.notes);
             report.set("kind", "motion");
             report.set("joints", joints);
@@ -136,7 +145,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         }
         Some(FileKind::Gestures) => {
             let gestures = load_gestures(&RealDisk, path)?;
-            report.line(format!("{} gestures", gestures.len()));
+            report.line(counted(gestures.len(), "gesture", "gestures"));
             report.set("kind", "gestures");
             report.set("gestures", gestures.len());
         }
@@ -168,18 +177,26 @@ fn describe_model(report: &mut Report, model: &Model) {
     let unweighted =
         model.weights.as_ref().map(|weights| (0..weights.len()).filter(|p| weights.of(*p).len() == 0).count());
     let morphs: usize = model.objects.iter().map(|object| object.morph_names.len()).sum();
-    report.line(format!("{} points, {faces} faces ({triangles} triangles), {vertices} vertices", model.points.len()));
+    report.line(format!(
+        "{}, {} ({}), {}",
+        counted(model.points.len(), "point", "points"),
+        counted(faces, "face", "faces"),
+        counted(triangles, "triangle", "triangles"),
+        counted(vertices, "vertex", "vertices")
+    ));
     report.line(format!("box {:.4} {:.4} {:.4} to {:.4} {:.4} {:.4}", low.x, low.y, low.z, high.x, high.y, high.z));
     let names: Vec<&str> = model.objects.iter().map(|object| object.name.as_str()).collect();
-    report.line(format!("{} objects: {}", model.objects.len(), names.join(", ")));
+    report.line(format!("{}: {}", counted(names.len(), "object", "objects"), names.join(", ")));
     report.line(format!(
-        "{} materials, {} images, {morphs} morph targets, {joints} joints, {} clips",
-        model.material_set.materials.len(),
-        model.material_set.images.len(),
-        model.clips.len()
+        "{}, {}, {}, {}, {}",
+        counted(model.material_set.materials.len(), "material", "materials"),
+        counted(model.material_set.images.len(), "image", "images"),
+        counted(morphs, "morph target", "morph targets"),
+        counted(joints, "joint", "joints"),
+        counted(model.clips.len(), "clip", "clips")
     ));
     if let Some(unweighted) = unweighted {
-        report.line(format!("skinned; {unweighted} points without weights"));
+        report.line(format!("skinned; {} without weights", counted(unweighted, "point", "points")));
     }
     report.notes(model.notes.iter().cloned());
     report.set("kind", "mesh");
@@ -199,11 +216,19 @@ fn describe_model(report: &mut Report, model: &Model) {
 }
 
 fn describe_joints(report: &mut Report, rig: &Rig) {
-    report.line(format!("{} joints, {} roots, {} local groups", rig.len(), rig.roots().len(), rig.groups().len()));
+    report.line(format!(
+        "{}, {}, {}",
+        counted(rig.len(), "joint", "joints"),
+        counted(rig.roots().len(), "root", "roots"),
+        counted(rig.groups().len(), "local group", "local groups")
+    ));
     for joint in rig.walk().take(200) {
         let depth = rig.ancestors(joint.data.uid).count();
         let label = joint.data.label.as_deref().unwrap_or("(no label)");
-        let tags = if joint.data.tags.is_empty() { String::new() } else { format!("  {} tags", joint.data.tags.len()) };
+        let tags = match joint.data.tags.len() {
+            0 => String::new(),
+            count => format!("  {}", counted(count, "tag", "tags")),
+        };
         report.line(format!("  {}{label}{tags}", "  ".repeat(depth.min(40))));
     }
     if rig.len() > 200 {

@@ -11,7 +11,7 @@ use clap::Args;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::{Failure, Report};
+use super::{Failure, Report, report::counted};
 use crate::{
     files::{
         BUNDLED_CHARACTERS, BUNDLED_PARTS, Disk, EntryKind, FileKind, PartFiles, RealDisk, SearchPaths, load_template,
@@ -59,7 +59,9 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
         listed.append(&mut elsewhere);
     }
     if listed.len() > MOST {
-        report.notes.push(format!("{} more templates are not listed", listed.len() - MOST));
+        report
+            .notes
+            .push(format!("{} not listed", counted(listed.len() - MOST, "more template is", "more templates are")));
         listed.truncate(MOST);
     }
     let newest = newest(listed.iter().chain(&elsewhere).chain(&bundled));
@@ -213,7 +215,8 @@ fn line(file: &str, header: &TemplateHeader) -> String {
     let parts = [kind.as_str(), version].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ");
     let about = header.description.split(['.', ':']).next().unwrap_or_default();
     let about = if about.is_empty() { String::new() } else { format!(": {about}") };
-    format!("{file}  {name} ({parts}{}{joint_count} joints){about}", if parts.is_empty() { "" } else { ", " })
+    let joints = counted(*joint_count, "joint", "joints");
+    format!("{file}  {name} ({parts}{}{joints}){about}", if parts.is_empty() { "" } else { ", " })
 }
 
 /// Author, picture, features with their switches, sockets and options, as far as there are any.

@@ -6,7 +6,10 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::Value;
 
-use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, build, skin, switches::SwitchArgs};
+use super::{
+    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, build, report::counted, skin,
+    switches::SwitchArgs,
+};
 use crate::{
     files::{FileKind, RealDisk, load_project, store_model, store_rig},
     headless::{
@@ -111,7 +114,8 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     report.notes(held);
     let nodes = bench.nodes()?;
     let error = nodes.iter().map(|node| node.entity.translation.distance(node.program.translation)).fold(0.0, f32::max);
-    report.line(format!("{} nodes; entities and program differ by {error:e} at most", nodes.len()));
+    let count = counted(nodes.len(), "node", "nodes");
+    report.line(format!("{count}; entities and program differ by {error:e} at most"));
     report.set("nodes", Value::Array(nodes.iter().map(|node| node.json()).collect()));
     report.set("error", error);
     if let Some(output) = &args.output {

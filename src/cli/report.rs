@@ -45,6 +45,11 @@ impl Report {
     }
 }
 
+/// A number with the words for what it counts: `one` for a single one, `many` for any other number.
+pub(super) fn counted(number: usize, one: &str, many: &str) -> String {
+    format!("{number} {}", if number == 1 { one } else { many })
+}
+
 /// Error of a command.
 pub(super) enum Failure {
     /// Fault of the input: exit code 1.

@@ -8,7 +8,10 @@ use std::{
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, binding::bind, progress::spinning};
+use super::{
+    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, binding::bind, progress::spinning,
+    report::counted,
+};
 use crate::{
     files::{FileKind, RealDisk, bundled_characters, load_gestures, load_model, stem, store_model, store_rig},
     headless::Workbench,
@@ -57,7 +60,11 @@ pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
         }
     }
     let joints = bench.rig().len();
-    report.line(format!("{} gestures, {missed} without effect; {joints} joints", answers.len()));
+    report.line(format!(
+        "{}, {missed} without effect; {}",
+        counted(answers.len(), "gesture", "gestures"),
+        counted(joints, "joint", "joints")
+    ));
     report.set("gestures", serde_json::to_value(&answers).unwrap_or(Value::Null));
     describe_rig(&mut report, bench.rig());
     save(&mut bench, &args.output, kind, args, &mut report)?;

@@ -8,7 +8,7 @@ use std::{
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::{Failure, InPlaceArgs, Report, explanation::Explanation};
+use super::{Failure, InPlaceArgs, Report, explanation::Explanation, report::counted};
 use crate::{
     files::{Disk, FileKind, RealDisk, StoreError, load_template, save_atomic, store_rig_over},
     modules,
@@ -109,9 +109,8 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     let conflicts = updated.conflicts();
     report.set("conflicts", conflicts);
     if conflicts > 0 && args.take.is_none() {
-        let fields = if conflicts == 1 { "field" } else { "fields" };
-        let fault =
-            format!("both sides changed {conflicts} {fields}, and nothing was written; say --take theirs or mine");
+        let fields = counted(conflicts, "field", "fields");
+        let fault = format!("both sides changed {fields}, and nothing was written; say --take theirs or mine");
         report.fault = Some(Explanation::at(args.rig.display().to_string(), &fault));
         report.notes.push(fault);
         report.at_fault = true;

@@ -14,7 +14,7 @@ use super::{
     ExportArgs, Failure, InPlaceArgs, Report, SEED, WeightArgs,
     build::character_of,
     explanation::Explanation,
-    report::{print, print_json},
+    report::{counted, print, print_json},
 };
 use crate::{
     files::{FileKind, LOOK, LoadError, PartFiles, RealDisk, TemplateWatch, store_model},
@@ -185,8 +185,10 @@ impl Watch<'_> {
         let names = ran.iter().take(NAMED).copied().collect::<Vec<_>>().join(", ");
         let more = if ran.len() > NAMED { format!(" and {} more", ran.len() - NAMED) } else { String::new() };
         let what = if ran.is_empty() { String::new() } else { format!(": {names}{more}") };
-        let (count, of, built, written) = (ran.len(), &told["commands"], &told["build_ms"], &told["total_ms"]);
-        print([format!("{count} of {of} commands ran{what}; built in {built} ms, written in {written} ms").as_str()])
+        let commands = told["commands"].as_u64().and_then(|count| usize::try_from(count).ok()).unwrap_or_default();
+        let of = counted(commands, "command", "commands");
+        let (count, built, written) = (ran.len(), &told["build_ms"], &told["total_ms"]);
+        print([format!("{count} of {of} ran{what}; built in {built} ms, written in {written} ms").as_str()])
     }
 }
 

@@ -22,7 +22,7 @@ pub enum AllowedError {
         /// The folders, in words.
         folders: String,
     },
-    /// There is no such file or folder.
+    /// The file or folder does not exist.
     #[error("`{}` cannot be found: {source}; check the path", path.display())]
     Missing {
         /// The path as given.

@@ -27,7 +27,7 @@ pub enum Fault {
     /// The process dies: this and all later operations fail, and the files stay as they are. A write stores half of its
     /// bytes.
     Crash,
-    /// Like `Crash`, and files lose what was written to them since they were last synced.
+    /// The machine dies: as in a `Crash`, and files lose what was written to them since they were last synced.
     PowerLoss,
 }
 

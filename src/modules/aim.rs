@@ -48,7 +48,7 @@ parameters! {
         pub aim: Axis = Axis::Y,
         /// The axis that is kept up as far as the aim allows.
         pub up_axis: Axis = Axis::Z,
-        /// direction: up is a direction of the rig, or of the up node; node: it is where the up node is.
+        /// Meaning of up, direction: a direction of the rig, or of the up node; node: the place of the up node.
         pub up: AimUpMode = AimUpMode::Direction,
         /// The direction that is up.
         pub direction: Vec3 = Vec3::Y,
@@ -118,7 +118,7 @@ impl RigModule for AimModule {
 }
 
 impl AimModule {
-    /// From where the aim alone would turn a node to how it is turned.
+    /// Rotation of a node beyond the one that the aim alone would give it.
     fn offset(
         &self,
         scope: &mut BuildScope<'_>,

@@ -41,11 +41,11 @@ parameters! {
         pub outer: f32 = 90.0,
         /// The nodes that are driven; none for a morph target.
         pub output: NodeRefs = NodeRefs::NONE,
-        /// Name of the attribute of theirs that is driven.
+        /// Name of the attribute of the nodes that is driven.
         pub output_attribute: String = String::new(),
-        /// Or the channel that is driven, on top of how they were built.
+        /// Channel of the nodes that is driven, in place of an attribute; added to the value that they were built with.
         pub output_channel: Option<Channel> = None,
-        /// Or the name of the morph target whose weight is driven, on every mesh of the rig.
+        /// Name of the morph target whose weight is driven on every mesh of the rig, in place of nodes.
         pub morph: String = String::new(),
     }
 }

@@ -50,10 +50,10 @@ pub fn side_color(side: Side) -> [f32; 3] {
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ControlAxes {
-    /// Like those of its node.
+    /// Directions of the axes of its node.
     #[default]
     Node,
-    /// Like those of the rig.
+    /// Directions of the axes of the rig.
     Rig,
 }
 
@@ -110,7 +110,7 @@ parameters! {
         pub parent: NodeRefs = NodeRefs::NONE,
         /// True: each stands below the control of the nearest node above it in the list.
         pub hierarchy: bool = true,
-        /// node: its axes lie like its node's; rig: like the rig's.
+        /// Directions of the control's axes, node: like its node's; rig: like the rig's.
         pub axes: ControlAxes = ControlAxes::Node,
         /// True: a null takes its place, so that its own base changes nothing.
         pub offset_group: bool = true,
@@ -126,7 +126,7 @@ parameters! {
         pub size: Option<f32> = None,
         /// Half the width of the shape as a share of the bone's length, where size is left out.
         pub relative_size: f32 = 0.35,
-        /// bone: the shape's Y lies along the bone; control: along the control's Y; rig: along the rig's.
+        /// Direction of the shape's Y, bone: along the bone; control: along the control's Y; rig: along the rig's.
         pub shape_axes: ShapeAxes = ShapeAxes::Bone,
         /// Offset of the shape along its own axes, in the rig's units.
         pub shape_translate: Vec3 = Vec3::ZERO,

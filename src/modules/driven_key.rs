@@ -27,9 +27,9 @@ parameters! {
     pub struct DrivenKey {
         /// The node whose attribute or channel drives.
         pub driver: NodeRefs = NodeRef::this().into(),
-        /// Name of the attribute that drives.
+        /// Name of the attribute of the driver that drives.
         pub driver_attribute: String = String::new(),
-        /// Or the channel of its pose that drives, such as RotateX in degrees.
+        /// Channel of the driver's pose that drives, in place of an attribute, such as RotateX in degrees.
         pub driver_channel: Option<Channel> = None,
         /// Pairs of driver and value, driver increasing; flat before the first and after the last.
         pub keys: Vec<(f32, f32)> = vec![(0.0, 0.0), (1.0, 1.0)],
@@ -37,11 +37,11 @@ parameters! {
         pub ease: KeyEase = KeyEase::Smooth,
         /// The nodes that are driven; none for a morph target.
         pub output: NodeRefs = NodeRefs::NONE,
-        /// Name of the attribute of theirs that is driven.
+        /// Name of the attribute of the nodes that is driven.
         pub output_attribute: String = String::new(),
-        /// Or the channel that is driven, on top of how they were built.
+        /// Channel of the nodes that is driven, in place of an attribute; added to the value that they were built with.
         pub output_channel: Option<Channel> = None,
-        /// Or the name of the morph target whose weight is driven, on every mesh of the rig.
+        /// Name of the morph target whose weight is driven on every mesh of the rig, in place of nodes.
         pub morph: String = String::new(),
     }
 }

@@ -36,7 +36,7 @@ parameters! {
         pub joints: NodeRefs = Source::Hierarchy(Top::This).into(),
         /// Parent of the uppermost copies; the parent of each node if left out.
         pub parent: NodeRefs = NodeRefs::NONE,
-        /// null: the copies move no mesh; joint: they are joints.
+        /// Kind of the copies, null: nodes that move no mesh; joint: joints.
         pub kind: CopyKind = CopyKind::Null,
         /// Ending of the names of the copies.
         pub suffix: String = "copy".to_owned(),

@@ -26,7 +26,7 @@ parameters! {
         pub name: String = "layer".to_owned(),
         /// False: its nodes are hidden.
         pub visible: bool = true,
-        /// normal: as they are; template: grey and not to be picked; reference: not to be picked.
+        /// Display of the nodes, normal: as they are; template: grey and not to be picked; reference: not to be picked.
         pub display: LayerDisplay = LayerDisplay::Normal,
         /// sRGB colour, 0 to 1 each, in place of the nodes' own; their own if left out.
         pub color: Option<[f32; 3]> = None,

@@ -22,9 +22,9 @@ pub enum UpMode {
     /// Direction in the rig's space.
     #[default]
     Direction,
-    /// Across the plane in which the chain bends; in the direction where it is straight.
+    /// Normal of the plane in which the chain bends; the direction where it is straight.
     Plane,
-    /// Towards a node.
+    /// Direction towards a node.
     Node,
 }
 
@@ -35,7 +35,7 @@ pub enum EndMode {
     /// Turned like the joint above.
     #[default]
     Parent,
-    /// Along the rig's axes.
+    /// Turned like the rig's axes.
     Rig,
     /// Left as they are.
     Keep,
@@ -56,9 +56,9 @@ parameters! {
         pub along: Axis = Axis::Y,
         /// The axis that points up as far as the bone allows.
         pub up_axis: Axis = Axis::Z,
-        /// direction: up is a direction of the rig; plane: across the plane in which the chain bends; node: to a node.
+        /// Meaning of up, direction: one of the rig; plane: across the plane in which the chain bends; node: to a node.
         pub up: UpMode = UpMode::Direction,
-        /// Up in the rig's space; also where a chain is straight.
+        /// Up direction in the rig's space; used where a chain is straight, too.
         pub direction: Vec3 = Vec3::Z,
         /// The node that is up where `up` is node.
         pub up_node: NodeRefs = NodeRefs::NONE,

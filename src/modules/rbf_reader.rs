@@ -53,9 +53,9 @@ pub struct ReaderPose {
     pub rotate: Vec3,
     /// Name of the attribute that is driven; added to the output, from 0 to 1, if it lacks it.
     pub attribute: String,
-    /// Or the channel that is driven.
+    /// Channel of the output that is driven, in place of an attribute.
     pub channel: Option<Channel>,
-    /// Or the morph target that is driven.
+    /// Name of the morph target that is driven, in place of an attribute or a channel.
     pub morph: String,
 }
 

@@ -48,7 +48,7 @@ parameters! {
         pub heel_back: f32 = 0.3,
         /// Width of the sole at the ball, as a share of the distance from ankle to toe tip; 0 or more.
         pub width: f32 = 0.4,
-        /// Up from the sole, in the rig's space.
+        /// Direction up from the sole, in the rig's space.
         pub up: Vec3 = Vec3::Y,
         /// Degrees at which the roll moves on from ball to toe, until somebody sets others; 0 to 180.
         pub break_angle: f32 = 35.0,

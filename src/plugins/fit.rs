@@ -72,7 +72,7 @@ pub struct FitRequest {
     pub mesh: Entity,
     /// The template, if the rig has no joints; a rig that has joints has those moved.
     pub template: FitTemplate,
-    /// Up in the mesh's space; found if `None`.
+    /// Up direction in the mesh's space; found if `None`.
     pub up: Option<Vec3>,
     /// Direction in which the figure faces; found if `None`.
     pub forward: Option<Vec3>,
@@ -161,10 +161,10 @@ pub enum FitFailure {
     /// The entity of the request has no mesh, or its mesh no rig.
     #[error("the mesh belongs to no rig; it may have been closed")]
     NoRig,
-    /// Neither the rig nor the request has joints.
+    /// The rig and the request have no joints.
     #[error("there is no skeleton to fit; name a template")]
     NoTemplate,
-    /// There is no template with the name.
+    /// No template has the name.
     #[error("there is no template \"{name}\"{nearest}")]
     NoName {
         /// Requested name.

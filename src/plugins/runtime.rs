@@ -74,7 +74,7 @@ pub enum InstanceMode {
     /// driven nodes is written before Bevy propagates.
     #[default]
     Hierarchy,
-    /// Only joints and exposed nodes are entities, without parents. Exposed nodes are posed by their [`ControlPose`];
+    /// Joints and exposed nodes alone are entities, without parents. Exposed nodes are posed by their [`ControlPose`];
     /// the `GlobalTransform` of joints is written after Bevy has propagated the rig's.
     Direct,
 }

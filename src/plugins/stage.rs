@@ -55,7 +55,7 @@ pub enum RigStage {
     Edit,
     /// All commands are in effect, and follow every edit.
     Built,
-    /// There is nothing but the name, the stored poses and the weights; see [`DELETE`].
+    /// The joints and their tags are deleted; the name, the stored poses and the weights are left; see [`DELETE`].
     Deleted,
 }
 

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use bevy::reflect::Reflect;
 use serde::{Deserialize, Serialize};
 
-use super::{BuildScope, ModuleError, mirror::opposite, world::NodeId};
+use super::{BuildScope, ModuleError, error::number_text, mirror::opposite, world::NodeId};
 use crate::{
     mesh::model::Trs,
     rig::{Attribute, AttributeKind, Scalar},
@@ -17,7 +17,7 @@ use crate::{
 #[derive(Reflect, Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Amount {
-    /// Always this.
+    /// Number that stays the same in every frame.
     Value(f32),
     /// Value of the attribute of that name; its opposite if the name begins with [`OPPOSITE`](Self::OPPOSITE).
     Attribute(String),
@@ -98,10 +98,14 @@ impl BuildScope<'_> {
         if value.is_finite() && range.contains(&value) {
             return Ok(());
         }
+        let is_above_zero = *range.start() == f32::MIN_POSITIVE;
+        let (start, end) = (number_text(*range.start()), number_text(*range.end()));
         let needed = match (range.start().is_finite(), range.end().is_finite()) {
-            (true, true) => format!("a number from {} to {}", range.start(), range.end()),
-            (true, false) => format!("a number that is not below {}", range.start()),
-            (false, true) => format!("a number that is not above {}", range.end()),
+            (true, true) if is_above_zero => format!("a number above 0 that is not above {end}"),
+            (true, false) if is_above_zero => "a number above 0".to_owned(),
+            (true, true) => format!("a number from {start} to {end}"),
+            (true, false) => format!("a number that is not below {start}"),
+            (false, true) => format!("a number that is not above {end}"),
             (false, false) => "a finite number".to_owned(),
         };
         Err(ModuleError::OutOfRange { parameter: parameter.to_owned(), value, needed })

@@ -9,18 +9,18 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "snake_case")]
 #[reflect(Default)]
 pub enum Axis {
-    /// Along X.
+    /// Direction of X.
     X,
-    /// Along Y.
+    /// Direction of Y.
     #[default]
     Y,
-    /// Along Z.
+    /// Direction of Z.
     Z,
-    /// Against X.
+    /// Direction opposite to X.
     NegX,
-    /// Against Y.
+    /// Direction opposite to Y.
     NegY,
-    /// Against Z.
+    /// Direction opposite to Z.
     NegZ,
 }
 

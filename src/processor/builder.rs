@@ -79,7 +79,7 @@ pub struct Builder {
     breakpoints: HashSet<Uid>,
     /// First place from which something that can close a circle of constraints has changed.
     graph_changed: Option<u32>,
-    /// From which place on references may find other nodes than before.
+    /// First place from which references may find other nodes than before.
     structure_changed: Option<u32>,
     /// Counts runs.
     run: u32,
@@ -126,7 +126,7 @@ impl Builder {
         self.range = range;
     }
 
-    /// Somebody (`None`: the document) changed what a cell holds: whoever read it later has to be looked at.
+    /// Marks the later readers of a cell, whose content `writer` (`None`: the document) has changed, to be looked at.
     /// `circles` is true if that may have closed a circle of constraints.
     fn changed(&mut self, node: NodeId, aspect: Aspect, writer: Option<u32>, circles: bool) {
         self.built.note(node, aspect);

@@ -25,7 +25,7 @@ pub enum ModuleError {
         problem: String,
     },
     /// A number outside of its range, whatever the other parameters are.
-    #[error("{parameter}: is {value}; write {needed}")]
+    #[error("{parameter}: is {}; write {needed}", number_text(*value))]
     OutOfRange {
         /// The parameter.
         parameter: String,
@@ -43,7 +43,7 @@ pub enum ModuleError {
         /// Switch that is off.
         off: Exclusion,
     },
-    /// Anything else.
+    /// Problem of another kind, in words.
     #[error("{0}")]
     Other(String),
     /// More than [`BuildLimits`](super::BuildLimits) allows.
@@ -61,6 +61,12 @@ pub enum ModuleError {
     Cycle(String),
 }
 
+/// Text of a number for people: with an exponent where it would have many zeros.
+pub(super) fn number_text(number: f32) -> String {
+    let is_plain = number == 0.0 || !number.is_finite() || (1e-4..1e7).contains(&number.abs());
+    if is_plain { number.to_string() } else { format!("{number:e}") }
+}
+
 impl ModuleError {
     /// A parameter that is out of its range or makes no sense with the others; `problem` says what to write.
     pub fn parameter(parameter: impl Into<String>, problem: impl Into<String>) -> Self {
@@ -72,7 +78,7 @@ impl ModuleError {
         Self::Reference { parameter: parameter.into(), reference: references.to_string(), problem: problem.into() }
     }
 
-    /// Anything else.
+    /// A problem of another kind, in words.
     pub fn other(problem: impl Into<String>) -> Self {
         Self::Other(problem.into())
     }
@@ -81,7 +87,7 @@ impl ModuleError {
 /// Problem of a command.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BuildProblem {
-    /// Nobody registered the module.
+    /// No module is registered under the name.
     #[error("there is no module \"{module}\"{nearest}; register it, or disable the tag")]
     NoModule {
         /// The name.

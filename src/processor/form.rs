@@ -277,7 +277,7 @@ impl TypeAt {
         self.path.short_path()
     }
 
-    /// Without an `Option` around it.
+    /// The type without an `Option` around it.
     fn bare(self) -> Self {
         if let Some(TypeInfo::Enum(info)) = self.info
             && info.type_path_table().short_path().starts_with("Option<")

@@ -10,10 +10,10 @@ use crate::rig::{JointData, Rig, TagData, TagKind, Uid};
 /// Joints whose commands are built.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum BuildRange {
-    /// All of the rig.
+    /// All commands of the rig.
     #[default]
     Rig,
-    /// Only those of these joints.
+    /// Commands of these joints.
     Joints(HashSet<Uid>),
     /// Commands of these joints and of all joints below them.
     Hierarchy(HashSet<Uid>),

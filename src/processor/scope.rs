@@ -26,7 +26,7 @@ pub enum Side {
     Left,
     /// The character's right: towards -X.
     Right,
-    /// On the middle plane.
+    /// The middle plane.
     Middle,
 }
 

@@ -63,7 +63,7 @@ pub enum FeatureState {
     On,
     /// No tag is enabled.
     Off,
-    /// Some tags are enabled.
+    /// Tags of both states: one at least is enabled, and one is not.
     Mixed,
 }
 

@@ -460,7 +460,7 @@ fn uids<'a, T: 'a>(list: impl IntoIterator<Item = &'a T>, uid: impl Fn(&T) -> Ui
     list.into_iter().map(uid).collect()
 }
 
-/// Each uid of the lists once: those of the file first, then of the rig now, then of the base.
+/// Uids of the lists, without repeats: those of the file first, then of the rig now, then of the base.
 fn all([base, now, file]: &[Vec<Uid>; 3]) -> Vec<Uid> {
     let mut seen = HashSet::new();
     file.iter().chain(now).chain(base).copied().filter(|uid| seen.insert(*uid)).collect()

@@ -25,7 +25,7 @@ pub struct FootPivots {
     pub outer: Vec3,
     /// The ankle.
     pub ankle: Vec3,
-    /// Up from the sole, any length.
+    /// Direction up from the sole, of any length.
     pub up: Vec3,
 }
 

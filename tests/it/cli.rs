@@ -439,6 +439,19 @@ fn rigid_parts_and_idle_joints_are_told_and_chosen() {
     assert!(!is_idle(&claimed) && claimed["rigid_parts"][0]["joint"] == "far", "{claimed}");
 }
 
+/// A single thing is counted in the singular, and joints of one name are named once with their number.
+#[test]
+fn reports_count_what_they_name() {
+    let folder = folder();
+    fs::write(folder.path().join("one.rig"), "rig 1\njoint 0 -1 0.1 0 0 base\n").unwrap();
+    let text = rigsmith(folder.path(), &["info", "one.rig"]).out;
+    assert!(text.contains("1 joint, 1 root, 0 local groups"), "{text}");
+    fs::write(folder.path().join("tube.rig"), format!("{TUBE_RIG}joint 3 0 3 9 0 far\n")).unwrap();
+    fs::write(folder.path().join("tube.obj"), tube_with_pouch([2.8, 0.5, -0.1], [3.1, 0.7, 0.1])).unwrap();
+    let text = rigsmith(folder.path(), &["skin", "tube.rig", "tube.obj", "-o", "a.glb"]).out;
+    assert!(text.contains("outside of the mesh: far (2 joints, 8.3"), "{text}");
+}
+
 /// A character of many parts: poles and targets are idle, and a part goes to the joint that a person names.
 #[test]
 fn parts_of_a_character_go_by_their_names() {

@@ -136,7 +136,7 @@ impl Window {
         self.send(EditRequest::operation(rig, Operation::Edits(vec![edit])));
     }
 
-    fn said(&self, severity: Severity, part: &str) -> bool {
+    fn has_notice(&self, severity: Severity, part: &str) -> bool {
         self.notices.iter().any(|notice| notice.severity == severity && notice.text.contains(part))
     }
 }
@@ -154,7 +154,11 @@ fn a_changed_template_is_offered_and_taken_over_as_one_step() {
     window.send(OfferAnswer::Take(Take::Mine));
     window.until("the update", |window| window.height("b") == 0.5);
     window.settle();
-    assert!(window.offer().is_none() && window.said(Severity::Done, "1 change taken over"), "{:?}", window.notices);
+    assert!(
+        window.offer().is_none() && window.has_notice(Severity::Done, "1 change taken over"),
+        "{:?}",
+        window.notices
+    );
     // Undone, it stays undone until the file changes again; then both changes are offered.
     let rig = window.rig();
     window.send(EditRequest { rig, change: Change::Undo });
@@ -228,7 +232,7 @@ fn a_save_of_the_window_itself_is_no_news() {
 fn a_broken_save_changes_nothing_and_is_told() {
     let mut window = Window::new();
     fs::write(&window.file, "(format: 2, name: \"chain\", joints: [(").expect("the template is written");
-    window.until("the notice", |window| window.said(Severity::Error, "not taken over"));
+    window.until("the notice", |window| window.has_notice(Severity::Error, "not taken over"));
     assert!(window.offer().is_none() && window.height("b") == 0.3);
     fs::write(&window.file, CHAIN.replace("0.3", "0.35")).expect("the template is written");
     window.until("the offer", |window| window.offer().is_some());

@@ -67,7 +67,7 @@ fn run(folder: &Path, args: &[&str]) -> CommandEnd {
 }
 
 /// Runs a command with `--json`, fails unless it ends as promised, and returns its answer.
-fn tried(folder: &Path, args: &[&str]) -> (CommandEnd, Value) {
+fn json_answer(folder: &Path, args: &[&str]) -> (CommandEnd, Value) {
     let ended = run(folder, &[args, &["--json"]].concat());
     let said = || format!("{args:?}: {:?} {:.300} {:.300}", ended.code, ended.out, ended.err);
     assert!(matches!(ended.code, Some(0 | 1)), "{}", said());
@@ -114,7 +114,7 @@ fn bombs_are_told_and_write_nothing() {
         let file = format!("{name}.rig.ron");
         fs::write(folder.path().join(&file), &text).unwrap();
         for args in [&["check", &file][..], &["build", &file, "-o", "out.glb"]] {
-            let (ended, answer) = tried(folder.path(), args);
+            let (ended, answer) = json_answer(folder.path(), args);
             assert_eq!(ended.code, Some(1), "{args:?}: {answer:.300}");
             assert!(answer.to_string().contains(wanted), "{args:?} says \"{wanted}\": {answer:.600}");
             assert!(!folder.path().join("out.glb").exists(), "{args:?}");
@@ -168,14 +168,14 @@ fn shapes_that_broke_binding_are_bound() {
     fs::write(folder.path().join("two.rig"), "rig 1\njoint 0 -1 0 0 0 root\njoint 1 0 0 1 0 tip\n").unwrap();
     for (name, text) in triangles(22_000) {
         fs::write(folder.path().join(name), text).unwrap();
-        let (ended, answer) = tried(folder.path(), &["skin", "two.rig", name, "-o", "out.glb"]);
+        let (ended, answer) = json_answer(folder.path(), &["skin", "two.rig", name, "-o", "out.glb"]);
         assert_eq!(ended.code, Some(0), "{name}: {answer}");
         let model = load_model(&RealDisk, &folder.path().join("out.glb")).unwrap();
         assert!(model.weights.is_some(), "{name}");
     }
     for (name, is_chain) in [("chain.rig", true), ("star.rig", false)] {
         fs::write(folder.path().join(name), skeleton(10_000, is_chain)).unwrap();
-        let (ended, answer) = tried(folder.path(), &["build", name, "-o", "out.rig.ron"]);
+        let (ended, answer) = json_answer(folder.path(), &["build", name, "-o", "out.rig.ron"]);
         assert_eq!(ended.code, Some(0), "{name}: {answer}");
         assert_eq!(load_template(&RealDisk, &folder.path().join("out.rig.ron")).unwrap().rig.len(), 10_000, "{name}");
     }
@@ -190,7 +190,7 @@ fn texts_that_no_terminal_should_obey_are_escaped() {
     fs::write(folder.path().join("a.rig.ron"), template).unwrap();
     fs::write(folder.path().join("b.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\no \u{1b}]0;owned\u{7}\nf 1 2 3\n").unwrap();
     for args in [["info", "a.rig.ron"], ["check", "a.rig.ron"], ["info", "b.obj"], ["check", "b.obj"]] {
-        tried(folder.path(), &args);
+        json_answer(folder.path(), &args);
         let ended = run(folder.path(), &args);
         let is_obeyed = |c: char| c.is_control() && !matches!(c, '\n' | '\t') || c == '\u{202e}';
         assert!(!ended.out.contains(is_obeyed) && !ended.err.contains(is_obeyed), "{args:?}: {}", ended.err);
@@ -202,13 +202,13 @@ fn a_minified_file_with_a_typo_shows_a_piece_of_its_line() {
     let folder = tempfile::tempdir().unwrap();
     let biped = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/biped.rig");
     fs::copy(biped, folder.path().join("b.rig")).unwrap();
-    tried(folder.path(), &["convert", "b.rig", "b.rig.ron"]);
+    json_answer(folder.path(), &["convert", "b.rig", "b.rig.ron"]);
     let text = fs::read_to_string(folder.path().join("b.rig.ron")).unwrap();
     let line = text.split_whitespace().collect::<Vec<&str>>().join(" ");
     let long = line.replacen("joints: [", &format!("joints: [{}", " ".repeat(70_000)), 1) + " oops";
     fs::write(folder.path().join("long.rig.ron"), long).unwrap();
     for command in ["check", "build", "info"] {
-        let (ended, answer) = tried(folder.path(), &[command, "long.rig.ron"]);
+        let (ended, answer) = json_answer(folder.path(), &[command, "long.rig.ron"]);
         assert_eq!(ended.code, Some(1), "{command}: {answer}");
         let place = explained(&answer);
         assert!(place.starts_with("long.rig.ron:1:"), "{command}: {place}");
@@ -218,7 +218,7 @@ fn a_minified_file_with_a_typo_shows_a_piece_of_its_line() {
 }
 
 /// Memory of a command, in bytes, that its input of `size` bytes may take.
-fn allowed(size: u64) -> u64 {
+fn memory_allowance(size: u64) -> u64 {
     (64 << 20) + 16 * size
 }
 
@@ -251,8 +251,13 @@ fn readers_stay_within_their_memory() {
         (&["check", "unknown.rig.ron"], size("unknown.rig.ron")),
     ];
     for (args, size) in cases {
-        let (ended, _) = tried(folder.path(), args);
-        assert!(ended.memory <= allowed(size), "{args:?}: {} KiB of {}", ended.memory >> 10, allowed(size) >> 10);
+        let (ended, _) = json_answer(folder.path(), args);
+        assert!(
+            ended.memory <= memory_allowance(size),
+            "{args:?}: {} KiB of {}",
+            ended.memory >> 10,
+            memory_allowance(size) >> 10
+        );
     }
 }
 
@@ -283,7 +288,7 @@ fn hostile_files_of_the_data_are_told_or_read() {
     let mut count = 0;
     for file in files.iter().map(|file| file.to_str().unwrap()) {
         for args in commands_for(file) {
-            tried(folder.path(), &args);
+            json_answer(folder.path(), &args);
             count += 1;
             for output in ["out.glb", "out.obj"].map(|name| folder.path().join(name)) {
                 if output.exists() {

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use rigsmith::mesh::influences::keep_strongest;
 
-fn kept(influences: &[(u32, f32)], most: usize, least: f32) -> Vec<(u32, f32)> {
+fn kept_influences(influences: &[(u32, f32)], most: usize, least: f32) -> Vec<(u32, f32)> {
     let mut influences = influences.to_vec();
     keep_strongest(&mut influences, most, least);
     influences
@@ -12,20 +12,20 @@ fn kept(influences: &[(u32, f32)], most: usize, least: f32) -> Vec<(u32, f32)> {
 #[test]
 fn the_strongest_stay_and_sum_to_one() {
     let all = [(4, 0.5), (2, 2.0), (9, 1.0), (1, 0.5)];
-    assert_eq!(kept(&all, 4, 0.0), [(2, 0.5), (9, 0.25), (1, 0.125), (4, 0.125)]);
-    assert_eq!(kept(&all, 2, 0.0), [(2, 2.0 / 3.0), (9, 1.0 / 3.0)]);
-    assert_eq!(kept(&all, 4, 0.2), [(2, 2.0 / 3.0), (9, 1.0 / 3.0)], "an eighth is less than a fifth");
-    assert_eq!(kept(&all, 4, 0.9), [(2, 1.0)], "the strongest stays whatever the threshold");
-    assert_eq!(kept(&all, 0, 0.0), [(2, 1.0)]);
+    assert_eq!(kept_influences(&all, 4, 0.0), [(2, 0.5), (9, 0.25), (1, 0.125), (4, 0.125)]);
+    assert_eq!(kept_influences(&all, 2, 0.0), [(2, 2.0 / 3.0), (9, 1.0 / 3.0)]);
+    assert_eq!(kept_influences(&all, 4, 0.2), [(2, 2.0 / 3.0), (9, 1.0 / 3.0)], "an eighth is less than a fifth");
+    assert_eq!(kept_influences(&all, 4, 0.9), [(2, 1.0)], "the strongest stays whatever the threshold");
+    assert_eq!(kept_influences(&all, 0, 0.0), [(2, 1.0)]);
 }
 
 #[test]
 fn what_is_no_weight_is_left_out() {
-    assert_eq!(kept(&[], 4, 0.1), []);
-    assert_eq!(kept(&[(0, 0.0), (1, -1.0), (2, f32::NAN), (3, f32::INFINITY)], 4, 0.0), []);
-    assert_eq!(kept(&[(0, f32::NAN), (1, 3.0)], 4, 0.0), [(1, 1.0)]);
-    assert_eq!(kept(&[(0, f32::MAX), (1, f32::MAX)], 4, 0.0), [(0, 0.5), (1, 0.5)]);
-    assert_eq!(kept(&[(0, f32::MIN_POSITIVE), (1, f32::MIN_POSITIVE)], 4, 0.0), [(0, 0.5), (1, 0.5)]);
+    assert_eq!(kept_influences(&[], 4, 0.1), []);
+    assert_eq!(kept_influences(&[(0, 0.0), (1, -1.0), (2, f32::NAN), (3, f32::INFINITY)], 4, 0.0), []);
+    assert_eq!(kept_influences(&[(0, f32::NAN), (1, 3.0)], 4, 0.0), [(1, 1.0)]);
+    assert_eq!(kept_influences(&[(0, f32::MAX), (1, f32::MAX)], 4, 0.0), [(0, 0.5), (1, 0.5)]);
+    assert_eq!(kept_influences(&[(0, f32::MIN_POSITIVE), (1, f32::MIN_POSITIVE)], 4, 0.0), [(0, 0.5), (1, 0.5)]);
 }
 
 proptest! {
@@ -33,7 +33,7 @@ proptest! {
     fn they_are_sorted_and_whole(
         influences in prop::collection::vec((0u32..50, 1e-30f32..1e30), 1..20), most in 1usize..9, least in 0.0f32..0.2,
     ) {
-        let found = kept(&influences, most, least);
+        let found = kept_influences(&influences, most, least);
         prop_assert!((1..=most).contains(&found.len()));
         prop_assert!(found.windows(2).all(|pair| pair[0].1 >= pair[1].1));
         prop_assert!((found.iter().map(|(_, weight)| f64::from(*weight)).sum::<f64>() - 1.0).abs() < 1e-5);

@@ -78,15 +78,15 @@ impl Game {
         Self::new(RigInstancePlugin::default(), Path::new("assets"))
     }
 
-    fn told(&self) -> &InstanceReport {
+    fn instance_report(&self) -> &InstanceReport {
         self.app.world().resource::<InstanceReport>()
     }
 
     /// Updates until something is so.
     fn until(&mut self, what: &str, is_so: impl Fn(&InstanceReport) -> bool) {
         let start = Instant::now();
-        while !is_so(self.told()) {
-            assert!(start.elapsed() < HANG, "{what} does not come: {:?}", self.told());
+        while !is_so(self.instance_report()) {
+            assert!(start.elapsed() < HANG, "{what} does not come: {:?}", self.instance_report());
             self.app.update();
             sleep(Duration::from_millis(1));
         }
@@ -109,7 +109,7 @@ impl Game {
     }
 
     fn spawn(&mut self, template: Handle<RigTemplate>, mode: InstanceMode) -> Entity {
-        let built = self.told().built;
+        let built = self.instance_report().built;
         let instance = self.app.world_mut().spawn((RigInstance(template), mode)).id();
         self.until("the instance", |told| told.built > built);
         instance
@@ -240,12 +240,12 @@ fn a_saved_file_reaches_its_instances_and_leaves_the_rest_to_the_bit() {
             }
         }
         assert_eq!(game.node(instance, "b_end"), other, "the entity stays");
-        assert_eq!(game.told().updated, [1]);
+        assert_eq!(game.instance_report().updated, [1]);
         // A comment is no change.
         fs::write(&path, fs::read_to_string(&path).unwrap().replace("(\n    format", "( // mine\n    format")).unwrap();
         game.go_on(Duration::from_millis(100));
-        assert_eq!(game.told().updated, [1]);
-        assert!(game.told().failed.is_empty());
+        assert_eq!(game.instance_report().updated, [1]);
+        assert!(game.instance_report().failed.is_empty());
         let assets = game.app.world().resource::<Assets<RigTemplate>>();
         assert!(assets.iter().next().unwrap().1.text().contains("// mine"), "and stays in what a save writes");
     }
@@ -394,21 +394,21 @@ fn a_file_is_taken_over_once_however_it_is_saved() {
         let took = writer.join().unwrap();
         // Nothing comes after it.
         game.go_on(Duration::from_millis(60));
-        assert_eq!(game.told().updated.len(), number + 1, "{name}");
+        assert_eq!(game.instance_report().updated.len(), number + 1, "{name}");
         // A writer that the machine stopped in the middle of a file leaves a broken file, which is told.
         if is_broken {
-            assert_eq!(game.told().failed.len(), failed + 1, "{name}: {:?}", game.told().failed);
+            assert_eq!(game.instance_report().failed.len(), failed + 1, "{name}: {:?}", game.instance_report().failed);
         } else if took < UNDISTURBED {
-            assert_eq!(game.told().failed.len(), failed, "{name}: {:?}", game.told().failed);
+            assert_eq!(game.instance_report().failed.len(), failed, "{name}: {:?}", game.instance_report().failed);
         }
-        failed = game.told().failed.len();
+        failed = game.instance_report().failed.len();
         let world = game.app.world();
         let place = world.get::<GlobalTransform>(end).unwrap().translation();
         assert!((place.y - height - 0.5).abs() < 1e-5, "{name}: {place}");
         let posed = world.get::<GlobalTransform>(control).unwrap().translation();
         assert!((posed.x - 1.25).abs() < 1e-5, "{name}: the pose stays, {posed}");
     }
-    let told = game.told().failed.last().unwrap();
+    let told = game.instance_report().failed.last().unwrap();
     assert!(told.contains("t.rig.ron") && told.contains("line "), "{told}");
 }
 
@@ -441,13 +441,13 @@ fn a_thousand_broken_saves_change_nothing_and_are_told() {
             break;
         }
     }
-    assert_eq!(game.told().failed.len(), 1000);
-    assert!(game.told().updated.is_empty());
-    assert!(game.told().failed.iter().all(|told| told.contains("line ")), "each has a place");
+    assert_eq!(game.instance_report().failed.len(), 1000);
+    assert!(game.instance_report().updated.is_empty());
+    assert!(game.instance_report().failed.iter().all(|told| told.contains("line ")), "each has a place");
     assert_eq!(game.places(instance), before);
     game.offer(instance, CHAIN.replace("(0, 1, 0)", "(0, 2, 0)").as_bytes());
     game.until("the next good save", |told| told.updated.len() == 1);
-    assert_eq!(game.told().failed.len(), 1000);
+    assert_eq!(game.instance_report().failed.len(), 1000);
     game.app.update();
     assert_ne!(game.places(instance), before);
 }
@@ -473,7 +473,7 @@ fn the_asset_server_loads_templates_and_a_failed_first_load_is_tried_again() {
     let handle = game.app.world().resource::<AssetServer>().load::<RigTemplate>("good.rig.ron");
     let other = game.spawn(handle.clone(), InstanceMode::Hierarchy);
     game.go_on(Duration::from_millis(100));
-    assert_eq!((game.told().built, game.told().updated.len()), (2, 1));
+    assert_eq!((game.instance_report().built, game.instance_report().updated.len()), (2, 1));
     let mut assets = game.app.world_mut().resource_mut::<Assets<RigTemplate>>();
     let mut template = assets.get_mut(&handle).unwrap();
     let mut rig = (**template.rig()).clone();
@@ -591,5 +591,5 @@ fn the_asset_server_loads_parts_too() {
     fs::write(&limb, part.replace("(0, 1, 0)", "(0, 3, 0)")).unwrap();
     game.until("the part", |told| !told.updated.is_empty());
     game.go_on(Duration::from_millis(50));
-    assert_eq!((height(&mut game), game.told().failed.len()), (3.0, 0));
+    assert_eq!((height(&mut game), game.instance_report().failed.len()), (3.0, 0));
 }

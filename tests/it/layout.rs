@@ -81,7 +81,7 @@ fn raw_quote(marks: &[char]) -> Option<usize> {
 }
 
 /// Code without unit tests.
-fn shipped(text: &str) -> String {
+fn code_without_tests(text: &str) -> String {
     let code = code(text);
     let Some(start) = code.find("#[cfg(test)]") else { return code };
     code[..start].to_owned()
@@ -191,7 +191,7 @@ fn parts_depend_in_one_direction() {
         let files = sources(folder);
         assert!(!files.is_empty(), "there is nothing in {folder}");
         for (path, text) in files {
-            let code = shipped(&text);
+            let code = code_without_tests(&text);
             for name in forbidden {
                 wrong.extend(
                     mentions(&code, name).into_iter().map(|line| format!("{}:{line} uses {name}", path.display())),
@@ -203,7 +203,7 @@ fn parts_depend_in_one_direction() {
 }
 
 /// Parts of the crate that the column "uses" of the architecture's table gives to each part.
-fn allowed_uses() -> BTreeMap<String, BTreeSet<String>> {
+fn uses_of_parts() -> BTreeMap<String, BTreeSet<String>> {
     let text = include_str!("../../ARCHITECTURE.md");
     let rows = text.lines().filter_map(|line| line.strip_prefix("| ")).filter(|row| row.starts_with("`src/"));
     let quoted = |cell: &str| -> Vec<String> { cell.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
@@ -221,7 +221,7 @@ fn allowed_uses() -> BTreeMap<String, BTreeSet<String>> {
 
 #[test]
 fn parts_use_what_the_architecture_says() {
-    let allowed = allowed_uses();
+    let allowed = uses_of_parts();
     let parts: Vec<String> = allowed.keys().filter(|part| !part.is_empty() && *part != "main").cloned().collect();
     assert!(parts.len() > 12, "the table was not read: {parts:?}");
     for entry in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("src")).unwrap() {
@@ -231,7 +231,7 @@ fn parts_use_what_the_architecture_says() {
     let mut wrong = Vec::new();
     for part in &parts {
         for (path, text) in sources(part) {
-            let code = shipped(&text);
+            let code = code_without_tests(&text);
             for other in parts.iter().filter(|other| *other != part && !allowed[part].contains(*other)) {
                 let lines = mentions(&code, &format!("crate::{other}"));
                 wrong.extend(lines.into_iter().map(|line| format!("{}:{line} uses {other}", path.display())));
@@ -251,7 +251,7 @@ fn files_stay_readable_and_never_panic_on_purpose() {
         if lines > 500 {
             wrong.push(format!("{} has {lines} lines", path.display()));
         }
-        for (number, line) in shipped(&text).lines().enumerate() {
+        for (number, line) in code_without_tests(&text).lines().enumerate() {
             for word in [".unwrap()", ".expect(", "panic!(", "todo!(", "unimplemented!(", "unreachable!("] {
                 if line.contains(word) {
                     wrong.push(format!("{}:{} has {word}", path.display(), number + 1));
@@ -265,7 +265,7 @@ fn files_stay_readable_and_never_panic_on_purpose() {
 #[test]
 fn the_check_sees_code_and_only_code() {
     let text = "// std::fs\n/* App */ let a = \"std::fs\"; let b = r#\"App \" \"#; let c = '\"'; std::fs::read();\nuse crate::{\n    plugins::{a, b},\n    rig,\n};\n#[cfg(test)]\nmod tests { App }";
-    let code = shipped(text);
+    let code = code_without_tests(text);
     assert_eq!(mentions(&code, "std::fs"), [2]);
     assert_eq!(mentions(&code, "App"), [0; 0]);
     assert_eq!(mentions(&code, "crate::plugins"), [3]);
@@ -346,6 +346,12 @@ fn rust_files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
+/// First words that name no subject: pronouns, prepositions, conjunctions and adverbs.
+const NO_SUBJECTS: &str = "What How Where Which Whether Those Who Whose Why That Its Their It They This These \
+    Something Everything Anything Somebody Nobody Both Neither Some Same There Always Never Not Only Also \
+    As For By Of In Or or And But So Like From With Without At On \
+    About Above Across Against Along Beside Between Over Towards";
+
 /// Documentation begins with a noun of the field: of items in the sources, the benches and the examples, and of modules in
 /// the tests.
 #[test]
@@ -363,35 +369,7 @@ fn documentation_names_its_subject() {
                 }
                 count += 1;
                 let first = words.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default();
-                if [
-                    "What",
-                    "How",
-                    "Where",
-                    "Which",
-                    "Whether",
-                    "Those",
-                    "Who",
-                    "Whose",
-                    "Why",
-                    "That",
-                    "Its",
-                    "Their",
-                    "It",
-                    "They",
-                    "This",
-                    "These",
-                    "Something",
-                    "Everything",
-                    "As",
-                    "For",
-                    "By",
-                    "Both",
-                    "Of",
-                    "In",
-                ]
-                .contains(&first)
-                    || words.starts_with("The same")
-                {
+                if NO_SUBJECTS.split_whitespace().any(|word| word == first) || words.starts_with("The same") {
                     wrong.push(format!("{}:{line}: {words}", path.strip_prefix(root).unwrap().display()));
                 }
             }
@@ -402,7 +380,7 @@ fn documentation_names_its_subject() {
 }
 
 /// Pieces of a text in backticks, with their lines.
-fn backticked(text: &str) -> Vec<(usize, &str)> {
+fn code_pieces(text: &str) -> Vec<(usize, &str)> {
     let mut is_code = false;
     let mut pieces = Vec::new();
     for (number, line) in text.lines().enumerate() {
@@ -427,7 +405,7 @@ fn the_architecture_names_every_folder() {
     let text = fs::read_to_string(root.join("ARCHITECTURE.md")).unwrap();
     let mut named: Vec<PathBuf> = Vec::new();
     for row in section(&text, "Where things are").filter(|line| line.starts_with("| `")) {
-        let pieces = backticked(row);
+        let pieces = code_pieces(row);
         let first = Path::new(pieces[0].1);
         let above = first.parent().unwrap_or(Path::new(""));
         for (_, piece) in pieces.iter().filter(|(_, piece)| piece.ends_with('/')) {
@@ -469,7 +447,7 @@ fn the_architecture_names_paths_that_exist() {
         (piece.contains('/') || is_file && !piece.starts_with('.')) && !piece.contains([' ', '*', '(', '{'])
     };
     let (mut wrong, mut count) = (Vec::new(), 0);
-    for (line, piece) in backticked(&text) {
+    for (line, piece) in code_pieces(&text) {
         let row = text.lines().nth(line - 1).unwrap_or_default();
         if !is_path(piece) || folders.contains(&row) && !piece.ends_with(".rs") {
             continue;

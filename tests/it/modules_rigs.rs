@@ -400,6 +400,8 @@ fn mistakes_say_what_to_do() {
             format!("(driver: \"{}\", driver_channel: RotateX, output: \"@this\")", knob(100)),
             &["output", "what is driven"],
         ),
+        ("pole_vector", "(distance: 0.0)".into(), &["distance: is 0; write a number above 0"]),
+        ("pole_vector", "(distance: -1e-9)".into(), &["distance: is -1e-9; write a number above 0"]),
         ("morph", "()".into(), &["morph", "empty"]),
         ("expression", "(text: \"a + \", output: \"@this\", output_channel: RotateX)".into(), &["text", "column"]),
         (
@@ -422,7 +424,7 @@ fn mistakes_say_what_to_do() {
 }
 
 /// An arm with a switch; tags: three forward controls, goal, pole, the switch.
-fn switched(extra: &str) -> (Bench, [u64; 5]) {
+fn arm_with_switch(extra: &str) -> (Bench, [u64; 5]) {
     let mut bench = Bench::new(&ARM);
     let upper = bench.tag(2, "knob", &format!("(below: \"{}\", turn: 20)", joint(1)));
     let lower = bench.tag(3, "knob", &format!("(below: \"{}\", turn: -30)", knob(upper)));
@@ -472,7 +474,7 @@ fn a_limb_is_switched_without_a_jump() {
     ];
     let goals = [([-0.2, 0.15, 0.1], 0.4), ([0.3, 0.1, 0.0], 0.0), ([-0.45, -0.2, 0.2], -1.2)];
     for extra in &cases {
-        let (bench, tags) = switched(extra);
+        let (bench, tags) = arm_with_switch(extra);
         let mut play = bench.play();
         let [upper, lower, hand, goal, pole] = tags.map(|tag| play.knob(tag));
         let joints = |play: &mut Play| [2, 3, 4].map(|joint| play.joint(joint));
@@ -512,7 +514,7 @@ fn a_limb_is_switched_without_a_jump() {
 #[test]
 fn what_is_left_of_a_jump_is_told() {
     // A goal that goes ahead of a soft limb also lengthens its bones where they stretch: the end stays, the elbow cannot.
-    let (bench, tags) = switched(&with_pole(", soft: 0.05, stretch: 0.5"));
+    let (bench, tags) = arm_with_switch(&with_pole(", soft: 0.05, stretch: 0.5"));
     let mut play = bench.play();
     let [upper, lower, _, goal, _] = tags.map(|tag| play.knob(tag));
     play.value(goal, "ik_fk", 0.0);
@@ -738,7 +740,7 @@ fn a_bone_keeps_its_volume_and_a_tail_lags_behind() {
 
 #[test]
 fn what_is_posed_waits_for_its_node() {
-    let (mut bench, tags) = switched("");
+    let (mut bench, tags) = arm_with_switch("");
     let play = bench.play();
     let (goal, hand) = (play.knob(tags[3]), play.knob(tags[2]));
     let offset = PoseOffset { translation: Vec3::X, ..PoseOffset::IDENTITY };

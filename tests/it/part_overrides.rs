@@ -34,19 +34,19 @@ impl Desk {
     fn saved(&self, rig: &Rig) -> String {
         let path = self.path();
         assert_eq!(store_rig_over(&RealDisk, &path, rig, &[&path]).unwrap(), Vec::<String>::new());
-        assert_eq!(said(load(&path)), said(rig.clone()));
+        assert_eq!(text_of_rig(load(&path)), text_of_rig(rig.clone()));
         fs::read_to_string(path).unwrap()
     }
 }
 
 /// The template of a rig, with the parameters of every command in the order of their names, which means nothing: a parameter
 /// that a change sets comes behind those of the part.
-fn said(mut rig: Rig) -> String {
+fn text_of_rig(mut rig: Rig) -> String {
     let tags: Vec<(Uid, TagData)> =
         rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag.clone()))).collect();
     for (joint, mut tag) in tags {
         if let TagKind::Command { params, .. } = &mut tag.kind {
-            *params = unbound(&sorted(&without_blanks(params)));
+            *params = unbound_params(&sorted(&without_blanks(params)));
             apply(&mut rig, RigEdit::SetTag(joint, Box::new(tag)));
         }
     }
@@ -54,7 +54,7 @@ fn said(mut rig: Rig) -> String {
 }
 
 /// Parameters whose references have names alone: reading binds a name to the uid that it stands for.
-fn unbound(params: &str) -> String {
+fn unbound_params(params: &str) -> String {
     let mut pieces = params.split('#');
     let mut text = pieces.next().unwrap_or_default().to_owned();
     for piece in pieces {
@@ -352,7 +352,7 @@ fn a_value_of_the_bundled_biped_is_one_line() {
         assert!(added.len() <= 8 && added.iter().any(|added| added.contains(line)), "{added:#?}");
         in_a_line += usize::from(added.len() == 1);
         assert!(lines_beyond(&text, &saved).len() <= 1);
-        assert_eq!(said(load(&out)), said(rig));
+        assert_eq!(text_of_rig(load(&out)), text_of_rig(rig));
         changed += 1;
     }
     assert!(changed > 5 && in_a_line * 2 > changed, "{changed} {in_a_line}");

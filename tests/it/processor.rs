@@ -149,7 +149,7 @@ fn add(rig: &mut Rig, joint: u64, tag: Box<TagData>) {
     rig.apply(&RigEdit::AddTag { joint: Uid(joint), tag, index: usize::MAX }).unwrap();
 }
 
-fn started(rig: &Rig) -> Builder {
+fn started_builder(rig: &Rig) -> Builder {
     let mut builder = Builder::new(modules());
     builder.sync(rig);
     builder
@@ -184,7 +184,7 @@ fn example() -> Rig {
 #[test]
 fn commands_run_parents_first_and_top_to_bottom() {
     let rig = example();
-    let mut builder = started(&rig);
+    let mut builder = started_builder(&rig);
     let list: Vec<u64> = builder.list().iter().map(|entry| entry.command.0).collect();
     assert_eq!(list, [101, 102, 103, 104, 105]);
     let report = builder.run_all();
@@ -201,7 +201,7 @@ fn commands_run_parents_first_and_top_to_bottom() {
 #[test]
 fn only_what_depends_on_an_edit_runs() {
     let mut rig = example();
-    let mut builder = started(&rig);
+    let mut builder = started_builder(&rig);
     builder.run_all();
     let set = |uid, module: &str, params: &str, joint| RigEdit::SetTag(Uid(joint), command(uid, module, params));
     let at_j3 = |up: &str| format!(r#"(at: "@joint #0000000000000003", up: {up})"#);
@@ -232,7 +232,7 @@ fn only_what_depends_on_an_edit_runs() {
 #[test]
 fn stepping_back_and_forth_is_exact_and_runs_nothing_twice() {
     let rig = example();
-    let mut builder = started(&rig);
+    let mut builder = started_builder(&rig);
     let mut views = vec![builder.built()];
     for place in 1..=5 {
         let report = builder.step_forward();
@@ -260,7 +260,7 @@ fn stepping_back_and_forth_is_exact_and_runs_nothing_twice() {
 #[test]
 fn a_failing_command_halts_the_build_where_it_is() {
     let mut rig = example();
-    let mut builder = started(&rig);
+    let mut builder = started_builder(&rig);
     builder.run_all();
     let bad = RigEdit::SetTag(Uid(2), command(103, "nudge", r#"(node: "@module mrak")"#));
     rig.apply(&bad).unwrap();
@@ -277,7 +277,7 @@ fn a_failing_command_halts_the_build_where_it_is() {
     assert_eq!(states, [Done, Done, Failed, Pending, Pending]);
     assert_eq!(names(&builder.built()), ["j1", "j2", "j3", "j1_mark", "j3_mark"], "what was before stands");
     // Nothing behind it ran, in a build from nothing neither.
-    let mut fresh = started(&rig);
+    let mut fresh = started_builder(&rig);
     assert_eq!(fresh.run_all().executed.len(), 3);
     assert_eq!(fresh.built(), builder.built());
     // Mended: the others are still as they were, and need not run.
@@ -348,7 +348,7 @@ fn circles_that_an_earlier_command_closes_are_found() {
         2,
         command(103, "follow", r#"(node: "@command #0000000000000065", targets: "@joint #0000000000000001")"#),
     );
-    let mut builder = started(&rig);
+    let mut builder = started_builder(&rig);
     assert_eq!(builder.run_all().error, None);
     let closing =
         command(102, "follow", r#"(node: "@joint #0000000000000001", targets: "@command #0000000000000065")"#);
@@ -377,7 +377,7 @@ fn features_and_groups_switch_commands() {
     let kind = TagKind::Command { module: "nudge".into(), params: "()".into(), feature: Some(Uid(200)) };
     let tag = TagData { uid: Uid(103), enabled: true, comment: String::new(), kind };
     rig.apply(&RigEdit::SetTag(Uid(2), Box::new(tag))).unwrap();
-    let mut builder = started(&rig);
+    let mut builder = started_builder(&rig);
     builder.run_all();
     assert_eq!(change(&mut rig, &mut builder, RigEdit::SetTag(Uid(1), feature(false))), [0; 0]);
     assert_eq!(builder.status(Uid(103)).unwrap().state, CommandState::Skipped);
@@ -402,7 +402,7 @@ fn features_and_groups_switch_commands() {
 fn identities_outlive_what_happens_around_them() {
     let mut rig = chain(4);
     add(&mut rig, 1, command(101, "mark", r#"(at: "@joints")"#));
-    let mut builder = started(&rig);
+    let mut builder = started_builder(&rig);
     builder.run_all();
     let marks = |builder: &Builder| -> Vec<(Uid, Uid)> {
         let built = builder.built();
@@ -429,7 +429,7 @@ fn identities_outlive_what_happens_around_them() {
 fn references_by_label_outlive_renaming() {
     let mut rig = chain(3);
     add(&mut rig, 1, command(101, "mark", r#"(at: "@joints label:j3#0000000000000003", up: 1.0)"#));
-    let mut builder = started(&rig);
+    let mut builder = started_builder(&rig);
     builder.run_all();
     assert_eq!(change(&mut rig, &mut builder, RigEdit::SetLabel(Uid(3), Some("head".into()))), [0; 0]);
     assert_eq!(builder.built().nodes.len(), 4);
@@ -459,7 +459,7 @@ fn forward_references_find_what_is_made_in_between() {
     let refs: NodeRefs = NodeRef::from(Source::Module("mark".into())).into();
     let params = format!("(node: {:?}, by: 1.0)", refs.to_string());
     add(&mut rig, 2, command(102, "nudge", &params));
-    let mut builder = started(&rig);
+    let mut builder = started_builder(&rig);
     assert!(builder.run_all().error.is_some());
     assert_eq!(
         change(&mut rig, &mut builder, RigEdit::AddTag { joint: Uid(1), tag: command(101, "mark", "()"), index: 0 }),

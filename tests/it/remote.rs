@@ -114,7 +114,7 @@ impl Remote {
     }
 
     #[track_caller]
-    fn refused(&mut self, method: &str, params: Value) -> (i64, String) {
+    fn refusal(&mut self, method: &str, params: Value) -> (i64, String) {
         let answer = self.answer(method, params);
         assert!(answer.get("result").is_none(), "{method}: {answer}");
         let error = &answer["error"];
@@ -245,11 +245,11 @@ fn the_schema_names_every_method_and_its_parameters() {
         // Each parameter that the schema has is known, and one that it has not is refused.
         for param in method["params"].as_array().unwrap() {
             let given = json!({param["name"].as_str().unwrap(): {"no": "such"}});
-            let (code, message) = remote.refused(name, given);
+            let (code, message) = remote.refusal(name, given);
             assert!(code == -32602 && !message.contains("unknown field"), "{name}: {message}");
         }
         if name != "rpc.discover" {
-            let (code, message) = remote.refused(name, json!({"rig": rig, "surplus": 1}));
+            let (code, message) = remote.refusal(name, json!({"rig": rig, "surplus": 1}));
             assert!(code == -32602 && message.contains("unknown field"), "{name}: {message}");
         }
     }
@@ -384,7 +384,7 @@ fn hostile_calls_are_refused_and_change_nothing() {
             ("rig.template.load", json!({"path": "link.rig.ron"})),
             ("rig.template.save", json!({"rig": rig, "path": "link.rig.ron"})),
         ] {
-            assert_eq!(remote.refused(method, params).0, -32002);
+            assert_eq!(remote.refusal(method, params).0, -32002);
         }
         assert_eq!(fs::read_to_string(remote.folder.path().join("secret.rig.ron")).unwrap(), CHAIN);
     }
@@ -394,18 +394,18 @@ fn hostile_calls_are_refused_and_change_nothing() {
 fn templates_that_cannot_be_read_leave_nothing_behind() {
     let mut remote = Remote::new();
     fs::write(remote.file("broken.rig.ron"), "(format: 2, name: \"x\", joints: [(label: 3)])").unwrap();
-    let (code, message) = remote.refused("rig.template.load", json!({"path": "broken.rig.ron"}));
+    let (code, message) = remote.refusal("rig.template.load", json!({"path": "broken.rig.ron"}));
     assert!(code == -32003 && message.contains("broken.rig.ron"), "{message}");
-    assert_eq!(remote.refused("rig.template.load", json!({"path": "none.rig.ron"})).0, -32002);
+    assert_eq!(remote.refusal("rig.template.load", json!({"path": "none.rig.ron"})).0, -32002);
     remote.app.update();
     assert_eq!(remote.call("rig.list", json!({})), json!([]));
     let rig = remote.load();
     let before = remote.text(&rig);
     fs::write(remote.file("t.rig.ron"), &CHAIN[..CHAIN.len() / 2]).unwrap();
-    assert_eq!(remote.refused("rig.template.update", json!({"rig": rig})).0, -32003);
+    assert_eq!(remote.refusal("rig.template.update", json!({"rig": rig})).0, -32003);
     assert_eq!(remote.text(&rig), before);
     assert_eq!(
-        remote.refused("rig.edit", json!({"rig": rig, "history": "undo"})).1.matches("nothing to undo").count(),
+        remote.refusal("rig.edit", json!({"rig": rig, "history": "undo"})).1.matches("nothing to undo").count(),
         1
     );
 }

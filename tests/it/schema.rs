@@ -23,7 +23,7 @@ use rigsmith::{
 use super::bench::HANG;
 
 /// Names of components in the first column of the table of `plugins`, without the module in front.
-fn told_components() -> BTreeSet<String> {
+fn table_components() -> BTreeSet<String> {
     let text = include_str!("../../src/plugins.rs");
     let rows = text.lines().filter_map(|line| line.strip_prefix("//! | ")).skip(1);
     let cells = rows.take_while(|row| !row.contains("plugin |")).filter_map(|row| row.split(" | ").next());
@@ -41,7 +41,7 @@ fn told_components() -> BTreeSet<String> {
 
 #[test]
 fn every_component_of_the_table_is_registered() {
-    let names = told_components();
+    let names = table_components();
     assert!(names.len() > 30, "the table was not read: {names:?}");
     for name in ["Rig", "NodeSlot", "BuildFailure", "RunFailure", "Parked", "Constrains"] {
         assert!(names.contains(name), "the table lacks {name}");
@@ -68,7 +68,7 @@ fn every_registered_component_is_told() {
         RigInstancePlugin::default(),
     ));
     let registry = app.world().resource::<AppTypeRegistry>().read();
-    let names = told_components();
+    let names = table_components();
     let registered = registry.iter().filter(|of| of.data::<ReflectComponent>().is_some());
     // The editor's own components describe its windows, not rigs.
     let own = registered
@@ -92,7 +92,7 @@ fn every_registered_component_is_told() {
 fn every_component_of_the_schema_is_told() {
     let text = include_str!("../../src/plugins/schema.rs");
     let mut lines = text.lines();
-    let names = told_components();
+    let names = table_components();
     let mut count = 0;
     while let Some(line) = lines.next() {
         if !line.starts_with("#[derive(Component") {
@@ -112,7 +112,7 @@ fn template() -> (&'static str, RigTemplate) {
 }
 
 /// Kinds of components that describe nodes, by name.
-fn described(entity: EntityRef) -> BTreeSet<&'static str> {
+fn node_components(entity: EntityRef) -> BTreeSet<&'static str> {
     let kinds = [
         ("Joint", TypeId::of::<Joint>()),
         ("Null", TypeId::of::<Null>()),
@@ -160,7 +160,7 @@ fn instances_carry_the_components_of_a_built_rig() {
         for (uid, entity) in known {
             let (_, model) = nodes.iter().find(|(other, _)| *other == uid).expect("a node that the editor has, too");
             let node = played.entity(entity);
-            assert_eq!(described(node), described(told.entity(*model)), "{uid} in {mode:?}");
+            assert_eq!(node_components(node), node_components(told.entity(*model)), "{uid} in {mode:?}");
             assert!(node.contains::<NodeSlot>());
             assert_eq!(node.get::<NodeLabel>(), told.get::<NodeLabel>(*model), "{uid} in {mode:?}");
             assert_eq!(node.get::<Control>(), told.get::<Control>(*model), "{uid} in {mode:?}");

@@ -65,7 +65,7 @@ impl Studio {
         let mut studio = Self { app, rig, file, _folder: folder };
         studio.until("the rig", |world, rig| world.get::<Built>(rig).is_some());
         studio.app.update();
-        assert_eq!(studio.told().built, 1);
+        assert_eq!(studio.instance_report().built, 1);
         studio
     }
 
@@ -76,7 +76,7 @@ impl Studio {
         (template, built)
     }
 
-    fn told(&self) -> &InstanceReport {
+    fn instance_report(&self) -> &InstanceReport {
         self.app.world().resource::<InstanceReport>()
     }
 
@@ -87,7 +87,7 @@ impl Studio {
     fn until(&mut self, what: &str, is_so: impl Fn(&World, Entity) -> bool) {
         let start = Instant::now();
         while !is_so(self.app.world(), self.rig) {
-            assert!(start.elapsed() < HANG, "{what} does not come: {:?}", self.told());
+            assert!(start.elapsed() < HANG, "{what} does not come: {:?}", self.instance_report());
             self.app.update();
             std::thread::sleep(std::time::Duration::from_millis(1));
         }
@@ -147,7 +147,7 @@ fn a_live_rig_takes_over_what_the_file_changed_and_keeps_what_is_its_own() {
         studio.app.update();
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
-    assert_eq!((studio.height("tail_1"), studio.told().updated), (1.0, 1));
+    assert_eq!((studio.height("tail_1"), studio.instance_report().updated), (1.0, 1));
     studio.request(Change::Redo);
     assert_eq!(studio.app.world().get::<RigSource>(studio.rig).unwrap().base(), Some(&after));
     studio.request(Change::Undo);
@@ -195,7 +195,7 @@ fn an_update_that_is_not_live_waits_and_one_that_cannot_be_built_is_taken_back()
     let mut studio = Studio::new(false);
     studio.save(&CHAIN.replace("(0, 1, 0)", "(0, 1.5, 0)"));
     studio.until("the offer", |world, rig| world.get::<UpdateOffer>(rig).is_some());
-    assert_eq!((studio.height("tail_1"), studio.told().updated), (1.0, 0));
+    assert_eq!((studio.height("tail_1"), studio.instance_report().updated), (1.0, 0));
 
     // The file alone builds; with what was changed here it does not.
     let mut studio = Studio::new(true);
@@ -211,7 +211,7 @@ fn an_update_that_is_not_live_waits_and_one_that_cannot_be_built_is_taken_back()
     studio.until("the failure", |world, _| !world.resource::<InstanceReport>().failed.is_empty());
     studio.app.update();
     studio.app.update();
-    assert_eq!((studio.rig(), studio.told().updated), (&before, 0));
+    assert_eq!((studio.rig(), studio.instance_report().updated), (&before, 0));
     assert!(studio.app.world().get::<BuildFailure>(studio.rig).is_none(), "it is built as before");
     studio.save(&CHAIN.replace("(0, 1, 0)", "(0, 1.5, 0)"));
     studio.until("the next good save", |world, _| world.resource::<InstanceReport>().updated == 1);
@@ -313,7 +313,7 @@ struct FileJoint {
 }
 
 /// The text of a template of these joints, with a control on each and an attribute on the first.
-fn written(joints: &[Option<FileJoint>]) -> String {
+fn template_of_joints(joints: &[Option<FileJoint>]) -> String {
     let mut text = String::from("(\n    format: 2,\n    name: \"living\",\n    joints: [\n");
     for joint in joints.iter().flatten() {
         let above = joint.above.and_then(|above| joints[above].as_ref());
@@ -392,7 +392,7 @@ struct PosedState {
 }
 
 impl Studio {
-    fn standing(&self) -> PosedState {
+    fn posed_state(&self) -> PosedState {
         let runtime = self.app.world().get::<RigRuntime>(self.rig).unwrap();
         let rig = self.rig();
         let joint = |joint: &RigJoint| {
@@ -403,7 +403,7 @@ impl Studio {
         PosedState { pose: rig.pose().clone(), values: rig.attribute_values().clone(), joints }
     }
 
-    fn living(&self, node: Uid) -> bool {
+    fn is_built(&self, node: Uid) -> bool {
         self.app.world().get::<Built>(self.rig).unwrap().0.node(node).is_some()
     }
 }
@@ -422,7 +422,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
         let above = number.checked_sub(1);
         joints.push(Some(FileJoint { name: format!("joint_{number}"), above, place, turn: 0.0, size: 1.0 }));
     }
-    let mut studio = Studio::of(true, &written(&joints));
+    let mut studio = Studio::of(true, &template_of_joints(&joints));
     studio.app.init_resource::<ListedJoints>();
     studio.app.add_observer(|updated: On<RigUpdated>, mut listed: ResMut<ListedJoints>| {
         listed.0 = updated.poses.iter().map(|note| note.deviation.joint).collect();
@@ -439,7 +439,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
         let labels: Vec<Uid> = studio.rig().walk().map(|joint| joint.data.uid).collect();
         let joint = labels[dice.below(labels.len() as u64) as usize];
         let share = dice.below(1000) as f32 / 1000.0;
-        let before = studio.standing();
+        let before = studio.posed_state();
         let edit = match dice.below(10) {
             0..=2 => {
                 let turned = PoseOffset::from_rotation(Quat::from_rotation_z(share - 0.5));
@@ -456,7 +456,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
             }
             _ => {
                 let known = studio.built();
-                let was = written(&joints);
+                let was = template_of_joints(&joints);
                 let is_part = dice.below(4) == 0;
                 let mut means_other = false;
                 studio.app.world_mut().resource_mut::<ListedJoints>().0.clear();
@@ -468,10 +468,10 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                     parts += 1;
                 } else {
                     means_other = rewrite(&mut joints, dice, step);
-                    while written(&joints) == was {
+                    while template_of_joints(&joints) == was {
                         means_other |= rewrite(&mut joints, dice, step);
                     }
-                    studio.save(&written(&joints));
+                    studio.save(&template_of_joints(&joints));
                 }
                 studio.until("the template", |world, _| {
                     world.resource::<RigTemplates>().built(&known.0).is_some_and(|now| !Arc::ptr_eq(now, &known.1))
@@ -489,15 +489,15 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                     }
                     is_mixed = true;
                 }
-                assert_eq!(studio.told().failed, Vec::<String>::new());
+                assert_eq!(studio.instance_report().failed, Vec::<String>::new());
                 reloads += 1;
-                let after = studio.standing();
-                for (node, values) in before.values.iter().filter(|(node, _)| studio.living(**node)) {
+                let after = studio.posed_state();
+                for (node, values) in before.values.iter().filter(|(node, _)| studio.is_built(**node)) {
                     assert_eq!(after.values.get(node), Some(values), "step {step}");
                 }
                 let listed = &studio.app.world().resource::<ListedJoints>().0;
                 if !means_other && !is_mixed {
-                    for (node, offset) in before.pose.iter().filter(|(node, _)| studio.living(**node)) {
+                    for (node, offset) in before.pose.iter().filter(|(node, _)| studio.is_built(**node)) {
                         assert_eq!(after.pose.get(node), Some(offset), "step {step}");
                     }
                 } else if !is_mixed {

@@ -103,7 +103,7 @@ impl Stages {
     }
 
     /// What a stage shows: the commands in effect, whether edits rebuild, and whether the rest pose is shown.
-    fn shown(&self) -> (usize, bool, bool) {
+    fn stage_view(&self) -> (usize, bool, bool) {
         let processor = self.app.world().get::<Processor>(self.rig).unwrap();
         let rest = self.app.world().get::<ShowRest>(self.rig).unwrap().0;
         (processor.builder().cursor(), processor.follows(), rest)
@@ -119,7 +119,7 @@ fn is_near(a: &[(Uid, Vec3)], b: &[(Uid, Vec3)]) -> bool {
 fn every_stage_leads_to_every_other_and_nothing_is_lost() {
     let mut stages = Stages::new();
     let (document, bytes) = (stages.rig().clone(), write_template(stages.rig()));
-    let commands = stages.shown().0;
+    let commands = stages.stage_view().0;
     assert!(commands > 0);
     let mut places: BTreeMap<&str, Vec<(Uid, Vec3)>> = BTreeMap::new();
     let mut walked = 0;
@@ -142,7 +142,7 @@ fn every_stage_leads_to_every_other_and_nothing_is_lost() {
                     RigStage::Built => (commands, true, false),
                     stage => (0, false, stage == RigStage::Edit),
                 };
-                assert_eq!(stages.shown(), expected, "{from:?} to {to:?}");
+                assert_eq!(stages.stage_view(), expected, "{from:?} to {to:?}");
                 let now = stages.places();
                 let before = places.entry(stage.name()).or_insert_with(|| now.clone());
                 assert!(is_near(before, &now), "{from:?} to {to:?}: {stage:?} was {before:?} and is {now:?}");
@@ -165,7 +165,7 @@ fn edits_at_a_stage_stay_and_run_only_where_commands_are_in_effect() {
     let mut rest = stages.rig().joint(tip).unwrap().data.rest;
     rest.translation.y = 0.5;
     stages.operate(Operation::Edits(vec![RigEdit::SetRest(tip, rest)]));
-    assert_eq!(stages.shown(), (0, false, true));
+    assert_eq!(stages.stage_view(), (0, false, true));
     stages.request(RigStage::Built);
     assert_eq!(stages.built().nodes.len(), nodes);
     assert_eq!(stages.rig().joint(tip).unwrap().data.rest.translation.y, 0.5);

@@ -104,7 +104,7 @@ impl Desk {
     }
 
     #[track_caller]
-    fn refused(&mut self, operation: TagOperation) -> OperationError {
+    fn refusal(&mut self, operation: TagOperation) -> OperationError {
         run(&mut self.rig, &mut self.uids, operation).unwrap_err()
     }
 
@@ -141,9 +141,9 @@ fn tags_are_added_changed_and_deleted() {
     assert_eq!(desk.params(second), "(t: \"@joint hand_r#0000000000000005\")");
     assert_eq!(desk.tags(ARM_L), [second, IK_L, HANDLE_L]);
     let error =
-        desk.refused(TagOperation::Add { joints: vec![HIPS], kind: aim("(t: \"@joint hnad_r\")"), index: None });
+        desk.refusal(TagOperation::Add { joints: vec![HIPS], kind: aim("(t: \"@joint hnad_r\")"), index: None });
     assert!(error.to_string().contains("byte 4") && error.to_string().contains("did you mean \"hand_r\""), "{error}");
-    let error = desk.refused(TagOperation::Params(vec![(first, "(".into())]));
+    let error = desk.refusal(TagOperation::Params(vec![(first, "(".into())]));
     assert!(matches!(error, OperationError::Edit(EditError::BadParams(..))), "{error}");
 
     desk.run(TagOperation::Params(vec![(first, "(1, \"@command control\")".into())]));
@@ -173,7 +173,7 @@ fn tags_are_added_changed_and_deleted() {
             TagError::NotFeature(HANDLE_L),
         ),
     ] {
-        assert_eq!(desk.refused(operation.clone()), error.into(), "{operation:?}");
+        assert_eq!(desk.refusal(operation.clone()), error.into(), "{operation:?}");
     }
 }
 
@@ -195,9 +195,9 @@ fn tags_are_moved_within_and_between_joints() {
         assert_eq!(desk.feature_of(HANDLE_L), Some(IK_L));
     }
     let mut desk = Desk::new();
-    assert_eq!(desk.refused(relocate(&[Uid(9)], HIPS, None)), TagError::NoTag(Uid(9)).into());
-    assert_eq!(desk.refused(relocate(&[IK_L], Uid(9), None)), EditError::NoJoint(Uid(9)).into());
-    assert_eq!(desk.refused(relocate(&[IK_L], HIPS, Some(IK_R))), EditError::NoTag(HIPS, IK_R).into());
+    assert_eq!(desk.refusal(relocate(&[Uid(9)], HIPS, None)), TagError::NoTag(Uid(9)).into());
+    assert_eq!(desk.refusal(relocate(&[IK_L], Uid(9), None)), EditError::NoJoint(Uid(9)).into());
+    assert_eq!(desk.refusal(relocate(&[IK_L], HIPS, Some(IK_R))), EditError::NoTag(HIPS, IK_R).into());
 }
 
 #[test]
@@ -277,8 +277,8 @@ fn features_of_one_kind_and_name_in_one_group_act_as_one() {
 
     assert_eq!(features_named(&desk.rig, "IK arm").unwrap().len(), 4);
     for (error, says) in [
-        (desk.refused(TagOperation::SetSwitch(left, "sotf".into(), true)), "did you mean \"soft\"?"),
-        (desk.refused(TagOperation::SetFeature(key(Some(RIGHT), "fk"), true)), "\"IK arm\" of kind \"fk\""),
+        (desk.refusal(TagOperation::SetSwitch(left, "sotf".into(), true)), "did you mean \"soft\"?"),
+        (desk.refusal(TagOperation::SetFeature(key(Some(RIGHT), "fk"), true)), "\"IK arm\" of kind \"fk\""),
         (features_named(&desk.rig, "IK amr").unwrap_err().into(), "did you mean \"IK arm\"?"),
     ] {
         assert!(error.to_string().contains(says), "{error}");
@@ -375,7 +375,7 @@ fn one_joint_is_pasted_onto_each_and_several_in_order() {
         (paste(&one, PasteTo::Joints(vec![Uid(9)])), EditError::NoJoint(Uid(9)).into()),
         (paste(&copy(&desk.rig, TagScope::Joints(vec![HIPS]), true), PasteTo::Mirror), TagError::NoMirror.into()),
     ] {
-        assert_eq!(desk.refused(operation), error);
+        assert_eq!(desk.refusal(operation), error);
     }
     for text in ["", "hello", "TagClipboard(", "TagClipboard(rig: 3)"] {
         assert!(matches!(TagClipboard::from_text(text), Err(TagError::NoClipboard(_))), "{text}");
@@ -527,8 +527,8 @@ fn a_part_is_dropped_onto_a_chain_until_either_list_ends() {
         joints: vec!["upper".into(), "lower".into(), "end".into()],
         given,
     };
-    assert_eq!(desk.refused(drop_on(&[ARM_L])), needs(1).into());
-    assert_eq!(desk.refused(drop_on(&[ARM_L, HAND_L])), needs(2).into());
+    assert_eq!(desk.refusal(drop_on(&[ARM_L])), needs(1).into());
+    assert_eq!(desk.refusal(drop_on(&[ARM_L, HAND_L])), needs(2).into());
     assert!(desk.rig == before, "a refused part changes nothing");
     assert!(needs(2).to_string().contains("needs 3 joints, from the first on upper, lower, end; 2 are selected"));
 
@@ -541,7 +541,7 @@ fn a_part_is_dropped_onto_a_chain_until_either_list_ends() {
 
     // Two joints with the label: it is asked which.
     desk.rig.apply(&RigEdit::SetLabel(HAND_R, Some("end".into()))).unwrap();
-    let error = desk.refused(drop_on(&[ARM_L, HAND_L]));
+    let error = desk.refusal(drop_on(&[ARM_L, HAND_L]));
     let candidates = vec![HIPS, HAND_R];
     let ambiguous = TagError::Ambiguous { kind: NameKind::Joint, uid: Uid(0xe2), name: "end".into(), candidates };
     assert_eq!(error, ambiguous.into());
@@ -549,8 +549,8 @@ fn a_part_is_dropped_onto_a_chain_until_either_list_ends() {
     desk.run(TagOperation::Drop { part: Arc::new(part()), joints: vec![ARM_L, HAND_L], bindings });
     let control = *desk.tags(HAND_L).last().unwrap();
     assert!(desk.params(control).contains("@joint end#0000000000000005"), "{}", desk.params(control));
-    assert_eq!(desk.refused(drop_on(&[])), TagError::NoTarget.into());
-    assert_eq!(desk.refused(drop_on(&[HIPS, Uid(9)])), EditError::NoJoint(Uid(9)).into());
+    assert_eq!(desk.refusal(drop_on(&[])), TagError::NoTarget.into());
+    assert_eq!(desk.refusal(drop_on(&[HIPS, Uid(9)])), EditError::NoJoint(Uid(9)).into());
 }
 
 /// A random operation: kind, and three numbers that choose among what there is.

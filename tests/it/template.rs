@@ -35,14 +35,14 @@ proptest! {
         prop_assert_eq!(write_template(&read.rig), text.clone());
         let again = read_template(text.as_bytes()).unwrap().rig;
         prop_assert_eq!(&again, &read.rig);
-        prop_assert_eq!(sound(first), read.rig.clone());
+        prop_assert_eq!(storable_rig(first), read.rig.clone());
         let header = read_header(text.as_bytes()).unwrap();
         prop_assert_eq!((&header.name, header.joint_count), (&read.rig.about().name, read.rig.len()));
     }
 }
 
 /// The rig without its current pose, which templates never store, and without names of pairs and features that were deleted.
-fn sound(mut rig: Rig) -> Rig {
+fn storable_rig(mut rig: Rig) -> Rig {
     for joint in rig.pose().keys().copied().collect::<Vec<_>>() {
         rig.apply(&RigEdit::SetOffset(joint, None)).unwrap();
     }
@@ -345,7 +345,7 @@ fn names_of_the_deleted_do_not_make_a_file_unreadable() {
     rig.apply(&RigEdit::RemoveTag(Uid(1), Uid(0x20))).unwrap();
     let read = read_template(write_template(&rig).as_bytes()).unwrap().rig;
     assert_eq!(read.joint(Uid(2)).unwrap().data.mirror, None);
-    assert_eq!(read, sound(rig));
+    assert_eq!(read, storable_rig(rig));
 }
 
 #[test]

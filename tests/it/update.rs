@@ -9,10 +9,10 @@ use rigsmith::rig::{
 use super::template_text::{CHAIN, Dice, apply, change, handwritten, plain, read};
 
 fn changes(base: Option<&Rig>, now: &Rig, file: &Rig) -> Vec<String> {
-    update(base, now, file, Take::Mine).changes.iter().map(told).collect()
+    update(base, now, file, Take::Mine).changes.iter().map(change_text).collect()
 }
 
-fn told(change: &Change) -> String {
+fn change_text(change: &Change) -> String {
     let parts = [&change.joint, &change.tag, &change.field, &change.from, &change.to];
     let parts: Vec<&str> = parts.into_iter().flatten().map(String::as_str).collect();
     let conflict = if change.conflict { "conflict " } else { "" };
@@ -39,7 +39,7 @@ fn what_each_side_changed_is_there_afterwards() {
     apply(&mut now, RigEdit::AddJoint { joint: Box::new(own), parent: Some(tip), index: 0 });
 
     let updated = update(Some(&base), &now, &file, Take::Mine);
-    let lines: Vec<String> = updated.changes.iter().map(told).collect();
+    let lines: Vec<String> = updated.changes.iter().map(change_text).collect();
     assert_eq!(
         lines,
         [
@@ -118,7 +118,7 @@ fn another_name_is_told_as_such_and_keeps_the_identity() {
     );
     assert!(file.joint(tip).is_none());
     let updated = update(Some(&base), &base, &file, Take::Mine);
-    let lines: Vec<String> = updated.changes.iter().map(told).collect();
+    let lines: Vec<String> = updated.changes.iter().map(change_text).collect();
     assert_eq!(lines[0], "Renamed tail_3 label tail_3 tip");
     assert!(lines.iter().all(|line| !line.starts_with("Added") && !line.starts_with("Removed")), "{lines:?}");
     assert_eq!(updated.rig.find_label("tip"), Some(tip));

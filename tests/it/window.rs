@@ -185,7 +185,7 @@ impl<'a> Hands<'a> {
     }
 
     /// Time of processors that the program has used, in hundredths of a second.
-    fn worked(&self) -> u64 {
+    fn processor_time(&self) -> u64 {
         let text = std::fs::read_to_string(format!("/proc/{}/stat", self.program.id())).unwrap();
         let fields: Vec<&str> = text[text.rfind(')').unwrap()..].split_whitespace().collect();
         fields[12].parse::<u64>().unwrap() + fields[13].parse::<u64>().unwrap()
@@ -197,9 +197,9 @@ impl<'a> Hands<'a> {
         let mut used = Vec::new();
         while used.last() != Some(&0) && used.last() != Some(&1) {
             assert!(start.elapsed() < PATIENCE, "the window never rests; hundredths of a second in 2 s: {used:?}");
-            let before = self.worked();
+            let before = self.processor_time();
             sleep(Duration::from_secs(2));
-            used.push(self.worked() - before);
+            used.push(self.processor_time() - before);
         }
     }
 
@@ -218,7 +218,7 @@ fn there(tool: &str) -> bool {
 }
 
 /// What is missing to drive a window.
-fn missing() -> Option<&'static str> {
+fn missing_prerequisite() -> Option<&'static str> {
     if cfg!(not(target_os = "linux")) {
         Some("windows are driven on Linux only")
     } else if !there("Xvfb") {
@@ -270,7 +270,7 @@ fn pixel(report: &WindowReport, place: [f32; 3]) -> [f32; 2] {
 /// Fitted, skinned and posed in six gestures: a key, a key, a key, a click, a drag; and all of a fit taken back with one key.
 #[test]
 fn a_body_is_fitted_by_a_key_on_a_display_and_gpu() {
-    if let Some(reason) = missing() {
+    if let Some(reason) = missing_prerequisite() {
         skip(reason, "RIGSMITH_REQUIRE_GPU");
         return;
     }
@@ -308,7 +308,7 @@ fn a_body_is_fitted_by_a_key_on_a_display_and_gpu() {
 
 #[test]
 fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
-    if let Some(reason) = missing() {
+    if let Some(reason) = missing_prerequisite() {
         skip(reason, "RIGSMITH_REQUIRE_GPU");
         return;
     }

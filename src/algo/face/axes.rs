@@ -18,7 +18,7 @@ mod mirror;
 /// Orientation of a head in the space of its mesh: unit vectors at right angles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeadAxes {
-    /// Towards the crown.
+    /// Direction towards the crown.
     pub up: Vec3,
     /// View direction of the face.
     pub forward: Vec3,

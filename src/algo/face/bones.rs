@@ -26,7 +26,7 @@ use spread::{FixedPlace, PARTS, Seat, Spreader};
 pub enum Side {
     /// The character's left, +x.
     Left,
-    /// On the plane of symmetry.
+    /// The plane of symmetry.
     Middle,
     /// The character's right.
     Right,
@@ -35,7 +35,7 @@ pub enum Side {
 /// A region of the face.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Region {
-    /// Above the brows.
+    /// Forehead, above the brows.
     Forehead,
     /// Eyebrows.
     Brow,
@@ -49,7 +49,7 @@ pub enum Region {
     Lip,
     /// Chin and lower jaw.
     Jaw,
-    /// Beside the eyes.
+    /// Temples, beside the eyes.
     Temple,
     /// Eyeballs.
     Eye,

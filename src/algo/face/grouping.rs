@@ -24,7 +24,7 @@ mod spread;
 pub enum HeadGroup {
     /// The front.
     Face,
-    /// Between front and back.
+    /// The part between front and back.
     Middle,
     /// The back.
     Back,

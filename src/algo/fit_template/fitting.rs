@@ -229,7 +229,7 @@ impl<'a> Fit<'a> {
         found
     }
 
-    /// Up and forward in the mesh's space: the file's axes where they are near.
+    /// Directions up and forward in the mesh's space: the file's axes where they are near.
     fn directions(&self, best: &Hypothesis, body: Option<&human::FittedBody>) -> (Vec3, Vec3) {
         let rotation = body.map_or(best.alignment.rotation, |b| b.trunk);
         let space = &self.analysis.mesh.space;

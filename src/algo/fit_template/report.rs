@@ -10,7 +10,7 @@ use super::{assign::Hypothesis, human::FittedBody, limbs::LimbKind};
 /// A template's skeleton in a mesh.
 #[derive(Debug, Clone)]
 pub struct FittedSkeleton {
-    /// Up in the mesh's space, unit length.
+    /// Up direction in the mesh's space, of unit length.
     pub up: Vec3,
     /// Direction that the figure faces in the mesh's space, unit length.
     pub forward: Vec3,

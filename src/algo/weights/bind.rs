@@ -25,7 +25,7 @@ pub(crate) enum Source {
     Voxels,
     Fill,
     Nearest,
-    /// Not bound yet.
+    /// No origin: the place is not bound yet.
     None,
 }
 

@@ -1,4 +1,4 @@
-//! From joints to bones: which straight pieces a joint pulls with, and how far its flesh reaches.
+//! Bones of joints: which straight pieces a joint pulls with, and how far its flesh reaches.
 //!
 //! A joint owns a bone to each of its children that does not lie behind it, so a hand holds its whole palm and a chest
 //! reaches up to both collarbones. Where a chain ends there is no child: the bone then runs through the flesh beyond
@@ -17,7 +17,7 @@ use super::{
 
 /// Length of a last bone in the flesh beyond its joint, as a share of the reach of that flesh.
 const LEAF_REACH: f32 = 0.8;
-/// About how many points measure the girth of bones.
+/// Approximate number of points that measure the girth of bones.
 const SAMPLES: usize = 8192;
 /// The share of the flesh around a bone that lies within its girth.
 const GIRTH: f32 = 0.9;

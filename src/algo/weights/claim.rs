@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{bone_tree::closest_on, bones::Bones, laplacian::Graph, sight::Sight};
 
-/// At most this many joints share a point before the heat spreads.
+/// Largest number of joints that share a point before the heat spreads.
 pub(crate) const SHARES: usize = 4;
 /// The heat coefficient at unit distance. Baran and Popović use 1 for soft cartoon flesh; hand-made weights of human
 /// bodies are tighter.

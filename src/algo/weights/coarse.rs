@@ -8,7 +8,7 @@ use crate::mesh::model::Weights;
 
 /// Meshes up to this many points are bound as they are.
 pub(crate) const LIMIT: usize = 40_000;
-/// About how many clusters a larger mesh becomes.
+/// Approximate number of clusters that a larger mesh becomes.
 const CLUSTERS: usize = 20_000;
 /// Number of times that weights are averaged with their neighbours while they are spread back.
 const STEPS: usize = 5;

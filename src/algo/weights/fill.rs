@@ -169,7 +169,7 @@ fn ends(bones: &[BoneSegment]) -> impl Iterator<Item = Vec3> + '_ {
     bones.iter().flat_map(|b| [b.head, b.tail])
 }
 
-/// At most a few dozen nodes of an island, evenly spread.
+/// Sample of an island: a few dozen of its nodes at most, evenly spread.
 fn sample(island: &[u32]) -> impl Iterator<Item = &u32> {
     island.iter().step_by(island.len().div_ceil(32).max(1))
 }

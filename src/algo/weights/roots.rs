@@ -95,7 +95,7 @@ pub(crate) struct Homes {
     parts: Vec<Vec<bool>>,
 }
 
-/// About how many points of a part without bones look for the part that it lies on.
+/// Approximate number of points of a part without bones that look for the part that it lies on.
 const SAMPLES: usize = 32;
 
 impl Homes {

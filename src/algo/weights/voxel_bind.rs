@@ -74,7 +74,7 @@ pub enum VoxelError {
     /// The mesh cannot be made into voxels.
     #[error(transparent)]
     Mesh(#[from] VoxelizeError),
-    /// There is nothing to bind to.
+    /// No bone to bind to.
     #[error("there is no bone with finite ends to bind to; place joints first")]
     NoBones,
     /// The progress callback asked to stop.

@@ -79,7 +79,7 @@ enum SavedContent {
         notes: Vec<String>,
         bundled: Option<PathBuf>,
     },
-    /// With the rig if it was saved to the template that was opened.
+    /// Export; `template` is the rig if it was saved to the template that was opened.
     Export {
         notes: Vec<String>,
         template: Option<Arc<Rig>>,

@@ -50,11 +50,11 @@ impl Ink {
 /// Depth of a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Layer {
-    /// Over the mesh, sorted among the pictures over it.
+    /// Place over the mesh, sorted among the pictures over it.
     Over,
     /// Place in the scene: nearer objects hide the picture.
     Scene,
-    /// At exactly this depth (see [`Ink::depths`]).
+    /// Exactly this depth (see [`Ink::depths`]).
     Fixed(f32),
 }
 

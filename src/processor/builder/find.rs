@@ -30,7 +30,7 @@ pub enum FindError {
         /// Switch that is off.
         off: Exclusion,
     },
-    /// There is no joint that could ask.
+    /// Rig without joints, in which no joint could ask.
     #[error("the rig has no joints, so references find nothing")]
     Empty,
 }

@@ -10,7 +10,7 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CommandState {
-    /// Not carried out yet, or rolled back.
+    /// Waiting to be carried out: for the first time, or again after it was rolled back.
     Pending,
     /// Carried out.
     Done,

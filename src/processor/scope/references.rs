@@ -32,7 +32,7 @@ impl BuildScope<'_> {
         Ok(found.nodes)
     }
 
-    /// Like [`BuildScope::resolve`], but at least one node.
+    /// Nodes that references stand for, at least one; see [`BuildScope::resolve`].
     ///
     /// # Errors
     /// See [`BuildScope::resolve`]; nothing found, with the nearest matches; [`ModuleError::Off`] if all is off.
@@ -45,8 +45,8 @@ impl BuildScope<'_> {
         Err(self.nothing(parameter, references, &found.gaps))
     }
 
-    /// Like [`BuildScope::resolve_some`], with `None` in the place of each node that is off: for lists whose places go
-    /// with those of another list.
+    /// Nodes that references stand for, at least one, with `None` in the place of each node that is off: for lists
+    /// whose places go with those of another list.
     ///
     /// # Errors
     /// See [`BuildScope::resolve_some`].
@@ -61,7 +61,7 @@ impl BuildScope<'_> {
         Ok(list)
     }
 
-    /// Like [`BuildScope::resolve_some`], but nothing may be missing.
+    /// Nodes that references stand for, at least one, of which none may be off.
     ///
     /// # Errors
     /// See [`BuildScope::resolve_some`]; [`ModuleError::Off`] if a part of it is off.
@@ -93,7 +93,7 @@ impl BuildScope<'_> {
         }
     }
 
-    /// Like [`BuildScope::resolve_one`], but `None` for an empty parameter and for a node that is off.
+    /// The one node that references stand for; `None` for an empty parameter and for a node that is off.
     ///
     /// # Errors
     /// See [`BuildScope::resolve_one`].

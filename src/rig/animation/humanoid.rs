@@ -31,15 +31,15 @@ impl BodySide {
 pub enum LimbBone {
     /// Collarbone.
     Shoulder,
-    /// From shoulder to elbow.
+    /// Upper arm, from shoulder to elbow.
     UpperArm,
-    /// From elbow to wrist.
+    /// Lower arm, from elbow to wrist.
     LowerArm,
     /// Hand.
     Hand,
-    /// From hip to knee.
+    /// Upper leg, from hip to knee.
     UpperLeg,
-    /// From knee to ankle.
+    /// Lower leg, from knee to ankle.
     LowerLeg,
     /// Foot.
     Foot,

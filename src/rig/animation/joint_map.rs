@@ -24,7 +24,7 @@ pub enum FoundBy {
     Names,
     /// Shape of the skeleton.
     Shape,
-    /// Not at all: joints of the same names are mapped.
+    /// Labels of the joints: no bones were found, and joints of the same names are mapped.
     Labels,
 }
 

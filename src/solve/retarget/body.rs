@@ -35,7 +35,7 @@ pub(super) struct Body<'a> {
     pub target: &'a Figure,
     pub source: &'a Figure,
     pub frames: Vec<SourceFrame>,
-    /// Up in the target's space.
+    /// Up direction in the target's space.
     pub up: Vec3,
     /// Joints of the target that are turned, with the joint of the source that tells by how much, and a constant rotation.
     turned: BTreeMap<usize, TurnedJoint>,

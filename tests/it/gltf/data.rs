@@ -149,7 +149,7 @@ fn characters_pose_the_same() {
 type OtherView = (Vec<Vec3>, Vec<[f32; 4]>, Vec<[[f32; 4]; 4]>, Vec<f32>);
 
 /// What the crate `gltf` reads from a file that is known to be good.
-fn read_by_other(glb: &[u8]) -> OtherView {
+fn view_of_other_reader(glb: &[u8]) -> OtherView {
     let file = ::gltf::Gltf::from_slice(glb).unwrap();
     let bytes = |_: ::gltf::Buffer| file.blob.as_deref();
     let (mut points, mut weights, mut binds, mut times) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -178,7 +178,7 @@ fn another_reader_sees_the_same() {
         .filter(|path| path.extension().is_some_and(|kind| kind == "glb"))
     {
         let model = read_file(&path);
-        let (points, weights, binds, times) = read_by_other(&std::fs::read(&path).unwrap());
+        let (points, weights, binds, times) = view_of_other_reader(&std::fs::read(&path).unwrap());
         let skinned: Vec<Vec3> = (model.parts.iter().filter(|part| model.objects[part.object].skin.is_some()))
             .flat_map(|part| part.vertices.iter().map(|point| model.points[*point as usize]))
             .collect();
@@ -203,7 +203,7 @@ fn another_reader_sees_the_same() {
         );
 
         let glb = write_glb(&model, &settings).unwrap();
-        let (points_after, weights_after, binds_after, times_after) = read_by_other(&glb);
+        let (points_after, weights_after, binds_after, times_after) = view_of_other_reader(&glb);
         assert!(points_after == points && binds_after == binds && times_after == times, "{}", path.display());
         assert_eq!(weights_after.len(), weights.len());
         for (after, before) in weights_after.iter().zip(&weights).filter(|_| !path.ends_with("body_gt.glb")) {

@@ -57,12 +57,12 @@ fn a_thousand_broken_files_on_the_disk_change_nothing_and_are_told() {
         let saved = String::from_utf8_lossy(&last);
         game.until(&format!("the report of {saved:?}"), |told| told.failed.len() == count);
     }
-    assert!(game.told().updated.is_empty());
-    assert!(game.told().failed.iter().all(|told| told.contains("t.rig.ron")), "each has its file");
+    assert!(game.instance_report().updated.is_empty());
+    assert!(game.instance_report().failed.iter().all(|told| told.contains("t.rig.ron")), "each has its file");
     assert_eq!(game.places(instance), before);
     save(CHAIN.replace("(0, 1, 0)", "(0, 2, 0)").as_bytes());
     game.until("the next good save", |told| told.updated.len() == 1);
-    assert_eq!(game.told().failed.len(), 1000);
+    assert_eq!(game.instance_report().failed.len(), 1000);
     game.app.update();
     assert_ne!(game.places(instance), before);
 }
@@ -136,7 +136,7 @@ fn no_frame_of_a_reload_shows_the_rest_pose_or_moves_an_untouched_limb() {
             while after < 8 {
                 assert!(start.elapsed() < HANG, "the save does not come");
                 game.app.update();
-                after += usize::from(game.told().updated.len() > save);
+                after += usize::from(game.instance_report().updated.len() > save);
                 let now = game.places(instance);
                 for uid in &untouched {
                     assert_eq!(now.get(uid), posed.get(uid), "{mode:?}, save {save}, frame {after}");
@@ -147,7 +147,7 @@ fn no_frame_of_a_reload_shows_the_rest_pose_or_moves_an_untouched_limb() {
             }
             assert_ne!(game.places(instance).get(&hand), posed.get(&hand), "the change is there");
         }
-        assert_eq!(game.told().failed, Vec::<String>::new());
+        assert_eq!(game.instance_report().failed, Vec::<String>::new());
     }
 }
 
@@ -161,7 +161,7 @@ fn a_thousand_instances_go_on_in_one_frame() {
     let spawned = (0..1000).map(|number| (RigInstance(handle.clone()), Transform::from_xyz(number as f32, 0.0, 0.0)));
     let crowd: Vec<Entity> = spawned.map(|one| game.app.world_mut().spawn((one, InstanceMode::Direct)).id()).collect();
     game.until("the crowd", |told| told.built > 0);
-    assert_eq!(game.told().built, 1000, "all at once");
+    assert_eq!(game.instance_report().built, 1000, "all at once");
     // The limbs stand where their parts say in the rig's space; the chest goes with the hips.
     let chests: Vec<Entity> = [0, 499, 999].iter().map(|at| game.node(crowd[*at], "chest")).collect();
     game.app.update();
@@ -170,7 +170,7 @@ fn a_thousand_instances_go_on_in_one_frame() {
     assert!((before[2] - before[0]).distance(Vec3::X * 999.0) < 1e-3);
     game.offer(crowd[0], text.replace("translation: (0, 0.955, -0.006)", "translation: (0, 1.055, -0.006)").as_bytes());
     game.until("the update", |told| !told.updated.is_empty());
-    assert_eq!((game.told().updated.len(), game.told().failed.len()), (1000, 0), "in one frame");
+    assert_eq!((game.instance_report().updated.len(), game.instance_report().failed.len()), (1000, 0), "in one frame");
     for (at, before) in before.into_iter().enumerate() {
         assert!((place(&game, at) - before).distance(Vec3::Y * 0.1) < 1e-4, "{at}");
     }

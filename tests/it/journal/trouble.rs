@@ -50,7 +50,7 @@ fn the_next_place_is_taken_where_one_cannot_be_written() {
 }
 
 /// All that any journal in the folders gives back, as numbers of changes, with the rigs.
-fn found(folders: &[PathBuf]) -> Vec<Rig> {
+fn rigs_in_journals(folders: &[PathBuf]) -> Vec<Rig> {
     let mut rigs = Vec::new();
     for entry in folders.iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten() {
         let path = entry.unwrap().path();
@@ -123,7 +123,7 @@ fn whatever_fails_what_was_said_to_be_safe_is_recovered() {
                 let disk = Arc::new(FaultyDisk::new(RealDisk, Some(plan)));
                 let (states, safe) = work(folder.path(), &disk);
                 let folders = [folder.path().to_owned(), folder.path().join("state")];
-                let rigs = found(&folders);
+                let rigs = rigs_in_journals(&folders);
                 // What the project itself holds counts where no journal is left.
                 let project = fs::read(folder.path().join("hero.rigsmith.ron")).ok();
                 let saved = project.and_then(|bytes| Some(read_template(&bytes).ok()?.rig));

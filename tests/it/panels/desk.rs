@@ -93,7 +93,7 @@ impl Desk {
         self.shapes = output.shapes.len();
         output.textures_delta.clear();
         if let Some(update) = output.platform_output.accesskit_update {
-            self.seen = update.nodes.iter().filter_map(|(_, node)| seen(node)).collect();
+            self.seen = update.nodes.iter().filter_map(|(_, node)| shown_widget(node)).collect();
         }
         requests.carry_out(self.app.world_mut());
         self.app.update();
@@ -258,7 +258,7 @@ impl Desk {
     }
 }
 
-fn seen(node: &accesskit::Node) -> Option<ShownWidget> {
+fn shown_widget(node: &accesskit::Node) -> Option<ShownWidget> {
     let bounds = node.bounds()?;
     let rect = Rect::from_min_max(
         egui::pos2(bounds.x0 as f32, bounds.y0 as f32),

@@ -103,7 +103,7 @@ fn built(builder: &mut Builder, what: &str) -> (BuiltRig, RigState) {
 const STILL: f32 = 1e-5;
 
 /// Document joints, by uid, that a control moves, of those that it leaves finite.
-fn moved_by(built: &BuiltRig, state: &mut RigState, controls: &[Uid], what: &str) -> BTreeSet<Uid> {
+fn joints_moved_by(built: &BuiltRig, state: &mut RigState, controls: &[Uid], what: &str) -> BTreeSet<Uid> {
     let joints: Vec<Uid> =
         built.nodes.iter().filter(|node| node.kind == NodeType::Joint).map(|node| node.uid).collect();
     let places = |state: &RigState| -> Vec<[Vec3; 3]> {
@@ -239,7 +239,7 @@ fn with_one_switch_off_the_rest_builds_and_moves_as_before() {
         let (whole, mut state) = built(&mut builder, &name);
         let all: BTreeMap<Uid, BTreeSet<Uid>> = controls(&whole)
             .into_iter()
-            .map(|control| (control, moved_by(&whole, &mut state, &[control], &name)))
+            .map(|control| (control, joints_moved_by(&whole, &mut state, &[control], &name)))
             .collect();
         assert!(all.values().any(|moved| !moved.is_empty()), "{name} does not move");
         for switch in switches(&rig) {
@@ -251,7 +251,7 @@ fn with_one_switch_off_the_rest_builds_and_moves_as_before() {
             let index = part.index();
             let left = controls(&part);
             let moved: BTreeSet<Uid> =
-                left.iter().flat_map(|control| moved_by(&part, &mut state, &[*control], &what)).collect();
+                left.iter().flat_map(|control| joints_moved_by(&part, &mut state, &[*control], &what)).collect();
             let before: BTreeSet<Uid> = left.iter().filter_map(|control| all.get(control)).flatten().copied().collect();
             if let Some(lost) = before.iter().find(|joint| index.contains_key(joint) && !moved.contains(joint)) {
                 let name = part.node(*lost).map(|node| node.name.to_string()).unwrap_or_default();
@@ -274,7 +274,7 @@ fn with_any_two_switches_off_the_rest_builds_binds_and_moves() {
         let body = Body::new(&rig, &whole);
         let mut all: BTreeMap<Uid, BTreeSet<Uid>> = controls(&whole)
             .into_iter()
-            .map(|control| (control, moved_by(&whole, &mut state, &[control], &name)))
+            .map(|control| (control, joints_moved_by(&whole, &mut state, &[control], &name)))
             .collect();
         // Controls that carry the whole rig would hide what does not move by itself, so they stay unless all do.
         let every = whole.nodes.iter().filter(|node| node.kind == NodeType::Joint).count();
@@ -294,7 +294,7 @@ fn with_any_two_switches_off_the_rest_builds_binds_and_moves() {
                 let (part, mut state) = built(&mut builder, &what);
                 binds(&rig, &part, &what);
                 let left: Vec<Uid> = controls(&part).into_iter().filter(|control| all.contains_key(control)).collect();
-                let moved = moved_by(&part, &mut state, &left, &what);
+                let moved = joints_moved_by(&part, &mut state, &left, &what);
                 let index = part.index();
                 let before = left.iter().flat_map(|control| &all[control]);
                 if let Some(lost) = before.into_iter().find(|joint| index.contains_key(joint) && !moved.contains(joint))

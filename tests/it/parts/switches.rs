@@ -9,7 +9,7 @@ use rigsmith::{
 use super::Puppet;
 
 /// Throws a switch: poses and attribute as the edits say.
-fn thrown(puppet: &mut Puppet, control: Uid, attribute: &str, value: f32) {
+fn throw_switch(puppet: &mut Puppet, control: Uid, attribute: &str, value: f32) {
     let switch =
         puppet.built.switches.iter().find(|switch| switch.control == control && *switch.attribute == *attribute);
     let switch = switch.unwrap_or_else(|| panic!("no switch {attribute}")).clone();
@@ -41,7 +41,7 @@ fn limbs_do_not_jump_between_forward_and_inverse_kinematics() {
         puppet.turn(goal, Quat::from_rotation_y(0.4));
         for value in [0.0, 1.0] {
             let before = joints.map(|joint| puppet.at(puppet.joint(joint)));
-            thrown(&mut puppet, settings, "ik_fk", value);
+            throw_switch(&mut puppet, settings, "ik_fk", value);
             assert_eq!(puppet.state.attribute(settings, "ik_fk"), Some(value));
             for (joint, before) in joints.iter().zip(before) {
                 let now = puppet.at(puppet.joint(joint));
@@ -71,7 +71,7 @@ fn controls_stay_where_they_are_while_their_space_changes() {
             let Matching::Space { control } = switch.matching else { continue };
             for value in [1.0, 0.0] {
                 let before = puppet.at(control);
-                thrown(&mut puppet, switch.control, &switch.attribute, value);
+                throw_switch(&mut puppet, switch.control, &switch.attribute, value);
                 let now = puppet.at(control);
                 let off = now.translation.distance(before.translation);
                 let turned = now.rotation.angle_between(before.rotation);
@@ -137,15 +137,15 @@ fn limbs_that_were_straightened_and_turned_stay_within_their_hinges() {
         assert!((mid - root).angle_between(end - mid) < 0.02, "{template}: the limb is straight");
         let places = |puppet: &Puppet| joints.map(|joint| (joint, puppet.at(puppet.joint(joint))));
         let before = places(&puppet);
-        thrown(&mut puppet, control, "ik_fk", 1.0);
+        throw_switch(&mut puppet, control, "ik_fk", 1.0);
         stand(&puppet, &before, &format!("{template}, straight"));
         let length = root.distance(mid) + mid.distance(end);
         for by in [Vec3::new(0.1, 0.2, 0.15), Vec3::new(-0.3, 0.3, 0.2), Vec3::new(0.2, 0.1, -0.3)] {
             puppet.move_to(goal, end + (root - end) * 0.3 + by * length);
             let before = places(&puppet);
-            thrown(&mut puppet, control, "ik_fk", 0.0);
+            throw_switch(&mut puppet, control, "ik_fk", 0.0);
             stand(&puppet, &before, &format!("{template}, by {by} to forward"));
-            thrown(&mut puppet, control, "ik_fk", 1.0);
+            throw_switch(&mut puppet, control, "ik_fk", 1.0);
             stand(&puppet, &before, &format!("{template}, by {by} to inverse"));
         }
     }
@@ -163,7 +163,7 @@ fn a_shoulder_that_follows_the_goal_stays_when_its_arm_is_switched() {
         let before: Vec<_> = joints.iter().map(|joint| (&**joint, puppet.at(puppet.joint(joint)))).collect();
         let control = puppet.control(&name("arm_settings"));
         for value in [0.0, 1.0, 0.0] {
-            thrown(&mut puppet, control, "ik_fk", value);
+            throw_switch(&mut puppet, control, "ik_fk", value);
             stand(&puppet, &before, &format!("{template} to {value}"));
         }
     }
@@ -187,7 +187,7 @@ fn a_foot_whose_pivots_are_turned_stays_when_its_leg_is_switched() {
             let before: Vec<_> = joints.iter().map(|joint| (&**joint, puppet.at(puppet.joint(joint)))).collect();
             let control = puppet.control(&format!("leg_settings_{side}"));
             for value in [0.0, 1.0] {
-                thrown(&mut puppet, control, "ik_fk", value);
+                throw_switch(&mut puppet, control, "ik_fk", value);
                 stand(&puppet, &before, &format!("{template}, {role}, to {value}"));
             }
         }

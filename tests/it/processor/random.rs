@@ -60,7 +60,7 @@ impl Maker {
     }
 
     /// A node that commands of a module made, or a joint if there is none.
-    fn made(&mut self, rig: &Rig, by: &str) -> String {
+    fn created_node(&mut self, rig: &Rig, by: &str) -> String {
         let commands: Vec<Uid> = Self::tags(rig)
             .into_iter()
             .filter(|(_, tag)| matches!(&tag.kind, TagKind::Command { module, .. } if module == by))
@@ -123,8 +123,8 @@ impl Maker {
         ];
         let module = self.random.pick(MODULES);
         let (any, joint) = (self.reference(rig, true), self.reference(rig, false));
-        let control = self.made(rig, "control");
-        let other = self.made(rig, "null");
+        let control = self.created_node(rig, "control");
+        let other = self.created_node(rig, "null");
         let (a, b) = self.chain(rig, 2).unwrap_or((Uid(0), Uid(0)));
         let middle = rig.joint(b).and_then(|joint| joint.parent).unwrap_or(Uid(0));
         let number = self.number();
@@ -330,7 +330,7 @@ fn building_what_changed_is_building_from_nothing() {
     for seed in 0..seeds {
         let mut maker = Maker { random: Random(seed), next: seed << 32 };
         let mut rig = maker.rig();
-        let mut builder = started(&rig);
+        let mut builder = started_builder(&rig);
         let report = builder.run_all();
         assert_eq!((report.error, builder.len() >= COMMANDS), (None, true), "seed {seed}");
         used.extend(builder.list().iter().map(|entry| entry.module.to_string()));
@@ -340,7 +340,7 @@ fn building_what_changed_is_building_from_nothing() {
             builder.touch(&rig, &edit);
             let report = builder.run_all();
             let context = format!("seed {seed}, step {step}: {edit:?}");
-            let mut fresh = started(&rig);
+            let mut fresh = started_builder(&rig);
             let full = fresh.run_all();
             assert_eq!(report.error, full.error, "{context}");
             assert_eq!(builder.cursor(), fresh.cursor(), "{context}");
@@ -370,7 +370,7 @@ fn rolled_back_and_built_again_is_the_same() {
     for seed in 0..seeds {
         let mut maker = Maker { random: Random(1_000_000 + seed), next: seed << 32 };
         let rig = maker.rig();
-        let mut builder = started(&rig);
+        let mut builder = started_builder(&rig);
         let bare = builder.built();
         builder.run_all();
         let built = builder.built();
@@ -378,7 +378,7 @@ fn rolled_back_and_built_again_is_the_same() {
         for _ in 0..4 {
             let place = maker.random.below(builder.len() + 1);
             builder.run_to(place);
-            let mut fresh = started(&rig);
+            let mut fresh = started_builder(&rig);
             fresh.run_to(place);
             assert_eq!(builder.built(), fresh.built(), "seed {seed}, place {place}");
         }

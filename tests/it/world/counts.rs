@@ -41,7 +41,7 @@ fn of_rigs(world: &World) -> Vec<EntityRef<'_>> {
 }
 
 /// Components of the rigs' entities that were written after a tick, with their names.
-fn written_since(stage: &Stage, tick: Tick) -> Vec<(Entity, ComponentId, String)> {
+fn writes_since(stage: &Stage, tick: Tick) -> Vec<(Entity, ComponentId, String)> {
     let world = stage.app.world();
     let now = world.read_change_tick();
     let mut found = Vec::new();
@@ -59,7 +59,7 @@ fn written_since(stage: &Stage, tick: Tick) -> Vec<(Entity, ComponentId, String)
 
 /// The same for the parts of the rigs, without the rigs' own entities.
 fn parts_written_since(stage: &Stage, tick: Tick) -> Vec<(Entity, String)> {
-    let written = written_since(stage, tick).into_iter().filter(|(entity, ..)| *entity != stage.rig);
+    let written = writes_since(stage, tick).into_iter().filter(|(entity, ..)| *entity != stage.rig);
     written.map(|(entity, _, name)| (entity, name)).collect()
 }
 
@@ -160,7 +160,7 @@ fn unchanged_writes(stage: &mut Stage, edit: impl FnOnce(&mut Stage)) -> (Vec<St
     edit(stage);
     let after = values(stage, &registry.read());
     let mut same = Vec::new();
-    let written = written_since(stage, tick);
+    let written = writes_since(stage, tick);
     for (entity, component, name) in &written {
         let key = (*entity, *component);
         let is_of_ours = name.starts_with("rigsmith::");

@@ -95,7 +95,7 @@ impl Patch {
         self.corners.is_empty() && self.points.is_empty()
     }
 
-    /// About `count` points, evenly by mass, the same every time.
+    /// Sample of about `count` points, evenly by mass, the same every time.
     pub fn sample(&self, count: usize) -> Vec<Vec3> {
         let total = self.mass();
         if !(total > 0.0 && total.is_finite()) {

@@ -10,7 +10,7 @@ use crate::algo::face::bones::{FaceBoneKind, Region, map::line_distance};
 /// Upper or lower rim of lips or lids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Rim {
-    /// Neither rim.
+    /// No rim.
     None,
     /// Rim above the opening.
     Upper,

@@ -15,7 +15,7 @@ use super::{
 pub(in super::super) enum Role {
     /// The head of a bone.
     Bone(usize),
-    /// Between the heads of two bones.
+    /// A point between the heads of two bones.
     Between(usize, usize, f32),
 }
 

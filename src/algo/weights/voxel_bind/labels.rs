@@ -60,7 +60,7 @@ impl Joints {
         )
     }
 
-    /// From the nearest point of a joint's bones to `point`.
+    /// Vector from the nearest point of a joint's bones to `point`.
     fn offset(&self, joint: u32, point: Vec3) -> Vec3 {
         let mut best = Vec3::INFINITY;
         let mut least = f32::INFINITY;
