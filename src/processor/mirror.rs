@@ -70,7 +70,7 @@ pub(super) fn mirror_attributes(module: &mut dyn PartialReflect) {
     mirror_attributes_in(module, false);
 }
 
-/// Tells a field whose text is the name of an attribute.
+/// True for the name of a field whose text is the name of an attribute.
 fn is_attribute_field(name: &str) -> bool {
     name == "attribute" || name.ends_with("_attribute")
 }
