@@ -8,7 +8,11 @@ use std::{
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::{Failure, InPlaceArgs, Report, SEED, report::counted, update::load};
+use super::{
+    Failure, InPlaceArgs, Report, SEED,
+    report::counted,
+    update::{load, load_part},
+};
 use crate::{
     files::{RealDisk, stem, store_rig, store_rig_over},
     rig::{
@@ -165,17 +169,17 @@ fn orient(
 pub(super) fn inject(args: &InjectArgs) -> Result<Report, Failure> {
     args.in_place.check(&[&args.template, &args.rig], Some(&args.output), &[])?;
     let mut report = Report::default();
-    let (template, mut rig) = (load(&args.template, &mut report)?, load(&args.rig, &mut report)?);
+    let (part, mut rig) = (load_part(&args.template, &mut report)?, load(&args.rig, &mut report)?);
     let joints = args.joints.iter().map(|label| joint(&rig, label)).collect::<Result<Vec<_>, _>>()?;
-    let mut uids = uids_of(&[rig.clone(), template.clone()]);
+    let mut uids = uids_of(&[rig.clone(), part.rig.clone()]);
     if let Some(along) = args.orient {
         orient(&mut rig, joints.clone(), along, &mut uids, &mut report)?;
     }
     let count = |rig: &Rig| rig.walk().map(|joint| joint.data.tags.len()).sum::<usize>();
     let before = count(&rig);
-    let left = (template.len().saturating_sub(joints.len()), joints.len().saturating_sub(template.len()));
-    let operation =
-        Operation::Tags(TagOperation::Drop { part: Arc::new(template), joints, bindings: Default::default() });
+    let size = part.sized_for(joints.len()).map_or(part.rig.len(), |sized| sized.len());
+    let left = (size.saturating_sub(joints.len()), joints.len().saturating_sub(size));
+    let operation = Operation::Tags(TagOperation::Drop { part: Arc::new(part), joints, bindings: Default::default() });
     run(&mut rig, &operation, &mut uids, &mut report)?;
     write(&args.output, &rig, &[&args.rig], &mut report)?;
     let tags = count(&rig) - before;

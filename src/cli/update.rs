@@ -15,6 +15,7 @@ use crate::{
     processor::keep_poses,
     rig::{
         Rig,
+        part::Part,
         template::write_template,
         update::{Change, Take, diff, update},
         version::VersionChange,
@@ -136,13 +137,18 @@ fn companion(rig: &Path) -> PathBuf {
 }
 
 pub(super) fn load(path: &Path, report: &mut Report) -> Result<Rig, Failure> {
+    Ok(load_part(path, report)?.rig)
+}
+
+/// The template of a file, with what it says for its use as a part.
+pub(super) fn load_part(path: &Path, report: &mut Report) -> Result<Part, Failure> {
     // A name without an ending is that of a template in the folders of the site.
     if path.extension().is_some() && FileKind::of(path) != Some(FileKind::Template) {
         return Err(Failure::Usage(format!("`{}` is no template; give a .rig.ron", path.display())));
     }
-    let template = load_template(&RealDisk, path)?;
-    report.notes(template.notes);
-    Ok(template.rig)
+    let mut template = load_template(&RealDisk, path)?;
+    report.notes(std::mem::take(&mut template.notes));
+    Ok(template.into())
 }
 
 fn tell(report: &mut Report, changes: &[Change]) {

@@ -65,11 +65,11 @@ pub fn bundled_characters() -> Vec<Arc<Rig>> {
 }
 
 /// Parts that come with Rigsmith, by name.
-pub fn bundled_parts() -> Vec<(&'static str, Arc<Rig>)> {
+pub fn bundled_parts() -> Vec<(&'static str, Arc<Part>)> {
     let none = BTreeMap::new();
     let read = |(name, text): &(&'static str, &'static str)| {
         let template = PartFiles::given(&none).complete(Path::new(name), text.as_bytes()).ok()?;
-        Some((*name, Arc::new(template.rig)))
+        Some((*name, Arc::new(Part::from(template))))
     };
     BUNDLED_PARTS.iter().filter_map(read).collect()
 }
@@ -248,8 +248,7 @@ impl<'a> PartFiles<'a> {
         let template = self.complete(&path, &bytes);
         self.open.pop();
         let template = template.map_err(|source| PartFileError::Template { path, source })?;
-        let Template { rig, chains, sockets, options, .. } = template;
-        let part = Arc::new(Part { rig, chains, sockets, options });
+        let part = Arc::new(Part::from(template));
         self.known.insert(first.to_owned(), part.clone());
         Ok(part)
     }

@@ -98,6 +98,6 @@ impl RigModule for ConeReader {
     fn mirror(&mut self) {
         self.axis = self.axis.mirrored();
         self.towards = self.towards.map(mirrored_direction);
-        [&mut self.output_attribute, &mut self.morph].into_iter().for_each(mirror_label);
+        mirror_label(&mut self.morph);
     }
 }

@@ -76,7 +76,7 @@ impl RigModule for DrivenKey {
             self.keys.iter_mut().for_each(|(driver, _)| *driver = opposite(*driver));
             self.keys.reverse();
         }
-        [&mut self.driver_attribute, &mut self.output_attribute, &mut self.morph].into_iter().for_each(mirror_label);
+        mirror_label(&mut self.morph);
     }
 }
 

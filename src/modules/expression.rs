@@ -106,8 +106,7 @@ impl RigModule for Expression {
         if self.output_channel.is_some_and(Channel::is_turned_over) {
             self.text = opposite_text(&self.text);
         }
-        self.inputs.iter_mut().for_each(|input| mirror_label(&mut input.attribute));
-        [&mut self.output_attribute, &mut self.morph].into_iter().for_each(mirror_label);
+        mirror_label(&mut self.morph);
     }
 }
 

@@ -87,7 +87,7 @@ impl RigModule for IkFkSwitch {
     const DOC: &'static str = "Moves a limb by its joints' own controls (0) or by a goal (1), as an attribute says; the \
                                switch can be thrown without a jump.";
     const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
-    const SIDED: &'static [&'static str] = &["twist", "prefer"];
+    const SIDED: &'static [&'static str] = &["attribute", "twist", "prefer"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/ik_fk_switch.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/ik_fk_switch.svg"));
 

@@ -57,6 +57,6 @@ impl RigModule for Morph {
     }
 
     fn mirror(&mut self) {
-        [&mut self.morph, &mut self.attribute].into_iter().for_each(mirror_label);
+        mirror_label(&mut self.morph);
     }
 }

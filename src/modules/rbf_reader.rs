@@ -96,7 +96,7 @@ impl RigModule for RbfReader {
     fn mirror(&mut self) {
         for pose in &mut self.poses {
             pose.rotate = mirrored_angles(pose.rotate);
-            [&mut pose.attribute, &mut pose.morph].into_iter().for_each(mirror_label);
+            mirror_label(&mut pose.morph);
         }
     }
 }

@@ -54,7 +54,7 @@ impl RigModule for SpaceSwitch {
     const DOC: &'static str = "Lets a control move with one of several nodes, as an attribute says; spaces can be changed \
                                without a jump.";
     const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
-    const SIDED: &'static [&'static str] = &["names"];
+    const SIDED: &'static [&'static str] = &["names", "attribute"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/space_switch.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/space_switch.svg"));
 

@@ -6,10 +6,11 @@
 
 use std::{collections::HashMap, ops::Range};
 
+use bevy::reflect::{PartialReflect, ReflectMut};
 use glam::Vec3;
 
 use super::{Amount, ik::JointAngles};
-use crate::rig::{fields, with_field};
+use crate::rig::{fields, label::mirror_label, with_field};
 
 /// A number of the opposite sign, without a negative zero.
 pub fn opposite(value: f32) -> f32 {
@@ -47,6 +48,76 @@ impl Amount {
                 None => format!("{}{name}", Self::OPPOSITE),
             }),
         }
+    }
+
+    /// Gives the attribute that it follows the name of the other side.
+    fn mirror_name(&mut self) {
+        let Self::Attribute(text) = self else { return };
+        match text.strip_prefix(Self::OPPOSITE) {
+            Some(name) => {
+                let mut name = name.to_owned();
+                mirror_label(&mut name);
+                *text = format!("{}{name}", Self::OPPOSITE);
+            }
+            None => mirror_label(text),
+        }
+    }
+}
+
+/// Gives the attributes that a module's values name the names of the other side: every [`Amount`], and every text in a field
+/// called `attribute` or `SOMETHING_attribute`.
+pub(super) fn mirror_attributes(module: &mut dyn PartialReflect) {
+    mirror_attributes_in(module, false);
+}
+
+/// True for the name of a field whose text is the name of an attribute.
+fn is_attribute_field(name: &str) -> bool {
+    name == "attribute" || name.ends_with("_attribute")
+}
+
+fn mirror_attributes_in(value: &mut dyn PartialReflect, is_attribute: bool) {
+    if let Some(amount) = value.try_downcast_mut::<Amount>() {
+        amount.mirror_name();
+        return;
+    }
+    if let Some(text) = value.try_downcast_mut::<String>() {
+        if is_attribute {
+            mirror_label(text);
+        }
+        return;
+    }
+    match value.reflect_mut() {
+        ReflectMut::Struct(fields) => {
+            for at in 0..fields.field_len() {
+                let is_attribute = fields.name_at(at).is_some_and(is_attribute_field);
+                if let Some(field) = fields.field_at_mut(at) {
+                    mirror_attributes_in(field, is_attribute);
+                }
+            }
+        }
+        ReflectMut::List(items) => {
+            for at in 0..items.len() {
+                if let Some(item) = items.get_mut(at) {
+                    mirror_attributes_in(item, is_attribute);
+                }
+            }
+        }
+        ReflectMut::Tuple(fields) => {
+            for at in 0..fields.field_len() {
+                if let Some(field) = fields.field_mut(at) {
+                    mirror_attributes_in(field, is_attribute);
+                }
+            }
+        }
+        ReflectMut::Enum(variant) => {
+            for at in 0..variant.field_len() {
+                let is_attribute = is_attribute || variant.name_at(at).is_some_and(is_attribute_field);
+                if let Some(field) = variant.field_at_mut(at) {
+                    mirror_attributes_in(field, is_attribute);
+                }
+            }
+        }
+        _ => {}
     }
 }
 

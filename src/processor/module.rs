@@ -37,7 +37,8 @@ pub trait RigModule: Reflect + Typed + Serialize + DeserializeOwned + Default + 
 
     /// Turns values that have a side (axes, colours by side) into those of the other side of the character, for tags
     /// that are pasted mirrored: those of [`RigModule::SIDED`] and no others. Twice gives the first values back.
-    /// References are mirrored already.
+    /// References are mirrored already, and so are, for every module, names of attributes: each
+    /// [`Amount`](super::Amount), and texts in fields called `attribute` or `SOMETHING_attribute`.
     fn mirror(&mut self) {}
 
     /// Brings lengths in the rig's units, and directions along the rig's axes, to a body of another size: for templates that
@@ -215,6 +216,7 @@ impl Modules {
                 let before = ron_text(&read::<M>(text)?);
                 let mut module = read::<M>(text)?;
                 module.mirror();
+                mirror::mirror_attributes(&mut module);
                 Ok(mirror::with_changes(text, &before, &ron_text(&module)))
             },
             resize: |text, change| {

@@ -27,7 +27,9 @@ pub use orient::Axis;
 pub use place::settle;
 pub use symmetry::MirrorPlane;
 pub(in crate::rig) use tags::drop_part;
-pub use tags::{CopiedIdentifiers, CopiedJoint, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation, TagScope};
+pub use tags::{
+    CopiedIdentifiers, CopiedJoint, PartOrder, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation, TagScope,
+};
 
 use crate::rig::{EditError, GROUP_COLORS, GroupData, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource};
 

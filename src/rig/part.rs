@@ -66,16 +66,19 @@ impl PartNeeds {
             needed.filter(move |other| *other != place).collect::<Vec<_>>()
         });
         let least = of_others.max().map_or(part.len().min(1), |last| last + 1);
-        let names = part.walk().map(|joint| joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string()));
         let roots = part.walk().filter(|joint| joint.parent.is_none());
-        let parents = roots.map(|joint| joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string()));
-        let mut sockets: Vec<Socket> = parents.map(Socket::Parent).collect();
+        let mut sockets: Vec<Socket> = roots.map(|joint| Socket::Parent(name_of(joint))).collect();
         let references = part.walk().flat_map(references_of);
         if references.into_iter().any(|reference| reference.source == Source::Root) {
             sockets.push(Socket::Root);
         }
-        Self { joints: names.take(least).collect(), sockets }
+        Self { joints: part.walk().take(least).map(name_of).collect(), sockets }
     }
+}
+
+/// Label of a joint, or its uid where it has none.
+pub(in crate::rig) fn name_of(joint: &RigJoint) -> String {
+    joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string())
 }
 
 /// The number of the joint that each joint is, and that carries each tag.
@@ -102,9 +105,13 @@ fn refers_to(joint: &RigJoint) -> impl Iterator<Item = (NameKind, Uid)> {
     uids.filter(|(kind, _)| matches!(kind, NameKind::Joint | NameKind::Command))
 }
 
-/// Joints and commands beyond the first joints of a part that the commands of those refer to.
+/// Joints and commands beyond the first joints of a part that the commands of other joints refer to.
 pub(in crate::rig) fn left_out(part: &Rig, count: usize) -> Vec<(NameKind, Uid)> {
     let places = places(part);
-    let needed = part.walk().take(count).flat_map(refers_to);
-    needed.filter(|(_, uid)| places.get(uid).is_some_and(|place| *place >= count)).collect()
+    let mut left = Vec::new();
+    for (place, joint) in part.walk().enumerate() {
+        let is_left = |uid: &Uid| places.get(uid).is_some_and(|other| *other >= count && *other != place);
+        left.extend(refers_to(joint).filter(|(_, uid)| is_left(uid)));
+    }
+    left
 }

@@ -172,6 +172,11 @@ fn rigs_are_made_of_others() {
     assert!(
         code == 1 && said.contains("no joint of \"c\" is called \"x\"") && !folder.path().join("no.rig.ron").exists()
     );
+    for (joints, told) in [("c,b,a", "\"b\" is not next below \"c\""), ("a,b,b", "\"b\" is given twice")] {
+        let (code, said) =
+            rigsmith(folder.path(), &["inject", part, "chain.rig.ron", "--joints", joints, "-o", "no.rig.ron"]);
+        assert!(code == 1 && said.contains(told) && !folder.path().join("no.rig.ron").exists(), "{joints}: {said}");
+    }
 }
 
 #[test]

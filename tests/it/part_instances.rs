@@ -155,7 +155,7 @@ fn what_does_not_fit_is_told_with_its_place() {
         ("(part: \"fnger.rig.ron\", parent: \"palm\")", "fnger.rig.ron"),
         ("(part: \"t.rig.ron\", parent: \"palm\")", "is a part of itself"),
         ("(part: \"finger.rig.ron\", parent: \"plam\")", "there is no joint \"plam\"; did you mean \"palm\"?"),
-        ("(part: \"finger.rig.ron\", onto: [\"palm\", \"palm\"])", "uid"),
+        ("(part: \"finger.rig.ron\", onto: [\"palm\", \"palm\"])", "\"palm\" is given twice"),
         ("(part: \"finger.rig.ron\", off: [\"fkk\"])", "no feature \"fkk\"; did you mean \"fk\"?"),
         ("(part: \"finger.rig.ron\", changes: [(tag: \"control/bse\", enabled: false)])", "no tag \"control/bse\""),
         ("(part: \"finger.rig.ron\", changes: [(joint: \"bone_4\", translation: (0, 0, 0))])", "no joint \"bone_4\""),

@@ -3,10 +3,16 @@
 use std::{collections::BTreeMap, fs, path::Path, sync::Arc};
 
 use rigsmith::{
-    files::{RealDisk, load_template},
+    files::{RealDisk, bundled_parts, load_template},
     modules,
     processor::{Builder, review},
-    rig::{Rig, Uid, label::mirrored_label, template::read_template},
+    rig::{
+        JointData, RestTransform, Rig, RigEdit, Uid, UidSource,
+        label::mirrored_label,
+        operations::{Operation, OperationError, Outcome, TagError, TagOperation},
+        part::{Part, PartNeeds},
+        template::read_template,
+    },
     solve::program::{CompileOptions, RigProgram, RigState},
 };
 
@@ -116,6 +122,122 @@ fn a_chain_goes_onto_as_many_joints_as_there_are() {
             }
         }
     }
+}
+
+/// A rig of `count` joints that hang on each other as those of a part, and one below the other after its last.
+fn host(part: &Rig, count: usize) -> (Rig, Vec<Uid>) {
+    let mut rig = Rig::new(Uid(0x5eed_0000), "host");
+    let mut joints: Vec<Uid> = Vec::new();
+    let mut places: BTreeMap<Uid, Uid> = BTreeMap::new();
+    let mut of_part = part.walk();
+    for number in 1..=count {
+        let uid = Uid(0x5eed_0000 + number as u64);
+        let (parent, rest) = match of_part.next() {
+            Some(joint) => {
+                places.insert(joint.data.uid, uid);
+                (joint.parent.map(|parent| places[&parent]), joint.data.rest)
+            }
+            None => (joints.last().copied(), RestTransform::from_translation(bevy::math::Vec3::new(0.0, 0.1, 0.0))),
+        };
+        let joint = JointData { uid, label: Some(format!("host_{number}")), rest, ..JointData::default() };
+        rig.apply(&RigEdit::AddJoint { joint: Box::new(joint), parent, index: usize::MAX }).unwrap();
+        joints.push(uid);
+    }
+    (rig, joints)
+}
+
+fn dropped(rig: &mut Rig, part: &Arc<Part>, joints: Vec<Uid>) -> Result<Outcome, OperationError> {
+    let drop = TagOperation::Drop { part: Arc::clone(part), joints, bindings: BTreeMap::new() };
+    Operation::Tags(drop).run(rig, &mut UidSource::seeded(11), None)
+}
+
+/// A part on any number of joints: what is dropped is all that those joints of the part hold, and builds; else nothing
+/// changes, and the joints that it needs are told.
+#[test]
+fn every_part_goes_whole_onto_as_many_joints_as_it_needs_or_is_refused() {
+    let mut least = BTreeMap::new();
+    for (name, part) in bundled_parts() {
+        let name = name.trim_start_matches("parts/").trim_end_matches(".rig.ron").to_owned();
+        for count in 1..=part.rig.len() + 2 {
+            let what = format!("{name} on {count} joints");
+            let sized = part.sized_for(count).unwrap_or_else(|_| part.rig.clone());
+            let (mut rig, joints) = host(&sized, count);
+            let before = rig.clone();
+            match dropped(&mut rig, &part, joints) {
+                Err(OperationError::Tag(TagError::PartNeeds { part: told, joints: needed, given })) => {
+                    assert!(rig == before, "{what}: refused, but changed");
+                    assert_eq!((told, given), (part.rig.about().name.clone(), count), "{what}");
+                    assert!(needed.len() > count && !least.contains_key(&name), "{what}: {needed:?}");
+                }
+                Err(error) => panic!("{what}: {error}"),
+                Ok(outcome) => {
+                    least.entry(name.clone()).or_insert(count);
+                    let needs = PartNeeds::of(&sized).joints;
+                    assert!(needs.len() <= count, "{what}: needs {needs:?}");
+                    let tags = |rig: &Rig| -> usize { rig.walk().take(count).map(|joint| joint.data.tags.len()).sum() };
+                    assert_eq!(tags(&rig), tags(&sized), "{what}");
+                    let is_told = outcome.notes.iter().any(|note| note.contains("left over"));
+                    assert_eq!(is_told, sized.len() != count, "{what}: {:?}", outcome.notes);
+                    controls(&rig, 0.02);
+                }
+            }
+        }
+    }
+    let expected = [
+        ("arm", 4),
+        ("bendy_limb", 5),
+        ("eye", 1),
+        ("fk_chain", 1),
+        ("front_leg", 3),
+        ("hand", 16),
+        ("ikfk_chain", 3),
+        ("jaw", 1),
+        ("leg", 4),
+        ("leg_3joint", 4),
+        ("lips", 1),
+        ("neck_chain", 3),
+        ("neck_head", 1),
+        ("single_control", 1),
+        ("spine", 3),
+        ("spring_chain", 2),
+        ("tail", 3),
+        ("tongue", 3),
+        ("wing", 9),
+    ];
+    let expected: BTreeMap<String, usize> =
+        expected.into_iter().map(|(name, count)| (name.to_owned(), count)).collect();
+    assert_eq!(least, expected);
+}
+
+#[test]
+fn joints_that_do_not_follow_each_other_as_those_of_the_part_are_refused() {
+    let part = |wanted: &str| {
+        let mut parts = bundled_parts().into_iter();
+        parts.find(|(name, _)| *name == format!("parts/{wanted}.rig.ron")).unwrap().1
+    };
+    let arm = part("arm");
+    let (mut rig, joints) = host(&arm.rig, 4);
+    let before = rig.clone();
+    let [a, b, c, d] = joints[..] else { panic!("{joints:?}") };
+    for (joints, told) in [
+        (vec![d, c, b, a], ["\"host_3\" is not next below \"host_4\"", "clavicle_l, upper_arm_l, forearm_l, hand_l"]),
+        (vec![a, c, b, d], ["\"host_3\" is not next below \"host_1\"", "upper_arm_l next below clavicle_l"]),
+        (vec![a, b, b, d], ["\"host_2\" is given twice", "\"arm\""]),
+        (vec![a, a], ["\"host_1\" is given twice", "\"arm\""]),
+        (vec![a], ["needs 4 joints", "clavicle_l, upper_arm_l, forearm_l, hand_l; 1 are selected"]),
+    ] {
+        let error = dropped(&mut rig, &arm, joints.clone()).unwrap_err().to_string();
+        assert!(told.iter().all(|told| error.contains(told)), "{joints:?}: {error}");
+        assert!(rig == before, "{joints:?}: refused, but changed");
+    }
+    // Joints between those that are given are passed over.
+    let (mut rig, joints) = host(&part("fk_chain").rig, 5);
+    dropped(&mut rig, &part("fk_chain"), vec![joints[0], joints[2], joints[4]]).unwrap();
+    // Fingers are no chain.
+    let hand = part("hand");
+    let (mut rig, joints) = host(&part("fk_chain").sized_for(16).unwrap(), 16);
+    let error = dropped(&mut rig, &hand, joints).unwrap_err().to_string();
+    assert!(error.contains("index_01_l next below hand_l") && error.contains("\"host_5\""), "{error}");
 }
 
 #[test]

@@ -259,7 +259,7 @@ fn every_part_drops_onto_joints_elsewhere() {
             joints.push(uid);
         }
         Operation::Edits(edits).run(&mut rig, &mut uids, None).unwrap();
-        let drop = TagOperation::Drop { part: Arc::new(part_rig), joints, bindings: Default::default() };
+        let drop = TagOperation::Drop { part: Arc::new(part_rig.into()), joints, bindings: Default::default() };
         let outcome = Operation::Tags(drop).run(&mut rig, &mut uids, None).unwrap();
         assert!(outcome.notes.is_empty(), "{part}: {:?}", outcome.notes);
         let puppet = Puppet::new(rig);

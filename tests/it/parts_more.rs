@@ -227,7 +227,7 @@ fn add(rig: &mut Rig, part: &Rig, factor: f32, first: u64) -> Vec<Uid> {
 
 fn drop_onto(rig: &mut Rig, part: &Rig, joints: &[Uid]) {
     let operation =
-        TagOperation::Drop { part: Arc::new(part.clone()), joints: joints.to_vec(), bindings: BTreeMap::new() };
+        TagOperation::Drop { part: Arc::new(part.clone().into()), joints: joints.to_vec(), bindings: BTreeMap::new() };
     Operation::Tags(operation).run(rig, &mut UidSource::seeded(rig.len() as u64), None).unwrap();
 }
 

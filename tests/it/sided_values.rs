@@ -1,11 +1,19 @@
 //! Values with a side: what tags say on the other side of the character, and that both sides move alike.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    sync::Arc,
+};
 
-use bevy::math::{EulerRot, Quat, Vec3};
+use bevy::{
+    math::{EulerRot, Quat, Vec3},
+    reflect::{TypeInfo, enums::VariantInfo},
+};
 use rigsmith::{
+    files::{RealDisk, load_template},
     modules,
-    processor::Builder,
+    processor::{Amount, Builder},
     rig::{
         JointData, NodeType, PoseOffset, RestTransform, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
         label::mirrored_label,
@@ -113,6 +121,130 @@ fn every_sided_value_is_mirrored_and_twice_gives_the_first_back() {
     }
 }
 
+/// Fields of parameters whose texts name no attribute of a node. A text in another field that names one is called
+/// `attribute` or `SOMETHING_attribute`, and mirrored.
+const OTHER_TEXTS: [&str; 8] = ["choices", "label", "morph", "name", "names", "shape", "suffix", "text"];
+
+/// Values of a field, each of which names the attribute `open_l` once; names of fields with other texts go to `others`.
+fn naming_values(info: &TypeInfo, field: &str, others: &mut BTreeSet<String>) -> Vec<String> {
+    let name = || vec!["\"open_l\"".to_owned()];
+    if info.is::<Amount>() {
+        return name();
+    }
+    if info.is::<String>() {
+        if field == "attribute" || field.ends_with("_attribute") {
+            return name();
+        }
+        others.insert(field.to_owned());
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    match info {
+        TypeInfo::Struct(fields) => {
+            for inner in fields.iter() {
+                let values = inner.type_info().map(|info| naming_values(info, inner.name(), others));
+                found.extend(values.into_iter().flatten().map(|value| format!("({}: {value})", inner.name())));
+            }
+        }
+        TypeInfo::List(list) => {
+            let values = list.item_info().map(|info| naming_values(info, field, others));
+            found.extend(values.into_iter().flatten().map(|value| format!("[{value}]")));
+        }
+        TypeInfo::Enum(kinds) => {
+            for variant in kinds.iter() {
+                let VariantInfo::Tuple(tuple) = variant else { continue };
+                for inner in tuple.iter() {
+                    let values = inner.type_info().map(|info| naming_values(info, field, others));
+                    found.extend(values.into_iter().flatten().map(|value| format!("{}({value})", variant.name())));
+                }
+            }
+        }
+        _ => {}
+    }
+    found
+}
+
+/// Every parameter that can name an attribute names the other side's on the other side, whichever module has it.
+#[test]
+fn every_name_of_an_attribute_is_mirrored() {
+    let modules = modules::all();
+    let mut others = BTreeSet::new();
+    let mut found = Vec::new();
+    for module in modules.iter() {
+        let TypeInfo::Struct(fields) = module.type_info else { panic!("{} has no fields", module.name) };
+        for field in fields.iter() {
+            let Some(info) = field.type_info() else { continue };
+            for value in naming_values(info, field.name(), &mut others) {
+                let params = format!("({}: {value})", field.name());
+                let mirrored = module.mirrored(&params).unwrap_or_else(|error| panic!("{}: {error}", module.name));
+                // A value with a side is the opposite of the attribute besides.
+                let plain = mirrored.replace("\"-open", "\"open");
+                assert_eq!(plain, params.replace("open_l", "open_r"), "{}", module.name);
+                assert_eq!(module.mirrored(&mirrored).unwrap(), params, "{}", module.name);
+                found.push((module.name, field.name()));
+            }
+        }
+    }
+    for known in [("orient", "weight"), ("blend", "blend"), ("spring", "motion"), ("ik_fk_switch", "attribute")] {
+        assert!(found.contains(&known), "{known:?}");
+    }
+    for known in [("aim", "weights"), ("expression", "inputs"), ("rbf_reader", "poses")] {
+        assert!(found.contains(&known), "{known:?}");
+    }
+    assert!(found.len() >= 40, "{found:?}");
+    let unknown: Vec<&String> = others.iter().filter(|field| !OTHER_TEXTS.contains(&field.as_str())).collect();
+    assert!(unknown.is_empty(), "texts in {unknown:?}: do they name attributes?");
+    // Numbers have no name, and the opposite of an attribute is that of the other side's.
+    let orient = modules.get("orient").unwrap();
+    assert_eq!(orient.mirrored("(weight: 0.5)").unwrap(), "(weight: 0.5)");
+    assert_eq!(orient.mirrored("(weight: \"-open_l\")").unwrap(), "(weight: \"-open_r\")");
+    assert_eq!(orient.mirrored("(weight: \"-l_open\")").unwrap(), "(weight: \"-r_open\")");
+    assert_eq!(orient.mirrored("(weight: \"open\")").unwrap(), "(weight: \"open\")");
+}
+
+/// A part on both sides: the attribute of each side does there what it does on the other.
+#[test]
+fn attributes_of_both_sides_of_a_part_do_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let side = "(format: 2, name: \"side\", kind: \"part\", joints: [\
+         (label: \"lid_l\", translation: (0.1, 0, 0), tags: [\
+         control(creation: (name: \"lid_ctl_l\")), \
+         attribute(node: \"@command control/lid_ctl_l role:control\", name: \"open_l\", min: 0.0, max: 1.0), \
+         orient(node: \"@joint tip_l\", targets: \"@command control/lid_ctl_l role:control\", \
+         control: \"@command control/lid_ctl_l role:control\", weight: \"open_l\")]), \
+         (label: \"tip_l\", translation: (0, 0.1, 0))])";
+    fs::write(folder.path().join("side.rig.ron"), side).unwrap();
+    let path = folder.path().join("both.rig.ron");
+    let both = "(format: 2, name: \"both\", joints: [(label: \"body\")], parts: [\
+         (part: \"side.rig.ron\", name: \"L\", parent: \"body\"), \
+         (part: \"side.rig.ron\", name: \"R\", parent: \"body\", mirror: true)])";
+    fs::write(&path, both).unwrap();
+    let rig = load_template(&RealDisk, &path).unwrap_or_else(|error| panic!("{error}")).rig;
+    let built = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
+    let program = Arc::new(RigProgram::compile(&built, &CompileOptions::default()).unwrap());
+    let node = |name: &str| {
+        let mut found = built.nodes.iter().filter(|node| node.kind == NodeType::Control && &*node.name == name);
+        found.next().unwrap_or_else(|| panic!("there is no {name}"))
+    };
+    let has = |control: &str, attribute: &str| node(control).attributes.iter().any(|known| &*known.name == attribute);
+    assert!(has("lid_ctl_r", "open_r") && !has("lid_ctl_r", "open_l"), "{:?}", node("lid_ctl_r").attributes);
+    for (left, right) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.25)] {
+        let mut state = RigState::new(Arc::clone(&program));
+        for (side, share) in [("l", left), ("r", right)] {
+            let control = node(&format!("lid_ctl_{side}")).uid;
+            let rotation = Quat::from_rotation_x(60_f32.to_radians());
+            state.set_offset(control, PoseOffset { rotation, ..PoseOffset::default() }).unwrap();
+            state.set_attribute(control, &format!("open_{side}"), share).unwrap();
+        }
+        state.evaluate(0.0);
+        for (side, share) in [("l", left), ("r", right)] {
+            let tip = rig.find_label(&format!("tip_{side}")).unwrap();
+            let turned = state.global(tip).unwrap().rotation.angle_between(Quat::IDENTITY).to_degrees();
+            assert!((turned - 60.0 * share).abs() < 0.1, "tip_{side} at {share} is turned by {turned} degrees");
+        }
+    }
+}
+
 const ROOT: Uid = Uid(1);
 
 /// A limb on the left, of joints with frames that are turned anyhow, mirrored to the right.
@@ -196,8 +328,14 @@ impl Stage {
                 }
                 state.set_offset(node.uid, offset).unwrap();
                 // One value of an attribute moves both sides alike.
-                for attribute in node.attributes.iter().filter(|attribute| &*attribute.name == "turn") {
-                    state.set_attribute(node.uid, &attribute.name, 25.0 * t).unwrap();
+                for attribute in node.attributes.iter() {
+                    let value = match &*attribute.name {
+                        "turn" => 25.0 * t,
+                        // Of attributes with a side, those of the control's own.
+                        name if side(name) == Some(is_left) => 0.2 * t,
+                        _ => continue,
+                    };
+                    state.set_attribute(node.uid, &attribute.name, value).unwrap();
                 }
             }
             state.evaluate(0.0);
@@ -361,6 +499,24 @@ fn both_sides_move_alike() {
                     "expression",
                     "(text: \"3 + t * 20\", inputs: [(name: \"t\", node: \"@command #c000 role:control\", channel: TranslateX)], \
                      output: \"@command #c001 role:offset\", output_channel: RotateX)"
+                        .into(),
+                ),
+            ],
+        ),
+        (
+            "weight by an attribute of a side",
+            &[
+                ("a_l", "control", "(at: \"@joint #6\", follow: false, creation: (name: \"e_l\"))".into()),
+                (
+                    "a_l",
+                    "attribute",
+                    "(node: \"@command #c000 role:control\", name: \"open_l\", min: 0.0, max: 1.0)".into(),
+                ),
+                (
+                    "a_l",
+                    "orient",
+                    "(node: \"@joint #3\", targets: \"@command #c000 role:control\", \
+                     control: \"@command #c000 role:control\", weight: \"open_l\")"
                         .into(),
                 ),
             ],

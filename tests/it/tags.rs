@@ -10,7 +10,8 @@ use rigsmith::rig::{
     EditError, GroupData, JointData, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
     feature::{FeatureKey, FeatureKind, FeatureKinds, FeatureState, combined_features, features_named, is_active},
     operations::{
-        Operation, OperationError, Outcome, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation, TagScope,
+        Operation, OperationError, Outcome, PartOrder, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation,
+        TagScope,
     },
     reference::NameKind,
     template::write_template,
@@ -491,11 +492,14 @@ fn part() -> Rig {
 
 #[test]
 fn a_part_is_dropped_onto_a_chain_until_either_list_ends() {
-    let drop_on =
-        |joints: &[Uid]| TagOperation::Drop { part: Arc::new(part()), joints: joints.to_vec(), bindings: [].into() };
+    let drop_on = |joints: &[Uid]| TagOperation::Drop {
+        part: Arc::new(part().into()),
+        joints: joints.to_vec(),
+        bindings: [].into(),
+    };
     let mut desk = Desk::new();
-    for bare in [Uid(0x50), Uid(0x51), Uid(0x52), Uid(0x53)] {
-        add(&mut desk.rig, JointData { uid: bare, ..Default::default() }, Some(HIPS));
+    for (bare, parent) in [(0x50, HIPS), (0x51, Uid(0x50)), (0x52, Uid(0x51)), (0x53, Uid(0x52))] {
+        add(&mut desk.rig, JointData { uid: Uid(bare), ..Default::default() }, Some(parent));
     }
     let notes = desk.run(drop_on(&[Uid(0x50), Uid(0x51), Uid(0x52), Uid(0x53)])).notes;
     assert_eq!(notes, ["1 selected joints are left over: the part has only 3"]);
@@ -514,7 +518,9 @@ fn a_part_is_dropped_onto_a_chain_until_either_list_ends() {
 
     // Joints that are named and grouped stay so, and a second arm is another group.
     let mut desk = Desk::new();
-    desk.run(drop_on(&[ARM_R, HAND_R, HIPS]));
+    let tip = JointData { uid: Uid(0x54), label: Some("tip_r".into()), ..Default::default() };
+    add(&mut desk.rig, tip, Some(HAND_R));
+    desk.run(drop_on(&[ARM_R, HAND_R, Uid(0x54)]));
     assert_eq!(desk.rig.groups().len(), 2);
     let handle = *desk.tags(ARM_R).last().unwrap();
     let start = "(a: \"@joint arm_r#0000000000000004 + @joint hand_r#0000000000000005\", b: \"@joints group:arm_r#0000000000000011 label:arm_r#";
@@ -546,10 +552,31 @@ fn a_part_is_dropped_onto_a_chain_until_either_list_ends() {
     let ambiguous = TagError::Ambiguous { kind: NameKind::Joint, uid: Uid(0xe2), name: "end".into(), candidates };
     assert_eq!(error, ambiguous.into());
     let bindings = [(Uid(0xe2), HAND_R)].into();
-    desk.run(TagOperation::Drop { part: Arc::new(part()), joints: vec![ARM_L, HAND_L], bindings });
+    desk.run(TagOperation::Drop { part: Arc::new(part().into()), joints: vec![ARM_L, HAND_L], bindings });
     let control = *desk.tags(HAND_L).last().unwrap();
     assert!(desk.params(control).contains("@joint end#0000000000000005"), "{}", desk.params(control));
     assert_eq!(desk.refusal(drop_on(&[])), TagError::NoTarget.into());
+
+    // A joint twice, and joints that hang on each other otherwise than the part's.
+    let error = desk.refusal(drop_on(&[ARM_R, HAND_R, HAND_R]));
+    assert_eq!(error, TagError::JointTwice { part: "arm part".into(), joint: "end".into() }.into());
+    assert_eq!(error.to_string(), "\"end\" is given twice for the part \"arm part\"; give each joint once");
+    let order = |joint: &str, parent: &str, onto: &str, above: &str| {
+        TagError::PartOrder(Box::new(PartOrder {
+            part: "arm part".into(),
+            joint: joint.into(),
+            parent: parent.into(),
+            onto: onto.into(),
+            above: above.into(),
+            joints: vec!["upper".into(), "lower".into(), "end".into()],
+        }))
+    };
+    let error = desk.refusal(drop_on(&[Uid(0x54), HAND_R, ARM_R]));
+    assert_eq!(error, order("lower", "upper", "end", "tip_r").into());
+    assert!(error.to_string().contains("give joints that follow each other as upper, lower, end"), "{error}");
+    let error = desk.refusal(drop_on(&[ARM_R, Uid(0x54), HAND_R]));
+    assert_eq!(error, order("lower", "upper", "tip_r", "arm_r").into());
+    assert_eq!(desk.refusal(drop_on(&[ARM_L, HAND_R, Uid(0x54)])), order("lower", "upper", "end", "arm_l").into());
     assert_eq!(desk.refusal(drop_on(&[HIPS, Uid(9)])), EditError::NoJoint(Uid(9)).into());
 }
 
@@ -593,7 +620,9 @@ fn random_operation(rig: &Rig, copied: &mut TagClipboard, (kind, a, b, c): (u8, 
             to: PasteTo::Joints(vec![joint(a), joint(b)]),
         },
         11 => TagOperation::Paste { clipboard: Arc::new(copied.clone()), what, to: PasteTo::Mirror },
-        12 => TagOperation::Drop { part: Arc::new(part()), joints: vec![joint(a), joint(b)], bindings: [].into() },
+        12 => {
+            TagOperation::Drop { part: Arc::new(part().into()), joints: vec![joint(a), joint(b)], bindings: [].into() }
+        }
         _ => match b % 4 {
             0 => TagOperation::SetFeature(key, odd),
             1 => TagOperation::SetSwitch(key, name, odd),

@@ -124,7 +124,7 @@ impl TagsPanel {
             });
             ui.menu_button("Part", |ui| {
                 if let Some(part) = self.parts.menu(ui) {
-                    let joints = parts::chain(&shown.rig, &self.stack.joints, part.len());
+                    let joints = parts::joints_for(&shown.rig, &self.stack.joints, &part.rig);
                     let bindings = std::collections::BTreeMap::new();
                     send(TagOperation::Drop { part, joints, bindings }, shown, requests);
                 }

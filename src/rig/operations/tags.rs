@@ -9,6 +9,7 @@ mod paste;
 use std::{collections::BTreeMap, sync::Arc};
 
 pub use clipboard::{CopiedIdentifiers, CopiedJoint, TagClipboard, TagScope};
+pub use part::PartOrder;
 pub(in crate::rig) use part::drop_part;
 pub use paste::{PasteTo, PasteWhat};
 
@@ -16,6 +17,7 @@ use super::{Draft, OperationError};
 use crate::rig::{
     EditError, Rig, RigEdit, TagData, TagKind, Uid,
     feature::{self, FeatureError, FeatureKey},
+    part::{Part, PartError},
     reference::{BadReference, NameKind, bind_names, refresh_names},
 };
 
@@ -75,12 +77,12 @@ pub enum TagOperation {
         /// Target joints.
         to: PasteTo,
     },
-    /// Drops a part onto a chain of joints: the tags of the part's first joint go to the first, and so on, until either
-    /// list ends.
+    /// Drops a part onto joints: the tags of the part's first joint go to the first, and so on, until either list ends. A part
+    /// with a chain has as many joints in it as there are.
     Drop {
         /// The part.
-        part: Arc<Rig>,
-        /// The joints, in order.
+        part: Arc<Part>,
+        /// The joints, in the order of the part's, each below the one that its parent's tags go to.
         joints: Vec<Uid>,
         /// Counterparts in the rig of the part's joints and groups that have none in `joints`; other references are
         /// resolved by label or name.
@@ -141,6 +143,20 @@ pub enum TagError {
         /// The number of joints that it was dropped onto.
         given: usize,
     },
+    /// A joint that would be two joints of a part.
+    #[error("\"{joint}\" is given twice for the part \"{part}\"; give each joint once")]
+    JointTwice {
+        /// Name of the part.
+        part: String,
+        /// Label of the joint.
+        joint: String,
+    },
+    /// Joints that do not hang on each other as those of a part do.
+    #[error("{0}")]
+    PartOrder(Box<PartOrder>),
+    /// A part whose chain cannot have so many joints.
+    #[error("{0}")]
+    Part(Box<PartError>),
     /// A name of the part that fits several objects in the rig.
     #[error(
         "\"{name}\" of the part could be {} {kind}s of the rig ({}); choose one of them",
@@ -239,11 +255,7 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
         TagOperation::Attach(tags, feature) => attach(draft, tags, *feature),
         TagOperation::Cut(clipboard) => paste::cut(draft, clipboard),
         TagOperation::Paste { clipboard, what, to } => paste::paste(draft, clipboard, *what, to),
-        TagOperation::Drop { part, joints, bindings } => {
-            drop_part(draft, part, joints, bindings, &mut |draft, _| draft.next_uid())?;
-            part::note_left_over(draft, part, joints);
-            Ok(())
-        }
+        TagOperation::Drop { part, joints, bindings } => part::drop_sized(draft, part, joints, bindings),
         TagOperation::SetFeature(key, on) => apply(draft, feature::set_feature(draft.rig(), key, *on)?),
         TagOperation::SetSwitch(key, switch, on) => apply(draft, feature::set_switch(draft.rig(), key, switch, *on)?),
         TagOperation::ChooseSwitch(key, switch) => apply(draft, feature::choose_switch(draft.rig(), key, switch)?),

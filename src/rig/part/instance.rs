@@ -15,6 +15,7 @@ use crate::rig::{
     operations::{Draft, MirrorPlane, drop_part},
     reference::map_text_fields,
     remap::mirror_names,
+    template::Template,
 };
 
 /// A template that others use, with what it lets them vary.
@@ -28,6 +29,20 @@ pub struct Part {
     pub sockets: Vec<PartSocket>,
     /// Values that its uses may set.
     pub options: Vec<PartOption>,
+}
+
+impl From<Rig> for Part {
+    /// A part that is as it is everywhere: no chain of another length, no sockets and no options.
+    fn from(rig: Rig) -> Self {
+        Self { rig, chains: Vec::new(), sockets: Vec::new(), options: Vec::new() }
+    }
+}
+
+impl From<Template> for Part {
+    fn from(template: Template) -> Self {
+        let Template { rig, chains, sockets, options, .. } = template;
+        Self { rig, chains, sockets, options }
+    }
 }
 
 /// A part in a template.
@@ -202,11 +217,7 @@ impl PartInstance {
             && !self.onto.is_empty()
             && !self.adds
         {
-            let others = part.rig.len() - only.joints.len();
-            let most = self.onto.len().saturating_sub(others);
-            // What hangs behind the chain may be left out.
-            let count = if (only.min..=only.max).contains(&most) { most } else { self.onto.len().min(only.max) };
-            counts.push((only, count));
+            counts.push((only, only.count_on(&part.rig, self.onto.len())));
         }
         let mut rig = part.rig.clone();
         for (chain, count) in counts {

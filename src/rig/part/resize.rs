@@ -4,9 +4,10 @@ use std::collections::HashMap;
 
 use bevy::math::{Affine3, Quat, Vec3};
 
-use super::PartError;
+use super::{Part, PartError, PartNeeds, name_of};
 use crate::rig::{
     EditError, JointData, NodeRef, NodeRefs, RestTransform, Rig, RigEdit, TagKind, Uid,
+    operations::{OperationError, TagError},
     reference::{Source, map_unions},
 };
 
@@ -29,7 +30,34 @@ pub struct PartChain {
     pub max: usize,
 }
 
+impl Part {
+    /// The part with as many joints in its chain as there are for it where it goes onto `count` joints of a rig; as it is where
+    /// it has no chain, or several.
+    ///
+    /// # Errors
+    /// Fewer joints than the part needs with its shortest chain; a chain that is none of the part.
+    pub fn sized_for(&self, count: usize) -> Result<Rig, PartError> {
+        let [chain] = self.chains.as_slice() else { return Ok(self.rig.clone()) };
+        let least = chain.resized(&self.rig, chain.min)?;
+        let of_chain = least.walk().enumerate().filter(|(_, joint)| chain.joints.contains(&joint.data.uid));
+        let end = of_chain.map(|(place, _)| place + 1).max().unwrap_or_default();
+        let needed = end.max(PartNeeds::of(&least).joints.len());
+        if count < needed {
+            let joints = least.walk().take(needed).map(name_of).collect();
+            let error = TagError::PartNeeds { part: self.rig.about().name.clone(), joints, given: count };
+            return Err(OperationError::from(error).into());
+        }
+        chain.resized(&self.rig, chain.count_on(&self.rig, count).max(chain.min))
+    }
+}
+
 impl PartChain {
+    /// Number of joints of the chain where its part goes onto `count` joints. What hangs behind the chain may be left out.
+    pub(super) fn count_on(&self, part: &Rig, count: usize) -> usize {
+        let most = count.saturating_sub(part.len().saturating_sub(self.joints.len()));
+        if (self.min..=self.max).contains(&most) { most } else { count.min(self.max) }
+    }
+
     /// The part with `count` joints in this chain.
     ///
     /// # Errors

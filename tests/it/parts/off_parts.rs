@@ -398,7 +398,7 @@ fn a_dropped_part_goes_with_the_control_that_carries_the_rig() {
     }
     let drop = |joints: &[Uid]| {
         Operation::Tags(TagOperation::Drop {
-            part: Arc::new(part.clone()),
+            part: Arc::new(part.clone().into()),
             joints: joints.to_vec(),
             bindings: BTreeMap::new(),
         })

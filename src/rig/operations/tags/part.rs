@@ -1,6 +1,6 @@
 //! Dropping a part onto a chain of joints.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use super::{
     super::{Draft, OperationError},
@@ -9,10 +9,54 @@ use super::{
 };
 use crate::rig::{
     EditError, GroupData, JointData, NodeRefs, Rig, RigEdit, RigInput, TagKind, Uid,
-    part::{PartNeeds, left_out},
+    part::{Part, PartError, PartNeeds, left_out, name_of},
     reference::{NameKind, NameScope, Names, RigScope, map_references, references_in},
     remap::Remap,
 };
+
+/// Joint that is not next below another one as its counterpart in a part is.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the part \"{part}\" has {joint} next below {parent}, but of the joints that are given \"{onto}\" is not next below \
+     \"{above}\"; give joints that follow each other as {}",
+    .joints.join(", ")
+)]
+pub struct PartOrder {
+    /// Name of the part.
+    pub part: String,
+    /// Label of a joint of the part.
+    pub joint: String,
+    /// Label of its parent in the part.
+    pub parent: String,
+    /// Label of the joint that it was to go onto.
+    pub onto: String,
+    /// Label of the joint that its parent was to go onto.
+    pub above: String,
+    /// Labels of the joints of the part, as many as were given.
+    pub joints: Vec<String>,
+}
+
+/// Drops a part with as many joints in its chain as there are, see [`drop_part`], onto joints that hang on each other as the
+/// part's do, and notes which joints were too few or too many.
+pub(super) fn drop_sized(
+    draft: &mut Draft,
+    part: &Part,
+    joints: &[Uid],
+    bindings: &BTreeMap<Uid, Uid>,
+) -> Result<(), OperationError> {
+    if joints.is_empty() {
+        return Err(TagError::NoTarget.into());
+    }
+    let sized = part.sized_for(joints.len()).map_err(|error| match error {
+        PartError::Drop(error) => error,
+        error => TagError::Part(Box::new(error)).into(),
+    })?;
+    check_joints(draft.rig(), &sized, joints, bindings)?;
+    check_order(draft.rig(), &sized, joints)?;
+    drop_part(draft, &sized, joints, bindings, &mut |draft, _| draft.next_uid())?;
+    note_left_over(draft, &sized, joints);
+    Ok(())
+}
 
 /// Puts the tags of a part's joints (parents first, siblings as authored) onto `joints` in order, until either list
 /// ends. Refused, before anything changes, if the part needs more joints than there are.
@@ -29,16 +73,7 @@ pub(in crate::rig) fn drop_part(
     bindings: &BTreeMap<Uid, Uid>,
     uid_of: &mut dyn FnMut(&mut Draft, Uid) -> Uid,
 ) -> Result<(), OperationError> {
-    for (number, joint) in joints.iter().enumerate() {
-        draft.rig().joint(*joint).ok_or(EditError::NoJoint(*joint))?;
-        if joints[..number].contains(joint) {
-            return Err(EditError::UidInUse(*joint).into());
-        }
-    }
-    if joints.is_empty() {
-        return Err(TagError::NoTarget.into());
-    }
-    check_needs(draft.rig(), part, joints, bindings)?;
+    check_joints(draft.rig(), part, joints, bindings)?;
     let pairs: Vec<(&JointData, Uid)> = part.walk().map(|joint| &joint.data).zip(joints.iter().copied()).collect();
     let mut remap = Remap::default();
     for (joint, target) in &pairs {
@@ -74,7 +109,7 @@ pub(in crate::rig) fn drop_part(
 }
 
 /// Notes which joints were too few or too many for a part that was dropped onto them.
-pub(super) fn note_left_over(draft: &mut Draft, part: &Rig, joints: &[Uid]) {
+fn note_left_over(draft: &mut Draft, part: &Rig, joints: &[Uid]) {
     let left = part.len().saturating_sub(joints.len());
     if left > 0 {
         let needs = PartNeeds::of(part).joints;
@@ -87,6 +122,50 @@ pub(super) fn note_left_over(draft: &mut Draft, part: &Rig, joints: &[Uid]) {
         let left = joints.len() - part.len();
         draft.note(format!("{left} selected joints are left over: the part has only {}", part.len()));
     }
+}
+
+/// Refuses joints that are not there or are given twice, and fewer than the part needs.
+fn check_joints(rig: &Rig, part: &Rig, joints: &[Uid], bindings: &BTreeMap<Uid, Uid>) -> Result<(), OperationError> {
+    for (number, joint) in joints.iter().enumerate() {
+        rig.joint(*joint).ok_or(EditError::NoJoint(*joint))?;
+        if joints[..number].contains(joint) {
+            let (part, joint) = (part.about().name.clone(), joint_name(rig, *joint));
+            return Err(TagError::JointTwice { part, joint }.into());
+        }
+    }
+    if joints.is_empty() {
+        return Err(TagError::NoTarget.into());
+    }
+    check_needs(rig, part, joints, bindings)
+}
+
+/// Name of a joint of the rig for messages.
+fn joint_name(rig: &Rig, joint: Uid) -> String {
+    rig.joint(joint).map_or_else(|| joint.to_string(), name_of)
+}
+
+/// Refuses joints of which one is not the next below the counterpart of its parent in the part.
+fn check_order(rig: &Rig, part: &Rig, joints: &[Uid]) -> Result<(), OperationError> {
+    let pairs: HashMap<Uid, Uid> = part.walk().map(|joint| joint.data.uid).zip(joints.iter().copied()).collect();
+    let given = &joints[..joints.len().min(part.len())];
+    for (joint, onto) in part.walk().zip(given) {
+        let Some((parent, above)) = joint.parent.and_then(|parent| Some((parent, *pairs.get(&parent)?))) else {
+            continue;
+        };
+        let next = rig.ancestors(*onto).map(|joint| joint.data.uid).find(|uid| given.contains(uid));
+        if next != Some(above) {
+            let order = PartOrder {
+                part: part.about().name.clone(),
+                joint: name_of(joint),
+                parent: joint_name(part, parent),
+                onto: joint_name(rig, *onto),
+                above: joint_name(rig, above),
+                joints: part.walk().take(given.len()).map(name_of).collect(),
+            };
+            return Err(TagError::PartOrder(Box::new(order)).into());
+        }
+    }
+    Ok(())
 }
 
 /// Refuses fewer joints than the part needs. What the host has under the same label, or `bindings` name, counts.
