@@ -4,10 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, progress::spinning, skin::load_rig};
+use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, limits, progress::spinning, skin::load_rig};
 use crate::{
-    files::{FileKind, RealDisk, load_model, stem, store_model, store_rig, store_rig_over},
-    headless::Workbench,
+    files::{FileKind, RealDisk, stem, store_model, store_rig, store_rig_over},
     mesh::{
         gltf::GltfWriteSettings,
         model::{Model, SkinBinding},
@@ -38,14 +37,14 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let notes = match (from, to) {
         (Some(Obj | Gltf | Glb), Some(Obj | Gltf | Glb)) => {
-            let model = spinning("reading", || load_model(&RealDisk, &args.input))?;
+            let model = spinning("reading", || limits::load_model(&args.input))?;
             report.notes(model.notes.iter().cloned());
             // Points without weights in the input stay unmoved in the only way that glTF offers: bound to the root.
             let settings = GltfWriteSettings { bind_unweighted: true, ..args.export.settings() };
             spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?
         }
         (Some(Gltf | Glb), Some(RigText | Template)) => {
-            let model = load_model(&RealDisk, &args.input)?;
+            let model = limits::load_model(&args.input)?;
             if model.nodes.is_empty() {
                 let message =
                     format!("`{}` has no skeleton to convert; sketch one into it first", args.input.display());
@@ -63,7 +62,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
             store_rig_over(&RealDisk, &args.output, &rig, &[&args.input])?
         }
         (Some(RigText | Template), Some(Gltf | Glb)) => {
-            let bench = Workbench::with_rig(SEED, load_rig(&args.input, &mut report)?);
+            let bench = limits::workbench(load_rig(&args.input, &mut report)?);
             let settings = GltfWriteSettings { all_joints: true, ..args.export.settings() };
             let mut model = bench.character();
             mark_joints(&mut model, bench.rig());

@@ -5,11 +5,16 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Report, progress::spinning, sketch::describe_rig};
+use super::{
+    Failure, Report,
+    limits::{self, Limit},
+    progress::spinning,
+    sketch::describe_rig,
+};
 use crate::{
     files::{
-        FileKind, RealDisk, load_animation, load_gestures, load_model, load_motion, load_project, load_rig_text,
-        load_skin, load_template,
+        FileKind, RealDisk, load_animation, load_gestures, load_motion, load_project, load_rig_text, load_skin,
+        load_template,
     },
     mesh::model::Model,
     rig::{
@@ -31,11 +36,12 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     match FileKind::of(path) {
         Some(FileKind::Obj | FileKind::Gltf | FileKind::Glb) => {
-            let model = spinning("reading", || load_model(&RealDisk, path))?;
+            let model = spinning("reading", || limits::load_model(path))?;
             describe_model(&mut report, &model);
         }
         Some(FileKind::Template) => {
             let template = load_template(&RealDisk, path)?;
+            limits::check_rig(path, &template.rig)?;
             let about = template.rig.about();
             report.line(format!("template \"{}\" {}", about.name, about.version));
             if !about.description.is_empty() {
@@ -84,6 +90,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             for edit in import_rig_text(&text, &mut UidSource::seeded(super::SEED)).0 {
                 rig.apply(&edit).map_err(|error| Failure::Input(Box::new(error)))?;
             }
+            limits::check_rig(path, &rig)?;
             report.line("skeleton in .rig text");
             report.set("kind", "rig");
             describe_joints(&mut report, &rig);
@@ -136,6 +143,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         }
         Some(FileKind::Gestures) => {
             let gestures = load_gestures(&RealDisk, path)?;
+            limits::check_gestures(path, &gestures)?;
             report.line(format!("{} gestures", gestures.len()));
             report.set("kind", "gestures");
             report.set("gestures", gestures.len());
@@ -200,14 +208,15 @@ fn describe_model(report: &mut Report, model: &Model) {
 
 fn describe_joints(report: &mut Report, rig: &Rig) {
     report.line(format!("{} joints, {} roots, {} local groups", rig.len(), rig.roots().len(), rig.groups().len()));
-    for joint in rig.walk().take(200) {
+    let listed = limits::most(Limit::Listed);
+    for joint in rig.walk().take(listed) {
         let depth = rig.ancestors(joint.data.uid).count();
         let label = joint.data.label.as_deref().unwrap_or("(no label)");
         let tags = if joint.data.tags.is_empty() { String::new() } else { format!("  {} tags", joint.data.tags.len()) };
         report.line(format!("  {}{label}{tags}", "  ".repeat(depth.min(40))));
     }
-    if rig.len() > 200 {
-        report.line(format!("  and {} more", rig.len() - 200));
+    if rig.len() > listed {
+        report.line(format!("  and {} more", rig.len() - listed));
     }
     describe_rig(report, rig);
 }

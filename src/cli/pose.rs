@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::Value;
 
-use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, build, skin, switches::SwitchArgs};
+use super::{
+    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, build, limits, skin, switches::SwitchArgs,
+};
 use crate::{
     files::{FileKind, RealDisk, load_project, store_model, store_rig},
     headless::{
@@ -105,7 +107,7 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let mut rig = read(args, &mut report)?;
     args.steps.parts.apply(&mut rig)?;
-    let mut bench = Workbench::with_rig(SEED, rig);
+    let mut bench = limits::workbench(rig);
     run_steps(&mut bench, &args.steps, &writes)?;
     let nodes = bench.nodes()?;
     let error = nodes.iter().map(|node| node.entity.translation.distance(node.program.translation)).fold(0.0, f32::max);

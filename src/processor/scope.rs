@@ -155,7 +155,7 @@ impl BuildScope<'_> {
     /// The transform of a node relative to its parent.
     pub fn base(&mut self, node: NodeId) -> Trs {
         match self.read(node, Aspect::Base) {
-            Some(Value::Base(base)) => base,
+            Some(Value::Base(base)) => *base,
             _ => Trs::IDENTITY,
         }
     }
@@ -280,7 +280,7 @@ impl BuildScope<'_> {
         };
         self.write(node, Aspect::Birth, Value::Birth(Arc::new(birth)));
         self.write(node, Aspect::Parent, Value::Parent(parent));
-        self.write(node, Aspect::Base, Value::Base(base));
+        self.write(node, Aspect::Base, Value::Base(Arc::new(base)));
         self.write(node, Aspect::Label, Value::Label(label));
         self.write(node, Aspect::Group, Value::Group(group));
         Ok(node)
@@ -363,11 +363,12 @@ impl BuildScope<'_> {
     }
 
     fn read(&mut self, node: NodeId, aspect: Aspect) -> Option<Value> {
+        self.world.work += 1;
         let value = self.world.read_at(node, aspect, self.asker.place + 1).cloned();
         let command = self.command;
         if !self.is_own(node, aspect) {
             // Who is among the readers has noted it already.
-            let readers = &mut self.world.cell_mut(node, aspect).readers;
+            let readers = self.world.cell_mut(node, aspect).readers_mut();
             if let Err(at) = readers.binary_search(&command) {
                 readers.insert(at, command);
                 self.trace.reads.push(Read::Cell(node, aspect, value.clone()));
@@ -378,13 +379,14 @@ impl BuildScope<'_> {
 
     /// True if the command itself wrote it.
     fn is_own(&self, node: NodeId, aspect: Aspect) -> bool {
-        self.world.cell(node, aspect).writes.iter().any(|(writer, _)| *writer == self.command)
+        self.world.cell(node, aspect).writes().iter().any(|(writer, _)| *writer == self.command)
     }
 
     pub(super) fn write(&mut self, node: NodeId, aspect: Aspect, value: Value) {
         let command = self.command;
+        self.world.work += 1;
         self.world.note_parent(node, &value);
-        let writes = &mut self.world.cell_mut(node, aspect).writes;
+        let writes = self.world.cell_mut(node, aspect).writes_mut();
         match writes.iter_mut().find(|(writer, _)| *writer == command) {
             Some((_, old)) => *old = value,
             None => {
@@ -397,8 +399,10 @@ impl BuildScope<'_> {
     /// The place of something that the command makes for a purpose.
     fn identity(&mut self, role: &str, subject: NodeId, number: u32) -> Result<NodeId, ModuleError> {
         if self.world.is_full(self.asker.place + 1) {
-            return Err(ModuleError::TooMany { what: "nodes and constraints", limit: self.world.limits.made });
+            let limit = self.world.limits.made;
+            return Err(ModuleError::TooMany { what: "nodes and constraints", name: "nodes", limit });
         }
+        self.world.check_work()?;
         let uid = created_uid(self.command(), role, self.uid(subject), number);
         let node = self.world.slot(uid, Some(self.command));
         let mine = |aspect: Aspect| self.is_own(node, aspect);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy::platform::collections::HashMap;
 
-use super::{exclusion::Exclusions, module::BuildLimits};
+use super::{ModuleError, exclusion::Exclusions, module::BuildLimits};
 use crate::{
     mesh::model::Trs,
     rig::{Attribute, Constraint, ControlData, LayerData, NodeType, Origin, RigInput, SwitchData, Uid},
@@ -69,8 +69,8 @@ pub enum Value {
     Birth(Arc<Birth>),
     /// See [`Aspect::Parent`].
     Parent(Option<NodeId>),
-    /// See [`Aspect::Base`].
-    Base(Trs),
+    /// See [`Aspect::Base`]. Behind a pointer, so that other values stay small.
+    Base(Arc<Trs>),
     /// See [`Aspect::Label`].
     Label(Option<Arc<str>>),
     /// See [`Aspect::Group`].
@@ -119,10 +119,34 @@ pub(super) fn same(a: Option<&Value>, b: Option<&Value>) -> bool {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cell {
     pub document: Option<Value>,
+    /// Part of the cell that commands use; most cells of most joints have none.
+    used: Option<Box<CellUse>>,
+}
+
+#[derive(Debug, Clone, Default)]
+struct CellUse {
+    writes: Vec<(u32, Value)>,
+    readers: Vec<u32>,
+}
+
+impl Cell {
     /// Values by command, in no order: places of commands change.
-    pub writes: Vec<(u32, Value)>,
+    pub fn writes(&self) -> &[(u32, Value)] {
+        self.used.as_ref().map_or(&[], |used| &used.writes)
+    }
+
+    pub fn writes_mut(&mut self) -> &mut Vec<(u32, Value)> {
+        &mut self.used.get_or_insert_default().writes
+    }
+
     /// Commands that read the cell, sorted.
-    pub readers: Vec<u32>,
+    pub fn readers(&self) -> &[u32] {
+        self.used.as_ref().map_or(&[], |used| &used.readers)
+    }
+
+    pub fn readers_mut(&mut self) -> &mut Vec<u32> {
+        &mut self.used.get_or_insert_default().readers
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -164,6 +188,10 @@ pub(super) struct World {
     pub limits: BuildLimits,
     /// Number of slots of nodes and constraints that commands make.
     made: usize,
+    /// Number of values that commands have read and written.
+    pub work: u64,
+    /// Work before the current run.
+    pub work_before: u64,
 }
 
 impl World {
@@ -205,6 +233,16 @@ impl World {
         }
     }
 
+    /// Refuses more work in the current run than was agreed.
+    pub fn check_work(&self) -> Result<(), ModuleError> {
+        let limit = self.limits.work;
+        if self.work - self.work_before <= limit {
+            return Ok(());
+        }
+        let limit = usize::try_from(limit).unwrap_or(usize::MAX);
+        Err(ModuleError::TooMany { what: "values read and written in one build", name: "work", limit })
+    }
+
     /// The number of a command, made where there is none.
     pub fn command(&mut self, uid: Uid) -> u32 {
         let next = self.commands.len() as u32;
@@ -244,7 +282,7 @@ impl World {
     pub fn read_at(&self, node: NodeId, aspect: Aspect, place: u32) -> Option<&Value> {
         let cell = self.cell(node, aspect);
         let mut best: Option<(u32, &Value)> = None;
-        for (command, value) in &cell.writes {
+        for (command, value) in cell.writes() {
             let at = self.places[*command as usize];
             if at < place && best.is_none_or(|(place, _)| place < at) {
                 best = Some((at, value));
@@ -294,7 +332,7 @@ impl World {
 
     pub fn base(&self, node: NodeId, place: u32) -> Trs {
         match self.read_at(node, Aspect::Base, place) {
-            Some(Value::Base(base)) => *base,
+            Some(Value::Base(base)) => **base,
             _ => Trs::IDENTITY,
         }
     }

@@ -17,11 +17,15 @@ mod cli_build;
 #[cfg(feature = "cli")]
 mod cli_face;
 #[cfg(feature = "cli")]
+mod cli_limits;
+#[cfg(feature = "cli")]
 mod cli_outputs;
 #[cfg(feature = "cli")]
 mod cli_pose;
 #[cfg(feature = "cli")]
 mod cli_site;
+#[cfg(all(feature = "cli", target_os = "linux"))]
+mod cli_streams;
 #[cfg(feature = "cli")]
 mod cli_templates;
 mod commands;
