@@ -10,8 +10,14 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, WeightArgs, binding::bind, convert::mark_joints,
-    explanation::Explanation, limits, report::is_json, skin, switches::SwitchArgs,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, WeightArgs,
+    binding::bind,
+    convert::{mark_joints, skeleton_model},
+    explanation::Explanation,
+    limits,
+    report::is_json,
+    skin,
+    switches::SwitchArgs,
 };
 use crate::{
     files::{FileKind, RealDisk, store_model, store_rig},
@@ -22,13 +28,7 @@ use crate::{
     },
     plugins::commands::BuildStep,
     processor::{Builder, CommandState, RunReport},
-    rig::{
-        BuiltRig, Rig, Uid,
-        bake::baked,
-        character::{Character, character},
-        operations::Operation,
-        update::edits_between,
-    },
+    rig::{BuiltRig, Rig, TagKind, Uid, bake::baked, operations::Operation, update::edits_between},
     solve::program::{CompileOptions, RigProgram},
 };
 
@@ -74,14 +74,19 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let mut rig = skin::load_rig(&args.rig, &mut report)?;
     args.switches.apply(&mut rig)?;
-    match args.output.as_deref().filter(|path| FileKind::of(path) != Some(FileKind::Template)) {
+    let is_commanded = rig.walk().any(|joint| {
+        let mut tags = joint.data.tags.iter();
+        tags.any(|tag| matches!(tag.kind, TagKind::Command { .. }))
+    });
+    let is_posed = args.mesh.is_some() || is_commanded || !rig.pose().is_empty();
+    match args.output.as_deref().filter(|path| is_posed && FileKind::of(path) != Some(FileKind::Template)) {
         Some(output) => build_character(args, output, rig, &mut report)?,
         None => build_skeleton(args, rig, &mut report)?,
     }
     Ok(report)
 }
 
-/// Builds a rig without an app, which only poses and meshes need, and writes the built skeleton.
+/// Builds a rig without an app, which only poses and meshes need, and writes the built skeleton as it is at rest.
 fn build_skeleton(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure> {
     let mut builder = Builder::new(Arc::new(limits::modules()));
     builder.sync(&rig);
@@ -99,8 +104,16 @@ fn build_skeleton(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(),
     RigProgram::compile(&built, &CompileOptions::default()).map_err(PoseError::CannotRun)?;
     if let Some(output) = &args.output {
         let skeleton = baked(&rig, &built);
-        drop((rig, built));
-        report.notes(store_rig(&RealDisk, output, &skeleton)?);
+        if FileKind::of(output) == Some(FileKind::Template) {
+            drop((rig, built));
+            report.notes(store_rig(&RealDisk, output, &skeleton)?);
+        } else {
+            let mut model = skeleton_model(&rig, Some(&built));
+            mark_joints(&mut model, &skeleton);
+            drop((rig, built, skeleton));
+            let settings = GltfWriteSettings { all_joints: true, ..args.export.settings() };
+            report.notes(store_model(&RealDisk, output, &model, &settings)?);
+        }
         written(report, output);
     }
     Ok(())
@@ -229,9 +242,7 @@ fn posed_skeleton(bench: &Workbench, export: &ExportArgs) -> Result<(Model, Gltf
     let (rig, built) = (bench.rig(), bench.built().ok_or(PoseError::NotBuilt)?);
     let skeleton = baked(rig, built);
     let joints: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
-    let empty = Model { name: rig.about().name.clone(), ..Model::default() };
-    let parts = Character { rig, built: Some(built), file: &empty, rest: &empty, nodes: &[], skin: None };
-    let mut model = character(&parts);
+    let mut model = skeleton_model(rig, Some(built));
     mark_joints(&mut model, &skeleton);
     pose(&mut model, &joints, built, &posed);
     Ok((model, GltfWriteSettings { all_joints: true, ..export.settings() }))

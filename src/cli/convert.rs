@@ -12,8 +12,8 @@ use crate::{
         model::{Model, SkinBinding},
     },
     rig::{
-        Rig, UidSource,
-        character::{import_skeleton, inverse_bind},
+        BuiltRig, Rig, UidSource,
+        character::{Character, character, import_skeleton, inverse_bind},
     },
 };
 
@@ -62,10 +62,11 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
             store_rig_over(&RealDisk, &args.output, &rig, &[&args.input])?
         }
         (Some(RigText | Template), Some(Gltf | Glb)) => {
-            let bench = limits::workbench(load_rig(&args.input, &mut report)?);
+            let rig = load_rig(&args.input, &mut report)?;
             let settings = GltfWriteSettings { all_joints: true, ..args.export.settings() };
-            let mut model = bench.character();
-            mark_joints(&mut model, bench.rig());
+            let mut model = skeleton_model(&rig, None);
+            mark_joints(&mut model, &rig);
+            drop(rig);
             store_model(&RealDisk, &args.output, &model, &settings)?
         }
         _ => {
@@ -81,6 +82,12 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
     report.line(format!("wrote {}", args.output.display()));
     report.set("output", args.output.display().to_string());
     Ok(report)
+}
+
+/// A model of a rig without a mesh.
+pub(super) fn skeleton_model(rig: &Rig, built: Option<&BuiltRig>) -> Model {
+    let empty = Model { name: rig.about().name.clone(), ..Model::default() };
+    character(&Character { rig, built, file: &empty, rest: &empty, nodes: &[], skin: None })
 }
 
 /// Lists all joints in a skin, because readers recognise joints by the skins that list them, even without skinned

@@ -141,6 +141,13 @@ impl Builder {
                 self.mark(number, DueWork::Check);
             }
         }
+        if matches!(aspect, Aspect::Base | Aspect::Parent) {
+            for number in self.world.global_readers(node) {
+                if later(&self.world, number) {
+                    self.mark(number, DueWork::Check);
+                }
+            }
+        }
         if aspect.is_structure() {
             let from = from.map_or(0, |from| from + 1);
             self.structure_changed = Some(self.structure_changed.map_or(from, |before| before.min(from)));
@@ -208,12 +215,6 @@ impl Builder {
     /// True for an entry of the heap whose command still needs work at that place.
     fn is_waiting(&self, (place, number): (u32, u32)) -> bool {
         self.commands[number as usize].due != DueWork::Nothing && self.world.places[number as usize] == place
-    }
-
-    /// Number of values that commands have read and written since the builder was made: a measure of work that is the
-    /// same on every machine.
-    pub fn work(&self) -> u64 {
-        self.world.work
     }
 
     /// A run with [`Builder::run`] stops before commands with a breakpoint.
@@ -361,9 +362,9 @@ impl Builder {
         let outcome = if active { self.construct(number, &mut trace) } else { Ok(()) };
         let above = trace.above;
         if outcome.is_err() {
-            let reads = std::mem::take(&mut trace.reads);
+            let (reads, globals) = (std::mem::take(&mut trace.reads), std::mem::take(&mut trace.globals));
             self.take_back(number, &trace);
-            trace = Trace { reads, ..Trace::default() };
+            trace = Trace { reads, globals, ..Trace::default() };
         }
         let result = match outcome {
             Err(BuildProblem::Module(ModuleError::Off { parameter, off })) => {
@@ -418,6 +419,7 @@ impl Builder {
         let loaded = command.loaded.get_or_insert_with(|| modules.load(&command.module, &command.params));
         let module = loaded.clone()?;
         let name = command.module.clone();
+        self.world.begin_command();
         let mut scope = BuildScope { world: &mut self.world, trace, asker, command: number, module: name };
         if let Err(problem) = module.construct(&mut scope) {
             let params = &self.commands[number as usize].params;
@@ -440,6 +442,12 @@ impl Builder {
                 if let Ok(at) = readers.binary_search(&number) {
                     readers.remove(at);
                 }
+            }
+        }
+        for node in trace.globals.keys() {
+            let readers = &mut self.world.slots[node.0 as usize].global_readers;
+            if let Ok(at) = readers.binary_search(&number) {
+                readers.remove(at);
             }
         }
         let mut values = Vec::with_capacity(trace.writes.len());

@@ -162,6 +162,25 @@ impl BuildScope<'_> {
 
     /// The transform of a node in the rig's space.
     pub fn global(&mut self, node: NodeId) -> Trs {
+        let place = self.asker.place + 1;
+        let is_changed = |node: NodeId| self.is_own(node, Aspect::Base) || self.is_own(node, Aspect::Parent);
+        if std::iter::successors(Some(node), |node| self.world.parent(*node, place)).any(is_changed) {
+            return self.global_of_own(node);
+        }
+        let (global, count) = self.world.global(node, place);
+        self.world.work += count;
+        if self.trace.globals.insert(node, global).is_none() {
+            let readers = &mut self.world.slots[node.0 as usize].global_readers;
+            if let Err(at) = readers.binary_search(&self.command) {
+                readers.insert(at, self.command);
+            }
+        }
+        global
+    }
+
+    /// Transform, in the rig's space, of a node that the command itself moved, or that stands below such a node: the other
+    /// values on the way up are read one by one.
+    fn global_of_own(&mut self, node: NodeId) -> Trs {
         let mut global = self.base(node);
         let mut at = node;
         while let Some(parent) = self.parent(at) {
@@ -255,6 +274,7 @@ impl BuildScope<'_> {
         }
         self.check_inside(parent)?;
         let node = self.identity(role, subject, number)?;
+        self.world.note_made();
         let origin = Origin {
             command: self.command(),
             module: self.module.clone(),
@@ -335,6 +355,7 @@ impl BuildScope<'_> {
             self.check_inside(self.world.id(uid))?;
         }
         let id = self.identity(role, subject, number)?;
+        self.world.note_made();
         for driven in constraint.drives() {
             let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = driven;
             if let Some(node) = self.world.id(uid) {

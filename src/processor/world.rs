@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bevy::platform::collections::HashMap;
+use bevy::platform::collections::{HashMap, HashSet};
 
 use super::{ModuleError, exclusion::Exclusions, module::BuildLimits};
 use crate::{
@@ -101,7 +101,7 @@ impl Value {
     }
 }
 
-fn bits(trs: &Trs) -> [u32; 10] {
+pub(super) fn bits(trs: &Trs) -> [u32; 10] {
     let (t, r, s) = (trs.translation, trs.rotation, trs.scale);
     [t.x, t.y, t.z, r.x, r.y, r.z, r.w, s.x, s.y, s.z].map(f32::to_bits)
 }
@@ -158,6 +158,8 @@ pub(super) struct Slot {
     pub driven_by: Vec<NodeId>,
     /// Children of the node at any place of the list, in rising order.
     pub below: Vec<NodeId>,
+    /// Commands that read the node's transform in the rig's space, sorted.
+    pub global_readers: Vec<u32>,
     pub cells: [Cell; Aspect::COUNT],
 }
 
@@ -188,6 +190,8 @@ pub(super) struct World {
     pub limits: BuildLimits,
     /// Number of slots of nodes and constraints that commands make.
     made: usize,
+    /// Nodes and constraints that are there, counted by the running command once there may be too many.
+    counted: Option<usize>,
     /// Number of values that commands have read and written.
     pub work: u64,
     /// Work before the current run.
@@ -213,7 +217,8 @@ impl World {
             return *id;
         }
         let id = NodeId(self.slots.len() as u32);
-        self.slots.push(Slot { uid, creator, driven_by: Vec::new(), below: Vec::new(), cells: Default::default() });
+        let (driven_by, below, global_readers) = (Vec::new(), Vec::new(), Vec::new());
+        self.slots.push(Slot { uid, creator, driven_by, below, global_readers, cells: Default::default() });
         self.ids.insert(uid, id);
         if let Some(creator) = creator {
             self.created[creator as usize].push(id);
@@ -223,14 +228,26 @@ impl World {
     }
 
     /// Returns `true` if the commands before `place` have made as many nodes and constraints as they may.
-    pub fn is_full(&self, place: u32) -> bool {
+    pub fn is_full(&mut self, place: u32) -> bool {
         // Slots stay when what was made is gone.
-        self.made >= self.limits.made && {
-            let is_there =
-                |node: &NodeId| self.exists(*node, place) || self.read_at(*node, Aspect::Constraint, place).is_some();
-            let made = self.created.iter().flatten().filter(|node| is_there(node));
-            made.count() >= self.limits.made
+        if self.made < self.limits.made {
+            return false;
         }
+        let is_there =
+            |node: &&NodeId| self.exists(**node, place) || self.read_at(**node, Aspect::Constraint, place).is_some();
+        let made = self.counted.unwrap_or_else(|| self.created.iter().flatten().filter(is_there).count());
+        self.counted = Some(made);
+        made >= self.limits.made
+    }
+
+    /// Notes that another command makes nodes and constraints from now on.
+    pub fn begin_command(&mut self) {
+        self.counted = None;
+    }
+
+    /// Notes a node or constraint that the running command makes.
+    pub fn note_made(&mut self) {
+        self.counted = self.counted.map(|made| made + 1);
     }
 
     /// Refuses more work in the current run than was agreed.
@@ -335,6 +352,37 @@ impl World {
             Some(Value::Base(base)) => **base,
             _ => Trs::IDENTITY,
         }
+    }
+
+    /// Transform of a node in the rig's space, and the number of nodes on the way up to the rig.
+    pub fn global(&self, node: NodeId, place: u32) -> (Trs, u64) {
+        let (mut global, mut at, mut count) = (self.base(node, place), node, 1);
+        while let Some(parent) = self.parent(at, place) {
+            global = self.base(parent, place) * global;
+            at = parent;
+            count += 1;
+        }
+        (global, count)
+    }
+
+    /// Commands that read the transform, in the rig's space, of a node or of one that may stand below it.
+    pub fn global_readers(&self, node: NodeId) -> Vec<u32> {
+        let slot = |node: NodeId| &self.slots[node.0 as usize];
+        let mut readers = slot(node).global_readers.clone();
+        if slot(node).below.is_empty() {
+            return readers;
+        }
+        // Parents differ from place to place, so that two nodes may each stand below the other somewhere.
+        let mut seen: HashSet<NodeId> = HashSet::default();
+        seen.insert(node);
+        let mut stack = slot(node).below.clone();
+        while let Some(node) = stack.pop() {
+            if seen.insert(node) {
+                readers.extend(&slot(node).global_readers);
+                stack.extend(&slot(node).below);
+            }
+        }
+        readers
     }
 
     pub fn label(&self, node: NodeId, place: u32) -> Option<&Arc<str>> {

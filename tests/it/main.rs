@@ -79,6 +79,7 @@ mod gestures;
 mod gizmo;
 mod gltf;
 mod gltf_torture;
+mod growth;
 mod heads;
 #[cfg(feature = "cli")]
 mod hostile;
