@@ -50,11 +50,22 @@ struct Findings {
     remarks: Vec<String>,
 }
 
+impl Findings {
+    /// The findings with messages of limited length: one may list thousands of names.
+    fn cut(mut self) -> Self {
+        let remarks = self.remarks.iter_mut().chain(&mut self.error);
+        for message in remarks.chain(self.problems.iter_mut().map(|problem| &mut problem.message)) {
+            *message = limits::message(message);
+        }
+        self
+    }
+}
+
 pub(super) fn run(args: &CheckArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let mut list = Vec::new();
     for path in &args.files {
-        let found = check(path)?;
+        let found = check(path)?.cut();
         match &found.error {
             Some(error) => report.line(format!("{}: error: {error}", path.display())),
             None => report.line(format!("{}: ok", path.display())),

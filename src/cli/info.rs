@@ -179,7 +179,7 @@ fn describe_model(report: &mut Report, model: &Model) {
     report.line(format!("{} points, {faces} faces ({triangles} triangles), {vertices} vertices", model.points.len()));
     report.line(format!("box {:.4} {:.4} {:.4} to {:.4} {:.4} {:.4}", low.x, low.y, low.z, high.x, high.y, high.z));
     let names: Vec<&str> = model.objects.iter().map(|object| object.name.as_str()).collect();
-    report.line(format!("{} objects: {}", model.objects.len(), names.join(", ")));
+    report.line(limits::message(&format!("{} objects: {}", model.objects.len(), names.join(", "))));
     report.line(format!(
         "{} materials, {} images, {morphs} morph targets, {joints} joints, {} clips",
         model.material_set.materials.len(),
