@@ -28,7 +28,7 @@ use crate::{
     },
     plugins::commands::BuildStep,
     processor::{Builder, CommandState, RunReport},
-    rig::{BuiltRig, Rig, TagKind, Uid, bake::baked, operations::Operation, update::edits_between},
+    rig::{BuiltRig, Rig, Uid, bake::baked, operations::Operation, update::edits_between},
     solve::program::{CompileOptions, RigProgram},
 };
 
@@ -74,20 +74,12 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let mut rig = skin::load_rig(&args.rig, &mut report)?;
     args.switches.apply(&mut rig)?;
-    let is_commanded = rig.walk().any(|joint| {
-        let mut tags = joint.data.tags.iter();
-        tags.any(|tag| matches!(tag.kind, TagKind::Command { .. }))
-    });
-    let is_posed = args.mesh.is_some() || is_commanded || !rig.pose().is_empty();
-    match args.output.as_deref().filter(|path| is_posed && FileKind::of(path) != Some(FileKind::Template)) {
-        Some(output) => build_character(args, output, rig, &mut report)?,
-        None => build_skeleton(args, rig, &mut report)?,
-    }
+    build(args, rig, &mut report)?;
     Ok(report)
 }
 
-/// Builds a rig without an app, which only poses and meshes need, and writes the built skeleton as it is at rest.
-fn build_skeleton(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure> {
+/// Builds a rig, and writes what is built. An app, which takes several times the memory, is used for poses and meshes alone.
+fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure> {
     let mut builder = Builder::new(Arc::new(limits::modules()));
     builder.sync(&rig);
     let outcome = match args.until {
@@ -96,49 +88,37 @@ fn build_skeleton(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(),
     };
     let built = builder.built();
     describe(args, report, &rig, &builder, &built, outcome);
+    let has_commands = !builder.is_empty();
     drop(builder);
     if report.at_fault {
         return Ok(());
     }
     // Compiled even if no file is written: a built rig that cannot run, such as one with a cycle of parents, is no rig.
     RigProgram::compile(&built, &CompileOptions::default()).map_err(PoseError::CannotRun)?;
-    if let Some(output) = &args.output {
+    let Some(output) = &args.output else { return Ok(()) };
+    let notes = if FileKind::of(output) == Some(FileKind::Template) {
         let skeleton = baked(&rig, &built);
-        if FileKind::of(output) == Some(FileKind::Template) {
-            drop((rig, built));
-            report.notes(store_rig(&RealDisk, output, &skeleton)?);
-        } else {
+        drop((rig, built));
+        store_rig(&RealDisk, output, &skeleton)?
+    } else {
+        let is_at_rest = args.mesh.is_none() && !has_commands && rig.pose().is_empty();
+        let (model, settings) = if is_at_rest {
             let mut model = skeleton_model(&rig, Some(&built));
-            mark_joints(&mut model, &skeleton);
-            drop((rig, built, skeleton));
-            let settings = GltfWriteSettings { all_joints: true, ..args.export.settings() };
-            report.notes(store_model(&RealDisk, output, &model, &settings)?);
-        }
-        written(report, output);
-    }
-    Ok(())
-}
-
-/// Builds a rig in an app, and writes the character as posed.
-fn build_character(args: &BuildArgs, output: &Path, rig: Rig, report: &mut Report) -> Result<(), Failure> {
-    let mut bench = limits::workbench(rig);
-    let outcome = bench.build(args.until.map_or(BuildStep::All, BuildStep::To));
-    let built = bench.built().ok_or(PoseError::NotBuilt)?;
-    let builder = bench.processor().ok_or(PoseError::NotBuilt)?.builder();
-    describe(args, report, bench.rig(), builder, built, outcome);
-    if report.at_fault {
-        return Ok(());
-    }
-    let (model, settings) = character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, report)?;
-    drop(bench);
-    report.notes(store_model(&RealDisk, output, &model, &settings)?);
-    written(report, output);
-    Ok(())
-}
-
-fn written(report: &mut Report, output: &Path) {
+            mark_joints(&mut model, &baked(&rig, &built));
+            drop((rig, built));
+            (model, GltfWriteSettings { all_joints: true, ..args.export.settings() })
+        } else {
+            drop(built);
+            let mut bench = limits::workbench(rig);
+            bench.build(args.until.map_or(BuildStep::All, BuildStep::To));
+            character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, report)?
+        };
+        store_model(&RealDisk, output, &model, &settings)?
+    };
+    report.notes(notes);
     report.line(format!("wrote {}", output.display()));
     report.set("output", output.display().to_string());
+    Ok(())
 }
 
 /// Adds what a build came to. A command that stopped it is a fault of the input.

@@ -43,7 +43,7 @@ const LIMITS: [(Limit, &str, u64, &str); 13] = [
     (Limit::Influences, "influences", 1_000_000_000, "influences of a mesh, of all its points"),
     (Limit::Gestures, "gestures", 1_000_000, "gestures of a list"),
     (Limit::StrokePoints, "stroke_points", 1_000_000, "points of one stroke"),
-    (Limit::Seconds, "seconds", 3_600, "seconds for gestures, binding, a fit or a face, each"),
+    (Limit::Seconds, "seconds", 3_600, "seconds for gestures, binding, a fit and a face, together"),
     (Limit::Listed, "listed", 200, "joints and problems that are listed for people"),
     (Limit::Notes, "notes", 200, "notes of one command"),
     (Limit::Message, "message", 1_500, "characters of one note or error"),
