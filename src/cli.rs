@@ -18,6 +18,7 @@ mod face;
 mod fit;
 mod format;
 mod info;
+mod limits;
 mod list;
 mod modules;
 mod new;
@@ -36,6 +37,7 @@ mod update;
 mod watch;
 
 use std::{
+    io::Write as _,
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -53,10 +55,14 @@ use report::{Failure, Report};
 /// Rig characters in minutes: sketch a skeleton into a mesh, skin it, export it.
 #[derive(Parser, Debug)]
 #[command(name = "rigsmith", version, about, long_about = None, arg_required_else_help = false)]
+#[command(after_help = limits::listing())]
 struct Cli {
     /// Answer in JSON, for programs
     #[arg(long, global = true)]
     json: bool,
+    /// Set a limit of what a command takes, makes or tells, such as joints=2000; may be repeated. `rigsmith --help` lists them
+    #[arg(long, global = true, value_name = "NAME=NUMBER")]
+    limit: Vec<limits::LimitSetting>,
     #[command(subcommand)]
     command: Option<Command>,
 }
@@ -278,8 +284,14 @@ pub fn main(window: OpenWindow) -> ExitCode {
         Err(error) if error.use_stderr() && std::env::args().any(|argument| argument == "--json") => {
             return report::finish(Err(Failure::Usage(error.to_string().trim_end().to_owned())), true, "");
         }
-        Err(error) => error.exit(),
+        Err(error) => {
+            let is_told = error.print().is_ok() && std::io::stdout().flush().is_ok();
+            let code = u8::try_from(error.exit_code()).unwrap_or(1);
+            return ExitCode::from(if is_told { code } else { code.max(1) });
+        }
     };
+    limits::choose(&cli.limit);
+    report::choose_json(cli.json);
     let subject = cli.command.as_ref().and_then(Command::subject).map(|path| path.display().to_string());
     let result = match cli.command {
         None if cli.json => demo::run(None),

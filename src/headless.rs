@@ -23,7 +23,7 @@ use crate::{
     mesh::{model::Model, shapes::Shapes},
     plugins::{
         RigPlugins,
-        commands::Built,
+        commands::{Built, RigModules},
         document::{ChangeError, EditRefused, EditRequest},
         face::{
             ExpressError, ExpressRequest, Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FacePreparation,
@@ -35,6 +35,7 @@ use crate::{
         surface::{RigMesh, SkinOf},
         task_pools,
     },
+    processor::BuildLimits,
     rig::{
         BuiltRig, PoseOffset, Rig, RigEdit, SkinData, StoredPose, Uid, UidSource,
         character::{Character, character, import_skeleton},
@@ -55,6 +56,8 @@ pub struct Workbench {
     app: App,
     rig: Entity,
     mesh: Option<Entity>,
+    /// End of the time that work may take, and that time.
+    deadline: Option<(Instant, Duration)>,
 }
 
 /// Error of the workbench.
@@ -75,6 +78,14 @@ pub enum WorkbenchError {
     /// The template was not fitted.
     #[error(transparent)]
     Fit(#[from] FitFailure),
+    /// Work took longer than it may.
+    #[error("{work} took longer than {seconds} s and was given up; simplify the input, or raise the limit `seconds`")]
+    OutOfTime {
+        /// The work, as a subject.
+        work: &'static str,
+        /// Time that it may take.
+        seconds: u64,
+    },
     /// The workbench has no mesh.
     #[error("no mesh is open; open one first")]
     NoMesh,
@@ -104,7 +115,7 @@ impl Workbench {
         app.cleanup();
         let uid = app.world_mut().resource_mut::<UidSource>().next_uid();
         let rig = app.world_mut().spawn(Rig::new(uid, name)).id();
-        Self { app, rig, mesh: None }
+        Self { app, rig, mesh: None, deadline: None }
     }
 
     /// A workbench with a loaded rig.
@@ -116,6 +127,30 @@ impl Workbench {
         let entity = bench.rig;
         bench.app.world_mut().entity_mut(entity).insert(rig);
         bench
+    }
+
+    /// Sets limits of what builds may make, and of the time that gestures, binding, fits and faces may take from now on.
+    pub fn set_limits(&mut self, build: BuildLimits, time: Duration) {
+        let mut modules = self.app.world_mut().resource_mut::<RigModules>();
+        if modules.0.limits != build {
+            Arc::make_mut(&mut modules.0).limits = build;
+        }
+        let now = Instant::now();
+        self.deadline = now.checked_add(time).map(|end| (end, time));
+    }
+
+    /// True once the time of [`Workbench::set_limits`] is over.
+    pub fn is_out_of_time(&self) -> bool {
+        self.deadline.is_some_and(|(end, _)| Instant::now() >= end)
+    }
+
+    fn check_time(&self, work: &'static str) -> Result<(), WorkbenchError> {
+        match self.deadline {
+            Some((end, time)) if Instant::now() >= end => {
+                Err(WorkbenchError::OutOfTime { work, seconds: time.as_secs() })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Opens a mesh below the rig. Its own skeleton and weights are imported, unless `mesh_only`.
@@ -144,7 +179,8 @@ impl Workbench {
         self.refused().map_or(Ok(()), Err)
     }
 
-    /// Carries out gestures and returns an answer for each.
+    /// Carries out gestures and returns an answer for each. Where the time is over, the last answer says so, and the
+    /// gestures behind it are left out.
     pub fn gestures(&mut self, gestures: Vec<Gesture>) -> Vec<GestureAnswer> {
         self.app.world_mut().entity_mut(self.rig).insert(GestureScript::new(gestures));
         loop {
@@ -152,6 +188,13 @@ impl Workbench {
             let Some(script) = self.app.world().get::<GestureScript>(self.rig) else { return Vec::new() };
             if script.is_done() {
                 return script.answers.clone();
+            }
+            if let Err(error) = self.check_time("the gesture") {
+                let mut answers = script.answers.clone();
+                let number = answers.len() + 1;
+                answers.push(GestureAnswer { number, message: error.to_string(), ..default() });
+                self.app.world_mut().entity_mut(self.rig).remove::<GestureScript>();
+                return answers;
             }
         }
     }
@@ -197,6 +240,7 @@ impl Workbench {
             if let Some(job) = self.app.world().get::<SkinningJob>(mesh) {
                 progress(job.progress());
             }
+            self.check_time("binding the mesh")?;
             pause.rest();
         }
     }
@@ -233,6 +277,7 @@ impl Workbench {
             if let Some(job) = self.app.world().get::<FitJob>(mesh) {
                 progress(job.progress());
             }
+            self.check_time("fitting the template")?;
             pause.rest();
         }
     }
@@ -267,6 +312,7 @@ impl Workbench {
             {
                 progress(step, job.progress());
             }
+            self.check_time("placing the face")?;
             pause.rest();
         }
     }

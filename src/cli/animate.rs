@@ -12,7 +12,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, build, positive, progress::spinning,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, WeightArgs, build, limits, positive, progress::spinning,
     report::counted, skin,
 };
 use crate::{
@@ -126,7 +126,7 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
             .push("--onto joints: the commands of the rig are left out, so that joints can have keys".to_owned());
         rig = without_commands(&rig)?;
     }
-    let mut bench = Workbench::with_rig(SEED, rig);
+    let mut bench = limits::workbench(rig);
     if let Some(error) = bench.build(BuildStep::All).error {
         return Err(Failure::Input(Box::new(error)));
     }

@@ -20,6 +20,9 @@ pub(super) enum ArgumentError {
     /// The strength of an expression is out of its range.
     #[error("{0} is not from 0 to {MAX_STRENGTH}")]
     Strength(f32),
+    /// The value has to name a limit and its number.
+    #[error("write NAME=NUMBER, such as joints=2000; `rigsmith --help` lists the names")]
+    NoLimit,
     /// The value has to be two angles.
     #[cfg(feature = "render")]
     #[error("write yaw and pitch in degrees, such as 30,15")]

@@ -1,6 +1,7 @@
 //! `rigsmith build`: carries out the commands of a rig.
 
 use std::{
+    collections::HashSet,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -9,19 +10,26 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, binding::bind, convert::mark_joints,
-    explanation::Explanation, report::counted, skin, switches::SwitchArgs,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, WeightArgs,
+    binding::bind,
+    convert::{mark_joints, skeleton_model},
+    explanation::Explanation,
+    limits,
+    report::{counted, is_json},
+    skin,
+    switches::SwitchArgs,
 };
 use crate::{
-    files::{FileKind, RealDisk, load_model, store_model, store_rig},
+    files::{FileKind, RealDisk, store_model, store_rig},
     headless::{Workbench, posing::PoseError},
     mesh::{
         gltf::GltfWriteSettings,
         model::{Model, Trs},
     },
     plugins::commands::BuildStep,
-    processor::{Builder, CommandState},
+    processor::{Builder, CommandState, RunReport},
     rig::{BuiltRig, Rig, Uid, bake::baked, operations::Operation, update::edits_between},
+    solve::program::{CompileOptions, RigProgram},
 };
 
 /// Arguments of `rigsmith build`.
@@ -66,14 +74,56 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let mut rig = skin::load_rig(&args.rig, &mut report)?;
     args.switches.apply(&mut rig)?;
-    let mut bench = Workbench::with_rig(SEED, rig);
-    let outcome = bench.build(args.until.map_or(BuildStep::All, BuildStep::To));
-    let (rig, built) = (bench.rig(), bench.built().ok_or(PoseError::NotBuilt)?);
-    let builder = bench.processor().ok_or(PoseError::NotBuilt)?.builder();
-    let lines = trace(&mut report, rig, builder, &outcome.executed);
-    if args.trace {
-        report.lines.extend(lines);
+    build(args, rig, &mut report)?;
+    Ok(report)
+}
+
+/// Builds a rig, and writes what is built. An app, which takes several times the memory, is used for poses and meshes alone.
+fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure> {
+    let mut builder = Builder::new(Arc::new(limits::modules()));
+    builder.sync(&rig);
+    let outcome = match args.until {
+        Some(count) => builder.run_to(count),
+        None => builder.run_all(),
+    };
+    let built = builder.built();
+    describe(args, report, &rig, &builder, &built, outcome);
+    let has_commands = !builder.is_empty();
+    drop(builder);
+    if report.at_fault {
+        return Ok(());
     }
+    // Compiled even if no file is written: a built rig that cannot run, such as one with a cycle of parents, is no rig.
+    RigProgram::compile(&built, &CompileOptions::default()).map_err(PoseError::CannotRun)?;
+    let Some(output) = &args.output else { return Ok(()) };
+    let notes = if FileKind::of(output) == Some(FileKind::Template) {
+        let skeleton = baked(&rig, &built);
+        drop((rig, built));
+        store_rig(&RealDisk, output, &skeleton)?
+    } else {
+        let is_at_rest = args.mesh.is_none() && !has_commands && rig.pose().is_empty();
+        let (model, settings) = if is_at_rest {
+            let mut model = skeleton_model(&rig, Some(&built));
+            mark_joints(&mut model, &baked(&rig, &built));
+            drop((rig, built));
+            (model, GltfWriteSettings { all_joints: true, ..args.export.settings() })
+        } else {
+            drop(built);
+            let mut bench = limits::workbench(rig);
+            bench.build(args.until.map_or(BuildStep::All, BuildStep::To));
+            character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, report)?
+        };
+        store_model(&RealDisk, output, &model, &settings)?
+    };
+    report.notes(notes);
+    report.line(format!("wrote {}", output.display()));
+    report.set("output", output.display().to_string());
+    Ok(())
+}
+
+/// Adds what a build came to. A command that stopped it is a fault of the input.
+fn describe(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, built: &BuiltRig, outcome: RunReport) {
+    trace(args, report, rig, builder, &outcome.executed);
     let created = built.nodes.iter().filter(|node| node.origin.is_some()).count();
     report.line(format!(
         "{} of {}, {}, {}, {}",
@@ -91,22 +141,15 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
         report.at_fault = true;
         report.notes.push(format!("`{}`: {error} (tag {})", args.rig.display(), error.command));
         report.fault = Some(Explanation::at(args.rig.display().to_string(), &error.to_string()));
-        return Ok(report);
     }
-    // Checked even if no file is written: a built rig that cannot run, such as one with a cycle of parents, is no rig.
-    bench.posed_nodes()?;
-    if let Some(output) = &args.output {
-        let notes = write(args, output, &mut bench, &mut report)?;
-        report.notes(notes);
-        report.line(format!("wrote {}", output.display()));
-        report.set("output", output.display().to_string());
-    }
-    Ok(report)
 }
 
-/// Adds the commands to the report for programs, and returns them for people, a line each.
-fn trace(report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) -> Vec<String> {
-    let mut lines = Vec::new();
+/// Adds the commands to the report: a line each for people who ask for them, and a list for programs.
+fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) {
+    if !args.trace && !is_json() {
+        return;
+    }
+    let executed: HashSet<Uid> = executed.iter().copied().collect();
     let mut list = Vec::new();
     for entry in builder.list() {
         let Some(status) = builder.status(entry.command) else { continue };
@@ -117,39 +160,29 @@ fn trace(report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) ->
             CommandState::Failed => "failed",
         };
         let label = rig.joint(entry.joint).and_then(|joint| joint.data.label.clone());
-        let error = status.error.as_ref().map(ToString::to_string);
         let skipped = status.skipped.as_ref().map(ToString::to_string);
-        let name = label.clone().unwrap_or_else(|| entry.joint.to_string());
-        let reason = skipped.as_ref().map_or_else(String::new, |reason| format!("  ({reason})"));
-        lines.push(format!("{state:>8} {:>9.1} µs  {name}  {}{reason}", status.micros, entry.module));
-        list.push(json!({
-            "uid": entry.command.to_string(),
-            "joint": entry.joint.to_string(),
-            "label": label,
-            "module": &*entry.module,
-            "state": state,
-            "micros": status.micros,
-            "executed": executed.contains(&entry.command),
-            "error": error,
-            "skipped": skipped,
-        }));
+        if args.trace {
+            let name = label.clone().unwrap_or_else(|| entry.joint.to_string());
+            let reason = skipped.as_ref().map_or_else(String::new, |reason| format!("  ({reason})"));
+            report.line(format!("{state:>8} {:>9.1} µs  {name}  {}{reason}", status.micros, entry.module));
+        }
+        if is_json() {
+            list.push(json!({
+                "uid": entry.command.to_string(),
+                "joint": entry.joint.to_string(),
+                "label": label,
+                "module": &*entry.module,
+                "state": state,
+                "micros": status.micros,
+                "executed": executed.contains(&entry.command),
+                "error": status.error.as_ref().map(ToString::to_string),
+                "skipped": skipped,
+            }));
+        }
     }
-    report.set("commands", Value::Array(list));
-    lines
-}
-
-fn write(
-    args: &BuildArgs,
-    output: &Output,
-    bench: &mut Workbench,
-    report: &mut Report,
-) -> Result<Vec<String>, Failure> {
-    if FileKind::of(output) == Some(FileKind::Template) {
-        let built = bench.built().ok_or(PoseError::NotBuilt)?;
-        return Ok(store_rig(&RealDisk, output, &baked(bench.rig(), built))?);
+    if is_json() {
+        report.set("commands", Value::Array(list));
     }
-    let (model, settings) = character_of(bench, args.mesh.as_deref(), &args.weights, &args.export, report)?;
-    Ok(store_model(&RealDisk, output, &model, &settings)?)
 }
 
 /// Built skeleton of a workbench as posed, with a mesh skinned to it if there is one, and the settings for writing it.
@@ -161,34 +194,39 @@ pub(super) fn character_of(
     export: &ExportArgs,
     report: &mut Report,
 ) -> Result<(Model, GltfWriteSettings), Failure> {
+    let Some(mesh) = mesh else { return posed_skeleton(bench, export) };
     // The mesh is bound elsewhere, so that no time passes for the pose.
-    let mut own = Workbench::with_rig(SEED, bench.rig().clone());
+    let mut own = limits::workbench(bench.rig().clone());
     if let Some(built) = bench.built() {
         own.set_built(Arc::new(built.clone()));
     }
-    if let Some(mesh) = mesh {
-        let model = load_model(&RealDisk, mesh)?;
-        report.notes(model.notes.iter().cloned());
-        own.open(model, true)?;
-        bind(&mut own, weights.settings(), &weights.claim, Vec::new(), report)?;
-        let edits = edits_between(bench.rig(), own.rig()).map_err(|error| Failure::Input(Box::new(error)))?;
-        if !edits.is_empty() {
-            bench.operate(Operation::Edits(edits))?;
-        }
+    let model = limits::load_model(mesh)?;
+    report.notes(model.notes.iter().cloned());
+    own.open(model, true)?;
+    bind(&mut own, weights.settings(), &weights.claim, Vec::new(), report)?;
+    let edits = edits_between(bench.rig(), own.rig()).map_err(|error| Failure::Input(Box::new(error)))?;
+    if !edits.is_empty() {
+        bench.operate(Operation::Edits(edits))?;
     }
     let posed = bench.posed_nodes()?;
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
-    let skeleton = baked(bench.rig(), built);
-    let joints: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
+    let joints: Vec<Uid> = baked(bench.rig(), built).walk().map(|joint| joint.data.uid).collect();
     own.set_built(Arc::new(built.clone()));
     let mut model = own.character();
-    if mesh.is_none() {
-        mark_joints(&mut model, &skeleton);
-    }
     pose(&mut model, &joints, built, &posed);
-    let mut settings = export.settings();
-    settings.all_joints |= mesh.is_none();
-    Ok((model, settings))
+    Ok((model, export.settings()))
+}
+
+/// Built skeleton of a workbench as posed, without a mesh, and the settings for writing it.
+fn posed_skeleton(bench: &Workbench, export: &ExportArgs) -> Result<(Model, GltfWriteSettings), Failure> {
+    let posed = bench.posed_nodes()?;
+    let (rig, built) = (bench.rig(), bench.built().ok_or(PoseError::NotBuilt)?);
+    let skeleton = baked(rig, built);
+    let joints: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
+    let mut model = skeleton_model(rig, Some(built));
+    mark_joints(&mut model, &skeleton);
+    pose(&mut model, &joints, built, &posed);
+    Ok((model, GltfWriteSettings { all_joints: true, ..export.settings() }))
 }
 
 /// Moves the nodes of an exported model to the pose; bind poses stay.

@@ -9,7 +9,13 @@ use std::{
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Report, explanation::Explanation, report::counted, skin::load_rig};
+use super::{
+    Failure, Report,
+    explanation::Explanation,
+    limits::{self, Limit},
+    report::counted,
+    skin::load_rig,
+};
 use crate::{
     files::{
         FileKind, LoadError, PartFiles, RealDisk, load_animation, load_gestures, load_model, load_motion, load_project,
@@ -19,7 +25,6 @@ use crate::{
         adjacency::{edges, islands, weld},
         model::Model,
     },
-    modules,
     processor::{BuildError, BuildProblem, Builder, ModuleError, Modules, SourceText, review},
     rig::{
         Rig, SourceError, TagData, TagKind, Uid,
@@ -46,11 +51,22 @@ struct Findings {
     remarks: Vec<String>,
 }
 
+impl Findings {
+    /// The findings with messages of limited length: one may list thousands of names.
+    fn cut(mut self) -> Self {
+        let remarks = self.remarks.iter_mut().chain(&mut self.error);
+        for message in remarks.chain(self.problems.iter_mut().map(|problem| &mut problem.message)) {
+            *message = limits::message(message);
+        }
+        self
+    }
+}
+
 pub(super) fn run(args: &CheckArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let mut list = Vec::new();
     for path in &args.files {
-        let found = check(path)?;
+        let found = check(path)?.cut();
         match &found.error {
             Some(error) => report.line(format!("{}: error: {error}", path.display())),
             None => report.line(format!("{}: ok", path.display())),
@@ -87,7 +103,10 @@ fn check(path: &Path) -> Result<Findings, Failure> {
     let mut found = Findings::default();
     let loaded: Result<(), LoadError> = match FileKind::of(path) {
         Some(FileKind::Obj | FileKind::Gltf | FileKind::Glb) => {
-            load_model(&RealDisk, path).map(|model| found.remarks = remarks_on_model(&model))
+            load_model(&RealDisk, path).map(|model| match limits::check_model(path, &model) {
+                Ok(()) => found.remarks = remarks_on_model(&model),
+                Err(error) => found.error = Some(error.to_string()),
+            })
         }
         Some(FileKind::Template) => {
             check_template(path, &mut found)?;
@@ -112,7 +131,9 @@ fn check(path: &Path) -> Result<Findings, Failure> {
         Some(FileKind::Skin) => load_skin(&RealDisk, path).map(drop),
         Some(FileKind::Animation) => load_animation(&RealDisk, path).map(|read| found.remarks = read.notes),
         Some(FileKind::Bvh) => load_motion(&RealDisk, path).map(|motion| found.remarks = motion.notes),
-        Some(FileKind::Gestures) => load_gestures(&RealDisk, path).map(drop),
+        Some(FileKind::Gestures) => load_gestures(&RealDisk, path).map(|gestures| {
+            found.error = limits::check_gestures(path, &gestures).err().map(|error| error.to_string());
+        }),
         None => {
             found.error = Some(
                 "Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .bvh, .skin and .ron"
@@ -148,6 +169,10 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
             return Ok(());
         }
     };
+    if let Err(error) = limits::check_rig(path, &template.rig) {
+        found.error = Some(error.to_string());
+        return Ok(());
+    }
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes));
     let (template, of_parts) = PartFiles::new(&RealDisk).survey(path, &text, template);
     faults.extend(of_parts);
@@ -160,14 +185,14 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     let unknown_kinds = unknown.len();
     let kinds: Vec<SourceError> = unknown
         .into_iter()
-        .take(LISTED)
+        .take(limits::most(Limit::Listed))
         .map(|kind| places.locate_declared(kind.tag, "kind", kind.to_string()))
         .collect();
     let undecided = undecided_choices(&rig);
     let undecided_count = undecided.len();
     let choices: Vec<SourceError> = undecided
         .into_iter()
-        .take(LISTED)
+        .take(limits::most(Limit::Listed))
         .map(|(feature, choice, tag)| {
             let feature = feature.name;
             let message = format!(
@@ -196,9 +221,6 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The most problems of one kind whose places are looked for and listed.
-const LISTED: usize = 200;
-
 /// Problems of the commands of a rig.
 struct CommandProblems {
     /// The first of them, with their places.
@@ -214,7 +236,7 @@ fn problems_of_commands(rig: &Rig, places: &SourceText, origins: &BTreeMap<Uid, 
         Some(origin) => places.locate_in_part(rig, error, origin),
         None => places.locate(rig, error),
     };
-    let modules = Arc::new(modules::all());
+    let modules = Arc::new(limits::modules());
     let problems = review(rig, &modules);
     if problems.is_empty() {
         let listed: Vec<SourceError> = problem_of_program(rig, &modules, places, &locate).into_iter().collect();
@@ -222,7 +244,7 @@ fn problems_of_commands(rig: &Rig, places: &SourceText, origins: &BTreeMap<Uid, 
         return CommandProblems { listed, problems: count, commands: count };
     }
     let commands: HashSet<Uid> = problems.iter().map(|problem| problem.command).collect();
-    let listed = problems.iter().take(LISTED).map(locate).collect();
+    let listed = problems.iter().take(limits::most(Limit::Listed)).map(locate).collect();
     CommandProblems { listed, problems: problems.len(), commands: commands.len() }
 }
 

@@ -4,17 +4,16 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, progress::spinning, skin::load_rig};
+use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, limits, progress::spinning, skin::load_rig};
 use crate::{
-    files::{FileKind, RealDisk, load_model, stem, store_model, store_rig, store_rig_over},
-    headless::Workbench,
+    files::{FileKind, RealDisk, stem, store_model, store_rig, store_rig_over},
     mesh::{
         gltf::GltfWriteSettings,
         model::{Model, SkinBinding},
     },
     rig::{
-        Rig, UidSource,
-        character::{import_skeleton, inverse_bind},
+        BuiltRig, Rig, UidSource,
+        character::{Character, character, import_skeleton, inverse_bind},
     },
 };
 
@@ -38,14 +37,14 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let notes = match (from, to) {
         (Some(Obj | Gltf | Glb), Some(Obj | Gltf | Glb)) => {
-            let model = spinning("reading", || load_model(&RealDisk, &args.input))?;
+            let model = spinning("reading", || limits::load_model(&args.input))?;
             report.notes(model.notes.iter().cloned());
             // Points without weights in the input stay unmoved in the only way that glTF offers: bound to the root.
             let settings = GltfWriteSettings { bind_unweighted: true, ..args.export.settings() };
             spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?
         }
         (Some(Gltf | Glb), Some(RigText | Template)) => {
-            let model = load_model(&RealDisk, &args.input)?;
+            let model = limits::load_model(&args.input)?;
             if model.nodes.is_empty() {
                 let message =
                     format!("`{}` has no skeleton to convert; sketch one into it first", args.input.display());
@@ -63,10 +62,11 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
             store_rig_over(&RealDisk, &args.output, &rig, &[&args.input])?
         }
         (Some(RigText | Template), Some(Gltf | Glb)) => {
-            let bench = Workbench::with_rig(SEED, load_rig(&args.input, &mut report)?);
+            let rig = load_rig(&args.input, &mut report)?;
             let settings = GltfWriteSettings { all_joints: true, ..args.export.settings() };
-            let mut model = bench.character();
-            mark_joints(&mut model, bench.rig());
+            let mut model = skeleton_model(&rig, None);
+            mark_joints(&mut model, &rig);
+            drop(rig);
             store_model(&RealDisk, &args.output, &model, &settings)?
         }
         _ => {
@@ -82,6 +82,12 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
     report.line(format!("wrote {}", args.output.display()));
     report.set("output", args.output.display().to_string());
     Ok(report)
+}
+
+/// A model of a rig without a mesh.
+pub(super) fn skeleton_model(rig: &Rig, built: Option<&BuiltRig>) -> Model {
+    let empty = Model { name: rig.about().name.clone(), ..Model::default() };
+    character(&Character { rig, built, file: &empty, rest: &empty, nodes: &[], skin: None })
 }
 
 /// Lists all joints in a skin, because readers recognise joints by the skins that list them, even without skinned

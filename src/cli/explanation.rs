@@ -4,6 +4,7 @@ use std::{error::Error, path::Path};
 
 use serde_json::{Value, json};
 
+use super::limits;
 use crate::{
     files::{LoadError, LoadShapesError, ReadError, SaveError, StoreError},
     mesh::gltf::GltfError,
@@ -33,7 +34,7 @@ impl Explanation {
     /// A fault at a place, told by a text that ends in the remedy: texts of errors are written as `fault; remedy`.
     pub fn at(place: String, text: &str) -> Self {
         let (what, remedy) = text.rsplit_once("; ").unwrap_or((text, SEE_HELP));
-        Self { what: what.to_owned(), place, remedy: remedy.to_owned() }
+        Self { what: limits::message(what), place, remedy: limits::message(remedy) }
     }
 
     /// The object of `--json`.

@@ -13,7 +13,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, SEED,
+    ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, limits,
     progress::{Progress, spinning},
     report::counted,
 };
@@ -23,7 +23,7 @@ use crate::{
         bones::FaceBoneKind,
         expression::{ExpressionSet, MAX_STRENGTH},
     },
-    files::{FileKind, RealDisk, load_model, load_shapes, stem, store_model, store_rig},
+    files::{FileKind, RealDisk, load_shapes, stem, store_model, store_rig},
     headless::Workbench,
     mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Model, Morph},
     plugins::face::{FaceReport, FaceShape, mixed},
@@ -119,11 +119,11 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     let inputs: Vec<&Path> = std::iter::once(&args.mesh).chain(&args.fit).map(PathBuf::as_path).collect();
     args.in_place.check(&inputs, Some(&args.output), &[])?;
     let mut report = Report::default();
-    let model = spinning("reading the mesh", || load_model(&RealDisk, &args.mesh))?;
+    let model = spinning("reading the mesh", || limits::load_model(&args.mesh))?;
     report.notes(model.notes.iter().cloned());
     let shapes = args.fit.as_ref().map(|path| spinning("reading shapes", || load_shapes(&RealDisk, path, &model)));
     let shapes = shapes.transpose()?.map(Arc::new);
-    let mut bench = Workbench::new(SEED, &stem(&args.mesh));
+    let mut bench = limits::empty_workbench(&stem(&args.mesh));
     bench.open(model, false)?;
     let settings = AutoSettings {
         bones: args.bones,

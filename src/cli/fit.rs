@@ -10,17 +10,15 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use super::{
-    ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
+    ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, WeightArgs,
     binding::bind,
+    limits,
     progress::{Progress, spinning},
     report::counted,
 };
 use crate::{
     algo::fit_template::FitSymmetry,
-    files::{
-        BUNDLED_CHARACTERS, FileKind, RealDisk, bundled_characters, load_model, load_template, stem, store_model,
-        store_rig,
-    },
+    files::{BUNDLED_CHARACTERS, FileKind, RealDisk, bundled_characters, load_template, stem, store_model, store_rig},
     headless::Workbench,
     plugins::{
         commands::BuildStep,
@@ -100,10 +98,10 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
     args.in_place.check(&inputs, Some(&args.output), &[])?;
     let mut report = Report::default();
     let template = template(args, &mut report)?;
-    let model = spinning("reading the mesh", || load_model(&RealDisk, &args.mesh))?;
+    let model = spinning("reading the mesh", || limits::load_model(&args.mesh))?;
     report.notes(model.notes.iter().cloned());
     let objects = objects(args, &model)?;
-    let mut bench = Workbench::new(SEED, &stem(&args.mesh));
+    let mut bench = limits::empty_workbench(&stem(&args.mesh));
     bench.open(model, true)?;
     bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));
     let mut progress = Progress::new("fitting");

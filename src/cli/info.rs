@@ -5,11 +5,17 @@ use std::path::PathBuf;
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Report, progress::spinning, report::counted, sketch::describe_rig};
+use super::{
+    Failure, Report,
+    limits::{self, Limit},
+    progress::spinning,
+    report::counted,
+    sketch::describe_rig,
+};
 use crate::{
     files::{
-        FileKind, RealDisk, load_animation, load_gestures, load_model, load_motion, load_project, load_rig_text,
-        load_skin, load_template,
+        FileKind, RealDisk, load_animation, load_gestures, load_motion, load_project, load_rig_text, load_skin,
+        load_template,
     },
     mesh::model::Model,
     rig::{
@@ -31,11 +37,12 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     match FileKind::of(path) {
         Some(FileKind::Obj | FileKind::Gltf | FileKind::Glb) => {
-            let model = spinning("reading", || load_model(&RealDisk, path))?;
+            let model = spinning("reading", || limits::load_model(path))?;
             describe_model(&mut report, &model);
         }
         Some(FileKind::Template) => {
             let template = load_template(&RealDisk, path)?;
+            limits::check_rig(path, &template.rig)?;
             let about = template.rig.about();
             report.line(format!("template \"{}\" {}", about.name, about.version));
             if !about.description.is_empty() {
@@ -84,6 +91,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             for edit in import_rig_text(&text, &mut UidSource::seeded(super::SEED)).0 {
                 rig.apply(&edit).map_err(|error| Failure::Input(Box::new(error)))?;
             }
+            limits::check_rig(path, &rig)?;
             report.line("skeleton in .rig text");
             report.set("kind", "rig");
             describe_joints(&mut report, &rig);
@@ -145,6 +153,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         }
         Some(FileKind::Gestures) => {
             let gestures = load_gestures(&RealDisk, path)?;
+            limits::check_gestures(path, &gestures)?;
             report.line(counted(gestures.len(), "gesture", "gestures"));
             report.set("kind", "gestures");
             report.set("gestures", gestures.len());
@@ -186,7 +195,8 @@ fn describe_model(report: &mut Report, model: &Model) {
     ));
     report.line(format!("box {:.4} {:.4} {:.4} to {:.4} {:.4} {:.4}", low.x, low.y, low.z, high.x, high.y, high.z));
     let names: Vec<&str> = model.objects.iter().map(|object| object.name.as_str()).collect();
-    report.line(format!("{}: {}", counted(names.len(), "object", "objects"), names.join(", ")));
+    let objects = counted(names.len(), "object", "objects");
+    report.line(limits::message(&format!("{objects}: {}", names.join(", "))));
     report.line(format!(
         "{}, {}, {}, {}, {}",
         counted(model.material_set.materials.len(), "material", "materials"),
@@ -222,7 +232,8 @@ fn describe_joints(report: &mut Report, rig: &Rig) {
         counted(rig.roots().len(), "root", "roots"),
         counted(rig.groups().len(), "local group", "local groups")
     ));
-    for joint in rig.walk().take(200) {
+    let listed = limits::most(Limit::Listed);
+    for joint in rig.walk().take(listed) {
         let depth = rig.ancestors(joint.data.uid).count();
         let label = joint.data.label.as_deref().unwrap_or("(no label)");
         let tags = match joint.data.tags.len() {
@@ -231,8 +242,8 @@ fn describe_joints(report: &mut Report, rig: &Rig) {
         };
         report.line(format!("  {}{label}{tags}", "  ".repeat(depth.min(40))));
     }
-    if rig.len() > 200 {
-        report.line(format!("  and {} more", rig.len() - 200));
+    if rig.len() > listed {
+        report.line(format!("  and {} more", rig.len() - listed));
     }
     describe_rig(report, rig);
 }

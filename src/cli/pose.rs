@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::Value;
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, build, report::counted, skin,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, build, limits, report::counted, skin,
     switches::SwitchArgs,
 };
 use crate::{
@@ -109,7 +109,7 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let mut rig = read(args, &mut report)?;
     args.steps.parts.apply(&mut rig)?;
-    let mut bench = Workbench::with_rig(SEED, rig);
+    let mut bench = limits::workbench(rig);
     let held = run_steps(&mut bench, &args.steps, &writes)?;
     report.notes(held);
     let nodes = bench.nodes()?;

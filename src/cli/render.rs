@@ -9,13 +9,13 @@ use serde_json::json;
 use super::{
     ArgumentError, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
     binding::bind,
-    device_selection,
+    device_selection, limits,
     pose::{self, PoseSteps},
     progress::spinning,
 };
 use crate::{
     algo::view::View,
-    files::{FileKind, MeshState, RealDisk, load_model, load_project, load_rig_text, load_template, save_atomic},
+    files::{FileKind, MeshState, RealDisk, load_project, load_rig_text, load_template, save_atomic},
     headless::Workbench,
     plugins::{
         commands::BuildStep,
@@ -163,7 +163,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
     if is_built {
         let writes = pose::parsed(&args.steps)?;
         args.steps.parts.apply(&mut scene.rig)?;
-        let mut bench = Workbench::with_rig(SEED, scene.rig);
+        let mut bench = limits::workbench(scene.rig);
         report.notes(pose::run_steps(&mut bench, &args.steps, &writes)?);
         scene.rig = bench.posed_document()?;
         state = Some(bench.runtime()?.state().clone());
@@ -232,11 +232,11 @@ pub(super) fn picture_of(
     output: &Path,
     report: &mut Report,
 ) -> Result<(), Failure> {
-    let mut bench = Workbench::with_rig(SEED, posed.posed_document()?);
+    let mut bench = limits::workbench(posed.posed_document()?);
     bench.build(BuildStep::All);
     let mut meshes = Vec::new();
     if let Some(mesh) = mesh {
-        let model = load_model(&RealDisk, mesh)?;
+        let model = limits::load_model(mesh)?;
         report.notes(model.notes.iter().cloned());
         bench.open(model, true)?;
         bind(&mut bench, weights.settings(), &weights.claim, Vec::new(), report)?;
@@ -297,7 +297,7 @@ fn read(args: &RenderArgs, report: &mut Report) -> Result<Scene, Failure> {
             Ok(Scene { rig, meshes })
         }
         _ => {
-            let model = spinning("reading", || load_model(&RealDisk, path))?;
+            let model = spinning("reading", || limits::load_model(path))?;
             report.notes(model.notes.iter().cloned());
             let mut rig = Rig::new(uids.next_uid(), model.name.clone());
             let uid = uids.next_uid();

@@ -1,15 +1,32 @@
 //! Results of commands, for people and for programs.
 
-use std::{borrow::Cow, fmt::Write as _, io::Write, path::Path, process::ExitCode};
+use std::{borrow::Cow, fmt::Write as _, io::Write, path::Path, process::ExitCode, sync::OnceLock};
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use serde_json::{Map, Value};
 
-use super::explanation::Explanation;
+use super::{
+    explanation::Explanation,
+    limits::{self, Limit, LimitError},
+};
 use crate::{
     files::{LoadError, LoadShapesError, StoreError},
     headless::WorkbenchError,
 };
+
+/// True if the command answers in JSON; set once, before the command runs.
+static IS_JSON: OnceLock<bool> = OnceLock::new();
+
+/// Notes whether the command answers in JSON.
+pub(super) fn choose_json(is_json: bool) {
+    // Set once: a process runs one command.
+    let _ = IS_JSON.set(is_json);
+}
+
+/// True if results for programs are wanted; lists of thousands of joints are made for nobody else.
+pub(super) fn is_json() -> bool {
+    IS_JSON.get().copied().unwrap_or(true)
+}
 
 /// The result of a command that ran (also of one that found a fault in its input and still has a result).
 #[derive(Default)]
@@ -86,6 +103,12 @@ impl From<StoreError> for Failure {
     }
 }
 
+impl From<LimitError> for Failure {
+    fn from(error: LimitError) -> Self {
+        Self::Input(Box::new(error))
+    }
+}
+
 impl From<WorkbenchError> for Failure {
     fn from(error: WorkbenchError) -> Self {
         Self::Input(Box::new(error))
@@ -104,17 +127,32 @@ struct InSource {
     place: SourceSpan,
 }
 
-/// Prints the result and returns the exit code. `subject` is the file that the command works on.
+/// Notes within the limits of their number and length.
+fn told_notes(mut notes: Vec<String>) -> Vec<String> {
+    let most = limits::most(Limit::Notes);
+    let more = notes.len().saturating_sub(most);
+    notes.truncate(most);
+    for note in &mut notes {
+        *note = limits::message(note);
+    }
+    if more > 0 {
+        notes.push(format!("{more} more notes are left out; --limit notes=N tells more"));
+    }
+    notes
+}
+
+/// Prints the result and returns the exit code. `subject` is the file that the command works on. An output that is closed
+/// or full is a failure: exit code 1 at least.
 pub(super) fn finish(result: Result<Report, Failure>, json: bool, subject: &str) -> ExitCode {
+    let mut is_told = true;
     let (code, answer) = match result {
-        Ok(report) => {
-            let mut code = u8::from(report.at_fault);
+        Ok(mut report) => {
+            report.notes = told_notes(report.notes);
+            let code = u8::from(report.at_fault);
             if !json {
-                if !print(report.lines.iter().map(String::as_str)) {
-                    code = code.max(1);
-                }
+                is_told &= print(report.lines.iter().map(String::as_str));
                 for note in &report.notes {
-                    complain(&format!("note: {note}"));
+                    is_told &= complain(&format!("note: {note}"));
                 }
             }
             if let (true, Some(list)) = (json, &report.list) {
@@ -133,19 +171,19 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool, subject: &str)
         }
         Err(Failure::Usage(message)) => {
             if !json {
-                complain(&format!("error: {message}\n\nFor more information, try 'rigsmith --help'."));
+                is_told = complain(&format!("error: {message}\n\nFor more information, try 'rigsmith --help'."));
             }
             (2, failed(&of_usage(&message)))
         }
         Err(Failure::Input(error)) => {
             if !json {
-                show(error.as_ref());
+                is_told = show(error.as_ref());
             }
             (1, failed(&Explanation::of_error(error.as_ref(), subject)))
         }
     };
-    let is_written = !json || print_json(&Value::Object(answer));
-    ExitCode::from(if is_written { code } else { code.max(1) })
+    is_told &= !json || print_json(&Value::Object(answer));
+    ExitCode::from(if is_told { code } else { code.max(1) })
 }
 
 /// Prints lines; `false` if standard output is closed or full.
@@ -181,9 +219,9 @@ fn json_line(value: &Value) -> String {
     line
 }
 
-/// Prints to standard error; nobody can be told if that is closed, too.
-fn complain(text: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{}", printable(text));
+/// Prints to standard error; `false` if that is closed or full.
+fn complain(text: &str) -> bool {
+    writeln!(std::io::stderr().lock(), "{}", printable(text)).is_ok()
 }
 
 /// A text without what a terminal obeys: names in files may hold control characters and marks that turn the direction
@@ -228,13 +266,13 @@ fn has_obeyed(text: &str) -> bool {
 /// Length of a line, in bytes, from which only a piece of it is shown.
 const LONG: usize = 200;
 
-fn show(error: &(dyn std::error::Error + 'static)) {
+fn show(error: &(dyn std::error::Error + 'static)) -> bool {
     if let Some(LoadError::Source { path, text, source }) = error.downcast_ref::<LoadError>() {
         let offset = source.offset.min(text.len());
         let is_plain = |text: &str| text.lines().all(|line| line.len() <= LONG && !has_obeyed(line));
         if !is_plain(lines_around(text, offset)) || has_obeyed(&error.to_string()) {
-            complain(&piece_of_line(path, text, offset, &format!("error: {error}"), &source.message));
-            return;
+            let message = limits::message(&format!("error: {error}"));
+            return complain(&piece_of_line(path, text, offset, &message, &limits::message(&source.message)));
         }
         let report = miette::Report::new(InSource {
             message: error.to_string(),
@@ -243,10 +281,10 @@ fn show(error: &(dyn std::error::Error + 'static)) {
             place: SourceSpan::from(offset),
         });
         // The report is coloured by escapes of its own, which have to reach the terminal.
-        let _ = writeln!(std::io::stderr().lock(), "{report:?}");
+        writeln!(std::io::stderr().lock(), "{report:?}").is_ok()
     } else {
         // The text of an error contains those of its causes.
-        complain(&format!("error: {error}"));
+        complain(&limits::message(&format!("error: {error}")))
     }
 }
 

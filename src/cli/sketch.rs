@@ -9,11 +9,14 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, binding::bind, progress::spinning,
-    report::counted,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, WeightArgs,
+    binding::bind,
+    limits,
+    progress::spinning,
+    report::{counted, is_json},
 };
 use crate::{
-    files::{FileKind, RealDisk, bundled_characters, load_gestures, load_model, stem, store_model, store_rig},
+    files::{FileKind, RealDisk, bundled_characters, load_gestures, stem, store_model, store_rig},
     headless::Workbench,
     plugins::fit::FitTemplates,
     rig::Rig,
@@ -44,13 +47,18 @@ pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
     let kind = output_kind(&args.output)?;
     args.in_place.check(&[&args.mesh, &args.gestures], Some(&args.output), &[])?;
     let gestures = load_gestures(&RealDisk, &args.gestures)?;
-    let model = spinning("reading the mesh", || load_model(&RealDisk, &args.mesh))?;
+    limits::check_gestures(&args.gestures, &gestures)?;
+    let model = spinning("reading the mesh", || limits::load_model(&args.mesh))?;
     let mut report = Report::default();
     report.notes(model.notes.iter().cloned());
-    let mut bench = Workbench::new(SEED, &stem(&args.mesh));
+    let mut bench = limits::empty_workbench(&stem(&args.mesh));
     bench.open(model, args.mesh_only)?;
     bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));
     let answers = spinning("sketching", || bench.gestures(gestures));
+    if let Some(last) = answers.last().filter(|_| bench.is_out_of_time()) {
+        let (file, number) = (args.gestures.display(), last.number);
+        return Err(Failure::Input(format!("`{file}`: gesture {number}: {}", last.message).into()));
+    }
     let missed = answers.iter().filter(|answer| !answer.done).count();
     for answer in &answers {
         if !answer.done {
@@ -102,6 +110,9 @@ fn save(
 
 /// Adds a description of the rig for programs.
 pub(super) fn describe_rig(report: &mut Report, rig: &Rig) {
+    if !is_json() {
+        return;
+    }
     let globals = rig.rest_globals();
     let joints: Vec<Value> = rig
         .walk()

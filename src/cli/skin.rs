@@ -11,11 +11,12 @@ use serde_json::json;
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
     binding::{bind, chosen_parts},
+    limits,
     progress::spinning,
 };
 use crate::{
     algo::transfer::{TransferMesh, TransferSettings, transfer_weights},
-    files::{FileKind, RealDisk, load_model, load_rig_text, load_skin, load_template, stem, store_model, store_skin},
+    files::{FileKind, RealDisk, load_rig_text, load_skin, load_template, stem, store_model, store_skin},
     headless::Workbench,
     rig::{
         Rig, SkinData, Uid, UidSource,
@@ -71,14 +72,14 @@ pub(super) fn run(args: &SkinArgs) -> Result<Report, Failure> {
     args.in_place.check(&inputs, Some(&args.output), &further)?;
     let mut report = Report::default();
     let rig = load_rig(&args.rig, &mut report)?;
-    let model = spinning("reading the mesh", || load_model(&RealDisk, &args.mesh))?;
+    let model = spinning("reading the mesh", || limits::load_model(&args.mesh))?;
     report.notes(model.notes.iter().cloned());
     if model.points.is_empty() {
         return Err(Failure::Input(
             format!("`{}` has no points to skin; open another mesh", args.mesh.display()).into(),
         ));
     }
-    let mut bench = Workbench::with_rig(SEED, rig);
+    let mut bench = limits::workbench(rig);
     bench.open(model, true)?;
     let parts = chosen_parts(&args.rigid, &args.blend, &bench)?;
     match &args.weights_from {
@@ -108,11 +109,12 @@ pub(super) fn load_rig(path: &Path, report: &mut Report) -> Result<Rig, Failure>
         Some(FileKind::Template) => {
             let template = load_template(&RealDisk, path)?;
             report.notes(template.notes);
+            limits::check_rig(path, &template.rig)?;
             return Ok(template.rig);
         }
         Some(FileKind::RigText) => import_rig_text(&load_rig_text(&RealDisk, path)?, &mut uids).0,
         Some(FileKind::Glb | FileKind::Gltf) => {
-            let model = load_model(&RealDisk, path)?;
+            let model = limits::load_model(path)?;
             report.notes(model.notes.iter().cloned());
             import_skeleton(&model, &mut uids).edits
         }
@@ -121,9 +123,10 @@ pub(super) fn load_rig(path: &Path, report: &mut Report) -> Result<Rig, Failure>
             return Err(Failure::Usage(message));
         }
     };
-    for edit in &edits {
-        rig.apply(edit).map_err(|error| Failure::Input(format!("`{}`: {error}", path.display()).into()))?;
+    for edit in edits {
+        rig.apply(&edit).map_err(|error| Failure::Input(format!("`{}`: {error}", path.display()).into()))?;
     }
+    limits::check_rig(path, &rig)?;
     Ok(rig)
 }
 

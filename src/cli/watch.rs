@@ -11,9 +11,10 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Report, SEED, WeightArgs,
+    ExportArgs, Failure, InPlaceArgs, Report, WeightArgs,
     build::character_of,
     explanation::Explanation,
+    limits,
     report::{counted, print, print_json},
 };
 use crate::{
@@ -61,7 +62,7 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
     let mut file = TemplateWatch::new(&args.template);
     let first = file.read(&RealDisk).map_err(|error| Failure::Input(Box::new(error)))?;
     let rig = parsed(&mut file, &args.template, &first)?;
-    let mut watch = Watch { args, bench: Workbench::with_rig(SEED, rig), is_json };
+    let mut watch = Watch { args, bench: limits::workbench(rig), is_json };
     let first = Instant::now();
     let all = watch.build(first, &[], None)?;
     let mut is_heard = watch.say(&all);
@@ -82,7 +83,7 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
         };
         is_heard = watch.say(&told);
     }
-    Ok(Report::default())
+    Ok(Report { at_fault: !is_heard, ..Report::default() })
 }
 
 /// The template's content once it or a part has a new one.
@@ -150,7 +151,7 @@ impl Watch<'_> {
         let mesh = args.mesh.as_deref();
         // Binding a mesh may change commands, and the rig here stays as its file has it.
         let mut bound = mesh.map(|_| {
-            let mut bench = Workbench::with_rig(SEED, self.bench.rig().clone());
+            let mut bench = limits::workbench(self.bench.rig().clone());
             bench.build(BuildStep::All);
             bench
         });

@@ -135,10 +135,17 @@ impl Builder {
             let place = world.places[number as usize];
             place != NOWHERE && from.is_none_or(|from| place > from)
         };
-        let readers: Vec<u32> = self.world.cell(node, aspect).readers.clone();
+        let readers: Vec<u32> = self.world.cell(node, aspect).readers().to_vec();
         for number in readers {
             if later(&self.world, number) {
                 self.mark(number, DueWork::Check);
+            }
+        }
+        if matches!(aspect, Aspect::Base | Aspect::Parent) {
+            for number in self.world.global_readers(node) {
+                if later(&self.world, number) {
+                    self.mark(number, DueWork::Check);
+                }
             }
         }
         if aspect.is_structure() {
@@ -165,7 +172,7 @@ impl Builder {
 
     /// Value that a command wrote to a cell.
     fn own(&self, number: u32, node: NodeId, aspect: Aspect) -> Option<&Value> {
-        let writes = &self.world.cell(node, aspect).writes;
+        let writes = self.world.cell(node, aspect).writes();
         writes.iter().find(|(writer, _)| *writer == number).map(|(_, value)| value)
     }
 
@@ -196,11 +203,18 @@ impl Builder {
     /// Number of commands in effect: the ones before this place in the list. After a change of the document that may be
     /// fewer than before, until the next run.
     pub fn cursor(&self) -> usize {
-        let waiting = |Reverse((place, number)): &Reverse<(u32, u32)>| {
-            let is_due = self.commands[*number as usize].due != DueWork::Nothing;
-            (is_due && self.world.places[*number as usize] == *place).then_some(*place)
+        let due = match self.due.peek() {
+            Some(Reverse(first)) if !self.is_waiting(*first) => {
+                self.due.iter().filter(|Reverse(entry)| self.is_waiting(*entry)).map(|Reverse((place, _))| *place).min()
+            }
+            first => first.map(|Reverse((place, _))| *place),
         };
-        self.due.iter().filter_map(waiting).min().map_or(self.cursor, |due| due.min(self.cursor)) as usize
+        due.map_or(self.cursor, |due| due.min(self.cursor)) as usize
+    }
+
+    /// True for an entry of the heap whose command still needs work at that place.
+    fn is_waiting(&self, (place, number): (u32, u32)) -> bool {
+        self.commands[number as usize].due != DueWork::Nothing && self.world.places[number as usize] == place
     }
 
     /// A run with [`Builder::run`] stops before commands with a breakpoint.
@@ -269,6 +283,7 @@ impl Builder {
     pub fn run_to(&mut self, place: usize) -> RunReport {
         let target = place.min(self.list.len()) as u32;
         self.run = self.run.wrapping_add(1);
+        self.world.work_before = self.world.work;
         let mut report = RunReport::default();
         let mut failed = None;
         while let Some(Reverse((place, number))) = self.due.peek().copied() {
@@ -276,10 +291,10 @@ impl Builder {
                 break;
             }
             self.due.pop();
-            let due = self.commands[number as usize].due;
-            if due == DueWork::Nothing || self.world.places[number as usize] != place {
+            if !self.is_waiting((place, number)) {
                 continue;
             }
+            let due = self.commands[number as usize].due;
             if due == DueWork::Check && self.holds(number) {
                 self.commands[number as usize].due = DueWork::Nothing;
                 continue;
@@ -305,6 +320,10 @@ impl Builder {
             self.failed = Some(number);
             self.commands[number as usize].error = Some(problem.clone());
             report.error = Some(self.error(number, problem));
+        }
+        // With an entry in effect at the top, the cursor is known without a search.
+        while self.due.peek().is_some_and(|Reverse(first)| !self.is_waiting(*first)) {
+            self.due.pop();
         }
         report.cursor = self.cursor as usize;
         report
@@ -343,9 +362,9 @@ impl Builder {
         let outcome = if active { self.construct(number, &mut trace) } else { Ok(()) };
         let above = trace.above;
         if outcome.is_err() {
-            let reads = std::mem::take(&mut trace.reads);
+            let (reads, globals) = (std::mem::take(&mut trace.reads), std::mem::take(&mut trace.globals));
             self.take_back(number, &trace);
-            trace = Trace { reads, ..Trace::default() };
+            trace = Trace { reads, globals, ..Trace::default() };
         }
         let result = match outcome {
             Err(BuildProblem::Module(ModuleError::Off { parameter, off })) => {
@@ -400,11 +419,13 @@ impl Builder {
         let loaded = command.loaded.get_or_insert_with(|| modules.load(&command.module, &command.params));
         let module = loaded.clone()?;
         let name = command.module.clone();
+        self.world.begin_command();
         let mut scope = BuildScope { world: &mut self.world, trace, asker, command: number, module: name };
         if let Err(problem) = module.construct(&mut scope) {
             let params = &self.commands[number as usize].params;
             return Err(error_references::as_written(problem, params, &self.world, asker.place));
         }
+        self.world.check_work()?;
         let made = trace.writes.iter().filter(|(_, aspect)| *aspect == Aspect::Constraint);
         let made: Vec<NodeId> = made.map(|(node, _)| *node).collect();
         for constraint in made {
@@ -417,15 +438,21 @@ impl Builder {
     fn take_back(&mut self, number: u32, trace: &Trace) -> Vec<(NodeId, Aspect, Value)> {
         for read in &trace.reads {
             if let super::scope::Read::Cell(node, aspect, _) = read {
-                let readers = &mut self.world.cell_mut(*node, *aspect).readers;
+                let readers = self.world.cell_mut(*node, *aspect).readers_mut();
                 if let Ok(at) = readers.binary_search(&number) {
                     readers.remove(at);
                 }
             }
         }
+        for node in trace.globals.keys() {
+            let readers = &mut self.world.slots[node.0 as usize].global_readers;
+            if let Ok(at) = readers.binary_search(&number) {
+                readers.remove(at);
+            }
+        }
         let mut values = Vec::with_capacity(trace.writes.len());
         for (node, aspect) in &trace.writes {
-            let writes = &mut self.world.cell_mut(*node, *aspect).writes;
+            let writes = self.world.cell_mut(*node, *aspect).writes_mut();
             if let Some(at) = writes.iter().position(|(writer, _)| *writer == number) {
                 values.push((*node, *aspect, writes.swap_remove(at).1));
             }

@@ -48,11 +48,14 @@ pub enum ModuleError {
     Other(String),
     /// More than [`BuildLimits`](super::BuildLimits) allows.
     #[error(
-        "there would be more than {limit} {what}; make fewer: a reference like @any names what was made before, too"
+        "there would be more than {limit} {what}; make fewer (a reference like @any names what was made before, too), \
+         or raise the limit `{name}`"
     )]
     TooMany {
         /// Name of what there is too much of.
         what: &'static str,
+        /// Name of the limit, as `--limit` of the commands takes it.
+        name: &'static str,
         /// The limit.
         limit: usize,
     },

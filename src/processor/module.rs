@@ -187,11 +187,13 @@ pub struct BuildLimits {
     pub made: usize,
     /// The most attributes of one node.
     pub attributes: usize,
+    /// The most values that commands read and write in one run. A character takes some ten thousands.
+    pub work: u64,
 }
 
 impl Default for BuildLimits {
     fn default() -> Self {
-        Self { made: 16_384, attributes: 1024 }
+        Self { made: 16_384, attributes: 1024, work: 1_000_000_000 }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Resolution of references to nodes.
 
-use std::collections::HashSet;
+use bevy::platform::collections::{HashMap, HashSet};
 
 use super::{
     exclusion::{Exclusion, Gap},
@@ -72,6 +72,7 @@ impl From<Gap> for MissingTarget {
 
 pub(super) fn resolve(world: &World, asker: Asker, references: &NodeRefs) -> Result<Resolution, ResolveError> {
     let mut all = Resolution::default();
+    let mut seen: HashSet<NodeId> = HashSet::default();
     for reference in references {
         let mut gaps = Vec::new();
         let found = match resolve_one(world, asker, reference, &mut gaps) {
@@ -83,7 +84,7 @@ pub(super) fn resolve(world: &World, asker: Asker, references: &NodeRefs) -> Res
             }
         };
         for node in found {
-            if !all.nodes.contains(&node) {
+            if seen.insert(node) {
                 all.nodes.push(node);
             }
         }
@@ -144,9 +145,8 @@ fn resolve_one(
             off.sort_unstable_by_key(|(uid, _)| **uid);
             gaps.extend(off.into_iter().filter_map(|(uid, _)| world.off.joint(*uid)));
             incomplete = gaps.first().cloned();
-            let below = |node: &NodeId| is_below(world, *node, top, place);
             let joints = |node: &NodeId| world.birth(*node, place).is_some_and(|b| b.kind == NodeType::Joint);
-            (0..world.slots.len() as u32).map(NodeId).filter(alive).filter(joints).filter(below).collect()
+            hierarchy(world, top, place).into_iter().filter(alive).filter(joints).collect()
         }
         Source::Command(uid) => {
             let command = world.creator_of(*uid).filter(|command| before(*command));
@@ -265,12 +265,61 @@ fn is_below(world: &World, node: NodeId, top: NodeId, place: u32) -> bool {
     false
 }
 
+/// A node and all nodes below it.
+fn hierarchy(world: &World, top: NodeId, place: u32) -> HashSet<NodeId> {
+    let mut found: HashSet<NodeId> = HashSet::default();
+    let mut stack = vec![top];
+    while let Some(node) = stack.pop() {
+        if found.insert(node) {
+            let below = world.slots[node.0 as usize].below.iter().copied();
+            stack.extend(below.filter(|child| world.parent(*child, place) == Some(node)));
+        }
+    }
+    found
+}
+
+/// Number of nodes up to which comparing the ways down to them takes less than a walk through the hierarchy.
+const FEW: usize = 16;
+
 /// Sorts nodes: parents first, siblings as authored, then in the order of creation.
 pub(super) fn sort(world: &World, nodes: &mut [NodeId], place: u32) {
-    if nodes.len() < 2 {
-        return;
+    match nodes.len() {
+        0 | 1 => {}
+        2..=FEW => nodes.sort_by_cached_key(|node| path(world, *node, place)),
+        _ => {
+            let ranks = ranks(world, nodes, place);
+            nodes.sort_by_key(|node| ranks.get(node).copied());
+        }
     }
-    nodes.sort_by_cached_key(|node| path(world, *node, place));
+}
+
+/// Places of nodes, and of all nodes above them, in a walk through the hierarchy. The ways down to the nodes of a long
+/// chain would be as long as the square of its length.
+fn ranks(world: &World, nodes: &[NodeId], place: u32) -> HashMap<NodeId, usize> {
+    let mut seen: HashSet<NodeId> = HashSet::default();
+    let mut children: HashMap<Option<NodeId>, Vec<((u32, u32), NodeId)>> = HashMap::default();
+    for node in nodes {
+        let mut at = Some(*node);
+        while let Some(node) = at.filter(|node| seen.insert(*node)) {
+            let mut parent = world.parent(node, place);
+            // A node that is not there has no place of its own in the walk.
+            while let Some(gone) = parent.filter(|parent| !world.exists(*parent, place)) {
+                parent = world.parent(gone, place);
+            }
+            if let Some(birth) = world.birth(node, place) {
+                children.entry(parent).or_default().push((world.order_key(node, birth), node));
+            }
+            at = parent;
+        }
+    }
+    children.values_mut().for_each(|siblings| siblings.sort_unstable_by(|a, b| b.cmp(a)));
+    let mut ranks: HashMap<NodeId, usize> = HashMap::default();
+    let mut stack = children.remove(&None).unwrap_or_default();
+    while let Some((_, node)) = stack.pop() {
+        ranks.insert(node, ranks.len());
+        stack.extend(children.remove(&Some(node)).unwrap_or_default());
+    }
+    ranks
 }
 
 /// The order keys from the root down to a node: comparing them gives the order of a walk through the hierarchy.

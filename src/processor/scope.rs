@@ -155,13 +155,32 @@ impl BuildScope<'_> {
     /// The transform of a node relative to its parent.
     pub fn base(&mut self, node: NodeId) -> Trs {
         match self.read(node, Aspect::Base) {
-            Some(Value::Base(base)) => base,
+            Some(Value::Base(base)) => *base,
             _ => Trs::IDENTITY,
         }
     }
 
     /// The transform of a node in the rig's space.
     pub fn global(&mut self, node: NodeId) -> Trs {
+        let place = self.asker.place + 1;
+        let is_changed = |node: NodeId| self.is_own(node, Aspect::Base) || self.is_own(node, Aspect::Parent);
+        if std::iter::successors(Some(node), |node| self.world.parent(*node, place)).any(is_changed) {
+            return self.global_of_own(node);
+        }
+        let (global, count) = self.world.global(node, place);
+        self.world.work += count;
+        if self.trace.globals.insert(node, global).is_none() {
+            let readers = &mut self.world.slots[node.0 as usize].global_readers;
+            if let Err(at) = readers.binary_search(&self.command) {
+                readers.insert(at, self.command);
+            }
+        }
+        global
+    }
+
+    /// Transform, in the rig's space, of a node that the command itself moved, or that stands below such a node: the other
+    /// values on the way up are read one by one.
+    fn global_of_own(&mut self, node: NodeId) -> Trs {
         let mut global = self.base(node);
         let mut at = node;
         while let Some(parent) = self.parent(at) {
@@ -255,6 +274,7 @@ impl BuildScope<'_> {
         }
         self.check_inside(parent)?;
         let node = self.identity(role, subject, number)?;
+        self.world.note_made();
         let origin = Origin {
             command: self.command(),
             module: self.module.clone(),
@@ -280,7 +300,7 @@ impl BuildScope<'_> {
         };
         self.write(node, Aspect::Birth, Value::Birth(Arc::new(birth)));
         self.write(node, Aspect::Parent, Value::Parent(parent));
-        self.write(node, Aspect::Base, Value::Base(base));
+        self.write(node, Aspect::Base, Value::Base(Arc::new(base)));
         self.write(node, Aspect::Label, Value::Label(label));
         self.write(node, Aspect::Group, Value::Group(group));
         Ok(node)
@@ -335,6 +355,7 @@ impl BuildScope<'_> {
             self.check_inside(self.world.id(uid))?;
         }
         let id = self.identity(role, subject, number)?;
+        self.world.note_made();
         for driven in constraint.drives() {
             let (Dependency::Node(uid) | Dependency::Attribute(uid, _)) = driven;
             if let Some(node) = self.world.id(uid) {
@@ -363,11 +384,12 @@ impl BuildScope<'_> {
     }
 
     fn read(&mut self, node: NodeId, aspect: Aspect) -> Option<Value> {
+        self.world.work += 1;
         let value = self.world.read_at(node, aspect, self.asker.place + 1).cloned();
         let command = self.command;
         if !self.is_own(node, aspect) {
             // Who is among the readers has noted it already.
-            let readers = &mut self.world.cell_mut(node, aspect).readers;
+            let readers = self.world.cell_mut(node, aspect).readers_mut();
             if let Err(at) = readers.binary_search(&command) {
                 readers.insert(at, command);
                 self.trace.reads.push(Read::Cell(node, aspect, value.clone()));
@@ -378,13 +400,14 @@ impl BuildScope<'_> {
 
     /// True if the command itself wrote it.
     fn is_own(&self, node: NodeId, aspect: Aspect) -> bool {
-        self.world.cell(node, aspect).writes.iter().any(|(writer, _)| *writer == self.command)
+        self.world.cell(node, aspect).writes().iter().any(|(writer, _)| *writer == self.command)
     }
 
     pub(super) fn write(&mut self, node: NodeId, aspect: Aspect, value: Value) {
         let command = self.command;
+        self.world.work += 1;
         self.world.note_parent(node, &value);
-        let writes = &mut self.world.cell_mut(node, aspect).writes;
+        let writes = self.world.cell_mut(node, aspect).writes_mut();
         match writes.iter_mut().find(|(writer, _)| *writer == command) {
             Some((_, old)) => *old = value,
             None => {
@@ -397,8 +420,10 @@ impl BuildScope<'_> {
     /// The place of something that the command makes for a purpose.
     fn identity(&mut self, role: &str, subject: NodeId, number: u32) -> Result<NodeId, ModuleError> {
         if self.world.is_full(self.asker.place + 1) {
-            return Err(ModuleError::TooMany { what: "nodes and constraints", limit: self.world.limits.made });
+            let limit = self.world.limits.made;
+            return Err(ModuleError::TooMany { what: "nodes and constraints", name: "nodes", limit });
         }
+        self.world.check_work()?;
         let uid = created_uid(self.command(), role, self.uid(subject), number);
         let node = self.world.slot(uid, Some(self.command));
         let mine = |aspect: Aspect| self.is_own(node, aspect);

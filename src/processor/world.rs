@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use bevy::platform::collections::HashMap;
+use bevy::platform::collections::{HashMap, HashSet};
 
-use super::{exclusion::Exclusions, module::BuildLimits};
+use super::{ModuleError, exclusion::Exclusions, module::BuildLimits};
 use crate::{
     mesh::model::Trs,
     rig::{Attribute, Constraint, ControlData, LayerData, NodeType, Origin, RigInput, SwitchData, Uid},
@@ -69,8 +69,8 @@ pub enum Value {
     Birth(Arc<Birth>),
     /// See [`Aspect::Parent`].
     Parent(Option<NodeId>),
-    /// See [`Aspect::Base`].
-    Base(Trs),
+    /// See [`Aspect::Base`]. Behind a pointer, so that other values stay small.
+    Base(Arc<Trs>),
     /// See [`Aspect::Label`].
     Label(Option<Arc<str>>),
     /// See [`Aspect::Group`].
@@ -101,7 +101,7 @@ impl Value {
     }
 }
 
-fn bits(trs: &Trs) -> [u32; 10] {
+pub(super) fn bits(trs: &Trs) -> [u32; 10] {
     let (t, r, s) = (trs.translation, trs.rotation, trs.scale);
     [t.x, t.y, t.z, r.x, r.y, r.z, r.w, s.x, s.y, s.z].map(f32::to_bits)
 }
@@ -119,10 +119,34 @@ pub(super) fn same(a: Option<&Value>, b: Option<&Value>) -> bool {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cell {
     pub document: Option<Value>,
+    /// Part of the cell that commands use; most cells of most joints have none.
+    used: Option<Box<CellUse>>,
+}
+
+#[derive(Debug, Clone, Default)]
+struct CellUse {
+    writes: Vec<(u32, Value)>,
+    readers: Vec<u32>,
+}
+
+impl Cell {
     /// Values by command, in no order: places of commands change.
-    pub writes: Vec<(u32, Value)>,
+    pub fn writes(&self) -> &[(u32, Value)] {
+        self.used.as_ref().map_or(&[], |used| &used.writes)
+    }
+
+    pub fn writes_mut(&mut self) -> &mut Vec<(u32, Value)> {
+        &mut self.used.get_or_insert_default().writes
+    }
+
     /// Commands that read the cell, sorted.
-    pub readers: Vec<u32>,
+    pub fn readers(&self) -> &[u32] {
+        self.used.as_ref().map_or(&[], |used| &used.readers)
+    }
+
+    pub fn readers_mut(&mut self) -> &mut Vec<u32> {
+        &mut self.used.get_or_insert_default().readers
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -134,6 +158,8 @@ pub(super) struct Slot {
     pub driven_by: Vec<NodeId>,
     /// Children of the node at any place of the list, in rising order.
     pub below: Vec<NodeId>,
+    /// Commands that read the node's transform in the rig's space, sorted.
+    pub global_readers: Vec<u32>,
     pub cells: [Cell; Aspect::COUNT],
 }
 
@@ -164,6 +190,12 @@ pub(super) struct World {
     pub limits: BuildLimits,
     /// Number of slots of nodes and constraints that commands make.
     made: usize,
+    /// Nodes and constraints that are there, counted by the running command once there may be too many.
+    counted: Option<usize>,
+    /// Number of values that commands have read and written.
+    pub work: u64,
+    /// Work before the current run.
+    pub work_before: u64,
 }
 
 impl World {
@@ -185,7 +217,8 @@ impl World {
             return *id;
         }
         let id = NodeId(self.slots.len() as u32);
-        self.slots.push(Slot { uid, creator, driven_by: Vec::new(), below: Vec::new(), cells: Default::default() });
+        let (driven_by, below, global_readers) = (Vec::new(), Vec::new(), Vec::new());
+        self.slots.push(Slot { uid, creator, driven_by, below, global_readers, cells: Default::default() });
         self.ids.insert(uid, id);
         if let Some(creator) = creator {
             self.created[creator as usize].push(id);
@@ -195,14 +228,36 @@ impl World {
     }
 
     /// Returns `true` if the commands before `place` have made as many nodes and constraints as they may.
-    pub fn is_full(&self, place: u32) -> bool {
+    pub fn is_full(&mut self, place: u32) -> bool {
         // Slots stay when what was made is gone.
-        self.made >= self.limits.made && {
-            let is_there =
-                |node: &NodeId| self.exists(*node, place) || self.read_at(*node, Aspect::Constraint, place).is_some();
-            let made = self.created.iter().flatten().filter(|node| is_there(node));
-            made.count() >= self.limits.made
+        if self.made < self.limits.made {
+            return false;
         }
+        let is_there =
+            |node: &&NodeId| self.exists(**node, place) || self.read_at(**node, Aspect::Constraint, place).is_some();
+        let made = self.counted.unwrap_or_else(|| self.created.iter().flatten().filter(is_there).count());
+        self.counted = Some(made);
+        made >= self.limits.made
+    }
+
+    /// Notes that another command makes nodes and constraints from now on.
+    pub fn begin_command(&mut self) {
+        self.counted = None;
+    }
+
+    /// Notes a node or constraint that the running command makes.
+    pub fn note_made(&mut self) {
+        self.counted = self.counted.map(|made| made + 1);
+    }
+
+    /// Refuses more work in the current run than was agreed.
+    pub fn check_work(&self) -> Result<(), ModuleError> {
+        let limit = self.limits.work;
+        if self.work - self.work_before <= limit {
+            return Ok(());
+        }
+        let limit = usize::try_from(limit).unwrap_or(usize::MAX);
+        Err(ModuleError::TooMany { what: "values read and written in one build", name: "work", limit })
     }
 
     /// The number of a command, made where there is none.
@@ -244,7 +299,7 @@ impl World {
     pub fn read_at(&self, node: NodeId, aspect: Aspect, place: u32) -> Option<&Value> {
         let cell = self.cell(node, aspect);
         let mut best: Option<(u32, &Value)> = None;
-        for (command, value) in &cell.writes {
+        for (command, value) in cell.writes() {
             let at = self.places[*command as usize];
             if at < place && best.is_none_or(|(place, _)| place < at) {
                 best = Some((at, value));
@@ -294,9 +349,40 @@ impl World {
 
     pub fn base(&self, node: NodeId, place: u32) -> Trs {
         match self.read_at(node, Aspect::Base, place) {
-            Some(Value::Base(base)) => *base,
+            Some(Value::Base(base)) => **base,
             _ => Trs::IDENTITY,
         }
+    }
+
+    /// Transform of a node in the rig's space, and the number of nodes on the way up to the rig.
+    pub fn global(&self, node: NodeId, place: u32) -> (Trs, u64) {
+        let (mut global, mut at, mut count) = (self.base(node, place), node, 1);
+        while let Some(parent) = self.parent(at, place) {
+            global = self.base(parent, place) * global;
+            at = parent;
+            count += 1;
+        }
+        (global, count)
+    }
+
+    /// Commands that read the transform, in the rig's space, of a node or of one that may stand below it.
+    pub fn global_readers(&self, node: NodeId) -> Vec<u32> {
+        let slot = |node: NodeId| &self.slots[node.0 as usize];
+        let mut readers = slot(node).global_readers.clone();
+        if slot(node).below.is_empty() {
+            return readers;
+        }
+        // Parents differ from place to place, so that two nodes may each stand below the other somewhere.
+        let mut seen: HashSet<NodeId> = HashSet::default();
+        seen.insert(node);
+        let mut stack = slot(node).below.clone();
+        while let Some(node) = stack.pop() {
+            if seen.insert(node) {
+                readers.extend(&slot(node).global_readers);
+                stack.extend(&slot(node).below);
+            }
+        }
+        readers
     }
 
     pub fn label(&self, node: NodeId, place: u32) -> Option<&Arc<str>> {

@@ -16,8 +16,10 @@ pub fn baked(rig: &Rig, built: &BuiltRig) -> Rig {
     }
     let mut baked = Rig::new(rig.uid(), rig.about().name.clone());
     let groups = rig.groups().iter().cloned().enumerate();
-    let mut edits: Vec<RigEdit> = vec![RigEdit::SetAbout(Box::new(rig.about().clone()))];
-    edits.extend(groups.map(|(at, group)| RigEdit::AddLocalGroup(GroupData { enabled: true, ..group }, at)));
+    // An edit is refused only for a rotation that is far from a unit quaternion; that joint is then left out.
+    let mut apply = |edit: RigEdit| drop(baked.apply(&edit));
+    apply(RigEdit::SetAbout(Box::new(rig.about().clone())));
+    groups.for_each(|(at, group)| apply(RigEdit::AddLocalGroup(GroupData { enabled: true, ..group }, at)));
     let known: HashSet<Uid> = rig.groups().iter().map(|group| group.uid).collect();
     for (at, node) in built.nodes.iter().enumerate().filter(|(at, _)| kept.contains(at)) {
         let source = rig.joint(node.uid).map(|joint| &joint.data);
@@ -38,12 +40,8 @@ pub fn baked(rig: &Rig, built: &BuiltRig) -> Rig {
             face: None,
         };
         let parent = built.nodes[at].parent.map(|parent| built.nodes[parent].uid);
-        edits.push(RigEdit::AddJoint { joint: Box::new(joint), parent, index: usize::MAX });
+        apply(RigEdit::AddJoint { joint: Box::new(joint), parent, index: usize::MAX });
     }
-    edits.extend(rig.skins().map(|(mesh, skin)| RigEdit::SetSkin(mesh, Some(skin.clone()))));
-    for edit in edits {
-        // An edit is refused only for a rotation that is far from a unit quaternion; that joint is then left out.
-        let _ = baked.apply(&edit);
-    }
+    rig.skins().for_each(|(mesh, skin)| apply(RigEdit::SetSkin(mesh, Some(skin.clone()))));
     baked
 }

@@ -24,7 +24,7 @@ fn doubling(commands: usize) -> Rig {
 
 fn limited(made: usize) -> Modules {
     let mut modules = rigsmith::modules::all();
-    modules.limits = BuildLimits { made, attributes: 2 };
+    modules.limits = BuildLimits { made, attributes: 2, ..BuildLimits::default() };
     modules
 }
 

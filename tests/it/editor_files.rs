@@ -19,7 +19,7 @@ use rigsmith::{
         recovery::{Recovery, can_recover, describe},
         settings::EditorSettings,
     },
-    files::{Disk, RealDisk, load_template, store_rig},
+    files::{Disk, RealDisk, journal::journal_beside, load_template, store_rig},
     headless::headless_app,
     plugins::{
         document::{Change, EditRequest},
@@ -552,4 +552,43 @@ fn an_unwritable_folder_for_journals_is_told_and_work_goes_on() {
     assert_eq!(steps, Some(1));
     window.act(Action::Quit);
     assert!(!journal.exists());
+}
+
+/// Waits until the journal of a window is at a path.
+fn wait_for_journal(window: &Window, path: &Path) {
+    let start = Instant::now();
+    while window.journal() != path {
+        assert!(start.elapsed() < HANG, "the journal never moves to {}", path.display());
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+#[test]
+fn the_second_window_on_a_project_is_told() {
+    let told = |window: &Window| window.said(Severity::Warning, "open in another window");
+    let folder = folder();
+    let mut first = Window::bundled(folder.path());
+    first.place(1.0);
+    let project = first.save_as("guy.rigsmith.ron");
+    first.place(1.1);
+    wait_for_journal(&first, &journal_beside(&project));
+    first.settle();
+    assert!(!told(&first), "{:?}", first.notices);
+    let mut second = Window::new(folder.path());
+    second.open_file(&project);
+    assert_ne!(second.journal(), journal_beside(&project));
+    second.settle();
+    assert!(told(&second), "{:?}", second.notices);
+    assert!(!told(&first), "{:?}", first.notices);
+    // The first window's journal is its own: both can be recovered.
+    assert!(journal_beside(&project).exists() && second.journal().exists());
+    second.act(Action::Quit);
+    drop(second);
+    first.act(Action::Save);
+    first.act(Action::Quit);
+    let mut third = Window::new(folder.path());
+    third.open_file(&project);
+    wait_for_journal(&third, &journal_beside(&project));
+    third.settle();
+    assert!(!told(&third), "{:?}", third.notices);
 }

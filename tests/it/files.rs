@@ -4,11 +4,11 @@ use std::{
     fs,
     path::{Path, PathBuf},
     process::{Command, Stdio},
-    time::{Duration, Instant},
+    time::{Duration, Instant, SystemTime},
 };
 
 use rigsmith::files::{
-    Disk, Fault, FaultPlan, FaultyDisk, RealDisk, SaveError, is_temp_name, remove_stale_temps, save_atomic,
+    Disk, Fault, FaultPlan, FaultyDisk, FileWatch, RealDisk, SaveError, is_temp_name, remove_stale_temps, save_atomic,
 };
 use tempfile::TempDir;
 
@@ -320,4 +320,59 @@ fn saves_from_many_threads_do_not_meet() {
     let bytes = fs::read(&path).unwrap();
     assert!(bytes.len() == 10_000 && bytes.iter().all(|&b| b == bytes[0]));
     assert_eq!(temps(folder.path()), 0);
+}
+
+/// Sets the time of a file's last change.
+fn set_time(path: &Path, time: SystemTime) {
+    fs::OpenOptions::new().write(true).open(path).unwrap().set_modified(time).unwrap();
+}
+
+#[test]
+fn a_clock_that_goes_back_hides_no_save_and_leaves_nothing() {
+    let folder = fresh();
+    let path = folder.path().join("rig");
+    let hour = Duration::from_secs(3600);
+    save_atomic(&RealDisk, &path, b"first").unwrap();
+    let mut watch = FileWatch::new(&path, 1000);
+    watch.know(b"first".to_vec());
+    assert_eq!(watch.look(&RealDisk), None);
+    // The clock was an hour ahead at the first save, and is right at the second one.
+    set_time(&path, SystemTime::now() + hour);
+    watch.look(&RealDisk);
+    save_atomic(&RealDisk, &path, b"other").unwrap();
+    set_time(&path, SystemTime::now() - hour);
+    let content = (0..3).find_map(|_| watch.look(&RealDisk).map(<[u8]>::to_vec));
+    assert_eq!(content.as_deref(), Some(&b"other"[..]));
+    // A save that died while the clock was ahead is cleared as any other.
+    let plan = FaultPlan { at: 3, fault: Fault::Crash, lasting: true };
+    save_atomic(&FaultyDisk::new(RealDisk, Some(plan)), &folder.path().join("dead"), &finished()).unwrap_err();
+    assert_eq!(temps(folder.path()), 1);
+    for entry in fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap()) {
+        if is_temp_name(&entry.file_name()) {
+            set_time(&entry.path(), SystemTime::now() + hour);
+        }
+    }
+    assert_eq!(remove_stale_temps(&RealDisk, folder.path()).unwrap(), 1);
+    assert_eq!((fs::read(&path).unwrap(), temps(folder.path())), (b"other".to_vec(), 0));
+}
+
+#[test]
+fn a_folder_that_vanishes_is_told_and_not_made_again() {
+    let folder = fresh();
+    let inner = folder.path().join("share");
+    let path = inner.join("rig");
+    fs::create_dir(&inner).unwrap();
+    save_atomic(&RealDisk, &path, OLD).unwrap();
+    let mut watch = FileWatch::new(&path, 1000);
+    watch.know(OLD.to_vec());
+    fs::remove_dir_all(&inner).unwrap();
+    let error = save_atomic(&RealDisk, &path, b"new").unwrap_err().to_string();
+    assert!(error.contains("create it or choose another"), "{error}");
+    assert!(!inner.exists(), "a folder of another machine must not be made here");
+    assert_eq!(watch.look(&RealDisk), None);
+    // It is there again: both go on.
+    fs::create_dir(&inner).unwrap();
+    save_atomic(&RealDisk, &path, b"new").unwrap();
+    let content = (0..3).find_map(|_| watch.look(&RealDisk).map(<[u8]>::to_vec));
+    assert_eq!(content.as_deref(), Some(&b"new"[..]));
 }

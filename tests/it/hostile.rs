@@ -138,6 +138,17 @@ fn skeleton(joints: usize, is_chain: bool) -> String {
     text
 }
 
+/// A template with a chain of joints, each with a null.
+fn chain_of_nulls(joints: usize) -> String {
+    let joint = |number: usize| {
+        let parent = if number == 0 { String::new() } else { format!("parent: \"j{}\", ", number - 1) };
+        let tag = command("null", "");
+        format!("(label: \"j{number}\", {parent}translation: (0, 0.1, 0), tags: [{tag}])")
+    };
+    let joints: Vec<String> = (0..joints).map(joint).collect();
+    format!("(format: 2, name: \"n\", joints: [{}])", joints.join(",\n"))
+}
+
 /// Triangles: equal ones, a fan about one point, and a soup that joins points at random.
 fn triangles(count: usize) -> [(&'static str, String); 3] {
     let stacked = "v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_owned() + &"f 1 2 3\n".repeat(count);
@@ -223,7 +234,7 @@ fn memory_allowance(size: u64) -> u64 {
 }
 
 #[test]
-fn readers_stay_within_their_memory() {
+fn files_and_builds_stay_within_their_memory() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     // 200 buffers that name one file of 10 MB.
@@ -239,6 +250,7 @@ fn readers_stay_within_their_memory() {
     }
     fs::write(at("chain.rig"), skeleton(8_000, true)).unwrap();
     fs::write(at("unknown.rig.ron"), tags(6_000, |_| command("nope", ""))).unwrap();
+    fs::write(at("nulls.rig.ron"), chain_of_nulls(1_500)).unwrap();
     let size = |file: &str| fs::metadata(at(file)).unwrap().len();
     let cases = [
         (&["info", "buffers.gltf"][..], size("buffers.gltf") + 10_000_000),
@@ -249,6 +261,11 @@ fn readers_stay_within_their_memory() {
         (&["check", "chain.rig"], size("chain.rig")),
         (&["convert", "chain.rig", "chain.rig.ron"], size("chain.rig")),
         (&["check", "unknown.rig.ron"], size("unknown.rig.ron")),
+        (&["build", "unknown.rig.ron"], size("unknown.rig.ron")),
+        (&["info", "chain.rig"], size("chain.rig")),
+        (&["build", "chain.rig"], size("chain.rig")),
+        (&["build", "chain.rig", "-o", "built.rig.ron"], size("chain.rig")),
+        (&["build", "nulls.rig.ron"], size("nulls.rig.ron")),
     ];
     for (args, size) in cases {
         let (ended, _) = json_answer(folder.path(), args);

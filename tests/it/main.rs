@@ -19,11 +19,15 @@ mod cli_check;
 #[cfg(feature = "cli")]
 mod cli_face;
 #[cfg(feature = "cli")]
+mod cli_limits;
+#[cfg(feature = "cli")]
 mod cli_outputs;
 #[cfg(feature = "cli")]
 mod cli_pose;
 #[cfg(feature = "cli")]
 mod cli_site;
+#[cfg(all(feature = "cli", target_os = "linux"))]
+mod cli_streams;
 #[cfg(feature = "cli")]
 mod cli_templates;
 mod commands;
@@ -77,6 +81,7 @@ mod gestures;
 mod gizmo;
 mod gltf;
 mod gltf_torture;
+mod growth;
 mod heads;
 #[cfg(feature = "cli")]
 mod hostile;

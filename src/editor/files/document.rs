@@ -5,11 +5,11 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 use bevy::{prelude::*, tasks::IoTaskPool};
 use serde::{Deserialize, Serialize};
 
-use super::{super::notice::Notice, active};
+use super::{super::notice::Notice, active, file_name};
 use crate::{
     files::{
-        MeshToSave, RealDisk,
-        journal::{Journal, JournalPlaces},
+        Disk, MeshToSave, RealDisk,
+        journal::{Journal, JournalPlaces, journal_beside},
     },
     plugins::{
         history::RigHistory,
@@ -144,7 +144,8 @@ impl Context {
     }
 }
 
-/// Sends a notice once if the journal is not at its usual place.
+/// Sends a notice once if the journal is not at its usual place: where it cannot be written, or where the journal of
+/// another window on the same project is.
 pub(super) fn watch_places(world: &mut World) {
     let Some(rig) = active(world) else { return };
     let Some(document) = world.get::<OpenDocument>(rig).filter(|document| !document.is_placed) else { return };
@@ -153,8 +154,22 @@ pub(super) fn watch_places(world: &mut World) {
     let state = world.get_resource::<StateFolder>().and_then(|folder| folder.0.clone());
     let beside = document.project.as_ref().and_then(|project| project.parent().map(std::path::Path::to_path_buf));
     let expected = folder == state || folder == beside;
+    let elsewhere = document.project.as_ref().filter(|project| {
+        let beside = journal_beside(project);
+        beside != path && RealDisk.is_locked(&beside).unwrap_or(false)
+    });
+    let other_window = elsewhere.map(|project| {
+        Notice::warning(format!(
+            "{} is open in another window, too: whoever saves last replaces the work of the other; close one of the two",
+            file_name(project)
+        ))
+    });
     if let Some(mut document) = world.get_mut::<OpenDocument>(rig) {
         document.is_placed = true;
+    }
+    if let Some(notice) = other_window {
+        world.write_message(notice);
+        return;
     }
     if let (false, Some(folder)) = (expected, folder) {
         let wanted = state.map_or_else(|| "a folder of its own".to_owned(), |folder| folder.display().to_string());

@@ -94,7 +94,7 @@ impl Builder {
             let birth = Birth { kind, name: None, origin: None, order: order as u32 };
             self.set_document(node, Aspect::Birth, Some(Value::Birth(Arc::new(birth))));
             self.set_document(node, Aspect::Parent, Some(Value::Parent(parent)));
-            self.set_document(node, Aspect::Base, Some(Value::Base(base)));
+            self.set_document(node, Aspect::Base, Some(Value::Base(Arc::new(base))));
             self.set_document(node, Aspect::Label, Some(Value::Label(label)));
             self.set_document(node, Aspect::Group, Some(Value::Group(data.group)));
         }
@@ -118,7 +118,7 @@ impl Builder {
             let label: Option<Arc<str>> = Some(input.name.as_str().into());
             self.set_document(node, Aspect::Birth, Some(Value::Birth(Arc::new(birth))));
             self.set_document(node, Aspect::Parent, Some(Value::Parent(None)));
-            self.set_document(node, Aspect::Base, Some(Value::Base(input.rest.into())));
+            self.set_document(node, Aspect::Base, Some(Value::Base(Arc::new(input.rest.into()))));
             self.set_document(node, Aspect::Label, Some(Value::Label(label)));
             self.set_document(node, Aspect::Group, Some(Value::Group(None)));
         }

@@ -1,8 +1,8 @@
 //! Progress of commands.
 
-use super::Builder;
+use super::{Builder, Command};
 use crate::{
-    processor::{BuildProblem, SkipReason, world::NOWHERE},
+    processor::{BuildProblem, SkipReason, scope::Trace, world::NOWHERE},
     rig::Uid,
 };
 
@@ -52,5 +52,20 @@ impl Builder {
         let error = command.error.clone().filter(|_| state == CommandState::Failed);
         let skipped = off.map(|off| off.reason.clone()).filter(|_| state == CommandState::Skipped);
         Some(CommandStatus { state, micros: command.micros, runs: command.runs, error, skipped })
+    }
+
+    /// Number of values that are kept to find out which commands have to run again: a measure of memory.
+    pub fn traced(&self) -> usize {
+        let trace = |command: &Command| {
+            let Trace { reads, writes, globals, .. } = &command.trace;
+            reads.len() + writes.len() + globals.len()
+        };
+        self.commands.iter().map(trace).sum()
+    }
+
+    /// Number of values that commands have read and written since the builder was made: a measure of work that is the
+    /// same on every machine.
+    pub fn work(&self) -> u64 {
+        self.world.work
     }
 }

@@ -1,10 +1,13 @@
 //! Traces of commands: the cells that a command reads and writes, and the nodes that it makes.
 
+use bevy::platform::collections::HashMap;
+
 use crate::{
+    mesh::model::Trs,
     processor::{
         exclusion::{Exclusion, Gap},
         resolve::{self, Asker, Resolution},
-        world::{Aspect, NodeId, Value, World, same},
+        world::{Aspect, NodeId, Value, World, bits, same},
     },
     rig::{Uid, mix, reference::NodeRefs},
 };
@@ -22,6 +25,8 @@ pub(in crate::processor) enum Read {
 pub(in crate::processor) struct Trace {
     pub reads: Vec<Read>,
     pub writes: Vec<(NodeId, Aspect)>,
+    /// Transforms in the rig's space that the command read: one value each, however deep the node stands.
+    pub globals: HashMap<NodeId, Trs>,
     /// Number of nodes and constraints that the command made.
     pub made: u32,
     /// First gap of a list that the command goes through.
@@ -39,13 +44,15 @@ impl Trace {
 
     /// True if everything that was read is still so.
     pub fn holds(&self, world: &World, asker: Asker) -> bool {
-        self.reads.iter().all(|read| match read {
+        let is_global = |(node, global): (&NodeId, &Trs)| bits(&world.global(*node, asker.place).0) == bits(global);
+        let is_read = |read: &Read| match read {
             Read::Cell(node, aspect, value) => same(world.read_at(*node, *aspect, asker.place), value.as_ref()),
             Read::References(references, found) => {
                 resolve::resolve(world, asker, references).ok().as_ref() == found.as_ref()
             }
             Read::Children(node, children) => world_children(world, *node, asker.place) == *children,
-        })
+        };
+        self.reads.iter().all(is_read) && self.globals.iter().all(is_global)
     }
 }
 

@@ -14,7 +14,7 @@ use crate::{
 impl BuildScope<'_> {
     /// Puts a node elsewhere, relative to its parent.
     pub fn set_base(&mut self, node: NodeId, base: Trs) {
-        self.write(node, Aspect::Base, Value::Base(base));
+        self.write(node, Aspect::Base, Value::Base(Arc::new(base)));
     }
 
     /// Puts a node elsewhere in the rig's space; what is below it moves along.
@@ -88,7 +88,7 @@ impl BuildScope<'_> {
         }
         let limit = self.world.limits.attributes;
         if list.len() >= limit {
-            return Err(ModuleError::TooMany { what: "attributes of one node", limit });
+            return Err(ModuleError::TooMany { what: "attributes of one node", name: "attributes", limit });
         }
         let default = attribute.clamp(attribute.default);
         list.push(Attribute { default, ..attribute });

@@ -1,0 +1,105 @@
+//! Limits of commands: `--limit` sets them, and errors say which one and what went over it.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::{cli::explained, cli_outputs::rigsmith};
+
+const BOX: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+const GESTURES: &str = "[Click((0.2, 0.2)), Stroke(points: [(0.1, 0.1), (0.1, 0.2), (0.1, 0.4)])]";
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let chain: String = (0..6).map(|joint| format!("joint {joint} {} 0 {joint} 0 j{joint}\n", joint - 1)).collect();
+    let tags: Vec<String> =
+        (0..4).map(|number| format!("Command(module: \"attribute\", params: (name: \"a{number}\"))")).collect();
+    let rig = format!(
+        "(format: 2, name: \"n\", joints: [(label: \"j\", translation: (0, 0.1, 0), tags: [{}, {}])])",
+        tags.join(", "),
+        "Command(module: \"null\", params: (at: \"@any\")), Command(module: \"null\", params: (at: \"@any\"))"
+    );
+    for (name, text) in [
+        ("chain.rig", format!("rig 1\n{chain}")),
+        ("tags.rig.ron", rig),
+        ("b.obj", BOX.to_owned()),
+        ("g.ron", GESTURES.to_owned()),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn each_limit_can_be_set_and_is_named_by_its_error() {
+    let folder = folder();
+    let biped = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/models/biped.obj");
+    let skeleton = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/models/biped.rig");
+    let out = ["-o", "out.glb"];
+    // Command, limit that is one too low, and what its error tells beside the name of the limit.
+    let cases: [(&[&str], &str, &str); 14] = [
+        (&["info", "chain.rig"], "joints=5", "the rig has 6 joints"),
+        (&["check", "chain.rig"], "joints=5", "the rig has 6 joints"),
+        (&["convert", "chain.rig", "out.rig.ron"], "joints=5", "the rig has 6 joints"),
+        (&["build", "chain.rig"], "joints=5", "the rig has 6 joints"),
+        (&["info", "b.obj"], "points=3", "the mesh has 4 points"),
+        (&["check", "b.obj"], "triangles=3", "the mesh has 4 triangles"),
+        (&["skin", "chain.rig", "b.obj", out[0], out[1]], "points=3", "the mesh has 4 points"),
+        (&["info", "g.ron"], "gestures=1", "the list has 2 gestures"),
+        (&["sketch", "b.obj", "g.ron", out[0], "out.rig"], "stroke_points=2", "gesture 2 (Stroke) has 3 points"),
+        (&["build", "tags.rig.ron"], "attributes=3", "attribute on j"),
+        (&["build", "tags.rig.ron"], "nodes=1", "null on j"),
+        (&["check", "tags.rig.ron"], "nodes=1", "null on joint j"),
+        (&["build", "tags.rig.ron", out[0], out[1]], "work=3", "on j: there would be more than 3 values"),
+        (&["skin", skeleton, biped, out[0], out[1]], "seconds=0", "binding the mesh took longer than 0 s"),
+    ];
+    for (args, setting, wanted) in cases {
+        let (name, _) = setting.split_once('=').unwrap();
+        let limited = [args, &["--limit", setting, "--json"]].concat();
+        let (code, said) = rigsmith(folder.path(), &limited);
+        assert_eq!(code, 1, "{limited:?}: {said}");
+        let answer: Value = serde_json::from_str(&said).unwrap_or_else(|error| panic!("{error}: {said}"));
+        let told = explained(&answer);
+        assert!(told.contains(name), "{limited:?}: {told}");
+        assert!(answer.to_string().contains(wanted), "{limited:?}: {answer:.800}");
+        assert!(!folder.path().join("out.glb").exists(), "{limited:?}");
+        // With the limits that hold otherwise the command is done.
+        if !args.contains(&biped) {
+            let (code, said) = rigsmith(folder.path(), args);
+            assert_eq!(code, 0, "{args:?}: {said}");
+            for written in ["out.glb", "out.rig", "out.rig.ron"] {
+                let _ = fs::remove_file(folder.path().join(written));
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_told_has_limits() {
+    let folder = folder();
+    let run = |args: &[&str]| rigsmith(folder.path(), args);
+    let (code, said) = run(&["info", "chain.rig", "--limit", "listed=2"]);
+    assert!(code == 0 && said.contains("and 4 more") && !said.contains("j3"), "{said}");
+    // A file with a note for each of two objects without faces.
+    fs::write(folder.path().join("notes.obj"), format!("mtllib one.mtl\nmtllib two.mtl\n{BOX}")).unwrap();
+    let (code, said) = run(&["info", "notes.obj", "--limit", "notes=1"]);
+    assert!(code == 0 && said.contains("1 more notes are left out"), "{said}");
+    let missing = format!("{}.obj", "a".repeat(100));
+    let (code, said) = run(&["info", &missing, "--limit", "message=60"]);
+    assert!(code == 1 && said.len() < 100 && said.contains('…'), "{said}");
+}
+
+#[test]
+fn limits_are_listed_and_checked() {
+    let folder = folder();
+    let run = |args: &[&str]| rigsmith(folder.path(), args);
+    let (code, said) = run(&["--help"]);
+    assert_eq!(code, 0);
+    for name in ["joints", "nodes", "attributes", "work", "points", "triangles", "influences", "gestures"] {
+        assert!(said.lines().any(|line| line.trim_start().starts_with(&format!("{name} "))), "{name}: {said}");
+    }
+    for wrong in ["joints", "joints=-1", "joints=many", "nothing=3"] {
+        let (code, said) = run(&["info", "b.obj", "--limit", wrong]);
+        assert!(code == 2 && said.contains("NAME=NUMBER"), "{wrong}: {said}");
+    }
+}

@@ -1,0 +1,116 @@
+//! Growth of work and memory with the size of a rig, counted: for the worst shapes, twice the size takes about twice as much.
+
+use std::{fmt::Write as _, sync::Arc};
+
+use rigsmith::{
+    processor::Builder,
+    rig::{Rig, template::read_template},
+};
+
+/// Largest growth for twice the size.
+const GROWTH: f64 = 2.3;
+
+fn template(joints: &[String]) -> Rig {
+    let text = format!("(format: 2, name: \"n\", joints: [{}])", joints.join(",\n"));
+    read_template(text.as_bytes()).unwrap().rig
+}
+
+fn joint(label: &str, parent: Option<&str>, tags: &[String]) -> String {
+    let mut text = format!("(label: \"{label}\", translation: (0, 0.1, 0)");
+    if let Some(parent) = parent {
+        let _ = write!(text, ", parent: \"{parent}\"");
+    }
+    if !tags.is_empty() {
+        let _ = write!(text, ", tags: [{}]", tags.join(", "));
+    }
+    text + ")"
+}
+
+fn null(at: &str) -> String {
+    format!("Command(module: \"null\", params: (at: \"{at}\"))")
+}
+
+/// Joints in a chain; `tags` are those of the joint with a number.
+fn chain(count: usize, tags: impl Fn(usize) -> Vec<String>) -> Rig {
+    let parent = |number: usize| number.checked_sub(1).map(|above| format!("j{above}"));
+    let joints: Vec<String> =
+        (0..count).map(|number| joint(&format!("j{number}"), parent(number).as_deref(), &tags(number))).collect();
+    template(&joints)
+}
+
+fn star(count: usize) -> Rig {
+    let arms = (0..count).map(|number| joint(&format!("j{number}"), Some("top"), &[null("@this")]));
+    template(&std::iter::once(joint("top", None, &[])).chain(arms).collect::<Vec<_>>())
+}
+
+fn all_tags_on_one_joint(count: usize) -> Rig {
+    let attribute = |number: usize| format!("Command(module: \"attribute\", params: (name: \"a{number}\"))");
+    let tags: Vec<String> = (0..count).flat_map(|number| [null("@this"), attribute(number)]).collect();
+    template(&[joint("j", None, &tags)])
+}
+
+fn equal_names(count: usize) -> Rig {
+    let joint = |number: usize| {
+        let (own, tag) = (0x1000 + number, 0x10_0000 + number);
+        let tag = format!("Command(uid: \"{tag:016x}\", module: \"null\", params: (at: \"@this\"))");
+        format!("(uid: \"{own:016x}\", label: \"j\", translation: (0, 0.1, 0), tags: [{tag}])")
+    };
+    template(&(0..count).map(joint).collect::<Vec<_>>())
+}
+
+/// Values that commands read and wrote in a build, and values that are kept of it.
+fn measured(rig: &Rig) -> (u64, usize) {
+    let mut builder = Builder::new(Arc::new(rigsmith::modules::all()));
+    builder.sync(rig);
+    let report = builder.run_all();
+    assert_eq!(report.error, None);
+    assert!(!report.executed.is_empty());
+    (builder.work(), builder.traced())
+}
+
+fn check(shape: &str, rig: impl Fn(usize) -> Rig, is_work_linear: bool) {
+    let measures: Vec<(u64, usize)> = [150, 300, 600].into_iter().map(|count| measured(&rig(count))).collect();
+    for pair in measures.windows(2) {
+        let [(work, traced), (more_work, more_traced)] = [pair[0], pair[1]];
+        assert!(work > 0 && traced > 0, "{shape}: nothing is counted");
+        assert!(more_traced as f64 <= GROWTH * traced as f64, "{shape}: memory grows by {measures:?}");
+        assert!(!is_work_linear || more_work as f64 <= GROWTH * work as f64, "{shape}: work grows by {measures:?}");
+    }
+}
+
+#[test]
+fn builds_of_the_worst_shapes_grow_with_their_size() {
+    check("star", star, true);
+    check("all tags on one joint", all_tags_on_one_joint, true);
+    check("equal names", equal_names, true);
+    // Each transform of a chain is put together from all joints above, but kept as one value.
+    check("chain", |count| chain(count, |_| vec![null("@this")]), false);
+    check(
+        "chain under one reference",
+        |count| chain(count, |at| if at == 0 { vec![null("@any")] } else { vec![] }),
+        false,
+    );
+}
+
+/// A command that reads where the end of a chain is runs again when any joint above moves, and no other one does.
+#[test]
+fn a_transform_is_read_again_when_a_joint_above_changes() {
+    use rigsmith::rig::{RestTransform, RigEdit};
+
+    let tags = |at: usize| if at == 3 { vec![null("@this")] } else { vec![] };
+    let mut rig = chain(8, tags);
+    let modules = Arc::new(rigsmith::modules::all());
+    let mut builder = Builder::new(modules.clone());
+    builder.sync(&rig);
+    builder.run_all();
+    let joint = |rig: &Rig, number: usize| rig.find_label(&format!("j{number}")).unwrap();
+    for (number, runs) in [(0, 1), (2, 1), (3, 1), (4, 0), (7, 0)] {
+        let rest = RestTransform::from_translation(glam::Vec3::new(number as f32, 0.5, 0.25));
+        let edit = RigEdit::SetRest(joint(&rig, number), rest);
+        rig.apply(&edit).unwrap();
+        builder.sync(&rig);
+        let report = builder.run_all();
+        assert_eq!((report.executed.len(), report.error), (runs, None), "joint {number}");
+        assert_eq!(builder.built(), Builder::build(&rig, &modules).unwrap(), "joint {number}");
+    }
+}
