@@ -1,10 +1,12 @@
 //! Local changes of parts that are made in the program: they become changes of the part's instance in the text.
 
-use std::{collections::HashMap, fs, path::Path};
+use std::{collections::HashMap, fs, path::Path, sync::Arc};
 
 use bevy::prelude::*;
 use rigsmith::{
-    files::{RealDisk, load_template, store_rig_over},
+    files::{PartFiles, RealDisk, load_template, store_rig_over},
+    modules,
+    processor::Builder,
     rig::{Rig, RigEdit, TagData, TagKind, Uid, UidSource},
 };
 
@@ -356,4 +358,49 @@ fn a_value_of_the_bundled_biped_is_one_line() {
         changed += 1;
     }
     assert!(changed > 5 && in_a_line * 2 > changed, "{changed} {in_a_line}");
+}
+
+/// The prefix of an instance names its joints and nodes, not the attributes by which its parameters refer to each other.
+#[test]
+fn attributes_keep_their_names_under_a_prefix() {
+    let part = r#"(
+    format: 2,
+    name: "lid",
+    kind: "part",
+    joints: [
+        (
+            label: "lid",
+            tags: [
+                control(creation: (name: "lid_ctl")),
+                attribute(node: "@command control/lid_ctl role:control", name: "open", max: Some(1.0)),
+            ],
+        ),
+        (
+            label: "tip",
+            parent: "lid",
+            translation: (0, 0.1, 0),
+            tags: [
+                orient(
+                    targets: "@command control/lid_ctl role:control",
+                    control: "@command control/lid_ctl role:control",
+                    weight: "open",
+                ),
+            ],
+        ),
+    ],
+)"#;
+    let host = r#"(
+    format: 2,
+    name: "host",
+    joints: [(label: "head")],
+    parts: [(part: "lid.rig.ron", parent: "head", prefix: "x_")],
+)"#;
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("lid.rig.ron"), part).unwrap();
+    let path = folder.path().join("host.rig.ron");
+    let template = PartFiles::new(&RealDisk).complete(&path, host.as_bytes()).unwrap();
+    let built = Builder::build(&template.rig, &Arc::new(modules::all())).unwrap();
+    let control = built.nodes.iter().find(|node| *node.name == *"x_lid_ctl").unwrap();
+    let names: Vec<&str> = control.attributes.iter().map(|attribute| &*attribute.name).collect();
+    assert_eq!(names, ["open"]);
 }

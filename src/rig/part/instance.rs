@@ -86,6 +86,9 @@ pub struct PartInstance {
 /// Gives the parameters of a module for the other side of the character; `None` if it does not know the module.
 pub type MirrorParams<'a> = &'a dyn Fn(&str, &str) -> Option<String>;
 
+/// Module whose name is that of an attribute, not of a node.
+const ATTRIBUTE: &str = "attribute";
+
 /// What comes of putting a part into a rig.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PutPart {
@@ -256,7 +259,8 @@ impl PartInstance {
                     if let Some(mirrored) = self.mirror.then(|| mirror(module, params)).flatten() {
                         *params = mirrored;
                     }
-                    if !self.prefix.is_empty() {
+                    // Attributes are told apart by the nodes that bear them, and are named in other parameters.
+                    if !self.prefix.is_empty() && *module != *ATTRIBUTE {
                         *params = map_text_fields(params, &["name", "label"], |name| Some(prefixed(name)));
                     }
                 }
