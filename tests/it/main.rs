@@ -24,6 +24,7 @@ mod cli_pose;
 mod cli_site;
 #[cfg(feature = "cli")]
 mod cli_templates;
+mod clip_files;
 mod commands;
 mod control_sizes;
 mod custom_module;
