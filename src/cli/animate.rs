@@ -22,6 +22,7 @@ use crate::{
         animation::{RigClip, joint_map::JointMapError},
         bake::baked,
         operations::KeyTolerance,
+        skeleton_preset::{SkeletonPreset, apply_preset},
     },
     solve::{
         bake_clip::{BakedNode, bake_clip},
@@ -70,6 +71,9 @@ pub(super) struct AnimateArgs {
     /// Let standing feet move as they do in the file
     #[arg(long)]
     free_feet: bool,
+    /// Names and axes of the bones in a .glb or .gltf
+    #[arg(long, value_enum, default_value = "plain")]
+    preset: PresetArg,
     /// The file to write: .glb or .gltf for the character with its animation, .anim.ron for the clip, .png for a strip of frames
     #[arg(short, long)]
     output: Output,
@@ -88,6 +92,20 @@ enum OntoArg {
     Controls,
     /// Joints; the commands of the rig are left out
     Joints,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+enum PresetArg {
+    /// Names and axes of the rig
+    Plain,
+    /// Mixamo: names such as mixamorig:LeftUpLeg, Y along the bones
+    Mixamo,
+    /// Unreal: names such as thigh_l, X along the bones
+    Unreal,
+    /// Unity's humanoid: names such as LeftUpperLeg, axes of the model
+    Unity,
+    /// VRM: names such as leftUpperLeg, axes of the model
+    Vrm,
 }
 
 impl From<RetargetError> for Failure {
@@ -139,6 +157,7 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
         let (mut model, settings) =
             build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?;
         model.clips = spinning("baking", || exported(args, &bench, &model, &clips, &mut report))?;
+        dress(args, &mut model, &mut report);
         report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);
     }
     report.line(format!("wrote {}", args.output.display()));
@@ -164,6 +183,9 @@ fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
     if let Some(clip) = args.clips.iter().find(|clip| !is_known(clip)) {
         let text = format!("`{}` has no motion; give .bvh, .glb, .gltf or .anim.ron", clip.display());
         return Err(Failure::Usage(text));
+    }
+    if args.preset != PresetArg::Plain && !matches!(kind, Some(FileKind::Glb | FileKind::Gltf)) {
+        return Err(Failure::Usage("--preset is for a character; write one with -o NAME.glb".to_owned()));
     }
     let motions = args.clips.iter().filter(|clip| is_motion(clip)).count();
     if motions == 0 && (args.map.is_some() || args.map_out.is_some() || args.onto.is_some()) {
@@ -258,6 +280,21 @@ fn exported(
     let channels: usize = baked.iter().map(|clip| clip.channels.len()).sum();
     report.set("channels", channels);
     Ok(baked)
+}
+
+/// Gives the model the names and axes of another program.
+fn dress(args: &AnimateArgs, model: &mut Model, report: &mut Report) {
+    let preset = match args.preset {
+        PresetArg::Plain => return,
+        PresetArg::Mixamo => SkeletonPreset::Mixamo,
+        PresetArg::Unreal => SkeletonPreset::Unreal,
+        PresetArg::Unity => SkeletonPreset::Unity,
+        PresetArg::Vrm => SkeletonPreset::Vrm,
+    };
+    match apply_preset(model, preset) {
+        Some(renamed) => report.set("renamed", renamed),
+        None => report.notes.push("--preset: no human was found in the skeleton; names and axes stay".to_owned()),
+    }
 }
 
 /// Nodes of an exported model, which are those of the baked rig in their order.

@@ -177,6 +177,80 @@ fn clips_of_characters_are_edited_on_their_joints() {
     }
 }
 
+/// Clips of a character with names of its own go onto the controls of the biped.
+#[test]
+fn clips_of_a_character_move_another_one() {
+    let Some(data) = test_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mage = data.join("characters/Mage.glb").display().to_string();
+    let clips = ["--clip", "Walking_A", "--clip", "Jump_Full_Short"];
+    let answer = json(folder.path(), &[&["animate", "biped", &mage], &clips[..], &["-o", "mage.anim.ron"]].concat());
+    for motion in answer["motions"].as_array().unwrap() {
+        assert_eq!((&motion["found_by"], &motion["onto"]), (&"names".into(), &"controls".into()), "{motion}");
+        assert!(motion["mapped"].as_array().unwrap().len() >= 14, "{motion}");
+    }
+    let read = load_animation(&RealDisk, &folder.path().join("mage.anim.ron")).unwrap().clips;
+    let names: Vec<&str> = read.iter().map(|clip| clip.name.as_str()).collect();
+    assert_eq!(names.len(), 2, "{names:?}");
+    assert!(read.iter().all(|clip| clip.duration() > 0.3 && clip.key_count() > 50));
+}
+
+#[test]
+fn presets_change_names_and_axes_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("walker.bvh"), WALKER).unwrap();
+    let run = |preset: &str, output: &str| {
+        json(folder.path(), &["animate", "biped.rig.ron", "walker.bvh", "--preset", preset, "-o", output])
+    };
+    run("plain", "plain.glb");
+    let plain = load_model(&RealDisk, &path("plain.glb")).unwrap();
+    let of_plain = motion_of(&plain, &plain.clips[0]);
+    for (preset, thigh, chest) in [
+        ("mixamo", "mixamorig:LeftUpLeg", "mixamorig:Spine1"),
+        ("unreal", "thigh_l", "spine_02"),
+        ("unity", "LeftUpperLeg", "Chest"),
+        ("vrm", "leftUpperLeg", "chest"),
+    ] {
+        let answer = run(preset, "other.glb");
+        assert!(answer["renamed"].as_u64().unwrap() >= 10, "{answer}");
+        let other = load_model(&RealDisk, &path("other.glb")).unwrap();
+        let find = |name: &str| {
+            let mut found = (0..other.nodes.len()).filter(|node| other.nodes[*node].name == name);
+            let place = found.next().unwrap_or_else(|| panic!("{preset}: no {name}"));
+            assert_eq!(found.next(), None, "{preset}: several {name}");
+            place
+        };
+        let (thigh, _) = (find(thigh), find(chest));
+        assert_eq!(plain.nodes[thigh].name, "thigh_l");
+        assert_eq!(other.nodes.len(), plain.nodes.len());
+        // Joints are where they were, at rest and in the clip.
+        let of_other = motion_of(&other, &other.clips[0]);
+        for time in [0.0, 0.3, 0.65, 0.9] {
+            let (was, is) = (of_plain.globals_at(time), of_other.globals_at(time));
+            for (at, (was, is)) in was.iter().zip(&is).enumerate() {
+                let off = was.translation.distance(is.translation);
+                assert!(off < 1e-4, "{preset}: {} at {time}: {off}", other.nodes[at].name);
+            }
+        }
+        // What is bound moves as before.
+        let globals = other.rest_globals();
+        for (joint, bind) in other.skins[0].joints.iter().zip(&other.skins[0].inverse_binds) {
+            let moved = bevy::math::Mat4::from(globals[*joint]) * *bind;
+            assert!(moved.abs_diff_eq(bevy::math::Mat4::IDENTITY, 1e-3), "{preset}: {}", other.nodes[*joint].name);
+        }
+        let at_rest = globals[thigh];
+        let axis = |axis: usize| at_rest.matrix3.col(axis).normalize();
+        match preset {
+            "mixamo" => assert!(axis(1).y < -0.9, "{}", axis(1)),
+            "unreal" => assert!(axis(0).y < -0.9, "{}", axis(0)),
+            _ => assert!((0..3).all(|at| axis(at)[at] > 0.9999), "{preset}: {at_rest}"),
+        }
+    }
+    let answer = rigsmith(folder.path(), &["animate", "biped", "walker.bvh", "--preset", "vrm", "-o", "a.anim.ron"]);
+    assert!(answer.code == 2 && answer.err.contains("--preset"), "{}", answer.err);
+}
+
 /// Characters for the validator: the walk on the biped and on a body.
 #[test]
 fn walks_are_exported() {

@@ -9,12 +9,15 @@ fn swinging() -> Motion {
     let walker = rigsmith::rig::format::bvh::read_bvh(include_bytes!("walker.bvh"), "swing").unwrap();
     let (width, rest) = (walker.width(), walker.values[..walker.width()].to_vec());
     let value = |frame: usize, channel: usize| {
-        // The hips stay; the other rotations swing by ten degrees.
-        if channel < 6 {
-            return rest[channel];
-        }
+        // The hips stay, knees are bent about their hinges, and all other rotations swing by ten degrees.
         let pace = 0.8 + 0.05 * (channel % 7) as f32;
-        10.0 * (frame as f32 / 60.0 * pace + channel as f32).sin()
+        let swing = 10.0 * (frame as f32 / 60.0 * pace + channel as f32).sin();
+        match channel {
+            0..6 => rest[channel],
+            15 | 16 | 27 | 28 => 0.0,
+            17 | 29 => 25.0 + swing,
+            _ => swing,
+        }
     };
     let values = (0..1200).flat_map(|frame| (0..width).map(move |channel| value(frame, channel))).collect();
     Motion { frame_time: 1.0 / 60.0, values, ..walker }
