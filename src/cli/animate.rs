@@ -13,9 +13,12 @@ use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, build, positive, progress::spinning, skin,
 };
 use crate::{
-    files::{FileKind, RealDisk, load_project, load_template, store_animation, store_model},
+    files::{FileKind, RealDisk, load_model, load_project, load_template, store_animation, store_model},
     headless::{Workbench, posing::PoseError},
-    mesh::model::{Clip, Model, Node},
+    mesh::{
+        gltf::GltfWriteSettings,
+        model::{Clip, Model, Node},
+    },
     plugins::commands::BuildStep,
     rig::{
         BuiltRig, Rig, RigEdit, Uid,
@@ -42,7 +45,7 @@ pub(super) struct AnimateArgs {
     /// A clip to take from the files, by its name or its number from 1; may be repeated; all, if left out
     #[arg(long = "clip", value_name = "NAME")]
     chosen: Vec<String>,
-    /// A mesh to bind to the rig, for .glb and .png
+    /// A mesh to bind to the rig, for .glb and .png; a rig that is a .glb or .gltf keeps its own mesh and weights in a .glb
     #[arg(long)]
     mesh: Option<PathBuf>,
     /// A map of joints for motion of another skeleton: a RON list of pairs of names, [("LeftUpLeg", "thigh_l"), ...]; it wins over what is
@@ -154,8 +157,12 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     } else if FileKind::of(&args.output) == Some(FileKind::Animation) {
         store_animation(&RealDisk, &args.output, bench.rig(), bench.built(), &clips)?;
     } else {
-        let (mut model, settings) =
-            build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?;
+        let (mut model, settings) = match own_character(args, &bench)? {
+            Some(model) => {
+                (model, GltfWriteSettings { all_joints: true, bind_unweighted: true, ..args.export.settings() })
+            }
+            None => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?,
+        };
         model.clips = spinning("baking", || exported(args, &bench, &model, &clips, &mut report))?;
         dress(args, &mut model, &mut report);
         report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);
@@ -249,6 +256,22 @@ fn describe(clips: &[RigClip], report: &mut Report) {
         ));
     }
     report.set("clips", clips.iter().map(clip).collect::<Vec<_>>());
+}
+
+/// Character of the rig's own file, with its mesh and weights; `None` if the rig is no model or has no mesh, or if another mesh is given.
+fn own_character(args: &AnimateArgs, bench: &Workbench) -> Result<Option<Model>, Failure> {
+    if args.mesh.is_some() || !matches!(FileKind::of(&args.rig), Some(FileKind::Glb | FileKind::Gltf)) {
+        return Ok(None);
+    }
+    let model = load_model(&RealDisk, &args.rig)?;
+    let built = bench.built().ok_or(PoseError::NotBuilt)?;
+    let skeleton = baked(bench.rig(), built);
+    let is_alike = skeleton.len() == model.nodes.len()
+        && skeleton
+            .walk()
+            .zip(&model.nodes)
+            .all(|(joint, node)| joint.data.label.as_deref().unwrap_or_default() == node.name);
+    Ok((is_alike && !model.points.is_empty()).then_some(model))
 }
 
 /// Clips baked for the nodes of an exported model.

@@ -34,6 +34,13 @@ pub fn fit_curve(property: &Property, times: &[f32], values: &[[f32; 4]], tolera
     }
     let samples = |is_cubic: bool| Samples { property, times, values, tolerance, is_cubic };
     let (cubic, linear) = (samples(true).keys(), samples(false).keys());
+    let is_finite = |key: &Key| match key.ease {
+        Ease::Cubic { arrive, leave } => [arrive, leave].as_flattened().iter().all(|number| number.is_finite()),
+        Ease::Linear | Ease::Stepped => true,
+    };
+    if !cubic.iter().all(is_finite) {
+        return linear;
+    }
     let numbers = |keys: &[Key], values: usize| keys.len() * (1 + values * property.width());
     if numbers(&linear, 1) <= numbers(&cubic, 3) { linear } else { cubic }
 }

@@ -162,6 +162,10 @@ fn clips_of_characters_are_edited_on_their_joints() {
     assert_eq!(answer["motions"][1]["found_by"], "joints", "{answer}");
     json(folder.path(), &["animate", &fox, "fox.anim.ron", "-o", "fox.glb"]);
     let [was, is] = [Path::new(&fox), &folder.path().join("fox.glb")].map(|path| load_model(&RealDisk, path).unwrap());
+    // Mesh and weights are those of the character.
+    assert!(was.points.len() > 100 && is.points.len() == was.points.len());
+    assert_eq!((is.skins.len(), is.clips.len()), (was.skins.len(), 2));
+    assert_eq!(is.weights.as_ref().map(|weights| weights.len()), was.weights.as_ref().map(|weights| weights.len()));
     let walk = was.clips.iter().find(|clip| clip.name == "Walk").unwrap();
     let again = is.clips.iter().find(|clip| clip.name == "Walk").unwrap();
     let [was_motion, is_motion] = [motion_of(&was, walk), motion_of(&is, again)];

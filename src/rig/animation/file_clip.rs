@@ -190,12 +190,11 @@ pub fn rig_clip(rig: &Rig, name: &str, clip: &Clip, joints: &[Option<Uid>]) -> O
     let of = rig.uid().to_string();
     let uids = ["clip", "layer"].map(|what| Uid::derived([of.as_str(), name, what]));
     let mut made = RigClip { frame_rate: frame_rate(clip, range[0]), range, ..RigClip::new(uids[0], uids[1], name) };
-    let size = rig.rest_globals().iter().map(|(_, at)| at.translation.abs().max_element()).fold(0.0, f32::max);
     let layer = made.layers.first_mut()?;
     for (node, property, track) in clip.channels.iter().filter_map(track_of) {
         let Some(uid) = joints.get(node).copied().flatten() else { continue };
         let Some(rest) = rig.joint(uid).map(|joint| Trs::from(joint.data.rest)) else { continue };
-        let change = RestChange { rest, property: property.clone(), grid: grid(&property, size) };
+        let change = RestChange { rest, property: property.clone(), grid: grid(&property, &track, &rest) };
         let keys = track.keys.iter().map(|key| change.offset(key)).collect();
         layer.tracks.insert(TrackTarget { node: uid, property }, Arc::new(Track { keys }));
     }
@@ -270,15 +269,17 @@ pub fn channel_of(
     Some(Channel { target, interpolation, times, values })
 }
 
-fn grid(property: &Property, size: f32) -> f64 {
-    match property {
-        // A power of two about a hundred-thousandth of the figure's size.
-        Property::Translation => {
-            let exponent = (size.max(1e-20).to_bits() >> 23) as i32 - 127 - 17;
-            f64::from_bits(((1023 + i64::from(exponent)) as u64) << 52)
-        }
-        _ => GRID,
+/// Grid of the offsets of a track: for translations a power of two below a two-hundred-thousandth of the largest number in the file.
+fn grid(property: &Property, track: &Track, rest: &Trs) -> f64 {
+    if *property != Property::Translation {
+        return GRID;
     }
+    let values = track.keys.iter().flat_map(|key| key.value).map(f32::abs);
+    let largest = values.fold(rest.translation.abs().max_element(), f32::max);
+    let scale = rest.scale.abs().min_element();
+    let exponent = |number: f32| i64::from(number.clamp(1e-20, 1e20).to_bits() >> 23) - 127;
+    let exponent = exponent(largest) - 19 - if scale > 0.0 { exponent(scale) } else { 0 };
+    f64::from_bits(((1023 + exponent) as u64) << 52)
 }
 
 /// Change of keys between transforms relative to the parent and offsets from rest.
