@@ -38,18 +38,19 @@ use crate::{
 pub(super) struct AnimateArgs {
     /// The rig: a .rig.ron, a template by its name, a project (.rigsmith.ron), or a skeleton in a .glb, .gltf or .rig
     rig: PathBuf,
-    /// The motion: clips of a rig (.anim.ron), motion capture (.bvh) or the animations of a model (.glb, .gltf) of any skeleton;
-    /// several files become several animations
+    /// The motion: clips of a rig (.anim.ron), motion capture (.bvh) or the animations of a model (.glb, .gltf) of any
+    /// skeleton; several files become several animations
     #[arg(required = true, value_name = "CLIP")]
     pub clips: Vec<PathBuf>,
     /// A clip to take from the files, by its name or its number from 1; may be repeated; all, if left out
     #[arg(long = "clip", value_name = "NAME")]
     chosen: Vec<String>,
-    /// A mesh to bind to the rig, for .glb and .png; a rig that is a .glb or .gltf keeps its own mesh and weights in a .glb
+    /// A mesh to bind to the rig, for .glb and .png; a rig that is a .glb or .gltf keeps its own mesh and weights in a
+    /// .glb
     #[arg(long)]
     mesh: Option<PathBuf>,
-    /// A map of joints for motion of another skeleton: a RON list of pairs of names, [("LeftUpLeg", "thigh_l"), ...]; it wins over what is
-    /// guessed
+    /// A map of joints for motion of another skeleton: a RON list of pairs of names, [("LeftUpLeg", "thigh_l"), ...];
+    /// it wins over what is guessed
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
     /// Write the map that was used, to correct it and give it to --map
@@ -58,8 +59,8 @@ pub(super) struct AnimateArgs {
     /// Frames a second of the clip; that of the file, but at most 60, if left out
     #[arg(long, value_name = "N", value_parser = positive)]
     fps: Option<f32>,
-    /// How far a joint may be off its place through the removal of keys, in millimetres on a figure of 1.7 m; if left out, 0.5 for motion
-    /// of other skeletons, and 0.05 in a .glb, where turns are kept to 0.01 degrees
+    /// Distance by which a joint may be off its place through the removal of keys, in millimetres on a figure of 1.7 m;
+    /// if left out, 0.5 for motion of other skeletons, and 0.05 in a .glb, where turns are kept to 0.01 degrees
     #[arg(long, value_name = "MM", value_parser = positive)]
     tolerance: Option<f32>,
     /// Play the clip over and over
@@ -77,7 +78,8 @@ pub(super) struct AnimateArgs {
     /// Names and axes of the bones in a .glb or .gltf
     #[arg(long, value_enum, default_value = "plain")]
     preset: PresetArg,
-    /// The file to write: .glb or .gltf for the character with its animation, .anim.ron for the clip, .png for a strip of frames
+    /// The file to write: .glb or .gltf for the character with its animation, .anim.ron for the clip, .png for a strip
+    /// of frames
     #[arg(short, long)]
     output: Output,
     /// Number of frames of a .png
@@ -258,7 +260,8 @@ fn describe(clips: &[RigClip], report: &mut Report) {
     report.set("clips", clips.iter().map(clip).collect::<Vec<_>>());
 }
 
-/// Character of the rig's own file, with its mesh and weights; `None` if the rig is no model or has no mesh, or if another mesh is given.
+/// Character of the rig's own file, with its mesh and weights; `None` if the rig is no model or has no mesh, or if
+/// another mesh is given.
 fn own_character(args: &AnimateArgs, bench: &Workbench) -> Result<Option<Model>, Failure> {
     if args.mesh.is_some() || !matches!(FileKind::of(&args.rig), Some(FileKind::Glb | FileKind::Gltf)) {
         return Ok(None);

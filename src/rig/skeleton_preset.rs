@@ -1,7 +1,7 @@
 //! Names and axes of skeletons, as other programs expect them.
 //!
-//! Bones of a human get the names of the other program, and their joints the axes that it has; all other joints keep theirs. Where
-//! axes turn, keys and bind poses turn with them, so that the mesh moves as before.
+//! Bones of a human get the names of the other program, and their joints the axes that it has; all other joints keep
+//! theirs. Where axes turn, keys and bind poses turn with them, so that the mesh moves as before.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -189,8 +189,9 @@ fn vrm(bone: HumanBone) -> String {
     }
 }
 
-/// Gives the bones of a human in a model the names and axes of a program; skins and clips follow. Returns the number of joints that
-/// have another name, or `None` if the model has no human, and then leaves it as it is. Joints of unequal scale keep their axes.
+/// Gives the bones of a human in a model the names and axes of a program; skins and clips follow. Returns the number of
+/// joints that have another name, or `None` if the model has no human, and then leaves it as it is. Joints of unequal
+/// scale keep their axes.
 pub fn apply_preset(model: &mut Model, preset: SkeletonPreset) -> Option<usize> {
     if preset == SkeletonPreset::Plain {
         return Some(0);
@@ -310,7 +311,8 @@ fn is_even(model: &Model, node: usize) -> bool {
         && channels.flat_map(|channel| channel.values.chunks_exact(3)).all(is_one)
 }
 
-/// Turns the axes of nodes, each in its own space; what hangs on them, and how they move, stays as it is in the model's space.
+/// Turns the axes of nodes, each in its own space; what hangs on them, and how they move, stays as it is in the model's
+/// space.
 fn turn_axes(model: &mut Model, turns: &[Quat]) {
     let parents: Vec<Option<usize>> = model.nodes.iter().map(|node| node.parent).collect();
     let back = |node: usize| parents[node].map_or(Quat::IDENTITY, |parent| turns[parent].inverse());

@@ -1,7 +1,7 @@
 //! Curves fitted to samples: few keys that stay within a tolerance at every sample.
 //!
-//! A segment begins and ends at samples and is as long as the tolerance lets it be. Between its ends runs a cubic Hermite spline
-//! whose tangents fit the samples best (least squares), or a line where lines need fewer numbers.
+//! A segment begins and ends at samples and is as long as the tolerance lets it be. Between its ends runs a cubic
+//! Hermite spline whose tangents fit the samples best (least squares), or a line where lines need fewer numbers.
 
 use crate::rig::animation::{Ease, Key, Property, Track};
 
@@ -23,8 +23,8 @@ struct Samples<'a> {
     is_cubic: bool,
 }
 
-/// Keys of a curve that stays within the tolerance at every sample: degrees for rotations, whose samples lie on one side each to the next. Lists
-/// have the same length. Time is nearly linear in the number of samples.
+/// Keys of a curve that stays within the tolerance at every sample: degrees for rotations, whose samples lie on one
+/// side each to the next. Lists have the same length. Time is nearly linear in the number of samples.
 pub fn fit_curve(property: &Property, times: &[f32], values: &[[f32; 4]], tolerance: &[f32]) -> Vec<Key> {
     let Some(first) = values.first() else { return Vec::new() };
     // Half of the tolerance is left to other tracks: a curve of one key is off on one side all the time.
@@ -124,7 +124,7 @@ impl Samples<'_> {
         (from + 1..to).all(is_near).then_some(segment)
     }
 
-    /// Both keys of a segment.
+    /// Keys at the two ends of a segment.
     fn pair(&self, segment: &Segment) -> Vec<Key> {
         let [from, to] = segment.ends;
         let span = self.times[to] - self.times[from];

@@ -1,8 +1,8 @@
 //! Reduction of sampled motion to few keys, bounded by what joints do in the rig's space.
 //!
-//! The error of a key matters by what hangs below its node: a tenth of a degree moves a head by nothing and a hand, seen from
-//! the hips, by two millimetres. So tracks are fitted with a tolerance by their reach, the motion is played, and where
-//! a joint is too far off, all tracks are fitted more closely around those frames, until none is.
+//! The error of a key matters by what hangs below its node: a tenth of a degree moves a head by nothing and a hand,
+//! seen from the hips, by two millimetres. So tracks are fitted with a tolerance by their reach, the motion is played,
+//! and where a joint is too far off, all tracks are fitted more closely around those frames, until none is.
 
 use bevy::math::{Quat, Vec3};
 use rayon::prelude::*;
@@ -37,8 +37,8 @@ pub struct SampledTrack {
 /// Position and rotation of a joint in the rig's space.
 pub type JointPlace = (Vec3, Quat);
 
-/// Keys of tracks with which the motion stays within its bounds. `measure` plays values, a list a track, and gives for each
-/// frame the error in tolerances: 1 is just allowed.
+/// Keys of tracks with which the motion stays within its bounds. `measure` plays values, a list a track, and gives for
+/// each frame the error in tolerances: 1 is just allowed.
 pub fn reduce_tracks(
     times: &[f32],
     tracks: &[SampledTrack],
@@ -106,8 +106,8 @@ pub struct SampledNode {
     pub locals: Vec<Trs>,
 }
 
-/// Keys of the transforms of a skeleton's nodes: translation, rotation and scale. Joints are within the tolerance of where they were at every
-/// frame. `fixed` marks what is played as it is, and gets no keys.
+/// Keys of the transforms of a skeleton's nodes: translation, rotation and scale. Joints are within the tolerance of
+/// where they were at every frame. `fixed` marks what is played as it is, and gets no keys.
 pub fn reduce_skeleton(
     times: &[f32],
     nodes: &[SampledNode],

@@ -1,4 +1,5 @@
-//! Clips of mesh files as motion and as keys, and clips as files and back: keys survive, and the second round is the same bytes.
+//! Clips of mesh files as motion and as keys, and clips as files and back: keys survive, and the second round is the
+//! same bytes.
 
 use std::sync::Arc;
 

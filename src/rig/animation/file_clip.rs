@@ -1,9 +1,9 @@
 //! Clips of mesh files: as the motion of the file's skeleton, as keys on joints of a rig, and back.
 //!
-//! A file has transforms relative to the parents, a clip has offsets from rest. From one to the other, each number of a key is
-//! a linear function of the numbers of that key, tangents included, so that interpolation between keys stays what it is. Numbers that
-//! come from a file are rounded to a grid which is coarser than what two such steps lose: keys that went out and in again
-//! are the same bits, and so is the file that is written from them.
+//! A file has transforms relative to the parents, a clip has offsets from rest. From one to the other, each number of a
+//! key is a linear function of the numbers of that key, tangents included, so that interpolation between keys stays
+//! what it is. Numbers that come from a file are rounded to a grid which is coarser than what two such steps lose: keys
+//! that went out and in again are the same bits, and so is the file that is written from them.
 
 use std::sync::Arc;
 
@@ -25,6 +25,8 @@ const USUAL_RATE: f32 = 60.0;
 /// Most frames, and most values, of a motion that is sampled from a clip.
 const MAX_FRAMES: usize = 200_000;
 const MAX_VALUES: usize = 32 << 20;
+/// Bound of numbers of a motion; larger ones are damage.
+const MAX_NUMBER: f32 = 1e9;
 
 /// Grid of rotations and scale factors.
 const GRID: f64 = 1.0 / (1 << 20) as f64;
@@ -95,8 +97,8 @@ fn frame_rate(clip: &Clip, start: f32) -> f32 {
     RATES.into_iter().find(|rate| lies(*rate)).unwrap_or(USUAL_RATE)
 }
 
-/// Motion of a file's skeleton in one of its clips, frame by frame at the rate of its keys. A clip without keys of nodes gives a
-/// motion without frames.
+/// Motion of a file's skeleton in one of its clips, frame by frame at the rate of its keys. A clip without keys of
+/// nodes gives a motion without frames.
 pub fn motion_of(model: &Model, clip: &Clip) -> Motion {
     let joint = |node: &crate::mesh::model::Node| MotionJoint {
         name: node.name.clone(),
@@ -139,15 +141,17 @@ pub fn motion_of(model: &Model, clip: &Clip) -> Motion {
     for frame in 0..count {
         let time = (f64::from(start) + frame as f64 / f64::from(rate)) as f32;
         for (_, property, track) in &tracks {
-            let value = track.sample(property, time).unwrap_or_else(|| property.rest());
+            let value =
+                track.sample(property, time).filter(|value| value.iter().all(|number| number.abs() <= MAX_NUMBER));
+            let value = value.unwrap_or_else(|| property.rest());
             motion.values.extend_from_slice(&value[..property.width()]);
         }
     }
     motion
 }
 
-/// Joints of a rig that are the nodes of a file: those with the same names and rest transforms, in the order of the nodes. `None` if an
-/// animated node has none, so that the clip has to be retargeted.
+/// Joints of a rig that are the nodes of a file: those with the same names and rest transforms, in the order of the
+/// nodes. `None` if an animated node has none, so that the clip has to be retargeted.
 pub fn own_joints(model: &Model, rig: &Rig) -> Option<Vec<Option<Uid>>> {
     let height = model.rest_globals().iter().map(|at| at.translation.abs().max_element()).fold(0.0, f32::max);
     let is_rest = |a: &Trs, b: &Trs| {
@@ -183,8 +187,8 @@ pub fn own_joints(model: &Model, rig: &Rig) -> Option<Vec<Option<Uid>>> {
     is_any.then_some(found)
 }
 
-/// Clip of a file as keys on the joints that its nodes became, key by key; `joints` are those of [`own_joints`] or of an import.
-/// Nodes without a joint, and morph targets, are left out. `None` if nothing is left.
+/// Clip of a file as keys on the joints that its nodes became, key by key; `joints` are those of [`own_joints`] or of
+/// an import. Nodes without a joint, and morph targets, are left out. `None` if nothing is left.
 pub fn rig_clip(rig: &Rig, name: &str, clip: &Clip, joints: &[Option<Uid>]) -> Option<RigClip> {
     let range = span(clip)?;
     let of = rig.uid().to_string();
@@ -201,7 +205,8 @@ pub fn rig_clip(rig: &Rig, name: &str, clip: &Clip, joints: &[Option<Uid>]) -> O
     (!layer.tracks.is_empty()).then_some(made)
 }
 
-/// Clips of a file on the joints that its nodes became. Names are those of the file; a clip without one is called `clip`.
+/// Clips of a file on the joints that its nodes became. Names are those of the file; a clip without one is called
+/// `clip`.
 pub fn rig_clips(rig: &Rig, model: &Model, joints: &[Option<Uid>]) -> Vec<RigClip> {
     let named = |clip: &Clip| if clip.name.trim().is_empty() { "clip".to_owned() } else { clip.name.trim().to_owned() };
     let clips = model.clips.iter().enumerate();
@@ -216,8 +221,9 @@ pub fn rig_clips(rig: &Rig, model: &Model, joints: &[Option<Uid>]) -> Vec<RigCli
     clips.collect()
 }
 
-/// Keys of a clip for one property of a joint whose transform is its rest transform and its offset alone, as a channel for a file. Time
-/// starts at zero with the clip. `None` if a channel cannot hold them: several layers, keys of several kinds or beyond the clip.
+/// Keys of a clip for one property of a joint whose transform is its rest transform and its offset alone, as a channel
+/// for a file. Time starts at zero with the clip. `None` if a channel cannot hold them: several layers, keys of several
+/// kinds or beyond the clip.
 pub fn channel_of(
     clip: &RigClip,
     joint: Uid,
@@ -269,7 +275,8 @@ pub fn channel_of(
     Some(Channel { target, interpolation, times, values })
 }
 
-/// Grid of the offsets of a track: for translations a power of two below a two-hundred-thousandth of the largest number in the file.
+/// Grid of the offsets of a track: for translations a power of two below a two-hundred-thousandth of the largest number
+/// in the file.
 fn grid(property: &Property, track: &Track, rest: &Trs) -> f64 {
     if *property != Property::Translation {
         return GRID;

@@ -91,7 +91,8 @@ impl Player {
         places
     }
 
-    /// Something of the joints' places for each of so many frames; the tracks have their values of each frame.
+    /// Results of a function of the joints' places, one for each of so many frames; `value` gives a track's value at a
+    /// frame.
     pub fn each<T: Send>(
         &self,
         frames: usize,
@@ -114,8 +115,8 @@ impl Player {
         played.into_iter().flatten().collect()
     }
 
-    /// Greatest way of a joint for one unit of each track, a degree for rotations: tried at some frames, in all directions. `length` is a
-    /// small distance on the figure.
+    /// Greatest way of a joint for one unit of each track, a degree for rotations: tried at some frames, in all
+    /// directions. `length` is a small distance on the figure.
     pub fn reaches(&self, tracks: &[SampledTrack], length: f32) -> Vec<f32> {
         let count = tracks.first().map_or(0, |track| track.values.len());
         let mut frames = [0, count / 4, count / 2, 3 * count / 4, count.saturating_sub(1)].to_vec();

@@ -24,8 +24,8 @@ impl Default for KeyTolerance {
 }
 
 impl KeyTolerance {
-    /// Differences below the noise of motion capture of a human in metres: half a millimetre, and half a degree, which moves a point
-    /// three centimetres beside a joint by a quarter of a millimetre.
+    /// Differences below the noise of motion capture of a human in metres: half a millimetre, and half a degree, which
+    /// moves a point three centimetres beside a joint by a quarter of a millimetre.
     pub fn captured() -> Self {
         Self { distance: 5e-4, angle: 0.5, factor: 1e-3, value: 0.05 }
     }
