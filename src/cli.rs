@@ -139,7 +139,7 @@ impl Command {
             Self::Update(args) => Some(&args.rig),
             Self::Build(args) => Some(&args.rig),
             Self::Pose(args) => Some(&args.rig),
-            Self::Animate(args) => Some(&args.clip),
+            Self::Animate(args) => args.clips.first().map(|path| &**path),
             Self::Modules(_) => None,
             #[cfg(feature = "render")]
             Self::Render(args) => Some(&args.file),

@@ -25,6 +25,7 @@ pub mod reference;
 mod remap;
 mod revision;
 pub mod shapes;
+pub mod skeleton_preset;
 pub mod step;
 mod tag;
 mod uid;

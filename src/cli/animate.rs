@@ -1,42 +1,36 @@
 //! `rigsmith animate`: a clip, or the motion of another skeleton, on a rig.
 
+mod source;
 #[cfg(feature = "render")]
 mod strip;
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, WeightArgs, build, limits, positive, progress::spinning,
     report::counted, skin,
 };
 use crate::{
-    files::{
-        FileKind, RealDisk, load_animation, load_joint_map, load_motion, load_project, load_template, save_atomic,
-        store_animation, store_model,
-    },
+    files::{FileKind, RealDisk, load_model, load_project, load_template, store_animation, store_model},
     headless::{Workbench, posing::PoseError},
-    mesh::model::{Clip, Model, Node},
+    mesh::{
+        gltf::GltfWriteSettings,
+        model::{Clip, Model, Node},
+    },
     plugins::commands::BuildStep,
     rig::{
         BuiltRig, Rig, RigEdit, Uid,
-        animation::{
-            RigClip,
-            humanoid::HumanBone,
-            joint_map::{JointMap, JointMapError, write_joint_map},
-            motion::Motion,
-        },
+        animation::{RigClip, joint_map::JointMapError},
         bake::baked,
-        operations::{ClipOperation, KeyTolerance, Operation},
+        operations::KeyTolerance,
+        skeleton_preset::{SkeletonPreset, apply_preset},
     },
     solve::{
         bake_clip::{BakedNode, bake_clip},
-        retarget::{MotionTarget, RetargetError, RetargetSettings, RetargetedMotion, measure_feet, retarget},
+        retarget::{MotionTarget, RetargetError},
     },
 };
 
@@ -45,13 +39,19 @@ use crate::{
 pub(super) struct AnimateArgs {
     /// The rig: a .rig.ron, a template by its name, a project (.rigsmith.ron), or a skeleton in a .glb, .gltf or .rig
     rig: PathBuf,
-    /// The motion: clips of a rig (.anim.ron), or a motion capture file (.bvh) of any skeleton
-    pub clip: PathBuf,
-    /// A mesh to bind to the rig, for .glb and .png
+    /// The motion: clips of a rig (.anim.ron), motion capture (.bvh) or the animations of a model (.glb, .gltf) of any
+    /// skeleton; several files become several animations
+    #[arg(required = true, value_name = "CLIP")]
+    pub clips: Vec<PathBuf>,
+    /// A clip to take from the files, by its name or its number from 1; may be repeated; all, if left out
+    #[arg(long = "clip", value_name = "NAME")]
+    chosen: Vec<String>,
+    /// A mesh to bind to the rig, for .glb and .png; a rig that is a .glb or .gltf keeps its own mesh and weights in a
+    /// .glb
     #[arg(long)]
     mesh: Option<PathBuf>,
-    /// A map of joints for a .bvh: a RON list of pairs of names, [("LeftUpLeg", "thigh_l"), ...]; it wins over what is
-    /// guessed
+    /// A map of joints for motion of another skeleton: a RON list of pairs of names, [("LeftUpLeg", "thigh_l"), ...];
+    /// it wins over what is guessed
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
     /// Write the map that was used, to correct it and give it to --map
@@ -60,10 +60,14 @@ pub(super) struct AnimateArgs {
     /// Frames a second of the clip; that of the file, but at most 60, if left out
     #[arg(long, value_name = "N", value_parser = positive)]
     fps: Option<f32>,
+    /// Distance by which a joint may be off its place through the removal of keys, in millimetres on a figure of 1.7 m;
+    /// if left out, 0.5 for motion of other skeletons, and 0.05 in a .glb, where turns are kept to 0.01 degrees
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    tolerance: Option<f32>,
     /// Play the clip over and over
     #[arg(long = "loop")]
     looped: bool,
-    /// Nodes that get the keys of a .bvh: controls if the rig has any, else joints, if left out
+    /// Nodes that get the keys of another skeleton: controls if the rig has any, else joints, if left out
     #[arg(long, value_enum)]
     onto: Option<OntoArg>,
     /// Leave a figure that walks on the spot where it is
@@ -72,7 +76,11 @@ pub(super) struct AnimateArgs {
     /// Let standing feet move as they do in the file
     #[arg(long)]
     free_feet: bool,
-    /// The file to write: .glb or .gltf for the character with its animation, .anim.ron for the clip, .png for a strip of frames
+    /// Names and axes of the bones in a .glb or .gltf
+    #[arg(long, value_enum, default_value = "plain")]
+    preset: PresetArg,
+    /// The file to write: .glb or .gltf for the character with its animation, .anim.ron for the clip, .png for a strip
+    /// of frames
     #[arg(short, long)]
     output: Output,
     /// Number of frames of a .png
@@ -90,6 +98,20 @@ enum OntoArg {
     Controls,
     /// Joints; the commands of the rig are left out
     Joints,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+enum PresetArg {
+    /// Names and axes of the rig
+    Plain,
+    /// Mixamo: names such as mixamorig:LeftUpLeg, Y along the bones
+    Mixamo,
+    /// Unreal: names such as thigh_l, X along the bones
+    Unreal,
+    /// Unity's humanoid: names such as LeftUpperLeg, axes of the model
+    Unity,
+    /// VRM: names such as leftUpperLeg, axes of the model
+    Vrm,
 }
 
 impl From<RetargetError> for Failure {
@@ -113,7 +135,7 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     check(args, is_picture)?;
     let mut report = Report::default();
     let mut rig = read(args, &mut report)?;
-    let is_motion = FileKind::of(&args.clip) == Some(FileKind::Bvh);
+    let is_motion = args.clips.iter().any(|clip| is_motion(clip));
     let has_commands = rig.walk().any(|joint| !joint.data.tags.is_empty());
     let onto = match args.onto {
         Some(OntoArg::Joints) => MotionTarget::Joints,
@@ -131,25 +153,31 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
         return Err(Failure::Input(Box::new(error)));
     }
     bench.runtime()?;
-    let clips = if is_motion {
-        moved(args, onto, &mut bench, &mut report)?
-    } else {
-        read_clips(args, &mut bench, &mut report)?
-    };
+    let clips = source::clips(args, onto, &mut bench, &mut report)?;
     describe(&clips, &mut report);
     if is_picture {
         picture(args, &mut bench, &clips, &mut report)?;
     } else if FileKind::of(&args.output) == Some(FileKind::Animation) {
         store_animation(&RealDisk, &args.output, bench.rig(), bench.built(), &clips)?;
     } else {
-        let (mut model, settings) =
-            build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?;
+        let (mut model, settings) = match own_character(args, &bench)? {
+            Some(model) => {
+                (model, GltfWriteSettings { all_joints: true, bind_unweighted: true, ..args.export.settings() })
+            }
+            None => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?,
+        };
         model.clips = spinning("baking", || exported(args, &bench, &model, &clips, &mut report))?;
+        dress(args, &mut model, &mut report);
         report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);
     }
     report.line(format!("wrote {}", args.output.display()));
     report.set("output", args.output.display().to_string());
     Ok(report)
+}
+
+/// True if a file has the motion of a skeleton of its own.
+fn is_motion(path: &Path) -> bool {
+    matches!(FileKind::of(path), Some(FileKind::Bvh | FileKind::Glb | FileKind::Gltf))
 }
 
 fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
@@ -161,17 +189,25 @@ fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
     if args.mesh.is_some() && kind == Some(FileKind::Animation) {
         return Err(Failure::Usage("--mesh is for a character; write one with -o NAME.glb".to_owned()));
     }
-    let is_motion = FileKind::of(&args.clip) == Some(FileKind::Bvh);
-    if !is_motion && FileKind::of(&args.clip) != Some(FileKind::Animation) {
-        let text = format!("`{}` has no motion; give .bvh or .anim.ron", args.clip.display());
+    let is_known = |clip: &PathBuf| is_motion(clip) || FileKind::of(clip) == Some(FileKind::Animation);
+    if let Some(clip) = args.clips.iter().find(|clip| !is_known(clip)) {
+        let text = format!("`{}` has no motion; give .bvh, .glb, .gltf or .anim.ron", clip.display());
         return Err(Failure::Usage(text));
     }
-    if !is_motion && (args.map.is_some() || args.map_out.is_some() || args.onto.is_some()) {
-        let text = "--map, --map-out and --onto are for a .bvh; a clip of a rig knows its nodes";
+    if args.preset != PresetArg::Plain && !matches!(kind, Some(FileKind::Glb | FileKind::Gltf)) {
+        return Err(Failure::Usage("--preset is for a character; write one with -o NAME.glb".to_owned()));
+    }
+    let motions = args.clips.iter().filter(|clip| is_motion(clip)).count();
+    if motions == 0 && (args.map.is_some() || args.map_out.is_some() || args.onto.is_some()) {
+        let text = "--map, --map-out and --onto are for a .bvh, .glb or .gltf; a clip of a rig knows its nodes";
         return Err(Failure::Usage(text.to_owned()));
     }
-    let inputs = [Some(&args.rig), Some(&args.clip), args.mesh.as_ref(), args.map.as_ref()];
-    let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
+    if motions > 1 && args.map_out.is_some() {
+        let text = "--map-out is for one file of motion; give one .bvh, .glb or .gltf";
+        return Err(Failure::Usage(text.to_owned()));
+    }
+    let inputs = [Some(&args.rig), args.mesh.as_ref(), args.map.as_ref()].into_iter().flatten().chain(&args.clips);
+    let inputs: Vec<&Path> = inputs.map(PathBuf::as_path).collect();
     let further: Vec<(&str, &Path)> = args.map_out.iter().map(|path| ("--map-out", path.as_path())).collect();
     InPlaceArgs::default().check(&inputs, Some(&args.output), &further)
 }
@@ -201,113 +237,6 @@ fn without_commands(rig: &Rig) -> Result<Rig, Failure> {
     Ok(bare)
 }
 
-/// Clips of a file, added to the rig as one would add them in the window.
-fn read_clips(args: &AnimateArgs, bench: &mut Workbench, report: &mut Report) -> Result<Vec<RigClip>, Failure> {
-    let read = load_animation(&RealDisk, &args.clip)?;
-    report.notes(read.notes.iter().cloned());
-    let bound = read.onto(bench.rig(), bench.built());
-    if !bound.missing.is_empty() {
-        report.notes.push(counted(
-            bound.missing.len(),
-            "node of the clips is not in the rig; its keys have no effect",
-            "nodes of the clips are not in the rig; their keys have no effect",
-        ));
-    }
-    if bound.clips.is_empty() {
-        return Err(Failure::Input(format!("`{}` has no clips", args.clip.display()).into()));
-    }
-    let mut added = Vec::new();
-    for mut clip in bound.clips {
-        clip.looped |= args.looped;
-        added.push(add(bench, clip)?);
-    }
-    Ok(added)
-}
-
-/// Adds a clip to the document; returns it as the document has it.
-fn add(bench: &mut Workbench, clip: RigClip) -> Result<RigClip, Failure> {
-    bench.operate(Operation::Clips(ClipOperation::Add(Box::new(clip.clone()))))?;
-    Ok(bench.rig().clips().last().cloned().unwrap_or(clip))
-}
-
-/// A motion on the rig, with its clip added to the document.
-fn moved(
-    args: &AnimateArgs,
-    onto: MotionTarget,
-    bench: &mut Workbench,
-    report: &mut Report,
-) -> Result<Vec<RigClip>, Failure> {
-    let motion = spinning("reading the motion", || load_motion(&RealDisk, &args.clip))?;
-    report.notes(motion.notes.iter().cloned());
-    let given = args.map.as_deref().map(|path| load_joint_map(&RealDisk, path)).transpose()?.unwrap_or_default();
-    let map = JointMap::new(&motion, bench.rig(), &given)?;
-    describe_map(&map, &motion, bench.rig(), report);
-    if let Some(path) = &args.map_out {
-        let text = write_joint_map(&map.names(&motion, bench.rig()));
-        save_atomic(&RealDisk, path, text.as_bytes()).map_err(|error| Failure::Input(Box::new(error)))?;
-        report.line(format!("wrote {}", path.display()));
-    }
-    let settings = RetargetSettings {
-        frame_rate: args.fps,
-        looped: args.looped,
-        onto,
-        travel: !args.in_place,
-        lock_feet: !args.free_feet,
-        ..RetargetSettings::default()
-    };
-    let built = bench.built().ok_or(PoseError::NotBuilt)?;
-    let done = spinning("retargeting", || retarget(bench.rig(), built, &motion, &map, &settings))?;
-    let RetargetedMotion { clip, keys, stances, unmoved, notes } = done;
-    report.notes(notes);
-    if !unmoved.is_empty() {
-        report
-            .notes
-            .push(format!("no control turns {}: they keep their places at the joints above", unmoved.join(", ")));
-    }
-    let clip = add(bench, clip)?;
-    let program = Arc::clone(bench.runtime()?.state().program());
-    let feet = measure_feet(bench.rig(), &program, &clip, &map.target, &stances);
-    report.line(format!(
-        "{} instead of {} ({:.1} : 1); feet stand {}, slide {:.2} % and are off the ground by {:.2} % of the height at most",
-        counted(keys[1], "key", "keys"),
-        keys[0],
-        keys[0] as f32 / keys[1].max(1) as f32,
-        counted(feet.stances, "time", "times"),
-        feet.slide,
-        feet.ankle,
-    ));
-    report.set("onto", json!(onto));
-    report.set("foot_slide", feet.slide);
-    report.set("ankle_off", feet.ankle);
-    report.set("stances", json!(stances));
-    report.set("unmoved", unmoved);
-    report.set("keys_before", keys[0]);
-    report.set("keys_after", keys[1]);
-    report.set("reduction", keys[0] as f32 / keys[1].max(1) as f32);
-    Ok(vec![clip])
-}
-
-fn describe_map(map: &JointMap, motion: &Motion, rig: &Rig, report: &mut Report) {
-    let labels: Vec<String> =
-        rig.walk().map(|joint| joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string())).collect();
-    let source = |joints: &[usize]| joints.iter().map(|joint| motion.joints[*joint].name.clone()).collect::<Vec<_>>();
-    let target = |joints: &[usize]| joints.iter().map(|joint| labels[*joint].clone()).collect::<Vec<_>>();
-    let entry = |(bone, from, to): (HumanBone, &[usize], &[usize])| json!({ "bone": bone.to_string(), "from": source(from), "to": target(to) });
-    let mut mapped: Vec<Value> = map.bones().map(entry).collect();
-    mapped.extend(map.pairs.iter().map(|(from, to)| json!({ "from": source(&[*from]), "to": target(&[*to]) })));
-    let (from, to) = (map.unmapped_source(motion), map.unmapped_target(rig));
-    report.line(format!(
-        "{} mapped; {} of the motion and {} of the rig are not",
-        counted(mapped.len(), "bone is", "bones are"),
-        counted(from.len(), "joint", "joints"),
-        to.len()
-    ));
-    report.set("found_by", json!(map.found_by));
-    report.set("mapped", mapped);
-    report.set("unmapped_source", from);
-    report.set("unmapped_target", to);
-}
-
 fn describe(clips: &[RigClip], report: &mut Report) {
     let clip = |clip: &RigClip| {
         let tracks: usize = clip.layers.iter().map(|layer| layer.tracks.len()).sum();
@@ -333,6 +262,23 @@ fn describe(clips: &[RigClip], report: &mut Report) {
     report.set("clips", clips.iter().map(clip).collect::<Vec<_>>());
 }
 
+/// Character of the rig's own file, with its mesh and weights; `None` if the rig is no model or has no mesh, or if
+/// another mesh is given.
+fn own_character(args: &AnimateArgs, bench: &Workbench) -> Result<Option<Model>, Failure> {
+    if args.mesh.is_some() || !matches!(FileKind::of(&args.rig), Some(FileKind::Glb | FileKind::Gltf)) {
+        return Ok(None);
+    }
+    let model = load_model(&RealDisk, &args.rig)?;
+    let built = bench.built().ok_or(PoseError::NotBuilt)?;
+    let skeleton = baked(bench.rig(), built);
+    let is_alike = skeleton.len() == model.nodes.len()
+        && skeleton
+            .walk()
+            .zip(&model.nodes)
+            .all(|(joint, node)| joint.data.label.as_deref().unwrap_or_default() == node.name);
+    Ok((is_alike && !model.points.is_empty()).then_some(model))
+}
+
 /// Clips baked for the nodes of an exported model.
 fn exported(
     args: &AnimateArgs,
@@ -344,10 +290,9 @@ fn exported(
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let program = bench.runtime()?.state().program();
     let nodes = baked_nodes(bench.rig(), built, model);
-    // The tolerance is for humans in metres.
     let height = model.rest_globals().iter().map(|at| at.translation.y).fold(0.0, f32::max);
-    let usual = KeyTolerance::default();
-    let tolerance = KeyTolerance { distance: usual.distance * (height / 1.7).max(1e-6), ..usual };
+    // The tolerance is for humans in metres.
+    let tolerance = KeyTolerance::default().scaled(args.tolerance.map_or(1.0, |most| most / 0.05)).for_height(height);
     let mut baked = Vec::new();
     for clip in clips {
         let rate = args.fps.unwrap_or(clip.frame_rate);
@@ -364,6 +309,21 @@ fn exported(
     let channels: usize = baked.iter().map(|clip| clip.channels.len()).sum();
     report.set("channels", channels);
     Ok(baked)
+}
+
+/// Gives the model the names and axes of another program.
+fn dress(args: &AnimateArgs, model: &mut Model, report: &mut Report) {
+    let preset = match args.preset {
+        PresetArg::Plain => return,
+        PresetArg::Mixamo => SkeletonPreset::Mixamo,
+        PresetArg::Unreal => SkeletonPreset::Unreal,
+        PresetArg::Unity => SkeletonPreset::Unity,
+        PresetArg::Vrm => SkeletonPreset::Vrm,
+    };
+    match apply_preset(model, preset) {
+        Some(renamed) => report.set("renamed", renamed),
+        None => report.notes.push("--preset: no human was found in the skeleton; names and axes stay".to_owned()),
+    }
 }
 
 /// Nodes of an exported model, which are those of the baked rig in their order.

@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
-use super::program::{RigProgram, RigState};
+use super::{
+    program::{RigProgram, RigState},
+    reduction::{SampledNode, reduce_skeleton},
+};
 use crate::{
     mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Trs},
     rig::{
         Uid,
-        animation::{Key, Property, RigClip, SampledPose, Track},
+        animation::{Ease, Key, Property, RigClip, SampledPose, TrackTarget, file_clip::channel_of},
         operations::KeyTolerance,
     },
 };
@@ -45,7 +48,8 @@ pub fn strike(state: &mut RigState, pose: &SampledPose) {
 }
 
 /// Plays a clip at a rate and gives the nodes' transforms relative to their parents as channels, whose targets are places among
-/// the nodes. Channels that stay at rest are left out, and keys without which a channel stays within the tolerance.
+/// the nodes. Channels that stay at rest are left out, and keys without which joints stay within the tolerance. A node that
+/// nothing but its keys moves keeps them as they are.
 ///
 /// Time starts at zero with the clip. Takes some tens of microseconds a frame for a character.
 pub fn bake_clip(
@@ -75,45 +79,125 @@ pub fn bake_clip(
             locals[at].push(local);
         }
     }
+    let properties = [Property::Translation, Property::Rotation, Property::Scale];
+    let channel = |at: usize, property: &Property| {
+        let base = plain_base(program, nodes, at)?;
+        let (node, target) = (nodes[at].uid, channel_target(at, property));
+        let track = TrackTarget { node, property: property.clone() };
+        if clip.layers.iter().any(|layer| layer.tracks.contains_key(&track)) {
+            return channel_of(clip, node, property, &base, target);
+        }
+        let key = Key { value: part_of(&base, property), ..Key::number(0.0, 0.0) };
+        Some(keyed_channel(target, property.width(), &[key]))
+    };
+    let mut direct: Vec<[Option<Channel>; 3]> =
+        (0..nodes.len()).map(|at| std::array::from_fn(|part| channel(at, &properties[part]))).collect();
+    let fixed: Vec<[bool; 3]> = direct.iter().map(|parts| std::array::from_fn(|part| parts[part].is_some())).collect();
+    let sampled: Vec<SampledNode> = nodes
+        .iter()
+        .zip(locals)
+        .map(|(node, locals)| SampledNode { parent: node.parent, locals: same_side(locals, node.rest.rotation) })
+        .collect();
+    let keys = reduce_skeleton(&times, &sampled, &fixed, tolerance);
     let mut baked = Clip { name: clip.name.clone(), ..Clip::default() };
-    for (at, (node, locals)) in nodes.iter().zip(&locals).enumerate() {
-        let vector = |v: glam::Vec3| [v.x, v.y, v.z, 0.0];
-        let mut last = node.rest.rotation;
-        let rotation = |local: &Trs| {
-            let turn = if local.rotation.dot(last) < 0.0 { -local.rotation } else { local.rotation };
-            last = turn;
-            turn.to_array()
-        };
-        let properties = [
-            (
-                Property::Translation,
-                vector(node.rest.translation),
-                locals.iter().map(|at| vector(at.translation)).collect(),
-            ),
-            (Property::Rotation, node.rest.rotation.to_array(), locals.iter().map(rotation).collect::<Vec<[f32; 4]>>()),
-            (Property::Scale, vector(node.rest.scale), locals.iter().map(|at| vector(at.scale)).collect()),
-        ];
-        for (property, rest, values) in properties {
-            let key = |(time, value): (&f32, &[f32; 4])| Key { time: *time, value: *value, ..Key::number(*time, 0.0) };
-            let track = Track { keys: times.iter().zip(&values).map(key).collect() };
-            let keys = tolerance.reduced(&track, &property);
-            if let [only] = keys[..]
-                && only.value.iter().zip(rest).all(|(a, b)| (a - b).abs() < 1e-6)
-            {
-                continue;
-            }
-            let target = match property {
-                Property::Translation => ChannelTarget::Translation(at),
-                Property::Rotation => ChannelTarget::Rotation(at),
-                Property::Scale | Property::Attribute(_) => ChannelTarget::Scale(at),
-            };
-            baked.channels.push(Channel {
-                target,
-                interpolation: Interpolation::Linear,
-                times: keys.iter().map(|key| key.time).collect(),
-                values: keys.iter().flat_map(|key| key.value[..property.width()].to_vec()).collect(),
+    for (at, (node, mut keys)) in nodes.iter().zip(keys).enumerate() {
+        for (part, property) in properties.iter().enumerate() {
+            let kept = direct[at][part].take();
+            let channel = kept.unwrap_or_else(|| {
+                keyed_channel(channel_target(at, property), property.width(), &std::mem::take(&mut keys[part]))
             });
+            if !is_at_rest(&channel, &part_of(&node.rest, property)) {
+                baked.channels.push(channel);
+            }
         }
     }
+    keep_length(&mut baked, clip.duration());
     baked
+}
+
+fn channel_target(at: usize, property: &Property) -> ChannelTarget {
+    match property {
+        Property::Translation => ChannelTarget::Translation(at),
+        Property::Rotation => ChannelTarget::Rotation(at),
+        Property::Scale | Property::Attribute(_) => ChannelTarget::Scale(at),
+    }
+}
+
+/// Numbers of a transform for a property.
+fn part_of(trs: &Trs, property: &Property) -> [f32; 4] {
+    match property {
+        Property::Rotation => trs.rotation.to_array(),
+        Property::Scale => trs.scale.extend(0.0).to_array(),
+        Property::Translation | Property::Attribute(_) => trs.translation.extend(0.0).to_array(),
+    }
+}
+
+/// Transforms whose first rotation lies on the side of that at rest.
+fn same_side(mut locals: Vec<Trs>, rest: glam::Quat) -> Vec<Trs> {
+    if let Some(first) = locals.first_mut().filter(|first| first.rotation.dot(rest) < 0.0) {
+        first.rotation = -first.rotation;
+    }
+    locals
+}
+
+/// Channel of keys that are all linear or all cubic.
+fn keyed_channel(target: ChannelTarget, width: usize, keys: &[Key]) -> Channel {
+    let is_cubic = keys.iter().any(|key| matches!(key.ease, Ease::Cubic { .. }));
+    let numbers = |key: &Key| match key.ease {
+        Ease::Cubic { arrive, leave } => {
+            [arrive, key.value, leave].iter().flat_map(|part| part[..width].to_vec()).collect()
+        }
+        Ease::Linear | Ease::Stepped => key.value[..width].to_vec(),
+    };
+    Channel {
+        target,
+        interpolation: if is_cubic { Interpolation::CubicSpline } else { Interpolation::Linear },
+        times: keys.iter().map(|key| key.time).collect(),
+        values: keys.iter().flat_map(numbers).collect(),
+    }
+}
+
+/// Rest transform of a node that nothing but its own keys moves, relative to the same parent in the rig and in the file.
+fn plain_base(program: &RigProgram, nodes: &[BakedNode], at: usize) -> Option<Trs> {
+    let node = &program.nodes()[program.node(nodes[at].uid)?];
+    let parent = node.parent.map(|parent| program.nodes()[parent].uid);
+    (node.is_plain() && parent == nodes[at].parent.map(|parent| nodes[parent].uid)).then_some(node.base)
+}
+
+/// True if a channel has one key, which is the node's rest.
+fn is_at_rest(channel: &Channel, rest: &[f32; 4]) -> bool {
+    channel.times.len() == 1
+        && channel.interpolation != Interpolation::CubicSpline
+        && channel.values.iter().zip(rest).all(|(a, b)| (a - b).abs() < 1e-6)
+}
+
+/// Adds keys to the first channel where no channel has one at the start or the end, so that the clip is as long in a file.
+fn keep_length(clip: &mut Clip, duration: f32) {
+    let times = || clip.channels.iter().filter_map(|channel| Some([*channel.times.first()?, *channel.times.last()?]));
+    let start = times().map(|[first, _]| first).fold(f32::MAX, f32::min);
+    let end = times().map(|[_, last]| last).fold(0.0, f32::max);
+    let Some(channel) = clip.channels.first_mut() else { return };
+    let is_cubic = channel.interpolation == Interpolation::CubicSpline;
+    let width = channel.values.len() / channel.times.len().max(1) / if is_cubic { 3 } else { 1 };
+    // A held value of a cubic channel leaves and arrives without a tangent.
+    let held =
+        |key: &[f32]| if is_cubic { [&[0.0; 4][..width], key, &[0.0; 4][..width]].concat() } else { key.to_vec() };
+    if start > 1e-4 {
+        let key = if is_cubic { &mut channel.values[..2 * width] } else { &mut channel.values[..width] };
+        let value = key[key.len() - width..].to_vec();
+        if is_cubic {
+            key[..width].fill(0.0);
+        }
+        channel.times.insert(0, 0.0);
+        channel.values.splice(0..0, held(&value));
+    }
+    if end < duration - 1e-4 {
+        let from = channel.values.len() - if is_cubic { 2 * width } else { width };
+        let value = channel.values[from..from + width].to_vec();
+        if is_cubic {
+            channel.values[from + width..].fill(0.0);
+        }
+        channel.times.push(duration);
+        channel.values.extend(held(&value));
+    }
 }

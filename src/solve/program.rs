@@ -134,6 +134,11 @@ impl ProgramNode {
     pub fn is_posable(&self) -> bool {
         self.pose != Pose::NONE
     }
+
+    /// Returns `true` if the node's transform relative to its parent is its base with its pose offset, and nothing else.
+    pub fn is_plain(&self) -> bool {
+        self.is_posable() && !self.is_driven && self.freedom.is_none()
+    }
 }
 
 /// An attribute of a program.

@@ -15,6 +15,7 @@ mod figure;
 mod joints;
 mod limbs;
 mod measure;
+mod player;
 mod tracks;
 
 use serde::Serialize;
@@ -31,6 +32,7 @@ use super::{
 use crate::rig::{
     BuiltRig, Rig,
     animation::{RigClip, joint_map::JointMap, motion::Motion},
+    operations::KeyTolerance,
 };
 
 /// Nodes that get the keys of a retargeted motion.
@@ -56,6 +58,8 @@ pub struct RetargetSettings {
     pub travel: bool,
     /// True to hold standing feet in their places.
     pub lock_feet: bool,
+    /// Distances and angles by which joints may be off at any frame through the removal of keys, on a human in metres.
+    pub tolerance: KeyTolerance,
     /// Largest frames of the clip.
     pub max_frames: usize,
 }
@@ -68,6 +72,7 @@ impl Default for RetargetSettings {
             onto: MotionTarget::Controls,
             travel: true,
             lock_feet: true,
+            tolerance: KeyTolerance::captured(),
             max_frames: 100_000,
         }
     }
@@ -147,14 +152,12 @@ pub fn retarget(
     let has_twist = settings.onto == MotionTarget::Controls;
     let poses = body.poses(&contacts, rate, has_twist);
     let mut clip = tracks::empty_clip(rig, &motion.name, rate, [0.0, *times.last().unwrap_or(&0.0)], settings.looped);
+    let program = std::sync::Arc::new(RigProgram::compile(built, &CompileOptions::default())?);
     let (keyed, unmoved) = match settings.onto {
-        MotionTarget::Controls => {
-            let program = std::sync::Arc::new(RigProgram::compile(built, &CompileOptions::default())?);
-            controls::keyed(built, &program, &body, &poses)?
-        }
+        MotionTarget::Controls => controls::keyed(built, &program, &body, &poses)?,
         MotionTarget::Joints => (joints::keyed(&body, &poses), Vec::new()),
     };
-    let keys = tracks::fill(&mut clip, &keyed, &times, target.height);
+    let keys = tracks::fill(&mut clip, &keyed, &times, &program, &settings.tolerance.for_height(target.height));
     Ok(RetargetedMotion { clip, keys, stances: contacts.stances(&body, &times), unmoved, notes })
 }
 

@@ -2,13 +2,12 @@
 
 use std::{fs, path::Path};
 
-use bevy::math::Vec3;
 use rigsmith::{
     files::{RealDisk, load_animation, load_model},
-    mesh::model::{Channel, ChannelTarget, Model, Trs},
+    mesh::model::{Model, Trs},
     modules,
     processor::Builder,
-    rig::bake::baked,
+    rig::{animation::file_clip::motion_of, bake::baked},
     solve::{
         bake_clip::strike,
         program::{CompileOptions, RigProgram, RigState},
@@ -27,40 +26,9 @@ fn json(folder: &Path, args: &[&str]) -> Value {
     serde_json::from_str(&answer.out).unwrap()
 }
 
-/// Value of a linear channel, three or four numbers.
-fn sampled(channel: &Channel, time: f32) -> Vec<f32> {
-    let width = channel.values.len() / channel.times.len();
-    let next = channel.times.partition_point(|key| *key <= time).clamp(1, channel.times.len().max(2) - 1);
-    let of = |key: usize| &channel.values[key * width..(key + 1) * width];
-    if channel.times.len() == 1 {
-        return of(0).to_vec();
-    }
-    let (from, to) = (channel.times[next - 1], channel.times[next]);
-    let share = ((time - from) / (to - from)).clamp(0.0, 1.0);
-    if width == 4 {
-        let [from, to] = [next - 1, next].map(|key| bevy::math::Quat::from_slice(of(key)));
-        return from.slerp(to, share).to_array().to_vec();
-    }
-    of(next - 1).iter().zip(of(next)).map(|(a, b)| a + (b - a) * share).collect()
-}
-
 /// Transforms of a file's nodes at a moment of its first clip.
 fn played(model: &Model, time: f32) -> Vec<Trs> {
-    let mut locals: Vec<Trs> = model.nodes.iter().map(|node| node.rest).collect();
-    for channel in &model.clips[0].channels {
-        let value = sampled(channel, time);
-        match channel.target {
-            ChannelTarget::Translation(node) => locals[node].translation = Vec3::from_slice(&value),
-            ChannelTarget::Rotation(node) => locals[node].rotation = bevy::math::Quat::from_slice(&value),
-            ChannelTarget::Scale(node) => locals[node].scale = Vec3::from_slice(&value),
-            ChannelTarget::MorphWeights(_) => {}
-        }
-    }
-    let mut globals: Vec<Trs> = Vec::new();
-    for (node, local) in model.nodes.iter().zip(locals) {
-        globals.push(node.parent.map_or(local, |parent| globals[parent] * local));
-    }
-    globals
+    motion_of(model, &model.clips[0]).globals_at(time)
 }
 
 #[test]
@@ -129,7 +97,7 @@ fn wrong_uses_are_told() {
         assert!(answer.err.contains(told), "{args:?}: {}", answer.err);
     };
     check(&["biped.rig.ron", "walker.bvh", "-o", "a.obj"], 2, "give .glb, .gltf, .anim.ron or .png");
-    check(&["biped.rig.ron", "walker.obj", "-o", "a.glb"], 2, "give .bvh or .anim.ron");
+    check(&["biped.rig.ron", "walker.obj", "-o", "a.glb"], 2, "give .bvh, .glb, .gltf or .anim.ron");
     check(&["biped.rig.ron", "walker.bvh", "-o", "walker.bvh"], 2, "cannot write");
     check(&["biped.rig.ron", "missing.bvh", "-o", "a.glb"], 1, "missing.bvh");
     check(&["biped.rig.ron", "broken.bvh", "-o", "a.glb"], 1, "line ");
@@ -138,6 +106,153 @@ fn wrong_uses_are_told() {
     check(&["biped.rig.ron", "walker.bvh", "--fps", "0", "-o", "a.glb"], 2, "--fps");
     check(&["hand.rig.ron", "walker.bvh", "-o", "a.glb"], 1, "--map");
     assert!(!folder.path().join("a.glb").exists());
+}
+
+#[test]
+fn clips_of_a_model_are_a_source() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("walker.bvh"), WALKER).unwrap();
+    let run = |args: &[&str]| json(folder.path(), &[&["animate"], args].concat());
+    run(&["biped.rig.ron", "walker.bvh", "--onto", "joints", "-o", "walk.glb"]);
+
+    // A character's own clip: its keys, on its joints, and the same bytes from the second round on.
+    let answer = run(&["walk.glb", "walk.glb", "-o", "own.anim.ron"]);
+    assert_eq!((&answer["found_by"], &answer["onto"]), (&"joints".into(), &"joints".into()), "{answer}");
+    let own = load_animation(&RealDisk, &path("own.anim.ron")).unwrap().clips;
+    let file = load_model(&RealDisk, &path("walk.glb")).unwrap();
+    let keys: usize = file.clips[0].channels.iter().map(|channel| channel.times.len()).sum();
+    assert_eq!((own.len(), own[0].name.as_str(), own[0].key_count()), (1, "walker", keys));
+    run(&["walk.glb", "walk.glb", "-o", "first.glb"]);
+    run(&["walk.glb", "first.glb", "-o", "second.glb"]);
+    assert_eq!(fs::read(path("first.glb")).unwrap(), fs::read(path("second.glb")).unwrap());
+    let (was, is) = (played(&file, 0.45), played(&load_model(&RealDisk, &path("second.glb")).unwrap(), 0.45));
+    for (was, is) in was.iter().zip(&is) {
+        assert!(was.translation.distance(is.translation) < 1e-4 && was.rotation.angle_between(is.rotation) < 1e-3);
+    }
+
+    // On another rig it is retargeted onto the controls.
+    let answer = run(&["biped.rig.ron", "walk.glb", "-o", "controls.anim.ron"]);
+    assert_eq!((&answer["found_by"], &answer["onto"]), (&"names".into(), &"controls".into()), "{answer}");
+    assert!(
+        answer["mapped"].as_array().unwrap().len() >= 8 && answer["foot_slide"].as_f64().unwrap() <= 1.0,
+        "{answer}"
+    );
+
+    // Several files are several animations, and clips can be chosen by name and by number.
+    let answer = run(&["biped.rig.ron", "walker.bvh", "walk.glb", "controls.anim.ron", "-o", "three.glb"]);
+    assert_eq!((answer["clips"].as_array().unwrap().len(), answer["motions"].as_array().unwrap().len()), (3, 2));
+    let three = load_model(&RealDisk, &path("three.glb")).unwrap();
+    let names: Vec<&str> = three.clips.iter().map(|clip| clip.name.as_str()).collect();
+    assert_eq!(names, ["walker", "walker 2", "walker 3"]);
+    let answer = run(&["biped.rig.ron", "three.glb", "--clip", "walker 3", "--clip", "1", "-o", "two.glb"]);
+    assert_eq!(answer["clips"].as_array().unwrap().len(), 2);
+    let answer = rigsmith(folder.path(), &["animate", "biped.rig.ron", "three.glb", "--clip", "run", "-o", "no.glb"]);
+    assert!(answer.code == 1 && answer.err.contains("\"run\""), "{} {}", answer.code, answer.err);
+}
+
+/// Clips that come with characters of the data folder, edited on their joints without a template.
+#[test]
+fn clips_of_characters_are_edited_on_their_joints() {
+    let Some(data) = test_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let fox = data.join("gltf_skinned/Fox.glb").display().to_string();
+    let answer = json(folder.path(), &["animate", &fox, &fox, "--clip", "Walk", "--clip", "3", "-o", "fox.anim.ron"]);
+    assert_eq!(answer["clips"].as_array().unwrap().len(), 2, "{answer}");
+    assert_eq!(answer["motions"][1]["found_by"], "joints", "{answer}");
+    json(folder.path(), &["animate", &fox, "fox.anim.ron", "-o", "fox.glb"]);
+    let [was, is] = [Path::new(&fox), &folder.path().join("fox.glb")].map(|path| load_model(&RealDisk, path).unwrap());
+    // Mesh and weights are those of the character.
+    assert!(was.points.len() > 100 && is.points.len() == was.points.len());
+    assert_eq!((is.skins.len(), is.clips.len()), (was.skins.len(), 2));
+    assert_eq!(is.weights.as_ref().map(|weights| weights.len()), was.weights.as_ref().map(|weights| weights.len()));
+    let walk = was.clips.iter().find(|clip| clip.name == "Walk").unwrap();
+    let again = is.clips.iter().find(|clip| clip.name == "Walk").unwrap();
+    let [was_motion, is_motion] = [motion_of(&was, walk), motion_of(&is, again)];
+    assert!(was_motion.frames() > 10);
+    let place = |motion: &rigsmith::rig::animation::motion::Motion, name: &str, time: f32| {
+        motion.globals_at(time)[motion.find(name).unwrap()].translation
+    };
+    for time in [0.0, 0.2, 0.5] {
+        for name in ["b_Head_05", "b_LeftHand_011", "b_Tail03_014"] {
+            let off = place(&was_motion, name, time).distance(place(&is_motion, name, time));
+            assert!(off < 0.05, "{name} at {time}: {off}");
+        }
+    }
+}
+
+/// Clips of a character with names of its own go onto the controls of the biped.
+#[test]
+fn clips_of_a_character_move_another_one() {
+    let Some(data) = test_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mage = data.join("characters/Mage.glb").display().to_string();
+    let clips = ["--clip", "Walking_A", "--clip", "Jump_Full_Short"];
+    let answer = json(folder.path(), &[&["animate", "biped", &mage], &clips[..], &["-o", "mage.anim.ron"]].concat());
+    for motion in answer["motions"].as_array().unwrap() {
+        assert_eq!((&motion["found_by"], &motion["onto"]), (&"names".into(), &"controls".into()), "{motion}");
+        assert!(motion["mapped"].as_array().unwrap().len() >= 14, "{motion}");
+    }
+    let read = load_animation(&RealDisk, &folder.path().join("mage.anim.ron")).unwrap().clips;
+    let names: Vec<&str> = read.iter().map(|clip| clip.name.as_str()).collect();
+    assert_eq!(names.len(), 2, "{names:?}");
+    assert!(read.iter().all(|clip| clip.duration() > 0.3 && clip.key_count() > 50));
+}
+
+#[test]
+fn presets_change_names_and_axes_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("walker.bvh"), WALKER).unwrap();
+    let run = |preset: &str, output: &str| {
+        json(folder.path(), &["animate", "biped.rig.ron", "walker.bvh", "--preset", preset, "-o", output])
+    };
+    run("plain", "plain.glb");
+    let plain = load_model(&RealDisk, &path("plain.glb")).unwrap();
+    let of_plain = motion_of(&plain, &plain.clips[0]);
+    for (preset, thigh, chest) in [
+        ("mixamo", "mixamorig:LeftUpLeg", "mixamorig:Spine1"),
+        ("unreal", "thigh_l", "spine_02"),
+        ("unity", "LeftUpperLeg", "Chest"),
+        ("vrm", "leftUpperLeg", "chest"),
+    ] {
+        let answer = run(preset, "other.glb");
+        assert!(answer["renamed"].as_u64().unwrap() >= 10, "{answer}");
+        let other = load_model(&RealDisk, &path("other.glb")).unwrap();
+        let find = |name: &str| {
+            let mut found = (0..other.nodes.len()).filter(|node| other.nodes[*node].name == name);
+            let place = found.next().unwrap_or_else(|| panic!("{preset}: no {name}"));
+            assert_eq!(found.next(), None, "{preset}: several {name}");
+            place
+        };
+        let (thigh, _) = (find(thigh), find(chest));
+        assert_eq!(plain.nodes[thigh].name, "thigh_l");
+        assert_eq!(other.nodes.len(), plain.nodes.len());
+        // Joints are where they were, at rest and in the clip.
+        let of_other = motion_of(&other, &other.clips[0]);
+        for time in [0.0, 0.3, 0.65, 0.9] {
+            let (was, is) = (of_plain.globals_at(time), of_other.globals_at(time));
+            for (at, (was, is)) in was.iter().zip(&is).enumerate() {
+                let off = was.translation.distance(is.translation);
+                assert!(off < 1e-4, "{preset}: {} at {time}: {off}", other.nodes[at].name);
+            }
+        }
+        // What is bound moves as before.
+        let globals = other.rest_globals();
+        for (joint, bind) in other.skins[0].joints.iter().zip(&other.skins[0].inverse_binds) {
+            let moved = bevy::math::Mat4::from(globals[*joint]) * *bind;
+            assert!(moved.abs_diff_eq(bevy::math::Mat4::IDENTITY, 1e-3), "{preset}: {}", other.nodes[*joint].name);
+        }
+        let at_rest = globals[thigh];
+        let axis = |axis: usize| at_rest.matrix3.col(axis).normalize();
+        match preset {
+            "mixamo" => assert!(axis(1).y < -0.9, "{}", axis(1)),
+            "unreal" => assert!(axis(0).y < -0.9, "{}", axis(0)),
+            _ => assert!((0..3).all(|at| axis(at)[at] > 0.9999), "{preset}: {at_rest}"),
+        }
+    }
+    let answer = rigsmith(folder.path(), &["animate", "biped", "walker.bvh", "--preset", "vrm", "-o", "a.anim.ron"]);
+    assert!(answer.code == 2 && answer.err.contains("--preset"), "{}", answer.err);
 }
 
 /// Characters for the validator: the walk on the biped and on a body.

@@ -54,8 +54,7 @@ fn no_text_breaks_the_bvh_reader() {
             for (at, joint) in motion.joints.iter().enumerate() {
                 assert!(joint.parent.is_none_or(|parent| parent < at) && joint.rest.translation.is_finite());
                 assert!(joint.channels.iter().all(|channel| {
-                    let (MotionChannel::Position(axis) | MotionChannel::Rotation(axis)) = channel;
-                    *axis < 3
+                    matches!(channel, MotionChannel::Position(0..3) | MotionChannel::Rotation(0..3))
                 }));
             }
             if motion.joints.len() > 200 || motion.frames() > 20 {

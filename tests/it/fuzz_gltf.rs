@@ -7,9 +7,12 @@ use super::{
     prerequisites::test_data,
 };
 use glam::Vec3;
-use rigsmith::mesh::{
-    gltf::{ExternalError, ExternalFile, GltfError, GltfWriteSettings, memory_limit, read_gltf, write_glb},
-    model::{ChannelTarget, Interpolation, Model},
+use rigsmith::{
+    mesh::{
+        gltf::{ExternalError, ExternalFile, GltfError, GltfWriteSettings, memory_limit, read_gltf, write_glb},
+        model::{ChannelTarget, Interpolation, Model},
+    },
+    rig::animation::file_clip::motion_of,
 };
 
 /// What a mutator should try inside JSON.
@@ -103,6 +106,15 @@ fn check(bytes: &[u8], bins: &[Vec<u8>]) {
         Err(error) => assert!(error.to_string().starts_with("fuzz.glb: "), "{error}"),
         Ok(model) => {
             check_promises(&model);
+            for clip in &model.clips {
+                // Sampling a clip of hours at every mutation takes too long.
+                if clip.channels.iter().flat_map(|channel| &channel.times).any(|time| *time > 60.0) {
+                    continue;
+                }
+                let motion = motion_of(&model, clip);
+                assert_eq!(motion.values.len(), motion.frames() * motion.width());
+                assert!(motion.values.iter().all(|value| value.is_finite()) && motion.frame_time > 0.0);
+            }
             for (all_joints, max_influences) in [(true, 8), (false, 2)] {
                 let settings =
                     GltfWriteSettings { all_joints, max_influences, bind_unweighted: true, ..Default::default() };

@@ -30,6 +30,7 @@ mod cli_site;
 mod cli_streams;
 #[cfg(feature = "cli")]
 mod cli_templates;
+mod clip_files;
 mod commands;
 mod control_sizes;
 mod custom_module;

@@ -2,6 +2,7 @@
 
 mod bodies;
 mod joints;
+mod reduction;
 
 use std::{path::Path, sync::Arc};
 

@@ -15,6 +15,10 @@ pub enum MotionChannel {
     Position(u8),
     /// Rotation about an axis 0 to 2 in degrees; rotations of a joint multiply in the order of its channels.
     Rotation(u8),
+    /// Component 0 to 3 (x, y, z, w) of the rotation relative to the parent, in place of that at rest.
+    Turn(u8),
+    /// Scale factor along an axis 0 to 2, in place of that at rest.
+    Scale(u8),
 }
 
 /// Joint of a [`Motion`].
@@ -103,7 +107,7 @@ impl Motion {
         let mixed = |(from, to): (&Trs, &Trs)| Trs {
             translation: from.translation.lerp(to.translation, share),
             rotation: slerp(from.rotation, to.rotation, share),
-            scale: from.scale,
+            scale: if from.scale == to.scale { from.scale } else { from.scale.lerp(to.scale, share) },
         };
         self.chained(from.iter().zip(&to).map(mixed))
     }
@@ -131,9 +135,16 @@ impl MotionJoint {
                     local.rotation = if is_turned { local.rotation * turn } else { turn };
                     is_turned = true;
                 }
+                MotionChannel::Turn(part) => {
+                    let mut parts = local.rotation.to_array();
+                    parts[usize::from(part)] = *value;
+                    local.rotation = Quat::from_array(parts);
+                }
+                MotionChannel::Scale(axis) => local.scale[usize::from(axis)] = *value,
             }
         }
-        local.rotation = local.rotation.normalize();
+        let is_rotation = local.rotation.length_squared() > 1e-12;
+        local.rotation = if is_rotation { local.rotation.normalize() } else { self.rest.rotation };
         local
     }
 }

@@ -125,7 +125,7 @@ impl PartInstance {
     ) -> Result<PutPart, PartError> {
         let mut faults = Vec::new();
         let options = self.option_changes(part, mirror).unwrap_or_else(|error| {
-            faults.push((None, error));
+            faults.push((None, PartError::from(error)));
             Vec::new()
         });
         let part = fitted;

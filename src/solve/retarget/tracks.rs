@@ -2,10 +2,17 @@
 
 use std::sync::Arc;
 
-use crate::rig::{
-    PoseOffset, Rig, Uid,
-    animation::{Ease, Key, Property, RigClip, Track, TrackTarget},
-    operations::KeyTolerance,
+use super::player::Player;
+use crate::{
+    rig::{
+        PoseOffset, Rig, Uid,
+        animation::{Ease, Key, Property, RigClip, Track, TrackTarget},
+        operations::KeyTolerance,
+    },
+    solve::{
+        program::RigProgram,
+        reduction::{JointPlace, SampledTrack, error_of, reduce_tracks, track_tolerance},
+    },
 };
 
 /// Offsets of nodes frame by frame, attributes that are constant, and attributes frame by frame.
@@ -24,50 +31,34 @@ pub(super) fn empty_clip(rig: &Rig, name: &str, rate: f32, range: [f32; 2], loop
     RigClip { frame_rate: rate, range, looped, ..RigClip::new(uids[0], uids[1], name) }
 }
 
-/// Adds the keys to the clip's first layer, reduced within what nobody sees on a figure of that height. Returns the numbers of
-/// keys before and after.
-pub(super) fn fill(clip: &mut RigClip, keyed: &KeyedTracks, times: &[f32], height: f32) -> [usize; 2] {
-    let usual = KeyTolerance::default();
-    // The tolerance is for humans in metres.
-    let tolerance = KeyTolerance { distance: usual.distance * (height / 1.7).max(1e-6), ..usual };
+/// Adds the keys to the clip's first layer, reduced within the tolerance of the joints, which the program plays. Returns the
+/// numbers of keys before and after.
+pub(super) fn fill(
+    clip: &mut RigClip,
+    keyed: &KeyedTracks,
+    times: &[f32],
+    program: &Arc<RigProgram>,
+    tolerance: &KeyTolerance,
+) -> [usize; 2] {
     let mut counts = [0, 0];
     let start = times.first().copied().unwrap_or_default();
     let Some(layer) = clip.layers.first_mut() else { return counts };
-    for (node, offsets) in &keyed.nodes {
-        let mut last = bevy::math::Quat::IDENTITY;
-        let rotations = offsets.iter().map(|offset| {
-            let turn = if offset.rotation.dot(last) < 0.0 { -offset.rotation } else { offset.rotation };
-            last = turn;
-            turn.to_array()
-        });
-        let rotations: Vec<[f32; 4]> = rotations.collect();
-        let vector = |v: bevy::math::Vec3| [v.x, v.y, v.z, 0.0];
-        let values = [
-            (Property::Translation, offsets.iter().map(|offset| vector(offset.translation)).collect::<Vec<_>>()),
-            (Property::Rotation, rotations),
-            (Property::Scale, offsets.iter().map(|offset| vector(offset.scale)).collect()),
-        ];
-        for (property, values) in values {
-            let rest = property.rest();
-            let is_rest = |value: &[f32; 4]| value.iter().zip(rest).all(|(a, b)| (a - b).abs() < 1e-7);
-            if values.iter().all(is_rest) {
-                continue;
-            }
-            let key = |(time, value): (&f32, &[f32; 4])| Key { time: *time, value: *value, ease: Ease::Linear };
-            let track = Track { keys: times.iter().zip(&values).map(key).collect() };
-            let keys = tolerance.reduced(&track, &property);
-            counts[0] += track.keys.len();
-            counts[1] += keys.len();
-            layer.tracks.insert(TrackTarget { node: *node, property }, Arc::new(Track { keys }));
-        }
-    }
-    for (node, name, numbers) in &keyed.numbers {
-        let track =
-            Track { keys: times.iter().zip(numbers).map(|(time, number)| Key::number(*time, *number)).collect() };
-        let target = TrackTarget { node: *node, property: Property::Attribute(name.clone()) };
+    let (targets, mut tracks) = keyed.tracks();
+    let player = Player::new(program, &targets, &keyed.values);
+    let reaches = player.reaches(&tracks, 20.0 * tolerance.distance);
+    for (track, reach) in tracks.iter_mut().zip(reaches) {
         // Numbers that turn joints are angles in degrees.
-        let keys = KeyTolerance { value: tolerance.angle, ..tolerance }.reduced(&track, &target.property);
-        counts[0] += track.keys.len();
+        let of = KeyTolerance { value: tolerance.angle, ..*tolerance };
+        track.tolerance = track_tolerance(&track.property, reach, &of);
+    }
+    let count = tracks.len();
+    let truth = player.each(times.len(), |track, frame| tracks[track].values[frame], count, |_, places| places);
+    let keys = reduce_tracks(times, &tracks, |values| {
+        let error = |frame: usize, places: Vec<JointPlace>| error_of(&places, &truth[frame], tolerance);
+        player.each(times.len(), |track, frame| values[track][frame], count, error)
+    });
+    for (target, keys) in targets.into_iter().zip(keys) {
+        counts[0] += times.len();
         counts[1] += keys.len();
         layer.tracks.insert(target, Arc::new(Track { keys }));
     }
@@ -79,4 +70,41 @@ pub(super) fn fill(clip: &mut RigClip, keyed: &KeyedTracks, times: &[f32], heigh
         counts[1] += 1;
     }
     counts
+}
+
+impl KeyedTracks {
+    /// Tracks that are not at rest all the time.
+    fn tracks(&self) -> (Vec<TrackTarget>, Vec<SampledTrack>) {
+        let (mut targets, mut tracks) = (Vec::new(), Vec::new());
+        let mut add = |node: Uid, property: Property, values: Vec<[f32; 4]>| {
+            targets.push(TrackTarget { node, property: property.clone() });
+            tracks.push(SampledTrack { property, values, tolerance: 0.0 });
+        };
+        for (node, offsets) in &self.nodes {
+            let mut last = bevy::math::Quat::IDENTITY;
+            let rotations = offsets.iter().map(|offset| {
+                last = if offset.rotation.dot(last) < 0.0 { -offset.rotation } else { offset.rotation };
+                last.to_array()
+            });
+            let rotations: Vec<[f32; 4]> = rotations.collect();
+            let vector = |v: bevy::math::Vec3| [v.x, v.y, v.z, 0.0];
+            let values = [
+                (Property::Translation, offsets.iter().map(|offset| vector(offset.translation)).collect::<Vec<_>>()),
+                (Property::Rotation, rotations),
+                (Property::Scale, offsets.iter().map(|offset| vector(offset.scale)).collect()),
+            ];
+            for (property, values) in values {
+                let rest = property.rest();
+                let is_rest = |value: &[f32; 4]| value.iter().zip(rest).all(|(a, b)| (a - b).abs() < 1e-7);
+                if !values.iter().all(is_rest) {
+                    add(*node, property, values);
+                }
+            }
+        }
+        for (node, name, numbers) in &self.numbers {
+            let values = numbers.iter().map(|number| [*number, 0.0, 0.0, 0.0]).collect();
+            add(*node, Property::Attribute(name.clone()), values);
+        }
+        (targets, tracks)
+    }
 }

@@ -24,6 +24,25 @@ impl Default for KeyTolerance {
 }
 
 impl KeyTolerance {
+    /// Differences below the noise of motion capture of a human in metres: half a millimetre, and half a degree, which
+    /// moves a point three centimetres beside a joint by a quarter of a millimetre.
+    pub fn captured() -> Self {
+        Self { distance: 5e-4, angle: 0.5, factor: 1e-3, value: 0.05 }
+    }
+
+    /// Tolerance with all differences multiplied.
+    #[must_use]
+    pub fn scaled(self, by: f32) -> Self {
+        let Self { distance, angle, factor, value } = self;
+        Self { distance: distance * by, angle: angle * by, factor: factor * by, value: value * by }
+    }
+
+    /// Tolerance for a figure of another height than a human's, whose distances are larger or smaller.
+    #[must_use]
+    pub fn for_height(self, height: f32) -> Self {
+        Self { distance: self.distance * (height / 1.7).max(1e-6), ..self }
+    }
+
     /// Keys that are needed for a track to stay within the tolerance.
     pub fn reduced(&self, track: &Track, property: &Property) -> Vec<Key> {
         reduced(track, property, self.of(property))

@@ -1,0 +1,202 @@
+//! Reduction of sampled motion to few keys, bounded by what joints do in the rig's space.
+//!
+//! The error of a key matters by what hangs below its node: a tenth of a degree moves a head by nothing and a hand,
+//! seen from the hips, by two millimetres. So tracks are fitted with a tolerance by their reach, the motion is played,
+//! and where a joint is too far off, all tracks are fitted more closely around those frames, until none is.
+
+use bevy::math::{Quat, Vec3};
+use rayon::prelude::*;
+
+use super::curve_fit::{fit_curve, sampled};
+use crate::{
+    mesh::model::Trs,
+    rig::{
+        animation::{Ease, Key, Property},
+        operations::KeyTolerance,
+    },
+};
+
+/// Most rounds of fitting.
+const ROUNDS: usize = 16;
+/// Round from which tracks keep all keys around frames that are still off.
+const LAST_RESORT: usize = 12;
+/// Frames on both sides of a frame that is off at which tracks are fitted more closely.
+const AROUND: usize = 6;
+
+/// Samples of a property of a node.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SampledTrack {
+    /// The property.
+    pub property: Property,
+    /// Values, one a frame.
+    pub values: Vec<[f32; 4]>,
+    /// Largest difference of a value at first: degrees for rotations.
+    pub tolerance: f32,
+}
+
+/// Position and rotation of a joint in the rig's space.
+pub type JointPlace = (Vec3, Quat);
+
+/// Keys of tracks with which the motion stays within its bounds. `measure` plays values, a list a track, and gives for
+/// each frame the error in tolerances: 1 is just allowed.
+pub fn reduce_tracks(
+    times: &[f32],
+    tracks: &[SampledTrack],
+    measure: impl Fn(&[Vec<[f32; 4]>]) -> Vec<f32>,
+) -> Vec<Vec<Key>> {
+    let mut shares = vec![1.0_f32; times.len()];
+    for round in 0..ROUNDS {
+        let fit = |track: &SampledTrack| {
+            let tolerance: Vec<f32> = shares.iter().map(|share| share * track.tolerance).collect();
+            let keys = fit_curve(&track.property, times, &track.values, &tolerance);
+            let values = sampled(&track.property, times, keys.clone());
+            (keys, values)
+        };
+        let (keys, values): (Vec<_>, Vec<_>) = tracks.par_iter().map(fit).unzip();
+        let errors = measure(&values);
+        if errors.iter().all(|error| *error <= 1.0) {
+            return keys;
+        }
+        tighten(&mut shares, &errors, round >= LAST_RESORT);
+    }
+    let key = |(time, value): (&f32, &[f32; 4])| Key { time: *time, value: *value, ease: Ease::Linear };
+    tracks.iter().map(|track| times.iter().zip(&track.values).map(key).collect()).collect()
+}
+
+/// Lowers the shares of the tolerance around frames that are off.
+fn tighten(shares: &mut [f32], errors: &[f32], is_last: bool) {
+    let before = shares.to_vec();
+    for (frame, error) in errors.iter().enumerate() {
+        if *error <= 1.0 {
+            continue;
+        }
+        let factor = if is_last { 0.0 } else { (0.97 / error).max(0.5) };
+        for near in frame.saturating_sub(AROUND)..(frame + AROUND + 1).min(shares.len()) {
+            shares[near] = shares[near].min(before[near] * factor);
+        }
+    }
+}
+
+/// Error of joints at a frame in tolerances: the greatest of all distances and angles.
+pub fn error_of(found: &[JointPlace], wanted: &[JointPlace], tolerance: &KeyTolerance) -> f32 {
+    let of = |((place, turn), (wanted, wanted_turn)): (&JointPlace, &JointPlace)| {
+        let angle = super::curve_fit::difference(&Property::Rotation, &turn.to_array(), &wanted_turn.to_array());
+        (place.distance(*wanted) / tolerance.distance).max(angle / tolerance.angle)
+    };
+    found.iter().zip(wanted).map(of).fold(0.0, f32::max)
+}
+
+/// Tolerance of a track that moves joints by `reach` for one unit of its value, a degree for rotations.
+pub fn track_tolerance(property: &Property, reach: f32, tolerance: &KeyTolerance) -> f32 {
+    let by_reach = tolerance.distance / reach.max(1e-9);
+    match property {
+        Property::Rotation => by_reach.min(tolerance.angle),
+        Property::Translation => by_reach.min(10.0 * tolerance.distance),
+        Property::Scale => by_reach.min(tolerance.factor),
+        Property::Attribute(_) => by_reach.min(tolerance.value),
+    }
+}
+
+/// Node of a skeleton with its transforms relative to the parent, frame by frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SampledNode {
+    /// Place of the parent among the nodes, before the node's own.
+    pub parent: Option<usize>,
+    /// Transforms relative to the parent.
+    pub locals: Vec<Trs>,
+}
+
+/// Keys of the transforms of a skeleton's nodes: translation, rotation and scale. Joints are within the tolerance of
+/// where they were at every frame. `fixed` marks what is played as it is, and gets no keys.
+pub fn reduce_skeleton(
+    times: &[f32],
+    nodes: &[SampledNode],
+    fixed: &[[bool; 3]],
+    tolerance: &KeyTolerance,
+) -> Vec<[Vec<Key>; 3]> {
+    let properties = [Property::Translation, Property::Rotation, Property::Scale];
+    let truth: Vec<Vec<JointPlace>> =
+        (0..times.len()).into_par_iter().map(|frame| places(nodes, |at| nodes[at].locals[frame])).collect();
+    let reaches = reaches(nodes, &truth);
+    let mut tracks: Vec<SampledTrack> = Vec::new();
+    let mut owners: Vec<(usize, usize)> = Vec::new();
+    for (at, node) in nodes.iter().enumerate() {
+        for (part, property) in properties.iter().enumerate().filter(|(part, _)| !fixed[at][*part]) {
+            let reach = match property {
+                Property::Rotation => reaches[at] * 1.0_f32.to_radians(),
+                Property::Scale => reaches[at],
+                Property::Translation | Property::Attribute(_) => 1.0,
+            };
+            let tolerance = track_tolerance(property, reach, tolerance);
+            tracks.push(SampledTrack { property: property.clone(), values: values(&node.locals, part), tolerance });
+            owners.push((at, part));
+        }
+    }
+    let mut track_of = vec![[None; 3]; nodes.len()];
+    owners.iter().enumerate().for_each(|(track, (at, part))| track_of[*at][*part] = Some(track));
+    let measure = |samples: &[Vec<[f32; 4]>]| {
+        let at_frame = |frame: usize| {
+            let local = |at: usize| {
+                let mut local = nodes[at].locals[frame];
+                let value = |part: usize| track_of[at][part].map(|track: usize| samples[track][frame]);
+                if let Some([x, y, z, _]) = value(0) {
+                    local.translation = Vec3::new(x, y, z);
+                }
+                if let Some(turn) = value(1) {
+                    local.rotation = Quat::from_array(turn);
+                }
+                if let Some([x, y, z, _]) = value(2) {
+                    local.scale = Vec3::new(x, y, z);
+                }
+                local
+            };
+            error_of(&places(nodes, local), &truth[frame], tolerance)
+        };
+        (0..times.len()).into_par_iter().map(at_frame).collect()
+    };
+    let mut keys: Vec<[Vec<Key>; 3]> = vec![Default::default(); nodes.len()];
+    for ((at, part), found) in owners.into_iter().zip(reduce_tracks(times, &tracks, measure)) {
+        keys[at][part] = found;
+    }
+    keys
+}
+
+/// Values of a part of transforms; rotations each lie on the side of the one before.
+fn values(locals: &[Trs], part: usize) -> Vec<[f32; 4]> {
+    let vector = |v: Vec3| [v.x, v.y, v.z, 0.0];
+    let mut last = locals.first().map_or(Quat::IDENTITY, |local| local.rotation);
+    let value = |local: &Trs| match part {
+        0 => vector(local.translation),
+        1 => {
+            last = if local.rotation.dot(last) < 0.0 { -local.rotation } else { local.rotation };
+            last.to_array()
+        }
+        _ => vector(local.scale),
+    };
+    locals.iter().map(value).collect()
+}
+
+fn places(nodes: &[SampledNode], local: impl Fn(usize) -> Trs) -> Vec<JointPlace> {
+    let mut globals: Vec<Trs> = Vec::with_capacity(nodes.len());
+    for (at, node) in nodes.iter().enumerate() {
+        let local = local(at);
+        globals.push(node.parent.map_or(local, |parent| globals[parent] * local));
+    }
+    globals.iter().map(|at| (at.translation, at.rotation)).collect()
+}
+
+/// Greatest distance of a node below each node.
+fn reaches(nodes: &[SampledNode], truth: &[Vec<JointPlace>]) -> Vec<f32> {
+    let mut reaches = vec![0.0_f32; nodes.len()];
+    // Distances change little within a few frames.
+    for frame in truth.iter().step_by((truth.len() / 64).max(1)) {
+        for (at, node) in nodes.iter().enumerate() {
+            let mut above = node.parent;
+            while let Some(parent) = above {
+                reaches[parent] = reaches[parent].max(frame[at].0.distance(frame[parent].0));
+                above = nodes[parent].parent;
+            }
+        }
+    }
+    reaches
+}

@@ -1,0 +1,164 @@
+//! Tracks played on a program, frame by frame, to see where they put the joints.
+
+use std::sync::Arc;
+
+use bevy::math::{Quat, Vec3};
+use rayon::prelude::*;
+
+use crate::{
+    rig::{
+        NodeType, PoseOffset, Uid,
+        animation::{Property, TrackTarget},
+    },
+    solve::{
+        program::{RigProgram, RigState},
+        reduction::{JointPlace, SampledTrack},
+    },
+};
+
+/// Frames that one instance plays.
+const BLOCK: usize = 32;
+
+/// Program with the slots that tracks write.
+pub(super) struct Player {
+    program: Arc<RigProgram>,
+    /// Slots of nodes with their tracks for translation, rotation and scale.
+    nodes: Vec<(usize, [Option<usize>; 3])>,
+    /// Slots of attributes with their tracks.
+    attributes: Vec<(usize, usize)>,
+    /// Settings of the switches at which joints are looked at: as they are, and all the other way round.
+    modes: Vec<Vec<(usize, f32)>>,
+    joints: Vec<usize>,
+}
+
+impl Player {
+    /// Player of tracks on these targets. `switches` are attributes from 0 to 1 with their values.
+    pub fn new(program: &Arc<RigProgram>, targets: &[TrackTarget], switches: &[(Uid, String, f32)]) -> Self {
+        let mut nodes: std::collections::BTreeMap<usize, [Option<usize>; 3]> = std::collections::BTreeMap::new();
+        let mut attributes = Vec::new();
+        for (track, TrackTarget { node, property }) in targets.iter().enumerate() {
+            let part = match property {
+                Property::Translation => 0,
+                Property::Rotation => 1,
+                Property::Scale => 2,
+                Property::Attribute(name) => {
+                    attributes.extend(program.attribute(*node, name).map(|slot| (slot, track)));
+                    continue;
+                }
+            };
+            if let Some(slot) = program.node(*node) {
+                nodes.entry(slot).or_default()[part] = Some(track);
+            }
+        }
+        let found: Vec<(usize, f32)> =
+            switches.iter().filter_map(|(node, name, value)| Some((program.attribute(*node, name)?, *value))).collect();
+        let other = found.iter().map(|(slot, value)| (*slot, 1.0 - value)).collect();
+        let modes = if found.is_empty() { vec![found] } else { vec![found, other] };
+        let is_joint = |slot: &usize| program.nodes()[*slot].kind == NodeType::Joint;
+        let joints = (0..program.nodes().len()).filter(is_joint).collect();
+        Self { program: program.clone(), nodes: nodes.into_iter().collect(), attributes, modes, joints }
+    }
+
+    /// Places of the joints in each mode, with values of the tracks.
+    fn places(&self, state: &mut RigState, values: &[[f32; 4]]) -> Vec<JointPlace> {
+        for (slot, parts) in &self.nodes {
+            let mut offset = PoseOffset::IDENTITY;
+            if let Some([x, y, z, _]) = parts[0].map(|track| values[track]) {
+                offset.translation = Vec3::new(x, y, z);
+            }
+            if let Some(turn) = parts[1].map(|track| values[track]) {
+                offset.rotation = Quat::from_array(turn);
+            }
+            if let Some([x, y, z, _]) = parts[2].map(|track| values[track]) {
+                offset.scale = Vec3::new(x, y, z);
+            }
+            state.set_offset_at(*slot, offset);
+        }
+        for (slot, track) in &self.attributes {
+            state.set_attribute_at(*slot, values[*track][0]);
+        }
+        let mut places = Vec::with_capacity(self.modes.len() * self.joints.len());
+        for mode in &self.modes {
+            for (slot, value) in mode {
+                state.set_attribute_at(*slot, *value);
+            }
+            state.evaluate(0.0);
+            places.extend(self.joints.iter().map(|joint| {
+                let at = state.global_at(*joint);
+                (at.translation, at.rotation)
+            }));
+        }
+        places
+    }
+
+    /// Results of a function of the joints' places, one for each of so many frames; `value` gives a track's value at a
+    /// frame.
+    pub fn each<T: Send>(
+        &self,
+        frames: usize,
+        value: impl Fn(usize, usize) -> [f32; 4] + Sync,
+        tracks: usize,
+        of: impl Fn(usize, Vec<JointPlace>) -> T + Sync,
+    ) -> Vec<T> {
+        let blocks: Vec<usize> = (0..frames).step_by(BLOCK).collect();
+        let played: Vec<Vec<T>> = blocks
+            .into_par_iter()
+            .map(|start| {
+                let mut state = RigState::new(self.program.clone());
+                let at = |frame: usize| {
+                    let values: Vec<[f32; 4]> = (0..tracks).map(|track| value(track, frame)).collect();
+                    of(frame, self.places(&mut state, &values))
+                };
+                (start..(start + BLOCK).min(frames)).map(at).collect()
+            })
+            .collect();
+        played.into_iter().flatten().collect()
+    }
+
+    /// Greatest way of a joint for one unit of each track, a degree for rotations: tried at some frames, in all
+    /// directions. `length` is a small distance on the figure.
+    pub fn reaches(&self, tracks: &[SampledTrack], length: f32) -> Vec<f32> {
+        let count = tracks.first().map_or(0, |track| track.values.len());
+        let mut frames = [0, count / 4, count / 2, 3 * count / 4, count.saturating_sub(1)].to_vec();
+        frames.dedup();
+        let mut reaches = vec![0.0_f32; tracks.len()];
+        let mut state = RigState::new(self.program.clone());
+        for frame in frames.into_iter().filter(|frame| *frame < count) {
+            let mut values: Vec<[f32; 4]> = tracks.iter().map(|track| track.values[frame]).collect();
+            let before = self.places(&mut state, &values);
+            for (track, reach) in reaches.iter_mut().enumerate() {
+                let value = values[track];
+                for (changed, by) in tried(&tracks[track].property, value, length) {
+                    values[track] = changed;
+                    let after = self.places(&mut state, &values);
+                    let ways = before.iter().zip(&after).map(|((from, _), (to, _))| from.distance(*to));
+                    *reach = reach.max(ways.fold(0.0, f32::max) / by);
+                }
+                values[track] = value;
+            }
+        }
+        reaches
+    }
+}
+
+/// Values near one, with how far they are from it.
+fn tried(property: &Property, value: [f32; 4], length: f32) -> Vec<([f32; 4], f32)> {
+    let moved = |axis: usize, by: f32| {
+        let mut changed = value;
+        changed[axis] += by;
+        (changed, by)
+    };
+    match property {
+        Property::Translation => (0..3).map(|axis| moved(axis, length)).collect(),
+        Property::Scale => (0..3).map(|axis| moved(axis, 0.01)).collect(),
+        Property::Attribute(_) => vec![moved(0, 1.0)],
+        Property::Rotation => {
+            let (sin, cos) = bevy::math::ops::sin_cos(0.5 * 1.0_f32.to_radians());
+            let turned = |axis: Vec3| {
+                let turn = Quat::from_xyzw(axis.x * sin, axis.y * sin, axis.z * sin, cos);
+                ((Quat::from_array(value) * turn).normalize().to_array(), 1.0)
+            };
+            [Vec3::X, Vec3::Y, Vec3::Z].map(turned).to_vec()
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! Reduction of keys: how many are left, and how far joints are off at every frame.
+
+use rigsmith::rig::{Rig, animation::motion::Motion, operations::KeyTolerance};
+
+use super::{MotionTarget, PlayedRig, RetargetSettings, joints::strip, motion, shipped, test_data};
+
+/// A figure whose joints all swing slowly, each at a pace of its own.
+fn swinging() -> Motion {
+    let walker = rigsmith::rig::format::bvh::read_bvh(include_bytes!("walker.bvh"), "swing").unwrap();
+    let (width, rest) = (walker.width(), walker.values[..walker.width()].to_vec());
+    let value = |frame: usize, channel: usize| {
+        // The hips stay, knees are bent about their hinges, and all other rotations swing by ten degrees.
+        let pace = 0.8 + 0.05 * (channel % 7) as f32;
+        let swing = 10.0 * (frame as f32 / 60.0 * pace + channel as f32).sin();
+        match channel {
+            0..6 => rest[channel],
+            15 | 16 | 27 | 28 => 0.0,
+            17 | 29 => 25.0 + swing,
+            _ => swing,
+        }
+    };
+    let values = (0..1200).flat_map(|frame| (0..width).map(move |channel| value(frame, channel))).collect();
+    Motion { frame_time: 1.0 / 60.0, values, ..walker }
+}
+
+/// Plays a motion with usual and with hardly any tolerance; gives both and the largest distance of a joint between them.
+fn check(rig: &Rig, motion: &Motion, settings: &RetargetSettings) -> (PlayedRig, PlayedRig, f32) {
+    let reduced = PlayedRig::new(rig.clone(), motion, settings);
+    let exact = RetargetSettings { tolerance: KeyTolerance::captured().scaled(1e-3), ..settings.clone() };
+    let exact = PlayedRig::new(rig.clone(), motion, &exact);
+    let labels: Vec<&str> = rig.walk().filter_map(|joint| joint.data.label.as_deref()).collect();
+    let times = reduced.times();
+    let pairs = reduced.globals(&times, &labels).into_iter().zip(exact.globals(&times, &labels));
+    let off = |(a, b): (Vec<rigsmith::mesh::model::Trs>, Vec<rigsmith::mesh::model::Trs>)| {
+        a.iter().zip(&b).map(|(a, b)| a.translation.distance(b.translation)).fold(0.0, f32::max)
+    };
+    let worst = pairs.map(off).fold(0.0, f32::max);
+    println!("keys {:?} and {:?}, off {:.3} mm", reduced.done.keys, exact.done.keys, 1e3 * worst);
+    (reduced, exact, worst)
+}
+
+fn joints_alone() -> Rig {
+    let mut rig = shipped("biped");
+    strip(&mut rig);
+    rig
+}
+
+#[test]
+fn smooth_motion_needs_a_twentieth_of_its_keys() {
+    let settings =
+        RetargetSettings { onto: MotionTarget::Joints, travel: false, lock_feet: false, ..RetargetSettings::default() };
+    let (reduced, _, off) = check(&joints_alone(), &swinging(), &settings);
+    let [before, after] = reduced.done.keys;
+    assert!(after * 20 <= before, "{after} of {before} keys are left");
+    assert!(off <= 0.52e-3 * reduced.height / 1.7, "{off}");
+}
+
+/// The noise of a capture is larger than the tolerance; keys go nevertheless.
+#[test]
+fn captured_motion_stays_within_half_a_millimetre() {
+    let Some(data) = test_data() else { return };
+    let motion = motion(&data, "cmu_01_01");
+    let rig = joints_alone();
+    let settings = RetargetSettings { onto: MotionTarget::Joints, ..RetargetSettings::default() };
+    let (reduced, _, off) = check(&rig, &motion, &settings);
+    assert!(off <= 0.52e-3 * reduced.height / 1.7, "{off}");
+    let [before, after] = reduced.done.keys;
+    assert!(2 * before >= 5 * after, "{after} of {before} keys are left");
+    // Against a key each frame for translation, rotation and scale of every joint, as compressors of clips count.
+    let whole = 3 * rig.walk().count() * reduced.times().len();
+    assert!(whole >= 20 * after, "{after} keys for {whole}");
+}
+
+#[test]
+fn controls_stay_within_half_a_millimetre() {
+    let Some(data) = test_data() else { return };
+    let motion = motion(&data, "makehuman_walk1");
+    let (reduced, exact, off) = check(&shipped("biped"), &motion, &RetargetSettings::default());
+    assert!(off <= 0.52e-3 * reduced.height / 1.7, "{off}");
+    assert!(reduced.done.keys[1] < exact.done.keys[1], "{:?} {:?}", reduced.done.keys, exact.done.keys);
+}
