@@ -110,6 +110,7 @@ mod parts_more;
 mod picking;
 mod placement;
 mod plugins;
+mod polling;
 mod pose;
 mod prerequisites;
 mod processor;
