@@ -33,6 +33,7 @@ mod display;
 mod drawing;
 #[cfg(feature = "render")]
 mod drawing_pictures;
+mod dropped_parts;
 mod dual_quaternion;
 mod edit_text;
 #[cfg(feature = "editor")]

@@ -1,6 +1,7 @@
 //! Changes of what parts bring, as local changes of the part instances in a template's text.
 
 mod change;
+mod instance;
 
 use std::collections::{HashMap, HashSet};
 
@@ -15,6 +16,7 @@ use crate::rig::{
     part::{PartInstance, switch_name},
 };
 use change::{FieldChange, JointDiff, TagDiff, Words, short_tag};
+pub(crate) use instance::{with_instances, without_instances};
 
 /// Rigs of a template with parts, from which its text is changed.
 pub(crate) struct PartRigs<'a> {
