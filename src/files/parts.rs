@@ -3,7 +3,7 @@
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{Arc, OnceLock},
 };
 
 use super::{Disk, ReadError, SearchPaths, SiteError, read_capped};
@@ -72,6 +72,17 @@ pub fn bundled_parts() -> Vec<(&'static str, Arc<Rig>)> {
         Some((*name, Arc::new(template.rig)))
     };
     BUNDLED_PARTS.iter().filter_map(read).collect()
+}
+
+/// A part that comes with Rigsmith and uses no others, read once.
+fn bundled_alone(name: &str) -> Option<Arc<Part>> {
+    static READ: [OnceLock<Option<Arc<Part>>>; BUNDLED_PARTS.len()] = [const { OnceLock::new() }; BUNDLED_PARTS.len()];
+    let place = BUNDLED_PARTS.iter().position(|(known, _)| *known == name)?;
+    let read = || {
+        let template = read_template(BUNDLED_PARTS[place].1.as_bytes()).ok()?;
+        template.parts.is_empty().then(|| Arc::new(Part::of(template)))
+    };
+    READ[place].get_or_init(read).clone()
 }
 
 /// Text of a part that comes with Rigsmith. It is used where no file has its name.
@@ -245,6 +256,23 @@ impl<'a> PartFiles<'a> {
         Ok(instance.fitted(&part, &mirror)?)
     }
 
+    /// Every part instance of a template with its part as far as a header tells of it: with as many joints as it has here, and
+    /// with other names and values than here where nothing refers to them.
+    ///
+    /// # Errors
+    /// A part that cannot be had, or that does not take so many joints.
+    pub fn counted(&mut self, path: &Path, template: &Template) -> Result<Vec<(PartInstance, Rig)>, PartFileError> {
+        let counted = template.parts.iter().map(|instance| {
+            // Changes call tags by the names that they have here.
+            if instance.changes.iter().any(|change| change.removed) {
+                return Ok((instance.clone(), self.fitted_part(path, instance)?));
+            }
+            let part = self.of_instance(path, instance)?;
+            Ok((instance.clone(), instance.sized(&part)?))
+        });
+        counted.collect()
+    }
+
     fn of_instance(&mut self, path: &Path, instance: &PartInstance) -> Result<Arc<Part>, PartFileError> {
         let folder = path.parent().unwrap_or(Path::new(""));
         self.part(&folder.join(&instance.part), &instance.part)
@@ -261,9 +289,13 @@ impl<'a> PartFiles<'a> {
                 self.found.insert(first.to_owned(), part);
                 (path, content)
             }
-            None => match bundled(name) {
-                Some(text) => (first.to_owned(), text.as_bytes().to_vec()),
-                None => return Err(self.nowhere(first)),
+            None => match (bundled_alone(name), bundled(name)) {
+                (Some(part), _) => {
+                    self.known.insert(first.to_owned(), part.clone());
+                    return Ok(part);
+                }
+                (None, Some(text)) => (first.to_owned(), text.as_bytes().to_vec()),
+                (None, None) => return Err(self.nowhere(first)),
             },
         };
         if self.open.contains(&path) || self.open.len() >= DEPTH {
@@ -273,8 +305,7 @@ impl<'a> PartFiles<'a> {
         let template = self.complete(&path, &bytes);
         self.open.pop();
         let template = template.map_err(|source| PartFileError::Template { path, source })?;
-        let Template { rig, chains, sockets, options, .. } = template;
-        let part = Arc::new(Part { rig, chains, sockets, options });
+        let part = Arc::new(Part::of(template));
         self.known.insert(first.to_owned(), part.clone());
         Ok(part)
     }

@@ -329,7 +329,10 @@ fn a_header_counts_what_parts_bring_as_the_template_has_it() {
         let parts = files.fitted(Path::new("t.rig.ron"), &template).unwrap();
         let mut header = read_header(text.as_bytes()).unwrap();
         let written = (header.joint_count, header.features.clone());
+        let mut listed = header.clone();
+        listed.complete_from_parts(&template.rig, &files.counted(Path::new("t.rig.ron"), &template).unwrap());
         header.complete_from_parts(&template.rig, &parts);
+        assert_eq!(listed, header, "{name}");
         let whole = files.complete(Path::new("t.rig.ron"), text.as_bytes()).unwrap().rig;
         assert_eq!(header.joint_count, whole.len(), "{name}");
         let counted = (header.joint_count, header.features.clone());
@@ -355,6 +358,9 @@ fn a_header_has_the_features_that_changes_of_parts_leave() {
         let parts = reader.fitted(Path::new("man.rig.ron"), &template).unwrap();
         let mut header = read_header(text.as_bytes()).unwrap();
         header.complete_from_parts(&template.rig, &parts);
+        let mut listed = header.clone();
+        listed.complete_from_parts(&template.rig, &reader.counted(Path::new("man.rig.ron"), &template).unwrap());
+        assert_eq!(listed, header, "{changes}");
         let counted = header.features.clone();
         header.complete_from(&reader.complete(Path::new("man.rig.ron"), text.as_bytes()).unwrap().rig);
         assert_eq!(counted, header.features, "{changes}");

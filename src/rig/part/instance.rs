@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, HashMap};
 use super::{OptionError, PartChain, PartChange, PartError, PartOption, PartSocket};
 use crate::rig::{
     JointData, RestTransform, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
-    format::tree::with_field,
+    format::{template::Template, tree::with_field},
     label::mirrored_label,
     nearest::did_you_mean,
     operations::{Draft, MirrorPlane, drop_part},
@@ -28,6 +28,14 @@ pub struct Part {
     pub sockets: Vec<PartSocket>,
     /// Values that its uses may set.
     pub options: Vec<PartOption>,
+}
+
+impl Part {
+    /// The part that a template is, once its own parts are in its rig.
+    pub fn of(template: Template) -> Self {
+        let Template { rig, chains, sockets, options, .. } = template;
+        Self { rig, chains, sockets, options }
+    }
 }
 
 /// A part in a template.
@@ -168,11 +176,14 @@ impl PartInstance {
     /// # Errors
     /// A chain that the part does not have, or that takes another number of joints.
     pub fn fitted(&self, part: &Part, mirror: MirrorParams) -> Result<Rig, PartError> {
-        Ok(self.prepared(self.resized(part)?, mirror))
+        Ok(self.prepared(self.sized(part)?, mirror))
     }
 
     /// The part with as many joints as it has here: as many as it goes onto, where nothing else is said.
-    fn resized(&self, part: &Part) -> Result<Rig, PartError> {
+    ///
+    /// # Errors
+    /// A chain that the part does not have, or that takes another number of joints.
+    pub fn sized(&self, part: &Part) -> Result<Rig, PartError> {
         let mut counts = Vec::new();
         for (name, count) in &self.counts {
             let chain = match part.chains.as_slice() {
