@@ -9,6 +9,7 @@ use crate::rig::{EditError, Rig, RigEdit, Uid, label::mirrored_label};
 
 /// A part that was dropped onto joints of a rig. The next save of the rig writes it as a [`PartInstance`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct DroppedPart {
     /// Identity of the instance, from which those of what the part brings follow.
     pub uid: Uid,
