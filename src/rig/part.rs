@@ -5,7 +5,7 @@
 //! connected through its sockets.
 
 mod change;
-mod dropped;
+mod dropped_part;
 mod error;
 mod instance;
 mod option;
@@ -19,8 +19,8 @@ use std::{
 };
 
 pub use change::PartChange;
-pub use dropped::DroppedPart;
-pub(crate) use dropped::without_dropped;
+pub use dropped_part::DroppedPart;
+pub(crate) use dropped_part::without_dropped;
 pub use error::PartError;
 pub(in crate::rig) use instance::switch_name;
 pub use instance::{MirrorParams, Part, PartInstance};
