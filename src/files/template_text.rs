@@ -15,7 +15,7 @@ pub(crate) type PartReader<'r, 'd> = &'r dyn Fn() -> PartFiles<'d>;
 /// The text of a rig's template.
 pub(crate) struct TemplateText {
     pub text: String,
-    /// What of the former text is lost, a sentence.
+    /// Loss of what the former text has, a sentence.
     pub note: Option<&'static str>,
 }
 
