@@ -4,9 +4,9 @@
 //! cargo bench --bench list
 //! ```
 //!
-//! Five hundred templates of mixed kinds in five folders: the bundled characters, whose headers say all; the same without what
-//! their headers say of joints and features, so that their parts have to be put together; the bundled parts; and
-//! chains written by hand without counts. Runs the command as people do, from its start to its end, and prints the median and
+//! Five hundred templates of mixed kinds in five folders: the bundled characters, whose headers say all; the same without their
+//! counts of joints, so that the files of their parts have to be read; the bundled parts, whose headers say what they need;
+//! and chains written by hand without counts. Runs the command as people do, from its start to its end, and prints the median and
 //! the longest of the rounds in milliseconds, after checking that every template was listed with its joints.
 
 use std::{fs, path::Path, process::Command, time::Instant};

@@ -31,6 +31,7 @@ mod read;
 mod shapes;
 mod site;
 mod store;
+mod template_text;
 mod verify;
 mod watch;
 
@@ -45,7 +46,9 @@ pub use load::{
     FileKind, LoadError, load_animation, load_gestures, load_joint_map, load_model, load_motion, load_rig_text,
     load_skin, load_template, stem,
 };
-pub use parts::{BUNDLED_CHARACTERS, BUNDLED_PARTS, PartFileError, PartFiles, bundled_characters, bundled_parts};
+pub use parts::{
+    BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartFileError, PartFiles, bundled_characters, bundled_parts,
+};
 pub use project::{
     LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote,
     ProjectTemplate, ProjectToSave, load_project, project_files, store_project,
@@ -54,4 +57,5 @@ pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
 pub use site::{SITE_FILE, SearchPaths, SiteError, TEMPLATES_VARIABLE};
 pub use store::{StoreError, store_animation, store_model, store_rig, store_rig_over, store_skin};
+pub(crate) use template_text::template_text;
 pub use watch::{FileWatch, LOOK, TemplateWatch};

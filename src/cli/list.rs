@@ -53,7 +53,10 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
         elsewhere.extend(in_folder(folder, false, &mut report)?);
     }
     elsewhere.retain(|other| listed.iter().all(|own| own.file != other.file));
-    let mut bundled: Vec<ListedTemplate> = BUNDLED_CHARACTERS.iter().chain(BUNDLED_PARTS).map(of_bundled).collect();
+    let bundled: Vec<&(&str, &str)> = BUNDLED_CHARACTERS.iter().chain(BUNDLED_PARTS).collect();
+    // Beside a folder's templates only their versions are of interest.
+    let is_listed = args.folder.is_none();
+    let mut bundled: Vec<ListedTemplate> = bundled.into_par_iter().map(|one| of_bundled(one, is_listed)).collect();
     bundled.sort_by(|a, b| a.file.cmp(&b.file));
     if args.folder.is_none() {
         listed.append(&mut elsewhere);
@@ -112,12 +115,13 @@ fn in_folder(top: &Path, is_needed: bool, report: &mut Report) -> Result<Vec<Lis
     Ok(listed.collect())
 }
 
-/// A template that comes with Rigsmith.
-fn of_bundled((name, text): &(&str, &str)) -> ListedTemplate {
+/// A template that comes with Rigsmith; `is_whole` with what only all of it tells.
+fn of_bundled((name, text): &(&str, &str), is_whole: bool) -> ListedTemplate {
     let header = template::read_header(text.as_bytes()).map_err(HeaderError::from);
     let completed = header.map(|mut header| {
         let none = BTreeMap::new();
-        if is_unknown(&header)
+        if is_whole
+            && is_unknown(&header)
             && let Ok(template) = PartFiles::given(&none).complete(Path::new(name), text.as_bytes())
         {
             header.complete_from(&template.rig);
@@ -197,7 +201,7 @@ fn header(path: &Path, files: &mut PartFiles) -> Result<TemplateHeader, HeaderEr
         let all = read(template::MAX_BYTES as u64)?;
         // What is wrong with a part is told where the template is used.
         if let Ok(template) = template::read_template(&all)
-            && let Ok(parts) = files.fitted(path, &template)
+            && let Ok(parts) = files.counted(path, &template)
         {
             header.complete_from_parts(&template.rig, &parts);
         }

@@ -3,7 +3,7 @@
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{Arc, OnceLock},
 };
 
 use super::{Disk, ReadError, SearchPaths, SiteError, read_capped};
@@ -74,6 +74,17 @@ pub fn bundled_parts() -> Vec<(&'static str, Arc<Part>)> {
     BUNDLED_PARTS.iter().filter_map(read).collect()
 }
 
+/// A part that comes with Rigsmith and uses no others, read once.
+fn bundled_alone(name: &str) -> Option<Arc<Part>> {
+    static READ: [OnceLock<Option<Arc<Part>>>; BUNDLED_PARTS.len()] = [const { OnceLock::new() }; BUNDLED_PARTS.len()];
+    let place = BUNDLED_PARTS.iter().position(|(known, _)| *known == name)?;
+    let read = || {
+        let template = read_template(BUNDLED_PARTS[place].1.as_bytes()).ok()?;
+        template.parts.is_empty().then(|| Arc::new(Part::from(template)))
+    };
+    READ[place].get_or_init(read).clone()
+}
+
 /// Text of a part that comes with Rigsmith. It is used where no file has its name.
 fn bundled(name: &str) -> Option<&'static str> {
     BUNDLED_PARTS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
@@ -87,6 +98,17 @@ enum Source<'a> {
     Disk(&'a dyn Disk),
     /// Contents that are there; `None` for files that there are not.
     Contents(&'a BTreeMap<PathBuf, Option<Vec<u8>>>),
+    /// Parts that another reader has found, by the places beside their templates.
+    Found(&'a BTreeMap<PathBuf, FoundPart>),
+}
+
+/// File of a part that a reader has found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FoundPart {
+    /// The file.
+    pub path: PathBuf,
+    /// Content of the file.
+    pub content: Vec<u8>,
 }
 
 /// Reason why a part of a template cannot be used.
@@ -140,6 +162,8 @@ pub struct PartFiles<'a> {
     pub asked: BTreeMap<PathBuf, Option<Vec<u8>>>,
     /// Files of parts that no list has, in the order in which they were asked for.
     pub missing: Vec<PathBuf>,
+    /// Parts that have files, by the places beside their templates, where they are looked for first.
+    pub found: BTreeMap<PathBuf, FoundPart>,
     site: Option<SearchPaths>,
     known: BTreeMap<PathBuf, Arc<Part>>,
     open: Vec<PathBuf>,
@@ -162,11 +186,22 @@ impl<'a> PartFiles<'a> {
         Self::of(Source::Contents(files), modules::all())
     }
 
+    /// A reader of the parts that another one has [found](Self::found), and of those that come with Rigsmith.
+    pub fn known(found: &'a BTreeMap<PathBuf, FoundPart>, modules: Modules) -> Self {
+        Self::of(Source::Found(found), modules)
+    }
+
+    /// The modules whose parameters are mirrored.
+    pub fn modules(&self) -> &Modules {
+        &self.modules
+    }
+
     fn of(source: Source<'a>, modules: Modules) -> Self {
         Self {
             source,
             modules,
             missing: Vec::new(),
+            found: BTreeMap::new(),
             asked: BTreeMap::new(),
             site: None,
             known: BTreeMap::new(),
@@ -218,15 +253,40 @@ impl<'a> PartFiles<'a> {
     /// # Errors
     /// A part that cannot be had or does not fit.
     pub fn fitted(&mut self, path: &Path, template: &Template) -> Result<Vec<(PartInstance, Rig)>, PartFileError> {
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let modules = self.modules.clone();
-        let mirror = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
         let instances = template.parts.iter().chain(&template.instances);
-        let fitted = instances.map(|instance| {
-            let part = self.part(&folder.join(&instance.part), &instance.part)?;
-            Ok((instance.clone(), instance.fitted(&part, &mirror)?))
+        instances.map(|instance| Ok((instance.clone(), self.fitted_part(path, instance)?))).collect()
+    }
+
+    /// The part of an instance, [fitted](PartInstance::fitted), for the template whose file is `path`.
+    ///
+    /// # Errors
+    /// A part that cannot be had or does not fit.
+    pub fn fitted_part(&mut self, path: &Path, instance: &PartInstance) -> Result<Rig, PartFileError> {
+        let part = self.of_instance(path, instance)?;
+        let mirror = |module: &str, params: &str| self.modules.get(module)?.mirrored(params).ok();
+        Ok(instance.fitted(&part, &mirror)?)
+    }
+
+    /// Every part instance of a template with its part as far as a header tells of it: with as many joints as it has here, and
+    /// with other names and values than here where nothing refers to them.
+    ///
+    /// # Errors
+    /// A part that cannot be had, or that does not take so many joints.
+    pub fn counted(&mut self, path: &Path, template: &Template) -> Result<Vec<(PartInstance, Rig)>, PartFileError> {
+        let counted = template.parts.iter().map(|instance| {
+            // Changes call tags by the names that they have here.
+            if instance.changes.iter().any(|change| change.removed) {
+                return Ok((instance.clone(), self.fitted_part(path, instance)?));
+            }
+            let part = self.of_instance(path, instance)?;
+            Ok((instance.clone(), instance.sized(&part)?))
         });
-        fitted.collect()
+        counted.collect()
+    }
+
+    fn of_instance(&mut self, path: &Path, instance: &PartInstance) -> Result<Arc<Part>, PartFileError> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        self.part(&folder.join(&instance.part), &instance.part)
     }
 
     /// The part of that name, beside its template at `first` or elsewhere.
@@ -234,11 +294,19 @@ impl<'a> PartFiles<'a> {
         if let Some(known) = self.known.get(first) {
             return Ok(known.clone());
         }
-        let (path, bytes) = match self.found(first, name)? {
-            Some(found) => found,
-            None => match bundled(name) {
-                Some(text) => (first.to_owned(), text.as_bytes().to_vec()),
-                None => return Err(self.nowhere(first)),
+        let (path, bytes) = match self.file(first, name)? {
+            Some((path, content)) => {
+                let part = FoundPart { path: path.clone(), content: content.clone() };
+                self.found.insert(first.to_owned(), part);
+                (path, content)
+            }
+            None => match (bundled_alone(name), bundled(name)) {
+                (Some(part), _) => {
+                    self.known.insert(first.to_owned(), part.clone());
+                    return Ok(part);
+                }
+                (None, Some(text)) => (first.to_owned(), text.as_bytes().to_vec()),
+                (None, None) => return Err(self.nowhere(first)),
             },
         };
         if self.open.contains(&path) || self.open.len() >= DEPTH {
@@ -254,9 +322,12 @@ impl<'a> PartFiles<'a> {
     }
 
     /// The file of a part and its content; `None` if no folder has it. A file that is there, and cannot be read, is an error.
-    fn found(&mut self, first: &Path, name: &str) -> Result<Option<(PathBuf, Vec<u8>)>, PartFileError> {
+    fn file(&mut self, first: &Path, name: &str) -> Result<Option<(PathBuf, Vec<u8>)>, PartFileError> {
         let disk = match self.source {
             Source::Disk(disk) => disk,
+            Source::Found(found) => {
+                return Ok(found.get(first).map(|part| (part.path.clone(), part.content.clone())));
+            }
             Source::Contents(files) => {
                 let known = files.get(first);
                 if known.is_none() {
@@ -297,7 +368,7 @@ impl<'a> PartFiles<'a> {
     fn nowhere(&self, first: &Path) -> PartFileError {
         let missing = match self.source {
             Source::Disk(disk) => read_capped(disk, first, 0).err(),
-            Source::Contents(_) => None,
+            Source::Contents(_) | Source::Found(_) => None,
         };
         match (missing, self.site.as_ref().map_or(0, |site| site.folders.len())) {
             (None, _) => PartFileError::Missing { path: first.to_owned() },

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    Disk, FileKind, FileSet, LoadError, PartFiles, SaveError, read_capped, save_atomic, save_set, stem, verify,
+    Disk, FileKind, FileSet, LoadError, PartFiles, SaveError, read_capped, save_atomic, save_set, stem,
+    template_text::{TemplateText, template_text},
+    verify,
 };
 use crate::{
     mesh::{
@@ -16,10 +18,9 @@ use crate::{
         animation::RigClip,
         character::rig_text,
         format::animation::{self, write_animation},
-        part::PartChange,
         project,
         skin::{SkinError, SkinFile},
-        template::{self, PartRigs, write_template},
+        template::{self, write_template},
         text::{self, RigTextError},
     },
 };
@@ -224,50 +225,10 @@ pub fn store_rig_over(disk: &dyn Disk, path: &Path, rig: &Rig, sources: &[&Path]
         Some(text.strip_prefix('\u{FEFF}').map(str::to_owned).unwrap_or(text))
     };
     let found = sources.iter().find_map(|source| Some((*source, text_of(source)?)));
-    if let Some((source, text)) = &found
-        && template::read_template(text.as_bytes()).is_ok_and(|template| !template.parts.is_empty())
-    {
-        let over = over_parts(disk, rig, source, text);
-        save_template(disk, path, &over.clone().unwrap_or_else(|| write_template(rig)))?;
-        let note =
-            "the parts of the template were written out: its text could not be changed to say what the rig is now";
-        return Ok(over.is_none().then(|| note.to_owned()).into_iter().collect());
-    }
-    let source = found.map(|(_, text)| text);
-    let over = source.as_deref().and_then(|text| template::write_template_over(rig, text));
-    let is_anew = source.is_some() && over.is_none();
-    save_template(disk, path, &over.unwrap_or_else(|| write_template(rig)))?;
-    let note = "the file was written anew: its text could not be changed to say what the rig is now, and its comments are gone";
-    Ok(is_anew.then(|| note.to_owned()).into_iter().collect())
-}
-
-/// The text of a template with parts that says what the rig is; `None` if something of the parts is different in it.
-fn over_parts(disk: &dyn Disk, rig: &Rig, path: &Path, text: &str) -> Option<String> {
-    let says = |text: &str| {
-        let read = PartFiles::new(disk).complete(path, text.as_bytes());
-        read.is_ok_and(|template| template::says_the_same(&template.rig, rig))
-    };
-    if says(text) {
-        return Some(text.to_owned());
-    }
-    let mut files = PartFiles::new(disk);
-    let read = template::read_template(text.as_bytes()).ok()?;
-    let parts = files.fitted(path, &read).ok()?;
-    let own = read.rig.clone();
-    let mut without_changes = read.clone();
-    for part in &mut without_changes.parts {
-        // Other parts may go onto joints by the labels that changes give.
-        for change in &mut part.changes {
-            *change = PartChange { joint: change.joint.clone(), label: change.label.clone(), ..PartChange::default() };
-        }
-        part.changes.retain(|change| change.label.is_some());
-    }
-    let before = files.put_together(path, text, read).ok()?.rig;
-    let plain = files.put_together(path, text, without_changes).ok()?.rig;
-    let rigs = PartRigs { own: &own, before: &before, plain: &plain, parts: &parts };
-    // Names are what people write; uids say it where a name means something else.
-    let texts = [true, false].into_iter().filter_map(|names| template::write_parts_over(rig, &rigs, text, names));
-    texts.into_iter().find(|text| says(text))
+    let source = found.as_ref().map(|(source, text)| (*source, text.as_str()));
+    let TemplateText { text, note } = template_text(rig, source, path, &|| PartFiles::new(disk));
+    save_template(disk, path, &text)?;
+    Ok(note.map(str::to_owned).into_iter().collect())
 }
 
 fn save_template(disk: &dyn Disk, path: &Path, text: &str) -> Result<(), StoreError> {

@@ -52,12 +52,17 @@ impl FileWatch {
     /// Looks at the file. A content that is neither known nor given out, and the same at two looks in a row, is given out.
     /// A file that is not there for the moment, as between two steps of a save, is waited for.
     pub fn look(&mut self, disk: &dyn Disk) -> Option<&[u8]> {
+        self.look_at(disk, Instant::now())
+    }
+
+    /// Looks at the file at a time that is not before that of the last look: see [`look`](Self::look).
+    pub fn look_at(&mut self, disk: &dyn Disk, now: Instant) -> Option<&[u8]> {
         let state = disk.entry(&self.path, true).ok().map(|entry| (entry.len, entry.modified));
-        let is_recent = self.read.is_some_and(|read| read.elapsed() < READ_EVERY);
+        let is_recent = self.read.is_some_and(|read| now.saturating_duration_since(read) < READ_EVERY);
         if self.next.is_none() && state == self.seen && is_recent {
             return None;
         }
-        self.read = Some(Instant::now());
+        self.read = Some(now);
         let content = match read_capped(disk, &self.path, self.limit) {
             Ok(content) => content,
             // A file may be emptied before it is written; one that stays empty is given out, too.
@@ -115,10 +120,15 @@ impl TemplateWatch {
 
     /// Looks at all files, see [`FileWatch::look`]. The content of the template's own file, if one of them has a new one.
     pub fn look(&mut self, disk: &dyn Disk) -> Option<Vec<u8>> {
-        let own = self.own.look(disk).map(<[u8]>::to_vec);
+        self.look_at(disk, Instant::now())
+    }
+
+    /// Looks at all files at a time that is not before that of the last look: see [`look`](Self::look).
+    pub fn look_at(&mut self, disk: &dyn Disk, now: Instant) -> Option<Vec<u8>> {
+        let own = self.own.look_at(disk, now).map(<[u8]>::to_vec);
         let mut is_part = false;
         for part in &mut self.parts {
-            is_part |= part.look(disk).is_some();
+            is_part |= part.look_at(disk, now).is_some();
         }
         own.or_else(|| match &self.own.known {
             _ if !is_part => None,

@@ -20,7 +20,7 @@ use crate::{
         schema::Attributes,
     },
     processor::{Exclusion, FindError, RunReport},
-    rig::{AttributeKind, BuiltNode, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::listed},
+    rig::{AttributeKind, BuiltNode, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::listed},
     solve::program::ProgramError,
 };
 

@@ -1,6 +1,10 @@
 //! Templates as assets.
 
-use std::{collections::BTreeMap, path::Path, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use bevy::{
     asset::{
@@ -12,29 +16,54 @@ use bevy::{
 };
 
 use crate::{
-    files::PartFiles,
+    files::{FoundPart, PartFiles, template_text},
+    modules,
+    processor::Modules,
     rig::{
         Rig, SourceError,
         part::PartSocket,
-        template::{Template, text_of, write_template, write_template_over},
+        template::{Template, text_of},
     },
 };
 
 /// A template as an asset, `.rig.ron`.
 #[derive(Asset, TypePath, Debug, Clone)]
 pub struct RigTemplate {
-    /// True if the text has parts, whose content the rig has.
-    has_parts: bool,
     rig: Arc<Rig>,
     sockets: Arc<[PartSocket]>,
     /// The text that the rig was read from; empty for a rig that was made by code.
     text: Arc<str>,
+    /// True if the rig is what the text says.
+    is_of_text: bool,
+    parts: Arc<TemplateParts>,
+}
+
+/// Parts of a template as they were when it was read.
+#[derive(Debug)]
+struct TemplateParts {
+    /// The template's own file.
+    path: PathBuf,
+    found: BTreeMap<PathBuf, FoundPart>,
+    modules: Modules,
+}
+
+impl TemplateParts {
+    fn reader(&self) -> PartFiles<'_> {
+        PartFiles::known(&self.found, self.modules.clone())
+    }
 }
 
 impl RigTemplate {
     /// A template of a rig.
     pub fn new(rig: Rig) -> Self {
-        Self { has_parts: false, rig: Arc::new(rig), sockets: Arc::from([]), text: Arc::from("") }
+        let parts = TemplateParts { path: PathBuf::new(), found: BTreeMap::new(), modules: modules::all() };
+        Self {
+            rig: Arc::new(rig),
+            sockets: Arc::from([]),
+            text: Arc::from(""),
+            is_of_text: false,
+            parts: Arc::new(parts),
+        }
     }
 
     /// The template that a text holds. Its parts are those that come with Rigsmith.
@@ -50,13 +79,11 @@ impl RigTemplate {
     /// # Errors
     /// See [`PartFiles::complete`].
     pub fn read_with_parts(content: &[u8], path: &Path, files: &mut PartFiles) -> Result<Self, SourceError> {
-        Self::of(files.complete(path, content)?, content)
-    }
-
-    fn of(template: Template, content: &[u8]) -> Result<Self, SourceError> {
-        let has_parts = !template.instances.is_empty();
-        let (rig, sockets, text) = (Arc::new(template.rig), template.sockets.into(), Arc::from(text_of(content)?));
-        Ok(Self { has_parts, rig, sockets, text })
+        let Template { rig, sockets, .. } = files.complete(path, content)?;
+        let (found, modules) = (files.found.clone(), files.modules().clone());
+        let parts = Arc::new(TemplateParts { path: path.to_owned(), found, modules });
+        let text = Arc::from(text_of(content)?);
+        Ok(Self { rig: Arc::new(rig), sockets: sockets.into(), text, is_of_text: true, parts })
     }
 
     /// The rig.
@@ -69,14 +96,11 @@ impl RigTemplate {
         &self.sockets
     }
 
-    /// Replaces the rig; a save changes the text only where the rig differs from it.
+    /// Replaces the rig; a save changes the text only where the rig differs from it, and parts stay parts.
     pub fn set_rig(&mut self, rig: Rig) {
         if rig != *self.rig {
             self.rig = Arc::new(rig);
-            if std::mem::take(&mut self.has_parts) {
-                // Parts are written out: the text does not say what is different about them.
-                self.text = Arc::from("");
-            }
+            self.is_of_text = false;
         }
     }
 
@@ -85,12 +109,15 @@ impl RigTemplate {
         &self.text
     }
 
-    /// The text that a save writes: that of the file where it was read from one, changed where the rig differs from it.
+    /// The text that a save writes: that of the file where it was read from one, changed where the rig differs from it. What
+    /// is different about parts becomes changes of their instances; where these cannot say it, the parts are written out.
     pub fn saved(&self) -> String {
-        if self.has_parts {
+        if self.is_of_text {
             return self.text.to_string();
         }
-        write_template_over(&self.rig, &self.text).unwrap_or_else(|| write_template(&self.rig))
+        let path = self.parts.path.as_path();
+        let source = (!self.text.is_empty()).then(|| (path, &*self.text));
+        template_text(&self.rig, source, path, &|| self.parts.reader()).text
     }
 
     /// True if both are the same in memory.

@@ -11,7 +11,7 @@ use crate::{
     mesh::model::Weights,
     rig::{
         AttributeValues, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint, StoredPose,
-        TagData, Uid, animation::RigClip,
+        TagData, Uid, animation::RigClip, part::DroppedPart,
     },
 };
 
@@ -37,6 +37,8 @@ pub struct Rig {
     pub(super) values: AttributeValues,
     pub(super) poses: Vec<StoredPose>,
     pub(super) clips: Vec<RigClip>,
+    /// Parts that were dropped onto joints, and that the rig's file may not have yet.
+    pub(super) dropped: Vec<DroppedPart>,
     /// Renewed by each edit of anything but pose, values, stored poses and clips.
     pub(super) revision: Revision,
 }
@@ -113,6 +115,12 @@ impl Rig {
     /// The declared input with that uid.
     pub fn input(&self, uid: Uid) -> Option<&RigInput> {
         self.inputs.iter().find(|input| input.uid == uid)
+    }
+
+    /// Parts that were dropped onto joints, in their order. Those whose tags are gone have no effect, and those that the rig's
+    /// file has are in it.
+    pub fn dropped_parts(&self) -> &[DroppedPart] {
+        &self.dropped
     }
 
     /// Root joints in authored order.

@@ -23,6 +23,7 @@ use crate::{
         animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
         document::{RigAbout, SkinData},
         format::source::ron_options,
+        part::DroppedPart,
     },
 };
 
@@ -146,6 +147,8 @@ pub enum RigEdit {
     SetFace(Uid, Option<Box<FacePlacement>>),
     /// Replaces the declared inputs.
     SetInputs(Vec<RigInput>),
+    /// Replaces the record of parts that were dropped onto joints; what they brought stays.
+    SetDroppedParts(Vec<DroppedPart>),
 }
 
 /// Error of applying an edit. The rig is unchanged.
@@ -325,6 +328,9 @@ impl Rig {
                 RigEdit::SetFace(*uid, old.map(Box::new))
             }
             RigEdit::SetInputs(inputs) => self.set_inputs(inputs)?,
+            RigEdit::SetDroppedParts(parts) => {
+                RigEdit::SetDroppedParts(std::mem::replace(&mut self.dropped, parts.clone()))
+            }
         })
     }
 

@@ -5,6 +5,7 @@
 //! connected through its sockets.
 
 mod change;
+mod dropped_part;
 mod error;
 mod instance;
 mod option;
@@ -12,9 +13,14 @@ mod overrides;
 mod resize;
 mod socket;
 
-use std::{collections::HashMap, fmt};
+use std::{
+    collections::{HashMap, HashSet},
+    fmt,
+};
 
 pub use change::PartChange;
+pub use dropped_part::DroppedPart;
+pub(crate) use dropped_part::without_dropped;
 pub use error::PartError;
 pub(in crate::rig) use instance::switch_name;
 pub use instance::{MirrorParams, Part, PartInstance};
@@ -26,6 +32,7 @@ pub use socket::{PartSocket, SocketError};
 
 use crate::rig::{
     NodeRef, Rig, RigJoint, TagKind, Uid,
+    label::mirrored_label,
     reference::{NameKind, Source, references_in},
 };
 
@@ -103,6 +110,22 @@ fn references_of(joint: &RigJoint) -> Vec<NodeRef> {
 fn refers_to(joint: &RigJoint) -> impl Iterator<Item = (NameKind, Uid)> {
     let uids = references_of(joint).into_iter().flat_map(|reference| reference.uids().collect::<Vec<_>>());
     uids.filter(|(kind, _)| matches!(kind, NameKind::Joint | NameKind::Command))
+}
+
+/// Joints whose labels differ by their side alone, where neither has a partner.
+pub(in crate::rig) fn unpaired_sides(rig: &Rig) -> Vec<(Uid, Uid)> {
+    let mut paired: HashSet<Uid> =
+        rig.walk().filter(|joint| joint.data.mirror.is_some()).map(|joint| joint.data.uid).collect();
+    let mut pairs = Vec::new();
+    for joint in rig.walk() {
+        let (uid, opposite) = (joint.data.uid, joint.data.label.as_deref().and_then(mirrored_label));
+        let Some(other) = opposite.and_then(|label| rig.find_label(&label)) else { continue };
+        if !paired.contains(&uid) && !paired.contains(&other) {
+            paired.extend([uid, other]);
+            pairs.push((uid, other));
+        }
+    }
+    pairs
 }
 
 /// Joints and commands beyond the first joints of a part that the commands of other joints refer to.

@@ -182,6 +182,9 @@ pub fn edits_from_empty(rig: &Rig) -> Vec<RigEdit> {
     if !rig.inputs().is_empty() {
         edits.push(RigEdit::SetInputs(rig.inputs().to_vec()));
     }
+    if !rig.dropped_parts().is_empty() {
+        edits.push(RigEdit::SetDroppedParts(rig.dropped_parts().to_vec()));
+    }
     edits.extend(rig.walk().map(|joint| RigEdit::AddJoint {
         joint: Box::new(joint.data.clone()),
         parent: joint.parent,

@@ -40,6 +40,7 @@ mod display;
 mod drawing;
 #[cfg(feature = "render")]
 mod drawing_pictures;
+mod dropped_parts;
 mod dual_quaternion;
 mod edit_text;
 #[cfg(feature = "editor")]
@@ -118,6 +119,7 @@ mod parts_more;
 mod picking;
 mod placement;
 mod plugins;
+mod polling;
 mod pose;
 mod prerequisites;
 mod processor;

@@ -1,6 +1,10 @@
 //! Sockets and options of parts: where others hang, and what they may vary.
 
-use std::{fs, path::Path};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use bevy::{ecs::system::RunSystemOnce, prelude::*};
 use rigsmith::{
@@ -11,7 +15,7 @@ use rigsmith::{
     plugins::runtime::{InstanceMode, RigNodes},
     rig::{
         Rig, RigEdit, TagKind,
-        template::{read_header, read_template},
+        template::{FeatureSummary, read_header, read_template},
     },
     solve::program::ExposedNode,
 };
@@ -320,12 +324,15 @@ fn frozen_files_with_parts_stay_readable() {
 fn a_header_counts_what_parts_bring_as_the_template_has_it() {
     for (name, text) in BUNDLED_CHARACTERS {
         let template = read_template(text.as_bytes()).unwrap();
-        let none = std::collections::BTreeMap::new();
+        let none = BTreeMap::new();
         let mut files = PartFiles::given(&none);
         let parts = files.fitted(Path::new("t.rig.ron"), &template).unwrap();
         let mut header = read_header(text.as_bytes()).unwrap();
         let written = (header.joint_count, header.features.clone());
+        let mut listed = header.clone();
+        listed.complete_from_parts(&template.rig, &files.counted(Path::new("t.rig.ron"), &template).unwrap());
         header.complete_from_parts(&template.rig, &parts);
+        assert_eq!(listed, header, "{name}");
         let whole = files.complete(Path::new("t.rig.ron"), text.as_bytes()).unwrap().rig;
         assert_eq!(header.joint_count, whole.len(), "{name}");
         let counted = (header.joint_count, header.features.clone());
@@ -333,4 +340,38 @@ fn a_header_counts_what_parts_bring_as_the_template_has_it() {
         assert_eq!(counted.1, header.features, "{name}");
         assert_eq!(written, counted, "{name} says so itself");
     }
+}
+
+#[test]
+fn a_header_has_the_features_that_changes_of_parts_leave() {
+    let part = "(format: 2, name: \"limb\", kind: \"part\", joints: [(label: \"bone\", tags: [\
+                Feature(kind: \"ik\", name: \"ik\"), Feature(kind: \"ik\", name: \"ik\", switch: \"stretch\"), \
+                Feature(uid: \"00000000000000f1\", kind: \"deform\", name: \"twist\"), control()])])";
+    let files = BTreeMap::from([(PathBuf::from("limb.rig.ron"), Some(part.as_bytes().to_vec()))]);
+    let named = |changes: &str| {
+        let text = format!(
+            "(format: 2, name: \"man\", joints: [(label: \"body\")], parts: [(part: \"limb.rig.ron\", name: \"left\", \
+             parent: \"body\", prefix: \"l_\", changes: [{changes}])])"
+        );
+        let template = read_template(text.as_bytes()).unwrap();
+        let mut reader = PartFiles::given(&files);
+        let parts = reader.fitted(Path::new("man.rig.ron"), &template).unwrap();
+        let mut header = read_header(text.as_bytes()).unwrap();
+        header.complete_from_parts(&template.rig, &parts);
+        let mut listed = header.clone();
+        listed.complete_from_parts(&template.rig, &reader.counted(Path::new("man.rig.ron"), &template).unwrap());
+        assert_eq!(listed, header, "{changes}");
+        let counted = header.features.clone();
+        header.complete_from(&reader.complete(Path::new("man.rig.ron"), text.as_bytes()).unwrap().rig);
+        assert_eq!(counted, header.features, "{changes}");
+        let names = |feature: &FeatureSummary| (feature.name.clone(), feature.switches.join(" "));
+        counted.iter().map(names).collect::<Vec<_>>()
+    };
+    let of = |names: &[(&str, &str)]| -> Vec<(String, String)> {
+        names.iter().map(|(name, switches)| ((*name).to_owned(), (*switches).to_owned())).collect()
+    };
+    assert_eq!(named(""), of(&[("twist", ""), ("ik", "stretch")]));
+    assert_eq!(named("(tag: \"00000000000000f1\", removed: true)"), of(&[("ik", "stretch")]));
+    let added = "(joint: \"bone\", tags: [Feature(kind: \"hand\", name: \"fingers\", switch: \"curl\")])";
+    assert_eq!(named(added), of(&[("twist", ""), ("fingers", "curl"), ("ik", "stretch")]));
 }

@@ -211,14 +211,14 @@ fn mistakes_are_named_with_their_place() {
 #[test]
 fn a_newer_format_opens_and_says_what_it_does_not_know() {
     let text = FROZEN
-        .replacen("format: 1,", "format: 4, lights: [(x: 1)],", 1)
+        .replacen("format: 1,", "format: 5, lights: [(x: 1)],", 1)
         .replacen("mode: \"Pose\"", "fog: 0.5, mode: \"Pose\"", 1)
         .replacen("skins: [", "muscles: [], skins: [", 1)
-        .replacen("format: 1,", "format: 4, meaning: 42,", 1);
+        .replacen("format: 1,", "format: 5, meaning: 42,", 1);
     let read = read_project(text.as_bytes()).unwrap();
     assert_eq!(read.project, frozen());
     let told = read.notes.join("\n");
-    for part in ["project has format 4", "`lights`", "`fog`", "`muscles`", "template has format 4"] {
+    for part in ["project has format 5", "`lights`", "`fog`", "`muscles`", "template has format 5"] {
         assert!(told.contains(part), "{part}: {told}");
     }
     let line = place(&text, "meaning: 42").0;
@@ -549,6 +549,19 @@ fn a_character_with_a_skeleton_of_its_own_goes_through_a_project() {
 }
 
 const FOLLOWS: &str = include_str!("../frozen/format-3.rigsmith.ron");
+
+#[test]
+fn the_frozen_file_of_format_4_keeps_dropped_parts() {
+    let text = include_str!("../frozen/format-4.rigsmith.ron");
+    let read = read_project(text.as_bytes()).unwrap();
+    assert_eq!(read.notes, Vec::<String>::new());
+    let [part] = read.project.rigs[0].rig.dropped_parts() else { panic!("{:?}", read.project) };
+    assert_eq!((part.uid, part.part.as_str(), part.mirror), (Uid(0xc0), "parts/fk_chain.rig.ron", true));
+    assert_eq!(part.joints, [Uid(0xa1)]);
+    assert_eq!(write_project(&read.project), text);
+    let wrong = text.replacen("mirror: true", "mirrored: true", 1);
+    assert!(read_project(wrong.as_bytes()).unwrap_err().to_string().contains("mirrored"));
+}
 
 #[test]
 fn the_template_that_a_rig_follows_is_kept_with_its_version() {

@@ -123,10 +123,10 @@ impl TagsPanel {
                 }
             });
             ui.menu_button("Part", |ui| {
-                if let Some(part) = self.parts.menu(ui) {
-                    let joints = parts::joints_for(&shown.rig, &self.stack.joints, &part.rig);
-                    let bindings = std::collections::BTreeMap::new();
-                    send(TagOperation::Drop { part, joints, bindings }, shown, requests);
+                let Some((file, part)) = self.parts.menu(ui) else { return };
+                match parts::added(&shown.rig, &self.stack.joints, (file, &part.rig), modules) {
+                    Ok(operation) => send(operation, shown, requests),
+                    Err(error) => requests.send(Notice::error(format!("The part was not added: {error}."))),
                 }
             });
             if ui.button("Copy all").on_hover_text("Copies all tags of the selected joints").clicked() {

@@ -36,7 +36,7 @@ pub(in crate::rig) use read::read_text;
 pub use read::{read_header, read_template, survey_template, text_of};
 pub use shorthand::{Explicit, explicit};
 pub use text_patch::write_template_over;
-pub(crate) use text_patch::{PartRigs, says_the_same, write_parts_over};
+pub(crate) use text_patch::{PartRigs, says_the_same, with_instances, without_instances, write_parts_over};
 pub use tidy::{UidStyle, format_template};
 pub use write::write_template;
 pub(in crate::rig) use write::{quoted, vector, write_without_poses};

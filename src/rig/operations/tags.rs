@@ -88,6 +88,17 @@ pub enum TagOperation {
         /// resolved by label or name.
         bindings: BTreeMap<Uid, Uid>,
     },
+    /// Drops a part onto a chain of joints so that it stays a part: the rig's file gets a part instance.
+    AddPart {
+        /// File of the part, as a template names it.
+        part: String,
+        /// The part as it is [fitted](crate::rig::part::PartInstance::fitted) to these joints.
+        fitted: Arc<Rig>,
+        /// The joints, in order.
+        joints: Vec<Uid>,
+        /// True for a part of the other side of the character.
+        mirror: bool,
+    },
     /// Turns a combined feature on or off.
     SetFeature(FeatureKey, bool),
     /// Turns one part of a combined feature on or off.
@@ -192,6 +203,7 @@ impl TagOperation {
             Self::Paste { to: PasteTo::Mirror, .. } => "Paste tags mirrored",
             Self::Paste { .. } => "Paste tags",
             Self::Drop { .. } => "Drop part",
+            Self::AddPart { .. } => "Add part",
             Self::SetFeature(_, true) | Self::SetSwitch(_, _, true) => "Turn feature on",
             Self::SetFeature(_, false) | Self::SetSwitch(_, _, false) => "Turn feature off",
             Self::ChooseSwitch(..) => "Choose switch",
@@ -256,6 +268,9 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
         TagOperation::Cut(clipboard) => paste::cut(draft, clipboard),
         TagOperation::Paste { clipboard, what, to } => paste::paste(draft, clipboard, *what, to),
         TagOperation::Drop { part, joints, bindings } => part::drop_sized(draft, part, joints, bindings),
+        TagOperation::AddPart { part, fitted, joints, mirror } => {
+            part::drop_instance(draft, part, fitted, joints, *mirror)
+        }
         TagOperation::SetFeature(key, on) => apply(draft, feature::set_feature(draft.rig(), key, *on)?),
         TagOperation::SetSwitch(key, switch, on) => apply(draft, feature::set_switch(draft.rig(), key, switch, *on)?),
         TagOperation::ChooseSwitch(key, switch) => apply(draft, feature::choose_switch(draft.rig(), key, switch)?),

@@ -9,13 +9,12 @@ use std::collections::{BTreeMap, HashMap};
 use super::{OptionError, PartChain, PartChange, PartError, PartOption, PartSocket};
 use crate::rig::{
     JointData, RestTransform, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
-    format::tree::with_field,
+    format::{template::Template, tree::with_field},
     label::mirrored_label,
     nearest::did_you_mean,
     operations::{Draft, MirrorPlane, drop_part},
     reference::map_text_fields,
     remap::mirror_names,
-    template::Template,
 };
 
 /// A template that others use, with what it lets them vary.
@@ -203,11 +202,14 @@ impl PartInstance {
     /// # Errors
     /// A chain that the part does not have, or that takes another number of joints.
     pub fn fitted(&self, part: &Part, mirror: MirrorParams) -> Result<Rig, PartError> {
-        Ok(self.prepared(self.resized(part)?, mirror))
+        Ok(self.prepared(self.sized(part)?, mirror))
     }
 
     /// The part with as many joints as it has here: as many as it goes onto, where nothing else is said.
-    fn resized(&self, part: &Part) -> Result<Rig, PartError> {
+    ///
+    /// # Errors
+    /// A chain that the part does not have, or that takes another number of joints.
+    pub fn sized(&self, part: &Part) -> Result<Rig, PartError> {
         let mut counts = Vec::new();
         for (name, count) in &self.counts {
             let chain = match part.chains.as_slice() {

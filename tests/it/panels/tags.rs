@@ -1,8 +1,14 @@
 //! The list of a joint's tags tells what became of each command.
 
+use std::fs;
+
 use rigsmith::{
-    editor::panels::properties::PropertiesPanel,
-    plugins::commands::{BuildRequest, BuildStep},
+    editor::panels::{properties::PropertiesPanel, tags::TagsPanel},
+    files::{RealDisk, load_template, store_rig_over},
+    plugins::{
+        commands::{BuildRequest, BuildStep},
+        document::{Change, EditRequest},
+    },
     rig::{Uid, template::read_template},
 };
 
@@ -37,4 +43,37 @@ fn tags_are_listed_with_what_became_of_them() {
     desk.click("control");
     desk.frames(3);
     assert!(is_on(&desk) && !desk.says("passed over"));
+}
+
+#[test]
+fn a_part_that_is_added_stays_a_part() {
+    let mut desk = Desk::new(TagsPanel::default());
+    desk.resize(400.0, 1200.0);
+    let joints = desk.chain(&["horn_1", "horn_2", "horn_3"]);
+    desk.select(&[joints[0]]);
+    desk.frames(2);
+    let (before, steps) = (desk.rig().clone(), desk.steps().0);
+    desk.click("Part");
+    desk.frames(3);
+    desk.click("fk chain");
+    desk.frames(3);
+    assert_eq!(desk.steps().0, steps + 1, "{:?}", desk.told());
+    let [part] = desk.rig().dropped_parts() else { panic!("{:?}", desk.rig().dropped_parts()) };
+    assert_eq!((part.part.as_str(), &part.joints), ("parts/fk_chain.rig.ron", &joints));
+    // The file names the part, and reads as the rig in the window.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("horn.rig.ron");
+    let save = |desk: &Desk| -> String {
+        assert_eq!(store_rig_over(&RealDisk, &path, desk.rig(), &[&path]).unwrap(), Vec::<String>::new());
+        fs::read_to_string(&path).unwrap()
+    };
+    let text = save(&desk);
+    let line = "(part: \"parts/fk_chain.rig.ron\", onto: [\"horn_1\", \"horn_2\", \"horn_3\"])";
+    assert!(text.contains(line) && !text.contains("Command"), "{text}");
+    assert_eq!(load_template(&RealDisk, &path).unwrap().instances.len(), 1);
+    // Undo takes it out of the rig and, with the next save, out of the file.
+    desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
+    desk.frames(3);
+    assert_eq!(*desk.rig(), before);
+    assert!(!save(&desk).contains("parts"));
 }

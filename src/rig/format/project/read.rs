@@ -19,6 +19,7 @@ use crate::rig::{
     format::scan::{self, Field},
     format::source::{ron_options, utf8},
     format::version::Format,
+    part::DroppedPart,
     template,
 };
 
@@ -66,6 +67,8 @@ struct RigFile {
     poses: Vec<PoseFile>,
     #[serde(default)]
     clips: Vec<ClipFile>,
+    #[serde(default)]
+    parts: Vec<DroppedPart>,
 }
 
 pub(super) fn vector<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec3, D::Error> {
@@ -187,6 +190,8 @@ fn read_rigs(
         }
         read_stored_poses(places, element, &mut rig, &file.poses)?;
         read_clips(places, number, &mut rig, file.clips)?;
+        let edit = RigEdit::SetDroppedParts(file.parts);
+        rig.apply(&edit).map_err(|error| places.error(element, "parts", error.to_string()))?;
         rigs.push(ProjectRig { rig, skins: file.skins });
     }
     Ok(rigs)
@@ -291,8 +296,9 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
         (1, ["", "", ""]) => Some(&["format", "name", "meshes", "rigs", "templates", "view", "journal"]),
         (3, ["meshes", "", ""]) => Some(&["uid", "rig", "path", "hash", "nodes"]),
         (3, ["templates", "", ""]) => Some(&["rig", "path", "base"]),
-        (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "values", "poses", "clips"]),
+        (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "values", "poses", "clips", "parts"]),
         (5, ["skins", "rigs", ""]) => Some(&["mesh", "path", "hash", "at_rest"]),
+        (5, ["parts", "rigs", ""]) => Some(&["uid", "part", "joints", "mirror"]),
         (5, ["pose", "rigs", ""]) => Some(OFFSET),
         (5, ["poses", "rigs", ""]) => Some(&["uid", "name", "offsets", "values"]),
         (7, ["offsets", "poses", "rigs"]) => Some(OFFSET),

@@ -11,6 +11,7 @@ use crate::rig::{
         poses::{write_offsets, write_stored_poses, write_values},
         scan,
     },
+    part::DroppedPart,
     template::{quoted, vector, write_without_poses},
 };
 
@@ -23,7 +24,7 @@ pub fn write_project(project: &Project) -> String {
 
 fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
     let of_rigs = project.rigs.iter().map(|entry| needed_format(&entry.rig)).max().unwrap_or(1);
-    let format = if project.templates.is_empty() { of_rigs } else { FORMAT };
+    let format = if project.templates.is_empty() { of_rigs } else { of_rigs.max(3) };
     writeln!(out, "(\n    format: {format},\n    name: {},", quoted(&project.name))?;
     writeln!(out, "    meshes: [")?;
     for mesh in &project.meshes {
@@ -89,18 +90,28 @@ fn write_rig(out: &mut String, entry: &ProjectRig) -> std::fmt::Result {
         write_clips(out, entry.rig.clips(), &NodeNames::of(&entry.rig, None), "                ")?;
         writeln!(out, "            ],")?;
     }
+    if !entry.rig.dropped_parts().is_empty() {
+        writeln!(out, "            parts: [")?;
+        for DroppedPart { uid, part, joints, mirror } in entry.rig.dropped_parts() {
+            let joints: Vec<String> = joints.iter().map(|joint| format!("\"{joint}\"")).collect();
+            let (part, joints) = (quoted(part), joints.join(", "));
+            writeln!(out, "                (uid: \"{uid}\", part: {part}, joints: [{joints}], mirror: {mirror}),")?;
+        }
+        writeln!(out, "            ],")?;
+    }
     writeln!(out, "        ),")
 }
 
-/// The first format that can hold the rig's poses and clips.
+/// The first format that can hold the rig's poses, clips and dropped parts.
 fn needed_format(rig: &Rig) -> u32 {
     let needs_values = !rig.attribute_values().is_empty()
         || rig.stored_poses().iter().any(|pose| !pose.values.is_empty())
         || rig.pose().keys().any(|node| rig.joint(*node).is_none());
-    match (rig.clips().is_empty(), needs_values) {
-        (false, _) => FORMAT,
-        (true, true) => 2,
-        (true, false) => 1,
+    match (rig.dropped_parts().is_empty(), rig.clips().is_empty(), needs_values) {
+        (false, ..) => FORMAT,
+        (true, false, _) => 3,
+        (true, true, true) => 2,
+        (true, true, false) => 1,
     }
 }
 

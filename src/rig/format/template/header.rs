@@ -1,6 +1,6 @@
 //! Header of a template: what people left out of it follows from the rest of the file.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use super::{
     FeatureSummary, TemplateHeader,
@@ -45,18 +45,23 @@ impl TemplateHeader {
     pub fn complete_from_parts(&mut self, own: &Rig, parts: &[(PartInstance, Rig)]) {
         self.joint_count = own.len();
         let mut features: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
-        let mut add = |rig: &Rig, joints: usize| {
-            for FeatureSummary { kind, name, switches } in features_of(rig.walk().take(joints)) {
+        let mut add = |found: Vec<FeatureSummary>| {
+            for FeatureSummary { kind, name, switches } in found {
                 features.entry((kind, name)).or_default().extend(switches);
             }
         };
-        add(own, own.len());
+        add(feature_summaries(own));
         for (instance, part) in parts {
             // Joints of a part beyond those that it goes onto stay out, with their tags, unless it adds them.
             let there = instance.onto.len();
             let joints = if there == 0 || instance.adds { part.len() } else { there.min(part.len()) };
             self.joint_count += joints.saturating_sub(there);
-            add(part, joints);
+            let removed = instance.changes.iter().filter(|change| change.removed);
+            let removed: HashSet<Uid> =
+                removed.filter_map(|change| instance.find_tag(part, change.tag.as_deref()?).ok()).collect();
+            let of_part = part.walk().take(joints).flat_map(|joint| &joint.data.tags);
+            let added = instance.changes.iter().flat_map(|change| &change.tags);
+            add(features_of(of_part.filter(|tag| !removed.contains(&tag.uid)).chain(added)));
         }
         let summary = |((kind, name), mut switches): ((String, String), Vec<String>)| {
             switches.sort_unstable();

@@ -32,7 +32,7 @@ use crate::rig::{
 };
 use labels::header_labels;
 use order::reordered;
-pub(crate) use parts::{PartRigs, write_parts_over};
+pub(crate) use parts::{PartRigs, with_instances, without_instances, write_parts_over};
 use patch::Patch;
 
 /// The text of a rig's template, as changes of a text of the same rig. `None` if `source` is no template of this rig, or
@@ -55,9 +55,14 @@ pub fn write_template_over(rig: &Rig, source: &str) -> Option<String> {
     is_right(&text).then_some(text)
 }
 
-/// True if the templates of two rigs say the same.
+/// True if the templates of two rigs say the same. The order of groups and inputs is no matter: those of parts come last.
 pub(crate) fn says_the_same(a: &Rig, b: &Rig) -> bool {
-    let said = |rig: &Rig| read_text(&write_template(rig), 1).ok().map(|read| comparable(read.rig));
+    let said = |rig: &Rig| {
+        let mut read = comparable(read_text(&write_template(rig), 1).ok()?.rig);
+        read.groups.sort_by_key(|group| group.uid);
+        read.inputs.sort_by_key(|input| input.uid);
+        Some(read)
+    };
     said(a).is_some_and(|said_a| said(b) == Some(said_a))
 }
 

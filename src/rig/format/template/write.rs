@@ -176,13 +176,13 @@ pub(super) fn needs_summary(rig: &Rig) -> Option<NeedsSummary> {
 
 /// Named features of the rig with their switches, sorted.
 pub(super) fn feature_summaries(rig: &Rig) -> Vec<FeatureSummary> {
-    features_of(rig.walk())
+    features_of(rig.walk().flat_map(|joint| &joint.data.tags))
 }
 
-/// Named features of joints with their switches, sorted.
-pub(super) fn features_of<'r>(joints: impl Iterator<Item = &'r RigJoint>) -> Vec<FeatureSummary> {
+/// Named features among tags with their switches, sorted.
+pub(super) fn features_of<'r>(tags: impl Iterator<Item = &'r TagData>) -> Vec<FeatureSummary> {
     let mut features: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
-    for tag in joints.flat_map(|joint| &joint.data.tags) {
+    for tag in tags {
         if let TagKind::Feature { kind, name, switch, .. } = &tag.kind
             && !name.is_empty()
         {

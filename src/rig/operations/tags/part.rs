@@ -9,7 +9,7 @@ use super::{
 };
 use crate::rig::{
     EditError, GroupData, JointData, NodeRefs, Rig, RigEdit, RigInput, TagKind, Uid,
-    part::{Part, PartError, PartNeeds, left_out, name_of},
+    part::{DroppedPart, Part, PartError, PartInstance, PartNeeds, left_out, name_of, unpaired_sides},
     reference::{NameKind, NameScope, Names, RigScope, map_references, references_in},
     remap::Remap,
 };
@@ -106,6 +106,56 @@ pub(in crate::rig) fn drop_part(
         }
     }
     refresh_all(draft, &dropped)
+}
+
+/// Drops a part, as it is fitted, onto joints, and notes it as an instance for the rig's file. Joints without a label get one
+/// that is theirs alone.
+pub(super) fn drop_instance(
+    draft: &mut Draft,
+    file: &str,
+    fitted: &Rig,
+    chosen: &[Uid],
+    mirror: bool,
+) -> Result<(), OperationError> {
+    let joints = &chosen[..chosen.len().min(fitted.len())];
+    for (joint, of_part) in joints.iter().zip(fitted.walk()) {
+        let known = draft.rig().joint(*joint).ok_or(EditError::NoJoint(*joint))?;
+        if known.data.label.is_none() {
+            let label = free_label(draft.rig(), of_part.data.label.as_deref().unwrap_or("joint"));
+            draft.apply(RigEdit::SetLabel(*joint, Some(label)))?;
+        }
+    }
+    let label = |joint: &Uid| draft.rig().joint(*joint).and_then(|joint| joint.data.label.clone()).unwrap_or_default();
+    let onto: Vec<String> = joints.iter().map(label).collect();
+    let of = |uid: Uid| PartInstance { uid, onto: onto.clone(), ..PartInstance::default() };
+    let is_free = |instance: &PartInstance| {
+        let is_taken = |uid: &Uid| draft.rig().is_taken(*uid);
+        !instance.brought(fitted).iter().any(is_taken)
+            && draft.rig().dropped_parts().iter().all(|other| other.uid != instance.uid)
+    };
+    let derived = of(PartInstance::uid_from_joints(file, &onto));
+    let instance = if is_free(&derived) { derived } else { of(draft.next_uid()) };
+    drop_part(draft, fitted, joints, &BTreeMap::new(), &mut |_, uid| instance.uid_of(uid))?;
+    // A file with parts has partners where labels differ by their side alone.
+    for (joint, other) in unpaired_sides(draft.rig()) {
+        draft.apply(RigEdit::SetMirror(joint, Some(other)))?;
+        draft.apply(RigEdit::SetMirror(other, Some(joint)))?;
+    }
+    let part = DroppedPart { uid: instance.uid, part: file.to_owned(), joints: joints.to_vec(), mirror };
+    if part.instance(draft.rig()).is_none() {
+        draft.note("other joints have the same labels: a save writes the part out, unless you rename them".to_owned());
+    }
+    let dropped = draft.rig().dropped_parts().iter().cloned().chain([part]).collect();
+    draft.apply(RigEdit::SetDroppedParts(dropped))?;
+    note_left_over(draft, fitted, chosen);
+    Ok(())
+}
+
+/// The label, with a number if a joint has it already.
+fn free_label(rig: &Rig, label: &str) -> String {
+    let numbered = (2..).map(|number| format!("{label}_{number}"));
+    let mut names = std::iter::once(label.to_owned()).chain(numbered);
+    names.find(|name| rig.find_label(name).is_none()).unwrap_or_default()
 }
 
 /// Notes which joints were too few or too many for a part that was dropped onto them.

@@ -24,8 +24,10 @@ use crate::rig::{
         scan::{Field, fields},
         source::ron_text,
     },
-    label::mirrored_label,
-    part::{MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption, PartSocket},
+    part::{
+        MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption, PartSocket,
+        unpaired_sides,
+    },
 };
 
 /// Chains of a part. One that does not fit the joints is told and left out.
@@ -427,16 +429,10 @@ impl Template {
 /// Makes joints partners whose labels differ by their side alone, where neither has one: a side comes from a part that knows
 /// nothing of the other.
 fn pair_sides(rig: &mut Rig) {
-    let free = |rig: &Rig, joint: Uid| rig.joint(joint).is_some_and(|joint| joint.data.mirror.is_none());
-    let labelled: Vec<(Uid, Option<String>)> =
-        rig.walk().map(|joint| (joint.data.uid, joint.data.label.as_deref().and_then(mirrored_label))).collect();
-    for (joint, opposite) in labelled {
-        let Some(other) = opposite.and_then(|label| rig.find_label(&label)) else { continue };
-        if free(rig, joint) && free(rig, other) {
-            for (of, to) in [(joint, other), (other, joint)] {
-                let done = rig.apply(&RigEdit::SetMirror(of, Some(to)));
-                debug_assert!(done.is_ok(), "a partner of the rig was refused: {done:?}");
-            }
+    for (joint, other) in unpaired_sides(rig) {
+        for (of, to) in [(joint, other), (other, joint)] {
+            let done = rig.apply(&RigEdit::SetMirror(of, Some(to)));
+            debug_assert!(done.is_ok(), "a partner of the rig was refused: {done:?}");
         }
     }
 }

@@ -13,8 +13,8 @@ use super::{
 use crate::rig::{
     SourceError,
     format::{
-        ron_options,
         scan::{self, Field, elements_around},
+        source::ron_options,
     },
     template::quoted,
 };

@@ -1,6 +1,7 @@
 //! Changes of what parts bring, as local changes of the part instances in a template's text.
 
 mod change;
+mod instance;
 
 use std::collections::{HashMap, HashSet};
 
@@ -14,7 +15,8 @@ use crate::rig::{
     },
     part::{PartInstance, switch_name},
 };
-use change::{JointDiff, TagDiff, Words, short_tag};
+use change::{FieldChange, JointDiff, TagDiff, Words, short_tag};
+pub(crate) use instance::{with_instances, without_instances};
 
 /// Rigs of a template with parts, from which its text is changed.
 pub(crate) struct PartRigs<'a> {
@@ -275,8 +277,7 @@ impl Overrides<'_, '_> {
         }
         let texts: Vec<String> = new.iter().map(|tag| self.tag_text(tag)).collect();
         let Some(number) = entry else {
-            let mut said: Vec<String> =
-                fields.into_iter().filter_map(|(field, value)| Some(format!("{field}: {}", value?))).collect();
+            let mut said = written(fields);
             if !texts.is_empty() {
                 said.push(format!("tags: [{}]", texts.join(", ")));
             }
@@ -286,12 +287,7 @@ impl Overrides<'_, '_> {
             return;
         };
         let element = self.tree.elements(changes.node, "changes")[number].value;
-        let mut left = self.fields_of(element);
-        for (field, value) in fields {
-            left.retain(|other| *other != field);
-            left.extend(value.is_some().then_some(field));
-            self.patch.set_or_remove(element, field, value.as_deref());
-        }
+        let mut left = self.set_fields(element, fields);
         // Tags that the change has given.
         let known = self.rigs.parts.iter().flat_map(|(instance, _)| &instance.changes).flat_map(|change| &change.tags);
         let elements = self.tree.elements(element, "tags");
@@ -348,8 +344,7 @@ impl Overrides<'_, '_> {
             (None, None) => return,
         };
         let Some(number) = entry else {
-            let mut said: Vec<String> =
-                fields.into_iter().filter_map(|(field, value)| Some(format!("{field}: {}", value?))).collect();
+            let mut said = written(fields);
             let set: Vec<String> =
                 params.iter().filter_map(|(key, value)| Some(format!("{key}: {}", value.as_ref()?))).collect();
             if !set.is_empty() {
@@ -362,12 +357,7 @@ impl Overrides<'_, '_> {
             return;
         };
         let element = self.tree.elements(changes.node, "changes")[number].value;
-        let mut left = self.fields_of(element);
-        for (field, value) in fields {
-            left.retain(|other| *other != field);
-            left.extend(value.is_some().then_some(field));
-            self.patch.set_or_remove(element, field, value.as_deref());
-        }
+        let mut left = self.set_fields(element, fields);
         if self.params(element, &params) {
             left.push("params");
         } else {
@@ -401,6 +391,17 @@ impl Overrides<'_, '_> {
         true
     }
 
+    /// Sets fields of a change in the text, or takes them out. Returns those that it has then.
+    fn set_fields(&mut self, element: NodeId, fields: Vec<FieldChange>) -> Vec<&'static str> {
+        let mut left = self.fields_of(element);
+        for (field, value) in fields {
+            left.retain(|other| *other != field);
+            left.extend(value.is_some().then_some(field));
+            self.patch.set_or_remove(element, field, value.as_deref());
+        }
+        left
+    }
+
     /// Fields of a change that say something different from the part.
     fn fields_of(&self, element: NodeId) -> Vec<&'static str> {
         let known = super::super::file::PART_CHANGE_FIELDS.into_iter().skip(2);
@@ -411,6 +412,11 @@ impl Overrides<'_, '_> {
         let long = || value_on_one_line(&tag_text(self.rig, tag, &self.features));
         self.words.styled(&short_tag(self.rig, tag, &self.features).unwrap_or_else(long))
     }
+}
+
+/// Fields of a change that comes, as they are written.
+fn written(fields: Vec<FieldChange>) -> Vec<String> {
+    fields.into_iter().filter_map(|(field, value)| Some(format!("{field}: {}", value?))).collect()
 }
 
 /// A joint of a part, and what it is in the template.

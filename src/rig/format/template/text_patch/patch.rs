@@ -147,6 +147,17 @@ impl<'d, 'a> Patch<'d, 'a> {
         }
     }
 
+    /// Puts elements behind the last one of the list that is the value of a field, each in its layout.
+    pub fn append(&mut self, node: NodeId, field: &str, elements: &[String]) {
+        match self.tree.field(node, field).map(|item| item.value) {
+            Some(list) => {
+                let last = self.tree.node(list).items.len().checked_sub(1);
+                elements.iter().for_each(|element| self.insert(list, last, element));
+            }
+            None => self.add(node, field, &format!("[{}]", elements.join(", "))),
+        }
+    }
+
     /// Adds a field with a list to a struct: on one line, or with a line for each of several where the fields have lines.
     fn add_list(&mut self, node: NodeId, field: &str, elements: &[String]) {
         let items = &self.tree.node(node).items;
