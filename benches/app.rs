@@ -16,7 +16,7 @@ use rigsmith::{
     files::{RealDisk, load_template},
     headless::headless_app,
     plugins::{
-        commands::{BuildDone, BuildRequest, BuildStep, Built, BuiltEntities},
+        commands::{BuildDone, BuildRequest, BuildResult, BuildStep, BuiltEntities},
         schema::Attributes,
     },
     prelude::*,
@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     (0..20).for_each(|_| app.update());
     let filter = std::env::args().skip(1).find(|argument| !argument.starts_with("--"));
     let mut bench = Bench { app, rig, filter };
-    let built = bench.app.world().get::<Built>(rig).ok_or("the rig is not built")?.0.clone();
+    let built = bench.app.world().get::<BuildResult>(rig).ok_or("the rig is not built")?.0.clone();
     let goal = built.switches.iter().find_map(|switch| match switch.matching {
         Matching::IkFk { goal, .. } => Some((goal, switch.control, switch.attribute.clone())),
         Matching::Space { .. } => None,

@@ -76,7 +76,7 @@ fn wave(rigs: Query<Entity, With<RigSource>>, nodes: InstanceNodes, time: Res<Ti
 /// Saves the template with a tail once the character has been there for two seconds.
 fn save(
     time: Res<Time>,
-    rigs: Query<(), With<Built>>,
+    rigs: Query<(), With<BuildResult>>,
     mut template: ResMut<Template>,
     mut since: Local<f32>,
 ) -> Result {

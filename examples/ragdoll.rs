@@ -61,7 +61,7 @@ fn spawn(mut commands: Commands, files: TemplateFiles, mut uids: ResMut<UidSourc
 /// Hands the joints over after a while, with a push, and takes them back later.
 fn throw(
     mut commands: Commands,
-    rigs: Query<(Entity, &Rig, &JointEntities), With<Built>>,
+    rigs: Query<(Entity, &Rig, &JointEntities), With<BuildResult>>,
     places: Query<&GlobalTransform>,
     mut body: ResMut<Body>,
     time: Res<Time>,

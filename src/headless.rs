@@ -23,15 +23,15 @@ use crate::{
     mesh::{model::Model, shapes::Shapes},
     plugins::{
         RigPlugins,
-        commands::{Built, RigModules},
-        document::{ChangeError, EditRefused, EditRequest},
+        commands::{BuildResult, RigModules},
+        document::{ChangeError, EditRefusal, EditRequest},
         face::{
-            ExpressError, ExpressRequest, Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FacePreparation,
-            FaceReport, FaceRequest, FaceShape, PlaceFaceError, arkit_shapes,
+            ExpressError, ExpressRequest, ExpressionAnswer, Face, FaceExpressions, FaceJob, FacePlaced,
+            FacePreparation, FaceReport, FaceRequest, FaceShape, PlaceFaceError, arkit_shapes,
         },
-        fit::{FitFailure, FitJob, FitReport, FitRequest, FitTemplates, Fitted},
+        fit::{FitAnswer, FitFailure, FitJob, FitReport, FitRequest, FitTemplates},
         gesture::{Gesture, GestureAnswer, GestureScript},
-        skinning::{BindRequest, Bound, MeshPart, PartBinding, SkinningError, SkinningJob, SkinningReport},
+        skinning::{BindAnswer, BindRequest, MeshPart, PartBinding, SkinningError, SkinningJob, SkinningReport},
         surface::{RigMesh, SkinOf},
         task_pools,
     },
@@ -201,7 +201,7 @@ impl Workbench {
 
     /// Sets the result of the rig's commands, so that meshes are bound to the built joints and exported with them.
     pub fn set_built(&mut self, built: Arc<BuiltRig>) {
-        self.app.world_mut().entity_mut(self.rig).insert(Built(built));
+        self.app.world_mut().entity_mut(self.rig).insert(BuildResult(built));
         self.app.update();
     }
 
@@ -230,7 +230,7 @@ impl Workbench {
         let pause = Pause::new();
         loop {
             self.app.update();
-            let bound = self.app.world_mut().resource_mut::<Messages<Bound>>().drain().last();
+            let bound = self.app.world_mut().resource_mut::<Messages<BindAnswer>>().drain().last();
             if let Some(bound) = bound {
                 // The edit that binds the weights is applied in the next frame.
                 self.app.update();
@@ -267,7 +267,7 @@ impl Workbench {
         let pause = Pause::new();
         loop {
             self.app.update();
-            let fitted = self.app.world_mut().resource_mut::<Messages<Fitted>>().drain().last();
+            let fitted = self.app.world_mut().resource_mut::<Messages<FitAnswer>>().drain().last();
             if let Some(fitted) = fitted {
                 // The edit that moves the joints is applied in the same frame or in the next one.
                 self.app.update();
@@ -325,7 +325,7 @@ impl Workbench {
         let pause = Pause::new();
         loop {
             self.app.update();
-            let told = self.app.world_mut().resource_mut::<Messages<Expressed>>().drain().last();
+            let told = self.app.world_mut().resource_mut::<Messages<ExpressionAnswer>>().drain().last();
             if told.is_some() || self.app.world().get::<FacePreparation>(mesh).is_none() {
                 told.map_or(Ok(()), |told| told.result)?;
                 return self.refused().map_or(Ok(()), Err);
@@ -368,11 +368,11 @@ impl Workbench {
     /// Drops refusals of earlier edits, which gestures have answered already, so that none is taken for the next
     /// result.
     fn forget_refusals(&mut self) {
-        self.app.world_mut().resource_mut::<Messages<EditRefused>>().clear();
+        self.app.world_mut().resource_mut::<Messages<EditRefusal>>().clear();
     }
 
     fn refused(&mut self) -> Option<WorkbenchError> {
-        let refused = self.app.world_mut().resource_mut::<Messages<EditRefused>>().drain().last();
+        let refused = self.app.world_mut().resource_mut::<Messages<EditRefusal>>().drain().last();
         refused.map(|refused| WorkbenchError::Refused(refused.reason))
     }
 
@@ -400,7 +400,7 @@ impl Workbench {
 
     /// Result of the rig's commands; `None` if the rig is not built.
     pub fn built(&self) -> Option<&BuiltRig> {
-        self.app.world().get::<Built>(self.rig).map(|built| &*built.0)
+        self.app.world().get::<BuildResult>(self.rig).map(|built| &*built.0)
     }
 
     /// Mesh with the rig's joints (the built ones if the rig is built) and weights, for export.

@@ -66,7 +66,7 @@ use crate::{
     mesh::model::Trs,
     modules,
     plugins::{
-        commands::{Built, RigModules},
+        commands::{BuildResult, RigModules},
         runtime::{ControlPose, InstanceMode, NodeOf, RigRuntime, RuntimePlugin},
     },
     processor::PoseNote,
@@ -312,7 +312,7 @@ impl TemplateFiles<'_> {
 /// Nodes of instances by name.
 #[derive(SystemParam)]
 pub struct InstanceNodes<'w, 's> {
-    instances: Query<'w, 's, (AnyOf<(&'static RunningTemplate, &'static Built)>, &'static RigRuntime)>,
+    instances: Query<'w, 's, (AnyOf<(&'static RunningTemplate, &'static BuildResult)>, &'static RigRuntime)>,
     sources: Query<'w, 's, &'static RigSource>,
 }
 

@@ -17,7 +17,7 @@
 //! | [`Attributes`](schema::Attributes) | the program, and the document where its values change | drives the rig in the same frame; a driven value is put back and told once for each entity and name ([`document::EntityWriteError::DrivenAttribute`]) |
 //! | `GlobalTransform` of a node | propagation, corrected where Bevy would shear | overwritten |
 //! | [`Null`](schema::Null) | the document, for joints without weights, and the build, for created nulls | on a joint: an edit, it is without weights; on a created node it is put back and told |
-//! | `Uid`, [`CreatedRole`](schema::CreatedRole), [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`Parked`](schema::Parked), [`commands::CommandReport`], [`commands::Built`], [`commands::BuildFailure`], [`commands::RunFailure`], [`ConstraintKind`](schema::ConstraintKind), [`ConstraintTargets`](schema::ConstraintTargets), [`controls::NodeVisible`] | the build | immutable in place; what is inserted or removed is put back in the same frame and told ([`document::EntityWriteError::BuiltContent`]); reports and failures stand until the next build |
+//! | `Uid`, [`CreatedRole`](schema::CreatedRole), [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`ParkedNode`](schema::ParkedNode), [`commands::CommandReport`], [`commands::BuildResult`], [`commands::BuildFailure`], [`commands::RunFailure`], [`ConstraintKind`](schema::ConstraintKind), [`ConstraintTargets`](schema::ConstraintTargets), [`controls::NodeVisible`] | the build | immutable in place; what is inserted or removed is put back in the same frame and told ([`document::EntityWriteError::BuiltContent`]); reports and failures stand until the next build |
 //! | [`controls::size::ShapeFactor`] | the measurement of shapes on a mesh | stands until the mesh or the build changes |
 //! | [`CreatedBy`](schema::CreatedBy), [`Constrains`](schema::Constrains), [`NodeOf`](schema::NodeOf) | the build, and the document for its joints | put back in the same frame and told |
 //! | a despawned constraint | | spawned again and told: change the command instead |
@@ -28,11 +28,11 @@
 //! | [`surface::RigMesh`], [`surface::SkinOf`] | whoever loads a mesh | the mesh is bound, shown and found by rays anew |
 //! | [`selection::Selection`] | picking, gestures, edits, undo | stands until one of them writes it |
 //! | label, group, rest and parent of a created node, and the node itself | the build | put back and told: change the command instead |
-//! | [`face::Expressions`] of a mesh | an [`face::ExpressRequest`] | becomes one, an edit of the pose in the same frame; what is shown already is none; unknown names are told by [`face::Expressed`] |
+//! | [`face::Expressions`] of a mesh | an [`face::ExpressRequest`] | becomes one, an edit of the pose in the same frame; what is shown already is none; unknown names are told by [`face::ExpressionAnswer`] |
 //! | [`animation::ClipPlayer`] | a person or a game; its time by the playback | plays from there |
 //! | `Name` of joints and groups | the label or name | an edit of the label or name; of a created node it stands until the build writes it |
 //! | [`document::ShowRest`], [`document::Symmetry`], [`animation::AutoKey`] | the editor | takes effect with the next edit |
-//! | [`selection::Hovered`] | picking | stands until the pointer moves |
+//! | [`selection::HoveredNode`] | picking | stands until the pointer moves |
 //! | [`stage::RigStage`] | the build | immutable; send a [`stage::StageRequest`] |
 //! | [`runtime::RigInputs`] | games | read each frame: where the entities of a template's inputs stand |
 //! | [`animation::RigClips`], [`animation::RootMotion`], [`animation::ClipTargets`] | games | takes effect in the same frame; the movement in `RootMotion` is written each frame |

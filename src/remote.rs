@@ -45,7 +45,7 @@ use crate::{
     instance::{RigInstancePlugin, UpdateInstances},
     plugins::{
         commands::{BuildDone, BuildRequest},
-        document::{EditRefused, EditRequest, Edited},
+        document::{EditRefusal, EditReport, EditRequest},
     },
 };
 
@@ -176,8 +176,8 @@ impl Plugin for RemotePlugin {
             error!("there is no remote control, because no thread can be started: {error}");
         }
         app.add_message::<EditRequest>()
-            .add_message::<Edited>()
-            .add_message::<EditRefused>()
+            .add_message::<EditReport>()
+            .add_message::<EditRefusal>()
             .add_message::<BuildRequest>()
             .add_message::<BuildDone>()
             .insert_resource(RemoteServer {

@@ -11,7 +11,7 @@ use rigsmith::{
     mesh::model::{Faces, Model, Object, Part, Weights},
     plugins::{
         display::{DisplayJob, DisplayPlugin, MeshDisplay, WeightColors},
-        document::{Hovered, JointEntities},
+        document::{HoveredNode, JointEntities},
         drawing::{
             RigDrawing,
             ink::Ink,
@@ -142,7 +142,7 @@ fn draw_joints() {
     let times = (0..100).map(|_| {
         let started = Instant::now();
         let mut next = Ink::with_capacity_of(&ink);
-        let joints = drawn_joints(rig, &Selection::default(), &Hovered(None), |uid| globals.get(&uid).copied());
+        let joints = drawn_joints(rig, &Selection::default(), &HoveredNode(None), |uid| globals.get(&uid).copied());
         draw_skeleton(&joints, &[], &sight, &RigDrawing::default(), &mut next);
         ink = next;
         started.elapsed()

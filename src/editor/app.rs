@@ -38,7 +38,7 @@ use crate::plugins::{
     RigPlugins,
     controls::size::MeasuredShapes,
     display::{DisplayJob, DisplayPlugin},
-    document::{Change, EditRequest, Edited},
+    document::{Change, EditReport, EditRequest},
     drawing::DrawingPlugin,
     fit::FitJob,
     skinning::SkinningJob,
@@ -256,7 +256,7 @@ fn drop_old_modifiers(mut inputs: Query<&mut EguiInput>, mut last: Local<Option<
 /// Keeps the window drawing after an event and while background work runs; otherwise it sleeps until the next event.
 fn keep_drawing(
     mut events: MessageReader<WindowEvent>,
-    mut edited: MessageReader<Edited>,
+    mut edited: MessageReader<EditReport>,
     mut notices: MessageReader<Notice>,
     loading: Res<LoadJob>,
     jobs: Query<(), Or<(With<SkinningJob>, With<FitJob>, With<DisplayJob>)>>,

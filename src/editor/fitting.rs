@@ -18,7 +18,7 @@ use crate::{
     plugins::{
         RigSystems,
         document::Selection,
-        fit::{EndFit, FitFailure, FitJob, FitReport, FitRequest, FitTemplates, Fitted, FittedRig},
+        fit::{EndFit, FitAnswer, FitFailure, FitJob, FitReport, FitRequest, FitTemplates, FittedRig},
         history::RigHistory,
         picking::{Pick, PickRequest},
         surface::{RigMesh, RigMeshes, SkinOf},
@@ -35,7 +35,7 @@ impl Plugin for FittingPlugin {
             .insert_resource(FitTemplates(Arc::new(bundled_characters)))
             .add_message::<FitRequest>()
             .add_message::<EndFit>()
-            .add_message::<Fitted>()
+            .add_message::<FitAnswer>()
             .add_message::<PickRequest>()
             .add_painter(FitBar)
             .add_systems(
@@ -98,12 +98,12 @@ fn act(
 
 /// Tells what a fit found, and selects the joints that it is not sure of.
 fn show_result(
-    mut answers: MessageReader<Fitted>,
+    mut answers: MessageReader<FitAnswer>,
     meshes: Query<&SkinOf>,
     selections: Query<&Selection>,
     mut commands: Commands,
 ) {
-    for Fitted { mesh, result } in answers.read() {
+    for FitAnswer { mesh, result } in answers.read() {
         let report = match result {
             Ok(report) => report,
             Err(FitFailure::Fit(crate::algo::fit_template::FitError::Cancelled)) => {

@@ -20,7 +20,7 @@ use crate::{
     mesh::model::Model,
     plugins::{
         RigSystems,
-        mesh_reload::{ReloadRequest, Reloaded},
+        mesh_reload::{ReloadAnswer, ReloadRequest},
         surface::RigMesh,
     },
 };
@@ -35,7 +35,7 @@ impl Plugin for MeshWatchPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<MeshWatches>()
             .add_message::<ReloadRequest>()
-            .add_message::<Reloaded>()
+            .add_message::<ReloadAnswer>()
             .add_message::<Notice>()
             .add_systems(Update, (look, land, tell).chain().after(attend).before(RigSystems::Script));
     }
@@ -112,8 +112,8 @@ fn land(mut watches: ResMut<MeshWatches>, mut commands: Commands) {
     }
 }
 
-fn tell(mut answers: MessageReader<Reloaded>, meshes: Query<&RigMesh>, mut commands: Commands) {
-    for Reloaded { mesh, result } in answers.read() {
+fn tell(mut answers: MessageReader<ReloadAnswer>, meshes: Query<&RigMesh>, mut commands: Commands) {
+    for ReloadAnswer { mesh, result } in answers.read() {
         let name = meshes.get(*mesh).map_or("The mesh", |mesh| mesh.file.name.as_str());
         let notice = match result {
             Ok(report) => {

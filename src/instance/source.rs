@@ -7,8 +7,8 @@ use bevy::{ecs::entity::EntityHashSet, prelude::*};
 use super::{BuiltTemplate, RigBuilt, RigFailed, RigTemplate, RigTemplates, RigUpdated, TemplateError};
 use crate::{
     plugins::{
-        commands::{BuildFailure, BuildRequest, BuildStep, Built, RigModules},
-        document::{Change, EditRefused, EditRequest, Edited},
+        commands::{BuildFailure, BuildRequest, BuildResult, BuildStep, RigModules},
+        document::{Change, EditRefusal, EditReport, EditRequest},
         skinning::BindRequest,
         surface::{RigMesh, RigMeshes},
     },
@@ -162,8 +162,8 @@ pub struct AcceptUpdate {
 
 pub(super) fn add(app: &mut App) {
     app.add_message::<AcceptUpdate>()
-        .add_message::<Edited>()
-        .add_message::<EditRefused>()
+        .add_message::<EditReport>()
+        .add_message::<EditRefusal>()
         .add_message::<EditRequest>()
         .add_message::<BuildRequest>()
         .add_message::<BindRequest>();
@@ -171,12 +171,12 @@ pub(super) fn add(app: &mut App) {
 
 /// Follows updates through the history: the base is that of the last one in effect.
 pub(super) fn follow_steps(
-    mut edited: MessageReader<Edited>,
-    mut refused: MessageReader<EditRefused>,
+    mut edited: MessageReader<EditReport>,
+    mut refused: MessageReader<EditRefusal>,
     mut sources: Query<&mut RigSource>,
     mut commands: Commands,
 ) {
-    for Edited { rig, name, committed, .. } in edited.read() {
+    for EditReport { rig, name, committed, .. } in edited.read() {
         let (Ok(mut source), Some(committed)) = (sources.get_mut(*rig), committed) else { continue };
         let known = source.steps.iter().find(|known| Arc::ptr_eq(&known.step, committed.step())).cloned();
         match (committed, known) {
@@ -192,7 +192,7 @@ pub(super) fn follow_steps(
             _ => {}
         }
     }
-    for EditRefused { rig, reason } in refused.read() {
+    for EditRefusal { rig, reason } in refused.read() {
         if let Ok(mut source) = sources.get_mut(*rig)
             && source.pending.take().is_some()
         {
@@ -328,8 +328,8 @@ fn take_over(
 
 /// Tells rigs that are built for the first time, and binds their meshes that have no weights.
 pub(super) fn bind_meshes(
-    fresh: Query<Entity, (With<RigSource>, Added<Built>)>,
-    rigs: Query<(&Rig, &RigMeshes, &RigSource), With<Built>>,
+    fresh: Query<Entity, (With<RigSource>, Added<BuildResult>)>,
+    rigs: Query<(&Rig, &RigMeshes, &RigSource), With<BuildResult>>,
     meshes: Query<&RigMesh>,
     mut asked: Local<EntityHashSet>,
     mut requests: MessageWriter<BindRequest>,

@@ -18,12 +18,12 @@ use bevy::prelude::*;
 
 pub use run::{Programs, RunFailure};
 
-use super::{RigSystems, configure_sets, document::Edited};
+use super::{RigSystems, configure_sets, document::EditReport};
 pub use super::{
     document::{TagEntities, entities::BuiltEntities},
     schema::{
         Attributes, CommandTag, Constrains, Control, CreatedBy, CreatedNodes, CreatedRole, FeatureCommands, FeatureTag,
-        InFeature, NodeLayer, Null, Parked, Tag, TagOf, Tags,
+        InFeature, NodeLayer, Null, ParkedNode, Tag, TagOf, Tags,
     },
 };
 use crate::{
@@ -160,7 +160,7 @@ impl Processor {
 #[component(immutable)]
 #[reflect(opaque)]
 #[reflect(Component, Debug, Clone, Default)]
-pub struct Built(pub Arc<BuiltRig>);
+pub struct BuildResult(pub Arc<BuiltRig>);
 
 /// Error that stopped a rig's build; absent if the build has no error.
 #[derive(Component, Reflect, Debug, Clone, PartialEq)]
@@ -180,8 +180,8 @@ pub struct CommandReport(pub CommandStatus);
 fn build_rigs(
     mut commands: Commands,
     mut requests: MessageReader<BuildRequest>,
-    mut edited: MessageReader<Edited>,
-    mut rigs: Query<(&Rig, Option<&mut Processor>, Option<&Built>, Has<BuildFailure>)>,
+    mut edited: MessageReader<EditReport>,
+    mut rigs: Query<(&Rig, Option<&mut Processor>, Option<&BuildResult>, Has<BuildFailure>)>,
     modules: Res<RigModules>,
     mut done: MessageWriter<BuildDone>,
 ) {
@@ -287,14 +287,14 @@ fn finish(
     commands: &mut Commands,
     rig: Entity,
     builder: &mut Builder,
-    (before, had_failed): (Option<&Built>, bool),
+    (before, had_failed): (Option<&BuildResult>, bool),
     report: RunReport,
     done: &mut MessageWriter<BuildDone>,
 ) {
     let mut entity = commands.entity(rig);
     let built = builder.shared_built();
     if before.is_none_or(|before| !Arc::ptr_eq(&before.0, &built) && before.0 != built) {
-        entity.try_insert(Built(built));
+        entity.try_insert(BuildResult(built));
     }
     match &report.error {
         Some(error) => {

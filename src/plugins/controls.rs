@@ -12,9 +12,9 @@ use bevy::prelude::*;
 
 use super::{
     RigSystems,
-    commands::Built,
+    commands::BuildResult,
     configure_sets,
-    document::{EditRefused, EditRequest},
+    document::{EditRefusal, EditRequest},
     runtime::RigRuntime,
     schema::{Attributes, Control, NodeLayer},
 };
@@ -37,7 +37,7 @@ impl Plugin for ControlsPlugin {
         app.init_resource::<ControlsInUse>()
             .add_message::<SwitchRequest>()
             .add_message::<EditRequest>()
-            .add_message::<EditRefused>()
+            .add_message::<EditRefusal>()
             .add_systems(Update, throw_switches.in_set(RigSystems::Gesture))
             .register_type::<size::ShapeFactor>()
             .add_systems(
@@ -130,7 +130,7 @@ pub enum SwitchError {
 
 fn throw_switches(
     mut requests: MessageReader<SwitchRequest>,
-    rigs: Query<(&Built, &RigRuntime)>,
+    rigs: Query<(&BuildResult, &RigRuntime)>,
     mut commands: Commands,
 ) {
     for SwitchRequest { rig, control, attribute, value } in requests.read() {
@@ -139,14 +139,14 @@ fn throw_switches(
                 commands.write_message(EditRequest::operation(*rig, operation));
             }
             Err(error) => {
-                commands.write_message(EditRefused { rig: *rig, reason: error.into() });
+                commands.write_message(EditRefusal { rig: *rig, reason: error.into() });
             }
         }
     }
 }
 
 fn edits_of(
-    rig: Option<(&Built, &RigRuntime)>,
+    rig: Option<(&BuildResult, &RigRuntime)>,
     control: Uid,
     attribute: &str,
     value: f32,

@@ -26,7 +26,7 @@ use super::{
 };
 pub use super::{
     schema::{Joint, NodeLabel, NodeOf},
-    selection::{Hovered, Selection},
+    selection::{HoveredNode, Selection},
 };
 use crate::rig::{
     Rig, UidSource,
@@ -43,7 +43,7 @@ impl Plugin for DocumentPlugin {
         configure_sets(app);
         app.register_required_components::<Rig, Transform>();
         app.register_required_components::<Rig, Selection>();
-        app.register_required_components::<Rig, Hovered>();
+        app.register_required_components::<Rig, HoveredNode>();
         app.register_required_components::<Rig, Symmetry>();
         app.register_required_components::<Rig, RigHistory>();
         app.register_required_components::<Rig, ShowRest>();
@@ -55,8 +55,8 @@ impl Plugin for DocumentPlugin {
             .init_resource::<entities::EntityIndex>()
             .init_resource::<adopt::EntityEdits>()
             .add_message::<EditRequest>()
-            .add_message::<Edited>()
-            .add_message::<EditRefused>()
+            .add_message::<EditReport>()
+            .add_message::<EditRefusal>()
             .add_systems(
                 Update,
                 (
@@ -113,7 +113,7 @@ impl EditRequest {
 
 /// Message that a rig was changed.
 #[derive(Message, Debug, Clone)]
-pub struct Edited {
+pub struct EditReport {
     /// The rig.
     pub rig: Entity,
     /// Short name of the step that was done, undone or redone.
@@ -128,7 +128,7 @@ pub struct Edited {
 
 /// Message that a change was refused; the rig stays as it was.
 #[derive(Message, Debug, Clone)]
-pub struct EditRefused {
+pub struct EditRefusal {
     /// Requested rig.
     pub rig: Entity,
     /// Reason for the refusal.
@@ -141,8 +141,8 @@ fn apply_edits(
     mut entity_edits: ResMut<adopt::EntityEdits>,
     mut rigs: Query<(&mut Rig, &mut Selection, &mut RigHistory, &Symmetry, Option<&AutoKey>)>,
     mut uids: ResMut<UidSource>,
-    mut edited: MessageWriter<Edited>,
-    mut refused: MessageWriter<EditRefused>,
+    mut edited: MessageWriter<EditReport>,
+    mut refused: MessageWriter<EditRefusal>,
 ) {
     let of_entities = std::mem::take(&mut entity_edits.bypass_change_detection().0).into_iter().map(|(rig, edits)| {
         let operation = Operation::Named { name: "Edit entities", edits };
@@ -152,15 +152,21 @@ fn apply_edits(
         let EditRequest { rig, change } = &request;
         let rig = *rig;
         let Ok((mut document, mut selection, mut history, symmetry, auto_key)) = rigs.get_mut(rig) else {
-            refused.write(EditRefused { rig, reason: ChangeError::NoRig(rig) });
+            refused.write(EditRefusal { rig, reason: ChangeError::NoRig(rig) });
             continue;
         };
         // The selection is written only where it changes.
         let mut selected = selection.clone();
-        let done = |name, committed| Edited { rig, name, committed, preview: false, notes: Vec::new() };
-        let previewed =
-            |name: &'static str| Edited { rig, name: name.into(), committed: None, preview: true, notes: Vec::new() };
-        let recorded = |RecordedOperation { name, step, notes }| Edited { notes, ..done(name, step.map(Commit::Done)) };
+        let done = |name, committed| EditReport { rig, name, committed, preview: false, notes: Vec::new() };
+        let previewed = |name: &'static str| EditReport {
+            rig,
+            name: name.into(),
+            committed: None,
+            preview: true,
+            notes: Vec::new(),
+        };
+        let recorded =
+            |RecordedOperation { name, step, notes }| EditReport { notes, ..done(name, step.map(Commit::Done)) };
         // A write to an entity concerns that entity only; live mirroring does not apply to it.
         let plane = symmetry.0.filter(|_| !is_of_entities);
         let keyed = |operation| auto_key.map_or(Cow::Borrowed(operation), |auto_key| auto_key.keyed(operation));
@@ -199,7 +205,7 @@ fn apply_edits(
                 edited.write(message);
             }
             Err(reason) => {
-                refused.write(EditRefused { rig, reason });
+                refused.write(EditRefusal { rig, reason });
             }
         }
     }

@@ -45,7 +45,7 @@ impl Plugin for FacePlugin {
             .add_message::<FacePlaced>()
             .add_message::<super::landing::ResultHeld>()
             .add_message::<ExpressRequest>()
-            .add_message::<Expressed>()
+            .add_message::<ExpressionAnswer>()
             .add_systems(
                 Update,
                 (
@@ -162,7 +162,7 @@ pub struct ExpressRequest {
 
 /// The answer to an [`ExpressRequest`].
 #[derive(Message, Debug, Clone)]
-pub struct Expressed {
+pub struct ExpressionAnswer {
     /// The mesh.
     pub mesh: Entity,
     /// Success, or the reason why nothing is shown.
@@ -175,7 +175,7 @@ pub struct Expressed {
 /// The document holds them as values of attributes of the mesh, so undo, stored poses and projects bring them back.
 ///
 /// A game sets expressions by writing it: the face moves in the same frame, as an [`ExpressRequest`] would move it, and
-/// the answer is an [`Expressed`] message. While the face is still prepared ([`FacePreparation`]), both wait for it. A
+/// the answer is an [`ExpressionAnswer`] message. While the face is still prepared ([`FacePreparation`]), both wait for it. A
 /// value equal to what is shown is no edit.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
 #[reflect(Component, Debug, Clone, PartialEq, Default)]

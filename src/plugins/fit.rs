@@ -50,10 +50,10 @@ impl Plugin for FitPlugin {
         configure_sets(app);
         app.init_resource::<FitTemplates>()
             .add_message::<FitRequest>()
-            .add_message::<Fitted>()
+            .add_message::<FitAnswer>()
             .add_message::<EndFit>()
             .add_message::<ResultHeld>()
-            .add_message::<super::document::Edited>()
+            .add_message::<super::document::EditReport>()
             .add_message::<EditRequest>()
             .add_systems(
                 Update,
@@ -122,7 +122,7 @@ impl Default for FitTemplates {
 
 /// Answer to a [`FitRequest`].
 #[derive(Message, Debug, Clone)]
-pub struct Fitted {
+pub struct FitAnswer {
     /// The mesh.
     pub mesh: Entity,
     /// Report of the fit, or the reason why there is none.
@@ -282,12 +282,12 @@ fn start(
     meshes: Query<(&RigMesh, &SkinOf)>,
     rigs: Query<(&Rig, &RigHistory)>,
     (modules, templates): (Res<RigModules>, Res<FitTemplates>),
-    mut fitted: MessageWriter<Fitted>,
+    mut fitted: MessageWriter<FitAnswer>,
 ) {
     for request in requests.read() {
         let found = meshes.get(request.mesh).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
         let Some((mesh, (rig, history))) = found else {
-            fitted.write(Fitted { mesh: request.mesh, result: Err(FitFailure::NoRig) });
+            fitted.write(FitAnswer { mesh: request.mesh, result: Err(FitFailure::NoRig) });
             continue;
         };
         let from = Arc::new(rig.clone());
@@ -323,7 +323,7 @@ fn land(
     mut jobs: Query<(Entity, &mut FitJob, &SkinOf)>,
     rigs: Query<(&Rig, &RigHistory)>,
     modules: Res<RigModules>,
-    mut answers: MessageWriter<Fitted>,
+    mut answers: MessageWriter<FitAnswer>,
 ) {
     for (entity, mut job, of) in &mut jobs {
         let was_held = job.held.is_some();
@@ -358,7 +358,7 @@ fn land(
                 }
             }
         };
-        answers.write(Fitted { mesh: entity, result });
+        answers.write(FitAnswer { mesh: entity, result });
         commands.entity(entity).try_remove::<FitJob>();
     }
 }

@@ -11,7 +11,7 @@ use std::{
 
 use bevy::prelude::*;
 
-use super::{RigSystems, configure_sets, document::Edited, history::RigHistory, selection::Selection};
+use super::{RigSystems, configure_sets, document::EditReport, history::RigHistory, selection::Selection};
 use crate::rig::{
     Rig,
     step::{Commit, Replay, SinkError, StepSink},
@@ -23,9 +23,9 @@ pub struct JournalPlugin;
 impl Plugin for JournalPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
-        app.add_message::<Edited>().add_message::<JournalTrouble>().add_systems(
+        app.add_message::<EditReport>().add_message::<JournalTrouble>().add_systems(
             Update,
-            (record_edits.run_if(on_message::<Edited>), report_trouble)
+            (record_edits.run_if(on_message::<EditReport>), report_trouble)
                 .chain()
                 .after(RigSystems::Edits)
                 .before(RigSystems::Build),
@@ -74,8 +74,8 @@ pub struct JournalTrouble {
     pub reason: Option<SinkError>,
 }
 
-fn record_edits(mut edited: MessageReader<Edited>, journals: Query<&RigJournal>) {
-    for Edited { rig, committed, .. } in edited.read() {
+fn record_edits(mut edited: MessageReader<EditReport>, journals: Query<&RigJournal>) {
+    for EditReport { rig, committed, .. } in edited.read() {
         if let (Ok(journal), Some(committed)) = (journals.get(*rig), committed) {
             journal.record(committed.clone());
         }

@@ -12,7 +12,7 @@ use bevy::{
 
 use super::{
     RigSystems, configure_sets,
-    document::{EditRequest, Edited},
+    document::{EditReport, EditRequest},
     history::RigHistory,
     landing::{HeldResult, ResultHeld},
     surface::{RigMesh, SkinOf},
@@ -37,9 +37,9 @@ impl Plugin for MeshReloadPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
         app.add_message::<ReloadRequest>()
-            .add_message::<Reloaded>()
+            .add_message::<ReloadAnswer>()
             .add_message::<ResultHeld>()
-            .add_message::<Edited>()
+            .add_message::<EditReport>()
             .add_message::<EditRequest>()
             .add_systems(
                 Update,
@@ -62,7 +62,7 @@ pub struct ReloadRequest {
 
 /// Answer to a [`ReloadRequest`].
 #[derive(Message, Debug, Clone)]
-pub struct Reloaded {
+pub struct ReloadAnswer {
     /// The mesh.
     pub mesh: Entity,
     /// Report of the exchange, or the reason why the mesh stays as it was.
@@ -125,12 +125,12 @@ fn start(
     mut requests: MessageReader<ReloadRequest>,
     meshes: Query<(&RigMesh, &SkinOf)>,
     rigs: Query<&Rig>,
-    mut answers: MessageWriter<Reloaded>,
+    mut answers: MessageWriter<ReloadAnswer>,
 ) {
     for ReloadRequest { mesh: entity, model } in requests.read() {
         let found = meshes.get(*entity).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
         let Some((mesh, rig)) = found else {
-            answers.write(Reloaded { mesh: *entity, result: Err(ReloadError::NoRig) });
+            answers.write(ReloadAnswer { mesh: *entity, result: Err(ReloadError::NoRig) });
             continue;
         };
         let from = rig.skin(mesh.uid).cloned();
@@ -174,7 +174,7 @@ fn land(
     mut commands: Commands,
     mut jobs: Query<(Entity, &mut ReloadJob, &RigMesh, &SkinOf, Option<&mut MeshVersions>)>,
     rigs: Query<(&Rig, &RigHistory)>,
-    mut answers: MessageWriter<Reloaded>,
+    mut answers: MessageWriter<ReloadAnswer>,
 ) {
     for (entity, mut job, mesh, of, versions) in &mut jobs {
         let was_held = job.held.is_some();
@@ -219,17 +219,17 @@ fn land(
             }
             report
         });
-        answers.write(Reloaded { mesh: entity, result });
+        answers.write(ReloadAnswer { mesh: entity, result });
     }
 }
 
 /// Exchanges meshes together with their weights, in whatever direction the history goes.
 fn exchange(
-    mut edited: MessageReader<Edited>,
+    mut edited: MessageReader<EditReport>,
     mut meshes: Query<(Entity, &RigMesh, &SkinOf, &mut MeshVersions)>,
     mut commands: Commands,
 ) {
-    for Edited { rig, name, committed, .. } in edited.read() {
+    for EditReport { rig, name, committed, .. } in edited.read() {
         let Some(committed) = committed else { continue };
         for (entity, mesh, _, mut versions) in meshes.iter_mut().filter(|(_, _, of, _)| of.0 == *rig) {
             let step = committed.step();

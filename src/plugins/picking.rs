@@ -18,7 +18,7 @@ use super::{
         ControlsInUse,
         outline::{ControlNodes, control_at},
     },
-    document::{Hovered, JointEntities, NodeOf, Selection, entities::BuiltEntities},
+    document::{HoveredNode, JointEntities, NodeOf, Selection, entities::BuiltEntities},
     schema::RigNodes,
     surface::{Answer, RigMeshes, RigSurface, answer},
 };
@@ -41,7 +41,7 @@ impl Plugin for PickingPlugin {
             .add_message::<PickRequest>()
             .add_message::<HoverRequest>()
             .add_message::<HoverJoint>()
-            .add_message::<Picked>()
+            .add_message::<PickAnswer>()
             .add_systems(Update, (forget_click, pick, hover).chain().in_set(RigSystems::Pick));
     }
 }
@@ -84,10 +84,10 @@ pub enum Pick {
     None,
 }
 
-/// Position of the pointer over a view of a rig. [`Hovered`] then follows the joint that a click there would pick, also
+/// Position of the pointer over a view of a rig. [`HoveredNode`] then follows the joint that a click there would pick, also
 /// when the rig, its pose or the selection change under a resting pointer, until the next request.
 ///
-/// While the mesh's surface is being built nothing changes; while it is behind the pose, so is [`Hovered`].
+/// While the mesh's surface is being built nothing changes; while it is behind the pose, so is [`HoveredNode`].
 #[derive(Message, Debug, Clone, Copy)]
 pub struct HoverRequest {
     /// The rig.
@@ -96,7 +96,7 @@ pub struct HoverRequest {
     pub what: Option<(ViewPlane, Vec2, f32)>,
 }
 
-/// The joint under the pointer outside of any view: in a list, for example. [`Hovered`] follows it while the pointer is
+/// The joint under the pointer outside of any view: in a list, for example. [`HoveredNode`] follows it while the pointer is
 /// over no view of that rig.
 #[derive(Message, Debug, Clone, Copy)]
 pub struct HoverJoint {
@@ -115,7 +115,7 @@ struct HoverSpot {
 
 /// Result of a [`PickRequest`].
 #[derive(Message, Debug, Clone)]
-pub struct Picked {
+pub struct PickAnswer {
     /// The rig.
     pub rig: Entity,
     /// The picked joints; empty if the request hit none.
@@ -192,7 +192,7 @@ fn pick(
     controls: ControlNodes,
     in_use: Res<ControlsInUse>,
     mut last: ResMut<LastClick>,
-    mut picked: MessageWriter<Picked>,
+    mut picked: MessageWriter<PickAnswer>,
 ) {
     waiting.extend(requests.read().map(|request| (request.clone(), None)));
     // Requests are answered in their order: a request after a waiting click waits, too.
@@ -240,7 +240,7 @@ fn pick(
         next.retain(|joint| !found.contains(joint));
         next.extend(&found);
         selection.set_if_neq(Selection(next));
-        picked.write(Picked { rig: request.rig, joints: found });
+        picked.write(PickAnswer { rig: request.rig, joints: found });
         false
     });
 }
@@ -273,7 +273,7 @@ fn candidates(
     picking::candidates_at(hit.map(|hit| ray.at(hit.distance)), plane, point, &positions, reach)
 }
 
-/// Updates [`Hovered`] to the joint that a click under the pointer would pick. Queries again only after a change.
+/// Updates [`HoveredNode`] to the joint that a click under the pointer would pick. Queries again only after a change.
 fn hover(
     mut requests: MessageReader<HoverRequest>,
     mut named: MessageReader<HoverJoint>,
@@ -285,7 +285,7 @@ fn hover(
     controls: ControlNodes,
     in_use: Res<ControlsInUse>,
     last: Res<LastClick>,
-    mut hovered: Query<&mut Hovered>,
+    mut hovered: Query<&mut HoveredNode>,
 ) {
     let mut due: Vec<Entity> = Vec::new();
     for HoverRequest { rig, what } in requests.read() {
@@ -320,11 +320,11 @@ fn hover(
                 None => continue,
             },
         };
-        hovered.set_if_neq(Hovered(joint));
+        hovered.set_if_neq(HoveredNode(joint));
     }
     for HoverJoint { rig, joint } in named.read() {
         if let (false, Ok(mut hovered)) = (spots.contains_key(rig), hovered.get_mut(*rig)) {
-            hovered.set_if_neq(Hovered(*joint));
+            hovered.set_if_neq(HoveredNode(*joint));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Placing joints with rays (Pencil Rigger, section 3.2).
 //!
 //! The joint goes to the midpoint of the closest and the furthest hit of a ray through the posed mesh, becomes a child
-//! of the selected joint or a root, and is selected. If the ray misses the mesh, nothing happens, and [`Placed`]
+//! of the selected joint or a root, and is selected. If the ray misses the mesh, nothing happens, and [`PlaceAnswer`]
 //! reports it. While the surface is behind the pose, requests wait for it.
 
 use bevy::prelude::*;
@@ -24,7 +24,7 @@ impl Plugin for PlacementPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
         app.add_message::<PlaceRequest>()
-            .add_message::<Placed>()
+            .add_message::<PlaceAnswer>()
             .add_systems(Update, place.in_set(RigSystems::Gesture));
     }
 }
@@ -42,7 +42,7 @@ pub struct PlaceRequest {
 
 /// The answer to a [`PlaceRequest`].
 #[derive(Message, Debug, Clone)]
-pub struct Placed {
+pub struct PlaceAnswer {
     /// The rig.
     pub rig: Entity,
     /// Hits of the ray, and the position of the joint.
@@ -81,7 +81,7 @@ pub(super) fn place(
     mut waiting: Local<Vec<(PlaceRequest, Option<u64>)>>,
     rigs: Query<(&Rig, &Selection, Option<&RigSurface>, Has<RigMeshes>)>,
     mut edits: MessageWriter<EditRequest>,
-    mut placed: MessageWriter<Placed>,
+    mut placed: MessageWriter<PlaceAnswer>,
 ) {
     waiting.extend(requests.read().map(|request| (request.clone(), None)));
     waiting.retain_mut(|(PlaceRequest { rig, ray, settings }, since)| {
@@ -91,7 +91,7 @@ pub(super) fn place(
         if let Some(position) = rest {
             edits.write(EditRequest::operation(*rig, Operation::Place { position, parent }));
         }
-        placed.write(Placed { rig: *rig, placement });
+        placed.write(PlaceAnswer { rig: *rig, placement });
         false
     });
 }

@@ -28,7 +28,7 @@ pub use self::{
     spawn::{furnish_instance, spawn_instance},
 };
 pub use super::schema::{ControlPose, NodeOf, NodeSlot, RigNodes};
-use super::{RigSystems, configure_sets, document::EditRefused};
+use super::{RigSystems, configure_sets, document::EditRefusal};
 use crate::{
     rig::{AttributeValues, NodeType, PoseOffset, Rig, Uid},
     solve::program::{Carry, Memory, RigProgram, RigState},
@@ -40,7 +40,7 @@ pub struct RuntimePlugin;
 impl Plugin for RuntimePlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
-        app.add_message::<EditRefused>().add_systems(
+        app.add_message::<EditRefusal>().add_systems(
             PostUpdate,
             (
                 (

@@ -204,7 +204,7 @@ pub struct Attributes(pub BTreeMap<String, f32>);
 #[derive(Component, Reflect, Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[component(immutable)]
 #[reflect(Component)]
-pub struct Parked;
+pub struct ParkedNode;
 
 /// Node that a constraint drives (the last one if it drives several). Constraints on one node run in the order of its
 /// [`NodeConstraints`].

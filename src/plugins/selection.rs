@@ -19,4 +19,4 @@ impl Selection {
 /// The joint under the pointer, which a click would pick.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[reflect(Component, Default)]
-pub struct Hovered(pub Option<Uid>);
+pub struct HoveredNode(pub Option<Uid>);

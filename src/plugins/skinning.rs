@@ -32,7 +32,7 @@ use self::{
 };
 use super::{
     RigSystems,
-    commands::{Built, RigModules},
+    commands::{BuildResult, RigModules},
     configure_sets,
     document::EditRequest,
     history::RigHistory,
@@ -56,7 +56,7 @@ pub struct SkinningPlugin;
 impl Plugin for SkinningPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
-        app.add_message::<BindRequest>().add_message::<Bound>().add_message::<ResultHeld>().add_systems(
+        app.add_message::<BindRequest>().add_message::<BindAnswer>().add_message::<ResultHeld>().add_systems(
             Update,
             (start_skinning, late_joints::start_late_shares, land_skinning).chain().in_set(RigSystems::Bind),
         );
@@ -95,7 +95,7 @@ pub enum PartBinding {
 
 /// The answer to a [`BindRequest`].
 #[derive(Message, Debug, Clone)]
-pub struct Bound {
+pub struct BindAnswer {
     /// The mesh.
     pub mesh: Entity,
     /// Report of the computation, or the reason why it failed.
@@ -129,7 +129,7 @@ pub struct SkinningJob {
     basis: JobBasis,
     /// Finished weights that wait to be committed; see [`landing`](super::landing).
     held: Option<SkinningResult>,
-    /// True if a [`BindRequest`] asked for it, which [`Bound`] answers.
+    /// True if a [`BindRequest`] asked for it, which [`BindAnswer`] answers.
     is_asked: bool,
 }
 
@@ -329,14 +329,14 @@ fn start_skinning(
     mut commands: Commands,
     mut requests: MessageReader<BindRequest>,
     meshes: Query<(&RigMesh, &SkinOf)>,
-    rigs: Query<(&Rig, Option<&Built>)>,
+    rigs: Query<(&Rig, Option<&BuildResult>)>,
     modules: Option<Res<RigModules>>,
-    mut bound: MessageWriter<Bound>,
+    mut bound: MessageWriter<BindAnswer>,
 ) {
     for request in requests.read() {
         let found = meshes.get(request.mesh).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
         let Some((mesh, (rig, built))) = found else {
-            bound.write(Bound { mesh: request.mesh, result: Err(SkinningError::NoRig) });
+            bound.write(BindAnswer { mesh: request.mesh, result: Err(SkinningError::NoRig) });
             continue;
         };
         let basis = JobBasis::of(rig, mesh.uid);
@@ -365,7 +365,7 @@ fn land_skinning(
     rigs: Query<(&Rig, &RigHistory)>,
     modules: Option<Res<RigModules>>,
     mut edits: MessageWriter<EditRequest>,
-    mut bound: MessageWriter<Bound>,
+    mut bound: MessageWriter<BindAnswer>,
     mut held: MessageWriter<ResultHeld>,
 ) {
     for (entity, mut job, mesh, of) in &mut jobs {
@@ -396,7 +396,7 @@ fn land_skinning(
             },
         };
         if job.is_asked {
-            bound.write(Bound { mesh: entity, result });
+            bound.write(BindAnswer { mesh: entity, result });
         }
         commands.entity(entity).remove::<SkinningJob>();
     }

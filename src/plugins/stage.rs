@@ -12,7 +12,7 @@ use super::{
     RigSystems,
     commands::{BuildRequest, BuildStep, Processor},
     configure_sets,
-    document::{Change, EditRequest, Edited, ShowRest},
+    document::{Change, EditReport, EditRequest, ShowRest},
     history::RigHistory,
 };
 use crate::rig::{
@@ -154,11 +154,11 @@ fn deleting(rig: &Rig) -> Vec<RigEdit> {
 
 /// Follows deletions through the history.
 fn follow_steps(
-    mut edited: MessageReader<Edited>,
+    mut edited: MessageReader<EditReport>,
     mut rigs: Query<(&mut Deletions, Option<&RigStage>)>,
     mut commands: Commands,
 ) {
-    for Edited { rig, name, committed, .. } in edited.read() {
+    for EditReport { rig, name, committed, .. } in edited.read() {
         let (Ok((mut deletions, stage)), Some(committed)) = (rigs.get_mut(*rig), committed) else { continue };
         let step = committed.step();
         let was_deleted = deletions.current.is_some();

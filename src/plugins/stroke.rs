@@ -19,7 +19,7 @@ pub use plan::{StrokePlan, StrokeScene, plan_stroke, stroke_kind};
 use super::{
     RigSystems, configure_sets,
     document::{EditRequest, JointEntities, Selection, Symmetry},
-    picking::{Picked, posed_joints},
+    picking::{PickAnswer, posed_joints},
     surface::{Answer, RigMeshes, RigSurface, answer},
 };
 use crate::{
@@ -39,7 +39,7 @@ impl Plugin for StrokePlugin {
         app.init_resource::<WaitingStrokes>()
             .add_message::<StrokeRequest>()
             .add_message::<StrokeDone>()
-            .add_message::<Picked>()
+            .add_message::<PickAnswer>()
             .add_systems(
                 Update,
                 (
@@ -263,10 +263,10 @@ fn find_chain(request: &StrokeRequest, surface: &RigSurface, symmetry: Option<Mi
 fn note_tips(
     mut commands: Commands,
     mut done: MessageReader<StrokeDone>,
-    mut picked: MessageReader<Picked>,
+    mut picked: MessageReader<PickAnswer>,
     mut rigs: Query<(&Selection, Option<&mut StrokeTips>)>,
 ) {
-    for Picked { rig, joints } in picked.read() {
+    for PickAnswer { rig, joints } in picked.read() {
         let Ok((_, Some(mut tips))) = rigs.get_mut(*rig) else { continue };
         if joints.iter().any(|joint| tips.contains(*joint)) {
             tips.0.retain(|tip| !joints.contains(tip));

@@ -24,7 +24,7 @@ use bevy::{
 use self::refresh::{PosedMesh, Refresh, RefreshedSurface, are_same, are_same_meshes, bend, is_same};
 use super::{
     RigSystems,
-    commands::{Built, BuiltEntities},
+    commands::{BuildResult, BuiltEntities},
     configure_sets,
     document::{Joint, JointEntities, NodeOf},
 };
@@ -290,7 +290,7 @@ type FollowedRigs<'a> = (
     Ref<'a, Rig>,
     Ref<'a, RigMeshes>,
     &'a JointEntities,
-    Option<Ref<'a, Built>>,
+    Option<Ref<'a, BuildResult>>,
     Option<Ref<'a, BuiltEntities>>,
     &'a GlobalTransform,
     Option<&'a mut RigSurface>,

@@ -16,7 +16,7 @@ use crate::{
     },
     plugins::{
         commands::BuildDone,
-        document::{EditRefused, Edited},
+        document::{EditRefusal, EditReport},
     },
     rig::{
         step::Commit,
@@ -90,16 +90,16 @@ fn note(server: Option<ResMut<RemoteServer>>, sign: Sign) {
 /// Answers calls whose events have come.
 pub(super) fn answer_calls(
     mut server: ResMut<RemoteServer>,
-    mut edited: MessageReader<Edited>,
-    mut refused: MessageReader<EditRefused>,
+    mut edited: MessageReader<EditReport>,
+    mut refused: MessageReader<EditRefusal>,
     mut done: MessageReader<BuildDone>,
     sources: Query<(&RigSource, Option<&UpdateOffer>)>,
     templates: Res<RigTemplates>,
     mut accepted: MessageWriter<AcceptUpdate>,
     mut commands: Commands,
 ) {
-    let edited: Vec<&Edited> = edited.read().collect();
-    let refused: Vec<&EditRefused> = refused.read().collect();
+    let edited: Vec<&EditReport> = edited.read().collect();
+    let refused: Vec<&EditRefusal> = refused.read().collect();
     let done: Vec<&BuildDone> = done.read().collect();
     let server = server.bypass_change_detection();
     let signs = std::mem::take(&mut server.signs);
@@ -144,10 +144,10 @@ pub(super) fn answer_calls(
 fn edit_answer(
     rig: Entity,
     step: Option<&'static str>,
-    edited: &[&Edited],
-    refused: &[&EditRefused],
+    edited: &[&EditReport],
+    refused: &[&EditRefusal],
 ) -> Option<Answer> {
-    let is_asked = |edited: &&&Edited| {
+    let is_asked = |edited: &&&EditReport| {
         edited.rig == rig
             && match step {
                 Some(name) => edited.name == name,

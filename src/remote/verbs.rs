@@ -16,7 +16,7 @@ use crate::{
     files::{FileKind, PartFiles, RealDisk, read_capped, store_rig_over},
     instance::{RigSource, RigTemplate, RigTemplates, RunningTemplate, TemplateError, TemplateFiles, UpdateOffer},
     plugins::{
-        commands::{BuildFailure, BuildRequest, BuildStep, Built, Processor, RigModules},
+        commands::{BuildFailure, BuildRequest, BuildResult, BuildStep, Processor, RigModules},
         document::{Change, EditRequest},
     },
     rig::{
@@ -254,7 +254,7 @@ fn list(world: &mut World) -> Value {
             "name": rig.about().name,
             "joints": rig.len(),
             "is_document": is_document,
-            "is_built": !is_document || world.get::<Built>(entity).is_some(),
+            "is_built": !is_document || world.get::<BuildResult>(entity).is_some(),
         }))
     };
     all.into_iter().filter_map(row).collect()
@@ -265,7 +265,7 @@ fn describe(world: &mut World, params: DescribeParams) -> Result<Value, CallErro
     let rig = rig_of(world, entity).ok_or_else(|| CallError::NoRig(params.rig.to_string()))?;
     let joint = |joint: &crate::rig::RigJoint| json!({"parent": joint.parent, "joint": joint.data});
     let running = world.get::<RunningTemplate>(entity).map(|running| &running.get().built);
-    let built = world.get::<Built>(entity).map(|built| &built.0).or(running);
+    let built = world.get::<BuildResult>(entity).map(|built| &built.0).or(running);
     let node = |node: &crate::rig::BuiltNode| {
         let is_control = node.control.is_some();
         json!({"uid": node.uid, "name": &*node.name, "label": node.label.as_deref(), "is_control": is_control})

@@ -5,7 +5,7 @@ use rigsmith::{
     plugins::{
         commands::{
             BuildDone, BuildFailure, BuildRequest, BuildStep, BuiltEntities, CommandReport, CommandTag, CreatedBy,
-            CreatedRole, FeatureTag, InFeature, Null, Parked, RegisterRigModule, TagEntities, TagOf, Tags,
+            CreatedRole, FeatureTag, InFeature, Null, ParkedNode, RegisterRigModule, TagEntities, TagOf, Tags,
         },
         document::{Change, JointEntities},
     },
@@ -127,14 +127,14 @@ fn created_nodes_keep_their_entities_through_rolling_back() {
     }
     bench.step(BuildStep::RollBack);
     for (uid, entity) in &nodes {
-        assert!(bench.get::<Parked>(*entity).is_some() && bench.get::<Disabled>(*entity).is_some());
+        assert!(bench.get::<ParkedNode>(*entity).is_some() && bench.get::<Disabled>(*entity).is_some());
         assert!(bench.get::<ChildOf>(*entity).is_none() && bench.get::<Null>(*entity).is_none());
         assert_eq!(bench.get::<BuiltEntities>(bench.rig).unwrap().any(*uid), Some(*entity));
     }
     assert!(bench.nodes().is_empty());
     bench.step(BuildStep::All);
     assert_eq!(bench.nodes(), nodes);
-    assert!(bench.get::<Parked>(nodes[0].1).is_none() && bench.get::<Null>(nodes[0].1).is_some());
+    assert!(bench.get::<ParkedNode>(nodes[0].1).is_none() && bench.get::<Null>(nodes[0].1).is_some());
     // An inserted joint leaves the others' nodes alone.
     let joint = JointData { uid: Uid(9), ..default() };
     bench.edit(RigEdit::AddJoint { joint: Box::new(joint), parent: Some(Uid(1)), index: 0 });
@@ -156,12 +156,12 @@ fn nodes_of_commands_that_left_the_history_are_despawned() {
     let is_known = |bench: &Bench| bench.get::<BuiltEntities>(bench.rig).unwrap().any(uid) == Some(entity);
     // Undone, it can come back; deleted in a step that can be undone, too.
     bench.change(Change::Undo);
-    assert!(is_known(&bench) && bench.get::<Parked>(entity).is_some());
+    assert!(is_known(&bench) && bench.get::<ParkedNode>(entity).is_some());
     bench.change(Change::Redo);
-    assert!(is_known(&bench) && bench.get::<Parked>(entity).is_none());
+    assert!(is_known(&bench) && bench.get::<ParkedNode>(entity).is_none());
     bench.edit(RigEdit::RemoveTag(Uid(1), Uid(51)));
     bench.edit(RigEdit::SetLabel(Uid(1), Some("other".into())));
-    assert!(is_known(&bench) && bench.get::<Parked>(entity).is_some());
+    assert!(is_known(&bench) && bench.get::<ParkedNode>(entity).is_some());
     (0..3).for_each(|_| bench.change(Change::Undo));
     assert!(is_known(&bench), "a redo would restore the command");
     // A new step discards the undone ones, among them the only one that adds the command.

@@ -10,7 +10,7 @@ use rigsmith::{
     mesh::surface::Surface,
     modules,
     plugins::{
-        commands::{BuildStep, Built, BuiltEntities},
+        commands::{BuildResult, BuildStep, BuiltEntities},
         controls::{outline::lines_of, size::MeasuredShapes, size::ShapeFactor},
         surface::RigMeshes,
     },
@@ -67,7 +67,7 @@ fn measured(bench: &mut Workbench) {
 fn shares(bench: &mut Workbench, surface: &Surface) -> Vec<(String, f32, f32)> {
     let rig = bench.rig_entity();
     let world = bench.app_mut().world();
-    let built: Arc<BuiltRig> = world.get::<Built>(rig).unwrap().0.clone();
+    let built: Arc<BuiltRig> = world.get::<BuildResult>(rig).unwrap().0.clone();
     let entities = world.get::<BuiltEntities>(rig).unwrap();
     let mut found = Vec::new();
     for (at, node) in built.nodes.iter().enumerate() {
@@ -111,5 +111,5 @@ fn no_control_of_the_bundled_biped_lies_in_its_flesh() {
     assert_eq!(bench.rig(), &rig);
     let built = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
     let rig = bench.rig_entity();
-    assert_eq!(*bench.app_mut().world().get::<Built>(rig).unwrap().0, built);
+    assert_eq!(*bench.app_mut().world().get::<BuildResult>(rig).unwrap().0, built);
 }

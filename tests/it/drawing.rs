@@ -9,7 +9,7 @@ use bevy::{
 use rigsmith::{
     headless::headless_app,
     plugins::{
-        document::Hovered,
+        document::HoveredNode,
         drawing::{
             DrawingCounts, DrawingPlugin, GhostJoint, Ghosts, LETTER, LabelCandidate, LabelChoice, RigDrawing,
             RigLabels,
@@ -168,7 +168,7 @@ fn a_leaf_is_drawn_as_it_is_posed() {
         rig.apply(&RigEdit::AddJoint { joint: Box::new(joint), parent, index: 0 }).unwrap();
     }
     let tail = |pose: &dyn Fn(Uid) -> Affine3A| {
-        let joints = drawn_joints(&rig, &Selection::default(), &Hovered::default(), |uid| Some(pose(uid)));
+        let joints = drawn_joints(&rig, &Selection::default(), &HoveredNode::default(), |uid| Some(pose(uid)));
         let leaf = *bones(&joints).last().unwrap();
         leaf.tail - joints[leaf.joint].position
     };
@@ -378,7 +378,8 @@ fn twice_the_joints_are_twice_the_ink() {
             rig.rest_globals().into_iter().map(|(uid, global)| (uid, global.into())).collect();
         let mut first = Ink::default();
         let draw = |ink: &mut Ink| {
-            let joints = drawn_joints(&rig, &Selection::default(), &Hovered(None), |uid| globals.get(&uid).copied());
+            let joints =
+                drawn_joints(&rig, &Selection::default(), &HoveredNode(None), |uid| globals.get(&uid).copied());
             draw_skeleton(&joints, &[], &view, &RigDrawing::default(), ink);
         };
         draw(&mut first);
@@ -422,7 +423,7 @@ fn nothing_is_built_while_nothing_changes() {
 
     type Act<'a> = Box<dyn Fn(&mut World) + 'a>;
     let acts: [(&str, Act, [u64; 4]); 7] = [
-        ("hovering", Box::new(|world| world.get_mut::<Hovered>(rig).unwrap().0 = Some(first)), [1, 0, 0, 0]),
+        ("hovering", Box::new(|world| world.get_mut::<HoveredNode>(rig).unwrap().0 = Some(first)), [1, 0, 0, 0]),
         ("selecting", Box::new(|world| world.get_mut::<Selection>(rig).unwrap().0 = vec![first]), [1, 0, 0, 0]),
         (
             "symmetry",

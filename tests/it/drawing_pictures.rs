@@ -20,7 +20,7 @@ use bevy::{
 use rigsmith::{
     mesh::obj::{ObjSettings, read_model},
     plugins::{
-        document::Hovered,
+        document::HoveredNode,
         drawing::{BACKGROUND, DrawingPlugin, GhostJoint, Ghosts, LabelChoice, RigDrawing},
         viewport::{RigViewport, Sight},
     },
@@ -213,7 +213,7 @@ fn states_ghosts_and_labels_are_seen_on_a_gpu() {
     let plain = studio.take("near_plain");
     let rig = studio.rig;
     studio.app.world_mut().get_mut::<Selection>(rig).unwrap().0 = vec![hips, chest];
-    studio.app.world_mut().get_mut::<Hovered>(rig).unwrap().0 = Some(arm);
+    studio.app.world_mut().get_mut::<HoveredNode>(rig).unwrap().0 = Some(arm);
     let states = studio.take("near_states");
     for (label, what) in [("hips", "selected"), ("chest", "active"), ("head", "hovered")] {
         let place = studio.sight().project(studio.position(label)).unwrap();

@@ -17,7 +17,9 @@ use rigsmith::{
     mesh::{model::Model, shapes::Shapes},
     plugins::{
         document::{Change, EditRequest},
-        face::{ExpressError, Expressed, Expressions, FaceJob, FacePlaced, FaceRequest, FaceRig, PlaceFaceError},
+        face::{
+            ExpressError, ExpressionAnswer, Expressions, FaceJob, FacePlaced, FaceRequest, FaceRig, PlaceFaceError,
+        },
         gesture::Gesture,
         history::RigHistory,
         surface::RigMesh,
@@ -396,7 +398,7 @@ fn written_expressions_move_the_face() {
         bench.app_mut().update();
         let world = bench.app_mut().world_mut();
         let steps = world.get::<RigHistory>(rig).unwrap().steps().0.len();
-        let answer = world.resource_mut::<Messages<Expressed>>().drain().last();
+        let answer = world.resource_mut::<Messages<ExpressionAnswer>>().drain().last();
         (steps, answer.map(|answer| answer.result))
     };
     let (before, first) = write(&mut bench, "happiness", 0.0);

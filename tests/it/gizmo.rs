@@ -22,7 +22,7 @@ use rigsmith::{
     },
     headless::headless_app,
     plugins::{
-        commands::{BuildFailure, Built},
+        commands::{BuildFailure, BuildResult},
         controls::{ControlsInUse, outline::lines_of},
         document::{JointEntities, ShowRest},
         history::RigHistory,
@@ -497,7 +497,7 @@ fn a_click_takes_a_control_and_the_gizmo_moves_what_it_drives() {
         app.update();
         let mut bench = Bench { app, rig, sink: Sink::default() };
         let world = bench.app.world();
-        let built = world.get::<Built>(rig).expect("a rig with commands is built when it is opened").0.clone();
+        let built = world.get::<BuildResult>(rig).expect("a rig with commands is built when it is opened").0.clone();
         assert!(world.get::<BuildFailure>(rig).is_none());
         let wrist = built.find_label("hand_l").unwrap().uid;
         let global = |bench: &Bench, node: Uid| {

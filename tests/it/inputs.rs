@@ -8,7 +8,7 @@ use rigsmith::{
     instance::{InstanceNodes, RigInstance, RigInstancePlugin, RigSource, RigTemplate, TemplateFiles},
     modules,
     plugins::{
-        commands::{BuildFailure, Built},
+        commands::{BuildFailure, BuildResult},
         document::{Change, JointEntities},
         runtime::{InstanceMode, RigInputs, RigRuntime},
     },
@@ -266,7 +266,7 @@ fn a_hand_of_a_document_holds_a_wheel_through_edits_and_updates() {
         }
         app.update();
     };
-    until(&mut app, &|world| world.get::<Built>(rig).is_some());
+    until(&mut app, &|world| world.get::<BuildResult>(rig).is_some());
     let uid = app.world().get::<Rig>(rig).unwrap().find_label("hand").unwrap();
     let hand = app.world().get::<JointEntities>(rig).unwrap().get(uid).unwrap();
     assert!(place(&app, hand).distance(Vec3::new(0.2, 1.0, 0.5)) < 1e-5);

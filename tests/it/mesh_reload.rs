@@ -8,8 +8,8 @@ use rigsmith::{
     mesh::model::Model,
     plugins::{
         document::{Change, EditRequest},
-        mesh_reload::{ReloadError, ReloadRequest, Reloaded},
-        skinning::{BindRequest, Bound},
+        mesh_reload::{ReloadAnswer, ReloadError, ReloadRequest},
+        skinning::{BindAnswer, BindRequest},
         surface::{RigMesh, SkinOf},
     },
     prelude::*,
@@ -36,7 +36,7 @@ impl Bench {
         bench.change(Change::Do(Operation::Chain { positions, parent: None }));
         let request = BindRequest::new(mesh);
         bench.app.world_mut().write_message(request);
-        bench.until::<Bound>();
+        bench.until::<BindAnswer>();
         bench.app.update();
         assert!(bench.skin().is_some());
         bench
@@ -61,7 +61,7 @@ impl Bench {
 
     fn reload(&mut self, model: Model) -> Result<rigsmith::plugins::mesh_reload::ReloadReport, ReloadError> {
         self.app.world_mut().write_message(ReloadRequest { mesh: self.mesh, model: Arc::new(model) });
-        let result = self.until::<Reloaded>().result;
+        let result = self.until::<ReloadAnswer>().result;
         (0..2).for_each(|_| self.app.update());
         result
     }
@@ -128,7 +128,7 @@ fn a_late_version_never_cuts_off_undone_steps() {
     assert_eq!(bench.points(), points, "it waits");
     bench.change(Change::Redo);
     assert_eq!(bench.rig().len(), joints, "the step was not lost");
-    bench.until::<Reloaded>();
+    bench.until::<ReloadAnswer>();
     (0..2).for_each(|_| bench.app.update());
     assert_eq!((bench.points(), bench.skin()), (points + 1, Some(points + 1)));
 }

@@ -28,8 +28,8 @@ use rigsmith::{
         },
     },
     plugins::{
-        commands::{BuildRequest, BuildStep, Built},
-        document::Hovered,
+        commands::{BuildRequest, BuildResult, BuildStep},
+        document::HoveredNode,
         runtime::RigRuntime,
         skinning::{MeshPart, PartBinding, SkinningJob, held_objects},
         stage::RigStage,
@@ -162,10 +162,10 @@ fn clicks_select_one_a_range_or_one_more() {
     // And the row under the pointer is the hovered joint.
     desk.move_to(desk.find("c").rect.center());
     desk.frames(2);
-    assert_eq!(desk.app.world().get::<Hovered>(desk.rig), Some(&Hovered(Some(joints[2]))));
+    assert_eq!(desk.app.world().get::<HoveredNode>(desk.rig), Some(&HoveredNode(Some(joints[2]))));
     desk.move_to(Pos2::new(150.0, 590.0));
     desk.frames(2);
-    assert_eq!(desk.app.world().get::<Hovered>(desk.rig), Some(&Hovered(None)));
+    assert_eq!(desk.app.world().get::<HoveredNode>(desk.rig), Some(&HoveredNode(None)));
 }
 
 #[test]
@@ -606,7 +606,7 @@ fn the_controls_panel_poses_resets_and_switches() {
     desk.app.world_mut().entity_mut(entity).insert(rig);
     desk.app.world_mut().write_message(BuildRequest { rig: entity, step: BuildStep::All });
     desk.frames(3);
-    let built = desk.app.world().get::<Built>(entity).unwrap().0.clone();
+    let built = desk.app.world().get::<BuildResult>(entity).unwrap().0.clone();
     let switch = built.switches.iter().find(|switch| matches!(switch.matching, rigsmith::rig::Matching::IkFk { .. }));
     let switch = switch.unwrap();
     let rigsmith::rig::Matching::IkFk { goal, .. } = &switch.matching else { unreachable!() };

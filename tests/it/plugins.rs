@@ -117,20 +117,20 @@ fn refusals_and_edits_are_told() {
     let stranger = bench.app.world_mut().spawn_empty().id();
     bench.app.world_mut().write_message(EditRequest::operation(stranger, Operation::Lock(Vec::new(), true)));
     bench.app.update();
-    let refused = bench.messages::<EditRefused>();
+    let refused = bench.messages::<EditRefusal>();
     assert!(
         refused.len() == 1 && refused[0].rig == stranger && refused[0].reason == ChangeError::NoRig(stranger),
         "{refused:?}"
     );
     bench.change(Change::Undo);
-    assert_eq!(bench.messages::<EditRefused>()[0].reason, ChangeError::NothingToUndo);
+    assert_eq!(bench.messages::<EditRefusal>()[0].reason, ChangeError::NothingToUndo);
     bench.change(Change::Redo);
-    assert_eq!(bench.messages::<EditRefused>()[0].reason, ChangeError::NothingToRedo);
+    assert_eq!(bench.messages::<EditRefusal>()[0].reason, ChangeError::NothingToRedo);
     bench.edit(Operation::Lock(vec![Uid(5)], true));
-    assert!(bench.messages::<EditRefused>()[0].reason.to_string().contains("no joint"));
-    assert!(bench.messages::<Edited>().is_empty());
+    assert!(bench.messages::<EditRefusal>()[0].reason.to_string().contains("no joint"));
+    assert!(bench.messages::<EditReport>().is_empty());
     bench.edit(Operation::Place { position: Vec3::ZERO, parent: None });
-    let edited = bench.messages::<Edited>();
+    let edited = bench.messages::<EditReport>();
     assert!(edited.len() == 1 && edited[0].rig == bench.rig && edited[0].name == "Place joint");
 }
 
@@ -214,7 +214,7 @@ fn skinning_runs_in_the_background_and_can_be_stopped() {
     bench.wait("the weights", |bench| bench.rig().skin(Uid(99)).is_some());
     let skin = bench.rig().skin(Uid(99)).unwrap();
     assert_eq!((skin.weights.len(), &skin.joints), (8, &joints));
-    let bound = bench.messages::<Bound>();
+    let bound = bench.messages::<BindAnswer>();
     assert!(bound.len() == 1 && bound[0].mesh == mesh && bound[0].result.is_ok(), "{bound:?}");
     bench.change(Change::Undo);
     assert!(bench.rig().skin(Uid(99)).is_none(), "one step of the history");
@@ -232,16 +232,16 @@ fn skinning_runs_in_the_background_and_can_be_stopped() {
     let job = bench.app.world().get::<SkinningJob>(large).expect("the job is under way");
     assert!((0.0..=1.0).contains(&job.progress()));
     job.cancel();
-    bench.messages::<Bound>();
+    bench.messages::<BindAnswer>();
     bench.wait("the end of the job", |bench| bench.app.world().get::<SkinningJob>(large).is_none());
-    let bound = bench.messages::<Bound>();
+    let bound = bench.messages::<BindAnswer>();
     assert!(bound.len() == 1 && bound[0].mesh == large && bound[0].result.is_err(), "{bound:?}");
     assert!(bench.rig().skin(Uid(100)).is_none());
 
     let stranger = bench.app.world_mut().spawn_empty().id();
     bench.app.world_mut().write_message(BindRequest { mesh: stranger, ..request() });
     bench.app.update();
-    assert_eq!(bench.messages::<Bound>()[0].result, Err(SkinningError::NoRig));
+    assert_eq!(bench.messages::<BindAnswer>()[0].result, Err(SkinningError::NoRig));
 }
 
 #[derive(Resource, Default)]
@@ -293,7 +293,7 @@ fn a_late_result_never_cuts_off_undone_steps() {
     let mesh = bench.open(&boxes);
     let whole = bench.rig().clone();
     let start = |bench: &mut RigBench| {
-        bench.messages::<Bound>();
+        bench.messages::<BindAnswer>();
         bench.messages::<ResultHeld>();
         bench.app.world_mut().write_message(BindRequest::new(mesh));
         bench.app.update();
@@ -309,7 +309,7 @@ fn a_late_result_never_cuts_off_undone_steps() {
     start(&mut bench);
     let held = |bench: &RigBench| !bench.app.world().resource::<Messages<ResultHeld>>().is_empty();
     bench.wait("the word that the result waits", held);
-    assert!(bench.messages::<Bound>().is_empty() && bench.rig().skin(Uid(99)).is_none());
+    assert!(bench.messages::<BindAnswer>().is_empty() && bench.rig().skin(Uid(99)).is_none());
     bench.change(Change::Redo);
     bench.change(Change::Redo);
     assert_eq!(*bench.rig(), whole, "nothing was lost");
@@ -321,7 +321,7 @@ fn a_late_result_never_cuts_off_undone_steps() {
     start(&mut bench);
     bench.edit(Operation::Place { position: Vec3::new(0.0, 0.5, 0.0), parent: None });
     bench.wait("the end of the job", |bench| bench.app.world().get::<SkinningJob>(mesh).is_none());
-    let bound = bench.messages::<Bound>();
+    let bound = bench.messages::<BindAnswer>();
     assert!(bound.len() == 1 && bound[0].result.is_err(), "{bound:?}");
     assert!(bench.rig().skin(Uid(99)).is_none());
 }

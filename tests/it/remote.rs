@@ -18,7 +18,7 @@ use bevy::prelude::*;
 use rigsmith::{
     headless::headless_app,
     instance::{RigInstancePlugin, RigSource},
-    plugins::commands::Built,
+    plugins::commands::BuildResult,
     prelude::*,
     remote::{RemoteError, RemotePlugin, RemoteServer, RemoteSettings},
     rig::template::{read_template, write_template},
@@ -175,7 +175,7 @@ fn every_verb_drives_a_running_app() {
     assert_eq!(remote.call("rig.step", json!({"rig": rig, "to": "back"}))["cursor"], json!(commands - 1));
     assert_eq!(remote.call("rig.step", json!({"rig": rig, "to": "forward"}))["cursor"], json!(commands));
     assert_eq!(remote.call("rig.step", json!({"rig": rig, "to": 1}))["cursor"], json!(1));
-    let nodes = |remote: &Remote| remote.app.world().get::<Built>(entity(&rig)).unwrap().0.nodes.len();
+    let nodes = |remote: &Remote| remote.app.world().get::<BuildResult>(entity(&rig)).unwrap().0.nodes.len();
     let few = nodes(&remote);
     assert_eq!(remote.call("rig.step", json!({"rig": rig, "to": "run"}))["cursor"], json!(commands));
     assert!(nodes(&remote) > few);

@@ -12,7 +12,7 @@ use rigsmith::{
     instance::{RigInstance, RigInstancePlugin, RigTemplate},
     plugins::{
         RigPlugins,
-        commands::{BuildRequest, BuildStep, Built},
+        commands::{BuildRequest, BuildResult, BuildStep},
         document::EditRequest,
         runtime::{InstanceMode, RigNodes, RigRuntime},
         schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer, NodeOf, NodeSlot, Null},
@@ -43,7 +43,7 @@ fn table_components() -> BTreeSet<String> {
 fn every_component_of_the_table_is_registered() {
     let names = table_components();
     assert!(names.len() > 30, "the table was not read: {names:?}");
-    for name in ["Rig", "NodeSlot", "BuildFailure", "RunFailure", "Parked", "Constrains"] {
+    for name in ["Rig", "NodeSlot", "BuildFailure", "RunFailure", "ParkedNode", "Constrains"] {
         assert!(names.contains(name), "the table lacks {name}");
     }
     let mut app = App::new();
@@ -135,7 +135,10 @@ fn instances_carry_the_components_of_a_built_rig() {
     for _ in 0..4 {
         editor.update();
     }
-    assert!(editor.world().get::<Built>(rig).is_some_and(|built| !built.0.nodes.is_empty()), "{name} is not built");
+    assert!(
+        editor.world().get::<BuildResult>(rig).is_some_and(|built| !built.0.nodes.is_empty()),
+        "{name} is not built"
+    );
     let by_uid = |world: &World, rig: Entity| -> Vec<(Uid, Entity)> {
         let nodes = world.get::<RigNodes>(rig).unwrap();
         nodes.iter().map(|node| (*world.get::<Uid>(node).unwrap(), node)).collect()
@@ -164,7 +167,7 @@ fn instances_carry_the_components_of_a_built_rig() {
             assert!(node.contains::<NodeSlot>());
             assert_eq!(node.get::<NodeLabel>(), told.get::<NodeLabel>(*model), "{uid} in {mode:?}");
             assert_eq!(node.get::<Control>(), told.get::<Control>(*model), "{uid} in {mode:?}");
-            let built = &told.get::<Built>(rig).unwrap().0;
+            let built = &told.get::<BuildResult>(rig).unwrap().0;
             let rest = RestTransform::from(built.node(uid).unwrap().base);
             assert_eq!(node.get::<RestTransform>(), Some(&rest), "{uid} in {mode:?}");
             if node.contains::<CreatedRole>() {

@@ -11,7 +11,7 @@ use rigsmith::{
     },
     mesh::model::Model,
     plugins::{
-        commands::{BuildFailure, Built},
+        commands::{BuildFailure, BuildResult},
         document::{Change, JointEntities},
         runtime::RigRuntime,
         surface::{RigMesh, SkinOf},
@@ -63,7 +63,7 @@ impl Studio {
         let source = if is_live { RigSource::live(template) } else { RigSource::new(template) };
         let rig = app.world_mut().spawn(source).id();
         let mut studio = Self { app, rig, file, _folder: folder };
-        studio.until("the rig", |world, rig| world.get::<Built>(rig).is_some());
+        studio.until("the rig", |world, rig| world.get::<BuildResult>(rig).is_some());
         studio.app.update();
         assert_eq!(studio.instance_report().built, 1);
         studio
@@ -123,7 +123,7 @@ fn a_live_rig_takes_over_what_the_file_changed_and_keeps_what_is_its_own() {
     let (tip, middle) = (studio.joint("tail_3"), studio.joint("tail_2"));
     studio.edit(RigEdit::SetLocked(middle, true));
     let posed = PoseOffset { translation: Vec3::X * 0.1, ..PoseOffset::IDENTITY };
-    let built = studio.app.world().get::<Built>(studio.rig).unwrap().0.clone();
+    let built = studio.app.world().get::<BuildResult>(studio.rig).unwrap().0.clone();
     let on_root = |node: &&rigsmith::rig::BuiltNode| node.control.is_some() && node.name.contains("tail_1");
     let control = built.nodes.iter().find(on_root).unwrap().uid;
     studio.request(Change::Do(Operation::Pose(vec![(control, posed)])));
@@ -270,7 +270,7 @@ fn another_name_in_the_file_is_the_same_joint_for_ever() {
 #[test]
 fn a_live_update_that_moves_what_a_pose_means_holds_the_joints() {
     let mut studio = Studio::new(true);
-    let built = studio.app.world().get::<Built>(studio.rig).unwrap().0.clone();
+    let built = studio.app.world().get::<BuildResult>(studio.rig).unwrap().0.clone();
     let control =
         |name: &str| built.nodes.iter().find(|node| node.control.is_some() && node.name.contains(name)).unwrap().uid;
     let turn = |angle: f32| PoseOffset::from_rotation(Quat::from_rotation_z(angle));
@@ -404,7 +404,7 @@ impl Studio {
     }
 
     fn is_built(&self, node: Uid) -> bool {
-        self.app.world().get::<Built>(self.rig).unwrap().0.node(node).is_some()
+        self.app.world().get::<BuildResult>(self.rig).unwrap().0.node(node).is_some()
     }
 }
 
@@ -432,7 +432,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
     let (mut version, mut parts) = (0, 0);
     for step in 0..steps {
         let controls: Vec<Uid> = {
-            let built = &studio.app.world().get::<Built>(studio.rig).unwrap().0;
+            let built = &studio.app.world().get::<BuildResult>(studio.rig).unwrap().0;
             built.nodes.iter().filter(|node| node.control.is_some()).map(|node| node.uid).collect()
         };
         let control = controls[dice.below(controls.len() as u64) as usize];

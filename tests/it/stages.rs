@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use rigsmith::{
     mesh::model::Weights,
     plugins::{
-        commands::{Built, Processor},
+        commands::{BuildResult, Processor},
         document::{Change, JointEntities, ShowRest},
         history::RigHistory,
         stage::{DELETE, RESTORE, RigStage, StageRequest},
@@ -58,7 +58,7 @@ impl Stages {
     fn operate(&mut self, operation: Operation) {
         self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
         self.app.update();
-        let refused = self.app.world_mut().resource_mut::<Messages<EditRefused>>().drain().next();
+        let refused = self.app.world_mut().resource_mut::<Messages<EditRefusal>>().drain().next();
         assert!(refused.is_none(), "{refused:?}");
     }
 
@@ -83,7 +83,7 @@ impl Stages {
     }
 
     fn built(&self) -> Arc<rigsmith::rig::BuiltRig> {
-        self.app.world().get::<Built>(self.rig).unwrap().0.clone()
+        self.app.world().get::<BuildResult>(self.rig).unwrap().0.clone()
     }
 
     fn steps(&self) -> (Vec<String>, usize) {

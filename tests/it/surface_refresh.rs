@@ -16,7 +16,7 @@ use rigsmith::{
         skinning::skin_points,
         surface::Surface,
     },
-    plugins::document::{Hovered, JointEntities},
+    plugins::document::{HoveredNode, JointEntities},
     prelude::*,
     rig::SkinData,
 };
@@ -183,7 +183,7 @@ fn edits_leave_the_surface_alone() {
         Operation::Delete { joints: vec![hand], keep_children: false },
     ] {
         bench.edit(operation.clone());
-        assert!(bench.messages::<EditRefused>().is_empty());
+        assert!(bench.messages::<EditRefusal>().is_empty());
         bench.app.update();
         let surface = bench.surface().unwrap();
         assert!(surface.wanted() == number && !surface.is_stale(), "{operation:?}");
@@ -239,7 +239,7 @@ fn hovering_shows_what_a_click_picks() {
     let rig = bench.rig;
     let bounds = bench.surface().unwrap().bounds();
     let plane = ViewPlane::orthographic(View::Orbit(20.0, 10.0), bounds);
-    let hovered = |bench: &RigBench| bench.get::<Hovered>(rig).unwrap().0;
+    let hovered = |bench: &RigBench| bench.get::<HoveredNode>(rig).unwrap().0;
     let reach = 0.01;
     let mut picks = 0;
     for i in 0..60 {
@@ -248,9 +248,9 @@ fn hovering_shows_what_a_click_picks() {
         // Clicking on, the pointer at rest: each click takes what was shown before it.
         for _ in 0..3 {
             let shown = hovered(&bench);
-            bench.messages::<Picked>();
+            bench.messages::<PickAnswer>();
             bench.send(PickRequest { rig, what: Pick::Click { plane, point, reach }, add: false });
-            let picked = bench.messages::<Picked>();
+            let picked = bench.messages::<PickAnswer>();
             assert_eq!(picked[0].joints.first().copied(), shown, "at {point}");
             picks += picked[0].joints.len();
             bench.app.update();
@@ -259,9 +259,9 @@ fn hovering_shows_what_a_click_picks() {
         let other = ViewPlane::orthographic(View::Front, bounds);
         bench.send(HoverRequest { rig, what: Some((other, point, reach)) });
         let shown = hovered(&bench);
-        bench.messages::<Picked>();
+        bench.messages::<PickAnswer>();
         bench.send(PickRequest { rig, what: Pick::Click { plane: other, point, reach }, add: false });
-        assert_eq!(bench.messages::<Picked>()[0].joints.first().copied(), shown, "at {point} from the front");
+        assert_eq!(bench.messages::<PickAnswer>()[0].joints.first().copied(), shown, "at {point} from the front");
     }
     assert_eq!(picks, 180);
     bench.send(HoverRequest { rig, what: None });
@@ -306,27 +306,27 @@ fn requests_wait_for_the_surface_and_hovering_does_not() {
             break;
         }
         waited += 1;
-        assert_eq!(bench.get::<Hovered>(rig), Some(&Hovered(None)));
+        assert_eq!(bench.get::<HoveredNode>(rig), Some(&HoveredNode(None)));
         assert_eq!(bench.rig().len(), 1);
         assert!(bench.surface().is_none_or(|surface| surface.hits(&ray).is_empty()));
         std::thread::sleep(Duration::from_millis(1));
     }
     assert!(waited > 0, "the surface was there at once");
-    let (mut picked, mut placed) = (bench.messages::<Picked>(), bench.messages::<Placed>());
+    let (mut picked, mut placed) = (bench.messages::<PickAnswer>(), bench.messages::<PlaceAnswer>());
     bench.app.update();
-    picked.extend(bench.messages::<Picked>());
-    placed.extend(bench.messages::<Placed>());
+    picked.extend(bench.messages::<PickAnswer>());
+    placed.extend(bench.messages::<PlaceAnswer>());
     assert_eq!(picked.iter().map(|picked| picked.joints.len()).collect::<Vec<_>>(), [1, 0], "in their order");
     assert_eq!(placed.len(), 1);
     assert_eq!(bench.rig().len(), 2, "the answer came once");
     assert_eq!(bench.rig().roots().len(), 2, "below nothing: the second request took the selection away");
-    assert!(bench.get::<Hovered>(rig).unwrap().0.is_some());
+    assert!(bench.get::<HoveredNode>(rig).unwrap().0.is_some());
     assert!(bench.rig().joint(root).is_some());
     // A rig that is closed takes its requests with it.
     bench.app.world_mut().write_message(PlaceRequest { rig, ray, settings: PlaceSettings::default() });
     bench.app.world_mut().despawn(rig);
     bench.app.update();
-    assert!(bench.messages::<Placed>().is_empty());
+    assert!(bench.messages::<PlaceAnswer>().is_empty());
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::{path::Path, sync::Arc};
 
 use bevy::prelude::*;
 use proptest::prelude::*;
-use rigsmith::plugins::document::{EditRequest, Edited};
+use rigsmith::plugins::document::{EditReport, EditRequest};
 use rigsmith::processor::form::{FormElement, read_form};
 use rigsmith::rig::{
     EditError, GroupData, JointData, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
@@ -682,7 +682,7 @@ fn notes_reach_those_who_asked_and_kinds_are_a_resource() {
     let paste = Operation::Tags(TagOperation::Paste { clipboard, what: PasteWhat::Both, to });
     app.world_mut().write_message(EditRequest::operation(rig, paste));
     app.update();
-    let edited: Vec<Edited> = app.world_mut().resource_mut::<Messages<Edited>>().drain().collect();
+    let edited: Vec<EditReport> = app.world_mut().resource_mut::<Messages<EditReport>>().drain().collect();
     assert!(edited[0].name == "Paste tags" && edited[0].notes[0].contains("1 copied joints"), "{edited:?}");
     let names: Vec<_> = app.world().resource::<FeatureKinds>().iter().map(|kind| kind.name.clone()).collect();
     assert!(names.contains(&"wing".to_owned()) && names.contains(&"ik".to_owned()), "{names:?}");

@@ -24,7 +24,7 @@ use rigsmith::{
     },
     plugins::{
         display::{MeshDisplay, WeightColors},
-        document::Hovered,
+        document::HoveredNode,
         drawing::Ghosts,
         stroke::StrokeParent,
         viewport::{RigViewport, Sight},
@@ -181,7 +181,7 @@ impl Bench {
     }
 
     fn hovered(&self) -> Option<Uid> {
-        self.app.world().get::<Hovered>(self.rig).unwrap().0
+        self.app.world().get::<HoveredNode>(self.rig).unwrap().0
     }
 
     fn notices(&mut self) -> Vec<Notice> {

@@ -18,7 +18,7 @@ use bevy::{
 use rigsmith::{
     files::{RealDisk, load_template},
     plugins::{
-        commands::{BuildRequest, BuildStep, Built, BuiltEntities},
+        commands::{BuildRequest, BuildResult, BuildStep, BuiltEntities},
         document::JointEntities,
         runtime::RigRuntime,
     },
@@ -95,13 +95,13 @@ impl Stage {
 
     /// The node with that label.
     pub fn labelled(&self, label: &str) -> Entity {
-        let built = &self.app.world().get::<Built>(self.rig).unwrap().0;
+        let built = &self.app.world().get::<BuildResult>(self.rig).unwrap().0;
         self.node(built.find_label(label).unwrap_or_else(|| panic!("no {label}")).uid).unwrap()
     }
 
     /// The control with that name.
     pub fn control(&self, name: &str) -> Entity {
-        let built = &self.app.world().get::<Built>(self.rig).unwrap().0;
+        let built = &self.app.world().get::<BuildResult>(self.rig).unwrap().0;
         let is_meant = |node: &&BuiltNode| node.kind == NodeType::Control && *node.name == *name;
         let found = built.nodes.iter().find(is_meant).unwrap_or_else(|| panic!("no control {name}"));
         self.node(found.uid).unwrap()
@@ -134,7 +134,7 @@ impl Stage {
     /// the rig's space, over all nodes: of places as a share of the rig's height, of axes as a share of their length.
     pub fn off(&self) -> f32 {
         let world = self.app.world();
-        let built = &world.get::<Built>(self.rig).expect("the rig is built").0;
+        let built = &world.get::<BuildResult>(self.rig).expect("the rig is built").0;
         let state = self.runtime().state();
         assert_eq!(state.program().nodes().len(), built.nodes.len(), "the program is that of the build");
         let exact = |affine: Affine3A| DAffine3 {
@@ -166,7 +166,7 @@ impl Stage {
     /// Largest distance, as a share of the rig's height, between the running program and one compiled from nothing and
     /// posed as the document says.
     pub fn off_from_document(&self) -> f32 {
-        let built = &self.app.world().get::<Built>(self.rig).unwrap().0;
+        let built = &self.app.world().get::<BuildResult>(self.rig).unwrap().0;
         let program = RigProgram::compile(built, &CompileOptions::default()).unwrap();
         let mut state = RigState::new(Arc::new(program));
         for (node, offset) in self.document().pose() {

@@ -30,7 +30,7 @@ use crate::{
     },
     instance::RigSource,
     mesh::{gltf::GltfWriteSettings, model::Model},
-    plugins::{commands::Built, history::RigHistory, surface::RigMesh},
+    plugins::{commands::BuildResult, history::RigHistory, surface::RigMesh},
     rig::{
         BuiltRig, Rig,
         character::{Character, character},
@@ -234,7 +234,7 @@ fn export(world: &mut World, path: PathBuf) {
     let more = open.len().saturating_sub(1);
     let mesh = open.into_iter().next().map(|(_, mesh, _)| mesh.clone());
     let (step, name) = (last_step(world, rig), file_name(&path));
-    let built = world.get::<Built>(rig).map(|built| built.0.clone());
+    let built = world.get::<BuildResult>(rig).map(|built| built.0.clone());
     let template = world.get::<OpenDocument>(rig).and_then(|document| document.template.clone());
     let task = spawn(move || {
         let mut notes = export_to(&path, &data, built.as_deref(), mesh.as_ref(), template.as_deref())?;

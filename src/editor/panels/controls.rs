@@ -13,7 +13,7 @@ use super::{
 use crate::{
     editor::panel::{EditorPanel, Requests},
     plugins::{
-        commands::{BuildFailure, BuildRequest, BuildStep, Built, Processor, RunFailure},
+        commands::{BuildFailure, BuildRequest, BuildResult, BuildStep, Processor, RunFailure},
         controls::SwitchRequest,
         document::{Change, EditRequest},
         runtime::RigRuntime,
@@ -41,7 +41,7 @@ impl EditorPanel for ControlsPanel {
         let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
-        let built = world.get::<Built>(shown.entity).map(|built| &*built.0);
+        let built = world.get::<BuildResult>(shown.entity).map(|built| &*built.0);
         let runtime = world.get::<RigRuntime>(shown.entity);
         ScrollArea::vertical().id_salt("controls").auto_shrink(false).show(ui, |ui| {
             build_state(ui, world, &shown, requests);

@@ -7,7 +7,7 @@ use bevy_egui::egui::Color32;
 
 use crate::{
     editor::ActiveRig,
-    plugins::document::{Hovered, Selection},
+    plugins::document::{HoveredNode, Selection},
     rig::{JointData, Rig, Uid},
 };
 
@@ -33,7 +33,7 @@ impl<'w> DisplayedRig<'w> {
         let rig = world.get_entity(entity).ok()?;
         Some(Self {
             entity,
-            hovered: rig.get::<Hovered>().and_then(|hovered| hovered.0),
+            hovered: rig.get::<HoveredNode>().and_then(|hovered| hovered.0),
             rig: rig.get_ref()?,
             selection: rig.get_ref()?,
         })

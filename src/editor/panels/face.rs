@@ -27,7 +27,8 @@ use crate::{
     plugins::{
         RigSystems,
         face::{
-            Expressed, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport, FaceRequest, FaceRig, PlaceFaceError,
+            ExpressionAnswer, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport, FaceRequest, FaceRig,
+            PlaceFaceError,
         },
         picking::{Pick, PickRequest},
         surface::{RigMesh, RigMeshes},
@@ -43,7 +44,7 @@ impl Plugin for FacePanelPlugin {
         app.init_resource::<FaceResults>()
             .add_message::<CancelFace>()
             .add_message::<FacePlaced>()
-            .add_message::<Expressed>()
+            .add_message::<ExpressionAnswer>()
             .add_message::<Notice>()
             .add_systems(Update, cancel.after(RigSystems::Build).before(RigSystems::Bind))
             .add_systems(Last, tell_results.before(LogSystems));
@@ -71,7 +72,7 @@ fn cancel(mut requests: MessageReader<CancelFace>, jobs: Query<&FaceJob>) {
 
 fn tell_results(
     mut placed: MessageReader<FacePlaced>,
-    mut expressed: MessageReader<Expressed>,
+    mut expressed: MessageReader<ExpressionAnswer>,
     meshes: Query<&RigMesh>,
     mut results: ResMut<FaceResults>,
     mut commands: Commands,
@@ -100,7 +101,7 @@ fn tell_results(
             }
         }
     }
-    for Expressed { result, .. } in expressed.read() {
+    for ExpressionAnswer { result, .. } in expressed.read() {
         if let Err(error) = result {
             commands.write_message(Notice::error(format!("The face shows nothing: {error}.")));
         }

@@ -11,7 +11,7 @@ use crate::{
         notice::{Notice, Severity},
         panel::{EditorPanel, Requests},
     },
-    plugins::document::EditRefused,
+    plugins::document::EditRefusal,
 };
 
 /// Plugin that stores notices, and makes notices of refused edits.
@@ -22,7 +22,7 @@ impl Plugin for LogPlugin {
         app.init_resource::<LogBook>()
             .add_message::<Notice>()
             .add_message::<ClearLog>()
-            .add_message::<EditRefused>()
+            .add_message::<EditRefusal>()
             .add_message::<RequestRedraw>()
             .add_systems(Last, (tell_refusals, keep_notices).chain().in_set(LogSystems));
     }
@@ -94,7 +94,7 @@ impl LogEntry {
     }
 }
 
-fn tell_refusals(mut refused: MessageReader<EditRefused>, mut notices: MessageWriter<Notice>) {
+fn tell_refusals(mut refused: MessageReader<EditRefusal>, mut notices: MessageWriter<Notice>) {
     for refused in refused.read() {
         notices.write(Notice::error(sentence(&refused.reason.to_string())));
     }

@@ -27,7 +27,7 @@ use crate::{
     plugins::{
         RigSystems,
         landing::ResultHeld,
-        skinning::{BindRequest, Bound, SkinningError, SkinningJob, SkinningReport},
+        skinning::{BindAnswer, BindRequest, SkinningError, SkinningJob, SkinningReport},
         surface::{RigMesh, RigMeshes},
     },
     rig::{NodeKind, Rig, SkinData, Uid},
@@ -45,7 +45,7 @@ impl Plugin for SkinningPanelPlugin {
             .add_message::<ActionRequest>()
             .add_message::<CancelSkinning>()
             .add_message::<Notice>()
-            .add_message::<Bound>()
+            .add_message::<BindAnswer>()
             .add_message::<ResultHeld>()
             .add_systems(Update, (skin, cancel).chain().after(RigSystems::Build).before(RigSystems::Bind))
             .add_systems(Last, (tell_results, tell_held).chain().before(LogSystems));
@@ -128,12 +128,12 @@ fn cancel(
 }
 
 fn tell_results(
-    mut bound: MessageReader<Bound>,
+    mut bound: MessageReader<BindAnswer>,
     meshes: Query<&RigMesh>,
     mut results: ResMut<SkinningResults>,
     mut notices: MessageWriter<Notice>,
 ) {
-    for Bound { mesh, result } in bound.read() {
+    for BindAnswer { mesh, result } in bound.read() {
         let name = meshes.get(*mesh).map_or("The mesh", |mesh| mesh_name(mesh));
         notices.write(match result {
             Ok(SkinningReport { weights: report, .. }) => {

@@ -5,7 +5,7 @@ use bevy::{ecs::system::SystemParam, math::Affine3, prelude::*};
 use crate::{
     editor::{ActiveRig, camera::ViewportSight},
     plugins::{
-        commands::Built,
+        commands::BuildResult,
         document::{JointEntities, Selection, Symmetry},
         picking::posed_joints,
         runtime::RigRuntime,
@@ -34,7 +34,7 @@ type RigQuery = (
     Option<Ref<'static, RigSurface>>,
     Has<RigMeshes>,
     Option<Ref<'static, RigRuntime>>,
-    Option<&'static Built>,
+    Option<&'static BuildResult>,
 );
 
 /// The active rig.
@@ -58,7 +58,7 @@ pub struct EditedRig<'a> {
     /// The running program of a built rig.
     pub runtime: Option<Ref<'a, RigRuntime>>,
     /// Result of its commands.
-    pub built: Option<&'a Built>,
+    pub built: Option<&'a BuildResult>,
 }
 
 impl Scene<'_, '_> {

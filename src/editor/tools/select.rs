@@ -18,7 +18,7 @@ use crate::{
         pointer::{ModifierKeys, PointerAct, ViewportArea},
     },
     plugins::{
-        document::Hovered,
+        document::HoveredNode,
         picking::{HoverRequest, Pick, PickRequest},
         viewport::Sight,
     },
@@ -78,7 +78,7 @@ pub(super) fn select(
     mut pointers: MessageReader<ToolPointer>,
     scene: Scene,
     (mode, area, gizmo): (Res<Mode>, Res<ViewportArea>, Res<GizmoHover>),
-    hovered: Query<&Hovered>,
+    hovered: Query<&HoveredNode>,
     mut picks: MessageWriter<PickRequest>,
     mut hovers: MessageWriter<HoverRequest>,
 ) {
@@ -136,7 +136,7 @@ fn clicked(
     at: Vec2,
     held: ModifierKeys,
     count: u8,
-    hovered: Option<&Hovered>,
+    hovered: Option<&HoveredNode>,
 ) -> PickRequest {
     let request = |what, add| PickRequest { rig: rig.entity, what, add };
     let selected = &rig.selection.0;
@@ -180,7 +180,7 @@ pub(super) fn say(
     mode: Res<Mode>,
     tool: Res<SelectTool>,
     scene: Scene,
-    hovered: Query<Ref<Hovered>>,
+    hovered: Query<Ref<HoveredNode>>,
     mut status: ResMut<StatusLine>,
 ) {
     let Some(rig) = scene.rig() else { return };

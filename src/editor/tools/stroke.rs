@@ -34,7 +34,7 @@ use crate::{
     },
     mesh::surface::Surface,
     plugins::{
-        document::Hovered,
+        document::HoveredNode,
         picking::{Pick, PickRequest},
         stroke::{
             FollowedStroke, StrokeParent, StrokePlan, StrokeRequest, StrokeResult, StrokeScene, StrokeTips,
@@ -203,7 +203,7 @@ fn draw(
     scene: Scene,
     mut press: Local<Option<Press>>,
     mut hovering: Local<bool>,
-    mut hovered: Query<&mut Hovered>,
+    mut hovered: Query<&mut HoveredNode>,
     mut out: Outcomes,
 ) {
     for ActionRequest(action) in actions.read() {
@@ -269,7 +269,7 @@ fn draw(
         }
         // A stroke that starts here continues from this joint; a click selects it.
         if let Ok(mut hovered) = hovered.get_mut(rig.entity) {
-            hovered.set_if_neq(Hovered(under));
+            hovered.set_if_neq(HoveredNode(under));
         }
         *hovering = under.is_some();
     }
@@ -277,7 +277,7 @@ fn draw(
         && std::mem::take(&mut *hovering)
         && let Some(mut hovered) = found.as_ref().and_then(|(rig, _)| hovered.get_mut(rig.entity).ok())
     {
-        hovered.set_if_neq(Hovered(None));
+        hovered.set_if_neq(HoveredNode(None));
     }
     let on = found.as_ref().and_then(|(rig, _)| {
         let surface = rig.surface.as_ref()?.shared()?;
@@ -406,7 +406,7 @@ pub(super) fn show(
     mode: Res<Mode>,
     scene: Scene,
     tips: Query<&StrokeTips>,
-    hovered: Query<Ref<Hovered>>,
+    hovered: Query<Ref<HoveredNode>>,
     mut status: ResMut<StatusLine>,
 ) {
     let is_on = *mode == Mode::Stroke || matches!(tool.state, StrokeState::Drawing(_));

@@ -28,7 +28,7 @@ use crate::{
         settings::{EditorSettings, GizmoSpace},
     },
     plugins::{
-        document::{Change, EditRequest, Edited},
+        document::{Change, EditReport, EditRequest},
         picking::{Pick, PickRequest},
     },
     rig::{
@@ -160,7 +160,7 @@ fn hover(
 fn drag(
     mut pointers: MessageReader<ToolPointer>,
     mut actions: MessageReader<ActionRequest>,
-    mut edited: MessageReader<Edited>,
+    mut edited: MessageReader<EditReport>,
     (mode, settings, moves): (Res<Mode>, Res<EditorSettings>, Res<PoseMoves>),
     scene: Scene,
     mut tool: ResMut<GizmoTool>,

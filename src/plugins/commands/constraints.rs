@@ -4,7 +4,7 @@ use std::{collections::HashSet, sync::Arc};
 
 use bevy::prelude::*;
 
-use super::Built;
+use super::BuildResult;
 use crate::{
     plugins::{
         document::{
@@ -21,8 +21,8 @@ use crate::{
 pub(super) fn follow_constraints(
     mut commands: Commands,
     mut rigs: Query<
-        (Entity, &Built, &JointEntities, &TagEntities, &mut BuiltEntities),
-        Or<(Changed<Built>, Changed<JointEntities>)>,
+        (Entity, &BuildResult, &JointEntities, &TagEntities, &mut BuiltEntities),
+        Or<(Changed<BuildResult>, Changed<JointEntities>)>,
     >,
     mut index: ResMut<EntityIndex>,
 ) {

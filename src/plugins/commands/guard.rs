@@ -11,13 +11,13 @@ use super::constraints::targets;
 use crate::{
     plugins::{
         document::{
-            EditRefused, EntityWriteError, JointEntities, TagEntities,
+            EditRefusal, EntityWriteError, JointEntities, TagEntities,
             entities::{BuiltEntities, EntityIndex, EntityPart, IndexedEntity},
         },
         runtime::RigRuntime,
         schema::{
             Constrains, ConstraintKind, ConstraintTargets, Control, CreatedBy, CreatedRole, Joint, NodeLayer, NodeOf,
-            NodeSlot, Null, Parked,
+            NodeSlot, Null, ParkedNode,
         },
     },
     rig::{BuiltNode, NodeType, RestTransform, Rig, Uid},
@@ -33,7 +33,7 @@ pub(super) struct GuardedComponents {
     control: Option<&'static Control>,
     is_null: Has<Null>,
     is_joint: Has<Joint>,
-    is_parked: Has<Parked>,
+    is_parked: Has<ParkedNode>,
     kind: Option<&'static ConstraintKind>,
     targets: Option<&'static ConstraintTargets>,
     constrains: Option<&'static Constrains>,
@@ -48,7 +48,7 @@ type GuardedWrites = (
         Changed<Control>,
         Added<Null>,
         Added<Joint>,
-        Added<Parked>,
+        Added<ParkedNode>,
         Changed<ConstraintKind>,
         Changed<ConstraintTargets>,
         Changed<Constrains>,
@@ -68,7 +68,7 @@ pub(super) struct GuardedRemovals<'w, 's> {
     control: RemovedComponents<'w, 's, Control>,
     null: RemovedComponents<'w, 's, Null>,
     joint: RemovedComponents<'w, 's, Joint>,
-    parked: RemovedComponents<'w, 's, Parked>,
+    parked: RemovedComponents<'w, 's, ParkedNode>,
     kind: RemovedComponents<'w, 's, ConstraintKind>,
     targets: RemovedComponents<'w, 's, ConstraintTargets>,
     constrains: RemovedComponents<'w, 's, Constrains>,
@@ -94,7 +94,7 @@ pub(super) fn keep_built(
     views: Query<GuardedComponents, Allow<Disabled>>,
     rigs: Query<GuardedRig>,
     index: Res<EntityIndex>,
-    mut refused: MessageWriter<EditRefused>,
+    mut refused: MessageWriter<EditRefusal>,
 ) {
     let mut entities = removed.entities();
     entities.extend(written.iter());
@@ -113,7 +113,7 @@ pub(super) fn keep_built(
         if let Some(name) = guard.name {
             let reason = EntityWriteError::BuiltContent { name };
             warn!("{reason}");
-            refused.write(EditRefused { rig, reason: reason.into() });
+            refused.write(EditRefusal { rig, reason: reason.into() });
         }
     }
 }
@@ -125,7 +125,7 @@ pub(super) fn keep_places(
     bare: Query<(Option<&RestTransform>, Option<&Name>), (Without<Transform>, Allow<Disabled>)>,
     rigs: Query<(&Rig, Option<&RigRuntime>)>,
     index: Res<EntityIndex>,
-    mut refused: MessageWriter<EditRefused>,
+    mut refused: MessageWriter<EditRefusal>,
 ) {
     for entity in removed.read() {
         let Some(IndexedEntity { rig, uid, part: EntityPart::Joint | EntityPart::Node }) = index.get(entity) else {
@@ -140,7 +140,7 @@ pub(super) fn keep_places(
         commands.entity(entity).try_insert(place);
         let reason = EntityWriteError::BuiltContent { name: name.map_or_else(|| uid.to_string(), Name::to_string) };
         warn!("{reason}");
-        refused.write(EditRefused { rig, reason: reason.into() });
+        refused.write(EditRefusal { rig, reason: reason.into() });
     }
 }
 
@@ -187,7 +187,7 @@ impl Guard<'_, '_, '_> {
         is_other |= self.hold(view.layer, layer);
         is_other |= self.hold(view.control, None);
         is_other |= self.hold(view.role, None);
-        is_other |= self.mark::<Parked>(view.is_parked, false);
+        is_other |= self.mark::<ParkedNode>(view.is_parked, false);
         if is_other {
             self.name = Some(node.map_or_else(|| uid.to_string(), |node| node.name.to_string()));
         }
@@ -196,7 +196,7 @@ impl Guard<'_, '_, '_> {
     fn node(&mut self, rig: Entity, uid: Uid, tags: &TagEntities, built: &BuiltEntities, view: &GuardedComponentsItem) {
         let Some(mirrored) = built.nodes.get(&uid).filter(|mirrored| mirrored.entity == self.entity) else { return };
         if mirrored.is_parked {
-            if self.mark::<Parked>(view.is_parked, true) {
+            if self.mark::<ParkedNode>(view.is_parked, true) {
                 self.commands.entity(self.entity).try_insert(Disabled);
                 self.name = Some(uid.to_string());
             }
@@ -209,7 +209,7 @@ impl Guard<'_, '_, '_> {
         is_other |= self.hold(view.control, node.control.as_deref().cloned().map(Control));
         is_other |= self.mark::<Null>(view.is_null, node.kind == NodeType::Null);
         is_other |= self.mark::<Joint>(view.is_joint, node.kind == NodeType::Joint);
-        is_other |= self.mark::<Parked>(view.is_parked, false);
+        is_other |= self.mark::<ParkedNode>(view.is_parked, false);
         is_other |= self.relate(view.by, tags.get(mirrored.command).map(CreatedBy));
         if is_other {
             self.name = Some(node.name.to_string());

@@ -7,7 +7,7 @@ use bevy::{
     prelude::*,
 };
 
-use super::{Built, guard::role_of};
+use super::{BuildResult, guard::role_of};
 use crate::{
     plugins::{
         document::{
@@ -17,7 +17,7 @@ use crate::{
         history::RigHistory,
         runtime::RigRuntime,
         schema::{
-            Attributes, Control, CreatedBy, CreatedRole, InGroup, Joint, NodeLabel, NodeLayer, NodeOf, Null, Parked,
+            Attributes, Control, CreatedBy, CreatedRole, InGroup, Joint, NodeLabel, NodeLayer, NodeOf, Null, ParkedNode,
         },
     },
     rig::{BuiltNode, NodeType, RestTransform, Rig, Uid},
@@ -26,7 +26,7 @@ use crate::{
 type FollowedNodes<'a> = (
     Entity,
     &'a Rig,
-    Option<Ref<'a, Built>>,
+    Option<Ref<'a, BuildResult>>,
     &'a mut JointEntities,
     &'a TagEntities,
     &'a GroupEntities,
@@ -38,7 +38,7 @@ type FollowedNodes<'a> = (
 /// below its parent: the built parent, or, for joints that are not built, the parent in the document.
 pub(super) fn follow_nodes(
     mut commands: Commands,
-    mut rigs: Query<FollowedNodes, Or<(Changed<Built>, Changed<Rig>)>>,
+    mut rigs: Query<FollowedNodes, Or<(Changed<BuildResult>, Changed<Rig>)>>,
     parents: Query<&ChildOf, Allow<Disabled>>,
     mut places: Query<(&mut Transform, &mut RestTransform), Allow<Disabled>>,
     mut index: ResMut<EntityIndex>,
@@ -84,7 +84,7 @@ pub(super) fn follow_nodes(
             let is_back = std::mem::take(&mut mirrored.is_parked);
             if is_back {
                 let placed = (rest, pose, NodeOf(rig_entity), ChildOf(parent));
-                writer.commands.entity(entity).try_remove::<(Parked, Disabled)>().try_insert(placed);
+                writer.commands.entity(entity).try_remove::<(ParkedNode, Disabled)>().try_insert(placed);
                 mirrored.node = None;
             } else if mirrored.parent != Some(parent) || !parents.contains(entity) {
                 writer.commands.entity(entity).try_insert(ChildOf(parent));
@@ -119,7 +119,7 @@ pub(super) fn follow_nodes(
 /// wrote the parent of a node.
 pub(super) fn unsorted_rigs(
     edited: Query<(Entity, &Rig, &JointEntities), Changed<Rig>>,
-    rebuilt: Query<Entity, (With<Rig>, Or<(Changed<Built>, Changed<Children>)>)>,
+    rebuilt: Query<Entity, (With<Rig>, Or<(Changed<BuildResult>, Changed<Children>)>)>,
     nodes: Query<&NodeOf, Changed<Children>>,
 ) -> BTreeSet<Entity> {
     let edited = edited.iter().filter(|(_, rig, joints)| !joints.follow(rig)).map(|(entity, ..)| entity);
@@ -178,7 +178,7 @@ fn park(commands: &mut Commands, known: &mut BuiltEntities, nodes: &[BuiltNode])
         if let Ok(mut entity) = commands.get_entity(mirrored.entity) {
             entity.detach_all_children();
             entity.try_remove::<(ChildOf, NodeOf, Control, Null, Joint, NodeLabel, Name, InGroup)>();
-            entity.try_remove::<(CreatedBy, CreatedRole, NodeLayer, Attributes)>().try_insert((Parked, Disabled));
+            entity.try_remove::<(CreatedBy, CreatedRole, NodeLayer, Attributes)>().try_insert((ParkedNode, Disabled));
         }
     }
 }

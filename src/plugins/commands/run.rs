@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 
-use super::{Built, BuiltEntities};
+use super::{BuildResult, BuiltEntities};
 use crate::{
     plugins::{
         document::{JointEntities, ShowRest},
@@ -28,7 +28,7 @@ pub struct RunFailure(pub ProgramError);
 type BuiltRigs<'a> = (
     Entity,
     &'a Rig,
-    Ref<'a, Built>,
+    Ref<'a, BuildResult>,
     &'a JointEntities,
     &'a BuiltEntities,
     Option<&'a ShowRest>,
@@ -44,7 +44,7 @@ pub(super) struct SuspendedRuntime(RigRuntime);
 /// values of the document where those have changed.
 pub(super) fn run_built(
     mut commands: Commands,
-    mut rigs: Query<BuiltRigs, Or<(Changed<Built>, Changed<Rig>, Changed<ShowRest>)>>,
+    mut rigs: Query<BuiltRigs, Or<(Changed<BuildResult>, Changed<Rig>, Changed<ShowRest>)>>,
     transforms: Query<&Transform>,
     mut programs: ResMut<Programs>,
 ) {

@@ -16,7 +16,7 @@ use crate::{
     algo::control_size::clear_factor,
     mesh::{model::Model, surface::Surface},
     plugins::{
-        commands::{Built, BuiltEntities},
+        commands::{BuildResult, BuiltEntities},
         surface::{RigMesh, RigMeshes},
     },
     rig::{BuiltRig, Uid},
@@ -65,7 +65,7 @@ struct MeasuredFactors {
 type Rigs<'w, 's> = Query<
     'w,
     's,
-    (Entity, &'static RigMeshes, &'static Built, &'static BuiltEntities, Option<&'static mut MeasuredShapes>),
+    (Entity, &'static RigMeshes, &'static BuildResult, &'static BuiltEntities, Option<&'static mut MeasuredShapes>),
 >;
 
 /// Measures the shapes of rigs whose meshes or controls changed.

@@ -23,7 +23,7 @@ use super::{
 use crate::{
     mesh::model::Model,
     plugins::{
-        commands::{Built, BuiltEntities},
+        commands::{BuildResult, BuiltEntities},
         document::JointEntities,
         runtime::RigRuntime,
         skinning::{InstanceBody, InstanceSkin},
@@ -281,7 +281,7 @@ impl DisplayedMesh {
 pub(super) fn follow_skins(
     mut commands: Commands,
     mut displays: Query<(&mut DisplayedMesh, Ref<SkinOf>)>,
-    rigs: Query<(Entity, Ref<Rig>, Ref<JointEntities>, Option<Ref<Built>>, Option<Ref<BuiltEntities>>)>,
+    rigs: Query<(Entity, Ref<Rig>, Ref<JointEntities>, Option<Ref<BuildResult>>, Option<Ref<BuiltEntities>>)>,
     bodies: Query<(Entity, Ref<InstanceBody>, &RigRuntime), Without<Rig>>,
     mut bind_assets: ResMut<Assets<SkinnedMeshInverseBindposes>>,
 ) {

@@ -26,7 +26,7 @@ use bevy::{
 
 use self::trial::Trial;
 use super::{
-    EditRefused,
+    EditRefusal,
     entities::{BuiltEntities, EntityIndex, EntityPart, GroupEntities, JointEntities, TagEntities},
     error::{EntityWrite, EntityWriteError},
 };
@@ -168,7 +168,7 @@ pub(super) fn adopt_writes(
     mut uids: ResMut<UidSource>,
     mut index: ResMut<EntityIndex>,
     mut edits: ResMut<EntityEdits>,
-    mut refused: MessageWriter<EditRefused>,
+    mut refused: MessageWriter<EditRefusal>,
 ) {
     let touched = written.take();
     let closed: HashSet<Entity> = written.rigs.read().filter(|rig| !rigs.contains(*rig)).collect();
@@ -203,7 +203,7 @@ pub(super) fn adopt_writes(
         let outcome = trial.finish();
         for reason in outcome.refused {
             warn!("{reason}");
-            refused.write(EditRefused { rig: rig_entity, reason: reason.into() });
+            refused.write(EditRefusal { rig: rig_entity, reason: reason.into() });
         }
         if outcome.respawn {
             rig.set_changed();

@@ -7,7 +7,7 @@ use super::{
 use crate::{
     plugins::{
         controls::outline::ControlOutline,
-        document::{Hovered, Selection},
+        document::{HoveredNode, Selection},
         viewport::Sight,
     },
     rig::LayerDisplay,
@@ -20,7 +20,7 @@ const TEMPLATE: Tint = [128, 130, 136, 255];
 pub fn draw_controls(
     controls: &[ControlOutline],
     selection: &Selection,
-    hovered: &Hovered,
+    hovered: &HoveredNode,
     sight: &Sight,
     theme: &Theme,
     ink: &mut Ink,

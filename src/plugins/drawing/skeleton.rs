@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     plugins::{
-        document::{Hovered, Selection},
+        document::{HoveredNode, Selection},
         viewport::Sight,
     },
     rig::{NodeKind, Rig, Uid},
@@ -59,7 +59,7 @@ pub struct DrawnJoint {
 pub fn drawn_joints(
     rig: &Rig,
     selection: &Selection,
-    hovered: &Hovered,
+    hovered: &HoveredNode,
     mut pose: impl FnMut(Uid) -> Option<Affine3A>,
 ) -> Vec<DrawnJoint> {
     let mut numbers = bevy::platform::collections::HashMap::<Uid, usize>::with_capacity(rig.len());

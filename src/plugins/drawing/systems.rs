@@ -21,7 +21,7 @@ use super::{
 use crate::{
     plugins::{
         controls::{ControlsInUse, NodeVisible, outline::ControlNodes, size::ShapeFactor},
-        document::{Hovered, Joint, JointEntities, NodeOf, Selection, Symmetry},
+        document::{HoveredNode, Joint, JointEntities, NodeOf, Selection, Symmetry},
         schema::{Control, NodeLayer, RigNodes},
         surface::{RigMesh, RigMeshes},
         viewport::{RigViewport, Sight},
@@ -209,7 +209,7 @@ pub(super) fn draw_rigs(
             Entity,
             Ref<Rig>,
             Ref<Selection>,
-            Ref<Hovered>,
+            Ref<HoveredNode>,
             &JointEntities,
             &GlobalTransform,
             Option<&RigNodes>,

@@ -5,7 +5,7 @@ use std::{borrow::Cow, collections::BTreeMap, sync::Arc};
 use bevy::prelude::*;
 
 use super::{
-    ExpressError, ExpressRequest, Expressed, Expressions, Face, FaceExpressions,
+    ExpressError, ExpressRequest, ExpressionAnswer, Expressions, Face, FaceExpressions,
     placed_bones::FaceRig,
     preparation::{FacePreparation, PreparedFace, PreparedParts},
 };
@@ -114,7 +114,7 @@ pub(super) fn express(
     mut meshes: Query<(&RigMesh, &SkinOf, Option<&Face>, Option<&PreparedFace>, Option<&mut FacePreparation>)>,
     rigs: Query<(&Rig, Option<&RigHistory>)>,
     set: Res<FaceExpressions>,
-    mut told: MessageWriter<Expressed>,
+    mut told: MessageWriter<ExpressionAnswer>,
 ) {
     for request in requests.read() {
         let ExpressRequest { mesh: entity, strengths, preview } = request;
@@ -122,7 +122,7 @@ pub(super) fn express(
             Some((mesh, of.0, rigs.get(of.0).ok()?, face, prepared, preparation))
         });
         let Some((mesh, rig_entity, (rig, history), face, prepared, preparation)) = found else {
-            told.write(Expressed { mesh: *entity, result: Err(ExpressError::NoRig) });
+            told.write(ExpressionAnswer { mesh: *entity, result: Err(ExpressError::NoRig) });
             continue;
         };
         // A preview is undone before the next preview or edit.
@@ -131,7 +131,7 @@ pub(super) fn express(
         let (mix, (known, skin)) = match checked {
             Ok(checked) => checked,
             Err(error) => {
-                told.write(Expressed { mesh: *entity, result: Err(error) });
+                told.write(ExpressionAnswer { mesh: *entity, result: Err(error) });
                 continue;
             }
         };
@@ -165,7 +165,7 @@ pub(super) fn express(
         }
         // What is shown is what the document says after the edit: see `follow_strengths`.
         commands.entity(*entity).insert((Expressions(strengths.clone()), OwnStrengths(strengths.clone())));
-        told.write(Expressed { mesh: *entity, result: Ok(()) });
+        told.write(ExpressionAnswer { mesh: *entity, result: Ok(()) });
     }
 }
 

@@ -12,7 +12,7 @@ use bevy::{
 };
 
 use super::{
-    ExpressError, ExpressRequest, Expressed, Face, FaceExpressions,
+    ExpressError, ExpressRequest, ExpressionAnswer, Face, FaceExpressions,
     placed_bones::FaceRig,
     pose::{analysed_weights, facial_bones},
 };
@@ -132,7 +132,7 @@ pub(super) fn keep(
     mut commands: Commands,
     mut preparations: Query<(Entity, &mut FacePreparation, &RigMesh)>,
     mut requests: MessageWriter<ExpressRequest>,
-    mut told: MessageWriter<Expressed>,
+    mut told: MessageWriter<ExpressionAnswer>,
 ) {
     for (entity, mut preparation, mesh) in &mut preparations {
         let Some(finished) = check_ready(&mut preparation.task) else { continue };
@@ -149,7 +149,7 @@ pub(super) fn keep(
                 }
             }
             Err(error) if wanted.is_some() => {
-                told.write(Expressed { mesh: entity, result: Err(ExpressError::from(error)) });
+                told.write(ExpressionAnswer { mesh: entity, result: Err(ExpressError::from(error)) });
             }
             Err(_) => {}
         }

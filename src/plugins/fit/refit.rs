@@ -12,7 +12,7 @@ use crate::{
     algo::fit_template::refit_template,
     plugins::{
         commands::RigModules,
-        document::{Change, EditRequest, Edited},
+        document::{Change, EditReport, EditRequest},
         history::RigHistory,
     },
     rig::{EditError, Rig, RigEdit, Uid, operations::Operation, step::Commit},
@@ -23,12 +23,12 @@ const MOVED: f32 = 1e-4;
 
 /// Fits the joints around those that a person has moved again, as a step of its own.
 pub(super) fn follow_moves(
-    mut edited: MessageReader<Edited>,
+    mut edited: MessageReader<EditReport>,
     mut rigs: Query<(&Rig, &mut FittedRig)>,
     modules: Res<RigModules>,
     mut commands: Commands,
 ) {
-    for Edited { rig: entity, name, committed, .. } in edited.read() {
+    for EditReport { rig: entity, name, committed, .. } in edited.read() {
         // A fit that is undone can no longer be corrected.
         if *name == FIT && matches!(committed, Some(Commit::Undone(_))) {
             commands.entity(*entity).try_remove::<FittedRig>();

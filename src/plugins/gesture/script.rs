@@ -12,10 +12,10 @@ use crate::{
         view::{View, ViewPlane},
     },
     plugins::{
-        document::{Change, EditRefused, EditRequest, Edited, Selection, Symmetry},
-        fit::{FIT_AROUND, FitRequest, FitTemplate, Fitted},
-        picking::{Pick, PickRequest, Picked},
-        placement::{PlaceRequest, Placed},
+        document::{Change, EditRefusal, EditReport, EditRequest, Selection, Symmetry},
+        fit::{FIT_AROUND, FitAnswer, FitRequest, FitTemplate},
+        picking::{Pick, PickAnswer, PickRequest},
+        placement::{PlaceAnswer, PlaceRequest},
         stroke::{StrokeDone, StrokeParent, StrokeRequest, StrokeResult},
         surface::{RigMeshes, RigSurface, SkinOf},
     },
@@ -96,12 +96,12 @@ pub(super) struct Requests<'w> {
 /// Readers of the answers.
 #[derive(SystemParam)]
 pub(super) struct Answers<'w, 's> {
-    edited: MessageReader<'w, 's, Edited>,
-    refused: MessageReader<'w, 's, EditRefused>,
-    picked: MessageReader<'w, 's, Picked>,
-    placed: MessageReader<'w, 's, Placed>,
+    edited: MessageReader<'w, 's, EditReport>,
+    refused: MessageReader<'w, 's, EditRefusal>,
+    picked: MessageReader<'w, 's, PickAnswer>,
+    placed: MessageReader<'w, 's, PlaceAnswer>,
     drawn: MessageReader<'w, 's, StrokeDone>,
-    fitted: MessageReader<'w, 's, Fitted>,
+    fitted: MessageReader<'w, 's, FitAnswer>,
     meshes: Query<'w, 's, &'static SkinOf>,
 }
 
@@ -159,7 +159,7 @@ impl GestureScript {
 
 impl Answers<'_, '_> {
     fn collect(&mut self, scripts: &mut Query<ScriptedRig>) {
-        for Picked { rig: entity, joints } in self.picked.read() {
+        for PickAnswer { rig: entity, joints } in self.picked.read() {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             match joints.as_slice() {
                 _ if !script.pending => continue,
@@ -169,7 +169,7 @@ impl Answers<'_, '_> {
             }
             script.pending = false;
         }
-        for Placed { rig: entity, placement } in self.placed.read() {
+        for PlaceAnswer { rig: entity, placement } in self.placed.read() {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             script.note_added(rig);
             match placement {
@@ -205,7 +205,7 @@ impl Answers<'_, '_> {
             }
             script.pending = false;
         }
-        for Fitted { mesh, result } in self.fitted.read() {
+        for FitAnswer { mesh, result } in self.fitted.read() {
             let Ok(SkinOf(rig)) = self.meshes.get(*mesh) else { continue };
             let Ok((_, mut script, ..)) = scripts.get_mut(*rig) else { continue };
             // The edit of a fit answers for it.
@@ -215,9 +215,10 @@ impl Answers<'_, '_> {
             }
         }
         // Joints around a moved one are fitted again by themselves, in answer to no gesture.
-        let follows = |edited: &Edited| edited.name == FIT_AROUND && matches!(edited.committed, Some(Commit::Done(_)));
-        let own = |edited: &&Edited| !edited.preview && !follows(edited);
-        for Edited { rig: entity, name, .. } in self.edited.read().filter(own) {
+        let follows =
+            |edited: &EditReport| edited.name == FIT_AROUND && matches!(edited.committed, Some(Commit::Done(_)));
+        let own = |edited: &&EditReport| !edited.preview && !follows(edited);
+        for EditReport { rig: entity, name, .. } in self.edited.read().filter(own) {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             if script.pending {
                 script.note_added(rig);
@@ -225,7 +226,7 @@ impl Answers<'_, '_> {
                 script.pending = false;
             }
         }
-        for EditRefused { rig: entity, reason } in self.refused.read() {
+        for EditRefusal { rig: entity, reason } in self.refused.read() {
             let Ok((_, mut script, ..)) = scripts.get_mut(*entity) else { continue };
             script.fail(&reason.clone().into());
             script.pending = false;

@@ -7,8 +7,8 @@ use bevy::prelude::*;
 use super::RigRuntime;
 use crate::{
     plugins::{
-        commands::Built,
-        document::{EditRefused, EntityWriteError},
+        commands::BuildResult,
+        document::{EditRefusal, EntityWriteError},
         schema::Attributes,
     },
     rig::{Dependency, Rig, TagKind, Uid},
@@ -16,9 +16,9 @@ use crate::{
 
 /// Tells refused writes to driven attributes, once for each entity and attribute.
 pub(super) fn tell_driven(
-    mut rigs: Query<(Entity, &mut RigRuntime, Option<&Built>, Option<&Rig>), Changed<RigRuntime>>,
+    mut rigs: Query<(Entity, &mut RigRuntime, Option<&BuildResult>, Option<&Rig>), Changed<RigRuntime>>,
     mut told: Local<BTreeSet<(Entity, Arc<str>)>>,
-    mut refused: MessageWriter<EditRefused>,
+    mut refused: MessageWriter<EditRefusal>,
     holders: Query<(), With<Attributes>>,
 ) {
     for (rig, mut runtime, built, document) in &mut rigs {
@@ -41,13 +41,13 @@ pub(super) fn tell_driven(
                 driver: driver(built, document, node.uid, &attribute.name),
             };
             warn!("{reason}");
-            refused.write(EditRefused { rig, reason: reason.into() });
+            refused.write(EditRefusal { rig, reason: reason.into() });
         }
     }
 }
 
 /// Words for the command that drives an attribute; instances of games know no commands.
-fn driver(built: Option<&Built>, document: Option<&Rig>, node: Uid, attribute: &Arc<str>) -> String {
+fn driver(built: Option<&BuildResult>, document: Option<&Rig>, node: Uid, attribute: &Arc<str>) -> String {
     let driven = Dependency::Attribute(node, Arc::clone(attribute));
     let mut constraints = built.into_iter().flat_map(|built| built.0.constraints.iter());
     let Some(found) = constraints.find(|known| known.constraint.drives().contains(&driven)) else {

@@ -12,8 +12,8 @@ use super::{BoundSkin, SkinningInput, SkinningJob, SkinningReport, held_objects,
 use crate::{
     algo::weights::{WeightReport, WeightSettings, late_shares},
     plugins::{
-        commands::{Built, RigModules},
-        document::Edited,
+        commands::{BuildResult, RigModules},
+        document::EditReport,
         landing::JobBasis,
         surface::{RigMesh, SkinOf},
     },
@@ -32,9 +32,9 @@ const MOST: usize = 4;
 /// Undone and redone steps bring their weights with them.
 pub(super) fn start_late_shares(
     mut commands: Commands,
-    mut edited: MessageReader<Edited>,
+    mut edited: MessageReader<EditReport>,
     meshes: Query<(Entity, &RigMesh, &SkinOf), Without<SkinningJob>>,
-    rigs: Query<(&Rig, &Built)>,
+    rigs: Query<(&Rig, &BuildResult)>,
     modules: Option<Res<RigModules>>,
 ) {
     let mut switched: Vec<Entity> = Vec::new();

@@ -16,7 +16,7 @@ fn bench(sight: Sight) -> (Bench, Uid) {
     app.update();
     app.update();
     let mut bench = Bench { app, rig, sink: Sink::default() };
-    let built = bench.app.world().get::<Built>(rig).unwrap().0.clone();
+    let built = bench.app.world().get::<BuildResult>(rig).unwrap().0.clone();
     let control = built.nodes.iter().find(|node| node.control.is_some()).expect("a control").uid;
     bench.mode(Mode::Pose);
     bench.select(&[control]);

@@ -3,7 +3,7 @@
 use rigsmith::{
     editor::panels::controls::ControlsPanel,
     files::{RealDisk, load_template},
-    plugins::commands::Built,
+    plugins::commands::BuildResult,
     rig::feature::combined_features,
 };
 
@@ -55,5 +55,5 @@ fn features_switches_and_choices_are_turned_by_a_click() {
     desk.click("fabrik");
     desk.frames(3);
     assert_eq!(rigsmith::rig::template::write_template(desk.rig()), bytes, "there and back");
-    assert!(desk.app.world().get::<Built>(entity).is_none(), "the panel itself builds nothing");
+    assert!(desk.app.world().get::<BuildResult>(entity).is_none(), "the panel itself builds nothing");
 }

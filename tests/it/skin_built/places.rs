@@ -5,7 +5,7 @@ use rigsmith::{
     algo::weights::WeightSettings,
     headless::Workbench,
     plugins::{
-        commands::{BuildRequest, BuildStep, Built},
+        commands::{BuildRequest, BuildResult, BuildStep},
         skinning::SkinningInput,
         surface::RigSurface,
     },
@@ -86,7 +86,7 @@ fn the_posed_surface_hangs_on_created_joints() {
     let wanted = figure.posed(&state);
     let moved = wanted.iter().zip(&figure.model.points).filter(|(a, b)| a.distance(**b) > 1e-3).count();
     assert!(moved > 300, "{moved} points move");
-    assert!(bench.app_mut().world().get::<Built>(rig).is_some());
+    assert!(bench.app_mut().world().get::<BuildResult>(rig).is_some());
     for _ in 0..500 {
         bench.app_mut().update();
         let surface = bench.app_mut().world().get::<RigSurface>(rig);

@@ -10,7 +10,7 @@ use bevy::{
 };
 use rigsmith::{
     plugins::{
-        commands::{BuildStep, Built, CommandReport},
+        commands::{BuildResult, BuildStep, CommandReport},
         runtime::RigRuntime,
         schema::{Constrains, Control, GroupOf, NodeOf, TagOf},
     },
@@ -73,7 +73,7 @@ fn a_build_that_executes_nothing_writes_nothing() {
     let since = |ticks: Option<bevy::ecs::change_detection::ComponentTicks>| {
         ticks.is_some_and(|ticks| ticks.is_changed(tick, world.read_change_tick()))
     };
-    assert!(!since(rig.get_change_ticks::<Built>()) && !since(rig.get_change_ticks::<RigRuntime>()));
+    assert!(!since(rig.get_change_ticks::<BuildResult>()) && !since(rig.get_change_ticks::<RigRuntime>()));
     let written = parts_written_since(&stage, tick);
     assert!(written.is_empty(), "{} components were written: {written:?}", written.len());
 }
@@ -88,7 +88,7 @@ fn an_edit_of_one_tag_touches_only_what_changed() {
     let end = start + params[start..].find(')').unwrap();
     params.replace_range(start..=end, "shape_scale: (1.5, 1.25, 1.75)");
     let uid = tag.uid;
-    let built = stage.get::<Built>(stage.rig).unwrap().0.clone();
+    let built = stage.get::<BuildResult>(stage.rig).unwrap().0.clone();
     let of_tag = |node: Uid| {
         let origin = built.node(node).and_then(|node| node.origin.clone());
         origin.is_some_and(|origin| origin.command == uid)
@@ -240,6 +240,6 @@ fn no_value_that_stays_the_same_is_written() {
     assert!(count > 0);
     assert_eq!(same, Vec::<String>::new(), "a pose");
     assert!(stage.get::<Control>(control).is_some());
-    let built = &stage.get::<Built>(stage.rig).unwrap().0;
+    let built = &stage.get::<BuildResult>(stage.rig).unwrap().0;
     assert!(built.nodes.iter().any(|node| node.kind == NodeType::Control));
 }

@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 use rigsmith::{
-    plugins::{commands::Built, controls::NodeVisible},
+    plugins::{commands::BuildResult, controls::NodeVisible},
     prelude::*,
     rig::{Matching, NodeType},
 };
@@ -14,7 +14,7 @@ use super::{Stage, shipped};
 fn controls_without_effect_are_hidden() {
     let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
     let mut stage = Stage::built(rig);
-    let built = stage.get::<Built>(stage.rig).unwrap().0.clone();
+    let built = stage.get::<BuildResult>(stage.rig).unwrap().0.clone();
     let limbs = built.switches.iter().filter_map(|switch| match &switch.matching {
         Matching::IkFk { fk, goal, .. } if *goal != switch.control => {
             Some((switch.control, switch.attribute.to_string(), fk.clone(), *goal))
@@ -53,13 +53,13 @@ mod drawn_layers {
         algo::view::ViewPlane,
         plugins::{
             controls::outline::{ControlNodes, ControlOutline, lines_of},
-            document::Hovered,
+            document::HoveredNode,
             drawing::{
                 controls::draw_controls,
                 ink::Ink,
                 theme::{Theme, Tint, group_tint},
             },
-            picking::{Pick, PickRequest, Picked},
+            picking::{Pick, PickAnswer, PickRequest},
             schema::{Control, RigNodes},
             viewport::{RigViewport, Sight},
         },
@@ -83,7 +83,7 @@ mod drawn_layers {
         rig.apply(&RigEdit::SetTag(Uid(2), Box::new(tag))).unwrap();
         rig.apply(&RigEdit::AddTag { joint: Uid(2), tag: Box::new(layer("()")), index: 1 }).unwrap();
         let stage = Stage::built(rig);
-        let built = &stage.get::<Built>(stage.rig).unwrap().0;
+        let built = &stage.get::<BuildResult>(stage.rig).unwrap().0;
         let control = built.nodes.iter().find(|node| node.kind == NodeType::Control).unwrap().uid;
         (stage, control)
     }
@@ -119,7 +119,7 @@ mod drawn_layers {
 
     fn tints(stage: &mut Stage) -> Vec<Tint> {
         let (controls, mut ink) = (outlines(stage), Ink::default());
-        draw_controls(&controls, &Selection::default(), &Hovered::default(), &sight(), &Theme::default(), &mut ink);
+        draw_controls(&controls, &Selection::default(), &HoveredNode::default(), &sight(), &Theme::default(), &mut ink);
         ink.tints.clone()
     }
 
@@ -132,10 +132,10 @@ mod drawn_layers {
         let point = plane.project(lines[0][0].midpoint(lines[0][1])).unwrap();
         let what = Pick::Click { plane, point, reach: 0.02 };
         let rig = stage.rig;
-        stage.app.world_mut().resource_mut::<Messages<Picked>>().clear();
+        stage.app.world_mut().resource_mut::<Messages<PickAnswer>>().clear();
         stage.app.world_mut().write_message(PickRequest { rig, what, add: false });
         stage.app.update();
-        let picked = stage.app.world_mut().resource_mut::<Messages<Picked>>().drain().last();
+        let picked = stage.app.world_mut().resource_mut::<Messages<PickAnswer>>().drain().last();
         let picked = picked.expect("an answer").joints;
         assert_eq!(stage.get::<Selection>(rig).unwrap().0, picked);
         picked

@@ -5,7 +5,7 @@ use bevy::{
     prelude::*,
 };
 use rigsmith::{
-    plugins::commands::{BuildStep, Built},
+    plugins::commands::{BuildResult, BuildStep},
     prelude::*,
     rig::{JointData, NodeType, PoseOffset, RestTransform, TagData, TagKind},
 };
@@ -44,7 +44,7 @@ fn limited() -> (Stage, Uid) {
 }
 
 fn only_control(stage: &Stage) -> Uid {
-    let built = &stage.get::<Built>(stage.rig).unwrap().0;
+    let built = &stage.get::<BuildResult>(stage.rig).unwrap().0;
     let control = built.nodes.iter().find(|node| node.kind == NodeType::Control);
     control.unwrap_or_else(|| panic!("no control in {:?}", built.nodes)).uid
 }

@@ -5,7 +5,7 @@ use bevy::{
     prelude::*,
 };
 use rigsmith::{
-    plugins::commands::{Attributes, BuildStep, Built, Processor},
+    plugins::commands::{Attributes, BuildResult, BuildStep, Processor},
     prelude::*,
     rig::{
         NodeType, PoseOffset,
@@ -32,7 +32,7 @@ fn entities_stand_as_the_program_says_at_every_step() {
             }
             steps = cursor;
         }
-        let whole = stage.app.world().get::<Built>(stage.rig).unwrap().clone();
+        let whole = stage.app.world().get::<BuildResult>(stage.rig).unwrap().clone();
         assert!(steps > 0, "{name} has commands");
         for back in (0..steps).rev() {
             stage.step(BuildStep::Back);
@@ -40,7 +40,7 @@ fn entities_stand_as_the_program_says_at_every_step() {
             assert!(off <= NEAR, "{name} back at {back} commands: {off}");
         }
         stage.step(BuildStep::All);
-        assert_eq!(stage.app.world().get::<Built>(stage.rig).unwrap().0, whole.0, "{name}");
+        assert_eq!(stage.app.world().get::<BuildResult>(stage.rig).unwrap().0, whole.0, "{name}");
         assert!(stage.off() <= NEAR && stage.off_from_document() <= NEAR, "{name}");
     }
 }
@@ -63,7 +63,7 @@ fn a_rig_that_is_spawned_and_built_stands_as_it_was_drawn() {
 /// One random move of a rig: of its controls, attributes and place, of its document and its history, of what is switched
 /// off, and of the build.
 fn random_move(stage: &mut Stage, random: &mut Random) -> &'static str {
-    let built = stage.get::<Built>(stage.rig).unwrap().0.clone();
+    let built = stage.get::<BuildResult>(stage.rig).unwrap().0.clone();
     let controls: Vec<Uid> =
         built.nodes.iter().filter(|node| node.kind == NodeType::Control).map(|node| node.uid).collect();
     let attributes: Vec<(Uid, &str)> = (built.nodes.iter())
@@ -192,7 +192,7 @@ fn writing_the_transform_of_a_control_drives_the_rig_in_the_same_frame() {
 
 /// The left wrist and the control whose movement moves it most.
 fn hand_and_control(stage: &Stage) -> (Entity, Entity) {
-    let built = &stage.app.world().get::<Built>(stage.rig).unwrap().0;
+    let built = &stage.app.world().get::<BuildResult>(stage.rig).unwrap().0;
     let labels: Vec<&str> = built.nodes.iter().filter_map(|node| node.label.as_deref()).collect();
     assert!(labels.contains(&"hand_l"), "{labels:?}");
     let hand = built.find_label("hand_l").unwrap().uid;

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use bevy::prelude::*;
 use rigsmith::{
     plugins::{
-        commands::{Attributes, BuildStep, Built, BuiltEntities},
+        commands::{Attributes, BuildResult, BuildStep, BuiltEntities},
         controls::SwitchRequest,
         document::{GroupEntities, JointEntities, TagEntities},
         history::RigHistory,
         runtime::RigRuntime,
         schema::{
             CommandTag, Constrains, ConstraintKind, ConstraintTargets, Control, CreatedBy, CreatedRole, FeatureTag,
-            GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeLayer, NodeOf, Null, Parked, Tag, TagOf,
+            GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeLayer, NodeOf, Null, ParkedNode, Tag, TagOf,
             Tags,
         },
     },
@@ -32,7 +32,7 @@ use crate::random::Random;
 fn check(stage: &mut Stage, what: &str) {
     let rig = stage.document().clone();
     // Commands may put joints below other nodes.
-    let built = stage.get::<Built>(stage.rig).map(|built| built.0.clone()).unwrap_or_default();
+    let built = stage.get::<BuildResult>(stage.rig).map(|built| built.0.clone()).unwrap_or_default();
     let parents: BTreeMap<Uid, Option<Uid>> =
         (built.nodes.iter()).map(|node| (node.uid, node.parent.map(|parent| built.nodes[parent].uid))).collect();
     let mut siblings: BTreeMap<Entity, Vec<Entity>> = BTreeMap::new();
@@ -147,7 +147,7 @@ fn check_built(stage: &Stage, built: &BuiltRig, what: &str) {
         assert_eq!(role, Some((&*origin.role, origin.subject, origin.number)), "{what}: {}", node.name);
         let by = stage.get::<CreatedBy>(entity).and_then(|by| stage.get::<Uid>(by.0)).copied();
         assert_eq!(by, Some(origin.command), "{what}: the command of {}", node.name);
-        assert!(stage.get::<Parked>(entity).is_none(), "{what}: {} is parked", node.name);
+        assert!(stage.get::<ParkedNode>(entity).is_none(), "{what}: {} is parked", node.name);
     }
     for constraint in &built.constraints {
         let entity = stage.get::<BuiltEntities>(stage.rig).unwrap().constraint(constraint.uid);
@@ -213,7 +213,7 @@ fn layer() -> LayerData {
 fn put_on(entity: &mut EntityWorldMut, number: usize, other: Entity) {
     match number % 10 {
         0 => entity.insert(NodeOf(other)),
-        1 => entity.insert(Parked),
+        1 => entity.insert(ParkedNode),
         2 => entity.insert(Control(control())),
         3 => entity.insert(NodeLayer(layer())),
         4 => entity.insert(CreatedRole { role: "mine".into(), subject: Uid(1), number: 0 }),
@@ -247,7 +247,7 @@ fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
         .unwrap_or_default();
     let number = random.below(1000);
     let constraints: Vec<Entity> =
-        (stage.get::<Built>(stage.rig).map(|built| built.0.clone()).unwrap_or_default().constraints.iter())
+        (stage.get::<BuildResult>(stage.rig).map(|built| built.0.clone()).unwrap_or_default().constraints.iter())
             .filter_map(|constraint| stage.get::<BuiltEntities>(stage.rig)?.constraint(constraint.uid))
             .filter(is_alive)
             .collect();
@@ -407,7 +407,7 @@ fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
             }
         }
         (30, ..) => {
-            let built = stage.get::<Built>(stage.rig).map(|built| built.0.clone()).unwrap_or_default();
+            let built = stage.get::<BuildResult>(stage.rig).map(|built| built.0.clone()).unwrap_or_default();
             if !built.switches.is_empty() {
                 let switch = random.pick(&built.switches);
                 let request = SwitchRequest {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use rigsmith::{
-    plugins::commands::{BuildStep, Built},
+    plugins::commands::{BuildResult, BuildStep},
     prelude::*,
     rig::{BuiltNode, NodeType, RestTransform, TagData, TagKind},
     test_app::test_app,
@@ -27,7 +27,7 @@ fn chain() -> Stage {
 /// Turns the first control of the chain.
 fn swing(stage: &mut Stage) {
     let root = stage.document().roots()[0];
-    let built = &stage.get::<Built>(stage.rig).unwrap().0;
+    let built = &stage.get::<BuildResult>(stage.rig).unwrap().0;
     let is_first = |node: &&BuiltNode| {
         node.kind == NodeType::Control && node.origin.as_ref().is_some_and(|origin| origin.subject == root)
     };

@@ -4,9 +4,9 @@
 use bevy::prelude::*;
 use rigsmith::{
     plugins::{
-        commands::{Attributes, Built},
+        commands::{Attributes, BuildResult},
         controls::SwitchRequest,
-        document::EditRefused,
+        document::EditRefusal,
         history::RigHistory,
     },
     prelude::*,
@@ -20,7 +20,7 @@ const STILL: f32 = 1e-4;
 
 /// World transforms of the built joints' entities.
 fn joints(stage: &Stage) -> Vec<(String, GlobalTransform)> {
-    let built = &stage.get::<Built>(stage.rig).unwrap().0;
+    let built = &stage.get::<BuildResult>(stage.rig).unwrap().0;
     let joints = built.nodes.iter().filter(|node| node.kind == NodeType::Joint);
     let place = |uid| *stage.get::<GlobalTransform>(stage.node(uid).unwrap()).unwrap();
     joints.map(|joint| (joint.name.to_string(), place(joint.uid))).collect()
@@ -43,7 +43,7 @@ fn steps(stage: &Stage) -> usize {
 
 /// Values of a switch: both kinematics, or all spaces.
 fn values(stage: &Stage, switch: &SwitchData) -> Vec<f32> {
-    let built = &stage.get::<Built>(stage.rig).unwrap().0;
+    let built = &stage.get::<BuildResult>(stage.rig).unwrap().0;
     let node = built.node(switch.control).unwrap();
     let attribute = node.attributes.iter().find(|attribute| attribute.name == switch.attribute).unwrap();
     match &attribute.kind {
@@ -64,7 +64,7 @@ fn throw(stage: &mut Stage, switch: &SwitchData, value: f32) {
 }
 
 fn refusals(stage: &mut Stage) -> Vec<String> {
-    let mut messages = stage.app.world_mut().resource_mut::<Messages<EditRefused>>();
+    let mut messages = stage.app.world_mut().resource_mut::<Messages<EditRefusal>>();
     messages.drain().map(|refused| refused.reason.to_string()).collect()
 }
 
@@ -74,7 +74,7 @@ fn switches_keep_every_joint_in_place_as_one_step() {
     for name in ["biped", "quadruped", "bird"] {
         let (_, rig) = shipped().into_iter().find(|(template, _)| template == name).unwrap();
         let mut stage = Stage::built(rig);
-        let built = stage.get::<Built>(stage.rig).unwrap().0.clone();
+        let built = stage.get::<BuildResult>(stage.rig).unwrap().0.clone();
         // Bent limbs: their goals are a little nearer to their roots, and turned.
         let goals = built.switches.iter().filter_map(|switch| match &switch.matching {
             Matching::IkFk { goal, .. } => Some(*goal),

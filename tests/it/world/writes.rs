@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use rigsmith::{
     plugins::{
-        commands::{BuildStep, Built, BuiltEntities},
+        commands::{BuildResult, BuildStep, BuiltEntities},
         document::{ChangeError, EntityWriteError, GroupEntities, TagEntities},
         schema::{
             Attributes, CommandTag, Constrains, ConstraintTargets, CreatedBy, FeatureTag, GroupOf, InFeature, InGroup,
@@ -108,8 +108,8 @@ fn a_driven_attribute_is_put_back_and_told_once() {
         stage.app.world_mut().get_mut::<Attributes>(joint).unwrap().0.insert(name.into(), value);
         stage.app.update();
     };
-    let refused = |stage: &mut Stage| -> Vec<EditRefused> {
-        stage.app.world_mut().resource_mut::<Messages<EditRefused>>().drain().collect()
+    let refused = |stage: &mut Stage| -> Vec<EditRefusal> {
+        stage.app.world_mut().resource_mut::<Messages<EditRefusal>>().drain().collect()
     };
     assert!((out(&stage) - 0.25).abs() < 1e-6, "{}", out(&stage));
     assert!(refused(&mut stage).is_empty());
@@ -231,11 +231,11 @@ fn reparenting_an_entity_reparents_the_joint() {
     // Below itself, below a stranger: refused aloud, once, and put back.
     let stranger = stage.app.world_mut().spawn(Transform::default()).id();
     stage.app.world_mut().entity_mut(one).insert(ChildOf(stranger));
-    stage.app.world_mut().resource_mut::<Messages<EditRefused>>().clear();
+    stage.app.world_mut().resource_mut::<Messages<EditRefusal>>().clear();
     let mut told = 0;
     for _ in 0..4 {
         stage.app.update();
-        told += stage.app.world_mut().resource_mut::<Messages<EditRefused>>().drain().count();
+        told += stage.app.world_mut().resource_mut::<Messages<EditRefusal>>().drain().count();
     }
     assert_eq!(told, 1);
     assert_eq!(stage.get::<ChildOf>(one).unwrap().parent(), stage.rig);
@@ -260,9 +260,9 @@ fn nothing_that_happens_to_entities_panics_or_leaves_a_stale_handle() {
     for (uid, _) in nodes.iter().step_by(37) {
         let entity = stage.node(*uid).unwrap();
         stage.app.world_mut().entity_mut(entity).despawn();
-        stage.app.world_mut().resource_mut::<Messages<EditRefused>>().clear();
+        stage.app.world_mut().resource_mut::<Messages<EditRefusal>>().clear();
         stage.app.update();
-        assert!(!stage.app.world().resource::<Messages<EditRefused>>().is_empty(), "it is told");
+        assert!(!stage.app.world().resource::<Messages<EditRefusal>>().is_empty(), "it is told");
         assert_eq!(stage.document().len(), joints, "and no joint is deleted");
         assert!(stage.node(*uid).is_some_and(|again| again != entity));
         assert!(stage.off() <= NEAR);
@@ -290,7 +290,7 @@ fn nothing_that_happens_to_entities_panics_or_leaves_a_stale_handle() {
 fn constraints_are_entities_that_name_their_nodes() {
     let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
     let mut stage = Stage::built(rig);
-    let built = stage.get::<Built>(stage.rig).unwrap().0.clone();
+    let built = stage.get::<BuildResult>(stage.rig).unwrap().0.clone();
     assert!(built.constraints.len() > 50);
     let known = |stage: &Stage, uid: Uid| stage.get::<BuiltEntities>(stage.rig).unwrap().constraint(uid);
     for constraint in &built.constraints {
@@ -318,7 +318,7 @@ fn a_pose_that_ends_a_preview_brings_the_build_back() {
     let preview = Operation::Edits(vec![RigEdit::SetRest(Uid(2), rest)]);
     stage.change(Change::Preview(preview));
     stage.app.update();
-    let base = |stage: &Stage| stage.get::<Built>(stage.rig).unwrap().0.node(Uid(2)).unwrap().base.translation;
+    let base = |stage: &Stage| stage.get::<BuildResult>(stage.rig).unwrap().0.node(Uid(2)).unwrap().base.translation;
     assert_eq!(base(&stage), Vec3::new(0.0, 3.0, 0.0));
     let offset = PoseOffset::from_rotation(Quat::from_rotation_x(0.3));
     stage.change(Change::Do(Operation::Pose(vec![(Uid(1), offset)])));
