@@ -20,9 +20,9 @@ use crate::{
     modules,
     processor::Modules,
     rig::{
-        Rig, SourceError,
+        Rig, SourceError, Uid,
         part::PartSocket,
-        template::{Template, text_of},
+        template::{PartOrigin, Template, text_of},
     },
 };
 
@@ -31,6 +31,8 @@ use crate::{
 pub struct RigTemplate {
     rig: Arc<Rig>,
     sockets: Arc<[PartSocket]>,
+    /// Origins of the commands that came of parts.
+    origins: Arc<BTreeMap<Uid, PartOrigin>>,
     /// The text that the rig was read from; empty for a rig that was made by code.
     text: Arc<str>,
     /// True if the rig is what the text says.
@@ -60,6 +62,7 @@ impl RigTemplate {
         Self {
             rig: Arc::new(rig),
             sockets: Arc::from([]),
+            origins: Arc::default(),
             text: Arc::from(""),
             is_of_text: false,
             parts: Arc::new(parts),
@@ -79,11 +82,12 @@ impl RigTemplate {
     /// # Errors
     /// See [`PartFiles::complete`].
     pub fn read_with_parts(content: &[u8], path: &Path, files: &mut PartFiles) -> Result<Self, SourceError> {
-        let Template { rig, sockets, .. } = files.complete(path, content)?;
+        let Template { rig, sockets, origins, .. } = files.complete(path, content)?;
         let (found, modules) = (files.found.clone(), files.modules().clone());
         let parts = Arc::new(TemplateParts { path: path.to_owned(), found, modules });
         let text = Arc::from(text_of(content)?);
-        Ok(Self { rig: Arc::new(rig), sockets: sockets.into(), text, is_of_text: true, parts })
+        let (rig, sockets, origins) = (Arc::new(rig), sockets.into(), Arc::new(origins));
+        Ok(Self { rig, sockets, origins, text, is_of_text: true, parts })
     }
 
     /// The rig.
@@ -94,6 +98,11 @@ impl RigTemplate {
     /// Places that other things hang on: those of the template itself and of its parts.
     pub fn sockets(&self) -> &Arc<[PartSocket]> {
         &self.sockets
+    }
+
+    /// Origins of the commands that came of parts, with their places in the text.
+    pub fn origins(&self) -> &BTreeMap<Uid, PartOrigin> {
+        &self.origins
     }
 
     /// Replaces the rig; a save changes the text only where the rig differs from it, and parts stay parts.

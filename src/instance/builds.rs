@@ -352,7 +352,11 @@ impl TemplateBuild {
     /// An error of a command at its place in the text.
     fn placed(&self, template: &RigTemplate, error: &BuildError) -> TemplateError {
         let explicit = template::explicit(template.text());
-        let source = SourceText::new(&explicit).locate(template.rig(), error);
+        let text = SourceText::new(&explicit);
+        let source = match template.origins().get(&error.command) {
+            Some(origin) => text.locate_in_part(template.rig(), error, origin),
+            None => text.locate(template.rig(), error),
+        };
         TemplateError::Source { file: self.file.clone(), source }
     }
 }

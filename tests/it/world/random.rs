@@ -531,9 +531,15 @@ impl Stage {
 fn world_and_document_stay_equal_through_random_deeds() {
     let steps: usize = std::env::var("RIGSMITH_STEPS").ok().and_then(|count| count.parse().ok()).unwrap_or(10_000);
     let templates = shipped();
-    // The last one is edited for a while before it is built.
-    let starts = [("arm", true), ("hand", true), ("spine", true), ("arm", false)];
-    for (number, (start, is_built)) in starts.into_iter().enumerate() {
+    // The second arm is edited for a while before it is built.
+    let starts = [
+        ("arm", true, steps / 4),
+        ("hand", true, steps / 4),
+        ("spine", true, steps / 4),
+        ("arm", false, steps / 4),
+        ("biped", true, steps / 50),
+    ];
+    for (number, (start, is_built, rounds)) in starts.into_iter().enumerate() {
         let rig = templates.iter().find(|(name, _)| name == start).unwrap().1.clone();
         let mut random = Random(7 + number as u64);
         let mut stage = if is_built { Stage::built(rig) } else { Stage::new(rig) };
@@ -542,7 +548,7 @@ fn world_and_document_stay_equal_through_random_deeds() {
         let of_other = |stage: &Stage| write_template(stage.get::<Rig>(other).unwrap());
         let beside = of_other(&stage);
         let mut deeds: Vec<String> = Vec::new();
-        for round in 0..steps / 4 {
+        for round in 0..rounds {
             let (deed, is_seen) = step(&mut stage, &mut random);
             deeds.push(deed);
             if is_seen {
