@@ -169,17 +169,18 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
             return Ok(());
         }
     };
-    if let Err(error) = limits::check_rig(path, &template.rig) {
-        found.error = Some(error.to_string());
-        return Ok(());
-    }
     let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes));
     let (template, of_parts) = PartFiles::new(&RealDisk).survey(path, &text, template);
     faults.extend(of_parts);
-    let Template { rig, notes: remarks, origins, .. } = template;
+    if let Err(error) = limits::check_rig(path, &template.rig) {
+        found.error = Some(error.to_string());
+        found.problems = faults;
+        return Ok(());
+    }
+    let Template { rig, notes: remarks, origins, unbound, .. } = template;
     let explicit = template::explicit(&text);
     let places = SourceText::new(&explicit);
-    let CommandProblems { listed: commands, problems, commands: failing } =
+    let CommandProblems { listed: commands, problems, commands: failing, readable } =
         problems_of_commands(&rig, &places, &origins);
     let unknown = FeatureKinds::default().unknown_in(&rig);
     let unknown_kinds = unknown.len();
@@ -211,6 +212,8 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     let told: Vec<String> = told.map(|(count, one, many)| counted(count, one, many)).collect();
     found.error = (!told.is_empty()).then(|| told.join(", "));
     found.remarks = remarks;
+    // Of a command that is told, its references are among what is told, unless nobody knows its module.
+    found.remarks.extend(unbound.into_iter().filter(|(tag, _)| !readable.contains(tag)).map(|(_, told)| told));
     found.remarks.extend(remarks_on_rig(&rig));
     let unlisted = problems - commands.len() + unknown_kinds - kinds.len() + undecided_count - choices.len();
     if unlisted > 0 {
@@ -229,6 +232,8 @@ struct CommandProblems {
     problems: usize,
     /// Number of commands that have any.
     commands: usize,
+    /// Those of them whose parameters were read.
+    readable: HashSet<Uid>,
 }
 
 fn problems_of_commands(rig: &Rig, places: &SourceText, origins: &BTreeMap<Uid, PartOrigin>) -> CommandProblems {
@@ -241,11 +246,13 @@ fn problems_of_commands(rig: &Rig, places: &SourceText, origins: &BTreeMap<Uid, 
     if problems.is_empty() {
         let listed: Vec<SourceError> = problem_of_program(rig, &modules, places, &locate).into_iter().collect();
         let count = listed.len();
-        return CommandProblems { listed, problems: count, commands: count };
+        return CommandProblems { listed, problems: count, commands: count, readable: HashSet::new() };
     }
     let commands: HashSet<Uid> = problems.iter().map(|problem| problem.command).collect();
     let listed = problems.iter().take(limits::most(Limit::Listed)).map(locate).collect();
-    CommandProblems { listed, problems: problems.len(), commands: commands.len() }
+    let is_read = |error: &&BuildError| !matches!(error.problem, BuildProblem::NoModule { .. });
+    let readable = problems.iter().filter(is_read).map(|error| error.command).collect();
+    CommandProblems { listed, problems: problems.len(), commands: commands.len(), readable }
 }
 
 /// Problem that keeps a fully built rig from moving, such as constraints that wait for each other by way of a parent;

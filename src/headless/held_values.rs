@@ -96,7 +96,7 @@ impl Workbench {
                     tell(vector(wanted), vector(is.translation))
                 }
                 WriteValue::Scale(wanted) if differs(is.scale, wanted) => tell(vector(wanted), vector(is.scale)),
-                WriteValue::Rotate(wanted) if is.rotation.angle_between(rotation(wanted)) > 1e-3 => {
+                WriteValue::Rotate(wanted) if turns(is.rotation, rotation(wanted)) => {
                     let (x, y, z) = is.rotation.to_euler(EulerRot::XYZ);
                     tell(vector(wanted), vector(Vec3::new(x, y, z).map(f32::to_degrees)));
                 }
@@ -111,6 +111,12 @@ impl Workbench {
 pub(super) fn rotation(degrees: Vec3) -> Quat {
     let [x, y, z] = degrees.to_array().map(f32::to_radians);
     Quat::from_euler(EulerRot::XYZ, x, y, z)
+}
+
+/// True for rotations that differ by more than rounding: the angle itself would be inexact where it is small.
+fn turns(is: Quat, wanted: Quat) -> bool {
+    let apart = |wanted: Quat| (is - wanted).length();
+    apart(wanted).min(apart(-wanted)) > 1e-3
 }
 
 fn differ(is: f32, wanted: f32) -> bool {

@@ -270,7 +270,7 @@ impl Workbench {
     /// Writes values to the entities of controls and nodes, and runs one frame.
     ///
     /// # Errors
-    /// See [`PoseError`]; nothing is written then.
+    /// See [`PoseError`]. Nothing is written then, unless the pose has no finite place for a node.
     pub fn pose(&mut self, writes: &[ControlWrite]) -> Result<(), PoseError> {
         self.pose_through(writes, &[]).map(drop)
     }
@@ -295,10 +295,18 @@ impl Workbench {
         }
         self.check_range(&found)?;
         self.write_values(&found)?;
+        let mut thrown: Vec<(Uid, String)> = Vec::new();
         for (name, value) in switches {
-            self.switch(name, value)?;
+            thrown.extend(self.throw(name, value)?);
         }
-        if !switches.is_empty() {
+        if !thrown.is_empty() {
+            // A switch stands as it was thrown, whatever was written to it before.
+            let is_switch = |(_, node, value): &NodeWrite| {
+                thrown
+                    .iter()
+                    .any(|(control, attribute)| *control == node.uid && value.attribute() == Some(attribute.as_str()))
+            };
+            found.retain(|write| !is_switch(write));
             self.write_values(&found)?;
         }
         self.held_values(&found)
@@ -336,13 +344,20 @@ impl Workbench {
     /// # Errors
     /// The built rig has no such switch or value, or the rig is not built.
     pub fn switch(&mut self, name: &str, value: &str) -> Result<(), PoseError> {
+        self.throw(name, value).map(drop)
+    }
+
+    /// Sets the switches that `name` matches; returns their controls and attributes.
+    fn throw(&mut self, name: &str, value: &str) -> Result<Vec<(Uid, String)>, PoseError> {
         let built = self.built().ok_or(PoseError::NotBuilt)?;
+        let mut thrown = Vec::new();
         for (control, attribute, value) in find_switches(built, self.rig(), name, value)? {
+            thrown.push((control, attribute.clone()));
             self.app.world_mut().write_message(SwitchRequest { rig: self.rig, control, attribute, value });
             self.app.update();
             self.refused().map_or(Ok(()), Err)?;
         }
-        Ok(())
+        Ok(thrown)
     }
 
     /// Runs `count` frames of a sixtieth of a second each, so that springs move. No other time passes in a workbench.

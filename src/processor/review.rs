@@ -1,6 +1,7 @@
 //! Problems of a rig's commands, all at once.
 
 use std::{
+    cell::OnceCell,
     collections::{HashMap, HashSet},
     sync::Arc,
 };
@@ -210,12 +211,13 @@ pub struct SourceText<'a> {
     /// The text without shorthand, in which every declaration has its uid.
     explicit: &'a Explicit<'a>,
     fields: Vec<Field<'a>>,
+    of_source: OnceCell<Vec<Field<'a>>>,
 }
 
 impl<'a> SourceText<'a> {
     /// Scans a text once, for any number of problems.
     pub fn new(explicit: &'a Explicit<'a>) -> Self {
-        Self { explicit, fields: fields(&explicit.text) }
+        Self { explicit, fields: fields(&explicit.text), of_source: OnceCell::new() }
     }
 
     /// A problem of the whole text.
@@ -272,7 +274,7 @@ impl<'a> SourceText<'a> {
         let PartOrigin { title, offset } = origin;
         let message = format!("part \"{title}\": {} on joint {}: {problem}", error.module, error.joint_label);
         let source = self.explicit.source();
-        let fields = fields(source);
+        let fields = self.of_source.get_or_init(|| fields(source));
         let params = fields.iter().position(|field| field.start == *offset && field.name == "params");
         let faulty = params.and_then(|params| {
             let name = faulty_parameter(rig, error)?;

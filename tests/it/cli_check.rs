@@ -119,7 +119,7 @@ fn faults_of_the_structure_hide_no_others() {
             ],
         ),
         (
-            label: "b", parent: "a" translation: (0, 1, 0), // Expected comma
+            label: "b", translation: (0, 1, 0), parent: "a" locked: false, // Expected comma
             tags: [control(shape: "nosuch", at: "@joint nobody")], // there is no shape "nosuch" // there is no joint "nobody"
         ),
         (label: "c", parent: "b", translation: (0, 1)), // Expected a tuple of size 3

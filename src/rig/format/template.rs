@@ -170,9 +170,9 @@ pub struct Template {
     pub instances: Vec<PartInstance>,
     /// Instances of the commands that come of parts.
     pub origins: BTreeMap<Uid, PartOrigin>,
-    /// References in parameters that are bound to nothing, a sentence each. Those of a template that was read without faults
-    /// are among its notes instead.
-    pub unbound: Vec<String>,
+    /// References in parameters that are bound to nothing: commands, and a sentence for each. Those of a template that was read
+    /// without faults are among its notes instead.
+    pub unbound: Vec<(Uid, String)>,
     /// Notes about content that the reader ignored (fields of a newer format, a wrong joint count), a sentence each.
     pub notes: Vec<String>,
 }
@@ -180,7 +180,7 @@ pub struct Template {
 impl Template {
     /// The template with the references that are bound to nothing among its notes.
     fn with_unbound_told(mut self) -> Self {
-        self.notes.append(&mut self.unbound);
+        self.notes.extend(self.unbound.drain(..).map(|(_, told)| told));
         self
     }
 }

@@ -219,7 +219,19 @@ impl Names for PartNames<'_> {
     }
 
     fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid> {
-        let found = self.part.find(scope, kind, name);
+        let mut found = self.part.find(scope, kind, name);
+        if found.is_empty() {
+            // As in the part's file, without the prefix of the instance.
+            let prefix = &self.instance.prefix;
+            found = match (kind, name.split_once('/')) {
+                (NameKind::Command, Some((module, name))) => {
+                    let name = name.replace('/', &format!("/{prefix}"));
+                    self.part.find(scope, kind, &format!("{module}/{prefix}{name}"))
+                }
+                (NameKind::Joint | NameKind::Label, _) => self.part.find(scope, kind, &format!("{prefix}{name}")),
+                _ => found,
+            };
+        }
         match found.is_empty() {
             true => self.host.find(scope, kind, name),
             false => found.into_iter().map(|uid| self.uid_here(uid)).collect(),

@@ -88,7 +88,7 @@ pub type MirrorParams<'a> = &'a dyn Fn(&str, &str) -> Option<String>;
 /// Module whose name is that of an attribute, not of a node.
 const ATTRIBUTE: &str = "attribute";
 
-/// What comes of putting a part into a rig.
+/// Notes and faults of a part that was put into a rig.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PutPart {
     /// Notes, a sentence each.
@@ -130,16 +130,14 @@ impl PartInstance {
         let part = fitted;
         let mut uids = UidSource::seeded(self.uid.0);
         let mut draft = Draft::new(rig, &mut uids, None);
-        let mut joints = self.known_joints(&draft)?;
-        if self.onto.is_empty() || self.adds {
-            self.add_joints(&mut draft, part, socket, &mut joints)?;
-        }
-        if joints.len() > part.len() {
-            return Err(PartError::TooManyJoints { given: joints.len(), count: part.len() });
-        }
-        let bindings = BTreeMap::new();
-        drop_part(&mut draft, part, &joints, &bindings, &mut |_, uid| self.uid_of(uid))?;
-        self.turn_off(&mut draft, part)?;
+        let joints = match self.place(&mut draft, part, socket) {
+            Ok(joints) => joints,
+            Err(error) => {
+                draft.take_back();
+                return Err(error);
+            }
+        };
+        faults.extend(self.turn_off(&mut draft, part).err().map(|error| (None, error)));
         let changes = self.changes.iter().enumerate().map(|(number, change)| (Some(number), change));
         for (number, change) in options.iter().map(|option| (None, option)).chain(changes) {
             let done = self.change(&mut draft, part, &joints, change);
@@ -147,6 +145,19 @@ impl PartInstance {
         }
         let notes = draft.finish().notes.into_iter().map(|note| format!("part {}: {note}", self.title())).collect();
         Ok(PutPart { notes, faults })
+    }
+
+    /// Puts the joints and the tags of the part into a rig; returns the joints there.
+    fn place(&self, draft: &mut Draft, part: &Rig, socket: Option<&PartSocket>) -> Result<Vec<Uid>, PartError> {
+        let mut joints = self.known_joints(draft)?;
+        if self.onto.is_empty() || self.adds {
+            self.add_joints(draft, part, socket, &mut joints)?;
+        }
+        if joints.len() > part.len() {
+            return Err(PartError::TooManyJoints { given: joints.len(), count: part.len() });
+        }
+        drop_part(draft, part, &joints, &BTreeMap::new(), &mut |_, uid| self.uid_of(uid))?;
+        Ok(joints)
     }
 
     /// Sockets of the part as they are in `rig`, under the instance's name. The part need not be in the rig yet.

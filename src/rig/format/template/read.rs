@@ -162,15 +162,17 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
     }
 }
 
-/// Adds uids to references that people wrote as names alone, and updates the names beside uids.
-pub(super) fn bind_references(rig: &mut Rig, notes: &mut Vec<String>) {
+/// Adds uids to references that people wrote as names alone, and updates the names beside uids. Those that cannot be bound are
+/// told with their commands.
+pub(super) fn bind_references(rig: &mut Rig, unbound: &mut Vec<(Uid, String)>) {
     let mut edits = Vec::new();
     for joint in rig.walk() {
         for tag in &joint.data.tags {
             let TagKind::Command { module, params, feature } = &tag.kind else { continue };
             let (bound, bad) = bind_names(params, rig);
             let on = joint.data.label.as_deref().unwrap_or("without a label");
-            notes.extend(bad.iter().map(|bad| format!("{module} {} on joint {on}: {bad}; it stays as it is", tag.uid)));
+            let told = |bad| format!("{module} {} on joint {on}: {bad}; it stays as it is", tag.uid);
+            unbound.extend(bad.iter().map(|bad| (tag.uid, told(bad))));
             let named = refresh_names(&bound, rig);
             if *named != **params {
                 let kind = TagKind::Command { module: module.clone(), params: named.into_owned(), feature: *feature };
@@ -361,8 +363,12 @@ impl Places<'_> {
         let declares = |field: &&Field| {
             field.name == "uid" && self.text[field.value..field.end].trim_start_matches([' ', '"']).starts_with(&digits)
         };
-        let is_inside = |field: &&Field| self.left_out.iter().any(|range| range.contains(&field.start));
-        self.fields.iter().filter(declares).any(|field| is_inside(&field))
+        !self.left_out.is_empty() && self.fields.iter().filter(declares).any(|field| self.is_inside_left_out(field))
+    }
+
+    /// True for a field in an element that is not read.
+    fn is_inside_left_out(&self, field: &Field) -> bool {
+        self.left_out.iter().any(|range| range.contains(&field.start))
     }
 
     fn used_twice(&self, uid: Uid) -> SourceError {

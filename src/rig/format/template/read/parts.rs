@@ -58,7 +58,7 @@ pub(super) fn chains(rig: &Rig, files: Vec<ChainFile>, notes: &mut Vec<String>) 
 fn elements<'p>(places: &'p Places, list: &'static str) -> impl Iterator<Item = usize> + 'p {
     let is_name = move |field: &&Field| {
         let parent = field.parent.map(|parent| places.fields[parent].name);
-        field.depth == 3 && field.name == "name" && parent == Some(list)
+        field.depth == 3 && field.name == "name" && parent == Some(list) && !places.is_inside_left_out(field)
     };
     places.fields.iter().filter(is_name).map(|field| field.start)
 }
@@ -129,7 +129,7 @@ pub(super) fn options(places: &Places, files: Vec<OptionFile>, faults: &mut Vec<
 pub(super) fn instances(places: &Places, parts: Vec<PartFile>, faults: &mut Vec<SourceError>) -> Vec<PartInstance> {
     let is_part = |field: &&Field| {
         let parent = field.parent.map(|parent| places.fields[parent].name);
-        field.depth == 3 && field.name == "part" && parent == Some("parts")
+        field.depth == 3 && field.name == "part" && parent == Some("parts") && !places.is_inside_left_out(field)
     };
     let mut offsets = places.fields.iter().filter(is_part).map(|field| field.start);
     let mut seen = HashSet::new();
@@ -166,7 +166,11 @@ pub(super) fn instances(places: &Places, parts: Vec<PartFile>, faults: &mut Vec<
         for change in file.changes {
             match change_of(uid, change) {
                 Ok(change) => changes.push(change),
-                Err(error) => fault(error.to_string()),
+                Err(error) => {
+                    fault(error.to_string());
+                    // Changes are told apart by their numbers.
+                    changes.push(PartChange::default());
+                }
             }
         }
         found.push(PartInstance {
@@ -331,7 +335,9 @@ impl InstancePlaces<'_> {
                 .find(|field| field.bracket == subject.bracket && field.name == "params")
                 .map(|field| field.start)
         };
-        fields.iter().filter(is_subject).map(|subject| (subject.start, params(subject))).collect()
+        let mut subjects: Vec<&Field> = fields.iter().filter(is_subject).collect();
+        subjects.dedup_by_key(|subject| subject.bracket);
+        subjects.into_iter().map(|subject| (subject.start, params(subject))).collect()
     }
 }
 

@@ -57,10 +57,11 @@ fn in_source(explicit: &Explicit, faults: Vec<SourceError>) -> Vec<SourceError> 
     let source = explicit.source();
     // An element that cannot be read says nothing of its names.
     let is_unreadable = |fault: &SourceError| {
-        elements_around(source, fault.offset).first().is_some_and(|element| {
-            let blanks = source[element.clone()].len() - source[element.clone()].trim_start().len();
-            fault.offset == element.start + blanks && all.iter().any(|other| element.contains(&other.offset))
-        })
+        !all.is_empty()
+            && elements_around(source, fault.offset).first().is_some_and(|element| {
+                let blanks = source[element.clone()].len() - source[element.clone()].trim_start().len();
+                fault.offset == element.start + blanks && all.iter().any(|other| element.contains(&other.offset))
+            })
     };
     let of_shorthand: Vec<SourceError> =
         explicit.faults.iter().filter(|fault| !is_unreadable(fault)).cloned().collect();
