@@ -114,12 +114,12 @@ fn faults_of_the_structure_hide_no_others() {
             tags: [
                 control(at: "@joint qq"), // there is no joint "qq"
                 (x: 1), // there is no field `x` // Expected
-                twist(start: "@joint a", end: "@joint b", count: 0), // count: is 0
+                half_joint(share: 3.0), // share: is 3
                 Feature(kind: 3, name: "f"), // Expected string
             ],
         ),
         (
-            label: "b", translation: (0, 1, 0), parent: "a" locked: false, // Expected comma
+            label: "b", parent: "a", translation: (0, 1, 0) locked: false, // Expected comma
             tags: [control(shape: "nosuch", at: "@joint nobody")], // there is no shape "nosuch" // there is no joint "nobody"
         ),
         (label: "c", parent: "b", translation: (0, 1)), // Expected a tuple of size 3

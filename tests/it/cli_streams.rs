@@ -71,6 +71,8 @@ fn an_output_that_takes_nothing_is_a_failure() {
     ];
     for args in commands {
         for stream in [Stream::Full, Stream::Closed] {
+            // What the command before it wrote would stand in the way of `new`.
+            let _ = fs::remove_file(folder.path().join("limb.rig.ron"));
             let (code, said) = run(folder.path(), args, stream, true);
             assert_eq!(code, Some(1), "{args:?} {stream:?}: {said}");
             assert!(!said.contains("panicked") && !said.contains("RUST_BACKTRACE"), "{args:?} {stream:?}: {said}");

@@ -77,26 +77,32 @@ fn end_at(fields: &mut [Field], field: Option<usize>, end: usize) {
     }
 }
 
-/// Elements of lists around a place, the innermost first, each with white space before it and without the comma behind it.
+/// Elements of lists around a place, the innermost first, each without white space, comments and comma around it.
 pub(crate) fn elements_around(text: &str, offset: usize) -> Vec<Range<usize>> {
+    /// Open bracket: of a list, with the start of its element that goes on, if one does.
+    struct Open {
+        is_list: bool,
+        element: Option<usize>,
+    }
     let mut found = Vec::new();
-    // Open brackets, with the start of the element that goes on in lists.
-    let mut open: Vec<Option<usize>> = Vec::new();
     let mut close = |start: Option<usize>, end: usize| {
         found.extend(start.map(|start| start..end).filter(|element| element.contains(&offset)));
     };
+    let mut open: Vec<Open> = Vec::new();
+    let mut end = 0;
     for token in tokens(text) {
+        let is_closing = matches!(token.text, ")" | "]" | "}");
+        if let Some(here) = open.last_mut().filter(|here| here.is_list && !is_closing && token.text != ",") {
+            here.element.get_or_insert(token.start);
+        }
         match token.text {
-            "[" => open.push(Some(token.start + 1)),
-            "(" | "{" => open.push(None),
-            ")" | "]" | "}" => close(open.pop().flatten(), token.start),
-            "," => {
-                if let Some(Some(start)) = open.last_mut() {
-                    close(Some(std::mem::replace(start, token.start + 1)), token.start);
-                }
-            }
+            "[" => open.push(Open { is_list: true, element: None }),
+            "(" | "{" => open.push(Open { is_list: false, element: None }),
+            _ if is_closing => close(open.pop().and_then(|open| open.element), end),
+            "," => close(open.last_mut().and_then(|open| open.element.take()), end),
             _ => {}
         }
+        end = token.start + token.text.len();
     }
     found
 }

@@ -1,6 +1,8 @@
 //! Matching of joints behind a limb, such as a foot behind a hock: they turn with one control by forward kinematics and
 //! with another one by inverse kinematics, which the switch of the limb weighs.
 
+use glam::Quat;
+
 use super::{Attempt, MatchError, angle_between, limb::Limb, number};
 use crate::{
     mesh::model::Trs,
@@ -16,6 +18,8 @@ pub(super) struct Follower {
     target: Uid,
     /// Transform of the joint relative to the target.
     offset: Trs,
+    /// Rotation that the joint's own pose adds.
+    own: Quat,
     /// Weights of this constraint and of those after it on the same joint.
     weights: Vec<Scalar>,
     /// The target was built where the joint is, so it is placed and not only turned.
@@ -30,24 +34,24 @@ pub(super) fn followers(attempt: &Attempt<'_>, switch: &SwitchData, limb: &Limb<
         _ => false,
     };
     let turned = attempt.rig.constraints.iter().filter_map(|built| match &*built.constraint {
-        Constraint::Transform { driven, targets, rotate: [true, true, true], weight, keep_pose: false, .. } => {
+        Constraint::Transform { driven, targets, rotate: [true, true, true], weight, keep_pose, .. } => {
             let is_joint = attempt.rig.node(*driven).is_some_and(|node| node.kind == NodeType::Joint);
             let is_behind = is_joint && !limb.joints.contains(driven);
             let target = targets.first().filter(|_| targets.len() == 1 && is_behind)?;
-            Some((*driven, target, weight))
+            Some((*driven, target, weight, *keep_pose))
         }
         _ => None,
     });
     let turned: Vec<_> = turned.collect();
     let of_limb: Vec<Uid> = [limb.goal].into_iter().chain(limb.pole).map(|node| attempt.handle(node)).collect();
     let mut found = Vec::new();
-    for (at, (joint, target, _)) in turned.iter().enumerate() {
+    for (at, (joint, target, _, keeps_pose)) in turned.iter().enumerate() {
         let of_joint =
-            || turned[at..].iter().filter(|(other, ..)| other == joint).map(|(.., weight)| (*weight).clone());
+            || turned[at..].iter().filter(|(other, ..)| other == joint).map(|(_, _, weight, _)| (*weight).clone());
         let handle = attempt.handle(target.node);
         if of_limb.contains(&handle)
             || limb.fk.contains(&handle)
-            || !turned.iter().any(|(other, _, weight)| other == joint && is_switched(weight))
+            || !turned.iter().any(|(other, _, weight, _)| other == joint && is_switched(weight))
         {
             continue;
         }
@@ -56,7 +60,8 @@ pub(super) fn followers(attempt: &Attempt<'_>, switch: &SwitchData, limb: &Limb<
             _ => false,
         };
         let weights = of_joint().collect();
-        found.push(Follower { joint: *joint, target: target.node, offset: target.offset, weights, is_placed });
+        let own = if *keeps_pose { attempt.offset(*joint).rotation } else { Quat::IDENTITY };
+        found.push(Follower { joint: *joint, target: target.node, offset: target.offset, own, weights, is_placed });
     }
     found
 }
@@ -75,7 +80,7 @@ impl Follower {
         let handle = attempt.handle(self.target);
         let now = attempt.global(handle)?;
         let carried = attempt.global(self.target)?.relative_to(&now);
-        let target = (wanted.rotation * self.offset.rotation.conjugate()).normalize();
+        let target = (wanted.rotation * (self.offset.rotation * self.own).conjugate()).normalize();
         let rotation = (target * carried.rotation.conjugate()).normalize();
         let translation = match self.is_placed {
             true => wanted.translation - rotation * (now.scale * carried.translation),

@@ -59,8 +59,7 @@ fn in_source(explicit: &Explicit, faults: Vec<SourceError>) -> Vec<SourceError> 
     let is_unreadable = |fault: &SourceError| {
         !all.is_empty()
             && elements_around(source, fault.offset).first().is_some_and(|element| {
-                let blanks = source[element.clone()].len() - source[element.clone()].trim_start().len();
-                fault.offset == element.start + blanks && all.iter().any(|other| element.contains(&other.offset))
+                fault.offset == element.start && all.iter().any(|other| element.contains(&other.offset))
             })
     };
     let of_shorthand: Vec<SourceError> =
@@ -145,9 +144,11 @@ impl Survey<'_> {
             self.stand_ins.push((element, stand_in));
             return true;
         }
-        let comma = self.text[element.end..].starts_with(',');
+        // A comma that is left behind would be one too many.
+        let rest = &self.text[element.end..];
+        let comma = rest.find(',').filter(|at| rest[..*at].trim().is_empty());
         self.left_out.push(element.clone());
-        self.blank.push(element.start..element.end + usize::from(comma));
+        self.blank.push(element.start..element.end + comma.map_or(0, |at| at + 1));
         true
     }
 
