@@ -128,7 +128,7 @@ fn clips_of_a_model_are_a_source() {
     assert_eq!(fs::read(path("first.glb")).unwrap(), fs::read(path("second.glb")).unwrap());
     let (was, is) = (played(&file, 0.45), played(&load_model(&RealDisk, &path("second.glb")).unwrap(), 0.45));
     for (was, is) in was.iter().zip(&is) {
-        assert!(was.translation.distance(is.translation) < 1e-4 && was.rotation.angle_between(is.rotation) < 1e-3);
+        assert!(was.translation.distance(is.translation) < 1e-4 && was.rotation.angle_between(is.rotation) < 3e-3);
     }
 
     // On another rig it is retargeted onto the controls.
