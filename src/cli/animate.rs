@@ -15,7 +15,7 @@ use super::{
     report::counted, skin,
 };
 use crate::{
-    files::{FileKind, RealDisk, load_model, load_project, load_template, store_animation, store_model},
+    files::{FileKind, RealDisk, store_animation, store_model},
     headless::{Workbench, posing::PoseError},
     mesh::{
         gltf::GltfWriteSettings,
@@ -218,12 +218,12 @@ fn read(args: &AnimateArgs, report: &mut Report) -> Result<Rig, Failure> {
         Some(FileKind::Project) => {}
         Some(_) => return skin::load_rig(&args.rig, report),
         None => {
-            let template = load_template(&RealDisk, &args.rig)?;
+            let template = limits::load_template(&args.rig)?;
             report.notes(template.notes);
             return Ok(template.rig);
         }
     }
-    let mut project = load_project(&RealDisk, &args.rig)?;
+    let mut project = limits::load_project(&args.rig)?;
     report.notes(project.notes);
     let empty = || Failure::Input(format!("`{}` has no rig to animate", args.rig.display()).into());
     (!project.rigs.is_empty()).then(|| project.rigs.swap_remove(0)).ok_or_else(empty)
@@ -269,7 +269,7 @@ fn own_character(args: &AnimateArgs, bench: &Workbench, report: &mut Report) -> 
     if args.mesh.is_some() || !matches!(FileKind::of(&args.rig), Some(FileKind::Glb | FileKind::Gltf)) {
         return Ok(None);
     }
-    let model = load_model(&RealDisk, &args.rig)?;
+    let model = limits::load_model(&args.rig)?;
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let skeleton = baked(bench.rig(), built);
     let is_alike = skeleton.len() == model.nodes.len()

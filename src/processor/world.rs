@@ -257,7 +257,7 @@ impl World {
             return Ok(());
         }
         let limit = usize::try_from(limit).unwrap_or(usize::MAX);
-        Err(ModuleError::TooMany { what: "values read and written in one build", name: "work", limit })
+        Err(ModuleError::TooMany { what: "values read and written in one run", name: "work", limit })
     }
 
     /// The number of a command, made where there is none.

@@ -9,8 +9,8 @@ use serde_json::{Map, Value, json};
 
 use super::AnimateArgs;
 use crate::{
-    cli::{Failure, Report, progress::spinning, report::counted},
-    files::{FileKind, RealDisk, load_animation, load_joint_map, load_model, load_motion, save_atomic, stem},
+    cli::{Failure, Report, limits, progress::spinning, report::counted},
+    files::{FileKind, RealDisk, load_animation, load_joint_map, load_motion, save_atomic, stem},
     headless::{Workbench, posing::PoseError},
     mesh::model::Model,
     rig::{
@@ -98,7 +98,7 @@ pub(super) fn clips(
     for path in &args.clips {
         match FileKind::of(path) {
             Some(FileKind::Glb | FileKind::Gltf) => {
-                let model = spinning("reading the animations", || load_model(&RealDisk, path))?;
+                let model = spinning("reading the animations", || limits::load_model(path))?;
                 let source = ModelSource { path, model };
                 source.add(args, onto, bench, &mut choice, &mut added, &mut told, report)?;
             }
