@@ -1,5 +1,5 @@
 //! Limits of commands: how much a file may hold, how much a build may make, how long a job may take, and how much is told.
-//! `--limit NAME=NUMBER` sets each of them, for every command.
+//! `--limit NAME=NUMBER` sets each of them, for every command but `edit`.
 
 use std::{fmt::Write as _, path::Path, str::FromStr, sync::OnceLock, time::Duration};
 
