@@ -279,7 +279,7 @@ fn own_character(args: &AnimateArgs, bench: &Workbench, report: &mut Report) -> 
             .all(|(joint, node)| joint.data.label.as_deref().unwrap_or_default() == node.name);
     if !is_alike && !model.points.is_empty() {
         report.notes.push(format!(
-            "the joints of the built rig are not those of `{}`: its mesh and weights are left out; give a mesh with --mesh",
+            "the built rig has other joints than `{}`: its mesh and weights are left out; give a mesh with --mesh",
             args.rig.display()
         ));
     }

@@ -129,8 +129,8 @@ impl Builder {
         self.range = range;
     }
 
-    /// Marks the later readers of a cell, whose content `writer` (`None`: the document) has changed, to be looked at. Readers
-    /// in the rig's space wait for [`Builder::spread_moves`].
+    /// Marks the later readers of a cell, whose content `writer` (`None`: the document) has changed, to be looked at.
+    /// Readers in the rig's space wait for [`Builder::spread_moves`].
     /// `circles` is true if that may have closed a circle of constraints.
     fn changed(&mut self, node: NodeId, aspect: Aspect, writer: Option<u32>, circles: bool) {
         self.built.note(node, aspect);

@@ -275,7 +275,7 @@ fn turns(model: &Model, joints: &[SkeletonJoint], human: &HumanJoints, axes: Bon
     turns
 }
 
-/// Direction of a chain at its first joint: to its next joint at another place, else away from the parent, else upwards.
+/// Direction of a chain at its first joint: to the next joint at another place, else away from the parent, else up.
 fn first_direction(chain: &[usize], joints: &[SkeletonJoint]) -> Vec3 {
     let Some(first) = chain.first().map(|first| &joints[*first]) else { return Vec3::Y };
     let later = chain.iter().find_map(|joint| (joints[*joint].position - first.position).try_normalize());
