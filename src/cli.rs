@@ -60,7 +60,8 @@ struct Cli {
     /// Answer in JSON, for programs
     #[arg(long, global = true)]
     json: bool,
-    /// Set a limit of what a command takes, makes or tells, such as joints=2000; may be repeated. `rigsmith --help` lists them
+    /// Set a limit of what a command takes, makes or tells, such as joints=2000; may be repeated; not for the window.
+    /// `rigsmith --help` lists them
     #[arg(long, global = true, value_name = "NAME=NUMBER")]
     limit: Vec<limits::LimitSetting>,
     #[command(subcommand)]
@@ -290,6 +291,10 @@ pub fn main(window: OpenWindow) -> ExitCode {
             return ExitCode::from(if is_told { code } else { code.max(1) });
         }
     };
+    if !cli.limit.is_empty() && matches!(cli.command, Some(Command::Edit(_))) {
+        let text = "--limit has no effect on the window; leave it out of `edit`, or use a command without a window";
+        return report::finish(Err(Failure::Usage(text.to_owned())), cli.json, "");
+    }
     limits::choose(&cli.limit);
     report::choose_json(cli.json);
     let subject = cli.command.as_ref().and_then(Command::subject).map(|path| path.display().to_string());

@@ -139,11 +139,6 @@ impl Workbench {
         self.deadline = now.checked_add(time).map(|end| (end, time));
     }
 
-    /// True once the time of [`Workbench::set_limits`] is over.
-    pub fn is_out_of_time(&self) -> bool {
-        self.deadline.is_some_and(|(end, _)| Instant::now() >= end)
-    }
-
     fn check_time(&self, work: &'static str) -> Result<(), WorkbenchError> {
         match self.deadline {
             Some((end, time)) if Instant::now() >= end => {
@@ -179,8 +174,8 @@ impl Workbench {
         self.refused().map_or(Ok(()), Err)
     }
 
-    /// Carries out gestures and returns an answer for each. Where the time is over, the last answer says so, and the
-    /// gestures behind it are left out.
+    /// Carries out gestures and returns an answer for each. Where the time of [`Workbench::set_limits`] is over,
+    /// the last answer is [`GestureAnswer::out_of_time`], and the gestures behind it are left out.
     pub fn gestures(&mut self, gestures: Vec<Gesture>) -> Vec<GestureAnswer> {
         self.app.world_mut().entity_mut(self.rig).insert(GestureScript::new(gestures));
         loop {
@@ -192,7 +187,7 @@ impl Workbench {
             if let Err(error) = self.check_time("the gesture") {
                 let mut answers = script.answers.clone();
                 let number = answers.len() + 1;
-                answers.push(GestureAnswer { number, message: error.to_string(), ..default() });
+                answers.push(GestureAnswer { number, message: error.to_string(), out_of_time: true, ..default() });
                 self.app.world_mut().entity_mut(self.rig).remove::<GestureScript>();
                 return answers;
             }
@@ -223,6 +218,7 @@ impl Workbench {
         progress: &mut dyn FnMut(f32),
     ) -> Result<SkinningReport, WorkbenchError> {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
+        self.check_time("binding the mesh")?;
         self.forget_refusals();
         let mut request = BindRequest::new(mesh);
         ask(&mut request);

@@ -6,6 +6,7 @@ mod strip;
 
 use std::path::{Path, PathBuf};
 
+use bevy::math::Vec3A;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
@@ -14,7 +15,7 @@ use super::{
     report::counted, skin,
 };
 use crate::{
-    files::{FileKind, RealDisk, load_model, load_project, load_template, store_animation, store_model},
+    files::{FileKind, RealDisk, store_animation, store_model},
     headless::{Workbench, posing::PoseError},
     mesh::{
         gltf::GltfWriteSettings,
@@ -57,7 +58,7 @@ pub(super) struct AnimateArgs {
     /// Write the map that was used, to correct it and give it to --map
     #[arg(long, value_name = "FILE")]
     map_out: Option<PathBuf>,
-    /// Frames a second of the clip; that of the file, but at most 60, if left out
+    /// Frames a second of the clip; that of the file if left out, but at most 60 for motion of another skeleton
     #[arg(long, value_name = "N", value_parser = positive)]
     fps: Option<f32>,
     /// Distance by which a joint may be off its place through the removal of keys, in millimetres on a figure of 1.7 m;
@@ -160,7 +161,7 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     } else if FileKind::of(&args.output) == Some(FileKind::Animation) {
         store_animation(&RealDisk, &args.output, bench.rig(), bench.built(), &clips)?;
     } else {
-        let (mut model, settings) = match own_character(args, &bench)? {
+        let (mut model, settings) = match own_character(args, &bench, &mut report)? {
             Some(model) => {
                 (model, GltfWriteSettings { all_joints: true, bind_unweighted: true, ..args.export.settings() })
             }
@@ -217,12 +218,12 @@ fn read(args: &AnimateArgs, report: &mut Report) -> Result<Rig, Failure> {
         Some(FileKind::Project) => {}
         Some(_) => return skin::load_rig(&args.rig, report),
         None => {
-            let template = load_template(&RealDisk, &args.rig)?;
+            let template = limits::load_template(&args.rig)?;
             report.notes(template.notes);
             return Ok(template.rig);
         }
     }
-    let mut project = load_project(&RealDisk, &args.rig)?;
+    let mut project = limits::load_project(&args.rig)?;
     report.notes(project.notes);
     let empty = || Failure::Input(format!("`{}` has no rig to animate", args.rig.display()).into());
     (!project.rigs.is_empty()).then(|| project.rigs.swap_remove(0)).ok_or_else(empty)
@@ -264,11 +265,11 @@ fn describe(clips: &[RigClip], report: &mut Report) {
 
 /// Character of the rig's own file, with its mesh and weights; `None` if the rig is no model or has no mesh, or if
 /// another mesh is given.
-fn own_character(args: &AnimateArgs, bench: &Workbench) -> Result<Option<Model>, Failure> {
+fn own_character(args: &AnimateArgs, bench: &Workbench, report: &mut Report) -> Result<Option<Model>, Failure> {
     if args.mesh.is_some() || !matches!(FileKind::of(&args.rig), Some(FileKind::Glb | FileKind::Gltf)) {
         return Ok(None);
     }
-    let model = load_model(&RealDisk, &args.rig)?;
+    let model = limits::load_model(&args.rig)?;
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let skeleton = baked(bench.rig(), built);
     let is_alike = skeleton.len() == model.nodes.len()
@@ -276,6 +277,12 @@ fn own_character(args: &AnimateArgs, bench: &Workbench) -> Result<Option<Model>,
             .walk()
             .zip(&model.nodes)
             .all(|(joint, node)| joint.data.label.as_deref().unwrap_or_default() == node.name);
+    if !is_alike && !model.points.is_empty() {
+        report.notes.push(format!(
+            "the built rig has other joints than `{}`: its mesh and weights are left out; give a mesh with --mesh",
+            args.rig.display()
+        ));
+    }
     Ok((is_alike && !model.points.is_empty()).then_some(model))
 }
 
@@ -290,9 +297,12 @@ fn exported(
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let program = bench.runtime()?.state().program();
     let nodes = baked_nodes(bench.rig(), built, model);
-    let height = model.rest_globals().iter().map(|at| at.translation.y).fold(0.0, f32::max);
-    // The tolerance is for humans in metres.
-    let tolerance = KeyTolerance::default().scaled(args.tolerance.map_or(1.0, |most| most / 0.05)).for_height(height);
+    let globals = model.rest_globals();
+    let places = || globals.iter().map(|at| at.translation);
+    let extent = places().reduce(Vec3A::max).zip(places().reduce(Vec3A::min));
+    // The tolerance is for humans in metres; animals are longer than high, and skeletons may hang below the ground.
+    let size = extent.map_or(0.0, |(most, least)| (most - least).max_element());
+    let tolerance = KeyTolerance::default().scaled(args.tolerance.map_or(1.0, |most| most / 0.05)).for_height(size);
     let mut baked = Vec::new();
     for clip in clips {
         let rate = args.fps.unwrap_or(clip.frame_rate);

@@ -127,6 +127,7 @@ fn check(path: &Path) -> Result<Findings, Failure> {
         Some(FileKind::Project) => load_project(&RealDisk, path).map(|project| {
             found.remarks = project.notes.iter().map(ToString::to_string).collect();
             found.remarks.extend(project.rigs.iter().flat_map(remarks_on_rig));
+            found.error = limits::check_project(path, &project).err().map(|error| error.to_string());
         }),
         Some(FileKind::Skin) => load_skin(&RealDisk, path).map(drop),
         Some(FileKind::Animation) => load_animation(&RealDisk, path).map(|read| found.remarks = read.notes),

@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use super::{Failure, Report, SEED, WindowError, binding::bind, report::counted};
+use super::{Failure, Report, WindowError, binding::bind, limits, report::counted};
 use crate::{
     algo::weights::WeightSettings,
     files::{ReadError, RealDisk, read_capped, save_atomic},
-    headless::Workbench,
     mesh::{
         gltf::{GltfWriteSettings, write_glb},
         obj::{ObjSettings, read_model},
@@ -30,7 +29,7 @@ pub(super) fn run(reason: Option<&WindowError>) -> Result<Report, Failure> {
     let faces = model.face_count();
     let gestures = read_gestures(GESTURES).map_err(|error| Failure::Input(Box::new(error)))?;
     let strokes = gestures.len();
-    let mut bench = Workbench::new(SEED, "biped");
+    let mut bench = limits::empty_workbench("biped");
     bench.open(model, false)?;
     for answer in bench.gestures(gestures).iter().filter(|answer| !answer.done) {
         report.notes.push(format!("gesture {} ({}): {}", answer.number, answer.gesture, answer.message));

@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     algo::fit_template::FitSymmetry,
-    files::{BUNDLED_CHARACTERS, FileKind, RealDisk, bundled_characters, load_template, stem, store_model, store_rig},
+    files::{BUNDLED_CHARACTERS, FileKind, RealDisk, bundled_characters, stem, store_model, store_rig},
     headless::Workbench,
     plugins::{
         commands::BuildStep,
@@ -147,7 +147,7 @@ fn template(args: &FitArgs, report: &mut Report) -> Result<FitTemplate, Failure>
     if let Some(name) = file.to_str().and_then(bundled_name) {
         return Ok(FitTemplate::Named(name.to_owned()));
     }
-    let template = load_template(&RealDisk, file)?;
+    let template = limits::load_template(file)?;
     report.notes(template.notes);
     Ok(FitTemplate::Rig(Arc::new(template.rig)))
 }

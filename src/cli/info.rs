@@ -13,10 +13,7 @@ use super::{
     sketch::describe_rig,
 };
 use crate::{
-    files::{
-        FileKind, RealDisk, load_animation, load_gestures, load_motion, load_project, load_rig_text, load_skin,
-        load_template,
-    },
+    files::{FileKind, RealDisk, load_animation, load_gestures, load_motion, load_rig_text, load_skin},
     mesh::model::Model,
     rig::{
         Rig, Uid, UidSource,
@@ -41,8 +38,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             describe_model(&mut report, &model);
         }
         Some(FileKind::Template) => {
-            let template = load_template(&RealDisk, path)?;
-            limits::check_rig(path, &template.rig)?;
+            let template = limits::load_template(path)?;
             let about = template.rig.about();
             report.line(format!("template \"{}\" {}", about.name, about.version));
             if !about.description.is_empty() {
@@ -97,7 +93,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             describe_joints(&mut report, &rig);
         }
         Some(FileKind::Project) => {
-            let project = spinning("reading", || load_project(&RealDisk, path))?;
+            let project = spinning("reading", || limits::load_project(path))?;
             report.line(format!("project \"{}\": {}", project.name, counted(project.meshes.len(), "mesh", "meshes")));
             report.set("kind", "project");
             report.set("name", project.name);

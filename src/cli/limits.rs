@@ -1,17 +1,17 @@
 //! Limits of commands: how much a file may hold, how much a build may make, how long a job may take, and how much is told.
-//! `--limit NAME=NUMBER` sets each of them, for every command.
+//! `--limit NAME=NUMBER` sets each of them, for every command but `edit`.
 
 use std::{fmt::Write as _, path::Path, str::FromStr, sync::OnceLock, time::Duration};
 
 use super::{ArgumentError, Failure, SEED};
 use crate::{
-    files::{self, RealDisk},
+    files::{self, LoadedProject, MeshState, RealDisk},
     headless::Workbench,
     mesh::model::Model,
     modules,
     plugins::gesture::Gesture,
     processor::{BuildLimits, Modules},
-    rig::Rig,
+    rig::{Rig, template::Template},
 };
 
 /// Limit that can be set.
@@ -37,7 +37,7 @@ const LIMITS: [(Limit, &str, u64, &str); 13] = [
     (Limit::Joints, "joints", 500_000, "joints of a rig"),
     (Limit::Nodes, "nodes", 16_384, "nodes and constraints that the commands of a rig make"),
     (Limit::Attributes, "attributes", 1_024, "attributes of one node"),
-    (Limit::Work, "work", 1_000_000_000, "values that commands read and write in one build"),
+    (Limit::Work, "work", 1_000_000_000, "values that commands read and write in one run"),
     (Limit::Points, "points", 100_000_000, "points of a mesh"),
     (Limit::Triangles, "triangles", 200_000_000, "triangles of a mesh"),
     (Limit::Influences, "influences", 1_000_000_000, "influences of a mesh, of all its points"),
@@ -118,11 +118,14 @@ pub(super) fn listing() -> String {
 /// A text within the limit of messages: its beginning and its end, which says what to do.
 pub(super) fn message(text: &str) -> String {
     let most = most(Limit::Message);
-    if text.len() <= most {
+    let count = text.chars().count();
+    if count <= most {
         return text.to_owned();
     }
-    let end = text.ceil_char_boundary(text.len() - most / 4);
-    format!("{} … {}", &text[..text.floor_char_boundary(most - most / 4)], &text[end..])
+    // Byte at which a character begins.
+    let start = |number: usize| text.char_indices().nth(number).map_or(text.len(), |(at, _)| at);
+    let (head, tail) = (start(most - most / 4), start(count - most / 4));
+    format!("{} … {}", &text[..head], &text[tail..])
 }
 
 fn check(of: Limit, count: usize, path: &Path, holder: &str) -> Result<(), LimitError> {
@@ -149,6 +152,15 @@ pub(super) fn check_rig(path: &Path, rig: &Rig) -> Result<(), LimitError> {
     check(Limit::Joints, rig.len(), path, "the rig")
 }
 
+/// Refuses a project whose rigs or meshes have more than is taken.
+pub(super) fn check_project(path: &Path, project: &LoadedProject) -> Result<(), LimitError> {
+    project.rigs.iter().try_for_each(|rig| check_rig(path, rig))?;
+    project.meshes.iter().try_for_each(|mesh| match &mesh.shape {
+        MeshState::Open { model, .. } => check_model(&mesh.path, model),
+        MeshState::Missing { .. } => Ok(()),
+    })
+}
+
 /// Refuses a list with more gestures than are taken, or with a stroke of more points.
 pub(super) fn check_gestures(path: &Path, gestures: &[Gesture]) -> Result<(), LimitError> {
     check(Limit::Gestures, gestures.len(), path, "the list")?;
@@ -165,6 +177,20 @@ pub(super) fn load_model(path: &Path) -> Result<Model, Failure> {
     let model = files::load_model(&RealDisk, path)?;
     check_model(path, &model)?;
     Ok(model)
+}
+
+/// Reads a template with its parts.
+pub(super) fn load_template(path: &Path) -> Result<Template, Failure> {
+    let template = files::load_template(&RealDisk, path)?;
+    check_rig(path, &template.rig)?;
+    Ok(template)
+}
+
+/// Reads a project with its meshes.
+pub(super) fn load_project(path: &Path) -> Result<LoadedProject, Failure> {
+    let project = files::load_project(&RealDisk, path)?;
+    check_project(path, &project)?;
+    Ok(project)
 }
 
 /// Limits of builds.
@@ -229,7 +255,11 @@ mod tests {
     fn long_messages_keep_their_beginning_and_end() {
         let text = format!("a fault {}; do this", "é".repeat(5000));
         let cut = message(&text);
-        assert!(cut.len() < 1600 && cut.starts_with("a fault") && cut.ends_with("; do this"), "{}", cut.len());
+        // The limit and the three characters of the gap.
+        assert_eq!(cut.chars().count(), 1503);
+        assert!(cut.starts_with("a fault") && cut.ends_with("; do this"), "{cut}");
+        let accents = "é".repeat(1500);
+        assert_eq!(message(&accents), accents);
         assert_eq!(message("short"), "short");
     }
 }

@@ -11,7 +11,7 @@ use super::{
     switches::SwitchArgs,
 };
 use crate::{
-    files::{FileKind, RealDisk, load_project, store_model, store_rig},
+    files::{FileKind, RealDisk, store_model, store_rig},
     headless::{
         Workbench,
         posing::{ControlWrite, HeldValue, PoseError},
@@ -164,7 +164,7 @@ pub(super) fn run_steps(
 
 fn read(args: &PoseArgs, report: &mut Report) -> Result<Rig, Failure> {
     let mut rig = if FileKind::of(&args.rig) == Some(FileKind::Project) {
-        let mut project = load_project(&RealDisk, &args.rig)?;
+        let mut project = limits::load_project(&args.rig)?;
         report.notes(project.notes);
         let empty = || Failure::Input(format!("`{}` has no rig to pose", args.rig.display()).into());
         (!project.rigs.is_empty()).then(|| project.rigs.swap_remove(0)).ok_or_else(empty)?

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     algo::view::View,
-    files::{FileKind, MeshState, RealDisk, load_project, load_rig_text, load_template, save_atomic},
+    files::{FileKind, MeshState, RealDisk, load_rig_text, save_atomic},
     headless::Workbench,
     plugins::{
         commands::BuildStep,
@@ -266,7 +266,7 @@ fn read(args: &RenderArgs, report: &mut Report) -> Result<Scene, Failure> {
     let refused = |error: crate::rig::EditError| Failure::Input(Box::new(error));
     match FileKind::of(path) {
         Some(FileKind::Template) => {
-            let template = load_template(&RealDisk, path)?;
+            let template = limits::load_template(path)?;
             report.notes(template.notes);
             Ok(Scene { rig: template.rig, meshes: Vec::new() })
         }
@@ -276,10 +276,11 @@ fn read(args: &RenderArgs, report: &mut Report) -> Result<Scene, Failure> {
             for edit in import_rig_text(&text, &mut uids).0 {
                 rig.apply(&edit).map_err(refused)?;
             }
+            limits::check_rig(path, &rig)?;
             Ok(Scene { rig, meshes: Vec::new() })
         }
         Some(FileKind::Project) => {
-            let mut project = spinning("reading", || load_project(&RealDisk, path))?;
+            let mut project = spinning("reading", || limits::load_project(path))?;
             report.notes(project.notes);
             let empty = || Failure::Input(format!("`{}` has no rig to draw", path.display()).into());
             let rig = (!project.rigs.is_empty()).then(|| project.rigs.swap_remove(0)).ok_or_else(empty)?;

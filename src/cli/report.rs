@@ -136,7 +136,8 @@ fn told_notes(mut notes: Vec<String>) -> Vec<String> {
         *note = limits::message(note);
     }
     if more > 0 {
-        notes.push(format!("{more} more notes are left out; --limit notes=N tells more"));
+        let more = counted(more, "more note is", "more notes are");
+        notes.push(format!("{more} left out; --limit notes=N tells more"));
     }
     notes
 }

@@ -55,7 +55,7 @@ pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
     bench.open(model, args.mesh_only)?;
     bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));
     let answers = spinning("sketching", || bench.gestures(gestures));
-    if let Some(last) = answers.last().filter(|_| bench.is_out_of_time()) {
+    if let Some(last) = answers.last().filter(|last| last.out_of_time) {
         let (file, number) = (args.gestures.display(), last.number);
         return Err(Failure::Input(format!("`{file}`: gesture {number}: {}", last.message).into()));
     }

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     algo::transfer::{TransferMesh, TransferSettings, transfer_weights},
-    files::{FileKind, RealDisk, load_rig_text, load_skin, load_template, stem, store_model, store_skin},
+    files::{FileKind, RealDisk, load_rig_text, load_skin, stem, store_model, store_skin},
     headless::Workbench,
     rig::{
         Rig, SkinData, Uid, UidSource,
@@ -107,9 +107,8 @@ pub(super) fn load_rig(path: &Path, report: &mut Report) -> Result<Rig, Failure>
     let mut rig = Rig::new(uids.next_uid(), stem(path));
     let edits = match FileKind::of(path) {
         Some(FileKind::Template) => {
-            let template = load_template(&RealDisk, path)?;
+            let template = limits::load_template(path)?;
             report.notes(template.notes);
-            limits::check_rig(path, &template.rig)?;
             return Ok(template.rig);
         }
         Some(FileKind::RigText) => import_rig_text(&load_rig_text(&RealDisk, path)?, &mut uids).0,

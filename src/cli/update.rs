@@ -8,10 +8,9 @@ use std::{
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::{Failure, InPlaceArgs, Report, explanation::Explanation, report::counted};
+use super::{Failure, InPlaceArgs, Report, explanation::Explanation, limits, report::counted};
 use crate::{
-    files::{Disk, FileKind, RealDisk, StoreError, load_template, save_atomic, store_rig_over},
-    modules,
+    files::{Disk, FileKind, RealDisk, StoreError, save_atomic, store_rig_over},
     processor::keep_poses,
     rig::{
         Rig,
@@ -84,7 +83,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     let is_beside = args.base.is_none() && RealDisk.entry(&beside, true).is_ok();
     let base = match &args.base {
         Some(base) => Some(load(base, &mut report)?),
-        None if is_beside => Some(load_template(&RealDisk, &beside)?.rig),
+        None if is_beside => Some(limits::load_template(&beside)?.rig),
         None => None,
     };
     report.set(
@@ -101,7 +100,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
         report.set("version", json!({"from": version.from, "to": version.to}));
     }
     tell(&mut report, &updated.changes);
-    let poses = keep_poses(&now, &mut updated.rig, &Arc::new(modules::all()))
+    let poses = keep_poses(&now, &mut updated.rig, &Arc::new(limits::modules()))
         .map_err(|error| Failure::Input(Box::new(error)))?;
     for note in &poses {
         report.line(format!("moves    {note}"));
@@ -146,7 +145,7 @@ pub(super) fn load_part(path: &Path, report: &mut Report) -> Result<Part, Failur
     if path.extension().is_some() && FileKind::of(path) != Some(FileKind::Template) {
         return Err(Failure::Usage(format!("`{}` is no template; give a .rig.ron", path.display())));
     }
-    let mut template = load_template(&RealDisk, path)?;
+    let mut template = limits::load_template(path)?;
     report.notes(std::mem::take(&mut template.notes));
     Ok(template.into())
 }

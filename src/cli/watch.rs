@@ -102,7 +102,9 @@ fn parsed(file: &mut TemplateWatch, path: &Path, bytes: &[u8]) -> Result<Rig, Fa
     let mut files = PartFiles::new(&RealDisk);
     let read = files.complete(path, bytes);
     file.follow(files.asked, read.is_ok());
-    Ok(read.map_err(|source| LoadError::Source { path: path.into(), text, source })?.rig)
+    let rig = read.map_err(|source| LoadError::Source { path: path.into(), text, source })?.rig;
+    limits::check_rig(path, &rig)?;
+    Ok(rig)
 }
 
 struct Watch<'a> {

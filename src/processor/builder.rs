@@ -81,6 +81,8 @@ pub struct Builder {
     graph_changed: Option<u32>,
     /// First place from which references may find other nodes than before.
     structure_changed: Option<u32>,
+    /// Nodes that have moved, or have another parent, and whose readers in the rig's space are not marked yet.
+    moved: Vec<NodeId>,
     /// Counts runs.
     run: u32,
     /// Result of the last run as plain data, with what has changed since.
@@ -103,6 +105,7 @@ impl Builder {
             breakpoints: HashSet::new(),
             graph_changed: None,
             structure_changed: None,
+            moved: Vec::new(),
             run: 0,
             built: BuiltCache::default(),
         }
@@ -127,6 +130,7 @@ impl Builder {
     }
 
     /// Marks the later readers of a cell, whose content `writer` (`None`: the document) has changed, to be looked at.
+    /// Readers in the rig's space wait for [`Builder::spread_moves`].
     /// `circles` is true if that may have closed a circle of constraints.
     fn changed(&mut self, node: NodeId, aspect: Aspect, writer: Option<u32>, circles: bool) {
         self.built.note(node, aspect);
@@ -141,12 +145,8 @@ impl Builder {
                 self.mark(number, DueWork::Check);
             }
         }
-        if matches!(aspect, Aspect::Base | Aspect::Parent) {
-            for number in self.world.global_readers(node) {
-                if later(&self.world, number) {
-                    self.mark(number, DueWork::Check);
-                }
-            }
+        if matches!(aspect, Aspect::Base | Aspect::Parent) && self.world.global_reads > 0 {
+            self.moved.push(node);
         }
         if aspect.is_structure() {
             let from = from.map_or(0, |from| from + 1);
@@ -406,6 +406,7 @@ impl Builder {
             command.micros = started.elapsed().as_nanos() as f32 / 1000.0;
         }
         command.error = result.clone().err();
+        self.spread_moves(Some(number));
         self.spread_structure();
         result
     }
@@ -448,6 +449,7 @@ impl Builder {
             let readers = &mut self.world.slots[node.0 as usize].global_readers;
             if let Ok(at) = readers.binary_search(&number) {
                 readers.remove(at);
+                self.world.global_reads -= 1;
             }
         }
         let mut values = Vec::with_capacity(trace.writes.len());

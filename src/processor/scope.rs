@@ -173,6 +173,7 @@ impl BuildScope<'_> {
             let readers = &mut self.world.slots[node.0 as usize].global_readers;
             if let Err(at) = readers.binary_search(&self.command) {
                 readers.insert(at, self.command);
+                self.world.global_reads += 1;
             }
         }
         global

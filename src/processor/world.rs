@@ -192,6 +192,10 @@ pub(super) struct World {
     made: usize,
     /// Nodes and constraints that are there, counted by the running command once there may be too many.
     counted: Option<usize>,
+    /// Number of commands and nodes in [`Slot::global_readers`] of all nodes.
+    pub global_reads: usize,
+    /// Number of nodes that were visited to find readers of transforms.
+    pub visited: u64,
     /// Number of values that commands have read and written.
     pub work: u64,
     /// Work before the current run.
@@ -257,7 +261,7 @@ impl World {
             return Ok(());
         }
         let limit = usize::try_from(limit).unwrap_or(usize::MAX);
-        Err(ModuleError::TooMany { what: "values read and written in one build", name: "work", limit })
+        Err(ModuleError::TooMany { what: "values read and written in one run", name: "work", limit })
     }
 
     /// The number of a command, made where there is none.
@@ -365,21 +369,18 @@ impl World {
         (global, count)
     }
 
-    /// Commands that read the transform, in the rig's space, of a node or of one that may stand below it.
-    pub fn global_readers(&self, node: NodeId) -> Vec<u32> {
-        let slot = |node: NodeId| &self.slots[node.0 as usize];
-        let mut readers = slot(node).global_readers.clone();
-        if slot(node).below.is_empty() {
-            return readers;
-        }
+    /// Commands that read the transform, in the rig's space, of one of the nodes or of one that may stand below them.
+    pub fn global_readers(&mut self, nodes: Vec<NodeId>) -> Vec<u32> {
+        let mut readers = Vec::new();
         // Parents differ from place to place, so that two nodes may each stand below the other somewhere.
         let mut seen: HashSet<NodeId> = HashSet::default();
-        seen.insert(node);
-        let mut stack = slot(node).below.clone();
+        let mut stack = nodes;
         while let Some(node) = stack.pop() {
+            self.visited += 1;
             if seen.insert(node) {
-                readers.extend(&slot(node).global_readers);
-                stack.extend(&slot(node).below);
+                let slot = &self.slots[node.0 as usize];
+                readers.extend(&slot.global_readers);
+                stack.extend(&slot.below);
             }
         }
         readers

@@ -224,12 +224,14 @@ fn rename(model: &mut Model, human: &HumanJoints, preset: SkeletonPreset) -> usi
             given.extend(name.map(|name| (*joint, name)));
         }
     }
-    let mut taken: BTreeSet<String> = given.values().cloned().collect();
+    let wanted: BTreeSet<String> = given.values().cloned().collect();
+    let others = model.nodes.iter().enumerate().filter(|(at, _)| !given.contains_key(at));
+    let mut taken: BTreeSet<String> = others.map(|(_, node)| node.name.clone()).chain(wanted.iter().cloned()).collect();
     let mut count = 0;
     for (at, node) in model.nodes.iter_mut().enumerate() {
         let name = match given.get(&at) {
             Some(name) => name.clone(),
-            None if taken.contains(&node.name) => {
+            None if wanted.contains(&node.name) => {
                 let mut numbered = (1..).map(|number| format!("{}.{number:03}", node.name));
                 numbered.find(|name| !taken.contains(name)).unwrap_or_else(|| node.name.clone())
             }
@@ -256,7 +258,7 @@ fn turns(model: &Model, joints: &[SkeletonJoint], human: &HumanJoints, axes: Bon
         BoneAxes::Model => wanted.extend(human.values().flatten().map(|joint| (*joint, Quat::IDENTITY))),
         BoneAxes::Along(axis) => {
             for chain in chains(human) {
-                let mut along = Vec3::Y;
+                let mut along = first_direction(&chain, joints);
                 for (place, joint) in chain.iter().enumerate() {
                     let next = chain.get(place + 1).map(|next| joints[*next].position - joints[*joint].position);
                     along = next.and_then(Vec3::try_normalize).unwrap_or(along);
@@ -271,6 +273,14 @@ fn turns(model: &Model, joints: &[SkeletonJoint], human: &HumanJoints, axes: Bon
         }
     }
     turns
+}
+
+/// Direction of a chain at its first joint: to the next joint at another place, else away from the parent, else up.
+fn first_direction(chain: &[usize], joints: &[SkeletonJoint]) -> Vec3 {
+    let Some(first) = chain.first().map(|first| &joints[*first]) else { return Vec3::Y };
+    let later = chain.iter().find_map(|joint| (joints[*joint].position - first.position).try_normalize());
+    let above = first.parent.and_then(|parent| (first.position - joints[parent].position).try_normalize());
+    later.or(above).unwrap_or(Vec3::Y)
 }
 
 /// Chains of joints from the body outwards: trunk, arms, legs and fingers.
@@ -342,5 +352,37 @@ fn turn_axes(model: &mut Model, turns: &[Quat]) {
             }
             ChannelTarget::Scale(_) | ChannelTarget::MorphWeights(_) => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::model::Node;
+
+    #[test]
+    fn chains_without_length_have_a_direction() {
+        let joint = |parent: Option<usize>, position: Vec3| SkeletonJoint { name: String::new(), parent, position };
+        let joints = [joint(None, Vec3::Y), joint(Some(0), Vec3::Y), joint(Some(1), Vec3::new(2.0, 1.0, 0.0))];
+        for (chain, wanted) in [
+            (vec![0, 1, 2], Vec3::X),
+            (vec![2], Vec3::X),
+            (vec![1], Vec3::Y),
+            (vec![0], Vec3::Y),
+            (Vec::new(), Vec3::Y),
+        ] {
+            assert_eq!(first_direction(&chain, &joints), wanted, "{chain:?}");
+        }
+    }
+
+    #[test]
+    fn names_stay_different() {
+        let names = ["mixamorig:Hips.001", "mixamorig:Hips", "pelvis"];
+        let node = |name: &str| Node { name: name.to_owned(), ..Node::default() };
+        let mut model = Model { nodes: names.iter().map(|name| node(name)).collect(), ..Model::default() };
+        let human = HumanJoints::from_iter([(HumanBone::Hips, vec![2])]);
+        assert_eq!(rename(&mut model, &human, SkeletonPreset::Mixamo), 2);
+        let names: Vec<&str> = model.nodes.iter().map(|node| node.name.as_str()).collect();
+        assert_eq!(names, ["mixamorig:Hips.001", "mixamorig:Hips.002", "mixamorig:Hips"]);
     }
 }

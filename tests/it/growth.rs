@@ -114,3 +114,32 @@ fn a_transform_is_read_again_when_a_joint_above_changes() {
         assert_eq!(builder.built(), Builder::build(&rig, &modules).unwrap(), "joint {number}");
     }
 }
+
+/// Nodes that are visited when all joints of a chain move at once, and a command reads where its end is.
+fn visited(count: usize) -> u64 {
+    use rigsmith::rig::{RestTransform, RigEdit};
+
+    let mut rig = chain(count, |at| if at + 1 == count { vec![null("@this")] } else { vec![] });
+    let mut builder = Builder::new(Arc::new(rigsmith::modules::all()));
+    builder.sync(&rig);
+    assert_eq!(builder.visited(), 0, "nothing is read before the first run");
+    assert_eq!(builder.run_all().error, None);
+    let before = builder.visited();
+    let joints: Vec<_> = rig.walk().map(|joint| joint.data.uid).collect();
+    for joint in joints {
+        let rest = RestTransform::from_translation(glam::Vec3::new(0.0, 0.2, 0.0));
+        rig.apply(&RigEdit::SetRest(joint, rest)).unwrap();
+    }
+    builder.sync(&rig);
+    let visited = builder.visited() - before;
+    assert_eq!(builder.run_all().executed.len(), 1);
+    visited
+}
+
+#[test]
+fn moves_of_whole_chains_are_followed_once() {
+    let visits: Vec<u64> = [150, 300, 600].into_iter().map(visited).collect();
+    for pair in visits.windows(2) {
+        assert!(pair[0] > 0 && pair[1] as f64 <= GROWTH * pair[0] as f64, "{visits:?}");
+    }
+}

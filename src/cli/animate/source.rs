@@ -9,15 +9,15 @@ use serde_json::{Map, Value, json};
 
 use super::AnimateArgs;
 use crate::{
-    cli::{Failure, Report, progress::spinning, report::counted},
-    files::{FileKind, RealDisk, load_animation, load_joint_map, load_model, load_motion, save_atomic, stem},
+    cli::{Failure, Report, limits, progress::spinning, report::counted},
+    files::{FileKind, RealDisk, load_animation, load_joint_map, load_motion, save_atomic, stem},
     headless::{Workbench, posing::PoseError},
     mesh::model::Model,
     rig::{
         Rig,
         animation::{
             RigClip,
-            file_clip::{motion_of, own_joints, rig_clips},
+            file_clip::{motion_of, numbered_clip, own_joints},
             humanoid::HumanBone,
             joint_map::{JointMap, write_joint_map},
             motion::Motion,
@@ -38,8 +38,8 @@ enum ClipChoiceError {
         /// Names of the clips with their numbers.
         known: String,
     },
-    /// A file has no clips.
-    #[error("`{}` has no clips", path.display())]
+    /// A file has no clips, or none that moves a joint.
+    #[error("`{}` has no clips that move joints; give a file with animations of its skeleton", path.display())]
     Empty {
         /// The file.
         path: PathBuf,
@@ -98,10 +98,7 @@ pub(super) fn clips(
     for path in &args.clips {
         match FileKind::of(path) {
             Some(FileKind::Glb | FileKind::Gltf) => {
-                let model = spinning("reading the animations", || load_model(&RealDisk, path))?;
-                if model.clips.is_empty() {
-                    return Err(ClipChoiceError::Empty { path: path.clone() }.into());
-                }
+                let model = spinning("reading the animations", || limits::load_model(path))?;
                 let source = ModelSource { path, model };
                 source.add(args, onto, bench, &mut choice, &mut added, &mut told, report)?;
             }
@@ -183,26 +180,31 @@ impl ModelSource<'_> {
     ) -> Result<(), Failure> {
         let has_keys = onto == MotionTarget::Joints && args.map.is_none() && args.map_out.is_none();
         let own = has_keys.then(|| own_joints(&self.model, bench.rig())).flatten();
-        let Some(joints) = own else {
-            for clip in &self.model.clips {
-                if choice.takes(&clip.name) {
-                    let mut motion = motion_of(&self.model, clip);
-                    if motion.name.is_empty() {
-                        motion.name = stem(self.path);
-                    }
-                    added.push(moved(args, self.path, &motion, onto, bench, told, report)?);
-                }
-            }
-            return Ok(());
-        };
-        let mut made = rig_clips(bench.rig(), &self.model, &joints);
-        for clip in &mut made {
-            if !choice.takes(&clip.name) {
+        let before = added.len();
+        let mut is_any_left_out = false;
+        for (number, clip) in self.model.clips.iter().enumerate() {
+            let name = if clip.name.trim().is_empty() { stem(self.path) } else { clip.name.trim().to_owned() };
+            if !choice.takes(&name) {
+                is_any_left_out = true;
                 continue;
             }
+            let Some(joints) = &own else {
+                let motion = Motion { name: name.clone(), ..motion_of(&self.model, clip) };
+                if motion.frames() == 0 {
+                    report.notes.push(format!("the clip \"{name}\" moves no joint"));
+                } else {
+                    added.push(moved(args, self.path, &motion, onto, bench, told, report)?);
+                }
+                continue;
+            };
+            let Some(mut clip) = numbered_clip(bench.rig(), &self.model, number, joints) else {
+                report.notes.push(format!("the clip \"{name}\" moves no joint"));
+                continue;
+            };
+            clip.name = name;
             clip.looped |= args.looped;
             clip.frame_rate = args.fps.unwrap_or(clip.frame_rate);
-            let clip = add(bench, clip.clone())?;
+            let clip = add(bench, clip)?;
             let keys = clip.key_count();
             report.line(format!("\"{}\" has its keys on the joints of the rig", clip.name));
             told.push(Map::from_iter([
@@ -214,6 +216,9 @@ impl ModelSource<'_> {
                 ("keys_after".to_owned(), keys.into()),
             ]));
             added.push(clip);
+        }
+        if added.len() == before && !is_any_left_out {
+            return Err(ClipChoiceError::Empty { path: self.path.to_owned() }.into());
         }
         Ok(())
     }

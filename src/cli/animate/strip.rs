@@ -8,8 +8,8 @@ use image::{ImageFormat, RgbImage};
 use super::AnimateArgs;
 use crate::{
     algo::view::View,
-    cli::{Failure, Report, binding::bind, progress::spinning},
-    files::{RealDisk, load_model, save_atomic},
+    cli::{Failure, Report, binding::bind, limits, progress::spinning},
+    files::{RealDisk, save_atomic},
     headless::Workbench,
     plugins::drawing::RigDrawing,
     render::{PictureError, PictureSettings, take_picture},
@@ -34,7 +34,7 @@ pub(super) fn draw(
 ) -> Result<(), Failure> {
     let Some(clip) = clips.first() else { return Ok(()) };
     if let Some(mesh) = &args.mesh {
-        let model = load_model(&RealDisk, mesh)?;
+        let model = limits::load_model(mesh)?;
         report.notes(model.notes.iter().cloned());
         bench.open(model, true)?;
         bind(bench, args.weights.settings(), &args.weights.claim, Vec::new(), report)?;

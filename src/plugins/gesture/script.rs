@@ -49,6 +49,9 @@ pub struct GestureAnswer {
     pub message: String,
     /// Number of joints that it added.
     pub joints_added: usize,
+    /// True if the time was over before the gesture was done, and the gestures behind it were left out.
+    #[serde(skip)]
+    pub out_of_time: bool,
 }
 
 /// State of the simulated user between gestures.

@@ -23,6 +23,7 @@ impl Builder {
         let switches = Switches::of(rig);
         self.sync_joints(rig, &switches);
         self.sync_inputs(rig);
+        self.spread_moves(None);
         self.sync_list(rig, &switches);
         self.spread_structure();
     }
@@ -266,6 +267,22 @@ impl Builder {
         self.cursor = still.unwrap_or(end);
         if self.failed.is_some_and(|number| self.world.places[number as usize] == NOWHERE) {
             self.failed = None;
+        }
+    }
+
+    /// Marks the later readers of what `writer` (`None`: the document) has moved in the rig's space: in one walk, since
+    /// each node of a chain moves all nodes below it.
+    pub(super) fn spread_moves(&mut self, writer: Option<u32>) {
+        if self.moved.is_empty() {
+            return;
+        }
+        let moved = std::mem::take(&mut self.moved);
+        let from = writer.map(|writer| self.world.places[writer as usize]);
+        for number in self.world.global_readers(moved) {
+            let place = self.world.places[number as usize];
+            if place != NOWHERE && from.is_none_or(|from| place > from) {
+                self.mark(number, DueWork::Check);
+            }
         }
     }
 

@@ -63,6 +63,12 @@ impl Builder {
         self.commands.iter().map(trace).sum()
     }
 
+    /// Number of nodes that were visited since the builder was made to find the commands that read where something is:
+    /// a measure of work that is the same on every machine.
+    pub fn visited(&self) -> u64 {
+        self.world.visited
+    }
+
     /// Number of values that commands have read and written since the builder was made: a measure of work that is the
     /// same on every machine.
     pub fn work(&self) -> u64 {

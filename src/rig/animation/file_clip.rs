@@ -77,10 +77,14 @@ fn with_unit_length(key: Key) -> Key {
     Key { value: divided(key.value), ease, ..key }
 }
 
+/// Channels of a clip that move nodes.
+fn node_channels(clip: &Clip) -> impl Iterator<Item = &Channel> {
+    clip.channels.iter().filter(|channel| !matches!(channel.target, ChannelTarget::MorphWeights(_)))
+}
+
 /// First and last second of the keys of nodes; `None` without any.
 fn span(clip: &Clip) -> Option<[f32; 2]> {
-    let channels = clip.channels.iter().filter(|channel| !matches!(channel.target, ChannelTarget::MorphWeights(_)));
-    channels
+    node_channels(clip)
         .filter_map(|channel| Some([*channel.times.first()?, *channel.times.last()?]))
         .reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
 }
@@ -92,7 +96,7 @@ fn frame_rate(clip: &Clip, start: f32) -> f32 {
             let frame = f64::from(time - start) * f64::from(rate);
             (frame - frame.round()).abs() < 0.02
         };
-        clip.channels.iter().flat_map(|channel| &channel.times).all(near)
+        node_channels(clip).flat_map(|channel| &channel.times).all(near)
     };
     RATES.into_iter().find(|rate| lies(*rate)).unwrap_or(USUAL_RATE)
 }
@@ -208,17 +212,19 @@ pub fn rig_clip(rig: &Rig, name: &str, clip: &Clip, joints: &[Option<Uid>]) -> O
 /// Clips of a file on the joints that its nodes became. Names are those of the file; a clip without one is called
 /// `clip`.
 pub fn rig_clips(rig: &Rig, model: &Model, joints: &[Option<Uid>]) -> Vec<RigClip> {
-    let named = |clip: &Clip| if clip.name.trim().is_empty() { "clip".to_owned() } else { clip.name.trim().to_owned() };
-    let clips = model.clips.iter().enumerate();
-    let clips = clips.filter_map(|(number, clip)| {
-        let mut made = rig_clip(rig, &named(clip), clip, joints)?;
-        // Two clips of one name are two clips.
-        let (of, number) = (rig.uid().to_string(), number.to_string());
-        made.uid = Uid::derived([of.as_str(), &made.name, &number, "clip"]);
-        made.layers[0].uid = Uid::derived([of.as_str(), &made.name, &number, "layer"]);
-        Some(made)
-    });
-    clips.collect()
+    (0..model.clips.len()).filter_map(|number| numbered_clip(rig, model, number, joints)).collect()
+}
+
+/// Clip of a file with that number, from zero, as [`rig_clips`] has it; `None` if it has no keys of the joints.
+pub fn numbered_clip(rig: &Rig, model: &Model, number: usize, joints: &[Option<Uid>]) -> Option<RigClip> {
+    let clip = model.clips.get(number)?;
+    let name = if clip.name.trim().is_empty() { "clip" } else { clip.name.trim() };
+    let mut made = rig_clip(rig, name, clip, joints)?;
+    // Two clips of one name are two clips.
+    let (of, number) = (rig.uid().to_string(), number.to_string());
+    made.uid = Uid::derived([of.as_str(), &made.name, &number, "clip"]);
+    made.layers[0].uid = Uid::derived([of.as_str(), &made.name, &number, "layer"]);
+    Some(made)
 }
 
 /// Keys of a clip for one property of a joint whose transform is its rest transform and its offset alone, as a channel
