@@ -11,7 +11,7 @@ use rigsmith::{
     instance::RigTemplate,
     rig::{
         Rig, RigEdit, TagData, TagKind, Uid, UidSource,
-        operations::{Operation, Outcome, TagOperation},
+        operations::{Operation, OperationError, Outcome, TagOperation},
         part::PartInstance,
         step::edits_from_empty,
     },
@@ -78,13 +78,18 @@ impl Desk {
 
     /// Drops the limb onto joints.
     fn drop(&mut self, labels: &[&str], mirror: bool) -> Outcome {
-        let part = "limb.rig.ron".to_owned();
+        self.add("limb.rig.ron", labels, mirror).unwrap()
+    }
+
+    /// Adds a part on joints, or is refused.
+    fn add(&mut self, part: &str, labels: &[&str], mirror: bool) -> Result<Outcome, OperationError> {
+        let part = part.to_owned();
         let onto = vec![String::new(); labels.len()];
         let instance = PartInstance { part: part.clone(), onto, mirror, ..PartInstance::default() };
         let fitted = Arc::new(PartFiles::new(&RealDisk).fitted_part(&self.path(), &instance).unwrap());
         let joints = labels.iter().map(|label| self.joint(label)).collect();
         let operation = Operation::Tags(TagOperation::AddPart { part, fitted, joints, mirror });
-        operation.run(&mut self.rig, &mut self.uids, None).unwrap()
+        operation.run(&mut self.rig, &mut self.uids, None)
     }
 
     /// Saves the rig; the text, which says what the rig is with all its parts.
@@ -264,4 +269,38 @@ fn a_template_that_code_changes_keeps_its_parts() {
     template.set_rig(rig);
     let saved = template.saved();
     assert!(saved.contains("parts: [(part: \"parts/fk_chain.rig.ron\", onto: [\"a\", \"b\"])]"), "{saved}");
+}
+
+#[test]
+fn joints_in_another_order_are_refused_and_other_partners_are_told() {
+    let mut desk = Desk::new();
+    let before = desk.rig.clone();
+    let error = desk.add("limb.rig.ron", &["elbow_l", "arm_l"], false).unwrap_err().to_string();
+    assert!(error.contains("\"arm_l\" is not next below \"elbow_l\""), "{error}");
+    assert_eq!(desk.rig, before);
+    let notes = desk.drop(&["hips", "arm_l"], false).notes;
+    assert!(matches!(&notes[..], [note] if note.starts_with("1 other pairs of joints are partners now")), "{notes:?}");
+}
+
+#[test]
+fn a_file_may_use_the_first_joints_of_a_part_that_a_drop_takes_as_a_whole() {
+    let claw = r#"(
+        format: 2,
+        name: "claw",
+        kind: "part",
+        joints: [
+            (label: "root", tags: [control()]),
+            (label: "middle", parent: "root", tags: [control(at: "@joint tip")]),
+            (label: "tip", parent: "middle"),
+        ],
+    )"#;
+    let mut desk = Desk::new();
+    fs::write(desk.folder.path().join("claw.rig.ron"), claw).unwrap();
+    let error = desk.add("claw.rig.ron", &["hips"], false).unwrap_err().to_string();
+    assert!(error.contains("needs 3 joints"), "{error}");
+    let path = desk.folder.path().join("short.rig.ron");
+    let parts = "    parts: [(part: \"claw.rig.ron\", onto: [\"hips\"])],\n)";
+    fs::write(&path, MAN.trim_end().trim_end_matches(')').to_owned() + parts).unwrap();
+    let hips = desk.joint("hips");
+    assert_eq!(load(&path).joint(hips).unwrap().data.tags.len(), 2);
 }
