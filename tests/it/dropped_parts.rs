@@ -304,3 +304,55 @@ fn a_file_may_use_the_first_joints_of_a_part_that_a_drop_takes_as_a_whole() {
     let hips = desk.joint("hips");
     assert_eq!(load(&path).joint(hips).unwrap().data.tags.len(), 2);
 }
+
+#[test]
+fn parts_that_a_save_cannot_keep_are_told_once() {
+    let notes_of = |desk: &Desk| store_rig_over(&RealDisk, &desk.path(), &desk.rig, &[&desk.path()]).unwrap();
+    let is_told = |notes: &[String]| matches!(notes, [note] if note.contains("written out"));
+    let tags = |rig: &Rig| rig.walk().map(|joint| joint.data.tags.len()).sum::<usize>();
+    // Two joints with one label.
+    let mut desk = Desk::new();
+    desk.drop(&["arm_l", "elbow_l"], false);
+    let other = desk.joint("arm_r");
+    apply(&mut desk.rig, RigEdit::SetLabel(other, Some("arm_l".to_owned())));
+    let notes = notes_of(&desk);
+    assert!(is_told(&notes), "{notes:?}");
+    assert_eq!(tags(&load(&desk.path())), 4);
+    assert_eq!(notes_of(&desk), Vec::<String>::new());
+    // No file of the part any more.
+    let mut desk = Desk::new();
+    desk.drop(&["arm_l", "elbow_l"], false);
+    fs::remove_file(desk.folder.path().join("limb.rig.ron")).unwrap();
+    let notes = notes_of(&desk);
+    assert!(is_told(&notes), "{notes:?}");
+    assert_eq!(tags(&load(&desk.path())), 4);
+    // Another file of the part, of which nothing is in the rig.
+    let mut desk = Desk::new();
+    desk.drop(&["arm_l", "elbow_l"], false);
+    desk.save();
+    desk.rig = load(&desk.path());
+    let renamed = LIMB.replace("upper_l", "over_l").replace("lower_l", "under_l");
+    fs::write(desk.folder.path().join("limb.rig.ron"), renamed).unwrap();
+    let notes = notes_of(&desk);
+    assert!(is_told(&notes), "{notes:?}");
+    assert_eq!((desk.instances().len(), tags(&load(&desk.path()))), (0, 4));
+}
+
+#[test]
+fn a_part_that_is_added_again_for_the_other_side_takes_the_place_of_the_first() {
+    let mut desk = Desk::new();
+    let knob = "(format: 2, name: \"knob\", kind: \"part\", joints: [\
+        (label: \"knob_l\", tags: [control(creation: (name: \"knob_l\"))])])";
+    fs::write(desk.folder.path().join("knob.rig.ron"), knob).unwrap();
+    desk.add("knob.rig.ron", &["arm_l"], false).unwrap();
+    desk.save();
+    desk.rig = load(&desk.path());
+    let arm = desk.joint("arm_l");
+    let tag = desk.rig.joint(arm).unwrap().data.tags[0].uid;
+    apply(&mut desk.rig, RigEdit::RemoveTag(arm, tag));
+    desk.add("knob.rig.ron", &["arm_l"], true).unwrap();
+    let text = desk.save();
+    assert!(text.contains("onto: [\"arm_l\"], mirror: true)"), "{text}");
+    assert!(!text.contains("changes"), "{text}");
+    assert_eq!(desk.instances(), [["arm_l"]]);
+}
