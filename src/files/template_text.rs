@@ -57,7 +57,10 @@ pub(crate) fn template_text(
 
 /// True if a text at that path says what the rig is.
 fn says(reader: PartReader, at: &Path, text: &str, rig: &Rig) -> bool {
-    reader().complete(at, text.as_bytes()).is_ok_and(|template| template::says_the_same(&template.rig, rig))
+    let Ok(read) = template::read_template(text.as_bytes()) else { return false };
+    let own = read.rig.clone();
+    let whole = reader().put_together(at, text, read);
+    whole.is_ok_and(|template| template::says_the_same(&template.rig, rig, &own))
 }
 
 /// The parts that were dropped onto joints and are not in the template yet. `source` is the template with its text.
@@ -162,9 +165,10 @@ fn over_parts(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<Te
     let before = files.put_together(at, text, read).ok()?.rig;
     let plain = files.put_together(at, text, without_changes).ok()?.rig;
     let rigs = PartRigs { own: &own, before: &before, plain: &plain, parts: &parts };
-    // Names are what people write; uids say it where a name means something else.
-    let texts = [true, false].into_iter().filter_map(|names| template::write_parts_over(rig, &rigs, text, names));
-    let text = texts.into_iter().find(|text| says(reader, at, text, rig))?;
+    // Names are what people write; uids say it where a name means something else. The order of a text stays if it can.
+    let ways = [(true, false), (false, false), (true, true), (false, true)].into_iter();
+    let mut texts = ways.filter_map(|(names, in_order)| template::write_parts_over(rig, &rigs, text, names, in_order));
+    let text = texts.find(|text| says(reader, at, text, rig))?;
     Some(TemplateText { text, note: None })
 }
 

@@ -10,7 +10,7 @@ use rigsmith::{
     files::{PartFiles, RealDisk, load_template, store_rig_over},
     instance::RigTemplate,
     rig::{
-        Rig, RigEdit, TagData, TagKind, Uid, UidSource,
+        GroupData, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
         operations::{Operation, OperationError, Outcome, TagOperation},
         part::PartInstance,
         step::edits_from_empty,
@@ -355,4 +355,22 @@ fn a_part_that_is_added_again_for_the_other_side_takes_the_place_of_the_first() 
     assert!(text.contains("onto: [\"arm_l\"], mirror: true)"), "{text}");
     assert!(!text.contains("changes"), "{text}");
     assert_eq!(desk.instances(), [["arm_l"]]);
+}
+
+#[test]
+fn the_order_of_own_groups_is_saved_beside_parts() {
+    let mut desk = Desk::new();
+    let group = |uid: u64, name: &str| GroupData { uid: Uid(uid), name: name.into(), color: [0.5; 3], enabled: true };
+    for group in [group(0x91, "one"), group(0x92, "two")] {
+        apply(&mut desk.rig, RigEdit::AddLocalGroup(group, usize::MAX));
+    }
+    desk.drop(&["arm_l", "elbow_l"], false);
+    desk.save();
+    apply(&mut desk.rig, RigEdit::RemoveLocalGroup(Uid(0x91)));
+    apply(&mut desk.rig, RigEdit::AddLocalGroup(group(0x91, "one"), usize::MAX));
+    let text = desk.save();
+    let own: Vec<String> = load(&desk.path()).groups().iter().map(|group| group.name.clone()).collect();
+    assert_eq!(own, ["two", "one", "limb_l"]);
+    assert!(text.contains("// It bends."), "{text}");
+    assert_eq!(desk.instances(), [["arm_l", "elbow_l"]]);
 }
