@@ -149,7 +149,7 @@ fn over_parts(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<Te
         && let Some(rest) = template::without_instances(text, rig, &gone)
         && let Some(changed) = over(rig, at, &rest, reader)
     {
-        let are_lost = gone.iter().any(|number| has_remains(&read.rig, &changed.text, &parts[*number]));
+        let are_lost = gone.iter().any(|number| has_remains(&read, &changed.text, &parts[*number]));
         return Some(TemplateText { note: if are_lost { Some(PARTS_LOST) } else { changed.note }, ..changed });
     }
     let own = read.rig.clone();
@@ -173,21 +173,25 @@ fn over_parts(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<Te
 }
 
 /// True if a text from which a part was taken out has, as its own, tags that may be those of the part from a time when its
-/// file was another: tags that `before`, what the template had itself, lacks, on the joints of the part, or like its own on
-/// new joints.
-fn has_remains(before: &Rig, text: &str, (instance, part): &(PartInstance, Rig)) -> bool {
+/// file was another: tags that the template `before` lacks, on the joints of the part, or like its own on new joints and in
+/// changes of other parts.
+fn has_remains(before: &Template, text: &str, (instance, part): &(PartInstance, Rig)) -> bool {
     let Ok(after) = template::read_template(text.as_bytes()) else { return false };
     let module = |tag: &TagData| match &tag.kind {
         TagKind::Command { module, .. } => Some(module.clone()),
         TagKind::Feature { .. } => None,
     };
     let modules: HashSet<_> = part.walk().flat_map(|joint| &joint.data.tags).filter_map(module).collect();
-    let onto: HashSet<Uid> = instance.onto.iter().filter_map(|label| before.find_label(label)).collect();
+    let is_like = |tag: &TagData| module(tag).is_some_and(|module| modules.contains(&module));
+    let onto: HashSet<Uid> = instance.onto.iter().filter_map(|label| before.rig.find_label(label)).collect();
     let has_own = instance.onto.is_empty() || instance.adds;
-    after.rig.walk().any(|joint| {
-        let is_new = has_own && before.joint(joint.data.uid).is_none();
-        let is_like = |tag: &TagData| is_new && module(tag).is_some_and(|module| modules.contains(&module));
-        let mut fresh = joint.data.tags.iter().filter(|tag| !before.is_taken(tag.uid));
-        fresh.any(|tag| onto.contains(&joint.data.uid) || is_like(tag))
-    })
+    let is_own = after.rig.walk().any(|joint| {
+        let is_new = has_own && before.rig.joint(joint.data.uid).is_none();
+        let mut fresh = joint.data.tags.iter().filter(|tag| !before.rig.is_taken(tag.uid));
+        fresh.any(|tag| onto.contains(&joint.data.uid) || is_new && is_like(tag))
+    });
+    let changes = before.parts.iter().flat_map(|part| &part.changes);
+    let known: HashSet<Uid> = changes.flat_map(|change| &change.tags).map(|tag| tag.uid).collect();
+    let mut changes = after.parts.iter().flat_map(|part| &part.changes).flat_map(|change| &change.tags);
+    is_own || changes.any(|tag| !known.contains(&tag.uid) && is_like(tag))
 }
