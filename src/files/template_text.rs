@@ -1,11 +1,11 @@
 //! Texts of templates that say what a rig is, as changes of the text that it was read from.
 
-use std::path::Path;
+use std::{collections::HashSet, path::Path};
 
 use super::PartFiles;
 use crate::rig::{
-    Rig,
-    part::{PartChange, PartInstance, without_dropped},
+    Rig, TagData, TagKind, Uid,
+    part::{DroppedPart, PartChange, PartInstance, without_dropped},
     template::{self, PartRigs, Template, write_template},
 };
 
@@ -17,6 +17,15 @@ pub(crate) struct TemplateText {
     pub text: String,
     /// Loss of what the former text has, a sentence.
     pub note: Option<&'static str>,
+}
+
+/// Parts that were dropped onto joints and are not in the template yet.
+#[derive(Default)]
+struct FreshParts {
+    /// The instances, each with its part as it is fitted.
+    parts: Vec<(PartInstance, Rig)>,
+    /// True if there are others, whose file cannot be had or whose joints are not known by their labels.
+    are_some_lost: bool,
 }
 
 const PARTS_LOST: &str =
@@ -34,36 +43,58 @@ pub(crate) fn template_text(
 ) -> TemplateText {
     let (at, text) = source.map_or((target, None), |(at, text)| (at, Some(text)));
     let template = text.and_then(|text| template::read_template(text.as_bytes()).ok());
-    let dropped = dropped(rig, at, template.as_ref(), reader);
-    let has_parts = !dropped.is_empty() || template.is_some_and(|template| !template.parts.is_empty());
+    let FreshParts { parts, are_some_lost } = dropped(rig, at, text.zip(template.as_ref()), reader);
+    let has_parts = !parts.is_empty() || template.is_some_and(|template| !template.parts.is_empty());
     // Parts beside the one file may not be there beside the other.
     let is_right = |text: &str| !has_parts || at.parent() == target.parent() || says(reader, target, text, rig);
-    match changed(rig, at, text, &dropped, reader).filter(|changed| is_right(&changed.text)) {
-        Some(changed) => changed,
-        None => {
-            let lost = if has_parts { PARTS_LOST } else { COMMENTS_LOST };
-            TemplateText { text: write_template(rig), note: (has_parts || text.is_some()).then_some(lost) }
-        }
-    }
+    let changed = changed(rig, at, text, &parts, reader).filter(|changed| is_right(&changed.text));
+    let written = changed.unwrap_or_else(|| {
+        let lost = if has_parts { PARTS_LOST } else { COMMENTS_LOST };
+        TemplateText { text: write_template(rig), note: (has_parts || text.is_some()).then_some(lost) }
+    });
+    if are_some_lost { TemplateText { note: Some(PARTS_LOST), ..written } } else { written }
 }
 
 /// True if a text at that path says what the rig is.
 fn says(reader: PartReader, at: &Path, text: &str, rig: &Rig) -> bool {
-    reader().complete(at, text.as_bytes()).is_ok_and(|template| template::says_the_same(&template.rig, rig))
+    let Ok(read) = template::read_template(text.as_bytes()) else { return false };
+    let own = read.rig.clone();
+    let whole = reader().put_together(at, text, read);
+    whole.is_ok_and(|template| template::says_the_same(&template.rig, rig, &own))
 }
 
-/// The parts that were dropped onto joints and are not in the template yet, each as it is fitted.
-fn dropped(rig: &Rig, at: &Path, template: Option<&Template>, reader: PartReader) -> Vec<(PartInstance, Rig)> {
-    let is_known = |instance: &PartInstance| {
-        template.is_some_and(|template| template.parts.iter().any(|known| known.uid == instance.uid))
+/// The parts that were dropped onto joints and are not in the template yet. `source` is the template with its text.
+fn dropped(rig: &Rig, at: &Path, source: Option<(&str, &Template)>, reader: PartReader) -> FreshParts {
+    let is_known = |part: &DroppedPart| {
+        let Some((text, template)) = source else { return false };
+        let known = template.parts.iter().find(|known| known.uid == part.uid);
+        // Another part or side on the same joints follows to the same uid.
+        known.is_some_and(|known| {
+            (&known.part, known.mirror) == (&part.part, part.mirror) || says(reader, at, text, rig)
+        })
     };
+    // What the template has itself was written out by an earlier save.
+    let is_fresh = |uid: Uid| rig.is_taken(uid) && source.is_none_or(|(_, template)| !template.rig.is_taken(uid));
     let mut files = reader();
-    let instances = rig.dropped_parts().iter().filter_map(|part| part.instance(rig));
-    let fitted = instances.filter(|instance| !is_known(instance)).filter_map(|instance| {
-        let part = files.fitted_part(at, &instance).ok()?;
-        Some((instance, part))
-    });
-    fitted.filter(|(instance, part)| instance.brought(part).iter().any(|uid| rig.is_taken(*uid))).collect()
+    let mut fresh = FreshParts::default();
+    for part in rig.dropped_parts().iter().filter(|part| !is_known(part)) {
+        let labelled = part.instance(rig);
+        let has_labels = labelled.is_some();
+        // What a part brings does not depend on the labels.
+        let instance = labelled.unwrap_or_else(|| part.instance_onto(vec![String::new(); part.joints.len()]));
+        let Ok(fitted) = files.fitted_part(at, &instance) else {
+            let joints = part.joints.iter().filter_map(|joint| rig.joint(*joint));
+            fresh.are_some_lost |= joints.flat_map(|joint| &joint.data.tags).any(|tag| is_fresh(tag.uid));
+            continue;
+        };
+        let brought = instance.brought(&fitted);
+        if !has_labels {
+            fresh.are_some_lost |= brought.iter().any(|uid| is_fresh(*uid));
+        } else if brought.iter().any(|uid| rig.is_taken(*uid)) {
+            fresh.parts.push((instance, fitted));
+        }
+    }
+    fresh
 }
 
 /// The text that says what the rig is; `None` without a text that could be changed so.
@@ -75,31 +106,37 @@ fn changed(
     reader: PartReader,
 ) -> Option<TemplateText> {
     if dropped.is_empty() {
-        return over(rig, at, source?, reader).map(|text| TemplateText { text, note: None });
+        return over(rig, at, source?, reader);
     }
     // First what is the rig's own, then the parts, then what is different about them.
     let file = source.and_then(|text| reader().complete(at, text.as_bytes()).ok());
     let has_partners = file.as_ref().is_some_and(|file| !file.instances.is_empty());
     let own = without_dropped(rig, dropped, file.as_ref().map(|file| &file.rig), has_partners).ok()?;
     let base = source.and_then(|text| over(&own, at, text, reader));
-    let note = (source.is_some() && base.is_none()).then_some(COMMENTS_LOST);
-    let base = base.unwrap_or_else(|| write_template(&own));
+    let base = base.unwrap_or_else(|| TemplateText {
+        text: write_template(&own),
+        note: source.is_some().then_some(COMMENTS_LOST),
+    });
     let instances: Vec<PartInstance> = dropped.iter().map(|(instance, _)| instance.clone()).collect();
-    let text = template::with_instances(&base, &own, rig, &instances)?;
-    over_parts(rig, at, &text, reader).map(|text| TemplateText { text, note })
+    let text = template::with_instances(&base.text, &own, rig, &instances)?;
+    let changed = over_parts(rig, at, &text, reader)?;
+    Some(TemplateText { note: base.note.or(changed.note), ..changed })
 }
 
 /// The text, changed so that it says what the rig is.
-fn over(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<String> {
+fn over(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<TemplateText> {
     let has_parts = template::read_template(text.as_bytes()).is_ok_and(|template| !template.parts.is_empty());
-    if has_parts { over_parts(rig, at, text, reader) } else { template::write_template_over(rig, text) }
+    if has_parts {
+        return over_parts(rig, at, text, reader);
+    }
+    Some(TemplateText { text: template::write_template_over(rig, text)?, note: None })
 }
 
 /// The text of a template with parts, changed so that it says what the rig is; `None` if something of the parts is different
 /// in it. Parts of which nothing is left are taken out.
-fn over_parts(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<String> {
+fn over_parts(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<TemplateText> {
     if says(reader, at, text, rig) {
-        return Some(text.to_owned());
+        return Some(TemplateText { text: text.to_owned(), note: None });
     }
     let read = template::read_template(text.as_bytes()).ok()?;
     let parts = reader().fitted(at, &read).ok()?;
@@ -110,9 +147,10 @@ fn over_parts(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<St
     let gone: Vec<usize> = (0..parts.len()).filter(|number| is_gone(&parts[*number])).collect();
     if !gone.is_empty()
         && let Some(rest) = template::without_instances(text, rig, &gone)
-        && let Some(text) = over(rig, at, &rest, reader)
+        && let Some(changed) = over(rig, at, &rest, reader)
     {
-        return Some(text);
+        let are_lost = gone.iter().any(|number| has_remains(&read, &changed.text, &parts[*number]));
+        return Some(TemplateText { note: if are_lost { Some(PARTS_LOST) } else { changed.note }, ..changed });
     }
     let own = read.rig.clone();
     let mut without_changes = read.clone();
@@ -127,7 +165,33 @@ fn over_parts(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<St
     let before = files.put_together(at, text, read).ok()?.rig;
     let plain = files.put_together(at, text, without_changes).ok()?.rig;
     let rigs = PartRigs { own: &own, before: &before, plain: &plain, parts: &parts };
-    // Names are what people write; uids say it where a name means something else.
-    let texts = [true, false].into_iter().filter_map(|names| template::write_parts_over(rig, &rigs, text, names));
-    texts.into_iter().find(|text| says(reader, at, text, rig))
+    // Names are what people write; uids say it where a name means something else. The order of a text stays if it can.
+    let ways = [(true, false), (false, false), (true, true), (false, true)].into_iter();
+    let mut texts = ways.filter_map(|(names, in_order)| template::write_parts_over(rig, &rigs, text, names, in_order));
+    let text = texts.find(|text| says(reader, at, text, rig))?;
+    Some(TemplateText { text, note: None })
+}
+
+/// True if a text from which a part was taken out has, as its own, tags that may be those of the part from a time when its
+/// file was another: tags that the template `before` lacks, on the joints of the part, or like its own on new joints and in
+/// changes of other parts.
+fn has_remains(before: &Template, text: &str, (instance, part): &(PartInstance, Rig)) -> bool {
+    let Ok(after) = template::read_template(text.as_bytes()) else { return false };
+    let module = |tag: &TagData| match &tag.kind {
+        TagKind::Command { module, .. } => Some(module.clone()),
+        TagKind::Feature { .. } => None,
+    };
+    let modules: HashSet<_> = part.walk().flat_map(|joint| &joint.data.tags).filter_map(module).collect();
+    let is_like = |tag: &TagData| module(tag).is_some_and(|module| modules.contains(&module));
+    let onto: HashSet<Uid> = instance.onto.iter().filter_map(|label| before.rig.find_label(label)).collect();
+    let has_own = instance.onto.is_empty() || instance.adds;
+    let is_own = after.rig.walk().any(|joint| {
+        let is_new = has_own && before.rig.joint(joint.data.uid).is_none();
+        let mut fresh = joint.data.tags.iter().filter(|tag| !before.rig.is_taken(tag.uid));
+        fresh.any(|tag| onto.contains(&joint.data.uid) || is_new && is_like(tag))
+    });
+    let changes = before.parts.iter().flat_map(|part| &part.changes);
+    let known: HashSet<Uid> = changes.flat_map(|change| &change.tags).map(|tag| tag.uid).collect();
+    let mut changes = after.parts.iter().flat_map(|part| &part.changes).flat_map(|change| &change.tags);
+    is_own || changes.any(|tag| !known.contains(&tag.uid) && is_like(tag))
 }

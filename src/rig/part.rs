@@ -128,11 +128,12 @@ pub(in crate::rig) fn unpaired_sides(rig: &Rig) -> Vec<(Uid, Uid)> {
     pairs
 }
 
-/// Joints and commands beyond the first joints of a part that the commands of other joints refer to.
-pub(in crate::rig) fn left_out(part: &Rig, count: usize) -> Vec<(NameKind, Uid)> {
+/// Joints and commands beyond the first `count` joints of a part that the commands of others among its first `asking` joints
+/// refer to.
+pub(in crate::rig) fn left_out(part: &Rig, count: usize, asking: usize) -> Vec<(NameKind, Uid)> {
     let places = places(part);
     let mut left = Vec::new();
-    for (place, joint) in part.walk().enumerate() {
+    for (place, joint) in part.walk().take(asking).enumerate() {
         let is_left = |uid: &Uid| places.get(uid).is_some_and(|other| *other >= count && *other != place);
         left.extend(refers_to(joint).filter(|(_, uid)| is_left(uid)));
     }

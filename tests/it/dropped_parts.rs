@@ -10,8 +10,8 @@ use rigsmith::{
     files::{PartFiles, RealDisk, load_template, store_rig_over},
     instance::RigTemplate,
     rig::{
-        Rig, RigEdit, TagData, TagKind, Uid, UidSource,
-        operations::{Operation, Outcome, TagOperation},
+        GroupData, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
+        operations::{Operation, OperationError, Outcome, TagOperation},
         part::PartInstance,
         step::edits_from_empty,
     },
@@ -78,13 +78,18 @@ impl Desk {
 
     /// Drops the limb onto joints.
     fn drop(&mut self, labels: &[&str], mirror: bool) -> Outcome {
-        let part = "limb.rig.ron".to_owned();
+        self.add("limb.rig.ron", labels, mirror).unwrap()
+    }
+
+    /// Adds a part on joints, or is refused.
+    fn add(&mut self, part: &str, labels: &[&str], mirror: bool) -> Result<Outcome, OperationError> {
+        let part = part.to_owned();
         let onto = vec![String::new(); labels.len()];
         let instance = PartInstance { part: part.clone(), onto, mirror, ..PartInstance::default() };
         let fitted = Arc::new(PartFiles::new(&RealDisk).fitted_part(&self.path(), &instance).unwrap());
         let joints = labels.iter().map(|label| self.joint(label)).collect();
         let operation = Operation::Tags(TagOperation::AddPart { part, fitted, joints, mirror });
-        operation.run(&mut self.rig, &mut self.uids, None).unwrap()
+        operation.run(&mut self.rig, &mut self.uids, None)
     }
 
     /// Saves the rig; the text, which says what the rig is with all its parts.
@@ -264,4 +269,108 @@ fn a_template_that_code_changes_keeps_its_parts() {
     template.set_rig(rig);
     let saved = template.saved();
     assert!(saved.contains("parts: [(part: \"parts/fk_chain.rig.ron\", onto: [\"a\", \"b\"])]"), "{saved}");
+}
+
+#[test]
+fn joints_in_another_order_are_refused_and_other_partners_are_told() {
+    let mut desk = Desk::new();
+    let before = desk.rig.clone();
+    let error = desk.add("limb.rig.ron", &["elbow_l", "arm_l"], false).unwrap_err().to_string();
+    assert!(error.contains("\"arm_l\" is not next below \"elbow_l\""), "{error}");
+    assert_eq!(desk.rig, before);
+    let notes = desk.drop(&["hips", "arm_l"], false).notes;
+    assert!(matches!(&notes[..], [note] if note.starts_with("1 other pairs of joints are partners now")), "{notes:?}");
+}
+
+#[test]
+fn a_file_may_use_the_first_joints_of_a_part_that_a_drop_takes_as_a_whole() {
+    let claw = r#"(
+        format: 2,
+        name: "claw",
+        kind: "part",
+        joints: [
+            (label: "root", tags: [control()]),
+            (label: "middle", parent: "root", tags: [control(at: "@joint tip")]),
+            (label: "tip", parent: "middle"),
+        ],
+    )"#;
+    let mut desk = Desk::new();
+    fs::write(desk.folder.path().join("claw.rig.ron"), claw).unwrap();
+    let error = desk.add("claw.rig.ron", &["hips"], false).unwrap_err().to_string();
+    assert!(error.contains("needs 3 joints"), "{error}");
+    let path = desk.folder.path().join("short.rig.ron");
+    let parts = "    parts: [(part: \"claw.rig.ron\", onto: [\"hips\"])],\n)";
+    fs::write(&path, MAN.trim_end().trim_end_matches(')').to_owned() + parts).unwrap();
+    let hips = desk.joint("hips");
+    assert_eq!(load(&path).joint(hips).unwrap().data.tags.len(), 2);
+}
+
+#[test]
+fn parts_that_a_save_cannot_keep_are_told_once() {
+    let notes_of = |desk: &Desk| store_rig_over(&RealDisk, &desk.path(), &desk.rig, &[&desk.path()]).unwrap();
+    let is_told = |notes: &[String]| matches!(notes, [note] if note.contains("written out"));
+    let tags = |rig: &Rig| rig.walk().map(|joint| joint.data.tags.len()).sum::<usize>();
+    // Two joints with one label.
+    let mut desk = Desk::new();
+    desk.drop(&["arm_l", "elbow_l"], false);
+    let other = desk.joint("arm_r");
+    apply(&mut desk.rig, RigEdit::SetLabel(other, Some("arm_l".to_owned())));
+    let notes = notes_of(&desk);
+    assert!(is_told(&notes), "{notes:?}");
+    assert_eq!(tags(&load(&desk.path())), 4);
+    assert_eq!(notes_of(&desk), Vec::<String>::new());
+    // No file of the part any more.
+    let mut desk = Desk::new();
+    desk.drop(&["arm_l", "elbow_l"], false);
+    fs::remove_file(desk.folder.path().join("limb.rig.ron")).unwrap();
+    let notes = notes_of(&desk);
+    assert!(is_told(&notes), "{notes:?}");
+    assert_eq!(tags(&load(&desk.path())), 4);
+    // Another file of the part, of which nothing is in the rig.
+    let mut desk = Desk::new();
+    desk.drop(&["arm_l", "elbow_l"], false);
+    desk.save();
+    desk.rig = load(&desk.path());
+    let renamed = LIMB.replace("upper_l", "over_l").replace("lower_l", "under_l");
+    fs::write(desk.folder.path().join("limb.rig.ron"), renamed).unwrap();
+    let notes = notes_of(&desk);
+    assert!(is_told(&notes), "{notes:?}");
+    assert_eq!((desk.instances().len(), tags(&load(&desk.path()))), (0, 4));
+}
+
+#[test]
+fn a_part_that_is_added_again_for_the_other_side_takes_the_place_of_the_first() {
+    let mut desk = Desk::new();
+    let knob = "(format: 2, name: \"knob\", kind: \"part\", joints: [\
+        (label: \"knob_l\", tags: [control(creation: (name: \"knob_l\"))])])";
+    fs::write(desk.folder.path().join("knob.rig.ron"), knob).unwrap();
+    desk.add("knob.rig.ron", &["arm_l"], false).unwrap();
+    desk.save();
+    desk.rig = load(&desk.path());
+    let arm = desk.joint("arm_l");
+    let tag = desk.rig.joint(arm).unwrap().data.tags[0].uid;
+    apply(&mut desk.rig, RigEdit::RemoveTag(arm, tag));
+    desk.add("knob.rig.ron", &["arm_l"], true).unwrap();
+    let text = desk.save();
+    assert!(text.contains("onto: [\"arm_l\"], mirror: true)"), "{text}");
+    assert!(!text.contains("changes"), "{text}");
+    assert_eq!(desk.instances(), [["arm_l"]]);
+}
+
+#[test]
+fn the_order_of_own_groups_is_saved_beside_parts() {
+    let mut desk = Desk::new();
+    let group = |uid: u64, name: &str| GroupData { uid: Uid(uid), name: name.into(), color: [0.5; 3], enabled: true };
+    for group in [group(0x91, "one"), group(0x92, "two")] {
+        apply(&mut desk.rig, RigEdit::AddLocalGroup(group, usize::MAX));
+    }
+    desk.drop(&["arm_l", "elbow_l"], false);
+    desk.save();
+    apply(&mut desk.rig, RigEdit::RemoveLocalGroup(Uid(0x91)));
+    apply(&mut desk.rig, RigEdit::AddLocalGroup(group(0x91, "one"), usize::MAX));
+    let text = desk.save();
+    let own: Vec<String> = load(&desk.path()).groups().iter().map(|group| group.name.clone()).collect();
+    assert_eq!(own, ["two", "one", "limb_l"]);
+    assert!(text.contains("// It bends."), "{text}");
+    assert_eq!(desk.instances(), [["arm_l", "elbow_l"]]);
 }

@@ -124,7 +124,7 @@ impl TagsPanel {
             });
             ui.menu_button("Part", |ui| {
                 let Some((file, part)) = self.parts.menu(ui) else { return };
-                match parts::added(&shown.rig, &self.stack.joints, (file, &part.rig), modules) {
+                match parts::added(&shown.rig, &self.stack.joints, (file, part.as_ref()), modules) {
                     Ok(operation) => send(operation, shown, requests),
                     Err(error) => requests.send(Notice::error(format!("The part was not added: {error}."))),
                 }

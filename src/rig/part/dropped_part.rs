@@ -30,14 +30,12 @@ impl DroppedPart {
             let bearers = rig.walk().filter(|other| other.data.label.as_ref() == Some(&label)).count();
             (bearers == 1).then_some(label)
         };
-        let onto = self.joints.iter().map(label).collect::<Option<Vec<String>>>()?;
-        Some(PartInstance {
-            uid: self.uid,
-            part: self.part.clone(),
-            onto,
-            mirror: self.mirror,
-            ..PartInstance::default()
-        })
+        Some(self.instance_onto(self.joints.iter().map(label).collect::<Option<_>>()?))
+    }
+
+    /// The instance with labels for the joints that it goes onto.
+    pub(crate) fn instance_onto(&self, onto: Vec<String>) -> PartInstance {
+        PartInstance { uid: self.uid, part: self.part.clone(), onto, mirror: self.mirror, ..PartInstance::default() }
     }
 }
 

@@ -47,12 +47,13 @@ impl PartList {
 pub(super) fn added(
     rig: &Rig,
     selected: &[Uid],
-    (file, part): (&str, &Rig),
+    (file, part): (&str, &Part),
     modules: &Modules,
 ) -> Result<TagOperation, PartFileError> {
-    let joints = joints_for(rig, selected, part);
+    let joints = joints_for(rig, selected, &part.rig);
+    part.sized_for(joints.len())?;
     let label = |joint: &Uid| rig.joint(*joint).and_then(|joint| joint.data.label.as_deref());
-    let of_part = side(part.walk().map(|joint| joint.data.label.as_deref()));
+    let of_part = side(part.rig.walk().map(|joint| joint.data.label.as_deref()));
     let mirror = of_part != 0 && side(joints.iter().map(label)) == -of_part;
     let instance = PartInstance {
         part: file.to_owned(),

@@ -55,12 +55,15 @@ pub fn write_template_over(rig: &Rig, source: &str) -> Option<String> {
     is_right(&text).then_some(text)
 }
 
-/// True if the templates of two rigs say the same. The order of groups and inputs is no matter: those of parts come last.
-pub(crate) fn says_the_same(a: &Rig, b: &Rig) -> bool {
+/// True if the templates of two rigs say the same. Groups and inputs that are not in `own`, which is what a template has
+/// besides its parts, may stand anywhere: those of parts come last where it is read.
+pub(crate) fn says_the_same(a: &Rig, b: &Rig, own: &Rig) -> bool {
+    // Those of the template come first, in their order, then those of parts by their uids.
+    let place = |uid: Uid| (!own.is_taken(uid)).then_some(uid);
     let said = |rig: &Rig| {
         let mut read = comparable(read_text(&write_template(rig), 1).ok()?.rig);
-        read.groups.sort_by_key(|group| group.uid);
-        read.inputs.sort_by_key(|input| input.uid);
+        read.groups.sort_by_key(|group| place(group.uid));
+        read.inputs.sort_by_key(|input| place(input.uid));
         Some(read)
     };
     said(a).is_some_and(|said_a| said(b) == Some(said_a))

@@ -51,7 +51,8 @@ pub(super) fn drop_sized(
         PartError::Drop(error) => error,
         error => TagError::Part(Box::new(error)).into(),
     })?;
-    check_joints(draft.rig(), &sized, joints, bindings)?;
+    check_joints(draft.rig(), &sized, joints)?;
+    check_needs(draft.rig(), &sized, joints, bindings, sized.len())?;
     check_order(draft.rig(), &sized, joints)?;
     drop_part(draft, &sized, joints, bindings, &mut |draft, _| draft.next_uid())?;
     note_left_over(draft, &sized, joints);
@@ -59,7 +60,7 @@ pub(super) fn drop_sized(
 }
 
 /// Puts the tags of a part's joints (parents first, siblings as authored) onto `joints` in order, until either list
-/// ends. Refused, before anything changes, if the part needs more joints than there are.
+/// ends. Refused, before anything changes, if what goes onto `joints` refers to joints of the part that are left out.
 ///
 /// Joints without a label get the part's, joints without a local group the part's group, which is created. References
 /// of the part are mapped to the counterparts of their nodes; without one, to the entry in `bindings`, or to the object
@@ -73,7 +74,8 @@ pub(in crate::rig) fn drop_part(
     bindings: &BTreeMap<Uid, Uid>,
     uid_of: &mut dyn FnMut(&mut Draft, Uid) -> Uid,
 ) -> Result<(), OperationError> {
-    check_joints(draft.rig(), part, joints, bindings)?;
+    check_joints(draft.rig(), part, joints)?;
+    check_needs(draft.rig(), part, joints, bindings, joints.len())?;
     let pairs: Vec<(&JointData, Uid)> = part.walk().map(|joint| &joint.data).zip(joints.iter().copied()).collect();
     let mut remap = Remap::default();
     for (joint, target) in &pairs {
@@ -118,6 +120,9 @@ pub(super) fn drop_instance(
     mirror: bool,
 ) -> Result<(), OperationError> {
     let joints = &chosen[..chosen.len().min(fitted.len())];
+    check_joints(draft.rig(), fitted, joints)?;
+    check_needs(draft.rig(), fitted, joints, &BTreeMap::new(), fitted.len())?;
+    check_order(draft.rig(), fitted, joints)?;
     for (joint, of_part) in joints.iter().zip(fitted.walk()) {
         let known = draft.rig().joint(*joint).ok_or(EditError::NoJoint(*joint))?;
         if known.data.label.is_none() {
@@ -137,9 +142,17 @@ pub(super) fn drop_instance(
     let instance = if is_free(&derived) { derived } else { of(draft.next_uid()) };
     drop_part(draft, fitted, joints, &BTreeMap::new(), &mut |_, uid| instance.uid_of(uid))?;
     // A file with parts has partners where labels differ by their side alone.
-    for (joint, other) in unpaired_sides(draft.rig()) {
+    let pairs = unpaired_sides(draft.rig());
+    for &(joint, other) in &pairs {
         draft.apply(RigEdit::SetMirror(joint, Some(other)))?;
         draft.apply(RigEdit::SetMirror(other, Some(joint)))?;
+    }
+    let others = pairs.iter().filter(|(joint, other)| !joints.contains(joint) && !joints.contains(other)).count();
+    if others > 0 {
+        draft.note(format!(
+            "{others} other pairs of joints are partners now, too: in a file with parts joints are whose labels differ by \
+             their side alone"
+        ));
     }
     let part = DroppedPart { uid: instance.uid, part: file.to_owned(), joints: joints.to_vec(), mirror };
     if part.instance(draft.rig()).is_none() {
@@ -162,20 +175,15 @@ fn free_label(rig: &Rig, label: &str) -> String {
 fn note_left_over(draft: &mut Draft, part: &Rig, joints: &[Uid]) {
     let left = part.len().saturating_sub(joints.len());
     if left > 0 {
-        let needs = PartNeeds::of(part).joints;
-        let whole = match needs.len() > joints.len() {
-            true => format!("; the whole part needs {}", needs.join(", ")),
-            false => String::new(),
-        };
-        draft.note(format!("{left} joints of the part are left over: only {} are selected{whole}", joints.len()));
+        draft.note(format!("{left} joints of the part are left over: only {} are selected", joints.len()));
     } else if joints.len() > part.len() {
         let left = joints.len() - part.len();
         draft.note(format!("{left} selected joints are left over: the part has only {}", part.len()));
     }
 }
 
-/// Refuses joints that are not there or are given twice, and fewer than the part needs.
-fn check_joints(rig: &Rig, part: &Rig, joints: &[Uid], bindings: &BTreeMap<Uid, Uid>) -> Result<(), OperationError> {
+/// Refuses no joints at all, and joints that are not there or are given twice.
+fn check_joints(rig: &Rig, part: &Rig, joints: &[Uid]) -> Result<(), OperationError> {
     for (number, joint) in joints.iter().enumerate() {
         rig.joint(*joint).ok_or(EditError::NoJoint(*joint))?;
         if joints[..number].contains(joint) {
@@ -186,7 +194,7 @@ fn check_joints(rig: &Rig, part: &Rig, joints: &[Uid], bindings: &BTreeMap<Uid, 
     if joints.is_empty() {
         return Err(TagError::NoTarget.into());
     }
-    check_needs(rig, part, joints, bindings)
+    Ok(())
 }
 
 /// Name of a joint of the rig for messages.
@@ -218,13 +226,20 @@ fn check_order(rig: &Rig, part: &Rig, joints: &[Uid]) -> Result<(), OperationErr
     Ok(())
 }
 
-/// Refuses fewer joints than the part needs. What the host has under the same label, or `bindings` name, counts.
-fn check_needs(rig: &Rig, part: &Rig, joints: &[Uid], bindings: &BTreeMap<Uid, Uid>) -> Result<(), OperationError> {
+/// Refuses fewer joints than the first `asking` joints of the part need. What the host has under the same label, or
+/// `bindings` name, counts.
+fn check_needs(
+    rig: &Rig,
+    part: &Rig,
+    joints: &[Uid],
+    bindings: &BTreeMap<Uid, Uid>,
+    asking: usize,
+) -> Result<(), OperationError> {
     let is_found = |(kind, uid): &(NameKind, Uid)| {
         let by_label = || part.name_of(NameKind::Joint, *uid).is_some_and(|label| rig.find_label(&label).is_some());
         bindings.contains_key(uid) || *kind == NameKind::Joint && by_label()
     };
-    if left_out(part, joints.len()).iter().all(is_found) {
+    if left_out(part, joints.len(), asking).iter().all(is_found) {
         return Ok(());
     }
     let (part, needs) = (part.about().name.clone(), PartNeeds::of(part));

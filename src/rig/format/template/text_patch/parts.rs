@@ -5,7 +5,7 @@ mod instance;
 
 use std::collections::{HashMap, HashSet};
 
-use super::{Rewriter, labels::header_labels, patch::Patch, tag_text};
+use super::{Rewriter, labels::header_labels, order::reordered, patch::Patch, tag_text};
 use crate::rig::{
     Rig, RigJoint, TagData, Uid,
     format::{
@@ -32,8 +32,15 @@ pub(crate) struct PartRigs<'a> {
 
 /// The text of a template with parts, as changes of a text of the same rig: of what the template has itself, and of the
 /// `changes` of its part instances. The result may say something else than `rig` where no change says what is different of a
-/// part: read it to see. With `with_names`, references in the changes are names without uids.
-pub(crate) fn write_parts_over(rig: &Rig, rigs: &PartRigs, source: &str, with_names: bool) -> Option<String> {
+/// part: read it to see. With `with_names`, references in the changes are names without uids; with `in_order`, what the
+/// template has itself is put into the rig's order.
+pub(crate) fn write_parts_over(
+    rig: &Rig,
+    rigs: &PartRigs,
+    source: &str,
+    with_names: bool,
+    in_order: bool,
+) -> Option<String> {
     let added = added_tags(rig, rigs);
     let of_parts: HashSet<Uid> = added.values().flatten().map(|(_, tag)| *tag).collect();
     let set_by_changes = joints_set_by_changes(rigs);
@@ -57,6 +64,7 @@ pub(crate) fn write_parts_over(rig: &Rig, rigs: &PartRigs, source: &str, with_na
     let (own, own_before) = (stripped(rig), stripped(rigs.before));
     let declared = Declarations::find(source)?;
     let text = Rewriter { whole: [rigs.before, rig], ..Rewriter::new(&own, &own_before, &declared) }.text();
+    let text = if in_order { reordered(&own, &text)? } else { text };
     let tree = Tree::parse(&text)?;
     let elements = tree.elements(tree.root(), "parts");
     if elements.len() != rigs.parts.len() {

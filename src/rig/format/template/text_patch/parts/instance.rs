@@ -43,10 +43,8 @@ pub(crate) fn without_instances(text: &str, whole: &Rig, gone: &[usize]) -> Opti
     if tree.field(root, "features").is_some() {
         patch.set(root, "features", &feature_list(whole));
     }
-    if tree.field(root, "needs").is_some()
-        && let Some(needs) = needs_text(whole)
-    {
-        patch.set(root, "needs", &needs);
+    if tree.field(root, "needs").is_some() {
+        patch.set_or_remove(root, "needs", needs_text(whole).as_deref());
     }
     patch.exchange(root, "parts", gone, &[]);
     Some(patch.text())
