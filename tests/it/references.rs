@@ -165,7 +165,7 @@ fn mistakes_are_named_with_their_place_and_what_to_do() {
     }
     let unbound = "@this + @joint hand_l".parse::<NodeRefs>().unwrap_err();
     assert_eq!(unbound.at, 15);
-    assert!(unbound.to_string().contains("joint \"hand_l\" has no uid"), "{unbound}");
+    assert!(unbound.to_string().contains("the rig has no joint \"hand_l\", or several"), "{unbound}");
     let two = "@this + @any".parse::<NodeRef>().unwrap_err();
     assert!(two.to_string().contains("one reference is needed here, not 2"), "{two}");
     assert_eq!("@this".parse(), Ok(NodeRef::this()));

@@ -45,10 +45,6 @@ const KNOWN: [(&str, [(i32, usize); 4]); 8] = [
     ("male_young", [(10, 0), (11, 0), (13, 0), (11, 0)]),
 ];
 
-/// Loss and folds of a hip that is raised at rest, by 54 degrees in the one body that has one, and bent on to a right angle
-/// with the trunk. Its flesh is pressed at rest already.
-const RAISED: (i32, usize) = (24, 0);
-
 /// Endings of the labels of both sides.
 const SIDES: [&str; 2] = ["_l", "_r"];
 
@@ -168,7 +164,6 @@ fn bends(figure: &Figure, side: &str, known: &[(&str, [(i32, usize); 4])], wrong
         let loss = (100.0 * measure::loss(figure, joint, side, &bent)).round() as i32;
         line += &format!("  {joint:?} {loss:>3} % {folds:>2}");
         let (most, folded) = match known {
-            _ if joint.is_raised(figure, side) => RAISED,
             Some(known) => known[number],
             None => (15, 0),
         };
