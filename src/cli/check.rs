@@ -233,7 +233,7 @@ struct CommandProblems {
     problems: usize,
     /// Number of commands that have any.
     commands: usize,
-    /// Those of them whose parameters were read.
+    /// Commands among them whose parameters were read.
     readable: HashSet<Uid>,
 }
 

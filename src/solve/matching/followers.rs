@@ -16,14 +16,55 @@ const STILL: f32 = 1e-3;
 pub(super) struct Follower {
     pub joint: Uid,
     target: Uid,
-    /// Transform of the joint relative to the target.
-    offset: Trs,
-    /// Rotation that the joint's own pose adds.
-    own: Quat,
+    space: FollowSpace,
     /// Weights of this constraint and of those after it on the same joint.
     weights: Vec<Scalar>,
     /// The target was built where the joint is, so it is placed and not only turned.
     is_placed: bool,
+}
+
+/// Space in which a joint follows its target.
+#[derive(Clone)]
+enum FollowSpace {
+    /// Space of the rig.
+    Rig {
+        /// Rotation of the joint relative to the target, with that which the joint's own pose adds.
+        offset: Quat,
+    },
+    /// Space of the joint's parent, in which the joint stands as the target does in that of another node.
+    Parent {
+        /// The other node.
+        of_target: Uid,
+        /// Parent of the joint.
+        of_joint: Uid,
+    },
+}
+
+/// Constraint that turns a joint.
+struct Turn<'a> {
+    joint: Uid,
+    target: Uid,
+    space: FollowSpace,
+    weight: &'a Scalar,
+}
+
+impl<'a> Turn<'a> {
+    fn of(constraint: &'a Constraint, attempt: &Attempt<'_>) -> Option<Self> {
+        match constraint {
+            Constraint::Transform { driven, targets, rotate: [true, true, true], weight, keep_pose, .. } => {
+                let [target] = targets.as_slice() else { return None };
+                let own = if *keep_pose { attempt.offset(*driven).rotation } else { Quat::IDENTITY };
+                let space = FollowSpace::Rig { offset: target.offset.rotation * own };
+                Some(Self { joint: *driven, target: target.node, space, weight })
+            }
+            Constraint::Relative { driven, source, space, rotate: true, weight, .. } => {
+                let parent = attempt.rig.node(*driven)?.parent?;
+                let space = FollowSpace::Parent { of_target: *space, of_joint: attempt.rig.nodes[parent].uid };
+                Some(Self { joint: *driven, target: *source, space, weight })
+            }
+            _ => None,
+        }
+    }
 }
 
 /// Followers of a switch: of joints outside of the limb that a constraint weighs by the switch's attribute, each of the
@@ -33,35 +74,28 @@ pub(super) fn followers(attempt: &Attempt<'_>, switch: &SwitchData, limb: &Limb<
         Scalar::Attribute { node, name, .. } => *node == switch.control && *name == switch.attribute,
         _ => false,
     };
-    let turned = attempt.rig.constraints.iter().filter_map(|built| match &*built.constraint {
-        Constraint::Transform { driven, targets, rotate: [true, true, true], weight, keep_pose, .. } => {
-            let is_joint = attempt.rig.node(*driven).is_some_and(|node| node.kind == NodeType::Joint);
-            let is_behind = is_joint && !limb.joints.contains(driven);
-            let target = targets.first().filter(|_| targets.len() == 1 && is_behind)?;
-            Some((*driven, target, weight, *keep_pose))
-        }
-        _ => None,
-    });
-    let turned: Vec<_> = turned.collect();
+    let is_behind = |joint: Uid| {
+        let is_joint = attempt.rig.node(joint).is_some_and(|node| node.kind == NodeType::Joint);
+        is_joint && !limb.joints.contains(&joint)
+    };
+    let turns = attempt.rig.constraints.iter().filter_map(|built| Turn::of(&built.constraint, attempt));
+    let turns: Vec<Turn> = turns.filter(|turn| is_behind(turn.joint)).collect();
     let of_limb: Vec<Uid> = [limb.goal].into_iter().chain(limb.pole).map(|node| attempt.handle(node)).collect();
     let mut found = Vec::new();
-    for (at, (joint, target, _, keeps_pose)) in turned.iter().enumerate() {
-        let of_joint =
-            || turned[at..].iter().filter(|(other, ..)| other == joint).map(|(_, _, weight, _)| (*weight).clone());
-        let handle = attempt.handle(target.node);
-        if of_limb.contains(&handle)
-            || limb.fk.contains(&handle)
-            || !turned.iter().any(|(other, _, weight, _)| other == joint && is_switched(weight))
+    for (at, turn) in turns.iter().enumerate() {
+        let of_joint = |from: usize| turns[from..].iter().filter(|other| other.joint == turn.joint);
+        let handle = attempt.handle(turn.target);
+        if of_limb.contains(&handle) || limb.fk.contains(&handle) || !of_joint(0).any(|other| is_switched(other.weight))
         {
             continue;
         }
-        let is_placed = match (attempt.built(*joint), attempt.built(target.node)) {
+        let is_placed = match (attempt.built(turn.joint), attempt.built(turn.target)) {
             (Some(joint), Some(target)) => joint.translation.distance(target.translation) <= near,
             _ => false,
         };
-        let weights = of_joint().collect();
-        let own = if *keeps_pose { attempt.offset(*joint).rotation } else { Quat::IDENTITY };
-        found.push(Follower { joint: *joint, target: target.node, offset: target.offset, own, weights, is_placed });
+        let weights = of_joint(at).map(|other| other.weight.clone()).collect();
+        let (joint, target, space) = (turn.joint, turn.target, turn.space.clone());
+        found.push(Follower { joint, target, space, weights, is_placed });
     }
     found
 }
@@ -80,10 +114,18 @@ impl Follower {
         let handle = attempt.handle(self.target);
         let now = attempt.global(handle)?;
         let carried = attempt.global(self.target)?.relative_to(&now);
-        let target = (wanted.rotation * (self.offset.rotation * self.own).conjugate()).normalize();
-        let rotation = (target * carried.rotation.conjugate()).normalize();
+        let target = match &self.space {
+            FollowSpace::Rig { offset } => {
+                Trs { rotation: (wanted.rotation * offset.conjugate()).normalize(), ..*wanted }
+            }
+            FollowSpace::Parent { of_target, of_joint } => {
+                let inside = wanted.relative_to(&attempt.global(*of_joint)?);
+                attempt.global(*of_target)? * inside
+            }
+        };
+        let rotation = (target.rotation * carried.rotation.conjugate()).normalize();
         let translation = match self.is_placed {
-            true => wanted.translation - rotation * (now.scale * carried.translation),
+            true => target.translation - rotation * (now.scale * carried.translation),
             false => now.translation,
         };
         attempt.place(handle, &Trs { translation, rotation, scale: now.scale }, Some(1e-5 * length))
