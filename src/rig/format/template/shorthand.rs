@@ -251,7 +251,7 @@ impl<'d, 'a> Writer<'d, 'a> {
         let said = format!("\"{}\"", declaration.uid);
         if let Some(field) = tree.field(declaration.node, "uid") {
             let message = match tree.string(declaration.node, "uid") {
-                Some(text) => UidError(text.into()).to_string(),
+                Some(text) => UidError(text).to_string(),
                 None => format!("{} is no uid; write 16 hexadecimal digits in quotes", tree.written(field.value)),
             };
             self.faults.push(SourceError::at(tree.text, tree.node(field.value).range.start, message));
