@@ -1,6 +1,12 @@
 //! Rigs with documents of their own that follow their templates, in an app.
 
-use std::{collections::HashSet, fs, path::PathBuf, sync::Arc, time::Instant};
+use std::{
+    collections::HashSet,
+    fs,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Instant,
+};
 
 use bevy::{ecs::system::RunSystemOnce, prelude::*};
 use rigsmith::{
@@ -94,7 +100,7 @@ impl Studio {
     }
 
     fn save(&self, text: &str) {
-        fs::write(&self.file, text).unwrap();
+        save_whole(&self.file, text);
     }
 
     fn edit(&mut self, edit: RigEdit) {
@@ -412,6 +418,13 @@ impl Studio {
 #[derive(Resource, Default)]
 struct ListedJoints(HashSet<Uid>);
 
+/// Saves a text by a rename, so that nobody reads half of it: how other ways to save are taken is tested elsewhere.
+fn save_whole(path: &Path, text: &str) {
+    let beside = path.with_extension("saved");
+    fs::write(&beside, text).unwrap();
+    fs::rename(&beside, path).unwrap();
+}
+
 #[test]
 fn a_long_life_of_edits_and_saves_loses_nothing() {
     let steps = std::env::var("RIGSMITH_STEPS").ok().and_then(|steps| steps.parse().ok()).unwrap_or(400);
@@ -464,7 +477,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                     let next =
                         (1..).map(|more| version + more).find(|next| written_part(*next) != written_part(version));
                     version = next.unwrap_or_default();
-                    fs::write(studio.file.with_file_name("link.rig.ron"), written_part(version)).unwrap();
+                    save_whole(&studio.file.with_file_name("link.rig.ron"), &written_part(version));
                     parts += 1;
                 } else {
                     means_other = rewrite(&mut joints, dice, step);
