@@ -360,10 +360,8 @@ fn a_value_of_the_bundled_biped_is_one_line() {
     assert!(changed > 5 && in_a_line * 2 > changed, "{changed} {in_a_line}");
 }
 
-/// The prefix of an instance names its joints and nodes, not the attributes by which its parameters refer to each other.
-#[test]
-fn attributes_keep_their_names_under_a_prefix() {
-    let part = r#"(
+/// A part with an attribute that a weight follows.
+const LID: &str = r#"(
     format: 2,
     name: "lid",
     kind: "part",
@@ -389,6 +387,10 @@ fn attributes_keep_their_names_under_a_prefix() {
         ),
     ],
 )"#;
+
+/// The prefix of an instance names its joints and nodes, not the attributes by which its parameters refer to each other.
+#[test]
+fn attributes_keep_their_names_under_a_prefix() {
     let host = r#"(
     format: 2,
     name: "host",
@@ -396,11 +398,35 @@ fn attributes_keep_their_names_under_a_prefix() {
     parts: [(part: "lid.rig.ron", parent: "head", prefix: "x_")],
 )"#;
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("lid.rig.ron"), part).unwrap();
+    fs::write(folder.path().join("lid.rig.ron"), LID).unwrap();
     let path = folder.path().join("host.rig.ron");
     let template = PartFiles::new(&RealDisk).complete(&path, host.as_bytes()).unwrap();
     let built = Builder::build(&template.rig, &Arc::new(modules::all())).unwrap();
     let control = built.nodes.iter().find(|node| *node.name == *"x_lid_ctl").unwrap();
     let names: Vec<&str> = control.attributes.iter().map(|attribute| &*attribute.name).collect();
     assert_eq!(names, ["open"]);
+}
+
+/// Names in an instance's changes: those of the template before those of the part without the prefix.
+#[test]
+fn names_in_changes_need_no_prefix() {
+    let host = |node: &str| {
+        format!(
+            "(format: 2, name: \"host\", joints: [(label: \"head\"), (label: \"lid\", parent: \"head\")], parts: [\
+             (part: \"lid.rig.ron\", parent: \"head\", prefix: \"x_\", changes: [\
+             (tag: \"orient/tip\", params: (node: \"@joint {node}\"))])])"
+        )
+    };
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("lid.rig.ron"), LID).unwrap();
+    for (node, meant) in [("x_lid", "x_lid"), ("lid", "lid"), ("tip", "x_tip")] {
+        let path = folder.path().join("host.rig.ron");
+        let rig = PartFiles::new(&RealDisk).complete(&path, host(node).as_bytes()).unwrap().rig;
+        let orients = rig.walk().flat_map(|joint| &joint.data.tags).filter_map(|tag| match &tag.kind {
+            TagKind::Command { module, params, .. } if *module == "orient" => Some(params.clone()),
+            _ => None,
+        });
+        let wanted = format!("@joint {meant}#{}", rig.find_label(meant).unwrap());
+        assert!(orients.clone().any(|params| params.contains(&wanted)), "{node}: {:?}", orients.collect::<Vec<_>>());
+    }
 }

@@ -70,7 +70,8 @@ impl PartInstance {
                 }
             })?;
             if let Some(others) = &change.params {
-                // Names are those of the part first, then those of the template, in which other parts may bring more.
+                // Names are those of the part first, then those of the template, in which other parts may bring more, then those
+                // that the part's file has, without the prefix.
                 let names = PartNames { part, host: draft.rig(), instance: self, joints: &places };
                 let others = &map_references(&bind_known_names(others, &names), |reference| {
                     for (_, uid) in reference.uids_mut() {
@@ -219,22 +220,24 @@ impl Names for PartNames<'_> {
     }
 
     fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid> {
-        let mut found = self.part.find(scope, kind, name);
-        if found.is_empty() {
-            // As in the part's file, without the prefix of the instance.
-            let prefix = &self.instance.prefix;
-            found = match (kind, name.split_once('/')) {
-                (NameKind::Command, Some((module, name))) => {
-                    let name = name.replace('/', &format!("/{prefix}"));
-                    self.part.find(scope, kind, &format!("{module}/{prefix}{name}"))
-                }
-                (NameKind::Joint | NameKind::Label, _) => self.part.find(scope, kind, &format!("{prefix}{name}")),
-                _ => found,
-            };
+        let here = |found: Vec<Uid>| found.into_iter().map(|uid| self.uid_here(uid)).collect::<Vec<Uid>>();
+        let found = self.part.find(scope, kind, name);
+        if !found.is_empty() {
+            return here(found);
         }
-        match found.is_empty() {
-            true => self.host.find(scope, kind, name),
-            false => found.into_iter().map(|uid| self.uid_here(uid)).collect(),
+        let found = self.host.find(scope, kind, name);
+        if !found.is_empty() {
+            return found;
+        }
+        // As in the part's file, without the prefix of the instance.
+        let prefix = &self.instance.prefix;
+        match (kind, name.split_once('/')) {
+            (NameKind::Command, Some((module, name))) => {
+                let name = name.replace('/', &format!("/{prefix}"));
+                here(self.part.find(scope, kind, &format!("{module}/{prefix}{name}")))
+            }
+            (NameKind::Joint | NameKind::Label, _) => here(self.part.find(scope, kind, &format!("{prefix}{name}"))),
+            _ => found,
         }
     }
 
