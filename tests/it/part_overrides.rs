@@ -412,7 +412,8 @@ fn attributes_keep_their_names_under_a_prefix() {
 fn names_in_changes_need_no_prefix() {
     let host = |node: &str| {
         format!(
-            "(format: 2, name: \"host\", joints: [(label: \"head\"), (label: \"lid\", parent: \"head\")], parts: [\
+            "(format: 2, name: \"host\", joints: [(label: \"head\"), (label: \"lid\", \
+             uid: \"00000000000000aa\", parent: \"head\")], parts: [\
              (part: \"lid.rig.ron\", parent: \"head\", prefix: \"x_\", changes: [\
              (tag: \"orient/tip\", params: (node: \"@joint {node}\"))])])"
         )
@@ -427,6 +428,7 @@ fn names_in_changes_need_no_prefix() {
             _ => None,
         });
         let wanted = format!("@joint {meant}#{}", rig.find_label(meant).unwrap());
-        assert!(orients.clone().any(|params| params.contains(&wanted)), "{node}: {:?}", orients.collect::<Vec<_>>());
+        let orients: Vec<String> = orients.collect();
+        assert!(orients.iter().any(|params| params.contains(&wanted)), "{node}: {orients:?}");
     }
 }
