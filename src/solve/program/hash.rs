@@ -44,7 +44,7 @@ impl ContentHash {
             if let Some(control) = &node.control
                 && (control.channels != Channels::default() || control.limits != Limits::default())
             {
-                hasher.debug(&(control.channels, control.limits));
+                hasher.ranges(&control.channels, &control.limits);
             }
             hasher.word(node.attributes.len() as u64);
             for attribute in node.attributes.iter() {
@@ -52,9 +52,8 @@ impl ContentHash {
                 hasher.word(u64::from(attribute.default.to_bits()));
                 match &attribute.kind {
                     AttributeKind::Number { min, max } => {
-                        let end = |end: &Option<f32>| end.map_or(1 << 32, |end| u64::from(end.to_bits()));
-                        hasher.word(end(min));
-                        hasher.word(end(max));
+                        hasher.end(*min);
+                        hasher.end(*max);
                     }
                     AttributeKind::Choice(names) => {
                         hasher.word(2 << 32);
@@ -122,6 +121,24 @@ impl Hasher {
     fn trs(&mut self, trs: &Trs) {
         let numbers = trs.translation.to_array().into_iter().chain(trs.rotation.to_array());
         numbers.chain(trs.scale.to_array()).for_each(|number| self.word(u64::from(number.to_bits())));
+    }
+
+    /// Free channels and their ranges, word by word: most controls have some, and their text would take longer than all
+    /// the rest of a node.
+    fn ranges(&mut self, channels: &Channels, limits: &Limits) {
+        let Channels { translate, rotate, scale } = channels;
+        let free = [translate, rotate, scale].into_iter().flatten();
+        self.word(free.fold(1, |bits, is_free| bits << 1 | u64::from(*is_free)));
+        let Limits { translate, rotate, scale } = limits;
+        for (low, high) in [translate, rotate, scale].into_iter().flatten() {
+            self.end(*low);
+            self.end(*high);
+        }
+    }
+
+    /// End of a range; no bits of a number stand for an open one.
+    fn end(&mut self, end: Option<f32>) {
+        self.word(end.map_or(1 << 32, |end| u64::from(end.to_bits())));
     }
 
     fn text(&mut self, text: &str) {
