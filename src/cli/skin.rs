@@ -35,8 +35,13 @@ pub(super) struct SkinArgs {
     /// Output file: .glb or .gltf, or only the weights as .skin
     #[arg(short, long)]
     output: Output,
-    /// Take the weights from a .skin file: as they are if the mesh is the same, transferred if it has changed
-    #[arg(long, value_name = "FILE")]
+    /// Take the weights from a .skin file: as they are if the mesh is the same, transferred if it has changed. Options that
+    /// say how weights are made do not go with it
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with_all = ["rigid", "blend", "method", "smoothing", "stored_influences", "bend_parts", "claim"]
+    )]
     weights_from: Option<PathBuf>,
     /// Save the weights to a .skin file, too; it may be neither an input nor the output
     #[arg(long, value_name = "FILE")]

@@ -161,6 +161,14 @@ fn weights_travel_by_file() {
     let moved = run(&["--json", "skin", "a.rig.ron", "moved.obj", "-o", "c.glb", "--weights-from", "a.skin"]);
     assert_eq!(moved.json()["weights"]["exact"], false, "{}", moved.err);
     assert_eq!(run(&["--json", "info", "c.glb"]).json()["unweighted"], 0);
+    // Options of weights that are made would be passed over in silence.
+    for option in [&["--rigid", "box=tip"][..], &["--blend", "box"], &["--claim", "tip"], &["--smoothing", "2"]] {
+        let both = ["skin", "a.rig.ron", "box.obj", "-o", "d.glb", "--weights-from", "a.skin"];
+        let refused = run(&[&both[..], option].concat());
+        assert_eq!(refused.code, 2, "{option:?}");
+        assert!(refused.err.contains("--weights-from"), "{}", refused.err);
+    }
+    assert!(!folder.path().join("d.glb").exists());
 }
 
 #[test]
