@@ -3,7 +3,11 @@
 //! ```text
 //! cargo bench --bench app --no-default-features
 //! cargo bench --bench app --no-default-features -- ik_handle
+//! cargo bench --bench app --no-default-features -- one_thread
 //! ```
+//!
+//! With `one_thread` all systems run one after the other, so that the times hold their work without the waking of threads
+//! that Bevy's executor hands them to.
 //!
 //! The bundled biped in an app with `RigPlugins` and no window, built and at rest. Each round makes one change and runs one
 //! `App::update`; rounds alternate with updates in which nothing happens, whose median is subtracted. Prints median and
@@ -11,7 +15,10 @@
 
 use std::time::{Duration, Instant};
 
-use bevy::prelude::*;
+use bevy::{
+    ecs::schedule::{ScheduleLabel, SingleThreadedExecutor},
+    prelude::*,
+};
 use rigsmith::{
     files::{RealDisk, load_template},
     headless::headless_app,
@@ -34,7 +41,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     app.update();
     app.world_mut().write_message(BuildRequest { rig, step: BuildStep::All });
     (0..20).for_each(|_| app.update());
-    let filter = std::env::args().skip(1).find(|argument| !argument.starts_with("--"));
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
+    if arguments.iter().any(|argument| argument == "one_thread") {
+        [PreUpdate.intern(), Update.intern(), PostUpdate.intern(), Last.intern()].map(|label| {
+            app.edit_schedule(label, |schedule| {
+                schedule.set_executor(SingleThreadedExecutor::new());
+            });
+        });
+    }
+    let filter = arguments.into_iter().find(|argument| argument != "one_thread");
     let mut bench = Bench { app, rig, filter };
     let built = bench.app.world().get::<BuildResult>(rig).ok_or("the rig is not built")?.0.clone();
     let goal = built.switches.iter().find_map(|switch| match switch.matching {
