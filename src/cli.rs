@@ -80,7 +80,7 @@ enum Command {
     Fit(fit::FitArgs),
     /// Place a face in a head: bones, weights and expressions
     Face(face::FaceArgs),
-    /// Convert between .obj, .gltf, .glb, .rig and .rig.ron where possible
+    /// Convert between .obj, .gltf, .glb, .rig and .rig.ron where possible, and from .vrm
     Convert(convert::ConvertArgs),
     /// Say what is in a file
     Info(info::InfoArgs),
