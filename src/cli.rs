@@ -34,6 +34,7 @@ mod sketch;
 mod skin;
 mod switches;
 mod update;
+mod vrm;
 mod watch;
 
 use std::{
@@ -51,6 +52,7 @@ use crate::{
 use argument::ArgumentError;
 use outputs::InPlaceArgs;
 use report::{Failure, Report};
+use vrm::VrmArgs;
 
 /// Rig characters in minutes: sketch a skeleton into a mesh, skin it, export it.
 #[derive(Parser, Debug)]

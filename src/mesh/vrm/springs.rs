@@ -122,14 +122,7 @@ pub struct SpringJoint {
 impl SpringJoint {
     /// Joint that only ends the bone before it.
     pub fn end(node: usize) -> Self {
-        Self {
-            node,
-            hit_radius: 0.0,
-            stiffness: 0.0,
-            gravity_power: 0.0,
-            gravity_dir: Vec3::NEG_Y,
-            drag_force: 0.0,
-        }
+        Self { node, hit_radius: 0.0, stiffness: 0.0, gravity_power: 0.0, gravity_dir: Vec3::NEG_Y, drag_force: 0.0 }
     }
 }
 
