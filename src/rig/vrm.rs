@@ -43,7 +43,7 @@ pub enum AvatarError {
         /// Bone on which it ought to hang.
         above: String,
     },
-    /// Nobody is known who made the avatar.
+    /// Author that is not known.
     #[error(
         "VRM 1.0 requires an author, and \"{0}\" names none; say who made it with --author NAME, or in the template's header"
     )]

@@ -35,8 +35,8 @@ impl HumanNodes {
     }
 }
 
-/// Finds the bones that VRM 1.0 knows by the names of the nodes, or by the shape of a skeleton without such names. Bones that the format does
-/// not require are left out where they do not hang as it demands.
+/// Finds the bones that VRM 1.0 knows by the names of the nodes, or by the shape of a skeleton without such names. Bones that
+/// the format does not require are left out where they do not hang as it demands.
 ///
 /// # Errors
 /// [`AvatarError::MissingBones`] with all required bones that are not there, [`AvatarError::Hierarchy`] for a required bone
@@ -62,8 +62,8 @@ pub fn human_nodes(model: &Model) -> Result<HumanNodes, AvatarError> {
     if !missing.is_empty() {
         return Err(AvatarError::MissingBones(missing));
     }
-    if let Some(head) = bones.get("head") {
-        for (bone, node) in head_bones(&joints, *head) {
+    if let Some(head) = bones.get("head").copied() {
+        for (bone, node) in head_bones(&joints, head) {
             let name = match bone {
                 HeadBone::Eye(BodySide::Left) => "leftEye",
                 HeadBone::Eye(BodySide::Right) => "rightEye",

@@ -45,7 +45,7 @@ pub struct TPose {
 enum Goal {
     /// The way to a place, which the joint carries, lies along a direction.
     Along { to: Vec3, direction: Vec3 },
-    /// As before, and a way across lies to the front.
+    /// Palm of a hand: the same, and a way across lies to the front.
     Palm { to: Vec3, direction: Vec3, across: Option<Vec3> },
     /// The foot stands as it did, but for its heading, which is that of a way.
     Heading { way: Vec3 },
