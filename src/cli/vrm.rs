@@ -33,7 +33,7 @@ impl From<AvatarError> for Failure {
 }
 
 /// True if an avatar is to be written.
-pub(super) fn is_avatar(output: &Path) -> bool {
+fn is_avatar(output: &Path) -> bool {
     FileKind::of(output) == Some(FileKind::Vrm)
 }
 
