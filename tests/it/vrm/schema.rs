@@ -423,11 +423,12 @@ fn the_rules_find_faults() {
         } },
     });
     check_avatar(&right);
+    let hips = place("hips").unwrap();
     let faults: [(&str, Value); 8] = [
         ("/extensions/VRMC_vrm/specVersion", "2.0".into()),
         ("/extensions/VRMC_vrm/meta/authors", Value::Array(Vec::new())),
         ("/extensions/VRMC_vrm/meta/name", Value::Null),
-        ("/extensions/VRMC_vrm/humanoid/humanBones/head", bone(0)),
+        ("/extensions/VRMC_vrm/humanoid/humanBones/head", bone(hips)),
         ("/extensions/VRMC_vrm/humanoid/humanBones/hips", bone(99)),
         ("/extensions/VRMC_vrm/humanoid/humanBones", serde_json::json!({})),
         ("/extensionsUsed", Value::Array(Vec::new())),
