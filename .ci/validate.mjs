@@ -1,4 +1,4 @@
-// Runs the Khronos glTF validator on every .glb and .gltf below a folder; exit 1 on any error, or if there is none.
+// Runs the Khronos glTF validator on every .glb, .gltf and .vrm below a folder; exit 1 on any error, or if there is none.
 // node validate.mjs FOLDER_WITH_NODE_MODULES FOLDER
 import { createRequire } from "node:module";
 import { readdirSync, readFileSync } from "node:fs";
@@ -6,7 +6,7 @@ import { dirname, join, resolve } from "node:path";
 
 const [tools, folder] = process.argv.slice(2);
 const { validateBytes } = createRequire(resolve(tools, "package.json"))("gltf-validator");
-const files = readdirSync(folder, { recursive: true }).filter((name) => /\.(glb|gltf)$/.test(name)).sort();
+const files = readdirSync(folder, { recursive: true }).filter((name) => /\.(glb|gltf|vrm)$/.test(name)).sort();
 let bad = 0;
 for (const name of files) {
   const path = join(folder, name);

@@ -34,6 +34,7 @@ mod sketch;
 mod skin;
 mod switches;
 mod update;
+mod vrm;
 mod watch;
 
 use std::{
@@ -51,6 +52,7 @@ use crate::{
 use argument::ArgumentError;
 use outputs::InPlaceArgs;
 use report::{Failure, Report};
+use vrm::VrmArgs;
 
 /// Rig characters in minutes: sketch a skeleton into a mesh, skin it, export it.
 #[derive(Parser, Debug)]
@@ -80,7 +82,7 @@ enum Command {
     Fit(fit::FitArgs),
     /// Place a face in a head: bones, weights and expressions
     Face(face::FaceArgs),
-    /// Convert between .obj, .gltf, .glb, .rig and .rig.ron where possible
+    /// Convert between .obj, .gltf, .glb, .rig and .rig.ron where possible, and from .vrm
     Convert(convert::ConvertArgs),
     /// Say what is in a file
     Info(info::InfoArgs),

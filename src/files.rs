@@ -56,6 +56,6 @@ pub use project::{
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
 pub use site::{SITE_FILE, SearchPaths, SiteError, TEMPLATES_VARIABLE};
-pub use store::{StoreError, store_animation, store_model, store_rig, store_rig_over, store_skin};
+pub use store::{StoreError, store_animation, store_avatar, store_model, store_rig, store_rig_over, store_skin};
 pub(crate) use template_text::template_text;
 pub use watch::{FileWatch, LOOK, TemplateWatch};

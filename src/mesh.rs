@@ -11,9 +11,11 @@ pub mod obj;
 pub mod ray;
 mod rest;
 pub mod shapes;
+pub mod similarity;
 pub mod skinning;
 pub mod surface;
 pub mod voxels;
+pub mod vrm;
 
 /// Takes a companion of the file that is written (a buffer, an image, a material library) with the name that it would have
 /// alone, and returns the name that it gets.

@@ -31,6 +31,7 @@ mod tag;
 mod uid;
 pub mod update;
 pub mod version;
+pub mod vrm;
 
 pub use built_rig::{
     Attribute, AttributeKind, BuiltConstraint, BuiltInput, BuiltNode, BuiltRig, Channels, ControlData, LayerData,

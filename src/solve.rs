@@ -6,6 +6,7 @@
 //! gives the same bits.
 
 pub mod aim;
+pub mod avatar;
 pub mod bake_clip;
 pub mod ccd;
 pub mod collider;
@@ -14,6 +15,7 @@ pub mod curve_fit;
 pub mod expression;
 pub mod fabrik;
 pub mod foot;
+mod human_axes;
 pub mod keep_pose;
 pub mod limit;
 pub mod matching;

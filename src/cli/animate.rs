@@ -11,8 +11,8 @@ use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, WeightArgs, build, limits, positive, progress::spinning,
-    report::counted, skin,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs, build, limits, positive, progress::spinning,
+    report::counted, skin, vrm::AvatarDraft,
 };
 use crate::{
     files::{FileKind, RealDisk, store_animation, store_model},
@@ -38,17 +38,17 @@ use crate::{
 /// Arguments of `rigsmith animate`.
 #[derive(Args, Debug)]
 pub(super) struct AnimateArgs {
-    /// The rig: a .rig.ron, a template by its name, a project (.rigsmith.ron), or a skeleton in a .glb, .gltf or .rig
+    /// The rig: a .rig.ron, a template by its name, a project (.rigsmith.ron), or a skeleton in a .glb, .gltf, .vrm or .rig
     rig: PathBuf,
-    /// The motion: clips of a rig (.anim.ron), motion capture (.bvh) or the animations of a model (.glb, .gltf) of any
-    /// skeleton; several files become several animations
+    /// The motion: clips of a rig (.anim.ron), motion capture (.bvh) or the animations of a model (.glb, .gltf, .vrm) of
+    /// any skeleton; several files become several animations
     #[arg(required = true, value_name = "CLIP")]
     pub clips: Vec<PathBuf>,
     /// A clip to take from the files, by its name or its number from 1; may be repeated; all, if left out
     #[arg(long = "clip", value_name = "NAME")]
     chosen: Vec<String>,
-    /// A mesh to bind to the rig, for .glb and .png; a rig that is a .glb or .gltf keeps its own mesh and weights in a
-    /// .glb
+    /// A mesh to bind to the rig, for .glb, .vrm and .png; a rig that is a .glb, .gltf or .vrm keeps its own mesh and
+    /// weights in a .glb or .vrm
     #[arg(long)]
     mesh: Option<PathBuf>,
     /// A map of joints for motion of another skeleton: a RON list of pairs of names, [("LeftUpLeg", "thigh_l"), ...];
@@ -77,11 +77,11 @@ pub(super) struct AnimateArgs {
     /// Let standing feet move as they do in the file
     #[arg(long)]
     free_feet: bool,
-    /// Names and axes of the bones in a .glb or .gltf
+    /// Names and axes of the bones in a .glb, .gltf or .vrm
     #[arg(long, value_enum, default_value = "plain")]
     preset: PresetArg,
-    /// The file to write: .glb or .gltf for the character with its animation, .anim.ron for the clip, .png for a strip
-    /// of frames
+    /// The file to write: .glb or .gltf for the character with its animation, .vrm for an avatar in VRM 1.0 (at rest in a
+    /// T-pose, with bones, expressions, gaze and springs), .anim.ron for the clip, .png for a strip of frames
     #[arg(short, long)]
     output: Output,
     /// Number of frames of a .png
@@ -91,6 +91,8 @@ pub(super) struct AnimateArgs {
     weights: WeightArgs,
     #[command(flatten)]
     export: ExportArgs,
+    #[command(flatten)]
+    vrm: VrmArgs,
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
@@ -136,6 +138,7 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     check(args, is_picture)?;
     let mut report = Report::default();
     let mut rig = read(args, &mut report)?;
+    let meta = args.vrm.meta(&rig, &args.output)?;
     let is_motion = args.clips.iter().any(|clip| is_motion(clip));
     let has_commands = rig.walk().any(|joint| !joint.data.tags.is_empty());
     let onto = match args.onto {
@@ -167,9 +170,13 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
             }
             None => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?,
         };
+        let draft = meta.map(|meta| (AvatarDraft::new(bench.rig(), bench.built(), &mut model), meta));
         model.clips = spinning("baking", || exported(args, &bench, &model, &clips, &mut report))?;
         dress(args, &mut model, &mut report);
-        report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);
+        match draft {
+            Some((draft, meta)) => draft.store(&mut model, meta, &args.output, &settings, &mut report)?,
+            None => report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?),
+        }
     }
     report.line(format!("wrote {}", args.output.display()));
     report.set("output", args.output.display().to_string());
@@ -178,13 +185,14 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
 
 /// True if a file has the motion of a skeleton of its own.
 fn is_motion(path: &Path) -> bool {
-    matches!(FileKind::of(path), Some(FileKind::Bvh | FileKind::Glb | FileKind::Gltf))
+    FileKind::of(path).is_some_and(|kind| kind == FileKind::Bvh || kind.is_gltf())
 }
 
 fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
     let kind = FileKind::of(&args.output);
-    if !is_picture && !matches!(kind, Some(FileKind::Glb | FileKind::Gltf | FileKind::Animation)) {
-        let text = format!("cannot write `{}`; give .glb, .gltf, .anim.ron or .png", args.output.display());
+    let is_character = kind.is_some_and(FileKind::is_gltf);
+    if !is_picture && !is_character && kind != Some(FileKind::Animation) {
+        let text = format!("cannot write `{}`; give .glb, .gltf, .vrm, .anim.ron or .png", args.output.display());
         return Err(Failure::Usage(text));
     }
     if args.mesh.is_some() && kind == Some(FileKind::Animation) {
@@ -192,19 +200,20 @@ fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
     }
     let is_known = |clip: &PathBuf| is_motion(clip) || FileKind::of(clip) == Some(FileKind::Animation);
     if let Some(clip) = args.clips.iter().find(|clip| !is_known(clip)) {
-        let text = format!("`{}` has no motion; give .bvh, .glb, .gltf or .anim.ron", clip.display());
+        let text = format!("`{}` has no motion; give .bvh, .glb, .gltf, .vrm or .anim.ron", clip.display());
         return Err(Failure::Usage(text));
     }
-    if args.preset != PresetArg::Plain && !matches!(kind, Some(FileKind::Glb | FileKind::Gltf)) {
+    args.vrm.check(Some(&args.output))?;
+    if args.preset != PresetArg::Plain && !is_character {
         return Err(Failure::Usage("--preset is for a character; write one with -o NAME.glb".to_owned()));
     }
     let motions = args.clips.iter().filter(|clip| is_motion(clip)).count();
     if motions == 0 && (args.map.is_some() || args.map_out.is_some() || args.onto.is_some()) {
-        let text = "--map, --map-out and --onto are for a .bvh, .glb or .gltf; a clip of a rig knows its nodes";
+        let text = "--map, --map-out and --onto are for a .bvh, .glb, .gltf or .vrm; a clip of a rig knows its nodes";
         return Err(Failure::Usage(text.to_owned()));
     }
     if motions > 1 && args.map_out.is_some() {
-        let text = "--map-out is for one file of motion; give one .bvh, .glb or .gltf";
+        let text = "--map-out is for one file of motion; give one .bvh, .glb, .gltf or .vrm";
         return Err(Failure::Usage(text.to_owned()));
     }
     let inputs = [Some(&args.rig), args.mesh.as_ref(), args.map.as_ref()].into_iter().flatten().chain(&args.clips);
@@ -266,7 +275,7 @@ fn describe(clips: &[RigClip], report: &mut Report) {
 /// Character of the rig's own file, with its mesh and weights; `None` if the rig is no model or has no mesh, or if
 /// another mesh is given.
 fn own_character(args: &AnimateArgs, bench: &Workbench, report: &mut Report) -> Result<Option<Model>, Failure> {
-    if args.mesh.is_some() || !matches!(FileKind::of(&args.rig), Some(FileKind::Glb | FileKind::Gltf)) {
+    if args.mesh.is_some() || !FileKind::of(&args.rig).is_some_and(FileKind::is_gltf) {
         return Ok(None);
     }
     let model = limits::load_model(&args.rig)?;

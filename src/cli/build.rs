@@ -10,7 +10,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, WeightArgs,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs,
     binding::bind,
     convert::{mark_joints, skeleton_model},
     explanation::Explanation,
@@ -18,6 +18,7 @@ use super::{
     report::{counted, is_json},
     skin,
     switches::SwitchArgs,
+    vrm::AvatarDraft,
 };
 use crate::{
     files::{FileKind, RealDisk, store_model, store_rig},
@@ -48,7 +49,8 @@ pub(super) struct BuildArgs {
     /// Lists the commands with their state and time
     #[arg(long)]
     trace: bool,
-    /// The file to write: .glb or .gltf for the character as posed, .rig.ron for the built skeleton
+    /// The file to write: .glb or .gltf for the character as posed, .vrm for an avatar in VRM 1.0 (at rest in a T-pose, with
+    /// bones, expressions, gaze and springs), .rig.ron for the built skeleton
     #[arg(short, long)]
     output: Option<Output>,
     #[command(flatten)]
@@ -56,18 +58,21 @@ pub(super) struct BuildArgs {
     #[command(flatten)]
     export: ExportArgs,
     #[command(flatten)]
+    vrm: VrmArgs,
+    #[command(flatten)]
     in_place: InPlaceArgs,
 }
 
 pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     if let Some(output) = &args.output
-        && !matches!(FileKind::of(output), Some(FileKind::Glb | FileKind::Gltf | FileKind::Template))
+        && !FileKind::of(output).is_some_and(|kind| kind.is_gltf() || kind == FileKind::Template)
     {
-        return Err(Failure::Usage(format!("cannot write `{}`; give .glb, .gltf or .rig.ron", output.display())));
+        return Err(Failure::Usage(format!("cannot write `{}`; give .glb, .gltf, .vrm or .rig.ron", output.display())));
     }
     if args.mesh.is_some() && args.output.as_deref().is_none_or(|path| FileKind::of(path) == Some(FileKind::Template)) {
         return Err(Failure::Usage("--mesh is for a character; write one with -o NAME.glb".to_owned()));
     }
+    args.vrm.check(args.output.as_deref())?;
     let inputs: Vec<&Path> =
         [Some(&args.rig), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
     args.in_place.check(&inputs, args.output.as_deref(), &[])?;
@@ -96,24 +101,31 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
     // Compiled even if no file is written: a built rig that cannot run, such as one with a cycle of parents, is no rig.
     RigProgram::compile(&built, &CompileOptions::default()).map_err(PoseError::CannotRun)?;
     let Some(output) = &args.output else { return Ok(()) };
+    let meta = args.vrm.meta(&rig, output)?;
     let notes = if FileKind::of(output) == Some(FileKind::Template) {
         let skeleton = baked(&rig, &built);
         drop((rig, built));
         store_rig(&RealDisk, output, &skeleton)?
-    } else {
-        let is_at_rest = args.mesh.is_none() && !has_commands && rig.pose().is_empty();
-        let (model, settings) = if is_at_rest {
-            let mut model = skeleton_model(&rig, Some(&built));
-            mark_joints(&mut model, &baked(&rig, &built));
-            drop((rig, built));
-            (model, GltfWriteSettings { all_joints: true, ..args.export.settings() })
-        } else {
-            drop(built);
-            let mut bench = limits::workbench(rig);
-            bench.build(args.until.map_or(BuildStep::All, BuildStep::To));
-            character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, report)?
-        };
+    } else if args.mesh.is_none() && !has_commands && rig.pose().is_empty() && meta.is_none() {
+        let mut model = skeleton_model(&rig, Some(&built));
+        mark_joints(&mut model, &baked(&rig, &built));
+        drop((rig, built));
+        let settings = GltfWriteSettings { all_joints: true, ..args.export.settings() };
         store_model(&RealDisk, output, &model, &settings)?
+    } else {
+        drop(built);
+        let mut bench = limits::workbench(rig);
+        bench.build(args.until.map_or(BuildStep::All, BuildStep::To));
+        let (mut model, settings) =
+            character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, report)?;
+        match meta {
+            Some(meta) => {
+                let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
+                draft.store(&mut model, meta, output, &settings, report)?;
+                Vec::new()
+            }
+            None => store_model(&RealDisk, output, &model, &settings)?,
+        }
     };
     report.notes(notes);
     report.line(format!("wrote {}", output.display()));

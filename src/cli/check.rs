@@ -102,7 +102,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<Report, Failure> {
 fn check(path: &Path) -> Result<Findings, Failure> {
     let mut found = Findings::default();
     let loaded: Result<(), LoadError> = match FileKind::of(path) {
-        Some(FileKind::Obj | FileKind::Gltf | FileKind::Glb) => {
+        Some(FileKind::Obj | FileKind::Gltf | FileKind::Glb | FileKind::Vrm) => {
             load_model(&RealDisk, path).map(|model| match limits::check_model(path, &model) {
                 Ok(()) => found.remarks = remarks_on_model(&model),
                 Err(error) => found.error = Some(error.to_string()),
@@ -137,7 +137,7 @@ fn check(path: &Path) -> Result<Findings, Failure> {
         }),
         None => {
             found.error = Some(
-                "Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .bvh, .skin and .ron"
+                "Rigsmith knows .obj, .gltf, .glb, .vrm, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .bvh, .skin and .ron"
                     .to_owned(),
             );
             Ok(())

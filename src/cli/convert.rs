@@ -31,19 +31,19 @@ pub(super) struct ConvertArgs {
 }
 
 pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
-    use FileKind::{Glb, Gltf, Obj, RigText, Template};
+    use FileKind::{Glb, Gltf, Obj, RigText, Template, Vrm};
     args.in_place.check(&[&args.input], Some(&args.output), &[])?;
     let (from, to) = (FileKind::of(&args.input), FileKind::of(&args.output));
     let mut report = Report::default();
     let notes = match (from, to) {
-        (Some(Obj | Gltf | Glb), Some(Obj | Gltf | Glb)) => {
+        (Some(Obj | Gltf | Glb | Vrm), Some(Obj | Gltf | Glb)) => {
             let model = spinning("reading", || limits::load_model(&args.input))?;
             report.notes(model.notes.iter().cloned());
             // Points without weights in the input stay unmoved in the only way that glTF offers: bound to the root.
             let settings = GltfWriteSettings { bind_unweighted: true, ..args.export.settings() };
             spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?
         }
-        (Some(Gltf | Glb), Some(RigText | Template)) => {
+        (Some(Gltf | Glb | Vrm), Some(RigText | Template)) => {
             let model = limits::load_model(&args.input)?;
             if model.nodes.is_empty() {
                 let message =
@@ -69,10 +69,17 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
             drop(rig);
             store_model(&RealDisk, &args.output, &model, &settings)?
         }
+        (_, Some(Vrm)) => {
+            return Err(Failure::Usage(format!(
+                "cannot make `{}` of `{}`; a .vrm is written by build, animate, fit and face, which know the rig",
+                args.output.display(),
+                args.input.display()
+            )));
+        }
         _ => {
             return Err(Failure::Usage(format!(
-                "cannot make `{}` of `{}`; meshes (.obj, .gltf, .glb) become meshes, rigs (.rig, .rig.ron) and skeletons \
-                 of .gltf and .glb become rigs, rigs become .gltf and .glb",
+                "cannot make `{}` of `{}`; meshes (.obj, .gltf, .glb, .vrm) become .obj, .gltf and .glb, rigs (.rig, \
+                 .rig.ron) and skeletons of .gltf, .glb and .vrm become rigs, rigs become .gltf and .glb",
                 args.output.display(),
                 args.input.display()
             )));

@@ -13,9 +13,10 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, limits,
+    ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, limits,
     progress::{Progress, spinning},
     report::counted,
+    vrm::AvatarDraft,
 };
 use crate::{
     algo::face::{
@@ -33,7 +34,7 @@ use crate::{
 /// Arguments of `rigsmith face`.
 #[derive(Args, Debug)]
 pub(super) struct FaceArgs {
-    /// The mesh: a head, or a body whose head is found. .obj, .gltf or .glb
+    /// The mesh: a head, or a body whose head is found. .obj, .gltf, .glb or .vrm
     pub mesh: PathBuf,
     /// Number of bones on the facial skin: the density. Jaw and eyes come on top
     #[arg(long, value_name = "K", default_value_t = 40)]
@@ -68,11 +69,14 @@ pub(super) struct FaceArgs {
     /// clips of one frame in .glb or .gltf, as stored poses in .rig.ron
     #[arg(long)]
     arkit: bool,
-    /// Output file: .glb or .gltf for the character, .rig.ron for the rig, .png for a picture
+    /// Output file: .glb or .gltf for the character, .vrm for an avatar in VRM 1.0 (of a body with its skeleton), .rig.ron for
+    /// the rig, .png for a picture
     #[arg(short, long)]
     output: Output,
     #[command(flatten)]
     export: ExportArgs,
+    #[command(flatten)]
+    vrm: VrmArgs,
     #[command(flatten)]
     in_place: InPlaceArgs,
 }
@@ -118,6 +122,7 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     }
     let inputs: Vec<&Path> = std::iter::once(&args.mesh).chain(&args.fit).map(PathBuf::as_path).collect();
     args.in_place.check(&inputs, Some(&args.output), &[])?;
+    args.vrm.check(Some(&args.output))?;
     let mut report = Report::default();
     let model = spinning("reading the mesh", || limits::load_model(&args.mesh))?;
     report.notes(model.notes.iter().cloned());
@@ -160,9 +165,17 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
             model.clips.extend(clips(bench.rig()));
             pose(&mut model.nodes, bench.rig());
             let settings = args.export.settings();
-            report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);
+            let meta = args.vrm.meta(bench.rig(), &args.output)?;
+            let is_avatar = meta.is_some();
+            match meta {
+                Some(meta) => {
+                    let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
+                    draft.store(&mut model, meta, &args.output, &settings, &mut report)?;
+                }
+                None => report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?),
+            }
             // Another pose, and clips of ARKit of the same names, would be measured.
-            let is_plain = args.expression.is_empty() && !args.arkit;
+            let is_plain = args.expression.is_empty() && !args.arkit && !is_avatar;
             let placed_face = bench.placed_face().filter(|_| is_plain);
             if let (Some(shapes), Some(mesh), Some(face)) = (&fitted, bench.mesh(), placed_face) {
                 let rest = &mesh.rest.points;
@@ -193,12 +206,12 @@ fn report_written_error(report: &mut Report, error: Option<f32>) {
 fn output_kind(args: &FaceArgs) -> Result<OutputKind, Failure> {
     let is_png = args.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
     match FileKind::of(&args.output) {
-        Some(FileKind::Glb | FileKind::Gltf) => Ok(OutputKind::Character),
+        Some(FileKind::Glb | FileKind::Gltf | FileKind::Vrm) => Ok(OutputKind::Character),
         Some(FileKind::Template) => Ok(OutputKind::Rig),
         None if is_png && cfg!(feature = "render") => Ok(OutputKind::Picture),
         _ if is_png => Err(Failure::Usage("this build draws no pictures; write .glb, .gltf or .rig.ron".to_owned())),
         _ => {
-            let message = format!("cannot write `{}`; give .glb, .gltf, .rig.ron or .png", args.output.display());
+            let message = format!("cannot write `{}`; give .glb, .gltf, .vrm, .rig.ron or .png", args.output.display());
             Err(Failure::Usage(message))
         }
     }

@@ -10,11 +10,12 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use super::{
-    ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, WeightArgs,
+    ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs,
     binding::bind,
     limits,
     progress::{Progress, spinning},
     report::counted,
+    vrm::AvatarDraft,
 };
 use crate::{
     algo::fit_template::FitSymmetry,
@@ -29,7 +30,7 @@ use crate::{
 /// Arguments of `rigsmith fit`.
 #[derive(Args, Debug)]
 pub(super) struct FitArgs {
-    /// The mesh: .obj, .gltf or .glb; a skeleton in it is ignored
+    /// The mesh: .obj, .gltf, .glb or .vrm; a skeleton in it is ignored
     pub mesh: PathBuf,
     /// The template: biped, quadruped, bird or a .rig.ron; the one whose limbs the mesh shows if left out
     #[arg(long, value_name = "NAME|FILE")]
@@ -49,13 +50,16 @@ pub(super) struct FitArgs {
     /// Fit into one object of the mesh only, by its name; may be repeated
     #[arg(long = "object", value_name = "NAME")]
     objects: Vec<String>,
-    /// Output file: the fitted template as .rig.ron, the skinned character as .glb or .gltf, or a picture as .png
+    /// Output file: the fitted template as .rig.ron, the skinned character as .glb or .gltf, an avatar in VRM 1.0 as .vrm, or
+    /// a picture as .png
     #[arg(short, long)]
     output: Output,
     #[command(flatten)]
     weights: WeightArgs,
     #[command(flatten)]
     export: ExportArgs,
+    #[command(flatten)]
+    vrm: VrmArgs,
     #[command(flatten)]
     in_place: InPlaceArgs,
 }
@@ -89,10 +93,11 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
         super::device_selection::restart_without();
     }
     let kind = FileKind::of(&args.output);
-    if !is_picture && !matches!(kind, Some(FileKind::Template | FileKind::Glb | FileKind::Gltf)) {
-        let text = format!("cannot fit into `{}`; write .rig.ron, .glb, .gltf or .png", args.output.display());
+    if !is_picture && !kind.is_some_and(|kind| kind.is_gltf() || kind == FileKind::Template) {
+        let text = format!("cannot fit into `{}`; write .rig.ron, .glb, .gltf, .vrm or .png", args.output.display());
         return Err(Failure::Usage(text));
     }
+    args.vrm.check(Some(&args.output))?;
     let file = args.template.as_deref().filter(|name| name.to_str().and_then(bundled_name).is_none());
     let inputs: Vec<&Path> = [Some(args.mesh.as_path()), file].into_iter().flatten().collect();
     args.in_place.check(&inputs, Some(&args.output), &[])?;
@@ -130,8 +135,14 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
             return Err(Failure::Input(Box::new(error)));
         }
         bind(&mut bench, args.weights.settings(), &args.weights.claim, Vec::new(), &mut report)?;
-        let write = || store_model(&RealDisk, &args.output, &bench.character(), &args.export.settings());
-        report.notes(spinning("writing", write)?);
+        let (mut model, settings) = (bench.character(), args.export.settings());
+        match args.vrm.meta(bench.rig(), &args.output)? {
+            Some(meta) => {
+                let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
+                draft.store(&mut model, meta, &args.output, &settings, &mut report)?;
+            }
+            None => report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?),
+        }
     }
     report.line(format!("wrote {}", args.output.display()));
     report.set("output", args.output.display().to_string());

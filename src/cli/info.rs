@@ -33,7 +33,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
     let path = &args.file;
     let mut report = Report::default();
     match FileKind::of(path) {
-        Some(FileKind::Obj | FileKind::Gltf | FileKind::Glb) => {
+        Some(FileKind::Obj | FileKind::Gltf | FileKind::Glb | FileKind::Vrm) => {
             let model = spinning("reading", || limits::load_model(path))?;
             describe_model(&mut report, &model);
         }
@@ -156,7 +156,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         }
         None => {
             let message = format!(
-                "`{}`: Rigsmith knows .obj, .gltf, .glb, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .bvh, .skin and .ron",
+                "`{}`: Rigsmith knows .obj, .gltf, .glb, .vrm, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .bvh, .skin and .ron",
                 path.display()
             );
             return Err(Failure::Usage(message));

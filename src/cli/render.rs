@@ -34,7 +34,7 @@ use crate::{
 /// Arguments of `rigsmith render`.
 #[derive(Args, Debug)]
 pub(super) struct RenderArgs {
-    /// A mesh (.obj, .gltf, .glb), a skeleton (.rig.ron, .rig) or a project (.rigsmith.ron)
+    /// A mesh (.obj, .gltf, .glb, .vrm), a skeleton (.rig.ron, .rig) or a project (.rigsmith.ron)
     pub file: PathBuf,
     /// The picture to write, a .png
     #[arg(short, long)]

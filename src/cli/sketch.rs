@@ -25,7 +25,7 @@ use crate::{
 /// Arguments of `rigsmith sketch`.
 #[derive(Args, Debug)]
 pub(super) struct SketchArgs {
-    /// The mesh: .obj, .gltf or .glb. The sketch begins with its skeleton, if it has one
+    /// The mesh: .obj, .gltf, .glb or .vrm. The sketch begins with its skeleton, if it has one
     mesh: PathBuf,
     /// The gestures, a list in RON such as [Stroke(points: [(0.0, 0.9), (0.0, 1.4)], joints: 3)]
     pub gestures: PathBuf,

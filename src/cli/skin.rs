@@ -28,9 +28,9 @@ use crate::{
 /// Arguments of `rigsmith skin`.
 #[derive(Args, Debug)]
 pub(super) struct SkinArgs {
-    /// The skeleton: .rig.ron, .rig, or a .glb or .gltf that has one
+    /// The skeleton: .rig.ron, .rig, or a .glb, .gltf or .vrm that has one
     rig: PathBuf,
-    /// The mesh: .obj, .gltf or .glb. A skeleton in it is left aside
+    /// The mesh: .obj, .gltf, .glb or .vrm. A skeleton in it is left aside
     pub mesh: PathBuf,
     /// Output file: .glb or .gltf, or only the weights as .skin
     #[arg(short, long)]
@@ -117,13 +117,13 @@ pub(super) fn load_rig(path: &Path, report: &mut Report) -> Result<Rig, Failure>
             return Ok(template.rig);
         }
         Some(FileKind::RigText) => import_rig_text(&load_rig_text(&RealDisk, path)?, &mut uids).0,
-        Some(FileKind::Glb | FileKind::Gltf) => {
+        Some(kind) if kind.is_gltf() => {
             let model = limits::load_model(path)?;
             report.notes(model.notes.iter().cloned());
             import_skeleton(&model, &mut uids).edits
         }
         _ => {
-            let message = format!("`{}` holds no rig; give .rig.ron, .rig, .glb or .gltf", path.display());
+            let message = format!("`{}` holds no rig; give .rig.ron, .rig, .glb, .gltf or .vrm", path.display());
             return Err(Failure::Usage(message));
         }
     };

@@ -47,6 +47,8 @@ pub enum FileKind {
     Gltf,
     /// glTF mesh in binary form, `.glb`.
     Glb,
+    /// Avatar in VRM 1.0, `.vrm`: glTF in binary form with extensions. It is read as a mesh.
+    Vrm,
     /// Skeleton as text, `.rig`.
     RigText,
     /// Template of a rig, `.rig.ron`.
@@ -78,8 +80,14 @@ impl FileKind {
             (".obj", Self::Obj),
             (".gltf", Self::Gltf),
             (".glb", Self::Glb),
+            (".vrm", Self::Vrm),
         ];
         endings.into_iter().find(|(ending, _)| name.ends_with(ending)).map(|(_, kind)| kind)
+    }
+
+    /// Returns `true` for glTF in any form.
+    pub fn is_gltf(self) -> bool {
+        matches!(self, Self::Gltf | Self::Glb | Self::Vrm)
     }
 }
 
@@ -167,12 +175,12 @@ impl LoadError {
     }
 }
 
-/// Reads a mesh: `.obj`, `.gltf` or `.glb`.
+/// Reads a mesh: `.obj`, `.gltf`, `.glb` or `.vrm`.
 pub fn load_model(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
     match FileKind::of(path) {
         Some(FileKind::Obj) => surviving(path, || load_obj(disk, path)),
-        Some(FileKind::Gltf | FileKind::Glb) => surviving(path, || load_gltf(disk, path)),
-        _ => Err(LoadError::Kind { path: path.into(), wanted: "no mesh; a mesh ends in .obj, .gltf or .glb" }),
+        Some(kind) if kind.is_gltf() => surviving(path, || load_gltf(disk, path)),
+        _ => Err(LoadError::Kind { path: path.into(), wanted: "no mesh; a mesh ends in .obj, .gltf, .glb or .vrm" }),
     }
 }
 
@@ -275,7 +283,9 @@ pub(super) fn in_source(path: &Path, bytes: &[u8], source: SourceError) -> LoadE
 /// Name of a file without folder and endings.
 pub fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    for ending in [".rig.ron", ".rigsmith.ron", ".anim.ron", ".obj", ".gltf", ".glb", ".rig", ".ron", ".skin", ".bvh"] {
+    let endings =
+        [".rig.ron", ".rigsmith.ron", ".anim.ron", ".obj", ".gltf", ".glb", ".vrm", ".rig", ".ron", ".skin", ".bvh"];
+    for ending in endings {
         let split = name.len().saturating_sub(ending.len());
         if split > 0 && name.is_char_boundary(split) && name[split..].eq_ignore_ascii_case(ending) {
             return name[..split].to_owned();

@@ -42,7 +42,7 @@ pub enum LoadShapesError {
     },
 }
 
-/// Reads shapes of `rest`: a .glb or .gltf with morph targets, a folder with one mesh a shape (.obj, in the order of
+/// Reads shapes of `rest`: a .glb, .gltf or .vrm with morph targets, a folder with one mesh a shape (.obj, in the order of
 /// their names), or a .json that names raw displacements in the .f32 beside it.
 pub fn load_shapes(disk: &dyn Disk, path: &Path, rest: &Model) -> Result<Shapes, LoadShapesError> {
     let wrong = |path: &Path| {
@@ -62,7 +62,7 @@ pub fn load_shapes(disk: &dyn Disk, path: &Path, rest: &Model) -> Result<Shapes,
         return if shapes.names.is_empty() { Err(LoadShapesError::Kind { path: path.into() }) } else { Ok(shapes) };
     }
     match FileKind::of(path) {
-        Some(FileKind::Glb | FileKind::Gltf) => {
+        Some(kind) if kind.is_gltf() => {
             let model = load_model(disk, path)?;
             let shapes = Shapes::of_morphs(&model).map_err(wrong(path))?;
             let (found, wanted) = (model.points.len(), rest.points.len());

@@ -9,9 +9,10 @@ use super::{
 };
 use crate::{
     mesh::{
-        gltf::{GltfError, GltfWriteSettings, write_glb, write_gltf},
+        gltf::{GltfError, GltfWriteSettings, write_glb, write_gltf, write_vrm},
         model::Model,
         obj::write_obj,
+        vrm::Avatar,
     },
     rig::{
         BuiltRig, Rig,
@@ -188,11 +189,37 @@ pub fn store_model(
             set.finish(obj);
             notes = lost_in_obj(model);
         }
+        Some(FileKind::Vrm) => {
+            let wanted = "a .vrm has the bones of a human, which are looked for where a rig is; save the model as .glb";
+            return Err(StoreError::Kind { path: path.into(), wanted });
+        }
         _ => return Err(StoreError::Kind { path: path.into(), wanted: "a model is saved as .glb, .gltf or .obj" }),
     }
     verify::model(&set, model)?;
     save_set(disk, &set)?;
     Ok(notes)
+}
+
+/// Saves an avatar as `.vrm`, after reading back what is to be written.
+///
+/// # Errors
+/// [`StoreError`]; the former file is unchanged.
+pub fn store_avatar(
+    disk: &dyn Disk,
+    path: &Path,
+    model: &Model,
+    avatar: &Avatar,
+    settings: &GltfWriteSettings,
+) -> Result<(), StoreError> {
+    if FileKind::of(path) != Some(FileKind::Vrm) {
+        return Err(StoreError::Kind { path: path.into(), wanted: "an avatar is saved as .vrm" });
+    }
+    let mut set = FileSet::new(path);
+    let bytes = write_vrm(model, avatar, settings);
+    set.finish(bytes.map_err(|source| StoreError::Gltf { path: path.into(), source })?);
+    verify::model(&set, model)?;
+    verify::avatar(&set, avatar)?;
+    Ok(save_set(disk, &set)?)
 }
 
 /// Note about the content of a model that OBJ cannot hold; empty if there is none.

@@ -12,9 +12,10 @@ use super::{
 };
 use crate::{
     mesh::{
-        gltf::{ExternalError, ExternalFile, read_gltf},
+        gltf::{ExternalError, ExternalFile, read_avatar, read_gltf},
         model::Model,
         obj::{self, ObjSettings},
+        vrm::Avatar,
     },
     rig::{
         animation::RigClip, format::animation::read_animation, project::read_project, skin::SkinFile,
@@ -48,6 +49,33 @@ pub(super) fn model(set: &FileSet, model: &Model) -> Result<(), StoreError> {
     }
     same("triangles", triangles(model), triangles(&back))?;
     same("finite points", back.points.len(), back.points.iter().filter(|point| point.is_finite()).count())
+}
+
+/// Reads back an avatar before it is saved, and compares the counts of its content.
+pub(super) fn avatar(set: &FileSet, avatar: &Avatar) -> Result<(), StoreError> {
+    let path = set.path();
+    let back = read_avatar(set.bytes(), &path.display().to_string()).map_err(LoadError::from);
+    let back = readable(path, back)?;
+    let counts = |avatar: &Avatar| {
+        let Avatar { vrm, springs, constraints } = avatar;
+        let joints = springs.springs.iter().map(|chain| chain.joints.len()).sum::<usize>();
+        [
+            ("authors", vrm.meta.authors.len()),
+            ("humanoid bones", vrm.humanoid.human_bones.len()),
+            ("expressions", vrm.expressions.preset.len() + vrm.expressions.custom.len()),
+            ("ranges of the eyes", usize::from(vrm.look_at.is_some())),
+            ("joints of springs", joints),
+            ("colliders", if joints == 0 { 0 } else { springs.colliders.len() }),
+            ("constraints", constraints.len()),
+        ]
+    };
+    let read = back.as_ref().map_or([0; 7], |back| counts(back).map(|(_, count)| count));
+    for ((what, written), read) in counts(avatar).into_iter().zip(read) {
+        if written != read {
+            return Err(StoreError::Lost { path: path.into(), what, written, read });
+        }
+    }
+    Ok(())
 }
 
 /// Reads back a template before it is saved.

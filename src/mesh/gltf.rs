@@ -24,10 +24,12 @@ mod matrix;
 mod primitive;
 mod skin;
 mod uri;
+mod vrm;
 mod write;
 
 pub use uri::{ExternalError, ExternalFile, ExternalKind, GltfUriError};
-pub use write::{GltfWriteSettings, write_glb, write_gltf};
+pub use vrm::read_avatar;
+pub use write::{GltfWriteSettings, write_glb, write_gltf, write_vrm};
 
 use crate::mesh::model::Model;
 use budget::{Budget, Notes};

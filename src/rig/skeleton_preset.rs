@@ -50,7 +50,7 @@ impl SkeletonPreset {
     }
 
     /// Names for the joints of a bone, from the body outwards; `None` for a joint that keeps its name.
-    fn names(self, bone: HumanBone, count: usize) -> Vec<Option<String>> {
+    pub(crate) fn names(self, bone: HumanBone, count: usize) -> Vec<Option<String>> {
         let one = |name: String| std::iter::once(Some(name)).chain(std::iter::repeat_n(None, count - 1)).collect();
         let numbered = |first: &str, name: &dyn Fn(usize) -> String| {
             (0..count).map(|at| Some(if at == 0 { first.to_owned() } else { name(at) })).collect()

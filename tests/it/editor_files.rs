@@ -421,7 +421,7 @@ fn files_that_are_nothing_lose_nothing() {
     window.place(1.0);
     let rig = window.rig();
     let cases: &[(&str, &[u8], &str)] = &[
-        ("notes.txt", b"hello", ".obj, .gltf or .glb"),
+        ("notes.txt", b"hello", ".obj, .gltf, .glb or .vrm"),
         ("weights.skin", b"hello", "only weights"),
         ("strokes.ron", b"[]", "neither template nor project"),
     ];

@@ -153,6 +153,8 @@ mod tools;
 mod transfer;
 mod update;
 mod voxels;
+#[cfg(feature = "cli")]
+mod vrm;
 mod watched_folder;
 mod weights;
 mod weights_bodies;

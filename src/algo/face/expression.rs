@@ -14,6 +14,7 @@ mod fold_repair;
 mod openings;
 mod set;
 mod text;
+mod vrm;
 
 use bevy::math::ops;
 use glam::{Affine3A, Quat, Vec3};
@@ -30,6 +31,7 @@ pub use self::{
     fold_repair::repair_folds,
     set::{ExpressionSet, UnitSet},
     text::{Expression, ExpressionError, Gaze, MAX_STRENGTH, MAX_TEXT, Part, Sides, Unit, UnitMove, UnitUse},
+    vrm::vrm_mixes,
 };
 
 /// Largest distance that a bone is moved, in eye distances.

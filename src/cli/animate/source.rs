@@ -97,7 +97,7 @@ pub(super) fn clips(
     let mut told: Vec<Map<String, Value>> = Vec::new();
     for path in &args.clips {
         match FileKind::of(path) {
-            Some(FileKind::Glb | FileKind::Gltf) => {
+            Some(kind) if kind.is_gltf() => {
                 let model = spinning("reading the animations", || limits::load_model(path))?;
                 let source = ModelSource { path, model };
                 source.add(args, onto, bench, &mut choice, &mut added, &mut told, report)?;

@@ -41,9 +41,17 @@ pub(super) struct DialogView {
 const OPENED: &[(&str, &[FileKind])] = &[
     (
         "Meshes, templates, projects",
-        &[FileKind::Obj, FileKind::Gltf, FileKind::Glb, FileKind::Template, FileKind::RigText, FileKind::Project],
+        &[
+            FileKind::Obj,
+            FileKind::Gltf,
+            FileKind::Glb,
+            FileKind::Vrm,
+            FileKind::Template,
+            FileKind::RigText,
+            FileKind::Project,
+        ],
     ),
-    ("Meshes (.obj, .gltf, .glb)", &[FileKind::Obj, FileKind::Gltf, FileKind::Glb]),
+    ("Meshes (.obj, .gltf, .glb, .vrm)", &[FileKind::Obj, FileKind::Gltf, FileKind::Glb, FileKind::Vrm]),
     ("Templates (.rig.ron, .rig)", &[FileKind::Template, FileKind::RigText]),
     ("Projects (.rigsmith.ron)", &[FileKind::Project]),
 ];

@@ -37,8 +37,8 @@ pub(in crate::editor) enum OpenError {
     },
     /// The file's name has no known ending.
     #[error(
-        "{name} is nothing that can be opened; a mesh ends in .obj, .gltf or .glb, a template in .rig.ron or .rig, a \
-         project in .rigsmith.ron"
+        "{name} is nothing that can be opened; a mesh ends in .obj, .gltf, .glb or .vrm, a template in .rig.ron or \
+         .rig, a project in .rigsmith.ron"
     )]
     Unknown {
         /// Name of the file.

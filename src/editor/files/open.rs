@@ -147,9 +147,8 @@ impl LoadedDocument {
 pub(super) fn recognise(path: &Path) -> Result<(), OpenError> {
     let name = || file_name(path);
     match FileKind::of(path) {
-        Some(
-            FileKind::Obj | FileKind::Gltf | FileKind::Glb | FileKind::RigText | FileKind::Template | FileKind::Project,
-        ) => Ok(()),
+        Some(FileKind::Obj | FileKind::Gltf | FileKind::Glb | FileKind::Vrm) => Ok(()),
+        Some(FileKind::RigText | FileKind::Template | FileKind::Project) => Ok(()),
         Some(FileKind::Skin) => Err(OpenError::WeightsAlone { name: name() }),
         Some(FileKind::Gestures) => Err(OpenError::Gestures { name: name() }),
         Some(FileKind::Animation) => Err(OpenError::ClipsAlone { name: name() }),

@@ -6,11 +6,12 @@ mod clips;
 mod materials;
 mod meshes;
 mod skeleton;
+mod vrm;
 
 use serde_json::{Map, Value};
 
 use super::{GltfError, uri::percent_encode};
-use crate::mesh::{CompanionSink, model::Model};
+use crate::mesh::{CompanionSink, model::Model, vrm::Avatar};
 use buffer::Bin;
 use skeleton::Skeleton;
 
@@ -48,8 +49,23 @@ impl Default for GltfWriteSettings {
 /// [`GltfError::Model`] if the model's indices or lists do not fit together or a number is not finite,
 /// [`GltfError::Unweighted`] if `bind_unweighted` is off. Costs time and memory linear in the model.
 pub fn write_glb(model: &Model, settings: &GltfWriteSettings) -> Result<Vec<u8>, GltfError> {
-    let (json, bin) = document(model, settings, None)?;
-    let mut json = to_bytes(&json, false)?;
+    let (json, bin) = document(model, settings, None, None)?;
+    glb(&json, &bin)
+}
+
+/// Writes an avatar in VRM 1.0: a GLB file as [`write_glb`] writes it, with the extensions of the avatar.
+///
+/// # Errors
+/// As [`write_glb`], and [`GltfError::Model`] if the avatar refers to a node that is not in the model or is not written
+/// ([`GltfWriteSettings::all_joints`] writes all), or to a morph target that is not there.
+pub fn write_vrm(model: &Model, avatar: &Avatar, settings: &GltfWriteSettings) -> Result<Vec<u8>, GltfError> {
+    let (json, bin) = document(model, settings, Some(avatar), None)?;
+    glb(&json, &bin)
+}
+
+/// File of a document and its buffer.
+fn glb(json: &Map<String, Value>, bin: &[u8]) -> Result<Vec<u8>, GltfError> {
+    let mut json = to_bytes(json, false)?;
     json.resize(json.len().next_multiple_of(4), b' ');
     let bin_chunk = if bin.is_empty() { 0 } else { 8 + bin.len() };
     let length = 12 + 8 + json.len() + bin_chunk;
@@ -66,7 +82,7 @@ pub fn write_glb(model: &Model, settings: &GltfWriteSettings) -> Result<Vec<u8>,
     if !bin.is_empty() {
         glb.extend_from_slice(&word(bin.len())?);
         glb.extend_from_slice(b"BIN\0");
-        glb.extend_from_slice(&bin);
+        glb.extend_from_slice(bin);
     }
     Ok(glb)
 }
@@ -81,7 +97,7 @@ pub fn write_gltf(
     stem: &str,
     companion: &mut CompanionSink,
 ) -> Result<Vec<u8>, GltfError> {
-    to_bytes(&document(model, settings, Some((stem, companion)))?.0, true)
+    to_bytes(&document(model, settings, None, Some((stem, companion)))?.0, true)
 }
 
 fn to_bytes(root: &Map<String, Value>, pretty: bool) -> Result<Vec<u8>, GltfError> {
@@ -93,6 +109,7 @@ fn to_bytes(root: &Map<String, Value>, pretty: bool) -> Result<Vec<u8>, GltfErro
 fn document(
     model: &Model,
     settings: &GltfWriteSettings,
+    avatar: Option<&Avatar>,
     mut outside: Option<(&str, &mut CompanionSink)>,
 ) -> Result<(Map<String, Value>, Vec<u8>), GltfError> {
     check::check(model)?;
@@ -103,7 +120,16 @@ fn document(
     let meshes = meshes::write(model, &skeleton, &mut bin, &mut nodes, &mut scene_nodes)?;
     let skins = skeleton.skins(model, &mut bin);
     let animations = clips::write(model, &skeleton, &meshes.node_of_object, &mut bin);
-    let written = materials::write(&model.material_set, outside.as_mut(), &mut bin);
+    let mut written = materials::write(&model.material_set, outside.as_mut(), &mut bin);
+    let mut extensions = Map::new();
+    if let Some(avatar) = avatar {
+        extensions = vrm::write(avatar, model, &skeleton, &meshes.node_of_object, &mut nodes)?;
+        let names = vrm::NAMES.into_iter().filter(|name| match *name {
+            vrm::CONSTRAINT => !avatar.constraints.is_empty(),
+            name => extensions.contains_key(name),
+        });
+        written.extensions_used.extend(names.map(str::to_owned));
+    }
 
     let mut asset = Map::new();
     asset.insert("version".to_owned(), "2.0".into());
@@ -118,6 +144,9 @@ fn document(
     root.insert("asset".to_owned(), asset.into());
     insert_list(&mut root, "extensionsUsed", written.extensions_used);
     insert_list(&mut root, "extensionsRequired", written.extensions_required);
+    if !extensions.is_empty() {
+        root.insert("extensions".to_owned(), extensions.into());
+    }
     // The scene is left out if it has no nodes, because some readers refuse an empty one.
     if scene.contains_key("nodes") {
         root.insert("scene".to_owned(), 0.into());

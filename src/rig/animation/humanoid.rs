@@ -167,8 +167,35 @@ pub struct SkeletonJoint {
 /// position, the last its rotation.
 pub type HumanJoints = BTreeMap<HumanBone, Vec<usize>>;
 
+/// Bone of a head, which clips of bodies do not move.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum HeadBone {
+    /// Eyeball.
+    Eye(BodySide),
+    /// Lower jaw.
+    Jaw,
+}
+
+/// Joints below a head that stand for its bones, by their names.
+pub fn head_bones(joints: &[SkeletonJoint], head: usize) -> BTreeMap<HeadBone, usize> {
+    let mut found = BTreeMap::new();
+    for (at, joint) in joints.iter().enumerate().filter(|(at, _)| is_above(joints, head, *at)) {
+        if let Some(bone) = names::head_bone_of(&joint.name) {
+            // The joint nearest to the root comes first.
+            found.entry(bone).or_insert(at);
+        }
+    }
+    found
+}
+
 /// Joints that stand for bones, by their names. Empty if the names say nothing: a human needs hips and two legs.
 pub fn by_names(joints: &[SkeletonJoint]) -> HumanJoints {
+    complete(joints, &named_bones(joints))
+}
+
+/// Joints that are named as bones, whether they make up a human or not. Of spines, only those that go on to the head have
+/// such names.
+pub fn named_bones(joints: &[SkeletonJoint]) -> BTreeMap<HumanBone, usize> {
     let mut named: BTreeMap<HumanBone, usize> = BTreeMap::new();
     let mut ranks: BTreeMap<HumanBone, usize> = BTreeMap::new();
     for (at, joint) in joints.iter().enumerate() {
@@ -184,7 +211,7 @@ pub fn by_names(joints: &[SkeletonJoint]) -> HumanJoints {
     {
         named.insert(HumanBone::Head, head);
     }
-    complete(joints, &named)
+    named
 }
 
 /// Last joint of a numbered spine that goes on above the arms: the head.
@@ -261,12 +288,12 @@ pub(super) fn complete(joints: &[SkeletonJoint], named: &BTreeMap<HumanBone, usi
 }
 
 /// True if a joint is an ancestor of another one.
-pub(super) fn is_above(joints: &[SkeletonJoint], above: usize, joint: usize) -> bool {
+pub(crate) fn is_above(joints: &[SkeletonJoint], above: usize, joint: usize) -> bool {
     ancestors(joints, joint).any(|at| at == above)
 }
 
 /// Ancestors of a joint, the nearest first.
-pub(super) fn ancestors(joints: &[SkeletonJoint], joint: usize) -> impl Iterator<Item = usize> {
+pub(crate) fn ancestors(joints: &[SkeletonJoint], joint: usize) -> impl Iterator<Item = usize> {
     std::iter::successors(joints[joint].parent, |at| joints[*at].parent)
 }
 

@@ -1,6 +1,6 @@
 //! Skeletons at rest: their joints, the directions in which they stand and face, and their sizes.
 
-use bevy::math::{Mat3, Quat, Vec3};
+use bevy::math::{Quat, Vec3};
 
 use crate::{
     mesh::model::Trs,
@@ -12,7 +12,7 @@ use crate::{
             motion::Motion,
         },
     },
-    solve::rotate::{direction, perpendicular_or_any},
+    solve::human_axes::human_axes,
 };
 
 /// Joint of a skeleton.
@@ -73,7 +73,8 @@ impl Figure {
 
     fn new(joints: Vec<FigureJoint>, bones: HumanJoints) -> Option<Self> {
         let mut figure = Self { joints, bones, axes: Quat::IDENTITY, height: 0.0, leg: 0.0 };
-        figure.axes = figure.find_axes();
+        let place = |joint: usize| figure.joints[joint].rest.translation;
+        figure.axes = human_axes(&figure.bones, &place).unwrap_or_default();
         let up = figure.axes * Vec3::Y;
         let heights = || figure.joints.iter().map(|joint| joint.rest.translation.dot(up));
         let (low, high) = (heights().fold(f32::MAX, f32::min), heights().fold(f32::MIN, f32::max));
@@ -106,29 +107,4 @@ impl Figure {
             .map(|bone| self.place(HumanBone::Limb(side, bone)));
         Some(hip?.distance(knee?) + knee?.distance(ankle?))
     }
-
-    /// Axes of a human by its limbs; those of the space for any other figure.
-    fn find_axes(&self) -> Quat {
-        let limb = |side, bone| self.place(HumanBone::Limb(side, bone));
-        let middle = |bone| Some(limb(BodySide::Left, bone)?.midpoint(limb(BodySide::Right, bone)?));
-        let top =
-            self.place(HumanBone::Head).or_else(|| self.place(HumanBone::Neck)).or_else(|| middle(LimbBone::UpperArm));
-        let top = top.or_else(|| self.place(HumanBone::Hips));
-        let feet = middle(LimbBone::Foot).or_else(|| middle(LimbBone::LowerLeg));
-        let across = |bone| Some(limb(BodySide::Left, bone)? - limb(BodySide::Right, bone)?);
-        let left = across(LimbBone::UpperLeg).or_else(|| across(LimbBone::UpperArm));
-        let (Some(top), Some(feet), Some(left)) = (top, feet, left) else { return Quat::IDENTITY };
-        let Some(up) = direction(top - feet) else { return Quat::IDENTITY };
-        // Grounds are level: a figure that leans stands along the nearest axis.
-        let up = snapped(up, 0.8);
-        let left = snapped(perpendicular_or_any(up, &[left]), 0.985);
-        let left = perpendicular_or_any(up, &[left]);
-        Quat::from_mat3(&Mat3::from_cols(left, up, left.cross(up))).normalize()
-    }
-}
-
-/// The axis next to a direction, if the cosine between them is large enough.
-fn snapped(direction: Vec3, least: f32) -> Vec3 {
-    let axes = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().flat_map(|axis| [axis, -axis]);
-    axes.into_iter().find(|axis| axis.dot(direction) >= least).unwrap_or(direction)
 }

@@ -4,7 +4,7 @@
 //! (`LeftUpLeg`, `LHipJoint`), MakeHuman (`upperleg01.L`, `UpLeg_L`), Rigify (`DEF-thigh.L`), Biped (`Bip01 L Thigh`) and the
 //! templates of this crate (`thigh_l`).
 
-use super::{BodySide, Finger, HumanBone, LimbBone};
+use super::{BodySide, Finger, HeadBone, HumanBone, LimbBone};
 
 /// Beginnings of names that say which tool made the skeleton.
 const PREFIXES: [&[&str]; 8] =
@@ -38,19 +38,7 @@ pub(super) fn bone_of(name: &str) -> Option<(HumanBone, usize)> {
         return None;
     }
     let words = own_words(name);
-    let mut words: Vec<&str> = words.iter().map(String::as_str).collect();
-    let mut side = None;
-    words.retain(|word| {
-        let of = match *word {
-            "l" | "left" | "lft" => BodySide::Left,
-            "r" | "right" | "rgt" | "rt" => BodySide::Right,
-            // The centre of VRM's names.
-            "c" => return false,
-            _ => return true,
-        };
-        side = Some(of);
-        false
-    });
+    let (words, side) = without_side(&words);
     let (number, stem) = numbered(&words);
     let side_of = |bone: LimbBone, rank: usize| Some((HumanBone::Limb(side?, bone), rank));
     if let Some((finger, number)) = finger(&words) {
@@ -90,6 +78,38 @@ pub(super) fn bone_of(name: &str) -> Option<(HumanBone, usize)> {
         ("toebase" | "toes" | "toe" | "ball", _) => side_of(LimbBone::Toes, 0),
         _ => None,
     }
+}
+
+/// Bone of the head that a name means.
+pub(super) fn head_bone_of(name: &str) -> Option<HeadBone> {
+    // VRoid: `J_Adj_L_FaceEye`; Character Creator: `CC_Base_L_Eye`; MetaHuman: `FACIAL_L_Eye`.
+    const HELPERS: [&str; 6] = ["j", "adj", "face", "cc", "base", "facial"];
+    let words = own_words(name);
+    let (words, side) = without_side(&words);
+    let own: Vec<&str> = words.into_iter().skip_while(|word| HELPERS.contains(word)).collect();
+    match (own.concat().as_str(), side) {
+        ("eye" | "eyeball", Some(side)) => Some(HeadBone::Eye(side)),
+        ("jaw" | "jawroot" | "lowerjaw" | "mandible", None) => Some(HeadBone::Jaw),
+        _ => None,
+    }
+}
+
+/// Words that name no side, and the side that the others name.
+fn without_side(words: &[String]) -> (Vec<&str>, Option<BodySide>) {
+    let mut words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let mut side = None;
+    words.retain(|word| {
+        let of = match *word {
+            "l" | "left" | "lft" => BodySide::Left,
+            "r" | "right" | "rgt" | "rt" => BodySide::Right,
+            // The centre of VRM's names.
+            "c" => return false,
+            _ => return true,
+        };
+        side = Some(of);
+        false
+    });
+    (words, side)
 }
 
 /// Words of a name in small letters: split at signs, before capitals and around numbers.
