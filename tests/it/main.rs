@@ -78,6 +78,8 @@ mod fuzz_project;
 mod fuzz_rig_text;
 mod fuzz_skin;
 mod fuzz_template;
+mod fuzz_whole;
+mod generate;
 mod gestures;
 #[cfg(feature = "editor")]
 mod gizmo;
@@ -156,6 +158,7 @@ mod voxels;
 mod watched_folder;
 mod weights;
 mod weights_bodies;
+mod whole;
 #[cfg(all(feature = "editor", feature = "cli"))]
 mod window;
 mod world;
