@@ -151,6 +151,9 @@ pub enum PartFileError {
     /// A part that does not fit.
     #[error(transparent)]
     Part(#[from] PartError),
+    /// A part that was refused before.
+    #[error(transparent)]
+    Again(Arc<PartFileError>),
 }
 
 /// Reader of templates with their parts. A part is looked for beside its template, then in the folders of the site
@@ -166,6 +169,9 @@ pub struct PartFiles<'a> {
     pub found: BTreeMap<PathBuf, FoundPart>,
     site: Option<SearchPaths>,
     known: BTreeMap<PathBuf, Arc<Part>>,
+    /// Errors of parts that cannot be had, by the places beside their templates: a part that many others use is read once,
+    /// and refused once.
+    refused: BTreeMap<PathBuf, Arc<PartFileError>>,
     open: Vec<PathBuf>,
 }
 
@@ -205,6 +211,7 @@ impl<'a> PartFiles<'a> {
             asked: BTreeMap::new(),
             site: None,
             known: BTreeMap::new(),
+            refused: BTreeMap::new(),
             open: Vec::new(),
         }
     }
@@ -231,6 +238,7 @@ impl<'a> PartFiles<'a> {
         if template.parts.is_empty() {
             return Ok(template);
         }
+        self.begin();
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let modules = self.modules.clone();
         let mirror = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
@@ -242,6 +250,7 @@ impl<'a> PartFiles<'a> {
         if template.parts.is_empty() {
             return (template, Vec::new());
         }
+        self.begin();
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let modules = self.modules.clone();
         let mirror = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
@@ -289,11 +298,31 @@ impl<'a> PartFiles<'a> {
         self.part(&folder.join(&instance.part), &instance.part)
     }
 
+    /// Begins with another template, unless it is one of the parts of the present one: what stands in the way of a part, such as
+    /// the depth at which it is used, may be different there.
+    fn begin(&mut self) {
+        if self.open.is_empty() {
+            self.refused.clear();
+        }
+    }
+
     /// The part of that name, beside its template at `first` or elsewhere.
     fn part(&mut self, first: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
         if let Some(known) = self.known.get(first) {
             return Ok(known.clone());
         }
+        if let Some(refused) = self.refused.get(first) {
+            return Err(PartFileError::Again(refused.clone()));
+        }
+        self.read_part(first, name).map_err(|error| {
+            let error = Arc::new(error);
+            self.refused.insert(first.to_owned(), error.clone());
+            PartFileError::Again(error)
+        })
+    }
+
+    /// Reads the part of that name, with those that it has itself.
+    fn read_part(&mut self, first: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
         let (path, bytes) = match self.file(first, name)? {
             Some((path, content)) => {
                 let part = FoundPart { path: path.clone(), content: content.clone() };
