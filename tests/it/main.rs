@@ -99,6 +99,7 @@ mod kmeans;
 mod layout;
 mod leg_strokes;
 mod linkage;
+mod long_run;
 mod mesh_reload;
 #[cfg(feature = "editor")]
 mod mesh_watch;
