@@ -6,7 +6,7 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
-use super::{Disk, ReadError, SearchPaths, SiteError, read_capped};
+use super::{Disk, ReadError, SearchPaths, SiteError, read::is_missing, read_capped};
 use crate::{
     modules,
     processor::Modules,
@@ -386,10 +386,14 @@ impl<'a> PartFiles<'a> {
     fn read(&mut self, disk: &dyn Disk, path: &Path) -> Result<Option<Vec<u8>>, PartFileError> {
         let read = read_capped(disk, path, template::MAX_BYTES as u64);
         self.asked.insert(path.to_owned(), read.as_ref().ok().cloned());
-        match read {
-            Ok(bytes) => Ok(Some(bytes)),
-            Err(_) if disk.entry(path, true).is_err() => Ok(None),
-            Err(error) => Err(error.into()),
+        let error = match read {
+            Ok(bytes) => return Ok(Some(bytes)),
+            Err(error) => error,
+        };
+        match disk.entry(path, true) {
+            // A file that cannot be reached is another matter: one of the same name elsewhere is another part.
+            Err(reason) if is_missing(&reason) => Ok(None),
+            _ => Err(error.into()),
         }
     }
 
@@ -408,19 +412,22 @@ impl<'a> PartFiles<'a> {
 }
 
 /// A template that is called by its name: the file in a folder of the site, or one that comes with Rigsmith.
-pub(super) fn named_template(disk: &dyn Disk, name: &Path) -> Option<(PathBuf, Vec<u8>)> {
+///
+/// # Errors
+/// A file of that name that cannot be read.
+pub(super) fn named_template(disk: &dyn Disk, name: &Path) -> Result<Option<(PathBuf, Vec<u8>)>, ReadError> {
     if name.is_absolute() {
-        return None;
+        return Ok(None);
     }
     let of_site = SearchPaths::of_site().ok().and_then(|site| site.find(disk, name));
     if let Some(path) = of_site {
-        let bytes = read_capped(disk, &path, template::MAX_BYTES as u64).ok()?;
-        return Some((path, bytes));
+        let bytes = read_capped(disk, &path, template::MAX_BYTES as u64)?;
+        return Ok(Some((path, bytes)));
     }
     let named = super::site::with_ending(name);
-    let file = named.to_str()?;
+    let Some(file) = named.to_str() else { return Ok(None) };
     let character = |(known, _): &&(&str, &str)| file.strip_suffix(".rig.ron") == Some(*known);
-    let text = BUNDLED_CHARACTERS.iter().find(character).map(|(_, text)| *text).or_else(|| bundled(file))?;
-    let bytes = text.as_bytes().to_vec();
-    Some((named, bytes))
+    let text = BUNDLED_CHARACTERS.iter().find(character).map(|(_, text)| *text).or_else(|| bundled(file));
+    let bytes = text.map(|text| text.as_bytes().to_vec());
+    Ok(bytes.map(|bytes| (named, bytes)))
 }

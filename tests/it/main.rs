@@ -62,6 +62,7 @@ mod face_landmarks;
 mod face_symmetry;
 mod face_units;
 mod files;
+mod files_faults;
 mod files_kill;
 mod files_read;
 mod files_set;
