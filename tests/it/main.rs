@@ -47,6 +47,8 @@ mod edit_text;
 mod editor_files;
 #[cfg(feature = "editor")]
 mod editor_follow;
+#[cfg(feature = "editor")]
+mod editor_settings;
 mod edits;
 #[cfg(feature = "editor")]
 mod examples;
