@@ -394,7 +394,8 @@ fn thousands_of_deeds_leave_nothing_behind() {
     let left: Vec<Entity> =
         world.iter_entities().map(|entity| entity.id()).filter(|id| !run.before.contains(id)).collect();
     let names = |entity: &Entity| {
-        let components = world.entity(*entity).archetype().components().iter();
+        let entity = world.entity(*entity);
+        let components = entity.archetype().components().iter();
         components.filter_map(|id| Some(world.components().get_name(*id)?.to_string())).collect::<Vec<_>>()
     };
     // The mesh is an entity of its own, which its owner removes.

@@ -77,6 +77,7 @@ mod fuzz_gestures;
 mod fuzz_gltf;
 mod fuzz_journal;
 mod fuzz_obj;
+mod fuzz_peers;
 mod fuzz_project;
 mod fuzz_rig_text;
 mod fuzz_skin;

@@ -50,11 +50,6 @@ impl<'a> Choices<'a> {
         byte
     }
 
-    /// A number of four bytes.
-    pub fn word(&mut self) -> u32 {
-        u32::from_le_bytes([self.byte(), self.byte(), self.byte(), self.byte()])
-    }
-
     /// A number below `end`; 0 if `end` is 0 or 1. Takes one byte for small ends, two for others.
     pub fn below(&mut self, end: usize) -> usize {
         match end {

@@ -54,9 +54,14 @@ impl Document {
         self.accessor(&bytes, 5126, kind, values.len() / width)
     }
 
+    /// Vectors with the bounds that positions need.
     fn vectors(&mut self, values: &[Vec3]) -> usize {
         let flat: Vec<f32> = values.iter().flat_map(|value| value.to_array()).collect();
-        self.floats(&flat, "VEC3")
+        let at = self.floats(&flat, "VEC3");
+        let bound = |of: fn(Vec3, Vec3) -> Vec3| values.iter().copied().reduce(of).unwrap_or_default().to_array();
+        self.accessors[at]["min"] = json!(bound(Vec3::min));
+        self.accessors[at]["max"] = json!(bound(Vec3::max));
+        at
     }
 }
 

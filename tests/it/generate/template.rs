@@ -40,8 +40,6 @@ pub struct MadeTemplate {
     pub text: String,
     /// Files of parts, by path.
     pub files: BTreeMap<PathBuf, Option<Vec<u8>>>,
-    /// True if the text was bent, so that it may be no template.
-    pub is_bent: bool,
 }
 
 impl MadeTemplate {
@@ -109,11 +107,10 @@ pub fn template(choices: &mut Choices, modules: &Modules, has_parts: bool) -> Ma
         list(&mut text, "poses", [pose]);
     }
     text.push_str(")\n");
-    let is_bent = choices.chance(3);
-    if is_bent {
+    if choices.chance(3) {
         bend(choices, &mut text);
     }
-    MadeTemplate { text, files, is_bent }
+    MadeTemplate { text, files }
 }
 
 fn list(text: &mut String, name: &str, items: impl IntoIterator<Item = String>) {

@@ -20,7 +20,7 @@ const POOL: usize = 256;
 /// Mutants that a test tries, on every machine the same ones.
 const MUTANTS: u64 = 4000;
 /// Targets, each with a folder of findings of its own.
-const TARGETS: [&str; 21] = [
+const TARGETS: [&str; 23] = [
     "animation",
     "bvh",
     "edit_sequence",
@@ -29,6 +29,8 @@ const TARGETS: [&str; 21] = [
     "gltf",
     "journal",
     "obj",
+    "peer_gltf",
+    "peer_obj",
     "pose_command",
     "project",
     "remote_calls",
