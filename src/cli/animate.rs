@@ -315,7 +315,8 @@ fn exported(
     let mut baked = Vec::new();
     for clip in clips {
         let rate = args.fps.unwrap_or(clip.frame_rate);
-        let done = bake_clip(program, clip, &nodes, rate, &tolerance);
+        let done = bake_clip(program, clip, &nodes, rate, &tolerance)
+            .map_err(|error| Failure::Input(format!("clip \"{}\": {error}", clip.name).into()))?;
         let keys: usize = done.channels.iter().map(|channel| channel.times.len()).sum();
         report.line(format!(
             "animation \"{}\": {}, {} at {rate} frames a second",

@@ -18,7 +18,7 @@ use super::{
     report::{counted, print, print_json},
 };
 use crate::{
-    files::{FileKind, LOOK, LoadError, PartFiles, RealDisk, TemplateWatch, store_model},
+    files::{FileKind, LOOK, LoadError, PartFiles, RealDisk, StoreError, TemplateWatch, store_model},
     headless::Workbench,
     plugins::commands::BuildStep,
     rig::{Rig, RigEdit, TagKind, Uid, operations::Operation, update::edits_between},
@@ -49,6 +49,9 @@ pub(super) struct WatchArgs {
 /// Commands that are named after a build.
 const NAMED: usize = 6;
 
+/// Pause before a character that could not be written is written again.
+const AGAIN: Duration = Duration::from_secs(1);
+
 pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
     if FileKind::of(&args.template) != Some(FileKind::Template) {
         return Err(Failure::Usage(format!("`{}` is no template; give a .rig.ron", args.template.display())));
@@ -62,35 +65,47 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
     let mut file = TemplateWatch::new(&args.template);
     let first = file.read(&RealDisk).map_err(|error| Failure::Input(Box::new(error)))?;
     let rig = parsed(&mut file, &args.template, &first)?;
-    let mut watch = Watch { args, bench: limits::workbench(rig), is_json };
+    let mut watch = Watch { args, bench: limits::workbench(rig), is_json, again: None };
     let first = Instant::now();
     let all = watch.build(first, &[], None)?;
     let mut is_heard = watch.say(&all);
     let mut builds = 1;
+    // What is tried again fails for the same reason again and again.
+    let mut last_error = None;
     while is_heard && args.count.is_none_or(|count| builds < count) {
-        let bytes = next(&mut file);
+        let bytes = next(&mut file, watch.again);
         let start = Instant::now();
-        let told = match watch.update(&mut file, &bytes, start) {
+        let is_again = bytes.is_none();
+        let built = match bytes {
+            Some(bytes) => watch.update(&mut file, &bytes, start),
+            None => watch.build(start, &watch.runs(), None),
+        };
+        let (told, error) = match built {
             Ok(told) => {
                 builds += 1;
-                told
+                (told, None)
             }
             Err(Failure::Input(error)) => {
                 let subject = args.template.display().to_string();
-                json!({ "ok": false, "error": Explanation::of_error(error.as_ref(), &subject).json() })
+                let error = Explanation::of_error(error.as_ref(), &subject).json();
+                (json!({ "ok": false, "error": error }), Some(error))
             }
             Err(usage) => return Err(usage),
         };
-        is_heard = watch.say(&told);
+        if !is_again || error.is_none() || error != last_error {
+            is_heard = watch.say(&told);
+        }
+        last_error = error;
     }
     Ok(Report { at_fault: !is_heard, ..Report::default() })
 }
 
-/// The template's content once it or a part has a new one.
-fn next(file: &mut TemplateWatch) -> Vec<u8> {
+/// The template's content once it or a part has a new one; `None` at the time `again`, if there is none until then.
+fn next(file: &mut TemplateWatch, again: Option<Instant>) -> Option<Vec<u8>> {
     loop {
         sleep(LOOK);
-        if let Some(content) = file.look(&RealDisk) {
+        let content = file.look(&RealDisk);
+        if content.is_some() || again.is_some_and(|again| Instant::now() >= again) {
             return content;
         }
     }
@@ -111,6 +126,8 @@ struct Watch<'a> {
     args: &'a WatchArgs,
     bench: Workbench,
     is_json: bool,
+    /// Time at which the character is written again, because it could not be: the disk may be full only for a while.
+    again: Option<Instant>,
 }
 
 impl Watch<'_> {
@@ -137,6 +154,7 @@ impl Watch<'_> {
 
     /// Builds, writes the character and says which commands ran since `runs`; goes back to `before` if it cannot be built.
     fn build(&mut self, start: Instant, runs: &[(Uid, u32)], before: Option<&Rig>) -> Result<Value, Failure> {
+        self.again = None;
         let outcome = self.bench.build(BuildStep::All);
         if let Some(error) = outcome.error {
             let message = format!("`{}`: {error} (tag {})", self.args.template.display(), error.command);
@@ -159,7 +177,9 @@ impl Watch<'_> {
         });
         let bench = bound.as_mut().unwrap_or(&mut self.bench);
         let (model, settings) = character_of(bench, mesh, &args.weights, &args.export, &mut report)?;
-        store_model(&RealDisk, &args.output, &model, &settings)?;
+        let stored = store_model(&RealDisk, &args.output, &model, &settings);
+        self.again = matches!(stored, Err(StoreError::Save(_))).then(|| Instant::now() + AGAIN);
+        stored?;
         let runs: HashMap<Uid, u32> = runs.iter().copied().collect();
         let is_newer = |(tag, count): &(Uid, u32)| *count > runs.get(tag).copied().unwrap_or_default();
         let ran: Vec<String> =

@@ -1,10 +1,14 @@
 //! Settings stored between runs: recent files, switches, keys and the layout of panels.
 
-use std::{path::PathBuf, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
 
 use bevy::{
     prelude::*,
-    tasks::{IoTaskPool, Task, futures::check_ready},
+    tasks::{IoTaskPool, Task, block_on, futures::check_ready},
 };
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +19,7 @@ use super::{
     notice::Notice,
     panel::Panels,
 };
-use crate::files::{RealDisk, SaveError, read_capped, save_atomic};
+use crate::files::{Disk, ReadError, RealDisk, SaveError, read_capped, save_atomic};
 
 /// Plugin of the settings, their switches, and their file.
 pub struct SettingsPlugin;
@@ -85,19 +89,55 @@ impl EditorSettings {
 }
 
 /// File of the settings, and whether it can be written.
-#[derive(Resource, Default)]
+#[derive(Resource)]
 pub struct SettingsFile {
+    disk: Arc<dyn Disk>,
     path: Option<PathBuf>,
+    /// True if the file holds what could not be read, and would be lost with a save.
     refused: bool,
+    /// True from a save that failed to the next one that succeeds.
+    failed: bool,
     /// Text that was last saved, or found at the start.
     text: Option<String>,
     looked: Duration,
     saving: Option<Task<Result<(), SettingsError>>>,
 }
 
-/// Reason why the settings are not saved.
+impl SettingsFile {
+    /// A file on a disk; without a path, settings are not kept.
+    pub fn new(disk: Arc<dyn Disk>, path: Option<PathBuf>) -> Self {
+        Self { disk, path, refused: false, failed: false, text: None, looked: Duration::ZERO, saving: None }
+    }
+}
+
+impl Default for SettingsFile {
+    fn default() -> Self {
+        Self::new(Arc::new(RealDisk), folder().map(|folder| folder.join("settings.ron")))
+    }
+}
+
+/// Reason why the settings are not read or not saved.
 #[derive(Debug, thiserror::Error)]
 enum SettingsError {
+    /// The file cannot be read.
+    #[error("the settings are neither read nor saved: {0}")]
+    Read(#[from] ReadError),
+    /// The file is no UTF-8 text.
+    #[error("{}: {source}: the settings are neither read nor saved; correct or delete the file", path.display())]
+    Utf8 {
+        /// The file.
+        path: PathBuf,
+        /// Place of the wrong byte.
+        source: std::string::FromUtf8Error,
+    },
+    /// The file holds no settings.
+    #[error("{}:{source}: the settings are neither read nor saved; correct or delete the file", path.display())]
+    Source {
+        /// The file.
+        path: PathBuf,
+        /// Place and reason.
+        source: ron::error::SpannedError,
+    },
     /// The folder cannot be created.
     #[error("{}: {source}", folder.display())]
     Folder {
@@ -132,37 +172,47 @@ pub fn folder() -> Option<PathBuf> {
 }
 
 fn read(world: &mut World) {
-    let Some(path) = folder().map(|folder| folder.join("settings.ron")) else { return };
-    let text = read_capped(&RealDisk, &path, MAX_BYTES).ok().and_then(|bytes| String::from_utf8(bytes).ok());
-    if let Some(text) = text {
-        match ron::from_str::<SettingsContent>(&text) {
-            Ok(kept) => {
-                world.insert_resource(kept.settings);
-                if let Some(keys) = kept.keys {
-                    for chord in keys.doubles() {
-                        let text = format!("{}: {chord} is bound twice; the first one counts", path.display());
-                        world.write_message(Notice::warning(text));
-                    }
-                    world.insert_resource(keys);
-                }
-                if let Some(mut layout) = kept.layout {
-                    let titles: Vec<&'static str> = world
-                        .get_resource::<Panels>()
-                        .map(|panels| panels.panels.iter().map(|panel| panel.title()).collect())
-                        .unwrap_or_default();
-                    layout.repair(&titles);
-                    world.insert_resource(layout);
-                }
-            }
-            Err(error) => {
-                let text = format!("{}:{error}: the settings are not read; correct or delete the file", path.display());
-                world.write_message(Notice::warning(text));
-                // A file with manual edits is not overwritten.
-                world.resource_mut::<SettingsFile>().refused = true;
-            }
+    let file = world.resource::<SettingsFile>();
+    let Some(path) = file.path.clone() else { return };
+    match content(file.disk.as_ref(), &path) {
+        Ok(None) => {}
+        Ok(Some(kept)) => take(world, &path, kept),
+        Err(error) => {
+            world.write_message(Notice::warning(error.to_string()));
+            world.resource_mut::<SettingsFile>().refused = true;
         }
     }
-    world.resource_mut::<SettingsFile>().path = Some(path);
+}
+
+/// The content of a file; `None` if there is none yet.
+fn content(disk: &dyn Disk, path: &Path) -> Result<Option<SettingsContent>, SettingsError> {
+    let bytes = match read_capped(disk, path, MAX_BYTES) {
+        Ok(bytes) => bytes,
+        Err(ReadError::Missing { .. } | ReadError::Empty { .. }) => return Ok(None),
+        Err(error) => return Err(error.into()),
+    };
+    let text = String::from_utf8(bytes).map_err(|source| SettingsError::Utf8 { path: path.to_owned(), source })?;
+    let kept = ron::from_str(&text).map_err(|source| SettingsError::Source { path: path.to_owned(), source })?;
+    Ok(Some(kept))
+}
+
+fn take(world: &mut World, path: &Path, kept: SettingsContent) {
+    world.insert_resource(kept.settings);
+    if let Some(keys) = kept.keys {
+        for chord in keys.doubles() {
+            let text = format!("{}: {chord} is bound twice; the first one counts", path.display());
+            world.write_message(Notice::warning(text));
+        }
+        world.insert_resource(keys);
+    }
+    if let Some(mut layout) = kept.layout {
+        let titles: Vec<&'static str> = world
+            .get_resource::<Panels>()
+            .map(|panels| panels.panels.iter().map(|panel| panel.title()).collect())
+            .unwrap_or_default();
+        layout.repair(&titles);
+        world.insert_resource(layout);
+    }
 }
 
 fn switch(mut actions: MessageReader<ActionRequest>, mut settings: ResMut<EditorSettings>) {
@@ -186,15 +236,16 @@ fn write(
     mut notices: MessageWriter<Notice>,
 ) {
     let file = file.bypass_change_detection();
-    if let Some(result) = file.saving.as_mut().and_then(check_ready) {
+    let closing = !exits.is_empty();
+    let result =
+        |task: &mut Task<Result<(), SettingsError>>| if closing { Some(block_on(task)) } else { check_ready(task) };
+    if let Some(result) = file.saving.as_mut().and_then(result) {
         file.saving = None;
-        if let Err(reason) = result
-            && !std::mem::replace(&mut file.refused, true)
-        {
+        let failed = std::mem::replace(&mut file.failed, result.is_err());
+        if let (Err(reason), false) = (result, failed) {
             notices.write(Notice::warning(format!("Settings are not kept: {reason}")));
         }
     }
-    let closing = !exits.is_empty();
     if !closing && time.elapsed().saturating_sub(file.looked) < LOOK_EVERY {
         return;
     }
@@ -204,25 +255,28 @@ fn write(
     let kept = SettingsContent { settings: settings.clone(), keys, layout: layout.map(|layout| layout.clone()) };
     // A frame may move panels without any event, so a change is only visible in the text.
     let Ok(text) = ron::ser::to_string_pretty(&kept, ron::ser::PrettyConfig::default()) else { return };
-    if file.text.as_ref() == Some(&text) {
+    if file.text.as_ref() == Some(&text) && !file.failed {
         return;
     }
     let first = file.text.replace(text.clone()).is_none();
     if first && !closing {
         return;
     }
-    let save = move || -> Result<(), SettingsError> {
-        if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder)
-                .map_err(|source| SettingsError::Folder { folder: folder.to_owned(), source })?;
-        }
-        Ok(save_atomic(&RealDisk, &path, text.as_bytes())?)
-    };
     if closing {
-        if let Err(reason) = save() {
+        if let Err(reason) = save(file.disk.as_ref(), &path, &text) {
             warn!("settings are not kept: {reason}");
         }
     } else {
-        file.saving = Some(IoTaskPool::get().spawn(async move { save() }));
+        let disk = file.disk.clone();
+        file.saving = Some(IoTaskPool::get().spawn(async move { save(disk.as_ref(), &path, &text) }));
     }
+}
+
+/// Saves a text of settings; the folder is created if it is missing.
+fn save(disk: &dyn Disk, path: &Path, text: &str) -> Result<(), SettingsError> {
+    if let Some(folder) = path.parent() {
+        let refused = |source| SettingsError::Folder { folder: folder.to_owned(), source };
+        disk.create_folder(folder).map_err(refused)?;
+    }
+    Ok(save_atomic(disk, path, text.as_bytes())?)
 }

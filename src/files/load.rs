@@ -222,7 +222,7 @@ fn load_gltf(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
 pub fn load_template(disk: &dyn Disk, path: &Path) -> Result<Template, LoadError> {
     let (path, bytes) = match read_capped(disk, path, template::MAX_BYTES as u64) {
         Ok(bytes) => (path.to_owned(), bytes),
-        Err(error @ ReadError::Missing { .. }) => named_template(disk, path).ok_or(error)?,
+        Err(error @ ReadError::Missing { .. }) => named_template(disk, path)?.ok_or(error)?,
         Err(error) => return Err(error.into()),
     };
     PartFiles::new(disk).complete(&path, &bytes).map_err(|source| in_source(&path, &bytes, source))

@@ -6,7 +6,7 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
-use super::{Disk, ReadError, SearchPaths, SiteError, read_capped};
+use super::{Disk, ReadError, SearchPaths, SiteError, read::is_missing, read_capped};
 use crate::{
     modules,
     processor::Modules,
@@ -151,6 +151,9 @@ pub enum PartFileError {
     /// A part that does not fit.
     #[error(transparent)]
     Part(#[from] PartError),
+    /// A part that was refused before.
+    #[error(transparent)]
+    Again(Arc<PartFileError>),
 }
 
 /// Reader of templates with their parts. A part is looked for beside its template, then in the folders of the site
@@ -166,6 +169,9 @@ pub struct PartFiles<'a> {
     pub found: BTreeMap<PathBuf, FoundPart>,
     site: Option<SearchPaths>,
     known: BTreeMap<PathBuf, Arc<Part>>,
+    /// Errors of parts that cannot be had, by the places beside their templates: a part that many others use is read once,
+    /// and refused once.
+    refused: BTreeMap<PathBuf, Arc<PartFileError>>,
     open: Vec<PathBuf>,
 }
 
@@ -205,6 +211,7 @@ impl<'a> PartFiles<'a> {
             asked: BTreeMap::new(),
             site: None,
             known: BTreeMap::new(),
+            refused: BTreeMap::new(),
             open: Vec::new(),
         }
     }
@@ -231,6 +238,7 @@ impl<'a> PartFiles<'a> {
         if template.parts.is_empty() {
             return Ok(template);
         }
+        self.begin();
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let modules = self.modules.clone();
         let mirror = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
@@ -242,6 +250,7 @@ impl<'a> PartFiles<'a> {
         if template.parts.is_empty() {
             return (template, Vec::new());
         }
+        self.begin();
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let modules = self.modules.clone();
         let mirror = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
@@ -289,11 +298,31 @@ impl<'a> PartFiles<'a> {
         self.part(&folder.join(&instance.part), &instance.part)
     }
 
+    /// Begins with another template, unless it is one of the parts of the present one: what stands in the way of a part, such as
+    /// the depth at which it is used, may be different there.
+    fn begin(&mut self) {
+        if self.open.is_empty() {
+            self.refused.clear();
+        }
+    }
+
     /// The part of that name, beside its template at `first` or elsewhere.
     fn part(&mut self, first: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
         if let Some(known) = self.known.get(first) {
             return Ok(known.clone());
         }
+        if let Some(refused) = self.refused.get(first) {
+            return Err(PartFileError::Again(refused.clone()));
+        }
+        self.read_part(first, name).map_err(|error| {
+            let error = Arc::new(error);
+            self.refused.insert(first.to_owned(), error.clone());
+            PartFileError::Again(error)
+        })
+    }
+
+    /// Reads the part of that name, with those that it has itself.
+    fn read_part(&mut self, first: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
         let (path, bytes) = match self.file(first, name)? {
             Some((path, content)) => {
                 let part = FoundPart { path: path.clone(), content: content.clone() };
@@ -357,10 +386,14 @@ impl<'a> PartFiles<'a> {
     fn read(&mut self, disk: &dyn Disk, path: &Path) -> Result<Option<Vec<u8>>, PartFileError> {
         let read = read_capped(disk, path, template::MAX_BYTES as u64);
         self.asked.insert(path.to_owned(), read.as_ref().ok().cloned());
-        match read {
-            Ok(bytes) => Ok(Some(bytes)),
-            Err(_) if disk.entry(path, true).is_err() => Ok(None),
-            Err(error) => Err(error.into()),
+        let error = match read {
+            Ok(bytes) => return Ok(Some(bytes)),
+            Err(error) => error,
+        };
+        match disk.entry(path, true) {
+            // A file that cannot be reached is another matter: one of the same name elsewhere is another part.
+            Err(reason) if is_missing(&reason) => Ok(None),
+            _ => Err(error.into()),
         }
     }
 
@@ -379,19 +412,22 @@ impl<'a> PartFiles<'a> {
 }
 
 /// A template that is called by its name: the file in a folder of the site, or one that comes with Rigsmith.
-pub(super) fn named_template(disk: &dyn Disk, name: &Path) -> Option<(PathBuf, Vec<u8>)> {
+///
+/// # Errors
+/// A file of that name that cannot be read.
+pub(super) fn named_template(disk: &dyn Disk, name: &Path) -> Result<Option<(PathBuf, Vec<u8>)>, ReadError> {
     if name.is_absolute() {
-        return None;
+        return Ok(None);
     }
     let of_site = SearchPaths::of_site().ok().and_then(|site| site.find(disk, name));
     if let Some(path) = of_site {
-        let bytes = read_capped(disk, &path, template::MAX_BYTES as u64).ok()?;
-        return Some((path, bytes));
+        let bytes = read_capped(disk, &path, template::MAX_BYTES as u64)?;
+        return Ok(Some((path, bytes)));
     }
     let named = super::site::with_ending(name);
-    let file = named.to_str()?;
+    let Some(file) = named.to_str() else { return Ok(None) };
     let character = |(known, _): &&(&str, &str)| file.strip_suffix(".rig.ron") == Some(*known);
-    let text = BUNDLED_CHARACTERS.iter().find(character).map(|(_, text)| *text).or_else(|| bundled(file))?;
-    let bytes = text.as_bytes().to_vec();
-    Some((named, bytes))
+    let text = BUNDLED_CHARACTERS.iter().find(character).map(|(_, text)| *text).or_else(|| bundled(file));
+    let bytes = text.map(|text| text.as_bytes().to_vec());
+    Ok(bytes.map(|bytes| (named, bytes)))
 }

@@ -89,10 +89,7 @@ impl ReadError {
     }
 
     pub(super) fn new(disk: &dyn Disk, path: &Path, source: io::Error) -> Self {
-        let hint = match source.kind() {
-            ErrorKind::NotFound | ErrorKind::NotADirectory => Some(hint(disk, path)),
-            _ => None,
-        };
+        let hint = is_missing(&source).then(|| hint(disk, path));
         let path = path.to_path_buf();
         match (source.kind(), hint) {
             (_, Some(hint)) => Self::Missing { path, hint },
@@ -101,6 +98,11 @@ impl ReadError {
             _ => Self::Io { path, source: source.into() },
         }
     }
+}
+
+/// True if an error says that there is nothing at a path. Others are no answer: something may be there.
+pub(super) fn is_missing(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory)
 }
 
 /// A file to be read in blocks.

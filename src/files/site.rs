@@ -18,7 +18,7 @@ use std::{
 
 use serde::Deserialize;
 
-use super::{Disk, EntryKind, FileKind, ReadError, RealDisk, read_capped};
+use super::{Disk, EntryKind, FileKind, ReadError, RealDisk, read::is_missing, read_capped};
 use crate::rig::SourceError;
 
 /// Environment variable with folders of templates, separated as in `PATH`.
@@ -95,8 +95,12 @@ impl SearchPaths {
     }
 
     /// The file of a template that is called by its name, with or without `.rig.ron`: the first of the folders that has it.
+    /// Where it cannot be told whether a folder has it, it counts as found there: another one is not taken for it.
     pub fn find(&self, disk: &dyn Disk, name: &Path) -> Option<PathBuf> {
-        let is_file = |path: &PathBuf| disk.entry(path, true).is_ok_and(|entry| entry.kind == EntryKind::File);
+        let is_file = |path: &PathBuf| match disk.entry(path, true) {
+            Ok(entry) => entry.kind == EntryKind::File,
+            Err(error) => !is_missing(&error),
+        };
         let named = with_ending(name);
         self.candidates(&named).find(is_file)
     }

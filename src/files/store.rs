@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    Disk, FileKind, FileSet, LoadError, PartFiles, SaveError, read_capped, save_atomic, save_set, stem,
+    Disk, FileKind, FileSet, LoadError, PartFiles, ReadError, SaveError, read_capped, save_atomic, save_set, stem,
     template_text::{TemplateText, template_text},
     verify,
 };
@@ -15,7 +15,7 @@ use crate::{
         vrm::Avatar,
     },
     rig::{
-        BuiltRig, Rig,
+        BuiltRig, Rig, Uid,
         animation::RigClip,
         character::rig_text,
         format::animation::{self, write_animation},
@@ -100,6 +100,14 @@ pub enum StoreError {
         /// The reason, and what to do.
         what: &'static str,
     },
+    /// The text of a template that was to be changed cannot be read.
+    #[error("`{}` was not written, because its present text could not be read ({source}), and nothing was changed; allow reading it and try again, or save under another name", path.display())]
+    Unread {
+        /// The file.
+        path: PathBuf,
+        /// Error of reading it.
+        source: ReadError,
+    },
     /// Rigsmith's own reader refuses the bytes that were to be written.
     #[error("`{}` was not written, because it could not be read again ({source}), and nothing was changed; save in another format and report this", path.display())]
     Unreadable {
@@ -142,6 +150,7 @@ impl StoreError {
             | Self::AnimationTooLarge { path, .. }
             | Self::Skin { path, .. }
             | Self::Nothing { path, .. }
+            | Self::Unread { path, .. }
             | Self::Unreadable { path, .. }
             | Self::Lost { path, .. }
             | Self::Kind { path, .. } => path,
@@ -237,25 +246,52 @@ fn lost_in_obj(model: &Model) -> Vec<String> {
     if lost.is_empty() { Vec::new() } else { vec![format!("OBJ cannot hold {}: left out", lost.join(", "))] }
 }
 
+const SOURCE_UNREAD: &str =
+    "the file was written anew: the template that it comes from could not be read, and its comments are not in it";
+
 /// Saves a rig over a template that was read: only what changed is written into its text, see
 /// [`write_template_over`](template::write_template_over). That is the first of the files in `sources` that is a template
 /// of the same rig; without one, and for another kind of file, it is saved as by [`store_rig`]. Returns notes, a sentence each:
 /// about what the format cannot hold, and about a text that had to be written anew.
+///
+/// # Errors
+/// [`StoreError`]; the former file is unchanged. A file at `path` that is one of the sources and cannot be read is not
+/// replaced.
 pub fn store_rig_over(disk: &dyn Disk, path: &Path, rig: &Rig, sources: &[&Path]) -> Result<Vec<String>, StoreError> {
     if FileKind::of(path) != Some(FileKind::Template) {
         return store_rig(disk, path, rig);
     }
-    let text_of = |path: &Path| {
-        let bytes = read_capped(disk, path, template::MAX_BYTES as u64).ok()?;
-        let is_same = template::read_header(&bytes).is_ok_and(|header| header.uid == rig.uid());
-        let text = String::from_utf8(bytes).ok().filter(|_| is_same)?;
-        Some(text.strip_prefix('\u{FEFF}').map(str::to_owned).unwrap_or(text))
-    };
-    let found = sources.iter().find_map(|source| Some((*source, text_of(source)?)));
+    let mut found = None;
+    let mut is_unread = false;
+    for source in sources {
+        match template_of(disk, source, rig.uid()) {
+            Ok(Some(text)) => {
+                found = Some((*source, text));
+                break;
+            }
+            Ok(None) => {}
+            // What people wrote in it would be gone.
+            Err(source) if source.path() == path => return Err(StoreError::Unread { path: path.into(), source }),
+            Err(_) => is_unread = true,
+        }
+    }
+    is_unread &= found.is_none();
     let source = found.as_ref().map(|(source, text)| (*source, text.as_str()));
     let TemplateText { text, note } = template_text(rig, source, path, &|| PartFiles::new(disk));
     save_template(disk, path, &text)?;
-    Ok(note.map(str::to_owned).into_iter().collect())
+    Ok(note.into_iter().chain(is_unread.then_some(SOURCE_UNREAD)).map(str::to_owned).collect())
+}
+
+/// The text of the template of a rig in a file; `None` if the file is not there, or is something else.
+fn template_of(disk: &dyn Disk, path: &Path, rig: Uid) -> Result<Option<String>, ReadError> {
+    let bytes = match read_capped(disk, path, template::MAX_BYTES as u64) {
+        Ok(bytes) => bytes,
+        Err(error @ (ReadError::NoAccess { .. } | ReadError::Io { .. })) => return Err(error),
+        Err(_) => return Ok(None),
+    };
+    let is_same = template::read_header(&bytes).is_ok_and(|header| header.uid == rig);
+    let text = String::from_utf8(bytes).ok().filter(|_| is_same);
+    Ok(text.map(|text| text.strip_prefix('\u{FEFF}').map(str::to_owned).unwrap_or(text)))
 }
 
 fn save_template(disk: &dyn Disk, path: &Path, text: &str) -> Result<(), StoreError> {

@@ -137,17 +137,23 @@ impl TemplateWatch {
         })
     }
 
-    /// Takes note of the files of parts that a reader has asked for, with what it got of each. While a template
-    /// cannot be read as a whole, the parts that it had before stay watched as well.
+    /// Takes note of the files of parts that a reader has asked for, with what it got of each: one that it could not read
+    /// is news as soon as it can be. While a template cannot be read as a whole, the parts that it had before stay watched
+    /// as well.
     pub fn follow(&mut self, asked: BTreeMap<PathBuf, Option<Vec<u8>>>, is_whole: bool) {
         if is_whole {
             self.parts.retain(|part| asked.contains_key(&part.path));
         }
         for (path, content) in asked {
-            if self.parts.iter().all(|part| part.path != path) {
-                let mut watch = FileWatch::new(&path, template::MAX_BYTES as u64);
-                watch.known = content;
-                self.parts.push(watch);
+            match self.parts.iter_mut().find(|part| part.path == path) {
+                // A file that stays empty was given out once.
+                Some(part) if content.is_none() && part.known.as_ref().is_some_and(Vec::is_empty) => {}
+                Some(part) => part.known = content,
+                None => {
+                    let mut watch = FileWatch::new(&path, template::MAX_BYTES as u64);
+                    watch.known = content;
+                    self.parts.push(watch);
+                }
             }
         }
     }

@@ -1,6 +1,9 @@
 //! Undo and redo, one step for each gesture; a step restores the selection as well.
+//!
+//! A history holds the last [`MOST_STEPS`] steps at least, unless their weights take more than [`MOST_WEIGHT_BYTES`]: older
+//! ones are dropped, so that a long day takes no more memory than a morning.
 
-use std::{borrow::Cow, sync::Arc};
+use std::{borrow::Cow, collections::HashSet, sync::Arc};
 
 use bevy::prelude::*;
 
@@ -11,11 +14,19 @@ use crate::rig::{
     step::{Commit, Step, UndoStacks},
 };
 
+/// Number of steps that a history holds at least; it drops older ones a tenth of that at a time.
+pub const MOST_STEPS: usize = 10_000;
+
+/// Bytes of weights that the steps of a history hold at most, besides those of the last step.
+pub const MOST_WEIGHT_BYTES: usize = 1 << 30;
+
 /// Steps done to a rig and steps that can be redone, with the preview of a drag.
 #[derive(Component, Default)]
 pub struct RigHistory {
     stacks: UndoStacks,
-    /// Number of times that a new step discarded undone ones.
+    /// Last step that was dropped; it stays in effect.
+    bottom: Option<Arc<Step>>,
+    /// Number of times that steps left the history: a new one discarded undone ones, or old ones were dropped.
     discarded: u64,
     preview: Option<Preview>,
 }
@@ -44,6 +55,11 @@ fn removes(edits: &[RigEdit], joint: Uid) -> bool {
         RigEdit::Batch(edits) => removes(edits, joint),
         _ => false,
     })
+}
+
+/// Bytes of weights that a step binds meshes with. Those that it takes away are those of an earlier step, as a rule.
+fn weight_bytes(step: &Step) -> usize {
+    step.forward.iter().map(RigEdit::weight_bytes).sum()
 }
 
 fn apply_all(rig: &mut Rig, edits: &[RigEdit]) -> Result<(), EditError> {
@@ -133,7 +149,27 @@ impl RigHistory {
         selection.0.clone_from(&step.after);
         self.discarded += u64::from(self.can_redo());
         self.stacks.follow(&Commit::Done(step.clone()));
+        self.drop_old(&step);
         RecordedOperation { name, step: Some(step), notes: outcome.notes }
+    }
+
+    /// Drops the oldest steps where there are too many, or too heavy ones, after a step was recorded.
+    fn drop_old(&mut self, recorded: &Step) {
+        let done = &mut self.stacks.done;
+        let mut count = if done.len() >= MOST_STEPS + MOST_STEPS / 10 { done.len() - MOST_STEPS } else { 0 };
+        if weight_bytes(recorded) > 0 {
+            let mut bytes = 0;
+            let fits = |step: &&Arc<Step>| {
+                bytes += weight_bytes(step);
+                bytes <= MOST_WEIGHT_BYTES
+            };
+            let kept = done.iter().rev().skip(1).take_while(fits).count() + 1;
+            count = count.max(done.len() - kept);
+        }
+        if let Some(last) = done.drain(..count).next_back() {
+            self.bottom = Some(last);
+            self.discarded += 1;
+        }
     }
 
     /// Undoes the last step and returns it; `None` without a step. A preview is reverted first.
@@ -165,16 +201,17 @@ impl RigHistory {
         !self.stacks.undone.is_empty()
     }
 
-    /// Number of times that a new step discarded undone ones, which can never be redone.
+    /// Number of times that steps left the history, which can never be redone or undone.
     pub fn discarded(&self) -> u64 {
         self.discarded
     }
 
-    /// True if undoing or redoing some step restores a tag.
-    pub fn holds_tag(&self, tag: Uid) -> bool {
-        let mut edits =
-            self.stacks.done.iter().chain(&self.stacks.undone).flat_map(|step| [&step.forward, &step.backward]);
-        edits.any(|edits| edits.iter().any(|edit| edit.adds_tag(tag)))
+    /// Uids of the joints and tags that undoing or redoing some step restores.
+    pub fn restorable(&self) -> HashSet<Uid> {
+        let steps = self.stacks.done.iter().chain(&self.stacks.undone);
+        let mut uids = HashSet::new();
+        steps.flat_map(|step| step.forward.iter().chain(&step.backward)).for_each(|edit| edit.added(&mut uids));
+        uids
     }
 
     /// Names of all steps, oldest first, and how many of them are in effect.
@@ -194,8 +231,9 @@ impl RigHistory {
         self.stacks.done.iter().rev().position(|known| Arc::ptr_eq(known, step)).unwrap_or(0)
     }
 
-    /// Last step in effect. The same step again means that nothing happened in between but its undo and redo.
+    /// Last step in effect, even if it is too old to be undone; `None` where there was none. The same step again means that
+    /// nothing happened in between but its undo and redo.
     pub fn last(&self) -> Option<&Arc<Step>> {
-        self.stacks.done.last()
+        self.stacks.done.last().or(self.bottom.as_ref())
     }
 }

@@ -4,6 +4,7 @@ mod find;
 mod follow;
 mod loops;
 mod status;
+mod waste;
 
 use std::{
     cmp::Reverse,
@@ -87,6 +88,8 @@ pub struct Builder {
     run: u32,
     /// Result of the last run as plain data, with what has changed since.
     built: BuiltCache,
+    /// Number of kept nodes and commands from which on those that are gone are counted.
+    next_count: usize,
 }
 
 impl Builder {
@@ -108,6 +111,7 @@ impl Builder {
             moved: Vec::new(),
             run: 0,
             built: BuiltCache::default(),
+            next_count: waste::FEW,
         }
     }
 

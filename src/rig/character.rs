@@ -125,13 +125,14 @@ pub fn character(parts: &Character) -> Model {
     let globals = rig.rest_globals();
     let place: HashMap<Uid, usize> = globals.iter().enumerate().map(|(number, (uid, _))| (*uid, number)).collect();
     let node_of: Vec<Option<usize>> = file_nodes.iter().map(|uid| place.get(uid).copied()).collect();
+    // The first of equal uids counts.
+    let file_number: HashMap<Uid, usize> = file_nodes.iter().enumerate().rev().map(|(at, uid)| (*uid, at)).collect();
     let from_file = skin.is_some_and(|skin| !skin.at_rest);
     let mut model = if from_file { (*file).clone() } else { (*rest).clone() };
     model.nodes = rig
         .walk()
         .map(|joint| {
-            let source =
-                file_nodes.iter().position(|uid| *uid == joint.data.uid).and_then(|number| file.nodes.get(number));
+            let source = file_number.get(&joint.data.uid).and_then(|number| file.nodes.get(*number));
             Node {
                 name: joint.data.label.clone().unwrap_or_default(),
                 parent: joint.parent.and_then(|parent| place.get(&parent).copied()),

@@ -22,7 +22,7 @@ pub use change::PartChange;
 pub use dropped_part::DroppedPart;
 pub(crate) use dropped_part::without_dropped;
 pub use error::PartError;
-pub(in crate::rig) use instance::switch_name;
+pub(in crate::rig) use instance::{MOST_BROUGHT, switch_name};
 pub use instance::{MirrorParams, Part, PartInstance};
 pub use option::{OptionError, OptionForm, PartOption};
 pub use overrides::PartOverride;

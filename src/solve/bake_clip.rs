@@ -16,7 +16,30 @@ use crate::{
 };
 
 /// Most frames of a baked clip.
-const FRAMES: f32 = 1e6;
+const MOST_FRAMES: usize = 1_000_000;
+
+/// Most transforms of a baked clip: one for each frame and node.
+pub const MOST_TRANSFORMS: usize = 8 << 20;
+
+/// Reason for not baking a clip.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum BakeError {
+    /// More frames than there is memory for.
+    #[error(
+        "the clip has {frames} frames at {rate} frames a second, and no more than {most} are baked for {nodes} nodes; \
+         shorten its range, or bake fewer frames a second"
+    )]
+    TooLong {
+        /// Number of frames.
+        frames: u64,
+        /// Frames a second.
+        rate: f32,
+        /// Largest number of frames.
+        most: usize,
+        /// Number of nodes.
+        nodes: usize,
+    },
+}
 
 /// Node that is baked.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,15 +75,23 @@ pub fn strike(state: &mut RigState, pose: &SampledPose) {
 /// nothing but its keys moves keeps them as they are.
 ///
 /// Time starts at zero with the clip. Takes some tens of microseconds a frame for a character.
+///
+/// # Errors
+/// A clip with more frames than there is memory for: see [`MOST_TRANSFORMS`].
 pub fn bake_clip(
     program: &Arc<RigProgram>,
     clip: &RigClip,
     nodes: &[BakedNode],
     rate: f32,
     tolerance: &KeyTolerance,
-) -> Clip {
+) -> Result<Clip, BakeError> {
     let mut state = RigState::new(program.clone());
-    let count = (clip.duration() * rate + 1e-3).floor().clamp(0.0, FRAMES) as usize;
+    let last = (clip.duration() * rate + 1e-3).floor().max(0.0);
+    let most = MOST_FRAMES.min(MOST_TRANSFORMS / nodes.len().max(1));
+    if last >= most as f32 {
+        return Err(BakeError::TooLong { frames: (last as u64).saturating_add(1), rate, most, nodes: nodes.len() });
+    }
+    let count = last as usize;
     let mut times: Vec<f32> = (0..=count).map(|frame| frame as f32 / rate).collect();
     // The end lies between frames where the rate is not the clip's own.
     if clip.duration() - times.last().copied().unwrap_or_default() > 1e-4 {
@@ -112,7 +143,7 @@ pub fn bake_clip(
         }
     }
     keep_length(&mut baked, clip.duration());
-    baked
+    Ok(baked)
 }
 
 fn channel_target(at: usize, property: &Property) -> ChannelTarget {

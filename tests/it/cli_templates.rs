@@ -5,7 +5,10 @@ use std::{
     io::{BufRead, BufReader},
     path::Path,
     process::{Child, Command, Stdio},
-    sync::{Arc, mpsc::channel},
+    sync::{
+        Arc,
+        mpsc::{Receiver, channel},
+    },
     thread::spawn,
 };
 
@@ -179,53 +182,92 @@ fn rigs_are_made_of_others() {
     }
 }
 
+/// `rigsmith watch` that ends with the test, passed or not.
+struct Watch {
+    process: Child,
+    heard: Receiver<String>,
+}
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+    }
+}
+
+impl Watch {
+    fn start(folder: &Path, output: &str, count: &str) -> Self {
+        let process = Command::new(env!("CARGO_BIN_EXE_rigsmith"))
+            .current_dir(folder)
+            .args(["watch", "a.rig.ron", "-o", output, "--count", count, "--json"])
+            .stdout(Stdio::piped())
+            .spawn();
+        let mut process = process.unwrap();
+        let lines = BufReader::new(process.stdout.take().unwrap()).lines();
+        let (told, heard) = channel();
+        spawn(move || lines.map_while(Result::ok).try_for_each(|line| told.send(line)));
+        Self { process, heard }
+    }
+
+    fn next(&self) -> Value {
+        serde_json::from_str(&self.heard.recv_timeout(HANG).unwrap()).unwrap()
+    }
+
+    fn ended(&mut self) -> bool {
+        self.process.wait().unwrap().success()
+    }
+}
+
 #[test]
 fn a_watched_template_is_built_at_every_save_and_no_broken_one_is_taken_over() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "a.rig.ron"]).0, 0);
     let text = fs::read_to_string(at("a.rig.ron")).unwrap();
-    /// A process that ends with the test, passed or not.
-    struct OwnedProcess(Child);
-    impl Drop for OwnedProcess {
-        fn drop(&mut self) {
-            let _ = self.0.kill();
-        }
-    }
-    let watch = Command::new(env!("CARGO_BIN_EXE_rigsmith"))
-        .current_dir(folder.path())
-        .args(["watch", "a.rig.ron", "-o", "a.glb", "--count", "4", "--json"])
-        .stdout(Stdio::piped())
-        .spawn();
-    let mut watch = OwnedProcess(watch.unwrap());
-    let lines = BufReader::new(watch.0.stdout.take().unwrap()).lines();
-    let (told, heard) = channel();
-    spawn(move || lines.map_while(Result::ok).try_for_each(|line| told.send(line)));
-    let next = || serde_json::from_str::<Value>(&heard.recv_timeout(HANG).unwrap()).unwrap();
+    let mut watch = Watch::start(folder.path(), "a.glb", "4");
     let glb = || fs::read(at("a.glb")).unwrap();
     let ran = |told: &Value| told["ran"].as_array().unwrap().len();
-    let first = next();
+    let first = watch.next();
     assert_eq!((ran(&first), first["commands"].as_u64()), (3, Some(3)), "{first}");
     let first_bytes = glb();
     // One parameter: one command; another file in its place, as most programs save.
     fs::write(at("new"), text.replace("square", "cube")).unwrap();
     fs::rename(at("new"), at("a.rig.ron")).unwrap();
-    let told = next();
+    let told = watch.next();
     assert_eq!(told["ran"], serde_json::json!(["control on link_1"]), "{told}");
     // A broken file, one whose build fails, and the next good one.
     fs::write(at("a.rig.ron"), &text[..200]).unwrap();
-    assert_eq!(next()["ok"], false);
+    assert_eq!(watch.next()["ok"], false);
     fs::write(at("a.rig.ron"), text.replace("square", "no such shape")).unwrap();
-    let told = next();
+    let told = watch.next();
     assert!(crate::cli::explained(&told).contains("no such shape"), "{told}");
     let after_cube = glb();
     fs::write(at("a.rig.ron"), text.replace("(0, 0.3, 0)", "(0, 0.5, 0)")).unwrap();
-    assert_eq!(next()["ok"], true);
+    assert_eq!(watch.next()["ok"], true);
     assert_ne!(glb(), after_cube);
     fs::write(at("a.rig.ron"), &text).unwrap();
-    assert_eq!(next()["ok"], true);
+    assert_eq!(watch.next()["ok"], true);
     assert!(glb() == first_bytes, "back to the first bytes");
-    assert!(watch.0.wait().unwrap().success());
+    assert!(watch.ended());
+}
+
+#[test]
+fn a_character_that_could_not_be_written_is_written_as_soon_as_it_can_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "a.rig.ron"]).0, 0);
+    let text = fs::read_to_string(at("a.rig.ron")).unwrap();
+    fs::create_dir(at("out")).unwrap();
+    let mut watch = Watch::start(folder.path(), "out/a.glb", "2");
+    assert_eq!(watch.next()["ok"], true);
+    fs::remove_dir_all(at("out")).unwrap();
+    fs::write(at("a.rig.ron"), text.replace("(0, 0.3, 0)", "(0, 0.5, 0)")).unwrap();
+    let told = watch.next();
+    assert!(crate::cli::explained(&told).contains("create it or choose another"), "{told}");
+    // The folder is there again, and nobody has saved the template since. The same error is not told again meanwhile.
+    fs::create_dir(at("out")).unwrap();
+    let told = watch.next();
+    assert!(told["ok"] == true && at("out/a.glb").exists(), "{told}");
+    assert!(watch.ended());
 }
 
 #[test]

@@ -100,7 +100,7 @@ fn written(rig: &Rig, model: &Model, joints: &[Uid], clip: &RigClip) -> Vec<u8> 
     let program = Arc::new(RigProgram::compile(&built, &CompileOptions::default()).unwrap());
     let node = |(uid, node): (&Uid, &Node)| BakedNode { uid: *uid, parent: node.parent, rest: node.rest };
     let nodes: Vec<BakedNode> = joints.iter().zip(&model.nodes).map(node).collect();
-    let baked = bake_clip(&program, clip, &nodes, 30.0, &KeyTolerance::default());
+    let baked = bake_clip(&program, clip, &nodes, 30.0, &KeyTolerance::default()).unwrap();
     let settings = GltfWriteSettings { all_joints: true, ..GltfWriteSettings::default() };
     write_glb(&Model { clips: vec![baked], ..model.clone() }, &settings).unwrap()
 }

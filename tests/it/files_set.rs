@@ -11,9 +11,8 @@ use std::{
 use glam::Vec3;
 use rigsmith::{
     files::{
-        Disk, DiskFile, Entry, Fault, FaultPlan, FaultyDisk, FileSet, MeshShape, MeshToSave, ProjectToSave, RealDisk,
-        SaveError, StoreError, is_temp_name, load_model, load_project, remove_stale_temps, save_set, store_model,
-        store_project,
+        Disk, DiskFile, Entry, FaultyDisk, FileSet, MeshShape, MeshToSave, ProjectToSave, RealDisk, SaveError,
+        StoreError, is_temp_name, load_model, load_project, remove_stale_temps, save_set, store_model, store_project,
     },
     mesh::{
         gltf::GltfWriteSettings,
@@ -23,6 +22,8 @@ use rigsmith::{
     rig::{JointData, Rig, RigEdit, SkinData, Uid},
 };
 use tempfile::TempDir;
+
+use crate::files_faults::plans;
 
 /// A set of each kind that Rigsmith saves, in versions that can be told apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,7 +41,7 @@ fn texture(version: u32) -> Vec<u8> {
 }
 
 /// A textured triangle whose first point tells the version.
-fn triangle(version: u32) -> Model {
+pub fn triangle(version: u32) -> Model {
     let obj = format!("mtllib a.mtl\nv {version} 0 0\nv 1 5 0\nv 0 1 9\nvt 0 0\nusemtl wood\nf 1/1 2/1 3/1\n");
     let mtl = format!("newmtl wood\nKd 0.5 0.5 0.{version}\nmap_Kd wood.png\n");
     let mut sidecar = |name: &str| Some(if name == "a.mtl" { mtl.clone().into() } else { texture(version) });
@@ -151,19 +152,8 @@ pub fn temps(folder: &Path) -> usize {
     fs::read_dir(folder).unwrap().filter(|entry| is_temp_name(&entry.as_ref().unwrap().file_name())).count()
 }
 
-/// Every operation fails in every manner that makes a difference; the tests of single files tell errors apart.
-fn plans(operations: usize) -> impl Iterator<Item = FaultPlan> {
-    let manners = [
-        (Fault::Io, false),
-        (Fault::NoSpace, true),
-        (Fault::Short, false),
-        (Fault::Crash, true),
-        (Fault::PowerLoss, true),
-    ];
-    (0..operations).flat_map(move |at| manners.map(|(fault, lasting)| FaultPlan { at, fault, lasting }))
-}
-
-fn copy(from: &Path) -> TempDir {
+/// A copy of a furnished folder.
+pub fn copy(from: &Path) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     for name in names(from) {
         fs::copy(from.join(&name), folder.path().join(&name)).unwrap();
@@ -171,7 +161,7 @@ fn copy(from: &Path) -> TempDir {
     folder
 }
 
-/// Fails every operation of a save in every manner.
+/// Fails every operation of a save in every way.
 fn check_every_operation(kind: Kind, existed: bool) {
     let before = furnished();
     if existed {
@@ -206,20 +196,32 @@ fn check_every_operation(kind: Kind, existed: bool) {
 
 #[test]
 fn a_gltf_is_saved_whole_or_not_at_all() {
-    check_every_operation(Kind::Gltf, true);
     check_every_operation(Kind::Gltf, false);
 }
 
 #[test]
+fn a_gltf_is_saved_over_another_whole_or_not_at_all() {
+    check_every_operation(Kind::Gltf, true);
+}
+
+#[test]
 fn an_obj_is_saved_whole_or_not_at_all() {
-    check_every_operation(Kind::Obj, true);
     check_every_operation(Kind::Obj, false);
 }
 
 #[test]
+fn an_obj_is_saved_over_another_whole_or_not_at_all() {
+    check_every_operation(Kind::Obj, true);
+}
+
+#[test]
 fn a_project_is_saved_whole_or_not_at_all() {
-    check_every_operation(Kind::Project, true);
     check_every_operation(Kind::Project, false);
+}
+
+#[test]
+fn a_project_is_saved_over_another_whole_or_not_at_all() {
+    check_every_operation(Kind::Project, true);
 }
 
 #[test]

@@ -5,13 +5,10 @@ use super::{
     gltf::{compose, data},
     mutate::run_fuzz,
     prerequisites::test_data,
+    whole::promises,
 };
-use glam::Vec3;
 use rigsmith::{
-    mesh::{
-        gltf::{ExternalError, ExternalFile, GltfError, GltfWriteSettings, memory_limit, read_gltf, write_glb},
-        model::{ChannelTarget, Interpolation, Model},
-    },
+    mesh::gltf::{ExternalError, ExternalFile, GltfError, GltfWriteSettings, memory_limit, read_gltf, write_glb},
     rig::animation::file_clip::motion_of,
 };
 
@@ -25,76 +22,6 @@ const WORDS: &str = r#""bufferView":0 "byteOffset":4 "byteStride":4 "byteStride"
 "node":0 "node":1 "index":7 "source":0 "uri":"../x" "uri":"data:;base64,AAAA" "uri":"%FF" "scene":0 "scenes":[] "extras":{} {} [] null true
 1e308 -1 1.5 0 2 255 65535 4294967296 9007199254740993 1e-45 -0.0"#;
 
-/// Fails unless everything that `Model` documents holds.
-fn check_promises(model: &Model) {
-    let (points, nodes) = (model.points.len(), model.nodes.len());
-    assert!(model.points.iter().all(|point| point.is_finite()));
-    for (i, node) in model.nodes.iter().enumerate() {
-        assert!(node.parent.is_none_or(|parent| parent < i));
-        assert!(node.rest.affine().is_finite() && (node.rest.rotation.length() - 1.0).abs() < 1e-4);
-    }
-    assert!(model.rest_globals().iter().all(|global| global.is_finite()));
-    for skin in &model.skins {
-        assert_eq!(skin.joints.len(), skin.inverse_binds.len());
-        assert!(skin.joints.iter().all(|joint| *joint < nodes && model.nodes[*joint].joint));
-        assert!(skin.inverse_binds.iter().all(|matrix| matrix.is_finite()));
-    }
-    for object in &model.objects {
-        assert!(object.skin.is_none_or(|skin| skin < model.skins.len()));
-        assert!(object.node.is_none_or(|node| node < nodes) && (object.skin.is_none() || object.node.is_none()));
-        assert!(object.morph_weights.is_empty() || object.morph_weights.len() == object.morph_names.len());
-    }
-    for part in &model.parts {
-        let count = part.vertices.len();
-        let fits = |length: usize| length == 0 || length == count;
-        let object = &model.objects[part.object];
-        assert!(part.material.is_none_or(|material| material < model.material_set.materials.len()));
-        assert!(part.vertices.iter().all(|point| (*point as usize) < points));
-        assert!(!part.triangles.is_empty() && part.triangles.iter().flatten().all(|vertex| (*vertex as usize) < count));
-        assert!(part.normals.len() == count && part.normals.iter().all(|normal| (normal.length() - 1.0).abs() < 1e-3));
-        assert!(fits(part.tangents.len()) && fits(part.colors.len()) && part.uvs.iter().all(|set| fits(set.len())));
-        assert!(
-            part.tangents
-                .iter()
-                .all(|tangent| (tangent.truncate().length() - 1.0).abs() < 1e-3 && tangent.w.abs() == 1.0)
-        );
-        assert!(
-            part.colors.iter().all(|color| color.cmpge(glam::Vec4::ZERO).all() && color.cmple(glam::Vec4::ONE).all())
-        );
-        assert!(part.uvs.iter().flatten().all(|uv| uv.is_finite()));
-        assert_eq!(part.morphs.len(), object.morph_names.len());
-        for morph in &part.morphs {
-            for list in [&morph.positions, &morph.normals, &morph.tangents] {
-                assert!(fits(list.len()) && list.iter().all(|offset: &Vec3| offset.is_finite()));
-            }
-        }
-    }
-    let skinned = model.objects.iter().any(|object| object.skin.is_some());
-    assert_eq!(model.weights.is_some(), skinned);
-    if let Some(weights) = &model.weights {
-        assert_eq!(weights.len(), points);
-        for point in 0..points {
-            let list: Vec<_> = weights.of(point).collect();
-            assert!(list.iter().all(|(joint, weight)| (*joint as usize) < nodes && *weight > 0.0));
-            assert!(list.windows(2).all(|pair| pair[0].1 >= pair[1].1));
-            let sum: f64 = list.iter().map(|(_, weight)| f64::from(*weight)).sum();
-            assert!(list.is_empty() || (sum - 1.0).abs() <= 1e-7 * list.len() as f64, "{list:?}");
-        }
-    }
-    for channel in model.clips.iter().flat_map(|clip| &clip.channels) {
-        let width = match channel.target {
-            ChannelTarget::Translation(node) | ChannelTarget::Scale(node) if node < nodes => 3,
-            ChannelTarget::Rotation(node) if node < nodes => 4,
-            ChannelTarget::MorphWeights(object) => model.objects[object].morph_names.len(),
-            ref target => panic!("{target:?}"),
-        };
-        let per_key = width * if channel.interpolation == Interpolation::CubicSpline { 3 } else { 1 };
-        assert_eq!(channel.values.len(), channel.times.len() * per_key);
-        assert!(!channel.times.is_empty() && channel.times.windows(2).all(|pair| pair[0] < pair[1]));
-        assert!(channel.times.iter().chain(&channel.values).all(|value| value.is_finite()));
-    }
-}
-
 fn check(bytes: &[u8], bins: &[Vec<u8>]) {
     // JSON refers to the binary part of a seed by number, so that bent JSON still finds bytes.
     let mut load = |ExternalFile { path: uri, .. }: ExternalFile| {
@@ -105,7 +32,7 @@ fn check(bytes: &[u8], bins: &[Vec<u8>]) {
     match read_gltf(bytes, "fuzz.glb", &mut load) {
         Err(error) => assert!(error.to_string().starts_with("fuzz.glb: "), "{error}"),
         Ok(model) => {
-            check_promises(&model);
+            promises::model(&model);
             for clip in &model.clips {
                 // Sampling a clip of hours at every mutation takes too long.
                 if clip.channels.iter().flat_map(|channel| &channel.times).any(|time| *time > 60.0) {
@@ -127,7 +54,7 @@ fn check(bytes: &[u8], bins: &[Vec<u8>]) {
                             Err(ExternalError::new(format!("{uri} is outside")))
                         };
                         match read_gltf(&glb, "again.glb", &mut none) {
-                            Ok(again) => check_promises(&again),
+                            Ok(again) => promises::model(&again),
                             Err(GltfError::TooLarge { limit, .. }) => assert_eq!(limit, memory_limit(glb.len() as u64)),
                             Err(error) => panic!("written, but: {error}"),
                         }

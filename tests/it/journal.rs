@@ -3,6 +3,7 @@
 mod clips;
 mod damage;
 mod evidence;
+mod places;
 mod trouble;
 
 use std::{fs, path::Path, sync::Arc, time::Duration};

@@ -47,6 +47,8 @@ mod edit_text;
 mod editor_files;
 #[cfg(feature = "editor")]
 mod editor_follow;
+#[cfg(feature = "editor")]
+mod editor_settings;
 mod edits;
 #[cfg(feature = "editor")]
 mod examples;
@@ -62,6 +64,7 @@ mod face_landmarks;
 mod face_symmetry;
 mod face_units;
 mod files;
+mod files_faults;
 mod files_kill;
 mod files_read;
 mod files_set;
@@ -74,10 +77,13 @@ mod fuzz_gestures;
 mod fuzz_gltf;
 mod fuzz_journal;
 mod fuzz_obj;
+mod fuzz_peers;
 mod fuzz_project;
 mod fuzz_rig_text;
 mod fuzz_skin;
 mod fuzz_template;
+mod fuzz_whole;
+mod generate;
 mod gestures;
 #[cfg(feature = "editor")]
 mod gizmo;
@@ -97,6 +103,7 @@ mod kmeans;
 mod layout;
 mod leg_strokes;
 mod linkage;
+mod long_run;
 mod mesh_reload;
 #[cfg(feature = "editor")]
 mod mesh_watch;
@@ -158,6 +165,7 @@ mod vrm;
 mod watched_folder;
 mod weights;
 mod weights_bodies;
+mod whole;
 #[cfg(all(feature = "editor", feature = "cli"))]
 mod window;
 mod world;

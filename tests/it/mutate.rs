@@ -6,7 +6,7 @@
 
 mod harness;
 
-pub use harness::run_fuzz;
+pub use harness::{run_fuzz, run_seeded};
 
 use crate::random::Random;
 

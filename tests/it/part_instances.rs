@@ -1,16 +1,25 @@
 //! Parts that stay parts: templates that use the files of other templates, changed where they are used, and updated when the
 //! part's file is saved.
 
-use std::{fs, path::Path, sync::Arc, time::Instant};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Instant,
+};
 
 use bevy::{ecs::system::RunSystemOnce, prelude::*};
 use rigsmith::{
-    files::{RealDisk, load_template, store_rig_over},
+    files::{PartFiles, RealDisk, load_template, store_rig_over},
     headless::headless_app,
     instance::{RigBuilt, RigFailed, RigInstance, RigInstancePlugin, RigUpdated, RunningTemplate, TemplateFiles},
     modules,
     processor::{Builder, review},
-    rig::{Rig, RigEdit, TagKind, Uid, template::write_template},
+    rig::{
+        Rig, RigEdit, TagKind, Uid,
+        template::{read_template, write_template},
+    },
 };
 
 use super::{bench::HANG, template_text::apply};
@@ -168,6 +177,31 @@ fn what_does_not_fit_is_told_with_its_place() {
         let error = load_template(&RealDisk, &path).expect_err(part).to_string();
         assert!(error.contains(message) && error.contains("t.rig.ron"), "{part}: {error}");
         assert!(error.contains('6') || error.contains("line 6"), "{part}: no place: {error}");
+    }
+}
+
+/// A dozen files, each of which uses the next eight times: neither what they would bring nor what keeps them from it is worked
+/// out for each use.
+#[test]
+fn parts_of_parts_fill_neither_the_memory_nor_the_day() {
+    let level = |next: &str| {
+        let part = |number: usize| format!("(part: \"{next}\", name: \"{number}\", prefix: \"p{number}_\")");
+        let parts: Vec<String> = (0..8).map(part).collect();
+        format!("(format: 2, name: \"level\", joints: [(label: \"own\")], parts: [{}])", parts.join(", "))
+    };
+    let leaf = "(format: 2, name: \"leaf\", joints: [(label: \"a\", tags: [null]), (label: \"b\", parent: \"a\")])";
+    let text = level("0.rig.ron");
+    let path = Path::new("t.rig.ron");
+    for (end, message) in [(Some(leaf), "more than 50000 joints and tags"), (None, "there is no file `12.rig.ron`")] {
+        let mut files: BTreeMap<PathBuf, Option<Vec<u8>>> = (0..12)
+            .map(|number| (format!("{number}.rig.ron").into(), Some(level(&format!("{}.rig.ron", number + 1)).into())))
+            .collect();
+        files.insert("12.rig.ron".into(), end.map(Into::into));
+        let error = PartFiles::given(&files).complete(path, text.as_bytes()).unwrap_err();
+        assert!(error.message.contains(message), "{error}");
+        let template = read_template(text.as_bytes()).unwrap();
+        let (_, faults) = PartFiles::given(&files).survey(path, &text, template);
+        assert_eq!(faults.len(), 8, "each use is told");
     }
 }
 

@@ -12,7 +12,7 @@ use super::{
     Ending, JournalError, MAX_JOURNAL, Origin, RecordCount, file_hash,
     summary::{Summary, summarise},
 };
-use crate::files::{Disk, EntryKind, ReadError, atomic::folder_of, read_capped};
+use crate::files::{Disk, EntryKind, ReadError, atomic::folder_of, read::is_missing, read_capped};
 
 /// Largest number of names in a folder that are searched.
 const MAX_NAMES: usize = 10_000;
@@ -70,7 +70,7 @@ pub(super) fn set_aside(disk: &dyn Disk, old: &Path, ending: &str) -> io::Result
             name.push(format!(".{number}"));
         }
         let aside = PathBuf::from(name);
-        if disk.entry(&aside, false).is_ok() {
+        if is_there(disk, &aside)? {
             continue;
         }
         let linked = match disk.hard_link(old, &aside) {
@@ -85,6 +85,15 @@ pub(super) fn set_aside(disk: &dyn Disk, old: &Path, ending: &str) -> io::Result
         return Ok((aside, linked));
     }
     Err(ErrorKind::AlreadyExists.into())
+}
+
+/// True if there is something at a path. An error is no answer: a file that cannot be reached must not be replaced.
+pub(super) fn is_there(disk: &dyn Disk, path: &Path) -> io::Result<bool> {
+    match disk.entry(path, false) {
+        Ok(_) => Ok(true),
+        Err(error) if is_missing(&error) => Ok(false),
+        Err(error) => Err(error),
+    }
 }
 
 /// State of a journal that was left behind.
@@ -143,22 +152,28 @@ pub fn pending_journals(disk: &dyn Disk, folder: &Path) -> Vec<PendingJournal> {
 
 /// Unsaved work in one journal, such as [`journal_beside`] a project that is opened; see [`pending_journals`].
 pub fn pending_journal(disk: &dyn Disk, path: &Path) -> Option<PendingJournal> {
-    let entry = disk.entry(path, false).ok().filter(|entry| entry.kind == EntryKind::File)?;
+    let entry = match disk.entry(path, false) {
+        Ok(entry) if entry.kind == EntryKind::File => Ok(entry),
+        Ok(_) => return None,
+        Err(error) if is_missing(&error) => return None,
+        Err(error) => Err(ReadError::new(disk, path, error)),
+    };
     // If the lock cannot be tested, the journal is offered: offering saved work is better than hiding unsaved work.
-    if disk.is_locked(path).unwrap_or(false) {
+    let lock = disk.is_locked(path);
+    if matches!(lock, Ok(true)) {
         return None;
     }
     let pending = |condition| PendingJournal {
         path: path.to_owned(),
         origin: Origin::Unknown,
         started: 0,
-        modified: entry.modified,
+        modified: entry.as_ref().ok().and_then(|entry| entry.modified),
         changes: 0,
         project_changed: false,
         ending: Ending::Torn,
         condition,
     };
-    let read = match read_capped(disk, path, MAX_JOURNAL) {
+    let read = match entry.as_ref().map_err(Clone::clone).and_then(|_| read_capped(disk, path, MAX_JOURNAL)) {
         Ok(bytes) => summarise(&bytes),
         // The journal belongs to another user, or has just been removed.
         Err(ReadError::NoAccess { .. } | ReadError::Missing { .. }) => return None,
@@ -172,7 +187,10 @@ pub fn pending_journal(disk: &dyn Disk, path: &Path) -> Option<PendingJournal> {
     let (changes, project_changed) = unsaved(disk, &summary);
     if !summary.is_damaged && (changes == 0 || summary.ending == Ending::Closed || is_superseded(disk, path, &summary))
     {
-        let _ = disk.remove(path);
+        // A living process may be about to write its first changes.
+        if lock.is_ok() {
+            let _ = disk.remove(path);
+        }
         return None;
     }
     let condition = if summary.is_damaged { Condition::Damaged(summary.records) } else { Condition::Whole };

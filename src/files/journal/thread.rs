@@ -12,6 +12,7 @@ use std::{
 use super::{
     Content, JournalPlaces, JournalWriteError, SaveMark,
     encode::Encoder,
+    place::is_there,
     sync::{SyncResult, Syncer},
     writer::{Order, WriterState},
 };
@@ -237,7 +238,9 @@ impl Work {
         let former = writer.shared.settle(Some(open.path.clone()));
         // Windows removes a file at once only if it is closed.
         self.open = None;
-        for old in former.into_iter().chain(writer.replaces.take()).filter(|old| *old != open.path) {
+        // Another window may have gone on with the same work, in its place.
+        let replaced = writer.replaces.take().filter(|old| !is_in_use(writer.disk.as_ref(), old));
+        for old in former.into_iter().chain(replaced).filter(|old| *old != open.path) {
             let _ = writer.disk.remove(&old);
         }
         open.syncer = open.file.another().ok().and_then(|file| {
@@ -290,14 +293,15 @@ fn create_somewhere(
         if number > 0 || places.project.is_none() {
             let _ = writer.disk.create_folder(folder);
         }
+        let disk = writer.disk.as_ref();
         let own = former == Some(&path);
-        let replaced = writer.replaces.as_ref() == Some(&path) && !writer.disk.is_locked(&path).unwrap_or(false);
-        let taken = !own && !replaced && writer.disk.entry(&path, false).is_ok();
-        let created = if taken {
+        let replaced = writer.replaces.as_ref() == Some(&path) && !is_in_use(disk, &path);
+        let taken = if own || replaced { Ok(false) } else { is_there(disk, &path) };
+        let created = match taken {
+            Ok(false) => create(disk, &path, writer.session, content),
             // Another window works on this project, or unsaved work waits to be recovered.
-            Err(JournalWriteError::PathInUse)
-        } else {
-            create(writer.disk.as_ref(), &path, writer.session, content)
+            Ok(true) => Err(JournalWriteError::PathInUse),
+            Err(error) => Err(error.into()),
         };
         match created {
             Ok(open) => return Ok(open),
@@ -305,6 +309,11 @@ fn create_somewhere(
         }
     }
     Err(first.unwrap_or_else(|| (PathBuf::new(), JournalWriteError::NoPlace)))
+}
+
+/// True unless it is known that no living process writes the journal at a path.
+fn is_in_use(disk: &dyn Disk, path: &Path) -> bool {
+    !matches!(disk.is_locked(path), Ok(false))
 }
 
 /// Writes a whole journal to a temporary file in the same folder, then renames it.

@@ -76,7 +76,8 @@ pub(super) fn follow_nodes(
                 index.insert(entity, rig_entity, node.uid, EntityPart::Node);
                 writer.describe(entity, rig, node, None);
                 let (node, parent) = (Some(node.clone()), Some(parent));
-                let mirrored = MirroredNode { entity, command: origin.command, is_parked: false, node, parent };
+                let (command, subject) = (origin.command, origin.subject);
+                let mirrored = MirroredNode { entity, command, subject, is_parked: false, node, parent };
                 known.nodes.insert(uid, mirrored);
                 continue;
             };
@@ -183,8 +184,8 @@ fn park(commands: &mut Commands, known: &mut BuiltEntities, nodes: &[BuiltNode])
     }
 }
 
-/// Despawns parked nodes that no build can bring back: their commands are deleted, and neither undo nor redo restores
-/// them. Commands leave the history only where undone steps are discarded, so nothing is searched at other times.
+/// Despawns parked nodes that no build can bring back: their commands, or the joints that they were made for, are deleted, and
+/// neither undo nor redo restores them. Both leave the history only where steps do, so nothing is searched at other times.
 pub(super) fn despawn_parked(
     mut commands: Commands,
     mut rigs: Query<(Entity, &Rig, Ref<RigHistory>, &mut BuiltEntities)>,
@@ -195,9 +196,19 @@ pub(super) fn despawn_parked(
         if discarded.insert(entity, history.discarded()) == Some(history.discarded()) && !history.is_added() {
             continue;
         }
-        let is_gone = |command: Uid| rig.find_tag(command).is_none() && !history.holds_tag(command);
-        known.bypass_change_detection().nodes.retain(|_, node| {
-            let stays = !node.is_parked || !is_gone(node.command);
+        let known = known.bypass_change_detection();
+        if !known.nodes.values().any(|node| node.is_parked) {
+            continue;
+        }
+        let restorable = history.restorable();
+        // Nodes that were made for other nodes stay as long as those.
+        let made: HashSet<Uid> = known.nodes.keys().copied().collect();
+        let is_there = |uid: &Uid| rig.is_taken(*uid) || *uid == rig.uid() || restorable.contains(uid);
+        let is_gone = |node: &MirroredNode| {
+            !is_there(&node.command) || !(is_there(&node.subject) || made.contains(&node.subject))
+        };
+        known.nodes.retain(|_, node| {
+            let stays = !node.is_parked || !is_gone(node);
             if !stays {
                 index.remove(node.entity);
                 commands.entity(node.entity).try_despawn();

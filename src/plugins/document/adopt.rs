@@ -33,7 +33,7 @@ use super::{
 use crate::{
     plugins::schema::{
         CommandTag, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf, Null,
-        Tag, TagOf, Tags,
+        ParkedNode, Tag, TagOf, Tags,
     },
     rig::{RestTransform, Rig, RigEdit, Uid, UidSource},
 };
@@ -169,11 +169,15 @@ pub(super) fn adopt_writes(
     mut index: ResMut<EntityIndex>,
     mut edits: ResMut<EntityEdits>,
     mut refused: MessageWriter<EditRefusal>,
+    parked: Query<(), (With<ParkedNode>, Allow<Disabled>)>,
 ) {
     let touched = written.take();
     let closed: HashSet<Entity> = written.rigs.read().filter(|rig| !rigs.contains(*rig)).collect();
     if !closed.is_empty() {
-        index.forget_rigs(&closed);
+        // Nodes that were rolled back have no place below the rig, with which they would have gone.
+        for entity in index.forget_rigs(&closed).into_iter().filter(|entity| parked.contains(*entity)) {
+            commands.entity(entity).try_despawn();
+        }
     }
     if touched.joints.is_empty() && touched.tags.is_empty() && touched.groups.is_empty() && touched.uids.is_empty() {
         return;

@@ -66,9 +66,17 @@ impl EntityIndex {
         self.0.remove(&entity)
     }
 
-    /// Removes all entities of rigs that no longer exist.
-    pub fn forget_rigs(&mut self, gone: &HashSet<Entity>) {
-        self.0.retain(|_, indexed| !gone.contains(&indexed.rig));
+    /// Removes all entities of rigs that no longer exist; returns those of created nodes.
+    pub fn forget_rigs(&mut self, gone: &HashSet<Entity>) -> Vec<Entity> {
+        let mut nodes = Vec::new();
+        self.0.retain(|entity, indexed| {
+            let stays = !gone.contains(&indexed.rig);
+            if !stays && indexed.part == EntityPart::Node {
+                nodes.push(*entity);
+            }
+            stays
+        });
+        nodes
     }
 }
 
@@ -206,6 +214,8 @@ pub(in crate::plugins) struct MirroredNode {
     pub entity: Entity,
     /// Uid of the command that creates the node.
     pub command: Uid,
+    /// Uid of the joint or node that it is made for.
+    pub subject: Uid,
     pub is_parked: bool,
     pub node: Option<BuiltNode>,
     pub parent: Option<Entity>,

@@ -26,6 +26,7 @@ impl Builder {
         self.spread_moves(None);
         self.sync_list(rig, &switches);
         self.spread_structure();
+        self.drop_waste(rig);
     }
 
     /// Takes over one edit that was applied to the document since the last [`Builder::sync`]. What concerns one tag or

@@ -63,6 +63,12 @@ impl Builder {
         self.commands.iter().map(trace).sum()
     }
 
+    /// Number of nodes, constraints and commands that are kept, with those that are gone and may come back: a measure of
+    /// memory.
+    pub fn kept(&self) -> usize {
+        self.world.slots.len() + self.commands.len()
+    }
+
     /// Number of nodes that were visited since the builder was made to find the commands that read where something is:
     /// a measure of work that is the same on every machine.
     pub fn visited(&self) -> u64 {

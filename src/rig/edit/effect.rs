@@ -1,16 +1,37 @@
 //! Effects of edits, by which others decide whether an edit concerns them.
 
+use std::collections::HashSet;
+
 use super::RigEdit;
 use crate::rig::Uid;
 
+/// Bytes of an influence of weights: its joint and its share.
+const INFLUENCE: usize = 8;
+/// Bytes of a point of weights.
+const POINT: usize = 4;
+
 impl RigEdit {
-    /// True if the edit puts a tag into the rig.
-    pub fn adds_tag(&self, tag: Uid) -> bool {
+    /// Uids of the joints and tags that the edit puts into the rig, added to `uids`.
+    pub fn added(&self, uids: &mut HashSet<Uid>) {
         match self {
-            Self::AddJoint { joint, .. } => joint.tags.iter().any(|known| known.uid == tag),
-            Self::AddTag { tag: added, .. } => added.uid == tag,
-            Self::Batch(edits) => edits.iter().any(|edit| edit.adds_tag(tag)),
-            _ => false,
+            Self::AddJoint { joint, .. } => {
+                uids.insert(joint.uid);
+                uids.extend(joint.tags.iter().map(|tag| tag.uid));
+            }
+            Self::AddTag { tag, .. } => {
+                uids.insert(tag.uid);
+            }
+            Self::Batch(edits) => edits.iter().for_each(|edit| edit.added(uids)),
+            _ => {}
+        }
+    }
+
+    /// Bytes of the weights that the edit binds a mesh with: what makes an edit heavy.
+    pub fn weight_bytes(&self) -> usize {
+        match self {
+            Self::SetSkin(_, Some(skin)) => INFLUENCE * skin.weights.joints.len() + POINT * skin.weights.starts.len(),
+            Self::Batch(edits) => edits.iter().map(Self::weight_bytes).sum(),
+            _ => 0,
         }
     }
 

@@ -49,6 +49,15 @@ pub enum PartError {
         /// End of the sentence with similar names.
         nearest: String,
     },
+    /// Parts, and parts of parts, that bring more than a template takes.
+    #[error(
+        "the parts of the template would bring more than {most} joints and tags; use this part, and those that it has \
+         itself, less often"
+    )]
+    TooLarge {
+        /// Largest number of joints and tags.
+        most: usize,
+    },
     /// More joints of the host than the part has.
     #[error("{given} joints are given, and the part has only {count}; take some away")]
     TooManyJoints {

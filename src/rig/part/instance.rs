@@ -17,6 +17,10 @@ use crate::rig::{
     remap::mirror_names,
 };
 
+/// Most joints and tags that the parts of a template bring, with their own parts: a dozen files, each of which uses the next
+/// eight times, would bring billions.
+pub(in crate::rig) const MOST_BROUGHT: usize = 50_000;
+
 /// A template that others use, with what it lets them vary.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
@@ -28,6 +32,13 @@ pub struct Part {
     pub sockets: Vec<PartSocket>,
     /// Values that its uses may set.
     pub options: Vec<PartOption>,
+}
+
+impl Part {
+    /// Number of its joints and tags.
+    pub(in crate::rig) fn size(&self) -> usize {
+        self.rig.joints.len() + self.rig.tags.len()
+    }
 }
 
 impl From<Rig> for Part {
@@ -296,8 +307,8 @@ impl PartInstance {
     ) -> Result<(), PartError> {
         let parent = self.parent.as_deref().map(|label| labelled(draft.rig(), label)).transpose()?;
         let parent = socket.and_then(|socket| socket.joint).or(parent);
-        let globals = draft.rig().rest_globals();
-        let below = globals.into_iter().find(|(uid, _)| self.is_world && parent == Some(*uid));
+        let globals = if self.is_world { draft.rig().rest_globals() } else { Vec::new() };
+        let below = globals.into_iter().find(|(uid, _)| parent == Some(*uid));
         let place = match (below, socket) {
             (Some((_, global)), _) => global.inverse() * self.rest.affine(),
             (None, Some(socket)) => socket.rest.affine() * self.rest.affine(),

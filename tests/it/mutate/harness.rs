@@ -20,8 +20,33 @@ const POOL: usize = 256;
 /// Mutants that a test tries, on every machine the same ones.
 const MUTANTS: u64 = 4000;
 /// Targets, each with a folder of findings of its own.
-const TARGETS: [&str; 10] =
-    ["animation", "bvh", "gestures", "gltf", "journal", "obj", "project", "rig", "skin", "template"];
+const TARGETS: [&str; 23] = [
+    "animation",
+    "bvh",
+    "edit_sequence",
+    "entity_writes",
+    "gestures",
+    "gltf",
+    "journal",
+    "obj",
+    "peer_gltf",
+    "peer_obj",
+    "pose_command",
+    "project",
+    "remote_calls",
+    "rig",
+    "skin",
+    "template",
+    "update",
+    "whole_clip",
+    "whole_gestures",
+    "whole_model",
+    "whole_project",
+    "whole_skin",
+    "whole_template",
+];
+/// Largest numbers of bytes from which generators make an input, small ones as often as large ones.
+const CHOICES: [usize; 4] = [16, 128, 512, 2048];
 
 /// Extent of a run.
 #[derive(Debug, Clone, Copy)]
@@ -42,43 +67,91 @@ pub fn findings(name: &str) -> PathBuf {
 /// one that takes longer than a minute, is written to `tests/fuzz_findings/NAME/`, and the test fails naming it.
 pub fn run_fuzz(name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]], check: impl Fn(&[u8])) {
     assert!(TARGETS.contains(&name), "{name} is not among the targets");
-    let budget = number_from("RIGSMITH_FUZZ_SECONDS").map_or(Budget::Mutants(MUTANTS), Budget::Seconds);
-    run_fuzz_for(budget, name, seeds, dictionary, check);
+    run_fuzz_for(Budget::of(MUTANTS), name, seeds, dictionary, check);
+}
+
+/// Replays what was found before, then calls `check` with seeded bytes, from which it makes its input: `count` times, or as
+/// often as fits into `RIGSMITH_FUZZ_SECONDS`. Findings are kept as those of [`run_fuzz`].
+pub fn run_seeded(name: &str, count: u64, check: impl Fn(&[u8])) {
+    assert!(TARGETS.contains(&name), "{name} is not among the targets");
+    let budget = Budget::of(count);
+    let attempts = Attempts { name, watch: Watch::new(name), check };
+    let replayed = attempts.replay();
+    let mut random = Random(first_seed());
+    let (started, mut runs) = (Instant::now(), 0u64);
+    while budget.has_room(runs, started) {
+        let longest = random.pick(&CHOICES);
+        let bytes: Vec<u8> = (0..random.below(longest)).map(|_| random.next() as u8).collect();
+        attempts.make(&bytes, &format_args!("run {runs}"));
+        runs += 1;
+    }
+    println!("{name}: {replayed} findings replayed, {runs} inputs in {:.1} s", started.elapsed().as_secs_f64());
+}
+
+impl Budget {
+    fn of(count: u64) -> Self {
+        number_from("RIGSMITH_FUZZ_SECONDS").map_or(Self::Mutants(count), Self::Seconds)
+    }
+
+    fn has_room(self, runs: u64, started: Instant) -> bool {
+        match self {
+            Self::Mutants(count) => runs < count,
+            Self::Seconds(seconds) => started.elapsed().as_secs_f64() < seconds,
+        }
+    }
+}
+
+/// Start of the random sequence.
+fn first_seed() -> u64 {
+    number_from("RIGSMITH_FUZZ_SEED").unwrap_or(1.0) as u64
+}
+
+/// Attempts of one target.
+struct Attempts<'a, F> {
+    name: &'a str,
+    watch: Watch,
+    check: F,
+}
+
+impl<F: Fn(&[u8])> Attempts<'_, F> {
+    /// Checks one input; keeps it and fails where something is wrong.
+    fn make(&self, bytes: &[u8], origin: &dyn std::fmt::Display) {
+        self.watch.begin(bytes);
+        let outcome = try_one(bytes, &self.check);
+        self.watch.end();
+        if let Err(problem) = outcome {
+            let path = save_finding(self.name, bytes);
+            panic!("{}: {origin} fails: {problem}; kept as {}", self.name, path.display());
+        }
+    }
+
+    /// Checks what was found before; returns how much it is.
+    fn replay(&self) -> usize {
+        let keep = findings(self.name);
+        let mut known: Vec<PathBuf> =
+            fs::read_dir(&keep).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())).collect();
+        known.sort();
+        for path in &known {
+            self.make(&fs::read(path).unwrap(), &format_args!("the finding {}", path.display()));
+        }
+        known.len()
+    }
 }
 
 fn run_fuzz_for(budget: Budget, name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]], check: impl Fn(&[u8])) {
     assert!(!seeds.is_empty(), "{name}: no seeds");
-    let keep = findings(name);
-    let mut replayed: Vec<PathBuf> =
-        fs::read_dir(&keep).into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())).collect();
-    replayed.sort();
-    let watch = Watch::new(name);
-    let attempt = |bytes: &[u8], origin: &dyn std::fmt::Display| {
-        watch.begin(bytes);
-        let outcome = try_one(bytes, &check);
-        watch.end();
-        if let Err(problem) = outcome {
-            let path = save_finding(name, bytes);
-            panic!("{name}: {origin} fails: {problem}; kept as {}", path.display());
-        }
-    };
-    for path in &replayed {
-        attempt(&fs::read(path).unwrap(), &format_args!("the finding {}", path.display()));
-    }
+    let attempts = Attempts { name, watch: Watch::new(name), check };
+    let replayed = attempts.replay();
     for (i, seed) in seeds.iter().enumerate() {
-        attempt(seed, &format_args!("seed {i}"));
+        attempts.make(seed, &format_args!("seed {i}"));
     }
 
-    let start = number_from("RIGSMITH_FUZZ_SEED").unwrap_or(1.0) as u64;
+    let start = first_seed();
     let longest = seeds.iter().map(Vec::len).max().unwrap_or(0);
     let mut mutator = Mutator::new(start, dictionary, MAX_LEN.max(4 * longest));
     let mut pool: Vec<Vec<u8>> = Vec::new();
     let (started, mut runs) = (Instant::now(), 0u64);
-    let goes_on = |runs: u64| match budget {
-        Budget::Mutants(count) => runs < count,
-        Budget::Seconds(seconds) => started.elapsed().as_secs_f64() < seconds,
-    };
-    while goes_on(runs) {
+    while budget.has_room(runs, started) {
         let source = |random: &mut Random, pool: &[Vec<u8>]| -> Vec<u8> {
             // Mutants of mutants reach further, but most of the time goes to what is nearly right.
             if pool.is_empty() || !random.chance(4) { random.pick(seeds) } else { random.pick(pool) }
@@ -86,7 +159,7 @@ fn run_fuzz_for(budget: Budget, name: &str, seeds: &[Vec<u8>], dictionary: &[&[u
         let input = source(&mut mutator.random, &pool);
         let other = source(&mut mutator.random, &pool);
         let mutant = mutator.mutate(&input, &other);
-        attempt(&mutant, &format_args!("run {runs}"));
+        attempts.make(&mutant, &format_args!("run {runs}"));
         if mutator.random.chance(16) {
             match pool.len() {
                 POOL => {
@@ -98,11 +171,7 @@ fn run_fuzz_for(budget: Budget, name: &str, seeds: &[Vec<u8>], dictionary: &[&[u
         }
         runs += 1;
     }
-    println!(
-        "{name}: {} findings replayed, {runs} mutants in {:.1} s",
-        replayed.len(),
-        started.elapsed().as_secs_f64()
-    );
+    println!("{name}: {replayed} findings replayed, {runs} mutants in {:.1} s", started.elapsed().as_secs_f64());
 }
 
 fn number_from(variable: &str) -> Option<f64> {

@@ -25,8 +25,8 @@ use crate::rig::{
         source::ron_text,
     },
     part::{
-        MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption, PartSocket,
-        unpaired_sides,
+        MOST_BROUGHT, MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption,
+        PartSocket, unpaired_sides,
     },
 };
 
@@ -387,12 +387,16 @@ impl Template {
         mirror: MirrorParams,
     ) -> (Self, Vec<SourceError>) {
         let mut of_parts: Vec<PartSocket> = Vec::new();
-        let (mut faults, mut is_one_missing) = (Vec::new(), false);
+        let (mut faults, mut is_one_missing, mut brings) = (Vec::new(), false, 0);
         let places = InstancePlaces { fields: fields(source) };
         for instance in std::mem::take(&mut self.parts) {
             let message = |error: &dyn fmt::Display| format!("part \"{}\": {error}", instance.title());
             let put = part(&instance.part).map_err(|error| (message(&error), false)).and_then(|part| {
                 let told = |error: PartError| (message(&E::from(error.clone())), error.is_of_host());
+                brings += part.size();
+                if brings > MOST_BROUGHT {
+                    return Err(told(PartError::TooLarge { most: MOST_BROUGHT }));
+                }
                 let among = self.sockets.iter().chain(&of_parts);
                 let socket = instance.socket.as_deref().map(|name| PartSocket::find(name, among, &self.rig));
                 let socket = socket.transpose().map_err(|error| told(error.into()))?;
