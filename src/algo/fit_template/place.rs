@@ -37,10 +37,11 @@ const LEADING_EDGE: f32 = 0.55;
 /// a joint takes there.
 const HIDDEN: f32 = 0.5;
 const SHAPED: f32 = 0.9;
-/// Share of a leg's free length at which its distance from the plane of symmetry is taken, and the share by which its root
-/// follows it.
+/// Share of a leg's free length at which its distance from the plane of symmetry is taken, the share by which its root
+/// follows it, and the cosine of its angle to up from which on it hangs straight down.
 const LEG: f32 = 0.7;
 const LEG_WIDTH: f32 = 0.8;
+const HANGS: f32 = 0.85;
 
 /// The joints of a template in the mesh.
 #[derive(Debug, Clone)]
@@ -174,12 +175,8 @@ impl Work<'_> {
         // A long body has no longer shoulders: the limb's place at its joint of the trunk keeps the template's shape.
         let beside = template.positions[first] - template.positions[limb.attach];
         let mut root = attach + self.hypothesis.alignment.rotation * (beside * self.standing);
-        if limb.kind == LimbKind::Leg
-            && !self.upright()
-            && let Some(wide) = self.beside_of_leg(limb, line, attach)
-        {
-            let left = self.hypothesis.alignment.rotation * Vec3::X;
-            root += left * (wide - (root - attach).dot(left)) * LEG_WIDTH;
+        if !self.upright() {
+            root = self.over_leg(limb, line, attach, root);
         }
         if limb.kind == LimbKind::Wing {
             let left = self.hypothesis.alignment.rotation * Vec3::X;
@@ -198,7 +195,7 @@ impl Work<'_> {
                 let place = self.ball_place(limb.kind, line);
                 let ratio = (line.free + place.distance(line.at(line.free))) / rest[ball];
                 let beside = self.hypothesis.alignment.rotation * (beside * self.ball_scale());
-                let root = if ball == 0 { place } else { attach + beside };
+                let root = if ball == 0 { self.over_leg(limb, line, attach, place) } else { attach + beside };
                 (ratio, root)
             }
             // A tail leaves the trunk at its first joint.
@@ -275,14 +272,19 @@ impl Work<'_> {
         }
     }
 
-    /// Distance of a leg's root from the trunk to the left, as the leg itself has it: legs of animals hang straight down.
-    fn beside_of_leg(&self, limb: &Limb, line: &CentreLine, attach: Vec3) -> Option<f32> {
-        let left = self.hypothesis.alignment.rotation * Vec3::X;
+    /// The root of a leg that hangs straight down, as far from the plane of symmetry as the leg itself tells.
+    fn over_leg(&self, limb: &Limb, line: &CentreLine, attach: Vec3, root: Vec3) -> Vec3 {
+        let turn = self.hypothesis.alignment.rotation;
+        let (left, up) = (turn * Vec3::X, turn * Vec3::Y);
         let of = |joint: usize| self.template.positions[joint].x - self.template.positions[limb.attach].x;
-        let below = of(*limb.joints.get(limb.joints.len() / 2)?);
+        let below = of(limb.joints[limb.joints.len() / 2]);
         let share = of(limb.joints[0]) / below;
-        let wide = (line.at(line.free * LEG) - attach).dot(left);
-        (below.abs() > 1e-6 && (0.0..=1.5).contains(&share)).then_some(wide * share)
+        let hangs = (line.at(line.free * LEG) - line.at(line.free * (1.0 - LEG))).normalize_or_zero().dot(up) > HANGS;
+        if limb.kind != LimbKind::Leg || !hangs || below.abs() < 1e-6 || !(0.0..=1.5).contains(&share) {
+            return root;
+        }
+        let wide = (line.at(line.free * LEG) - attach).dot(left) * share;
+        root + left * (wide - (root - attach).dot(left)) * LEG_WIDTH
     }
 
     /// Index in the limb of the joint that turns it in the trunk: a shoulder or a hip.
