@@ -4,6 +4,7 @@
 //! return bytes.
 
 pub mod adjacency;
+mod gear;
 pub mod gltf;
 pub mod influences;
 pub mod model;

@@ -8,7 +8,8 @@ use super::{
     clean,
     limbs::TemplateLimbs,
     markers::Marker,
-    symmetry, target,
+    symmetry::{self, MirrorPlane},
+    target,
     tree::{self, Tree},
     volume,
 };
@@ -30,8 +31,8 @@ pub struct MeshAnalysis {
     pub(super) target: target::Target,
     pub(super) graph: volume::VoxelGraph,
     pub(super) trees: Vec<Tree>,
-    /// A point and the normal of the plane of symmetry, if the mesh has one.
-    pub(super) mirror: Option<(Vec3, Vec3)>,
+    /// Plane of symmetry, if the mesh has one.
+    pub(super) mirror: Option<MirrorPlane>,
 }
 
 impl MeshAnalysis {
@@ -76,9 +77,13 @@ impl MeshAnalysis {
             || (volume::graph(&voxels), target::Target::new(&mesh, &voxels)),
         );
         step(0.7)?;
-        let trees = tree::trees(&graph);
+        let mut trees = tree::trees(&graph);
         let file_axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|d| mesh.space.direction_to_unit(d));
         let mirror = symmetry::of_mesh(&graph, &voxels, file_axes);
+        // A staff or a shield in one hand bends the centre lines of the whole arm: without it they are tried, too.
+        if let Some(core) = mirror.and_then(|plane| symmetry::core(&graph, &voxels, &plane)) {
+            trees.extend(tree::trees(&core));
+        }
         step(1.0)?;
         if trees.is_empty() {
             return Err(FitError::NoSurface);
@@ -114,7 +119,7 @@ impl MeshAnalysis {
             up: settings.up.map(|d| space.direction_to_unit(d)),
             forward: settings.forward.map(|d| space.direction_to_unit(d)),
             file_axes: [Vec3::X, Vec3::Y, Vec3::Z].map(|d| space.direction_to_unit(d)),
-            mirror: self.mirror,
+            mirror: self.mirror.map(|plane| (plane.point, plane.normal)),
         };
         let of_limb = |marker: &Marker| {
             let limb = template.limbs.iter().position(|l| l.joints.contains(&marker.joint))?;

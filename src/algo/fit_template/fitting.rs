@@ -213,7 +213,9 @@ impl<'a> Fit<'a> {
 
     fn make_symmetric(&self, places: &mut [Vec3]) -> Option<(Vec3, Vec3)> {
         let analysis = self.analysis;
-        let found = symmetry::find(&self.template, places, &analysis.graph, &analysis.voxels);
+        let of_mesh = analysis.mirror.filter(|plane| plane.is_of(&self.template, places));
+        let found = symmetry::find(&self.template, places, &analysis.graph, &analysis.voxels)
+            .or_else(|| of_mesh.map(|plane| (plane.point, plane.normal)));
         let plane = match self.settings.symmetry {
             FitSymmetry::Off => None,
             FitSymmetry::Auto => found,
@@ -224,7 +226,7 @@ impl<'a> Fit<'a> {
         } else if self.settings.symmetry == FitSymmetry::Auto
             && let Some(plane) = analysis.mirror
         {
-            symmetry::centre(&self.template, places, plane);
+            symmetry::centre(&self.template, places, (plane.point, plane.normal));
         }
         found
     }

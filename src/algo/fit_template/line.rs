@@ -80,6 +80,17 @@ impl CentreLine {
         line
     }
 
+    /// The line over other points, one for each of its own.
+    pub(super) fn along(mut self, points: Vec<Vec3>) -> Self {
+        self.points = points;
+        self.lengths = vec![0.0];
+        for pair in self.points.windows(2) {
+            self.lengths.push(self.lengths[self.lengths.len() - 1] + pair[0].distance(pair[1]));
+        }
+        self.free = self.lengths.get(self.free_count.saturating_sub(1)).copied().unwrap_or(0.0);
+        self
+    }
+
     /// The place at a length from the end; beyond the last point, the last point.
     pub(super) fn at(&self, length: f32) -> Vec3 {
         let after = self.lengths.partition_point(|&l| l < length).clamp(1, self.points.len().max(2) - 1);

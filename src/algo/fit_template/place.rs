@@ -30,6 +30,19 @@ const WING: [f32; 3] = [0.0, 0.17, 0.38];
 /// Root of a wing, as a share of the way from the middle of the trunk to the place at which the wing leaves it.
 const WING_ROOT: f32 = 0.4;
 
+/// Place of the bones in a wing, as a share of the way from its centre line to its leading edge.
+const LEADING_EDGE: f32 = 0.55;
+
+/// Share of a leg's free length above which the trunk's flesh hides how it bends, and the share of the template's bend that
+/// a joint takes there.
+const HIDDEN: f32 = 0.5;
+const SHAPED: f32 = 0.9;
+/// Share of a leg's free length at which its distance from the plane of symmetry is taken, the share by which its root
+/// follows it, and the cosine of its angle to up from which on it hangs straight down.
+const LEG: f32 = 0.7;
+const LEG_WIDTH: f32 = 0.8;
+const HANGS: f32 = 0.85;
+
 /// The joints of a template in the mesh.
 #[derive(Debug, Clone)]
 pub(super) struct Placement {
@@ -46,8 +59,13 @@ pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, h
     let count = template.positions.len();
     let mut reasons = vec![FitReason::Proportion; count];
     let mut strain = vec![0.0; count];
-    let line = |leaf: &Option<usize>| leaf.map(|l| tree.lines[l].among(&tree.branches, &hypothesis.leaves));
-    let lines: Vec<Option<CentreLine>> = hypothesis.leaves.iter().map(line).collect();
+    let forward = hypothesis.alignment.rotation * Vec3::Z;
+    let line = |(limb, leaf): (&Limb, &Option<usize>)| {
+        let leaf = (*leaf)?;
+        let line = tree.lines[leaf].among(&tree.branches, &hypothesis.leaves);
+        Some(if limb.kind == LimbKind::Wing { leading_edge(line, leaf, tree, graph, forward) } else { line })
+    };
+    let lines: Vec<Option<CentreLine>> = template.limbs.iter().zip(&hypothesis.leaves).map(line).collect();
     let standing = hypothesis.alignment.scale;
     let mut work = Work { template, tree, graph, hypothesis, stretch, lines, standing };
     let mut places: Vec<Option<Vec3>> = vec![None; count];
@@ -72,8 +90,34 @@ pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, h
             }
             places[joint] = Some(beyond_line(line, along, root, whole));
         }
+        work.hold_bends(limb, line, &lengths, &mut places);
     }
     Placement { places: follow(template, &stretch, &places), reasons, strain }
+}
+
+/// The centre line of a wing, moved towards its leading edge: there lie the bones, and behind them feathers or skin.
+fn leading_edge(line: CentreLine, leaf: usize, tree: &Tree, graph: &VoxelGraph, forward: Vec3) -> CentreLine {
+    let arc_of = &tree.branches.arc_of;
+    let nodes: Vec<Vec3> =
+        (0..graph.len()).filter(|&node| arc_of[node] as usize == leaf).map(|node| graph.centres[node]).collect();
+    let front = |at: usize| {
+        let (before, after) = (at.saturating_sub(2), (at + 2).min(line.points.len() - 1));
+        let along = (line.points[after] - line.points[before]).normalize_or_zero();
+        let along = (along - forward * along.dot(forward)).normalize_or_zero();
+        let place = line.points[at];
+        let near = nodes.iter().filter(|node| (**node - place).dot(along).abs() < SECTION * graph.cell);
+        near.map(|node| (*node - place).dot(forward)).fold(0.0f32, f32::max)
+    };
+    let shifts: Vec<f32> = (0..line.free_count.min(line.points.len())).map(front).collect();
+    let last = shifts.last().copied().unwrap_or(0.0);
+    let shifted = line.points.iter().enumerate().map(|(at, place)| {
+        // Sections beside the body and at the tip hold little of the wing.
+        let around = shifts.get(at.saturating_sub(3)..(at + 4).min(shifts.len())).unwrap_or_default();
+        let mean = around.iter().sum::<f32>() / around.len().max(1) as f32;
+        *place + forward * (LEADING_EDGE * if around.is_empty() { last } else { mean })
+    });
+    let shifted = shifted.collect();
+    line.along(shifted)
 }
 
 /// The place at a length from a limb's end: on the line, then straight from the line's free end to the root.
@@ -131,6 +175,9 @@ impl Work<'_> {
         // A long body has no longer shoulders: the limb's place at its joint of the trunk keeps the template's shape.
         let beside = template.positions[first] - template.positions[limb.attach];
         let mut root = attach + self.hypothesis.alignment.rotation * (beside * self.standing);
+        if !self.upright() {
+            root = self.over_leg(limb, line, attach, root);
+        }
         if limb.kind == LimbKind::Wing {
             let left = self.hypothesis.alignment.rotation * Vec3::X;
             let out = (line.at(line.free) - attach).dot(left) * WING_ROOT;
@@ -148,7 +195,7 @@ impl Work<'_> {
                 let place = self.ball_place(limb.kind, line);
                 let ratio = (line.free + place.distance(line.at(line.free))) / rest[ball];
                 let beside = self.hypothesis.alignment.rotation * (beside * self.ball_scale());
-                let root = if ball == 0 { place } else { attach + beside };
+                let root = if ball == 0 { self.over_leg(limb, line, attach, place) } else { attach + beside };
                 (ratio, root)
             }
             // A tail leaves the trunk at its first joint.
@@ -198,6 +245,46 @@ impl Work<'_> {
             }
             lengths[i] += 0.8 * (best.1 - lengths[i]);
         }
+    }
+
+    /// Draws the joints of an animal's leg that lie where the leg runs into the trunk to the shape that the template has
+    /// between their neighbours: the flesh about a knee hides its bend.
+    fn hold_bends(&self, limb: &Limb, line: &CentreLine, lengths: &[f32], places: &mut [Option<Vec3>]) {
+        if limb.kind != LimbKind::Leg || self.upright() {
+            return;
+        }
+        for i in 1..lengths.len().saturating_sub(1) {
+            let near = lengths[i] / line.free.max(1e-9);
+            if near > 1.0 || near < HIDDEN {
+                continue;
+            }
+            let [before, here, after] = [i - 1, i, i + 1].map(|k| limb.joints[k]);
+            let (Some(a), Some(c), Some(b)) = (places[before], places[here], places[after]) else { continue };
+            let [from, at, to] = [before, here, after].map(|joint| self.template.positions[joint]);
+            let chord = to - from;
+            let share = (at - from).dot(chord) / chord.length_squared().max(1e-12);
+            let out = at - from - chord * share;
+            let way = b - a;
+            let side = self.stretch.turn(out);
+            let side = (side - way * side.dot(way) / way.length_squared().max(1e-12)).normalize_or_zero();
+            let shaped = a + way * share + side * (out.length() / chord.length().max(1e-9) * way.length());
+            places[here] = Some(c.lerp(shaped, ((near - HIDDEN) / (1.0 - HIDDEN)).sqrt() * SHAPED));
+        }
+    }
+
+    /// The root of a leg that hangs straight down, as far from the plane of symmetry as the leg itself tells.
+    fn over_leg(&self, limb: &Limb, line: &CentreLine, attach: Vec3, root: Vec3) -> Vec3 {
+        let turn = self.hypothesis.alignment.rotation;
+        let (left, up) = (turn * Vec3::X, turn * Vec3::Y);
+        let of = |joint: usize| self.template.positions[joint].x - self.template.positions[limb.attach].x;
+        let below = of(limb.joints[limb.joints.len() / 2]);
+        let share = of(limb.joints[0]) / below;
+        let hangs = (line.at(line.free * LEG) - line.at(line.free * (1.0 - LEG))).normalize_or_zero().dot(up) > HANGS;
+        if limb.kind != LimbKind::Leg || !hangs || below.abs() < 1e-6 || !(0.0..=1.5).contains(&share) {
+            return root;
+        }
+        let wide = (line.at(line.free * LEG) - attach).dot(left) * share;
+        root + left * (wide - (root - attach).dot(left)) * LEG_WIDTH
     }
 
     /// Index in the limb of the joint that turns it in the trunk: a shoulder or a hip.

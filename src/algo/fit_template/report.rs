@@ -108,6 +108,8 @@ pub enum FitNote {
     Tied(usize),
     /// Loose parts that are too far from the body.
     Loose(usize),
+    /// Objects that hang on a bone and were left out: a hat, a weapon.
+    Gear(usize),
     /// Branches that no limb of the template took: hair, clothes, weapons.
     UnusedBranches(usize),
     /// A limb of the template without a branch in the mesh.
@@ -126,6 +128,9 @@ impl fmt::Display for FitNote {
             Self::Specks(count) => write!(f, "{count} loose specks were ignored"),
             Self::Tied(count) => write!(f, "{count} loose parts were tied to the body over gaps"),
             Self::Loose(count) => write!(f, "{count} loose parts are too far from the body and were ignored"),
+            Self::Gear(count) => {
+                write!(f, "{count} objects that hang on a bone were left out; name objects to fit to others")
+            }
             Self::UnusedBranches(count) => write!(f, "{count} branches of the mesh belong to no limb of the template"),
             Self::MissingLimb(kind) => write!(f, "the mesh shows no {kind} for one of the template"),
             Self::BodyModel => f.write_str("joints follow a model of the human body"),

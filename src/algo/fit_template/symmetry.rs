@@ -86,24 +86,80 @@ pub(super) fn centre(template: &TemplateLimbs, places: &mut [Vec3], (point, norm
 
 /// Share of the volume that has to meet its mirror image for the mesh itself to have a plane of symmetry.
 const MESH_OVERLAP: f32 = 0.8;
+/// Share of the volume, about its middle, that has to meet its mirror image for other places of that plane to be tried:
+/// what a figure holds in one hand moves the middle.
+const LOOKED_INTO: f32 = 0.5;
+/// Distance from the middle up to which planes are tried, in cells.
+const ASIDE: i32 = 12;
 
-/// A point and the normal of the plane in which the volume meets its mirror image best, among planes through its middle
-/// across its principal axes and the axes of the file.
-pub(super) fn of_mesh(graph: &VoxelGraph, voxels: &Voxels, file_axes: [Vec3; 3]) -> Option<(Vec3, Vec3)> {
+/// Plane of symmetry of a mesh.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MirrorPlane {
+    /// Point on the plane, in unit space.
+    pub(super) point: Vec3,
+    pub(super) normal: Vec3,
+    /// Share of the volume that meets its mirror image.
+    pub(super) overlap: f32,
+}
+
+impl MirrorPlane {
+    /// True if all of the volume meets its image, so that its pose is symmetric, too, and the skeleton lies across the plane.
+    pub(super) fn is_of(&self, template: &TemplateLimbs, places: &[Vec3]) -> bool {
+        self.overlap >= SAME_POSE_OVERLAP
+            && plane(template, places).is_some_and(|(_, left)| left.dot(self.normal).abs() >= SAME_PLANE)
+    }
+
+    /// Mirror image of a position.
+    pub(super) fn image(&self, p: Vec3) -> Vec3 {
+        p - self.normal * (2.0 * (p - self.point).dot(self.normal))
+    }
+}
+
+/// The plane in which the volume meets its mirror image best, among planes near its middle across its principal axes and
+/// the axes of the file.
+pub(super) fn of_mesh(graph: &VoxelGraph, voxels: &Voxels, file_axes: [Vec3; 3]) -> Option<MirrorPlane> {
     let body: Vec<Vec3> = (0..graph.len()).filter(|&n| graph.body[n]).map(|n| graph.centres[n]).collect();
     let middle = body.iter().map(|p| p.as_dvec3()).sum::<glam::DVec3>() / body.len().max(1) as f64;
     let middle = middle.as_vec3();
-    let overlap = |normal: Vec3| {
+    let at = |normal: Vec3, aside: i32| {
+        let plane = MirrorPlane { point: middle + normal * (0.5 * graph.cell * aside as f32), normal, overlap: 0.0 };
         let (mut met, mut all) = (0usize, 0usize);
         for &centre in body.iter().step_by(STRIDE) {
-            let image = centre - normal * (2.0 * (centre - middle).dot(normal));
-            let cell = voxels.cell_at(voxels.to_grid(image));
-            met += usize::from(cell.is_some_and(|c| voxels.solid_index(c).is_some()));
+            met += usize::from(is_solid(voxels, plane.image(centre)));
             all += 1;
         }
-        met as f32 / all.max(1) as f32
+        MirrorPlane { overlap: met as f32 / all.max(1) as f32, ..plane }
     };
+    let better = |a: MirrorPlane, b: MirrorPlane| if b.overlap > a.overlap { b } else { a };
     let axes = [Vec3::X, Vec3::Y, Vec3::Z].into_iter().chain(file_axes);
-    let best = axes.map(|normal| (overlap(normal), normal)).reduce(|a, b| if b.0 > a.0 { b } else { a })?;
-    (best.0 >= MESH_OVERLAP).then_some((middle, best.1))
+    let tried = axes.map(|normal| at(normal, 0)).map(|plane| {
+        // A plane in which nearly all of the volume meets its image needs no other place.
+        if !(LOOKED_INTO..SAME_POSE_OVERLAP).contains(&plane.overlap) {
+            return plane;
+        }
+        (1..=2 * ASIDE).flat_map(|aside| [aside, -aside]).map(|aside| at(plane.normal, aside)).fold(plane, better)
+    });
+    tried.reduce(better).filter(|best| best.overlap >= MESH_OVERLAP)
+}
+
+fn is_solid(voxels: &Voxels, place: Vec3) -> bool {
+    voxels.cell_at(voxels.to_grid(place)).is_some_and(|c| voxels.solid_index(c).is_some())
+}
+
+/// Share of the volume that meets its mirror image from which on nothing hangs on one side only.
+const SAME_POSE_OVERLAP: f32 = 0.985;
+
+/// Nodes of the body whose mirror image is solid, too, where the figure carries something on one side; `None` where all of
+/// it is as good as symmetric.
+pub(super) fn core(graph: &VoxelGraph, voxels: &Voxels, plane: &MirrorPlane) -> Option<VoxelGraph> {
+    if plane.overlap >= SAME_POSE_OVERLAP {
+        return None;
+    }
+    let is_kept = |node: usize| {
+        let image = plane.image(graph.centres[node]);
+        let around = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
+        graph.body[node] && around.iter().any(|way| is_solid(voxels, image + *way * graph.cell))
+    };
+    let kept: Vec<bool> = (0..graph.len()).map(is_kept).collect();
+    Some(graph.of_nodes(&kept))
 }

@@ -48,6 +48,22 @@ impl VoxelGraph {
         &self.links[self.starts[node as usize] as usize..self.starts[node as usize + 1] as usize]
     }
 
+    /// The largest connected part of some nodes as the body; other nodes stay without neighbours.
+    pub(super) fn of_nodes(&self, kept: &[bool]) -> Self {
+        let (mut starts, mut links) = (vec![0u32], Vec::with_capacity(self.links.len()));
+        for node in 0..self.len() {
+            if kept[node] {
+                links.extend(self.neighbours(node as u32).iter().filter(|(next, _)| kept[*next as usize]));
+            }
+            starts.push(links.len() as u32);
+        }
+        let mut part = Self { starts, links, ..self.clone() };
+        let (component, sizes) = components(&part);
+        let largest = (0..sizes.len()).max_by_key(|&c| (sizes[c], std::cmp::Reverse(c))).unwrap_or(0);
+        part.body = (0..self.len()).map(|node| kept[node] && component[node] as usize == largest).collect();
+        part
+    }
+
     /// Units of length of a cost.
     pub(super) fn length(&self, cost: u32) -> f32 {
         cost as f32 * 0.1 * self.cell

@@ -6,7 +6,9 @@ use bevy::prelude::*;
 
 use super::{FinishedFit, FitFailure, FitReport, FitRequest, FitTemplate, FitTemplates, FittedRig};
 use crate::{
-    algo::fit_template::{FitSettings, FittedSkeleton, MeshAnalysis, TemplateJoint, choose_template, fit_template},
+    algo::fit_template::{
+        FitNote, FitSettings, FittedSkeleton, MeshAnalysis, TemplateJoint, choose_template, fit_template,
+    },
     plugins::surface::RigMesh,
     processor::Modules,
     rig::{NodeKind, Rig, Uid, label::label_side, nearest::did_you_mean},
@@ -72,7 +74,7 @@ impl Work {
         let begin = Instant::now();
         let candidates = self.candidates()?;
         let Self { from: _, mesh, request, modules, .. } = self;
-        let region = region(&mesh, &request.objects);
+        let (region, gear) = region(&mesh, &request.objects);
         let points = &mesh.rest.points;
         let analysis = MeshAnalysis::new(points, &mesh.triangles, region.as_deref(), &|part| progress(0.5 * part))?;
         let skeletons: Vec<_> = candidates.iter().map(|rig| skeleton(rig)).collect();
@@ -112,6 +114,7 @@ impl Work {
         };
         let mut fit = fit_template(&analysis, &joints[chosen], &settings, &|part| progress(0.5 + 0.5 * part))?;
         centre(&mut fit, labels, &markers);
+        fit.notes.extend((gear > 0).then_some(FitNote::Gear(gear)));
         let floor = points.iter().filter(|p| p.is_finite()).map(|p| p.dot(fit.up)).fold(f32::INFINITY, f32::min);
         let report = FitReport {
             template: name,
@@ -153,19 +156,16 @@ pub(super) fn centre(fit: &mut FittedSkeleton, labels: &[String], markers: &[(us
     }
 }
 
-/// Numbers of the triangles of some objects; `None` for all.
-fn region(mesh: &RigMesh, objects: &[usize]) -> Option<Vec<u32>> {
-    if objects.is_empty() {
-        return None;
+/// Numbers of the triangles of some objects; `None` for all. Without a choice, gear that hangs on a bone is left out, and
+/// counted.
+fn region(mesh: &RigMesh, objects: &[usize]) -> (Option<Vec<u32>>, usize) {
+    if !objects.is_empty() {
+        return (Some(mesh.rest.triangles_of(|object| objects.contains(&object))), 0);
     }
-    let mut first = 0;
-    let mut triangles = Vec::new();
-    for part in &mesh.rest.parts {
-        let count = part.triangles.len() as u32;
-        if objects.contains(&part.object) {
-            triangles.extend(first..first + count);
-        }
-        first += count;
+    // The model at rest has no skins any more.
+    let gear = mesh.file.gear();
+    match gear.len() {
+        0 => (None, 0),
+        count => (Some(mesh.rest.triangles_of(|object| !gear.contains(&object))), count),
     }
-    Some(triangles)
 }

@@ -180,7 +180,7 @@ pub fn figures(data: &Path) -> Result<Vec<Figure>, Box<dyn Error>> {
             let head: [f32; 3] = serde_json::from_value(json["game_engine"][name]["head"].clone()).ok()?;
             Some(Vec3::from(head))
         };
-        figures.push(Figure::new(body, &model, "biped", HUMAN, ["l", "r"], &place));
+        figures.push(Figure::new(body, (&model, &[]), "biped", HUMAN, ["l", "r"], &place));
     }
     for KnownMesh { file, template, joints, sides } in OTHERS {
         let model = load_model(&RealDisk, &data.join(file))?;
@@ -189,7 +189,8 @@ pub fn figures(data: &Path) -> Result<Vec<Figure>, Box<dyn Error>> {
             let node = model.nodes.iter().position(|node| node.name == name)?;
             Some(globals[node].translation.into())
         };
-        figures.push(Figure::new(file, &model.at_rest(), template, joints, sides, &place));
+        // As the app fits: without what hangs on a bone.
+        figures.push(Figure::new(file, (&model.at_rest(), &model.gear()), template, joints, sides, &place));
     }
     Ok(figures)
 }
@@ -197,7 +198,7 @@ pub fn figures(data: &Path) -> Result<Vec<Figure>, Box<dyn Error>> {
 impl Figure {
     fn new(
         name: &str,
-        model: &Model,
+        (model, gear): (&Model, &[usize]),
         template: &'static str,
         joints: &[(&str, &str)],
         sides: [&str; 2],
@@ -214,7 +215,9 @@ impl Figure {
                 }
             }
         }
-        let (points, triangles) = (model.points.clone(), model.point_triangles());
+        let all = model.point_triangles();
+        let worn = model.triangles_of(|object| !gear.contains(&object));
+        let (points, triangles) = (model.points.clone(), worn.iter().map(|at| all[*at as usize]).collect());
         Self { name: name.to_owned(), points, triangles, template, truth }
     }
 }
