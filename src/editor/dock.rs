@@ -68,6 +68,12 @@ impl Layout {
         }
     }
 
+    /// Returns `true` if a panel is in front of the others in its place.
+    pub fn is_forward(&self, title: &str) -> bool {
+        let path = self.dock.find_tab_from(|tab| tab == title);
+        path.is_some_and(|path| self.dock.leaf(path.node_path()).is_ok_and(|leaf| leaf.active == path.tab))
+    }
+
     /// Shows a panel in front of the others in its place.
     pub fn bring_forward(&mut self, title: &str) {
         if !self.shows(title) {

@@ -25,15 +25,15 @@ use bevy::{
     window::{FileDragAndDrop, PrimaryWindow, RequestRedraw, WindowCloseRequested},
 };
 
-use self::{
-    dialog::{Answer, Dialog, DialogAnswer, Purpose, Question},
-    document::is_unsaved,
-};
 pub use self::{
     bundled::{BODY, BUNDLED_MODELS, BundledModel, HEAD},
     document::{MeshSource, OpenDocument, StateFolder},
     open::LoadJob,
     save::SaveJob,
+};
+use self::{
+    dialog::{Answer, Dialog, DialogAnswer, Purpose, Question},
+    document::is_unsaved,
 };
 use super::{
     ActiveRig,
@@ -88,6 +88,13 @@ pub enum OpenRequest {
     Empty,
     /// A mesh, a template or a project.
     File(PathBuf),
+}
+
+impl OpenRequest {
+    /// Start of the document that a bundled template becomes.
+    pub(super) fn origin_of_template(name: &str) -> Origin {
+        Origin::Bundled(format!("{name} template"))
+    }
 }
 
 /// Message that a document has taken the place of the open one, or a template has been put onto the open mesh.

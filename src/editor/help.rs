@@ -5,6 +5,7 @@ use bevy_egui::egui;
 
 use super::{
     actions::{Action, ActionRequest},
+    files::attend,
     keys::KeyBindings,
     palette::obstacle,
     panel::{EditorOverlay, PanelApp, Requests},
@@ -17,7 +18,10 @@ pub struct HelpPlugin;
 
 impl Plugin for HelpPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<HelpShown>().add_overlay(HelpPage::default()).add_systems(Update, toggle_help);
+        app.init_resource::<HelpShown>()
+            .add_message::<ActionRequest>()
+            .add_overlay(HelpPage::default())
+            .add_systems(Update, toggle_help.after(attend));
     }
 }
 
@@ -123,8 +127,7 @@ pub fn rows(world: &World, words: &str) -> Vec<HelpRow> {
     let words: Vec<String> = words.split_whitespace().map(str::to_lowercase).collect();
     let bindings = world.get_resource::<KeyBindings>();
     let row = |action: Action| {
-        let keys: Vec<String> =
-            bindings.iter().flat_map(|keys| keys.keys(action)).map(ToString::to_string).collect();
+        let keys: Vec<String> = bindings.iter().flat_map(|keys| keys.keys(action)).map(ToString::to_string).collect();
         HelpRow { action, text: describe(action), keys: keys.join(", "), obstacle: obstacle(world, action) }
     };
     let is_meant = |row: &HelpRow| {

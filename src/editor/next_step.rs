@@ -10,17 +10,12 @@ use crate::{
         skinning::SkinningJob,
         surface::{RigMesh, RigMeshes},
     },
-    rig::{Rig, TagKind},
+    rig::{BuiltRig, Rig, TagKind},
 };
 
-/// True if a mesh of a rig has weights for joints that the rig has.
-pub fn is_skinned(world: &World, entity: Entity) -> bool {
-    let Some(rig) = world.get::<Rig>(entity) else { return false };
-    let built = world.get::<BuildResult>(entity).map(|built| &*built.0);
-    let meshes = world.get::<RigMeshes>(entity);
-    let meshes = meshes.iter().flat_map(|meshes| meshes.iter()).filter_map(|mesh| world.get::<RigMesh>(mesh));
-    let skins = meshes.filter_map(|mesh| rig.skin(mesh.uid));
-    skins.into_iter().any(|skin| !skin.weights.is_empty() && is_held(rig, built, skin))
+/// True if one of a rig's meshes has weights for joints that the rig has.
+pub fn has_weights<'a>(rig: &Rig, built: Option<&BuiltRig>, mut meshes: impl Iterator<Item = &'a RigMesh>) -> bool {
+    meshes.any(|mesh| rig.skin(mesh.uid).is_some_and(|skin| !skin.weights.is_empty() && is_held(rig, built, skin)))
 }
 
 /// The next sensible step for a person; `None` while something is being computed, or without a rig.
@@ -37,7 +32,8 @@ pub fn next_step(world: &World) -> Option<String> {
         1 => "1 joint".to_owned(),
         count => format!("{count} joints"),
     };
-    let is_skinned = is_skinned(world, entity);
+    let built = world.get::<BuildResult>(entity).map(|built| &*built.0);
+    let is_skinned = has_weights(rig, built, meshes.iter().filter_map(|mesh| world.get::<RigMesh>(*mesh)));
     let has_commands =
         rig.walk().flat_map(|joint| &joint.data.tags).any(|tag| matches!(tag.kind, TagKind::Command { .. }));
     Some(match (meshes.is_empty(), rig.is_empty()) {

@@ -6,6 +6,7 @@ use bevy_egui::egui::{self, Key, RichText, TextEdit, WidgetInfo, WidgetType};
 use super::{
     ActiveRig,
     actions::{Action, ActionRequest},
+    files::attend,
     help::describe,
     keys::KeyBindings,
     panel::{EditorOverlay, PanelApp, Requests},
@@ -21,7 +22,10 @@ pub struct PalettePlugin;
 
 impl Plugin for PalettePlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<PaletteShown>().add_overlay(Palette::default()).add_systems(Update, toggle_palette);
+        app.init_resource::<PaletteShown>()
+            .add_message::<ActionRequest>()
+            .add_overlay(Palette::default())
+            .add_systems(Update, toggle_palette.after(attend));
     }
 }
 

@@ -14,8 +14,8 @@ use super::{
         FollowUp, LoadJob, after_asking,
         dialog::{Answer, Dialog, Question},
         loading::{
-            BundledModel, Context, LoadedDocument, LoadedFile, MeshSource, OpenError, Work, begin, describe_bundled, document,
-            hash_of, places, project, spawn,
+            BundledModel, Context, LoadedDocument, LoadedFile, MeshSource, OpenError, Work, begin, describe_bundled,
+            document, hash_of, places, project, spawn,
         },
     },
     notice::Notice,

@@ -28,7 +28,10 @@ impl Plugin for ScreenPlugin {
             .init_resource::<HiddenMeshes>()
             .init_resource::<EditorSettings>()
             .add_message::<ActionRequest>()
-            .add_systems(Update, (switch, hide_meshes, scale_window).chain().before(super::files::attend));
+            .add_systems(
+                Update,
+                (switch, hide_meshes, scale_window).chain().after(super::settings::switch).before(super::files::attend),
+            );
     }
 }
 

@@ -155,9 +155,11 @@ impl Default for SettingsFolder {
     /// `RIGSMITH_CONFIG`, or the user's configuration folder.
     fn default() -> Self {
         let chosen = std::env::var_os("RIGSMITH_CONFIG").filter(|folder| !folder.is_empty()).map(PathBuf::from);
-        Self(chosen.or_else(|| {
-            directories::ProjectDirs::from("", "", "rigsmith").map(|dirs| dirs.config_dir().to_owned())
-        }))
+        Self(
+            chosen.or_else(|| {
+                directories::ProjectDirs::from("", "", "rigsmith").map(|dirs| dirs.config_dir().to_owned())
+            }),
+        )
     }
 }
 
@@ -250,7 +252,7 @@ fn read(world: &mut World) {
     world.resource_mut::<SettingsFile>().path = Some(path);
 }
 
-fn switch(mut actions: MessageReader<ActionRequest>, mut settings: ResMut<EditorSettings>) {
+pub(super) fn switch(mut actions: MessageReader<ActionRequest>, mut settings: ResMut<EditorSettings>) {
     for ActionRequest(action) in actions.read() {
         match action {
             Action::MoveChildren => settings.move_children = !settings.move_children,
@@ -273,7 +275,7 @@ fn write(
     layout: Option<Res<Layout>>,
     time: Res<Time<Real>>,
     exits: MessageReader<AppExit>,
-    mut notices: MessageWriter<Notice>,
+    mut commands: Commands,
 ) {
     let file = file.bypass_change_detection();
     if let Some(result) = file.saving.as_mut().and_then(check_ready) {
@@ -281,7 +283,7 @@ fn write(
         if let Err(reason) = result
             && !std::mem::replace(&mut file.refused, true)
         {
-            notices.write(Notice::warning(format!("Settings are not kept: {reason}")));
+            commands.write_message(Notice::warning(format!("Settings are not kept: {reason}")));
         }
     }
     let closing = !exits.is_empty();

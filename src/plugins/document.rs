@@ -140,14 +140,7 @@ pub struct EditRefusal {
 fn apply_edits(
     mut requests: MessageReader<EditRequest>,
     mut entity_edits: ResMut<adopt::EntityEdits>,
-    mut rigs: Query<(
-        &mut Rig,
-        &mut Selection,
-        &mut RigHistory,
-        &Symmetry,
-        Option<&AutoKey>,
-        Option<&BuildResult>,
-    )>,
+    mut rigs: Query<(&mut Rig, &mut Selection, &mut RigHistory, &Symmetry, Option<&AutoKey>, Option<&BuildResult>)>,
     mut uids: ResMut<UidSource>,
     mut edited: MessageWriter<EditReport>,
     mut refused: MessageWriter<EditRefusal>,

@@ -68,14 +68,10 @@ impl Quantity {
         }
         let far = value.abs();
         match self {
-            Self::Distance { size } if far > MOST * size => {
-                Err(ProportionError::TooLarge { value, most: MOST * size })
-            }
+            Self::Distance { size } if far > MOST * size => Err(ProportionError::TooLarge { value, most: MOST * size }),
             Self::Factor if far > MOST => Err(ProportionError::TooLarge { value, most: MOST }),
             Self::Factor if far < 1.0 / MOST => Err(ProportionError::TooFlat { value, least: 1.0 / MOST }),
-            Self::Degrees if far > MOST_DEGREES => {
-                Err(ProportionError::TooManyTurns { value, most: MOST_DEGREES })
-            }
+            Self::Degrees if far > MOST_DEGREES => Err(ProportionError::TooManyTurns { value, most: MOST_DEGREES }),
             _ => Ok(()),
         }
     }

@@ -1,6 +1,6 @@
 //! The editor's panels: what a person does in them reaches the rig as one step, and everything is told.
 
-mod desk;
+pub(crate) mod desk;
 mod face;
 mod features;
 mod tags;

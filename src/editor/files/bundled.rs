@@ -30,16 +30,8 @@ pub static BUNDLED_MODELS: [BundledModel; 3] = [
         about: "the bundled character",
         bytes: include_bytes!("../../../assets/models/biped.obj"),
     },
-    BundledModel {
-        name: "hand",
-        about: "the bundled hand",
-        bytes: include_bytes!("../../../assets/models/hand.obj"),
-    },
-    BundledModel {
-        name: HEAD,
-        about: "the bundled head",
-        bytes: include_bytes!("../../../assets/models/head.obj"),
-    },
+    BundledModel { name: "hand", about: "the bundled hand", bytes: include_bytes!("../../../assets/models/hand.obj") },
+    BundledModel { name: HEAD, about: "the bundled head", bytes: include_bytes!("../../../assets/models/head.obj") },
 ];
 
 /// Name of the bundled body.

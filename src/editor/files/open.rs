@@ -165,7 +165,9 @@ pub(super) fn start(world: &mut World, request: OpenRequest) {
     let (name, task) = match request {
         OpenRequest::Bundled => model(bundled::BODY.to_owned(), uids),
         OpenRequest::Model(name) => model(name, uids),
-        OpenRequest::Template(name) => (bundled::describe(&name), spawn(move || template_document(name))),
+        OpenRequest::Template(name) => {
+            (format!("the bundled {name} template"), spawn(move || template_document(&name)))
+        }
         OpenRequest::Empty => {
             let open = move || Ok(document(LoadedDocument::named("untitled", Rig::new(uids.next_uid(), "untitled"))));
             ("an empty rig".to_owned(), spawn(open))
@@ -207,9 +209,9 @@ fn model(name: String, mut uids: UidSource) -> (String, Task<Result<LoadedFile, 
 }
 
 /// Reads a bundled template, as a document of its own.
-fn template_document(name: String) -> Result<LoadedFile, OpenError> {
-    let mut opened = LoadedDocument::named(name.as_str(), bundled::template(&name)?);
-    opened.origin = Origin::Bundled(name);
+fn template_document(name: &str) -> Result<LoadedFile, OpenError> {
+    let mut opened = LoadedDocument::named(name, bundled::template(name)?);
+    opened.origin = OpenRequest::origin_of_template(name);
     Ok(document(opened))
 }
 

@@ -134,14 +134,7 @@ impl ControlsPanel {
     }
 
     /// The pose offset of a control; channels that are all locked are left out.
-    fn pose(
-        &mut self,
-        ui: &mut Ui,
-        node: Uid,
-        channels: Channels,
-        offset: PoseOffset,
-        length: Look,
-    ) -> Option<Change> {
+    fn pose(&mut self, ui: &mut Ui, node: Uid, channels: Channels, offset: PoseOffset, length: Look) -> Option<Change> {
         let (x, y, z) = offset.rotation.to_euler(EulerRot::XYZ);
         let angles = Vec3::new(x, y, z).map(f32::to_degrees);
         let rows = [

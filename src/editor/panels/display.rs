@@ -115,7 +115,8 @@ fn meshes(ui: &mut Ui, world: &World, requests: &mut Requests) {
             name => name.to_owned(),
         };
         let mut on = !hidden.hides(mesh.uid);
-        let clicked = ui.push_id(mesh.uid, |ui| ui.indent("mesh", |ui| ui.checkbox(&mut on, name).clicked()).inner).inner;
+        let clicked =
+            ui.push_id(mesh.uid, |ui| ui.indent("mesh", |ui| ui.checkbox(&mut on, name).clicked()).inner).inner;
         if clicked {
             // The switch of one mesh ends the common one.
             let mut next = HiddenMeshes { all: false, meshes: hidden.meshes.clone() };

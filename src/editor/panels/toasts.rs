@@ -201,7 +201,8 @@ fn free_place(area: Rect, size: egui::Vec2, taken: &[Rect]) -> Option<Rect> {
             if place.top() < area.top() {
                 return None;
             }
-            let above = taken.iter().filter(|rect| rect.expand(GAP - 1.0).intersects(place)).map(|rect| rect.top() - GAP);
+            let above =
+                taken.iter().filter(|rect| rect.expand(GAP - 1.0).intersects(place)).map(|rect| rect.top() - GAP);
             match above.min_by(f32::total_cmp) {
                 // Each round goes up.
                 Some(next) if next < bottom => bottom = next,

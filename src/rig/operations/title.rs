@@ -44,11 +44,7 @@ fn first_of<T>(pairs: &[(Uid, T)]) -> Vec<Uid> {
 }
 
 /// Title of edits: the attribute and its node, if a single value of an attribute is set.
-fn attribute(
-    edits: &[RigEdit],
-    name_of: &dyn Fn(Uid) -> Option<String>,
-    otherwise: &'static str,
-) -> Cow<'static, str> {
+fn attribute(edits: &[RigEdit], name_of: &dyn Fn(Uid) -> Option<String>, otherwise: &'static str) -> Cow<'static, str> {
     let [RigEdit::SetAttributeValue(node, attribute, _)] = edits else { return otherwise.into() };
     name_of(*node).map_or(otherwise.into(), |name| format!("Set {attribute} of {}", cut(&name)).into())
 }
