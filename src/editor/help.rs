@@ -29,6 +29,11 @@ impl Plugin for HelpPlugin {
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct HelpShown(pub bool);
 
+/// Name of the page's area on the screen.
+pub fn page_id() -> egui::Id {
+    egui::Id::new("help page")
+}
+
 /// Actions of the pointer, for the list.
 const POINTER: &[(&str, &str)] = &[
     ("Left", "the mode's tool"),
@@ -158,6 +163,7 @@ impl EditorOverlay for HelpPage {
         let mut is_open = true;
         let room = ctx.content_rect().size() - egui::vec2(48.0, 140.0);
         egui::Window::new("Help")
+            .id(page_id())
             .open(&mut is_open)
             .collapsible(false)
             .resizable(false)

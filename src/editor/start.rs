@@ -143,7 +143,7 @@ impl Job {
         }
     }
 
-    /// What the job opens.
+    /// Request for the document that the job opens.
     pub fn request(self) -> OpenRequest {
         match self {
             Self::Character | Self::Tour => OpenRequest::Model(BODY.to_owned()),

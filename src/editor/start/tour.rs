@@ -47,7 +47,7 @@ impl TourStep {
         }
     }
 
-    /// What to do, without the key.
+    /// Instruction, without the key at its beginning.
     pub fn about(self) -> &'static str {
         match self {
             Self::Joints => {
