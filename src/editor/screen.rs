@@ -11,6 +11,7 @@ use super::{
 };
 use crate::{
     plugins::{
+        RigSystems,
         display::MeshDisplay,
         drawing::{LabelChoice, RigDrawing},
         surface::{RigMesh, SkinOf},
@@ -30,7 +31,11 @@ impl Plugin for ScreenPlugin {
             .add_message::<ActionRequest>()
             .add_systems(
                 Update,
-                (switch, hide_meshes, scale_window).chain().after(super::settings::switch).before(super::files::attend),
+                (switch, hide_meshes, scale_window)
+                    .chain()
+                    .after(super::settings::switch)
+                    .before(super::files::attend)
+                    .before(RigSystems::Script),
             );
     }
 }

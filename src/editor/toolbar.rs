@@ -80,6 +80,8 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
         let controls = drawing.is_some_and(|d| d.controls);
         switch(ui, controls, "Controls", "The controls of the built rig, in Select and Pose mode", Action::Controls);
         switch(ui, drawing.is_some_and(|d| d.grid), "Grid", "The ground", Action::Grid);
+        let bones = drawing.is_some_and(|d| d.bones);
+        switch(ui, bones, "Bones", "All bones, or those of selected joints alone", Action::Bones);
     });
 }
 

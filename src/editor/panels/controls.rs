@@ -93,7 +93,7 @@ const FACTOR: Look = Look { speed: 0.005, decimals: 3, suffix: "", quantity: Qua
 const VALUE: Look = Look { speed: 0.005, decimals: 3, suffix: "", quantity: Quantity::Plain };
 
 /// Size of a running rig: the distance of its farthest node.
-fn size_of(state: &RigState) -> f32 {
+fn rig_size(state: &RigState) -> f32 {
     let far = (0..state.program().nodes().len()).map(|slot| state.global_at(slot).translation.length());
     far.filter(|far| far.is_finite()).fold(1e-3, f32::max)
 }
@@ -111,7 +111,7 @@ impl ControlsPanel {
         ui.strong(&*node.name);
         let mut change = None;
         if let (Some(control), Some(slot)) = (&node.control, state.program().node(node.uid)) {
-            let length = Look { quantity: Quantity::Distance { size: size_of(state) }, ..LENGTH };
+            let length = Look { quantity: Quantity::Distance { size: rig_size(state) }, ..LENGTH };
             change = self.pose(ui, node.uid, control.channels, state.offset_at(slot), length);
         }
         for attribute in node.attributes.iter() {

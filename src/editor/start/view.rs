@@ -57,8 +57,7 @@ impl EditorOverlay for StartView {
                     });
                     return;
                 }
-                ui.columns(2, |columns| {
-                    let [left, right] = columns else { return };
+                ui.columns_const(|[left, right]| {
                     ScrollArea::vertical().id_salt("recent").auto_shrink(false).show(left, |ui| {
                         recent(ui, world, requests);
                     });
