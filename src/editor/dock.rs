@@ -21,7 +21,11 @@ pub struct DockPlugin;
 
 impl Plugin for DockPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Panels>().init_resource::<Layout>().add_systems(EguiPrimaryContextPass, draw);
+        app.init_resource::<Panels>()
+            .init_resource::<Layout>()
+            .add_message::<ShowPanel>()
+            .add_systems(Update, show_panels)
+            .add_systems(EguiPrimaryContextPass, draw);
     }
 }
 
@@ -91,6 +95,16 @@ impl Layout {
         if !self.shows(VIEWPORT) {
             *self = Self::default();
         }
+    }
+}
+
+/// Request to show a panel in front of the others in its place.
+#[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ShowPanel(pub &'static str);
+
+fn show_panels(mut requests: MessageReader<ShowPanel>, mut layout: ResMut<Layout>) {
+    for ShowPanel(title) in requests.read() {
+        layout.bring_forward(title);
     }
 }
 

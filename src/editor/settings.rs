@@ -7,7 +7,7 @@ use std::{
 
 use bevy::{
     prelude::*,
-    tasks::{IoTaskPool, Task, futures::check_ready},
+    tasks::{IoTaskPool, Task, block_on, futures::check_ready},
 };
 use serde::{Deserialize, Serialize};
 
@@ -287,6 +287,11 @@ fn write(
         }
     }
     let closing = !exits.is_empty();
+    if let Some(task) = file.saving.take_if(|_| closing)
+        && let Err(reason) = block_on(task)
+    {
+        warn!("settings are not kept: {reason}");
+    }
     if !closing && time.elapsed().saturating_sub(file.looked) < LOOK_EVERY {
         return;
     }

@@ -24,7 +24,7 @@ pub use self::{
 use super::{
     ActiveRig,
     actions::{Action, ActionRequest},
-    dock::Layout,
+    dock::ShowPanel,
     files::{BODY, DocumentLanded, HEAD, OpenRequest, attend},
     keys::KeyBindings,
     mode::Mode,
@@ -57,6 +57,7 @@ impl Plugin for StartPlugin {
             .add_message::<OpenRequest>()
             .add_message::<DocumentLanded>()
             .add_message::<StartJob>()
+            .add_message::<ShowPanel>()
             .add_message::<bevy::window::RequestRedraw>()
             .add_overlay(view::StartView::default())
             .add_painter(tour_card::TourCard)
@@ -210,7 +211,7 @@ fn land(
     mut page: ResMut<StartPage>,
     mut mode: ResMut<Mode>,
     mut tour: ResMut<Tour>,
-    layout: Option<ResMut<Layout>>,
+    mut panels: MessageWriter<ShowPanel>,
 ) {
     let Some(DocumentLanded { origin }) = landed.read().last() else { return };
     let is_first = std::mem::take(&mut page.waits) && *origin == Origin::Empty;
@@ -221,8 +222,8 @@ fn land(
     // A document that was opened in place of the job's ends it.
     let Some(job) = page.job.take().filter(|job| *origin == job.origin()) else { return };
     mode.set_if_neq(job.mode());
-    if let (Some(panel), Some(mut layout)) = (job.panel(), layout) {
-        layout.bring_forward(panel);
+    if let Some(panel) = job.panel() {
+        panels.write(ShowPanel(panel));
     }
     if let (Job::Tour, Some(active)) = (job, active) {
         *tour = Tour::on(active.0);

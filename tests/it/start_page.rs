@@ -7,13 +7,13 @@ use std::{
     time::Duration,
 };
 
-use bevy::prelude::*;
+use bevy::{ecs::message::MessageCursor, prelude::*};
 use bevy_egui::egui;
 use rigsmith::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
-        dock::Layout,
+        dock::{Layout, ShowPanel},
         files::{
             FilesPlugin, LoadJob, OpenRequest, SaveJob, StateFolder,
             dialog::{Answer, Dialog, DialogAnswer, Question},
@@ -55,6 +55,9 @@ const PYRAMID: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1
 struct Page {
     desk: Desk,
     folder: PathBuf,
+    cursor: MessageCursor<ShowPanel>,
+    /// Panels that were asked for.
+    panels: Vec<&'static str>,
 }
 
 impl Page {
@@ -62,7 +65,6 @@ impl Page {
         let mut app = headless_app(7);
         app.insert_resource(StateFolder(Some(folder.join("state"))))
             .insert_resource(SettingsFolder(Some(folder.join("config"))))
-            .init_resource::<Layout>()
             .add_plugins((
                 FilesPlugin,
                 SettingsPlugin,
@@ -74,7 +76,8 @@ impl Page {
             ))
             .add_message::<AppExit>();
         let desk = Desk::of(strict_app(app), Entity::PLACEHOLDER, Sheet::Window, SIZE);
-        let mut page = Self { desk, folder: folder.to_owned() };
+        let (cursor, panels) = (MessageCursor::default(), Vec::new());
+        let mut page = Self { desk, folder: folder.to_owned(), cursor, panels };
         page.settle();
         page
     }
@@ -85,6 +88,8 @@ impl Page {
 
     fn frame(&mut self) {
         self.desk.frame();
+        let asked = self.desk.app.world().resource::<Messages<ShowPanel>>();
+        self.panels.extend(self.cursor.read(asked).map(|asked| asked.0));
         // Work that other tests left in the system's folder for temporary files is none of ours.
         let foreign = match self.world().resource::<Dialog>().question() {
             Some(Question::Recover(list)) => list.iter().all(|pending| !pending.path.starts_with(&self.folder)),
@@ -220,12 +225,12 @@ fn each_job_leads_where_it_says_without_a_question() {
     page.click("Build a rig");
     assert_eq!((page.mesh(), page.mode(), page.is_shown()), (None, Mode::Select, false));
     assert!(page.desk.rig().walk().any(|joint| !joint.data.tags.is_empty()) && page.asks_nothing());
-    assert!(page.world().resource::<Layout>().is_forward("Tags"));
+    assert!(page.panels.contains(&"Tags"));
 
     page.send(ActionRequest(Action::StartPage));
     page.click("Make a face");
     assert_eq!((page.mesh().as_deref(), page.mode(), page.is_shown()), (Some("head"), Mode::Pose, false));
-    assert!(page.world().resource::<Layout>().is_forward("Face") && page.asks_nothing());
+    assert!(page.panels.contains(&"Face") && page.asks_nothing());
 
     // A picture opens what it shows, and leaves the mode.
     page.send(ActionRequest(Action::StartPage));
@@ -300,6 +305,18 @@ fn recent_files_are_kept_and_missing_ones_are_grey() {
     let mut many = EditorSettings::default();
     (0..20).for_each(|number| many.remember(format!("{number}.obj").into()));
     assert_eq!((many.recent.len(), many.recent[0].clone()), (EditorSettings::RECENT, PathBuf::from("19.obj")));
+}
+
+#[test]
+fn a_panel_comes_forward() {
+    let mut layout = Layout::default();
+    assert!(layout.is_forward("Properties") && !layout.is_forward("Face"));
+    layout.bring_forward("Face");
+    assert!(layout.is_forward("Face") && !layout.is_forward("Properties"));
+    layout.toggle("Face");
+    assert!(!layout.is_forward("Face"));
+    layout.bring_forward("Face");
+    assert!(layout.shows("Face") && layout.is_forward("Face"), "a closed one is opened");
 }
 
 /// Weights for all points of a mesh, held by one joint.

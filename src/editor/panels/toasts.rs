@@ -15,6 +15,7 @@ use bevy_egui::egui::{
 
 use super::log::{LogBook, severity_symbol};
 use crate::editor::{
+    dock::ShowPanel,
     notice::{Notice, Severity},
     panel::{EditorOverlay, Requests},
     pointer::ViewportArea,
@@ -26,7 +27,7 @@ pub struct ToastsPlugin;
 
 impl Plugin for ToastsPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<NextToast>().add_systems(Last, wake_for_toasts);
+        app.init_resource::<NextToast>().add_message::<ShowPanel>().add_systems(Last, wake_for_toasts);
     }
 }
 
@@ -156,6 +157,8 @@ impl EditorOverlay for Toasts {
             ctx.move_to_top(shown.response.layer_id);
             if shown.inner {
                 closed = Some(toast.id);
+            } else if shown.response.clicked() {
+                requests.send(ShowPanel("Log"));
             }
             let rect: Rect = shown.response.rect;
             // A toast under the pointer stays.
