@@ -154,7 +154,7 @@ const DEFAULTS: &[(&str, Action)] = &[
     ("Shift+G", Action::Grid),
     ("Shift+C", Action::Controls),
     ("F1", Action::Help),
-    ("Ctrl+Home", Action::StartPage),
+    ("Shift+F1", Action::StartPage),
     ("H", Action::Bones),
     ("Shift+H", Action::Meshes),
     ("Shift+D", Action::Deforming),

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use crate::{
-    files::{LoadError, PartFileError, ReadError, SaveError, StoreError, journal::JournalError},
+    files::{LoadError, ReadError, SaveError, StoreError, journal::JournalError},
     mesh::obj::ObjError,
-    rig::{EditError, skin::SkinError},
+    rig::{EditError, SourceError, skin::SkinError},
 };
 
 /// Reason why a document is not opened.
@@ -69,7 +69,7 @@ pub(in crate::editor) enum OpenError {
     Bundled(#[from] ObjError),
     /// A bundled template is invalid.
     #[error(transparent)]
-    BundledTemplate(#[from] PartFileError),
+    BundledTemplate(#[from] SourceError),
     /// Rigsmith comes with no such mesh or template.
     #[error("Rigsmith comes with no \"{name}\"; choose from the start page")]
     NotBundled {
