@@ -249,6 +249,23 @@ fn each_job_leads_where_it_says_without_a_question() {
     assert_eq!(page.mesh().as_deref(), Some("head"));
 }
 
+/// A template goes onto the open mesh as one step, and undo brings back every byte.
+#[test]
+fn a_template_is_put_onto_the_open_mesh() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    page.click("Mesh hand");
+    let bytes = write_template(page.desk.rig());
+    page.send(ActionRequest(Action::StartPage));
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/templates/hand.rig.ron");
+    page.send(OpenRequest::File(file));
+    assert!(!page.is_shown() && page.asks_nothing());
+    assert_eq!((page.mesh().as_deref(), page.desk.steps()), (Some("hand"), (1, 1)));
+    assert_eq!(page.desk.rig().len(), shipped("hand").len());
+    change(&mut page, Change::Undo);
+    assert_eq!(write_template(page.desk.rig()), bytes);
+}
+
 #[test]
 fn pictures_show_the_bundled_meshes_and_templates() {
     let folder = folder();

@@ -36,7 +36,7 @@ impl EditorOverlay for StartView {
     fn show(&mut self, ctx: &egui::Context, world: &World, requests: &mut Requests) {
         let Some(page) = world.get_resource::<StartPage>().filter(|page| page.is_shown()) else { return };
         let room = ctx.content_rect().size();
-        let size = vec2((room.x - 40.0).clamp(240.0, 940.0), (room.y - 150.0).clamp(160.0, 470.0));
+        let size = vec2((room.x - 40.0).clamp(240.0, 940.0), (room.y - 150.0).clamp(160.0, 520.0));
         let mut is_open = true;
         egui::Window::new("Start")
             .id(page_id())
