@@ -72,7 +72,7 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
-    /// Open the window on a mesh, a template or a project; without a file on the bundled character
+    /// Open the window on a mesh, a template or a project; without a file with the start page
     Edit(EditArgs),
     /// Make gestures (clicks, strokes) on a mesh and save the skeleton, or the skinned character
     Sketch(sketch::SketchArgs),
@@ -269,7 +269,7 @@ pub enum WindowError {
 /// Window to open.
 #[derive(Debug, Clone, Default)]
 pub struct WindowRequest {
-    /// The file; the bundled character without one.
+    /// The file; the start page without one.
     pub file: Option<PathBuf>,
     /// Remote control of the window.
     #[cfg(feature = "remote")]

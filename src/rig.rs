@@ -21,6 +21,7 @@ pub mod nearest;
 pub mod operations;
 pub mod part;
 mod pose;
+pub mod proportion;
 pub mod reference;
 mod remap;
 mod revision;

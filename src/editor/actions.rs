@@ -97,10 +97,28 @@ pub enum Action {
     Grid,
     /// Shows or hides the controls of the built rig.
     Controls,
-    /// Shows or hides the list of keys.
+    /// Shows or hides the help page.
     Help,
     /// Shows or hides the palette of all actions.
     Palette,
+    /// Shows or hides the start page.
+    StartPage,
+    /// Shows or hides bones; those of selected joints are always shown.
+    Bones,
+    /// Shows or hides all meshes.
+    Meshes,
+    /// Colours the joints that move points of a mesh, or shows the colours of groups again.
+    Deforming,
+    /// Makes the interface larger.
+    UiLarger,
+    /// Makes the interface smaller.
+    UiSmaller,
+    /// Makes the interface as large as usual.
+    UiUsual,
+    /// Switches between the dark and the light theme.
+    Theme,
+    /// Turns high contrast on or off.
+    Contrast,
 }
 
 impl Action {
@@ -151,6 +169,15 @@ impl Action {
             Self::Controls,
             Self::Help,
             Self::Palette,
+            Self::StartPage,
+            Self::Bones,
+            Self::Meshes,
+            Self::Deforming,
+            Self::UiLarger,
+            Self::UiSmaller,
+            Self::UiUsual,
+            Self::Theme,
+            Self::Contrast,
         ];
         Mode::ALL.into_iter().map(Self::Mode).chain(others).collect()
     }

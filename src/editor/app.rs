@@ -22,7 +22,7 @@ use super::{
     actions::{Action, ActionRequest},
     camera::CameraPlugin,
     dock::DockPlugin,
-    files::{FilesPlugin, LoadJob, OpenRequest},
+    files::{FilesPlugin, LoadJob},
     help::HelpPlugin,
     keys::KeysPlugin,
     labels::LabelsPlugin,
@@ -33,6 +33,7 @@ use super::{
     report::ReportPlugin,
     screen::ScreenPlugin,
     settings::SettingsPlugin,
+    start::StartPlugin,
 };
 use crate::plugins::{
     RigPlugins,
@@ -49,7 +50,7 @@ use crate::plugins::{
 /// Options of opening the window.
 #[derive(Debug, Clone, Default)]
 pub struct EditorOptions {
-    /// The file to open; the bundled character without one.
+    /// The file to open; the start page without one.
     pub file: Option<PathBuf>,
     /// Remote control.
     #[cfg(feature = "remote")]
@@ -103,13 +104,8 @@ pub struct EditorPlugin {
     pub options: EditorOptions,
 }
 
-/// File to open at the start.
-#[derive(Resource, Debug, Clone)]
-struct OpenFirst(OpenRequest);
-
 impl Plugin for EditorPlugin {
     fn build(&self, app: &mut App) {
-        let first = self.options.file.clone().map_or(OpenRequest::Bundled, OpenRequest::File);
         let window = Window {
             title: "Rigsmith".to_owned(),
             name: Some("rigsmith".to_owned()),
@@ -139,7 +135,7 @@ impl Plugin for EditorPlugin {
             DockPlugin,
             CameraPlugin,
             ScreenPlugin,
-            (HelpPlugin, super::palette::PalettePlugin),
+            (HelpPlugin, super::palette::PalettePlugin, StartPlugin { file: self.options.file.clone() }),
             LabelsPlugin,
             ReportPlugin,
             FilesPlugin,
@@ -152,11 +148,10 @@ impl Plugin for EditorPlugin {
             focused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),
             unfocused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),
         })
-        .insert_resource(OpenFirst(first))
         .init_resource::<Mode>()
         .init_resource::<StatusLine>()
         .add_message::<Notice>()
-        .add_systems(Startup, (spawn_interface, open_first, say_adapter))
+        .add_systems(Startup, (spawn_interface, say_adapter))
         .add_systems(Update, carry_out)
         .add_systems(
             PreUpdate,
@@ -187,10 +182,6 @@ fn spawn_interface(mut commands: Commands, mut settings: ResMut<EguiGlobalSettin
             ..default()
         },
     ));
-}
-
-fn open_first(first: Res<OpenFirst>, mut requests: MessageWriter<OpenRequest>) {
-    requests.write(first.0.clone());
 }
 
 /// Lets calls of remote control wake the window, which sleeps while nothing happens.

@@ -12,6 +12,7 @@ use super::{
     menu,
     panel::{Panels, Requests},
     pointer::ViewportArea,
+    settings::EditorSettings,
     status, style, toolbar,
 };
 
@@ -20,7 +21,11 @@ pub struct DockPlugin;
 
 impl Plugin for DockPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Panels>().init_resource::<Layout>().add_systems(EguiPrimaryContextPass, draw);
+        app.init_resource::<Panels>()
+            .init_resource::<Layout>()
+            .add_message::<ShowPanel>()
+            .add_systems(Update, show_panels)
+            .add_systems(EguiPrimaryContextPass, draw);
     }
 }
 
@@ -42,7 +47,7 @@ impl Default for Layout {
         let [centre, _] = tree.split_left(NodeIndex::root(), 0.19, tabs(&["Hierarchy", "Groups", "Process"]));
         let [centre, right] =
             tree.split_right(centre, 0.75, tabs(&["Properties", "Tags", "Controls", "Skinning", "Face"]));
-        let [_, _] = tree.split_below(right, 0.6, tabs(&["History", "Poses"]));
+        let [_, _] = tree.split_below(right, 0.6, tabs(&["History", "Poses", "Display"]));
         let [_, _] = tree.split_below(centre, 0.84, tabs(&["Log"]));
         Self { dock }
     }
@@ -67,12 +72,39 @@ impl Layout {
         }
     }
 
+    /// Returns `true` if a panel is in front of the others in its place.
+    pub fn is_forward(&self, title: &str) -> bool {
+        let path = self.dock.find_tab_from(|tab| tab == title);
+        path.is_some_and(|path| self.dock.leaf(path.node_path()).is_ok_and(|leaf| leaf.active == path.tab))
+    }
+
+    /// Shows a panel in front of the others in its place.
+    pub fn bring_forward(&mut self, title: &str) {
+        if !self.shows(title) {
+            self.toggle(title);
+        }
+        if let Some(path) = self.dock.find_tab_from(|tab| tab == title) {
+            // The path has just been found.
+            let _ = self.dock.set_active_tab(path);
+        }
+    }
+
     /// Drops panels that do not exist (of another version), and restores a missing viewport.
     pub fn repair(&mut self, known: &[&str]) {
         self.dock.retain_tabs(|tab| tab == VIEWPORT || known.contains(&tab.as_str()));
         if !self.shows(VIEWPORT) {
             *self = Self::default();
         }
+    }
+}
+
+/// Request to show a panel in front of the others in its place.
+#[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ShowPanel(pub &'static str);
+
+fn show_panels(mut requests: MessageReader<ShowPanel>, mut layout: ResMut<Layout>) {
+    for ShowPanel(title) in requests.read() {
+        layout.bring_forward(title);
     }
 }
 
@@ -83,7 +115,7 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
         Err(_) => None,
     };
     let Some(ctx) = context else { return };
-    style::apply(&ctx);
+    style::apply(&ctx, world.get_resource::<EditorSettings>().map(EditorSettings::look).unwrap_or_default());
     if ctx.has_requested_repaint() {
         trace!("drawing on: {:?}", ctx.repaint_causes());
     }

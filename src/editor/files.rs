@@ -4,6 +4,7 @@
 //! when it is complete. Actions that would lose unsaved changes ask first; see [`dialog`] for the questions. Every
 //! document has a journal from its first frame; see [`recovery`] for work left by a crash.
 
+mod bundled;
 pub mod dialog;
 mod dialog_view;
 mod document;
@@ -24,14 +25,15 @@ use bevy::{
     window::{FileDragAndDrop, PrimaryWindow, RequestRedraw, WindowCloseRequested},
 };
 
-use self::{
-    dialog::{Answer, Dialog, DialogAnswer, Purpose, Question},
-    document::is_unsaved,
-};
 pub use self::{
+    bundled::{BODY, BUNDLED_MODELS, BundledModel, HEAD},
     document::{MeshSource, OpenDocument, StateFolder},
     open::LoadJob,
     save::SaveJob,
+};
+use self::{
+    dialog::{Answer, Dialog, DialogAnswer, Purpose, Question},
+    document::is_unsaved,
 };
 use super::{
     ActiveRig,
@@ -43,7 +45,7 @@ use super::{
     settings::EditorSettings,
 };
 use crate::{
-    files::{RealDisk, remove_stale_temps},
+    files::{RealDisk, journal::Origin, remove_stale_temps},
     plugins::{RigSystems, journal::JournalTrouble},
 };
 
@@ -54,6 +56,7 @@ impl Plugin for FilesPlugin {
     fn build(&self, app: &mut App) {
         app.add_message::<OpenRequest>()
             .add_message::<DialogAnswer>()
+            .add_message::<DocumentLanded>()
             .add_message::<ActionRequest>()
             .add_message::<Notice>()
             .add_message::<JournalTrouble>()
@@ -77,10 +80,28 @@ impl Plugin for FilesPlugin {
 pub enum OpenRequest {
     /// The bundled character.
     Bundled,
+    /// A bundled mesh, by name.
+    Model(String),
+    /// A bundled template, by name.
+    Template(String),
     /// An empty rig without a mesh.
     Empty,
     /// A mesh, a template or a project.
     File(PathBuf),
+}
+
+impl OpenRequest {
+    /// Start of the document that a bundled template becomes.
+    pub(super) fn origin_of_template(name: &str) -> Origin {
+        Origin::Bundled(format!("{name} template"))
+    }
+}
+
+/// Message that a document has taken the place of the open one, or a template has been put onto the open mesh.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct DocumentLanded {
+    /// Start of the document; a template on an open mesh has none of its own.
+    pub origin: Origin,
 }
 
 /// Action that follows once unsaved changes are saved or discarded.
@@ -99,9 +120,10 @@ pub enum FollowUp {
 /// Parts shared with [`recovery`] and [`render_errors`](super::render_errors).
 pub(super) mod loading {
     pub(in crate::editor) use super::{
+        bundled::{BundledModel, describe as describe_bundled, template as bundled_template},
         document::{Context, MeshSource, places},
         error::{OpenError, WriteError},
-        open::{LoadedDocument, LoadedFile, Work, begin, bundled_model, document, hash_of, project, spawn},
+        open::{LoadedDocument, LoadedFile, Work, begin, document, hash_of, project, spawn},
         save::{place_bundled, snapshot},
     };
 }

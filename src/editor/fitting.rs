@@ -12,6 +12,7 @@ use super::{
     mode::Mode,
     notice::Notice,
     panel::{PanelApp, Requests, ViewportPainter},
+    start::{self, StartPage},
 };
 use crate::{
     files::bundled_characters,
@@ -40,7 +41,10 @@ impl Plugin for FittingPlugin {
             .add_painter(FitBar)
             .add_systems(
                 Update,
-                (act.before(RigSystems::Script).before(toggle_help), show_result.after(RigSystems::Bind)),
+                (
+                    act.before(RigSystems::Script).before(toggle_help).before(start::toggle),
+                    show_result.after(RigSystems::Bind),
+                ),
             );
     }
 }
@@ -52,16 +56,17 @@ fn act(
     rigs: Query<(Option<&RigMeshes>, Has<FittedRig>, &RigHistory)>,
     meshes: Query<&RigMesh>,
     jobs: Query<(Entity, &FitJob)>,
-    (mode, help): (Option<Res<Mode>>, Option<Res<HelpShown>>),
+    (mode, help, start): (Option<Res<Mode>>, Option<Res<HelpShown>>, Option<Res<StartPage>>),
     mut commands: Commands,
 ) {
     let Some((rig, (own, is_fitted, history))) = active.and_then(|active| Some((active.0, rigs.get(active.0).ok()?)))
     else {
         return;
     };
-    // A stroke that is drawn, a ghost that is placed and the list of keys take the key for themselves.
-    let is_free = !help.is_some_and(|help| help.0)
-        && mode.is_none_or(|mode| matches!(*mode, Mode::Select | Mode::Move | Mode::Rotate | Mode::Scale));
+    // A stroke that is drawn, a ghost that is placed, the help and the start page take the key for themselves.
+    let is_covered = help.is_some_and(|help| help.0) || start.is_some_and(|start| start.is_shown());
+    let is_free =
+        !is_covered && mode.is_none_or(|mode| matches!(*mode, Mode::Select | Mode::Move | Mode::Rotate | Mode::Scale));
     for ActionRequest(action) in actions.read() {
         match action {
             Action::Fit => {

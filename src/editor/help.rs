@@ -1,29 +1,38 @@
-//! List of keys and actions, over the whole window until it is closed.
+//! Help page with a search: every action, its keys, and the reason if it can do nothing at present.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
 
 use super::{
     actions::{Action, ActionRequest},
+    files::attend,
     keys::KeyBindings,
+    palette::obstacle,
     panel::{EditorOverlay, PanelApp, Requests},
+    settings::SettingsFile,
     style,
 };
 
-/// Plugin of the list of keys.
+/// Plugin of the help page.
 pub struct HelpPlugin;
 
 impl Plugin for HelpPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<HelpShown>().add_overlay(Help).add_systems(Update, toggle_help);
+        app.init_resource::<HelpShown>()
+            .add_message::<ActionRequest>()
+            .add_overlay(HelpPage::default())
+            .add_systems(Update, toggle_help.after(attend));
     }
 }
 
-/// Visibility of the list.
+/// Visibility of the page.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct HelpShown(pub bool);
 
-struct Help;
+/// Name of the page's area on the screen.
+pub fn page_id() -> egui::Id {
+    egui::Id::new("help page")
+}
 
 /// Actions of the pointer, for the list.
 const POINTER: &[(&str, &str)] = &[
@@ -90,50 +99,151 @@ pub fn describe(action: Action) -> String {
         Action::LocalAxes => "Local axes",
         Action::Grid => "Grid",
         Action::Controls => "Controls",
-        Action::Help => "Keys",
+        Action::Help => "Help",
         Action::Palette => "All actions",
+        Action::StartPage => "Start page",
+        Action::Bones => "Bones",
+        Action::Meshes => "Meshes",
+        Action::Deforming => "Joints that deform",
+        Action::UiLarger => "Larger interface",
+        Action::UiSmaller => "Smaller interface",
+        Action::UiUsual => "Interface as large as usual",
+        Action::Theme => "Dark or light theme",
+        Action::Contrast => "High contrast",
     };
     text.to_owned()
 }
 
-impl EditorOverlay for Help {
+/// Action with its keys and the reason if it can do nothing at present.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HelpRow {
+    /// The action.
+    pub action: Action,
+    /// Description of the action.
+    pub text: String,
+    /// Keys of the action, with commas between them.
+    pub keys: String,
+    /// Reason why it can do nothing at present.
+    pub obstacle: Option<&'static str>,
+}
+
+/// Actions whose description, keys or reason contain all words, in the order of [`Action::all`].
+pub fn rows(world: &World, words: &str) -> Vec<HelpRow> {
+    let words: Vec<String> = words.split_whitespace().map(str::to_lowercase).collect();
+    let bindings = world.get_resource::<KeyBindings>();
+    let row = |action: Action| {
+        let keys: Vec<String> = bindings.iter().flat_map(|keys| keys.keys(action)).map(ToString::to_string).collect();
+        HelpRow { action, text: describe(action), keys: keys.join(", "), obstacle: obstacle(world, action) }
+    };
+    let is_meant = |row: &HelpRow| {
+        let all = format!("{} {} {}", row.text, row.keys, row.obstacle.unwrap_or_default()).to_lowercase();
+        words.iter().all(|word| all.contains(word.as_str()))
+    };
+    Action::all().into_iter().map(row).filter(is_meant).collect()
+}
+
+/// The page.
+#[derive(Default)]
+struct HelpPage {
+    words: String,
+    was_shown: bool,
+}
+
+impl EditorOverlay for HelpPage {
     fn show(&mut self, ctx: &egui::Context, world: &World, requests: &mut Requests) {
-        if !world.get_resource::<HelpShown>().is_some_and(|shown| shown.0) {
+        let is_shown = world.get_resource::<HelpShown>().is_some_and(|shown| shown.0);
+        let opened = is_shown && !self.was_shown;
+        self.was_shown = is_shown;
+        if !is_shown {
             return;
         }
-        let mut open = true;
-        let height = (ctx.viewport_rect().height() - 120.0).max(200.0);
-        egui::Window::new("Keys")
-            .open(&mut open)
+        if opened {
+            self.words.clear();
+        }
+        let mut is_open = true;
+        let room = ctx.content_rect().size() - egui::vec2(48.0, 140.0);
+        egui::Window::new("Help")
+            .id(page_id())
+            .open(&mut is_open)
             .collapsible(false)
             .resizable(false)
             .anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO)
             .show(ctx, |ui| {
-                egui::ScrollArea::vertical().max_height(height).show(ui, |ui| {
-                    egui::Grid::new("pointer").num_columns(2).striped(true).show(ui, |ui| {
-                        for (what, does) in POINTER {
-                            ui.colored_label(style::ACCENT, *what);
-                            ui.label(*does);
-                            ui.end_row();
-                        }
-                    });
-                    ui.separator();
-                    let Some(keys) = world.get_resource::<KeyBindings>() else { return };
-                    let half = keys.0.len().div_ceil(2);
-                    egui::Grid::new("keys").num_columns(4).striped(true).spacing([18.0, 4.0]).show(ui, |ui| {
-                        for row in 0..half {
-                            for (chord, action) in [keys.0.get(row), keys.0.get(row + half)].into_iter().flatten() {
-                                ui.colored_label(style::ACCENT, chord.to_string());
-                                ui.label(describe(*action));
-                            }
-                            ui.end_row();
-                        }
-                    });
-                    ui.weak("Other keys can be bound in the settings file.");
+                ui.set_width(room.x.clamp(280.0, 660.0));
+                self.head(ui, opened, requests);
+                egui::ScrollArea::vertical().max_height(room.y.max(120.0)).auto_shrink([false, true]).show(ui, |ui| {
+                    self.pointer(ui);
+                    actions(ui, &rows(world, &self.words));
                 });
+                let file = world.get_resource::<SettingsFile>().and_then(SettingsFile::path);
+                let place = file.map_or_else(|| "the settings file".to_owned(), |file| file.display().to_string());
+                ui.weak(format!("Keys are bound in {place}."));
             });
-        if !open {
+        if !is_open || ctx.input(|input| input.key_pressed(egui::Key::Escape)) {
             requests.set(HelpShown(false));
         }
     }
+}
+
+impl HelpPage {
+    /// Draws the search field, and the ways to the other helpers.
+    fn head(&mut self, ui: &mut egui::Ui, opened: bool, requests: &mut Requests) {
+        ui.horizontal(|ui| {
+            let width = (ui.available_width() - 190.0).max(100.0);
+            let field = egui::TextEdit::singleline(&mut self.words).hint_text("Search").desired_width(width);
+            let field = ui.add(field);
+            field.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::TextEdit, true, "Search help"));
+            if opened {
+                field.request_focus();
+            }
+            for action in [Action::StartPage, Action::Palette] {
+                if ui.button(describe(action)).clicked() {
+                    requests.set(HelpShown(false));
+                    requests.send(ActionRequest(action));
+                }
+            }
+        });
+        ui.add_space(4.0);
+    }
+
+    /// Draws what the pointer does.
+    fn pointer(&self, ui: &mut egui::Ui) {
+        let words: Vec<String> = self.words.split_whitespace().map(str::to_lowercase).collect();
+        let is_meant = |(what, does): &&(&str, &str)| {
+            let all = format!("{what} {does}").to_lowercase();
+            words.iter().all(|word| all.contains(word.as_str()))
+        };
+        let list: Vec<&(&str, &str)> = POINTER.iter().filter(is_meant).collect();
+        if list.is_empty() {
+            return;
+        }
+        ui.strong("Pointer, in the viewport");
+        egui::Grid::new("pointer").num_columns(2).striped(true).show(ui, |ui| {
+            for (what, does) in list {
+                ui.colored_label(style::accent(ui.visuals()), *what);
+                ui.label(*does);
+                ui.end_row();
+            }
+        });
+        ui.add_space(6.0);
+    }
+}
+
+/// Draws actions, a row each.
+fn actions(ui: &mut egui::Ui, list: &[HelpRow]) {
+    if list.is_empty() {
+        ui.weak("No action is called so.");
+        return;
+    }
+    ui.strong("Actions");
+    egui::Grid::new("actions").num_columns(3).striped(true).spacing([18.0, 4.0]).show(ui, |ui| {
+        for row in list {
+            let is_free = row.obstacle.is_none();
+            let color = if is_free { ui.visuals().text_color() } else { style::quiet(ui.visuals()) };
+            ui.colored_label(color, &row.text);
+            ui.colored_label(style::accent(ui.visuals()), &row.keys);
+            ui.weak(row.obstacle.unwrap_or_default());
+            ui.end_row();
+        }
+    });
 }

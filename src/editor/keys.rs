@@ -88,6 +88,17 @@ impl std::fmt::Display for Chord {
 #[serde(transparent)]
 pub struct KeyBindings(pub Vec<(Chord, Action)>);
 
+/// Key that was bound to two actions.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DoubleBinding {
+    /// The key.
+    pub chord: Chord,
+    /// The action that keeps it.
+    pub kept: Action,
+    /// The action that does not get it.
+    pub refused: Action,
+}
+
 /// Default bindings.
 const DEFAULTS: &[(&str, Action)] = &[
     ("Q", Action::Mode(Mode::Select)),
@@ -143,6 +154,15 @@ const DEFAULTS: &[(&str, Action)] = &[
     ("Shift+G", Action::Grid),
     ("Shift+C", Action::Controls),
     ("F1", Action::Help),
+    ("Shift+F1", Action::StartPage),
+    ("H", Action::Bones),
+    ("Shift+H", Action::Meshes),
+    ("Shift+D", Action::Deforming),
+    ("Ctrl+Plus", Action::UiLarger),
+    ("Ctrl+Shift+Plus", Action::UiLarger),
+    ("Ctrl+Equal", Action::UiLarger),
+    ("Ctrl+Minus", Action::UiSmaller),
+    ("Ctrl+0", Action::UiUsual),
 ];
 
 impl Default for KeyBindings {
@@ -164,6 +184,26 @@ impl KeyBindings {
         self.0.iter().find(|(_, known)| *known == action).map(|(chord, _)| chord)
     }
 
+    /// All keys of an action.
+    pub fn keys(&self, action: Action) -> impl Iterator<Item = &Chord> {
+        self.0.iter().filter(move |(_, known)| *known == action).map(|(chord, _)| chord)
+    }
+
+    /// Removes the bindings of keys that are bound to another action before; returns them.
+    pub fn refuse_doubles(&mut self) -> Vec<DoubleBinding> {
+        let mut refused = Vec::new();
+        let mut kept: Vec<(Chord, Action)> = Vec::with_capacity(self.0.len());
+        for (chord, action) in std::mem::take(&mut self.0) {
+            match kept.iter().find(|(known, _)| *known == chord) {
+                Some((_, first)) if *first == action => {}
+                Some((_, first)) => refused.push(DoubleBinding { chord, kept: *first, refused: action }),
+                None => kept.push((chord, action)),
+            }
+        }
+        self.0 = kept;
+        refused
+    }
+
     /// Chords bound to two actions.
     pub fn doubles(&self) -> Vec<&Chord> {
         let twice = |number: usize| self.0[..number].iter().any(|(chord, _)| *chord == self.0[number].0);
@@ -171,14 +211,15 @@ impl KeyBindings {
     }
 }
 
-/// Name of a key: letters by the character they type, all other keys by their position.
+/// Name of a key: letters, plus and minus by the character they type, all other keys by their position.
 pub fn key_name(input: &KeyboardInput) -> Option<String> {
     if let Key::Character(text) = &input.logical_key {
         let mut letters = text.chars();
-        if let (Some(letter), None) = (letters.next(), letters.next())
-            && letter.is_alphabetic()
-        {
-            return Some(letter.to_uppercase().collect());
+        match (letters.next(), letters.next()) {
+            (Some(letter), None) if letter.is_alphabetic() => return Some(letter.to_uppercase().collect()),
+            (Some('+'), None) => return Some("Plus".to_owned()),
+            (Some('-'), None) => return Some("Minus".to_owned()),
+            _ => {}
         }
     }
     let name = format!("{:?}", input.key_code);

@@ -46,7 +46,15 @@ pub(super) fn show(
     let mut reset = false;
     egui::MenuBar::new().ui(ui, |ui| {
         ui.menu_button("File", |ui| {
-            entries(ui, &[Some(("New", Action::New)), Some(("Open…", Action::Open))]);
+            entries(
+                ui,
+                &[
+                    Some(("Start page", Action::StartPage)),
+                    None,
+                    Some(("New", Action::New)),
+                    Some(("Open…", Action::Open)),
+                ],
+            );
             let list =
                 world.get_resource::<EditorSettings>().map(|settings| settings.recent.clone()).unwrap_or_default();
             ui.add_enabled_ui(!list.is_empty(), |ui| {
@@ -135,6 +143,10 @@ pub(super) fn show(
                     Some(("Local axes", Action::LocalAxes)),
                     Some(("Grid", Action::Grid)),
                     Some(("Controls", Action::Controls)),
+                    None,
+                    Some(("Bones", Action::Bones)),
+                    Some(("Meshes", Action::Meshes)),
+                    Some(("Joints that deform", Action::Deforming)),
                 ],
             );
         });
@@ -150,9 +162,20 @@ pub(super) fn show(
                 reset = true;
                 ui.close();
             }
+            entries(
+                ui,
+                &[
+                    None,
+                    Some(("Larger", Action::UiLarger)),
+                    Some(("Smaller", Action::UiSmaller)),
+                    Some(("As large as usual", Action::UiUsual)),
+                    Some(("Dark or light", Action::Theme)),
+                    Some(("High contrast", Action::Contrast)),
+                ],
+            );
         });
         ui.menu_button("Help", |ui| {
-            entries(ui, &[Some(("All actions", Action::Palette)), Some(("Keys", Action::Help))])
+            entries(ui, &[Some(("All actions", Action::Palette)), Some(("Help", Action::Help))])
         });
     });
     if let Some(path) = recent {

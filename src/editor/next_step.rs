@@ -2,16 +2,21 @@
 
 use bevy::prelude::*;
 
-use super::{ActiveRig, actions::Action, keys::KeyBindings, mode::Mode};
+use super::{ActiveRig, actions::Action, keys::KeyBindings, mode::Mode, panels::skinning::is_held};
 use crate::{
     plugins::{
-        commands::{BuildFailure, Processor},
+        commands::{BuildFailure, BuildResult, Processor},
         fit::FitJob,
         skinning::SkinningJob,
         surface::{RigMesh, RigMeshes},
     },
-    rig::{Rig, TagKind},
+    rig::{BuiltRig, Rig, TagKind},
 };
+
+/// True if one of a rig's meshes has weights for joints that the rig has.
+pub fn has_weights<'a>(rig: &Rig, built: Option<&BuiltRig>, mut meshes: impl Iterator<Item = &'a RigMesh>) -> bool {
+    meshes.any(|mesh| rig.skin(mesh.uid).is_some_and(|skin| !skin.weights.is_empty() && is_held(rig, built, skin)))
+}
 
 /// The next sensible step for a person; `None` while something is being computed, or without a rig.
 pub fn next_step(world: &World) -> Option<String> {
@@ -27,10 +32,8 @@ pub fn next_step(world: &World) -> Option<String> {
         1 => "1 joint".to_owned(),
         count => format!("{count} joints"),
     };
-    let is_skinned = meshes
-        .iter()
-        .filter_map(|mesh| world.get::<RigMesh>(*mesh))
-        .any(|mesh| rig.skin(mesh.uid).is_some_and(|skin| !skin.weights.is_empty()));
+    let built = world.get::<BuildResult>(entity).map(|built| &*built.0);
+    let is_skinned = has_weights(rig, built, meshes.iter().filter_map(|mesh| world.get::<RigMesh>(*mesh)));
     let has_commands =
         rig.walk().flat_map(|joint| &joint.data.tags).any(|tag| matches!(tag.kind, TagKind::Command { .. }));
     Some(match (meshes.is_empty(), rig.is_empty()) {

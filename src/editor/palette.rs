@@ -6,6 +6,7 @@ use bevy_egui::egui::{self, Key, RichText, TextEdit, WidgetInfo, WidgetType};
 use super::{
     ActiveRig,
     actions::{Action, ActionRequest},
+    files::attend,
     help::describe,
     keys::KeyBindings,
     panel::{EditorOverlay, PanelApp, Requests},
@@ -21,7 +22,10 @@ pub struct PalettePlugin;
 
 impl Plugin for PalettePlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<PaletteShown>().add_overlay(Palette::default()).add_systems(Update, toggle_palette);
+        app.init_resource::<PaletteShown>()
+            .add_message::<ActionRequest>()
+            .add_overlay(Palette::default())
+            .add_systems(Update, toggle_palette.after(attend));
     }
 }
 
@@ -41,6 +45,9 @@ fn toggle_palette(mut actions: MessageReader<ActionRequest>, mut shown: ResMut<P
 
 /// The reason why an action can do nothing at present, in a few words; `None` if it can.
 pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
+    if is_of_window(action) {
+        return None;
+    }
     let Some(entity) = world.get_resource::<ActiveRig>().map(|rig| rig.0) else { return Some("no rig is open") };
     let rig = world.get::<Rig>(entity)?;
     let history = world.get::<RigHistory>(entity);
@@ -56,7 +63,8 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
             (!selected).then_some("no joint is selected")
         }
         Action::SelectAll | Action::StorePose | Action::ResetPose => rig.is_empty().then_some("there are no joints"),
-        Action::Fit => (!has_mesh).then_some("no mesh is open"),
+        Action::Fit | Action::Meshes => (!has_mesh).then_some("no mesh is open"),
+        Action::Deforming => rig.skins().next().is_none().then_some("no mesh has weights"),
         Action::Skin if !has_mesh => Some("no mesh is open"),
         Action::Skin => rig.is_empty().then_some("there are no joints"),
         Action::Build => (!has_commands()).then_some("no joint has commands: add tags, or a part"),
@@ -68,6 +76,24 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
         }
         _ => None,
     }
+}
+
+/// True for actions that need no rig.
+fn is_of_window(action: Action) -> bool {
+    matches!(
+        action,
+        Action::New
+            | Action::Open
+            | Action::Quit
+            | Action::Help
+            | Action::Palette
+            | Action::StartPage
+            | Action::UiLarger
+            | Action::UiSmaller
+            | Action::UiUsual
+            | Action::Theme
+            | Action::Contrast
+    )
 }
 
 /// Actions whose descriptions contain all words; those that begin with the first word come first.
@@ -135,7 +161,7 @@ impl EditorOverlay for Palette {
                     let why_not = obstacle(world, *action);
                     ui.horizontal(|ui| {
                         let text = RichText::new(describe(*action));
-                        let text = if why_not.is_some() { text.color(style::QUIET) } else { text };
+                        let text = if why_not.is_some() { text.color(style::quiet(ui.visuals())) } else { text };
                         let row = ui.selectable_label(number == self.place, text);
                         if moved != 0 && number == self.place {
                             row.scroll_to_me(None);
@@ -145,10 +171,12 @@ impl EditorOverlay for Palette {
                         }
                         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                             if let Some(key) = keys.and_then(|keys| keys.key(*action)) {
-                                ui.label(RichText::new(key.to_string()).small().color(style::ACCENT));
+                                let color = style::accent(ui.visuals());
+                                ui.label(RichText::new(key.to_string()).small().color(color));
                             }
                             if let Some(why_not) = why_not {
-                                ui.label(RichText::new(why_not).small().color(style::QUIET));
+                                let color = style::quiet(ui.visuals());
+                                ui.label(RichText::new(why_not).small().color(color));
                             }
                         });
                     });

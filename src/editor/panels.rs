@@ -4,6 +4,7 @@
 //! text being typed. Long lists draw the visible rows only.
 
 pub mod controls;
+pub mod display;
 pub mod face;
 pub mod hierarchy;
 pub mod history;
@@ -50,6 +51,7 @@ impl Plugin for PanelsPlugin {
         .add_panel(face::FacePanel::default())
         .add_panel(poses::PosesPanel::default())
         .add_panel(history::HistoryPanel::default())
+        .add_panel(display::DisplayPanel::default())
         .add_panel(log::LogPanel::default())
         .add_overlay(toasts::Toasts::default());
     }

@@ -14,8 +14,8 @@ use super::{
         FollowUp, LoadJob, after_asking,
         dialog::{Answer, Dialog, Question},
         loading::{
-            Context, LoadedDocument, LoadedFile, MeshSource, OpenError, Work, begin, bundled_model, document, hash_of,
-            places, project, spawn,
+            BundledModel, Context, LoadedDocument, LoadedFile, MeshSource, OpenError, Work, begin, describe_bundled,
+            document, hash_of, places, project, spawn,
         },
     },
     notice::Notice,
@@ -117,7 +117,7 @@ pub(super) fn answered(world: &mut World, mut list: Vec<PendingJournal>, answer:
 /// Description in one line of work that can be recovered: its document, its number of edits, and its damage.
 pub fn describe(pending: &PendingJournal) -> String {
     let on = match &pending.origin {
-        Origin::Bundled(_) => "the bundled character".to_owned(),
+        Origin::Bundled(name) => describe_bundled(name),
         Origin::Empty => "an empty rig".to_owned(),
         Origin::Mesh { path, .. } | Origin::Template { path, .. } | Origin::Project { path, .. } => stem(path),
         Origin::Unknown => {
@@ -224,7 +224,7 @@ fn with_meshes(recovered: &RecoveredJournal) -> LoadedDocument {
     let mut opened = LoadedDocument::named(name, Rig::default());
     for mesh in context.meshes {
         let model = match &mesh.source {
-            MeshSource::Bundled => bundled_model().map_err(OpenError::from),
+            MeshSource::Bundled(name) => BundledModel::named(name).and_then(BundledModel::read),
             MeshSource::File(path) => load_model(&RealDisk, path).map_err(OpenError::from),
         };
         match model {

@@ -109,14 +109,14 @@ fn make_safe(world: &mut World) -> String {
 
 /// Writes a copy of the project beside the journal.
 fn rescue(world: &mut World, rig: Entity) -> Result<PathBuf, WriteError> {
-    let (mut snapshot, is_bundled) = loading::snapshot(world, rig).ok_or(WriteError::NothingOpen)?;
+    let (mut snapshot, bundled) = loading::snapshot(world, rig).ok_or(WriteError::NothingOpen)?;
     let document = world.get::<OpenDocument>(rig).ok_or(WriteError::NothingOpen)?;
     let journal = document.journal().path();
     let folder = journal.as_deref().and_then(std::path::Path::parent).map(std::path::Path::to_path_buf);
     let folder = folder.unwrap_or_else(std::env::temp_dir);
     let path = folder.join(format!("{}-rescue.rigsmith.ron", document.name));
-    if is_bundled {
-        let bundled = loading::place_bundled(&path)?;
+    if let Some(name) = bundled {
+        let bundled = loading::place_bundled(&path, &name)?;
         for mesh in snapshot.meshes.iter_mut().filter(|mesh| mesh.path.as_os_str().is_empty()) {
             mesh.path.clone_from(&bundled);
         }

@@ -15,9 +15,13 @@ use serde::{Deserialize, Serialize};
 use super::{
     actions::{Action, ActionRequest},
     dock::Layout,
-    keys::KeyBindings,
+    files::attend,
+    help::describe,
+    keys::{DoubleBinding, KeyBindings},
     notice::Notice,
     panel::Panels,
+    panels::log::LogSystems,
+    style::{Look, WindowTheme},
 };
 use crate::files::{Disk, ReadError, RealDisk, SaveError, read_capped, save_atomic};
 
@@ -27,16 +31,19 @@ pub struct SettingsPlugin;
 impl Plugin for SettingsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<EditorSettings>()
+            .init_resource::<SettingsFolder>()
             .init_resource::<SettingsFile>()
+            .init_resource::<KeyBindings>()
+            .add_message::<ActionRequest>()
             .add_message::<Notice>()
             .add_systems(PreStartup, read)
-            .add_systems(Update, switch)
-            .add_systems(Last, write);
+            .add_systems(Update, switch.before(attend))
+            .add_systems(Last, write.before(LogSystems));
     }
 }
 
 /// Stored switches and lists.
-#[derive(Resource, Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+#[derive(Resource, Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct EditorSettings {
     /// Recently opened files, the last one first.
@@ -45,6 +52,25 @@ pub struct EditorSettings {
     pub move_children: bool,
     /// The axes of gizmos.
     pub gizmo_space: GizmoSpace,
+    /// Size of the interface; 1 is that of the system.
+    pub ui_scale: f32,
+    /// Dark or light.
+    pub theme: WindowTheme,
+    /// Shows text and lines with high contrast if `true`.
+    pub high_contrast: bool,
+}
+
+impl Default for EditorSettings {
+    fn default() -> Self {
+        Self {
+            recent: Vec::new(),
+            move_children: false,
+            gizmo_space: GizmoSpace::default(),
+            ui_scale: 1.0,
+            theme: WindowTheme::default(),
+            high_contrast: false,
+        }
+    }
 }
 
 /// Axes along which gizmos move, turn and scale.
@@ -79,12 +105,62 @@ impl GizmoSpace {
     }
 }
 
+/// Sizes of the interface, as factors of the system's size.
+pub static UI_SCALES: [f32; 9] = [0.75, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5];
+
 impl EditorSettings {
-    /// Adds a file at the top of the recent files; ten are kept.
+    /// The largest number of recent files.
+    pub const RECENT: usize = 12;
+
+    /// Adds a file at the top of the recent files.
     pub fn remember(&mut self, path: PathBuf) {
-        self.recent.retain(|known| *known != path);
+        self.forget(&path);
         self.recent.insert(0, path);
-        self.recent.truncate(10);
+        self.recent.truncate(Self::RECENT);
+    }
+
+    /// Removes a file from the recent files.
+    pub fn forget(&mut self, path: &Path) {
+        self.recent.retain(|known| known != path);
+    }
+
+    /// The look of the window.
+    pub fn look(&self) -> Look {
+        Look { theme: self.theme, high_contrast: self.high_contrast }
+    }
+
+    /// Makes the interface larger by a step, or smaller.
+    fn step_scale(&mut self, larger: bool) {
+        let now = self.ui_scale;
+        let next = if larger {
+            UI_SCALES.iter().find(|scale| **scale > now + 1e-3)
+        } else {
+            UI_SCALES.iter().rfind(|scale| **scale < now - 1e-3)
+        };
+        self.ui_scale = next.copied().unwrap_or(now);
+    }
+
+    /// Corrects values from a file that make no sense.
+    fn repair(&mut self) {
+        let [least, .., most] = UI_SCALES;
+        self.ui_scale = if self.ui_scale.is_finite() { self.ui_scale.clamp(least, most) } else { 1.0 };
+        self.recent.truncate(Self::RECENT);
+    }
+}
+
+/// Folder of the settings; without one they are not stored.
+#[derive(Resource, Debug, Clone, PartialEq, Eq)]
+pub struct SettingsFolder(pub Option<PathBuf>);
+
+impl Default for SettingsFolder {
+    /// `RIGSMITH_CONFIG`, or the user's configuration folder.
+    fn default() -> Self {
+        let chosen = std::env::var_os("RIGSMITH_CONFIG").filter(|folder| !folder.is_empty()).map(PathBuf::from);
+        Self(
+            chosen.or_else(|| {
+                directories::ProjectDirs::from("", "", "rigsmith").map(|dirs| dirs.config_dir().to_owned())
+            }),
+        )
     }
 }
 
@@ -104,15 +180,20 @@ pub struct SettingsFile {
 }
 
 impl SettingsFile {
-    /// A file on a disk; without a path, settings are not kept.
+    /// A file on a disk; without a path, the file is in the [`SettingsFolder`].
     pub fn new(disk: Arc<dyn Disk>, path: Option<PathBuf>) -> Self {
         Self { disk, path, refused: false, failed: false, text: None, looked: Duration::ZERO, saving: None }
+    }
+
+    /// The file; `None` where settings are not stored.
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
     }
 }
 
 impl Default for SettingsFile {
     fn default() -> Self {
-        Self::new(Arc::new(RealDisk), folder().map(|folder| folder.join("settings.ron")))
+        Self::new(Arc::new(RealDisk), None)
     }
 }
 
@@ -165,20 +246,18 @@ const MAX_BYTES: u64 = 1 << 20;
 /// Interval of checks for changes while the window is in use.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// Folder of the settings: `RIGSMITH_CONFIG`, or the user's configuration folder.
-pub fn folder() -> Option<PathBuf> {
-    let chosen = std::env::var_os("RIGSMITH_CONFIG").filter(|folder| !folder.is_empty()).map(PathBuf::from);
-    chosen.or_else(|| directories::ProjectDirs::from("", "", "rigsmith").map(|dirs| dirs.config_dir().to_owned()))
-}
-
 fn read(world: &mut World) {
-    let file = world.resource::<SettingsFile>();
+    let folder = world.resource::<SettingsFolder>().0.clone();
+    let mut file = world.resource_mut::<SettingsFile>();
+    file.path = file.path.take().or_else(|| folder.map(|folder| folder.join("settings.ron")));
     let Some(path) = file.path.clone() else { return };
-    match content(file.disk.as_ref(), &path) {
+    let disk = file.disk.clone();
+    match content(disk.as_ref(), &path) {
         Ok(None) => {}
         Ok(Some(kept)) => take(world, &path, kept),
         Err(error) => {
             world.write_message(Notice::warning(error.to_string()));
+            // A file with manual edits is not overwritten.
             world.resource_mut::<SettingsFile>().refused = true;
         }
     }
@@ -196,11 +275,17 @@ fn content(disk: &dyn Disk, path: &Path) -> Result<Option<SettingsContent>, Sett
     Ok(Some(kept))
 }
 
-fn take(world: &mut World, path: &Path, kept: SettingsContent) {
+fn take(world: &mut World, path: &Path, mut kept: SettingsContent) {
+    kept.settings.repair();
     world.insert_resource(kept.settings);
-    if let Some(keys) = kept.keys {
-        for chord in keys.doubles() {
-            let text = format!("{}: {chord} is bound twice; the first one counts", path.display());
+    if let Some(mut keys) = kept.keys {
+        for DoubleBinding { chord, kept, refused } in keys.refuse_doubles() {
+            let text = format!(
+                "{}: {chord} is bound to \"{}\" and not to \"{}\" as well; bind one of them to another key",
+                path.display(),
+                describe(kept),
+                describe(refused)
+            );
             world.write_message(Notice::warning(text));
         }
         world.insert_resource(keys);
@@ -215,11 +300,16 @@ fn take(world: &mut World, path: &Path, kept: SettingsContent) {
     }
 }
 
-fn switch(mut actions: MessageReader<ActionRequest>, mut settings: ResMut<EditorSettings>) {
+pub(super) fn switch(mut actions: MessageReader<ActionRequest>, mut settings: ResMut<EditorSettings>) {
     for ActionRequest(action) in actions.read() {
         match action {
             Action::MoveChildren => settings.move_children = !settings.move_children,
             Action::GizmoSpace => settings.gizmo_space = settings.gizmo_space.next(),
+            Action::UiLarger => settings.step_scale(true),
+            Action::UiSmaller => settings.step_scale(false),
+            Action::UiUsual => settings.ui_scale = 1.0,
+            Action::Theme => settings.theme = settings.theme.other(),
+            Action::Contrast => settings.high_contrast = !settings.high_contrast,
             _ => {}
         }
     }
@@ -233,7 +323,7 @@ fn write(
     layout: Option<Res<Layout>>,
     time: Res<Time<Real>>,
     exits: MessageReader<AppExit>,
-    mut notices: MessageWriter<Notice>,
+    mut commands: Commands,
 ) {
     let file = file.bypass_change_detection();
     let closing = !exits.is_empty();
@@ -243,7 +333,7 @@ fn write(
         file.saving = None;
         let failed = std::mem::replace(&mut file.failed, result.is_err());
         if let (Err(reason), false) = (result, failed) {
-            notices.write(Notice::warning(format!("Settings are not kept: {reason}")));
+            commands.write_message(Notice::warning(format!("Settings are not kept: {reason}")));
         }
     }
     if !closing && time.elapsed().saturating_sub(file.looked) < LOOK_EVERY {

@@ -22,19 +22,20 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World) {
             Some(next) => format!("Next: {next}  ·  {}", counts(world)),
             None => counts(world),
         };
+        let quiet = style::quiet(ui.visuals());
+        let (accent, obstacle_color) = (style::accent(ui.visuals()), style::obstacle(ui.visuals()));
         let room = ui.available_width();
-        let right =
-            ui.painter().layout_no_wrap(counts.clone(), egui::FontId::proportional(12.0), style::QUIET).size().x;
+        let right = ui.painter().layout_no_wrap(counts.clone(), egui::FontId::proportional(12.0), quiet).size().x;
         let text = match (&status.banner, &status.obstacle) {
-            (Some(banner), _) => egui::RichText::new(banner).color(style::ACCENT).strong(),
-            (None, Some(obstacle)) => egui::RichText::new(obstacle).color(style::OBSTACLE),
+            (Some(banner), _) => egui::RichText::new(banner).color(accent).strong(),
+            (None, Some(obstacle)) => egui::RichText::new(obstacle).color(obstacle_color),
             (None, None) => egui::RichText::new(&status.hint),
         };
         ui.scope(|ui| {
             ui.set_max_width((room - right - 24.0).max(80.0));
             if let Some(doing) = doing(world) {
                 ui.add(egui::Spinner::new().size(12.0));
-                ui.label(egui::RichText::new(doing).color(style::ACCENT));
+                ui.label(egui::RichText::new(doing).color(accent));
             }
             let label = ui.add(egui::Label::new(text).truncate());
             if let Some(hover) = status.obstacle.as_ref().or(Some(&status.hint)).filter(|hint| !hint.is_empty()) {
@@ -42,7 +43,7 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World) {
             }
         });
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.label(egui::RichText::new(counts).size(12.0).color(style::QUIET));
+            ui.label(egui::RichText::new(counts).size(12.0).color(quiet));
         });
     });
 }

@@ -35,7 +35,7 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
             let key = keys.and_then(|keys| keys.key(Action::Mode(choice))).map(ToString::to_string);
             let label = egui::Button::selectable(mode == choice, choice.name());
             let label = match &key {
-                Some(key) => label.shortcut_text(egui::RichText::new(key).small().color(style::QUIET)),
+                Some(key) => label.shortcut_text(egui::RichText::new(key).small().color(style::quiet(ui.visuals()))),
                 None => label,
             };
             let response = ui.add(label).on_hover_text(tip(purpose(choice), Action::Mode(choice)));
@@ -80,6 +80,8 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
         let controls = drawing.is_some_and(|d| d.controls);
         switch(ui, controls, "Controls", "The controls of the built rig, in Select and Pose mode", Action::Controls);
         switch(ui, drawing.is_some_and(|d| d.grid), "Grid", "The ground", Action::Grid);
+        let bones = drawing.is_some_and(|d| d.bones);
+        switch(ui, bones, "Bones", "All bones, or those of selected joints alone", Action::Bones);
     });
 }
 

@@ -8,10 +8,11 @@ use super::{
     Workbench,
     posing::{PoseError, WriteValue},
 };
-use crate::rig::{BuiltNode, PoseOffset, RestTransform};
+use crate::rig::{
+    BuiltNode, PoseOffset, RestTransform,
+    proportion::{ProportionError, Quantity},
+};
 
-/// Largest distance to which a control is moved, in sizes of the rig, and the largest factor by which it is scaled.
-const MOST: f32 = 1e4;
 /// Difference, relative to the value, from which on a value is held.
 const SAME: f32 = 1e-4;
 
@@ -42,20 +43,26 @@ impl fmt::Display for HeldValue {
 pub(super) type NodeWrite = (Entity, BuiltNode, WriteValue);
 
 impl Workbench {
-    /// Refuses values that would move a control out of all proportion to its rig, where numbers have no digits left.
+    /// Refuses values that make no sense on the rig, such as those where numbers have no digits left.
     pub(super) fn check_range(&self, writes: &[NodeWrite]) -> Result<(), PoseError> {
         let built = self.built().ok_or(PoseError::NotBuilt)?;
         let state = self.runtime()?.state();
         let far = built.nodes.iter().filter_map(|node| Some(state.global(node.uid)?.translation.length()));
         let size = far.filter(|far| far.is_finite()).fold(1e-3, f32::max);
-        for (_, node, value) in writes {
-            let (value, most) = match value {
-                WriteValue::Translate(by) => (by, MOST * size),
-                WriteValue::Scale(by) => (by, MOST),
-                _ => continue,
+        for (_, node, written) in writes {
+            let (vector, quantity) = match written {
+                WriteValue::Translate(by) => (by, Quantity::Distance { size }),
+                WriteValue::Rotate(by) => (by, Quantity::Degrees),
+                WriteValue::Scale(by) => (by, Quantity::Factor),
+                WriteValue::Attribute(..) | WriteValue::AttributeText(..) => continue,
             };
-            if value.abs().max_element() > most {
-                return Err(PoseError::OutOfRange { node: node.name.to_string(), value: value.to_string(), most });
+            for number in vector.to_array() {
+                let Err(reason) = quantity.check(number) else { continue };
+                let (node, value) = (node.name.to_string(), vector.to_string());
+                return Err(match reason {
+                    ProportionError::TooLarge { most, .. } => PoseError::OutOfRange { node, value, most },
+                    reason => PoseError::Disproportionate { node, reason },
+                });
             }
         }
         Ok(())

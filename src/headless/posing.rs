@@ -20,7 +20,10 @@ use crate::{
         schema::Attributes,
     },
     processor::{Exclusion, FindError, RunReport},
-    rig::{AttributeKind, BuiltNode, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::listed},
+    rig::{
+        AttributeKind, BuiltNode, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::listed,
+        proportion::ProportionError,
+    },
     solve::program::ProgramError,
 };
 
@@ -157,6 +160,14 @@ pub enum PoseError {
         value: String,
         /// Largest number that is taken.
         most: f32,
+    },
+    /// A number that makes no sense on any rig.
+    #[error("\"{node}\": {reason}")]
+    Disproportionate {
+        /// The node.
+        node: String,
+        /// Reason, with the number.
+        reason: ProportionError,
     },
     /// A pose in which a node has no finite place.
     #[error("the pose puts \"{node}\" at no finite place; write smaller values")]

@@ -21,8 +21,9 @@ pub use self::{
 use super::{
     RigSystems,
     animation::AutoKey,
+    commands::BuildResult,
     configure_sets,
-    history::{RecordedOperation, RigHistory},
+    history::{RecordedOperation, RigHistory, joint_name},
 };
 pub use super::{
     schema::{Joint, NodeLabel, NodeOf},
@@ -139,7 +140,7 @@ pub struct EditRefusal {
 fn apply_edits(
     mut requests: MessageReader<EditRequest>,
     mut entity_edits: ResMut<adopt::EntityEdits>,
-    mut rigs: Query<(&mut Rig, &mut Selection, &mut RigHistory, &Symmetry, Option<&AutoKey>)>,
+    mut rigs: Query<(&mut Rig, &mut Selection, &mut RigHistory, &Symmetry, Option<&AutoKey>, Option<&BuildResult>)>,
     mut uids: ResMut<UidSource>,
     mut edited: MessageWriter<EditReport>,
     mut refused: MessageWriter<EditRefusal>,
@@ -151,7 +152,7 @@ fn apply_edits(
     for (request, is_of_entities) in of_entities.chain(requests.read().map(|request| (request.clone(), false))) {
         let EditRequest { rig, change } = &request;
         let rig = *rig;
-        let Ok((mut document, mut selection, mut history, symmetry, auto_key)) = rigs.get_mut(rig) else {
+        let Ok((mut document, mut selection, mut history, symmetry, auto_key, built)) = rigs.get_mut(rig) else {
             refused.write(EditRefusal { rig, reason: ChangeError::NoRig(rig) });
             continue;
         };
@@ -171,10 +172,13 @@ fn apply_edits(
         let plane = symmetry.0.filter(|_| !is_of_entities);
         let keyed = |operation| auto_key.map_or(Cow::Borrowed(operation), |auto_key| auto_key.keyed(operation));
         let result = match change {
-            Change::Do(operation) => history
-                .edit(&mut document, &mut selected, &mut uids, plane, &keyed(operation))
-                .map(recorded)
-                .map_err(ChangeError::from),
+            Change::Do(operation) => {
+                let title = titled(operation, &document, built);
+                history
+                    .edit_as(title, &mut document, &mut selected, &mut uids, plane, &keyed(operation))
+                    .map(recorded)
+                    .map_err(ChangeError::from)
+            }
             Change::Undo => history
                 .undo(&mut document, &mut selected)
                 .ok_or(ChangeError::NothingToUndo)
@@ -185,10 +189,13 @@ fn apply_edits(
                 .ok_or(ChangeError::NothingToRedo)
                 .and_then(|redone| Ok(redone?))
                 .map(|step| done(step.name.clone(), Some(Commit::Redone(step)))),
-            Change::Preview(operation) => history
-                .preview(&mut document, &mut uids, symmetry.0, &keyed(operation))
-                .map(previewed)
-                .map_err(ChangeError::from),
+            Change::Preview(operation) => {
+                let title = titled(operation, &document, built);
+                history
+                    .preview(title, &mut document, &mut uids, symmetry.0, &keyed(operation))
+                    .map(previewed)
+                    .map_err(ChangeError::from)
+            }
             Change::Commit | Change::CancelPreview if !history.is_previewing() => continue,
             Change::Commit => {
                 let Some(step) = history.commit_preview(&mut selected) else { continue };
@@ -209,4 +216,12 @@ fn apply_edits(
             }
         }
     }
+}
+
+/// Title of an operation's step, with the names of joints and of nodes that commands created.
+fn titled(operation: &Operation, rig: &Rig, built: Option<&BuildResult>) -> Cow<'static, str> {
+    operation.title(&|node| {
+        let created = || Some(built?.0.node(node)?.name.to_string());
+        joint_name(rig, node).or_else(created)
+    })
 }

@@ -8,6 +8,7 @@
 //! Sizes in pixels are logical pixels. If several cameras are marked, the first active one by order counts.
 
 pub mod controls;
+mod deforming;
 pub mod ghosts;
 pub mod grid;
 pub mod ink;
@@ -20,6 +21,7 @@ pub mod theme;
 
 use bevy::{asset::AssetEventSystems, camera::CameraUpdateSystems, camera::visibility::VisibilitySystems, prelude::*};
 
+pub use deforming::deforming_joints;
 pub use ghosts::{GhostJoint, Ghosts};
 pub use labels::{LETTER, LabelCandidate, label_places};
 pub use theme::{BACKGROUND, Theme};
@@ -74,6 +76,10 @@ pub struct DrawingSystems;
 pub struct RigDrawing {
     /// Draws rigs if `true`.
     pub rig: bool,
+    /// Draws all bones if `true`; else only those of selected joints and of the hovered one.
+    pub bones: bool,
+    /// Colours joints by whether they move points of a mesh, in place of their groups, if `true`.
+    pub deforming: bool,
     /// The controls of built rigs.
     pub controls: bool,
     /// Choice of the labels.
@@ -96,6 +102,8 @@ impl Default for RigDrawing {
     fn default() -> Self {
         Self {
             rig: true,
+            bones: true,
+            deforming: false,
             controls: true,
             labels: LabelChoice::None,
             write_labels: true,

@@ -34,6 +34,8 @@ pub struct RigHistory {
 /// Preview of a drag: its edits are applied to the rig but not recorded.
 struct Preview {
     name: &'static str,
+    /// Title of the step that it becomes.
+    title: Cow<'static, str>,
     outcome: Outcome,
 }
 
@@ -62,6 +64,12 @@ fn weight_bytes(step: &Step) -> usize {
     step.forward.iter().map(RigEdit::weight_bytes).sum()
 }
 
+/// Name of a joint of a rig: its label, or the first digits of its uid.
+pub(super) fn joint_name(rig: &Rig, joint: Uid) -> Option<String> {
+    let label = rig.joint(joint)?.data.label.clone();
+    Some(label.unwrap_or_else(|| format!("joint {:04x}", joint.0 >> 48)))
+}
+
 fn apply_all(rig: &mut Rig, edits: &[RigEdit]) -> Result<(), EditError> {
     edits.iter().try_for_each(|edit| rig.apply(edit).map(drop))
 }
@@ -74,6 +82,9 @@ impl RigHistory {
 
     /// Runs an operation and records it as one step. Joints that the operation deletes leave the selection. A preview
     /// is reverted first.
+    ///
+    /// # Errors
+    /// The operation is refused; then the rig is as it was without a preview.
     pub fn edit(
         &mut self,
         rig: &mut Rig,
@@ -82,18 +93,36 @@ impl RigHistory {
         symmetry: Option<MirrorPlane>,
         operation: &Operation,
     ) -> Result<RecordedOperation, OperationError> {
-        self.cancel_preview(rig);
-        let outcome = operation.run(rig, uids, symmetry)?;
-        Ok(self.record(selection, operation.name(), outcome))
+        let title = operation.title(&|node| joint_name(rig, node));
+        self.edit_as(title, rig, selection, uids, symmetry, operation)
     }
 
-    /// Previews an operation: the rig changes, its history does not. A former preview is reverted first, so that each
-    /// preview starts from the rig without one.
+    /// Runs an operation as [`Self::edit`] does, and gives its step a title.
+    ///
+    /// # Errors
+    /// As for [`Self::edit`].
+    pub fn edit_as(
+        &mut self,
+        title: Cow<'static, str>,
+        rig: &mut Rig,
+        selection: &mut Selection,
+        uids: &mut UidSource,
+        symmetry: Option<MirrorPlane>,
+        operation: &Operation,
+    ) -> Result<RecordedOperation, OperationError> {
+        self.cancel_preview(rig);
+        let outcome = operation.run(rig, uids, symmetry)?;
+        Ok(self.record(selection, operation.name(), title, outcome))
+    }
+
+    /// Previews an operation, whose step gets a title: the rig changes, its history does not. A former preview is reverted
+    /// first, so that each preview starts from the rig without one.
     ///
     /// # Errors
     /// The operation is refused; then no preview remains.
     pub fn preview(
         &mut self,
+        title: Cow<'static, str>,
         rig: &mut Rig,
         uids: &mut UidSource,
         symmetry: Option<MirrorPlane>,
@@ -101,14 +130,14 @@ impl RigHistory {
     ) -> Result<&'static str, OperationError> {
         self.cancel_preview(rig);
         let (name, outcome) = (operation.name(), operation.run(rig, uids, symmetry)?);
-        self.preview = Some(Preview { name, outcome });
+        self.preview = Some(Preview { name, title, outcome });
         Ok(name)
     }
 
     /// Records the preview as one step; `None` without a preview.
     pub fn commit_preview(&mut self, selection: &mut Selection) -> Option<RecordedOperation> {
-        let Preview { name, outcome } = self.preview.take()?;
-        Some(self.record(selection, name, outcome))
+        let Preview { name, title, outcome } = self.preview.take()?;
+        Some(self.record(selection, name, title, outcome))
     }
 
     /// Reverts the preview exactly, bit by bit; false without a preview.
@@ -134,7 +163,13 @@ impl RigHistory {
     }
 
     /// Records an operation whose edits have already been applied.
-    fn record(&mut self, selection: &mut Selection, name: &'static str, outcome: Outcome) -> RecordedOperation {
+    fn record(
+        &mut self,
+        selection: &mut Selection,
+        name: &'static str,
+        title: Cow<'static, str>,
+        outcome: Outcome,
+    ) -> RecordedOperation {
         let before = selection.0.clone();
         let after = outcome
             .selected
@@ -144,7 +179,7 @@ impl RigHistory {
         if outcome.edits.is_empty() && after == before {
             return RecordedOperation { name, step: None, notes: outcome.notes };
         }
-        let step = Step { name: name.clone(), forward: outcome.edits, backward: outcome.inverses, before, after };
+        let step = Step { name: title, forward: outcome.edits, backward: outcome.inverses, before, after };
         let step = Arc::new(step);
         selection.0.clone_from(&step.after);
         self.discarded += u64::from(self.can_redo());

@@ -15,6 +15,7 @@ mod place;
 mod pose;
 mod symmetry;
 mod tags;
+mod title;
 mod transform;
 
 use std::sync::Arc;

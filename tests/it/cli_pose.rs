@@ -415,6 +415,8 @@ fn wrong_inputs_are_refused_and_write_nothing() {
         ("hook.turn=1", 1, "\"hook\" has no attribute \"turn\"; it has none"),
         ("lift.translate=(1e20,0,0)", 1, "out of all proportion to the rig; write numbers up to"),
         ("lift.scale=(1e6,1,1)", 1, "out of all proportion"),
+        ("lift.scale=(0,1,1)", 1, "flattens everything below"),
+        ("lift.rotate=(0,99999,0)", 1, "more than ten turns"),
         ("hook.rotate=(0,0,0)", 1, "control"),
         ("@joint hook.rotate=(0,0,0)", 1, "control"),
         ("@joint nothing.rotate=(0,0,0)", 1, "nothing"),

@@ -474,3 +474,47 @@ fn labels_come_on_demand() {
     app.update();
     assert_eq!(labels(&app).len(), 1);
 }
+
+/// Hidden bones leave those in use: less is drawn, and only the selected joint has a label.
+#[test]
+fn hidden_bones_leave_the_selected_joint() {
+    let (mut app, rig, _) = drawing_app();
+    let head = app.world().get::<Rig>(rig).unwrap().find_label("head").unwrap();
+    app.world_mut().get_mut::<Selection>(rig).unwrap().0 = vec![head];
+    app.world_mut().resource_mut::<RigDrawing>().labels = LabelChoice::All;
+    app.world_mut().resource_mut::<RigDrawing>().grid = false;
+    let look = |app: &mut App| {
+        app.update();
+        app.update();
+        let labels = app.world().get::<RigLabels>(rig).unwrap().0.len();
+        let mut shown = app.world_mut().query::<&Mesh3d>();
+        let meshes: Vec<AssetId<Mesh>> = shown.iter(app.world()).map(|mesh| mesh.id()).collect();
+        let assets = app.world().resource::<Assets<Mesh>>();
+        (labels, meshes.iter().filter_map(|mesh| assets.get(*mesh)).map(Mesh::count_vertices).sum::<usize>())
+    };
+    let all = look(&mut app);
+    app.world_mut().resource_mut::<RigDrawing>().bones = false;
+    let few = look(&mut app);
+    assert_eq!(few.0, 1, "the selected joint keeps its label");
+    assert!(all.0 > 8 && few.1 > 0 && few.1 * 4 < all.1, "{all:?} became {few:?}");
+    app.world_mut().resource_mut::<RigDrawing>().bones = true;
+    assert_eq!(look(&mut app), all);
+}
+
+#[test]
+fn joints_that_deform_are_those_with_weights() {
+    use rigsmith::{mesh::model::Weights, plugins::drawing::deforming_joints, rig::SkinData};
+    let mut rig = crate::bench::shipped("biped");
+    assert!(deforming_joints(&rig).is_empty());
+    let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).take(3).collect();
+    let mut weights = Weights::default();
+    weights.push(vec![(0, 0.5), (2, 0.5)]);
+    weights.push(vec![(2, 1.0)]);
+    let skin = SkinData { joints: joints.clone(), weights, at_rest: true, ..Default::default() };
+    rig.apply(&RigEdit::SetSkin(Uid(98), Some(std::sync::Arc::new(skin)))).unwrap();
+    assert_eq!(
+        deforming_joints(&rig),
+        [joints[0], joints[2]].into(),
+        "the one without an influence is bound, but moves nothing"
+    );
+}

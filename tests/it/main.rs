@@ -148,6 +148,8 @@ mod skin_file;
 mod solvers;
 mod sources;
 mod stages;
+#[cfg(feature = "editor")]
+mod start_page;
 mod stroke;
 mod surface;
 mod surface_refresh;

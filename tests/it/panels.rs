@@ -1,6 +1,6 @@
 //! The editor's panels: what a person does in them reaches the rig as one step, and everything is told.
 
-mod desk;
+pub(crate) mod desk;
 mod face;
 mod features;
 mod tags;
@@ -13,7 +13,7 @@ use rigsmith::{
     editor::{
         actions::{Action, ActionRequest},
         mode::Mode,
-        notice::Notice,
+        notice::{Notice, Severity},
         panel::EditorPanel,
         panels::{
             controls::ControlsPanel,
@@ -510,7 +510,7 @@ fn everything_is_told_and_the_log_is_capped() {
 }
 
 #[test]
-fn toasts_are_few_and_errors_stay() {
+fn toasts_are_few_and_errors_stay_longest() {
     let size = egui::vec2(1280.0, 720.0);
     let mut desk = Desk::with(Sheet::Overlay(Box::new(Toasts::default())), size);
     let shown = |desk: &Desk| desk.seen.iter().filter(|seen| seen.label == "Close").count();
@@ -523,12 +523,131 @@ fn toasts_are_few_and_errors_stay() {
     assert_eq!(shown(&desk), 4);
     let low = desk.seen.iter().filter(|seen| seen.label == "Close").all(|seen| seen.rect.top() > 200.0);
     assert!(low, "none is near the toolbar");
-    desk.time += 30.0;
+    desk.time += 8.0;
     desk.frames(3);
-    assert_eq!(shown(&desk), 1, "the error stays");
+    assert_eq!(shown(&desk), 1, "the error stays longer");
     desk.click("Close");
     desk.frames(2);
     assert_eq!(shown(&desk), 0);
+    desk.app.world_mut().write_message(Notice::error("It cannot be. Do that instead."));
+    desk.frames(3);
+    assert_eq!(shown(&desk), 1);
+    desk.time += 60.0;
+    desk.frames(3);
+    assert_eq!(shown(&desk), 0, "even an error goes, and is in the log");
+    assert!(desk.told().iter().any(|told| told.starts_with("It cannot be")));
+}
+
+#[test]
+fn equal_toasts_are_counted() {
+    let size = egui::vec2(1280.0, 720.0);
+    let mut desk = Desk::with(Sheet::Overlay(Box::new(Toasts::default())), size);
+    let shown = |desk: &Desk| desk.seen.iter().filter(|seen| seen.label == "Close").count();
+    let send = |desk: &mut Desk, notice: Notice| {
+        desk.app.world_mut().write_message(notice);
+    };
+    send(&mut desk, Notice::warning("again"));
+    send(&mut desk, Notice::warning("again"));
+    desk.frames(3);
+    assert!(desk.says("again ×2"), "{:?}", desk.seen);
+    // Another one between them makes no second toast.
+    send(&mut desk, Notice::info("other"));
+    desk.frames(2);
+    send(&mut desk, Notice::warning("again"));
+    desk.frames(3);
+    assert!(desk.says("again ×3") && desk.says("other") && shown(&desk) == 2, "{:?}", desk.seen);
+
+    // A key pressed too often is told, as what it is.
+    for change in [Change::Undo, Change::Undo, Change::Redo] {
+        desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change });
+    }
+    desk.frames(3);
+    let book = desk.app.world().resource::<LogBook>();
+    let told: Vec<_> = book.entries().map(|entry| (entry.notice.severity, entry.notice.text.as_str())).collect();
+    let none = |what: &str| (Severity::Info, format!("There is nothing to {what}."));
+    let [undo, redo] = ["undo", "redo"].map(none);
+    assert!(told.contains(&(undo.0, undo.1.as_str())) && told.contains(&(redo.0, redo.1.as_str())), "{told:?}");
+    assert!(desk.says("There is nothing to undo. ×2"), "{:?}", desk.seen);
+}
+
+/// A wrong number is told, and neither dropped nor taken: in the fields of a joint at rest and posed.
+#[test]
+fn wrong_numbers_are_told() {
+    let mut desk = Desk::new(PropertiesPanel::default());
+    let joints = desk.chain(&["a", "b"]);
+    desk.select(&[joints[1]]);
+    let (steps, before) = (desk.steps(), desk.rig().clone());
+    let cases: &[(bool, &str, &str, &str)] = &[
+        (false, "Position Y", "seven", "\"seven\" is no number"),
+        (false, "Position Y", "1e20", "out of all proportion"),
+        (false, "Scale X", "0", "flattens everything below"),
+        (false, "Rotation Z", "99999", "more than ten turns"),
+        (true, "Pose scale Y", "0", "flattens everything below"),
+        (true, "Pose rotation X", "-99999", "more than ten turns"),
+        (true, "Pose offset X", "inf", "\"inf\" is no number"),
+    ];
+    for (posing, field, text, reason) in cases {
+        desk.app.insert_resource(if *posing { Mode::Pose } else { Mode::Move });
+        desk.frames(2);
+        desk.click(field);
+        desk.type_text(text);
+        desk.key(Key::Enter);
+        desk.frames(2);
+        let told = desk.told().pop().unwrap_or_default();
+        assert!(told.starts_with(&format!("{field} stays as it was: ")) && told.contains(reason), "{field}: {told}");
+        assert_eq!(desk.steps(), steps, "{field}");
+    }
+    assert_eq!(*desk.rig(), before);
+
+    // What makes sense is taken, and undo brings back every byte.
+    let text = |desk: &Desk| rigsmith::rig::template::write_template(desk.rig());
+    let bytes = text(&desk);
+    desk.app.insert_resource(Mode::Move);
+    desk.frames(2);
+    for (field, number) in [("Scale X", "0.5"), ("Rotation Z", "90"), ("Position Y", "100")] {
+        desk.click(field);
+        desk.type_text(number);
+        desk.key(Key::Enter);
+        desk.frames(2);
+    }
+    assert_eq!(desk.steps().1, steps.1 + 3, "{:?}", desk.told());
+    for _ in 0..3 {
+        desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
+        desk.frames(2);
+    }
+    assert_eq!(text(&desk), bytes);
+}
+
+/// Steps of the history say which joint.
+#[test]
+fn steps_name_their_joints() {
+    let mut desk = Desk::new(HistoryPanel::default());
+    let joints = desk.chain(&["hips", "hand_l", "hand_r"]);
+    let bent = rigsmith::rig::PoseOffset::from_rotation(Quat::from_rotation_z(1.0));
+    let start = desk.rig().clone();
+    let operations = [
+        (Operation::Pose(vec![(joints[1], bent)]), "Pose hand_l"),
+        (Operation::Pose(joints.iter().map(|joint| (*joint, bent)).collect()), "Pose hips and 2 more"),
+        (Operation::ResetPose(vec![joints[2]]), "Reset hand_r"),
+        (Operation::ResetPose(Vec::new()), "Reset pose"),
+        (Operation::Move { to: vec![(joints[0], Vec3::ONE)], with_children: true }, "Move hips"),
+        (Operation::Labels(vec![(joints[1], "wrist_l".to_owned())]), "Rename hand_l"),
+        (Operation::Delete { joints: vec![joints[2]], keep_children: true }, "Delete hand_r"),
+    ];
+    let count = operations.len();
+    let before = desk.steps().0;
+    for (operation, title) in operations {
+        desk.edit(operation);
+        let history = desk.app.world().get::<rigsmith::plugins::history::RigHistory>(desk.rig).unwrap();
+        assert_eq!(history.steps().0.last(), Some(&title));
+    }
+    let number = before + count;
+    assert_eq!(desk.find(&format!("{number} Delete hand_r")).on, Some(true));
+    for _ in 0..count {
+        desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
+        desk.frames(2);
+    }
+    assert_eq!(*desk.rig(), start);
 }
 
 #[test]

@@ -204,7 +204,7 @@ impl DialogView {
             field.request_focus();
             select_stem(ui.ctx(), field.id, &self.text);
         }
-        ui.label(egui::RichText::new(hint).color(style::QUIET));
+        ui.label(egui::RichText::new(hint).color(style::quiet(ui.visuals())));
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         let path = PathBuf::from(self.text.trim());
         if browse {

@@ -56,8 +56,8 @@ pub(super) enum SavedAt {
 /// Source of an open mesh.
 #[derive(Component, Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MeshSource {
-    /// The bundled mesh.
-    Bundled,
+    /// A mesh that comes with Rigsmith, by name.
+    Bundled(String),
     /// A mesh file.
     File(PathBuf),
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::{
     files::{LoadError, ReadError, SaveError, StoreError, journal::JournalError},
     mesh::obj::ObjError,
-    rig::{EditError, skin::SkinError},
+    rig::{EditError, SourceError, skin::SkinError},
 };
 
 /// Reason why a document is not opened.
@@ -64,9 +64,18 @@ pub(in crate::editor) enum OpenError {
         /// Error of the reader.
         source: JournalError,
     },
-    /// The bundled character is invalid.
+    /// A bundled mesh is invalid.
     #[error(transparent)]
     Bundled(#[from] ObjError),
+    /// A bundled template is invalid.
+    #[error(transparent)]
+    BundledTemplate(#[from] SourceError),
+    /// Rigsmith comes with no such mesh or template.
+    #[error("Rigsmith comes with no \"{name}\"; choose from the start page")]
+    NotBundled {
+        /// The name.
+        name: String,
+    },
     /// The rig refuses a joint of the file.
     #[error(transparent)]
     Edit(#[from] EditError),
@@ -96,7 +105,13 @@ pub(in crate::editor) enum WriteError {
          these endings"
     )]
     Ending,
-    /// The folder has other files under the names that the bundled character would get.
+    /// Rigsmith comes with no such mesh, which work of another version may have.
+    #[error("this version comes with no mesh \"{name}\"; open its file and skin it again")]
+    NotBundled {
+        /// The name.
+        name: String,
+    },
+    /// The folder has other files under the names that the bundled mesh would get.
     #[error("there is another {names} in that folder already; choose another name or folder")]
     Occupied {
         /// The names, in words.

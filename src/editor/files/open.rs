@@ -8,7 +8,8 @@ use bevy::{
 };
 
 use super::{
-    FollowUp, OpenRequest, active,
+    DocumentLanded, FollowUp, OpenRequest, active,
+    bundled::{self, BundledModel},
     dialog::{Dialog, Question},
     document::{
         Context, ContextMesh, MeshSource, OpenDocument, SavedAt, close_journal, disk, is_same, is_unsaved, last_step,
@@ -30,10 +31,7 @@ use crate::{
         },
         load_model, load_project, load_rig_text, load_template, read_capped, stem,
     },
-    mesh::{
-        model::Model,
-        obj::{ObjError, ObjSettings, read_model},
-    },
+    mesh::model::Model,
     plugins::{
         history::RigHistory,
         journal::replayed_bundle,
@@ -48,8 +46,6 @@ use crate::{
     },
 };
 
-/// Bytes of the bundled character.
-pub(super) const BUNDLED: &[u8] = include_bytes!("../../../assets/models/biped.obj");
 /// Largest number of bytes of a file that are hashed.
 const MAX_HASHED: u64 = 1 << 30;
 
@@ -166,7 +162,11 @@ pub(super) fn is_rig_file(path: &Path) -> bool {
 pub(super) fn start(world: &mut World, request: OpenRequest) {
     let mut uids = UidSource::seeded(world.resource_mut::<UidSource>().next_uid().0);
     let (name, task) = match request {
-        OpenRequest::Bundled => ("the bundled character".to_owned(), spawn(move || bundled(&mut uids))),
+        OpenRequest::Bundled => model(bundled::BODY.to_owned(), uids),
+        OpenRequest::Model(name) => model(name, uids),
+        OpenRequest::Template(name) => {
+            (format!("the bundled {name} template"), spawn(move || template_document(&name)))
+        }
         OpenRequest::Empty => {
             let open = move || Ok(document(LoadedDocument::named("untitled", Rig::new(uids.next_uid(), "untitled"))));
             ("an empty rig".to_owned(), spawn(open))
@@ -196,14 +196,22 @@ pub(in crate::editor) fn document(opened: LoadedDocument) -> LoadedFile {
     LoadedFile::Document(Box::new(opened))
 }
 
-/// Reads the bundled character.
-pub(in crate::editor) fn bundled_model() -> Result<Model, ObjError> {
-    read_model(BUNDLED, "biped", &ObjSettings::default(), &mut |_| None)
+/// Starts to read a bundled mesh.
+fn model(name: String, mut uids: UidSource) -> (String, Task<Result<LoadedFile, OpenError>>) {
+    let about = bundled::describe(&name);
+    let open = move || {
+        let model = BundledModel::named(&name)?.read()?;
+        let (source, origin) = (MeshSource::Bundled(name.clone()), Origin::Bundled(name));
+        Ok(document(LoadedDocument::model(model, source, origin, &mut uids)))
+    };
+    (about, spawn(open))
 }
 
-fn bundled(uids: &mut UidSource) -> Result<LoadedFile, OpenError> {
-    let origin = Origin::Bundled("biped".to_owned());
-    Ok(document(LoadedDocument::model(bundled_model()?, MeshSource::Bundled, origin, uids)))
+/// Reads a bundled template, as a document of its own.
+fn template_document(name: &str) -> Result<LoadedFile, OpenError> {
+    let mut opened = LoadedDocument::named(name, bundled::template(name)?);
+    opened.origin = OpenRequest::origin_of_template(name);
+    Ok(document(opened))
 }
 
 /// Hash of a file's bytes; `None` if it cannot be read.
@@ -348,6 +356,7 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
             .map(|(mesh, source)| ContextMesh { uid: mesh.uid, source: source.clone(), nodes: mesh.nodes.to_vec() })
             .collect(),
     };
+    world.write_message(DocumentLanded { origin: origin.clone() });
     // A journal left by a crash beside the project stays there until a person decides about it.
     let places = places(world, project.clone().filter(|_| pending.is_none()));
     let is_recovered = work.is_some();
@@ -380,6 +389,7 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
         world.spawn((mesh, source, SkinOf(entity)));
     }
     world.insert_resource(ActiveRig(entity));
+    view::show_all(world);
     let restored = kept.is_some_and(|kept| view::restore(world, &kept));
     world.resource_mut::<FrameWhenReady>().0 = !restored;
     world.write_message(match is_recovered {

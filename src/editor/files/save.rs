@@ -14,11 +14,12 @@ use bevy::{
 
 use super::{
     FollowUp, active, after_asking,
+    bundled::{BODY, BundledModel},
     dialog::Purpose,
     document::{Context, ContextMesh, MeshSource, OpenDocument, SavedAt, last_step, meshes, places},
     error::WriteError,
     file_name,
-    open::{BUNDLED, spawn},
+    open::spawn,
     view,
 };
 use crate::{
@@ -138,19 +139,22 @@ fn settled(world: &World, rig: Entity) -> Option<Rig> {
     Some(world.get::<RigHistory>(rig).map_or_else(|| data.clone(), |history| history.settled(data).into_owned()))
 }
 
-/// Snapshot of the document; returns `true` with it if its mesh is the bundled one.
-pub(in crate::editor) fn snapshot(world: &mut World, rig: Entity) -> Option<(ProjectToSave, bool)> {
+/// Snapshot of the document; returns with it the bundled mesh that is open, by name.
+pub(in crate::editor) fn snapshot(world: &mut World, rig: Entity) -> Option<(ProjectToSave, Option<String>)> {
     let view = view::now(world);
     let document = world.get::<OpenDocument>(rig)?;
     let data = settled(world, rig)?;
-    let mut is_bundled = false;
+    let mut bundled = None;
     let mut open: Vec<MeshToSave> = Vec::new();
     for (_, mesh, source) in meshes(world, rig) {
         let path = match source {
             Some(MeshSource::File(path)) => path.clone(),
             // The path is set once the project has a folder for it.
-            _ => {
-                is_bundled = true;
+            source => {
+                bundled = Some(match source {
+                    Some(MeshSource::Bundled(name)) => name.clone(),
+                    _ => BODY.to_owned(),
+                });
                 PathBuf::new()
             }
         };
@@ -162,7 +166,7 @@ pub(in crate::editor) fn snapshot(world: &mut World, rig: Entity) -> Option<(Pro
     let base = world.get::<RigSource>(rig).and_then(RigSource::base).or(document.base.as_ref());
     let followed = document.template.clone().zip(base.cloned());
     let templates = followed.map(|(path, base)| ProjectTemplate { rig: data.uid(), path, base }).into_iter().collect();
-    Some((ProjectToSave { name, rigs: vec![data], meshes: open, templates, view, journal: None }, is_bundled))
+    Some((ProjectToSave { name, rigs: vec![data], meshes: open, templates, view, journal: None }, bundled))
 }
 
 /// Saves the project.
@@ -172,23 +176,23 @@ pub(super) fn project(world: &mut World, path: PathBuf, then: Option<FollowUp>) 
         return;
     }
     let Some(rig) = active(world) else { return };
-    let Some((mut snapshot, is_bundled)) = snapshot(world, rig) else { return };
+    let Some((mut snapshot, bundled)) = snapshot(world, rig) else { return };
     let Some(journal) = world.get::<OpenDocument>(rig).map(|document| document.journal.clone()) else { return };
     snapshot.name = stem(&path);
     let position = journal.position();
     let (step, name) = (last_step(world, rig), file_name(&path));
-    let task = spawn(move || store(snapshot, is_bundled, path, &journal, position));
+    let task = spawn(move || store(snapshot, bundled.as_deref(), path, &journal, position));
     world.resource_mut::<SaveJob>().job = Some(Job { name, rig, step, task, then });
 }
 
 fn store(
     mut project: ProjectToSave,
-    is_bundled: bool,
+    bundled: Option<&str>,
     path: PathBuf,
     journal: &Journal,
     position: u64,
 ) -> Result<SavedContent, WriteError> {
-    let bundled = if is_bundled { Some(place_bundled(&path)?) } else { None };
+    let bundled = bundled.map(|name| place_bundled(&path, name)).transpose()?;
     if let Some(bundled) = &bundled {
         for mesh in project.meshes.iter_mut().filter(|mesh| mesh.path.as_os_str().is_empty()) {
             mesh.path.clone_from(bundled);
@@ -203,19 +207,20 @@ fn store(
     Ok(SavedContent::Project { mark, notes: files.notes, bundled })
 }
 
-/// Copies the bundled character beside a project, so that the project can refer to its mesh.
-pub(in crate::editor) fn place_bundled(project: &Path) -> Result<PathBuf, WriteError> {
-    let names = ["biped.obj".to_owned(), format!("{}.biped.obj", stem(project))];
-    let limit = BUNDLED.len() as u64 + 1;
+/// Copies a bundled mesh beside a project, so that the project can refer to it.
+pub(in crate::editor) fn place_bundled(project: &Path, name: &str) -> Result<PathBuf, WriteError> {
+    let Ok(model) = BundledModel::named(name) else { return Err(WriteError::NotBundled { name: name.to_owned() }) };
+    let names = [format!("{name}.obj"), format!("{}.{name}.obj", stem(project))];
+    let limit = model.bytes.len() as u64 + 1;
     for name in &names {
         let path = project.with_file_name(name);
         let disk: &dyn Disk = &RealDisk;
         match disk.entry(&path, true) {
             Err(_) => {
-                save_atomic(disk, &path, BUNDLED)?;
+                save_atomic(disk, &path, model.bytes)?;
                 return Ok(path);
             }
-            Ok(_) if read_capped(disk, &path, limit).is_ok_and(|bytes| bytes == BUNDLED) => return Ok(path),
+            Ok(_) if read_capped(disk, &path, limit).is_ok_and(|bytes| bytes == model.bytes) => return Ok(path),
             Ok(_) => {}
         }
     }
@@ -333,7 +338,7 @@ fn saved(world: &mut World, rig: Entity, step: Option<Arc<Step>>, mark: SaveMark
     if let Some(path) = bundled {
         for entity in open {
             if let Some(mut source) =
-                world.get_mut::<MeshSource>(entity).filter(|source| **source == MeshSource::Bundled)
+                world.get_mut::<MeshSource>(entity).filter(|source| matches!(**source, MeshSource::Bundled(_)))
             {
                 *source = MeshSource::File(path.clone());
             }

@@ -5,13 +5,14 @@ use std::sync::Arc;
 use bevy::prelude::*;
 
 use super::{
-    active,
+    DocumentLanded, active,
     dialog::{Dialog, Question},
     document::meshes,
     open::LoadedDocument,
 };
 use crate::{
     editor::notice::Notice,
+    files::journal::Origin,
     plugins::document::EditRequest,
     rig::{PoseOffset, Rig, RigEdit, operations::Operation, step::edits_from_empty},
 };
@@ -94,6 +95,7 @@ pub(super) fn put(world: &mut World, fit: &Fit, scale: f32) {
             .map(|edit| if scale == 1.0 { edit } else { scaled(edit, scale) }),
     );
     world.write_message(EditRequest::operation(entity, Operation::Edits(edits)));
+    world.write_message(DocumentLanded { origin: Origin::Empty });
     let joints = fit.rig.len();
     let replaced =
         if had > 0 { format!(" instead of the {had} that were there; undo brings them back") } else { String::new() };

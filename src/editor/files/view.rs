@@ -4,7 +4,7 @@ use bevy::{ecs::system::SystemState, prelude::*};
 use bevy_panorbit_camera::PanOrbitCamera;
 
 use crate::{
-    editor::{camera, mode::Mode},
+    editor::{camera, mode::Mode, screen::HiddenMeshes},
     plugins::{
         display::{MeshDisplay, Shading},
         drawing::{LabelChoice, RigDrawing},
@@ -33,8 +33,23 @@ pub(in crate::editor) fn now(world: &mut World) -> ProjectView {
         view.switches.insert("labels".to_owned(), drawing.labels == LabelChoice::All);
         view.switches.insert("axes".to_owned(), drawing.axes);
         view.switches.insert("grid".to_owned(), drawing.grid);
+        view.switches.insert("bones".to_owned(), drawing.bones);
+        view.switches.insert("deforming".to_owned(), drawing.deforming);
+    }
+    if let Some(hidden) = world.get_resource::<HiddenMeshes>() {
+        view.switches.insert("meshes".to_owned(), !hidden.all);
     }
     view
+}
+
+/// Shows what the former document hid: whoever opens something wants to see it.
+pub(super) fn show_all(world: &mut World) {
+    if let Some(mut hidden) = world.get_resource_mut::<HiddenMeshes>() {
+        hidden.set_if_neq(HiddenMeshes::default());
+    }
+    if let Some(mut drawing) = world.get_resource_mut::<RigDrawing>().filter(|drawing| !drawing.bones) {
+        drawing.bones = true;
+    }
 }
 
 /// Restores the view state. Returns `true` if it includes the camera.
@@ -43,9 +58,10 @@ pub(super) fn restore(world: &mut World, view: &ProjectView) -> bool {
         Option<ResMut<Mode>>,
         Option<ResMut<MeshDisplay>>,
         Option<ResMut<RigDrawing>>,
+        Option<ResMut<HiddenMeshes>>,
         Query<(&mut PanOrbitCamera, &mut Projection)>,
     )> = SystemState::new(world);
-    let Ok((mode, display, drawing, mut cameras)) = state.get_mut(world) else { return false };
+    let Ok((mode, display, drawing, hidden, mut cameras)) = state.get_mut(world) else { return false };
     let switch = |name: &str| view.switches.get(name).copied();
     if let (Some(mut mode), Some(kept)) = (mode, Mode::ALL.into_iter().find(|mode| mode.name() == view.mode)) {
         mode.set_if_neq(kept);
@@ -69,6 +85,11 @@ pub(super) fn restore(world: &mut World, view: &ProjectView) -> bool {
         }
         drawing.axes = switch("axes").unwrap_or(drawing.axes);
         drawing.grid = switch("grid").unwrap_or(drawing.grid);
+        drawing.bones = switch("bones").unwrap_or(drawing.bones);
+        drawing.deforming = switch("deforming").unwrap_or(drawing.deforming);
+    }
+    if let (Some(mut hidden), Some(shown)) = (hidden, switch("meshes")) {
+        hidden.set_if_neq(HiddenMeshes { all: !shown, ..default() });
     }
     let Some(kept) = &view.camera else { return false };
     for (mut orbit, mut projection) in &mut cameras {

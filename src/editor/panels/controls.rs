@@ -20,7 +20,7 @@ use crate::{
     },
     rig::{
         Attribute, AttributeKind, BuiltNode, BuiltRig, Channels, Matching, PoseOffset, RigEdit, SwitchData, Uid,
-        operations::Operation,
+        operations::Operation, proportion::Quantity,
     },
     solve::program::RigState,
 };
@@ -87,9 +87,16 @@ fn build_state(ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut 
     }
 }
 
-const LENGTH: Look = Look { speed: 0.005, decimals: 4, suffix: "" };
-const DEGREES: Look = Look { speed: 0.5, decimals: 2, suffix: "°" };
-const FACTOR: Look = Look { speed: 0.005, decimals: 3, suffix: "" };
+const LENGTH: Look = Look { speed: 0.005, decimals: 4, suffix: "", quantity: Quantity::Plain };
+const DEGREES: Look = Look { speed: 0.5, decimals: 2, suffix: "°", quantity: Quantity::Degrees };
+const FACTOR: Look = Look { speed: 0.005, decimals: 3, suffix: "", quantity: Quantity::Factor };
+const VALUE: Look = Look { speed: 0.005, decimals: 3, suffix: "", quantity: Quantity::Plain };
+
+/// Size of a running rig: the distance of its farthest node.
+fn rig_size(state: &RigState) -> f32 {
+    let far = (0..state.program().nodes().len()).map(|slot| state.global_at(slot).translation.length());
+    far.filter(|far| far.is_finite()).fold(1e-3, f32::max)
+}
 
 /// Kind of transform channels.
 #[derive(Clone, Copy)]
@@ -104,7 +111,8 @@ impl ControlsPanel {
         ui.strong(&*node.name);
         let mut change = None;
         if let (Some(control), Some(slot)) = (&node.control, state.program().node(node.uid)) {
-            change = self.pose(ui, node.uid, control.channels, state.offset_at(slot));
+            let length = Look { quantity: Quantity::Distance { size: rig_size(state) }, ..LENGTH };
+            change = self.pose(ui, node.uid, control.channels, state.offset_at(slot), length);
         }
         for attribute in node.attributes.iter() {
             let value = state.attribute(node.uid, &attribute.name).unwrap_or(attribute.default);
@@ -119,17 +127,18 @@ impl ControlsPanel {
         if ui.button("Reset").on_hover_text("Pose and attributes of this control back to rest").clicked() {
             change = Some(Change::Do(Operation::ResetPose(vec![node.uid])));
         }
+        self.numbers.tell(requests);
         if let Some(change) = change {
             requests.send(EditRequest { rig, change });
         }
     }
 
     /// The pose offset of a control; channels that are all locked are left out.
-    fn pose(&mut self, ui: &mut Ui, node: Uid, channels: Channels, offset: PoseOffset) -> Option<Change> {
+    fn pose(&mut self, ui: &mut Ui, node: Uid, channels: Channels, offset: PoseOffset, length: Look) -> Option<Change> {
         let (x, y, z) = offset.rotation.to_euler(EulerRot::XYZ);
         let angles = Vec3::new(x, y, z).map(f32::to_degrees);
         let rows = [
-            (Channel::Translate, "Translation", channels.translate, offset.translation, LENGTH),
+            (Channel::Translate, "Translation", channels.translate, offset.translation, length),
             (Channel::Rotate, "Rotation", channels.rotate, angles, DEGREES),
             (Channel::Scale, "Scale", channels.scale, offset.scale, FACTOR),
         ];
@@ -159,7 +168,7 @@ impl ControlsPanel {
     fn attribute(&mut self, ui: &mut Ui, attribute: &Attribute, value: f32) -> Option<NumberEdit> {
         let name = &*attribute.name;
         let AttributeKind::Choice(choices) = &attribute.kind else {
-            return self.numbers.number(ui, name, value, FACTOR);
+            return self.numbers.number(ui, name, value, VALUE);
         };
         let mut chosen = (value.round().max(0.0) as usize).min(choices.len().saturating_sub(1));
         let before = chosen;

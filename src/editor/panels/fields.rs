@@ -10,6 +10,10 @@ use bevy_egui::egui::{
 };
 
 use super::list;
+use crate::{
+    editor::{notice::Notice, panel::Requests},
+    rig::proportion::{ProportionError, Quantity},
+};
 
 /// A value of several joints: that of the active one, and whether it differs among them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -93,6 +97,19 @@ pub(super) struct Numbers {
     dragged: Option<DraggedNumber>,
     /// The field left by Escape: egui returns the typed text once more in the next frame.
     dropped: Option<Id>,
+    /// The last typed text that was not taken: its field and the reason.
+    refused: Option<(String, NumberError)>,
+}
+
+/// Reason why a typed number is not taken.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+enum NumberError {
+    /// The text is no number.
+    #[error("\"{0}\" is no number; write one such as 1.5 or -20")]
+    NoNumber(String),
+    /// The number makes no sense on the rig.
+    #[error(transparent)]
+    Proportion(#[from] ProportionError),
 }
 
 /// The number that is being dragged.
@@ -123,9 +140,18 @@ pub(super) struct Look {
     pub speed: f64,
     pub decimals: usize,
     pub suffix: &'static str,
+    /// Kind of the number, which limits it.
+    pub quantity: Quantity,
 }
 
 impl Numbers {
+    /// Sends a notice if a typed text was not taken. Panels call it after their fields.
+    pub fn tell(&mut self, requests: &mut Requests) {
+        if let Some((field, reason)) = self.refused.take() {
+            requests.send(Notice::warning(format!("{field} stays as it was: {reason}.")));
+        }
+    }
+
     /// Three fields, X, Y and Z, beside each other, or below each other in a narrow panel. Returns the axis and its
     /// edit.
     pub fn vector(
@@ -187,6 +213,7 @@ impl Numbers {
         let dragged = self.dragged.filter(|dragged| dragged.id == id);
         let mut value = dragged.map_or(f64::from(shown.value), |dragged| dragged.value);
         let typed: Cell<Option<f64>> = Cell::new(None);
+        let wrong: Cell<Option<String>> = Cell::new(None);
         let mixed = shown.mixed && dragged.is_none();
         let field = DragValue::new(&mut value)
             .speed(look.speed)
@@ -197,7 +224,10 @@ impl Numbers {
             .custom_formatter(|number, _| if mixed { MIXED.to_owned() } else { short(number, look.decimals) })
             .custom_parser(|text| {
                 let number = parse(text, look.suffix);
-                typed.set(number.or(typed.get()));
+                match number {
+                    Some(_) => typed.set(number),
+                    None => wrong.set(Some(text.trim().to_owned()).filter(|text| text != MIXED)),
+                }
                 number
             });
         let response = ui.push_id(said, |ui| ui.add_sized(size, field)).inner;
@@ -206,7 +236,8 @@ impl Numbers {
         if response.dragged() && response.changed() && value.is_finite() {
             let from = dragged.map_or(f64::from(shown.value), |dragged| dragged.from);
             self.dragged = Some(DraggedNumber { id, from, value });
-            return Some(NumberEdit::Preview(value as f32));
+            // A drag passes over numbers that make no sense, such as a scale of zero.
+            return look.quantity.check(value as f32).is_ok().then_some(NumberEdit::Preview(value as f32));
         }
         if let Some(DraggedNumber { from, value, .. }) = dragged.filter(|_| !response.dragged()) {
             self.dragged = None;
@@ -221,10 +252,22 @@ impl Numbers {
         if escaped || dropped {
             return None;
         }
-        let number = typed.get().or(response.changed().then_some(value))? as f32;
+        let Some(number) = typed.get().or(response.changed().then_some(value)) else {
+            if let Some(text) = wrong.take() {
+                self.refused = Some((said.to_owned(), NumberError::NoNumber(text)));
+            }
+            return None;
+        };
+        let number = number as f32;
         // Confirming the visible digits keeps the hidden ones.
-        let same = !shown.mixed && short(number.into(), look.decimals) == short(shown.value.into(), look.decimals);
-        (number.is_finite() && !same).then_some(NumberEdit::Set(number))
+        if !shown.mixed && short(number.into(), look.decimals) == short(shown.value.into(), look.decimals) {
+            return None;
+        }
+        if let Err(reason) = look.quantity.check(number) {
+            self.refused = Some((said.to_owned(), reason.into()));
+            return None;
+        }
+        Some(NumberEdit::Set(number))
     }
 }
 

@@ -11,7 +11,7 @@ use crate::{
         notice::{Notice, Severity},
         panel::{EditorPanel, Requests},
     },
-    plugins::document::EditRefusal,
+    plugins::document::{ChangeError, EditRefusal},
 };
 
 /// Plugin that stores notices, and makes notices of refused edits.
@@ -96,7 +96,12 @@ impl LogEntry {
 
 fn tell_refusals(mut refused: MessageReader<EditRefusal>, mut notices: MessageWriter<Notice>) {
     for refused in refused.read() {
-        notices.write(Notice::error(sentence(&refused.reason.to_string())));
+        let text = sentence(&refused.reason.to_string());
+        notices.write(match refused.reason {
+            // A key that was pressed once too often has done no harm.
+            ChangeError::NothingToUndo | ChangeError::NothingToRedo => Notice::info(text),
+            _ => Notice::error(text),
+        });
     }
 }
 

@@ -23,8 +23,9 @@ use crate::{
     plugins::{
         document::{Change, EditRequest},
         picking::{Pick, PickRequest},
+        surface::RigSurface,
     },
-    rig::{NodeKind, Uid, operations::Operation},
+    rig::{NodeKind, Uid, operations::Operation, proportion::Quantity},
 };
 use values::{Part, Values};
 
@@ -206,9 +207,11 @@ impl PropertiesPanel {
     /// Draws the rest pose, or in Pose mode the pose on top of it.
     fn transform(&mut self, ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut Requests) {
         let posing = world.get_resource::<Mode>() == Some(&Mode::Pose);
-        let length = Look { speed: self.values.speed(), decimals: 4, suffix: "" };
-        let degrees = Look { speed: 0.5, decimals: 2, suffix: "°" };
-        let factor = Look { speed: 0.005, decimals: 3, suffix: "" };
+        let size = self.values.size().max(mesh_size(world, shown.entity));
+        let (distance, speed) = (Quantity::Distance { size }, self.values.speed());
+        let length = Look { speed, decimals: 4, suffix: "", quantity: distance };
+        let degrees = Look { speed: 0.5, decimals: 2, suffix: "°", quantity: Quantity::Degrees };
+        let factor = Look { speed: 0.005, decimals: 3, suffix: "", quantity: Quantity::Factor };
         let rest = [
             (Part::Position, "Position", length),
             (Part::Local, "Local position", length),
@@ -234,6 +237,7 @@ impl PropertiesPanel {
                 edit = Some((*part, axis, done));
             }
         }
+        self.numbers.tell(requests);
         if posing {
             let reset = ui.add_enabled(self.values.posed, egui::Button::new("Reset pose of the selection"));
             if reset.clicked() {
@@ -251,6 +255,15 @@ impl PropertiesPanel {
         };
         requests.send(EditRequest { rig: shown.entity, change });
     }
+}
+
+/// Largest distance of a rig's meshes from its origin; 1 without meshes.
+fn mesh_size(world: &World, rig: Entity) -> f32 {
+    let far = world.get::<RigSurface>(rig).map(|surface| {
+        let [low, high] = surface.bounds();
+        low.abs().max(high.abs()).length()
+    });
+    far.filter(|far| far.is_finite()).map_or(1.0, |far| far.max(1.0))
 }
 
 /// Lengths of the bones that begin at the selected joints.

@@ -26,11 +26,12 @@ use crate::{
     },
     plugins::{
         RigSystems,
+        commands::BuildResult,
         landing::ResultHeld,
         skinning::{BindAnswer, BindRequest, SkinningError, SkinningJob, SkinningReport},
         surface::{RigMesh, RigMeshes},
     },
-    rig::{NodeKind, Rig, SkinData, Uid},
+    rig::{BuiltRig, NodeKind, Rig, SkinData, Uid},
 };
 
 /// Plugin that carries out [`Action::Skin`] and reports the results.
@@ -297,6 +298,11 @@ impl SkinningPanel {
             self.failure(ui, world, entity);
             return;
         };
+        if !is_held(&shown.rig, world.get::<BuildResult>(shown.entity).map(|built| &*built.0), skin) {
+            let text = "The joints of its weights are gone: undo, or make joints and skin again.";
+            ui.colored_label(ui.visuals().warn_fg_color, text);
+            return;
+        }
         let without = self.without_weights(mesh.uid, skin) + points.saturating_sub(skin.weights.len());
         let good = without == 0;
         let (symbol, color) = super::log::severity_symbol(ui, if good { Severity::Done } else { Severity::Warning });
@@ -336,6 +342,12 @@ impl SkinningPanel {
         self.counted.push((mesh, std::sync::Arc::downgrade(skin), count));
         count
     }
+}
+
+/// True if a rig has a joint of some weights, its own or one that commands created.
+pub(in crate::editor) fn is_held(rig: &Rig, built: Option<&BuiltRig>, skin: &SkinData) -> bool {
+    let is_there = |joint: &Uid| rig.joint(*joint).is_some() || built.is_some_and(|built| built.node(*joint).is_some());
+    skin.joints.iter().any(is_there)
 }
 
 /// Sources of the points' weights that deserve a look.

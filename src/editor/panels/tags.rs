@@ -88,6 +88,7 @@ impl EditorPanel for TagsPanel {
             }
         });
         self.stack.entries = entries;
+        self.values.tell(requests);
     }
 }
 

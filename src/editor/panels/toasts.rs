@@ -1,7 +1,7 @@
-//! Toasts: recent notices, in the viewport's lower right corner.
+//! Toasts: recent notices, in the viewport's lower right corner, or the lower left one where a window is in the way.
 //!
 //! Toasts are areas of their own, so a click on one never reaches the viewport below, and they cost a frame only when
-//! one of them expires: the window sleeps until then.
+//! one of them expires: the window sleeps until then. They keep clear of windows and bars, and are below dialogs.
 
 use std::time::Duration;
 
@@ -15,9 +15,11 @@ use bevy_egui::egui::{
 
 use super::log::{LogBook, severity_symbol};
 use crate::editor::{
+    dock::ShowPanel,
     notice::{Notice, Severity},
     panel::{EditorOverlay, Requests},
     pointer::ViewportArea,
+    start,
 };
 
 /// Plugin that wakes the window when a toast expires.
@@ -25,7 +27,7 @@ pub struct ToastsPlugin;
 
 impl Plugin for ToastsPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<NextToast>().add_systems(Last, wake_for_toasts);
+        app.init_resource::<NextToast>().add_message::<ShowPanel>().add_systems(Last, wake_for_toasts);
     }
 }
 
@@ -77,11 +79,12 @@ pub struct Toasts {
 
 /// A notice on the screen.
 struct Toast {
-    number: u64,
+    /// Number of the first notice, which identifies the toast.
+    id: u64,
     notice: Notice,
     times: u32,
-    /// Expiry in egui's time; `None` if the toast stays until it is closed.
-    until: Option<f64>,
+    /// Expiry in egui's time.
+    until: f64,
 }
 
 impl Toasts {
@@ -92,74 +95,126 @@ impl Toasts {
     fn follow(&mut self, book: &LogBook, now: f64) {
         let unseen: Vec<_> = book.entries().rev().take_while(|entry| entry.number >= self.next).collect();
         for entry in unseen.into_iter().rev().filter(|entry| !entry.notice.quiet) {
-            let until = lifetime(&entry.notice).map(|time| now + time.as_secs_f64());
-            // A repeated notice renews its toast.
-            self.shown.retain(|toast| toast.notice != entry.notice);
-            let (number, notice, times) = (entry.number, entry.notice.clone(), entry.times);
-            self.shown.push(Toast { number, notice, times, until });
+            let until = now + lifetime(&entry.notice).as_secs_f64();
+            let known = self.shown.iter().position(|toast| toast.notice == entry.notice);
+            let times = known.map_or(0, |place| self.shown[place].times);
+            let id = known.map_or(entry.number, |place| self.shown.remove(place).id);
+            // An entry stands for several notices in a row, some of which may have been counted.
+            let fresh = u32::try_from(entry.number + 1 - self.next).unwrap_or(u32::MAX).min(entry.times);
+            let times = times.saturating_add(fresh);
+            self.shown.push(Toast { id, notice: entry.notice.clone(), times, until });
         }
         self.next = book.next_number();
         while self.shown.len() > Self::MOST {
-            // A toast that expires is dropped first; unclosed errors are still in the log.
-            let first = self.shown.iter().position(|toast| toast.until.is_some()).unwrap_or(0);
+            // Errors are kept longest.
+            let first = self.shown.iter().position(|toast| toast.notice.severity != Severity::Error).unwrap_or(0);
             self.shown.remove(first);
         }
     }
 }
 
-/// Lifetime of a toast, long enough to read it; `None` for errors.
-fn lifetime(notice: &Notice) -> Option<Duration> {
+/// Lifetime of a toast, long enough to read it; errors stay longest, and all stay in the log.
+fn lifetime(notice: &Notice) -> Duration {
     let reading = Duration::from_millis(45) * notice.text.chars().count().min(200) as u32;
-    match notice.severity {
-        Severity::Error => None,
-        Severity::Warning => Some(Duration::from_secs(4) + reading),
-        Severity::Info | Severity::Done => Some(Duration::from_secs(2) + reading),
-    }
+    let more = match notice.severity {
+        Severity::Error => 12,
+        Severity::Warning => 4,
+        Severity::Info | Severity::Done => 2,
+    };
+    Duration::from_secs(more) + reading
 }
+
+/// Height of a toast that has not been drawn yet.
+const HEIGHT: f32 = 36.0;
+/// Distance between toasts, and from windows.
+const GAP: f32 = 6.0;
 
 impl EditorOverlay for Toasts {
     fn show(&mut self, ctx: &egui::Context, world: &World, requests: &mut Requests) {
         let Some(book) = world.get_resource::<LogBook>() else { return };
         let now = ctx.input(|input| input.time);
         self.follow(book, now);
-        self.shown.retain(|toast| toast.until.is_none_or(|until| until > now));
+        self.shown.retain(|toast| toast.until > now);
         let window = ctx.content_rect();
         let area = viewport(world).map_or(window, |area| area.intersect(window));
-        let mut bottom = area.bottom() - 8.0;
+        let width = (area.width() - 16.0).clamp(140.0, 340.0);
+        let mut taken = self.windows(ctx);
         let mut closed = None;
         for toast in self.shown.iter_mut().rev() {
-            let width = (area.width() - 16.0).clamp(140.0, 340.0);
-            let corner = egui::pos2(area.right() - 8.0, bottom);
-            let shown = Area::new(Id::new(("toast", toast.number)))
-                .order(Order::Foreground)
+            let id = area_id(toast.id);
+            let height = ctx.memory(|memory| memory.area_rect(id)).map_or(HEIGHT, |rect| rect.height());
+            let size = egui::vec2(width, height);
+            // Without room the notice is in the log alone.
+            let Some(place) = free_place(area, size, &taken) else { continue };
+            let shown = Area::new(id)
+                .order(Order::Middle)
                 .pivot(Align2::RIGHT_BOTTOM)
-                .fixed_pos(corner)
+                .fixed_pos(place.right_bottom())
                 .constrain_to(window)
                 .sense(Sense::click())
                 .fade_in(false)
                 .show(ctx, |ui| draw(ui, toast, width));
+            ctx.move_to_top(shown.response.layer_id);
             if shown.inner {
-                closed = Some(toast.number);
+                closed = Some(toast.id);
+            } else if shown.response.clicked() {
+                requests.send(ShowPanel("Log"));
             }
             let rect: Rect = shown.response.rect;
-            if let Some(until) = &mut toast.until {
-                // A toast under the pointer stays.
-                let read = ctx.input(|input| input.pointer.hover_pos()).is_some_and(|pointer| rect.contains(pointer));
-                if read && *until < now + 1.0 {
-                    *until = now + 2.0;
-                }
+            // A toast under the pointer stays.
+            let read = ctx.input(|input| input.pointer.hover_pos()).is_some_and(|pointer| rect.contains(pointer));
+            if read && toast.until < now + 1.0 {
+                toast.until = now + 2.0;
             }
-            bottom = rect.top() - 6.0;
+            taken.push(rect);
         }
-        let next = self.shown.iter().filter_map(|toast| toast.until).min_by(f64::total_cmp);
+        let next = self.shown.iter().map(|toast| toast.until).min_by(f64::total_cmp);
         if world.get_resource::<NextToast>().is_some_and(|known| known.0 != next) {
             requests.set(NextToast(next));
         }
         if let Some(closed) = closed {
-            self.shown.retain(|toast| toast.number != closed);
+            self.shown.retain(|toast| toast.id != closed);
             ctx.request_repaint();
         }
     }
+}
+
+impl Toasts {
+    /// Rectangles of the windows and bars on the screen. The start page is none of them: what goes wrong on it is told over it.
+    fn windows(&self, ctx: &egui::Context) -> Vec<Rect> {
+        let own: Vec<Id> = self.shown.iter().map(|toast| area_id(toast.id)).chain([start::page_id()]).collect();
+        ctx.memory(|memory| {
+            let layers = memory.areas().visible_layer_ids().into_iter();
+            let layers = layers.filter(|layer| layer.order == Order::Middle && !own.contains(&layer.id));
+            layers.filter_map(|layer| memory.area_rect(layer.id)).collect()
+        })
+    }
+}
+
+fn area_id(toast: u64) -> Id {
+    Id::new(("toast", toast))
+}
+
+/// The lowest free place on the right of an area, or on its left.
+fn free_place(area: Rect, size: egui::Vec2, taken: &[Rect]) -> Option<Rect> {
+    let column = |left: f32| {
+        let mut bottom = area.bottom() - 8.0;
+        loop {
+            let place = Rect::from_min_size(egui::pos2(left, bottom - size.y), size);
+            if place.top() < area.top() {
+                return None;
+            }
+            let above =
+                taken.iter().filter(|rect| rect.expand(GAP - 1.0).intersects(place)).map(|rect| rect.top() - GAP);
+            match above.min_by(f32::total_cmp) {
+                // Each round goes up.
+                Some(next) if next < bottom => bottom = next,
+                Some(_) => return None,
+                None => return Some(place),
+            }
+        }
+    };
+    column(area.right() - 8.0 - size.x).or_else(|| column(area.left() + 8.0))
 }
 
 /// The viewport in the window.
@@ -183,12 +238,12 @@ fn draw(ui: &mut Ui, toast: &Toast, width: f32) -> bool {
         ui.set_width(width - 18.0);
         ui.horizontal_top(|ui| {
             ui.label(RichText::new(symbol).color(color));
-            let times = if toast.times > 1 { format!("{}× ", toast.times) } else { String::new() };
+            let times = if toast.times > 1 { format!(" ×{}", toast.times) } else { String::new() };
             let room = ui.available_width() - 24.0;
             ui.allocate_ui(egui::vec2(room, 0.0), |ui| {
                 ui.set_width(room);
                 let text =
-                    RichText::new(format!("{times}{}", toast.notice.text)).color(ui.visuals().strong_text_color());
+                    RichText::new(format!("{}{times}", toast.notice.text)).color(ui.visuals().strong_text_color());
                 ui.add(Label::new(text).wrap().selectable(false));
             });
             let cross = ui.add(egui::Button::new(RichText::new("✖").small()).frame(false));

@@ -60,6 +60,10 @@ pub(super) fn show_weights(
 
 /// Description of the active joint's weights, and the reason if it has none.
 fn describe(rig: &EditedRig) -> (String, Option<String>) {
+    if rig.rig.is_empty() {
+        let why = "there are no joints; place some, or fit a skeleton (F)".to_owned();
+        return ("Weights belong to joints.".to_owned(), Some(why));
+    }
     if rig.rig.skins().next().is_none() {
         let why = "the mesh has no weights yet; compute them first (B)".to_owned();
         return ("Click a joint to see what it moves.".to_owned(), Some(why));

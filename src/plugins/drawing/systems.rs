@@ -11,6 +11,7 @@ use bevy::{
 use super::{
     DrawingCounts, Ghosts, LETTER, LabelCandidate, LabelChoice, RigDrawing, RigLabels,
     controls::draw_controls,
+    deforming::DeformingJoints,
     ghosts, grid,
     ink::Ink,
     label_places,
@@ -84,6 +85,7 @@ pub(super) struct RigPictures {
     ghosts: Picture,
     plane: Picture,
     bounds: Option<[Vec3; 2]>,
+    deforming: DeformingJoints,
 }
 
 /// Access to the entities of pictures: spawns, fills and hides them.
@@ -237,7 +239,7 @@ pub(super) fn draw_rigs(
         if !stale && !posed() {
             continue;
         }
-        let drawn = &mut drawn.bypass_change_detection().skeleton;
+        let RigPictures { skeleton: drawn, deforming, .. } = drawn.bypass_change_detection();
         drawn.sight = sight;
         let mut texts = Vec::new();
         if let Some(sight) = &sight {
@@ -248,6 +250,15 @@ pub(super) fn draw_rigs(
                 let Some((_, visible, layer)) = node(joint.uid) else { continue };
                 joint.hidden = visible.is_some_and(|visible| !visible.0);
                 joint.color = layer.and_then(|layer| layer.0.color).map(group_tint).or(joint.color);
+            }
+            if settings.deforming {
+                let deforming = deforming.of(&rig);
+                let color = |deforms| if deforms { settings.theme.deforming } else { settings.theme.idle };
+                joints.iter_mut().for_each(|joint| joint.color = Some(color(deforming.contains(&joint.uid))));
+            }
+            if !settings.bones {
+                let is_in_use = |joint: &DrawnJoint| joint.hovered || joint.emphasis != Emphasis::None;
+                joints.iter_mut().filter(|joint| !is_in_use(joint)).for_each(|joint| joint.hidden = true);
             }
             texts = labels_of(&rig, &joints, sight, &settings);
             let written: &[(Vec2, String)] = if settings.write_labels { &texts } else { &[] };
@@ -274,6 +285,7 @@ fn labels_of(rig: &Rig, joints: &[DrawnJoint], sight: &Sight, settings: &RigDraw
         .zip(radii)
         .filter_map(|(joint, radius)| {
             let rank = match joint.emphasis {
+                _ if joint.hidden && !settings.bones => return None,
                 _ if joint.hovered => 3,
                 Emphasis::Active => 2,
                 Emphasis::Selected => 1,

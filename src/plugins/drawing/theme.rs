@@ -16,6 +16,10 @@ pub const BACKGROUND: Color = Color::srgb(0.232, 0.242, 0.262);
 pub struct Theme {
     /// Bones of joints without a group.
     pub bone: Tint,
+    /// Bones of joints that deform, while those are shown.
+    pub deforming: Tint,
+    /// Bones of all other joints meanwhile.
+    pub idle: Tint,
     /// Balls of all joints.
     pub joint: Tint,
     /// Crosses of nulls and the lines from them.
@@ -54,6 +58,8 @@ impl Default for Theme {
     fn default() -> Self {
         Self {
             bone: [150, 160, 176, 255],
+            deforming: [64, 196, 255, 255],
+            idle: [88, 92, 100, 255],
             joint: [208, 212, 220, 255],
             null: [196, 200, 208, 255],
             outline: [20, 21, 25, 255],

@@ -225,7 +225,7 @@ impl Answers<'_, '_> {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             if script.pending {
                 script.note_added(rig);
-                script.say(format!("{}: {} joints now", name.to_lowercase(), rig.len()));
+                script.say(format!("{}: {} joints now", within_sentence(name), rig.len()));
                 script.pending = false;
             }
         }
@@ -430,6 +430,12 @@ impl GestureRun<'_, '_> {
             _ => return Err(GestureError::NoOperation),
         })
     }
+}
+
+/// The title of a step in the middle of a sentence; names in it keep their letters.
+fn within_sentence(title: &str) -> String {
+    let mut letters = title.chars();
+    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
 }
 
 fn heard(note: &StrokeNote) -> String {

@@ -5,7 +5,7 @@ use bevy_egui::egui::{self, Event, Key, Modifiers, PointerButton, Pos2, RawInput
 use rigsmith::{
     editor::{
         ActiveRig,
-        panel::{EditorOverlay, EditorPanel, Requests},
+        panel::{EditorOverlay, EditorPanel, Panels, Requests},
         panels::{PanelsPlugin, log::LogBook},
     },
     headless::headless_app,
@@ -18,6 +18,8 @@ use rigsmith::{
 pub enum Sheet {
     Panel(Box<dyn EditorPanel>),
     Overlay(Box<dyn EditorOverlay>),
+    /// Everything over the viewport that the app's plugins have added, in a window of its own.
+    Window,
 }
 
 /// An app with a rig, and one panel of it.
@@ -57,6 +59,11 @@ impl Desk {
         let mut app = strict_app(app);
         let rig = app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
         app.insert_resource(ActiveRig(rig));
+        Self::of(app, rig, sheet, size)
+    }
+
+    /// An app of its own, ready for updates.
+    pub fn of(app: App, rig: Entity, sheet: Sheet, size: egui::Vec2) -> Self {
         let ctx = egui::Context::default();
         ctx.enable_accesskit();
         let mut desk = Self {
@@ -85,11 +92,28 @@ impl Desk {
             ..default()
         };
         let mut requests = Requests::default();
+        let mut window = match self.sheet {
+            Sheet::Window => self.app.world_mut().remove_resource::<Panels>(),
+            _ => None,
+        };
         let (sheet, world) = (&mut self.sheet, self.app.world());
-        let mut output = self.ctx.run_ui(input, |ui| match sheet {
-            Sheet::Panel(panel) => panel.show(ui, world, &mut requests),
-            Sheet::Overlay(overlay) => overlay.show(&ui.ctx().clone(), world, &mut requests),
+        let mut output = self.ctx.run_ui(input, |ui| match (&mut *sheet, &mut window) {
+            (Sheet::Panel(panel), _) => panel.show(ui, world, &mut requests),
+            (Sheet::Overlay(overlay), _) => overlay.show(&ui.ctx().clone(), world, &mut requests),
+            (Sheet::Window, panels) => {
+                let (ctx, area) = (ui.ctx().clone(), ui.max_rect());
+                let panels = panels.as_mut().expect("plugins add panels");
+                for painter in &mut panels.painters {
+                    painter.widgets(ui, area, world, &mut requests);
+                }
+                for overlay in &mut panels.overlays {
+                    overlay.show(&ctx, world, &mut requests);
+                }
+            }
         });
+        if let Some(window) = window {
+            self.app.insert_resource(window);
+        }
         self.shapes = output.shapes.len();
         output.textures_delta.clear();
         if let Some(update) = output.platform_output.accesskit_update {

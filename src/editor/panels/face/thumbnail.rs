@@ -3,10 +3,11 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use bevy::math::Vec3;
-use bevy_egui::egui::{self, Color32, ColorImage, TextureHandle, TextureOptions};
+use bevy_egui::egui::{self, ColorImage, TextureHandle, TextureOptions};
 
 use crate::{
     algo::face::{auto::FaceAnalysis, expression::ExpressionSet, shells::ShellKind},
+    editor::raster::{Raster, normals},
     plugins::{
         face::{Face, expressed_points},
         surface::RigMesh,
@@ -65,46 +66,14 @@ fn draw(points: &[Vec3], analysis: &FaceAnalysis) -> ColorImage {
     let project = |point: Vec3| {
         Vec3::new((point.x - middle.x + 0.5 * side) * scale, (middle.y - point.y + 0.56 * side) * scale, point.z)
     };
-    let mut depth = vec![f32::NEG_INFINITY; PIXELS * PIXELS];
-    let mut pixels = vec![Color32::TRANSPARENT; PIXELS * PIXELS];
+    let mut raster = Raster::new(PIXELS);
     let normals = normals(points, &analysis.triangles);
-    let light = Vec3::new(0.25, 0.5, 1.0).normalize();
     for triangle in &analysis.triangles {
-        let corners = triangle.map(|corner| points[corner as usize]);
-        let [a, b, c] = corners.map(project);
-        let area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
-        if area.abs() < 1e-9 || !area.is_finite() {
-            continue;
-        }
-        let low = a.min(b).min(c).max(Vec3::ZERO);
-        let high = a.max(b).max(c).min(Vec3::splat(PIXELS as f32 - 1.0));
-        if high.x < low.x || high.y < low.y {
-            continue;
-        }
+        let corners = triangle.map(|corner| project(points[corner as usize]));
         let tone = tone(analysis.shells.kind(triangle[0] as usize));
-        for y in low.y as usize..=high.y as usize {
-            for x in low.x as usize..=high.x as usize {
-                let at = Vec3::new(x as f32 + 0.5, y as f32 + 0.5, 0.0);
-                let u = ((b.x - at.x) * (c.y - at.y) - (c.x - at.x) * (b.y - at.y)) / area;
-                let v = ((c.x - at.x) * (a.y - at.y) - (a.x - at.x) * (c.y - at.y)) / area;
-                let w = 1.0 - u - v;
-                if u < 0.0 || v < 0.0 || w < 0.0 {
-                    continue;
-                }
-                let z = u * a.z + v * b.z + w * c.z;
-                let pixel = y * PIXELS + x;
-                if z > depth[pixel] {
-                    depth[pixel] = z;
-                    let [p, q, r] = triangle.map(|corner| normals[corner as usize]);
-                    let normal = (u * p + v * q + w * r).normalize_or_zero();
-                    let lit = 0.28 + 0.72 * normal.dot(light).abs();
-                    pixels[pixel] =
-                        Color32::from_rgb((tone[0] * lit) as u8, (tone[1] * lit) as u8, (tone[2] * lit) as u8);
-                }
-            }
-        }
+        raster.triangle(corners, triangle.map(|corner| normals[corner as usize]), tone);
     }
-    ColorImage::new([PIXELS, PIXELS], pixels)
+    raster.image()
 }
 
 fn tone(kind: ShellKind) -> [f32; 3] {
@@ -113,16 +82,4 @@ fn tone(kind: ShellKind) -> [f32; 3] {
         ShellKind::LeftEye | ShellKind::RightEye => [240.0, 240.0, 240.0],
         ShellKind::Inside => [190.0, 150.0, 145.0],
     }
-}
-
-fn normals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
-    let mut normals = vec![Vec3::ZERO; points.len()];
-    for triangle in triangles {
-        let [a, b, c] = triangle.map(|corner| points[corner as usize]);
-        let normal = (b - a).cross(c - a);
-        for corner in triangle {
-            normals[*corner as usize] += normal;
-        }
-    }
-    normals
 }

@@ -28,8 +28,10 @@ pub(super) struct Values {
     vectors: [[CommonValue<f32>; 3]; Part::ALL.len()],
     /// Distances at rest from each joint to its children.
     pub lengths: Vec<f32>,
-    /// The size of the skeleton, for the speed of drags.
+    /// The extent of the skeleton, for the speed of drags.
     extent: f32,
+    /// The distance of its farthest joint from the rig's origin.
+    far: f32,
     typed: TypedAngles,
 }
 
@@ -114,6 +116,7 @@ impl Values {
             vectors,
             lengths: bones.map(|(head, tail)| place(head).distance(place(tail))).collect(),
             extent: (high - low).max_element().max(0.0),
+            far: if low.is_finite() { low.abs().max(high.abs()).length() } else { 0.0 },
             joints: data().map(|joint| joint.uid).collect(),
             typed,
         })
@@ -170,6 +173,11 @@ impl Values {
                 Operation::Pose(pairs.map(offset).collect())
             }
         }
+    }
+
+    /// Size of the skeleton: the distance of its farthest joint from the rig's origin.
+    pub fn size(&self) -> f32 {
+        self.far
     }
 
     /// Change per pixel of a drag, in model units.

@@ -14,16 +14,19 @@ use super::{
     stack::Entry,
 };
 use crate::{
-    editor::panels::{
-        displayed_rig::DisplayedRig,
-        fields::{CommonValue, Look, MIXED, NumberEdit, Numbers, labelled},
-        list,
+    editor::{
+        panel::Requests,
+        panels::{
+            displayed_rig::DisplayedRig,
+            fields::{CommonValue, Look, MIXED, NumberEdit, Numbers, labelled},
+            list,
+        },
     },
     processor::{
         Builder, ModuleInfo, ParameterValues,
         form::{Form, FormElement, read_module_form},
     },
-    rig::{Uid, ron_text},
+    rig::{Uid, proportion::Quantity, ron_text},
 };
 
 /// Colour of a parameter that gets its first one.
@@ -137,6 +140,11 @@ impl Subject<'_> {
 }
 
 impl Values {
+    /// Sends a notice if a typed number was not taken.
+    pub fn tell(&mut self, requests: &mut Requests) {
+        self.numbers.tell(requests);
+    }
+
     /// Draws the form of an entry; the text of its parameters and the reason where they cannot be read.
     pub fn show(
         &mut self,
@@ -250,7 +258,7 @@ impl Values {
                 let label = if unit.is_empty() { label } else { format!("{label} ({unit})") };
                 match value.parse::<f32>() {
                     Ok(number) => {
-                        let look = Look { speed: f64::from(*step), decimals: 4, suffix: "" };
+                        let look = Look { speed: f64::from(*step), decimals: 4, suffix: "", quantity: Quantity::Plain };
                         let edit = self.numbers.number(ui, &label, CommonValue { value: number, mixed }, look)?;
                         Some(subject.number(path, edit))
                     }
@@ -259,7 +267,7 @@ impl Values {
             }
             FormElement::Vector(_) => match subject.vector(path) {
                 Some(shown) => {
-                    let look = Look { speed: 0.01, decimals: 4, suffix: "" };
+                    let look = Look { speed: 0.01, decimals: 4, suffix: "", quantity: Quantity::Plain };
                     let (axis, edit) = self.numbers.vector(ui, &label, shown, look)?;
                     Some(axis_edit(subject, path, axis, edit))
                 }

@@ -1,0 +1,164 @@
+//! Display panel: what the viewport shows, and the look and size of the window.
+
+use std::collections::BTreeSet;
+
+use bevy::prelude::*;
+use bevy_egui::egui::{self, Checkbox, ScrollArea, Ui};
+
+use super::displayed_rig::{DisplayedRig, Stamp};
+use crate::{
+    editor::{
+        actions::{Action, ActionRequest},
+        help::describe,
+        keys::KeyBindings,
+        panel::{EditorPanel, Requests},
+        screen::HiddenMeshes,
+        settings::{EditorSettings, UI_SCALES},
+        style::WindowTheme,
+    },
+    plugins::{
+        display::MeshDisplay,
+        drawing::{LabelChoice, RigDrawing, deforming_joints},
+        surface::{RigMesh, RigMeshes},
+    },
+    rig::Uid,
+};
+
+/// The panel.
+#[derive(Default)]
+pub struct DisplayPanel {
+    deforming: BTreeSet<Uid>,
+    made_from: Option<Stamp>,
+}
+
+impl EditorPanel for DisplayPanel {
+    fn title(&self) -> &'static str {
+        "Display"
+    }
+
+    fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
+        ScrollArea::vertical().id_salt("display").auto_shrink(false).show(ui, |ui| {
+            ui.strong("Viewport");
+            for (action, is_on) in switches(world) {
+                switch(ui, world, action, is_on, requests);
+                if action == Action::Deforming && is_on {
+                    self.count(ui, world);
+                }
+            }
+            meshes(ui, world, requests);
+            ui.separator();
+            window(ui, world, requests);
+        });
+    }
+}
+
+/// Switches of the viewport, with their states.
+fn switches(world: &World) -> Vec<(Action, bool)> {
+    let mut list = Vec::new();
+    if let Some(drawing) = world.get_resource::<RigDrawing>() {
+        list.extend([
+            (Action::Bones, drawing.bones),
+            (Action::Deforming, drawing.deforming),
+            (Action::Controls, drawing.controls),
+            (Action::Labels, drawing.labels == LabelChoice::All),
+            (Action::LocalAxes, drawing.axes),
+            (Action::Grid, drawing.grid),
+        ]);
+    }
+    if let Some(display) = world.get_resource::<MeshDisplay>() {
+        list.extend([(Action::XRay, display.xray), (Action::Wireframe, display.wireframe)]);
+    }
+    if let Some(hidden) = world.get_resource::<HiddenMeshes>() {
+        list.push((Action::Meshes, !hidden.all && hidden.meshes.is_empty()));
+    }
+    list
+}
+
+/// Draws a switch that an action turns.
+fn switch(ui: &mut Ui, world: &World, action: Action, is_on: bool, requests: &mut Requests) {
+    let mut on = is_on;
+    let field = ui.add(Checkbox::new(&mut on, describe(action)));
+    if field.clicked() {
+        requests.send(ActionRequest(action));
+    }
+    if let Some(key) = world.get_resource::<KeyBindings>().and_then(|keys| keys.key(action)) {
+        field.on_hover_text(key.to_string());
+    }
+}
+
+impl DisplayPanel {
+    /// Draws the number of joints that deform.
+    fn count(&mut self, ui: &mut Ui, world: &World) {
+        let Some(shown) = DisplayedRig::of(world) else { return };
+        if self.made_from != Some(shown.stamp()) {
+            self.deforming = deforming_joints(&shown.rig);
+            self.made_from = Some(shown.stamp());
+        }
+        let joints = shown.rig.len();
+        let text = match self.deforming.iter().filter(|joint| shown.rig.joint(**joint).is_some()).count() {
+            0 => "No joint moves a point yet: skin the mesh first.".to_owned(),
+            count => format!("{count} of {joints} joints move points of a mesh."),
+        };
+        ui.weak(text);
+    }
+}
+
+/// Draws the meshes of the rig, with a switch each.
+fn meshes(ui: &mut Ui, world: &World, requests: &mut Requests) {
+    let Some(hidden) = world.get_resource::<HiddenMeshes>() else { return };
+    let meshes = DisplayedRig::of(world).and_then(|shown| world.get::<RigMeshes>(shown.entity));
+    let meshes = meshes.iter().flat_map(|meshes| meshes.iter()).filter_map(|mesh| world.get::<RigMesh>(mesh));
+    let meshes: Vec<&RigMesh> = meshes.collect();
+    for (number, mesh) in meshes.iter().enumerate() {
+        let name = match mesh.file.name.as_str() {
+            "" => format!("Mesh {}", number + 1),
+            name => name.to_owned(),
+        };
+        let mut on = !hidden.hides(mesh.uid);
+        let clicked =
+            ui.push_id(mesh.uid, |ui| ui.indent("mesh", |ui| ui.checkbox(&mut on, name).clicked()).inner).inner;
+        if clicked {
+            // The switch of one mesh ends the common one.
+            let mut next = HiddenMeshes { all: false, meshes: hidden.meshes.clone() };
+            if hidden.all {
+                next.meshes = meshes.iter().map(|mesh| mesh.uid).collect();
+            }
+            if on {
+                next.meshes.remove(&mesh.uid);
+            } else {
+                next.meshes.insert(mesh.uid);
+            }
+            requests.set(next);
+        }
+    }
+}
+
+/// Draws theme, contrast and size of the window.
+fn window(ui: &mut Ui, world: &World, requests: &mut Requests) {
+    let Some(settings) = world.get_resource::<EditorSettings>() else { return };
+    ui.strong("Window");
+    ui.horizontal(|ui| {
+        for theme in [WindowTheme::Dark, WindowTheme::Light] {
+            let chosen = ui.selectable_label(settings.theme == theme, theme.name()).clicked();
+            if chosen && settings.theme != theme {
+                requests.send(ActionRequest(Action::Theme));
+            }
+        }
+    });
+    switch(ui, world, Action::Contrast, settings.high_contrast, requests);
+    ui.horizontal(|ui| {
+        let [least, .., most] = UI_SCALES;
+        let mut step = |ui: &mut Ui, text: &str, action: Action, is_free: bool| {
+            let button = ui.add_enabled(is_free, egui::Button::new(text)).on_hover_text(describe(action));
+            let said = describe(action);
+            button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, is_free, &said));
+            if button.clicked() {
+                requests.send(ActionRequest(action));
+            }
+        };
+        step(ui, "-", Action::UiSmaller, settings.ui_scale > least);
+        ui.label(format!("{:.0} %", 100.0 * settings.ui_scale));
+        step(ui, "+", Action::UiLarger, settings.ui_scale < most);
+        step(ui, "100 %", Action::UiUsual, settings.ui_scale != 1.0);
+    });
+}
