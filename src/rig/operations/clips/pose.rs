@@ -44,15 +44,28 @@ pub(super) fn set_pose(
     time: f32,
     targets: &BTreeSet<TrackTarget>,
 ) -> Result<(), OperationError> {
+    let rig = draft.rig();
+    let values = targets.iter().filter_map(|target| Some((target.clone(), current(rig, target)?)));
+    let values: Vec<(TrackTarget, [f32; 4])> = values.collect();
+    set_values(draft, clip, layer, time, &values)
+}
+
+/// Sets keys of a layer with which the layers up to it give values.
+pub(super) fn set_values(
+    draft: &mut Draft,
+    clip: Uid,
+    layer: Uid,
+    time: f32,
+    values: &[(TrackTarget, [f32; 4])],
+) -> Result<(), OperationError> {
     if !time.is_finite() {
         return Err(OperationError::BadNumber("a key needs a time that is finite; use another"));
     }
     let found = find(draft, clip)?;
     let place = found.layers.iter().position(|own| own.uid == layer).ok_or(EditError::NoLayer(clip, layer))?;
     let mut changes = Changes::default();
-    for target in targets {
-        let Some(wanted) = current(draft.rig(), target) else { continue };
-        let value = found.value_for(place, target, time, wanted);
+    for (target, wanted) in values {
+        let value = found.value_for(place, target, time, *wanted);
         let keys = found.layers[place].tracks.get(target).map_or(&[] as &[Key], |track| &track.keys);
         changes.insert(target, [Key { time, value, ease: ease_at(keys, time) }]);
     }
