@@ -9,6 +9,7 @@ use super::{
     help::describe,
     keys::KeyBindings,
     panel::{EditorOverlay, PanelApp, Requests},
+    panels::timeline,
     style,
 };
 use crate::{
@@ -42,6 +43,9 @@ fn toggle_palette(mut actions: MessageReader<ActionRequest>, mut shown: ResMut<P
 /// The reason why an action can do nothing at present, in a few words; `None` if it can.
 pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
     let Some(entity) = world.get_resource::<ActiveRig>().map(|rig| rig.0) else { return Some("no rig is open") };
+    if let Action::Timeline(action) = action {
+        return timeline::obstacle(world, action);
+    }
     let rig = world.get::<Rig>(entity)?;
     let history = world.get::<RigHistory>(entity);
     let selected = world.get::<Selection>(entity).is_some_and(|selection| !selection.0.is_empty());

@@ -1,6 +1,6 @@
 //! The editor's panels: what a person does in them reaches the rig as one step, and everything is told.
 
-mod desk;
+pub mod desk;
 mod face;
 mod features;
 mod tags;
@@ -541,7 +541,8 @@ fn symbols_are_in_the_fonts() {
         galley.rows[0].glyphs[0].uv_rect
     };
     // What the fonts lack is drawn like what no font has.
-    let missing: Vec<char> = "✖⏷⏵🗑✏🔒ℹ✔⚠⮪⮫×°…".chars().filter(|c| shape(*c) == shape('\u{10fffd}')).collect();
+    let missing: Vec<char> =
+        "✖⏷⏵🗑✏🔒ℹ✔⚠⮪⮫×°…⏮⏪⏴▶⏸⏩⏭🔁🔑⏺⚑⌖👁".chars().filter(|c| shape(*c) == shape('\u{10fffd}')).collect();
     assert!(missing.is_empty(), "{missing:?}");
 }
 

@@ -18,13 +18,13 @@ pub(in crate::editor) enum OpenError {
         name: String,
     },
     /// The file has animation clips, which are no document.
-    #[error("{name} has only animation clips; open the rig or the project that they belong to")]
+    #[error("{name} has only animation clips; open the rig or the project that they belong to first")]
     ClipsAlone {
         /// Name of the file.
         name: String,
     },
     /// The file has the motion of a skeleton, which is no document.
-    #[error("{name} has only motion; put it onto a rig with `rigsmith animate`")]
+    #[error("{name} has only motion; open a mesh or a template with joints first, and then the motion onto it")]
     MotionAlone {
         /// Name of the file.
         name: String,
