@@ -46,7 +46,7 @@ impl Default for Layout {
         let [centre, right] =
             tree.split_right(centre, 0.75, tabs(&["Properties", "Tags", "Controls", "Skinning", "Face"]));
         let [_, _] = tree.split_below(right, 0.6, tabs(&["History", "Poses"]));
-        let [_, _] = tree.split_below(centre, 0.74, tabs(&BELOW));
+        let [_, _] = tree.split_below(centre, 0.78, tabs(&BELOW));
         Self { dock }
     }
 }
@@ -80,7 +80,7 @@ impl Layout {
         }
         match self.dock.find_main_surface_tab(&VIEWPORT.to_owned()) {
             Some((viewport, _)) => {
-                self.dock.main_surface_mut().split_below(viewport, 0.74, vec![title.to_owned()]);
+                self.dock.main_surface_mut().split_below(viewport, 0.78, vec![title.to_owned()]);
             }
             None => self.dock.push_to_first_leaf(title.to_owned()),
         }

@@ -98,7 +98,10 @@ impl EditorPanel for CurvesPanel {
             return list::nothing(ui, "Select keys in the Timeline, or a control that has keys, to see its curves.");
         }
         let rect = ui.available_rect_before_wrap();
-        let split = rect.left() + (rect.width() * 0.22).clamp(60.0, 190.0);
+        if rect.width() < 60.0 || rect.height() < 60.0 {
+            return;
+        }
+        let split = rect.left() + (rect.width() * 0.22).clamp(60.0, 190.0).min(rect.width() * 0.6);
         let below = rect.top() + ruler_height(open.clip);
         let axis = TimeAxis { span: timeline.span, x: Rangef::new(split, rect.right()) };
         let over = Rect::from_min_max(pos2(split, rect.top()), pos2(rect.right(), below));

@@ -129,7 +129,10 @@ impl TimelinePanel {
     fn body(&mut self, ui: &mut Ui, context: &RowContext, requests: &mut Requests) {
         let (open, timeline) = (context.open, context.timeline);
         let rect = ui.available_rect_before_wrap();
-        let names = (rect.width() * 0.28).clamp(72.0, 240.0);
+        if rect.width() < 60.0 || rect.height() < 40.0 {
+            return;
+        }
+        let names = (rect.width() * 0.28).clamp(72.0, 240.0).min(rect.width() * 0.6);
         let split = rect.left() + names;
         let below = rect.top() + ruler::height(open.clip);
         let axis = TimeAxis { span: timeline.span, x: Rangef::new(split, rect.right()) };
@@ -145,7 +148,7 @@ impl TimelinePanel {
         let list = List { id: "timeline rows", count: rows.len(), height, reveal: None, follow: false };
         list.show(ui, |ui, range, place| {
             let visible = ui.clip_rect();
-            let area = Rect::from_min_max(pos2(split, visible.top()), pos2(rect.right(), visible.bottom()));
+            let area = Rect::from_min_max(pos2(split, visible.top().max(below)), pos2(rect.right(), visible.bottom()));
             let response = ui.interact(area, ui.id().with("keys"), Sense::click_and_drag());
             let said = format!("Keys of {}", open.clip.name);
             response.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, &said));

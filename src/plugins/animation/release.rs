@@ -79,15 +79,27 @@ pub(super) fn release(
                     }
                 }
             }
-            if offset == place.offset && runtime.is_some() || !place.is_posable {
+            if !place.is_posable {
                 continue;
             }
-            if place.is_direct {
-                if let Ok(mut pose) = poses.get_mut(place.entity) {
-                    pose.set_if_neq(offset.into());
+            if place.is_direct
+                && let Ok(mut pose) = poses.get_mut(place.entity)
+            {
+                pose.set_if_neq(offset.into());
+            }
+            // The program of a running rig writes the transforms of its nodes; a clip that moves the node goes on from here.
+            match &mut runtime {
+                Some(runtime) => {
+                    let state = runtime.bypass_change_detection().state_mut();
+                    if let Some(slot) = state.program().node(node) {
+                        state.set_offset_at(slot, offset);
+                    }
                 }
-            } else if let Ok(mut transform) = transforms.get_mut(place.entity) {
-                transform.set_if_neq(offset.on(&place.base));
+                None => {
+                    if let Ok(mut transform) = transforms.get_mut(place.entity) {
+                        transform.set_if_neq(offset.on(&place.base));
+                    }
+                }
             }
         }
     }

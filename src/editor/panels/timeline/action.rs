@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     editor::{ActiveRig, actions::Action},
-    plugins::document::Selection,
+    plugins::document::{Selection, ShowRest},
     rig::Rig,
 };
 
@@ -205,6 +205,9 @@ pub fn obstacle(world: &World, action: TimelineAction) -> Option<&'static str> {
     match action {
         TimelineAction::NextKey | TimelineAction::PreviousKey => (!has_keys()).then_some("the clip has no keys"),
         TimelineAction::Play => (open.clip.duration() <= 0.0).then_some("the clip has no length"),
+        TimelineAction::Key | TimelineAction::KeyAll if shows_rest(world, open.entity) => {
+            Some("the rig is shown at rest: change to Select or Pose mode")
+        }
         TimelineAction::Key if open.layer.is_none() => Some("the clip has no layer"),
         TimelineAction::Key => {
             let selected = world.get::<Selection>(open.entity);
@@ -222,4 +225,8 @@ pub fn obstacle(world: &World, action: TimelineAction) -> Option<&'static str> {
         }
         _ => None,
     }
+}
+
+fn shows_rest(world: &World, rig: Entity) -> bool {
+    world.get::<ShowRest>(rig).is_some_and(|rest| rest.0)
 }

@@ -161,7 +161,9 @@ impl Markers {
             if x < until && dragged.is_none() {
                 continue;
             }
-            until = x + 7.0;
+            if dragged.is_none() {
+                until = x + 7.0;
+            }
             let next = markers.get(number + 1).map_or(strip.right(), |next| axis.at(next.time));
             let width = (next - x - 2.0).clamp(8.0, 90.0);
             let flag = Rect::from_min_size(pos2(x - 2.0, strip.top()), vec2(width, strip.height()));

@@ -82,8 +82,10 @@ fn ease_at(keys: &[Key], time: f32) -> Ease {
     }
 }
 
-/// Runs an operation, then sets keys for what it changed in the pose, or asked to pose to values other than those of the
-/// clip.
+/// Largest difference of a value from that of a clip that is rounding.
+const ROUNDING: f32 = 2e-6;
+
+/// Runs an operation, then sets keys for what it posed to values other than those of the clip.
 pub(in crate::rig::operations) fn keyed(
     draft: &mut Draft,
     operation: &Operation,
@@ -102,17 +104,14 @@ pub(in crate::rig::operations) fn keyed(
     }
     let mut targets = BTreeSet::new();
     for node in nodes {
-        let was = pose.get(&node).copied().unwrap_or_default();
-        let is = rig.offset(node).copied().unwrap_or_default();
-        let changed = [
-            (Property::Translation, is.translation != was.translation),
-            (Property::Rotation, is.rotation != was.rotation),
-            (Property::Scale, is.scale != was.scale),
-        ];
-        for (property, is_changed) in changed {
+        for property in [Property::Translation, Property::Rotation, Property::Scale] {
             let target = TrackTarget { node, property };
             let shown = found.value(&target, time).unwrap_or_else(|| target.property.rest());
-            if is_changed || current(rig, &target).is_some_and(|value| value != shown) {
+            // A key with the value of the clip would change the curves on both sides of it. Poses that were taken from what is
+            // shown are rounded.
+            let is_other =
+                |value: [f32; 4]| value.iter().zip(&shown).any(|(a, b)| (a - b).abs() > ROUNDING * a.abs().max(1.0));
+            if current(rig, &target).is_some_and(is_other) {
                 targets.insert(target);
             }
         }
