@@ -1,5 +1,5 @@
-//! What follows the frame: the playhead goes with the playback, poses set keys at the playhead, and the timeline belongs to the
-//! active rig.
+//! Systems at the end of a frame: the playhead goes with the playback, poses set keys at the playhead, and the timeline
+//! belongs to the active rig.
 
 use bevy::{prelude::*, window::RequestRedraw};
 

@@ -35,7 +35,7 @@ use crate::{
 
 const WEIGHT: Look = Look { speed: 0.005, decimals: 3, suffix: "" };
 
-/// What all rows are drawn with.
+/// Context that all rows are drawn with.
 pub(super) struct RowContext<'a> {
     pub world: &'a World,
     pub shown: &'a DisplayedRig<'a>,
