@@ -142,15 +142,11 @@ pub(super) fn gestures(
     if response.clicked()
         && let Some(at) = response.interact_pointer_pos()
     {
-        match hit(at, plot, all, &timeline.keys) {
-            Some(Hit::Key(curve, key)) => {
-                let mut keys = if held.shift || held.command { timeline.keys.clone() } else { KeyTimes::new() };
-                add_keys(&mut keys, &one(curve, key));
-                requests.send(TimelineRequest::Select(keys));
-            }
-            Some(Hit::Tangent(..)) => {}
-            // The curves stay those of the selected keys: an empty click deselects nothing.
-            None => {}
+        // The curves stay those of the selected keys: an empty click deselects nothing.
+        if let Some(Hit::Key(curve, key)) = hit(at, plot, all, &timeline.keys) {
+            let mut keys = if held.shift || held.command { timeline.keys.clone() } else { KeyTimes::new() };
+            add_keys(&mut keys, &one(curve, key));
+            requests.send(TimelineRequest::Select(keys));
         }
     }
 }

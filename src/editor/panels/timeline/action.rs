@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     import::ClipImport,
-    state::{OpenClip, Timeline, count},
+    state::{OpenClip, Timeline, has_any},
 };
 use crate::{
     editor::{ActiveRig, actions::Action},
@@ -220,8 +220,8 @@ pub fn obstacle(world: &World, action: TimelineAction) -> Option<&'static str> {
             open.layer.is_none_or(|layer| layer.tracks.is_empty()).then_some("the layer has no keys")
         }
         action if action.is_of_keys() => {
-            let selected = open.layer.map_or(0, |layer| count(layer, &timeline.keys));
-            (selected == 0).then_some("no key is selected")
+            let is_any = open.layer.is_some_and(|layer| has_any(layer, &timeline.keys));
+            (!is_any).then_some("no key is selected")
         }
         _ => None,
     }

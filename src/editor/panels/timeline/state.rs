@@ -184,17 +184,15 @@ pub(super) fn all_keys(layer: &ClipLayer) -> KeyTimes {
     layer.tracks.iter().map(times).collect()
 }
 
-/// Number of selected keys that the layer has.
-pub(super) fn count(layer: &ClipLayer, keys: &KeyTimes) -> usize {
-    let of = |(target, times): (&TrackTarget, &Vec<f32>)| {
-        let Some(track) = layer.tracks.get(target) else { return 0 };
-        let is_there = |time: &&f32| {
-            let place = track.keys.partition_point(|key| key.time < **time);
-            track.keys.get(place).is_some_and(|key| key.time == **time)
-        };
-        times.iter().filter(is_there).count()
-    };
-    keys.iter().map(of).sum()
+/// True if the layer has any of these keys.
+pub(super) fn has_any(layer: &ClipLayer, keys: &KeyTimes) -> bool {
+    keys.iter().any(|(target, times)| {
+        let Some(track) = layer.tracks.get(target) else { return false };
+        times.iter().any(|time| {
+            let place = track.keys.partition_point(|key| key.time < *time);
+            track.keys.get(place).is_some_and(|key| key.time == *time)
+        })
+    })
 }
 
 /// Adds keys to others, each once.
