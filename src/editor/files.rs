@@ -4,6 +4,7 @@
 //! when it is complete. Actions that would lose unsaved changes ask first; see [`dialog`] for the questions. Every
 //! document has a journal from its first frame; see [`recovery`] for work left by a crash.
 
+mod clips;
 pub mod dialog;
 mod dialog_view;
 mod document;

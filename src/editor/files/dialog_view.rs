@@ -187,8 +187,8 @@ impl DialogView {
             Purpose::Export => (
                 "Export",
                 "Export",
-                "The ending says what: .glb, .gltf or .obj the character at rest, .rig.ron the template, .rig the \
-                 skeleton, .skin the weights.",
+                "The ending says what: .glb or .gltf the character with its clips, .obj at rest, .anim.ron the clips, \
+                 .rig.ron the template, .rig the skeleton, .skin the weights.",
             ),
         };
         ui.heading(title);

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use crate::{
     files::{LoadError, ReadError, SaveError, StoreError, journal::JournalError},
     mesh::obj::ObjError,
+    processor::BuildError,
     rig::{EditError, skin::SkinError},
+    solve::program::ProgramError,
 };
 
 /// Reason why a document is not opened.
@@ -90,10 +92,19 @@ pub(in crate::editor) enum WriteError {
     /// The mesh has no weights.
     #[error("there are no weights to export; skin the mesh first")]
     NoWeights,
+    /// The document has no clips.
+    #[error("there are no clips to export; make one in the Timeline first")]
+    NoClips,
+    /// The commands of the rig stop with an error, so that its clips cannot be played.
+    #[error("the rig cannot be built, and its clips not be played: {0}")]
+    Build(#[from] BuildError),
+    /// The built rig cannot run.
+    #[error("the built rig cannot run, and its clips not be played: {0}")]
+    Program(#[from] ProgramError),
     /// The file's name has no fitting ending.
     #[error(
-        "a character is exported as .glb, .gltf or .obj, a rig as .rig.ron or .rig, weights as .skin; choose one of \
-         these endings"
+        "a character is exported as .glb, .gltf or .obj, a rig as .rig.ron or .rig, weights as .skin, clips as \
+         .anim.ron; choose one of these endings"
     )]
     Ending,
     /// The folder has other files under the names that the bundled character would get.

@@ -8,8 +8,8 @@ mod edit;
 
 use bevy::prelude::*;
 use bevy_egui::egui::{
-    Align2, Color32, FontId, Painter, Pos2, Rangef, Rect, Sense, Shape, Stroke, Ui, UiBuilder, WidgetInfo, WidgetType,
-    pos2, vec2,
+    Align2, FontId, Painter, Pos2, Rangef, Rect, Sense, Shape, Stroke, Ui, UiBuilder, WidgetInfo, WidgetType, pos2,
+    vec2,
 };
 
 use self::{
@@ -19,13 +19,12 @@ use self::{
 use super::{
     displayed_rig::DisplayedRig,
     fields, list,
-    timeline::{Markers, OpenClip, TimeAxis, Timeline, lines, navigate, paint_playhead, ruler_height, show_ruler},
+    timeline::{
+        KeyColors, Markers, OpenClip, TimeAxis, Timeline, lines, navigate, paint_playhead, ruler_height, show_ruler,
+    },
 };
 use crate::{
-    editor::{
-        panel::{EditorPanel, Requests},
-        style,
-    },
+    editor::panel::{EditorPanel, Requests},
     rig::{Uid, animation::TrackTarget},
 };
 
@@ -119,8 +118,9 @@ impl EditorPanel for CurvesPanel {
         self.zoom(ui, area, &plot, requests);
         let painter = ui.painter_at(area);
         grid(ui, &painter, area, &plot, &open);
+        let colors = KeyColors::of(ui.visuals());
         for curve in &all {
-            paint(&painter, curve, &plot, timeline);
+            paint(&painter, curve, &plot, timeline, &colors);
         }
         paint_playhead(ui, area, &axis, &open);
         ui.advance_cursor_after_rect(rect);
@@ -224,7 +224,7 @@ fn grid(ui: &Ui, painter: &Painter, area: Rect, plot: &Plot, open: &OpenClip) {
     }
 }
 
-fn paint(painter: &Painter, curve: &Curve, plot: &Plot, timeline: &Timeline) {
+fn paint(painter: &Painter, curve: &Curve, plot: &Plot, timeline: &Timeline, colors: &KeyColors) {
     let points = curve.points.iter().map(|(time, value)| plot.at(*time, *value)).collect();
     painter.add(Shape::line(points, Stroke::new(1.5, curve.color)));
     let selected = timeline.keys.get(&curve.target);
@@ -233,15 +233,15 @@ fn paint(painter: &Painter, curve: &Curve, plot: &Plot, timeline: &Timeline) {
         let is_selected = selected.is_some_and(|times| times.contains(&key.key.time));
         if let Some(ends) = plot.tangents(key).filter(|_| is_selected) {
             for end in ends {
-                painter.line_segment([at, end], Stroke::new(1.0, style::QUIET));
-                painter.circle_filled(end, 3.0, style::QUIET);
+                painter.line_segment([at, end], Stroke::new(1.0, colors.quiet));
+                painter.circle_filled(end, 3.0, colors.quiet);
             }
         }
-        let color = if is_selected { style::ACCENT } else { curve.color };
+        let color = if is_selected { colors.accent } else { curve.color };
         painter.add(Shape::convex_polygon(
             [(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)].map(|(x, y)| at + vec2(x, y) * 4.0).to_vec(),
             color,
-            Stroke::new(1.0, Color32::from_rgb(26, 27, 31)),
+            Stroke::new(1.0, colors.outline),
         ));
     }
 }

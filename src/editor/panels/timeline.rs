@@ -10,6 +10,7 @@ mod area;
 mod axis;
 mod bar;
 mod carry_out;
+mod colors;
 mod drag;
 mod follow;
 pub mod import;
@@ -32,6 +33,7 @@ pub use self::{
 };
 pub(super) use self::{
     area::preview,
+    colors::KeyColors,
     drag::KeyDrag,
     ruler::{Markers, height as ruler_height, lines, paint_playhead, show as show_ruler},
     state::{add as add_keys, contains as contains_keys},
@@ -201,13 +203,15 @@ impl TimelinePanel {
         };
         let version = (timeline.changes, dragged.map_or(0, |_| self.drags + 1));
         let keys = dragged.unwrap_or(&timeline.keys);
+        let colors = KeyColors::of(ui.visuals());
         self.sheet.note_selected(keys, version);
         for (row, place) in rows {
             let place = place.with_min_x(area.left()).with_max_x(area.right());
             if matches!(row, Row::All | Row::Node(_)) {
                 painter.rect_filled(place.shrink2(vec2(0.0, 1.0)), 0.0, ui.visuals().faint_bg_color);
             }
-            area::paint(&painter, place, axis, &self.sheet, row, self.sheet.selected_times(row, keys));
+            let selected = self.sheet.selected_times(row, keys);
+            area::paint(&painter, place, axis, (&self.sheet, row), selected, &colors);
         }
         ruler::paint_playhead(ui, area, axis, open);
     }

@@ -7,13 +7,14 @@ use bevy_egui::egui::{
 
 use super::{
     axis::TimeAxis,
+    colors::KeyColors,
     drag::KeyDrag,
     marks::{Bucket, HALF, MarkKind, bucket_at, buckets, count_within},
     sheet::{Row, Sheet},
     state::{OpenClip, Timeline, TimelineRequest, add, contains, subtract},
 };
 use crate::{
-    editor::{panel::Requests, style},
+    editor::panel::Requests,
     plugins::document::{Change, EditRequest},
     rig::operations::{ClipOperation, KeyOperation, KeyTimes, Operation},
 };
@@ -58,24 +59,31 @@ impl Grid<'_> {
 }
 
 /// Paints the marks of a row.
-pub(super) fn paint(painter: &Painter, rect: Rect, axis: &TimeAxis, sheet: &Sheet, row: Row, selected: &[f32]) {
+pub(super) fn paint(
+    painter: &Painter,
+    rect: Rect,
+    axis: &TimeAxis,
+    (sheet, row): (&Sheet, Row),
+    selected: &[f32],
+    colors: &KeyColors,
+) {
     let (middle, most) = (rect.center().y, rect.height() * 0.5 - 1.0);
     let quiet = matches!(row, Row::All | Row::Node(_));
     for bucket in buckets(sheet.marks_of(row), axis) {
         let chosen = count_within(selected, bucket.times);
-        painter.add(shape(&bucket, middle, most, chosen, quiet));
+        let plain = if quiet { colors.sum } else { colors.key };
+        painter.add(shape(&bucket, (middle, most), chosen, plain, colors));
     }
 }
 
 /// Shape of a mark: squares are stepped, diamonds linear, discs cubic; bars stand for many keys, and grow with their number.
-fn shape(bucket: &Bucket, middle: f32, most: f32, chosen: usize, quiet: bool) -> Shape {
-    let plain = if quiet { Color32::from_rgb(150, 156, 168) } else { Color32::from_rgb(196, 202, 212) };
+fn shape(bucket: &Bucket, (middle, most): (f32, f32), chosen: usize, plain: Color32, colors: &KeyColors) -> Shape {
     let color = match chosen {
         0 => plain,
-        chosen if chosen < bucket.count => plain.lerp_to_gamma(style::ACCENT, 0.6),
-        _ => style::ACCENT,
+        chosen if chosen < bucket.count => plain.lerp_to_gamma(colors.accent, 0.6),
+        _ => colors.accent,
     };
-    let line = Stroke::new(1.0, Color32::from_rgb(26, 27, 31));
+    let line = Stroke::new(1.0, colors.outline);
     if bucket.count > 1 {
         let high = (3.0 + ops::log2(bucket.count as f32)).min(most);
         let corners = [pos2(bucket.x[0] - 2.0, middle - high), pos2(bucket.x[1] + 2.0, middle + high)];
@@ -132,8 +140,9 @@ pub(super) fn gestures(
             if let Some(at) = at {
                 let rect = Rect::from_two_pos(*from, at);
                 let painter = ui.painter_at(response.rect);
-                painter.rect_filled(rect, 0.0, style::ACCENT.gamma_multiply(0.12));
-                painter.rect_stroke(rect, 0.0, Stroke::new(1.0, style::ACCENT), StrokeKind::Inside);
+                let accent = KeyColors::of(ui.visuals()).accent;
+                painter.rect_filled(rect, 0.0, accent.gamma_multiply(0.12));
+                painter.rect_stroke(rect, 0.0, Stroke::new(1.0, accent), StrokeKind::Inside);
             }
         }
         None => {}

@@ -9,6 +9,7 @@ use bevy_egui::egui::{
 use super::{
     TimelinePanel,
     bar::entry,
+    colors::KeyColors,
     sheet::Row,
     state::{OpenClip, Timeline, TimelineRequest, add},
 };
@@ -20,7 +21,6 @@ use crate::{
             fields::{Look, NumberEdit},
             list,
         },
-        style,
     },
     plugins::{
         document::{Change, EditRequest},
@@ -239,7 +239,7 @@ fn layer(
         ui.spacing_mut().item_spacing.x = 4.0;
         let height = ui.spacing().interact_size.y;
         let name = format!("Weight of {said}");
-        let weight = RichText::new("weight ").color(style::QUIET);
+        let weight = RichText::new("weight ").color(KeyColors::of(ui.visuals()).quiet);
         let width = right.width().min(90.0);
         let edit = panel.numbers.field(ui, &name, weight, layer.weight.into(), WEIGHT, vec2(width, height));
         let weigh = |value: f32| set(&|about| about.weight = value.clamp(0.0, 1.0));
@@ -273,7 +273,8 @@ fn layer(
             requests.send(EditRequest::operation(open.entity, set(&|about| about.muted = !layer.muted)));
         }
         let keys: usize = layer.tracks.values().map(|track| track.keys.len()).sum();
-        let text = RichText::new(format!("{} tracks, {keys} keys", layer.tracks.len())).color(style::QUIET);
+        let text = RichText::new(format!("{} tracks, {keys} keys", layer.tracks.len()))
+            .color(KeyColors::of(ui.visuals()).quiet);
         ui.add(Label::new(text).truncate());
     });
 }
@@ -313,6 +314,6 @@ fn orphan(ui: &mut Ui, rect: Rect, split: f32, orphan: &OrphanedKeys, context: &
             }
         }
         let text = format!("{} keys of {} tracks", orphan.keys, orphan.tracks);
-        ui.add(Label::new(RichText::new(text).color(style::QUIET)).truncate());
+        ui.add(Label::new(RichText::new(text).color(KeyColors::of(ui.visuals()).quiet)).truncate());
     });
 }

@@ -9,6 +9,7 @@ use super::{
     action::TimelineAction,
     axis::TimeAxis,
     bar::about,
+    colors::KeyColors,
     state::{OpenClip, TimelineRequest, snapped},
 };
 use crate::{
@@ -19,7 +20,6 @@ use crate::{
             fields::{self, Renaming},
             list,
         },
-        style,
     },
     plugins::document::EditRequest,
     rig::{
@@ -113,7 +113,8 @@ fn paint(ui: &Ui, rect: Rect, axis: &TimeAxis, open: &OpenClip) {
     painter.rect_filled(rect, 0.0, ui.visuals().extreme_bg_color);
     let [start, end] = open.clip.range.map(|time| axis.at(time));
     let range = Rect::from_min_max(pos2(start, rect.bottom() - 3.0), pos2(end, rect.bottom()));
-    painter.rect_filled(range, 0.0, style::ACCENT.gamma_multiply(0.45));
+    let colors = KeyColors::of(ui.visuals());
+    painter.rect_filled(range, 0.0, colors.accent.gamma_multiply(0.45));
     let quiet = ui.visuals().weak_text_color();
     for (frame, x) in lines(axis, open.clip) {
         painter.vline(x, rect.bottom() - 7.0..=rect.bottom(), Stroke::new(1.0, quiet));
@@ -121,12 +122,12 @@ fn paint(ui: &Ui, rect: Rect, axis: &TimeAxis, open: &OpenClip) {
     }
     let x = axis.at(open.time);
     let frame = fields::short(f64::from(open.frame()), 2);
-    let galley = painter.layout_no_wrap(frame, FontId::proportional(11.0), Color32::BLACK);
+    let galley = painter.layout_no_wrap(frame, FontId::proportional(11.0), colors.on_accent);
     let half = galley.size().x / 2.0 + 4.0;
     let middle = x.clamp(rect.left() + half, (rect.right() - half).max(rect.left() + half));
     let back = Rect::from_center_size(pos2(middle, rect.center().y), vec2(half * 2.0, rect.height() - 4.0));
-    painter.rect_filled(back, 3.0, style::ACCENT);
-    painter.galley(back.center() - galley.size() / 2.0, galley, Color32::BLACK);
+    painter.rect_filled(back, 3.0, colors.accent);
+    painter.galley(back.center() - galley.size() / 2.0, galley, colors.on_accent);
 }
 
 /// Paints the playhead and the ends of the range over the keys.
@@ -139,7 +140,7 @@ pub(in crate::editor::panels) fn paint_playhead(ui: &Ui, rect: Rect, axis: &Time
             painter.rect_filled(Rect::from_x_y_ranges(from..=to, rect.y_range()), 0.0, shade);
         }
     }
-    painter.vline(axis.at(open.time), rect.y_range(), Stroke::new(1.5, style::ACCENT));
+    painter.vline(axis.at(open.time), rect.y_range(), Stroke::new(1.5, KeyColors::of(ui.visuals()).accent));
 }
 
 impl Markers {
@@ -249,7 +250,8 @@ fn place(about: &mut ClipAbout, number: usize, time: f32) {
 }
 
 fn paint_flag(ui: &Ui, flag: Rect, name: &str, is_hovered: bool) {
-    let color = if is_hovered { style::ACCENT } else { Color32::from_rgb(120, 180, 220) };
+    let colors = KeyColors::of(ui.visuals());
+    let color = if is_hovered { colors.accent } else { colors.marker };
     let at: Pos2 = flag.left_top() + vec2(2.0, 2.0);
     let points = vec![at, at + vec2(6.0, 3.0), at + vec2(0.0, 6.0)];
     ui.painter().add(Shape::convex_polygon(points, color, Stroke::NONE));
