@@ -6,7 +6,7 @@
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::mode::Mode;
+use super::{mode::Mode, panels::timeline::TimelineAction};
 
 /// An action that a person can request with a key, a menu entry or a button.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -119,6 +119,8 @@ pub enum Action {
     Theme,
     /// Turns high contrast on or off.
     Contrast,
+    /// An action of the timeline.
+    Timeline(TimelineAction),
 }
 
 impl Action {
@@ -179,7 +181,8 @@ impl Action {
             Self::Theme,
             Self::Contrast,
         ];
-        Mode::ALL.into_iter().map(Self::Mode).chain(others).collect()
+        let of_timeline = TimelineAction::ALL.into_iter().map(Self::Timeline);
+        Mode::ALL.into_iter().map(Self::Mode).chain(others).chain(of_timeline).collect()
     }
 }
 

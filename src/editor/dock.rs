@@ -32,6 +32,9 @@ impl Plugin for DockPlugin {
 /// Name of the viewport's tab.
 pub const VIEWPORT: &str = "Viewport";
 
+/// Panels below the viewport, which are wide and low.
+const BELOW: [&str; 3] = ["Timeline", "Curves", "Log"];
+
 /// Arrangement of the panels; stored between runs.
 #[derive(Resource, Clone, Serialize, Deserialize)]
 #[serde(transparent)]
@@ -48,7 +51,7 @@ impl Default for Layout {
         let [centre, right] =
             tree.split_right(centre, 0.75, tabs(&["Properties", "Tags", "Controls", "Skinning", "Face"]));
         let [_, _] = tree.split_below(right, 0.6, tabs(&["History", "Poses", "Display"]));
-        let [_, _] = tree.split_below(centre, 0.84, tabs(&["Log"]));
+        let [_, _] = tree.split_below(centre, 0.78, tabs(&BELOW));
         Self { dock }
     }
 }
@@ -67,6 +70,22 @@ impl Layout {
         match self.dock.find_tab_from(|tab| tab == title) {
             Some(path) => {
                 self.dock.remove_tab(path);
+            }
+            None if BELOW.contains(&title) => self.show_below(title),
+            None => self.dock.push_to_first_leaf(title.to_owned()),
+        }
+    }
+
+    /// Shows a panel beside the others below the viewport, or below the viewport if there are none.
+    fn show_below(&mut self, title: &str) {
+        let beside = self.dock.find_tab_from(|tab| BELOW.contains(&tab.as_str()));
+        if let Some(leaf) = beside.and_then(|path| self.dock.leaf_mut(path.node_path()).ok()) {
+            leaf.append_tab(title.to_owned());
+            return;
+        }
+        match self.dock.find_main_surface_tab(&VIEWPORT.to_owned()) {
+            Some((viewport, _)) => {
+                self.dock.main_surface_mut().split_below(viewport, 0.78, vec![title.to_owned()]);
             }
             None => self.dock.push_to_first_leaf(title.to_owned()),
         }

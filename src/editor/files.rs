@@ -5,6 +5,7 @@
 //! document has a journal from its first frame; see [`recovery`] for work left by a crash.
 
 mod bundled;
+mod clips;
 pub mod dialog;
 mod dialog_view;
 mod document;
@@ -41,12 +42,14 @@ use super::{
     camera::FrameWhenReady,
     notice::Notice,
     panel::PanelApp,
+    panels::timeline::import::ImportRequest,
     recovery,
     settings::EditorSettings,
 };
 use crate::{
-    files::{RealDisk, journal::Origin, remove_stale_temps},
+    files::{FileKind, RealDisk, journal::Origin, remove_stale_temps},
     plugins::{RigSystems, journal::JournalTrouble},
+    rig::Rig,
 };
 
 /// Plugin that opens, saves and exports files.
@@ -60,6 +63,7 @@ impl Plugin for FilesPlugin {
             .add_message::<ActionRequest>()
             .add_message::<Notice>()
             .add_message::<JournalTrouble>()
+            .add_message::<ImportRequest>()
             .add_message::<WindowCloseRequested>()
             .add_message::<FileDragAndDrop>()
             .init_resource::<LoadJob>()
@@ -224,6 +228,11 @@ fn act(world: &mut World, action: Action) {
 /// Opens a document; asks about unsaved changes first if it would replace the open one.
 fn request_open(world: &mut World, request: OpenRequest) {
     if let OpenRequest::File(path) = &request {
+        if matches!(FileKind::of(path), Some(FileKind::Bvh | FileKind::Animation)) && has_joints(world) {
+            // Motion is no document; it is put onto the open rig.
+            world.write_message(ImportRequest(path.clone()));
+            return;
+        }
         if let Err(error) = open::recognise(path) {
             world.write_message(Notice::error(error.to_string()));
             return;
@@ -235,6 +244,10 @@ fn request_open(world: &mut World, request: OpenRequest) {
         }
     }
     after_asking(world, FollowUp::Open(request));
+}
+
+fn has_joints(world: &World) -> bool {
+    active(world).and_then(|rig| world.get::<Rig>(rig)).is_some_and(|rig| !rig.is_empty())
 }
 
 /// Proceeds at once if no unsaved changes would be lost; otherwise asks.
@@ -288,6 +301,9 @@ fn dialog_answered(world: &mut World, question: Question, answer: Answer) {
         (Question::Unsaved { then, .. }, Answer::Discard) => proceed(world, then),
         (Question::Unsaved { then: FollowUp::Land, .. }, _) => open::drop_held(world),
         (Question::Open, Answer::Path(path)) => request_open(world, OpenRequest::File(path)),
+        (Question::Motion, Answer::Path(path)) => {
+            world.write_message(ImportRequest(path));
+        }
         (Question::Path { purpose, suggestion, then }, Answer::Path(path)) => {
             let path = save::completed(&path, purpose);
             let known = active(world).and_then(|rig| world.get::<OpenDocument>(rig)?.project.clone());

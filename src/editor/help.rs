@@ -41,6 +41,10 @@ const POINTER: &[(&str, &str)] = &[
     ("Right drag, or Shift + middle drag", "pan"),
     ("Wheel, or Alt + right drag", "zoom (with Ctrl while a tool has the wheel)"),
     ("Trackpad: two fingers / Shift / Ctrl", "orbit / pan / zoom"),
+    ("Timeline: drag in the ruler", "scrub (with Shift between frames)"),
+    ("Timeline: click, or drag a box", "select keys (with Shift more, with Ctrl one more or less)"),
+    ("Timeline: drag selected keys", "move (with Alt between frames); with Ctrl scale about the playhead"),
+    ("Timeline: Ctrl + wheel, Shift + wheel", "zoom, pan in time"),
 ];
 
 pub(super) fn toggle_help(mut actions: MessageReader<ActionRequest>, mut shown: ResMut<HelpShown>) {
@@ -110,6 +114,7 @@ pub fn describe(action: Action) -> String {
         Action::UiUsual => "Interface as large as usual",
         Action::Theme => "Dark or light theme",
         Action::Contrast => "High contrast",
+        Action::Timeline(action) => action.name(),
     };
     text.to_owned()
 }

@@ -15,6 +15,7 @@ use super::{
     actions::{Action, ActionRequest},
     files::dialog::Dialog,
     mode::Mode,
+    panels::timeline::{Timeline, TimelineAction, over_timeline},
     pointer::ModifierKeys,
 };
 
@@ -163,6 +164,23 @@ const DEFAULTS: &[(&str, Action)] = &[
     ("Ctrl+Equal", Action::UiLarger),
     ("Ctrl+Minus", Action::UiSmaller),
     ("Ctrl+0", Action::UiUsual),
+    ("Space", Action::Timeline(TimelineAction::Play)),
+    ("Period", Action::Timeline(TimelineAction::NextFrame)),
+    ("Comma", Action::Timeline(TimelineAction::PreviousFrame)),
+    ("Shift+Period", Action::Timeline(TimelineAction::NextKey)),
+    ("Shift+Comma", Action::Timeline(TimelineAction::PreviousKey)),
+    ("Ctrl+Home", Action::Timeline(TimelineAction::Start)),
+    ("Ctrl+End", Action::Timeline(TimelineAction::End)),
+    ("Shift+Home", Action::Timeline(TimelineAction::Fit)),
+    ("K", Action::Timeline(TimelineAction::Key)),
+    ("Shift+K", Action::Timeline(TimelineAction::KeyAll)),
+    ("Ctrl+K", Action::Timeline(TimelineAction::AutoKey)),
+    ("Shift+M", Action::Timeline(TimelineAction::Marker)),
+    ("Ctrl+C", Action::Timeline(TimelineAction::Copy)),
+    ("Ctrl+V", Action::Timeline(TimelineAction::Paste)),
+    ("Ctrl+Delete", Action::Timeline(TimelineAction::Delete)),
+    ("Ctrl+Shift+M", Action::Timeline(TimelineAction::Mirror)),
+    ("Ctrl+I", Action::Timeline(TimelineAction::Import)),
 ];
 
 impl Default for KeyBindings {
@@ -223,7 +241,8 @@ pub fn key_name(input: &KeyboardInput) -> Option<String> {
         }
     }
     let name = format!("{:?}", input.key_code);
-    let name = name.strip_prefix("Key").or(name.strip_prefix("Digit")).or(name.strip_prefix("Numpad")).unwrap_or(&name);
+    let short = ["Key", "Digit", "Numpad", "Arrow"].iter().find_map(|prefix| name.strip_prefix(prefix));
+    let name = short.unwrap_or(&name);
     (!name.is_empty() && !name.contains(' ')).then(|| name.to_owned())
 }
 
@@ -233,7 +252,7 @@ fn press_keys(
     mut lost: MessageReader<WindowFocused>,
     mut held: Local<ModifierKeys>,
     bindings: Res<KeyBindings>,
-    dialog: Option<Res<Dialog>>,
+    (dialog, timeline): (Option<Res<Dialog>>, Option<Res<Timeline>>),
     mut contexts: Query<&mut EguiContext, With<PrimaryEguiContext>>,
     mut actions: MessageWriter<ActionRequest>,
 ) {
@@ -244,6 +263,7 @@ fn press_keys(
         return;
     }
     let typing = contexts.iter_mut().any(|mut context| context.get_mut().egui_wants_keyboard_input());
+    let is_over_timeline = timeline.is_some_and(|timeline| timeline.hovered);
     let is_asked = dialog.is_some_and(|dialog| dialog.question().is_some());
     for input in keys.read() {
         if held.follow(input) || is_asked || input.state == ButtonState::Released || input.repeat {
@@ -254,7 +274,7 @@ fn press_keys(
         match bindings.action(&chord) {
             // Text fields do not use these chords.
             Some(action) if !typing || matches!(action, Action::Save | Action::SaveAs | Action::Help) => {
-                actions.write(ActionRequest(action));
+                actions.write(ActionRequest(if is_over_timeline { over_timeline(action) } else { action }));
             }
             _ => {}
         }

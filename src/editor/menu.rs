@@ -12,6 +12,7 @@ use super::{
     keys::KeyBindings,
     mode::Mode,
     panel::Requests,
+    panels::timeline::TimelineAction,
     settings::EditorSettings,
 };
 
@@ -121,6 +122,21 @@ pub(super) fn show(
                     Some(("Store pose", Action::StorePose)),
                 ],
             );
+        });
+        ui.menu_button("Animate", |ui| {
+            let list = |list: &[TimelineAction]| -> Vec<Option<(&'static str, Action)>> {
+                list.iter().map(|action| Some((action.name(), Action::Timeline(*action)))).collect()
+            };
+            entries(ui, &list(&[TimelineAction::NewClip, TimelineAction::DuplicateClip, TimelineAction::DeleteClip]));
+            entries(ui, &[Some(("Import motion…", Action::Timeline(TimelineAction::Import)))]);
+            ui.separator();
+            entries(ui, &list(&[TimelineAction::Play, TimelineAction::Loop]));
+            entries(ui, &list(&[TimelineAction::NextKey, TimelineAction::PreviousKey]));
+            ui.separator();
+            entries(ui, &list(&[TimelineAction::Key, TimelineAction::KeyAll, TimelineAction::AutoKey]));
+            entries(ui, &list(&[TimelineAction::Marker, TimelineAction::NewLayer]));
+            ui.separator();
+            entries(ui, &list(&[TimelineAction::Copy, TimelineAction::Paste, TimelineAction::Mirror]));
         });
         ui.menu_button("View", |ui| {
             entries(

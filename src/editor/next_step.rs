@@ -2,7 +2,16 @@
 
 use bevy::prelude::*;
 
-use super::{ActiveRig, actions::Action, keys::KeyBindings, mode::Mode, panels::skinning::is_held};
+use super::{
+    ActiveRig,
+    actions::Action,
+    keys::KeyBindings,
+    mode::Mode,
+    panels::{
+        skinning::is_held,
+        timeline::{OpenClip, Timeline, TimelineAction},
+    },
+};
 use crate::{
     plugins::{
         commands::{BuildFailure, BuildResult, Processor},
@@ -28,6 +37,11 @@ pub fn next_step(world: &World) -> Option<String> {
     if meshes.iter().any(|mesh| world.get::<SkinningJob>(*mesh).is_some() || world.get::<FitJob>(*mesh).is_some()) {
         return None;
     }
+    if world.get::<BuildFailure>(entity).is_none()
+        && let Some(next) = of_clip(world, &key)
+    {
+        return Some(next);
+    }
     let joints = match rig.len() {
         1 => "1 joint".to_owned(),
         count => format!("{count} joints"),
@@ -52,6 +66,12 @@ pub fn next_step(world: &World) -> Option<String> {
                 let (done, all) = (builder.cursor(), builder.len());
                 return Some(format!("{done} of {all} commands are carried out: {} builds all.", key(Action::Build)));
             }
+            match rig.clips() {
+                _ if !no_mesh && !is_skinned => {}
+                [] => {}
+                [only] => return Some(format!("The rig has a clip, \"{}\": choose it in the Timeline.", only.name)),
+                several => return Some(format!("The rig has {} clips: choose one in the Timeline.", several.len())),
+            }
             match (no_mesh, is_skinned, has_commands) {
                 (false, false, _) => format!("{joints}, no weights yet: {} skins.", key(Action::Skin)),
                 (_, _, true) => {
@@ -67,5 +87,27 @@ pub fn next_step(world: &World) -> Option<String> {
                 (true, _, false) => format!("{joints}: add a part or tags, or open a mesh with {}.", key(Action::Open)),
             }
         }
+    })
+}
+
+/// The next step with the open clip.
+fn of_clip(world: &World, key: &impl Fn(Action) -> String) -> Option<String> {
+    let of = |action: TimelineAction| key(Action::Timeline(action));
+    let open = OpenClip::of(world)?;
+    let timeline = world.get_resource::<Timeline>()?;
+    let frame = open.frame().round();
+    Some(if timeline.playing {
+        format!("{} halts the clip.", of(TimelineAction::Play))
+    } else if timeline.auto_key {
+        format!("Move a control in {} mode: its keys are set at frame {frame}.", Mode::Pose.name())
+    } else if open.clip.key_count() == 0 {
+        let (one, all) = (of(TimelineAction::Key), of(TimelineAction::KeyAll));
+        format!("The clip has no keys: pose controls, then {one} keys the selected ones at frame {frame}, {all} all.")
+    } else {
+        format!(
+            "{} plays; {} keys the selected controls at frame {frame}; drag in the ruler to scrub.",
+            of(TimelineAction::Play),
+            of(TimelineAction::Key)
+        )
     })
 }

@@ -10,6 +10,7 @@ use super::{
     help::describe,
     keys::KeyBindings,
     panel::{EditorOverlay, PanelApp, Requests},
+    panels::timeline,
     style,
 };
 use crate::{
@@ -49,6 +50,9 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
         return None;
     }
     let Some(entity) = world.get_resource::<ActiveRig>().map(|rig| rig.0) else { return Some("no rig is open") };
+    if let Action::Timeline(action) = action {
+        return timeline::obstacle(world, action);
+    }
     let rig = world.get::<Rig>(entity)?;
     let history = world.get::<RigHistory>(entity);
     let selected = world.get::<Selection>(entity).is_some_and(|selection| !selection.0.is_empty());

@@ -4,6 +4,7 @@
 //! text being typed. Long lists draw the visible rows only.
 
 pub mod controls;
+pub mod curves;
 pub mod display;
 pub mod face;
 pub mod hierarchy;
@@ -15,6 +16,7 @@ pub mod process;
 pub mod properties;
 pub mod skinning;
 pub mod tags;
+pub mod timeline;
 pub mod toasts;
 
 mod displayed_rig;
@@ -39,6 +41,7 @@ impl Plugin for PanelsPlugin {
             skinning::SkinningPanelPlugin,
             face::FacePanelPlugin,
             poses::PosesPlugin,
+            timeline::TimelinePlugin,
             toasts::ToastsPlugin,
         ))
         .add_panel(hierarchy::HierarchyPanel::default())
@@ -52,6 +55,8 @@ impl Plugin for PanelsPlugin {
         .add_panel(poses::PosesPanel::default())
         .add_panel(history::HistoryPanel::default())
         .add_panel(display::DisplayPanel::default())
+        .add_panel(timeline::TimelinePanel::default())
+        .add_panel(curves::CurvesPanel::default())
         .add_panel(log::LogPanel::default())
         .add_overlay(toasts::Toasts::default());
     }

@@ -3,7 +3,9 @@
 use bevy::prelude::*;
 use bevy_egui::egui;
 
-use super::{ActiveRig, files::LoadJob, next_step::next_step, notice::StatusLine, style};
+use super::{
+    ActiveRig, files::LoadJob, next_step::next_step, notice::StatusLine, panels::timeline::import::ClipImport, style,
+};
 use crate::{
     plugins::{
         document::Selection,
@@ -54,6 +56,11 @@ fn doing(world: &World) -> Option<String> {
         && let Some(what) = loading.what()
     {
         return Some(format!("Opening {what}"));
+    }
+    if let Some(import) = world.get_resource::<ClipImport>()
+        && let Some(what) = import.what()
+    {
+        return Some(format!("Importing {what}"));
     }
     let rig = world.get_resource::<ActiveRig>()?.0;
     let jobs = world.get::<RigMeshes>(rig)?.iter().filter_map(|mesh| world.get::<SkinningJob>(mesh));

@@ -7,6 +7,7 @@
 
 mod graph;
 mod play;
+mod release;
 
 use std::{borrow::Cow, sync::Arc};
 
@@ -24,14 +25,18 @@ pub struct ClipPlugin;
 impl Plugin for ClipPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
-        app.add_systems(Update, graph::name_targets.after(RigSystems::Build)).add_systems(
+        app.add_message::<EndPlayback>().add_systems(Update, graph::name_targets.after(RigSystems::Build)).add_systems(
             PostUpdate,
-            (play::compile, play::play, play::follow_player).chain().after(AnimationSystems).before(RigSystems::Solve),
+            (release::end_playback, play::compile, release::release, play::play, play::follow_player)
+                .chain()
+                .after(AnimationSystems)
+                .before(RigSystems::Solve),
         );
     }
 }
 
-/// Playback of a clip on a rig.
+/// Playback of a clip on a rig. A clip that is halted poses the rig when its time or its keys change: what is posed on top of it
+/// in between stays. Nodes that a clip moves no longer go back to the pose of the document.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component)]
 #[require(PlayedClip)]
@@ -53,6 +58,14 @@ impl ClipPlayer {
     pub fn new(clip: &RigClip) -> Self {
         Self { clip: clip.uid, time: clip.range[0], speed: 1.0, looped: clip.looped, playing: true }
     }
+}
+
+/// Request to end the playback of a rig: its [`ClipPlayer`] is taken off, and the nodes that the clip moved show the pose of the
+/// document again.
+#[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EndPlayback {
+    /// The rig.
+    pub rig: Entity,
 }
 
 /// Clips of a rig without a document.

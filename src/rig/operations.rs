@@ -22,7 +22,7 @@ use std::sync::Arc;
 
 use bevy::math::{Affine3, Quat, Vec3};
 
-pub use clips::{ClipOperation, KeyClipboard, KeyOperation, KeyTimes, KeyTolerance};
+pub use clips::{ClipOperation, KeyClipboard, KeyEase, KeyOperation, KeyTimes, KeyTolerance};
 pub use draft::{Draft, Outcome};
 pub use orient::Axis;
 pub use place::settle;

@@ -19,7 +19,7 @@ use rigsmith::{
         recovery::{Recovery, can_recover, describe},
         settings::EditorSettings,
     },
-    files::{Disk, RealDisk, journal::journal_beside, load_template, store_rig},
+    files::{Disk, RealDisk, journal::journal_beside, load_animation, load_template, store_rig},
     headless::headless_app,
     plugins::{
         document::{Change, EditRequest},
@@ -27,7 +27,10 @@ use rigsmith::{
         surface::{RigMesh, RigMeshes},
     },
     prelude::*,
-    rig::operations::Operation,
+    rig::{
+        animation::{Key, Property, RigClip, Track, TrackTarget},
+        operations::Operation,
+    },
     test_app::strict_app,
 };
 
@@ -489,6 +492,38 @@ fn a_template_is_put_onto_the_mesh() {
     window.answer(Answer::AsItIs);
     assert!((height(&window) / mesh / 100.0 - 1.0).abs() < 1e-4);
     assert!(window.mesh().is_some());
+}
+
+#[test]
+fn clips_of_the_document_are_exported_as_they_are_edited() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    window.place(1.0);
+    window.export("none.anim.ron");
+    assert!(window.said(Severity::Error, "no clips to export"));
+    let joint = window.rig().roots()[0];
+    let mut clip = RigClip { range: [0.5, 1.5], ..RigClip::new(Uid(77), Uid(78), "turn") };
+    let keys = [0.5, 1.0, 1.5].map(|time| Key::rotation(time, Quat::from_rotation_z(time))).to_vec();
+    let target = TrackTarget { node: joint, property: Property::Rotation };
+    clip.layers[0].tracks.insert(target, std::sync::Arc::new(Track { keys }));
+    window.change(Change::Do(Operation::Edits(vec![RigEdit::AddClip(Box::new(clip.clone()), 0)])));
+    let bytes = std::fs::read(window.export("turn.glb")).expect("a file");
+    let file = gltf::Gltf::from_slice(&bytes).expect("a model");
+    let animations: Vec<_> = file.animations().collect();
+    assert_eq!((animations.len(), animations[0].name()), (1, Some("turn")));
+    let channel = animations[0].channels().next().expect("a channel");
+    let blob = file.blob.clone().expect("a buffer");
+    let reader = channel.reader(|_| Some(&blob[..]));
+    let times: Vec<f32> = reader.read_inputs().expect("times").collect();
+    assert_eq!((times[0], times[times.len() - 1]), (0.0, 1.0), "a clip begins at zero");
+    // The clips alone come back as they were, and a file with animations opens with them.
+    let read = load_animation(&RealDisk, &window.export("turn.anim.ron")).expect("clips");
+    assert_eq!(read.clips, [clip]);
+    window.open_file(&folder.path().join("turn.glb"));
+    window.answer(Answer::Discard);
+    let clips = window.rig().clips().to_vec();
+    assert_eq!((clips.len(), clips[0].name.as_str()), (1, "turn"), "{:?}", window.notices);
+    assert!(clips[0].key_count() >= 2 && !has_unsaved_changes(window.world()));
 }
 
 #[test]

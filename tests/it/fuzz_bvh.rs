@@ -11,7 +11,8 @@ use rigsmith::{
 
 use crate::{bench::shipped, mutate::run_fuzz};
 
-const HUMAN: &str = "HIERARCHY\nROOT Hips\n{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n\
+/// Two frames of a human.
+pub const HUMAN: &str = "HIERARCHY\nROOT Hips\n{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n\
     JOINT LeftUpLeg\n{\n OFFSET 1 -1 0\n CHANNELS 3 Zrotation Yrotation Xrotation\n JOINT LeftLeg\n{\n OFFSET 0 -4 0.1\n CHANNELS 3 Zrotation Yrotation Xrotation\n\
     JOINT LeftFoot\n{\n OFFSET 0 -4 0\n CHANNELS 3 Zrotation Yrotation Xrotation\n End Site\n{\n OFFSET 0 -1 1\n}\n}\n}\n}\n\
     JOINT RightUpLeg\n{\n OFFSET -1 -1 0\n CHANNELS 3 Zrotation Yrotation Xrotation\n JOINT RightLeg\n{\n OFFSET 0 -4 0.1\n CHANNELS 3 Zrotation Yrotation Xrotation\n\

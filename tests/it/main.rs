@@ -158,6 +158,8 @@ mod template;
 mod template_text;
 mod three_strokes;
 #[cfg(feature = "editor")]
+mod timeline;
+#[cfg(feature = "editor")]
 mod tools;
 mod transfer;
 mod update;

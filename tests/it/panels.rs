@@ -660,7 +660,8 @@ fn symbols_are_in_the_fonts() {
         galley.rows[0].glyphs[0].uv_rect
     };
     // What the fonts lack is drawn like what no font has.
-    let missing: Vec<char> = "✖⏷⏵🗑✏🔒ℹ✔⚠⮪⮫×°…".chars().filter(|c| shape(*c) == shape('\u{10fffd}')).collect();
+    let missing: Vec<char> =
+        "✖⏷⏵🗑✏🔒ℹ✔⚠⮪⮫×°…⏮⏪⏴▶⏸⏩⏭🔁🔑⏺⚑⌖👁".chars().filter(|c| shape(*c) == shape('\u{10fffd}')).collect();
     assert!(missing.is_empty(), "{missing:?}");
 }
 

@@ -48,6 +48,8 @@ pub enum Question {
     },
     /// Choice of a file to open.
     Open,
+    /// Choice of a file of motion, to put it onto the rig.
+    Motion,
     /// Choice of a path to write to.
     Path {
         /// Content to write.

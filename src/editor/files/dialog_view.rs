@@ -17,6 +17,7 @@ use super::{
 use crate::{
     editor::{
         panel::{EditorOverlay, Requests},
+        panels::timeline::import::MOTION_FILES,
         recovery, style,
     },
     files::{
@@ -56,6 +57,13 @@ const OPENED: &[(&str, &[FileKind])] = &[
     ("Projects (.rigsmith.ron)", &[FileKind::Project]),
 ];
 
+/// Kinds of files with motion, by name.
+const MOTION: &[(&str, &[FileKind])] = &[
+    ("Motion (.bvh, .anim.ron, .glb, .gltf)", MOTION_FILES),
+    ("Motion capture (.bvh)", &[FileKind::Bvh]),
+    ("Clips (.anim.ron)", &[FileKind::Animation]),
+];
+
 impl EditorOverlay for DialogView {
     fn show(&mut self, ctx: &egui::Context, world: &World, requests: &mut Requests) {
         let Some(dialog) = world.get_resource::<Dialog>() else { return };
@@ -67,7 +75,8 @@ impl EditorOverlay for DialogView {
             *self = Self { number: dialog.number(), ..Self::default() };
             match question {
                 Question::Path { suggestion, .. } => self.text = suggestion.display().to_string(),
-                Question::Open => self.browser = Some(browser(world)),
+                Question::Open => self.browser = Some(browser(world, "Open", OPENED)),
+                Question::Motion => self.browser = Some(browser(world, "Import motion", MOTION)),
                 _ => {}
             }
         }
@@ -93,13 +102,13 @@ fn file_dialog(folder: Option<PathBuf>) -> FileDialog {
     }
 }
 
-fn browser(world: &World) -> FileDialog {
-    let mut dialog = file_dialog(folder(world)).title("Open");
-    for (name, kinds) in OPENED {
+fn browser(world: &World, title: &str, files: &'static [(&'static str, &'static [FileKind])]) -> FileDialog {
+    let mut dialog = file_dialog(folder(world)).title(title);
+    for (name, kinds) in files {
         let matches = move |path: &Path| FileKind::of(path).is_some_and(|kind| kinds.contains(&kind));
         dialog = dialog.add_file_filter(name, Filter::new(matches));
     }
-    if let Some((name, _)) = OPENED.first() {
+    if let Some((name, _)) = files.first() {
         dialog = dialog.default_file_filter(name);
     }
     dialog.pick_file();
@@ -113,8 +122,8 @@ impl DialogView {
             let picked = browser.take_picked();
             let is_open = *browser.state() == DialogState::Open;
             return match (question, picked) {
-                (Question::Open, Some(path)) => Some(Answer::Path(path)),
-                (Question::Open, None) => (!is_open).then_some(Answer::Cancel),
+                (Question::Open | Question::Motion, Some(path)) => Some(Answer::Path(path)),
+                (Question::Open | Question::Motion, None) => (!is_open).then_some(Answer::Cancel),
                 (_, picked) => {
                     if let Some(path) = picked {
                         self.text = path.display().to_string();
@@ -136,7 +145,7 @@ impl DialogView {
                 Question::Replace { path, .. } => self.replace(ui, path),
                 Question::Fit(fit) => self.fit(ui, fit),
                 Question::Recover(list) => self.recover(ui, list),
-                Question::Open => None,
+                Question::Open | Question::Motion => None,
             }
         });
         let escaped = ctx.input(|input| input.key_pressed(egui::Key::Escape));
@@ -186,8 +195,8 @@ impl DialogView {
             Purpose::Export => (
                 "Export",
                 "Export",
-                "The ending says what: .glb, .gltf or .obj the character at rest, .rig.ron the template, .rig the \
-                 skeleton, .skin the weights.",
+                "The ending says what: .glb or .gltf the character with its clips, .obj at rest, .anim.ron the clips, \
+                 .rig.ron the template, .rig the skeleton, .skin the weights.",
             ),
         };
         ui.heading(title);

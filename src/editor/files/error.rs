@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use crate::{
     files::{LoadError, ReadError, SaveError, StoreError, journal::JournalError},
     mesh::obj::ObjError,
+    processor::BuildError,
     rig::{EditError, SourceError, skin::SkinError},
+    solve::{bake_clip::BakeError, program::ProgramError},
 };
 
 /// Reason why a document is not opened.
@@ -18,13 +20,13 @@ pub(in crate::editor) enum OpenError {
         name: String,
     },
     /// The file has animation clips, which are no document.
-    #[error("{name} has only animation clips; open the rig or the project that they belong to")]
+    #[error("{name} has only animation clips; open the rig or the project that they belong to first")]
     ClipsAlone {
         /// Name of the file.
         name: String,
     },
     /// The file has the motion of a skeleton, which is no document.
-    #[error("{name} has only motion; put it onto a rig with `rigsmith animate`")]
+    #[error("{name} has only motion; open a mesh or a template with joints first, and then the motion onto it")]
     MotionAlone {
         /// Name of the file.
         name: String,
@@ -99,10 +101,22 @@ pub(in crate::editor) enum WriteError {
     /// The mesh has no weights.
     #[error("there are no weights to export; skin the mesh first")]
     NoWeights,
+    /// The document has no clips.
+    #[error("there are no clips to export; make one in the Timeline first")]
+    NoClips,
+    /// The commands of the rig stop with an error, so that its clips cannot be played.
+    #[error("the rig cannot be built, and its clips not be played: {0}")]
+    Build(#[from] BuildError),
+    /// The built rig cannot run.
+    #[error("the built rig cannot run, and its clips not be played: {0}")]
+    Program(#[from] ProgramError),
+    /// A clip is too long to be baked.
+    #[error(transparent)]
+    Bake(#[from] BakeError),
     /// The file's name has no fitting ending.
     #[error(
-        "a character is exported as .glb, .gltf or .obj, a rig as .rig.ron or .rig, weights as .skin; choose one of \
-         these endings"
+        "a character is exported as .glb, .gltf or .obj, a rig as .rig.ron or .rig, weights as .skin, clips as \
+         .anim.ron; choose one of these endings"
     )]
     Ending,
     /// Rigsmith comes with no such mesh, which work of another version may have.

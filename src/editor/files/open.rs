@@ -39,7 +39,8 @@ use crate::{
         surface::{RigMesh, SkinOf},
     },
     rig::{
-        Rig, RigEdit, UidSource,
+        Rig, RigEdit, Uid, UidSource,
+        animation::file_clip::rig_clips,
         character::{import_rig_text, import_skeleton},
         project::ProjectView,
         step::Step,
@@ -133,6 +134,11 @@ impl LoadedDocument {
         opened.notes.clone_from(&model.notes);
         for edit in &edits {
             opened.warnings.extend(opened.rig.apply(edit).err().map(|error| error.to_string()));
+        }
+        let joints: Vec<Option<Uid>> = skeleton.nodes.iter().copied().map(Some).collect();
+        for clip in rig_clips(&opened.rig, &model, &joints) {
+            let added = opened.rig.apply(&RigEdit::AddClip(Box::new(clip), usize::MAX));
+            opened.warnings.extend(added.err().map(|error| error.to_string()));
         }
         opened.meshes.push((RigMesh::new(uid, model, skeleton.nodes), source));
         Self { origin, ..opened }

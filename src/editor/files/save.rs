@@ -15,6 +15,7 @@ use bevy::{
 use super::{
     FollowUp, active, after_asking,
     bundled::{BODY, BundledModel},
+    clips::put_clips,
     dialog::Purpose,
     document::{Context, ContextMesh, MeshSource, OpenDocument, SavedAt, last_step, meshes, places},
     error::WriteError,
@@ -27,11 +28,17 @@ use crate::{
     files::{
         Disk, FileKind, MeshShape, MeshToSave, ProjectTemplate, ProjectToSave, RealDisk,
         journal::{Journal, SaveMark},
-        project_files, read_capped, save_atomic, save_set, stem, store_model, store_rig_over, store_skin,
+        project_files, read_capped, save_atomic, save_set, stem, store_animation, store_model, store_rig_over,
+        store_skin,
     },
     instance::RigSource,
     mesh::{gltf::GltfWriteSettings, model::Model},
-    plugins::{commands::BuildResult, history::RigHistory, surface::RigMesh},
+    plugins::{
+        commands::{BuildResult, RigModules},
+        history::RigHistory,
+        surface::RigMesh,
+    },
+    processor::Modules,
     rig::{
         BuiltRig, Rig,
         character::{Character, character},
@@ -240,9 +247,10 @@ fn export(world: &mut World, path: PathBuf) {
     let mesh = open.into_iter().next().map(|(_, mesh, _)| mesh.clone());
     let (step, name) = (last_step(world, rig), file_name(&path));
     let built = world.get::<BuildResult>(rig).map(|built| built.0.clone());
+    let Some(modules) = world.get_resource::<RigModules>().map(|modules| modules.0.clone()) else { return };
     let template = world.get::<OpenDocument>(rig).and_then(|document| document.template.clone());
     let task = spawn(move || {
-        let mut notes = export_to(&path, &data, built.as_deref(), mesh.as_ref(), template.as_deref())?;
+        let mut notes = export_to(&path, &data, (built.as_deref(), &modules), mesh.as_ref(), template.as_deref())?;
         if more > 0 {
             notes.push(format!("only the first mesh was exported; {more} more are open"));
         }
@@ -255,7 +263,7 @@ fn export(world: &mut World, path: PathBuf) {
 fn export_to(
     path: &Path,
     rig: &Rig,
-    built: Option<&BuiltRig>,
+    (built, modules): (Option<&BuiltRig>, &Arc<Modules>),
     mesh: Option<&RigMesh>,
     template: Option<&Path>,
 ) -> Result<Vec<String>, WriteError> {
@@ -263,7 +271,7 @@ fn export_to(
         Some(FileKind::Glb | FileKind::Gltf | FileKind::Obj) => {
             let empty = Model { name: rig.about().name.clone(), ..default() };
             let skin = mesh.and_then(|mesh| rig.skin(mesh.uid));
-            let model = character(&Character {
+            let mut model = character(&Character {
                 rig,
                 built,
                 file: mesh.map_or(&empty, |mesh| &mesh.file),
@@ -271,9 +279,15 @@ fn export_to(
                 nodes: mesh.map_or(&[], |mesh| &mesh.nodes),
                 skin: skin.map(Arc::as_ref),
             });
+            put_clips(&mut model, rig, built, modules)?;
             // Without weights no joint deforms, and none would be written.
             let settings = GltfWriteSettings { all_joints: skin.is_none(), ..default() };
             Ok(store_model(&RealDisk, path, &model, &settings)?)
+        }
+        Some(FileKind::Animation) if rig.clips().is_empty() => Err(WriteError::NoClips),
+        Some(FileKind::Animation) => {
+            store_animation(&RealDisk, path, rig, built, rig.clips())?;
+            Ok(Vec::new())
         }
         Some(FileKind::Template | FileKind::RigText) => {
             let sources = [Some(path), template];

@@ -200,7 +200,7 @@ impl Numbers {
     }
 
     /// Draws one field. Escape drops the typed or dragged value.
-    fn field(
+    pub fn field(
         &mut self,
         ui: &mut Ui,
         said: &str,

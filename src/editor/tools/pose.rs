@@ -42,15 +42,14 @@ impl PosedJoint {
                     carried: above.any(|above| joints.contains(&above)),
                 });
             }
-            let rig = &rig.rig;
-            let found = rig.joint(joint)?;
+            let found = rig.rig.joint(joint)?;
             Some(Self {
                 joint,
                 rest: found.data.rest,
-                offset: rig.offset(joint).copied().unwrap_or_default(),
+                offset: rig.shown_offset(joint).unwrap_or_default(),
                 parent: found.parent.map_or(Affine3::IDENTITY, |parent| rig.posed_global(parent)),
                 axes: own_axes(&rig.posed_global(joint)),
-                carried: rig.ancestors(joint).any(|above| joints.contains(&above.data.uid)),
+                carried: rig.rig.ancestors(joint).any(|above| joints.contains(&above.data.uid)),
             })
         };
         joints.iter().filter_map(posed).collect()

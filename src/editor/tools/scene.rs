@@ -1,10 +1,15 @@
 //! The edited rig, as tools read it.
 
-use bevy::{ecs::system::SystemParam, math::Affine3, prelude::*};
+use bevy::{
+    ecs::system::SystemParam,
+    math::{Affine3, Affine3A},
+    prelude::*,
+};
 
 use crate::{
     editor::{ActiveRig, camera::ViewportSight},
     plugins::{
+        animation::ClipPlayer,
         commands::BuildResult,
         document::{JointEntities, Selection, Symmetry},
         picking::posed_joints,
@@ -12,7 +17,7 @@ use crate::{
         surface::{RigMeshes, RigSurface},
         viewport::Sight,
     },
-    rig::{BuiltNode, Rig, Uid},
+    rig::{BuiltNode, PoseOffset, Rig, Uid},
     solve::program::RigState,
 };
 
@@ -35,6 +40,7 @@ type RigQuery = (
     Has<RigMeshes>,
     Option<Ref<'static, RigRuntime>>,
     Option<&'static BuildResult>,
+    Option<Ref<'static, ClipPlayer>>,
 );
 
 /// The active rig.
@@ -59,6 +65,9 @@ pub struct EditedRig<'a> {
     pub runtime: Option<Ref<'a, RigRuntime>>,
     /// Result of its commands.
     pub built: Option<&'a BuildResult>,
+    /// Playback of a clip.
+    pub player: Option<Ref<'a, ClipPlayer>>,
+    joints: &'a Query<'a, 'a, &'static GlobalTransform>,
 }
 
 impl Scene<'_, '_> {
@@ -70,9 +79,23 @@ impl Scene<'_, '_> {
     /// The active rig, if it exists.
     pub fn rig(&self) -> Option<EditedRig<'_>> {
         let entity = self.active.as_ref()?.0;
-        let (rig, selection, symmetry, entities, place, surface, has_mesh, runtime, built) =
+        let (rig, selection, symmetry, entities, place, surface, has_mesh, runtime, built, player) =
             self.rigs.get(entity).ok()?;
-        Some(EditedRig { entity, rig, selection, symmetry, entities, place, surface, has_mesh, runtime, built })
+        let joints = &self.joints;
+        Some(EditedRig {
+            entity,
+            rig,
+            selection,
+            symmetry,
+            entities,
+            place,
+            surface,
+            has_mesh,
+            runtime,
+            built,
+            player,
+            joints,
+        })
     }
 
     /// Posed positions of a rig's joints, in the rig's space.
@@ -89,6 +112,7 @@ impl Scene<'_, '_> {
                     || rig.selection.is_changed()
                     || rig.symmetry.is_changed()
                     || rig.runtime.is_some_and(|runtime| runtime.is_changed())
+                    || rig.player.is_some_and(|player| player.is_changed())
                     || rig.surface.is_some_and(|surface| surface.is_changed())
             })
     }
@@ -118,8 +142,28 @@ impl EditedRig<'_> {
     pub fn posed_global(&self, node: Uid) -> Affine3 {
         match self.built_slot(node) {
             Some((state, slot)) => state.global_at(slot).affine().into(),
-            None => self.rig.posed_global(node),
+            None => self.shown_global(node).map_or_else(|| self.rig.posed_global(node), Into::into),
         }
+    }
+
+    /// Transform of a joint in the rig's space as a clip shows it; `None` for rigs that are built, or that play no clip.
+    fn shown_global(&self, joint: Uid) -> Option<Affine3A> {
+        if self.player.is_none() || self.runtime.is_some() {
+            return None;
+        }
+        let shown = self.joints.get(self.entities.get(joint)?).ok()?;
+        Some(self.place.affine().inverse() * shown.affine())
+    }
+
+    /// Pose offset of a joint of a rig that is not built: as a clip shows it, or else that of the document.
+    pub fn shown_offset(&self, joint: Uid) -> Option<PoseOffset> {
+        let found = self.rig.joint(joint)?;
+        let Some(shown) = self.shown_global(joint) else {
+            return Some(self.rig.offset(joint).copied().unwrap_or_default());
+        };
+        let parent = found.parent.map_or(Some(Affine3A::IDENTITY), |parent| self.shown_global(parent))?;
+        let local = GlobalTransform::from(parent.inverse() * shown).compute_transform();
+        Some(PoseOffset::between(&found.data.rest, &local))
     }
 
     /// True for a joint of the document and for a node that commands created.

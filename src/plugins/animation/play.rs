@@ -1,6 +1,9 @@
 //! Systems that play clips.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 use bevy::{math::Vec4, prelude::*};
 
@@ -12,7 +15,7 @@ use crate::{
         schema::Attributes,
     },
     rig::{
-        PoseOffset, RestTransform, Rig, Uid,
+        PoseOffset, RestTransform, Revision, Rig, Uid,
         animation::{ClipSampler, Property, RigClip, SampleCursor, TrackTarget},
     },
 };
@@ -26,7 +29,23 @@ pub struct PlayedClip {
     compiled: Option<CompiledClip>,
     /// Time up to which markers were told.
     told: Option<f32>,
-    is_due: bool,
+    due: Due,
+    /// Revision of the document that was followed last.
+    revision: Option<Revision>,
+    /// Properties that a clip has moved and moves no longer: they go back to the pose of the document.
+    pub(super) released: BTreeSet<TrackTarget>,
+}
+
+/// Nodes of a halted clip that the next frame writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+enum Due {
+    /// None: what was posed on top of the clip stays.
+    #[default]
+    None,
+    /// Nodes whose values in the clip have changed.
+    Changed,
+    /// All nodes of the clip.
+    All,
 }
 
 #[derive(Debug)]
@@ -35,6 +54,8 @@ struct CompiledClip {
     sampler: ClipSampler,
     cursor: SampleCursor,
     values: Vec<Vec4>,
+    /// Values that were written last; `None` for those that never were.
+    written: Vec<Option<Vec4>>,
     nodes: Vec<PlayedNode>,
 }
 
@@ -60,7 +81,20 @@ pub(super) fn compile(
 ) {
     for (player, mut played, rig, clips, rest) in &mut players {
         let is_new = rig.as_ref().is_some_and(Ref::is_changed) || clips.as_ref().is_some_and(Ref::is_changed);
-        played.is_due |= player.is_changed() || is_new || rest.is_some_and(|rest| rest.is_changed());
+        // A pose that is set on top of a halted clip stays until time goes on; other changes of the rig may bring nodes that
+        // the clip has to move.
+        let revision = rig.as_ref().map(|rig| rig.revision().clone());
+        let is_other_rig = match (&played.revision, &revision) {
+            (Some(known), Some(now)) => !known.is_same(now),
+            (None, None) => false,
+            _ => true,
+        };
+        if is_other_rig || player.is_changed() || rest.is_some_and(|rest| rest.is_changed()) {
+            played.due = Due::All;
+        }
+        if is_other_rig {
+            played.revision = revision;
+        }
         let known = played.compiled.as_ref().map(|compiled| compiled.clip.uid);
         if known == Some(player.clip) && !is_new {
             continue;
@@ -68,16 +102,43 @@ pub(super) fn compile(
         let of_rig = rig.as_ref().and_then(|rig| rig.clip(player.clip));
         let given = || clips.as_ref().and_then(|clips| clips.0.iter().find(|clip| clip.uid == player.clip));
         let Some(clip) = of_rig.or_else(given) else {
-            played.compiled = None;
+            played.end();
             continue;
         };
         if played.compiled.as_ref().is_some_and(|compiled| *compiled.clip == *clip) {
             continue;
         }
-        if known != Some(player.clip) {
+        if known == Some(player.clip) {
+            played.due = played.due.max(Due::Changed);
+        } else {
             played.told = None;
+            played.due = Due::All;
         }
-        played.compiled = Some(CompiledClip::new(clip));
+        let mut next = CompiledClip::new(clip);
+        if let Some(before) = played.compiled.take() {
+            let written = before.sampler.targets().iter().zip(before.written);
+            let mut written: BTreeMap<&TrackTarget, Option<Vec4>> = written.collect();
+            for (target, place) in next.sampler.targets().iter().zip(&mut next.written) {
+                *place = written.remove(target).flatten();
+            }
+            let gone = written.into_iter().filter(|(_, value)| value.is_some());
+            let gone: Vec<TrackTarget> = gone.map(|(target, _)| target.clone()).collect();
+            played.released.extend(gone);
+        }
+        for target in next.sampler.targets() {
+            played.released.remove(target);
+        }
+        played.compiled = Some(next);
+    }
+}
+
+impl PlayedClip {
+    /// Ends the playback; what the clip has moved goes back to the pose of the document.
+    pub(super) fn end(&mut self) {
+        let Some(compiled) = self.compiled.take() else { return };
+        self.told = None;
+        let written = compiled.sampler.targets().iter().zip(&compiled.written).filter(|(_, value)| value.is_some());
+        self.released.extend(written.map(|(target, _)| target.clone()));
     }
 }
 
@@ -95,9 +156,17 @@ impl CompiledClip {
                 Property::Attribute(name) => played.attributes.push((name.clone(), place)),
             }
         }
-        let values = vec![Vec4::ZERO; sampler.targets().len()];
+        let (values, written) = (vec![Vec4::ZERO; sampler.targets().len()], vec![None; sampler.targets().len()]);
         let (cursor, nodes) = (sampler.cursor(), nodes.into_values().collect());
-        Self { clip: Arc::new(clip.clone()), sampler, cursor, values, nodes }
+        Self { clip: Arc::new(clip.clone()), sampler, cursor, values, written, nodes }
+    }
+}
+
+impl PlayedNode {
+    /// Places of its values.
+    fn places(&self) -> impl Iterator<Item = usize> {
+        let own = [self.translation, self.rotation, self.scale].into_iter().flatten();
+        own.chain(self.attributes.iter().map(|(_, place)| *place))
     }
 }
 
@@ -120,7 +189,7 @@ pub(super) fn play(
     mut commands: Commands,
 ) {
     for (entity, mut player, mut played, mut motion, mut runtime, rig, joints, rest) in &mut players {
-        let PlayedClip { compiled, told, is_due } = played.bypass_change_detection();
+        let PlayedClip { compiled, told, due, .. } = played.bypass_change_detection();
         if let Some(motion) = &mut motion
             && motion.delta != Transform::IDENTITY
         {
@@ -143,19 +212,25 @@ pub(super) fn play(
                 motion.delta = Transform::from_isometry(motion.delta.to_isometry() * step);
             }
             *told = Some(player.time);
-        } else if !std::mem::take(is_due) {
+            *due = Due::All;
+        }
+        let due = std::mem::take(due);
+        if due == Due::None {
             continue;
         }
-        *is_due = false;
         // A rig that is shown at rest waits for its pose.
         if rest.is_some_and(|rest| rest.0) {
             continue;
         }
-        let CompiledClip { sampler, cursor, values, nodes, .. } = compiled;
+        let CompiledClip { sampler, cursor, values, written, nodes, .. } = compiled;
         sampler.sample(player.time, cursor, values);
         let held = motion.as_ref().map(|motion| motion.node);
         for node in nodes.iter() {
+            if due == Due::Changed && node.places().all(|at| written[at] == Some(values[at])) {
+                continue;
+            }
             let Some(place) = NodePlace::of(node.uid, runtime.as_deref(), rig, joints) else { continue };
+            node.places().for_each(|at| written[at] = Some(values[at]));
             let mut offset = place.offset;
             let vector = |at: usize| values[at].truncate();
             offset.translation = node.translation.map_or(offset.translation, vector);
@@ -199,16 +274,21 @@ pub(super) fn play(
 }
 
 /// Entity of a node, with what its pose is told by.
-struct NodePlace {
-    entity: Entity,
-    base: RestTransform,
-    offset: PoseOffset,
-    is_direct: bool,
-    is_posable: bool,
+pub(super) struct NodePlace {
+    pub entity: Entity,
+    pub base: RestTransform,
+    pub offset: PoseOffset,
+    pub is_direct: bool,
+    pub is_posable: bool,
 }
 
 impl NodePlace {
-    fn of(node: Uid, runtime: Option<&RigRuntime>, rig: Option<&Rig>, joints: Option<&JointEntities>) -> Option<Self> {
+    pub fn of(
+        node: Uid,
+        runtime: Option<&RigRuntime>,
+        rig: Option<&Rig>,
+        joints: Option<&JointEntities>,
+    ) -> Option<Self> {
         if let Some(runtime) = runtime {
             let slot = runtime.state().program().node(node)?;
             let found = &runtime.state().program().nodes()[slot];

@@ -1,5 +1,6 @@
 //! Clips, their layers and their keys, as people change them. Each operation is one step of the history.
 
+mod ease;
 mod keys;
 mod mirror;
 mod pose;
@@ -14,6 +15,7 @@ use crate::rig::{
     animation::{ClipAbout, ClipLayer, Key, LayerAbout, LayerMode, RigClip, TrackTarget},
 };
 
+pub use ease::KeyEase;
 pub use keys::KeyClipboard;
 pub(super) use mirror::carried as carried_key;
 pub(super) use pose::keyed;
@@ -107,8 +109,18 @@ pub enum KeyOperation {
         /// The nodes.
         nodes: Vec<Uid>,
     },
+    /// Sets keys at a time so that the clip has these values there, mixed with the layers below.
+    Values {
+        /// Second in the clip.
+        time: f32,
+        /// The values, of which the first [`Property::width`](crate::rig::animation::Property::width) numbers count.
+        values: Vec<(TrackTarget, [f32; 4])>,
+    },
     /// Sets keys; those at the same times are replaced.
     Set(Vec<(TrackTarget, Vec<Key>)>),
+    /// Puts keys to other times: each pair has the time of a key and the one that it gets. Keys that they meet are replaced;
+    /// pairs without a key are passed over.
+    Place(Vec<(TrackTarget, Vec<[f32; 2]>)>),
     /// Moves keys in time. Keys that they meet are replaced.
     Move {
         /// The keys.
@@ -141,6 +153,13 @@ pub enum KeyOperation {
         keys: KeyTimes,
         /// Result of the rig's commands, for the pairs of created nodes.
         built: Option<Arc<BuiltRig>>,
+    },
+    /// Sets the interpolation from keys to the next ones.
+    Ease {
+        /// The keys.
+        keys: KeyTimes,
+        /// The interpolation.
+        ease: KeyEase,
     },
     /// Replaces the keys of tracks by linear ones at a rate; steps stay steps.
     Bake {
@@ -180,12 +199,13 @@ impl ClipOperation {
             Self::DeleteLayer { .. } => "Delete animation layer",
             Self::Retime { .. } => "Retime clip",
             Self::Keys { change, .. } => match change {
-                KeyOperation::Pose { .. } | KeyOperation::Set(_) => "Set keys",
-                KeyOperation::Move { .. } => "Move keys",
+                KeyOperation::Pose { .. } | KeyOperation::Values { .. } | KeyOperation::Set(_) => "Set keys",
+                KeyOperation::Move { .. } | KeyOperation::Place(_) => "Move keys",
                 KeyOperation::Scale { .. } => "Scale keys",
                 KeyOperation::Delete(_) => "Delete keys",
                 KeyOperation::Paste { .. } => "Paste keys",
                 KeyOperation::Mirror { .. } => "Mirror keys",
+                KeyOperation::Ease { .. } => "Set interpolation",
                 KeyOperation::Bake { .. } => "Bake keys",
                 KeyOperation::Reduce { .. } => "Reduce keys",
                 KeyOperation::Adopt { .. } => "Adopt keys",

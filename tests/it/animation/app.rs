@@ -6,7 +6,10 @@ use bevy::{animation::AnimationPlugin, math::Affine3A, prelude::*, time::TimeUpd
 use rigsmith::{
     headless::headless_app,
     plugins::{
-        animation::{AutoKey, ClipPlayer, ClipTargets, MarkerReached, RigClips, RootMotion, animation_clip, target_id},
+        animation::{
+            AutoKey, ClipPlayer, ClipTargets, EndPlayback, MarkerReached, RigClips, RootMotion, animation_clip,
+            target_id,
+        },
         commands::{BuildRequest, BuildStep},
         document::{Change, EditRequest},
         history::RigHistory,
@@ -122,6 +125,96 @@ fn a_clip_plays_on_the_entities_and_leaves_the_document() {
     let changed = app.world().get::<Rig>(entity).unwrap().clip(CLIP).unwrap().clone();
     assert_ne!(changed, clip);
     compare(&mut app, entity, &program, &changed, player.time);
+}
+
+#[test]
+fn a_pose_on_top_of_a_halted_clip_stays_until_time_goes_on() {
+    let rig = animated();
+    let (program, clip) = (program(&rig), rig.clip(CLIP).unwrap().clone());
+    let node = controls(&program)[1];
+    let mut app = app();
+    let entity = with_document(&mut app, rig);
+    app.world_mut().entity_mut(entity).insert(ClipPlayer { time: 0.25, playing: false, ..ClipPlayer::new(&clip) });
+    app.update();
+    let at = |app: &App, node: Uid| {
+        let state = app.world().get::<RigRuntime>(entity).unwrap().state();
+        state.offset_at(state.program().node(node).unwrap())
+    };
+    let (other, shown) = (controls(&program)[6], at(&app, controls(&program)[6]));
+    let mut wanted = expected(&program, &clip, 0.25);
+    wanted.set_offset(node, PoseOffset::from_rotation(Quat::from_rotation_z(0.6))).unwrap();
+    let wanted = wanted.offset_at(program.node(node).unwrap());
+    assert!(wanted.rotation.angle_between(at(&app, node).rotation) > 0.05);
+    let pose = Operation::Pose(vec![(node, PoseOffset::from_rotation(Quat::from_rotation_z(0.6)))]);
+    app.world_mut().write_message(EditRequest::operation(entity, pose));
+    for _ in 0..3 {
+        app.update();
+        assert!(wanted.rotation.angle_between(at(&app, node).rotation) < 1e-3);
+        assert_eq!(at(&app, other), shown, "the clip poses the others");
+    }
+    // A key that is set for the node is its value; what is posed and not keyed stays.
+    let edit =
+        RigEdit::SetClipAbout(CLIP, Box::new(rigsmith::rig::animation::ClipAbout { looped: false, ..clip.about() }));
+    app.world_mut().write_message(EditRequest::operation(entity, Operation::Edits(vec![edit])));
+    app.update();
+    assert!(wanted.rotation.angle_between(at(&app, node).rotation) < 1e-3);
+    app.world_mut().get_mut::<ClipPlayer>(entity).unwrap().time = 0.5;
+    app.update();
+    compare(&mut app, entity, &program, &clip, 0.5);
+}
+
+#[test]
+fn nodes_go_back_to_the_pose_of_the_document() {
+    let mut rig = animated();
+    let clip = rig.clip(CLIP).unwrap().clone();
+    let node = controls(&program(&rig))[1];
+    let bent = PoseOffset::from_rotation(Quat::from_rotation_z(0.4));
+    apply(&mut rig, RigEdit::SetOffset(node, Some(bent)));
+    let short = RigClip { layers: clip.layers[1..].to_vec(), ..RigClip::new(Uid(0xabc1), Uid(0xabc2), "short") };
+    let short = RigClip {
+        layers: vec![rigsmith::rig::animation::ClipLayer { uid: Uid(0xabc2), ..short.layers[0].clone() }],
+        ..short
+    };
+    apply(&mut rig, RigEdit::AddClip(Box::new(short.clone()), 1));
+    let program = program(&rig);
+    let state = |clip: Option<&RigClip>| {
+        let mut state = RigState::new(program.clone());
+        let _ = state.set_offset(node, bent);
+        for (node, offset) in clip.map(|clip| clip.sample(0.25)).unwrap_or_default().offsets {
+            let _ = state.set_offset(node, offset);
+        }
+        state.evaluate(0.0);
+        state
+    };
+    let mut app = app();
+    let entity = with_document(&mut app, rig);
+    let check = |app: &mut App, wanted: &RigState, when: &str| {
+        for (uid, at) in joints(app, entity) {
+            let place = wanted.global_at(program.node(uid).unwrap()).translation;
+            assert!(at.translation.distance(place.into()) < 2e-4, "{when}: {uid}");
+        }
+        let shown = app.world().get::<RigRuntime>(entity).unwrap().state();
+        for slot in 0..program.attributes().len() {
+            assert!((shown.attribute_at(slot) - wanted.attribute_at(slot)).abs() < 1e-3, "{when}: attribute {slot}");
+        }
+    };
+    check(&mut app, &state(None), "at the start");
+    let player = ClipPlayer { time: 1.25, playing: false, ..ClipPlayer::new(&clip) };
+    app.world_mut().entity_mut(entity).insert(player);
+    app.update();
+    compare(&mut app, entity, &program, &clip, 1.25);
+    // Another clip, with fewer nodes and no attributes.
+    app.world_mut().entity_mut(entity).insert(ClipPlayer { time: 0.25, playing: false, ..ClipPlayer::new(&short) });
+    app.update();
+    app.update();
+    check(&mut app, &state(Some(&short)), "in the other clip");
+    app.world_mut().entity_mut(entity).insert(player);
+    app.update();
+    app.world_mut().write_message(EndPlayback { rig: entity });
+    app.update();
+    app.update();
+    assert!(app.world().get::<ClipPlayer>(entity).is_none());
+    check(&mut app, &state(None), "after the end");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use bevy::math::{Quat, Vec3};
 use rigsmith::rig::{
     PoseOffset, Rig, RigEdit, Uid, UidSource,
     animation::{Ease, Key, Property, RigClip, Track, TrackTarget},
-    operations::{ClipOperation, KeyClipboard, KeyOperation, KeyTolerance, Operation, Outcome},
+    operations::{ClipOperation, KeyClipboard, KeyEase, KeyOperation, KeyTolerance, Operation, Outcome},
 };
 
 use super::{BASE, CLIP, Random, TOP, animated, apply, biped, built, controls, program, share, target, turn};
@@ -256,5 +256,80 @@ fn turned_axes_keep_the_motion_of_their_keys() {
     run(&mut rig, Operation::Rest { to: vec![(joint, rest)], with_children: false });
     for (time, before) in [0.0, 0.5, 1.0].into_iter().zip(before) {
         assert!(at(&rig, time).distance(before) < 1e-5, "{time}");
+    }
+}
+
+#[test]
+fn values_are_keyed_above_the_layers_below() {
+    let mut rig = animated();
+    let node = controls(&program(&rig))[1];
+    let rotation = target(node, Property::Rotation);
+    let wanted = Quat::from_rotation_x(0.7).to_array();
+    // The top layer adds half of its values.
+    for layer in [BASE, TOP] {
+        let mut rig = rig.clone();
+        keys(&mut rig, layer, KeyOperation::Values { time: 0.6, values: vec![(rotation.clone(), wanted)] });
+        let clip = rig.clip(CLIP).unwrap();
+        let own = &clip.layers[usize::from(layer == TOP)].tracks[&rotation];
+        assert!(own.keys.iter().any(|key| key.time == 0.6));
+        let below = layer == BASE && clip.layers[1].tracks.contains_key(&rotation);
+        let found = clip.value(&rotation, 0.6).unwrap();
+        let alike: f32 = found.iter().zip(&wanted).map(|(a, b)| a * b).sum();
+        assert!(below || alike.abs() > 1.0 - 1e-5, "{found:?}");
+    }
+    let bad = KeyOperation::Values { time: f32::NAN, values: vec![(rotation, wanted)] };
+    let bad = Operation::Clips(ClipOperation::Keys { clip: CLIP, layer: BASE, change: bad });
+    assert!(bad.run(&mut rig, &mut UidSource::seeded(1), None).is_err());
+}
+
+#[test]
+fn keys_are_placed_at_times_of_their_own() {
+    let mut rig = animated();
+    let rotation = target(controls(&program(&rig))[1], Property::Rotation);
+    let before = track(&rig, 0, &rotation).to_vec();
+    // The key at 1.0 is met, the one at 9.0 does not exist.
+    let pairs = vec![[0.25, 0.3], [0.5, 1.0], [9.0, 9.5]];
+    keys(&mut rig, BASE, KeyOperation::Place(vec![(rotation.clone(), pairs)]));
+    let now = track(&rig, 0, &rotation);
+    assert_eq!(times(now), [0.0, 0.3, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0]);
+    assert_eq!((now[1].value, now[3].value), (before[1].value, before[2].value));
+}
+
+#[test]
+fn interpolation_is_set_for_the_keys_that_are_named() {
+    let mut rig = animated();
+    let translation = target(Uid(0xabc), Property::Translation);
+    let heights = [0.0, 1.0, 3.0, 2.0];
+    let line = heights.iter().zip([0.0, 0.5, 1.0, 1.5]);
+    let line: Vec<Key> = line.map(|(height, time)| Key::vector(time, Vec3::new(0.0, *height, 0.0))).collect();
+    keys(&mut rig, BASE, KeyOperation::Set(vec![(translation.clone(), line)]));
+    let some = |times: &[f32]| [(translation.clone(), times.to_vec())].into();
+    keys(&mut rig, BASE, KeyOperation::Ease { keys: some(&[0.5]), ease: KeyEase::Stepped });
+    let eases = |rig: &Rig| track(rig, 0, &translation).iter().map(|key| key.ease).collect::<Vec<_>>();
+    assert_eq!(eases(&rig), [Ease::Linear, Ease::Stepped, Ease::Linear, Ease::Linear]);
+    keys(&mut rig, BASE, KeyOperation::Ease { keys: some(&[1.5, 0.0, 1.0, 0.5]), ease: KeyEase::Cubic });
+    let slopes = eases(&rig).into_iter().map(|ease| match ease {
+        Ease::Cubic { arrive, leave } if arrive == leave => leave[1],
+        other => panic!("{other:?}"),
+    });
+    // Level at the ends and where the height turns back; three units a second in between.
+    assert_eq!(slopes.collect::<Vec<_>>(), [0.0, 3.0, 0.0, 0.0]);
+    let own = &rig.clips()[0].layers[0].tracks[&translation];
+    let most = (0..=150).map(|step| own.sample(&Property::Translation, step as f32 * 0.01).unwrap()[1]);
+    assert!(most.fold(0.0, f32::max) <= 3.0 + 1e-5, "a curve that swings beyond its keys");
+
+    // Two signs of one rotation: the curve between them stays.
+    let rotation = target(Uid(0xabc), Property::Rotation);
+    let turned = [0.1f32, 0.2, 0.3].map(Quat::from_rotation_y);
+    let turned = [turned[0], -turned[1], turned[2]];
+    let line = turned.iter().zip([0.0, 0.5, 1.0]).map(|(turn, time)| Key::rotation(time, *turn)).collect();
+    keys(&mut rig, BASE, KeyOperation::Set(vec![(rotation.clone(), line)]));
+    let all = [(rotation.clone(), vec![0.0, 0.5, 1.0])].into();
+    keys(&mut rig, BASE, KeyOperation::Ease { keys: all, ease: KeyEase::Cubic });
+    let own = &rig.clips()[0].layers[0].tracks[&rotation];
+    for step in 0..=20 {
+        let at = Quat::from_array(own.sample(&Property::Rotation, step as f32 * 0.05).unwrap());
+        let angle = at.angle_between(Quat::IDENTITY);
+        assert!((0.1 - 1e-3..=0.3 + 1e-3).contains(&angle), "{angle}");
     }
 }

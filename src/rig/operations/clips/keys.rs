@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{KeyOperation, KeyTimes, OperationError, layer_of, mirror, pose, reduce, time};
+use super::{KeyOperation, KeyTimes, OperationError, ease, layer_of, mirror, pose, reduce, time};
 use crate::rig::{
     RigEdit, Uid,
     animation::{ClipLayer, Key, TrackTarget},
@@ -43,8 +43,10 @@ pub(super) fn run(draft: &mut Draft, clip: Uid, layer: Uid, change: &KeyOperatio
             let targets = pose::targets(draft.rig(), &own, nodes);
             return pose::set_pose(draft, clip, layer, *time, &targets);
         }
+        KeyOperation::Values { time, values } => return pose::set_values(draft, clip, layer, *time, values),
         KeyOperation::Set(list) => list.iter().for_each(|(target, keys)| changes.insert(target, keys.iter().copied())),
         KeyOperation::Move { keys, by } => time::shifted(&own, keys, &mut changes, |time| time + by, 1.0),
+        KeyOperation::Place(list) => time::placed(&own, list, &mut changes),
         KeyOperation::Scale { keys, pivot, factor } => {
             if !factor.is_finite() || *factor == 0.0 {
                 return Err(OperationError::BadNumber("keys cannot be scaled by zero; use another factor"));
@@ -62,6 +64,7 @@ pub(super) fn run(draft: &mut Draft, clip: Uid, layer: Uid, change: &KeyOperatio
             }
         }
         KeyOperation::Mirror { keys, built } => mirror::mirror(draft, &own, keys, built.as_deref(), &mut changes)?,
+        KeyOperation::Ease { keys, ease } => ease::ease(&own, keys, *ease, &mut changes),
         KeyOperation::Bake { targets, rate } => {
             if !rate.is_finite() || *rate <= 0.0 {
                 return Err(OperationError::BadNumber("keys cannot be baked at that rate; use a positive one"));

@@ -44,15 +44,28 @@ pub(super) fn set_pose(
     time: f32,
     targets: &BTreeSet<TrackTarget>,
 ) -> Result<(), OperationError> {
+    let rig = draft.rig();
+    let values = targets.iter().filter_map(|target| Some((target.clone(), current(rig, target)?)));
+    let values: Vec<(TrackTarget, [f32; 4])> = values.collect();
+    set_values(draft, clip, layer, time, &values)
+}
+
+/// Sets keys of a layer with which the layers up to it give values.
+pub(super) fn set_values(
+    draft: &mut Draft,
+    clip: Uid,
+    layer: Uid,
+    time: f32,
+    values: &[(TrackTarget, [f32; 4])],
+) -> Result<(), OperationError> {
     if !time.is_finite() {
         return Err(OperationError::BadNumber("a key needs a time that is finite; use another"));
     }
     let found = find(draft, clip)?;
     let place = found.layers.iter().position(|own| own.uid == layer).ok_or(EditError::NoLayer(clip, layer))?;
     let mut changes = Changes::default();
-    for target in targets {
-        let Some(wanted) = current(draft.rig(), target) else { continue };
-        let value = found.value_for(place, target, time, wanted);
+    for (target, wanted) in values {
+        let value = found.value_for(place, target, time, *wanted);
         let keys = found.layers[place].tracks.get(target).map_or(&[] as &[Key], |track| &track.keys);
         changes.insert(target, [Key { time, value, ease: ease_at(keys, time) }]);
     }
@@ -69,8 +82,10 @@ fn ease_at(keys: &[Key], time: f32) -> Ease {
     }
 }
 
-/// Runs an operation, then sets keys for what it changed in the pose, or asked to pose to values other than those of the
-/// clip.
+/// Largest difference of a value from that of a clip that is rounding.
+const ROUNDING: f32 = 2e-6;
+
+/// Runs an operation, then sets keys for what it posed to values other than those of the clip.
 pub(in crate::rig::operations) fn keyed(
     draft: &mut Draft,
     operation: &Operation,
@@ -89,17 +104,14 @@ pub(in crate::rig::operations) fn keyed(
     }
     let mut targets = BTreeSet::new();
     for node in nodes {
-        let was = pose.get(&node).copied().unwrap_or_default();
-        let is = rig.offset(node).copied().unwrap_or_default();
-        let changed = [
-            (Property::Translation, is.translation != was.translation),
-            (Property::Rotation, is.rotation != was.rotation),
-            (Property::Scale, is.scale != was.scale),
-        ];
-        for (property, is_changed) in changed {
+        for property in [Property::Translation, Property::Rotation, Property::Scale] {
             let target = TrackTarget { node, property };
             let shown = found.value(&target, time).unwrap_or_else(|| target.property.rest());
-            if is_changed || current(rig, &target).is_some_and(|value| value != shown) {
+            // A key with the value of the clip would change the curves on both sides of it. Poses that were taken from what is
+            // shown are rounded.
+            let is_other =
+                |value: [f32; 4]| value.iter().zip(&shown).any(|(a, b)| (a - b).abs() > ROUNDING * a.abs().max(1.0));
+            if current(rig, &target).is_some_and(is_other) {
                 targets.insert(target);
             }
         }

@@ -28,6 +28,21 @@ pub(super) fn shifted(
     }
 }
 
+/// Puts keys to times of their own; tangents stay as they are.
+pub(super) fn placed(layer: &ClipLayer, list: &[(TrackTarget, Vec<[f32; 2]>)], changes: &mut Changes) {
+    for (target, pairs) in list {
+        let Some(track) = layer.tracks.get(target) else { continue };
+        let key_at = |time: f32| {
+            let place = track.keys.partition_point(|key| key.time < time);
+            track.keys.get(place).filter(|key| key.time == time)
+        };
+        let moved: Vec<Key> =
+            pairs.iter().filter_map(|[from, to]| Some(Key { time: *to, ..*key_at(*from)? })).collect();
+        changes.remove(target, pairs.iter().map(|[from, _]| *from));
+        changes.insert(target, moved);
+    }
+}
+
 /// A key at another time, where time runs slower by these factors before and behind it.
 fn stretched(key: &Key, time: f32, before: f32, behind: f32) -> Key {
     let slower = |tangent: [f32; 4], factor: f32| if factor == 0.0 { [0.0; 4] } else { tangent.map(|t| t / factor) };

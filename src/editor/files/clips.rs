@@ -1,0 +1,74 @@
+//! Clips of the document as animations of an exported character: played by the rig's own program, for every node of the model.
+
+use std::sync::Arc;
+
+use bevy::math::Vec3A;
+
+use super::error::WriteError;
+use crate::{
+    mesh::model::{Channel, ChannelTarget, Clip, Model},
+    processor::{Builder, Modules},
+    rig::{BuiltRig, Rig, Uid, animation::RigClip, bake::baked, operations::KeyTolerance},
+    solve::{
+        bake_clip::{BakedNode, bake_clip},
+        program::{CompileOptions, RigProgram},
+    },
+};
+
+/// Puts the clips of the document in place of the clips that the mesh came with, of which morph targets stay. A document
+/// without clips leaves the model as it is.
+///
+/// # Errors
+/// The rig cannot be built, or the built rig cannot run.
+pub(super) fn put_clips(
+    model: &mut Model,
+    rig: &Rig,
+    built: Option<&BuiltRig>,
+    modules: &Arc<Modules>,
+) -> Result<(), WriteError> {
+    if rig.clips().is_empty() {
+        return Ok(());
+    }
+    // Nodes of a model are those of the built skeleton, or the joints of the document.
+    let uids: Vec<Uid> = match built {
+        Some(built) => baked(rig, built).walk().map(|joint| joint.data.uid).collect(),
+        None => rig.walk().map(|joint| joint.data.uid).collect(),
+    };
+    let own;
+    let built = match built {
+        Some(built) => built,
+        None => {
+            own = Builder::build(rig, modules)?;
+            &own
+        }
+    };
+    let program = Arc::new(RigProgram::compile(built, &CompileOptions::default())?);
+    let node = |(uid, node): (Uid, &crate::mesh::model::Node)| BakedNode { uid, parent: node.parent, rest: node.rest };
+    let nodes: Vec<BakedNode> = uids.into_iter().zip(&model.nodes).map(node).collect();
+    // The tolerance is for humans in metres.
+    let globals = model.rest_globals();
+    let places = || globals.iter().map(|at| at.translation);
+    let extent = places().reduce(Vec3A::max).zip(places().reduce(Vec3A::min));
+    let size = extent.map_or(0.0, |(most, least)| (most - least).max_element());
+    let tolerance = KeyTolerance::default().for_height(size);
+    let bake = |clip: &RigClip| bake_clip(&program, clip, &nodes, clip.frame_rate, &tolerance);
+    let mut clips: Vec<Clip> = rig.clips().iter().map(bake).collect::<Result<_, _>>()?;
+    for mut clip in std::mem::take(&mut model.clips) {
+        clip.channels.retain(|channel| matches!(channel.target, ChannelTarget::MorphWeights(_)));
+        match rig.clips().iter().position(|own| own.name == clip.name.trim()) {
+            // A baked clip begins at zero.
+            Some(place) => clips[place].channels.extend(earlier(clip.channels, rig.clips()[place].range[0])),
+            None => clips.push(clip),
+        }
+    }
+    clips.retain(|clip| !clip.channels.is_empty());
+    model.clips = clips;
+    Ok(())
+}
+
+fn earlier(channels: Vec<Channel>, by: f32) -> impl Iterator<Item = Channel> {
+    channels.into_iter().map(move |channel| {
+        let times = channel.times.iter().map(|time| (time - by).max(0.0)).collect();
+        Channel { times, ..channel }
+    })
+}

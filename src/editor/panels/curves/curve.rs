@@ -1,0 +1,168 @@
+//! Curves of tracks: values over time, one curve a number, rotations as angles.
+
+use bevy::{math::EulerRot, prelude::*};
+use bevy_egui::egui::Color32;
+
+use crate::{
+    editor::panels::timeline::{Mark, TimeAxis, buckets},
+    rig::animation::{ClipLayer, Ease, Key, Property, Track, TrackTarget},
+};
+
+/// Pixels from one sample to the next.
+const STEP: f32 = 3.0;
+/// Most samples of a curve.
+const MOST: usize = 700;
+
+/// Colours of the numbers of a value.
+const COLORS: [Color32; 3] =
+    [Color32::from_rgb(230, 96, 96), Color32::from_rgb(120, 190, 80), Color32::from_rgb(90, 150, 240)];
+/// Colour of attributes.
+const ATTRIBUTE: Color32 = Color32::from_rgb(214, 178, 92);
+
+/// Curve of one number of a track.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// The track.
+    pub target: TrackTarget,
+    /// Name for people.
+    pub name: String,
+    /// Number of the value, from zero.
+    pub axis: usize,
+    /// Colour.
+    pub color: Color32,
+    /// Times with values, by rising time.
+    pub points: Vec<(f32, f32)>,
+    /// Visible keys that stand apart from others.
+    pub keys: Vec<CurveKey>,
+}
+
+/// Key on a curve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CurveKey {
+    /// The key.
+    pub key: Key,
+    /// Value of the curve there.
+    pub value: f32,
+    /// Angles of a rotation in degrees; zero for others.
+    pub angles: Vec3,
+    /// Slopes before and behind a cubic key, in units a second. Those of rotations are of quaternions and have no slope here.
+    pub slopes: Option<[f32; 2]>,
+}
+
+impl CurveKey {
+    /// The key with another value of its curve.
+    pub fn with_value(&self, property: &Property, axis: usize, value: f32) -> Key {
+        let mut key = self.key;
+        if *property == Property::Rotation {
+            let mut angles = self.angles;
+            angles[axis.min(2)] = value;
+            key.value = rotation(angles).to_array();
+            // The sign that is nearer to the key as it was keeps the curve on both sides of it.
+            let dot: f32 = key.value.iter().zip(&self.key.value).map(|(a, b)| a * b).sum();
+            if dot < 0.0 {
+                key.value = key.value.map(|number| -number);
+            }
+        } else if let Some(number) = key.value.get_mut(axis) {
+            *number = value;
+        }
+        key
+    }
+
+    /// The key with other slopes.
+    pub fn with_slopes(&self, axis: usize, slopes: [f32; 2]) -> Key {
+        let mut key = self.key;
+        if let Ease::Cubic { arrive, leave } = &mut key.ease
+            && axis < arrive.len()
+        {
+            (arrive[axis], leave[axis]) = (slopes[0], slopes[1]);
+        }
+        key
+    }
+}
+
+/// Curves of a track in the visible span of time.
+pub fn curves(layer: &ClipLayer, target: &TrackTarget, node: &str, axis: &TimeAxis) -> Vec<Curve> {
+    let Some(track) = layer.tracks.get(target) else { return Vec::new() };
+    let property = &target.property;
+    let keys = apart(track, axis);
+    let times = sampled(track, &keys, axis);
+    let is_turn = *property == Property::Rotation;
+    let count = if is_turn { 3 } else { property.width() };
+    let mut points: Vec<Vec<(f32, f32)>> = vec![Vec::with_capacity(times.len()); count];
+    let mut found: Vec<Vec<CurveKey>> = vec![Vec::with_capacity(keys.len()); count];
+    let mut angles = Vec3::ZERO;
+    let mut next = keys.iter().peekable();
+    for (number, time) in times.iter().enumerate() {
+        let Some(value) = track.sample(property, *time) else { continue };
+        let mut values = [value[0], value[1], value[2]];
+        if is_turn {
+            let turn = near_angles(Quat::from_array(value), if number == 0 { None } else { Some(angles) });
+            (angles, values) = (turn, turn.to_array());
+        }
+        for (axis, points) in points.iter_mut().enumerate() {
+            points.push((*time, values[axis]));
+        }
+        let Some(key) = next.next_if(|key| key.time == *time) else { continue };
+        for (axis, keys) in found.iter_mut().enumerate() {
+            let slopes = match key.ease {
+                Ease::Cubic { arrive, leave } if !is_turn => Some([arrive[axis], leave[axis]]),
+                _ => None,
+            };
+            keys.push(CurveKey { key: **key, value: values[axis], angles, slopes });
+        }
+    }
+    let curve = |(axis, (points, keys)): (usize, (Vec<(f32, f32)>, Vec<CurveKey>))| {
+        let (name, color) = match property {
+            Property::Attribute(attribute) => (format!("{node} {attribute}"), ATTRIBUTE),
+            _ => (format!("{node} {property} {}", ["X", "Y", "Z"][axis]), COLORS[axis]),
+        };
+        Curve { target: target.clone(), name, axis, color, points, keys }
+    };
+    points.into_iter().zip(found).enumerate().map(curve).collect()
+}
+
+/// Visible keys that stand apart from their neighbours on the screen.
+fn apart<'a>(track: &'a Track, axis: &TimeAxis) -> Vec<&'a Key> {
+    let marks: Vec<Mark> = track.keys.iter().map(Mark::from).collect();
+    let single = buckets(&marks, axis).into_iter().filter(|bucket| bucket.count == 1);
+    let key = |time: f32| {
+        let place = track.keys.partition_point(|key| key.time < time);
+        track.keys.get(place)
+    };
+    single.filter_map(|bucket| key(bucket.times[0])).collect()
+}
+
+/// Times at which a curve is drawn: even steps, keys, and the ends of steps.
+fn sampled(track: &Track, keys: &[&Key], axis: &TimeAxis) -> Vec<f32> {
+    let count = ((axis.x.span() / STEP).max(2.0) as usize).min(MOST);
+    let [start, end] = axis.span;
+    let mut times: Vec<f32> =
+        (0..=count).map(|number| start + (end - start) * (number as f32 / count as f32)).collect();
+    times.extend(keys.iter().map(|key| key.time));
+    let pixel = 0.2 / axis.scale();
+    for key in keys.iter().filter(|key| key.ease == Ease::Stepped) {
+        let place = track.keys.partition_point(|other| other.time <= key.time);
+        times.extend(track.keys.get(place).map(|next| (next.time - pixel).max(key.time)));
+    }
+    times.sort_by(f32::total_cmp);
+    times.dedup();
+    times
+}
+
+/// Rotation of angles about X, Y and Z in degrees.
+fn rotation(angles: Vec3) -> Quat {
+    let [x, y, z] = angles.to_array().map(f32::to_radians);
+    Quat::from_euler(EulerRot::XYZ, x, y, z)
+}
+
+/// Angles of a rotation in degrees. Of all angles with that rotation, those that are nearest to the ones before, so that curves
+/// do not jump.
+fn near_angles(rotation: Quat, before: Option<Vec3>) -> Vec3 {
+    let (x, y, z) = rotation.to_euler(EulerRot::XYZ);
+    let angles = Vec3::new(x, y, z).map(f32::to_degrees);
+    let Some(before) = before else { return angles };
+    let other = Vec3::new(angles.x + 180.0, 180.0 - angles.y, angles.z + 180.0);
+    let near = |angles: Vec3| angles - ((angles - before) / 360.0).round() * 360.0;
+    let (one, two) = (near(angles), near(other));
+    if one.distance_squared(before) <= two.distance_squared(before) { one } else { two }
+}

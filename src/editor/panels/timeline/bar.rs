@@ -1,0 +1,232 @@
+//! The bar of the timeline: the choice of a clip, playback, and the clip's range and frame rate. Buttons that can do nothing say
+//! why.
+
+use bevy::prelude::*;
+use bevy_egui::egui::{Button, ComboBox, RichText, Sense, Ui, WidgetInfo, WidgetType, vec2};
+
+use super::{
+    action::{TimelineAction, obstacle},
+    state::{OpenClip, Timeline, TimelineRequest, frames},
+};
+use crate::{
+    editor::{
+        actions::{Action, ActionRequest},
+        keys::KeyBindings,
+        panel::Requests,
+        panels::{
+            displayed_rig::DisplayedRig,
+            fields::{self, Look, NumberEdit, Numbers, Renaming},
+        },
+    },
+    plugins::document::{Change, EditRequest},
+    rig::{
+        Uid,
+        animation::{ClipAbout, RigClip},
+        operations::{ClipOperation, Operation},
+        proportion::Quantity,
+    },
+};
+
+/// State of the bar.
+#[derive(Default)]
+pub(super) struct Bar {
+    rename: Option<Rename>,
+    numbers: Numbers,
+}
+
+/// Name of a clip that is being typed.
+struct Rename {
+    clip: Uid,
+    text: String,
+    focused: bool,
+}
+
+const FRAMES: Look = Look { speed: 0.2, decimals: 2, suffix: "", quantity: Quantity::Plain };
+const RATE: Look = Look { speed: 0.1, decimals: 3, suffix: "", quantity: Quantity::Plain };
+
+impl Bar {
+    pub fn show(&mut self, ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut Requests) {
+        let open = OpenClip::of(world);
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 3.0;
+            self.clips(ui, shown, open.as_ref(), requests);
+            self.menu(ui, world, open.as_ref(), requests);
+            ui.separator();
+            let playing = world.get_resource::<Timeline>().is_some_and(|timeline| timeline.playing);
+            for (symbol, action) in [
+                ("⏮", TimelineAction::Start),
+                ("⏪", TimelineAction::PreviousKey),
+                ("⏴", TimelineAction::PreviousFrame),
+                (if playing { "⏸" } else { "▶" }, TimelineAction::Play),
+                ("⏵", TimelineAction::NextFrame),
+                ("⏩", TimelineAction::NextKey),
+                ("⏭", TimelineAction::End),
+            ] {
+                tool(ui, world, symbol, action, None, requests);
+            }
+            let is_looped = open.is_some_and(|open| open.clip.looped);
+            tool(ui, world, "🔁", TimelineAction::Loop, Some(is_looped), requests);
+            ui.separator();
+            tool(ui, world, "🔑", TimelineAction::Key, None, requests);
+            let auto_key = world.get_resource::<Timeline>().is_some_and(|timeline| timeline.auto_key);
+            tool(ui, world, "⏺", TimelineAction::AutoKey, Some(auto_key), requests);
+            tool(ui, world, "⚑", TimelineAction::Marker, None, requests);
+            tool(ui, world, "⌖", TimelineAction::Fit, None, requests);
+            if let Some(open) = &open {
+                ui.separator();
+                self.frames(ui, open, requests);
+            }
+        });
+    }
+
+    /// The choice of a clip, or the field in which its name is typed.
+    fn clips(&mut self, ui: &mut Ui, shown: &DisplayedRig, open: Option<&OpenClip>, requests: &mut Requests) {
+        let size = vec2(132.0, ui.spacing().interact_size.y);
+        if let Some(rename) = &mut self.rename {
+            let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
+            let id = ui.id().with((rename.clip, "rename"));
+            match fields::rename(ui, rect, id, "Rename clip", &mut rename.text, &mut rename.focused) {
+                Renaming::Typing => {}
+                Renaming::Dropped => self.rename = None,
+                Renaming::Accepted => {
+                    let Some(Rename { clip, text, .. }) = self.rename.take() else { return };
+                    let name = text.trim().to_owned();
+                    if shown.rig.clip(clip).is_some_and(|clip| !name.is_empty() && clip.name != name) {
+                        let operation = Operation::Clips(ClipOperation::Rename(clip, name));
+                        requests.send(EditRequest::operation(shown.entity, operation));
+                    }
+                }
+            }
+            return;
+        }
+        let now = open.map(|open| open.clip.uid);
+        let text = open.map_or("No clip", |open| open.clip.name.as_str());
+        let mut chosen = now;
+        let combo = ComboBox::from_id_salt("clip").selected_text(text).width(size.x).truncate().show_ui(ui, |ui| {
+            ui.selectable_value(&mut chosen, None, "No clip");
+            for clip in shown.rig.clips() {
+                ui.selectable_value(&mut chosen, Some(clip.uid), &clip.name);
+            }
+        });
+        ui.ctx().accesskit_node_builder(combo.response.id, |node| node.set_label("Clip"));
+        combo.response.on_hover_text("The clip that is shown; without one the rig shows its own pose");
+        if chosen != now {
+            requests.send(TimelineRequest::Open(chosen));
+        }
+    }
+
+    fn menu(&mut self, ui: &mut Ui, world: &World, open: Option<&OpenClip>, requests: &mut Requests) {
+        let menu = ui.menu_button("…", |ui| {
+            entry(ui, world, TimelineAction::NewClip, requests);
+            let rename = ui.add_enabled(open.is_some(), Button::new("Rename clip"));
+            if rename.on_disabled_hover_text("no clip is open").clicked()
+                && let Some(open) = open
+            {
+                self.rename = Some(Rename { clip: open.clip.uid, text: open.clip.name.clone(), focused: false });
+                ui.close();
+            }
+            entry(ui, world, TimelineAction::DuplicateClip, requests);
+            entry(ui, world, TimelineAction::DeleteClip, requests);
+            ui.separator();
+            entry(ui, world, TimelineAction::Import, requests);
+            entry(ui, world, TimelineAction::NewLayer, requests);
+            entry(ui, world, TimelineAction::KeyAll, requests);
+        });
+        menu.response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, "Menu of the clip"));
+        menu.response.on_hover_text("Make, rename, copy, delete and import clips");
+    }
+
+    /// The frame of the playhead, the range and the frame rate.
+    fn frames(&mut self, ui: &mut Ui, open: &OpenClip, requests: &mut Requests) {
+        let clip = open.clip;
+        let height = ui.spacing().interact_size.y;
+        let seconds = |frame: f32| (f64::from(frame) / f64::from(clip.frame_rate)) as f32;
+        let mut field = |ui: &mut Ui, said: &str, prefix: &str, value: f32, look: Look, width: f32| {
+            self.numbers.field(ui, said, RichText::new(prefix), value.into(), look, vec2(width, height))
+        };
+        let frame = field(ui, "Frame", "Frame ", open.frame(), FRAMES, 84.0);
+        if let Some(NumberEdit::Set(frame) | NumberEdit::Preview(frame)) = frame {
+            requests.send(TimelineRequest::Scrub(seconds(frame)));
+        }
+        let [start, end] = clip.range.map(|time| frames(clip, time));
+        let edits = [
+            field(ui, "Start frame", "from ", start, FRAMES, 72.0)
+                .map(|edit| changed(clip, edit, |about, frame| about.range[0] = seconds(frame).min(about.range[1]))),
+            field(ui, "End frame", "to ", end, FRAMES, 72.0)
+                .map(|edit| changed(clip, edit, |about, frame| about.range[1] = seconds(frame).max(about.range[0]))),
+            field(ui, "Frames a second", "fps ", clip.frame_rate, RATE, 72.0)
+                .map(|edit| changed(clip, edit, |about, rate| about.frame_rate = rate.clamp(0.1, 1000.0))),
+        ];
+        for change in edits.into_iter().flatten() {
+            requests.send(EditRequest { rig: open.entity, change });
+        }
+    }
+}
+
+/// Change of a clip's header by a number.
+pub(super) fn changed(clip: &RigClip, edit: NumberEdit, set: impl Fn(&mut ClipAbout, f32)) -> Change {
+    let operation = |value: f32| about(clip, |about| set(about, value));
+    match edit {
+        NumberEdit::Set(value) => Change::Do(operation(value)),
+        NumberEdit::Preview(value) => Change::Preview(operation(value)),
+        NumberEdit::Commit => Change::Commit,
+        NumberEdit::Cancel => Change::CancelPreview,
+    }
+}
+
+/// Operation that changes the header of a clip.
+pub(super) fn about(clip: &RigClip, change: impl FnOnce(&mut ClipAbout)) -> Operation {
+    let mut about = clip.about();
+    change(&mut about);
+    Operation::Clips(ClipOperation::About(clip.uid, Box::new(about)))
+}
+
+fn key_of(world: &World, action: TimelineAction) -> Option<String> {
+    world.get_resource::<KeyBindings>()?.key(Action::Timeline(action)).map(ToString::to_string)
+}
+
+/// Draws a button with a symbol, which is called by its action. `on` makes it a switch.
+fn tool(ui: &mut Ui, world: &World, symbol: &str, action: TimelineAction, on: Option<bool>, requests: &mut Requests) {
+    let side = ui.spacing().interact_size.y;
+    let why_not = obstacle(world, action);
+    let button = match on {
+        Some(on) => Button::selectable(on, symbol),
+        None => Button::new(symbol),
+    };
+    let response = ui.add_enabled(why_not.is_none(), button.min_size(vec2(side + 2.0, side)));
+    response.widget_info(|| match on {
+        Some(on) => WidgetInfo::selected(WidgetType::Button, why_not.is_none(), on, action.name()),
+        None => WidgetInfo::labeled(WidgetType::Button, why_not.is_none(), action.name()),
+    });
+    let clicked = response.clicked();
+    let tip = match key_of(world, action) {
+        Some(key) => format!("{} ({key})", action.name()),
+        None => action.name().to_owned(),
+    };
+    match why_not {
+        Some(why_not) => response.on_disabled_hover_text(format!("{tip}: {why_not}")),
+        None => response.on_hover_text(tip),
+    };
+    if clicked {
+        requests.send(ActionRequest(Action::Timeline(action)));
+    }
+}
+
+/// Draws an entry of a menu.
+pub(super) fn entry(ui: &mut Ui, world: &World, action: TimelineAction, requests: &mut Requests) {
+    let why_not = obstacle(world, action);
+    let button = Button::new(action.name());
+    let button = match key_of(world, action) {
+        Some(key) => button.shortcut_text(key),
+        None => button,
+    };
+    let response = ui.add_enabled(why_not.is_none(), button);
+    let clicked = response.clicked();
+    if let Some(why_not) = why_not {
+        response.on_disabled_hover_text(why_not);
+    }
+    if clicked {
+        requests.send(ActionRequest(Action::Timeline(action)));
+        ui.close();
+    }
+}

@@ -1,0 +1,33 @@
+//! Context menu of the keys.
+
+use bevy::prelude::*;
+use bevy_egui::egui::{Response, Ui};
+
+use super::{action::TimelineAction, bar::entry};
+use crate::editor::panel::Requests;
+
+/// Entries of the menu, group by group.
+const GROUPS: [&[TimelineAction]; 5] = [
+    &[TimelineAction::Stepped, TimelineAction::Linear, TimelineAction::Cubic],
+    &[TimelineAction::Copy, TimelineAction::Paste, TimelineAction::Mirror, TimelineAction::Delete],
+    &[TimelineAction::Slower, TimelineAction::Faster, TimelineAction::Reverse, TimelineAction::Snap],
+    &[TimelineAction::Key, TimelineAction::KeyAll, TimelineAction::Marker],
+    &[TimelineAction::SelectAll, TimelineAction::SelectNone, TimelineAction::Fit],
+];
+
+/// Draws the menu while it is open.
+pub(super) fn show(response: &Response, world: &World, requests: &mut Requests) {
+    response.context_menu(|ui| entries(ui, world, requests));
+}
+
+fn entries(ui: &mut Ui, world: &World, requests: &mut Requests) {
+    ui.set_min_width(190.0);
+    for (number, group) in GROUPS.into_iter().enumerate() {
+        if number > 0 {
+            ui.separator();
+        }
+        for action in group {
+            entry(ui, world, *action, requests);
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Curves: values over time, with keys and tangents that are dragged.
+
+use rigsmith::{
+    editor::panels::{
+        curves::{CurvesPanel, curve::curves},
+        timeline::TimeAxis,
+    },
+    rig::{animation::ClipLayer, operations::KeyEase},
+};
+
+use super::*;
+
+fn moved(node: Uid) -> TrackTarget {
+    TrackTarget { node, property: Property::Translation }
+}
+
+/// The curves of a translation whose Y rises from 0 to 1 in two seconds, with all of its keys selected.
+fn open() -> (Desk, Uid) {
+    let (mut desk, [_, left, _]) = desk_with(CurvesPanel::default());
+    let line = [0.0, 1.0, 2.0].map(|time: f32| Key::vector(time, Vec3::Y * time * 0.5)).to_vec();
+    let set = KeyOperation::Set(vec![(moved(left), line)]);
+    desk.edit(Operation::Clips(ClipOperation::Keys { clip: CLIP, layer: BASE, change: set }));
+    ask(&mut desk, TimelineRequest::Open(Some(CLIP)));
+    ask(&mut desk, TimelineRequest::Select([(moved(left), vec![0.0, 1.0, 2.0])].into()));
+    (desk, left)
+}
+
+/// Pixel of a time and a value, of values from 0 to 1 with twelve hundredths of room.
+fn place(desk: &Desk, time: f32, value: f32) -> Pos2 {
+    let (rect, [start, end]) = (desk.find("Curves of the selected tracks").rect, timeline(desk).span);
+    let x = rect.left() + (time - start) / (end - start) * rect.width();
+    Pos2::new(x, rect.bottom() - (value + 0.12) / 1.24 * rect.height())
+}
+
+fn keys(desk: &Desk, node: Uid) -> &[Key] {
+    &clip(desk).layers[0].tracks[&moved(node)].keys
+}
+
+#[test]
+fn a_key_is_dragged_in_value_or_in_time() {
+    let (mut desk, left) = open();
+    ask(&mut desk, TimelineRequest::Select([(moved(left), vec![1.0])].into()));
+    let (before, steps) = (bytes(&desk), desk.steps().1);
+    desk.drag(place(&desk, 1.0, 0.5), place(&desk, 1.0, 0.8));
+    let key = keys(&desk, left)[1];
+    assert!((key.value[1] - 0.8).abs() < 0.01 && key.value[0] == 0.0 && key.time == 1.0, "{key:?}");
+    assert_eq!(desk.steps().1, steps + 1);
+    undo(&mut desk);
+    assert_eq!(bytes(&desk), before);
+    desk.drag(place(&desk, 1.0, 0.5), place(&desk, 1.3, 0.5));
+    let key = keys(&desk, left)[1];
+    assert!((key.time * 30.0 - 39.0).abs() < 1e-3 && key.value[1] == 0.5, "{key:?}");
+    undo(&mut desk);
+    assert_eq!((bytes(&desk), desk.steps().1), (before, steps));
+}
+
+#[test]
+fn a_tangent_turns_on_both_sides_or_one() {
+    let (mut desk, left) = open();
+    let ease = KeyOperation::Ease { keys: [(moved(left), vec![0.0, 1.0, 2.0])].into(), ease: KeyEase::Cubic };
+    desk.edit(Operation::Clips(ClipOperation::Keys { clip: CLIP, layer: BASE, change: ease }));
+    ask(&mut desk, TimelineRequest::Select([(moved(left), vec![1.0])].into()));
+    let slopes = |desk: &Desk| match keys(desk, left)[1].ease {
+        Ease::Cubic { arrive, leave } => [arrive[1], leave[1]],
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(slopes(&desk), [0.5, 0.5]);
+    let (before, steps) = (bytes(&desk), desk.steps().1);
+    // The end of the tangent behind the key, 42 pixels along its slope.
+    let (at, ahead) = (place(&desk, 1.0, 0.5), place(&desk, 1.1, 0.55));
+    let end = at + (ahead - at).normalized() * 42.0;
+    desk.drag(end, egui::pos2(end.x, at.y));
+    let level = slopes(&desk);
+    assert!(level[0].abs() < 0.05 && level[0] == level[1], "{level:?}");
+    assert_eq!(desk.steps().1, steps + 1);
+    undo(&mut desk);
+    desk.hold(Modifiers::ALT);
+    desk.drag(end, egui::pos2(end.x, at.y));
+    desk.hold(Modifiers::NONE);
+    let broken = slopes(&desk);
+    assert!(broken[0] == 0.5 && broken[1].abs() < 0.05, "{broken:?}");
+    undo(&mut desk);
+    assert_eq!(bytes(&desk), before);
+}
+
+#[test]
+fn the_panel_says_what_to_do_while_there_are_no_curves() {
+    let (mut desk, [hips, left, _]) = desk_with(CurvesPanel::default());
+    assert!(desk.says("No clip is open: choose or make one in the Timeline."));
+    desk.select(&[hips]);
+    ask(&mut desk, TimelineRequest::Open(Some(CLIP)));
+    assert!(desk.says("Select keys in the Timeline, or a control that has keys, to see its curves."));
+    // The curves of a selected node, where no key is selected.
+    desk.select(&[left]);
+    assert!(desk.look("Curves of the selected tracks").is_some());
+}
+
+#[test]
+fn turns_are_angles_without_jumps() {
+    let node = Uid(5);
+    let turn = |time: f32| Key::rotation(time, Quat::from_rotation_y((time * 170.0).to_radians()));
+    let mut layer = ClipLayer::empty(BASE);
+    let keys: Vec<Key> = (0..=8).map(|number| turn(number as f32 * 0.5)).collect();
+    layer.tracks.insert(turned(node), Arc::new(Track { keys }));
+    let axis = TimeAxis { span: [0.0, 4.0], x: egui::Rangef::new(0.0, 800.0) };
+    let found = curves(&layer, &turned(node), "node", &axis);
+    assert_eq!(
+        found.iter().map(|curve| curve.name.as_str()).collect::<Vec<_>>(),
+        ["node rotation X", "node rotation Y", "node rotation Z"]
+    );
+    for curve in &found {
+        for pair in curve.points.windows(2) {
+            assert!((pair[1].1 - pair[0].1).abs() < 5.0, "{}: {pair:?}", curve.name);
+        }
+    }
+    let last = found[1].points.last().unwrap();
+    assert!((last.1 - 680.0).abs() < 0.1, "{last:?}");
+    // A key with another angle has the rotation of all three.
+    let key = found[1].keys[1];
+    let other = key.with_value(&Property::Rotation, 1, 30.0);
+    let wanted = Quat::from_rotation_y(30f32.to_radians());
+    assert!(Quat::from_array(other.value).angle_between(wanted) < 1e-3, "{other:?}");
+}

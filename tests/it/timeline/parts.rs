@@ -1,0 +1,248 @@
+//! Clips, layers, markers, keys that are set aside, and motion from files.
+
+use rigsmith::rig::animation::{LayerMode, Marker};
+
+use super::*;
+
+fn names(desk: &Desk) -> Vec<&str> {
+    desk.rig().clips().iter().map(|clip| clip.name.as_str()).collect()
+}
+
+/// Chooses an entry of the clip's menu.
+fn choose(desk: &mut Desk, entry: &str) {
+    desk.click("Menu of the clip");
+    desk.frames(2);
+    desk.click(entry);
+    desk.frames(3);
+}
+
+#[test]
+fn clips_are_made_renamed_copied_and_deleted() {
+    let (mut desk, _) = desk_with(TimelinePanel::default());
+    choose(&mut desk, "New clip");
+    assert_eq!(names(&desk), ["walk", "Clip 1"]);
+    assert_eq!(OpenClip::of(desk.app.world()).unwrap().clip.name, "Clip 1");
+    choose(&mut desk, "Rename clip");
+    desk.type_text("run");
+    desk.key(KeyboardKey::Enter);
+    desk.frames(2);
+    assert_eq!(names(&desk), ["walk", "run"]);
+    choose(&mut desk, "Duplicate clip");
+    assert_eq!(names(&desk), ["walk", "run", "run 2"]);
+    choose(&mut desk, "Delete clip");
+    assert_eq!(names(&desk), ["walk", "run"]);
+    assert!(OpenClip::of(desk.app.world()).is_none());
+    // What undo brings back is open again.
+    undo(&mut desk);
+    assert_eq!(OpenClip::of(desk.app.world()).unwrap().clip.name, "run 2");
+
+    // The choice of a clip, or of none.
+    let combo = desk.find("Clip").rect.center();
+    desk.time += 1.0;
+    desk.click_at(combo);
+    desk.frames(2);
+    desk.click("walk");
+    desk.frames(2);
+    assert_eq!(timeline(&desk).clip, Some(CLIP));
+}
+
+#[test]
+fn range_rate_and_loop_are_fields() {
+    let (mut desk, _) = opened();
+    let fields = [("End frame", "90", [0.0, 3.0], 30.0), ("Frames a second", "24", [0.0, 3.0], 24.0)];
+    let steps = desk.steps().1;
+    for (number, (field, text, range, rate)) in fields.into_iter().enumerate() {
+        desk.click(field);
+        desk.type_text(text);
+        desk.key(KeyboardKey::Enter);
+        desk.frames(3);
+        assert_eq!((clip(&desk).range, clip(&desk).frame_rate), (range, rate), "{field}");
+        assert_eq!(desk.steps().1, steps + number + 1);
+    }
+    desk.click("Start frame");
+    desk.type_text("500");
+    desk.key(KeyboardKey::Enter);
+    desk.frames(3);
+    assert_eq!(clip(&desk).range, [3.0, 3.0], "a range never ends before it begins");
+    undo(&mut desk);
+    desk.click("Loop the clip");
+    desk.frames(3);
+    assert!(clip(&desk).looped && desk.app.world().get::<ClipPlayer>(desk.rig).unwrap().looped);
+    let before = bytes(&desk);
+    desk.click("Frame");
+    desk.type_text("12");
+    desk.key(KeyboardKey::Enter);
+    desk.frames(3);
+    assert_eq!((timeline(&desk).time, bytes(&desk)), (0.5, before));
+}
+
+#[test]
+fn markers_are_added_moved_renamed_and_deleted() {
+    let (mut desk, _) = opened();
+    ask(&mut desk, TimelineRequest::Scrub(0.5));
+    act(&mut desk, TimelineAction::Marker);
+    ask(&mut desk, TimelineRequest::Scrub(0.25));
+    act(&mut desk, TimelineAction::Marker);
+    let markers = |desk: &Desk| -> Vec<(f32, String)> {
+        let one = |marker: &Marker| ((marker.time * 30.0).round(), marker.name.clone());
+        clip(desk).markers.iter().map(one).collect()
+    };
+    assert_eq!(markers(&desk), [(8.0, "Marker 2".into()), (15.0, "Marker 1".into())]);
+    let steps = desk.steps().1;
+    let from = desk.find("Marker Marker 2").rect.left_center() + egui::vec2(3.0, 0.0);
+    let by = x(&desk, 1.0) - x(&desk, 0.25);
+    desk.drag(from, from + egui::vec2(by, 0.0));
+    assert_eq!(markers(&desk), [(15.0, "Marker 1".into()), (30.0, "Marker 2".into())]);
+    assert_eq!(desk.steps().1, steps + 1);
+    desk.double_click("Marker Marker 1");
+    desk.type_text("left foot");
+    desk.key(KeyboardKey::Enter);
+    desk.frames(3);
+    assert_eq!(markers(&desk)[0], (15.0, "left foot".into()));
+    desk.click("Marker Marker 2");
+    desk.frames(2);
+    assert_eq!(timeline(&desk).time, 1.0, "a click goes there");
+    desk.secondary_click("Marker left foot");
+    desk.click("Delete marker");
+    desk.frames(3);
+    assert_eq!(markers(&desk), [(30.0, "Marker 2".into())]);
+    assert_eq!(desk.steps().1, steps + 3);
+}
+
+#[test]
+fn layers_have_weights_modes_and_a_mute() {
+    let (mut desk, [_, left, _]) = opened();
+    act(&mut desk, TimelineAction::NewLayer);
+    desk.click("Layers");
+    desk.frames(2);
+    let top = clip(&desk).layers[1].uid;
+    assert!(desk.look("Base").is_some() && desk.look("Layer 2").is_some());
+    desk.click("Layer 2");
+    desk.frames(2);
+    assert_eq!(timeline(&desk).layer, Some(top));
+    // New keys go to that layer.
+    desk.select(&[left]);
+    act(&mut desk, TimelineAction::Key);
+    assert!(!clip(&desk).layers[1].tracks.is_empty());
+    let steps = desk.steps().1;
+    desk.click("Weight of Layer 2");
+    desk.type_text("0.5");
+    desk.key(KeyboardKey::Enter);
+    desk.frames(3);
+    assert_eq!(clip(&desk).layers[1].weight, 0.5);
+    desk.click("Mode of Layer 2: additive");
+    desk.frames(3);
+    assert_eq!(clip(&desk).layers[1].mode, LayerMode::Override);
+    desk.click("Mute Layer 2");
+    desk.frames(3);
+    assert!(clip(&desk).layers[1].muted);
+    assert_eq!(desk.steps().1, steps + 3);
+    desk.secondary_click("Layer 2");
+    desk.click("Delete layer");
+    desk.frames(3);
+    assert_eq!(clip(&desk).layers.len(), 1);
+}
+
+#[test]
+fn keys_of_nodes_that_are_gone_are_set_aside_under_their_names() {
+    let (mut desk, [_, _, right]) = opened();
+    assert!(desk.look("Set aside (1)").is_none());
+    desk.edit(Operation::Delete { joints: vec![right], keep_children: true });
+    desk.frames(2);
+    assert!(desk.look("arm_r").is_none());
+    desk.click("Set aside (1)");
+    desk.frames(2);
+    assert!(desk.says("arm_r") && desk.says("4 keys of 1 tracks"), "{:?}", desk.seen);
+    // They come back with the node, or go to another one of that name.
+    undo(&mut desk);
+    assert!(desk.look("Set aside (1)").is_none() && desk.look("arm_r").is_some());
+    change(&mut desk, Change::Redo);
+    let other = desk.chain(&["arm_r"])[0];
+    desk.frames(2);
+    desk.click("Give to arm_r");
+    desk.frames(3);
+    assert_eq!(times(&desk, other).len(), 4);
+    undo(&mut desk);
+    desk.click("Delete the keys of arm_r");
+    desk.frames(3);
+    assert!(desk.look("Set aside (1)").is_none());
+    assert_eq!(clip(&desk).key_count(), 4);
+}
+
+#[test]
+fn rows_are_filtered_and_folded() {
+    let (mut desk, [_, left, _]) = opened();
+    assert!(desk.look("arm_l rotation").is_none());
+    desk.click("Filter keys");
+    desk.type_text("ARM_R rot");
+    desk.frames(2);
+    assert!(desk.look("arm_r").is_some() && desk.look("arm_l").is_none());
+    desk.click("Clear filter keys");
+    desk.frames(2);
+    desk.select(&[left]);
+    desk.click("Selected nodes only");
+    desk.frames(2);
+    assert!(desk.look("arm_l").is_some() && desk.look("arm_r").is_none());
+    desk.click("Unfold arm_l");
+    desk.frames(2);
+    assert!(desk.look("arm_l rotation").is_some());
+    desk.click("Fold arm_l");
+    desk.frames(2);
+    assert!(desk.look("arm_l rotation").is_none());
+}
+
+fn import(desk: &mut Desk, path: std::path::PathBuf) {
+    let clips = desk.rig().clips().len();
+    let told = desk.told().len();
+    desk.app.world_mut().write_message(ImportRequest(path));
+    desk.frames(2);
+    crate::bench::wait(desk, "the motion", Desk::frame, |desk| {
+        desk.rig().clips().len() != clips || desk.told().len() != told
+    });
+    desk.frames(3);
+}
+
+#[test]
+fn motion_is_imported_in_one_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut desk, _) = desk_with(TimelinePanel::default());
+    // Two clips of one file.
+    let clips = [clip_on(&desk.rig().clips()[0].nodes().into_iter().collect::<Vec<_>>()), {
+        RigClip { uid: Uid(77), name: "run".into(), ..RigClip::new(Uid(77), Uid(78), "run") }
+    }];
+    let path = folder.path().join("both.anim.ron");
+    std::fs::write(&path, write_animation(desk.rig(), None, &clips)).unwrap();
+    let (before, steps) = (bytes(&desk), desk.steps().1);
+    import(&mut desk, path);
+    assert_eq!(names(&desk), ["walk", "walk 2", "run"]);
+    assert_eq!(OpenClip::of(desk.app.world()).unwrap().clip.name, "walk 2", "the first one is open");
+    assert_eq!(desk.steps().1, steps + 1);
+    undo(&mut desk);
+    assert_eq!(bytes(&desk), before);
+
+    // A file that is none says why.
+    let path = folder.path().join("broken.bvh");
+    std::fs::write(&path, "HIERARCHY\nhello").unwrap();
+    import(&mut desk, path);
+    assert!(desk.told().last().is_some_and(|told| told.contains("Could not import broken.bvh")), "{:?}", desk.told());
+    assert_eq!(bytes(&desk), before);
+}
+
+#[test]
+fn motion_capture_is_put_onto_the_controls() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("step.bvh");
+    std::fs::write(&path, crate::fuzz_bvh::HUMAN).unwrap();
+    let (mut desk, _) = desk_with(TimelinePanel::default());
+    let rig = crate::bench::shipped("biped");
+    let entity = desk.rig;
+    desk.app.world_mut().entity_mut(entity).insert(rig);
+    desk.frames(3);
+    import(&mut desk, path);
+    let [clip] = desk.rig().clips() else { panic!("{:?}", desk.told()) };
+    assert!(clip.key_count() > 10 && clip.name == "step", "{} {:?}", clip.name, desk.told());
+    let nodes = clip.nodes();
+    assert!(nodes.iter().any(|node| desk.rig().joint(*node).is_none()), "controls have the keys");
+    undo(&mut desk);
+    assert!(desk.rig().clips().is_empty());
+}
