@@ -78,11 +78,11 @@ fn joints_are_where_they_should_be() {
     let Some(all) = all() else { return };
     let bounds: BTreeMap<&str, f32> = [
         ("gltf_skinned/CesiumMan.glb", 3.45),
-        ("gltf_skinned/RobotExpressive.glb", 5.85),
-        ("characters/Mage.glb", 6.75),
-        ("creatures/fox-fox.glb", 6.65),
-        ("creatures/fox-dog.glb", 6.65),
-        ("creatures/bird-eagle.glb", 17.7),
+        ("gltf_skinned/RobotExpressive.glb", 5.1),
+        ("characters/Mage.glb", 3.45),
+        ("creatures/fox-fox.glb", 3.85),
+        ("creatures/fox-dog.glb", 5.0),
+        ("creatures/bird-eagle.glb", 13.8),
     ]
     .into();
     for fitted in all {
@@ -110,7 +110,7 @@ fn doubt_is_honest() {
         }
     }
     println!("of {wrong} wrong joints {told} are doubtful; of {doubtful} doubtful ones {told} are wrong");
-    assert!(told as f32 >= 0.87 * wrong as f32, "{told} of {wrong}");
+    assert!(told as f32 >= 0.9 * wrong as f32, "{told} of {wrong}");
     assert!(told as f32 >= 0.5 * doubtful as f32, "{told} of {doubtful}");
 }
 

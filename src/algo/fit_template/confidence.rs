@@ -19,6 +19,11 @@ const HALF_COST: f32 = 0.6;
 /// Difference of a limb's length from the template's, as a logarithm, at which trust is one half.
 const HALF_STRAIN: f32 = 0.6;
 
+/// Share of a limb's free length from its end from which on the trunk makes its joints uncertain, and the share over which
+/// that fades.
+const ROOTED: f32 = 0.6;
+const FREE: f32 = 0.2;
+
 fn trust(value: f32, half: f32) -> f32 {
     let q = value / half;
     1.0 / (1.0 + q * q)
@@ -49,15 +54,19 @@ pub(super) fn joints(
                     None => (0.8, FitReason::Proportion),
                 },
                 None => {
-                    let base = match placement.reasons[joint] {
-                        FitReason::NoLimb => 0.2,
-                        FitReason::CentreLine => 0.82,
-                        _ => 0.52,
+                    let doubt = trust(placement.strain[joint], HALF_STRAIN) * trust(best.posed_cost(), HALF_COST);
+                    let confidence = match placement.reasons[joint] {
+                        FitReason::NoLimb => 0.2 * doubt,
+                        // Towards its end a limb is right whatever the rest of the figure is like, unless parts of it stand
+                        // apart.
+                        FitReason::CentreLine => {
+                            let free = ((ROOTED - placement.along[joint]) / FREE).clamp(0.0, 1.0);
+                            let free = if graph.tied > 0 { 0.0 } else { free };
+                            (0.76 + 0.19 * free) * bevy::math::ops::powf(doubt, 1.0 - 0.5 * free)
+                        }
+                        _ => 0.52 * doubt,
                     };
-                    (
-                        base * trust(placement.strain[joint], HALF_STRAIN) * trust(best.posed_cost(), HALF_COST),
-                        placement.reasons[joint],
-                    )
+                    (confidence, placement.reasons[joint])
                 }
             };
             if confidence < 0.5 && reason == FitReason::Surface {

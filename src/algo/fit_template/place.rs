@@ -51,6 +51,8 @@ pub(super) struct Placement {
     pub(super) reasons: Vec<FitReason>,
     /// Share by which the length of each joint's limb differs from the template's; zero on the trunk.
     pub(super) strain: Vec<f32>,
+    /// Length of the limb from its end to each joint, as a share of the limb's free length; one on the trunk.
+    pub(super) along: Vec<f32>,
 }
 
 /// Places all joints of a template by a hypothesis.
@@ -59,6 +61,7 @@ pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, h
     let count = template.positions.len();
     let mut reasons = vec![FitReason::Proportion; count];
     let mut strain = vec![0.0; count];
+    let mut along_limb = vec![1.0; count];
     let forward = hypothesis.alignment.rotation * Vec3::Z;
     let line = |(limb, leaf): (&Limb, &Option<usize>)| {
         let leaf = (*leaf)?;
@@ -85,6 +88,7 @@ pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, h
         let Reach { lengths, root, whole, measured } = work.reach(limb, line, attach);
         for (&joint, &along) in limb.joints.iter().zip(&lengths) {
             strain[joint] = bevy::math::ops::ln(measured / hypothesis.alignment.scale).abs();
+            along_limb[joint] = along / line.free.max(1e-9);
             if along <= line.free {
                 reasons[joint] = FitReason::CentreLine;
             }
@@ -92,7 +96,7 @@ pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, h
         }
         work.hold_bends(limb, line, &lengths, &mut places);
     }
-    Placement { places: follow(template, &stretch, &places), reasons, strain }
+    Placement { places: follow(template, &stretch, &places), reasons, strain, along: along_limb }
 }
 
 /// The centre line of a wing, moved towards its leading edge: there lie the bones, and behind them feathers or skin.
