@@ -43,11 +43,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     (0..20).for_each(|_| app.update());
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
     if arguments.iter().any(|argument| argument == "one_thread") {
-        [PreUpdate.intern(), Update.intern(), PostUpdate.intern(), Last.intern()].map(|label| {
+        for label in [PreUpdate.intern(), Update.intern(), PostUpdate.intern(), Last.intern()] {
             app.edit_schedule(label, |schedule| {
                 schedule.set_executor(SingleThreadedExecutor::new());
             });
-        });
+        }
     }
     let filter = arguments.into_iter().find(|argument| argument != "one_thread");
     let mut bench = Bench { app, rig, filter };

@@ -257,12 +257,12 @@ impl Work<'_> {
         if limb.kind != LimbKind::Leg || self.upright() {
             return;
         }
-        for i in 1..lengths.len().saturating_sub(1) {
-            let near = lengths[i] / line.free.max(1e-9);
-            if near > 1.0 || near < HIDDEN {
+        for (joints, length) in limb.joints.windows(3).zip(lengths.iter().skip(1)) {
+            let near = length / line.free.max(1e-9);
+            let [before, here, after] = [joints[0], joints[1], joints[2]];
+            if !(HIDDEN..=1.0).contains(&near) {
                 continue;
             }
-            let [before, here, after] = [i - 1, i, i + 1].map(|k| limb.joints[k]);
             let (Some(a), Some(c), Some(b)) = (places[before], places[here], places[after]) else { continue };
             let [from, at, to] = [before, here, after].map(|joint| self.template.positions[joint]);
             let chord = to - from;

@@ -193,8 +193,8 @@ fn follow(
     });
     let posed = helpers.globals(&turned.collect(), source.joints);
     let mut now: Vec<Trs> = Vec::with_capacity(model.nodes.len());
-    for node in 0..model.nodes.len() {
-        let parent = model.nodes[node].parent.map_or(Trs::IDENTITY, |parent| now[parent]);
+    for (node, moved) in model.nodes.iter_mut().enumerate() {
+        let parent = moved.parent.map_or(Trs::IDENTITY, |parent| now[parent]);
         let uid = source.joints.get(node).copied().unwrap_or_default();
         if helpers.drives(uid)
             && let (Some(Some(was)), Some(Some(is))) = (rest.get(node), posed.get(node))
@@ -202,9 +202,9 @@ fn follow(
         {
             let rotation = (placement.rotation * is.rotation * axes[node]).normalize();
             let global = Trs { translation: placement.point(is.translation), rotation, scale: Vec3::ONE };
-            model.nodes[node].rest = global.relative_to(&parent);
+            moved.rest = global.relative_to(&parent);
         }
-        now.push(parent * model.nodes[node].rest);
+        now.push(parent * moved.rest);
     }
 }
 

@@ -100,26 +100,18 @@ pub(super) fn gestures(
         *gesture = begin(response, plot, all, timeline, (press, at), held.shift, requests);
     }
     if let Some(at) = at.filter(|_| !escaped) {
-        match gesture {
+        let shown = match gesture {
             Some(Gesture::Pan) => {
                 requests.send(TimelineRequest::Show(plot.axis.panned(response.drag_delta().x)));
+                None
             }
-            Some(Gesture::Time(drag)) => {
-                if drag.to(open.clip, plot.axis.time(at.x), held.alt) {
-                    requests.send(preview(open, drag.shown.clone()));
-                }
-            }
-            Some(Gesture::Value(drag)) => {
-                if drag.to(plot.value(at.y)) {
-                    requests.send(preview(open, drag.shown.clone()));
-                }
-            }
-            Some(Gesture::Tangent(drag)) => {
-                if drag.to(plot, at, held.alt) {
-                    requests.send(preview(open, drag.shown.clone()));
-                }
-            }
-            None => {}
+            Some(Gesture::Time(drag)) => drag.to(open.clip, plot.axis.time(at.x), held.alt).then(|| drag.shown.clone()),
+            Some(Gesture::Value(drag)) => drag.to(plot.value(at.y)).then(|| drag.shown.clone()),
+            Some(Gesture::Tangent(drag)) => drag.to(plot, at, held.alt).then(|| drag.shown.clone()),
+            None => None,
+        };
+        if let Some(shown) = shown {
+            requests.send(preview(open, shown));
         }
     }
     if (response.drag_stopped() || !response.dragged())
