@@ -142,6 +142,10 @@ impl Bar {
         let height = ui.spacing().interact_size.y;
         let seconds = |frame: f32| (f64::from(frame) / f64::from(clip.frame_rate)) as f32;
         let mut field = |ui: &mut Ui, said: &str, prefix: &str, value: f32, look: Look, width: f32| {
+            // Fields are placed, not laid out: they do not wrap by themselves.
+            if ui.available_size_before_wrap().x < width {
+                ui.end_row();
+            }
             self.numbers.field(ui, said, RichText::new(prefix), value.into(), look, vec2(width, height))
         };
         let frame = field(ui, "Frame", "Frame ", open.frame(), FRAMES, 84.0);
