@@ -150,6 +150,12 @@ pub fn character(parts: &Character) -> Model {
     }
     match skin {
         Some(skin) if skin.at_rest => {
+            // A null that became one after the mesh was bound to it moves the mesh as before, as joints of a file do.
+            let weights =
+                model.weights.iter().flat_map(|weights| (0..weights.len()).flat_map(move |at| weights.of(at)));
+            for (node, _) in weights.filter(|(_, weight)| *weight > 0.0) {
+                model.nodes[node as usize].joint = true;
+            }
             let joints: Vec<usize> = (0..model.nodes.len()).filter(|node| model.nodes[*node].joint).collect();
             let inverse_binds = joints.iter().map(|joint| inverse_bind(&globals[*joint].1)).collect();
             model.skins = vec![SkinBinding { name: rig.about().name.clone(), joints, inverse_binds }];

@@ -43,6 +43,12 @@ impl<'a> Choices<'a> {
         self.at >= self.bytes.len()
     }
 
+    /// True if faults and unusual values are wanted in what is made of these bytes. The last byte says so, without being taken:
+    /// every other choice stays what it was.
+    pub fn is_wild(&self) -> bool {
+        self.bytes.last().is_some_and(|last| (32..128).contains(last))
+    }
+
     /// The next byte; zero once they have run out.
     pub fn byte(&mut self) -> u8 {
         let byte = self.bytes.get(self.at).copied().unwrap_or_default();

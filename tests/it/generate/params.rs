@@ -24,6 +24,8 @@ pub struct Scene {
     pub commands: Vec<String>,
     /// Inputs, as references write them.
     pub inputs: Vec<String>,
+    /// Commands of controls that stand apart from all chains; without them, commands refer to whatever controls there are.
+    pub goals: Option<[String; 2]>,
 }
 
 impl Scene {
@@ -114,8 +116,10 @@ pub fn command(choices: &mut Choices, scene: &Scene, modules: &Modules) -> (Stri
     let at = if choices.chance(3) { plain } else { (plain + choices.below(known.len())) % known.len() };
     let info = known[at];
     let mut fields = usual(choices, scene, info.name);
+    // A template in which most is to build has few values that are not the usual ones.
+    let (one_in, one_in_wrong) = if scene.goals.is_some() { (60, 0) } else { (10, 64) };
     for parameter in &info.parameters {
-        if !choices.chance(10) {
+        if !choices.chance(one_in) {
             continue;
         }
         let menu = menu(info, parameter.name);
@@ -128,10 +132,10 @@ pub fn command(choices: &mut Choices, scene: &Scene, modules: &Modules) -> (Stri
         fields.retain(|(name, _)| name != parameter.name);
         fields.push((parameter.name.to_owned(), value));
     }
-    if choices.chance(64) {
+    if choices.chance(one_in_wrong) {
         fields.push((choices.pick(&["nothing", "at", "uid"]).to_owned(), "1".to_owned()));
     }
-    let name = if choices.chance(64) { "nothing".to_owned() } else { info.name.to_owned() };
+    let name = if choices.chance(one_in_wrong) { "nothing".to_owned() } else { info.name.to_owned() };
     let fields: Vec<String> = fields.into_iter().map(|(name, value)| format!("{name}: {value}")).collect();
     (name, format!("({})", fields.join(", ")))
 }
@@ -214,9 +218,15 @@ fn usual(choices: &mut Choices, scene: &Scene, module: &str) -> Vec<(String, Str
         format!("@joint {}", name.map_or("nothing", String::as_str))
     };
     let (start, middle, end) = (joint(0), joint(1), joint(chain.len()));
-    let (control, other) = ("@module control pick:START".to_owned(), "@module control pick:END".to_owned());
+    let (control, other) = match &scene.goals {
+        Some(goals) => {
+            let [control, other] = goals.each_ref().map(|goal| format!("@command {goal} role:control"));
+            (control, other)
+        }
+        None => ("@module control pick:START".to_owned(), "@module control pick:END".to_owned()),
+    };
     let all: Vec<String> = (0..chain.len()).map(joint).collect();
-    let reference = scene.reference(choices);
+    let reference = if scene.goals.is_some() { start.clone() } else { scene.reference(choices) };
     let name = choices.pick(&NAMES[..4]).to_owned();
     let quoted = |pairs: &[(&str, &String)]| -> Vec<(String, String)> {
         pairs.iter().map(|(name, text)| ((*name).to_owned(), format!("{text:?}"))).collect()
@@ -237,6 +247,10 @@ fn usual(choices: &mut Choices, scene: &Scene, module: &str) -> Vec<(String, Str
         "parent" | "point" | "orient" | "scale" | "aim" => quoted(&[("node", &middle), ("targets", &control)]),
         "pole_vector" => with(quoted(&[("chain", &all.join(" + "))]), &[prefer]),
         "blend" => quoted(&[("nodes", &end), ("a", &control), ("b", &other)]),
+        "limit" if scene.goals.is_some() => {
+            let limits = "(rotate: ((-10.0, 10.0), (None, None), (None, None)))";
+            with(quoted(&[("nodes", &middle)]), &[("limits", limits)])
+        }
         "limit" => quoted(&[("nodes", &middle)]),
         "ik_handle" => with(quoted(&[("start", &start), ("end", &end), ("goal", &other)]), &[prefer]),
         "ik_fk_switch" => {

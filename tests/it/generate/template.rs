@@ -30,6 +30,12 @@ const PART: &str = r#"(
 )
 "#;
 
+/// Joints apart from all others, with the controls that commands of a template refer to in which most is to build.
+const GOALS: [&str; 2] = [
+    r#"(label: "goal_1", translation: (1, 0, 0.5), tags: [control(), null()])"#,
+    r#"(label: "goal_2", translation: (-0.5, 0, 2), tags: [control()])"#,
+];
+
 /// Most joints of a template, without those of its parts.
 const JOINTS: usize = 14;
 
@@ -70,6 +76,9 @@ pub fn template(choices: &mut Choices, modules: &Modules, has_parts: bool) -> Ma
     let mut text = String::from("(\n    format: 2,\n    name: \"made\",\n");
     let count = 1 + choices.below(JOINTS);
     let mut scene = Scene::default();
+    if !choices.is_wild() {
+        scene.goals = Some(["control/goal_1", "control/goal_2"].map(str::to_owned));
+    }
     for number in 0..choices.below(4) {
         scene.groups.push(format!("g{number}"));
     }
@@ -90,7 +99,9 @@ pub fn template(choices: &mut Choices, modules: &Modules, has_parts: bool) -> Ma
     let inputs: Vec<String> =
         scene.inputs.clone().iter().map(|name| format!("(name: {name:?}, translation: {})", vector(choices))).collect();
     list(&mut text, "inputs", inputs);
-    let joints: Vec<String> = (0..count).map(|number| joint(choices, &mut scene, modules, number)).collect();
+    let goals: &[&str] = if scene.goals.is_some() { &GOALS } else { &[] };
+    let mut joints: Vec<String> = goals.iter().map(|&joint| joint.to_owned()).collect();
+    joints.extend((0..count).map(|number| joint(choices, &mut scene, modules, number)));
     list(&mut text, "joints", joints);
     let mut files = BTreeMap::new();
     if has_parts && choices.chance(3) {
@@ -107,7 +118,7 @@ pub fn template(choices: &mut Choices, modules: &Modules, has_parts: bool) -> Ma
         list(&mut text, "poses", [pose]);
     }
     text.push_str(")\n");
-    if choices.chance(3) {
+    if scene.goals.is_none() && choices.chance(3) {
         bend(choices, &mut text);
     }
     MadeTemplate { text, files }
@@ -155,7 +166,8 @@ fn joint(choices: &mut Choices, scene: &mut Scene, modules: &Modules, number: us
         tags.push(format!("Feature(kind: \"ik\", name: \"f{number}\", switch: {switch:?}, choice: {choice:?})"));
         tags.push(format!("Feature(kind: \"ik\", name: \"f{number}\")"));
     }
-    for _ in 0..choices.below(4) {
+    let most = if scene.goals.is_some() { 2 } else { 4 };
+    for _ in 0..choices.below(most) {
         let (module, params) = command(choices, scene, modules);
         scene.commands.push(format!("{module}/{own}"));
         tags.push(tag(choices, &module, &params, has_feature.then_some(number)));
@@ -182,10 +194,14 @@ fn tag(choices: &mut Choices, module: &str, params: &str, feature: Option<usize>
 
 /// A part instance.
 fn part(choices: &mut Choices, scene: &Scene, number: usize) -> String {
-    let file = choices.pick(&["link.rig.ron", "link.rig.ron", "parts/single_control.rig.ron", "nothing.rig.ron"]);
+    let is_usual = scene.goals.is_some();
+    let file = match is_usual {
+        true => "link.rig.ron",
+        false => choices.pick(&["link.rig.ron", "link.rig.ron", "parts/single_control.rig.ron", "nothing.rig.ron"]),
+    };
     let joint = |choices: &mut Choices| scene.joints[choices.below(scene.joints.len())].clone();
     let mut text = format!("(part: {file:?}, name: \"part {number}\", prefix: \"p{number}_\"");
-    match choices.below(6) {
+    match choices.below(if is_usual { 3 } else { 6 }) {
         0..=2 => {
             let _ = write!(text, ", parent: {:?}, translation: {}", joint(choices), vector(choices));
         }
@@ -212,6 +228,10 @@ fn part(choices: &mut Choices, scene: &Scene, number: usize) -> String {
         (8, ", changes: [(tag: \"control/link_2\", removed: true)]"),
         (16, ", changes: [(tag: \"control/nothing\", unset: [\"size\"])]"),
     ] {
+        let is_fault = [": \"big\"", "4294967295", "/nothing", "removed"].iter().any(|fault| field.contains(fault));
+        if is_usual && is_fault {
+            continue;
+        }
         // A second list of changes would be a field twice.
         if choices.chance(one_in) && !(field.contains("changes") && text.contains("changes")) {
             text.push_str(field);
