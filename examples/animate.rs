@@ -10,7 +10,7 @@
 mod common;
 
 use std::{
-    f32::consts::{FRAC_PI_3, TAU},
+    f32::consts::{FRAC_PI_3, PI, TAU},
     sync::Arc,
 };
 
@@ -118,10 +118,10 @@ fn dance_clip(built: &BuiltRig, uids: &mut UidSource) -> RigClip {
     clip
 }
 
-/// Moves the ball to and fro before the character.
+/// Moves the ball in a circle before the character.
 fn circle(mut ball: Single<&mut Transform, With<Ball>>, time: Res<Time>) {
-    let angle = 1.1 * ops::cos(2.0 * time.elapsed_secs());
-    ball.translation = Vec3::new(0.7 * ops::sin(angle), 1.5 + 0.25 * ops::sin(3.0 * angle), 0.7 * ops::cos(angle));
+    let (sine, cosine) = ops::sin_cos(PI * time.elapsed_secs());
+    ball.translation = Vec3::new(0.55 * cosine, 1.5 + 0.3 * sine, 0.6);
 }
 
 /// Turns the head towards the ball, on top of what the clip does with it.
