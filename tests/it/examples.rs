@@ -97,6 +97,55 @@ fn ragdoll_falls_and_gets_up() {
 }
 
 #[test]
+fn animate_dances_and_looks_at_the_ball() {
+    let Some(pictures) = run("animate", &[], &["-before"]) else { return };
+    assert!(pictures.iter().all(|picture| (0.03..0.6).contains(&shown(picture).0)));
+    let changed = changed(&pictures[0], &pictures[1]);
+    assert!((0.005..0.4).contains(&changed), "{changed}");
+    // The ball is the only thing that is red, and it is on the other side of its circle a second later.
+    let [before, after] = [0, 1].map(|at| {
+        let is_red = |pixel: &image::Rgb<u8>| {
+            let [r, g, b] = pixel.0.map(u32::from);
+            r > 90 && 2 * r > 3 * g && 2 * r > 3 * b
+        };
+        let red = pictures[at].enumerate_pixels().filter(|(.., pixel)| is_red(pixel));
+        let places: Vec<[f32; 2]> = red.map(|(x, y, _)| [x as f32, y as f32]).collect();
+        assert!(places.len() > 100, "the ball is not shown: {} pixels", places.len());
+        [0, 1].map(|axis| places.iter().map(|place| place[axis]).sum::<f32>() / places.len() as f32)
+    });
+    let way = (before[0] - after[0]).hypot(before[1] - after[1]);
+    assert!(way > 60.0, "{before:?} {after:?}");
+}
+
+#[test]
+fn retarget_walks_on_three_bodies() {
+    let Some(pictures) = run("retarget", &[], &["-before"]) else { return };
+    // Figures are runs of columns that show something; feet and hands of one may be a few columns apart.
+    let figures = |image: &RgbImage| {
+        let ground = *image.get_pixel(0, 0);
+        let is_shown = |x: u32, y: u32| image.get_pixel(x, y).0.iter().zip(ground.0).any(|(a, b)| a.abs_diff(b) > 12);
+        let mut found: Vec<[u32; 4]> = Vec::new();
+        for x in 0..image.width() {
+            let rows = || (0..image.height()).filter(|y| is_shown(x, *y));
+            let (Some(top), Some(bottom)) = (rows().min(), rows().max()) else { continue };
+            match found.last_mut() {
+                Some(last) if x - last[1] < 12 => *last = [last[0], x, last[2].min(top), last[3].max(bottom)],
+                _ => found.push([x, x, top, bottom]),
+            }
+        }
+        found
+    };
+    for picture in &pictures {
+        let found = figures(picture);
+        assert_eq!(found.len(), 3, "{found:?}");
+        let [short, grown, child] = [0, 1, 2].map(|at| (found[at][3] - found[at][2]) as f32);
+        assert!(short < 0.97 * grown && child < 0.85 * grown, "{found:?}");
+    }
+    let changed = changed(&pictures[0], &pictures[1]);
+    assert!((0.005..0.4).contains(&changed), "{changed}");
+}
+
+#[test]
 fn headless_build_writes_a_character() {
     let out = tempfile::tempdir().unwrap();
     let file = out.path().join("out.glb");
