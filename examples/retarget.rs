@@ -53,7 +53,7 @@ const BODIES: [Body; 3] = [
 ];
 
 impl Body {
-    /// Where a point of the biped is in this body. The biped faces along Z, and stands with its arms half lowered.
+    /// Place in this body of a point of the biped. The biped faces along Z, and stands with its arms half lowered.
     fn place(&self, mut point: Vec3) -> Vec3 {
         // Legs from the ankles to the hips; hands hang as low, but farther out.
         let (ankle, hip, is_leg) = (0.1, 0.9, point.x.abs() < 0.3);

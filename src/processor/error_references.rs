@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 use super::{
     error::{BuildProblem, ModuleError},
-    world::World,
+    world::{NOWHERE, World},
 };
 use crate::rig::{
     Uid,
@@ -24,7 +24,9 @@ impl Names for WorldNames<'_> {
             let node = self.world.id(uid).filter(|node| self.world.exists(*node, self.place))?;
             Some(Cow::Borrowed(self.world.label(node, self.place).map_or("", |label| label)))
         };
-        let command = || self.world.creator_of(uid).map(|_| Cow::Borrowed(""));
+        // A builder keeps the numbers of commands that are gone for a while.
+        let is_there = |number: &u32| self.world.places[*number as usize] != NOWHERE;
+        let command = || self.world.creator_of(uid).filter(is_there).map(|_| Cow::Borrowed(""));
         match kind {
             // What is built knows no names of these; the document watches over them.
             NameKind::Rig | NameKind::Group => Some(Cow::Borrowed("")),
