@@ -173,7 +173,9 @@ pub struct SettingsFile {
     refused: bool,
     /// True from a save that failed to the next one that succeeds.
     failed: bool,
-    /// Text that was last saved, or found at the start.
+    /// Settings and keys of the first frame, as text.
+    start: Option<String>,
+    /// Text that was last saved, or found at the first look.
     text: Option<String>,
     looked: Duration,
     saving: Option<Task<Result<(), SettingsError>>>,
@@ -182,7 +184,16 @@ pub struct SettingsFile {
 impl SettingsFile {
     /// A file on a disk; without a path, the file is in the [`SettingsFolder`].
     pub fn new(disk: Arc<dyn Disk>, path: Option<PathBuf>) -> Self {
-        Self { disk, path, refused: false, failed: false, text: None, looked: Duration::ZERO, saving: None }
+        Self {
+            disk,
+            path,
+            refused: false,
+            failed: false,
+            start: None,
+            text: None,
+            looked: Duration::ZERO,
+            saving: None,
+        }
     }
 
     /// The file; `None` where settings are not stored.
@@ -336,20 +347,27 @@ fn write(
             commands.write_message(Notice::warning(format!("Settings are not kept: {reason}")));
         }
     }
+    let text_of = |layout| {
+        let keys = (*keys != KeyBindings::default()).then(|| keys.clone());
+        let kept = SettingsContent { settings: settings.clone(), keys, layout };
+        ron::ser::to_string_pretty(&kept, ron::ser::PrettyConfig::default()).ok()
+    };
+    if file.start.is_none() {
+        file.start = text_of(None);
+    }
     if !closing && time.elapsed().saturating_sub(file.looked) < LOOK_EVERY {
         return;
     }
     file.looked = time.elapsed();
     let Some(path) = file.path.clone().filter(|_| !file.refused && file.saving.is_none()) else { return };
-    let keys = (*keys != KeyBindings::default()).then(|| keys.clone());
-    let kept = SettingsContent { settings: settings.clone(), keys, layout: layout.map(|layout| layout.clone()) };
     // A frame may move panels without any event, so a change is only visible in the text.
-    let Ok(text) = ron::ser::to_string_pretty(&kept, ron::ser::PrettyConfig::default()) else { return };
+    let Some(text) = text_of(layout.map(|layout| layout.clone())) else { return };
     if file.text.as_ref() == Some(&text) && !file.failed {
         return;
     }
     let first = file.text.replace(text.clone()).is_none();
-    if first && !closing {
+    // The first frames move panels by themselves; settings and keys that have changed by then were changed by somebody.
+    if first && !closing && file.start == text_of(None) {
         return;
     }
     if closing {

@@ -31,6 +31,13 @@ struct Settings {
 
 impl Settings {
     fn open(disk: Arc<dyn Disk>, path: &Path) -> Self {
+        let mut settings = Self::begin(disk, path);
+        // The text of the start is known after the first looks.
+        (0..3).for_each(|_| settings.update());
+        settings
+    }
+
+    fn begin(disk: Arc<dyn Disk>, path: &Path) -> Self {
         let mut app = App::new();
         app.insert_resource(SettingsFile::new(disk, Some(path.to_owned())))
             .add_plugins((MinimalPlugins, SettingsPlugin))
@@ -38,10 +45,7 @@ impl Settings {
             .init_resource::<KeyBindings>()
             .add_message::<ActionRequest>()
             .add_message::<AppExit>();
-        let mut settings = Self { app, told: Vec::new() };
-        // The text of the start is known after the first looks.
-        (0..3).for_each(|_| settings.update());
-        settings
+        Self { app, told: Vec::new() }
     }
 
     fn update(&mut self) {
@@ -176,4 +180,23 @@ fn a_save_that_fails_is_told_once_and_made_up_for() {
     assert_eq!(settings.told.len(), 1, "{:?}", settings.told);
     settings.close();
     assert_eq!(fs::read(&path).unwrap(), content);
+}
+
+/// What is changed before the file is looked at for the first time is kept as what is changed later.
+#[test]
+fn changes_of_the_first_second_are_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("settings.ron");
+    let mut settings = Settings::begin(Arc::new(RealDisk), &path);
+    settings.update();
+    settings.remember("early.obj");
+    let start = Instant::now();
+    while !path.exists() {
+        assert!(start.elapsed() < HANG, "the settings are not saved");
+        settings.update();
+    }
+    settings.close();
+    let again = Settings::open(Arc::new(RealDisk), &path);
+    let recent = again.app.world().resource::<EditorSettings>().recent.clone();
+    assert_eq!(recent, [PathBuf::from("early.obj")]);
 }

@@ -173,7 +173,8 @@ const BONES: &[(&str, &str)] = &[
     ("(*LittleDistal)", "*LittleIntermediate"),
 ];
 
-const PRESETS: [&str; 18] = [
+/// Names of preset expressions, sorted.
+pub const PRESETS: [&str; 18] = [
     "aa",
     "angry",
     "blink",
