@@ -485,7 +485,8 @@ fn a_builder_forgets_what_is_gone() {
             assert_eq!(builder.list(), fresh.list());
         }
     }
-    assert!((4096..3 * 8192).contains(&most), "{most} nodes and commands are kept");
+    // What is gone is dropped in the very look at the document that reaches 8192, so that a few less are seen at most.
+    assert!((8192 - 16..8192).contains(&most), "{most} nodes and commands are kept");
     assert_eq!(builder.built(), Builder::build(&rig, &modules).unwrap());
     assert_eq!(builder.run_all().executed, Vec::<Uid>::new(), "nothing has changed");
 }
