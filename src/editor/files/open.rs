@@ -381,8 +381,9 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
             (replayed_bundle(&work.restored.replayed), journal)
         }
         None => {
-            let base = project.is_none().then(|| rig.clone());
-            let start = JournalStart { places, origin, rig: base, context: context.text() };
+            let (base, saved_rig) =
+                if project.is_some() { (None, Some(rig.clone())) } else { (Some(rig.clone()), None) };
+            let start = JournalStart { places, origin, rig: base, context: context.text(), saved_rig };
             ((rig, Selection::default(), RigHistory::default()), Journal::start(disk(), start))
         }
     };
