@@ -114,9 +114,11 @@ fn recovered_work_goes_on_within_the_same_bounds() {
     let recovered = recover(&desk.bytes()).unwrap();
     let restored = recovered.restore(recovered.basis(hash_at), Some(joints()));
     assert_eq!(restored.replayed.rig, desk.rig);
+    let Desk { rig, selection, history, uids, journal } = desk;
+    drop(journal);
     let ResumedJournal { journal, kept } = Journal::resume(Arc::new(RealDisk), places, &recovered, &restored, &old);
     assert_eq!(kept, None);
-    desk.journal = journal;
+    let mut desk = Desk { rig, selection, history, uids, journal };
     work(&mut desk, 500..MOST_CHANGES + 500);
     assert_eq!(recover_at(&desk.journal.path().unwrap()).rig, desk.rig);
     assert!(desk.journal.held() < MOST_CHANGES, "{} changes are held", desk.journal.held());
