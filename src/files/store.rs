@@ -324,8 +324,8 @@ pub fn store_rig(disk: &dyn Disk, path: &Path, rig: impl Borrow<Rig>) -> Result<
             Ok(Vec::new())
         }
         Some(FileKind::RigText) => {
-            let written =
-                text::write(&rig_text(rig.borrow())).map_err(|source| StoreError::RigText { path: path.into(), source })?;
+            let written = text::write(&rig_text(rig.borrow()))
+                .map_err(|source| StoreError::RigText { path: path.into(), source })?;
             verify::rig_text(path, written.text.as_bytes())?;
             save_atomic(disk, path, written.text.as_bytes())?;
             Ok(written

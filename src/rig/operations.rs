@@ -33,7 +33,9 @@ pub use tags::{
     CopiedIdentifiers, CopiedJoint, PartOrder, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation, TagScope,
 };
 
-use crate::rig::{BuiltRig, EditError, GROUP_COLORS, GroupData, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource};
+use crate::rig::{
+    BuiltRig, EditError, GROUP_COLORS, GroupData, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource,
+};
 
 /// A change of a rig that a person requests. Positions and transforms are in the rig's space.
 #[derive(Debug, Clone, PartialEq)]

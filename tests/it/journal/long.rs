@@ -9,9 +9,7 @@ fn joints() -> Rig {
     let mut rig = Rig::new(Uid(42), "long");
     let mut uids = UidSource::seeded(3);
     for number in 0..12 {
-        Operation::Place { position: Vec3::splat(number as f32), parent: None }
-            .run(&mut rig, &mut uids, None)
-            .unwrap();
+        Operation::Place { position: Vec3::splat(number as f32), parent: None }.run(&mut rig, &mut uids, None).unwrap();
     }
     rig
 }
@@ -38,7 +36,8 @@ fn check(desk: &mut Desk) {
     let mut history = RigHistory::restored(&back.stacks);
     let (mut rig, mut selection) = (back.rig.clone(), Selection(back.selection.unwrap()));
     for step in 0..rigsmith::plugins::history::MOST_STEPS {
-        let undone = history.undo(&mut rig, &mut selection).unwrap_or_else(|| panic!("step {step} from the end is lost"));
+        let undone =
+            history.undo(&mut rig, &mut selection).unwrap_or_else(|| panic!("step {step} from the end is lost"));
         let here = desk.history.undo(&mut desk.rig, &mut desk.selection).unwrap();
         assert_eq!(undone.unwrap(), here.unwrap());
     }
