@@ -144,7 +144,7 @@ impl Surface {
     }
 
     /// Collects the [`hits`](Self::hits) of a ray that meets few triangles. False, and no hits, for one that comes near to
-    /// those of more than `most` leaves of the hierarchy (of four or eight triangles each), so that the time of a ray is
+    /// those of more than `most` leaves of the hierarchy (of up to eight triangles each), so that the time of a ray is
     /// bounded in a soup of long triangles, too.
     pub fn hits_within(&self, ray: &Ray, most: usize, out: &mut Vec<Hit>) -> bool {
         let mut crossings = Vec::new();

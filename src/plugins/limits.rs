@@ -141,7 +141,7 @@ pub struct OutOfTime {
 }
 
 impl RigLimits {
-    /// These limits with another value of one.
+    /// Copy of the limits with another value of one.
     pub fn with(mut self, limit: Limit, value: u64) -> Self {
         self.set(limit, value);
         self
@@ -277,9 +277,10 @@ impl Deadline {
 }
 
 /// Gives the limits of builds to the modules where an app sets them.
-pub(super) fn limit_builds(limits: Res<RigLimits>, modules: Option<ResMut<RigModules>>) {
+pub(super) fn limit_builds(limits: Res<RigLimits>, modules: Option<ResMut<RigModules>>, mut was_set: Local<bool>) {
     // An app may have limited the modules alone.
-    if limits.is_added() && *limits == RigLimits::default() {
+    let is_left = !std::mem::replace(&mut *was_set, true) && *limits == RigLimits::default();
+    if is_left {
         return;
     }
     if let Some(mut modules) = modules.filter(|modules| modules.0.limits != limits.build()) {

@@ -100,7 +100,9 @@ fn limits_are_listed_and_checked() {
         assert!(said.lines().any(|line| line.trim_start().starts_with(&format!("{name} "))), "{name}: {said}");
     }
     for wrong in ["joints", "joints=-1", "joints=many", "nothing=3"] {
-        let (code, said) = run(&["info", "b.obj", "--limit", wrong]);
-        assert!(code == 2 && said.contains("NAME=NUMBER"), "{wrong}: {said}");
+        for command in ["info", "edit"] {
+            let (code, said) = run(&[command, "b.obj", "--limit", wrong]);
+            assert!(code == 2 && said.contains("NAME=NUMBER"), "{command} {wrong}: {said}");
+        }
     }
 }

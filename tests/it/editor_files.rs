@@ -199,6 +199,7 @@ fn files_above_a_limit_are_refused_with_a_toast() {
     let mut window = Window::new(folder.path());
     let limits = RigLimits::default().with(Limit::Joints, 2).with(Limit::Triangles, 3);
     window.app.insert_resource(limits);
+    window.open(OpenRequest::Empty);
     let before = window.rig();
     for (file, told) in [("three.rig", "the rig has 3 joints"), ("box.obj", "the mesh has 4 triangles")] {
         window.open_file(&at(file));

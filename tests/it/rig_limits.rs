@@ -125,7 +125,10 @@ fn builds_obey_the_limits_of_the_app() {
     };
     let (failure, _) = build(&mut bench);
     assert!(failure.as_ref().is_some_and(|failure| failure.contains("nodes")), "{failure:?}");
-    let mut bench = Bench::new(RigLimits::default());
+    // Limits that are set anew hold from the next start of a build.
+    bench.app.insert_resource(RigLimits::default());
+    bench.app.update();
+    bench.app.world_mut().write_message(BuildRequest { rig: bench.rig, step: BuildStep::Restart });
     let (failure, made) = build(&mut bench);
     assert_eq!(failure, None);
     assert!(made.is_some_and(|made| made >= 4), "{made:?}");

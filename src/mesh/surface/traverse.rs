@@ -135,7 +135,7 @@ impl Tree {
         }
     }
 
-    /// Whether a triangle is crossed at a distance between `from` and `to`, in `most` leaves at most. The leaves that the
+    /// Looks for a triangle that is crossed at a distance between `from` and `to`, in `most` leaves at most. The leaves that the
     /// ray meets are added to `leaves`.
     pub fn crosses(
         &self,

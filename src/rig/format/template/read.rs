@@ -298,6 +298,8 @@ fn add_joints(
             }),
         );
     }
+    // A table that grows is there twice for a moment.
+    rig.joints.reserve(order.len());
     // Parents first, whatever the order in the file.
     let mut stack: Vec<(Option<Uid>, Uid)> = Vec::new();
     let push = |stack: &mut Vec<_>, parent: Option<Uid>| {
