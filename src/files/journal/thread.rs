@@ -225,20 +225,28 @@ impl Work {
     }
 
     /// Moves the oldest changes into the rig that the journal starts from, and starts a new file on it. If that cannot be
-    /// written, the present file goes on, which holds all of them.
+    /// written, the present file goes on, and so does what is held in memory for another place.
     fn fold(&mut self) {
-        let is_folded = self.writer.content.fold();
-        self.measure = Measure::of(&self.writer.content);
+        let writer = &mut self.writer;
+        let mut content = writer.content.clone();
+        content.generation += 1;
+        let (mut is_folded, mut opened) = (content.fold(), None);
+        if is_folded && self.open.is_some() {
+            let former = writer.shared.path();
+            opened = create_somewhere(writer, &content, &writer.places, former.as_deref()).ok();
+            is_folded = opened.is_some();
+        } else if is_folded {
+            // Nothing can be written at the moment, but it must not be the rig that is too large to be.
+            is_folded = Encoder::begin(writer.session, &content).is_ok();
+        }
+        if is_folded {
+            writer.content = content;
+        }
+        self.measure = Measure::of(&writer.content);
         if !is_folded {
             self.measure.put_off();
         }
-        if !is_folded || self.open.is_none() {
-            return;
-        }
-        let writer = &mut self.writer;
-        writer.content.generation += 1;
-        let former = writer.shared.path();
-        if let Ok(open) = create_somewhere(writer, &writer.content, &writer.places, former.as_deref()) {
+        if let Some(open) = opened {
             self.adopt(open);
         }
     }
