@@ -48,6 +48,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::{
     algo::weights::{Method, WeightSettings},
     mesh::gltf::GltfWriteSettings,
+    plugins::limits::RigLimits,
 };
 use argument::ArgumentError;
 use outputs::InPlaceArgs;
@@ -62,7 +63,7 @@ struct Cli {
     /// Answer in JSON, for programs
     #[arg(long, global = true)]
     json: bool,
-    /// Set a limit of what a command takes, makes or tells, such as joints=2000; may be repeated; not for the window.
+    /// Set a limit of what a command takes, makes or tells, such as joints=2000; may be repeated.
     /// `rigsmith --help` lists them
     #[arg(long, global = true, value_name = "NAME=NUMBER")]
     limit: Vec<limits::LimitSetting>,
@@ -169,6 +170,7 @@ impl EditArgs {
     fn window(self) -> Result<WindowRequest, Failure> {
         Ok(WindowRequest {
             file: self.file,
+            limits: limits::chosen(),
             #[cfg(feature = "remote")]
             remote: self.remote.map(|port| remote::bind(port, self.remote_folder)).transpose()?,
         })
@@ -271,6 +273,8 @@ pub enum WindowError {
 pub struct WindowRequest {
     /// The file; the start page without one.
     pub file: Option<PathBuf>,
+    /// Limits of what the window takes and makes.
+    pub limits: RigLimits,
     /// Remote control of the window.
     #[cfg(feature = "remote")]
     pub remote: Option<crate::remote::RemotePlugin>,
@@ -293,16 +297,12 @@ pub fn main(window: OpenWindow) -> ExitCode {
             return ExitCode::from(if is_told { code } else { code.max(1) });
         }
     };
-    if !cli.limit.is_empty() && matches!(cli.command, Some(Command::Edit(_))) {
-        let text = "--limit has no effect on the window; leave it out of `edit`, or use a command without a window";
-        return report::finish(Err(Failure::Usage(text.to_owned())), cli.json, "");
-    }
     limits::choose(&cli.limit);
     report::choose_json(cli.json);
     let subject = cli.command.as_ref().and_then(Command::subject).map(|path| path.display().to_string());
     let result = match cli.command {
         None if cli.json => demo::run(None),
-        None => match window(WindowRequest::default()) {
+        None => match window(WindowRequest { limits: limits::chosen(), ..WindowRequest::default() }) {
             Ok(code) => return code,
             Err(reason) => demo::run(Some(&reason)),
         },

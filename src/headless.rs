@@ -31,6 +31,7 @@ use crate::{
         },
         fit::{FitAnswer, FitFailure, FitJob, FitReport, FitRequest, FitTemplates},
         gesture::{Gesture, GestureAnswer, GestureScript},
+        limits::{Limit, RigLimits},
         skinning::{BindAnswer, BindRequest, MeshPart, PartBinding, SkinningError, SkinningJob, SkinningReport},
         surface::{RigMesh, SkinOf},
         task_pools,
@@ -137,6 +138,22 @@ impl Workbench {
         }
         let now = Instant::now();
         self.deadline = now.checked_add(time).map(|end| (end, time));
+        let mut limits = self.app.world_mut().resource_mut::<RigLimits>();
+        for (limit, value) in [
+            (Limit::Nodes, build.made as u64),
+            (Limit::Attributes, build.attributes as u64),
+            (Limit::Work, build.work),
+            (Limit::Seconds, time.as_secs()),
+        ] {
+            limits.set(limit, value);
+        }
+    }
+
+    /// Sets all limits of the app; their time counts from now on, for everything together.
+    pub fn set_rig_limits(&mut self, limits: RigLimits) {
+        let (build, time) = (limits.build(), limits.time());
+        self.app.insert_resource(limits);
+        self.set_limits(build, time);
     }
 
     fn check_time(&self, work: &'static str) -> Result<(), WorkbenchError> {

@@ -16,6 +16,7 @@ fn open_window(request: WindowRequest) -> Result<ExitCode, WindowError> {
 
     let options = EditorOptions {
         file: request.file,
+        limits: request.limits,
         #[cfg(feature = "remote")]
         remote: request.remote,
     };

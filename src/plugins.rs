@@ -56,6 +56,7 @@ pub mod gesture;
 pub mod history;
 pub mod journal;
 pub mod landing;
+pub mod limits;
 pub mod mesh_reload;
 pub mod picking;
 pub mod placement;
@@ -75,7 +76,7 @@ use bevy::{
     transform::systems::sync_simple_transforms,
 };
 
-/// Plugins of rigs, without window and renderer.
+/// Plugins of rigs, without window and renderer. What they take, make and wait for is bounded by [`limits::RigLimits`].
 ///
 /// | plugin | gives |
 /// | --- | --- |

@@ -4,7 +4,11 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use super::{Failure, Report, progress::Progress, report::counted};
+use super::{
+    Failure, Report,
+    progress::Progress,
+    report::{counted, is_json},
+};
 use crate::{
     algo::weights::{IdleReason, WeightSettings},
     headless::Workbench,
@@ -132,6 +136,10 @@ fn describe(report: &mut Report, names: &JointNames, bound: &SkinningReport, cla
     );
     report.lines.extend(rigid_lines(names, &bound.rigid_parts));
     report.lines.extend(idle_lines(names, &bound.idle_joints, claims));
+    if !is_json() {
+        // A soup has as many rigid parts as triangles, and each takes more memory here than its points.
+        return;
+    }
     let part = |rigid: &RigidPart| {
         let joint = names.of(rigid.joint);
         json!({ "part": rigid.name, "points": rigid.points, "joint": joint, "share": rigid.share })

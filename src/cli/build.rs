@@ -105,7 +105,7 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
     let notes = if FileKind::of(output) == Some(FileKind::Template) {
         let skeleton = baked(&rig, &built);
         drop((rig, built));
-        store_rig(&RealDisk, output, &skeleton)?
+        store_rig(&RealDisk, output, skeleton)?
     } else if args.mesh.is_none() && !has_commands && rig.pose().is_empty() && meta.is_none() {
         let mut model = skeleton_model(&rig, Some(&built));
         mark_joints(&mut model, &baked(&rig, &built));

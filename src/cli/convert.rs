@@ -55,11 +55,11 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
             for edit in &import_skeleton(&model, &mut uids).edits {
                 rig.apply(edit).map_err(|error| Failure::Input(Box::new(error)))?;
             }
-            store_rig(&RealDisk, &args.output, &rig)?
+            store_rig(&RealDisk, &args.output, rig)?
         }
         (Some(RigText | Template), Some(RigText | Template)) => {
             let rig = load_rig(&args.input, &mut report)?;
-            store_rig_over(&RealDisk, &args.output, &rig, &[&args.input])?
+            store_rig_over(&RealDisk, &args.output, rig, &[&args.input])?
         }
         (Some(RigText | Template), Some(Gltf | Glb)) => {
             let rig = load_rig(&args.input, &mut report)?;

@@ -42,6 +42,7 @@ use crate::plugins::{
     document::{Change, EditReport, EditRequest},
     drawing::DrawingPlugin,
     fit::FitJob,
+    limits::RigLimits,
     skinning::SkinningJob,
     surface::RigSurface,
     task_pools,
@@ -52,6 +53,8 @@ use crate::plugins::{
 pub struct EditorOptions {
     /// The file to open; the start page without one.
     pub file: Option<PathBuf>,
+    /// Limits of what is opened, imported, built and computed.
+    pub limits: RigLimits,
     /// Remote control.
     #[cfg(feature = "remote")]
     pub remote: Option<crate::remote::RemotePlugin>,
@@ -148,6 +151,7 @@ impl Plugin for EditorPlugin {
             focused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),
             unfocused_mode: UpdateMode::reactive_low_power(Duration::from_secs(60)),
         })
+        .insert_resource(self.options.limits.clone())
         .init_resource::<Mode>()
         .init_resource::<StatusLine>()
         .add_message::<Notice>()

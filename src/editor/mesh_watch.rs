@@ -20,6 +20,7 @@ use crate::{
     mesh::model::Model,
     plugins::{
         RigSystems,
+        limits::RigLimits,
         mesh_reload::{ReloadAnswer, ReloadRequest},
         surface::RigMesh,
     },
@@ -34,6 +35,7 @@ pub struct MeshWatchPlugin;
 impl Plugin for MeshWatchPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<MeshWatches>()
+            .init_resource::<RigLimits>()
             .add_message::<ReloadRequest>()
             .add_message::<ReloadAnswer>()
             .add_message::<Notice>()
@@ -96,19 +98,21 @@ fn look(meshes: Query<(Entity, &MeshSource), With<RigMesh>>, time: Res<Time<Real
     }
 }
 
-fn land(mut watches: ResMut<MeshWatches>, mut commands: Commands) {
+fn land(mut watches: ResMut<MeshWatches>, limits: Res<RigLimits>, mut commands: Commands) {
     for (entity, watch) in &mut watches.watches {
         let Some(result) = watch.job.as_mut().and_then(check_ready) else { continue };
         watch.job = None;
-        match result {
-            Ok(model) => {
-                commands.write_message(ReloadRequest { mesh: *entity, model: Arc::new(model) });
-            }
-            Err(error) => {
-                let text = format!("The changed mesh is not taken over: {error}");
-                commands.write_message(Notice::error(text));
-            }
-        }
+        let refused = match result {
+            Ok(model) => match limits.check_model(&watch.path.display().to_string(), &model) {
+                Ok(()) => {
+                    commands.write_message(ReloadRequest { mesh: *entity, model: Arc::new(model) });
+                    continue;
+                }
+                Err(error) => error.to_string(),
+            },
+            Err(error) => error.to_string(),
+        };
+        commands.write_message(Notice::error(format!("The changed mesh is not taken over: {refused}")));
     }
 }
 

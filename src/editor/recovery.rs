@@ -157,7 +157,8 @@ fn restore(journal: &Path) -> Result<LoadedFile, OpenError> {
             let base = std::mem::take(&mut opened.rig);
             (opened, Some(base))
         }
-        _ => (with_meshes(&recovered), None),
+        // A long journal starts from a rig of its own; everything else is still as the project file says.
+        _ => (as_opened(&recovered).unwrap_or_else(|| with_meshes(&recovered)), None),
     };
     let restored = recovered.restore(basis, base);
     tell_losses(&recovered, &restored, basis, &mut opened);
@@ -166,6 +167,14 @@ fn restore(journal: &Path) -> Result<LoadedFile, OpenError> {
     opened.rig = restored.replayed.rig.clone();
     opened.work = Some(Box::new(Work { recovered, restored, journal: journal.to_owned() }));
     Ok(document(opened))
+}
+
+/// The project from which the work started, if its file is as it was then.
+fn as_opened(recovered: &RecoveredJournal) -> Option<LoadedDocument> {
+    match recovered.origin() {
+        Origin::Project { path, hash } if hash_of(path) == Some(*hash) => project(path).ok(),
+        _ => None,
+    }
 }
 
 /// Adds warnings about lost work.

@@ -17,6 +17,10 @@
 //! [`Journal::saved`] starts the journal again from it. A crash between any two of these steps recovers the same
 //! document: the hash of the project file shows which changes it holds.
 //!
+//! **Long work.** Where many changes were recorded since the last save ([`MOST_CHANGES`], or gigabytes of weights), the
+//! oldest become part of the rig that the journal starts from, and its file is written anew. The document comes back as
+//! before, with as many steps as a history holds.
+//!
 //! **Trouble.** If a folder cannot be written, the next place is tried: beside the project, the caller's folder for
 //! such files, the system's folder for temporary files. If all fail, [`Journal::trouble`] gives the reason, editing
 //! goes on, and everything is written again as soon as one of them works.
@@ -27,6 +31,7 @@
 
 mod encode;
 mod error;
+mod fold;
 mod frame;
 mod gap;
 mod lossy_history;
@@ -46,6 +51,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 pub use error::JournalWriteError;
+pub use fold::MOST_CHANGES;
 pub use frame::{JOURNAL_FORMAT, MAX_RECORD, RecordKind};
 pub use gap::{Damage, Gap, RecordCount};
 pub use place::{
@@ -128,6 +134,8 @@ struct Content {
     first: u64,
     changes: Vec<crate::rig::step::Commit>,
     marks: Vec<SaveMark>,
+    /// Rig before the first change, wherever it is stored; `None` if it is not known.
+    known: Option<std::sync::Arc<crate::rig::Rig>>,
 }
 
 impl Content {
@@ -140,10 +148,11 @@ impl Content {
     /// Starts again from a saved project that holds the first `contained` changes.
     fn rebase_after(&mut self, mark: &SaveMark, contained: usize) {
         let contained = contained.min(self.changes.len());
+        self.base = None;
+        self.advance(contained);
         self.changes.drain(..contained);
         self.first = self.first.saturating_add(contained as u64);
         self.origin = Origin::Project { path: mark.path.clone(), hash: mark.hash };
-        self.base = None;
         self.marks.clear();
     }
 }

@@ -1,6 +1,9 @@
 //! Saving models, rigs and weights, whole or not at all.
 
-use std::path::{Path, PathBuf};
+use std::{
+    borrow::Borrow,
+    path::{Path, PathBuf},
+};
 
 use super::{
     Disk, FileKind, FileSet, LoadError, PartFiles, ReadError, SaveError, read_capped, save_atomic, save_set, stem,
@@ -252,19 +255,25 @@ const SOURCE_UNREAD: &str =
 /// Saves a rig over a template that was read: only what changed is written into its text, see
 /// [`write_template_over`](template::write_template_over). That is the first of the files in `sources` that is a template
 /// of the same rig; without one, and for another kind of file, it is saved as by [`store_rig`]. Returns notes, a sentence each:
-/// about what the format cannot hold, and about a text that had to be written anew.
+/// about what the format cannot hold, and about a text that had to be written anew. A rig that is handed over is dropped as by
+/// [`store_rig`].
 ///
 /// # Errors
 /// [`StoreError`]; the former file is unchanged. A file at `path` that is one of the sources and cannot be read is not
 /// replaced.
-pub fn store_rig_over(disk: &dyn Disk, path: &Path, rig: &Rig, sources: &[&Path]) -> Result<Vec<String>, StoreError> {
+pub fn store_rig_over(
+    disk: &dyn Disk,
+    path: &Path,
+    rig: impl Borrow<Rig>,
+    sources: &[&Path],
+) -> Result<Vec<String>, StoreError> {
     if FileKind::of(path) != Some(FileKind::Template) {
         return store_rig(disk, path, rig);
     }
     let mut found = None;
     let mut is_unread = false;
     for source in sources {
-        match template_of(disk, source, rig.uid()) {
+        match template_of(disk, source, rig.borrow().uid()) {
             Ok(Some(text)) => {
                 found = Some((*source, text));
                 break;
@@ -277,7 +286,8 @@ pub fn store_rig_over(disk: &dyn Disk, path: &Path, rig: &Rig, sources: &[&Path]
     }
     is_unread &= found.is_none();
     let source = found.as_ref().map(|(source, text)| (*source, text.as_str()));
-    let TemplateText { text, note } = template_text(rig, source, path, &|| PartFiles::new(disk));
+    let TemplateText { text, note } = template_text(rig.borrow(), source, path, &|| PartFiles::new(disk));
+    drop((rig, found));
     save_template(disk, path, &text)?;
     Ok(note.into_iter().chain(is_unread.then_some(SOURCE_UNREAD)).map(str::to_owned).collect())
 }
@@ -303,16 +313,19 @@ fn save_template(disk: &dyn Disk, path: &Path, text: &str) -> Result<(), StoreEr
 }
 
 /// Saves a rig as `.rig.ron`, or its skeleton as `.rig`. Returns notes about content that the format could not keep, a
-/// sentence each.
-pub fn store_rig(disk: &dyn Disk, path: &Path, rig: &Rig) -> Result<Vec<String>, StoreError> {
+/// sentence each. A rig that is handed over, not lent, is dropped as soon as its text is written: reading the text back takes as
+/// much memory as the rig.
+pub fn store_rig(disk: &dyn Disk, path: &Path, rig: impl Borrow<Rig>) -> Result<Vec<String>, StoreError> {
     match FileKind::of(path) {
         Some(FileKind::Template) => {
-            save_template(disk, path, &write_template(rig))?;
+            let text = write_template(rig.borrow());
+            drop(rig);
+            save_template(disk, path, &text)?;
             Ok(Vec::new())
         }
         Some(FileKind::RigText) => {
-            let written =
-                text::write(&rig_text(rig)).map_err(|source| StoreError::RigText { path: path.into(), source })?;
+            let written = text::write(&rig_text(rig.borrow()))
+                .map_err(|source| StoreError::RigText { path: path.into(), source })?;
             verify::rig_text(path, written.text.as_bytes())?;
             save_atomic(disk, path, written.text.as_bytes())?;
             Ok(written

@@ -26,10 +26,17 @@ pub use volumes::{Volume, volumes};
 use crate::mesh::ray::{Hit, Ray};
 use crossing::{Frame, resolve, usable};
 use node::BoxRay;
+use traverse::Sightline;
 use tree::Tree;
 
 /// Tangent of the angle by which a ray is tilted that runs along a flat surface.
 const TILT: f32 = 1e-3;
+
+/// Leaves that a ray may meet without a crossing. A ray through a mesh of a million triangles meets some dozens.
+const MOST_LEAVES: usize = 384;
+
+/// Leaves that a tilted ray may meet without a crossing. It starts beside what the ray ran along, so it may meet no less.
+const MOST_TILTED: usize = 96;
 
 /// A bounding volume hierarchy over triangles.
 ///
@@ -131,23 +138,51 @@ impl Surface {
     pub fn hits(&self, ray: &Ray, out: &mut Vec<Hit>) {
         let mut crossings = Vec::new();
         if let Some((frame, boxes)) = self.prepare(ray) {
-            self.tree.all(&frame, &boxes, &mut crossings);
+            self.tree.all(&frame, &boxes, usize::MAX, &mut crossings);
         }
         resolve(&mut crossings, |slot| self.tree.slot(slot).1, out);
     }
 
+    /// Collects the [`hits`](Self::hits) of a ray that meets few triangles. False, and no hits, for one that comes near to
+    /// those of more than `most` leaves of the hierarchy (of up to eight triangles each), so that the time of a ray is
+    /// bounded in a soup of long triangles, too.
+    pub fn hits_within(&self, ray: &Ray, most: usize, out: &mut Vec<Hit>) -> bool {
+        let mut crossings = Vec::new();
+        let is_whole = match self.prepare(ray) {
+            Some((frame, boxes)) => self.tree.all(&frame, &boxes, most, &mut crossings),
+            None => true,
+        };
+        if !is_whole {
+            crossings.clear();
+        }
+        resolve(&mut crossings, |slot| self.tree.slot(slot).1, out);
+        is_whole
+    }
+
     /// True if a triangle crosses `ray` at a distance from `from` to `to`: cheaper than asking for the first hit. A ray that
-    /// runs along hundreds of triangles, as within a flat mesh, is tilted a little.
+    /// runs along a flat surface, or along hundreds of triangles, is tilted a little.
     pub fn crosses(&self, ray: &Ray, from: f32, to: f32) -> bool {
+        self.crosses_counted(ray, from, to).0
+    }
+
+    /// The answer of [`Surface::crosses`], and the number of leaves of the hierarchy that were looked at for it.
+    pub fn crosses_counted(&self, ray: &Ray, from: f32, to: f32) -> (bool, usize) {
         let aside = ray.direction.any_orthonormal_vector();
-        let tilts = [Vec3::ZERO, aside, ray.direction.cross(aside)];
-        let crossed = tilts.iter().find_map(|tilt| {
-            let tilted = Ray { direction: (ray.direction + *tilt * TILT).normalize(), ..*ray };
-            let ray = if *tilt == Vec3::ZERO { ray } else { &tilted };
-            let Some((frame, boxes)) = self.prepare(ray) else { return Some(false) };
-            self.tree.crosses(&frame, &boxes, from, to)
-        });
-        crossed.unwrap_or(false)
+        let tilts = [(Vec3::ZERO, MOST_LEAVES), (aside, MOST_TILTED), (ray.direction.cross(aside), MOST_TILTED)];
+        let mut leaves = 0;
+        for (tilt, most) in tilts {
+            let is_tilted = tilt != Vec3::ZERO;
+            let tilted = Ray { direction: (ray.direction + tilt * TILT).normalize(), ..*ray };
+            let Some((frame, boxes)) = self.prepare(if is_tilted { &tilted } else { ray }) else { break };
+            match self.tree.crosses((&frame, &boxes), (from, to), most, &mut leaves) {
+                Sightline::Crossed => return (true, leaves),
+                Sightline::Clear => break,
+                // Another tilt would meet as many.
+                Sightline::Crowded if is_tilted => break,
+                Sightline::EdgeOn | Sightline::Crowded => {}
+            }
+        }
+        (false, leaves)
     }
 
     /// The point of the surface closest to `point`; `None` if the surface is empty or `point` is not finite. Of

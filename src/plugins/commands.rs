@@ -18,7 +18,11 @@ use bevy::prelude::*;
 
 pub use run::{Programs, RunFailure};
 
-use super::{RigSystems, configure_sets, document::EditReport};
+use super::{
+    RigSystems, configure_sets,
+    document::EditReport,
+    limits::{RigLimits, limit_builds},
+};
 pub use super::{
     document::{TagEntities, entities::BuiltEntities},
     schema::{
@@ -42,6 +46,7 @@ impl Plugin for CommandsPlugin {
             app.insert_resource(RigModules(Arc::new(modules::all())));
         }
         app.register_required_components::<Rig, BuiltEntities>();
+        app.init_resource::<RigLimits>().add_systems(First, limit_builds.run_if(resource_changed::<RigLimits>));
         app.init_resource::<Programs>().add_message::<BuildRequest>().add_message::<BuildDone>().add_systems(
             Update,
             (

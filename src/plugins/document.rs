@@ -10,7 +10,7 @@ pub(in crate::plugins) mod entities;
 mod error;
 pub(in crate::plugins) mod follow;
 
-use std::borrow::Cow;
+use std::{borrow::Cow, sync::Arc};
 
 use bevy::prelude::*;
 
@@ -30,7 +30,7 @@ pub use super::{
     selection::{HoveredNode, Selection},
 };
 use crate::rig::{
-    Rig, UidSource,
+    Rig, RigEdit, UidSource,
     feature::FeatureKinds,
     operations::{MirrorPlane, Operation},
     step::Commit,
@@ -175,7 +175,14 @@ fn apply_edits(
             Change::Do(operation) => {
                 let title = titled(operation, &document, built);
                 history
-                    .edit_as(title, &mut document, &mut selected, &mut uids, plane, &keyed(operation))
+                    .edit_as(
+                        title,
+                        &mut document,
+                        &mut selected,
+                        &mut uids,
+                        plane,
+                        &of_built(keyed(operation), built, is_of_entities),
+                    )
                     .map(recorded)
                     .map_err(ChangeError::from)
             }
@@ -216,6 +223,35 @@ fn apply_edits(
             }
         }
     }
+}
+
+/// An operation that deletes joints, as one on the built rig, so that nothing of what was made for them stays. Lists of edits
+/// say themselves what goes, but for those that writes to entities made.
+fn of_built<'o>(
+    operation: Cow<'o, Operation>,
+    built: Option<&BuildResult>,
+    is_of_entities: bool,
+) -> Cow<'o, Operation> {
+    let is_deletion = match &*operation {
+        Operation::Delete { .. } => true,
+        Operation::Named { edits, .. } => is_of_entities && deletes(edits),
+        _ => false,
+    };
+    match built {
+        Some(built) if is_deletion => {
+            Cow::Owned(Operation::Built { operation: Box::new(operation.into_owned()), built: Arc::clone(&built.0) })
+        }
+        _ => operation,
+    }
+}
+
+/// True if edits delete joints.
+fn deletes(edits: &[RigEdit]) -> bool {
+    edits.iter().any(|edit| match edit {
+        RigEdit::RemoveJoint(_) => true,
+        RigEdit::Batch(edits) => deletes(edits),
+        _ => false,
+    })
 }
 
 /// Title of an operation's step, with the names of joints and of nodes that commands created.

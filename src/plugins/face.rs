@@ -15,7 +15,7 @@ use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use bevy::prelude::*;
 
-use super::{RigSystems, configure_sets};
+use super::{RigSystems, configure_sets, limits::RigLimits};
 use crate::{
     algo::face::{
         auto::{AutoSettings, FaceAnalysis},
@@ -40,6 +40,7 @@ impl Plugin for FacePlugin {
         configure_sets(app);
         app.init_resource::<FaceExpressions>()
             .init_resource::<preparation::PreparedSkins>()
+            .init_resource::<RigLimits>()
             .add_observer(preparation::forget)
             .add_message::<FaceRequest>()
             .add_message::<FacePlaced>()

@@ -29,6 +29,7 @@ use super::{
     document::EditRequest,
     history::RigHistory,
     landing::{HeldResult, ResultHeld},
+    limits::{Deadline, LimitError, OutOfTime, RigLimits},
     surface::{RigMesh, SkinOf},
 };
 use crate::{
@@ -49,6 +50,7 @@ impl Plugin for FitPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
         app.init_resource::<FitTemplates>()
+            .init_resource::<RigLimits>()
             .add_message::<FitRequest>()
             .add_message::<FitAnswer>()
             .add_message::<EndFit>()
@@ -191,6 +193,12 @@ pub enum FitFailure {
     /// The rig was changed meanwhile.
     #[error("the joints were changed while the template was fitted; fit again")]
     Changed,
+    /// The mesh has more points or triangles than [`RigLimits`] allows.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
+    /// The fit took longer than [`RigLimits`] allows.
+    #[error(transparent)]
+    OutOfTime(#[from] OutOfTime),
 }
 
 /// Running fit of a mesh; remove the component or call [`FitJob::cancel`] to stop it.
@@ -205,6 +213,7 @@ pub struct FitJob {
     history: HistoryState,
     /// Finished fit that waits to be committed.
     held: Option<FinishedFit>,
+    deadline: Deadline,
 }
 
 /// Last step of a history and its number of undone steps: a new step discards those.
@@ -281,7 +290,7 @@ fn start(
     mut requests: MessageReader<FitRequest>,
     meshes: Query<(&RigMesh, &SkinOf)>,
     rigs: Query<(&Rig, &RigHistory)>,
-    (modules, templates): (Res<RigModules>, Res<FitTemplates>),
+    (modules, templates, limits): (Res<RigModules>, Res<FitTemplates>, Res<RigLimits>),
     mut fitted: MessageWriter<FitAnswer>,
 ) {
     for request in requests.read() {
@@ -290,6 +299,10 @@ fn start(
             fitted.write(FitAnswer { mesh: request.mesh, result: Err(FitFailure::NoRig) });
             continue;
         };
+        if let Err(error) = limits.check_open(mesh) {
+            fitted.write(FitAnswer { mesh: request.mesh, result: Err(error.into()) });
+            continue;
+        }
         let from = Arc::new(rig.clone());
         let work = Work {
             from: from.clone(),
@@ -314,6 +327,7 @@ fn start(
             from,
             history: state_of(history),
             held: None,
+            deadline: Deadline::new(&limits),
         });
     }
 }
@@ -327,7 +341,11 @@ fn land(
 ) {
     for (entity, mut job, of) in &mut jobs {
         let was_held = job.held.is_some();
-        let finished = if was_held { job.held.take().map(Ok) } else { check_ready(&mut job.task) };
+        let finished = match job.deadline.passed() {
+            _ if was_held => job.held.take().map(Ok),
+            Some(late) => Some(Err(late.into())),
+            None => check_ready(&mut job.task),
+        };
         let Some(result) = finished else { continue };
         let result = match (result, rigs.get(of.0)) {
             (Err(error), _) => Err(error),

@@ -9,7 +9,7 @@ mod script;
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{RigSystems, configure_sets};
+use super::{RigSystems, configure_sets, limits::RigLimits};
 use crate::{
     algo::view::View,
     rig::{SourceError, elements, operations::Axis, parse_ron, utf8},
@@ -26,7 +26,7 @@ pub struct GesturePlugin;
 impl Plugin for GesturePlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
-        app.add_systems(Update, script::run_scripts.in_set(RigSystems::Script));
+        app.init_resource::<RigLimits>().add_systems(Update, script::run_scripts.in_set(RigSystems::Script));
     }
 }
 

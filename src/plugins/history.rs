@@ -59,11 +59,6 @@ fn removes(edits: &[RigEdit], joint: Uid) -> bool {
     })
 }
 
-/// Bytes of weights that a step binds meshes with. Those that it takes away are those of an earlier step, as a rule.
-fn weight_bytes(step: &Step) -> usize {
-    step.forward.iter().map(RigEdit::weight_bytes).sum()
-}
-
 /// Name of a joint of a rig: its label, or the first digits of its uid.
 pub(super) fn joint_name(rig: &Rig, joint: Uid) -> Option<String> {
     let label = rig.joint(joint)?.data.label.clone();
@@ -192,10 +187,10 @@ impl RigHistory {
     fn drop_old(&mut self, recorded: &Step) {
         let done = &mut self.stacks.done;
         let mut count = if done.len() >= MOST_STEPS + MOST_STEPS / 10 { done.len() - MOST_STEPS } else { 0 };
-        if weight_bytes(recorded) > 0 {
+        if recorded.weight_bytes() > 0 {
             let mut bytes = 0;
             let fits = |step: &&Arc<Step>| {
-                bytes += weight_bytes(step);
+                bytes += step.weight_bytes();
                 bytes <= MOST_WEIGHT_BYTES
             };
             let kept = done.iter().rev().skip(1).take_while(fits).count() + 1;

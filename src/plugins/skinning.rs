@@ -37,6 +37,7 @@ use super::{
     document::EditRequest,
     history::RigHistory,
     landing::{HeldResult, JobBasis, JobOutcome, ResultHeld, landing},
+    limits::{Deadline, LimitError, OutOfTime, RigLimits},
     surface::{RigMesh, SkinOf},
 };
 use crate::{
@@ -56,10 +57,14 @@ pub struct SkinningPlugin;
 impl Plugin for SkinningPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
-        app.add_message::<BindRequest>().add_message::<BindAnswer>().add_message::<ResultHeld>().add_systems(
-            Update,
-            (start_skinning, late_joints::start_late_shares, land_skinning).chain().in_set(RigSystems::Bind),
-        );
+        app.init_resource::<RigLimits>()
+            .add_message::<BindRequest>()
+            .add_message::<BindAnswer>()
+            .add_message::<ResultHeld>()
+            .add_systems(
+                Update,
+                (start_skinning, late_joints::start_late_shares, land_skinning).chain().in_set(RigSystems::Bind),
+            );
     }
 }
 
@@ -117,6 +122,12 @@ pub enum SkinningError {
     /// The computation failed or was cancelled.
     #[error(transparent)]
     Weights(#[from] WeightError),
+    /// The mesh has more points or triangles than [`RigLimits`] allows.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
+    /// The computation took longer than [`RigLimits`] allows.
+    #[error(transparent)]
+    OutOfTime(#[from] OutOfTime),
 }
 
 /// Running computation of weights; remove the component or call [`SkinningJob::cancel`] to stop it.
@@ -131,6 +142,7 @@ pub struct SkinningJob {
     held: Option<SkinningResult>,
     /// True if a [`BindRequest`] asked for it, which [`BindAnswer`] answers.
     is_asked: bool,
+    deadline: Deadline,
 }
 
 type SkinningResult = Result<BoundSkin, WeightError>;
@@ -330,7 +342,7 @@ fn start_skinning(
     mut requests: MessageReader<BindRequest>,
     meshes: Query<(&RigMesh, &SkinOf)>,
     rigs: Query<(&Rig, Option<&BuildResult>)>,
-    modules: Option<Res<RigModules>>,
+    (modules, limits): (Option<Res<RigModules>>, Res<RigLimits>),
     mut bound: MessageWriter<BindAnswer>,
 ) {
     for request in requests.read() {
@@ -339,6 +351,10 @@ fn start_skinning(
             bound.write(BindAnswer { mesh: request.mesh, result: Err(SkinningError::NoRig) });
             continue;
         };
+        if let Err(error) = limits.check_open(mesh) {
+            bound.write(BindAnswer { mesh: request.mesh, result: Err(error.into()) });
+            continue;
+        }
         let basis = JobBasis::of(rig, mesh.uid);
         let (rig, mesh, request) = (rig.clone(), mesh.clone(), request.clone());
         let built = built.map(|built| built.0.clone());
@@ -355,7 +371,16 @@ fn start_skinning(
                 !stop.load(Ordering::Relaxed)
             })
         });
-        commands.entity(entity).insert(SkinningJob { progress, cancelled, task, basis, held: None, is_asked: true });
+        let deadline = Deadline::new(&limits);
+        commands.entity(entity).insert(SkinningJob {
+            progress,
+            cancelled,
+            task,
+            basis,
+            held: None,
+            is_asked: true,
+            deadline,
+        });
     }
 }
 
@@ -370,10 +395,15 @@ fn land_skinning(
 ) {
     for (entity, mut job, mesh, of) in &mut jobs {
         let was_held = job.held.is_some();
-        let finished = if was_held { job.held.take() } else { check_ready(&mut job.task) };
+        let late = job.deadline.passed().filter(|_| !was_held);
+        let finished = match late {
+            Some(late) => Some(Err(late.into())),
+            None if was_held => job.held.take().map(|held| held.map_err(SkinningError::from)),
+            None => check_ready(&mut job.task).map(|result| result.map_err(SkinningError::from)),
+        };
         let Some(result) = finished else { continue };
         let result = match (result, rigs.get(of.0)) {
-            (Err(error), _) => Err(error.into()),
+            (Err(error), _) => Err(error),
             (Ok(_), Err(_)) => Err(SkinningError::Closed),
             (Ok(computed), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
                 JobOutcome::Hold => {

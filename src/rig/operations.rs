@@ -8,6 +8,7 @@ mod clips;
 mod draft;
 mod frame;
 mod hierarchy;
+mod leftovers;
 mod merge;
 mod naming;
 mod orient;
@@ -32,7 +33,9 @@ pub use tags::{
     CopiedIdentifiers, CopiedJoint, PartOrder, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation, TagScope,
 };
 
-use crate::rig::{EditError, GROUP_COLORS, GroupData, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource};
+use crate::rig::{
+    BuiltRig, EditError, GROUP_COLORS, GroupData, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource,
+};
 
 /// A change of a rig that a person requests. Positions and transforms are in the rig's space.
 #[derive(Debug, Clone, PartialEq)]
@@ -161,6 +164,14 @@ pub enum Operation {
         /// Second of the keys.
         time: f32,
     },
+    /// Runs an operation on a rig as it is built: joints that it deletes take along pose and attribute values of nodes that
+    /// commands made for them, all as one step. Other operations leave those in the document.
+    Built {
+        /// The operation.
+        operation: Box<Operation>,
+        /// The built rig before the operation.
+        built: Arc<BuiltRig>,
+    },
     /// Changes tags.
     Tags(TagOperation),
     /// Puts another rig's joints, groups and tags into this one.
@@ -235,7 +246,7 @@ impl Operation {
             Self::RenamePose(..) => "Rename pose",
             Self::DeletePose(..) => "Delete pose",
             Self::Clips(operation) => operation.name(),
-            Self::Keyed { operation, .. } => operation.name(),
+            Self::Keyed { operation, .. } | Self::Built { operation, .. } => operation.name(),
             Self::Tags(operation) => operation.name(),
             Self::Merge { .. } => "Merge rig",
             Self::Edits(edits) => match edits[..] {
@@ -313,6 +324,7 @@ impl Operation {
             Self::DeletePose(pose) => Ok(draft.apply(RigEdit::RemoveStoredPose(*pose))?),
             Self::Clips(operation) => clips::run(draft, operation),
             Self::Keyed { operation, clip, layer, time } => clips::keyed(draft, operation, (*clip, *layer, *time)),
+            Self::Built { operation, built } => leftovers::run_built(draft, operation, built),
             Self::Tags(operation) => tags::run(draft, operation),
             Self::Merge { other, parent } => merge::merge(draft, other, *parent),
             Self::Edits(edits) | Self::Named { edits, .. } => {

@@ -19,6 +19,13 @@ pub struct Step {
     pub after: Vec<Uid>,
 }
 
+impl Step {
+    /// Bytes of weights that the step binds meshes with. Those that it takes away are those of an earlier step, as a rule.
+    pub fn weight_bytes(&self) -> usize {
+        self.forward.iter().map(RigEdit::weight_bytes).sum()
+    }
+}
+
 /// The debug form is short, because weights would fill pages.
 impl fmt::Debug for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

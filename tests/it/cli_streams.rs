@@ -17,7 +17,8 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// A stream that takes nothing.
+/// A stream that takes nothing. A stream that is closed before the command starts is none of them: the runtime of Rust opens
+/// the null device in its place, in the way in which other programs (Python, Node.js) open it to discard an output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Stream {
     /// A device without room.
@@ -77,6 +78,19 @@ fn an_output_that_takes_nothing_is_a_failure() {
             assert_eq!(code, Some(1), "{args:?} {stream:?}: {said}");
             assert!(!said.contains("panicked") && !said.contains("RUST_BACKTRACE"), "{args:?} {stream:?}: {said}");
         }
+    }
+}
+
+/// Whoever discards an output has it discarded, however the null device was opened.
+#[cfg(unix)]
+#[test]
+fn a_discarded_output_is_no_failure() {
+    let folder = folder();
+    for is_read in [false, true] {
+        let null = OpenOptions::new().read(is_read).write(true).open("/dev/null").unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_rigsmith"));
+        command.current_dir(folder.path()).args(["info", "a.rig"]).stdin(Stdio::null()).stdout(null);
+        assert_eq!(command.status().unwrap().code(), Some(0), "opened for reading, too: {is_read}");
     }
 }
 

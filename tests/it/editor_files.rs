@@ -24,6 +24,7 @@ use rigsmith::{
     plugins::{
         document::{Change, EditRequest},
         history::RigHistory,
+        limits::{Limit, RigLimits},
         surface::{RigMesh, RigMeshes},
     },
     prelude::*,
@@ -185,6 +186,30 @@ impl Window {
 
 fn folder() -> tempfile::TempDir {
     tempfile::tempdir().expect("a folder for the test")
+}
+
+/// Limits of the command line hold in the window, too: what goes over one is refused with a toast that names it.
+#[test]
+fn files_above_a_limit_are_refused_with_a_toast() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("three.rig"), "rig 1\njoint 0 -1 0 0 0 a\njoint 1 0 0 1 0 b\njoint 2 1 0 1 0 c\n").unwrap();
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+    std::fs::write(at("box.obj"), format!("{corners}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")).unwrap();
+    let mut window = Window::new(folder.path());
+    let limits = RigLimits::default().with(Limit::Joints, 2).with(Limit::Triangles, 3);
+    window.app.insert_resource(limits);
+    window.open(OpenRequest::Empty);
+    let before = window.rig();
+    for (file, told) in [("three.rig", "the rig has 3 joints"), ("box.obj", "the mesh has 4 triangles")] {
+        window.open_file(&at(file));
+        assert!(window.said(Severity::Error, told), "{file}: {:?}", window.notices);
+        assert!(window.said(Severity::Error, "--limit "), "{file}: {:?}", window.notices);
+        assert_eq!(window.rig(), before, "{file}");
+    }
+    window.app.insert_resource(RigLimits::default());
+    window.open_file(&at("three.rig"));
+    assert_eq!(window.rig().len(), 3);
 }
 
 #[test]

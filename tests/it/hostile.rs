@@ -249,6 +249,7 @@ fn files_and_builds_stay_within_their_memory() {
         fs::write(at(name), text).unwrap();
     }
     fs::write(at("chain.rig"), skeleton(8_000, true)).unwrap();
+    fs::write(at("long.rig"), skeleton(40_000, true)).unwrap();
     fs::write(at("unknown.rig.ron"), tags(6_000, |_| command("nope", ""))).unwrap();
     fs::write(at("nulls.rig.ron"), chain_of_nulls(1_500)).unwrap();
     let size = |file: &str| fs::metadata(at(file)).unwrap().len();
@@ -265,6 +266,9 @@ fn files_and_builds_stay_within_their_memory() {
         (&["info", "chain.rig"], size("chain.rig")),
         (&["build", "chain.rig"], size("chain.rig")),
         (&["build", "chain.rig", "-o", "built.rig.ron"], size("chain.rig")),
+        (&["build", "long.rig"], size("long.rig")),
+        (&["build", "long.rig", "-o", "built.rig.ron"], size("long.rig")),
+        (&["convert", "long.rig", "long.rig.ron"], size("long.rig")),
         (&["build", "nulls.rig.ron"], size("nulls.rig.ron")),
     ];
     for (args, size) in cases {

@@ -3,6 +3,7 @@
 mod clips;
 mod damage;
 mod evidence;
+mod long;
 mod places;
 mod trouble;
 

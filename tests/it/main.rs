@@ -138,6 +138,7 @@ mod remote;
 #[cfg(feature = "render")]
 mod render;
 mod retarget;
+mod rig_limits;
 mod rig_text;
 mod runtime;
 mod schema;

@@ -310,6 +310,57 @@ fn a_fan_of_growing_triangles() {
     assert_eq!(hits, brute);
 }
 
+/// Triangles about one point in a plane.
+fn fan(count: usize) -> Mesh {
+    let corner = |at: usize| {
+        let turn = at as f32 / count as f32;
+        Vec3::new(1.0 - 2.0 * (turn - 0.5).abs() * 2.0, (turn * 2.0 - 1.0) * (1.0 - turn), 0.0)
+    };
+    let points = std::iter::once(Vec3::ZERO).chain((0..=count).map(corner)).collect();
+    (points, (0..count as u32).map(|at| [0, at + 1, at + 2]).collect())
+}
+
+/// A ray within a flat fan runs along all of its triangles, and looks at a few only.
+#[test]
+fn a_ray_along_a_flat_fan_looks_at_few_leaves() {
+    for count in [500, 2_000, 8_000, 32_000] {
+        let (points, triangles) = fan(count);
+        let surface = Surface::build(&points, &triangles);
+        for at in (0..count).step_by(count / 50) {
+            let ray = towards(points[at + 1], Vec3::new(0.01, -0.02, 0.0));
+            let (is_crossed, leaves) = surface.crosses_counted(&ray, 1e-3, 0.5);
+            assert_eq!(is_crossed, surface.crosses(&ray, 1e-3, 0.5));
+            assert!(leaves <= 160, "{count} triangles, ray {at}: {leaves} leaves");
+        }
+    }
+}
+
+/// Triangles that join points at random, from everywhere to everywhere.
+fn knot(count: usize) -> Mesh {
+    let mut random = Random(11);
+    let points: Vec<Vec3> = (0..count.div_ceil(3).max(3)).map(|_| random.point()).collect();
+    let corner = |random: &mut Random| random.below(points.len()) as u32;
+    let triangles = (0..count).map(|_| [corner(&mut random), corner(&mut random), corner(&mut random)]).collect();
+    (points, triangles)
+}
+
+/// The work of a ray is bounded: it has all hits, or none and says so.
+#[test]
+fn a_ray_in_a_soup_is_given_up() {
+    const MOST: usize = 256;
+    for ((points, triangles), is_body) in [(ball(20, 0.3), true), (knot(300), true), (knot(20_000), false)] {
+        let surface = Surface::build(&points, &triangles);
+        let mut random = Random(7);
+        for _ in 0..40 {
+            let ray = towards(random.point() * 0.2, random.point() * 0.2);
+            let mut hits = vec![Hit { distance: -1.0, triangle: 0, entering: false }];
+            let is_whole = surface.hits_within(&ray, MOST, &mut hits);
+            assert_eq!(is_whole, is_body, "{} triangles", triangles.len());
+            assert_eq!(hits, if is_whole { hits_of(&surface, &ray) } else { Vec::new() });
+        }
+    }
+}
+
 #[test]
 fn closest_point_is_the_least_over_all_triangles() {
     let (points, triangles) = soup(400);

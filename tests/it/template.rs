@@ -283,14 +283,15 @@ fn files_that_are_none_are_refused() {
 }
 
 #[test]
-fn large_nonsense_is_refused_quickly() {
+fn large_nonsense_is_refused_and_never_hangs() {
     let started = std::time::Instant::now();
     for piece in ["a:", "a:(", "/*", "\"", "r#\"", "'", "),", "uid:\"0000000000000001\","] {
         let text = format!("(format: 3, joints: [{}", piece.repeat((4 << 20) / piece.len()));
         assert!(text.len() < MAX_BYTES);
         assert!(read_template(text.as_bytes()).is_err());
     }
-    assert!(started.elapsed().as_secs() < 30, "{:?}", started.elapsed());
+    // What takes time with the square of a text of 4 MiB takes hours.
+    assert!(started.elapsed() < crate::bench::HANG, "{:?}", started.elapsed());
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod counts;
 mod layers;
+mod leftovers;
 pub mod limits;
 mod poses;
 mod random;

@@ -13,6 +13,9 @@ use crate::mesh::{ray::Ray, surface::Surface};
 const DIRECTIONS: usize = 32;
 /// The share of a segment at either end in which nothing blocks it: the surface the point lies on.
 const MARGIN: f32 = 1e-3;
+/// Leaves of a hierarchy that a ray through a body may meet. Through a mesh of a million triangles it meets some dozens; in a
+/// soup of triangles from everywhere to everywhere it meets a share of all, and which side it is on has no meaning.
+const MOST_LEAVES: usize = 1024;
 
 /// A surface that answers lines of sight.
 pub(crate) struct Sight {
@@ -51,12 +54,15 @@ impl Sight {
     }
 
     /// True if `to`, a place inside the surface, lies on the outer side of the skin at `from`: the way there goes through
-    /// the air and enters the surface once more than it leaves it.
+    /// the air and enters the surface once more than it leaves it. A soup has no sides.
     pub fn faces_away(&self, point: usize, from: Vec3, to: Vec3) -> bool {
         let mut hits = Vec::new();
         let way = to - from;
         let length = way.length();
-        self.around(point).hits(&Ray { origin: from, direction: way / length }, &mut hits);
+        let ray = Ray { origin: from, direction: way / length };
+        if !self.around(point).hits_within(&ray, MOST_LEAVES, &mut hits) {
+            return false;
+        }
         let between = MARGIN * length..(1.0 - MARGIN) * length;
         hits.iter().filter(|hit| between.contains(&hit.distance)).count() % 2 == 1
     }

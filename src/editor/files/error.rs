@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use crate::{
     files::{LoadError, ReadError, SaveError, StoreError, journal::JournalError},
     mesh::obj::ObjError,
+    plugins::limits::LimitError,
     processor::BuildError,
     rig::{EditError, SourceError, skin::SkinError},
     solve::{bake_clip::BakeError, program::ProgramError},
@@ -81,6 +82,9 @@ pub(in crate::editor) enum OpenError {
     /// The rig refuses a joint of the file.
     #[error(transparent)]
     Edit(#[from] EditError),
+    /// The file holds more than is taken.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
 }
 
 /// Reason why a document is not written.

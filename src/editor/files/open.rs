@@ -35,6 +35,7 @@ use crate::{
     plugins::{
         history::RigHistory,
         journal::replayed_bundle,
+        limits::{Limit, RigLimits},
         selection::Selection,
         surface::{RigMesh, SkinOf},
     },
@@ -179,7 +180,8 @@ pub(super) fn start(world: &mut World, request: OpenRequest) {
         }
         OpenRequest::File(path) => {
             let path = std::path::absolute(&path).unwrap_or(path);
-            (file_name(&path), spawn(move || file(&path, &mut uids)))
+            let limits = world.get_resource::<RigLimits>().cloned().unwrap_or_default();
+            (file_name(&path), spawn(move || limited_file(&path, &mut uids, &limits)))
         }
     };
     begin(world, name, task);
@@ -223,6 +225,18 @@ fn template_document(name: &str) -> Result<LoadedFile, OpenError> {
 /// Hash of a file's bytes; `None` if it cannot be read.
 pub(in crate::editor) fn hash_of(path: &Path) -> Option<u64> {
     read_capped(&RealDisk, path, MAX_HASHED).ok().map(|bytes| file_hash(&bytes))
+}
+
+/// Opens a file that holds no more than the limits allow.
+fn limited_file(path: &Path, uids: &mut UidSource, limits: &RigLimits) -> Result<LoadedFile, OpenError> {
+    let opened = file(path, uids)?;
+    let (LoadedFile::Document(inside) | LoadedFile::Template(inside)) = &opened;
+    let name = file_name(path);
+    for (mesh, _) in &inside.meshes {
+        limits.check_model(&name, &mesh.file)?;
+    }
+    limits.check_rig(&name, &inside.rig)?;
+    Ok(opened)
 }
 
 fn file(path: &Path, uids: &mut UidSource) -> Result<LoadedFile, OpenError> {
@@ -381,8 +395,9 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
             (replayed_bundle(&work.restored.replayed), journal)
         }
         None => {
-            let base = project.is_none().then(|| rig.clone());
-            let start = JournalStart { places, origin, rig: base, context: context.text() };
+            let (base, saved_rig) =
+                if project.is_some() { (None, Some(rig.clone())) } else { (Some(rig.clone()), None) };
+            let start = JournalStart { places, origin, rig: base, context: context.text(), saved_rig };
             ((rig, Selection::default(), RigHistory::default()), Journal::start(disk(), start))
         }
     };
@@ -405,8 +420,15 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     for warning in warnings {
         world.write_message(Notice::warning(warning));
     }
-    for note in notes {
+    let most = world.get_resource::<RigLimits>().cloned().unwrap_or_default().most(Limit::Notes);
+    let more = notes.len().saturating_sub(most);
+    for note in notes.into_iter().take(most) {
         world.write_message(Notice::info(note).quiet());
+    }
+    if more > 0 {
+        let are = if more == 1 { "note is" } else { "notes are" };
+        let text = format!("{more} more {are} left out; --limit notes=N tells more");
+        world.write_message(Notice::info(text).quiet());
     }
     if let Some(pending) = pending {
         world.resource_mut::<Recovery>().offer(pending);

@@ -11,7 +11,10 @@ use crate::{
         notice::{Notice, Severity},
         panel::{EditorPanel, Requests},
     },
-    plugins::document::{ChangeError, EditRefusal},
+    plugins::{
+        document::{ChangeError, EditRefusal},
+        limits::RigLimits,
+    },
 };
 
 /// Plugin that stores notices, and makes notices of refused edits.
@@ -118,6 +121,7 @@ fn keep_notices(
     mut clear: MessageReader<ClearLog>,
     mut book: ResMut<LogBook>,
     time: Option<Res<Time<Real>>>,
+    limits: Option<Res<RigLimits>>,
     mut redraw: MessageWriter<RequestRedraw>,
 ) {
     if clear.read().count() > 0 {
@@ -125,7 +129,11 @@ fn keep_notices(
     }
     let at = time.map(|time| time.elapsed()).unwrap_or_default();
     for notice in notices.read() {
-        book.add(notice.clone(), at);
+        let mut notice = notice.clone();
+        if let Some(limits) = &limits {
+            notice.text = limits.shortened(&notice.text);
+        }
+        book.add(notice, at);
         redraw.write(RequestRedraw);
     }
 }

@@ -6,7 +6,7 @@
 
 use std::{borrow::Cow, collections::HashMap, sync::Arc};
 
-use super::{Basis, Content, Origin, RecoveredJournal};
+use super::{Basis, Content, Origin, RecoveredJournal, fold::StartRig};
 use crate::rig::{
     EditError, Rig, RigEdit, Uid,
     step::{Commit, Replay, Step, UndoStacks, replay},
@@ -46,6 +46,8 @@ pub struct RestoredRig {
     pub(super) content: Content,
     /// Number of the changes in `content` that the project holds.
     pub(super) contained: SavedSteps,
+    /// Rig on which the changes in `content` were made.
+    pub(super) start: StartRig,
 }
 
 /// Number of changes of a restored journal that its project holds.
@@ -72,14 +74,15 @@ impl RecoveredJournal {
         if content.origin == Origin::Unknown {
             content.origin = Origin::Empty;
         }
+        let mut start = StartRig { rig: Arc::new(rig.clone()), contained };
         let exact = self.gaps.iter().filter(|gap| gap.loses()).map(|gap| gap.changes).min().unwrap_or(usize::MAX);
         if exact >= self.changes().len() {
             let replayed = replay(rig, self.changes(), contained);
             content.changes.truncate(replayed.applied);
-            return RestoredRig { replayed, skipped: Vec::new(), content, contained: SavedSteps::Marked };
+            return RestoredRig { replayed, skipped: Vec::new(), content, contained: SavedSteps::Marked, start };
         }
         if basis == Basis::Journal {
-            content.base = Some(Arc::new(rig.clone()));
+            content.base = Some(start.rig.clone());
         }
         // Positions are counted again from the start.
         content.marks.clear();
@@ -90,6 +93,7 @@ impl RecoveredJournal {
             salvage.follow(committed);
         }
         let former = salvage.made.len();
+        start.contained = former;
         for (number, committed) in later.iter().enumerate() {
             salvage.make(contained + number, committed, contained + number < exact);
         }
@@ -104,7 +108,7 @@ impl RecoveredJournal {
         };
         let contained =
             if matches!(basis, Basis::Project { .. }) { SavedSteps::Counted(former) } else { SavedSteps::Nothing };
-        RestoredRig { replayed, skipped: salvage.skipped, content, contained }
+        RestoredRig { replayed, skipped: salvage.skipped, content, contained, start }
     }
 
     /// The [rig, selection and history](RestoredRig::replayed) of [`Self::restore`] alone.

@@ -12,6 +12,7 @@ use std::{
 use super::{
     Content, JournalPlaces, JournalWriteError, SaveMark,
     encode::Encoder,
+    fold::Measure,
     place::is_there,
     sync::{SyncResult, Syncer},
     writer::{Order, WriterState},
@@ -64,12 +65,15 @@ struct Work {
     open: Option<OpenJournal>,
     /// Earliest time of the next attempt after a failure.
     retry: Instant,
+    measure: Measure,
 }
 
 impl Writer {
     /// Carries out orders until one ends the thread.
     pub(super) fn run(self, inbox: &Receiver<Order>) {
-        let mut work = Work { writer: self, open: None, retry: Instant::now() };
+        let measure = Measure::of(&self.content);
+        self.shared.hold(self.content.changes.len());
+        let mut work = Work { writer: self, open: None, retry: Instant::now(), measure };
         work.reopen();
         let mut block = Vec::new();
         while let Ok(order) = inbox.recv() {
@@ -90,8 +94,15 @@ impl Work {
     fn take(&mut self, order: Order, block: &mut Vec<u8>) -> bool {
         match order {
             Order::Change(committed) => {
-                self.writer.content.changes.push(committed.clone());
+                let changes = &mut self.writer.content.changes;
+                changes.push(committed.clone());
+                let is_long = self.measure.add(&committed, changes.len());
                 self.append(block, |encoder, out| encoder.change(out, &committed));
+                if is_long {
+                    self.write(block);
+                    self.fold();
+                }
+                self.writer.shared.hold(self.writer.content.changes.len());
             }
             Order::Context(context) => {
                 self.append(block, |encoder, out| encoder.context(out, &context));
@@ -213,10 +224,41 @@ impl Work {
         }
     }
 
+    /// Moves the oldest changes into the rig that the journal starts from, and starts a new file on it. If that cannot be
+    /// written, the present file goes on, and so does what is held in memory for another place.
+    fn fold(&mut self) {
+        let writer = &mut self.writer;
+        let mut content = writer.content.clone();
+        content.generation += 1;
+        let (mut is_folded, mut opened) = (content.fold(), None);
+        if is_folded && self.open.is_some() {
+            let former = writer.shared.path();
+            opened = create_somewhere(writer, &content, &writer.places, former.as_deref()).ok();
+            is_folded = opened.is_some();
+        } else if is_folded {
+            // Nothing can be written at the moment, but it must not be the rig that is too large to be.
+            is_folded = Encoder::begin(writer.session, &content).is_ok();
+        }
+        if is_folded {
+            writer.content = content;
+        }
+        self.measure = Measure::of(&writer.content);
+        if !is_folded {
+            self.measure.put_off();
+        }
+        if let Some(open) = opened {
+            self.adopt(open);
+        }
+    }
+
     /// Starts a new file on a saved project. If that cannot be written, the present file goes on, since its mark
     /// identifies the save.
     fn rebase(&mut self, mark: &SaveMark, places: JournalPlaces) {
         let writer = &mut self.writer;
+        if writer.content.base.is_some() && mark.position < writer.content.first {
+            // The save took longer than it takes to fold: the project lacks changes that are in the rig of the journal alone.
+            return;
+        }
         let mut content = writer.content.clone();
         content.rebase(mark);
         content.generation += 1;
@@ -225,6 +267,8 @@ impl Work {
             Ok(open) => {
                 writer.content = content;
                 writer.places = places;
+                self.measure = Measure::of(&writer.content);
+                writer.shared.hold(writer.content.changes.len());
                 self.adopt(open);
             }
             Err((path, reason)) if self.open.is_none() => self.report(path, reason),

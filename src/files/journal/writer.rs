@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, AtomicU64, Ordering},
+        atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering},
         mpsc::{RecvTimeoutError, Sender, channel},
     },
     thread,
@@ -49,6 +49,9 @@ pub struct JournalStart {
     /// Text with anything else that the caller needs after a crash, such as the meshes that are open; returned
     /// unchanged.
     pub context: String,
+    /// The rig that a project file holds, where `rig` is `None`. It is not written; a journal that knows it can fold, see
+    /// [`MOST_CHANGES`](super::MOST_CHANGES).
+    pub saved_rig: Option<Rig>,
 }
 
 /// A journal that continues recovered work.
@@ -76,6 +79,7 @@ pub(super) enum Order {
 pub(super) struct WriterState {
     state: Mutex<State>,
     troubled: AtomicBool,
+    held: AtomicUsize,
 }
 
 #[derive(Default)]
@@ -96,6 +100,11 @@ impl WriterState {
     pub(super) fn trouble(&self) -> Option<Arc<JournalWriteError>> {
         // The atomic flag avoids the lock, since this is called in every frame.
         if self.troubled.load(Ordering::Acquire) { self.state().trouble.clone() } else { None }
+    }
+
+    /// Records the number of changes in memory.
+    pub(super) fn hold(&self, changes: usize) {
+        self.held.store(changes, Ordering::Release);
     }
 
     /// Records that the journal is written at `path` without trouble; returns the former path.
@@ -127,11 +136,18 @@ impl Journal {
     /// Starts a journal. [`Journal::trouble`] gives its errors.
     pub fn start(disk: Arc<dyn Disk>, start: JournalStart) -> Self {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let base = start.rig.map(Arc::new);
+        let known = match &start.origin {
+            _ if base.is_some() => base.clone(),
+            Origin::Project { .. } => start.saved_rig.map(Arc::new),
+            _ => Some(Arc::default()),
+        };
         let content = Content {
             started: now.as_secs(),
             origin: start.origin,
-            base: start.rig.map(Arc::new),
+            base,
             context: start.context,
+            known,
             ..Content::default()
         };
         let session = RandomState::new().hash_one((SystemTime::now(), std::process::id()));
@@ -161,12 +177,15 @@ impl Journal {
             Some(Err(_)) => (Some(old.to_owned()), None),
         };
         let mut content = restored.content.clone();
+        let held = content.changes.len();
         let saved = recovered.saved(&mut |path| file_hash_at(disk.as_ref(), path)).map(|(_, mark)| mark.clone());
         match (saved, restored.contained) {
             (Some(mark), SavedSteps::Marked) => content.rebase(&mark),
             (Some(mark), SavedSteps::Counted(contained)) => content.rebase_after(&mark, contained),
             (_, SavedSteps::Nothing) | (None, _) => {}
         }
+        let is_start = held - content.changes.len() == restored.start.contained;
+        content.known = is_start.then(|| restored.start.rig.clone());
         // The same session gives the same file name, so that the file replaces the old one in one step.
         ResumedJournal { journal: Self::begin(disk, recovered.session, places, content, replaces), kept }
     }
@@ -214,6 +233,12 @@ impl Journal {
     /// [`SaveMark::position`].
     pub fn position(&self) -> u64 {
         self.inner.position.load(Ordering::Acquire)
+    }
+
+    /// Number of changes that are held in memory, so that the whole journal can be written in another place: less than
+    /// [`MOST_CHANGES`](super::MOST_CHANGES) while people do steps, whatever the number of changes since the last save.
+    pub fn held(&self) -> usize {
+        self.inner.shared.held.load(Ordering::Acquire)
     }
 
     /// Path of the journal; `None` before it is created, and if no place accepts it.

@@ -78,11 +78,8 @@ impl Frame {
     /// Crossing of the ray and the triangle: distance, whether it enters, and the largest distance of a corner from the
     /// origin.
     pub fn cross(&self, corners: [Vec3; 3]) -> Option<(f64, bool, f32)> {
-        let [x, y, z] = self.axes;
-        let flat = corners.map(|corner| {
-            let from = corner - self.origin;
-            [from[x] - self.shear[0] * from[z], from[y] - self.shear[1] * from[z]]
-        });
+        let z = self.axes[2];
+        let flat = corners.map(|corner| self.flat(corner));
         let (u, u_side) = side(flat[1], flat[2]);
         let (v, v_side) = side(flat[2], flat[0]);
         let (w, w_side) = side(flat[0], flat[1]);
@@ -97,6 +94,19 @@ impl Frame {
         }
         let reach = corners.iter().fold(0.0, |reach: f32, &c| reach.max((c - self.origin).abs().max_element()));
         Some((distance, (w_side > 0) != (along > 0.0), SLACK * reach / along.abs() as f32))
+    }
+
+    /// True if the ray lies in the plane of the triangle, or the triangle is none.
+    pub fn is_edge_on(&self, corners: [Vec3; 3]) -> bool {
+        let [a, b, c] = corners.map(|corner| self.flat(corner));
+        [(a, b), (b, c), (c, a)].into_iter().all(|(a, b)| side(a, b).0 == 0.0)
+    }
+
+    /// Coordinates of a corner across the ray.
+    fn flat(&self, corner: Vec3) -> [f32; 2] {
+        let [x, y, z] = self.axes;
+        let from = corner - self.origin;
+        [from[x] - self.shear[0] * from[z], from[y] - self.shear[1] * from[z]]
     }
 }
 

@@ -14,8 +14,21 @@ use super::tree::{DEPTH, Tree};
 /// Largest number of waiting children: seven a level.
 const STACK: usize = (WIDTH - 1) * DEPTH + 1;
 
-/// Leaves that a ray may meet without a crossing. A ray through a mesh of a million triangles meets some dozens.
-const MOST_LEAVES: usize = 384;
+/// Triangles edge-on that a ray may meet without a crossing: it runs along a flat surface.
+const MOST_EDGE_ON: u32 = 32;
+
+/// Answer of [`Tree::crosses`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sightline {
+    /// A triangle is crossed.
+    Crossed,
+    /// No triangle is crossed.
+    Clear,
+    /// No triangle was crossed among as many as the ray may meet edge-on: it runs along a flat surface.
+    EdgeOn,
+    /// No triangle was crossed in as many leaves as the ray may meet.
+    Crowded,
+}
 
 /// Stack of children to visit, the best on top, each with a bound of the distances in it (less is better).
 struct ChildStack {
@@ -122,12 +135,19 @@ impl Tree {
         }
     }
 
-    /// True if a triangle is crossed at a distance between `from` and `to`; `None` for a ray that meets [`MOST_LEAVES`]
-    /// leaves and crosses none of their triangles, as one that runs along a flat surface.
-    pub fn crosses(&self, frame: &Frame, boxes: &BoxRay, from: f32, to: f32) -> Option<bool> {
+    /// Looks for a triangle that is crossed at a distance between `from` and `to`, in `most` leaves at most. The leaves that the
+    /// ray meets are added to `leaves`.
+    pub fn crosses(
+        &self,
+        (frame, boxes): (&Frame, &BoxRay),
+        (from, to): (f32, f32),
+        most: usize,
+        leaves: &mut usize,
+    ) -> Sightline {
         let between = |crossing: &Crossing| (f64::from(from)..f64::from(to)).contains(&crossing.distance);
         let mut waiting = ChildStack::new(self);
-        let mut leaves = 0;
+        let most = *leaves + most;
+        let mut edge_on = 0;
         while let Some((_, child)) = waiting.pop() {
             match child.target() {
                 Target::Node(index) => {
@@ -139,24 +159,28 @@ impl Tree {
                 }
                 Target::Leaf(index, two) => {
                     let mut found = false;
-                    self.test(index, two, frame, |crossing| found |= between(&crossing));
-                    leaves += 1;
+                    edge_on += self.test(index, two, frame, |crossing| found |= between(&crossing));
+                    *leaves += 1;
                     if found {
-                        return Some(true);
+                        return Sightline::Crossed;
                     }
-                    if leaves == MOST_LEAVES {
-                        return None;
+                    if edge_on >= MOST_EDGE_ON {
+                        return Sightline::EdgeOn;
+                    }
+                    if *leaves == most {
+                        return Sightline::Crowded;
                     }
                 }
             }
         }
-        Some(false)
+        Sightline::Clear
     }
 
-    /// Collects every crossing, in no order.
-    pub fn all(&self, frame: &Frame, boxes: &BoxRay, out: &mut Vec<Crossing>) {
+    /// Collects every crossing, in no order; false as soon as the ray has met more than `most` leaves.
+    pub fn all(&self, frame: &Frame, boxes: &BoxRay, most: usize, out: &mut Vec<Crossing>) -> bool {
         let mut waiting = ChildStack::new(self);
         let mut touched = 0;
+        let mut leaves = 0;
         while let Some((_, child)) = waiting.pop() {
             match child.target() {
                 Target::Node(index) => {
@@ -168,24 +192,37 @@ impl Tree {
                         touched ^= self.touch(child);
                     }
                 }
-                Target::Leaf(index, two) => self.test(index, two, frame, |crossing| out.push(crossing)),
-            }
-        }
-        black_box(touched);
-    }
-
-    /// Calls `found` for each triangle of a leaf that the ray crosses.
-    #[inline(always)]
-    fn test(&self, index: usize, two: bool, frame: &Frame, mut found: impl FnMut(Crossing)) {
-        for index in index..=index + usize::from(two) {
-            let packet = &self.packets[index];
-            for lane in bits(packet.candidates(frame)) {
-                if let Some((distance, entering, tolerance)) = frame.cross(packet.corners(lane)) {
-                    let (triangle, slot) = (packet.triangle(lane), (index * LANES + lane) as u32);
-                    found(Crossing { distance, triangle, slot, entering, tolerance });
+                Target::Leaf(index, two) => {
+                    if leaves == most {
+                        return false;
+                    }
+                    leaves += 1;
+                    self.test(index, two, frame, |crossing| out.push(crossing));
                 }
             }
         }
+        black_box(touched);
+        true
+    }
+
+    /// Calls `found` for each triangle of a leaf that the ray crosses; returns the number of those that it meets edge-on.
+    #[inline(always)]
+    fn test(&self, index: usize, two: bool, frame: &Frame, mut found: impl FnMut(Crossing)) -> u32 {
+        let mut edge_on = 0;
+        for index in index..=index + usize::from(two) {
+            let packet = &self.packets[index];
+            for lane in bits(packet.candidates(frame)) {
+                let corners = packet.corners(lane);
+                match frame.cross(corners) {
+                    Some((distance, entering, tolerance)) => {
+                        let (triangle, slot) = (packet.triangle(lane), (index * LANES + lane) as u32);
+                        found(Crossing { distance, triangle, slot, entering, tolerance });
+                    }
+                    None => edge_on += u32::from(frame.is_edge_on(corners)),
+                }
+            }
+        }
+        edge_on
     }
 
     /// The triangle in a slot of [`Crossing`] and its corners.

@@ -1,6 +1,9 @@
 //! Reasons why a face is not placed, or shows no expression.
 
-use crate::algo::face::{auto::FaceError, expression::MAX_STRENGTH};
+use crate::{
+    algo::face::{auto::FaceError, expression::MAX_STRENGTH},
+    plugins::limits::{LimitError, OutOfTime},
+};
 
 /// Reason why no face was placed; a sentence for people without its full stop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -20,6 +23,12 @@ pub enum PlaceFaceError {
     /// The computation failed or was cancelled.
     #[error(transparent)]
     Face(#[from] FaceError),
+    /// The mesh has more points or triangles than [`RigLimits`](crate::plugins::limits::RigLimits) allows.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
+    /// The computation took longer than [`RigLimits`](crate::plugins::limits::RigLimits) allows.
+    #[error(transparent)]
+    OutOfTime(#[from] OutOfTime),
 }
 
 /// Reason why a face shows no expression; a sentence for people without its full stop.

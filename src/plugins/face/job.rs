@@ -32,6 +32,7 @@ use crate::{
         document::EditRequest,
         history::RigHistory,
         landing::{HeldResult, JobBasis, JobOutcome, ResultHeld, landing},
+        limits::{Deadline, RigLimits},
         surface::{RigMesh, SkinOf},
     },
     rig::{PoseOffset, Rig, RigEdit, StoredPose, Uid, UidSource, operations::Operation},
@@ -48,6 +49,7 @@ pub struct FaceJob {
     basis: JobBasis,
     /// A face that is finished and waits; see [`landing`](crate::plugins::landing).
     held: Option<JobResult>,
+    deadline: Deadline,
 }
 
 #[derive(Default)]
@@ -125,7 +127,7 @@ pub(super) fn start(
     mut requests: MessageReader<FaceRequest>,
     meshes: Query<(&RigMesh, &SkinOf, Option<&Face>)>,
     rigs: Query<&Rig>,
-    expressions: Res<FaceExpressions>,
+    (expressions, limits): (Res<FaceExpressions>, Res<RigLimits>),
     mut placed: MessageWriter<FacePlaced>,
 ) {
     for FaceRequest { mesh: entity, settings, fit } in requests.read() {
@@ -134,6 +136,10 @@ pub(super) fn start(
             placed.write(FacePlaced { mesh: *entity, result: Err(PlaceFaceError::NoRig) });
             continue;
         };
+        if let Err(error) = limits.check_open(mesh) {
+            placed.write(FacePlaced { mesh: *entity, result: Err(error.into()) });
+            continue;
+        }
         let basis = JobBasis::of(rig, mesh.uid);
         let ready = face.filter(|face| face.serves(&mesh.rest, settings)).map(|face| face.analysis.clone());
         let work = JobInput {
@@ -147,7 +153,8 @@ pub(super) fn start(
         let progress = Arc::new(Progress::default());
         let told = progress.clone();
         let task = AsyncComputeTaskPool::get().spawn(async move { work.run(&told) });
-        commands.entity(*entity).insert(FaceJob { progress, shapes: fit.clone(), task, basis, held: None });
+        let deadline = Deadline::new(&limits);
+        commands.entity(*entity).insert(FaceJob { progress, shapes: fit.clone(), task, basis, held: None, deadline });
     }
 }
 
@@ -241,7 +248,11 @@ pub(super) fn land(
 ) {
     for (entity, mut job, mesh, of) in &mut jobs {
         let was_held = job.held.is_some();
-        let finished = job.held.take().map(Ok).or_else(|| check_ready(&mut job.task));
+        let finished = match (job.held.take(), job.deadline.passed()) {
+            (Some(held), _) => Some(Ok(held)),
+            (None, Some(late)) => Some(Err(late.into())),
+            (None, None) => check_ready(&mut job.task).map(|result| result.map_err(PlaceFaceError::from)),
+        };
         let Some(finished) = finished else { continue };
         let result = match (finished, rigs.get(of.0)) {
             (Ok(done), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
@@ -255,7 +266,7 @@ pub(super) fn land(
                     continue;
                 }
             },
-            (result, _) => result.map_err(PlaceFaceError::from),
+            (result, _) => result,
         };
         let shapes = job.shapes.clone();
         commands.entity(entity).remove::<FaceJob>();

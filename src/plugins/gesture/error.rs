@@ -1,6 +1,6 @@
 //! Reasons why gestures have no effect.
 
-use crate::plugins::{document::ChangeError, fit::FitFailure, stroke::StrokeFailure};
+use crate::plugins::{document::ChangeError, fit::FitFailure, limits::LimitError, stroke::StrokeFailure};
 
 /// Reason why a gesture had no effect; a sentence for people without its full stop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -31,6 +31,9 @@ pub(super) enum GestureError {
     /// The template was not fitted.
     #[error(transparent)]
     Fit(#[from] FitFailure),
+    /// The list has more gestures, or the stroke more points, than is taken.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
     /// The gesture is no operation on joints.
     #[error("this gesture changes no joint")]
     NoOperation,

@@ -14,6 +14,7 @@ use crate::{
     plugins::{
         document::{Change, EditRefusal, EditReport, EditRequest, Selection, Symmetry},
         fit::{FIT_AROUND, FitAnswer, FitRequest, FitTemplate},
+        limits::{Limit, RigLimits},
         picking::{Pick, PickAnswer, PickRequest},
         placement::{PlaceAnswer, PlaceRequest},
         stroke::{StrokeDone, StrokeParent, StrokeRequest, StrokeResult},
@@ -25,6 +26,9 @@ use crate::{
         step::Commit,
     },
 };
+
+/// Name of a list of gestures in errors.
+const LIST: &str = "gestures";
 
 /// Gestures to carry out on the rig of this entity, and the answers so far.
 #[derive(Component, Default)]
@@ -119,7 +123,12 @@ type ScriptedRig<'a> = (
 );
 
 /// Reads the answers to the last gesture of each script and carries out the next one.
-pub(super) fn run_scripts(mut scripts: Query<ScriptedRig>, mut requests: Requests, mut answers: Answers) {
+pub(super) fn run_scripts(
+    mut scripts: Query<ScriptedRig>,
+    mut requests: Requests,
+    mut answers: Answers,
+    limits: Res<RigLimits>,
+) {
     answers.collect(&mut scripts);
     for (entity, mut script, rig, selection, mut symmetry, surface, meshes) in &mut scripts {
         if script.pending
@@ -134,6 +143,16 @@ pub(super) fn run_scripts(mut scripts: Query<ScriptedRig>, mut requests: Request
         let name = format!("{gesture:?}");
         let name = name.split(['(', ' ', '{']).next().unwrap_or_default().to_owned();
         script.answers.push(GestureAnswer { number, gesture: name, done: true, ..Default::default() });
+        if let Err(error) = limits.check(Limit::Gestures, number, LIST, "the list") {
+            // What is behind it is too much as well.
+            script.waiting.clear();
+            script.fail(&error.into());
+            continue;
+        }
+        if let Err(error) = limits.check_gesture(LIST, number, &gesture) {
+            script.fail(&error.into());
+            continue;
+        }
         let bounds = surface.map_or([Vec3::splat(-0.5), Vec3::splat(0.5)], RigSurface::bounds);
         let mesh = meshes.and_then(|meshes| meshes.iter().next());
         let (state, symmetry) = (&mut script.state, &mut symmetry);

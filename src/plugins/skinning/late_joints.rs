@@ -15,6 +15,7 @@ use crate::{
         commands::{BuildResult, RigModules},
         document::EditReport,
         landing::JobBasis,
+        limits::{Deadline, RigLimits},
         surface::{RigMesh, SkinOf},
     },
     rig::{
@@ -35,7 +36,7 @@ pub(super) fn start_late_shares(
     mut edited: MessageReader<EditReport>,
     meshes: Query<(Entity, &RigMesh, &SkinOf), Without<SkinningJob>>,
     rigs: Query<(&Rig, &BuildResult)>,
-    modules: Option<Res<RigModules>>,
+    (modules, limits): (Option<Res<RigModules>>, Res<RigLimits>),
 ) {
     let mut switched: Vec<Entity> = Vec::new();
     for message in edited.read() {
@@ -61,7 +62,8 @@ pub(super) fn start_late_shares(
                 Ok(input.late_shares(&mesh, &skin))
             });
             let (progress, cancelled) = (Arc::new(AtomicU32::new(0)), Arc::new(AtomicBool::new(false)));
-            let job = SkinningJob { progress, cancelled, task, basis, held: None, is_asked: false };
+            let deadline = Deadline::new(&limits);
+            let job = SkinningJob { progress, cancelled, task, basis, held: None, is_asked: false, deadline };
             commands.entity(entity).insert(job);
         }
     }

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::{Draft, OperationError};
+use super::{Draft, OperationError, leftovers::clear};
 use crate::rig::{EditError, RigEdit, Uid};
 
 /// Deletes joints (and their partners). The joints below move up in place of their parent, or are deleted.
@@ -35,6 +35,7 @@ pub(super) fn delete(draft: &mut Draft, joints: &[Uid], keep_children: bool) -> 
         if let Some(partner) = partner.filter(names_it) {
             draft.apply(RigEdit::SetMirror(partner, None))?;
         }
+        clear(draft, joint)?;
         draft.apply(RigEdit::RemoveJoint(joint))?;
     }
     let next = first_parent.filter(|parent| draft.rig().joint(*parent).is_some());

@@ -20,7 +20,12 @@ use crate::{
         notice::Notice,
     },
     files::{FileKind, LoadError, RealDisk, load_animation, load_model, load_motion, stem},
-    plugins::{commands::RigModules, document::EditRequest, history::RigHistory},
+    plugins::{
+        commands::RigModules,
+        document::EditRequest,
+        history::RigHistory,
+        limits::{LimitError, RigLimits},
+    },
     processor::{BuildError, Builder, Modules},
     rig::{
         BuiltRig, Rig, UidSource,
@@ -79,6 +84,9 @@ enum ImportError {
     /// The file cannot be read.
     #[error(transparent)]
     Load(#[from] LoadError),
+    /// The file holds more than is taken.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
     /// The commands of the rig stop with an error.
     #[error("the rig cannot be built: {0}")]
     Build(#[from] BuildError),
@@ -116,12 +124,14 @@ fn begin(world: &mut World, path: &Path) {
     let Some(rig) = world.get::<Rig>(entity) else { return };
     let rig = world.get::<RigHistory>(entity).map_or_else(|| rig.clone(), |history| history.settled(rig).into_owned());
     let path = path.to_owned();
-    let task = AsyncComputeTaskPool::get().spawn(async move { read(&path, &rig, &modules) });
+    let limits = world.get_resource::<RigLimits>().cloned().unwrap_or_default();
+    let task = AsyncComputeTaskPool::get().spawn(async move { read(&path, &rig, &modules, &limits) });
     world.resource_mut::<ClipImport>().job = Some(Job { rig: entity, name, task });
 }
 
 /// Clips of a file on a rig, as `rigsmith animate` makes them.
-fn read(path: &Path, rig: &Rig, modules: &Arc<Modules>) -> Result<ImportedMotion, ImportError> {
+fn read(path: &Path, rig: &Rig, modules: &Arc<Modules>, limits: &RigLimits) -> Result<ImportedMotion, ImportError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let built = Builder::build(rig, modules)?;
     let has_commands = rig.walk().any(|joint| !joint.data.tags.is_empty());
     let onto = if has_commands { MotionTarget::Controls } else { MotionTarget::Joints };
@@ -139,10 +149,12 @@ fn read(path: &Path, rig: &Rig, modules: &Arc<Modules>) -> Result<ImportedMotion
         }
         Some(FileKind::Bvh) => {
             let motion = load_motion(&RealDisk, path)?;
+            limits.check_motion(&name, &motion)?;
             imported.retarget(rig, &built, &motion, onto)?;
         }
         Some(FileKind::Glb | FileKind::Gltf) => {
             let model = load_model(&RealDisk, path)?;
+            limits.check_model(&name, &model)?;
             let joints = (onto == MotionTarget::Joints).then(|| own_joints(&model, rig)).flatten();
             for (number, clip) in model.clips.iter().enumerate() {
                 let name = if clip.name.trim().is_empty() { stem(path) } else { clip.name.trim().to_owned() };

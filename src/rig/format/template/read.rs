@@ -200,7 +200,8 @@ fn add_joints(
     seen: &mut HashSet<Uid>,
     faults: &mut Vec<SourceError>,
 ) {
-    let mut data = HashMap::with_capacity(joints.len());
+    // Boxed, so that each is freed as soon as its joint is in the rig.
+    let mut data: HashMap<Uid, Box<JointData>> = HashMap::with_capacity(joints.len());
     let mut children: HashMap<Option<Uid>, Vec<Uid>> = HashMap::new();
     let known: HashSet<Uid> = joints.iter().map(|joint| joint.uid).collect();
     let features: HashSet<Uid> = joints.iter().flat_map(|joint| &joint.tags).filter_map(feature_uid).collect();
@@ -284,7 +285,7 @@ fn add_joints(
         children.entry(joint.parent).or_default().push(uid);
         data.insert(
             uid,
-            JointData {
+            Box::new(JointData {
                 uid,
                 label: joint.label,
                 group: joint.group,
@@ -294,9 +295,11 @@ fn add_joints(
                 locked: joint.locked,
                 tags,
                 face,
-            },
+            }),
         );
     }
+    // A table that grows is there twice for a moment.
+    rig.joints.reserve(order.len());
     // Parents first, whatever the order in the file.
     let mut stack: Vec<(Option<Uid>, Uid)> = Vec::new();
     let push = |stack: &mut Vec<_>, parent: Option<Uid>| {
@@ -307,7 +310,7 @@ fn add_joints(
     loop {
         while let Some((parent, uid)) = stack.pop() {
             let Some(joint) = data.remove(&uid) else { continue };
-            let edit = RigEdit::AddJoint { joint: Box::new(joint), parent, index: usize::MAX };
+            let edit = RigEdit::AddJoint { joint, parent, index: usize::MAX };
             if let Err(error) = rig.apply(&edit) {
                 faults.push(places.error(uid, 0, "uid", error.to_string()));
             }
