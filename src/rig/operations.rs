@@ -17,6 +17,7 @@ mod symmetry;
 mod tags;
 mod title;
 mod transform;
+mod whole_pose;
 
 use std::sync::Arc;
 
@@ -31,6 +32,7 @@ pub(in crate::rig) use tags::drop_part;
 pub use tags::{
     CopiedIdentifiers, CopiedJoint, PartOrder, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation, TagScope,
 };
+pub use whole_pose::WholePose;
 
 use crate::rig::{EditError, GROUP_COLORS, GroupData, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource};
 
@@ -138,6 +140,16 @@ pub enum Operation {
     Lock(Vec<Uid>, bool),
     /// Poses joints by offsets on top of their rest transforms. Partners get the mirror image.
     Pose(Vec<(Uid, PoseOffset)>),
+    /// Sets offsets and attributes of nodes as they are given, without mirroring; an attribute without a value gets its
+    /// default.
+    SetPose {
+        /// A few words for the history panel.
+        name: &'static str,
+        /// Nodes with their offsets.
+        offsets: Vec<(Uid, PoseOffset)>,
+        /// Nodes with names and values of their attributes.
+        values: Vec<(Uid, String, Option<f32>)>,
+    },
     /// Resets joints and their partners to rest; all joints if none is listed.
     ResetPose(Vec<Uid>),
     /// Stores the current pose under a name; a stored pose of that name is replaced.
@@ -242,7 +254,7 @@ impl Operation {
                 [RigEdit::SetSkin(_, Some(_))] => "Skin mesh",
                 _ => "Edit rig",
             },
-            Self::Named { name, .. } => name,
+            Self::SetPose { name, .. } | Self::Named { name, .. } => name,
         }
     }
 
@@ -306,6 +318,7 @@ impl Operation {
                 Ok(())
             }
             Self::Pose(offsets) => pose::pose(draft, offsets),
+            Self::SetPose { offsets, values, .. } => pose::set_all(draft, offsets, values),
             Self::ResetPose(joints) => pose::reset(draft, joints),
             Self::StorePose(name) => pose::store(draft, name),
             Self::ApplyPose(pose) => pose::apply(draft, *pose),

@@ -21,6 +21,23 @@ pub(super) fn pose(draft: &mut Draft, offsets: &[(Uid, PoseOffset)]) -> Result<(
     Ok(())
 }
 
+/// Sets offsets and attribute values of nodes; those that are set already stay as they are.
+pub(super) fn set_all(
+    draft: &mut Draft,
+    offsets: &[(Uid, PoseOffset)],
+    values: &[(Uid, String, Option<f32>)],
+) -> Result<(), OperationError> {
+    for (node, offset) in offsets {
+        set(draft, *node, Some(*offset))?;
+    }
+    for (node, name, value) in values {
+        if draft.rig().attribute_value(*node, name) != *value {
+            draft.apply(RigEdit::SetAttributeValue(*node, name.clone(), *value))?;
+        }
+    }
+    Ok(())
+}
+
 /// Resets joints and their partners to rest, and their attributes to the defaults of their commands; all joints and
 /// created nodes if none is listed.
 pub(super) fn reset(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationError> {
