@@ -154,6 +154,8 @@ pub enum Operation {
     ResetPose(Vec<Uid>),
     /// Stores the current pose under a name; a stored pose of that name is replaced.
     StorePose(String),
+    /// Stores a pose that is given under a name; a stored pose of that name is replaced.
+    StoreShown(String, Box<WholePose>),
     /// Makes a stored pose the current one; joints without an entry in it are reset to rest.
     ApplyPose(Uid),
     /// Renames a stored pose.
@@ -242,7 +244,7 @@ impl Operation {
             Self::Lock(..) => "Lock joints",
             Self::Pose(..) => "Pose joints",
             Self::ResetPose(..) => "Reset pose",
-            Self::StorePose(..) => "Store pose",
+            Self::StorePose(..) | Self::StoreShown(..) => "Store pose",
             Self::ApplyPose(..) => "Apply pose",
             Self::RenamePose(..) => "Rename pose",
             Self::DeletePose(..) => "Delete pose",
@@ -320,7 +322,11 @@ impl Operation {
             Self::Pose(offsets) => pose::pose(draft, offsets),
             Self::SetPose { offsets, values, .. } => pose::set_all(draft, offsets, values),
             Self::ResetPose(joints) => pose::reset(draft, joints),
-            Self::StorePose(name) => pose::store(draft, name),
+            Self::StorePose(name) => {
+                let shown = WholePose::of(draft.rig());
+                pose::store(draft, name, &shown)
+            }
+            Self::StoreShown(name, shown) => pose::store(draft, name, shown),
             Self::ApplyPose(pose) => pose::apply(draft, *pose),
             Self::RenamePose(pose, name) => pose::rename(draft, *pose, name),
             Self::DeletePose(pose) => Ok(draft.apply(RigEdit::RemoveStoredPose(*pose))?),

@@ -36,7 +36,7 @@ pub(super) use self::{
     colors::KeyColors,
     drag::KeyDrag,
     ruler::{Markers, height as ruler_height, lines, paint_playhead, show as show_ruler},
-    state::{add as add_keys, contains as contains_keys},
+    state::{add as add_keys, contains as contains_keys, key_times},
 };
 use self::{
     area::{Gesture, Grid},
