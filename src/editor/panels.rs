@@ -45,6 +45,7 @@ impl Plugin for PanelsPlugin {
             poses::PosesPlugin,
             timeline::TimelinePlugin,
             toasts::ToastsPlugin,
+            super::onion::OnionPlugin,
         ))
         .add_panel(hierarchy::HierarchyPanel::default())
         .add_panel(properties::PropertiesPanel::default())
