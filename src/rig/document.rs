@@ -10,8 +10,8 @@ use bevy::{math::Affine3, prelude::*};
 use crate::{
     mesh::model::Weights,
     rig::{
-        AttributeValues, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint,
-        SelectionSet, StoredPose, TagData, Uid, animation::RigClip, part::DroppedPart,
+        AttributeValues, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint, SelectionSet,
+        StoredPose, TagData, Uid, animation::RigClip, part::DroppedPart,
     },
 };
 

@@ -70,9 +70,8 @@ impl ViewportPainter for NodeMenu {
             return;
         }
         let shown = Area::new(Id::new("node menu")).order(Order::Foreground).fixed_pos(open.at).constrain(true);
-        let shown = shown.show(&ctx, |ui| {
-            Frame::menu(ui.style()).show(ui, |ui| entries(ui, world, &open, requests)).inner
-        });
+        let shown =
+            shown.show(&ctx, |ui| Frame::menu(ui.style()).show(ui, |ui| entries(ui, world, &open, requests)).inner);
         let is_elsewhere = ctx.input(|input| {
             let pressed = input.pointer.any_pressed();
             pressed && input.pointer.interact_pos().is_some_and(|at| !shown.response.rect.contains(at))

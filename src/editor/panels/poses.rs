@@ -9,11 +9,11 @@ use bevy_egui::egui::{
     self, Align, Button, Key, Layout, Rect, Sense, Stroke, TextEdit, Ui, UiBuilder, WidgetInfo, WidgetType,
 };
 
+pub(in crate::editor) use self::shown::{PosedRig, put_clip};
 use self::{
     picture::Pictures,
     tween::{Tween, TweenTarget},
 };
-pub(in crate::editor) use self::shown::{PosedRig, put_clip};
 use super::{
     displayed_rig::DisplayedRig,
     fields::{self, Renaming},
@@ -192,15 +192,18 @@ impl PosesPanel {
         let poses = posed.rig.stored_poses();
         let mut operation = None;
         let mut drawn = false;
-        List { id: "poses", count: poses.len(), height: CARD, reveal: None, follow: false }.show(ui, |ui, range, row| {
-            for number in range {
-                let pose = &poses[number];
-                drawn |= self.rename.as_ref().is_some_and(|rename| rename.pose == pose.uid);
-                let rect = row(number).shrink2(egui::vec2(0.0, 1.0));
-                let asked = self.card(ui, rect, pose, world, posed);
-                operation = asked.or(operation.take());
-            }
-        });
+        List { id: "poses", count: poses.len(), height: CARD, reveal: None, follow: false }.show(
+            ui,
+            |ui, range, row| {
+                for number in range {
+                    let pose = &poses[number];
+                    drawn |= self.rename.as_ref().is_some_and(|rename| rename.pose == pose.uid);
+                    let rect = row(number).shrink2(egui::vec2(0.0, 1.0));
+                    let asked = self.card(ui, rect, pose, world, posed);
+                    operation = asked.or(operation.take());
+                }
+            },
+        );
         // The typed text is also accepted when the field disappears.
         if !drawn && self.rename.as_ref().is_some_and(|rename| rename.focused) {
             let rename = self.rename.take()?;
@@ -210,7 +213,14 @@ impl PosesPanel {
     }
 
     /// Draws a pose: its picture, its name and its actions. A click makes it the one that the slider goes to.
-    fn card(&mut self, ui: &mut Ui, rect: Rect, pose: &StoredPose, world: &World, posed: &PosedRig) -> Option<Operation> {
+    fn card(
+        &mut self,
+        ui: &mut Ui,
+        rect: Rect,
+        pose: &StoredPose,
+        world: &World,
+        posed: &PosedRig,
+    ) -> Option<Operation> {
         let current = pose.offsets == posed.shown.offsets && pose.values == posed.shown.values;
         let is_target = self.tween.target == Some(TweenTarget::Pose(pose.uid));
         let response = ui.interact(rect, ui.id().with(pose.uid), Sense::click());
@@ -227,7 +237,8 @@ impl PosesPanel {
         let ground = visuals.extreme_bg_color;
         let lines = self.pictures.lines(world, posed.entity, posed.rig, pose);
         picture::paint(&ui.painter_at(frame), frame, lines, ground, Stroke::new(1.3, color));
-        let text = Rect::from_min_max(egui::pos2(frame.right() + 5.0, rect.top() + 2.0), rect.max - egui::vec2(2.0, 2.0));
+        let text =
+            Rect::from_min_max(egui::pos2(frame.right() + 5.0, rect.top() + 2.0), rect.max - egui::vec2(2.0, 2.0));
         let (head, foot) = text.split_top_bottom_at_fraction(0.5);
         let mut operation = None;
         if self.rename.as_ref().is_some_and(|rename| rename.pose == pose.uid) {
@@ -242,9 +253,8 @@ impl PosesPanel {
                 operation = Some(Operation::DeletePose(pose.uid));
             }
             let menu = ui.menu_button("…", |ui| self.menu(ui, pose, posed));
-            menu.response.widget_info(|| {
-                WidgetInfo::labeled(WidgetType::Button, true, format!("More of {}", pose.name))
-            });
+            menu.response
+                .widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, format!("More of {}", pose.name)));
             operation = menu.inner.flatten().or(operation.take());
             if ui.add_enabled(!current, Button::new("Apply")).on_disabled_hover_text("it is shown already").clicked() {
                 operation = Some(match posed.is_clip {

@@ -40,13 +40,16 @@ impl EditorPanel for SelectionSetsPanel {
             list::nothing(ui, "No selection is stored. Select controls or joints, and store them above.");
         }
         let height = ui.spacing().interact_size.y + 4.0;
-        List { id: "selection sets", count: sets.len(), height, reveal: None, follow: false }.show(ui, |ui, range, row| {
-            for number in range {
-                let rect = row(number).shrink2(egui::vec2(0.0, 1.0));
-                let asked = set_row(ui, rect, number, &sets[number], &shown, built, requests);
-                edit = asked.or(edit.take());
-            }
-        });
+        List { id: "selection sets", count: sets.len(), height, reveal: None, follow: false }.show(
+            ui,
+            |ui, range, row| {
+                for number in range {
+                    let rect = row(number).shrink2(egui::vec2(0.0, 1.0));
+                    let asked = set_row(ui, rect, number, &sets[number], &shown, built, requests);
+                    edit = asked.or(edit.take());
+                }
+            },
+        );
         if let Some((name, edit)) = edit {
             let operation = Operation::Named { name, edits: vec![edit] };
             requests.send(EditRequest::operation(shown.entity, operation));
@@ -103,7 +106,8 @@ fn set_row(
     built: Option<&BuiltRig>,
     requests: &mut Requests,
 ) -> Option<(&'static str, RigEdit)> {
-    let is_there = |node: &&Uid| shown.rig.joint(**node).is_some() || built.is_some_and(|built| built.node(**node).is_some());
+    let is_there =
+        |node: &&Uid| shown.rig.joint(**node).is_some() || built.is_some_and(|built| built.node(**node).is_some());
     let there = set.nodes.iter().filter(is_there).count();
     let is_selected = there > 0 && set.nodes.iter().filter(is_there).eq(shown.selection.0.iter());
     let response = ui.interact(rect, ui.id().with(("set", number)), Sense::click());

@@ -26,13 +26,13 @@ mod state;
 use bevy::{prelude::*, window::RequestRedraw};
 use bevy_egui::egui::{Rangef, Rect, Sense, Stroke, Ui, UiBuilder, WidgetInfo, WidgetType, pos2, vec2};
 
+pub(in crate::editor) use self::state::key_times;
 pub use self::{
     action::{TimelineAction, obstacle, over_timeline},
     axis::TimeAxis,
     marks::{Bucket, Mark, MarkKind, buckets},
     state::{OpenClip, Timeline, TimelineRequest},
 };
-pub(in crate::editor) use self::state::key_times;
 pub(super) use self::{
     area::preview,
     colors::KeyColors,

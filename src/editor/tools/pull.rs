@@ -239,9 +239,7 @@ impl Drag {
                 let gathered = |joints: &[Uid]| PosedJoint::gather(rig, joints);
                 let way = match chain.is_empty() {
                     true => Way::Itself(gathered(&[node])),
-                    false => {
-                        Way::Joints(gathered(&chain), chain.iter().chain([&node]).map(place).collect())
-                    }
+                    false => Way::Joints(gathered(&chain), chain.iter().chain([&node]).map(place).collect()),
                 };
                 (place(&node), way)
             }
@@ -272,9 +270,7 @@ impl Drag {
         Change::Preview(Operation::Pose(match &self.way {
             Way::Controls(pull) => pull.to(goal),
             Way::Joints(joints, points) => turned(joints, points, goal),
-            Way::Itself(roots) => {
-                roots.iter().map(|root| (root.joint, root.dragged(&Delta::Move(by), None))).collect()
-            }
+            Way::Itself(roots) => roots.iter().map(|root| (root.joint, root.dragged(&Delta::Move(by), None))).collect(),
         }))
     }
 

@@ -56,7 +56,8 @@ impl WholePose {
             pose.values.iter().flat_map(of).collect()
         };
         for (node, name) in names(self).into_iter().chain(names(other)) {
-            let attribute = built.and_then(|built| built.node(node)?.attributes.iter().find(|known| *known.name == *name));
+            let attribute =
+                built.and_then(|built| built.node(node)?.attributes.iter().find(|known| *known.name == *name));
             let default = attribute.map(|attribute| attribute.default);
             let of = |pose: &Self| pose.values.get(&node).and_then(|of| of.get(&name)).copied();
             // A node that is not built has no default to go to or to come from.
@@ -68,7 +69,13 @@ impl WholePose {
             };
             let is_choice = attribute.is_some_and(|known| matches!(known.kind, AttributeKind::Choice(_)));
             let value = match is_choice {
-                true => if share < 0.5 { from } else { to },
+                true => {
+                    if share < 0.5 {
+                        from
+                    } else {
+                        to
+                    }
+                }
                 false => from + (to - from) * share,
             };
             mixed.values.entry(node).or_default().insert(name, value);

@@ -46,9 +46,10 @@ impl Pictures {
 
     /// Lines of a stored pose in a unit square.
     pub fn lines(&mut self, world: &World, entity: Entity, rig: &Rig, pose: &StoredPose) -> &[[Vec2; 2]] {
-        let is_made = self.made.get(&pose.uid).is_some_and(|made| {
-            made.pose.offsets == pose.offsets && made.pose.values == pose.values
-        });
+        let is_made = self
+            .made
+            .get(&pose.uid)
+            .is_some_and(|made| made.pose.offsets == pose.offsets && made.pose.values == pose.values);
         if !is_made {
             let pose_of = WholePose::from(pose);
             let lines = fitted(&bones(rig, world.get::<RigRuntime>(entity), &pose_of));

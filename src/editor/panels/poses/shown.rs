@@ -159,7 +159,8 @@ fn of_clip(world: &World, entity: Entity, rig: &Rig) -> WholePose {
         for (slot, node) in state.program().nodes().iter().enumerate().filter(|(_, node)| node.is_posable()) {
             put(node.uid, state.offset_at(slot));
         }
-        for (slot, attribute) in state.program().attributes().iter().enumerate().filter(|(_, known)| known.is_settable) {
+        for (slot, attribute) in state.program().attributes().iter().enumerate().filter(|(_, known)| known.is_settable)
+        {
             let (node, value) = (state.program().nodes()[attribute.node].uid, state.attribute_at(slot));
             let name = attribute.name.to_string();
             if value != attribute.default || rig.attribute_value(node, &name).is_some() {

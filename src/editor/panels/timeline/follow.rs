@@ -82,8 +82,19 @@ pub(super) fn follow_playback(
         Err(_) => {}
     }
     if timeline.playing {
+        let (time, span) = (timeline.time, timeline.span);
+        if let Some(next) = turned_page(span, time) {
+            timeline.span = next;
+        }
         commands.write_message(RequestRedraw);
     }
+}
+
+/// Span of time of the same length with the playhead a tenth from its start, if the playhead is outside of the visible one.
+fn turned_page([start, end]: [f32; 2], time: f32) -> Option<[f32; 2]> {
+    let (length, is_seen) = (end - start, (start..=end).contains(&time));
+    let next = time - 0.1 * length;
+    (!is_seen && length > 0.0 && next.is_finite()).then_some([next, next + length])
 }
 
 /// Remembers the names of nodes, by which keys of nodes that are gone are listed.

@@ -303,13 +303,7 @@ fn retargeted(draft: &MapDraft, rig: &Rig, modules: &Arc<Modules>) -> Result<Imp
 
 impl ImportedMotion {
     /// Adds the motion of another skeleton.
-    fn retarget(
-        &mut self,
-        rig: &Rig,
-        built: &BuiltRig,
-        motion: &Motion,
-        map: &JointMap,
-    ) -> Result<(), ImportError> {
+    fn retarget(&mut self, rig: &Rig, built: &BuiltRig, motion: &Motion, map: &JointMap) -> Result<(), ImportError> {
         let settings = RetargetSettings { onto: target_of(rig), ..RetargetSettings::default() };
         let done = retarget(rig, built, motion, map, &settings)?;
         let unmapped = map.unmapped_source(motion).len();

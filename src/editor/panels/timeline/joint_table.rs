@@ -29,7 +29,8 @@ pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy:
     ui.horizontal_wrapped(|ui| {
         let can_import = mapped > 0 && !is_busy;
         let import = ui.add_enabled(can_import, Button::new("Import motion"));
-        let why_not = if is_busy { "it is being put onto the rig" } else { "no joint of the motion moves one of the rig" };
+        let why_not =
+            if is_busy { "it is being put onto the rig" } else { "no joint of the motion moves one of the rig" };
         if import.on_disabled_hover_text(why_not).clicked() {
             requests.send(MapRequest::Accept);
         }
