@@ -70,8 +70,8 @@ impl Tween {
         let response = ui
             .scope(|ui| {
                 ui.spacing_mut().slider_width = (ui.available_width() - 48.0).max(40.0);
-                let slider = Slider::new(&mut share, 0.0..=100.0).show_value(false);
                 ui.horizontal(|ui| {
+                    let slider = Slider::new(&mut share, 0.0..=100.0).show_value(false);
                     let response = ui.add_enabled(can_start || self.drag.is_some(), slider);
                     ui.weak(format!("{share:.0} %"));
                     response
