@@ -51,9 +51,9 @@ impl Default for OnionSkin {
 /// Distance between poses of the onion skin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OnionStep {
-    /// This many frames.
+    /// A number of frames.
     Frames(u32),
-    /// From key to key.
+    /// The way from key to key.
     Keys,
 }
 
@@ -147,7 +147,7 @@ struct OnionPainter {
     made_from: Option<MadeFrom>,
 }
 
-/// Everything that the ghosts follow from.
+/// Values that the ghosts follow from.
 #[derive(Clone, PartialEq)]
 struct MadeFrom {
     clip: RigClip,

@@ -70,6 +70,19 @@ pub fn pull(points: &[Vec3], goal: Vec3) -> Vec<Quat> {
 /// Joints that turn when a joint is pulled, from the top: those above it up to the next one from which several limbs go, but
 /// for a collarbone. A joint right below such a one turns it alone; a root has none.
 pub fn chain_above(rig: &Rig, joint: Uid) -> Vec<Uid> {
+    let mut chain = limb_above(rig, joint);
+    if let [first, second, ..] = chain[..] {
+        let third = chain.get(2).copied().unwrap_or(joint);
+        let length = |from: Uid, to: Uid| rig.position(from).distance(rig.position(to));
+        if length(first, second) < COLLARBONE * length(second, third) {
+            chain.remove(0);
+        }
+    }
+    chain
+}
+
+/// Joints above a joint up to the next one from which several limbs go, from the top.
+fn limb_above(rig: &Rig, joint: Uid) -> Vec<Uid> {
     let has_children = |joint: &&Uid| !rig.children(Some(**joint)).is_empty();
     let is_branch = |joint: Uid| rig.children(Some(joint)).iter().filter(has_children).count() > 1;
     let mut chain = Vec::new();
@@ -83,12 +96,5 @@ pub fn chain_above(rig: &Rig, joint: Uid) -> Vec<Uid> {
         chain.push(above);
     }
     chain.reverse();
-    if let [first, second, ..] = chain[..] {
-        let third = chain.get(2).copied().unwrap_or(joint);
-        let length = |from: Uid, to: Uid| rig.position(from).distance(rig.position(to));
-        if length(first, second) < COLLARBONE * length(second, third) {
-            chain.remove(0);
-        }
-    }
     chain
 }

@@ -101,7 +101,7 @@ pub(in crate::editor) enum WriteError {
     /// The mesh has no weights.
     #[error("there are no weights to export; skin the mesh first")]
     NoWeights,
-    /// Nobody is named as the author of an avatar.
+    /// An avatar without an author.
     #[error("VRM 1.0 requires an author; type a name into the field Author, or into the template's header")]
     NoAuthor,
     /// The rig is no avatar.

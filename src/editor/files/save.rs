@@ -86,7 +86,7 @@ pub(super) enum SavedContent {
     },
     /// Export; `template` is the rig if it was saved to the template that was opened.
     Export {
-        /// What Rigsmith's own reader finds in the file.
+        /// Content that Rigsmith's own reader finds in the file.
         checked: Result<String, LoadError>,
         notes: Vec<String>,
         template: Option<Arc<Rig>>,

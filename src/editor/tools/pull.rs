@@ -86,11 +86,11 @@ struct Drag {
 /// Way in which a node follows the pointer.
 #[derive(Debug)]
 enum Way {
-    /// By controls of a built rig.
+    /// Controls of a built rig, which move it.
     Controls(Box<ControlPull>),
-    /// By the joints above, from the top, with the positions of these joints and of the pulled one.
+    /// Joints above it, from the top, with their positions and its own.
     Joints(Vec<PosedJoint>, Vec<Vec3>),
-    /// By its own movement: a root.
+    /// Movement of the node itself: a root.
     Itself(Vec<PosedJoint>),
 }
 

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use bevy::math::{Quat, Vec3};
 
-use super::{chain_above, pull};
+use super::{chain_above, limb_above, pull};
 use crate::{
     mesh::model::Trs,
     rig::{BuiltRig, NodeType, PoseOffset, Rig, Uid},
@@ -65,8 +65,10 @@ enum Way {
 /// Control that was tried.
 struct Tried {
     slot: usize,
-    /// Numbers of joints that it moves.
+    /// Joints that it moves, as slots.
     moved: BTreeSet<usize>,
+    /// Joints that it turns.
+    turned: BTreeSet<usize>,
     /// Largest movement of the pulled node along that of the control, as a share of it; zero for a control that turns.
     gain: f32,
 }
@@ -82,10 +84,6 @@ impl ControlPull {
         let slot = state.program().node(node).ok_or(PullError::NoNode)?;
         let far = state.globals().iter().map(|at| at.translation.length());
         let size = far.filter(|far| far.is_finite()).fold(1e-3, f32::max);
-        let control = built.node(node).and_then(|node| node.control.as_ref());
-        if control.is_some_and(|control| control.channels.translate.contains(&true)) {
-            return Ok(Self { state, slot, way: Way::Move { handle: slot, gain: 1.0 }, size });
-        }
         let handles: Vec<(usize, [bool; 2])> = built
             .nodes
             .iter()
@@ -98,7 +96,10 @@ impl ControlPull {
             .collect();
         let subject = subject(rig, &mut state, node, size);
         let chain = subject.map(|joint| chain_above(rig, joint)).unwrap_or_default();
-        let below = below(built, &state, chain.first().copied().or(subject));
+        // A shoulder may follow the goal of its hand, but it does not turn by itself.
+        let limb = subject.map(|joint| limb_above(rig, joint)).unwrap_or_default();
+        let below = |top: Option<&Uid>| nodes_below(built, &state, top.copied().or(subject));
+        let (in_limb, in_chain) = (below(limb.first()), below(chain.first()));
         let above: Vec<usize> = chain.iter().filter_map(|joint| state.program().node(*joint)).collect();
         let mut turning = Vec::new();
         let mut moving = Vec::new();
@@ -110,14 +111,15 @@ impl ControlPull {
                 moving.extend(tried_move(&mut state, handle, slot, size));
             }
         }
-        let is_local = |tried: &&Tried| tried.moved.is_subset(&below);
-        let moves_chain = |tried: &&Tried| above.is_empty() || above.iter().any(|joint| tried.moved.contains(joint));
+        let is_local = |tried: &&Tried| tried.moved.is_subset(&in_limb);
+        // Forward controls that are moved carry the limb away; goals turn it.
+        let turns_chain = |tried: &&Tried| above.is_empty() || above.iter().any(|joint| tried.turned.contains(joint));
         let local = |least: f32| {
-            let good = moving.iter().filter(is_local).filter(moves_chain).filter(|tried| tried.gain >= least);
+            let good = moving.iter().filter(is_local).filter(turns_chain).filter(|tried| tried.gain >= least);
             good.min_by_key(|tried| tried.moved.len())
         };
         let as_move = |tried: &Tried| Way::Move { handle: tried.slot, gain: tried.gain };
-        let mut chain_controls: Vec<&Tried> = turning.iter().filter(is_local).collect();
+        let mut chain_controls: Vec<&Tried> = turning.iter().filter(|tried| tried.moved.is_subset(&in_chain)).collect();
         // A control that moves more stands above; of two that move the same joints the later one hangs below.
         chain_controls.sort_by_key(|tried| std::cmp::Reverse(tried.moved.len()));
         if chain.len() == 1 && chain_controls.len() > 1 {
@@ -134,9 +136,14 @@ impl ControlPull {
                 (None, turning) => turning.map(|turning| Way::Turn(vec![turning.slot])),
             }
         };
+        // A control that is pulled itself moves where it is a goal, or where no controls above it turn.
+        let own = moving.iter().find(|tried| tried.slot == slot);
+        let is_moved = own.is_some_and(|own| chain.is_empty() || turns_chain(&own) || chain_controls.is_empty());
         let way = match (local(GOOD_GAIN), chain_controls.is_empty()) {
-            (Some(best), _) => as_move(best),
-            (None, false) => Way::Turn(chain_controls.iter().map(|tried| tried.slot).collect()),
+            _ if is_moved => Way::Move { handle: slot, gain: 1.0 },
+            (Some(best), _) if own.is_none() => as_move(best),
+            (Some(_), true) => Way::Move { handle: slot, gain: 1.0 },
+            (_, false) => Way::Turn(chain_controls.iter().map(|tried| tried.slot).collect()),
             (None, true) => match local(LEAST_GAIN) {
                 Some(best) => as_move(best),
                 None => widest().ok_or(PullError::NoControl)?,
@@ -247,12 +254,12 @@ fn subject(rig: &Rig, state: &mut RigState, node: Uid, size: f32) -> Option<Uid>
     }
     let slot = state.program().node(node)?;
     let (moved, _) = with_turn(state, slot, None, size)?;
-    let joints = moved.into_iter().map(|slot| state.program().nodes()[slot].uid);
+    let joints = moved.joints.into_iter().map(|slot| state.program().nodes()[slot].uid);
     joints.filter(|joint| rig.joint(*joint).is_some()).min_by_key(|joint| rig.ancestors(*joint).count())
 }
 
 /// Slots of a node and of all nodes below it.
-fn below(built: &BuiltRig, state: &RigState, top: Option<Uid>) -> BTreeSet<usize> {
+fn nodes_below(built: &BuiltRig, state: &RigState, top: Option<Uid>) -> BTreeSet<usize> {
     let mut inside = vec![false; built.nodes.len()];
     for (number, node) in built.nodes.iter().enumerate() {
         inside[number] = Some(node.uid) == top || node.parent.is_some_and(|parent| inside[parent]);
@@ -261,22 +268,32 @@ fn below(built: &BuiltRig, state: &RigState, top: Option<Uid>) -> BTreeSet<usize
     nodes.filter_map(|(node, _)| state.program().node(node.uid)).collect()
 }
 
-/// Joints that differ between the state and what it was before.
-fn moved_joints(state: &RigState, before: &[Trs], size: f32) -> BTreeSet<usize> {
-    let nodes = state.program().nodes().iter().zip(before).enumerate();
-    let is_moved = |slot: usize, before: &Trs| {
-        let now = state.global_at(slot);
-        now.translation.distance(before.translation) > STILL * size
-            || now.rotation.dot(before.rotation).abs() < 1.0 - 1e-6
-    };
-    nodes
-        .filter(|(slot, (node, before))| node.kind == NodeType::Joint && is_moved(*slot, before))
-        .map(|(slot, _)| slot)
-        .collect()
+/// Joints that moved or turned, as slots.
+#[derive(Default)]
+struct Moved {
+    joints: BTreeSet<usize>,
+    turned: BTreeSet<usize>,
+}
+
+impl Moved {
+    /// Adds the joints that differ between the state and what it was before.
+    fn add(&mut self, state: &RigState, before: &[Trs], size: f32) {
+        let nodes = state.program().nodes().iter().zip(before).enumerate();
+        for (slot, (_, before)) in nodes.filter(|(_, (node, _))| node.kind == NodeType::Joint) {
+            let now = state.global_at(slot);
+            let is_turned = now.rotation.dot(before.rotation).abs() < 1.0 - 1e-6;
+            if is_turned {
+                self.turned.insert(slot);
+            }
+            if is_turned || now.translation.distance(before.translation) > STILL * size {
+                self.joints.insert(slot);
+            }
+        }
+    }
 }
 
 /// Joints that a turn of a control moves, and the movement of a pulled node; `None` for a control that cannot turn.
-fn with_turn(state: &mut RigState, slot: usize, pulled: Option<usize>, size: f32) -> Option<(BTreeSet<usize>, f32)> {
+fn with_turn(state: &mut RigState, slot: usize, pulled: Option<usize>, size: f32) -> Option<(Moved, f32)> {
     let (offset, before) = (state.offset_at(slot), state.globals().to_vec());
     for sign in [1.0, -1.0] {
         // An axis along none of the control's own turns it about each that is free.
@@ -284,7 +301,8 @@ fn with_turn(state: &mut RigState, slot: usize, pulled: Option<usize>, size: f32
         state.set_offset_at(slot, PoseOffset { rotation: (offset.rotation * by).normalize(), ..offset });
         let is_turned = state.offset_at(slot) != offset;
         state.evaluate(0.0);
-        let moved = moved_joints(state, &before, size);
+        let mut moved = Moved::default();
+        moved.add(state, &before, size);
         let by = pulled.map_or(0.0, |at| state.global_at(at).translation.distance(before[at].translation));
         state.set_offset_at(slot, offset);
         state.evaluate(0.0);
@@ -297,12 +315,12 @@ fn with_turn(state: &mut RigState, slot: usize, pulled: Option<usize>, size: f32
 
 fn tried_turn(state: &mut RigState, handle: usize, slot: usize, size: f32) -> Option<Tried> {
     let (moved, by) = with_turn(state, handle, Some(slot), size)?;
-    (by > STILL * size).then_some(Tried { slot: handle, moved, gain: 0.0 })
+    (by > STILL * size).then_some(Tried { slot: handle, moved: moved.joints, turned: moved.turned, gain: 0.0 })
 }
 
 fn tried_move(state: &mut RigState, handle: usize, slot: usize, size: f32) -> Option<Tried> {
     let (offset, before) = (state.offset_at(handle), state.globals().to_vec());
-    let (mut gain, mut moved) = (0.0_f32, BTreeSet::new());
+    let (mut gain, mut moved) = (0.0_f32, Moved::default());
     let far = TRIED_DISTANCE * size;
     let axes = Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
     for axis in std::iter::once(Vec3::new(0.55, 0.62, 0.56)).chain(axes) {
@@ -310,15 +328,20 @@ fn tried_move(state: &mut RigState, handle: usize, slot: usize, size: f32) -> Op
         let wanted = Trs { translation: now.translation + axis * far, ..now };
         state.set_offset_at(handle, offset_towards(&now, &offset, &wanted));
         state.evaluate(0.0);
-        let by = (state.global_at(slot).translation - before[slot].translation).dot(axis) / far;
-        gain = gain.max(by);
-        moved.extend(moved_joints(state, &before, size));
+        let by = state.global_at(slot).translation - before[slot].translation;
+        gain = gain.max(by.dot(axis) / far);
+        moved.add(state, &before, size);
         state.set_offset_at(handle, offset);
         state.evaluate(0.0);
         // Most controls have no effect, which the first direction shows: it is along none of their axes.
-        if moved.is_empty() {
+        if by.length() <= STILL * size {
             break;
         }
     }
-    (gain >= LEAST_GAIN).then_some(Tried { slot: handle, moved, gain: gain.min(1.0) })
+    (gain >= LEAST_GAIN).then_some(Tried {
+        slot: handle,
+        moved: moved.joints,
+        turned: moved.turned,
+        gain: gain.min(1.0),
+    })
 }

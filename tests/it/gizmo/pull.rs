@@ -55,7 +55,7 @@ fn chains_end_where_limbs_meet_and_collarbones_stay() {
         let name = |joint: Uid| rig.joint(joint).and_then(|joint| joint.data.label.clone()).unwrap_or_default();
         chain_above(&rig, joint).into_iter().map(name).collect::<Vec<_>>()
     };
-    assert_eq!(of("hand_l"), ["upper_arm_l", "lower_arm_l"]);
+    assert_eq!(of("hand_l"), ["upper_arm_l", "forearm_l"]);
     assert!(chain_above(&rig, rig.roots()[0]).is_empty());
 }
 

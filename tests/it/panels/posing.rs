@@ -17,7 +17,7 @@ use rigsmith::{
     },
     prelude::*,
     rig::{
-        Matching, PoseOffset,
+        JointData, Matching, PoseOffset, RestTransform,
         operations::{MirrorPlane, WholePose},
         project::{Project, ProjectRig, read_project, write_project},
         template::write_template,
@@ -29,15 +29,20 @@ use super::desk::{Desk, Sheet};
 /// Two arms that are partners, with the left one bent.
 fn arms(panel: impl rigsmith::editor::panel::EditorPanel) -> (Desk, [Uid; 3]) {
     let mut desk = Desk::with(Sheet::Panel(Box::new(panel)), egui::vec2(300.0, 900.0));
-    let hips = desk.chain(&["hips"])[0];
-    let mut arm = |x: f32, label: &str| {
-        desk.edit(Operation::Place { position: Vec3::new(x, 1.0, 0.0), parent: Some(hips) });
-        let joint = desk.rig().walk().last().unwrap().data.uid;
-        desk.edit(Operation::Labels(vec![(joint, label.to_owned())]));
-        joint
+    let [hips, left, right] = [Uid(11), Uid(12), Uid(13)];
+    let joint = |uid, label: &str, x: f32, mirror: Option<Uid>| JointData {
+        uid,
+        label: Some(label.to_owned()),
+        rest: RestTransform::from_translation(Vec3::new(x, 1.0, 0.0)),
+        mirror,
+        ..default()
     };
-    let (left, right) = (arm(1.0, "arm_l"), arm(-1.0, "arm_r"));
-    desk.edit(Operation::Edits(vec![RigEdit::SetMirror(left, Some(right)), RigEdit::SetMirror(right, Some(left))]));
+    let add = |joint: JointData, parent| RigEdit::AddJoint { joint: Box::new(joint), parent, index: 9 };
+    desk.edit(Operation::Edits(vec![
+        add(joint(hips, "hips", 0.0, None), None),
+        add(joint(left, "arm_l", 1.0, Some(right)), Some(hips)),
+        add(joint(right, "arm_r", -1.0, Some(left)), Some(hips)),
+    ]));
     desk.edit(Operation::Pose(vec![(left, bent(0.8))]));
     desk.select(&[]);
     (desk, [hips, left, right])

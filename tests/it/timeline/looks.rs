@@ -1,4 +1,4 @@
-//! What the timeline shows: its bar on one line, the page that turns, and the onion skin.
+//! Looks of the timeline: its bar on one line, the page that turns, and the onion skin.
 
 use rigsmith::editor::onion::{OnionSkin, OnionStep, onion_ghosts, onion_times};
 

@@ -47,6 +47,7 @@ pub(super) fn follow_playback(
         (timeline.playing, timeline.starting) = (false, false);
         return;
     };
+    let was_playing = timeline.playing;
     match players.get_mut(entity) {
         Ok(mut player) if player.clip == clip.uid => {
             if is_taken_back {
@@ -81,11 +82,12 @@ pub(super) fn follow_playback(
         }
         Err(_) => {}
     }
+    if (was_playing || timeline.playing)
+        && let Some(next) = turned_page(timeline.span, timeline.time)
+    {
+        timeline.span = next;
+    }
     if timeline.playing {
-        let (time, span) = (timeline.time, timeline.span);
-        if let Some(next) = turned_page(span, time) {
-            timeline.span = next;
-        }
         commands.write_message(RequestRedraw);
     }
 }
