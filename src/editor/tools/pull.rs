@@ -107,18 +107,28 @@ fn aim(
 ) {
     let presses = pointers.read().filter(|pointer| pointer.act == PointerAct::Pressed).map(|pointer| pointer.at);
     let Some(at) = presses.last() else { return };
-    let found = (|| {
-        let (rig, sight) = (scene.rig()?, scene.sight()?);
-        if *mode != Mode::Pose {
-            return None;
-        }
-        let reach = select::REACH * sight.pixel;
-        let visible = || controls.visible(nodes.get(rig.entity).ok(), rig.place.affine().inverse());
-        let control = in_use.0.then(|| control_at(&visible(), &sight.plane, sight.point(at), reach)).flatten();
-        control.or_else(|| joint_at(&scene, &rig, &sight, at))
-    })();
+    let found = (*mode == Mode::Pose).then(|| node_at(&scene, &nodes, &controls, *in_use, at)).flatten();
     tool.aim = found;
     hover.set_if_neq(PullHover(found.is_some()));
+}
+
+/// The control whose outline is at a pixel, or else the joint there.
+fn node_at(
+    scene: &Scene,
+    nodes: &Query<&RigNodes>,
+    controls: &ControlNodes,
+    in_use: ControlsInUse,
+    at: Vec2,
+) -> Option<Uid> {
+    let (rig, sight) = (scene.rig()?, scene.sight()?);
+    if in_use.0 {
+        let visible = controls.visible(nodes.get(rig.entity).ok(), rig.place.affine().inverse());
+        let control = control_at(&visible, &sight.plane, sight.point(at), select::REACH * sight.pixel);
+        if control.is_some() {
+            return control;
+        }
+    }
+    joint_at(scene, &rig, &sight, at)
 }
 
 /// The joint nearest to a pixel within reach; the selected one of several at the same distance.

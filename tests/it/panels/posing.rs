@@ -8,7 +8,7 @@ use rigsmith::{
     editor::{
         actions::{Action, ActionRequest},
         mode::Mode,
-        panels::{poses::PosesPanel, selection_sets::SelectionSetsPanel},
+        panels::{poses::PosesPanel, selection_sets::SelectionSetsPanel, timeline::TimelineRequest},
     },
     plugins::{
         commands::{BuildRequest, BuildResult, BuildStep},
@@ -18,6 +18,7 @@ use rigsmith::{
     prelude::*,
     rig::{
         JointData, Matching, PoseOffset, RestTransform,
+        animation::{Key as ClipKey, Property, RigClip, Track, TrackTarget},
         operations::{MirrorPlane, WholePose},
         project::{Project, ProjectRig, read_project, write_project},
         template::write_template,
@@ -308,4 +309,40 @@ fn the_menu_of_a_control_switches_kinematics_without_a_jump() {
     desk.key(Key::Escape);
     desk.frames(2);
     assert!(desk.look("Reset pose").is_none());
+}
+
+#[test]
+fn a_slider_tweens_the_shown_pose_to_a_neighbouring_key() {
+    let (mut desk, [_, left, _]) = arms(PosesPanel::default());
+    desk.edit(Operation::ResetPose(Vec::new()));
+    let mut clip = RigClip { range: [0.0, 2.0], ..RigClip::new(Uid(71), Uid(72), "wave") };
+    let keys = [0.0_f32, 1.0].map(|time| ClipKey::rotation(time, Quat::from_rotation_z(time))).to_vec();
+    clip.layers[0].tracks.insert(TrackTarget { node: left, property: Property::Rotation }, Arc::new(Track { keys }));
+    desk.edit(Operation::Edits(vec![RigEdit::AddClip(Box::new(clip), 0)]));
+    for request in [TimelineRequest::Open(Some(Uid(71))), TimelineRequest::Scrub(0.5)] {
+        desk.app.world_mut().write_message(request);
+        desk.frames(3);
+    }
+    assert!(desk.says("1 joint is posed"), "what the clip shows: {:?}", desk.seen);
+    let choose = |desk: &mut Desk, target: &str| {
+        let combo = desk.find("Tween to").rect.center();
+        desk.time += 1.0;
+        desk.click_at(combo);
+        desk.frames(2);
+        desk.click(target);
+        desk.frames(2);
+    };
+    for (target, angle) in [("Key after", 1.0), ("Key before", 0.0)] {
+        choose(&mut desk, target);
+        let rect = desk.find("Tween").rect;
+        let at = |share: f32| Pos2::new(rect.left() + rect.width() * share, rect.center().y);
+        let (before, steps) = (bytes(&desk), desk.steps().1);
+        desk.drag(at(0.05), at(0.5));
+        desk.frames(2);
+        assert_eq!(desk.steps().1, steps + 1);
+        let turn = desk.rig().offset(left).expect("a pose").rotation.angle_between(Quat::IDENTITY);
+        assert!((turn - (0.5 + angle) / 2.0).abs() < 0.06, "{target}: {turn}");
+        undo(&mut desk);
+        assert_eq!(bytes(&desk), before, "{target}");
+    }
 }
