@@ -25,6 +25,7 @@ pub mod proportion;
 pub mod reference;
 mod remap;
 mod revision;
+mod selection_set;
 pub mod shapes;
 pub mod skeleton_preset;
 pub mod step;
@@ -56,6 +57,7 @@ pub use joint::{FaceBonePart, FacePlacement, JointData, NodeKind, RestTransform,
 pub use pose::{AttributeValues, PoseOffset, StoredPose};
 pub use reference::{NodeRef, NodeRefs};
 pub use revision::Revision;
+pub use selection_set::SelectionSet;
 pub use tag::{TagData, TagKind};
 pub(crate) use uid::mix;
 pub use uid::{Uid, UidError, UidSource};

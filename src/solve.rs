@@ -21,6 +21,7 @@ pub mod limit;
 pub mod matching;
 pub mod pose_reader;
 pub mod program;
+pub mod pull;
 pub mod reduction;
 pub mod retarget;
 pub mod rivet;

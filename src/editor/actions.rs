@@ -55,6 +55,8 @@ pub enum Action {
     Skin,
     /// Resets the pose of the selected joints, or of all if none is selected.
     ResetPose,
+    /// Puts the mirror image of the selected joints' pose onto the other side, or swaps the sides if none is selected.
+    MirrorPose,
     /// Stores the pose under a name.
     StorePose,
     /// Carries out all commands of the rig.
@@ -109,6 +111,8 @@ pub enum Action {
     Meshes,
     /// Colours the joints that move points of a mesh, or shows the colours of groups again.
     Deforming,
+    /// Shows or hides the poses of the open clip before and after the playhead.
+    OnionSkin,
     /// Makes the interface larger.
     UiLarger,
     /// Makes the interface smaller.
@@ -148,6 +152,7 @@ impl Action {
             Self::Fit,
             Self::Skin,
             Self::ResetPose,
+            Self::MirrorPose,
             Self::StorePose,
             Self::Build,
             Self::RollBack,
@@ -175,6 +180,7 @@ impl Action {
             Self::Bones,
             Self::Meshes,
             Self::Deforming,
+            Self::OnionSkin,
             Self::UiLarger,
             Self::UiSmaller,
             Self::UiUsual,

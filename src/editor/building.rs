@@ -72,7 +72,11 @@ fn carry_out(
 }
 
 /// Controls are in use where people select and pose, unless they are hidden.
-fn use_controls(mode: Option<Res<Mode>>, drawing: Option<Res<RigDrawing>>, mut in_use: ResMut<ControlsInUse>) {
+pub(super) fn use_controls(
+    mode: Option<Res<Mode>>,
+    drawing: Option<Res<RigDrawing>>,
+    mut in_use: ResMut<ControlsInUse>,
+) {
     let is_mode = mode.is_none_or(|mode| matches!(*mode, Mode::Select | Mode::Pose));
     in_use.set_if_neq(ControlsInUse(is_mode && drawing.is_none_or(|drawing| drawing.controls)));
 }

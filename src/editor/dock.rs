@@ -47,7 +47,7 @@ impl Default for Layout {
         let mut dock = DockState::new(vec![VIEWPORT.to_owned()]);
         let tabs = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let tree = dock.main_surface_mut();
-        let [centre, _] = tree.split_left(NodeIndex::root(), 0.19, tabs(&["Hierarchy", "Groups", "Process"]));
+        let [centre, _] = tree.split_left(NodeIndex::root(), 0.19, tabs(&["Hierarchy", "Groups", "Sets", "Process"]));
         let [centre, right] =
             tree.split_right(centre, 0.75, tabs(&["Properties", "Tags", "Controls", "Skinning", "Face"]));
         let [_, _] = tree.split_below(right, 0.6, tabs(&["History", "Poses", "Display"]));

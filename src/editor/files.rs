@@ -10,6 +10,7 @@ pub mod dialog;
 mod dialog_view;
 mod document;
 mod error;
+mod export;
 mod open;
 mod save;
 mod template;
@@ -29,6 +30,7 @@ use bevy::{
 pub use self::{
     bundled::{BODY, BUNDLED_MODELS, BundledModel, HEAD},
     document::{MeshSource, OpenDocument, StateFolder},
+    export::ExportOptions,
     open::LoadJob,
     save::SaveJob,
 };
@@ -69,6 +71,7 @@ impl Plugin for FilesPlugin {
             .init_resource::<LoadJob>()
             .init_resource::<SaveJob>()
             .init_resource::<Dialog>()
+            .init_resource::<ExportOptions>()
             .init_resource::<StateFolder>()
             .init_resource::<recovery::Recovery>()
             .init_resource::<EditorSettings>()

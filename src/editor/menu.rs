@@ -119,6 +119,7 @@ pub(super) fn show(
                     Some(("Skin", Action::Skin)),
                     None,
                     Some(("Reset pose", Action::ResetPose)),
+                    Some(("Mirror pose", Action::MirrorPose)),
                     Some(("Store pose", Action::StorePose)),
                 ],
             );
@@ -163,6 +164,7 @@ pub(super) fn show(
                     Some(("Bones", Action::Bones)),
                     Some(("Meshes", Action::Meshes)),
                     Some(("Joints that deform", Action::Deforming)),
+                    Some(("Onion skin", Action::OnionSkin)),
                 ],
             );
         });

@@ -19,7 +19,7 @@ pub enum Mode {
     Rotate,
     /// A gizmo scales the selected joints at rest.
     Scale,
-    /// A gizmo turns the selected joints on top of the rest pose; the rest pose stays.
+    /// A gizmo turns the selected joints on top of the rest pose, and drags pull joints; the rest pose stays.
     Pose,
     /// Shows the weights of the selected joint.
     Weights,

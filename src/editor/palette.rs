@@ -66,7 +66,10 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
         Action::Delete | Action::DeleteHierarchy | Action::MirrorSelected => {
             (!selected).then_some("no joint is selected")
         }
-        Action::SelectAll | Action::StorePose | Action::ResetPose => rig.is_empty().then_some("there are no joints"),
+        Action::SelectAll | Action::StorePose | Action::ResetPose | Action::MirrorPose => {
+            rig.is_empty().then_some("there are no joints")
+        }
+        Action::OnionSkin => timeline::OpenClip::of(world).is_none().then_some("no clip is open"),
         Action::Fit | Action::Meshes => (!has_mesh).then_some("no mesh is open"),
         Action::Deforming => rig.skins().next().is_none().then_some("no mesh has weights"),
         Action::Skin if !has_mesh => Some("no mesh is open"),

@@ -14,6 +14,7 @@ pub mod log;
 pub mod poses;
 pub mod process;
 pub mod properties;
+pub mod selection_sets;
 pub mod skinning;
 pub mod tags;
 pub mod timeline;
@@ -24,6 +25,7 @@ mod features;
 mod fields;
 mod groups;
 mod list;
+mod node_menu;
 
 use bevy::prelude::*;
 
@@ -43,6 +45,7 @@ impl Plugin for PanelsPlugin {
             poses::PosesPlugin,
             timeline::TimelinePlugin,
             toasts::ToastsPlugin,
+            super::onion::OnionPlugin,
         ))
         .add_panel(hierarchy::HierarchyPanel::default())
         .add_panel(properties::PropertiesPanel::default())
@@ -53,11 +56,13 @@ impl Plugin for PanelsPlugin {
         .add_panel(skinning::SkinningPanel::default())
         .add_panel(face::FacePanel::default())
         .add_panel(poses::PosesPanel::default())
+        .add_panel(selection_sets::SelectionSetsPanel::default())
         .add_panel(history::HistoryPanel::default())
         .add_panel(display::DisplayPanel::default())
         .add_panel(timeline::TimelinePanel::default())
         .add_panel(curves::CurvesPanel::default())
         .add_panel(log::LogPanel::default())
-        .add_overlay(toasts::Toasts::default());
+        .add_overlay(toasts::Toasts::default())
+        .add_painter(node_menu::NodeMenu::default());
     }
 }

@@ -94,7 +94,7 @@ fn purpose(mode: Mode) -> &'static str {
         Mode::Move => "Move joints at rest",
         Mode::Rotate => "Turn joints at rest",
         Mode::Scale => "Scale joints at rest",
-        Mode::Pose => "Turn joints and see the mesh follow; the rest pose stays",
+        Mode::Pose => "Pull and turn joints and see the mesh follow; the rest pose stays",
         Mode::Weights => "See which points a joint moves",
     }
 }

@@ -6,6 +6,7 @@
 //! | [`place`] | Place | shows where a joint would go, and puts it there |
 //! | [`stroke`] | Stroke | draws, previews, accepts |
 //! | [`transform`] | Move, Rotate, Scale, Pose | drags the handles of a [`gizmo`](mod@gizmo) |
+//! | [`pull`] | Pose | drags a joint or a control, and the joints above follow |
 //! | [`weights`] | Weights | shows what the selected joint moves |
 //! | [`symmetry`] | all | the plane of live mirroring |
 //!
@@ -17,6 +18,7 @@ pub mod ghosts;
 pub mod gizmo;
 pub mod place;
 pub mod pose;
+pub mod pull;
 pub mod scene;
 pub mod select;
 pub mod stroke;
@@ -47,6 +49,7 @@ impl Plugin for ToolsPlugin {
             .init_resource::<ViewportSight>()
             .init_resource::<PointerOwner>()
             .init_resource::<GizmoHover>()
+            .init_resource::<PullHover>()
             .add_message::<ViewportPointer>()
             .add_message::<ToolPointer>()
             .add_message::<ActionRequest>()
@@ -66,6 +69,7 @@ impl Plugin for ToolsPlugin {
                 stroke::StrokeToolPlugin,
                 weights::WeightsPlugin,
                 transform::TransformPlugin,
+                pull::PullPlugin,
                 ghosts::GhostsPlugin,
             ));
     }
@@ -97,6 +101,8 @@ pub enum Tool {
     Stroke,
     /// A handle of a gizmo.
     Gizmo,
+    /// A joint or control that is pulled.
+    Pull,
 }
 
 impl Tool {
@@ -127,22 +133,27 @@ pub struct PointerOwner(pub Option<Tool>);
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct GizmoHover(pub bool);
 
+/// Marks that a press in this frame is on a joint or control that a drag pulls. Written before the press is routed.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PullHover(pub bool);
+
 fn route(
     mut pointers: MessageReader<ViewportPointer>,
     mode: Res<Mode>,
-    gizmo: Res<GizmoHover>,
+    (gizmo, pull): (Res<GizmoHover>, Res<PullHover>),
     mut owner: ResMut<PointerOwner>,
     mut routed: MessageWriter<ToolPointer>,
 ) {
     for pointer in pointers.read() {
         let free = if gizmo.0 { Tool::Gizmo } else { Tool::of(*mode) };
+        let pressed = if pull.0 && free == Tool::Select { Tool::Pull } else { free };
         let tool = owner.0.unwrap_or(free);
         match pointer.act {
-            PointerAct::Pressed => owner.0 = Some(free),
+            PointerAct::Pressed => owner.0 = Some(pressed),
             PointerAct::Released { .. } => owner.0 = None,
             _ => {}
         }
-        let tool = if pointer.act == PointerAct::Pressed { free } else { tool };
+        let tool = if pointer.act == PointerAct::Pressed { pressed } else { tool };
         routed.write(ToolPointer { tool, pointer: *pointer });
     }
 }

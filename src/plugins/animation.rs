@@ -124,7 +124,8 @@ impl AutoKey {
     pub(super) fn keyed<'a>(&self, operation: &'a Operation) -> Cow<'a, Operation> {
         let is_pose = |edit: &RigEdit| matches!(edit, RigEdit::SetOffset(..) | RigEdit::SetAttributeValue(..));
         let poses = match operation {
-            Operation::Pose(_) | Operation::ResetPose(_) | Operation::ApplyPose(_) => true,
+            Operation::Pose(_) | Operation::SetPose { .. } => true,
+            Operation::ResetPose(_) | Operation::ApplyPose(_) => true,
             Operation::Edits(edits) | Operation::Named { edits, .. } => !edits.is_empty() && edits.iter().all(is_pose),
             _ => false,
         };

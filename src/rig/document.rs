@@ -10,8 +10,8 @@ use bevy::{math::Affine3, prelude::*};
 use crate::{
     mesh::model::Weights,
     rig::{
-        AttributeValues, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint, StoredPose,
-        TagData, Uid, animation::RigClip, part::DroppedPart,
+        AttributeValues, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint, SelectionSet,
+        StoredPose, TagData, Uid, animation::RigClip, part::DroppedPart,
     },
 };
 
@@ -39,7 +39,8 @@ pub struct Rig {
     pub(super) clips: Vec<RigClip>,
     /// Parts that were dropped onto joints, and that the rig's file may not have yet.
     pub(super) dropped: Vec<DroppedPart>,
-    /// Renewed by each edit of anything but pose, values, stored poses and clips.
+    pub(super) sets: Vec<SelectionSet>,
+    /// Renewed by each edit of anything but pose, values, stored poses, clips and selection sets.
     pub(super) revision: Revision,
 }
 
@@ -87,7 +88,7 @@ impl Rig {
         self.uid
     }
 
-    /// Mark of everything but pose, attribute values, stored poses and clips.
+    /// Mark of everything but pose, attribute values, stored poses, clips and selection sets.
     pub fn revision(&self) -> &Revision {
         &self.revision
     }

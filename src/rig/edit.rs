@@ -19,7 +19,7 @@ use crate::{
     mesh::model::Weights,
     rig::{
         FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput, RigJoint,
-        StoredPose, TagData, TagKind, Uid,
+        SelectionSet, StoredPose, TagData, TagKind, Uid,
         animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
         document::{RigAbout, SkinData},
         format::source::ron_options,
@@ -149,6 +149,8 @@ pub enum RigEdit {
     SetInputs(Vec<RigInput>),
     /// Replaces the record of parts that were dropped onto joints; what they brought stays.
     SetDroppedParts(Vec<DroppedPart>),
+    /// Replaces the selection sets.
+    SetSelectionSets(Vec<SelectionSet>),
 }
 
 /// Error of applying an edit. The rig is unchanged.
@@ -328,6 +330,7 @@ impl Rig {
                 RigEdit::SetFace(*uid, old.map(Box::new))
             }
             RigEdit::SetInputs(inputs) => self.set_inputs(inputs)?,
+            RigEdit::SetSelectionSets(sets) => self.set_selection_sets(sets),
             RigEdit::SetDroppedParts(parts) => {
                 RigEdit::SetDroppedParts(std::mem::replace(&mut self.dropped, parts.clone()))
             }

@@ -18,6 +18,7 @@ mod symmetry;
 mod tags;
 mod title;
 mod transform;
+mod whole_pose;
 
 use std::sync::Arc;
 
@@ -32,6 +33,7 @@ pub(in crate::rig) use tags::drop_part;
 pub use tags::{
     CopiedIdentifiers, CopiedJoint, PartOrder, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation, TagScope,
 };
+pub use whole_pose::WholePose;
 
 use crate::rig::{
     BuiltRig, EditError, GROUP_COLORS, GroupData, PoseOffset, RestTransform, Rig, RigEdit, Uid, UidSource,
@@ -141,10 +143,22 @@ pub enum Operation {
     Lock(Vec<Uid>, bool),
     /// Poses joints by offsets on top of their rest transforms. Partners get the mirror image.
     Pose(Vec<(Uid, PoseOffset)>),
+    /// Sets offsets and attributes of nodes as they are given, without mirroring; an attribute without a value gets its
+    /// default.
+    SetPose {
+        /// A few words for the history panel.
+        name: &'static str,
+        /// Nodes with their offsets.
+        offsets: Vec<(Uid, PoseOffset)>,
+        /// Nodes with names and values of their attributes.
+        values: Vec<(Uid, String, Option<f32>)>,
+    },
     /// Resets joints and their partners to rest; all joints if none is listed.
     ResetPose(Vec<Uid>),
     /// Stores the current pose under a name; a stored pose of that name is replaced.
     StorePose(String),
+    /// Stores a pose that is given under a name; a stored pose of that name is replaced.
+    StoreShown(String, Box<WholePose>),
     /// Makes a stored pose the current one; joints without an entry in it are reset to rest.
     ApplyPose(Uid),
     /// Renames a stored pose.
@@ -241,7 +255,7 @@ impl Operation {
             Self::Lock(..) => "Lock joints",
             Self::Pose(..) => "Pose joints",
             Self::ResetPose(..) => "Reset pose",
-            Self::StorePose(..) => "Store pose",
+            Self::StorePose(..) | Self::StoreShown(..) => "Store pose",
             Self::ApplyPose(..) => "Apply pose",
             Self::RenamePose(..) => "Rename pose",
             Self::DeletePose(..) => "Delete pose",
@@ -253,7 +267,7 @@ impl Operation {
                 [RigEdit::SetSkin(_, Some(_))] => "Skin mesh",
                 _ => "Edit rig",
             },
-            Self::Named { name, .. } => name,
+            Self::SetPose { name, .. } | Self::Named { name, .. } => name,
         }
     }
 
@@ -317,8 +331,13 @@ impl Operation {
                 Ok(())
             }
             Self::Pose(offsets) => pose::pose(draft, offsets),
+            Self::SetPose { offsets, values, .. } => pose::set_all(draft, offsets, values),
             Self::ResetPose(joints) => pose::reset(draft, joints),
-            Self::StorePose(name) => pose::store(draft, name),
+            Self::StorePose(name) => {
+                let shown = WholePose::of(draft.rig());
+                pose::store(draft, name, &shown)
+            }
+            Self::StoreShown(name, shown) => pose::store(draft, name, shown),
             Self::ApplyPose(pose) => pose::apply(draft, *pose),
             Self::RenamePose(pose, name) => pose::rename(draft, *pose, name),
             Self::DeletePose(pose) => Ok(draft.apply(RigEdit::RemoveStoredPose(*pose))?),

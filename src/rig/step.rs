@@ -205,5 +205,8 @@ pub fn edits_from_empty(rig: &Rig) -> Vec<RigEdit> {
     }
     edits.extend(rig.stored_poses().iter().map(|pose| RigEdit::AddStoredPose(Box::new(pose.clone()), last)));
     edits.extend(rig.clips().iter().map(|clip| RigEdit::AddClip(Box::new(clip.clone()), last)));
+    if !rig.selection_sets().is_empty() {
+        edits.push(RigEdit::SetSelectionSets(rig.selection_sets().to_vec()));
+    }
     edits
 }

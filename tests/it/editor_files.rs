@@ -11,7 +11,7 @@ use rigsmith::{
         ActiveRig,
         actions::{Action, ActionRequest},
         files::{
-            FilesPlugin, LoadJob, OpenDocument, OpenRequest, SaveJob, StateFolder,
+            ExportOptions, FilesPlugin, LoadJob, OpenDocument, OpenRequest, SaveJob, StateFolder,
             dialog::{Answer, Dialog, DialogAnswer, Purpose, Question},
             has_unsaved_changes, title,
         },
@@ -19,7 +19,7 @@ use rigsmith::{
         recovery::{Recovery, can_recover, describe},
         settings::EditorSettings,
     },
-    files::{Disk, RealDisk, journal::journal_beside, load_animation, load_template, store_rig},
+    files::{Disk, RealDisk, journal::journal_beside, load_animation, load_model, load_template, store_rig},
     headless::headless_app,
     plugins::{
         document::{Change, EditRequest},
@@ -31,6 +31,7 @@ use rigsmith::{
     rig::{
         animation::{Key, Property, RigClip, Track, TrackTarget},
         operations::Operation,
+        skeleton_preset::SkeletonPreset,
     },
     test_app::strict_app,
 };
@@ -651,4 +652,49 @@ fn the_second_window_on_a_project_is_told() {
     wait_for_journal(&third, &journal_beside(&project));
     third.settle();
     assert!(!told(&third), "{:?}", third.notices);
+}
+
+#[test]
+fn presets_give_exports_the_names_of_other_programs_and_the_result_is_read_back() {
+    let folder = folder();
+    let mut window = Window::new(folder.path());
+    window.open(OpenRequest::Template("biped".into()));
+    let cases = [
+        (SkeletonPreset::Plain, "hand_l"),
+        (SkeletonPreset::Mixamo, "mixamorig:LeftHand"),
+        (SkeletonPreset::Unreal, "hand_l"),
+        (SkeletonPreset::Unity, "LeftHand"),
+        (SkeletonPreset::Vrm, "leftHand"),
+    ];
+    for (number, (preset, hand)) in cases.into_iter().enumerate() {
+        window.app.insert_resource(ExportOptions { preset, author: String::new() });
+        let path = window.export(&format!("{number}.glb"));
+        let model = load_model(&RealDisk, &path).expect("a model");
+        assert!(model.nodes.iter().any(|node| node.name == hand), "{preset:?}");
+        let counts = format!("Exported {number}.glb; read back: {} joints", model.nodes.len());
+        assert!(window.said(Severity::Done, &counts), "{counts}: {:?}", window.notices);
+    }
+    window.export("rig.rig.ron");
+    assert!(window.said(Severity::Done, "Exported rig.rig.ron; read back:"), "{:?}", window.notices);
+}
+
+#[test]
+fn avatars_are_exported_with_an_author() {
+    let folder = folder();
+    let mut window = Window::new(folder.path());
+    window.open(OpenRequest::Template("biped".into()));
+    let mut about = window.rig().about().clone();
+    about.author.clear();
+    window.change(Change::Do(Operation::Edits(vec![RigEdit::SetAbout(Box::new(about))])));
+    let before = window.rig();
+    let path = window.export("nobody.vrm");
+    assert!(window.said(Severity::Error, "requires an author") && !path.exists(), "{:?}", window.notices);
+    window.app.insert_resource(ExportOptions { author: "Ann".into(), ..default() });
+    let path = window.export("ann.vrm");
+    assert!(window.said(Severity::Done, "Exported ann.vrm; read back:"), "{:?}", window.notices);
+    let bytes = std::fs::read(&path).expect("an avatar");
+    let avatar = rigsmith::mesh::gltf::read_avatar(&bytes, "ann.vrm").expect("VRM").expect("an avatar");
+    assert_eq!(avatar.vrm.meta.authors, ["Ann"]);
+    assert!(avatar.vrm.humanoid.human_bones.contains_key("leftHand"));
+    assert_eq!(window.rig(), before, "an export changes nothing");
 }

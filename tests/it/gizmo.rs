@@ -1,6 +1,7 @@
 //! Gizmos: drags under the pointer in every kind of view, previews that leave no trace, poses, the other side.
 
 mod limits;
+mod pull;
 
 use std::sync::{Arc, Mutex};
 

@@ -3,6 +3,7 @@
 pub(crate) mod desk;
 mod face;
 mod features;
+mod posing;
 mod tags;
 
 use std::collections::HashSet;

@@ -2,6 +2,7 @@
 
 mod curves;
 mod keys;
+mod looks;
 mod parts;
 
 use std::{sync::Arc, time::Duration};

@@ -11,6 +11,7 @@ use egui_file_dialog::{DialogState, FileDialog, Filter};
 
 use super::{
     dialog::{Answer, Dialog, DialogAnswer, Purpose, Question},
+    export::{ExportOptions, PRESETS, effect, takes_preset},
     file_name,
     template::{Fit, number},
 };
@@ -24,6 +25,7 @@ use crate::{
         FileKind,
         journal::{Condition, PendingJournal},
     },
+    rig::skeleton_preset::SkeletonPreset,
 };
 
 /// View of the current question.
@@ -36,6 +38,8 @@ pub(super) struct DialogView {
     age: u32,
     chosen: usize,
     browser: Option<FileDialog>,
+    /// Choices of an export.
+    options: ExportOptions,
 }
 
 /// Kinds of files that can be opened, by name.
@@ -74,7 +78,10 @@ impl EditorOverlay for DialogView {
         if self.number != dialog.number() {
             *self = Self { number: dialog.number(), ..Self::default() };
             match question {
-                Question::Path { suggestion, .. } => self.text = suggestion.display().to_string(),
+                Question::Path { suggestion, .. } => {
+                    self.text = suggestion.display().to_string();
+                    self.options = world.get_resource::<ExportOptions>().cloned().unwrap_or_default();
+                }
                 Question::Open => self.browser = Some(browser(world, "Open", OPENED)),
                 Question::Motion => self.browser = Some(browser(world, "Import motion", MOTION)),
                 _ => {}
@@ -83,6 +90,10 @@ impl EditorOverlay for DialogView {
         self.age = self.age.saturating_add(1);
         if let Some(answer) = self.ask(ctx, question) {
             self.browser = None;
+            let is_export = matches!(question, Question::Path { purpose: Purpose::Export, .. });
+            if is_export && matches!(answer, Answer::Path(_)) {
+                requests.set(self.options.clone());
+            }
             requests.send(DialogAnswer(answer));
         }
     }
@@ -195,8 +206,9 @@ impl DialogView {
             Purpose::Export => (
                 "Export",
                 "Export",
-                "The ending says what: .glb or .gltf the character with its clips, .obj at rest, .anim.ron the clips, \
-                 .rig.ron the template, .rig the skeleton, .skin the weights.",
+                "The ending says what: .glb or .gltf the character with its clips, .vrm an avatar, .obj at rest, \
+                 .anim.ron the clips, .rig.ron the template, .rig the skeleton, .skin the weights. What is written is \
+                 read back.",
             ),
         };
         ui.heading(title);
@@ -215,6 +227,9 @@ impl DialogView {
         }
         ui.label(egui::RichText::new(hint).color(style::quiet(ui.visuals())));
         let entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        if purpose == Purpose::Export {
+            self.export_options(ui);
+        }
         let path = PathBuf::from(self.text.trim());
         if browse {
             let folder = path.parent().filter(|folder| folder.is_dir()).map(Path::to_path_buf);
@@ -232,6 +247,45 @@ impl DialogView {
         match clicked.or(entered.then_some(accept)) {
             Some(Answer::Path(_)) if !has_name => None,
             answer => answer,
+        }
+    }
+
+    /// Draws the preset of the skeleton, and the author of an avatar.
+    fn export_options(&mut self, ui: &mut egui::Ui) {
+        let path = PathBuf::from(self.text.trim());
+        if !takes_preset(&path) {
+            return;
+        }
+        let before = self.options.preset;
+        let name = PRESETS.iter().find(|(preset, _)| *preset == before).map_or("", |(_, name)| name);
+        ui.horizontal(|ui| {
+            ui.label("Names and axes");
+            let combo = egui::ComboBox::from_id_salt("preset").selected_text(name).show_ui(ui, |ui| {
+                for (preset, name) in PRESETS {
+                    ui.selectable_value(&mut self.options.preset, preset, name);
+                }
+            });
+            ui.ctx().accesskit_node_builder(combo.response.id, |node| node.set_label("Preset of the skeleton"));
+        });
+        if self.options.preset != before {
+            // An avatar has an ending of its own.
+            let ending = if self.options.preset == SkeletonPreset::Vrm { "vrm" } else { "glb" };
+            let is_avatar = FileKind::of(&path) == Some(FileKind::Vrm);
+            if is_avatar || ending == "vrm" {
+                self.text = path.with_extension(ending).display().to_string();
+            }
+        }
+        ui.label(egui::RichText::new(effect(self.options.preset)).color(style::quiet(ui.visuals())));
+        if FileKind::of(Path::new(self.text.trim())) == Some(FileKind::Vrm) {
+            ui.horizontal(|ui| {
+                ui.label("Author");
+                let field =
+                    egui::TextEdit::singleline(&mut self.options.author).hint_text("as in the template's header");
+                let field = ui.add(field.desired_width(ui.available_width()));
+                field.widget_info(|| {
+                    egui::WidgetInfo::labeled(egui::WidgetType::TextEdit, true, "Author of the avatar")
+                });
+            });
         }
     }
 

@@ -7,7 +7,7 @@ use crate::{
     mesh::obj::ObjError,
     plugins::limits::LimitError,
     processor::BuildError,
-    rig::{EditError, SourceError, skin::SkinError},
+    rig::{EditError, SourceError, skin::SkinError, vrm::AvatarError},
     solve::{bake_clip::BakeError, program::ProgramError},
 };
 
@@ -105,6 +105,12 @@ pub(in crate::editor) enum WriteError {
     /// The mesh has no weights.
     #[error("there are no weights to export; skin the mesh first")]
     NoWeights,
+    /// An avatar without an author.
+    #[error("VRM 1.0 requires an author; type a name into the field Author, or into the template's header")]
+    NoAuthor,
+    /// The rig is no avatar.
+    #[error(transparent)]
+    Avatar(#[from] AvatarError),
     /// The document has no clips.
     #[error("there are no clips to export; make one in the Timeline first")]
     NoClips,
@@ -119,7 +125,7 @@ pub(in crate::editor) enum WriteError {
     Bake(#[from] BakeError),
     /// The file's name has no fitting ending.
     #[error(
-        "a character is exported as .glb, .gltf or .obj, a rig as .rig.ron or .rig, weights as .skin, clips as \
+        "a character is exported as .glb, .gltf, .vrm or .obj, a rig as .rig.ron or .rig, weights as .skin, clips as \
          .anim.ron; choose one of these endings"
     )]
     Ending,

@@ -15,36 +15,23 @@ use bevy::{
 use super::{
     FollowUp, active, after_asking,
     bundled::{BODY, BundledModel},
-    clips::put_clips,
     dialog::Purpose,
     document::{Context, ContextMesh, MeshSource, OpenDocument, SavedAt, last_step, meshes, places},
     error::WriteError,
-    file_name,
+    export, file_name,
     open::spawn,
     view,
 };
 use crate::{
     editor::{notice::Notice, settings::EditorSettings},
     files::{
-        Disk, FileKind, MeshShape, MeshToSave, ProjectTemplate, ProjectToSave, RealDisk,
+        Disk, FileKind, LoadError, MeshShape, MeshToSave, ProjectTemplate, ProjectToSave, RealDisk,
         journal::{Journal, SaveMark},
-        project_files, read_capped, save_atomic, save_set, stem, store_animation, store_model, store_rig_over,
-        store_skin,
+        project_files, read_capped, save_atomic, save_set, stem,
     },
     instance::RigSource,
-    mesh::{gltf::GltfWriteSettings, model::Model},
-    plugins::{
-        commands::{BuildResult, RigModules},
-        history::RigHistory,
-        surface::RigMesh,
-    },
-    processor::Modules,
-    rig::{
-        BuiltRig, Rig,
-        character::{Character, character},
-        skin::{SkinFile, SkinJoint},
-        step::Step,
-    },
+    plugins::history::RigHistory,
+    rig::{Rig, step::Step},
 };
 
 /// Document that is being saved.
@@ -60,6 +47,16 @@ impl SaveJob {
         self.job.as_ref().map(|job| job.name.as_str())
     }
 
+    /// Takes a job up, while there is no other.
+    pub(super) fn begin(&mut self, job: Job) {
+        self.job = Some(job);
+    }
+
+    /// Lets a file wait until the current one is saved.
+    pub(super) fn queue(&mut self, purpose: Purpose, path: PathBuf, then: Option<FollowUp>) {
+        self.waiting.push_back((purpose, path, then));
+    }
+
     /// Schedules `then` after the current saving; returns `false` if nothing is being saved.
     pub(super) fn wait_for(&mut self, then: FollowUp) -> bool {
         let Some(job) = &mut self.job else { return false };
@@ -71,17 +68,17 @@ impl SaveJob {
     }
 }
 
-struct Job {
-    name: String,
-    rig: Entity,
+pub(super) struct Job {
+    pub name: String,
+    pub rig: Entity,
     /// Last step in the snapshot.
-    step: Option<Arc<Step>>,
-    task: Task<Result<SavedContent, WriteError>>,
-    then: Option<FollowUp>,
+    pub step: Option<Arc<Step>>,
+    pub task: Task<Result<SavedContent, WriteError>>,
+    pub then: Option<FollowUp>,
 }
 
 /// Content that was written.
-enum SavedContent {
+pub(super) enum SavedContent {
     Project {
         mark: SaveMark,
         notes: Vec<String>,
@@ -89,6 +86,8 @@ enum SavedContent {
     },
     /// Export; `template` is the rig if it was saved to the template that was opened.
     Export {
+        /// Content that Rigsmith's own reader finds in the file.
+        checked: Result<String, LoadError>,
         notes: Vec<String>,
         template: Option<Arc<Rig>>,
     },
@@ -136,12 +135,12 @@ pub(super) fn completed(path: &Path, purpose: Purpose) -> PathBuf {
 pub(super) fn to(world: &mut World, purpose: Purpose, path: PathBuf, then: Option<FollowUp>) {
     match purpose {
         Purpose::Save => project(world, path, then),
-        Purpose::Export => export(world, path),
+        Purpose::Export => export::export(world, path),
     }
 }
 
 /// The rig without the preview of a current drag.
-fn settled(world: &World, rig: Entity) -> Option<Rig> {
+pub(super) fn settled(world: &World, rig: Entity) -> Option<Rig> {
     let data = world.get::<Rig>(rig)?;
     Some(world.get::<RigHistory>(rig).map_or_else(|| data.clone(), |history| history.settled(data).into_owned()))
 }
@@ -234,78 +233,6 @@ pub(in crate::editor) fn place_bundled(project: &Path, name: &str) -> Result<Pat
     Err(WriteError::Occupied { names: names.join(" and ") })
 }
 
-/// Exports the format given by the path's extension.
-fn export(world: &mut World, path: PathBuf) {
-    if world.resource::<SaveJob>().job.is_some() {
-        world.resource_mut::<SaveJob>().waiting.push_back((Purpose::Export, path, None));
-        return;
-    }
-    let Some(rig) = active(world) else { return };
-    let Some(data) = settled(world, rig) else { return };
-    let open = meshes(world, rig);
-    let more = open.len().saturating_sub(1);
-    let mesh = open.into_iter().next().map(|(_, mesh, _)| mesh.clone());
-    let (step, name) = (last_step(world, rig), file_name(&path));
-    let built = world.get::<BuildResult>(rig).map(|built| built.0.clone());
-    let Some(modules) = world.get_resource::<RigModules>().map(|modules| modules.0.clone()) else { return };
-    let template = world.get::<OpenDocument>(rig).and_then(|document| document.template.clone());
-    let task = spawn(move || {
-        let mut notes = export_to(&path, &data, (built.as_deref(), &modules), mesh.as_ref(), template.as_deref())?;
-        if more > 0 {
-            notes.push(format!("only the first mesh was exported; {more} more are open"));
-        }
-        let template = (template.as_deref() == Some(&path)).then(|| Arc::new(data));
-        Ok(SavedContent::Export { notes, template })
-    });
-    world.resource_mut::<SaveJob>().job = Some(Job { name, rig, step, task, then: None });
-}
-
-fn export_to(
-    path: &Path,
-    rig: &Rig,
-    (built, modules): (Option<&BuiltRig>, &Arc<Modules>),
-    mesh: Option<&RigMesh>,
-    template: Option<&Path>,
-) -> Result<Vec<String>, WriteError> {
-    match FileKind::of(path) {
-        Some(FileKind::Glb | FileKind::Gltf | FileKind::Obj) => {
-            let empty = Model { name: rig.about().name.clone(), ..default() };
-            let skin = mesh.and_then(|mesh| rig.skin(mesh.uid));
-            let mut model = character(&Character {
-                rig,
-                built,
-                file: mesh.map_or(&empty, |mesh| &mesh.file),
-                rest: mesh.map_or(&empty, |mesh| &mesh.rest),
-                nodes: mesh.map_or(&[], |mesh| &mesh.nodes),
-                skin: skin.map(Arc::as_ref),
-            });
-            put_clips(&mut model, rig, built, modules)?;
-            // Without weights no joint deforms, and none would be written.
-            let settings = GltfWriteSettings { all_joints: skin.is_none(), ..default() };
-            Ok(store_model(&RealDisk, path, &model, &settings)?)
-        }
-        Some(FileKind::Animation) if rig.clips().is_empty() => Err(WriteError::NoClips),
-        Some(FileKind::Animation) => {
-            store_animation(&RealDisk, path, rig, built, rig.clips())?;
-            Ok(Vec::new())
-        }
-        Some(FileKind::Template | FileKind::RigText) => {
-            let sources = [Some(path), template];
-            Ok(store_rig_over(&RealDisk, path, rig, &sources.into_iter().flatten().collect::<Vec<_>>())?)
-        }
-        Some(FileKind::Skin) => {
-            let both = mesh.and_then(|mesh| Some((mesh, rig.skin(mesh.uid)?)));
-            let (mesh, skin) = both.ok_or(WriteError::NoWeights)?;
-            let joints = SkinJoint::list(rig, skin);
-            let file = SkinFile::new(joints, skin.weights.clone(), &mesh.rest.points, &mesh.triangles, true);
-            let file = file?;
-            store_skin(&RealDisk, path, &file)?;
-            Ok(Vec::new())
-        }
-        _ => Err(WriteError::Ending),
-    }
-}
-
 /// Reports the result of saving, and proceeds.
 pub(super) fn poll(world: &mut World) {
     let mut saving = world.resource_mut::<SaveJob>();
@@ -320,11 +247,15 @@ pub(super) fn poll(world: &mut World) {
             world.write_message(Notice::done(format!("Saved {name}")));
             tell(world, notes);
         }
-        Ok(SavedContent::Export { notes, template }) => {
+        Ok(SavedContent::Export { checked, notes, template }) => {
             if let (Some(template), Some(mut source)) = (template, world.get_mut::<RigSource>(rig)) {
                 source.rebase(template);
             }
-            world.write_message(Notice::done(format!("Exported {name}")));
+            world.write_message(match checked {
+                Ok(found) if found.is_empty() => Notice::done(format!("Exported {name}")),
+                Ok(found) => Notice::done(format!("Exported {name}; read back: {found}")),
+                Err(error) => Notice::error(format!("Exported {name}, but it cannot be read back: {error}")),
+            });
             tell(world, notes);
         }
         Err(error) => {

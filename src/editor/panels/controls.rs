@@ -219,7 +219,7 @@ fn switches(ui: &mut Ui, built: &BuiltRig, state: &RigState, rig: Entity, reques
 }
 
 /// Names of a switch's values, in the order of their numbers.
-fn values_of(node: &BuiltNode, switch: &SwitchData) -> Vec<String> {
+pub(super) fn values_of(node: &BuiltNode, switch: &SwitchData) -> Vec<String> {
     let attribute = node.attributes.iter().find(|attribute| attribute.name == switch.attribute);
     match (attribute.map(|attribute| &attribute.kind), &switch.matching) {
         (Some(AttributeKind::Choice(names)), _) => names.clone(),

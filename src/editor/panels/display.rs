@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Checkbox, ScrollArea, Ui};
+use bevy_egui::egui::{self, Checkbox, ScrollArea, Ui, WidgetInfo, WidgetType};
 
 use super::displayed_rig::{DisplayedRig, Stamp};
 use crate::{
@@ -11,6 +11,7 @@ use crate::{
         actions::{Action, ActionRequest},
         help::describe,
         keys::KeyBindings,
+        onion::{ONION_COUNTS, OnionSkin, OnionStep},
         panel::{EditorPanel, Requests},
         screen::HiddenMeshes,
         settings::{EditorSettings, UI_SCALES},
@@ -46,6 +47,7 @@ impl EditorPanel for DisplayPanel {
                 }
             }
             meshes(ui, world, requests);
+            onion(ui, world, requests);
             ui.separator();
             window(ui, world, requests);
         });
@@ -130,6 +132,38 @@ fn meshes(ui: &mut Ui, world: &World, requests: &mut Requests) {
             }
             requests.set(next);
         }
+    }
+}
+
+/// Draws the switch of the onion skin, and the number and distance of its poses.
+fn onion(ui: &mut Ui, world: &World, requests: &mut Requests) {
+    let Some(skin) = world.get_resource::<OnionSkin>() else { return };
+    switch(ui, world, Action::OnionSkin, skin.on, requests);
+    if !skin.on {
+        return;
+    }
+    let mut next = *skin;
+    ui.horizontal_wrapped(|ui| {
+        ui.weak("Before and after");
+        for count in ONION_COUNTS {
+            let response = ui.selectable_label(skin.count == count, count.to_string());
+            let said = format!("{count} ghosts before and after");
+            response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, skin.count == count, &said));
+            if response.clicked() {
+                next.count = count;
+            }
+        }
+    });
+    ui.horizontal_wrapped(|ui| {
+        ui.weak("Every");
+        for step in OnionStep::ALL {
+            if ui.selectable_label(skin.step == step, step.name()).clicked() {
+                next.step = step;
+            }
+        }
+    });
+    if next != *skin {
+        requests.set(next);
     }
 }
 

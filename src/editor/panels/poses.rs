@@ -1,8 +1,19 @@
-//! Poses panel: the pose of the rig and its stored poses. The rest pose never changes here.
+//! Poses panel: the pose of the rig, and its library of stored poses as cards with pictures. The rest pose never changes here.
+
+mod picture;
+mod shown;
+mod tween;
 
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Align, Button, Key, Layout, Rect, Sense, TextEdit, Ui, UiBuilder, WidgetInfo, WidgetType};
+use bevy_egui::egui::{
+    self, Align, Button, Key, Layout, Rect, Sense, Stroke, TextEdit, Ui, UiBuilder, WidgetInfo, WidgetType,
+};
 
+pub(in crate::editor) use self::shown::{PosedRig, put_clip};
+use self::{
+    picture::Pictures,
+    tween::{Tween, TweenTarget},
+};
 use super::{
     displayed_rig::DisplayedRig,
     fields::{self, Renaming},
@@ -12,41 +23,56 @@ use crate::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
+        notice::Notice,
         panel::{EditorPanel, Requests},
+        style,
     },
     plugins::{
         RigSystems,
         document::{EditRequest, Selection},
     },
-    rig::{Rig, StoredPose, Uid, operations::Operation},
+    rig::{
+        Rig, StoredPose, Uid,
+        operations::{Operation, WholePose},
+    },
 };
 
-/// Plugin that carries out [`Action::ResetPose`] and [`Action::StorePose`].
+/// Plugin that carries out [`Action::ResetPose`], [`Action::MirrorPose`] and [`Action::StorePose`].
 pub struct PosesPlugin;
 
 impl Plugin for PosesPlugin {
     fn build(&self, app: &mut App) {
         app.add_message::<ActionRequest>()
+            .add_message::<Notice>()
             .add_systems(Update, pose_actions.after(RigSystems::Gesture).before(RigSystems::Edits));
     }
 }
 
-fn pose_actions(
-    mut actions: MessageReader<ActionRequest>,
-    active: Option<Res<ActiveRig>>,
-    rigs: Query<(&Rig, &Selection)>,
-    mut commands: Commands,
-) {
-    for ActionRequest(action) in actions.read() {
-        let Some(entity) = active.as_ref().map(|active| active.0) else { continue };
-        let Ok((rig, selection)) = rigs.get(entity) else { continue };
-        let operation = match action {
-            Action::ResetPose => Operation::ResetPose(selection.0.clone()),
-            Action::StorePose => Operation::StorePose(free_name(rig)),
-            _ => continue,
-        };
-        commands.write_message(EditRequest::operation(entity, operation));
+fn pose_actions(mut actions: MessageReader<ActionRequest>, active: Option<Res<ActiveRig>>, mut commands: Commands) {
+    let Some(entity) = active.map(|active| active.0) else { return actions.clear() };
+    for ActionRequest(action) in actions.read().copied() {
+        if matches!(action, Action::ResetPose | Action::MirrorPose | Action::StorePose) {
+            commands.queue(move |world: &mut World| carry_out(world, entity, action));
+        }
     }
+}
+
+fn carry_out(world: &mut World, entity: Entity, action: Action) {
+    let Some(posed) = PosedRig::of(world, entity) else { return };
+    let has_selection = world.get::<Selection>(entity).is_some_and(|selection| !selection.0.is_empty());
+    let operation = match action {
+        Action::ResetPose => posed.reset(!has_selection),
+        Action::StorePose => posed.store(free_name(posed.rig)),
+        _ if has_selection => match posed.mirror_selected() {
+            Some(operation) => operation,
+            None => {
+                world.write_message(Notice::info("Mirror pose: what is selected has no other side."));
+                return;
+            }
+        },
+        _ => posed.flip(),
+    };
+    world.write_message(EditRequest::operation(entity, operation));
 }
 
 /// The first free name of "Pose 1", "Pose 2" and so on.
@@ -56,12 +82,17 @@ fn free_name(rig: &Rig) -> String {
     names.into_iter().find(|name| !taken(name)).unwrap_or_default()
 }
 
+/// Height of a card.
+const CARD: f32 = 54.0;
+
 /// The panel.
 #[derive(Default)]
 pub struct PosesPanel {
     /// The name typed for the next pose.
     name: String,
     rename: Option<Rename>,
+    tween: Tween,
+    pictures: Pictures,
 }
 
 /// Name of a stored pose that is being typed.
@@ -80,51 +111,66 @@ impl EditorPanel for PosesPanel {
         let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
-        let mut operation = current(ui, &shown);
-        operation = self.store(ui, &shown).or(operation);
-        if shown.rig.stored_poses().is_empty() {
+        let Some(posed) = PosedRig::of(world, shown.entity) else { return };
+        let mut operation = current(ui, &posed, &shown);
+        operation = self.store(ui, &posed).or(operation);
+        self.tween.show(ui, world, &posed, requests);
+        if posed.rig.stored_poses().is_empty() {
             list::nothing(ui, "No pose is stored.");
         } else {
-            operation = self.stored(ui, &shown).or(operation);
+            self.pictures.refresh(world, posed.entity, posed.rig);
+            operation = self.stored(ui, world, &posed).or(operation);
         }
         if let Some(operation) = operation {
-            requests.send(EditRequest::operation(shown.entity, operation));
+            requests.send(EditRequest::operation(posed.entity, operation));
         }
     }
 }
 
-/// Draws the number of posed joints and the reset button.
-fn current(ui: &mut Ui, shown: &DisplayedRig) -> Option<Operation> {
-    let posed = shown.rig.pose().len();
-    let text = match posed {
+/// Draws the number of posed joints, and the buttons that reset and mirror.
+fn current(ui: &mut Ui, posed: &PosedRig, shown: &DisplayedRig) -> Option<Operation> {
+    let count = posed.shown.offsets.len();
+    let text = match count {
         0 => "At rest".to_owned(),
         1 => "1 joint is posed".to_owned(),
         more => format!("{more} joints are posed"),
     };
     ui.weak(text);
-    let selected = shown.selection.0.iter().any(|joint| shown.rig.offset(*joint).is_some());
+    let is_posed = |node: &Uid| posed.shown.offsets.contains_key(node) || posed.shown.values.contains_key(node);
+    let selected = shown.selection.0.iter().any(is_posed);
+    let is_any = count > 0 || !posed.shown.values.is_empty();
+    let has_other_side = !posed.other_side().is_empty();
     let size = egui::vec2((ui.available_width() - ui.spacing().item_spacing.x) / 2.0, ui.spacing().interact_size.y);
-    ui.horizontal(|ui| {
-        let mut button = |text: &str, enabled: bool| {
-            let button = Button::new(text).truncate();
-            ui.add_enabled_ui(enabled, |ui| ui.add_sized(size, button)).inner.clicked()
-        };
-        let (one, all) = (button("Reset selected", selected), button("Reset all", posed > 0));
-        match (one, all) {
-            (true, _) => Some(Operation::ResetPose(shown.selection.0.clone())),
-            (_, true) => Some(Operation::ResetPose(Vec::new())),
-            _ => None,
-        }
-    })
-    .inner
+    let mut chosen = None;
+    let mut pair = |ui: &mut Ui, list: [(&'static str, bool, &str); 2]| {
+        ui.horizontal(|ui| {
+            for (text, enabled, why_not) in list {
+                let button = Button::new(text).truncate();
+                let response = ui.add_enabled_ui(enabled, |ui| ui.add_sized(size, button)).inner;
+                if response.on_disabled_hover_text(why_not).clicked() {
+                    chosen = Some(text);
+                }
+            }
+        });
+    };
+    let at_rest = "nothing is posed";
+    pair(ui, [("Reset selected", selected, "nothing of what is selected is posed"), ("Reset all", is_any, at_rest)]);
+    let no_side = "what is selected has no other side";
+    pair(ui, [("Mirror selected", has_other_side, no_side), ("Flip all", is_any, at_rest)]);
+    match chosen? {
+        "Reset selected" => Some(posed.reset(false)),
+        "Reset all" => Some(posed.reset(true)),
+        "Mirror selected" => posed.mirror_selected(),
+        _ => Some(posed.flip()),
+    }
 }
 
 impl PosesPanel {
     /// Draws a name field and a button that stores the pose under it.
-    fn store(&mut self, ui: &mut Ui, shown: &DisplayedRig) -> Option<Operation> {
-        let free = free_name(&shown.rig);
+    fn store(&mut self, ui: &mut Ui, posed: &PosedRig) -> Option<Operation> {
+        let free = free_name(posed.rig);
         let name = self.name.trim();
-        let replaces = shown.rig.stored_poses().iter().any(|pose| pose.name == name);
+        let replaces = posed.rig.stored_poses().iter().any(|pose| pose.name == name);
         let accepted = ui.horizontal(|ui| {
             let button = 62.0;
             let width = (ui.available_width() - button - ui.spacing().item_spacing.x).max(40.0);
@@ -137,64 +183,127 @@ impl PosesPanel {
         });
         accepted.inner.then(|| {
             let name = std::mem::take(&mut self.name);
-            Operation::StorePose(if name.trim().is_empty() { free } else { name.trim().to_owned() })
+            posed.store(if name.trim().is_empty() { free } else { name.trim().to_owned() })
         })
     }
 
     /// The stored poses.
-    fn stored(&mut self, ui: &mut Ui, shown: &DisplayedRig) -> Option<Operation> {
-        let poses = shown.rig.stored_poses();
+    fn stored(&mut self, ui: &mut Ui, world: &World, posed: &PosedRig) -> Option<Operation> {
+        let poses = posed.rig.stored_poses();
         let mut operation = None;
         let mut drawn = false;
-        let height = ui.spacing().interact_size.y + 4.0;
-        List { id: "poses", count: poses.len(), height, reveal: None, follow: false }.show(ui, |ui, range, row| {
-            for number in range {
-                let pose = &poses[number];
-                let renamed = self.rename.as_ref().is_some_and(|rename| rename.pose == pose.uid);
-                drawn |= renamed;
-                let rect = row(number).shrink2(egui::vec2(0.0, 1.0));
-                let asked = if renamed { self.rename(ui, rect, pose) } else { self.row(ui, rect, pose, shown) };
-                operation = asked.or(operation.take());
-            }
-        });
+        List { id: "poses", count: poses.len(), height: CARD, reveal: None, follow: false }.show(
+            ui,
+            |ui, range, row| {
+                for number in range {
+                    let pose = &poses[number];
+                    drawn |= self.rename.as_ref().is_some_and(|rename| rename.pose == pose.uid);
+                    let rect = row(number).shrink2(egui::vec2(0.0, 1.0));
+                    let asked = self.card(ui, rect, pose, world, posed);
+                    operation = asked.or(operation.take());
+                }
+            },
+        );
         // The typed text is also accepted when the field disappears.
         if !drawn && self.rename.as_ref().is_some_and(|rename| rename.focused) {
             let rename = self.rename.take()?;
-            operation = operation.or(shown.rig.stored_pose(rename.pose).and_then(|pose| renamed(pose, &rename.text)));
+            operation = operation.or(posed.rig.stored_pose(rename.pose).and_then(|pose| renamed(pose, &rename.text)));
         }
         operation
     }
 
-    /// Draws a pose with its actions: apply, rename, delete.
-    fn row(&mut self, ui: &mut Ui, rect: Rect, pose: &StoredPose, shown: &DisplayedRig) -> Option<Operation> {
-        let current = pose.offsets == *shown.rig.pose();
+    /// Draws a pose: its picture, its name and its actions. A click makes it the one that the slider goes to.
+    fn card(
+        &mut self,
+        ui: &mut Ui,
+        rect: Rect,
+        pose: &StoredPose,
+        world: &World,
+        posed: &PosedRig,
+    ) -> Option<Operation> {
+        let current = pose.offsets == posed.shown.offsets && pose.values == posed.shown.values;
+        let is_target = self.tween.target == Some(TweenTarget::Pose(pose.uid));
         let response = ui.interact(rect, ui.id().with(pose.uid), Sense::click());
         response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, current, &pose.name));
+        let visuals = ui.visuals();
         if current {
-            ui.painter().rect_filled(rect, 3.0, ui.visuals().selection.bg_fill.gamma_multiply(0.6));
+            ui.painter().rect_filled(rect, 3.0, visuals.selection.bg_fill.gamma_multiply(0.6));
         } else if response.hovered() {
-            ui.painter().rect_filled(rect, 3.0, ui.visuals().widgets.hovered.bg_fill.gamma_multiply(0.35));
+            ui.painter().rect_filled(rect, 3.0, visuals.widgets.hovered.bg_fill.gamma_multiply(0.35));
         }
+        let side = rect.height() - 4.0;
+        let frame = Rect::from_min_size(rect.min + egui::vec2(2.0, 2.0), egui::Vec2::splat(side));
+        let color = if is_target { style::accent(visuals) } else { visuals.text_color() };
+        let ground = visuals.extreme_bg_color;
+        let lines = self.pictures.lines(world, posed.entity, posed.rig, pose);
+        picture::paint(&ui.painter_at(frame), frame, lines, ground, Stroke::new(1.3, color));
+        let text =
+            Rect::from_min_max(egui::pos2(frame.right() + 5.0, rect.top() + 2.0), rect.max - egui::vec2(2.0, 2.0));
+        let (head, foot) = text.split_top_bottom_at_fraction(0.5);
         let mut operation = None;
-        let builder = UiBuilder::new().id_salt(pose.uid).max_rect(rect).layout(Layout::right_to_left(Align::Center));
+        if self.rename.as_ref().is_some_and(|rename| rename.pose == pose.uid) {
+            operation = self.rename(ui, head, pose);
+        } else {
+            list::line(ui, head, &pose.name, ui.visuals().text_color());
+        }
+        let builder = UiBuilder::new().id_salt(pose.uid).max_rect(foot).layout(Layout::right_to_left(Align::Center));
         ui.scope_builder(builder, |ui| {
             ui.spacing_mut().item_spacing.x = 3.0;
             if list::symbol_button(ui, "🗑", "Delete") {
                 operation = Some(Operation::DeletePose(pose.uid));
             }
-            if list::symbol_button(ui, "✏", "Rename") {
-                self.start_rename(pose);
+            let menu = ui.menu_button("…", |ui| self.menu(ui, pose, posed));
+            menu.response
+                .widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, format!("More of {}", pose.name)));
+            operation = menu.inner.flatten().or(operation.take());
+            if ui.add_enabled(!current, Button::new("Apply")).on_disabled_hover_text("it is shown already").clicked() {
+                operation = Some(match posed.is_clip {
+                    true => posed.change_to(&pose.into(), None, "Apply pose"),
+                    false => Operation::ApplyPose(pose.uid),
+                });
             }
-            if ui.add_enabled(!current, Button::new("Apply")).clicked() {
-                operation = Some(Operation::ApplyPose(pose.uid));
-            }
-            let name = ui.available_rect_before_wrap().shrink2(egui::vec2(4.0, 0.0));
-            list::line(ui, name, &pose.name, ui.visuals().text_color());
         });
         if response.double_clicked() {
             self.start_rename(pose);
+        } else if response.clicked() {
+            self.tween.target = Some(TweenTarget::Pose(pose.uid));
         }
         operation
+    }
+
+    /// Draws the menu of a pose.
+    fn menu(&mut self, ui: &mut Ui, pose: &StoredPose, posed: &PosedRig) -> Option<Operation> {
+        let (nodes, own) = (posed.meant(), WholePose::from(pose));
+        let mut chosen = None;
+        let entry = |ui: &mut Ui, text: &str, why_not: Option<&str>| {
+            let response = ui.add_enabled(why_not.is_none(), Button::new(text));
+            let clicked = response.clicked();
+            if let Some(why_not) = why_not {
+                response.on_disabled_hover_text(why_not);
+            }
+            if clicked {
+                ui.close();
+            }
+            clicked
+        };
+        let nothing = nodes.is_empty().then_some("nothing is selected");
+        if entry(ui, "Apply to selected", nothing) {
+            chosen = Some(posed.change_to(&own, Some(&nodes), "Apply pose"));
+        }
+        if entry(ui, "Apply mirrored", None) {
+            chosen = Some(posed.change_to(&posed.mirrored(&own), None, "Apply mirrored pose"));
+        }
+        if entry(ui, "Apply mirrored to selected", nothing) {
+            chosen = Some(posed.change_to(&posed.mirrored(&own), Some(&nodes), "Apply mirrored pose"));
+        }
+        ui.separator();
+        if entry(ui, "Replace by what is shown", None) {
+            chosen = Some(posed.store(pose.name.clone()));
+        }
+        if entry(ui, "Rename", None) {
+            self.start_rename(pose);
+        }
+        chosen
     }
 
     fn start_rename(&mut self, pose: &StoredPose) {

@@ -14,6 +14,7 @@ mod colors;
 mod drag;
 mod follow;
 pub mod import;
+mod joint_table;
 mod marks;
 mod menu;
 mod row;
@@ -25,6 +26,7 @@ mod state;
 use bevy::{prelude::*, window::RequestRedraw};
 use bevy_egui::egui::{Rangef, Rect, Sense, Stroke, Ui, UiBuilder, WidgetInfo, WidgetType, pos2, vec2};
 
+pub(in crate::editor) use self::state::key_times;
 pub use self::{
     action::{TimelineAction, obstacle, over_timeline},
     axis::TimeAxis,
@@ -52,6 +54,7 @@ use super::{
 use crate::{
     editor::{
         actions::ActionRequest,
+        dock::ShowPanel,
         notice::Notice,
         panel::{EditorPanel, Requests},
     },
@@ -67,12 +70,14 @@ impl Plugin for TimelinePlugin {
             .init_resource::<import::ClipImport>()
             .add_message::<TimelineRequest>()
             .add_message::<import::ImportRequest>()
+            .add_message::<import::MapRequest>()
+            .add_message::<ShowPanel>()
             .add_message::<ActionRequest>()
             .add_message::<Notice>()
             .add_message::<RequestRedraw>()
             .add_systems(
                 Update,
-                (carry_out::attend, import::start, import::land)
+                (carry_out::attend, import::start, import::change_map, import::land)
                     .chain()
                     .after(RigSystems::Gesture)
                     .before(RigSystems::Edits),
@@ -112,6 +117,12 @@ impl EditorPanel for TimelinePanel {
             requests.send(TimelineRequest::Hover(is_pointed));
         }
         self.bar.show(ui, world, &shown, requests);
+        if let Some(import) = world.get_resource::<import::ClipImport>()
+            && let Some(draft) = import.draft().filter(|draft| draft.rig == shown.entity)
+        {
+            self.gesture = None;
+            return joint_table::show(ui, draft, &shown, import.what().is_some(), requests);
+        }
         let (Some(open), Some(timeline)) = (open, world.get_resource::<Timeline>()) else {
             self.gesture = None;
             let text = match shown.rig.clips() {

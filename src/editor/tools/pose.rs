@@ -1,7 +1,7 @@
 //! Posing with gizmos: conversion of rotations and movements in the rig's space to offsets from rest.
 
 use bevy::{
-    math::{Affine3, Quat, Vec3},
+    math::{Affine3, Mat3, Quat, Vec3, ops},
     prelude::*,
 };
 
@@ -61,7 +61,7 @@ impl PosedJoint {
         match delta {
             Delta::Turn { axis, angle } => {
                 let axis = own.map_or(*axis, |own| self.axes[own]);
-                PoseOffset { rotation: self.turned(axis, *angle), ..self.offset }
+                PoseOffset { rotation: self.turned(self.parent.matrix3, axis, *angle), ..self.offset }
             }
             Delta::Move(by) if !self.carried => {
                 let turned = Affine3::from_scale_rotation_translation(self.rest.scale, self.rest.rotation, Vec3::ZERO);
@@ -73,8 +73,18 @@ impl PosedJoint {
         }
     }
 
-    fn turned(&self, axis: Vec3, angle: f32) -> Quat {
-        let linear = self.parent.matrix3;
+    /// The joint's offset after the joints above have turned it by `carried`, and itself by `turn` beyond; both in the rig's
+    /// space.
+    pub fn carried(&self, carried: Quat, turn: Quat) -> PoseOffset {
+        let sine = turn.xyz().length();
+        let Some(axis) = turn.xyz().try_normalize() else { return self.offset };
+        let angle = 2.0 * ops::atan2(sine, turn.w);
+        let linear = Mat3::from_quat(carried) * self.parent.matrix3;
+        PoseOffset { rotation: self.turned(linear, axis, angle), ..self.offset }
+    }
+
+    /// Rotation of the offset after a turn about an axis in the rig's space, below a parent with the matrix `linear`.
+    fn turned(&self, linear: Mat3, axis: Vec3, angle: f32) -> Quat {
         // A mirrored parent reverses the rotation.
         let angle = if linear.determinant() < 0.0 { -angle } else { angle };
         let Some(axis) = (linear.inverse() * axis).try_normalize() else { return self.offset.rotation };

@@ -129,7 +129,7 @@ pub(super) fn select(
     }
 }
 
-fn clicked(
+pub(super) fn clicked(
     scene: &Scene,
     rig: &EditedRig,
     sight: &Sight,

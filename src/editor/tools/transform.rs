@@ -157,7 +157,7 @@ fn hover(
     hover.set_if_neq(GizmoHover(handle.is_some()));
 }
 
-fn drag(
+pub(super) fn drag(
     mut pointers: MessageReader<ToolPointer>,
     mut actions: MessageReader<ActionRequest>,
     mut edited: MessageReader<EditReport>,
@@ -244,7 +244,7 @@ fn press(scene: &Scene, mode: Mode, space: GizmoSpace, moves: bool, at: Vec2) ->
 }
 
 /// The step of movements while snapping, in the rig's units.
-fn step(rig: &EditedRig) -> f32 {
+pub(super) fn step(rig: &EditedRig) -> f32 {
     let [low, high] = rig.bounds();
     let height = if high.y > low.y { high.y - low.y } else { rig.size() };
     height * MOVE_STEP

@@ -95,10 +95,6 @@ impl JointMap {
     /// A given name is unknown, or nothing can be mapped.
     pub fn new(motion: &Motion, rig: &Rig, given: &[(String, String)]) -> Result<Self, JointMapError> {
         let (sources, targets) = (motion_joints(motion), rig_joints(rig));
-        let found = |joints: &[SkeletonJoint]| {
-            let named = by_names(joints);
-            if named.is_empty() { (shaped(joints), FoundBy::Shape) } else { (named, FoundBy::Names) }
-        };
         let ((mut source, mut found_by), (target, _)) = (found(&sources), found(&targets));
         let mut pairs = Vec::new();
         if !given.is_empty() {
@@ -138,6 +134,45 @@ impl JointMap {
         Ok(Self { source, target, pairs, found_by })
     }
 
+    /// Map of these pairs alone: a joint of the motion, and one of the rig as an index in the order of [`Rig::walk`].
+    ///
+    /// # Errors
+    /// There are no pairs.
+    pub fn of_pairs(motion: &Motion, rig: &Rig, given: &[(usize, usize)]) -> Result<Self, JointMapError> {
+        let (sources, targets) = (motion.joints.len(), rig_joints(rig));
+        let (mut target, _) = found(&targets);
+        let mut source = HumanJoints::new();
+        let mut pairs = Vec::new();
+        for &(from, to) in given.iter().filter(|(from, to)| *from < sources && *to < targets.len()) {
+            match target.iter().find(|(_, joints)| joints.contains(&to)) {
+                Some((bone, _)) => source.entry(*bone).or_default().push(from),
+                None => pairs.push((from, to)),
+            }
+        }
+        for joints in source.values_mut() {
+            joints.sort_unstable();
+            joints.dedup();
+        }
+        target.retain(|bone, _| source.contains_key(bone));
+        if source.is_empty() && pairs.is_empty() {
+            return Err(JointMapError::Nothing);
+        }
+        Ok(Self { source, target, pairs, found_by: FoundBy::Map })
+    }
+
+    /// Pairs of the map: joint of the motion, joint of the rig. Of several joints of a bone, those at the same share of its
+    /// length belong together.
+    pub fn joint_pairs(&self) -> Vec<(usize, usize)> {
+        let mut pairs = Vec::new();
+        for (_, source, target) in self.bones() {
+            for (place, from) in source.iter().enumerate() {
+                pairs.push((*from, target[(place * target.len() / source.len()).min(target.len() - 1)]));
+            }
+        }
+        pairs.extend(&self.pairs);
+        pairs
+    }
+
     /// Bones that both skeletons have.
     pub fn bones(&self) -> impl Iterator<Item = (HumanBone, &[usize], &[usize])> {
         self.source.iter().filter_map(|(bone, source)| Some((*bone, &source[..], &self.target.get(bone)?[..])))
@@ -147,18 +182,12 @@ impl JointMap {
     pub fn names(&self, motion: &Motion, rig: &Rig) -> NamePairs {
         let targets = rig_joints(rig);
         let mut pairs = NamePairs::new();
-        let mut add = |from: usize, to: usize| {
+        for (from, to) in self.joint_pairs() {
             let (from, to) = (&motion.joints[from].name, &targets[to].name);
             if !from.is_empty() && !to.is_empty() {
                 pairs.push((from.clone(), to.clone()));
             }
-        };
-        for (_, source, target) in self.bones() {
-            for (place, from) in source.iter().enumerate() {
-                add(*from, target[(place * target.len() / source.len()).min(target.len() - 1)]);
-            }
         }
-        self.pairs.iter().for_each(|(from, to)| add(*from, *to));
         pairs
     }
 
@@ -182,6 +211,12 @@ impl JointMap {
             rig.walk().enumerate().filter(|(at, joint)| joint.data.kind == NodeKind::Joint && !used.contains(at));
         joints.map(|(_, joint)| joint.data.label.clone().unwrap_or_else(|| joint.data.uid.to_string())).collect()
     }
+}
+
+/// Bones of a skeleton, by names or else by shape.
+fn found(joints: &[SkeletonJoint]) -> (HumanJoints, FoundBy) {
+    let named = by_names(joints);
+    if named.is_empty() { (shaped(joints), FoundBy::Shape) } else { (named, FoundBy::Names) }
 }
 
 /// Joint of that name, or the name and the end of a sentence about it.

@@ -61,7 +61,7 @@ pub(super) fn between(from: &Key, to: &Key, property: &Property, time: f32) -> [
 }
 
 /// Rotation between two, on the shorter way.
-pub(super) fn slerp(from: Quat, to: Quat, share: f32) -> Quat {
+pub(in crate::rig) fn slerp(from: Quat, to: Quat, share: f32) -> Quat {
     let to = if from.dot(to) < 0.0 { -to } else { to };
     let cosine = from.dot(to).min(1.0);
     if cosine > 0.9995 {

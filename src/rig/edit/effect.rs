@@ -35,13 +35,14 @@ impl RigEdit {
         }
     }
 
-    /// True if the edit changes nothing but pose, attribute values, stored poses or clips, which no command reads.
+    /// True if the edit changes nothing but pose, attribute values, stored poses, clips or selection sets, which no command reads.
     pub fn is_of_motion(&self) -> bool {
         match self {
             Self::SetOffset(..) | Self::SetAttributeValue(..) => true,
             Self::AddStoredPose(..) | Self::RemoveStoredPose(..) | Self::SetStoredPose(..) => true,
             Self::AddClip(..) | Self::RemoveClip(..) | Self::SetClipAbout(..) => true,
             Self::AddLayer { .. } | Self::RemoveLayer { .. } | Self::SetLayer { .. } | Self::SetKeys { .. } => true,
+            Self::SetSelectionSets(..) => true,
             Self::Batch(edits) => edits.iter().all(Self::is_of_motion),
             _ => false,
         }

@@ -20,7 +20,7 @@ use crate::rig::{Rig, Uid};
 /// Highest format that this version reads; written only for content that needs it.
 ///
 /// Format 2 adds values of attributes, and poses of nodes that are not joints; format 3 adds clips, and the templates that rigs
-/// follow; format 4 adds parts that were dropped onto joints. A project is written in the first format that can hold it.
+/// follow; format 4 adds parts that were dropped onto joints, and selection sets. A project is written in the first format that can hold it.
 pub const FORMAT: u32 = 4;
 
 /// Largest size in bytes of a project that is read.

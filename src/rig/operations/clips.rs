@@ -17,7 +17,7 @@ use crate::rig::{
 
 pub use ease::KeyEase;
 pub use keys::KeyClipboard;
-pub(super) use mirror::carried as carried_key;
+pub(super) use mirror::{carried as carried_key, frame_of, partners};
 pub(super) use pose::keyed;
 pub use reduce::KeyTolerance;
 

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use super::{Draft, OperationError, frame::Frame};
+use super::{Draft, OperationError, WholePose, frame::Frame};
 use crate::rig::{AttributeValues, EditError, PoseOffset, RigEdit, StoredPose, Uid};
 
 /// Sets offsets on top of the rest pose, and their mirror images on the partners that are not in the list.
@@ -16,6 +16,23 @@ pub(super) fn pose(draft: &mut Draft, offsets: &[(Uid, PoseOffset)]) -> Result<(
             // whole pose; if one arm is raised and the other hangs, both elbows bend alike.
             let (here, there) = (Frame::of(draft.rig(), joint), Frame::of(draft.rig(), partner));
             set(draft, partner, Some(here.carried(&offset, &there, plane.reflection())))?;
+        }
+    }
+    Ok(())
+}
+
+/// Sets offsets and attribute values of nodes; those that are set already stay as they are.
+pub(super) fn set_all(
+    draft: &mut Draft,
+    offsets: &[(Uid, PoseOffset)],
+    values: &[(Uid, String, Option<f32>)],
+) -> Result<(), OperationError> {
+    for (node, offset) in offsets {
+        set(draft, *node, Some(*offset))?;
+    }
+    for (node, name, value) in values {
+        if draft.rig().attribute_value(*node, name) != *value {
+            draft.apply(RigEdit::SetAttributeValue(*node, name.clone(), *value))?;
         }
     }
     Ok(())
@@ -38,10 +55,10 @@ pub(super) fn reset(draft: &mut Draft, joints: &[Uid]) -> Result<(), OperationEr
     Ok(())
 }
 
-/// Stores the current pose under a name; a pose of that name is replaced.
-pub(super) fn store(draft: &mut Draft, name: &str) -> Result<(), OperationError> {
+/// Stores a pose under a name; a stored pose of that name is replaced.
+pub(super) fn store(draft: &mut Draft, name: &str, shown: &WholePose) -> Result<(), OperationError> {
     let name = checked_name(name)?;
-    let (offsets, values) = (draft.rig().pose().clone(), draft.rig().attribute_values().clone());
+    let WholePose { offsets, values } = shown.clone();
     let known = draft.rig().stored_poses().iter().find(|pose| pose.name == name).cloned();
     let edit = match known {
         Some(known) => RigEdit::SetStoredPose(Box::new(StoredPose { offsets, values, ..known })),

@@ -203,6 +203,10 @@ impl Desk {
     #[track_caller]
     pub fn secondary_click(&mut self, label: &str) {
         let at = self.find(label).rect.center();
+        self.secondary_click_at(at);
+    }
+
+    pub fn secondary_click_at(&mut self, at: Pos2) {
         self.move_to(at);
         self.button(at, PointerButton::Secondary, true);
         self.frame();

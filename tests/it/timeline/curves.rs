@@ -1,5 +1,6 @@
 //! Curves: values over time, with keys and tangents that are dragged.
 
+use bevy::math::EulerRot;
 use rigsmith::{
     editor::panels::{
         curves::{CurvesPanel, curve::curves},
@@ -81,6 +82,51 @@ fn a_tangent_turns_on_both_sides_or_one() {
     assert!(broken[0] == 0.5 && broken[1].abs() < 0.05, "{broken:?}");
     undo(&mut desk);
     assert_eq!(bytes(&desk), before);
+}
+
+#[test]
+fn tangents_of_turns_are_slopes_of_their_angles() {
+    let node = Uid(5);
+    // A turn about all axes, as a curve through three keys with the slopes of its quaternion.
+    let at = |time: f32| Quat::from_euler(EulerRot::XYZ, 0.4 * time, 0.3 - 0.2 * time, 0.5 * time * time);
+    let slope = |time: f32| {
+        let (before, after) = (at(time - 1e-3), at(time + 1e-3));
+        ((after - before) * 500.0).to_array()
+    };
+    let key = |time: f32| Key {
+        ease: Ease::Cubic { arrive: slope(time), leave: slope(time) },
+        ..Key::rotation(time, at(time))
+    };
+    let mut layer = ClipLayer::empty(BASE);
+    layer.tracks.insert(turned(node), Arc::new(Track { keys: [0.0, 1.0, 2.0].map(key).to_vec() }));
+    let axis = TimeAxis { span: [0.0, 2.0], x: egui::Rangef::new(0.0, 800.0) };
+    let found = curves(&layer, &turned(node), "node", &axis);
+    for (curve, wanted) in found.iter().zip([0.4_f32, -0.2, 1.0]) {
+        let [arrive, leave] = curve.keys[1].slopes.expect("slopes");
+        let wanted = wanted.to_degrees();
+        assert!((arrive - wanted).abs() < 0.2 && (leave - wanted).abs() < 0.2, "{}: {arrive} {leave}", curve.name);
+        // The drawn curve has that slope at the key.
+        let near =
+            |time: f32| curve.points.iter().min_by(|a, b| (a.0 - time).abs().total_cmp(&(b.0 - time).abs())).unwrap();
+        let (a, b) = (near(0.98), near(1.02));
+        assert!(((b.1 - a.1) / (b.0 - a.0) - wanted).abs() < 1.5, "{}", curve.name);
+    }
+    // Another slope of one angle leaves those of the others.
+    let changed = found[1].keys[1].with_slopes(&Property::Rotation, 1, [30.0, 30.0]);
+    let keys = vec![key(0.0), changed, key(2.0)];
+    layer.tracks.insert(turned(node), Arc::new(Track { keys }));
+    let now = curves(&layer, &turned(node), "node", &axis);
+    let slopes: Vec<f32> = now.iter().map(|curve| curve.keys[1].slopes.expect("slopes")[0]).collect();
+    assert!((slopes[1] - 30.0).abs() < 0.05, "{slopes:?}");
+    assert!(
+        (slopes[0] - 0.4_f32.to_degrees()).abs() < 0.2 && (slopes[2] - 1.0_f32.to_degrees()).abs() < 0.2,
+        "{slopes:?}"
+    );
+    // With the middle axis at a right angle the outer angles do not follow from the turn.
+    let locked = Key { ease: key(1.0).ease, ..Key::rotation(1.0, Quat::from_rotation_y(std::f32::consts::FRAC_PI_2)) };
+    layer.tracks.insert(turned(node), Arc::new(Track { keys: vec![key(0.0), locked] }));
+    let locked = curves(&layer, &turned(node), "node", &axis);
+    assert_eq!(locked[0].keys[1].slopes, None);
 }
 
 #[test]

@@ -1,6 +1,9 @@
 //! Clips, layers, markers, keys that are set aside, and motion from files.
 
-use rigsmith::rig::animation::{LayerMode, Marker};
+use rigsmith::{
+    editor::panels::timeline::import::ClipImport,
+    rig::animation::{LayerMode, Marker},
+};
 
 use super::*;
 
@@ -228,8 +231,8 @@ fn motion_is_imported_in_one_step() {
     assert_eq!(bytes(&desk), before);
 }
 
-#[test]
-fn motion_capture_is_put_onto_the_controls() {
+/// The bundled biped beside a capture of a human, whose map waits.
+fn captured() -> (Desk, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("step.bvh");
     std::fs::write(&path, crate::fuzz_bvh::HUMAN).unwrap();
@@ -239,10 +242,55 @@ fn motion_capture_is_put_onto_the_controls() {
     desk.app.world_mut().entity_mut(entity).insert(rig);
     desk.frames(3);
     import(&mut desk, path);
+    (desk, folder)
+}
+
+/// Accepts the map, and waits for the clip.
+fn accept(desk: &mut Desk) {
+    desk.click("Import motion");
+    desk.frames(2);
+    crate::bench::wait(desk, "the clip", Desk::frame, |desk| {
+        desk.app.world().resource::<ClipImport>().what().is_none() && !desk.rig().clips().is_empty()
+    });
+    desk.frames(3);
+}
+
+#[test]
+fn motion_capture_is_put_onto_the_controls() {
+    let (mut desk, _folder) = captured();
+    assert!(desk.rig().clips().is_empty(), "nothing is imported before the map is accepted");
+    assert!(desk.look("Joint for LeftLeg").is_some() && desk.says("shin_l"), "{:?}", desk.seen);
+    accept(&mut desk);
     let [clip] = desk.rig().clips() else { panic!("{:?}", desk.told()) };
     assert!(clip.key_count() > 10 && clip.name == "step", "{} {:?}", clip.name, desk.told());
     let nodes = clip.nodes();
     assert!(nodes.iter().any(|node| desk.rig().joint(*node).is_none()), "controls have the keys");
+    assert!(desk.look("Joint for LeftLeg").is_none(), "the table is gone");
     undo(&mut desk);
     assert!(desk.rig().clips().is_empty());
+}
+
+#[test]
+fn the_map_of_joints_is_changed_or_dropped_before_anything_is_applied() {
+    let (mut desk, _folder) = captured();
+    let (before, steps) = (bytes(&desk), desk.steps());
+    let draft = |desk: &Desk| desk.app.world().resource::<ClipImport>().draft().cloned();
+    let first = draft(&desk).expect("a map");
+    let leg = first.joints().position(|name| name == "LeftLeg").unwrap();
+    assert!(first.targets[leg].is_some() && first.mapped() >= 7, "{first:?}");
+    // A row by hand.
+    let combo = desk.find("Joint for LeftLeg").rect.center();
+    desk.time += 1.0;
+    desk.click_at(combo);
+    desk.frames(2);
+    desk.click("nothing");
+    desk.frames(3);
+    let changed = draft(&desk).unwrap();
+    assert_eq!((changed.targets[leg], changed.mapped()), (None, first.mapped() - 1));
+    assert_eq!((bytes(&desk), desk.steps()), (before.clone(), steps));
+    // Escape leaves all as it was.
+    desk.key(KeyboardKey::Escape);
+    desk.frames(3);
+    assert!(draft(&desk).is_none() && desk.look("Joint for LeftLeg").is_none());
+    assert_eq!((bytes(&desk), desk.steps()), (before, steps));
 }

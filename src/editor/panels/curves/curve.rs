@@ -1,6 +1,9 @@
 //! Curves of tracks: values over time, one curve a number, rotations as angles.
 
-use bevy::{math::EulerRot, prelude::*};
+use bevy::{
+    math::{EulerRot, Mat3, Vec4, ops},
+    prelude::*,
+};
 use bevy_egui::egui::Color32;
 
 use crate::{
@@ -45,7 +48,8 @@ pub struct CurveKey {
     pub value: f32,
     /// Angles of a rotation in degrees; zero for others.
     pub angles: Vec3,
-    /// Slopes before and behind a cubic key, in units a second. Those of rotations are of quaternions and have no slope here.
+    /// Slopes before and behind a cubic key, in units a second; for rotations in degrees a second. `None` also where the angles
+    /// of a rotation do not follow from its change, with the middle axis at a right angle.
     pub slopes: Option<[f32; 2]>,
 }
 
@@ -68,12 +72,19 @@ impl CurveKey {
         key
     }
 
-    /// The key with other slopes.
-    pub fn with_slopes(&self, axis: usize, slopes: [f32; 2]) -> Key {
+    /// The key with other slopes. A rotation keeps those of its other angles.
+    pub fn with_slopes(&self, property: &Property, axis: usize, slopes: [f32; 2]) -> Key {
         let mut key = self.key;
-        if let Ease::Cubic { arrive, leave } = &mut key.ease
-            && axis < arrive.len()
-        {
+        let Ease::Cubic { arrive, leave } = &mut key.ease else { return key };
+        if *property == Property::Rotation {
+            let (Some(before), Some(by)) = (self.slopes, by_angles(&self.key, self.angles).get(axis).copied()) else {
+                return key;
+            };
+            for (side, tangent) in [arrive, leave].into_iter().enumerate() {
+                let turned = Vec4::from_array(*tangent) + by * (slopes[side] - before[side]);
+                *tangent = turned.to_array();
+            }
+        } else if axis < arrive.len() {
             (arrive[axis], leave[axis]) = (slopes[0], slopes[1]);
         }
         key
@@ -103,10 +114,12 @@ pub fn curves(layer: &ClipLayer, target: &TrackTarget, node: &str, axis: &TimeAx
             points.push((*time, values[axis]));
         }
         let Some(key) = next.next_if(|key| key.time == *time) else { continue };
+        let turns = if is_turn { angle_slopes(key, angles) } else { None };
         for (axis, keys) in found.iter_mut().enumerate() {
             let slopes = match key.ease {
-                Ease::Cubic { arrive, leave } if !is_turn => Some([arrive[axis], leave[axis]]),
-                _ => None,
+                Ease::Cubic { .. } if is_turn => turns.map(|turns| turns.map(|turn| turn[axis])),
+                Ease::Cubic { arrive, leave } => Some([arrive[axis], leave[axis]]),
+                Ease::Stepped | Ease::Linear => None,
             };
             keys.push(CurveKey { key: **key, value: values[axis], angles, slopes });
         }
@@ -153,6 +166,51 @@ fn sampled(track: &Track, keys: &[&Key], axis: &TimeAxis) -> Vec<f32> {
 fn rotation(angles: Vec3) -> Quat {
     let [x, y, z] = angles.to_array().map(f32::to_radians);
     Quat::from_euler(EulerRot::XYZ, x, y, z)
+}
+
+/// Changes of a key's quaternion by degrees of its angles about X, Y and Z.
+fn by_angles(key: &Key, angles: Vec3) -> [Vec4; 3] {
+    let degree = 1.0_f32.to_radians();
+    let parts = angles.to_array().map(|angle| ops::sin_cos(0.5 * angle.to_radians()));
+    let turn = |axis: usize, (sine, cosine): (f32, f32)| {
+        let v = Vec3::AXES[axis] * sine;
+        Quat::from_xyzw(v.x, v.y, v.z, cosine)
+    };
+    let product = |changed: usize| {
+        let factor = |axis: usize| {
+            let (sine, cosine) = parts[axis];
+            // The derivative of half an angle's sine and cosine.
+            if axis == changed {
+                turn(axis, (0.5 * degree * cosine, -0.5 * degree * sine))
+            } else {
+                turn(axis, parts[axis])
+            }
+        };
+        Vec4::from(factor(0) * factor(1) * factor(2))
+    };
+    // The quaternion of a key may be the negative one of the same rotation.
+    let sign = if rotation(angles).dot(Quat::from_array(key.value)) < 0.0 { -1.0 } else { 1.0 };
+    [0, 1, 2].map(|axis| product(axis) * sign)
+}
+
+/// Slopes of the angles before and behind a cubic key of rotations, in degrees a second.
+fn angle_slopes(key: &Key, angles: Vec3) -> Option<[Vec3; 2]> {
+    let Ease::Cubic { arrive, leave } = key.ease else { return None };
+    let by = by_angles(key, angles);
+    let scale = by[0].length_squared();
+    let dots = |of: Vec4| Vec3::new(by[0].dot(of), by[1].dot(of), by[2].dot(of)) / scale;
+    let squares = Mat3::from_cols(dots(by[0]), dots(by[1]), dots(by[2]));
+    // With the middle axis at a right angle the outer two turn alike.
+    if squares.determinant().abs() < 1e-3 {
+        return None;
+    }
+    let (inverse, value) = (squares.inverse(), Vec4::from_array(key.value));
+    // What changes the length of the quaternion turns nothing.
+    let slopes = |tangent: [f32; 4]| {
+        let tangent = Vec4::from_array(tangent);
+        inverse * dots(tangent - value * value.dot(tangent))
+    };
+    Some([slopes(arrive), slopes(leave)])
 }
 
 /// Angles of a rotation in degrees. Of all angles with that rotation, those that are nearest to the ones before, so that curves

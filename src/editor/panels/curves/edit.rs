@@ -217,7 +217,7 @@ impl TangentDrag {
         if !broken {
             slopes = [slope; 2];
         }
-        let key = self.key.with_slopes(self.axis, slopes);
+        let key = self.key.with_slopes(&self.target.property, self.axis, slopes);
         let next = (key != self.key.key).then(|| KeyOperation::Set(vec![(self.target.clone(), vec![key])]));
         let is_other = next != self.shown;
         self.shown = next;

@@ -44,14 +44,55 @@ struct Rename {
 const FRAMES: Look = Look { speed: 0.2, decimals: 2, suffix: "", quantity: Quantity::Plain };
 const RATE: Look = Look { speed: 0.1, decimals: 3, suffix: "", quantity: Quantity::Plain };
 
+/// Widths with which the bar stays on one line.
+#[derive(Debug, Clone, Copy)]
+struct Fit {
+    /// Choice of a clip.
+    clip: f32,
+    /// Frame, start, end and frame rate.
+    fields: [f32; 4],
+    /// True for lines between the groups, and the word before the frame.
+    is_wide: bool,
+    /// True for all buttons; without, the rarer ones are in the menu alone.
+    has_all: bool,
+}
+
+impl Fit {
+    fn of(width: f32) -> Self {
+        let narrow = [56.0, 62.0, 56.0, 62.0];
+        match width {
+            840.0.. => Self { clip: 132.0, fields: [84.0, 72.0, 72.0, 72.0], is_wide: true, has_all: true },
+            690.0.. => Self { clip: 96.0, fields: narrow, is_wide: false, has_all: true },
+            _ => Self { clip: 88.0, fields: narrow, is_wide: false, has_all: false },
+        }
+    }
+}
+
+/// Actions that a narrow bar has in its menu alone.
+const RARER: [TimelineAction; 4] =
+    [TimelineAction::Start, TimelineAction::End, TimelineAction::Marker, TimelineAction::Fit];
+
 impl Bar {
     pub fn show(&mut self, ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut Requests) {
         let open = OpenClip::of(world);
+        let fit = Fit::of(ui.available_width());
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 3.0;
-            self.clips(ui, shown, open.as_ref(), requests);
+            ui.spacing_mut().button_padding.x = 3.0;
+            let line = |ui: &mut Ui| {
+                if fit.is_wide {
+                    ui.separator();
+                }
+            };
+            let tool =
+                |ui: &mut Ui, symbol: &str, action: TimelineAction, on: Option<bool>, requests: &mut Requests| {
+                    if fit.has_all || !RARER.contains(&action) {
+                        tool(ui, world, symbol, action, on, requests);
+                    }
+                };
+            self.clips(ui, shown, open.as_ref(), fit.clip, requests);
             self.menu(ui, world, open.as_ref(), requests);
-            ui.separator();
+            line(ui);
             let playing = world.get_resource::<Timeline>().is_some_and(|timeline| timeline.playing);
             for (symbol, action) in [
                 ("⏮", TimelineAction::Start),
@@ -62,26 +103,33 @@ impl Bar {
                 ("⏩", TimelineAction::NextKey),
                 ("⏭", TimelineAction::End),
             ] {
-                tool(ui, world, symbol, action, None, requests);
+                tool(ui, symbol, action, None, requests);
             }
             let is_looped = open.is_some_and(|open| open.clip.looped);
-            tool(ui, world, "🔁", TimelineAction::Loop, Some(is_looped), requests);
-            ui.separator();
-            tool(ui, world, "🔑", TimelineAction::Key, None, requests);
+            tool(ui, "🔁", TimelineAction::Loop, Some(is_looped), requests);
+            line(ui);
+            tool(ui, "🔑", TimelineAction::Key, None, requests);
             let auto_key = world.get_resource::<Timeline>().is_some_and(|timeline| timeline.auto_key);
-            tool(ui, world, "⏺", TimelineAction::AutoKey, Some(auto_key), requests);
-            tool(ui, world, "⚑", TimelineAction::Marker, None, requests);
-            tool(ui, world, "⌖", TimelineAction::Fit, None, requests);
+            tool(ui, "⏺", TimelineAction::AutoKey, Some(auto_key), requests);
+            tool(ui, "⚑", TimelineAction::Marker, None, requests);
+            tool(ui, "⌖", TimelineAction::Fit, None, requests);
             if let Some(open) = &open {
-                ui.separator();
-                self.frames(ui, open, requests);
+                line(ui);
+                self.frames(ui, open, &fit, requests);
             }
         });
     }
 
     /// The choice of a clip, or the field in which its name is typed.
-    fn clips(&mut self, ui: &mut Ui, shown: &DisplayedRig, open: Option<&OpenClip>, requests: &mut Requests) {
-        let size = vec2(132.0, ui.spacing().interact_size.y);
+    fn clips(
+        &mut self,
+        ui: &mut Ui,
+        shown: &DisplayedRig,
+        open: Option<&OpenClip>,
+        width: f32,
+        requests: &mut Requests,
+    ) {
+        let size = vec2(width, ui.spacing().interact_size.y);
         if let Some(rename) = &mut self.rename {
             let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
             let id = ui.id().with((rename.clip, "rename"));
@@ -131,13 +179,15 @@ impl Bar {
             entry(ui, world, TimelineAction::Import, requests);
             entry(ui, world, TimelineAction::NewLayer, requests);
             entry(ui, world, TimelineAction::KeyAll, requests);
+            ui.separator();
+            RARER.into_iter().for_each(|action| entry(ui, world, action, requests));
         });
         menu.response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, "Menu of the clip"));
         menu.response.on_hover_text("Make, rename, copy, delete and import clips");
     }
 
     /// The frame of the playhead, the range and the frame rate.
-    fn frames(&mut self, ui: &mut Ui, open: &OpenClip, requests: &mut Requests) {
+    fn frames(&mut self, ui: &mut Ui, open: &OpenClip, fit: &Fit, requests: &mut Requests) {
         let clip = open.clip;
         let height = ui.spacing().interact_size.y;
         let seconds = |frame: f32| (f64::from(frame) / f64::from(clip.frame_rate)) as f32;
@@ -148,17 +198,19 @@ impl Bar {
             }
             self.numbers.field(ui, said, RichText::new(prefix), value.into(), look, vec2(width, height))
         };
-        let frame = field(ui, "Frame", "Frame ", open.frame(), FRAMES, 84.0);
+        let [of_frame, of_start, of_end, of_rate] = fit.fields;
+        let word = if fit.is_wide { "Frame " } else { "" };
+        let frame = field(ui, "Frame", word, open.frame(), FRAMES, of_frame);
         if let Some(NumberEdit::Set(frame) | NumberEdit::Preview(frame)) = frame {
             requests.send(TimelineRequest::Scrub(seconds(frame)));
         }
         let [start, end] = clip.range.map(|time| frames(clip, time));
         let edits = [
-            field(ui, "Start frame", "from ", start, FRAMES, 72.0)
+            field(ui, "Start frame", "from ", start, FRAMES, of_start)
                 .map(|edit| changed(clip, edit, |about, frame| about.range[0] = seconds(frame).min(about.range[1]))),
-            field(ui, "End frame", "to ", end, FRAMES, 72.0)
+            field(ui, "End frame", "to ", end, FRAMES, of_end)
                 .map(|edit| changed(clip, edit, |about, frame| about.range[1] = seconds(frame).max(about.range[0]))),
-            field(ui, "Frames a second", "fps ", clip.frame_rate, RATE, 72.0)
+            field(ui, "Frames a second", "fps ", clip.frame_rate, RATE, of_rate)
                 .map(|edit| changed(clip, edit, |about, rate| about.frame_rate = rate.clamp(0.1, 1000.0))),
         ];
         for change in edits.into_iter().flatten() {

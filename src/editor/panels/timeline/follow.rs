@@ -47,6 +47,7 @@ pub(super) fn follow_playback(
         (timeline.playing, timeline.starting) = (false, false);
         return;
     };
+    let was_playing = timeline.playing;
     match players.get_mut(entity) {
         Ok(mut player) if player.clip == clip.uid => {
             if is_taken_back {
@@ -81,9 +82,21 @@ pub(super) fn follow_playback(
         }
         Err(_) => {}
     }
+    if (was_playing || timeline.playing)
+        && let Some(next) = turned_page(timeline.span, timeline.time)
+    {
+        timeline.span = next;
+    }
     if timeline.playing {
         commands.write_message(RequestRedraw);
     }
+}
+
+/// Span of time of the same length with the playhead a tenth from its start, if the playhead is outside of the visible one.
+fn turned_page([start, end]: [f32; 2], time: f32) -> Option<[f32; 2]> {
+    let (length, is_seen) = (end - start, (start..=end).contains(&time));
+    let next = time - 0.1 * length;
+    (!is_seen && length > 0.0 && next.is_finite()).then_some([next, next + length])
 }
 
 /// Remembers the names of nodes, by which keys of nodes that are gone are listed.

@@ -1,5 +1,5 @@
 //! Motion from files: clips of rigs, motion capture and the animations of models, put onto the rig in the background. All clips
-//! of a file come as one step.
+//! of a file come as one step. Motion of another skeleton waits until people have seen which joints it goes to.
 
 use std::{
     path::{Path, PathBuf},
@@ -16,6 +16,7 @@ use super::carry_out::open;
 use crate::{
     editor::{
         ActiveRig,
+        dock::ShowPanel,
         files::dialog::{Dialog, Question},
         notice::Notice,
     },
@@ -28,11 +29,11 @@ use crate::{
     },
     processor::{BuildError, Builder, Modules},
     rig::{
-        BuiltRig, Rig, UidSource,
+        BuiltRig, Rig, Uid, UidSource,
         animation::{
             RigClip,
             file_clip::{motion_of, numbered_clip, own_joints},
-            joint_map::{JointMap, JointMapError},
+            joint_map::{FoundBy, JointMap, JointMapError},
             motion::Motion,
         },
         operations::{ClipOperation, Operation, OperationError},
@@ -43,26 +44,85 @@ use crate::{
 /// Kinds of files that have motion.
 pub const MOTION_FILES: &[FileKind] = &[FileKind::Bvh, FileKind::Animation, FileKind::Glb, FileKind::Gltf];
 
-/// Request to put the motion of a file onto the active rig.
+/// Request to put the motion of a file onto the active rig. Motion of another skeleton waits for [`MapRequest::Accept`].
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct ImportRequest(pub PathBuf);
 
-/// File of motion that is being read.
+/// Change of the map of joints of motion that waits.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub enum MapRequest {
+    /// Gives a joint of the motion, by its number, another joint of the rig, or none.
+    Set(usize, Option<Uid>),
+    /// Puts the motion onto the rig by the map.
+    Accept,
+    /// Drops the motion.
+    Cancel,
+}
+
+/// File of motion that is being read, or that waits until its map of joints is accepted.
 #[derive(Resource, Default)]
 pub struct ClipImport {
     job: Option<Job>,
+    draft: Option<MapDraft>,
 }
 
 struct Job {
     rig: Entity,
     name: String,
-    task: Task<Result<ImportedMotion, ImportError>>,
+    task: Task<Result<ReadMotion, ImportError>>,
+}
+
+/// Result of reading a file, or of retargeting.
+enum ReadMotion {
+    /// Clips of the rig.
+    Clips(ImportedMotion),
+    /// Motion of another skeleton.
+    Draft(MapDraft),
+}
+
+/// Motion of another skeleton, with the joints of the rig that its joints move.
+#[derive(Debug, Clone)]
+pub struct MapDraft {
+    /// The rig.
+    pub rig: Entity,
+    /// Name of the file.
+    pub name: String,
+    /// Motions of one skeleton.
+    motions: Arc<Vec<Motion>>,
+    /// Joint of the rig for each joint of the motion.
+    pub targets: Vec<Option<Uid>>,
+    /// Way in which the guess was found; `None` if nothing was found.
+    pub found_by: Option<FoundBy>,
+    /// Remarks, a sentence each.
+    notes: Vec<String>,
+}
+
+impl MapDraft {
+    /// Names of the motion's joints, in order.
+    pub fn joints(&self) -> impl ExactSizeIterator<Item = &str> {
+        self.motions.first().map_or(&[][..], |motion| &motion.joints[..]).iter().map(|joint| joint.name.as_str())
+    }
+
+    /// Number of motions.
+    pub fn motions(&self) -> usize {
+        self.motions.len()
+    }
+
+    /// Number of joints of the motion that move a joint of the rig.
+    pub fn mapped(&self) -> usize {
+        self.targets.iter().flatten().count()
+    }
 }
 
 impl ClipImport {
     /// Name of the file that is being read.
     pub fn what(&self) -> Option<&str> {
         self.job.as_ref().map(|job| job.name.as_str())
+    }
+
+    /// Motion that waits until its map is accepted.
+    pub fn draft(&self) -> Option<&MapDraft> {
+        self.draft.as_ref()
     }
 }
 
@@ -120,26 +180,74 @@ fn begin(world: &mut World, path: &Path) {
         world.write_message(Notice::info(format!("{name} has to wait: another file is being read. Import it then.")));
         return;
     }
-    let Some(modules) = world.get_resource::<RigModules>().map(|modules| Arc::clone(&modules.0)) else { return };
-    let Some(rig) = world.get::<Rig>(entity) else { return };
-    let rig = world.get::<RigHistory>(entity).map_or_else(|| rig.clone(), |history| history.settled(rig).into_owned());
-    let path = path.to_owned();
+    let Some((rig, modules)) = snapshot(world, entity) else { return };
+    let (path, of_file) = (path.to_owned(), name.clone());
     let limits = world.get_resource::<RigLimits>().cloned().unwrap_or_default();
-    let task = AsyncComputeTaskPool::get().spawn(async move { read(&path, &rig, &modules, &limits) });
+    let task = AsyncComputeTaskPool::get().spawn(async move { read(&path, &of_file, entity, &rig, &modules, &limits) });
     world.resource_mut::<ClipImport>().job = Some(Job { rig: entity, name, task });
 }
 
-/// Clips of a file on a rig, as `rigsmith animate` makes them.
-fn read(path: &Path, rig: &Rig, modules: &Arc<Modules>, limits: &RigLimits) -> Result<ImportedMotion, ImportError> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let built = Builder::build(rig, modules)?;
+/// The rig without the preview of a current drag, and the modules of its commands.
+fn snapshot(world: &World, entity: Entity) -> Option<(Rig, Arc<Modules>)> {
+    let modules = world.get_resource::<RigModules>().map(|modules| Arc::clone(&modules.0))?;
+    let rig = world.get::<Rig>(entity)?;
+    let rig = world.get::<RigHistory>(entity).map_or_else(|| rig.clone(), |history| history.settled(rig).into_owned());
+    Some((rig, modules))
+}
+
+/// Carries out changes of the map that waits.
+pub(super) fn change_map(mut requests: MessageReader<MapRequest>, mut commands: Commands) {
+    for request in requests.read() {
+        let request = request.clone();
+        commands.queue(move |world: &mut World| answer(world, &request));
+    }
+}
+
+fn answer(world: &mut World, request: &MapRequest) {
+    let mut import = world.resource_mut::<ClipImport>();
+    if import.job.is_some() {
+        return;
+    }
+    match request {
+        MapRequest::Set(joint, target) => {
+            let known = import.draft.as_mut().and_then(|draft| draft.targets.get_mut(*joint));
+            if let Some(known) = known {
+                *known = *target;
+            }
+        }
+        MapRequest::Cancel => import.draft = None,
+        MapRequest::Accept => {
+            let Some(draft) = import.draft.clone() else { return };
+            let Some((rig, modules)) = snapshot(world, draft.rig) else { return };
+            let (entity, name) = (draft.rig, draft.name.clone());
+            let task = AsyncComputeTaskPool::get()
+                .spawn(async move { retargeted(&draft, &rig, &modules).map(ReadMotion::Clips) });
+            world.resource_mut::<ClipImport>().job = Some(Job { rig: entity, name, task });
+        }
+    }
+}
+
+/// Nodes of a rig that get keys.
+fn target_of(rig: &Rig) -> MotionTarget {
     let has_commands = rig.walk().any(|joint| !joint.data.tags.is_empty());
-    let onto = if has_commands { MotionTarget::Controls } else { MotionTarget::Joints };
+    if has_commands { MotionTarget::Controls } else { MotionTarget::Joints }
+}
+
+/// Clips of a file for a rig, or motion of another skeleton with a guess of the map.
+fn read(
+    path: &Path,
+    name: &str,
+    entity: Entity,
+    rig: &Rig,
+    modules: &Arc<Modules>,
+    limits: &RigLimits,
+) -> Result<ReadMotion, ImportError> {
     let mut imported = ImportedMotion { clips: Vec::new(), notes: Vec::new() };
+    let mut motions = Vec::new();
     match FileKind::of(path) {
         Some(FileKind::Animation) => {
             let file = load_animation(&RealDisk, path)?;
-            let bound = file.onto(rig, Some(&built));
+            let bound = file.onto(rig, Some(&Builder::build(rig, modules)?));
             imported.notes.extend(file.notes);
             if !bound.missing.is_empty() {
                 let count = bound.missing.len();
@@ -149,13 +257,13 @@ fn read(path: &Path, rig: &Rig, modules: &Arc<Modules>, limits: &RigLimits) -> R
         }
         Some(FileKind::Bvh) => {
             let motion = load_motion(&RealDisk, path)?;
-            limits.check_motion(&name, &motion)?;
-            imported.retarget(rig, &built, &motion, onto)?;
+            limits.check_motion(name, &motion)?;
+            motions.push(motion);
         }
         Some(FileKind::Glb | FileKind::Gltf) => {
             let model = load_model(&RealDisk, path)?;
-            limits.check_model(&name, &model)?;
-            let joints = (onto == MotionTarget::Joints).then(|| own_joints(&model, rig)).flatten();
+            limits.check_model(name, &model)?;
+            let joints = (target_of(rig) == MotionTarget::Joints).then(|| own_joints(&model, rig)).flatten();
             for (number, clip) in model.clips.iter().enumerate() {
                 let name = if clip.name.trim().is_empty() { stem(path) } else { clip.name.trim().to_owned() };
                 if let Some(joints) = &joints {
@@ -165,29 +273,62 @@ fn read(path: &Path, rig: &Rig, modules: &Arc<Modules>, limits: &RigLimits) -> R
                 }
                 let motion = Motion { name, ..motion_of(&model, clip) };
                 if motion.frames() > 0 {
-                    imported.retarget(rig, &built, &motion, onto)?;
+                    motions.push(motion);
                 }
             }
         }
         _ => return Err(ImportError::Kind),
     }
-    if imported.clips.is_empty() { Err(ImportError::Empty) } else { Ok(imported) }
+    match (motions.is_empty(), imported.clips.is_empty()) {
+        (false, _) => Ok(ReadMotion::Draft(draft(entity, name, rig, motions))),
+        (true, false) => Ok(ReadMotion::Clips(imported)),
+        (true, true) => Err(ImportError::Empty),
+    }
+}
+
+/// Motions with the map that names, shape or labels suggest. Where nothing is found all is for people to choose.
+fn draft(rig: Entity, name: &str, document: &Rig, motions: Vec<Motion>) -> MapDraft {
+    let joints: Vec<Uid> = document.walk().map(|joint| joint.data.uid).collect();
+    let guess = motions.first().and_then(|motion| JointMap::new(motion, document, &[]).ok());
+    let mut targets = vec![None; motions.first().map_or(0, |motion| motion.joints.len())];
+    for (from, to) in guess.iter().flat_map(JointMap::joint_pairs) {
+        if let Some(target) = targets.get_mut(from) {
+            *target = joints.get(to).copied();
+        }
+    }
+    let notes = motions.iter().flat_map(|motion| motion.notes.iter().cloned()).collect();
+    MapDraft {
+        rig,
+        name: name.to_owned(),
+        motions: Arc::new(motions),
+        targets,
+        found_by: guess.map(|guess| guess.found_by),
+        notes,
+    }
+}
+
+/// Motions of a draft on a rig, by its map.
+fn retargeted(draft: &MapDraft, rig: &Rig, modules: &Arc<Modules>) -> Result<ImportedMotion, ImportError> {
+    let built = Builder::build(rig, modules)?;
+    let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
+    let place = |target: Uid| joints.iter().position(|joint| *joint == target);
+    let pairs = draft.targets.iter().enumerate();
+    let pairs: Vec<(usize, usize)> = pairs.filter_map(|(from, to)| Some((from, place((*to)?)?))).collect();
+    let mut imported = ImportedMotion { clips: Vec::new(), notes: draft.notes.clone() };
+    for motion in draft.motions.iter() {
+        let map = JointMap::of_pairs(motion, rig, &pairs)?;
+        imported.retarget(rig, &built, motion, &map)?;
+    }
+    Ok(imported)
 }
 
 impl ImportedMotion {
     /// Adds the motion of another skeleton.
-    fn retarget(
-        &mut self,
-        rig: &Rig,
-        built: &BuiltRig,
-        motion: &Motion,
-        onto: MotionTarget,
-    ) -> Result<(), ImportError> {
-        let map = JointMap::new(motion, rig, &[])?;
-        let settings = RetargetSettings { onto, ..RetargetSettings::default() };
-        let done = retarget(rig, built, motion, &map, &settings)?;
+    fn retarget(&mut self, rig: &Rig, built: &BuiltRig, motion: &Motion, map: &JointMap) -> Result<(), ImportError> {
+        let settings = RetargetSettings { onto: target_of(rig), ..RetargetSettings::default() };
+        let done = retarget(rig, built, motion, map, &settings)?;
         let unmapped = map.unmapped_source(motion).len();
-        self.notes.extend(motion.notes.iter().cloned().chain(done.notes));
+        self.notes.extend(done.notes);
         self.notes.push(format!(
             "\"{}\": {} bones were found; {unmapped} joints of the motion move nothing",
             done.clip.name,
@@ -210,7 +351,16 @@ pub(super) fn land(mut import: ResMut<ClipImport>, mut commands: Commands) {
     };
     let Some(Job { rig, name, .. }) = import.job.take() else { return };
     commands.queue(move |world: &mut World| match result {
-        Ok(imported) => add(world, rig, &name, imported),
+        Ok(ReadMotion::Clips(imported)) => {
+            world.resource_mut::<ClipImport>().draft = None;
+            add(world, rig, &name, imported);
+        }
+        Ok(ReadMotion::Draft(draft)) => {
+            let text = format!("{name}: check in the Timeline which joints its motion goes to, then import it.");
+            world.write_message(Notice::info(text));
+            world.write_message(ShowPanel("Timeline"));
+            world.resource_mut::<ClipImport>().draft = Some(draft);
+        }
         Err(error) => {
             world.write_message(Notice::error(format!("Could not import {name}: {error}")));
         }

@@ -226,7 +226,7 @@ pub(in crate::editor::panels) fn contains(keys: &KeyTimes, these: &KeyTimes) -> 
 }
 
 /// Times at which keys of some nodes stand, or of all nodes if none of these has keys; rising, each once.
-pub(super) fn key_times(clip: &RigClip, nodes: &[Uid]) -> Vec<f32> {
+pub(in crate::editor) fn key_times(clip: &RigClip, nodes: &[Uid]) -> Vec<f32> {
     let nodes: BTreeSet<Uid> = nodes.iter().copied().collect();
     let tracks = || clip.layers.iter().flat_map(|layer| &layer.tracks);
     let own = tracks().filter(|(target, _)| nodes.contains(&target.node));

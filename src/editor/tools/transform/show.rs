@@ -72,6 +72,7 @@ pub(super) fn show(
     let hint = match &aim {
         Some(aim) => describe(&rig, *mode, aim, handle, &settings),
         None if rig.rig.is_empty() => "There are no joints yet: press A to place one, S to draw a stroke.".to_owned(),
+        None if *mode == Mode::Pose => "Drag a joint or a control to pull it; click one to pose it.".to_owned(),
         None => format!("Click a joint to {} it.", verb(*mode)),
     };
     let mut notes = Vec::new();
@@ -120,6 +121,9 @@ fn describe(
         Some(Handle::ViewRing) => format!("Drag turns {what} as you see it."),
         Some(Handle::ScaleAxis(number)) => format!("Drag scales {what} along {space} {}.", axis(number)),
         Some(Handle::ScaleAll) => format!("Drag right or up scales {what} evenly, left or down makes it smaller."),
+        None if mode == Mode::Pose => {
+            format!("Drag a handle to pose {what} ({space} axes: V), or any joint or control to pull it.")
+        }
         None => format!("Drag a handle to {} {what} ({space} axes: V).", verb(mode)),
     };
     let children = match (mode, settings.move_children) {

@@ -13,7 +13,7 @@ use super::{
     TemplateReference,
 };
 use crate::rig::{
-    AttributeValues, EditError, Rig, RigEdit, SourceError, StoredPose, Uid,
+    AttributeValues, EditError, Rig, RigEdit, SelectionSet, SourceError, StoredPose, Uid,
     format::animation::{ClipFile, clip_fields, clip_offset, clips_in},
     format::poses::{OffsetFile, PoseFile, ValueFile},
     format::scan::{self, Field},
@@ -69,6 +69,8 @@ struct RigFile {
     clips: Vec<ClipFile>,
     #[serde(default)]
     parts: Vec<DroppedPart>,
+    #[serde(default)]
+    sets: Vec<SelectionSet>,
 }
 
 pub(super) fn vector<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec3, D::Error> {
@@ -192,6 +194,8 @@ fn read_rigs(
         read_clips(places, number, &mut rig, file.clips)?;
         let edit = RigEdit::SetDroppedParts(file.parts);
         rig.apply(&edit).map_err(|error| places.error(element, "parts", error.to_string()))?;
+        let edit = RigEdit::SetSelectionSets(file.sets);
+        rig.apply(&edit).map_err(|error| places.error(element, "sets", error.to_string()))?;
         rigs.push(ProjectRig { rig, skins: file.skins });
     }
     Ok(rigs)
@@ -296,8 +300,9 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
         (1, ["", "", ""]) => Some(&["format", "name", "meshes", "rigs", "templates", "view", "journal"]),
         (3, ["meshes", "", ""]) => Some(&["uid", "rig", "path", "hash", "nodes"]),
         (3, ["templates", "", ""]) => Some(&["rig", "path", "base"]),
-        (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "values", "poses", "clips", "parts"]),
+        (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "values", "poses", "clips", "parts", "sets"]),
         (5, ["skins", "rigs", ""]) => Some(&["mesh", "path", "hash", "at_rest"]),
+        (5, ["sets", "rigs", ""]) => Some(&["name", "nodes"]),
         (5, ["parts", "rigs", ""]) => Some(&["uid", "part", "joints", "mirror"]),
         (5, ["pose", "rigs", ""]) => Some(OFFSET),
         (5, ["poses", "rigs", ""]) => Some(&["uid", "name", "offsets", "values"]),

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::{FORMAT, Project, ProjectRig, ProjectView, TemplateReference};
 use crate::rig::{
-    Rig,
+    Rig, SelectionSet,
     animation::NodeNames,
     format::{
         animation::write_clips,
@@ -99,15 +99,24 @@ fn write_rig(out: &mut String, entry: &ProjectRig) -> std::fmt::Result {
         }
         writeln!(out, "            ],")?;
     }
+    if !entry.rig.selection_sets().is_empty() {
+        writeln!(out, "            sets: [")?;
+        for SelectionSet { name, nodes } in entry.rig.selection_sets() {
+            let nodes: Vec<String> = nodes.iter().map(|node| format!("\"{node}\"")).collect();
+            writeln!(out, "                (name: {}, nodes: [{}]),", quoted(name), nodes.join(", "))?;
+        }
+        writeln!(out, "            ],")?;
+    }
     writeln!(out, "        ),")
 }
 
-/// The first format that can hold the rig's poses, clips and dropped parts.
+/// The first format that can hold the rig's poses, clips, dropped parts and selection sets.
 fn needed_format(rig: &Rig) -> u32 {
     let needs_values = !rig.attribute_values().is_empty()
         || rig.stored_poses().iter().any(|pose| !pose.values.is_empty())
         || rig.pose().keys().any(|node| rig.joint(*node).is_none());
-    match (rig.dropped_parts().is_empty(), rig.clips().is_empty(), needs_values) {
+    let is_plain = rig.dropped_parts().is_empty() && rig.selection_sets().is_empty();
+    match (is_plain, rig.clips().is_empty(), needs_values) {
         (false, ..) => FORMAT,
         (true, false, _) => 3,
         (true, true, true) => 2,

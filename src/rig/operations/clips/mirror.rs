@@ -22,10 +22,7 @@ pub(super) fn mirror(
 ) -> Result<(), OperationError> {
     let reflection = draft.symmetry().unwrap_or_else(|| MirrorPlane::sagittal(1.0)).reflection();
     let pairs = partners(draft.rig(), built);
-    let frame = |node: Uid| match built.and_then(|built| Frame::built(built, node)) {
-        Some(frame) if draft.rig().joint(node).is_none() => frame,
-        _ => Frame::of(draft.rig(), node),
-    };
+    let frame = |node: Uid| frame_of(draft.rig(), built, node);
     for (target, keys) in selected(layer, keys) {
         let other = pairs.get(&target.node).copied().unwrap_or(target.node);
         let (here, there) = (frame(target.node), frame(other));
@@ -50,8 +47,16 @@ pub(in crate::rig::operations) fn carried(
     Key { time: key.time, value: map(key.value, false), ease }
 }
 
+/// Frame of a joint, or of a node that commands created.
+pub(in crate::rig::operations) fn frame_of(rig: &Rig, built: Option<&BuiltRig>, node: Uid) -> Frame {
+    match built.and_then(|built| Frame::built(built, node)) {
+        Some(frame) if rig.joint(node).is_none() => frame,
+        _ => Frame::of(rig, node),
+    }
+}
+
 /// Nodes on the other side: the partners of joints, and created nodes of the same purpose under the mirrored label.
-fn partners(rig: &Rig, built: Option<&BuiltRig>) -> BTreeMap<Uid, Uid> {
+pub(in crate::rig::operations) fn partners(rig: &Rig, built: Option<&BuiltRig>) -> BTreeMap<Uid, Uid> {
     let mut pairs = BTreeMap::new();
     let names = NodeNames::of(rig, built);
     for (uid, name) in &names.0 {

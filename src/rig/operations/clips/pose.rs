@@ -99,7 +99,7 @@ pub(in crate::rig::operations) fn keyed(
     let (rig, (pose, values)) = (draft.rig(), &before);
     let is_other_offset = |node: &&Uid| rig.offset(**node) != pose.get(node);
     let mut nodes: BTreeSet<Uid> = pose.keys().chain(rig.pose().keys()).filter(is_other_offset).copied().collect();
-    if let Operation::Pose(offsets) = operation {
+    if let Operation::Pose(offsets) | Operation::SetPose { offsets, .. } = operation {
         nodes.extend(offsets.iter().map(|(node, _)| *node));
     }
     let mut targets = BTreeSet::new();

@@ -1,0 +1,241 @@
+//! Exports: the format follows from the ending of the file, names and axes from a preset, and what was written is read back
+//! with Rigsmith's own readers.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use bevy::prelude::*;
+
+use super::{
+    active,
+    clips::put_clips,
+    dialog::Purpose,
+    document::{OpenDocument, last_step, meshes},
+    error::WriteError,
+    file_name,
+    open::spawn,
+    save::{Job, SaveJob, SavedContent, settled},
+};
+use crate::{
+    algo::face::expression::{ExpressionSet, vrm_mixes},
+    files::{
+        FileKind, LoadError, RealDisk, load_animation, load_model, load_rig_text, load_skin, load_template, stem,
+        store_animation, store_avatar, store_model, store_rig_over, store_skin,
+    },
+    mesh::{gltf::GltfWriteSettings, model::Model},
+    plugins::{
+        commands::{BuildResult, RigModules},
+        surface::RigMesh,
+    },
+    processor::Modules,
+    rig::{
+        BuiltRig, Rig, Uid,
+        bake::baked,
+        character::{Character, character},
+        skeleton_preset::{SkeletonPreset, apply_preset},
+        skin::{SkinFile, SkinJoint},
+        vrm::{AvatarError, AvatarSource, ExpressionRecipe, avatar_meta, hang_half_joints},
+    },
+    solve::avatar::make_avatar,
+};
+
+/// Choices of an export that its file name does not say.
+#[derive(Resource, Debug, Clone, PartialEq, Eq, Default)]
+pub struct ExportOptions {
+    /// Names and axes of the skeleton.
+    pub preset: SkeletonPreset,
+    /// Author of an avatar; that of the rig's header if it is empty.
+    pub author: String,
+}
+
+/// Presets in the order of the dialog, with their names.
+pub(super) const PRESETS: [(SkeletonPreset, &str); 5] = [
+    (SkeletonPreset::Plain, "As in the rig"),
+    (SkeletonPreset::Mixamo, "Mixamo"),
+    (SkeletonPreset::Unreal, "Unreal mannequin"),
+    (SkeletonPreset::Unity, "Unity humanoid"),
+    (SkeletonPreset::Vrm, "VRM"),
+];
+
+/// Effect of a preset, in a few words.
+pub(super) fn effect(preset: SkeletonPreset) -> &'static str {
+    match preset {
+        SkeletonPreset::Plain => "Names and axes of the joints stay.",
+        SkeletonPreset::Mixamo => "Bones are called mixamorig:LeftUpLeg and so on; Y points along them.",
+        SkeletonPreset::Unreal => "Bones are called thigh_l and so on; X points along them.",
+        SkeletonPreset::Unity => "Bones are called LeftUpperLeg and so on; their axes are those of the model.",
+        SkeletonPreset::Vrm => {
+            "Bones are called leftUpperLeg and so on; as .vrm the character is an avatar of VRM 1.0."
+        }
+    }
+}
+
+/// True for files that have names and axes of a skeleton, which a preset changes.
+pub(super) fn takes_preset(path: &Path) -> bool {
+    matches!(FileKind::of(path), Some(FileKind::Glb | FileKind::Gltf | FileKind::Vrm))
+}
+
+/// Exports the format given by the path's extension.
+pub(super) fn export(world: &mut World, path: PathBuf) {
+    if world.resource::<SaveJob>().what().is_some() {
+        world.resource_mut::<SaveJob>().queue(Purpose::Export, path, None);
+        return;
+    }
+    let Some(rig) = active(world) else { return };
+    let Some(data) = settled(world, rig) else { return };
+    let open = meshes(world, rig);
+    let more = open.len().saturating_sub(1);
+    let mesh = open.into_iter().next().map(|(_, mesh, _)| mesh.clone());
+    let (step, name) = (last_step(world, rig), file_name(&path));
+    let built = world.get::<BuildResult>(rig).map(|built| built.0.clone());
+    let Some(modules) = world.get_resource::<RigModules>().map(|modules| modules.0.clone()) else { return };
+    let template = world.get::<OpenDocument>(rig).and_then(|document| document.template.clone());
+    let options = world.get_resource::<ExportOptions>().cloned().unwrap_or_default();
+    let task = spawn(move || {
+        let source = ExportSource { rig: &data, built: built.as_deref(), modules: &modules, mesh: mesh.as_ref() };
+        let mut notes = source.write(&path, template.as_deref(), &options)?;
+        if more > 0 {
+            notes.push(format!("only the first mesh was exported; {more} more are open"));
+        }
+        let checked = check(&path);
+        let template = (template.as_deref() == Some(&path)).then(|| Arc::new(data));
+        Ok(SavedContent::Export { checked, notes, template })
+    });
+    world.resource_mut::<SaveJob>().begin(Job { name, rig, step, task, then: None });
+}
+
+/// Document that is exported.
+struct ExportSource<'a> {
+    rig: &'a Rig,
+    built: Option<&'a BuiltRig>,
+    modules: &'a Arc<Modules>,
+    mesh: Option<&'a RigMesh>,
+}
+
+impl ExportSource<'_> {
+    fn write(&self, path: &Path, template: Option<&Path>, options: &ExportOptions) -> Result<Vec<String>, WriteError> {
+        let (rig, mesh) = (self.rig, self.mesh);
+        match FileKind::of(path) {
+            Some(FileKind::Vrm) => self.avatar(path, options),
+            Some(FileKind::Glb | FileKind::Gltf | FileKind::Obj) => {
+                let mut model = self.character();
+                put_clips(&mut model, rig, self.built, self.modules)?;
+                let mut notes = Vec::new();
+                if options.preset != SkeletonPreset::Plain
+                    && takes_preset(path)
+                    && apply_preset(&mut model, options.preset).is_none()
+                {
+                    notes.push("no human was found in the skeleton: names and axes stay".to_owned());
+                }
+                // Without weights no joint deforms, and none would be written.
+                let is_bare = mesh.is_none_or(|mesh| rig.skin(mesh.uid).is_none());
+                let settings = GltfWriteSettings { all_joints: is_bare, ..default() };
+                notes.extend(store_model(&RealDisk, path, &model, &settings)?);
+                Ok(notes)
+            }
+            Some(FileKind::Animation) if rig.clips().is_empty() => Err(WriteError::NoClips),
+            Some(FileKind::Animation) => {
+                store_animation(&RealDisk, path, rig, self.built, rig.clips())?;
+                Ok(Vec::new())
+            }
+            Some(FileKind::Template | FileKind::RigText) => {
+                let sources = [Some(path), template];
+                Ok(store_rig_over(&RealDisk, path, rig, &sources.into_iter().flatten().collect::<Vec<_>>())?)
+            }
+            Some(FileKind::Skin) => {
+                let both = mesh.and_then(|mesh| Some((mesh, rig.skin(mesh.uid)?)));
+                let (mesh, skin) = both.ok_or(WriteError::NoWeights)?;
+                let joints = SkinJoint::list(rig, skin);
+                let file = SkinFile::new(joints, skin.weights.clone(), &mesh.rest.points, &mesh.triangles, true);
+                let file = file?;
+                store_skin(&RealDisk, path, &file)?;
+                Ok(Vec::new())
+            }
+            _ => Err(WriteError::Ending),
+        }
+    }
+
+    /// The character at rest, with its mesh and weights.
+    fn character(&self) -> Model {
+        let (rig, mesh) = (self.rig, self.mesh);
+        let empty = Model { name: rig.about().name.clone(), ..default() };
+        character(&Character {
+            rig,
+            built: self.built,
+            file: mesh.map_or(&empty, |mesh| &mesh.file),
+            rest: mesh.map_or(&empty, |mesh| &mesh.rest),
+            nodes: mesh.map_or(&[], |mesh| &mesh.nodes),
+            skin: mesh.and_then(|mesh| rig.skin(mesh.uid)).map(Arc::as_ref),
+        })
+    }
+
+    /// Writes an avatar of VRM 1.0, as `rigsmith build` does.
+    fn avatar(&self, path: &Path, options: &ExportOptions) -> Result<Vec<String>, WriteError> {
+        let authors = [options.author.clone()];
+        let meta = avatar_meta(self.rig.about(), &authors, &stem(path)).map_err(|error| match error {
+            AvatarError::NoAuthor(_) => WriteError::NoAuthor,
+            error => error.into(),
+        })?;
+        let mut model = self.character();
+        let bare = self.built.map(|built| baked(self.rig, built));
+        let mut joints: Vec<Uid> = Vec::with_capacity(model.nodes.len());
+        for (joint, node) in bare.as_ref().unwrap_or(self.rig).walk().zip(&mut model.nodes) {
+            joints.push(joint.data.uid);
+            node.rest = joint.data.rest.into();
+        }
+        let source = AvatarSource { rig: self.rig, built: self.built, joints: &joints };
+        hang_half_joints(&mut model, &source);
+        put_clips(&mut model, self.rig, self.built, self.modules)?;
+        let recipe = |(preset, shapes)| ExpressionRecipe { preset, shapes };
+        let recipes: Vec<ExpressionRecipe> = vrm_mixes(ExpressionSet::bundled()).into_iter().map(recipe).collect();
+        let made = make_avatar(&mut model, &source, meta, &recipes)?;
+        // Bones of the human are written whether skin hangs on them or not.
+        let settings = GltfWriteSettings { all_joints: true, ..default() };
+        store_avatar(&RealDisk, path, &model, &made.avatar, &settings)?;
+        Ok(made.notes)
+    }
+}
+
+/// Content of a written file as Rigsmith's own reader finds it, in a sentence.
+fn check(path: &Path) -> Result<String, LoadError> {
+    let counted = |count: usize, one: &str, more: &str| match count {
+        1 => format!("1 {one}"),
+        count => format!("{count} {more}"),
+    };
+    let parts = match FileKind::of(path) {
+        Some(FileKind::Glb | FileKind::Gltf | FileKind::Obj | FileKind::Vrm) => {
+            let model = load_model(&RealDisk, path)?;
+            let morphs: usize = model.objects.iter().map(|object| object.morph_names.len()).sum();
+            let all = [
+                (model.points.len(), "point", "points"),
+                (model.nodes.len(), "joint", "joints"),
+                (morphs, "morph target", "morph targets"),
+                (model.clips.len(), "animation", "animations"),
+            ];
+            let there = all.into_iter().filter(|(count, ..)| *count > 0);
+            there.map(|(count, one, more)| counted(count, one, more)).collect()
+        }
+        Some(FileKind::Animation) => {
+            let read = load_animation(&RealDisk, path)?;
+            let keys = read.clips.iter().map(crate::rig::animation::RigClip::key_count).sum();
+            vec![counted(read.clips.len(), "clip", "clips"), counted(keys, "key", "keys")]
+        }
+        Some(FileKind::Template) => {
+            let rig = load_template(&RealDisk, path)?.rig;
+            let tags = rig.walk().map(|joint| joint.data.tags.len()).sum();
+            vec![counted(rig.len(), "joint", "joints"), counted(tags, "tag", "tags")]
+        }
+        Some(FileKind::RigText) => {
+            load_rig_text(&RealDisk, path)?;
+            vec!["the skeleton".to_owned()]
+        }
+        Some(FileKind::Skin) => {
+            load_skin(&RealDisk, path)?;
+            vec!["the weights".to_owned()]
+        }
+        _ => Vec::new(),
+    };
+    Ok(parts.join(", "))
+}

@@ -1,0 +1,104 @@
+//! Table of the joints of imported motion with the joints of the rig that they move, before the motion is put onto the rig.
+
+use bevy_egui::egui::{
+    Align, Button, ComboBox, Key, Layout, Popup, Rect, Ui, UiBuilder, WidgetInfo, WidgetType, pos2, vec2,
+};
+
+use super::import::{MapDraft, MapRequest};
+use crate::{
+    editor::{
+        panel::Requests,
+        panels::{
+            displayed_rig::DisplayedRig,
+            list::{self, List},
+        },
+        style,
+    },
+    rig::{NodeKind, Uid, animation::joint_map::FoundBy},
+};
+
+/// Choice of no joint.
+const NOTHING: &str = "nothing";
+
+/// Draws the table with its buttons. `is_busy` while the motion is being put onto the rig.
+pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy: bool, requests: &mut Requests) {
+    // An open list of joints takes Escape for itself.
+    let is_escaped = ui.input(|input| input.key_pressed(Key::Escape)) && !Popup::is_any_open(ui.ctx());
+    let mut is_cancelled = is_escaped;
+    let (mapped, all) = (draft.mapped(), draft.targets.len());
+    ui.horizontal_wrapped(|ui| {
+        let can_import = mapped > 0 && !is_busy;
+        let import = ui.add_enabled(can_import, Button::new("Import motion"));
+        let why_not =
+            if is_busy { "it is being put onto the rig" } else { "no joint of the motion moves one of the rig" };
+        if import.on_disabled_hover_text(why_not).clicked() {
+            requests.send(MapRequest::Accept);
+        }
+        is_cancelled |= ui.add_enabled(!is_busy, Button::new("Cancel import")).clicked();
+        let found = match draft.found_by {
+            Some(FoundBy::Names) => "guessed from names",
+            Some(FoundBy::Shape) => "guessed from the shape",
+            Some(FoundBy::Labels) => "guessed from equal labels",
+            Some(FoundBy::Map) => "of a map",
+            None => "nothing could be guessed",
+        };
+        let motions = if draft.motions() == 1 { String::new() } else { format!("{} motions, ", draft.motions()) };
+        ui.weak(format!("{}: {motions}{mapped} of {all} joints move a joint of the rig ({found}).", draft.name));
+    });
+    if is_cancelled && !is_busy {
+        requests.send(MapRequest::Cancel);
+    }
+    let joints = shown.rig.walk().filter(|joint| joint.data.kind == NodeKind::Joint);
+    let joints: Vec<(Uid, String)> =
+        joints.map(|joint| (joint.data.uid, shown.name(joint.data.uid).into_owned())).collect();
+    let names: Vec<&str> = draft.joints().collect();
+    let height = ui.spacing().interact_size.y + 2.0;
+    let list = List { id: "joints of the motion", count: names.len(), height, reveal: None, follow: false };
+    list.show(ui, |ui, range, place| {
+        for number in range {
+            row(ui, place(number), number, names[number], draft, &joints, is_busy, requests);
+        }
+    });
+}
+
+fn row(
+    ui: &mut Ui,
+    rect: Rect,
+    number: usize,
+    name: &str,
+    draft: &MapDraft,
+    joints: &[(Uid, String)],
+    is_busy: bool,
+    requests: &mut Requests,
+) {
+    let target = draft.targets[number];
+    let split = rect.left() + (rect.width() * 0.45).min(260.0);
+    let head = Rect::from_min_max(rect.min, pos2(split, rect.bottom())).shrink2(vec2(4.0, 0.0));
+    let color = if target.is_some() { ui.visuals().text_color() } else { style::quiet(ui.visuals()) };
+    list::line(ui, head, name, color);
+    let label = ui.interact(head, ui.id().with(("joint", number)), bevy_egui::egui::Sense::hover());
+    label.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, name));
+    let foot = Rect::from_min_max(pos2(split, rect.top()), rect.max).shrink2(vec2(2.0, 1.0));
+    let builder = UiBuilder::new().id_salt(number).max_rect(foot).layout(Layout::left_to_right(Align::Center));
+    ui.scope_builder(builder, |ui| {
+        let text = match target {
+            None => NOTHING,
+            Some(target) => joints.iter().find(|(uid, _)| *uid == target).map_or("gone", |(_, name)| name.as_str()),
+        };
+        let mut chosen = target;
+        ui.add_enabled_ui(!is_busy, |ui| {
+            let combo = ComboBox::from_id_salt(("target", number)).selected_text(text).width(foot.width().min(220.0));
+            let response = combo.truncate().show_ui(ui, |ui| {
+                ui.selectable_value(&mut chosen, None, NOTHING);
+                for (uid, name) in joints {
+                    ui.selectable_value(&mut chosen, Some(*uid), name);
+                }
+            });
+            let said = format!("Joint for {name}");
+            ui.ctx().accesskit_node_builder(response.response.id, |node| node.set_label(said.as_str()));
+        });
+        if chosen != target {
+            requests.send(MapRequest::Set(number, chosen));
+        }
+    });
+}

@@ -1,0 +1,311 @@
+//! Pull tool: in Pose mode a drag on a joint or a control takes it along with the pointer, and the joints above turn.
+//!
+//! A built rig is pulled by its controls, any other one by its joints. A drag only previews; the release makes one step of the
+//! history, Escape restores the rig to the bit. A press that does not become a drag is a click like any other.
+
+use bevy::prelude::*;
+
+use super::{
+    PullHover, Tool, ToolPointer, ToolSystems,
+    gizmo::{Delta, GizmoDrag, GizmoFrame, Handle},
+    pose::PosedJoint,
+    scene::{EditedRig, Scene, joints},
+    select, transform,
+};
+use crate::{
+    editor::{
+        actions::{Action, ActionRequest},
+        building::use_controls,
+        mode::Mode,
+        notice::{Notice, StatusLine},
+        pointer::{PointerAct, ViewportPointer},
+    },
+    plugins::{
+        controls::{
+            ControlsInUse,
+            outline::{ControlNodes, control_at},
+        },
+        document::{Change, EditReport, EditRequest, HoveredNode},
+        picking::PickRequest,
+        schema::RigNodes,
+        viewport::Sight,
+    },
+    rig::{PoseOffset, Uid, operations::Operation},
+    solve::pull::{ControlPull, PullError, chain_above, pull},
+};
+
+/// Plugin of the pull tool.
+pub struct PullPlugin;
+
+impl Plugin for PullPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<PullTool>()
+            .init_resource::<ControlsInUse>()
+            .add_systems(Update, aim.after(use_controls).before(ToolSystems::Route))
+            .add_systems(Update, drag.in_set(ToolSystems::Tools).after(transform::drag).before(select::select));
+    }
+}
+
+/// State of the pull tool.
+#[derive(Resource, Debug, Default)]
+pub struct PullTool {
+    /// Joint or control under the last press.
+    aim: Option<Uid>,
+    held: Option<Held>,
+    /// Marks that the banner describes a drag.
+    has_banner: bool,
+}
+
+impl PullTool {
+    /// The node that is being pulled.
+    pub fn pulled(&self) -> Option<Uid> {
+        self.held.as_ref().filter(|held| held.drag.is_some()).map(|held| held.node)
+    }
+}
+
+/// A press on a node, and its drag.
+#[derive(Debug)]
+struct Held {
+    rig: Entity,
+    node: Uid,
+    at: Vec2,
+    /// Drag; `None` until the pointer has moved further than in a click, or if nothing moves the node.
+    drag: Option<Drag>,
+    /// Marks a node that nothing moves, about which people have been told.
+    is_refused: bool,
+}
+
+#[derive(Debug)]
+struct Drag {
+    gizmo: GizmoDrag,
+    name: String,
+    step: f32,
+    way: Way,
+}
+
+/// Way in which a node follows the pointer.
+#[derive(Debug)]
+enum Way {
+    /// Controls of a built rig, which move it.
+    Controls(Box<ControlPull>),
+    /// Joints above it, from the top, with their positions and its own.
+    Joints(Vec<PosedJoint>, Vec<Vec3>),
+    /// Movement of the node itself: a root.
+    Itself(Vec<PosedJoint>),
+}
+
+/// Updates [`PullHover`] for the presses of this frame.
+fn aim(
+    mut pointers: MessageReader<ViewportPointer>,
+    mode: Res<Mode>,
+    scene: Scene,
+    nodes: Query<&RigNodes>,
+    controls: ControlNodes,
+    in_use: Res<ControlsInUse>,
+    mut tool: ResMut<PullTool>,
+    mut hover: ResMut<PullHover>,
+) {
+    let presses = pointers.read().filter(|pointer| pointer.act == PointerAct::Pressed).map(|pointer| pointer.at);
+    let Some(at) = presses.last() else { return };
+    let found = (*mode == Mode::Pose).then(|| node_at(&scene, &nodes, &controls, *in_use, at)).flatten();
+    tool.aim = found;
+    hover.set_if_neq(PullHover(found.is_some()));
+}
+
+/// The control whose outline is at a pixel, or else the joint there.
+fn node_at(
+    scene: &Scene,
+    nodes: &Query<&RigNodes>,
+    controls: &ControlNodes,
+    in_use: ControlsInUse,
+    at: Vec2,
+) -> Option<Uid> {
+    let (rig, sight) = (scene.rig()?, scene.sight()?);
+    if in_use.0 {
+        let visible = controls.visible(nodes.get(rig.entity).ok(), rig.place.affine().inverse());
+        let control = control_at(&visible, &sight.plane, sight.point(at), select::REACH * sight.pixel);
+        if control.is_some() {
+            return control;
+        }
+    }
+    joint_at(scene, &rig, &sight, at)
+}
+
+/// The joint nearest to a pixel within reach; the selected one of several at the same distance.
+fn joint_at(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<Uid> {
+    let near = scene.posed(rig).into_iter().filter_map(|(joint, place)| {
+        let distance = sight.project(place)?.distance(at);
+        (distance <= select::REACH).then_some((joint, distance, rig.selection.active() != Some(joint)))
+    });
+    let nearest = near.min_by(|a, b| a.1.total_cmp(&b.1).then(a.2.cmp(&b.2)));
+    nearest.map(|(joint, ..)| joint)
+}
+
+fn drag(
+    mut pointers: MessageReader<ToolPointer>,
+    mut actions: MessageReader<ActionRequest>,
+    mut edited: MessageReader<EditReport>,
+    scene: Scene,
+    hovered: Query<&HoveredNode>,
+    mut tool: ResMut<PullTool>,
+    mut status: ResMut<StatusLine>,
+    mut edits: MessageWriter<EditRequest>,
+    mut picks: MessageWriter<PickRequest>,
+    mut notices: MessageWriter<Notice>,
+) {
+    let rig = scene.rig();
+    let overtaken: Vec<Entity> = edited.read().filter(|edit| edit.committed.is_some()).map(|edit| edit.rig).collect();
+    let is_cancelled = actions.read().filter(|action| action.0 == Action::Cancel).count() > 0;
+    if let Some(held) = &tool.held
+        && (is_cancelled || overtaken.contains(&held.rig) || rig.as_ref().is_none_or(|rig| rig.entity != held.rig))
+    {
+        if held.drag.is_some() {
+            edits.write(EditRequest { rig: held.rig, change: Change::CancelPreview });
+        }
+        tool.held = None;
+    }
+    let mut preview = None;
+    for ToolPointer { tool: who, pointer } in pointers.read() {
+        if *who != Tool::Pull {
+            continue;
+        }
+        match pointer.act {
+            PointerAct::Pressed => {
+                let pressed = tool.aim.take().zip(rig.as_ref());
+                tool.held = pressed.map(|(node, rig)| Held {
+                    rig: rig.entity,
+                    node,
+                    at: pointer.at,
+                    drag: None,
+                    is_refused: false,
+                });
+            }
+            PointerAct::Dragged => {
+                let (Some(held), Some(rig), Some(sight)) = (&mut tool.held, &rig, scene.sight()) else { continue };
+                if held.drag.is_none() && !held.is_refused {
+                    match Drag::begin(rig, &sight, held.node, held.at) {
+                        Ok(begun) => held.drag = Some(begun),
+                        Err(reason) => {
+                            held.is_refused = true;
+                            let name = rig.name(held.node);
+                            notices.write(Notice::info(format!("{name} cannot be pulled: {reason}.")));
+                        }
+                    }
+                }
+                let Some(drag) = &mut held.drag else { continue };
+                drag.gizmo.to(pointer.at, pointer.held.control.then_some(drag.step));
+                preview = Some(EditRequest { rig: held.rig, change: drag.preview() });
+            }
+            PointerAct::Released { dragged, count } => {
+                let (Some(held), Some(rig)) = (tool.held.take(), &rig) else { continue };
+                preview = None;
+                match (held.drag, scene.sight()) {
+                    (Some(mut drag), _) if dragged => {
+                        drag.gizmo.to(pointer.at, pointer.held.control.then_some(drag.step));
+                        edits.write(EditRequest { rig: held.rig, change: drag.preview() });
+                        edits.write(EditRequest { rig: held.rig, change: Change::Commit });
+                    }
+                    (None, Some(sight)) if !dragged => {
+                        let hovered = hovered.get(rig.entity).ok();
+                        let held_keys = pointer.held;
+                        picks.write(select::clicked(&scene, rig, &sight, held.at, held_keys, count, hovered));
+                    }
+                    _ => {}
+                }
+            }
+            PointerAct::Moved | PointerAct::Left | PointerAct::Wheel(_) => {}
+        }
+    }
+    if let Some(preview) = preview {
+        edits.write(preview);
+    }
+    let banner = tool.held.as_ref().and_then(|held| held.drag.as_ref()).map(Drag::banner);
+    if (tool.has_banner || banner.is_some()) && status.banner != banner {
+        tool.has_banner = banner.is_some();
+        status.banner = banner;
+    }
+}
+
+impl Drag {
+    fn begin(rig: &EditedRig, sight: &Sight, node: Uid, at: Vec2) -> Result<Self, PullError> {
+        let chain = chain_above(&rig.rig, node);
+        let by_controls = match (rig.built, &rig.runtime) {
+            (Some(built), Some(runtime)) => {
+                let program = runtime.state().program();
+                let turned = if chain.is_empty() { std::slice::from_ref(&node) } else { &chain };
+                let is_plain = |joint: &Uid| program.node(*joint).is_some_and(|slot| program.nodes()[slot].is_plain());
+                match ControlPull::find(&rig.rig, &built.0, runtime.state(), node) {
+                    // Joints that no command drives are posed themselves.
+                    Err(PullError::NoControl) if rig.rig.joint(node).is_some() && turned.iter().all(is_plain) => None,
+                    found => Some(found?),
+                }
+            }
+            _ => None,
+        };
+        let (origin, way) = match by_controls {
+            Some(pull) => (pull.position(), Way::Controls(Box::new(pull))),
+            None => {
+                let place = |joint: &Uid| rig.posed_global(*joint).translation;
+                let gathered = |joints: &[Uid]| PosedJoint::gather(rig, joints);
+                let way = match chain.is_empty() {
+                    true => Way::Itself(gathered(&[node])),
+                    false => Way::Joints(gathered(&chain), chain.iter().chain([&node]).map(place).collect()),
+                };
+                (place(&node), way)
+            }
+        };
+        let axes = [sight.plane.right, sight.plane.up, sight.plane.towards()];
+        Ok(Self {
+            gizmo: GizmoDrag::new(Handle::MoveView, GizmoFrame { origin, axes }, *sight, at),
+            name: rig.name(node),
+            step: transform::step(rig),
+            way,
+        })
+    }
+
+    /// Movement of the pulled node.
+    fn by(&self) -> Vec3 {
+        match self.gizmo.delta() {
+            Delta::Move(by) => by,
+            Delta::Turn { .. } | Delta::Scale(_) => Vec3::ZERO,
+        }
+    }
+
+    fn preview(&self) -> Change {
+        let by = self.by();
+        if by == Vec3::ZERO {
+            return Change::CancelPreview;
+        }
+        let goal = self.gizmo.frame.origin + by;
+        Change::Preview(Operation::Pose(match &self.way {
+            Way::Controls(pull) => pull.to(goal),
+            Way::Joints(joints, points) => turned(joints, points, goal),
+            Way::Itself(roots) => roots.iter().map(|root| (root.joint, root.dragged(&Delta::Move(by), None))).collect(),
+        }))
+    }
+
+    /// Description of the pull, in a few words.
+    fn banner(&self) -> String {
+        let count = match &self.way {
+            Way::Controls(pull) => pull.handles().len(),
+            Way::Joints(joints, _) => joints.len(),
+            Way::Itself(_) => return format!("Moving {}", self.name),
+        };
+        match (&self.way, count) {
+            (Way::Controls(_), 1) => format!("Pulling {}: 1 control", self.name),
+            (Way::Controls(_), more) => format!("Pulling {}: {more} controls", self.name),
+            _ => format!("Pulling {}: {}", self.name, joints(count)),
+        }
+    }
+}
+
+/// Offsets of a chain's joints with which the end of the chain is at the goal.
+fn turned(chain: &[PosedJoint], points: &[Vec3], goal: Vec3) -> Vec<(Uid, PoseOffset)> {
+    let mut carried = Quat::IDENTITY;
+    let mut turned = Vec::with_capacity(chain.len());
+    for (joint, whole) in chain.iter().zip(pull(points, goal)) {
+        turned.push((joint.joint, joint.carried(carried, (whole * carried.conjugate()).normalize())));
+        carried = whole;
+    }
+    turned
+}

@@ -1,0 +1,187 @@
+//! Drags on joints and controls in Pose mode: they go where the pointer goes, and the joints above follow.
+
+use rigsmith::{
+    editor::tools::{pull::PullTool, select::SelectTool},
+    plugins::{controls::SwitchRequest, drawing::RigDrawing},
+    solve::pull::{chain_above, pull},
+};
+
+use super::*;
+
+fn pulled(bench: &Bench) -> Option<Uid> {
+    bench.app.world().resource::<PullTool>().pulled()
+}
+
+fn banded(bench: &Bench) -> bool {
+    bench.app.world().resource::<SelectTool>().band.is_some()
+}
+
+/// A way on the screen from one place to another, turned and shortened.
+fn way(from: Vec2, to: Vec2, turn: f32, share: f32) -> Vec2 {
+    Vec2::from_angle(turn).rotate(to - from) * share
+}
+
+#[test]
+fn the_end_of_a_chain_goes_to_a_goal_within_reach() {
+    let points = [
+        vec![Vec3::ZERO, Vec3::new(0.0, 1.0, 0.0)],
+        vec![Vec3::ZERO, Vec3::new(0.0, 1.0, 0.1), Vec3::new(0.0, 2.0, 0.0)],
+        vec![Vec3::ZERO, Vec3::new(0.1, 1.0, 0.0), Vec3::new(0.0, 1.8, 0.2), Vec3::new(0.0, 2.5, 0.0)],
+    ];
+    let goals = [Vec3::new(0.6, 0.8, 0.0), Vec3::new(0.9, 0.6, 0.7), Vec3::new(-0.3, 1.2, 0.4), Vec3::splat(9.0)];
+    for chain in &points {
+        let lengths: Vec<f32> = chain.windows(2).map(|ends| ends[0].distance(ends[1])).collect();
+        for goal in goals {
+            let turns = pull(chain, goal);
+            assert_eq!(turns.len(), lengths.len());
+            let mut end = chain[0];
+            for (turn, ends) in turns.iter().zip(chain.windows(2)) {
+                end += *turn * (ends[1] - ends[0]);
+            }
+            let (whole, far) = (lengths.iter().sum::<f32>(), goal.length());
+            let is_near = if lengths.len() == 1 { (far - whole).abs() < 1e-4 } else { far < whole };
+            let wanted = if is_near { goal } else { goal.normalize() * whole };
+            let off = if is_near || far > whole || lengths.len() == 1 { end.distance(wanted) } else { 0.0 };
+            assert!(off < 5e-3, "{chain:?} to {goal}: {end}");
+        }
+    }
+}
+
+#[test]
+fn chains_end_where_limbs_meet_and_collarbones_stay() {
+    let rig = crate::bench::shipped("biped");
+    let of = |label: &str| {
+        let joint = rig.walk().find(|joint| joint.data.label.as_deref() == Some(label)).expect("a joint").data.uid;
+        let name = |joint: Uid| rig.joint(joint).and_then(|joint| joint.data.label.clone()).unwrap_or_default();
+        chain_above(&rig, joint).into_iter().map(name).collect::<Vec<_>>()
+    };
+    assert_eq!(of("hand_l"), ["upper_arm_l", "forearm_l"]);
+    assert!(chain_above(&rig, rig.roots()[0]).is_empty());
+}
+
+#[test]
+fn a_joint_goes_with_the_pointer_in_one_step() {
+    for place in [Transform::IDENTITY, somewhere()] {
+        for sight in sights(place) {
+            let mut bench = Bench::new(sight, place);
+            let [root, middle, tip] = chain(&mut bench);
+            bench.mode(Mode::Pose);
+            let (before, steps) = (bench.rig().clone(), bench.steps());
+            let pixel = |bench: &Bench, joint: Uid| sight.project(bench.rig().posed_global(joint).translation).unwrap();
+            let (from, to) = (pixel(&bench, tip), pixel(&bench, root));
+            let by = way(from, to, 0.4, 0.3);
+            bench.drag(from, by, ModifierKeys::default());
+            assert_eq!((pulled(&bench), banded(&bench)), (Some(tip), false));
+            assert!(pixel(&bench, tip).distance(from + by) < 1.0, "{} is not {}", pixel(&bench, tip), from + by);
+            assert_eq!(bench.steps(), steps, "a preview is no step");
+            bench.release(from + by);
+            let rig = bench.rig().clone();
+            assert!(pixel(&bench, tip).distance(from + by) < 1.0);
+            assert_eq!((bench.steps(), bench.journaled()), (steps + 1, steps + 1));
+            for joint in [root, middle, tip] {
+                assert_eq!(rig.rest_global(joint), before.rest_global(joint), "the rest pose stays");
+            }
+            for (above, below) in [(root, middle), (middle, tip)] {
+                let length =
+                    |rig: &Rig| rig.posed_global(above).translation.distance(rig.posed_global(below).translation);
+                assert!((length(&rig) - length(&before)).abs() < 1e-4, "bones keep their lengths");
+            }
+            bench.app.world_mut().write_message(EditRequest { rig: bench.rig, change: Change::Undo });
+            bench.app.update();
+            assert_eq!(*bench.rig(), before);
+
+            // Escape takes it back to the bit, and the drag does not go on.
+            bench.drag(from, by, ModifierKeys::default());
+            assert_ne!(*bench.rig(), before);
+            bench.action(Action::Cancel);
+            bench.pointer(from + by, PointerAct::Dragged, ModifierKeys::default());
+            bench.release(from + by);
+            assert_eq!((bench.rig(), bench.steps()), (&before, steps));
+        }
+    }
+}
+
+#[test]
+fn a_root_moves_a_click_selects_and_a_drag_beside_joints_is_a_box() {
+    let [sight, _] = sights(Transform::IDENTITY);
+    let mut bench = Bench::new(sight, Transform::IDENTITY);
+    let [root, _, tip] = chain(&mut bench);
+    bench.select(&[]);
+    bench.mode(Mode::Pose);
+    let pixel = |bench: &Bench, joint: Uid| sight.project(bench.rig().posed_global(joint).translation).unwrap();
+    let (steps, from) = (bench.steps(), pixel(&bench, root));
+    let by = Vec2::new(60.0, 35.0);
+    bench.drag(from, by, ModifierKeys::default());
+    bench.release(from + by);
+    assert!(pixel(&bench, root).distance(from + by) < 1.0);
+    assert_eq!(bench.steps(), steps + 1);
+
+    let at = pixel(&bench, tip);
+    bench.pointer(at, PointerAct::Pressed, ModifierKeys::default());
+    bench.pointer(at, PointerAct::Released { dragged: false, count: 1 }, ModifierKeys::default());
+    bench.app.update();
+    assert_eq!(bench.app.world().get::<Selection>(bench.rig).unwrap().0, [tip]);
+    assert_eq!(bench.steps(), steps + 1, "a click poses nothing");
+
+    bench.drag(Vec2::new(15.0, 15.0), Vec2::new(30.0, 20.0), ModifierKeys::default());
+    assert_eq!((pulled(&bench), banded(&bench)), (None, true));
+    bench.release(Vec2::new(45.0, 35.0));
+    // In other modes a joint is not pulled.
+    bench.mode(Mode::Select);
+    bench.drag(at, Vec2::new(30.0, 20.0), ModifierKeys::default());
+    assert_eq!((pulled(&bench), banded(&bench)), (None, true));
+}
+
+/// The hand of the bundled biped, by its goal and by its forward controls.
+#[test]
+fn a_built_rig_is_pulled_by_its_controls() {
+    let [sight, _] = sights(Transform::IDENTITY);
+    let mut app = headless_app(1);
+    app.add_plugins((ToolsPlugin, BuildingPlugin)).insert_resource(RigDrawing { controls: false, ..default() });
+    let mut app = strict_app(app);
+    let rig = app.world_mut().spawn(crate::bench::shipped("biped")).id();
+    app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(sight)));
+    app.update();
+    app.update();
+    let mut bench = Bench { app, rig, sink: Sink::default() };
+    let built = bench.app.world().get::<BuildResult>(rig).expect("a built rig").0.clone();
+    let [hand, shoulder] = ["hand_l", "upper_arm_l"].map(|label| built.find_label(label).expect("a joint").uid);
+    let switch = built.switches.iter().find(|switch| match &switch.matching {
+        Matching::IkFk { joints, .. } => joints.contains(&hand),
+        Matching::Space { .. } => false,
+    });
+    let switch = switch.expect("a switch of the arm").clone();
+    bench.mode(Mode::Pose);
+    for value in [1.0, 0.0] {
+        let (control, attribute) = (switch.control, switch.attribute.to_string());
+        bench.app.world_mut().write_message(SwitchRequest { rig, control, attribute, value });
+        for _ in 0..3 {
+            bench.app.update();
+        }
+        let state = |bench: &Bench| bench.app.world().get::<RigRuntime>(rig).unwrap().state().clone();
+        assert_eq!(state(&bench).attribute(switch.control, &switch.attribute), Some(value));
+        let pixel = |bench: &Bench, node: Uid| sight.project(state(bench).global(node).unwrap().translation).unwrap();
+        let (before, steps, from) = (bench.rig().clone(), bench.steps(), pixel(&bench, hand));
+        let to = pixel(&bench, shoulder);
+        let by = way(from, to, 0.8, 40.0 / from.distance(to));
+        bench.drag(from, by, ModifierKeys::default());
+        assert_eq!(pulled(&bench), Some(hand), "switch at {value}");
+        bench.release(from + by);
+        bench.app.update();
+        let off = pixel(&bench, hand).distance(from + by);
+        assert!(off < 5.0, "switch at {value}: the hand is {off} pixels off");
+        assert_eq!(bench.steps(), steps + 1);
+        let posed = bench.rig().pose().iter().filter(|(node, offset)| before.offset(**node) != Some(*offset));
+        let posed: Vec<Uid> = posed.map(|(node, _)| *node).collect();
+        assert!(
+            !posed.is_empty() && posed.iter().all(|node| built.node(*node).is_some_and(|node| node.control.is_some()))
+        );
+        let is_goal = |node: &Uid| matches!(&switch.matching, Matching::IkFk { goal, .. } if goal == node);
+        assert_eq!(posed.iter().any(is_goal), value == 1.0, "{posed:?}");
+        bench.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+        bench.app.update();
+        bench.app.update();
+        assert_eq!(*bench.rig(), before);
+        assert!(pixel(&bench, hand).distance(from) < 0.5);
+    }
+}
