@@ -19,7 +19,7 @@ pub(super) fn found<'m>(modules: &'m Modules, words: &str) -> Vec<&'m ModuleInfo
 }
 
 /// Draws the library; returns the module that was chosen. `Enter` in the search field takes the first.
-pub(super) fn library(ui: &mut Ui, modules: &Modules, words: &mut String) -> Option<&'static str> {
+pub(in crate::editor::panels) fn library(ui: &mut Ui, modules: &Modules, words: &mut String) -> Option<&'static str> {
     ui.set_min_width(240.0);
     let field = ui.add(egui::TextEdit::singleline(words).hint_text("Search modules").desired_width(f32::INFINITY));
     field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Search modules"));
