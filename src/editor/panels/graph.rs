@@ -23,7 +23,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use bevy::{ecs::change_detection::Tick, prelude::*};
 use bevy_egui::egui::{
-    self, Id, Popup, Pos2, Rect, SetOpenCommand, Ui, WidgetInfo, WidgetType, emath::TSTransform, vec2,
+    self, Id, Popup, Pos2, Rect, Response, SetOpenCommand, Ui, WidgetInfo, WidgetType, emath::TSTransform, vec2,
 };
 use egui_snarl::{NodeId, Snarl};
 
@@ -32,7 +32,7 @@ pub use self::{
     state::{GraphLook, GraphRequest, GraphView},
 };
 use self::{
-    canvas::{Canvas, SCALES, Scene},
+    canvas::{Canvas, NodePart, SCALES, Scene},
     edits::Bench,
     gesture::{Gesture, Hand, Outcome, is_dropped, moved, pointer},
     layout::{LayoutNode, lay_out},
@@ -44,6 +44,7 @@ use self::{
 use super::{
     displayed_rig::{DisplayedRig, Stamp},
     list,
+    tags::library::DraggedModule,
 };
 use crate::{
     editor::{
@@ -73,6 +74,9 @@ impl Plugin for GraphPlugin {
     }
 }
 
+/// Name of the panel.
+const TITLE: &str = "Graph";
+
 /// Seconds for which a command that ran flashes.
 const FLASH: f64 = 0.7;
 
@@ -100,13 +104,15 @@ pub struct GraphPanel {
     gesture: Option<Gesture>,
     menu: Option<MenuTarget>,
     words: String,
-    /// True if the pointer was last told to be over the panel.
-    is_pointed: bool,
+    /// True if all nodes were in view in the last frame.
+    sees_all: bool,
+    /// True if the graph was laid out again while all of it was in view, and is brought into view again.
+    refits: bool,
 }
 
 impl EditorPanel for GraphPanel {
     fn title(&self) -> &'static str {
-        "Graph"
+        TITLE
     }
 
     fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
@@ -116,8 +122,7 @@ impl EditorPanel for GraphPanel {
             return list::nothing(ui, "No rig is open.");
         };
         let is_pointed = ui.rect_contains_pointer(ui.max_rect());
-        if is_pointed != self.is_pointed {
-            self.is_pointed = is_pointed;
+        if is_pointed != view.hovered {
             requests.send(GraphRequest::Hover(is_pointed));
         }
         let now = ui.input(|input| input.time);
@@ -142,6 +147,7 @@ impl GraphPanel {
         }
         if !has_same_modules {
             self.looks.clear();
+            self.graph = Graph::default();
             self.modules = Some(modules.clone());
         }
         if self.made_from.is_none_or(|(stamp, _)| !stamp.is_of(shown.entity)) {
@@ -150,7 +156,8 @@ impl GraphPanel {
         }
         self.made_from = made_from;
         let builder = processor.as_ref().map(|processor| processor.builder());
-        self.graph = Graph::of(&shown.rig, builder, modules, &mut self.looks);
+        let known = std::mem::take(&mut self.graph);
+        self.graph = Graph::of(&shown.rig, builder, modules, &mut self.looks, known);
         self.statuses = self.graph.nodes.iter().map(|node| builder?.status(node.tag)).collect();
         self.note_runs(now);
         let nodes = self.graph.nodes.iter();
@@ -160,6 +167,7 @@ impl GraphPanel {
         if self.laid_out != laid_out {
             self.places = lay_out(&laid_out.0, &laid_out.1);
             self.laid_out = laid_out;
+            self.refits = self.sees_all;
         }
     }
 
@@ -234,14 +242,17 @@ impl GraphPanel {
     fn wanted(&mut self, rig: Entity, view: &GraphView, rects: &[Rect], area: Rect) -> Option<TSTransform> {
         let (number, look) = view.look;
         let is_other = self.looked.is_none_or(|(known, _)| known != rig);
-        if self.looked == Some((rig, number)) || !area.is_positive() {
+        let refits = std::mem::take(&mut self.refits);
+        if self.looked == Some((rig, number)) && !refits || !area.is_positive() {
             return None;
         }
+        let is_asked = self.looked != Some((rig, number)) && !is_other;
+        let look = if is_asked { look } else { GraphLook::All };
         self.looked = Some((rig, number));
-        let is_meant = |tag: &Uid| is_other || look == GraphLook::All || view.selected.contains(tag);
+        let is_meant = |tag: &Uid| look == GraphLook::All || view.selected.contains(tag);
         let nodes = self.graph.nodes.iter().zip(rects).filter(|(node, _)| is_meant(&node.tag));
         let mut space = nodes.fold(Rect::NOTHING, |space, (_, rect)| space.union(*rect));
-        if look == GraphLook::All || is_other {
+        if look == GraphLook::All {
             space = frames(&self.graph, rects).into_iter().filter(|frame| frame.is_finite()).fold(space, Rect::union);
         }
         if !space.is_finite() {
@@ -315,6 +326,7 @@ impl GraphPanel {
         let ground = canvas.show(ui, &mut self.snarl);
         ground.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, "Graph of commands"));
         self.transform = canvas.transform;
+        self.sees_all = canvas.visible.len() == rects.len();
         let (at, pressed) = pointer(ui, &canvas);
         let hand = Hand { at, pressed, scale: canvas.transform.scaling, ..hand };
         let mut outcomes = Vec::new();
@@ -342,8 +354,17 @@ impl GraphPanel {
                 Outcome::CloseMenu => opened = Some(SetOpenCommand::Bool(false)),
             }
         }
-        let Some(target) = self.menu else { return };
         let mut menu = Menu { world, shown, bench, words: &mut self.words };
+        if let Some(module) = dropped_module(&ground, &canvas.touched) {
+            menu.drop_module(module.0, hand.target(None), requests);
+        }
+        let Some(target) = self.menu else { return };
         Popup::context_menu(&ground).open_memory(opened).show(|ui| menu.show(ui, target, requests));
     }
+}
+
+/// Module of the library that is let go over the graph.
+fn dropped_module(ground: &Response, parts: &[(NodePart, Response)]) -> Option<DraggedModule> {
+    let mut all = parts.iter().map(|(_, part)| part).chain([ground]);
+    all.find_map(|part| part.dnd_release_payload::<DraggedModule>()).map(|module| *module)
 }

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use bevy::prelude::*;
 
 use super::{
+    TITLE,
     action::{GraphAction, obstacle},
     layout::snapped,
     state::{GraphLook, GraphRequest, GraphView},
@@ -14,6 +15,7 @@ use crate::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
+        dock::Layout,
         notice::Notice,
     },
     plugins::{
@@ -119,10 +121,14 @@ fn look(view: &mut GraphView, at: GraphLook) {
 /// Keeps the selected commands with the selected joints: where a joint is selected elsewhere, its commands are. Commands that
 /// are gone are not selected.
 pub(super) fn follow_selection(
-    active: Option<Res<ActiveRig>>,
+    (active, layout): (Option<Res<ActiveRig>>, Option<Res<Layout>>),
     rigs: Query<(Ref<Rig>, Ref<Selection>)>,
     mut view: ResMut<GraphView>,
 ) {
+    // A panel that is not drawn cannot tell that the pointer has left it.
+    if view.hovered && layout.is_some_and(|layout| !layout.is_forward(TITLE)) {
+        view.hovered = false;
+    }
     let active = active.map(|active| active.0);
     let is_other = view.rig != active;
     if is_other {

@@ -10,7 +10,7 @@ use super::{
     layout::snapped,
     menu::MenuTarget,
     model::{Graph, GraphWire},
-    wires::{input_pin, output_pin, wire_at},
+    wires::{frames, input_pin, output_pin, wire_at},
 };
 use crate::rig::{Uid, operations::TagOperation};
 
@@ -69,6 +69,19 @@ impl Hand<'_> {
     pub fn wire_at(&self) -> Option<GraphWire> {
         let at = self.at.filter(|at| self.node_at(*at).is_none())?;
         wire_at(self.graph, self.rects, at, self.reach() * 0.8)
+    }
+
+    /// What lies under the pointer: a node, a wire, a frame, or the ground.
+    pub fn target(&self, node: Option<Uid>) -> MenuTarget {
+        let tag = |number: usize| self.graph.nodes[number].tag;
+        let node = node.or_else(|| self.at.and_then(|at| self.node_at(at)).map(tag));
+        let wire = || self.wire_at().map(|wire| MenuTarget::Wire(tag(wire.to), wire.input, tag(wire.from)));
+        let frame = || {
+            let at = self.at?;
+            let place = frames(self.graph, self.rects).iter().position(|frame| frame.contains(at))?;
+            Some(MenuTarget::Frame(self.graph.frames[place].tag))
+        };
+        node.map(MenuTarget::Node).or_else(wire).or_else(frame).unwrap_or(MenuTarget::Ground)
     }
 
     fn number(&self, tag: Uid) -> Option<usize> {
@@ -165,11 +178,7 @@ impl Hand<'_> {
             if let Some(tag) = tag.filter(|tag| !self.selected.contains(tag)) {
                 outcomes.push(Outcome::Select(BTreeSet::from([tag])));
             }
-            let wire = self.wire_at().filter(|_| tag.is_none()).map(|wire| {
-                let tag = |number: usize| self.graph.nodes[number].tag;
-                MenuTarget::Wire(tag(wire.to), wire.input, tag(wire.from))
-            });
-            let target = tag.map(MenuTarget::Node).or(wire).unwrap_or(MenuTarget::Ground);
+            let target = self.target(tag);
             outcomes.push(Outcome::Menu(target));
         }
     }

@@ -7,6 +7,7 @@ use super::{
     action::{GraphAction, obstacle},
     edits::Bench,
     model::GraphWire,
+    state::GraphRequest,
 };
 use crate::{
     editor::{
@@ -28,6 +29,8 @@ pub(super) enum MenuTarget {
     Node(Uid),
     /// Wire between two commands: (command that reads, input, command that is read from).
     Wire(Uid, usize, Uid),
+    /// Feature tag.
+    Frame(Uid),
     Ground,
 }
 
@@ -52,8 +55,78 @@ impl Menu<'_> {
         match target {
             MenuTarget::Node(tag) => self.node(ui, tag, requests),
             MenuTarget::Wire(to, input, from) => self.wire(ui, (to, input, from), requests),
+            MenuTarget::Frame(tag) => self.frame(ui, tag, requests),
             MenuTarget::Ground => self.ground(ui, requests),
         }
+    }
+
+    /// Adds a command of a module that is let go: into a wire, behind a node, or to the selected joints.
+    pub fn drop_module(&mut self, module: &'static str, target: MenuTarget, requests: &mut Requests) {
+        let at = |tag: Uid| self.bench.graph.at.get(&tag).copied();
+        match target {
+            MenuTarget::Wire(to, input, from) => {
+                if let (Some(to), Some(from)) = (at(to), at(from)) {
+                    self.insert(GraphWire { to, input, from }, module, requests);
+                }
+            }
+            MenuTarget::Node(tag) => {
+                if let Some(number) = at(tag) {
+                    send(self.behind(number, module), self.shown, requests);
+                }
+            }
+            MenuTarget::Frame(_) | MenuTarget::Ground => match selected_joints(self.shown) {
+                joints if joints.is_empty() => {
+                    let text = format!("{module} was not added: no joint is selected to carry it; select one first.");
+                    requests.send(Notice::error(text));
+                }
+                joints => {
+                    send(TagOperation::Add { joints, kind: command(module), index: None }, self.shown, requests);
+                }
+            },
+        }
+    }
+
+    /// The operation that adds a command behind another.
+    fn behind(&self, number: usize, module: &str) -> TagOperation {
+        let (joint, before) = (self.bench.graph.nodes[number].joint, self.bench.graph.next_on_joint(number));
+        TagOperation::Insert { joint, before, kind: command(module), rewired: None }
+    }
+
+    /// Inserts a command into a wire.
+    fn insert(&self, wire: GraphWire, module: &str, requests: &mut Requests) {
+        let nodes = &self.bench.graph.nodes;
+        match self.bench.inserted(wire, module) {
+            Ok((operation, is_rewired)) => {
+                send(operation, self.shown, requests);
+                if !is_rewired {
+                    let (from, to) = (&nodes[wire.from].title, &nodes[wire.to].title);
+                    let text = format!("{module} makes no nodes yet, so {to} still refers to {from}.");
+                    requests.send(Notice::info(text));
+                }
+            }
+            Err(error) => requests.send(Notice::error(format!("Nothing was inserted: {error}."))),
+        }
+    }
+
+    fn frame(&mut self, ui: &mut Ui, tag: Uid, requests: &mut Requests) {
+        let graph = self.bench.graph;
+        let Some(place) = graph.frames.iter().position(|frame| frame.tag == tag) else {
+            ui.weak("The feature is gone.");
+            return;
+        };
+        let frame = &graph.frames[place];
+        let name = format!("Turn {} {}", frame.name, if frame.enabled { "off" } else { "on" });
+        if ui.button(name).clicked() {
+            send(TagOperation::Enable(vec![tag], !frame.enabled), self.shown, requests);
+            ui.close();
+        }
+        if ui.button("Select its commands").clicked() {
+            let inside = graph.nodes.iter().filter(|node| node.frame == Some(place)).map(|node| node.tag);
+            requests.send(GraphRequest::Select(inside.collect()));
+            ui.close();
+        }
+        ui.separator();
+        self.ground(ui, requests);
     }
 
     fn node(&mut self, ui: &mut Ui, tag: Uid, requests: &mut Requests) {
@@ -65,11 +138,10 @@ impl Menu<'_> {
             self.entry(ui, action, requests);
         }
         ui.separator();
-        let (joint, before) = (self.bench.graph.nodes[number].joint, self.bench.graph.next_on_joint(number));
         ui.menu_button("Add command behind", |ui| {
-            let Some(module) = library(ui, self.bench.modules, self.words) else { return };
-            let kind = command(module);
-            send(TagOperation::Insert { joint, before, kind, rewired: None }, self.shown, requests);
+            if let Some(module) = library(ui, self.bench.modules, self.words) {
+                send(self.behind(number, module), self.shown, requests);
+            }
         });
         ui.menu_button("Put into feature", |ui| {
             let mut attach = |ui: &mut Ui, name: &str, feature: Option<Uid>| {
@@ -108,17 +180,8 @@ impl Menu<'_> {
             ui.close();
         }
         ui.menu_button("Insert command", |ui| {
-            let Some(module) = library(ui, self.bench.modules, self.words) else { return };
-            match self.bench.inserted(wire, module) {
-                Ok((operation, is_rewired)) => {
-                    send(operation, self.shown, requests);
-                    if !is_rewired {
-                        let (from, to) = (&nodes[from].title, &nodes[to].title);
-                        let text = format!("{module} makes no nodes yet, so {to} still refers to {from}.");
-                        requests.send(Notice::info(text));
-                    }
-                }
-                Err(error) => requests.send(Notice::error(format!("Nothing was inserted: {error}."))),
+            if let Some(module) = library(ui, self.bench.modules, self.words) {
+                self.insert(wire, module, requests);
             }
         });
     }
@@ -145,8 +208,7 @@ pub(super) fn add_to_selected(
     words: &mut String,
     requests: &mut Requests,
 ) {
-    let joints: Vec<Uid> =
-        shown.selection.0.iter().copied().filter(|joint| shown.rig.joint(*joint).is_some()).collect();
+    let joints = selected_joints(shown);
     if joints.is_empty() {
         ui.weak("Select a joint, or a command of it, first.");
         return;
@@ -168,6 +230,10 @@ pub(super) fn button(ui: &mut Ui, world: &World, action: GraphAction, name: &str
     if let Some(why_not) = why_not {
         response.on_disabled_hover_text(why_not);
     }
+}
+
+fn selected_joints(shown: &DisplayedRig) -> Vec<Uid> {
+    shown.selection.0.iter().copied().filter(|joint| shown.rig.joint(*joint).is_some()).collect()
 }
 
 fn command(module: &str) -> TagKind {

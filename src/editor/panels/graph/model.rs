@@ -2,8 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{look::ModuleLooks, words};
+use super::{
+    look::{ModuleLook, ModuleLooks},
+    words,
+};
 use crate::{
+    editor::panels::joint_name,
     processor::{Builder, Modules},
     rig::{
         JointData, Rig, TagData, TagKind, Uid, fields,
@@ -43,6 +47,24 @@ pub(super) struct GraphNode {
     pub frame: Option<usize>,
     /// The tag's own switch.
     pub enabled: bool,
+    /// References to commands that stand in the parameters: (parameter, command that is meant).
+    pub written: Vec<(String, Uid)>,
+    /// What the words were made of.
+    source: NodeSource,
+}
+
+/// What the words of a node are made of.
+#[derive(Debug, Clone, PartialEq)]
+struct NodeSource {
+    joint_name: String,
+    comment: String,
+    params: String,
+}
+
+impl NodeSource {
+    fn is(&self, joint_name: &str, tag: &TagData, params: &str) -> bool {
+        self.joint_name == joint_name && self.comment == tag.comment && self.params == params
+    }
 }
 
 /// Dependency of a command on an earlier one.
@@ -69,11 +91,11 @@ pub(super) struct GraphFrame {
 
 impl Graph {
     /// The graph of a rig. `builder` tells what commands read in their last runs; the references to commands that stand in
-    /// the parameters are wires before any run, too.
-    pub fn of(rig: &Rig, builder: Option<&Builder>, modules: &Modules, looks: &mut ModuleLooks) -> Self {
+    /// the parameters are wires before any run, too. Nodes of `known` that say the same as before are taken from there.
+    pub fn of(rig: &Rig, builder: Option<&Builder>, modules: &Modules, looks: &mut ModuleLooks, known: Self) -> Self {
+        let mut known: BTreeMap<Uid, GraphNode> = known.nodes.into_iter().map(|node| (node.tag, node)).collect();
         let mut graph = Self::default();
         let mut features: Vec<Option<Uid>> = Vec::new();
-        let mut written: BTreeSet<(Uid, String, Uid)> = BTreeSet::new();
         let mut names: BTreeMap<Uid, GraphFrame> = BTreeMap::new();
         for joint in rig.walk() {
             for tag in &joint.data.tags {
@@ -83,9 +105,17 @@ impl Graph {
                         names.insert(tag.uid, GraphFrame { tag: tag.uid, name, enabled: tag.enabled });
                     }
                     TagKind::Command { module, params, feature } => {
-                        written.extend(written_references(tag.uid, params));
                         features.push(*feature);
-                        graph.add(node(&joint.data, tag, (module, params), modules, looks));
+                        let name = joint_name(&joint.data);
+                        let same = known
+                            .remove(&tag.uid)
+                            .filter(|node| node.module == *module && node.source.is(&name, tag, params));
+                        graph.add(match same {
+                            Some(node) => {
+                                GraphNode { joint: joint.data.uid, frame: None, enabled: tag.enabled, ..node }
+                            }
+                            None => node(&joint.data, tag, (module, params), looks.of(module, modules)),
+                        });
                     }
                 }
             }
@@ -99,7 +129,7 @@ impl Graph {
             });
             graph.nodes[number].frame = Some(frame);
         }
-        graph.wire(written, builder);
+        graph.wire(builder);
         graph
     }
 
@@ -108,7 +138,7 @@ impl Graph {
         self.nodes.push(node);
     }
 
-    fn wire(&mut self, written: BTreeSet<(Uid, String, Uid)>, builder: Option<&Builder>) {
+    fn wire(&mut self, builder: Option<&Builder>) {
         let mut wires: BTreeSet<GraphWire> = BTreeSet::new();
         let mut add = |reader: Uid, parameter: Option<&str>, source: Uid| {
             let (Some(to), Some(from)) = (self.at.get(&reader).copied(), self.at.get(&source).copied()) else { return };
@@ -116,8 +146,10 @@ impl Graph {
             let found = parameter.and_then(|parameter| inputs.iter().position(|known| known == parameter));
             wires.insert(GraphWire { to, input: found.unwrap_or(inputs.len()), from });
         };
-        for (reader, parameter, source) in &written {
-            add(*reader, Some(parameter), *source);
+        for node in &self.nodes {
+            for (parameter, source) in &node.written {
+                add(node.tag, Some(parameter), *source);
+            }
         }
         for read in builder.map(Builder::dependencies).unwrap_or_default() {
             // Errors and reads of a part of a parameter name the part: `names[2]`.
@@ -134,15 +166,8 @@ impl Graph {
     }
 }
 
-fn node(
-    joint: &JointData,
-    tag: &TagData,
-    (module, params): (&str, &str),
-    modules: &Modules,
-    looks: &mut ModuleLooks,
-) -> GraphNode {
-    let look = looks.of(module, modules);
-    let name = crate::editor::panels::joint_name(joint);
+fn node(joint: &JointData, tag: &TagData, (module, params): (&str, &str), look: &ModuleLook) -> GraphNode {
+    let name = joint_name(joint).into_owned();
     GraphNode {
         tag: tag.uid,
         joint: joint.uid,
@@ -152,11 +177,13 @@ fn node(
         inputs: look.inputs.clone(),
         frame: None,
         enabled: tag.enabled,
+        written: written_references(params),
+        source: NodeSource { joint_name: name, comment: tag.comment.clone(), params: params.to_owned() },
     }
 }
 
-/// References to commands in parameters: (command, parameter, command that is meant).
-fn written_references(tag: Uid, params: &str) -> Vec<(Uid, String, Uid)> {
+/// References to commands in parameters: (parameter, command that is meant).
+fn written_references(params: &str) -> Vec<(String, Uid)> {
     if !params.contains("@command") {
         return Vec::new();
     }
@@ -170,7 +197,7 @@ fn written_references(tag: Uid, params: &str) -> Vec<(Uid, String, Uid)> {
         let Some(field) = field else { continue };
         for reference in &references {
             if let Source::Command(source) = reference.source {
-                list.push((tag, field.name.to_owned(), source));
+                list.push((field.name.to_owned(), source));
             }
         }
     }
