@@ -19,12 +19,13 @@ mod state;
 mod wires;
 mod words;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 use bevy::{ecs::change_detection::Tick, prelude::*};
-use bevy_egui::egui::{
-    self, Id, Popup, Pos2, Rect, Response, SetOpenCommand, Ui, WidgetInfo, WidgetType, emath::TSTransform, vec2,
-};
+use bevy_egui::egui::{self, Id, Popup, Pos2, Rect, Response, SetOpenCommand, Ui, emath::TSTransform, vec2};
 use egui_snarl::{NodeId, Snarl};
 
 pub use self::{
@@ -84,10 +85,10 @@ const FLASH: f64 = 0.7;
 #[derive(Default)]
 pub struct GraphPanel {
     made_from: Option<(Stamp, Option<Tick>)>,
-    modules: Option<std::sync::Arc<Modules>>,
+    modules: Option<Arc<Modules>>,
     looks: ModuleLooks,
     graph: Graph,
-    /// What the layout was made of.
+    /// Nodes and edges that the layout was made of.
     laid_out: (Vec<LayoutNode>, Vec<(usize, usize)>),
     /// Places of the layout.
     places: Vec<[f32; 2]>,
@@ -138,10 +139,10 @@ impl EditorPanel for GraphPanel {
 
 impl GraphPanel {
     /// Makes the graph again if the rig or its build changed, and lays it out if its shape did.
-    fn refresh(&mut self, world: &World, shown: &DisplayedRig, modules: &std::sync::Arc<Modules>, now: f64) {
+    fn refresh(&mut self, world: &World, shown: &DisplayedRig, modules: &Arc<Modules>, now: f64) {
         let processor = world.get_entity(shown.entity).ok().and_then(|rig| rig.get_ref::<Processor>());
         let made_from = Some((shown.stamp(), processor.as_ref().map(|processor| processor.last_changed())));
-        let has_same_modules = self.modules.as_ref().is_some_and(|known| std::sync::Arc::ptr_eq(known, modules));
+        let has_same_modules = self.modules.as_ref().is_some_and(|known| Arc::ptr_eq(known, modules));
         if self.made_from == made_from && has_same_modules {
             return;
         }
@@ -201,7 +202,7 @@ impl GraphPanel {
         world: &World,
         shown: &DisplayedRig,
         view: &GraphView,
-        modules: &std::sync::Arc<Modules>,
+        modules: &Arc<Modules>,
         requests: &mut Requests,
     ) {
         let (graph, words) = (&self.graph, &mut self.words);
@@ -271,7 +272,7 @@ impl GraphPanel {
         world: &World,
         shown: &DisplayedRig,
         view: &GraphView,
-        modules: &std::sync::Arc<Modules>,
+        modules: &Arc<Modules>,
         requests: &mut Requests,
     ) {
         let area = ui.available_rect_before_wrap();
@@ -324,7 +325,6 @@ impl GraphPanel {
             touched: Vec::new(),
         };
         let ground = canvas.show(ui, &mut self.snarl);
-        ground.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, "Graph of commands"));
         self.transform = canvas.transform;
         self.sees_all = canvas.visible.len() == rects.len();
         let (at, pressed) = pointer(ui, &canvas);

@@ -69,7 +69,7 @@ pub(super) struct Canvas<'a> {
     pub id: Id,
     /// Space of the canvas on the screen.
     pub area: Rect,
-    /// From the graph to the screen.
+    /// Transform from the graph to the screen.
     pub transform: TSTransform,
     /// Another transform than that of the last frame.
     pub want: Option<TSTransform>,
@@ -103,7 +103,9 @@ impl Canvas<'_> {
             widget.show(snarl, self, ui)
         });
         ui.input_mut(|input| input.modifiers = held);
-        ground.inner
+        let ground = ground.inner;
+        self.name(&ground, self.view(), "Graph of commands", None);
+        ground
     }
 
     fn is_detailed(&self) -> bool {

@@ -1,6 +1,8 @@
 //! Edits of the graph: wires that are connected, removed and broken by an inserted command. Each is one operation on tags,
 //! or is refused with the reason.
 
+use std::{collections::BTreeSet, sync::Arc};
+
 use super::{
     look::reference_parameters,
     model::{Graph, GraphWire},
@@ -9,7 +11,7 @@ use crate::{
     processor::{Builder, CommandState, Modules},
     rig::{
         NodeRef, NodeRefs, Rig, SourceError, TagKind, Uid, UidSource,
-        operations::{Operation, OperationError, Rewiring, TagOperation},
+        operations::{Operation, Rewiring, TagOperation},
         reference::{Source, refresh_names},
         ron_text,
     },
@@ -79,15 +81,12 @@ pub(super) enum WireError {
         /// Error of the module's reader.
         source: SourceError,
     },
-    /// Operation that the rig refuses.
-    #[error(transparent)]
-    Operation(#[from] OperationError),
 }
 
 /// Rig with its modules and its graph.
 pub(super) struct Bench<'a> {
     pub rig: &'a Rig,
-    pub modules: &'a std::sync::Arc<Modules>,
+    pub modules: &'a Arc<Modules>,
     pub graph: &'a Graph,
 }
 
@@ -208,7 +207,7 @@ impl Bench<'_> {
     /// True if a command that an operation inserts makes nodes: tried on a copy of the rig.
     fn makes_nodes(&self, operation: &TagOperation) -> bool {
         let mut rig = self.rig.clone();
-        let known: std::collections::BTreeSet<Uid> = self.graph.nodes.iter().map(|node| node.tag).collect();
+        let known: BTreeSet<Uid> = self.graph.nodes.iter().map(|node| node.tag).collect();
         // The copy is dropped, so its uids need not differ from those of other rigs.
         let mut uids = UidSource::seeded(1);
         if Operation::Tags(operation.clone()).run(&mut rig, &mut uids, None).is_err() {

@@ -71,7 +71,7 @@ impl Hand<'_> {
         wire_at(self.graph, self.rects, at, self.reach() * 0.8)
     }
 
-    /// What lies under the pointer: a node, a wire, a frame, or the ground.
+    /// Subject under the pointer: a node, a wire, a frame, or the ground.
     pub fn target(&self, node: Option<Uid>) -> MenuTarget {
         let tag = |number: usize| self.graph.nodes[number].tag;
         let node = node.or_else(|| self.at.and_then(|at| self.node_at(at)).map(tag));

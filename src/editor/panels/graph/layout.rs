@@ -47,8 +47,8 @@ pub fn lay_out(nodes: &[LayoutNode], edges: &[(usize, usize)]) -> Vec<[f32; 2]> 
     columns.places(nodes)
 }
 
-/// Number of crossings between edges whose ends stand in the same two columns: a measure for tests. It takes the square of
-/// the number of edges.
+/// Number of crossings between edges whose ends stand in the same two columns: a measure for tests. The time grows
+/// with the square of the number of edges.
 pub fn crossings(places: &[[f32; 2]], edges: &[(usize, usize)]) -> usize {
     let mut count = 0;
     for (number, (a, b)) in edges.iter().enumerate() {

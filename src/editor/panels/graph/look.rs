@@ -20,11 +20,7 @@ pub(super) struct ModuleLooks(BTreeMap<String, ModuleLook>);
 impl ModuleLooks {
     /// The appearance of a module; that of its name where no such module is known.
     pub fn of(&mut self, module: &str, modules: &Modules) -> &ModuleLook {
-        // A map's entry would need a name of its own for each look.
-        if !self.0.contains_key(module) {
-            self.0.insert(module.to_owned(), look(module, modules.get(module)));
-        }
-        &self.0[module]
+        self.0.entry(module.to_owned()).or_insert_with(|| look(module, modules.get(module)))
     }
 
     /// Forgets all: other modules are registered.

@@ -49,11 +49,11 @@ pub(super) struct GraphNode {
     pub enabled: bool,
     /// References to commands that stand in the parameters: (parameter, command that is meant).
     pub written: Vec<(String, Uid)>,
-    /// What the words were made of.
+    /// Texts that the words were made of.
     source: NodeSource,
 }
 
-/// What the words of a node are made of.
+/// Texts that the words of a node are made of.
 #[derive(Debug, Clone, PartialEq)]
 struct NodeSource {
     joint_name: String,
@@ -85,7 +85,7 @@ pub(super) struct GraphFrame {
     pub tag: Uid,
     /// Name for people.
     pub name: String,
-    /// Its own switch.
+    /// Switch of the feature tag.
     pub enabled: bool,
 }
 

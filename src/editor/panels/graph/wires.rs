@@ -3,7 +3,7 @@
 //! The panel draws its wires itself. Snarl would walk all wires for each pin of each node, and only knows wires between
 //! nodes that are drawn, where those that leave the view are to be seen, too.
 
-use bevy_egui::egui::{Color32, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2};
+use bevy_egui::egui::{Color32, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
 use super::model::{Graph, GraphWire};
 
@@ -58,7 +58,7 @@ pub(super) fn curve([from, to]: [Pos2; 2]) -> Vec<Pos2> {
 fn bounds([from, to]: [Pos2; 2]) -> Rect {
     let rect = Rect::from_two_pos(from, to);
     // A curve that goes back reaches beyond its ends.
-    rect.expand2(bevy_egui::egui::vec2(if to.x < from.x { 120.0 } else { 2.0 }, 2.0))
+    rect.expand2(vec2(if to.x < from.x { 120.0 } else { 2.0 }, 2.0))
 }
 
 /// Colour and width of wires.
@@ -152,9 +152,6 @@ pub(super) fn frames(graph: &Graph, rects: &[Rect]) -> Vec<Rect> {
     }
     frames
         .into_iter()
-        .map(|frame| Rect {
-            min: frame.min - bevy_egui::egui::vec2(16.0, 34.0),
-            max: frame.max + bevy_egui::egui::vec2(16.0, 16.0),
-        })
+        .map(|frame| Rect { min: frame.min - vec2(16.0, 34.0), max: frame.max + vec2(16.0, 16.0) })
         .collect()
 }
