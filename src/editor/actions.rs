@@ -6,7 +6,10 @@
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{mode::Mode, panels::timeline::TimelineAction};
+use super::{
+    mode::Mode,
+    panels::{graph::GraphAction, timeline::TimelineAction},
+};
 
 /// An action that a person can request with a key, a menu entry or a button.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -125,6 +128,8 @@ pub enum Action {
     Contrast,
     /// An action of the timeline.
     Timeline(TimelineAction),
+    /// An action of the graph.
+    Graph(GraphAction),
 }
 
 impl Action {
@@ -188,7 +193,8 @@ impl Action {
             Self::Contrast,
         ];
         let of_timeline = TimelineAction::ALL.into_iter().map(Self::Timeline);
-        Mode::ALL.into_iter().map(Self::Mode).chain(others).chain(of_timeline).collect()
+        let of_graph = GraphAction::ALL.into_iter().map(Self::Graph);
+        Mode::ALL.into_iter().map(Self::Mode).chain(others).chain(of_timeline).chain(of_graph).collect()
     }
 }
 

@@ -33,7 +33,7 @@ impl Plugin for DockPlugin {
 pub const VIEWPORT: &str = "Viewport";
 
 /// Panels below the viewport, which are wide and low.
-const BELOW: [&str; 3] = ["Timeline", "Curves", "Log"];
+const BELOW: [&str; 4] = ["Timeline", "Curves", "Graph", "Log"];
 
 /// Arrangement of the panels; stored between runs.
 #[derive(Resource, Clone, Serialize, Deserialize)]

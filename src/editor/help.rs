@@ -47,6 +47,11 @@ const POINTER: &[(&str, &str)] = &[
     ("Timeline: click, or drag a box", "select keys (with Shift more, with Ctrl one more or less)"),
     ("Timeline: drag selected keys", "move (with Alt between frames); with Ctrl scale about the playhead"),
     ("Timeline: Ctrl + wheel, Shift + wheel", "zoom, pan in time"),
+    ("Graph: click, or drag a box", "select commands (with Shift more, with Ctrl one more or less)"),
+    ("Graph: drag selected nodes", "move them on the grid; the document stays as it is"),
+    ("Graph: drag from an output to an input", "refer to what the command makes (with Shift besides what is there)"),
+    ("Graph: right click on a wire", "remove its reference, or insert a command"),
+    ("Graph: right drag, wheel, Ctrl + wheel", "pan, pan, zoom"),
 ];
 
 pub(super) fn toggle_help(mut actions: MessageReader<ActionRequest>, mut shown: ResMut<HelpShown>) {
@@ -119,6 +124,7 @@ pub fn describe(action: Action) -> String {
         Action::Theme => "Dark or light theme",
         Action::Contrast => "High contrast",
         Action::Timeline(action) => action.name(),
+        Action::Graph(action) => action.name(),
     };
     text.to_owned()
 }

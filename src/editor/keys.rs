@@ -15,7 +15,10 @@ use super::{
     actions::{Action, ActionRequest},
     files::dialog::Dialog,
     mode::Mode,
-    panels::timeline::{Timeline, TimelineAction, over_timeline},
+    panels::{
+        graph::{GraphView, over_graph},
+        timeline::{Timeline, TimelineAction, over_timeline},
+    },
     pointer::ModifierKeys,
 };
 
@@ -252,7 +255,7 @@ fn press_keys(
     mut lost: MessageReader<WindowFocused>,
     mut held: Local<ModifierKeys>,
     bindings: Res<KeyBindings>,
-    (dialog, timeline): (Option<Res<Dialog>>, Option<Res<Timeline>>),
+    (dialog, timeline, graph): (Option<Res<Dialog>>, Option<Res<Timeline>>, Option<Res<GraphView>>),
     mut contexts: Query<&mut EguiContext, With<PrimaryEguiContext>>,
     mut actions: MessageWriter<ActionRequest>,
 ) {
@@ -264,6 +267,7 @@ fn press_keys(
     }
     let typing = contexts.iter_mut().any(|mut context| context.get_mut().egui_wants_keyboard_input());
     let is_over_timeline = timeline.is_some_and(|timeline| timeline.hovered);
+    let is_over_graph = graph.is_some_and(|graph| graph.hovered);
     let is_asked = dialog.is_some_and(|dialog| dialog.question().is_some());
     for input in keys.read() {
         if held.follow(input) || is_asked || input.state == ButtonState::Released || input.repeat {
@@ -274,7 +278,8 @@ fn press_keys(
         match bindings.action(&chord) {
             // Text fields do not use these chords.
             Some(action) if !typing || matches!(action, Action::Save | Action::SaveAs | Action::Help) => {
-                actions.write(ActionRequest(if is_over_timeline { over_timeline(action) } else { action }));
+                let action = if is_over_timeline { over_timeline(action) } else { action };
+                actions.write(ActionRequest(if is_over_graph { over_graph(action) } else { action }));
             }
             _ => {}
         }

@@ -10,7 +10,7 @@ use super::{
     help::describe,
     keys::KeyBindings,
     panel::{EditorOverlay, PanelApp, Requests},
-    panels::timeline,
+    panels::{graph, timeline},
     style,
 };
 use crate::{
@@ -52,6 +52,9 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
     let Some(entity) = world.get_resource::<ActiveRig>().map(|rig| rig.0) else { return Some("no rig is open") };
     if let Action::Timeline(action) = action {
         return timeline::obstacle(world, action);
+    }
+    if let Action::Graph(action) = action {
+        return graph::obstacle(world, action);
     }
     let rig = world.get::<Rig>(entity)?;
     let history = world.get::<RigHistory>(entity);

@@ -7,6 +7,7 @@ pub mod controls;
 pub mod curves;
 pub mod display;
 pub mod face;
+pub mod graph;
 pub mod hierarchy;
 pub mod history;
 pub mod local_groups;
@@ -44,6 +45,7 @@ impl Plugin for PanelsPlugin {
             face::FacePanelPlugin,
             poses::PosesPlugin,
             timeline::TimelinePlugin,
+            graph::GraphPlugin,
             toasts::ToastsPlugin,
             super::onion::OnionPlugin,
         ))
@@ -61,6 +63,7 @@ impl Plugin for PanelsPlugin {
         .add_panel(display::DisplayPanel::default())
         .add_panel(timeline::TimelinePanel::default())
         .add_panel(curves::CurvesPanel::default())
+        .add_panel(graph::GraphPanel::default())
         .add_panel(log::LogPanel::default())
         .add_overlay(toasts::Toasts::default())
         .add_painter(node_menu::NodeMenu::default());

@@ -1,5 +1,6 @@
 //! The processor: follows a document, carries out what has to be carried out, and knows how far it has come.
 
+mod dependencies;
 mod find;
 mod follow;
 mod loops;
@@ -13,6 +14,7 @@ use std::{
     time::Instant,
 };
 
+pub use dependencies::CommandDependency;
 pub use find::FindError;
 pub use status::{CommandState, CommandStatus};
 

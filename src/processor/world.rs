@@ -313,6 +313,13 @@ impl World {
         best.map(|(_, value)| value).or(cell.document.as_ref())
     }
 
+    /// Command that wrote an aspect last before `place`; `None` for a value of the document.
+    pub fn writer_before(&self, node: NodeId, aspect: Aspect, place: u32) -> Option<u32> {
+        let writers = self.cell(node, aspect).writes().iter().map(|(command, _)| *command);
+        let before = writers.filter(|command| self.places[*command as usize] < place);
+        before.max_by_key(|command| self.places[*command as usize])
+    }
+
     pub fn birth(&self, node: NodeId, place: u32) -> Option<&Arc<Birth>> {
         match self.read_at(node, Aspect::Birth, place) {
             Some(Value::Birth(birth)) => Some(birth),

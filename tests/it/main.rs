@@ -89,6 +89,8 @@ mod gestures;
 mod gizmo;
 mod gltf;
 mod gltf_torture;
+#[cfg(feature = "editor")]
+mod graph;
 mod growth;
 mod heads;
 #[cfg(feature = "cli")]

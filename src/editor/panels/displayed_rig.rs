@@ -26,6 +26,13 @@ pub(super) struct Stamp {
     rig: Tick,
 }
 
+impl Stamp {
+    /// True for the state of that rig, however old.
+    pub fn is_of(self, entity: Entity) -> bool {
+        self.entity == entity
+    }
+}
+
 impl<'w> DisplayedRig<'w> {
     /// The active rig; `None` before there is one.
     pub fn of(world: &'w World) -> Option<Self> {

@@ -1,7 +1,7 @@
 //! Process panel: the list of commands with their states, steps in both directions, breakpoints.
 
 use bevy::{ecs::change_detection::Tick, prelude::*};
-use bevy_egui::egui::{self, Color32, Rect, RichText, Sense, Ui, WidgetInfo, WidgetType, pos2, vec2};
+use bevy_egui::egui::{self, Color32, Rect, RichText, Sense, Ui, Visuals, WidgetInfo, WidgetType, pos2, vec2};
 
 use super::{
     displayed_rig::{DisplayedRig, Stamp},
@@ -182,7 +182,7 @@ impl ProcessPanel {
         }
         let size = rect.height();
         let dot = Rect::from_min_size(rect.min, vec2(size, size));
-        let color = color(ui, row.status.as_ref());
+        let color = color(ui.visuals(), row.status.as_ref());
         painter.circle_filled(dot.center(), 4.0, color);
         if row.is_breakpoint {
             painter.circle_stroke(dot.center(), 6.0, (2.0, ui.visuals().error_fg_color));
@@ -273,7 +273,8 @@ fn name(shown: &DisplayedRig, entry: &ListEntry) -> String {
     }
 }
 
-fn state_word(status: Option<&CommandStatus>) -> &'static str {
+/// Word for the state of a command.
+pub(super) fn state_word(status: Option<&CommandStatus>) -> &'static str {
     match status.map(|status| status.state) {
         Some(CommandState::Done) => "built",
         Some(CommandState::Skipped) => "passed over",
@@ -282,12 +283,13 @@ fn state_word(status: Option<&CommandStatus>) -> &'static str {
     }
 }
 
-fn color(ui: &Ui, status: Option<&CommandStatus>) -> Color32 {
+/// Colour of the state of a command.
+pub(super) fn color(visuals: &Visuals, status: Option<&CommandStatus>) -> Color32 {
     match status.map(|status| status.state) {
         Some(CommandState::Done) => Color32::from_rgb(96, 176, 96),
-        Some(CommandState::Skipped) => ui.visuals().warn_fg_color,
-        Some(CommandState::Failed) => ui.visuals().error_fg_color,
-        Some(CommandState::Pending) | None => ui.visuals().weak_text_color(),
+        Some(CommandState::Skipped) => visuals.warn_fg_color,
+        Some(CommandState::Failed) => visuals.error_fg_color,
+        Some(CommandState::Pending) | None => visuals.weak_text_color(),
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Tags that several selected joints have alike are one card and are changed together.
 
-mod library;
+pub(super) mod library;
 mod parameter_text;
 mod parts;
 mod references;

@@ -144,7 +144,7 @@ impl BuildScope<'_> {
     fn resolution(&mut self, parameter: &str, references: &NodeRefs) -> Result<Resolution, ModuleError> {
         let found = resolve::resolve(self.world, self.asker, references);
         self.world.work += found.as_ref().map_or(1, |found| 1 + found.nodes.len() as u64);
-        self.trace.reads.push(Read::References(references.clone(), found.clone().ok()));
+        self.trace.reads.push(Read::References(parameter.into(), references.clone(), found.clone().ok()));
         found.map_err(|error| ModuleError::reference(parameter, references, error.to_string()))
     }
 

@@ -16,7 +16,8 @@ use crate::{
 #[derive(Debug, Clone)]
 pub(in crate::processor) enum Read {
     Cell(NodeId, Aspect, Option<Value>),
-    References(NodeRefs, Option<Resolution>),
+    /// References of a parameter, with what they found.
+    References(Box<str>, NodeRefs, Option<Resolution>),
     Children(NodeId, Vec<NodeId>),
 }
 
@@ -47,7 +48,7 @@ impl Trace {
         let is_global = |(node, global): (&NodeId, &Trs)| bits(&world.global(*node, asker.place).0) == bits(global);
         let is_read = |read: &Read| match read {
             Read::Cell(node, aspect, value) => same(world.read_at(*node, *aspect, asker.place), value.as_ref()),
-            Read::References(references, found) => {
+            Read::References(_, references, found) => {
                 resolve::resolve(world, asker, references).ok().as_ref() == found.as_ref()
             }
             Read::Children(node, children) => world_children(world, *node, asker.place) == *children,

@@ -3,12 +3,14 @@
 //! Live mirroring leaves tags alone; pasting them mirrored puts them on the other side.
 
 mod clipboard;
+mod insert;
 mod part;
 mod paste;
 
 use std::{collections::BTreeMap, sync::Arc};
 
 pub use clipboard::{CopiedIdentifiers, CopiedJoint, TagClipboard, TagScope};
+pub use insert::Rewiring;
 pub use part::PartOrder;
 pub(in crate::rig) use part::drop_part;
 pub use paste::{PasteTo, PasteWhat};
@@ -32,6 +34,17 @@ pub enum TagOperation {
         kind: TagKind,
         /// Index among the joint's tags; last if `None`.
         index: Option<usize>,
+    },
+    /// Gives a joint a command, to which references of another command go over.
+    Insert {
+        /// Joint that gets the tag.
+        joint: Uid,
+        /// Tag of the joint to insert before; `None` appends.
+        before: Option<Uid>,
+        /// Kind and data of the tag.
+        kind: TagKind,
+        /// References that go over to the tag.
+        rewired: Option<Rewiring>,
     },
     /// Deletes tags. Commands of a deleted feature are in none then.
     Delete(Vec<Uid>),
@@ -191,6 +204,7 @@ impl TagOperation {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Add { .. } => "Add tag",
+            Self::Insert { .. } => "Insert tag",
             Self::Delete(..) => "Delete tags",
             Self::Enable(_, true) => "Enable tags",
             Self::Enable(_, false) => "Disable tags",
@@ -228,6 +242,9 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
                 add(draft, joint, tag, index.unwrap_or(usize::MAX))?;
             }
             Ok(())
+        }
+        TagOperation::Insert { joint, before, kind, rewired } => {
+            insert::insert(draft, *joint, *before, kind, rewired.as_ref())
         }
         TagOperation::Delete(tags) => delete(draft, tags),
         TagOperation::Enable(tags, enabled) => {

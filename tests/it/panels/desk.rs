@@ -38,6 +38,8 @@ pub struct Desk {
     pub shapes: usize,
     /// Nothing that the panel asks for is done.
     pub deaf: bool,
+    /// True if the last frame asked for another one at once.
+    pub awake: bool,
 }
 
 /// A widget.
@@ -80,6 +82,7 @@ impl Desk {
             held: Modifiers::NONE,
             shapes: 0,
             deaf: false,
+            awake: false,
         };
         desk.frame();
         desk
@@ -118,6 +121,7 @@ impl Desk {
             self.app.insert_resource(window);
         }
         self.shapes = output.shapes.len();
+        self.awake = output.viewport_output.values().any(|viewport| viewport.repaint_delay.is_zero());
         output.textures_delta.clear();
         if let Some(update) = output.platform_output.accesskit_update {
             self.seen = update.nodes.iter().filter_map(|(_, node)| shown_widget(node)).collect();

@@ -7,6 +7,10 @@ use crate::{
     processor::{ModuleInfo, Modules},
 };
 
+/// Module of the library that is dragged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::editor::panels) struct DraggedModule(pub &'static str);
+
 /// Modules that fit all words, the name counting more than the description; all without words.
 pub(super) fn found<'m>(modules: &'m Modules, words: &str) -> Vec<&'m ModuleInfo> {
     let words: Vec<String> = words.split_whitespace().map(str::to_lowercase).collect();
@@ -19,7 +23,7 @@ pub(super) fn found<'m>(modules: &'m Modules, words: &str) -> Vec<&'m ModuleInfo
 }
 
 /// Draws the library; returns the module that was chosen. `Enter` in the search field takes the first.
-pub(super) fn library(ui: &mut Ui, modules: &Modules, words: &mut String) -> Option<&'static str> {
+pub(in crate::editor::panels) fn library(ui: &mut Ui, modules: &Modules, words: &mut String) -> Option<&'static str> {
     ui.set_min_width(240.0);
     let field = ui.add(egui::TextEdit::singleline(words).hint_text("Search modules").desired_width(f32::INFINITY));
     field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Search modules"));
@@ -35,7 +39,8 @@ pub(super) fn library(ui: &mut Ui, modules: &Modules, words: &mut String) -> Opt
     let height = list::row_height(ui) + ui.text_style_height(&TextStyle::Small);
     ScrollArea::vertical().max_height(320.0).show(ui, |ui| {
         for module in found {
-            let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
+            let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click_and_drag());
+            response.dnd_set_drag_payload(DraggedModule(module.name));
             response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, module.name));
             if ui.is_rect_visible(rect) {
                 if response.hovered() {

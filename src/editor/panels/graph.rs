@@ -1,0 +1,370 @@
+//! Graph panel: commands as nodes, references as wires, features as frames.
+//!
+//! The same document as the Tags and the Process panel, seen as a graph that lays itself out: the graph is derived from the
+//! rig and its builder whenever one of them changes, and every edit is an operation on tags. Only places of nodes that a
+//! person moved are the graph's own ([`GraphView`]); they last as long as the window, since no document has a place for
+//! them.
+
+mod action;
+mod canvas;
+mod carry_out;
+mod edits;
+mod gesture;
+pub mod layout;
+mod look;
+mod menu;
+mod model;
+mod node;
+mod state;
+mod wires;
+mod words;
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
+
+use bevy::{ecs::change_detection::Tick, prelude::*};
+use bevy_egui::egui::{self, Id, Popup, Pos2, Rect, Response, SetOpenCommand, Ui, emath::TSTransform, vec2};
+use egui_snarl::{NodeId, Snarl};
+
+pub use self::{
+    action::{GraphAction, obstacle, over_graph},
+    state::{GraphLook, GraphRequest, GraphView},
+};
+use self::{
+    canvas::{Canvas, NodePart, SCALES, Scene},
+    edits::Bench,
+    gesture::{Gesture, Hand, Outcome, is_dropped, moved, pointer},
+    layout::{LayoutNode, lay_out},
+    look::ModuleLooks,
+    menu::{Menu, MenuTarget, add_to_selected, button, send},
+    model::Graph,
+    wires::{frames, node_size},
+};
+use super::{
+    displayed_rig::{DisplayedRig, Stamp},
+    list,
+    tags::library::DraggedModule,
+};
+use crate::{
+    editor::{
+        actions::ActionRequest,
+        notice::Notice,
+        panel::{EditorPanel, Requests},
+    },
+    plugins::{
+        RigSystems,
+        commands::{Processor, RigModules},
+    },
+    processor::{CommandStatus, Modules},
+    rig::Uid,
+};
+
+/// Plugin of the graph: its state and actions.
+pub struct GraphPlugin;
+
+impl Plugin for GraphPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<GraphView>()
+            .add_message::<GraphRequest>()
+            .add_message::<ActionRequest>()
+            .add_message::<Notice>()
+            .add_systems(Update, carry_out::attend.after(RigSystems::Gesture).before(RigSystems::Edits))
+            .add_systems(Last, carry_out::follow_selection);
+    }
+}
+
+/// Name of the panel.
+const TITLE: &str = "Graph";
+
+/// Seconds for which a command that ran flashes.
+const FLASH: f64 = 0.7;
+
+/// The panel.
+#[derive(Default)]
+pub struct GraphPanel {
+    made_from: Option<(Stamp, Option<Tick>)>,
+    modules: Option<Arc<Modules>>,
+    looks: ModuleLooks,
+    graph: Graph,
+    /// Nodes and edges that the layout was made of.
+    laid_out: (Vec<LayoutNode>, Vec<(usize, usize)>),
+    /// Places of the layout.
+    places: Vec<[f32; 2]>,
+    statuses: Vec<Option<CommandStatus>>,
+    /// Number of runs of each command when the graph was made last; `None` before that.
+    runs: Option<BTreeMap<Uid, u32>>,
+    /// Second at which each command that ran began to flash.
+    flashes: BTreeMap<Uid, f64>,
+    snarl: Snarl<Uid>,
+    in_snarl: BTreeMap<Uid, NodeId>,
+    transform: TSTransform,
+    /// Rig that is in view, and the number of the last request of the view.
+    looked: Option<(Entity, u64)>,
+    gesture: Option<Gesture>,
+    menu: Option<MenuTarget>,
+    words: String,
+    /// True if all nodes were in view in the last frame.
+    sees_all: bool,
+    /// True if the graph was laid out again while all of it was in view, and is brought into view again.
+    refits: bool,
+}
+
+impl EditorPanel for GraphPanel {
+    fn title(&self) -> &'static str {
+        TITLE
+    }
+
+    fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
+        let (Some(shown), Some(view), Some(modules)) =
+            (DisplayedRig::of(world), world.get_resource::<GraphView>(), world.get_resource::<RigModules>())
+        else {
+            return list::nothing(ui, "No rig is open.");
+        };
+        let is_pointed = ui.rect_contains_pointer(ui.max_rect());
+        if is_pointed != view.hovered {
+            requests.send(GraphRequest::Hover(is_pointed));
+        }
+        let now = ui.input(|input| input.time);
+        self.refresh(world, &shown, &modules.0, now);
+        self.bar(ui, world, &shown, view, &modules.0, requests);
+        if self.graph.nodes.is_empty() {
+            self.gesture = None;
+            return list::nothing(ui, "No joint has commands yet: add tags to the selected joints, or a part.");
+        }
+        self.canvas(ui, world, &shown, view, &modules.0, requests);
+    }
+}
+
+impl GraphPanel {
+    /// Makes the graph again if the rig or its build changed, and lays it out if its shape did.
+    fn refresh(&mut self, world: &World, shown: &DisplayedRig, modules: &Arc<Modules>, now: f64) {
+        let processor = world.get_entity(shown.entity).ok().and_then(|rig| rig.get_ref::<Processor>());
+        let made_from = Some((shown.stamp(), processor.as_ref().map(|processor| processor.last_changed())));
+        let has_same_modules = self.modules.as_ref().is_some_and(|known| Arc::ptr_eq(known, modules));
+        if self.made_from == made_from && has_same_modules {
+            return;
+        }
+        if !has_same_modules {
+            self.looks.clear();
+            self.graph = Graph::default();
+            self.modules = Some(modules.clone());
+        }
+        if self.made_from.is_none_or(|(stamp, _)| !stamp.is_of(shown.entity)) {
+            (self.runs, self.gesture, self.menu) = (None, None, None);
+            self.flashes.clear();
+        }
+        self.made_from = made_from;
+        let builder = processor.as_ref().map(|processor| processor.builder());
+        let known = std::mem::take(&mut self.graph);
+        self.graph = Graph::of(&shown.rig, builder, modules, &mut self.looks, known);
+        self.statuses = self.graph.nodes.iter().map(|node| builder?.status(node.tag)).collect();
+        self.note_runs(now);
+        let nodes = self.graph.nodes.iter();
+        let nodes = nodes.map(|node| LayoutNode { size: node_size(node.inputs.len()), frame: node.frame });
+        let edges = self.graph.wires.iter().map(|wire| (wire.from, wire.to));
+        let laid_out = (nodes.collect(), edges.collect::<BTreeSet<_>>().into_iter().collect());
+        if self.laid_out != laid_out {
+            self.places = lay_out(&laid_out.0, &laid_out.1);
+            self.laid_out = laid_out;
+            self.refits = self.sees_all;
+        }
+    }
+
+    /// Lets the commands flash that ran since the last look.
+    fn note_runs(&mut self, now: f64) {
+        let nodes = self.graph.nodes.iter().zip(&self.statuses);
+        let runs: BTreeMap<Uid, u32> =
+            nodes.filter_map(|(node, status)| Some((node.tag, status.as_ref()?.runs))).collect();
+        if let Some(before) = &self.runs {
+            let ran = runs.iter().filter(|(tag, runs)| before.get(tag).copied().unwrap_or(0) < **runs);
+            self.flashes.extend(ran.map(|(tag, _)| (*tag, now)));
+        }
+        self.runs = Some(runs);
+    }
+
+    /// Strength of each node's flash; asks for frames as long as there is one.
+    fn glow(&mut self, ui: &Ui) -> Vec<f32> {
+        let now = ui.input(|input| input.time);
+        self.flashes.retain(|_, began| now - *began < FLASH);
+        if !self.flashes.is_empty() {
+            ui.ctx().request_repaint();
+        }
+        let strength = |began: &f64| (1.0 - (now - began) / FLASH).clamp(0.0, 1.0) as f32;
+        self.graph.nodes.iter().map(|node| self.flashes.get(&node.tag).map_or(0.0, strength)).collect()
+    }
+
+    /// Draws the buttons above the graph.
+    fn bar(
+        &mut self,
+        ui: &mut Ui,
+        world: &World,
+        shown: &DisplayedRig,
+        view: &GraphView,
+        modules: &Arc<Modules>,
+        requests: &mut Requests,
+    ) {
+        let (graph, words) = (&self.graph, &mut self.words);
+        ui.horizontal(|ui| {
+            let bench = Bench { rig: &shown.rig, modules, graph };
+            ui.menu_button("＋ Add", |ui| add_to_selected(ui, shown, &bench, words, requests));
+            button(ui, world, GraphAction::LayOut, "Lay out again", requests);
+            button(ui, world, GraphAction::ShowAll, "Show all", requests);
+            let count = match graph.nodes.len() {
+                1 => "1 command".to_owned(),
+                count => format!("{count} commands"),
+            };
+            let selected = view.selected.len();
+            let text = if selected == 0 { count } else { format!("{count}, {selected} selected") };
+            ui.add(egui::Label::new(egui::RichText::new(text).weak()).truncate());
+        });
+    }
+
+    /// Rectangles of all nodes: where the layout or a person put them, and where a drag has them.
+    fn rects(&self, view: &GraphView, by: egui::Vec2) -> Vec<Rect> {
+        let dragged = match &self.gesture {
+            Some(Gesture::Nodes(tags, _)) => Some(tags),
+            _ => None,
+        };
+        let nodes = self.graph.nodes.iter().zip(&self.places);
+        nodes
+            .map(|(node, place)| {
+                let [width, height] = node_size(node.inputs.len());
+                let place = view.moved.get(&node.tag).copied().unwrap_or(*place);
+                let rect = moved(Rect::from_min_size(Pos2::ZERO, vec2(width, height)), place);
+                let is_dragged = dragged.is_some_and(|tags| tags.contains(&node.tag));
+                if is_dragged { rect.translate(by) } else { rect }
+            })
+            .collect()
+    }
+
+    /// The transform that brings into view what was asked for; `None` if nothing was.
+    fn wanted(&mut self, rig: Entity, view: &GraphView, rects: &[Rect], area: Rect) -> Option<TSTransform> {
+        let (number, look) = view.look;
+        let is_other = self.looked.is_none_or(|(known, _)| known != rig);
+        let refits = std::mem::take(&mut self.refits);
+        if self.looked == Some((rig, number)) && !refits || !area.is_positive() {
+            return None;
+        }
+        let is_asked = self.looked != Some((rig, number)) && !is_other;
+        let look = if is_asked { look } else { GraphLook::All };
+        self.looked = Some((rig, number));
+        let is_meant = |tag: &Uid| look == GraphLook::All || view.selected.contains(tag);
+        let nodes = self.graph.nodes.iter().zip(rects).filter(|(node, _)| is_meant(&node.tag));
+        let mut space = nodes.fold(Rect::NOTHING, |space, (_, rect)| space.union(*rect));
+        if look == GraphLook::All {
+            space = frames(&self.graph, rects).into_iter().filter(|frame| frame.is_finite()).fold(space, Rect::union);
+        }
+        if !space.is_finite() {
+            return None;
+        }
+        let space = space.expand(30.0);
+        let fitting = area.size() / space.size();
+        let scale = fitting.min_elem().clamp(SCALES[0], 1.0);
+        let from = area.center() - scale * space.center().to_vec2();
+        Some(TSTransform::new(from.to_vec2(), scale))
+    }
+
+    fn canvas(
+        &mut self,
+        ui: &mut Ui,
+        world: &World,
+        shown: &DisplayedRig,
+        view: &GraphView,
+        modules: &Arc<Modules>,
+        requests: &mut Requests,
+    ) {
+        let area = ui.available_rect_before_wrap();
+        let glow = self.glow(ui);
+        if is_dropped(ui) {
+            self.gesture = None;
+        }
+        let rest = self.rects(view, egui::Vec2::ZERO);
+        let want = self.wanted(shown.entity, view, &rest, area);
+        let transform = want.unwrap_or(self.transform);
+        let inverse = transform.inverse();
+        let at = ui.input(|input| input.pointer.latest_pos()).map(|at| inverse * at);
+        let (held, is_down) = ui.input(|input| (input.modifiers, input.pointer.primary_down()));
+        let hand = Hand {
+            graph: &self.graph,
+            rects: &rest,
+            selected: &view.selected,
+            at,
+            pressed: None,
+            held,
+            scale: transform.scaling,
+        };
+        let by = match &self.gesture {
+            Some(Gesture::Nodes(_, from)) => hand.shift(*from),
+            _ => egui::Vec2::ZERO,
+        };
+        let is_free = self.gesture.is_none() && ui.rect_contains_pointer(area);
+        let hovered = if is_free { hand.wire_at() } else { None };
+        let rects = self.rects(view, by);
+        let hand = Hand { rects: &rects, ..hand };
+        let ink = self.gesture.as_ref().and_then(|gesture| hand.ink(gesture));
+        let id = Id::new("command graph");
+        let mut canvas = Canvas {
+            scene: Scene {
+                graph: &self.graph,
+                rects: &rects,
+                statuses: &self.statuses,
+                glow: &glow,
+                selected: &view.selected,
+                hovered,
+                ink: ink.as_ref(),
+            },
+            id,
+            area,
+            transform,
+            want,
+            hold: is_down,
+            shown: &mut self.in_snarl,
+            visible: Vec::new(),
+            touched: Vec::new(),
+        };
+        let ground = canvas.show(ui, &mut self.snarl);
+        self.transform = canvas.transform;
+        self.sees_all = canvas.visible.len() == rects.len();
+        let (at, pressed) = pointer(ui, &canvas);
+        let hand = Hand { at, pressed, scale: canvas.transform.scaling, ..hand };
+        let mut outcomes = Vec::new();
+        let mut gesture = self.gesture.take();
+        for (part, response) in &canvas.touched {
+            hand.touch(Some(*part), response, &mut gesture, &mut outcomes);
+        }
+        hand.touch(None, &ground, &mut gesture, &mut outcomes);
+        let bench = Bench { rig: &shown.rig, modules, graph: &self.graph };
+        if !is_down && let Some(gesture) = gesture.take() {
+            outcomes.extend(hand.end(gesture, &bench));
+        }
+        self.gesture = gesture;
+        let mut opened = None;
+        for outcome in outcomes {
+            match outcome {
+                Outcome::Select(tags) => requests.send(GraphRequest::Select(tags)),
+                Outcome::Move(list) => requests.send(GraphRequest::Move(list)),
+                Outcome::Edit(operation) => send(operation, shown, requests),
+                Outcome::Refused(error) => requests.send(Notice::error(format!("The wire was not set: {error}."))),
+                Outcome::Menu(target) => {
+                    self.menu = Some(target);
+                    opened = Some(SetOpenCommand::Bool(true));
+                }
+                Outcome::CloseMenu => opened = Some(SetOpenCommand::Bool(false)),
+            }
+        }
+        let mut menu = Menu { world, shown, bench, words: &mut self.words };
+        if let Some(module) = dropped_module(&ground, &canvas.touched) {
+            menu.drop_module(module.0, hand.target(None), requests);
+        }
+        let Some(target) = self.menu else { return };
+        Popup::context_menu(&ground).open_memory(opened).show(|ui| menu.show(ui, target, requests));
+    }
+}
+
+/// Module of the library that is let go over the graph.
+fn dropped_module(ground: &Response, parts: &[(NodePart, Response)]) -> Option<DraggedModule> {
+    let mut all = parts.iter().map(|(_, part)| part).chain([ground]);
+    all.find_map(|part| part.dnd_release_payload::<DraggedModule>()).map(|module| *module)
+}

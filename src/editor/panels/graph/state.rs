@@ -1,0 +1,44 @@
+//! State of the graph: selected commands, nodes that were moved by hand, what is in view. It belongs to the window and lasts
+//! as long as it; no document has any of it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use bevy::prelude::*;
+
+use crate::rig::Uid;
+
+/// State of the graph of the active rig.
+#[derive(Resource, Debug, Clone, PartialEq, Default)]
+pub struct GraphView {
+    /// The rig that the state is of.
+    pub rig: Option<Entity>,
+    /// Selected command tags.
+    pub selected: BTreeSet<Uid>,
+    /// Places of nodes that were moved by hand, on the grid.
+    pub moved: BTreeMap<Uid, [f32; 2]>,
+    /// Request of the view, with the number of requests before it.
+    pub look: (u64, GraphLook),
+    /// True while the pointer is over the graph, which then takes the keys that delete and select.
+    pub hovered: bool,
+}
+
+/// Part of the graph that is brought into view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum GraphLook {
+    /// All nodes.
+    #[default]
+    All,
+    /// The selected nodes.
+    Selected,
+}
+
+/// Request to change what the graph shows. Requests never change a document.
+#[derive(Message, Debug, Clone, PartialEq)]
+pub enum GraphRequest {
+    /// Selects command tags in place of the selected ones, and the joints that carry them.
+    Select(BTreeSet<Uid>),
+    /// Puts nodes to places.
+    Move(Vec<(Uid, [f32; 2])>),
+    /// Tells whether the pointer is over the graph.
+    Hover(bool),
+}
