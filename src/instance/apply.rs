@@ -122,15 +122,18 @@ pub(super) fn update_instances(world: &mut World) {
     for DueInstance { entity, built, program, mode, .. } in &fresh {
         world.entity_mut(*entity).despawn_related::<RigNodes>();
         spawn_instance(world, *entity, program, *mode);
-        describe(world, *entity, built);
+        describe(world, *entity, &built.built.nodes);
         world.entity_mut(*entity).insert(RunningTemplate(built.clone()));
     }
     let (changed_nodes, mut kept) = exchange(world, &going);
-    for (entity, built, has_other_nodes) in changed_nodes {
-        if has_other_nodes {
-            furnish_instance(world, entity);
+    for ChangedNodes { entity, built, described } in &changed_nodes {
+        match described {
+            Some(nodes) => describe(world, *entity, nodes.iter().map(|node| &built.built.nodes[*node])),
+            None => {
+                furnish_instance(world, *entity);
+                describe(world, *entity, &built.built.nodes);
+            }
         }
-        describe(world, entity, &built);
     }
     for (entity, kept) in &kept {
         pose_controls(world, *entity, kept);
@@ -160,31 +163,44 @@ fn program(
     }
 }
 
-/// Lets instances go on with the programs of their templates. Returns instances whose nodes are described otherwise now, with
-/// `true` if the nodes themselves are others, and the poses of instances whose offsets are others now.
-fn exchange(
-    world: &mut World,
-    going: &[DueInstance],
-) -> (Vec<(Entity, Arc<BuiltTemplate>, bool)>, EntityHashMap<KeptPose>) {
+/// An instance whose nodes are others now, or described otherwise.
+struct ChangedNodes {
+    entity: Entity,
+    built: Arc<BuiltTemplate>,
+    /// Indices of the built nodes that are described otherwise; `None` if the nodes themselves are others.
+    described: Option<Arc<[usize]>>,
+}
+
+/// Nodes that are described otherwise in one build than in an earlier one, the same for all instances that ran that one.
+struct ChangedDescriptions {
+    from: Arc<BuiltTemplate>,
+    to: Arc<BuiltTemplate>,
+    /// Indices into the built nodes.
+    nodes: Arc<[usize]>,
+}
+
+/// Lets instances go on with the programs of their templates. Returns instances whose nodes are others now or described
+/// otherwise, and the poses of instances whose offsets are others now.
+fn exchange(world: &mut World, going: &[DueInstance]) -> (Vec<ChangedNodes>, EntityHashMap<KeptPose>) {
     let wanted: EntityHashMap<&DueInstance> = going.iter().map(|due| (due.entity, due)).collect();
     let mut query = world.query::<(Entity, &mut RigRuntime, &mut RunningTemplate)>();
     let mut exchanges: Vec<Exchange> = Vec::new();
-    let mut descriptions: Vec<(Arc<BuiltTemplate>, Arc<BuiltTemplate>, bool)> = Vec::new();
+    let mut descriptions: Vec<ChangedDescriptions> = Vec::new();
     let (mut steps, mut others) = (Vec::new(), Vec::new());
     for (entity, runtime, mut running) in query.iter_mut(world) {
         let Some(DueInstance { built, program: to, .. }) = wanted.get(&entity) else { continue };
         let before = std::mem::replace(&mut running.0, built.clone());
-        let known = descriptions.iter().find(|(from, to, _)| Arc::ptr_eq(from, &before) && Arc::ptr_eq(to, built));
-        let is_alike = known.map(|(.., is_alike)| *is_alike).unwrap_or_else(|| {
-            let is_alike = has_same_description(&before.built, &built.built);
-            descriptions.push((before, built.clone(), is_alike));
-            is_alike
+        let known = descriptions.iter().find(|known| Arc::ptr_eq(&known.from, &before) && Arc::ptr_eq(&known.to, built));
+        let described = known.map(|known| known.nodes.clone()).unwrap_or_else(|| {
+            let nodes: Arc<[usize]> = described_otherwise(&before.built, &built.built).into();
+            descriptions.push(ChangedDescriptions { from: before, to: built.clone(), nodes: nodes.clone() });
+            nodes
         });
         let from = runtime.state().program();
         // The rest of the document may have changed, and the program not.
         if Arc::ptr_eq(from, to) {
-            if !is_alike {
-                others.push((entity, built.clone(), false));
+            if !described.is_empty() {
+                others.push(ChangedNodes { entity, built: built.clone(), described: Some(described) });
             }
             continue;
         }
@@ -199,8 +215,9 @@ fn exchange(
             });
             exchanges.len() - 1
         });
-        if exchanges[number].is_other || !is_alike {
-            others.push((entity, built.clone(), exchanges[number].is_other));
+        let is_other = exchanges[number].is_other;
+        if is_other || !described.is_empty() {
+            others.push(ChangedNodes { entity, built: built.clone(), described: Some(described).filter(|_| !is_other) });
         }
         steps.push(Step { entity, runtime, program: to, exchange: number, kept: None });
     }
@@ -257,22 +274,26 @@ fn has_same_nodes(a: &RigProgram, b: &RigProgram) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(same)
 }
 
-/// True if the nodes of two builds get the same components from [`describe`].
-fn has_same_description(a: &BuiltRig, b: &BuiltRig) -> bool {
-    let same = |(a, b): (&BuiltNode, &BuiltNode)| {
-        (a.uid, a.base, &a.name, &a.label, &a.control, &a.layer, &a.origin)
-            == (b.uid, b.base, &b.name, &b.label, &b.control, &b.layer, &b.origin)
+/// Indices of the nodes of the second build that get other components from [`describe`] than those of the first.
+fn described_otherwise(before: &BuiltRig, now: &BuiltRig) -> Vec<usize> {
+    let known: BTreeMap<Uid, &BuiltNode> = before.nodes.iter().map(|node| (node.uid, node)).collect();
+    let same = |a: &BuiltNode, b: &BuiltNode| {
+        (a.base, &a.name, &a.label, &a.control, &a.layer, &a.origin)
+            == (b.base, &b.name, &b.label, &b.control, &b.layer, &b.origin)
     };
-    a.nodes.len() == b.nodes.len() && a.nodes.iter().zip(&b.nodes).all(same)
+    let is_other = |node: &BuiltNode| known.get(&node.uid).is_none_or(|known| !same(known, node));
+    now.nodes.iter().enumerate().filter(|(_, node)| is_other(node)).map(|(number, _)| number).collect()
 }
 
 /// Writes the components that describe built nodes to the entities that an instance has of them.
-fn describe(world: &mut World, instance: Entity, built: &BuiltTemplate) {
+fn describe<'a>(world: &mut World, instance: Entity, nodes: impl IntoIterator<Item = &'a BuiltNode>) {
     let Some(runtime) = world.get::<RigRuntime>(instance) else { return };
-    let program = runtime.state().program().clone();
-    let entities: Vec<Option<Entity>> = (0..program.nodes().len()).map(|slot| runtime.entity(slot)).collect();
-    for node in &built.built.nodes {
-        let Some(entity) = program.node(node.uid).and_then(|slot| entities[slot]) else { continue };
+    let entity_of = |node: &'a BuiltNode| {
+        let slot = runtime.state().program().node(node.uid)?;
+        Some((runtime.entity(slot)?, node))
+    };
+    let described: Vec<(Entity, &BuiltNode)> = nodes.into_iter().filter_map(entity_of).collect();
+    for (entity, node) in described {
         let Ok(mut entity) = world.get_entity_mut(entity) else { continue };
         if entity.get::<Name>().map(Name::as_str) != Some(&*node.name) {
             entity.insert(Name::new(node.name.to_string()));

@@ -32,8 +32,8 @@ use super::{
 };
 use crate::{
     plugins::schema::{
-        CommandTag, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf, Null,
-        ParkedNode, Tag, TagOf, Tags,
+        CommandTag, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf, NodeSlot,
+        Null, ParkedNode, Tag, TagOf, Tags,
     },
     rig::{RestTransform, Rig, RigEdit, Uid, UidSource},
 };
@@ -81,11 +81,14 @@ type JointWritten = Or<(
 type TagWritten =
     Or<(Changed<Tag>, Changed<CommandTag>, Changed<FeatureTag>, Changed<TagOf>, Changed<InFeature>, Changed<Uid>)>;
 
+/// Entities other than the nodes of instances, which tell nothing of a document; a crowd has hundreds of thousands of them.
+type OfDocument = (Without<NodeSlot>, Allow<Disabled>);
+
 /// Entities that were written since the last frame, by this plugin or by other code.
 #[derive(SystemParam)]
 pub(super) struct WrittenEntities<'w, 's> {
-    nodes: Query<'w, 's, Entity, (Or<(With<Joint>, With<CreatedRole>)>, JointWritten, Allow<Disabled>)>,
-    tags: Query<'w, 's, Entity, (TagWritten, Allow<Disabled>)>,
+    nodes: Query<'w, 's, Entity, (Or<(With<Joint>, With<CreatedRole>)>, JointWritten, OfDocument)>,
+    tags: Query<'w, 's, Entity, (TagWritten, OfDocument)>,
     groups: Query<
         'w,
         's,
