@@ -9,6 +9,7 @@ pub mod display;
 pub mod face;
 pub mod hierarchy;
 pub mod history;
+pub mod loader;
 pub mod local_groups;
 pub mod log;
 pub mod poses;
@@ -18,6 +19,7 @@ pub mod skinning;
 pub mod tags;
 pub mod timeline;
 pub mod toasts;
+pub mod updater;
 
 mod displayed_rig;
 mod features;
@@ -43,8 +45,10 @@ impl Plugin for PanelsPlugin {
             poses::PosesPlugin,
             timeline::TimelinePlugin,
             toasts::ToastsPlugin,
+            super::library::LibraryPlugin,
         ))
         .add_panel(hierarchy::HierarchyPanel::default())
+        .add_panel(loader::LoaderPanel::default())
         .add_panel(properties::PropertiesPanel::default())
         .add_panel(tags::TagsPanel::default())
         .add_panel(controls::ControlsPanel::default())
@@ -54,6 +58,7 @@ impl Plugin for PanelsPlugin {
         .add_panel(face::FacePanel::default())
         .add_panel(poses::PosesPanel::default())
         .add_panel(history::HistoryPanel::default())
+        .add_panel(updater::UpdaterPanel::default())
         .add_panel(display::DisplayPanel::default())
         .add_panel(timeline::TimelinePanel::default())
         .add_panel(curves::CurvesPanel::default())
