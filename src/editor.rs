@@ -14,6 +14,7 @@ pub mod follow;
 pub mod help;
 pub mod keys;
 pub mod labels;
+pub mod library;
 mod menu;
 pub mod mesh_watch;
 pub mod mode;

@@ -24,6 +24,7 @@ mod fault;
 mod folder;
 mod identity;
 pub mod journal;
+mod library;
 mod load;
 mod parts;
 mod project;
@@ -42,6 +43,10 @@ pub use disk_error::DiskError;
 pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use identity::is_same_file;
+pub use library::{
+    FileState, FolderListError, FolderListing, HeaderError, HeaderMemory, LibraryError, ListedTemplate, TemplatePlace,
+    list_bundled, list_templates, newest_versions, read_listed,
+};
 pub use load::{
     FileKind, LoadError, load_animation, load_gestures, load_joint_map, load_model, load_motion, load_rig_text,
     load_skin, load_template, stem,

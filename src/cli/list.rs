@@ -1,24 +1,19 @@
 //! `rigsmith list`: templates of a folder, or of all folders in which templates are looked for, by their headers alone.
 
-use std::{
-    cmp::Ordering,
-    collections::BTreeMap,
-    io::Read,
-    path::{Path, PathBuf},
-};
+use std::{cmp::Ordering, collections::BTreeMap, path::PathBuf};
 
 use clap::Args;
-use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::{Failure, Report, report::counted};
 use crate::{
     files::{
-        BUNDLED_CHARACTERS, BUNDLED_PARTS, Disk, EntryKind, FileKind, PartFiles, RealDisk, SearchPaths, load_template,
+        FolderListError, FolderListing, HeaderMemory, ListedTemplate, RealDisk, SearchPaths, TemplatePlace,
+        list_bundled, list_templates, newest_versions,
     },
     rig::{
-        SourceError, Uid,
-        template::{self, FeatureSummary, TemplateHeader},
+        Uid,
+        template::{FeatureSummary, TemplateHeader},
         version::compare,
     },
 };
@@ -31,33 +26,28 @@ pub(super) struct ListArgs {
     pub folder: Option<PathBuf>,
 }
 
-/// Bytes of a file that are read first: a header of usual length.
-const FIRST_BYTES: u64 = 8 << 10;
-
-/// Most files that are listed.
+/// Most templates that are listed.
 const MOST: usize = 10_000;
-
-/// A template by its header.
-struct ListedTemplate {
-    file: String,
-    header: Result<TemplateHeader, HeaderError>,
-}
 
 pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let site = SearchPaths::of_site().map_err(|error| Failure::Input(Box::new(error)))?;
     let own = args.folder.clone().unwrap_or_else(|| PathBuf::from("."));
-    let mut listed = in_folder(&own, true, &mut report)?;
+    let none = HeaderMemory::default();
+    let mut listed = match list_templates(&RealDisk, &own, usize::MAX, &site, &none) {
+        Ok(listing) => taken(listing, &mut report),
+        Err(error) => return Err(Failure::Input(format!("{error}; give a folder").into())),
+    };
     let mut elsewhere = Vec::new();
     for folder in &site.folders {
-        elsewhere.extend(in_folder(folder, false, &mut report)?);
+        match list_templates(&RealDisk, folder, usize::MAX, &site, &none) {
+            Ok(listing) => elsewhere.extend(taken(listing, &mut report)),
+            Err(error) => report.notes.push(left_out(&error)),
+        }
     }
-    elsewhere.retain(|other| listed.iter().all(|own| own.file != other.file));
-    let bundled: Vec<&(&str, &str)> = BUNDLED_CHARACTERS.iter().chain(BUNDLED_PARTS).collect();
+    elsewhere.retain(|other| listed.iter().all(|own| own.place != other.place));
     // Beside a folder's templates only their versions are of interest.
-    let is_listed = args.folder.is_none();
-    let mut bundled: Vec<ListedTemplate> = bundled.into_par_iter().map(|one| of_bundled(one, is_listed)).collect();
-    bundled.sort_by(|a, b| a.file.cmp(&b.file));
+    let bundled = list_bundled(args.folder.is_none());
     if args.folder.is_none() {
         listed.append(&mut elsewhere);
     }
@@ -67,7 +57,7 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
             .push(format!("{} not listed", counted(listed.len() - MOST, "more template is", "more templates are")));
         listed.truncate(MOST);
     }
-    let newest = newest(listed.iter().chain(&elsewhere).chain(&bundled));
+    let newest = newest_versions(listed.iter().chain(&elsewhere).chain(&bundled));
     if listed.is_empty() {
         report.line(format!("no templates, .rig.ron, in {}", own.display()));
     }
@@ -81,72 +71,20 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// The templates in a folder and in those below it, in the order of their paths.
-fn in_folder(top: &Path, is_needed: bool, report: &mut Report) -> Result<Vec<ListedTemplate>, Failure> {
-    let mut paths = Vec::new();
-    let mut folders = vec![top.to_owned()];
-    while let Some(folder) = folders.pop() {
-        let names = match RealDisk.list(&folder, MOST) {
-            Ok(names) => names,
-            Err(error) if is_needed && folder == top => {
-                return Err(Failure::Input(
-                    format!("`{}` cannot be listed: {error}; give a folder", folder.display()).into(),
-                ));
-            }
-            Err(error) => {
-                report.notes.push(format!("`{}` is left out: {error}", folder.display()));
-                continue;
-            }
-        };
-        for name in names {
-            let path = folder.join(&name);
-            match RealDisk.entry(&path, false).map(|entry| entry.kind) {
-                Ok(EntryKind::Folder) if !name.to_string_lossy().starts_with('.') => folders.push(path),
-                Ok(EntryKind::File) if FileKind::of(&path) == Some(FileKind::Template) => paths.push(path),
-                _ => {}
-            }
-        }
-    }
-    paths.sort();
-    let listed = paths.par_iter().map_init(
-        || PartFiles::new(&RealDisk),
-        |files, path| ListedTemplate { file: path.display().to_string(), header: header(path, files) },
-    );
-    Ok(listed.collect())
+/// The templates of a listing; folders that it leaves out are noted.
+fn taken(listing: FolderListing, report: &mut Report) -> Vec<ListedTemplate> {
+    report.notes.extend(listing.left_out.iter().map(left_out));
+    listing.templates
 }
 
-/// A template that comes with Rigsmith; `is_whole` with what only all of it tells.
-fn of_bundled((name, text): &(&str, &str), is_whole: bool) -> ListedTemplate {
-    let header = template::read_header(text.as_bytes()).map_err(HeaderError::from);
-    let completed = header.map(|mut header| {
-        let none = BTreeMap::new();
-        if is_whole
-            && is_unknown(&header)
-            && let Ok(template) = PartFiles::given(&none).complete(Path::new(name), text.as_bytes())
-        {
-            header.complete_from(&template.rig);
-        }
-        header
-    });
-    ListedTemplate { file: (*name).to_owned(), header: completed }
-}
-
-/// The newest version of each template, and where it is.
-fn newest<'a>(all: impl Iterator<Item = &'a ListedTemplate>) -> BTreeMap<Uid, (&'a str, &'a str)> {
-    let mut newest: BTreeMap<Uid, (&str, &str)> = BTreeMap::new();
-    for ListedTemplate { file, header } in all {
-        let Ok(header) = header else { continue };
-        let known = newest.entry(header.uid).or_insert((&header.version, file));
-        if compare(known.0, &header.version) == Ordering::Less {
-            *known = (&header.version, file);
-        }
-    }
-    newest
+fn left_out(error: &FolderListError) -> String {
+    format!("`{}` is left out: {}", error.folder.display(), error.source)
 }
 
 /// Tells a template in a line; returns what programs read of it.
-fn tell(one: &ListedTemplate, newest: &BTreeMap<Uid, (&str, &str)>, report: &mut Report) -> Value {
-    let ListedTemplate { file, header } = one;
+fn tell(one: &ListedTemplate, newest: &BTreeMap<Uid, (&str, &TemplatePlace)>, report: &mut Report) -> Value {
+    let ListedTemplate { place, header, .. } = one;
+    let file = &place.to_string();
     let header = match header {
         Ok(header) => header,
         Err(error) => {
@@ -157,61 +95,12 @@ fn tell(one: &ListedTemplate, newest: &BTreeMap<Uid, (&str, &str)>, report: &mut
     let mut value = value(file, header);
     let newer = newest.get(&header.uid).filter(|(version, _)| compare(&header.version, version) == Ordering::Less);
     let newer = newer.map(|(version, at)| {
-        value["newer"] = json!({ "version": version, "file": at });
+        value["newer"] = json!({ "version": version, "file": at.to_string() });
         format!("; {version} is in {at}")
     });
     report.line(format!("{}{}", line(file, header), newer.unwrap_or_default()));
     details(header).into_iter().for_each(|detail| report.line(format!("    {detail}")));
     value
-}
-
-/// Reason why a template of a folder cannot be listed.
-#[derive(Debug, thiserror::Error)]
-enum HeaderError {
-    /// A file that cannot be read.
-    #[error(transparent)]
-    Read(#[from] std::io::Error),
-    /// A file that is no template.
-    #[error(transparent)]
-    Template(#[from] SourceError),
-}
-
-/// Header of a file: of its beginning if that is enough, else of all of it, else of the template with its parts.
-fn header(path: &Path, files: &mut PartFiles) -> Result<TemplateHeader, HeaderError> {
-    let read = |limit: u64| -> std::io::Result<Vec<u8>> {
-        let mut bytes = Vec::new();
-        RealDisk.open(path)?.take(limit).read_to_end(&mut bytes)?;
-        Ok(bytes)
-    };
-    let first = read(FIRST_BYTES)?;
-    let is_whole = (first.len() as u64) < FIRST_BYTES;
-    let mut header = match template::read_header(&first) {
-        Ok(header) if is_whole || header.joint_count > 0 => header,
-        _ => {
-            let all = read(template::MAX_BYTES as u64)?;
-            template::read_header(&all)?
-        }
-    };
-    // What parts bring, and what a part needs, only the whole template tells, unless its author wrote it down.
-    if header.kind == "part" && header.needs.is_none() {
-        if let Ok(template) = load_template(&RealDisk, path) {
-            header.complete_from(&template.rig);
-        }
-    } else if header.joint_count == 0 {
-        let all = read(template::MAX_BYTES as u64)?;
-        // What is wrong with a part is told where the template is used.
-        if let Ok(template) = template::read_template(&all)
-            && let Ok(parts) = files.counted(path, &template)
-        {
-            header.complete_from_parts(&template.rig, &parts);
-        }
-    }
-    Ok(header)
-}
-
-/// True for what only the whole template tells, unless its author wrote it down: what parts bring, and what a part needs.
-fn is_unknown(header: &TemplateHeader) -> bool {
-    header.joint_count == 0 || header.kind == "part" && header.needs.is_none()
 }
 
 fn line(file: &str, header: &TemplateHeader) -> String {

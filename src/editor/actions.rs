@@ -7,6 +7,7 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    library::LibraryAction,
     mode::Mode,
     panels::{graph::GraphAction, timeline::TimelineAction},
 };
@@ -130,6 +131,8 @@ pub enum Action {
     Timeline(TimelineAction),
     /// An action of the graph.
     Graph(GraphAction),
+    /// An action of the library of templates.
+    Library(LibraryAction),
 }
 
 impl Action {
@@ -194,7 +197,9 @@ impl Action {
         ];
         let of_timeline = TimelineAction::ALL.into_iter().map(Self::Timeline);
         let of_graph = GraphAction::ALL.into_iter().map(Self::Graph);
-        Mode::ALL.into_iter().map(Self::Mode).chain(others).chain(of_timeline).chain(of_graph).collect()
+        let of_library = LibraryAction::ALL.into_iter().map(Self::Library);
+        let of_panels = of_timeline.chain(of_graph).chain(of_library);
+        Mode::ALL.into_iter().map(Self::Mode).chain(others).chain(of_panels).collect()
     }
 }
 

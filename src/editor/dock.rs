@@ -9,7 +9,7 @@ use egui_dock::{DockArea, DockState, NodeIndex, TabViewer, tab_viewer::OnCloseRe
 use serde::{Deserialize, Serialize};
 
 use super::{
-    menu,
+    follow, menu,
     panel::{Panels, Requests},
     pointer::ViewportArea,
     settings::EditorSettings,
@@ -32,6 +32,9 @@ impl Plugin for DockPlugin {
 /// Name of the viewport's tab.
 pub const VIEWPORT: &str = "Viewport";
 
+/// Name of the panel whose tab has a mark while there is an update.
+const UPDATER: &str = "Updater";
+
 /// Panels below the viewport, which are wide and low.
 const BELOW: [&str; 4] = ["Timeline", "Curves", "Graph", "Log"];
 
@@ -47,10 +50,10 @@ impl Default for Layout {
         let mut dock = DockState::new(vec![VIEWPORT.to_owned()]);
         let tabs = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let tree = dock.main_surface_mut();
-        let [centre, _] = tree.split_left(NodeIndex::root(), 0.19, tabs(&["Hierarchy", "Groups", "Sets", "Process"]));
+        let [centre, _] = tree.split_left(NodeIndex::root(), 0.19, tabs(&["Hierarchy", "Loader", "Groups", "Process"]));
         let [centre, right] =
             tree.split_right(centre, 0.75, tabs(&["Properties", "Tags", "Controls", "Skinning", "Face"]));
-        let [_, _] = tree.split_below(right, 0.6, tabs(&["History", "Poses", "Display"]));
+        let [_, _] = tree.split_below(right, 0.6, tabs(&["History", "Updater", "Poses", "Sets", "Display"]));
         let [_, _] = tree.split_below(centre, 0.78, tabs(&BELOW));
         Self { dock }
     }
@@ -210,7 +213,12 @@ impl TabViewer for Tabs<'_> {
     }
 
     fn title(&mut self, tab: &mut String) -> egui::WidgetText {
-        tab.as_str().into()
+        match tab.as_str() {
+            UPDATER if follow::offer(self.world).is_some() => {
+                egui::RichText::new(format!("{UPDATER} ●")).color(style::ACCENT).into()
+            }
+            name => name.into(),
+        }
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, tab: &mut String) {

@@ -66,6 +66,7 @@ impl Plugin for FilesPlugin {
             .add_message::<Notice>()
             .add_message::<JournalTrouble>()
             .add_message::<ImportRequest>()
+            .add_message::<ExportRequest>()
             .add_message::<WindowCloseRequested>()
             .add_message::<FileDragAndDrop>()
             .init_resource::<LoadJob>()
@@ -111,6 +112,10 @@ pub struct DocumentLanded {
     pub origin: Origin,
 }
 
+/// Request to export to a file, as its ending says; a file that is there is replaced.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct ExportRequest(pub PathBuf);
+
 /// Action that follows once unsaved changes are saved or discarded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FollowUp {
@@ -131,7 +136,8 @@ pub(super) mod loading {
         document::{Context, MeshSource, places},
         error::{OpenError, WriteError},
         open::{LoadedDocument, LoadedFile, Work, begin, document, hash_of, project, spawn},
-        save::{place_bundled, snapshot},
+        save::{place_bundled, settled, snapshot},
+        template::replacing,
     };
 }
 
@@ -142,11 +148,14 @@ type Inbox<'w, 's> = (
     MessageReader<'w, 's, WindowCloseRequested>,
     MessageReader<'w, 's, FileDragAndDrop>,
     MessageReader<'w, 's, JournalTrouble>,
+    MessageReader<'w, 's, ExportRequest>,
 );
 
 /// Handles all file actions before this frame's edits, so that the saved state and the journal's count agree.
 pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, 'static>>) {
-    let Ok((mut opens, mut actions, mut answers, mut closes, mut drops, mut troubles)) = inbox.get_mut(world) else {
+    let Ok((mut opens, mut actions, mut answers, mut closes, mut drops, mut troubles, mut exports)) =
+        inbox.get_mut(world)
+    else {
         return;
     };
     let mut opens: Vec<OpenRequest> = opens.read().cloned().collect();
@@ -158,6 +167,7 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
         _ => None,
     }));
     let troubles: Vec<JournalTrouble> = troubles.read().cloned().collect();
+    let exports: Vec<PathBuf> = exports.read().map(|request| request.0.clone()).collect();
     for trouble in troubles {
         world.write_message(match trouble.reason {
             Some(reason) => Notice::warning(reason.to_string()),
@@ -172,6 +182,9 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
     }
     for request in opens {
         request_open(world, request);
+    }
+    for path in exports {
+        save::to(world, Purpose::Export, path, None);
     }
     for action in actions {
         act(world, action);

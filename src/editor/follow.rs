@@ -3,18 +3,19 @@
 use std::{sync::Arc, time::Duration};
 
 use bevy::{prelude::*, winit::WinitSettings};
-use bevy_egui::egui;
 
 use super::{
     ActiveRig,
     files::{OpenDocument, attend},
     notice::Notice,
-    panel::{EditorOverlay, PanelApp, Requests},
 };
 use crate::{
     instance::{AcceptUpdate, RigFailed, RigInstancePlugin, RigSource, RigUpdated, TemplateFiles, UpdateOffer},
     plugins::history::RigHistory,
-    rig::{Rig, update::Take},
+    rig::{
+        Rig,
+        update::{Choices, Take},
+    },
 };
 
 /// Time between two looks at the file, and between two frames of a window that follows one.
@@ -29,20 +30,26 @@ impl Plugin for FollowPlugin {
         app.add_plugins(RigInstancePlugin { live: true, look: LOOK, ..default() })
             .add_message::<OfferAnswer>()
             .add_message::<Notice>()
-            .add_overlay(OfferView)
-            .add_systems(Update, (follow, answer, wake.run_if(resource_exists::<WinitSettings>)).chain().after(attend))
+            .add_systems(
+                Update,
+                (follow, answer, tell_offer, wake.run_if(resource_exists::<WinitSettings>)).chain().after(attend),
+            )
             .add_observer(tell_update)
             .add_observer(tell_failure);
     }
 }
 
 /// Answer to the offer of the open rig's template.
-#[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub enum OfferAnswer {
     /// Takes it over; where both changed a field, the value of this side.
     Take(Take),
+    /// Takes it over; where both changed a field, the value that is chosen there.
+    Choose(Choices),
     /// Takes it over, and everything that the file brings from now on.
     TakeAlways,
+    /// Takes everything over that the file brings from now on, unless both changed a field; or asks from now on.
+    Live(bool),
     /// Leaves the rig as it is until the file changes again.
     Leave,
 }
@@ -72,7 +79,7 @@ fn follow(
 fn answer(
     mut answers: MessageReader<OfferAnswer>,
     rig: Option<Res<ActiveRig>>,
-    mut sources: Query<&mut RigSource>,
+    mut sources: Query<(&mut RigSource, Option<&UpdateOffer>)>,
     mut accepted: MessageWriter<AcceptUpdate>,
     mut commands: Commands,
 ) {
@@ -81,19 +88,59 @@ fn answer(
         return;
     };
     for answer in answers.read() {
+        let mut accept = |choices: Choices| {
+            accepted.write(AcceptUpdate { rig, choices });
+        };
         match answer {
-            OfferAnswer::Take(take) => drop(accepted.write(AcceptUpdate { rig, take: *take })),
+            OfferAnswer::Take(take) => accept((*take).into()),
+            OfferAnswer::Choose(choices) => accept(choices.clone()),
             OfferAnswer::TakeAlways => {
-                if let Ok(mut source) = sources.get_mut(rig) {
+                if let Ok((mut source, _)) = sources.get_mut(rig) {
                     source.is_live = true;
                 }
-                accepted.write(AcceptUpdate { rig, take: Take::Mine });
+                accept(Take::Mine.into());
+            }
+            OfferAnswer::Live(is_live) => {
+                let Ok((mut source, offer)) = sources.get_mut(rig) else { continue };
+                source.is_live = *is_live;
+                let is_free = offer.is_some_and(|offer| offer.changes.iter().all(|change| !change.conflict));
+                if *is_live && is_free {
+                    accept(Take::Mine.into());
+                }
             }
             OfferAnswer::Leave => {
                 commands.entity(rig).try_remove::<UpdateOffer>();
             }
         }
     }
+}
+
+/// Tells that the file of the open rig has changed; the Updater lists how.
+fn tell_offer(offers: Query<&UpdateOffer, Added<UpdateOffer>>, active: Option<Res<ActiveRig>>, mut commands: Commands) {
+    let Some(offer) = active.and_then(|active| offers.get(active.0).ok()) else { return };
+    commands.write_message(Notice::info(format!(
+        "The template's file has changed: {}. The Updater lists them",
+        counts(offer)
+    )));
+}
+
+/// Number of changes and conflicts of an offer, in words.
+pub(super) fn counts(offer: &UpdateOffer) -> String {
+    let conflicts = offer.changes.iter().filter(|change| change.conflict).count();
+    let changes = match offer.changes.len() {
+        1 => "1 change".to_owned(),
+        count => format!("{count} changes"),
+    };
+    match conflicts {
+        0 => changes,
+        1 => format!("{changes}, 1 conflict"),
+        count => format!("{changes}, {count} conflicts"),
+    }
+}
+
+/// The open rig's offer, if its template's file has changed.
+pub(super) fn offer(world: &World) -> Option<&UpdateOffer> {
+    world.get::<UpdateOffer>(world.get_resource::<ActiveRig>()?.0)
 }
 
 /// Draws a frame now and then while a file is followed: its changes arrive in frames.
@@ -132,57 +179,5 @@ fn tell_update(updated: On<RigUpdated>, documents: Query<&OpenDocument>, mut not
 fn tell_failure(failed: On<RigFailed>, documents: Query<&OpenDocument>, mut notices: MessageWriter<Notice>) {
     if documents.contains(failed.entity) {
         notices.write(Notice::error(format!("The changed file is not taken over: {}", failed.error)));
-    }
-}
-
-/// List of what the changed file would change, with the answers.
-struct OfferView;
-
-/// Largest number of changes that are listed.
-const LISTED: usize = 200;
-
-impl EditorOverlay for OfferView {
-    fn show(&mut self, ctx: &egui::Context, world: &World, requests: &mut Requests) {
-        let Some(rig) = world.get_resource::<ActiveRig>() else { return };
-        let Some(offer) = world.get::<UpdateOffer>(rig.0) else { return };
-        let conflicts = offer.changes.iter().filter(|change| change.conflict).count();
-        let version = offer.version.as_ref().map_or_else(String::new, |version| format!(", {version}"));
-        let title = match conflicts {
-            0 => format!("The template's file has changed{version}"),
-            1 => format!("The template's file has changed{version}: 1 conflict"),
-            count => format!("The template's file has changed{version}: {count} conflicts"),
-        };
-        let window = egui::Window::new(title).id(egui::Id::new("offer")).collapsible(true).resizable(true);
-        window.default_width(380.0).anchor(egui::Align2::RIGHT_BOTTOM, [-16.0, -40.0]).show(ctx, |ui| {
-            egui::ScrollArea::vertical().max_height(220.0).auto_shrink([false, true]).show(ui, |ui| {
-                for change in offer.changes.iter().take(LISTED) {
-                    let text = egui::RichText::new(change.to_string()).monospace().small();
-                    ui.label(if change.conflict { text.color(ui.visuals().warn_fg_color) } else { text });
-                }
-                if offer.changes.len() > LISTED {
-                    ui.label(format!("and {} more", offer.changes.len() - LISTED));
-                }
-                for note in offer.poses.iter().take(LISTED) {
-                    ui.label(egui::RichText::new(note.to_string()).small().color(ui.visuals().warn_fg_color));
-                }
-            });
-            ui.separator();
-            ui.horizontal_wrapped(|ui| {
-                let mut button = |text: &str, hint: &str, answer: OfferAnswer| {
-                    if ui.button(text).on_hover_text(hint).clicked() {
-                        requests.send(answer);
-                    }
-                };
-                if conflicts == 0 {
-                    button("Take over", "One step, which can be undone", OfferAnswer::Take(Take::Mine));
-                    let hint = "Whenever the file is saved, unless both sides changed the same";
-                    button("Always", hint, OfferAnswer::TakeAlways);
-                } else {
-                    button("Take over, mine stay", "In conflicts the values here stay", OfferAnswer::Take(Take::Mine));
-                    button("Take over all", "In conflicts the values of the file", OfferAnswer::Take(Take::Theirs));
-                }
-                button("Leave", "Until the file is saved again", OfferAnswer::Leave);
-            });
-        });
     }
 }

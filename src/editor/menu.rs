@@ -10,6 +10,7 @@ use super::{
     dock::Layout,
     files::OpenRequest,
     keys::KeyBindings,
+    library::LibraryAction,
     mode::Mode,
     panel::Requests,
     panels::timeline::TimelineAction,
@@ -121,6 +122,30 @@ pub(super) fn show(
                     Some(("Reset pose", Action::ResetPose)),
                     Some(("Mirror pose", Action::MirrorPose)),
                     Some(("Store pose", Action::StorePose)),
+                ],
+            );
+        });
+        ui.menu_button("Library", |ui| {
+            let entry = |name: &'static str, action: LibraryAction| Some((name, Action::Library(action)));
+            entries(
+                ui,
+                &[
+                    entry("Loader", LibraryAction::Loader),
+                    entry("Updater", LibraryAction::Updater),
+                    None,
+                    entry("Load skeleton", LibraryAction::LoadSkeleton),
+                    entry("Edit skeleton", LibraryAction::EditSkeleton),
+                    entry("Build rig", LibraryAction::BuildRig),
+                    entry("Delete rig", LibraryAction::DeleteRig),
+                    None,
+                    entry("Load chosen", LibraryAction::Load),
+                    entry("Fit chosen onto the mesh", LibraryAction::Fit),
+                    entry("Merge chosen", LibraryAction::Merge),
+                    entry("Inject chosen", LibraryAction::Inject),
+                    entry("Add chosen part", LibraryAction::Part),
+                    None,
+                    entry("Save as template…", LibraryAction::Save),
+                    entry("Live updates", LibraryAction::Live),
                 ],
             );
         });

@@ -9,6 +9,7 @@ use super::{
     files::attend,
     help::describe,
     keys::KeyBindings,
+    library,
     panel::{EditorOverlay, PanelApp, Requests},
     panels::{graph, timeline},
     style,
@@ -50,6 +51,9 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
         return None;
     }
     let Some(entity) = world.get_resource::<ActiveRig>().map(|rig| rig.0) else { return Some("no rig is open") };
+    if let Action::Library(action) = action {
+        return library::obstacle(world, action);
+    }
     if let Action::Timeline(action) = action {
         return timeline::obstacle(world, action);
     }
@@ -90,6 +94,9 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
 
 /// True for actions that need no rig.
 fn is_of_window(action: Action) -> bool {
+    if let Action::Library(action) = action {
+        return action.is_of_window();
+    }
     matches!(
         action,
         Action::New

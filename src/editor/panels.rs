@@ -10,6 +10,7 @@ pub mod face;
 pub mod graph;
 pub mod hierarchy;
 pub mod history;
+pub mod loader;
 pub mod local_groups;
 pub mod log;
 pub mod poses;
@@ -20,6 +21,7 @@ pub mod skinning;
 pub mod tags;
 pub mod timeline;
 pub mod toasts;
+pub mod updater;
 
 mod displayed_rig;
 mod features;
@@ -48,8 +50,10 @@ impl Plugin for PanelsPlugin {
             graph::GraphPlugin,
             toasts::ToastsPlugin,
             super::onion::OnionPlugin,
+            super::library::LibraryPlugin,
         ))
         .add_panel(hierarchy::HierarchyPanel::default())
+        .add_panel(loader::LoaderPanel::default())
         .add_panel(properties::PropertiesPanel::default())
         .add_panel(tags::TagsPanel::default())
         .add_panel(controls::ControlsPanel::default())
@@ -60,6 +64,7 @@ impl Plugin for PanelsPlugin {
         .add_panel(poses::PosesPanel::default())
         .add_panel(selection_sets::SelectionSetsPanel::default())
         .add_panel(history::HistoryPanel::default())
+        .add_panel(updater::UpdaterPanel::default())
         .add_panel(display::DisplayPanel::default())
         .add_panel(timeline::TimelinePanel::default())
         .add_panel(curves::CurvesPanel::default())

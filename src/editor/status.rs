@@ -4,7 +4,8 @@ use bevy::prelude::*;
 use bevy_egui::egui;
 
 use super::{
-    ActiveRig, files::LoadJob, next_step::next_step, notice::StatusLine, panels::timeline::import::ClipImport, style,
+    ActiveRig, files::LoadJob, follow, library::LibraryJobs, next_step::next_step, notice::StatusLine,
+    panels::timeline::import::ClipImport, style,
 };
 use crate::{
     plugins::{
@@ -62,6 +63,11 @@ fn doing(world: &World) -> Option<String> {
     {
         return Some(format!("Importing {what}"));
     }
+    if let Some(jobs) = world.get_resource::<LibraryJobs>()
+        && let Some(what) = jobs.what()
+    {
+        return Some(format!("Reading {what}"));
+    }
     let rig = world.get_resource::<ActiveRig>()?.0;
     let jobs = world.get::<RigMeshes>(rig)?.iter().filter_map(|mesh| world.get::<SkinningJob>(mesh));
     let progress: Vec<f32> = jobs.map(SkinningJob::progress).collect();
@@ -77,6 +83,9 @@ fn counts(world: &World) -> String {
         meshes.iter().filter_map(|mesh| world.get::<RigMesh>(mesh)).map(|mesh| mesh.triangles.len()).sum::<usize>()
     });
     let mut parts = Vec::new();
+    if follow::offer(world).is_some() {
+        parts.push("the template's file is newer".to_owned());
+    }
     if selected > 0 {
         parts.push(format!("{selected} selected"));
     }

@@ -6,7 +6,9 @@ use bevy_egui::egui;
 use super::{
     ActiveRig,
     actions::{Action, ActionRequest},
+    follow,
     keys::KeyBindings,
+    library::LibraryAction,
     mode::Mode,
     panel::Requests,
     settings::EditorSettings,
@@ -48,6 +50,7 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
         if ui.button("Fit").on_hover_text(tip(what, Action::Fit)).clicked() {
             requests.send(ActionRequest(Action::Fit));
         }
+        update(ui, world, requests);
         ui.separator();
         let mut switch = |ui: &mut egui::Ui, on: bool, name: &str, what: &str, action: Action| {
             if ui.selectable_label(on, name).on_hover_text(tip(what, action)).clicked() {
@@ -83,6 +86,18 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
         let bones = drawing.is_some_and(|d| d.bones);
         switch(ui, bones, "Bones", "All bones, or those of selected joints alone", Action::Bones);
     });
+}
+
+/// Draws the badge of a template's file that is newer than the rig.
+fn update(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
+    let Some(offer) = follow::offer(world) else { return };
+    let text = egui::RichText::new("⬆ Update").strong().color(style::accent(ui.visuals()));
+    let said = format!("Update: {}", follow::counts(offer));
+    let badge = ui.button(text);
+    badge.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, &said));
+    if badge.on_hover_text(&said).clicked() {
+        requests.send(ActionRequest(Action::Library(LibraryAction::Updater)));
+    }
 }
 
 /// Purpose of a mode, for its tooltip.

@@ -17,7 +17,7 @@ use crate::{
         Rig,
         operations::Operation,
         step::{Commit, Step},
-        update::{Change as Difference, Take, Update, clip_edits, edits_between, pose_edits, update},
+        update::{Change as Difference, Choices, Take, Update, clip_edits, edits_between, pose_edits, update_with},
         version::VersionChange,
     },
 };
@@ -152,12 +152,12 @@ pub struct UpdateOffer {
 }
 
 /// Accepts the [`UpdateOffer`] of a rig.
-#[derive(Message, Debug, Clone, Copy)]
+#[derive(Message, Debug, Clone)]
 pub struct AcceptUpdate {
     /// The rig.
     pub rig: Entity,
-    /// Side whose value is taken in conflicts.
-    pub take: Take,
+    /// Choices in conflicts; a [`Take`] becomes one for all.
+    pub choices: Choices,
 }
 
 pub(super) fn add(app: &mut App) {
@@ -248,7 +248,7 @@ pub(super) fn compare_templates(
             source.base = Some(built.rig.clone());
             continue;
         }
-        let (updated, poses) = updated(source.base.as_deref(), rig, &built.rig, Take::Mine, &modules);
+        let (updated, poses) = updated(source.base.as_deref(), rig, &built.rig, &Take::Mine.into(), &modules);
         if updated.changes.is_empty() {
             source.base = Some(built.rig.clone());
         } else if source.is_live && updated.conflicts() == 0 {
@@ -272,13 +272,13 @@ pub(super) fn accept_offers(
     mut edits: MessageWriter<EditRequest>,
     mut commands: Commands,
 ) {
-    for AcceptUpdate { rig: entity, take } in accepted.read() {
+    for AcceptUpdate { rig: entity, choices } in accepted.read() {
         let Ok((mut source, rig, offer, had_failed)) = sources.get_mut(*entity) else {
             warn!("rig {entity} has no update to accept");
             continue;
         };
         source.had_failed = had_failed;
-        let (updated, poses) = updated(source.base.as_deref(), rig, &offer.built.rig, *take, &modules);
+        let (updated, poses) = updated(source.base.as_deref(), rig, &offer.built.rig, choices, &modules);
         source.notes = poses;
         commands.entity(*entity).try_remove::<UpdateOffer>();
         take_over(*entity, rig, updated, &offer.built, &mut source, &mut edits, &mut commands);
@@ -286,8 +286,14 @@ pub(super) fn accept_offers(
 }
 
 /// An update whose poses mean the same, and what they could not hold.
-fn updated(base: Option<&Rig>, rig: &Rig, file: &Rig, take: Take, modules: &RigModules) -> (Update, Arc<[PoseNote]>) {
-    let mut updated = update(base, rig, file, take);
+fn updated(
+    base: Option<&Rig>,
+    rig: &Rig,
+    file: &Rig,
+    choices: &Choices,
+    modules: &RigModules,
+) -> (Update, Arc<[PoseNote]>) {
+    let mut updated = update_with(base, rig, file, choices);
     let notes = keep_poses(rig, &mut updated.rig, &modules.0).unwrap_or_else(|error| {
         warn!("poses were not re-expressed: {error}");
         Vec::new()

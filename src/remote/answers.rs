@@ -193,7 +193,7 @@ fn update_answer(
     match offer {
         Some(offer) if changes.is_none() => {
             *changes = Some(offer.changes.clone());
-            accepted.write(AcceptUpdate { rig: *rig, take: *take });
+            accepted.write(AcceptUpdate { rig: *rig, choices: (*take).into() });
             None
         }
         Some(_) => None,

@@ -6,6 +6,7 @@
 //! are matched by uid; a joint or tag that seems to have got another name, because it stands at the same place with the
 //! same content, keeps its uid. Clips are a person's: every update leaves them as they are, with the keys of nodes that are gone.
 
+mod choices;
 mod edits;
 mod fields;
 mod order;
@@ -24,6 +25,7 @@ use fields::{
 };
 use order::merged_order;
 
+pub use choices::{Choices, Take};
 pub use edits::{clip_edits, edits_between, pose_edits};
 
 /// Kind of a change.
@@ -79,15 +81,6 @@ impl fmt::Display for Change {
     }
 }
 
-/// Side whose value is taken in a conflict.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Take {
-    /// Value of the file.
-    Theirs,
-    /// Value of the rig now.
-    Mine,
-}
-
 /// An update.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Update {
@@ -122,6 +115,11 @@ pub fn diff(from: &Rig, to: &Rig) -> Vec<Change> {
 /// The update of a rig `now` to the content of `file`. Without a `base` whatever differs is a conflict, and what the file
 /// does not have stays.
 pub fn update(base: Option<&Rig>, now: &Rig, file: &Rig, take: Take) -> Update {
+    update_with(base, now, file, &take.into())
+}
+
+/// [`update`] with a choice for each conflict.
+pub fn update_with(base: Option<&Rig>, now: &Rig, file: &Rig, choices: &Choices) -> Update {
     let mut changes = Vec::new();
     // What was renamed by an earlier update has the name of the base here, and an older uid.
     let known = base.and_then(|base| rename_detection::renamed(now, base, &mut Vec::new()));
@@ -130,7 +128,8 @@ pub fn update(base: Option<&Rig>, now: &Rig, file: &Rig, take: Take) -> Update {
     changes.retain(|change: &Change| change.from != change.to);
     let file = renamed.as_ref().map_or(file, |(renamed, _)| renamed);
     let told = changes.iter().map(|change| change.uid).collect();
-    let mut merge = Merge { base, now, file, take, changes, rig: now.clone(), placed: HashSet::new(), renamed: told };
+    let mut merge =
+        Merge { base, now, file, choices, changes, rig: now.clone(), placed: HashSet::new(), renamed: told };
     merge.header();
     merge.groups();
     merge.inputs();
@@ -153,7 +152,7 @@ struct Merge<'a> {
     base: Option<&'a Rig>,
     now: &'a Rig,
     file: &'a Rig,
-    take: Take,
+    choices: &'a Choices,
     changes: Vec<Change>,
     rig: Rig,
     /// Tags that have their joint.
@@ -292,6 +291,8 @@ impl Merge<'_> {
     fn untangle(&mut self, joints: &mut BTreeMap<Uid, (JointData, Option<Uid>)>) {
         let (now, file) = (self.now, self.file);
         let of = |rig: &Rig, uid: Uid| rig.joint(uid).map(|joint| joint.parent);
+        // One side's parents are no circle; those that people choose joint by joint may be.
+        let mut is_chosen = true;
         loop {
             let parents = joints.iter().map(|(uid, (_, parent))| (*uid, *parent)).collect();
             let circles: Vec<Uid> = circles(&parents).into_iter().flatten().collect();
@@ -305,10 +306,11 @@ impl Merge<'_> {
                     continue;
                 }
                 self.parent_conflict(uid, mine, theirs);
-                let taken = if self.take == Take::Theirs { theirs } else { mine };
+                let take = if is_chosen { self.choices.of(uid, Some("parent")) } else { self.choices.take };
+                let taken = if take == Take::Theirs { theirs } else { mine };
                 is_changed |= std::mem::replace(parent, taken) != taken;
             }
-            if !is_changed {
+            if !is_changed && !std::mem::take(&mut is_chosen) {
                 return;
             }
         }
@@ -374,7 +376,7 @@ impl Merge<'_> {
                 Some(base) if same(base, file) => Fate::Absent,
                 Some(_) => {
                     self.whole(ChangeKind::Added, named, true);
-                    if self.take == Take::Theirs { Fate::Added(file.clone()) } else { Fate::Absent }
+                    if self.takes_theirs(named) { Fate::Added(file.clone()) } else { Fate::Absent }
                 }
             },
             (Some(now), None) => match base {
@@ -386,7 +388,7 @@ impl Merge<'_> {
                 }
                 Some(_) => {
                     self.whole(ChangeKind::Removed, named, true);
-                    if self.take == Take::Theirs { Fate::Removed } else { Fate::Kept(now.clone()) }
+                    if self.takes_theirs(named) { Fate::Removed } else { Fate::Kept(now.clone()) }
                 }
             },
         }
@@ -409,9 +411,11 @@ impl Merge<'_> {
                 continue;
             }
             let conflict = base != Some(mine.clone());
+            let name = format!("{}{}", named.prefix, field.name);
+            let take = self.choices.of(named.uid, Some(&name));
             let told = Change {
                 kind: ChangeKind::Changed,
-                field: Some(format!("{}{}", named.prefix, field.name)),
+                field: Some(name),
                 from: mine,
                 to: theirs,
                 conflict,
@@ -420,15 +424,19 @@ impl Merge<'_> {
             if conflict || !is_renamed || field.name != "label" {
                 self.changes.push(told);
             }
-            if !conflict || self.take == Take::Theirs {
+            if !conflict || take == Take::Theirs {
                 (field.take)(&mut merged, file);
             }
         }
         merged
     }
 
+    fn takes_theirs(&self, named: &ChangeSubject) -> bool {
+        self.choices.of(named.uid, named.whole()) == Take::Theirs
+    }
+
     fn whole(&mut self, kind: ChangeKind, named: &ChangeSubject, conflict: bool) {
-        let field = Some(named.prefix.trim().to_owned()).filter(|field| !field.is_empty());
+        let field = named.whole().map(str::to_owned);
         self.changes.push(Change { kind, field, conflict, ..named.change() });
     }
 }
@@ -442,6 +450,11 @@ struct ChangeSubject<'a> {
 }
 
 impl ChangeSubject<'_> {
+    /// Field of a change of the whole thing.
+    fn whole(&self) -> Option<&str> {
+        Some(self.prefix.trim()).filter(|field| !field.is_empty())
+    }
+
     fn change(&self) -> Change {
         Change {
             kind: ChangeKind::Changed,

@@ -299,7 +299,7 @@ impl LongRun {
         });
         self.frames(4);
         if self.app.world().get::<UpdateOffer>(self.rig).is_some() {
-            self.app.world_mut().write_message(AcceptUpdate { rig: self.rig, take: Take::Theirs });
+            self.app.world_mut().write_message(AcceptUpdate { rig: self.rig, choices: Take::Theirs.into() });
             self.frames(4);
         }
         assert_eq!(self.app.world().resource::<Failures>().0, Vec::<String>::new());

@@ -105,6 +105,8 @@ mod kmeans;
 mod layout;
 mod leg_strokes;
 mod linkage;
+#[cfg(feature = "editor")]
+mod loader;
 mod long_run;
 mod mesh_reload;
 #[cfg(feature = "editor")]
@@ -166,6 +168,8 @@ mod timeline;
 mod tools;
 mod transfer;
 mod update;
+#[cfg(feature = "editor")]
+mod updater;
 mod voxels;
 #[cfg(feature = "cli")]
 mod vrm;

@@ -187,7 +187,7 @@ fn a_conflict_is_offered_and_decided_by_a_choice() {
             [Some("(0.0, 2.0, 0.0)"), Some("(0.0, 1.5, 0.0)")]
         );
         assert_eq!(studio.height("tail_1"), 2.0, "nothing happens by itself");
-        studio.app.world_mut().write_message(AcceptUpdate { rig: studio.rig, take });
+        studio.app.world_mut().write_message(AcceptUpdate { rig: studio.rig, choices: take.into() });
         studio.until("the update", |world, _| world.resource::<InstanceReport>().updated == 1);
         assert_eq!(studio.height("tail_1"), height);
         let tip = studio.rig().joint(studio.joint("tail_3")).unwrap().clone();
@@ -496,7 +496,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                 if studio.app.world().get::<UpdateOffer>(studio.rig).is_some() {
                     offers += 1;
                     let take = if share < 0.5 { Take::Mine } else { Take::Theirs };
-                    studio.app.world_mut().write_message(AcceptUpdate { rig: studio.rig, take });
+                    studio.app.world_mut().write_message(AcceptUpdate { rig: studio.rig, choices: take.into() });
                     for _ in 0..4 {
                         studio.app.update();
                     }

@@ -140,7 +140,7 @@ pub(super) fn to(world: &mut World, purpose: Purpose, path: PathBuf, then: Optio
 }
 
 /// The rig without the preview of a current drag.
-pub(super) fn settled(world: &World, rig: Entity) -> Option<Rig> {
+pub(in crate::editor) fn settled(world: &World, rig: Entity) -> Option<Rig> {
     let data = world.get::<Rig>(rig)?;
     Some(world.get::<RigHistory>(rig).map_or_else(|| data.clone(), |history| history.settled(data).into_owned()))
 }

@@ -87,13 +87,7 @@ pub(super) fn put(world: &mut World, fit: &Fit, scale: f32) {
     let Some(entity) = active(world) else { return };
     let Some(rig) = world.get::<Rig>(entity) else { return };
     let had = rig.len();
-    let mut edits = clearing(rig);
-    edits.extend(
-        edits_from_empty(&fit.rig)
-            .into_iter()
-            .filter(|edit| !matches!(edit, RigEdit::SetSkin(..)))
-            .map(|edit| if scale == 1.0 { edit } else { scaled(edit, scale) }),
-    );
+    let edits = replacing(rig, &fit.rig, scale);
     world.write_message(EditRequest::operation(entity, Operation::Edits(edits)));
     world.write_message(DocumentLanded { origin: Origin::Empty });
     let joints = fit.rig.len();
@@ -101,6 +95,14 @@ pub(super) fn put(world: &mut World, fit: &Fit, scale: f32) {
         if had > 0 { format!(" instead of the {had} that were there; undo brings them back") } else { String::new() };
     let sized = if scale == 1.0 { String::new() } else { format!(", scaled by {scale:.3}") };
     world.write_message(Notice::done(format!("Put {} onto the mesh: {joints} joints{sized}{replaced}", fit.name)));
+}
+
+/// Edits that put a template, scaled by `scale`, in place of a rig. Weights of the template are left out.
+pub(in crate::editor) fn replacing(rig: &Rig, template: &Rig, scale: f32) -> Vec<RigEdit> {
+    let mut edits = clearing(rig);
+    let of_template = edits_from_empty(template).into_iter().filter(|edit| !matches!(edit, RigEdit::SetSkin(..)));
+    edits.extend(of_template.map(|edit| if scale == 1.0 { edit } else { scaled(edit, scale) }));
+    edits
 }
 
 /// Edits that empty a rig.

@@ -47,7 +47,7 @@ pub struct TagsPanel {
     open: HashSet<Uid>,
     words: String,
     clipboard: Option<Arc<TagClipboard>>,
-    parts: parts::PartList,
+    parts: parts::PartMenu,
 }
 
 /// Request of a card.
@@ -73,7 +73,7 @@ impl EditorPanel for TagsPanel {
             return list::nothing(ui, "Select a joint to see its tags: what the rig builds on it.");
         }
         let Some(modules) = world.get_resource::<RigModules>() else { return };
-        self.header(ui, &modules.0, &shown, requests);
+        self.header(ui, world, &modules.0, &shown, requests);
         ui.separator();
         let entries = std::mem::take(&mut self.stack.entries);
         ScrollArea::vertical().id_salt("tags").auto_shrink(false).show(ui, |ui| {
@@ -97,7 +97,7 @@ fn send(operation: TagOperation, shown: &DisplayedRig, requests: &mut Requests) 
 }
 
 impl TagsPanel {
-    fn header(&mut self, ui: &mut Ui, modules: &Modules, shown: &DisplayedRig, requests: &mut Requests) {
+    fn header(&mut self, ui: &mut Ui, world: &World, modules: &Modules, shown: &DisplayedRig, requests: &mut Requests) {
         ui.horizontal_wrapped(|ui| {
             let joints = &self.stack.joints;
             let name = match joints[..] {
@@ -123,13 +123,7 @@ impl TagsPanel {
                     ui.close();
                 }
             });
-            ui.menu_button("Part", |ui| {
-                let Some((file, part)) = self.parts.menu(ui) else { return };
-                match parts::added(&shown.rig, &self.stack.joints, (file, part.as_ref()), modules) {
-                    Ok(operation) => send(operation, shown, requests),
-                    Err(error) => requests.send(Notice::error(format!("The part was not added: {error}."))),
-                }
-            });
+            self.parts.show(ui, world, shown, requests);
             if ui.button("Copy all").on_hover_text("Copies all tags of the selected joints").clicked() {
                 let tags = self.stack.entries.iter().flat_map(Entry::uids).collect::<Vec<_>>();
                 self.copied(TagClipboard::copy_tags(&shown.rig, &tags), requests);

@@ -33,7 +33,7 @@ impl BonePicture {
     }
 
     /// Draws the picture into a square.
-    pub(super) fn paint(&self, painter: &Painter, square: Rect, bone: Color32, joint: Color32) {
+    pub(in crate::editor) fn paint(&self, painter: &Painter, square: Rect, bone: Color32, joint: Color32) {
         let at = |place: Vec2| -> Pos2 { square.min + square.size() * bevy_egui::egui::vec2(place.x, place.y) };
         for [a, b] in &self.bones {
             let (Some(from), Some(to)) = (self.joints.get(*a), self.joints.get(*b)) else { continue };

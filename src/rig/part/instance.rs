@@ -39,6 +39,23 @@ impl Part {
     pub(in crate::rig) fn size(&self) -> usize {
         self.rig.joints.len() + self.rig.tags.len()
     }
+
+    /// The part with other values of its options: each an option's name and its value as RON.
+    ///
+    /// # Errors
+    /// An option that the part does not have, or that does not take the value.
+    pub fn with_options(mut self, values: &[(String, String)]) -> Result<Self, PartError> {
+        let nameless = PartInstance { options: values.to_vec(), ..PartInstance::default() };
+        for (tag, param, value) in nameless.option_values(&self)? {
+            let Some((joint, found)) = self.rig.find_tag(tag) else { continue };
+            let (joint, mut found) = (joint.data.uid, found.clone());
+            if let TagKind::Command { params, .. } = &mut found.kind {
+                *params = with_field(params, &param, &value);
+            }
+            self.rig.apply(&RigEdit::SetTag(joint, Box::new(found)))?;
+        }
+        Ok(self)
+    }
 }
 
 impl From<Rig> for Part {
@@ -192,9 +209,9 @@ impl PartInstance {
         part.sockets.iter().filter_map(here).collect()
     }
 
-    /// Changes that the instance's options make.
-    fn option_changes(&self, part: &Part, mirror: MirrorParams) -> Result<Vec<PartChange>, OptionError> {
-        let mut changes = Vec::new();
+    /// Parameters that the instance's options set: tag, parameter and value.
+    fn option_values(&self, part: &Part) -> Result<Vec<(Uid, String, String)>, OptionError> {
+        let mut values = Vec::new();
         for (name, value) in &self.options {
             let Some(option) = part.options.iter().find(|option| option.name == *name) else {
                 let known: Vec<&str> = part.options.iter().map(|option| option.name.as_str()).collect();
@@ -206,17 +223,25 @@ impl PartInstance {
                 let in_file = PartInstance::default().find_tag(&part.rig, tag);
                 let tag =
                     in_file.map_err(|reason| OptionError::Target { name: name.clone(), reason: Box::new(reason) })?;
-                let params = with_field("()", param, value);
-                let module = part.rig.find_tag(tag).and_then(|(_, tag)| match &tag.kind {
-                    TagKind::Command { module, .. } => Some(module),
-                    TagKind::Feature { .. } => None,
-                });
-                let mirrored = module.filter(|_| self.mirror).and_then(|module| mirror(module, &params));
-                let params = Some(mirrored.unwrap_or(params));
-                changes.push(PartChange { tag: Some(tag.to_string()), params, ..PartChange::default() });
+                values.push((tag, param.clone(), value.clone()));
             }
         }
-        Ok(changes)
+        Ok(values)
+    }
+
+    /// Changes that the instance's options make.
+    fn option_changes(&self, part: &Part, mirror: MirrorParams) -> Result<Vec<PartChange>, OptionError> {
+        let change = |(tag, param, value): (Uid, String, String)| {
+            let params = with_field("()", &param, &value);
+            let module = part.rig.find_tag(tag).and_then(|(_, tag)| match &tag.kind {
+                TagKind::Command { module, .. } => Some(module),
+                TagKind::Feature { .. } => None,
+            });
+            let mirrored = module.filter(|_| self.mirror).and_then(|module| mirror(module, &params));
+            let params = Some(mirrored.unwrap_or(params));
+            PartChange { tag: Some(tag.to_string()), params, ..PartChange::default() }
+        };
+        Ok(self.option_values(part)?.into_iter().map(change).collect())
     }
 
     /// The part with the joints, names and values that it has here, before its changes.

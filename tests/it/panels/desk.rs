@@ -141,6 +141,18 @@ impl Desk {
         self.frames(3);
     }
 
+    /// Runs frames until something is so, which work in the background brings.
+    #[track_caller]
+    pub fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
+        let start = std::time::Instant::now();
+        while !is_so(self) {
+            let labels: Vec<&str> = self.seen.iter().map(|seen| seen.label.as_str()).collect();
+            assert!(start.elapsed() < crate::bench::HANG, "{what} does not come: {:?} {labels:?}", self.told());
+            self.frame();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+    }
+
     pub fn look(&self, label: &str) -> Option<&ShownWidget> {
         self.seen.iter().find(|seen| seen.label == label)
     }

@@ -54,9 +54,10 @@ fn a_part_that_is_added_stays_a_part() {
     desk.frames(2);
     let (before, steps) = (desk.rig().clone(), desk.steps().0);
     desk.click("Part");
-    desk.frames(3);
-    desk.click("fk chain");
-    desk.frames(3);
+    desk.until("the list of parts", |desk| desk.look("Part fk chain").is_some());
+    desk.frames(2);
+    desk.click("Part fk chain");
+    desk.until("the part", |desk| desk.steps().0 > steps);
     assert_eq!(desk.steps().0, steps + 1, "{:?}", desk.told());
     let [part] = desk.rig().dropped_parts() else { panic!("{:?}", desk.rig().dropped_parts()) };
     assert_eq!((part.part.as_str(), &part.joints), ("parts/fk_chain.rig.ron", &joints));

@@ -1,13 +1,14 @@
 //! A row of the tree.
 
 use bevy_egui::egui::{
-    Align2, CursorIcon, FontId, Id, LayerId, Order, PointerButton, Rect, Response, Sense, Stroke, StrokeKind, Ui,
-    UiBuilder, WidgetInfo, WidgetType, containers::collapsing_header::paint_default_icon, pos2, vec2,
+    Align2, CursorIcon, DragAndDrop, FontId, Id, LayerId, Order, PointerButton, Rect, Response, Sense, Stroke,
+    StrokeKind, Ui, UiBuilder, WidgetInfo, WidgetType, containers::collapsing_header::paint_default_icon, pos2, vec2,
 };
 
 use super::{DraggedJoints, HierarchyPanel, Tree, menu, obstacle, reparent, rows::Row, select, tops};
 use crate::{
     editor::{
+        library::{DraggedTemplate, LibraryAct, LibraryRequest},
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
@@ -179,6 +180,10 @@ fn drag(
     shown: &DisplayedRig,
     requests: &mut Requests,
 ) {
+    if DragAndDrop::has_payload_of_type::<DraggedTemplate>(ui.ctx()) {
+        drop_template(ui, response, rect, joint, shown, requests);
+        return;
+    }
     if response.drag_started_by(PointerButton::Primary) {
         let joints = match panel.selected.1.contains(&joint) {
             true => tops(&shown.rig, &shown.selection.0),
@@ -201,14 +206,30 @@ fn drag(
     }
 }
 
+/// Marks the row under a template of the library, and uses the template there when it is let go.
+fn drop_template(ui: &Ui, response: &Response, rect: Rect, joint: Uid, shown: &DisplayedRig, requests: &mut Requests) {
+    if let Some(dragged) = response.dnd_hover_payload::<DraggedTemplate>() {
+        let color = ui.visuals().selection.stroke.color;
+        ui.painter().rect_stroke(rect.shrink(0.5), 3.0, Stroke::new(1.5, color), StrokeKind::Inside);
+        beside_pointer(ui, format!("{} onto {}", dragged.name, shown.name(joint)));
+    }
+    if let Some(dragged) = response.dnd_release_payload::<DraggedTemplate>() {
+        requests.send(LibraryRequest { place: dragged.place.clone(), act: LibraryAct::Drop { joint } });
+    }
+}
+
 /// Paints the dragged joints, or the reason why they cannot be dropped here, beside the pointer.
 fn carried(ui: &Ui, joints: &[Uid], shown: &DisplayedRig, refused: Option<&str>) {
-    let Some(pointer) = ui.input(|input| input.pointer.latest_pos()) else { return };
     let text = match (refused, joints) {
         (Some(refused), _) => refused.to_owned(),
         (None, [one]) => shown.name(*one).into_owned(),
         (None, more) => format!("{} joints", more.len()),
     };
+    beside_pointer(ui, text);
+}
+
+fn beside_pointer(ui: &Ui, text: String) {
+    let Some(pointer) = ui.input(|input| input.pointer.latest_pos()) else { return };
     let painter = ui.ctx().layer_painter(LayerId::new(Order::Tooltip, Id::new("dragged joints")));
     let visuals = ui.visuals();
     let font = FontId::proportional(12.0);

@@ -1,96 +1,82 @@
-//! Menu of the parts that come with Rigsmith, and the joints that a part goes onto.
+//! Menu of parts as pictures: a click puts a part onto the selected joints, the chain below one, or the stroke drawn last.
 
-use std::{
-    collections::{BTreeMap, HashMap},
-    path::Path,
-    sync::Arc,
+use bevy::prelude::World;
+use bevy_egui::egui::{
+    PopupCloseBehavior, Ui,
+    containers::menu::{MenuButton, MenuConfig},
+    vec2,
 };
-
-use bevy_egui::egui::Ui;
 
 use crate::{
-    files::{PartFileError, PartFiles, bundled_parts},
-    processor::Modules,
-    rig::{
-        Rig, Uid,
-        label::label_side,
-        operations::TagOperation,
-        part::{Part, PartInstance},
+    editor::{
+        library::{LibraryAct, LibraryRequest, ListTemplates, TemplateLibrary},
+        panel::Requests,
+        panels::{
+            displayed_rig::DisplayedRig,
+            loader::{
+                card::{Card, about},
+                tiles::{Tiles, TilesShown},
+            },
+        },
     },
+    files::TemplatePlace,
 };
 
-/// The parts, read when they are first listed.
+/// The menu, with the part whose options are shown.
 #[derive(Default)]
-pub(super) struct PartList(Option<Vec<(&'static str, Arc<Part>)>>);
+pub(super) struct PartMenu {
+    tiles: Tiles,
+    card: Card,
+    chosen: Option<TemplatePlace>,
+    /// True to show a part's card before it is added.
+    options_first: bool,
+}
 
-impl PartList {
-    /// Draws a menu of the parts; returns the one that was chosen, with its file.
-    pub fn menu(&mut self, ui: &mut Ui) -> Option<(&'static str, Arc<Part>)> {
-        let mut chosen = None;
-        for (file, part) in self.0.get_or_insert_with(bundled_parts) {
-            let name = file.rsplit('/').next().unwrap_or(file).trim_end_matches(".rig.ron").replace('_', " ");
-            let joints: Vec<&str> = part.rig.walk().filter_map(|joint| joint.data.label.as_deref()).take(6).collect();
-            let tip = format!("{}\n{} joints: {}", part.rig.about().description, part.rig.len(), joints.join(", "));
-            if ui.button(name).on_hover_text(tip.trim()).clicked() {
-                chosen = Some((*file, Arc::clone(part)));
+impl PartMenu {
+    /// Draws the button of the menu, and the menu while it is open.
+    pub fn show(&mut self, ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut Requests) {
+        let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+        MenuButton::new("Part").config(config).ui(ui, |ui| self.menu(ui, world, shown, requests));
+    }
+
+    fn menu(&mut self, ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut Requests) {
+        let Some(library) = world.get_resource::<TemplateLibrary>() else { return };
+        if !library.is_begun() {
+            requests.send(ListTemplates);
+        }
+        ui.set_min_size(vec2(312.0, 60.0));
+        ui.set_max_width(312.0);
+        ui.checkbox(&mut self.options_first, "Options first")
+            .on_hover_text("Shows a part's options before it is added");
+        let adding = |place: &TemplatePlace, options: Vec<(String, String)>| {
+            let act = LibraryAct::Part { joints: shown.selection.0.clone(), options };
+            LibraryRequest { place: place.clone(), act }
+        };
+        if !self.options_first {
+            self.chosen = None;
+        }
+        let chosen = self.chosen.clone();
+        let listed = chosen.as_ref().and_then(|place| library.listing().find(place));
+        if let Some(listed) = listed
+            && let Ok(header) = &listed.header
+        {
+            about(ui, listed, header);
+            self.card.of(&listed.place);
+            self.card.options(ui, header);
+            if ui.button("Add part").clicked() {
+                requests.send(adding(&listed.place, self.card.values()));
+                ui.close();
+            }
+            ui.separator();
+        }
+        let wanted = TilesShown { parts_only: true, height: 320.0, chosen: chosen.as_ref() };
+        if let Some(listed) = self.tiles.show(ui, world, wanted, requests) {
+            if self.options_first {
+                self.chosen = Some(listed.place.clone());
+            } else {
+                requests.send(adding(&listed.place, Vec::new()));
                 ui.close();
             }
         }
-        chosen
     }
-}
-
-/// The operation that adds a part to a rig, on the selected joints: mirrored where these are on the other side than its own.
-///
-/// # Errors
-/// A part that does not take so many joints.
-pub(super) fn added(
-    rig: &Rig,
-    selected: &[Uid],
-    (file, part): (&str, &Part),
-    modules: &Modules,
-) -> Result<TagOperation, PartFileError> {
-    let joints = joints_for(rig, selected, &part.rig);
-    part.sized_for(joints.len())?;
-    let label = |joint: &Uid| rig.joint(*joint).and_then(|joint| joint.data.label.as_deref());
-    let of_part = side(part.rig.walk().map(|joint| joint.data.label.as_deref()));
-    let mirror = of_part != 0 && side(joints.iter().map(label)) == -of_part;
-    let instance = PartInstance {
-        part: file.to_owned(),
-        onto: vec![String::new(); joints.len()],
-        mirror,
-        ..PartInstance::default()
-    };
-    let none = BTreeMap::new();
-    let fitted = PartFiles::known(&none, modules.clone()).fitted_part(Path::new(""), &instance)?;
-    Ok(TagOperation::AddPart { part: file.to_owned(), fitted: Arc::new(fitted), joints, mirror })
-}
-
-/// Side of the first label that names one: see [`label_side`].
-fn side<'l>(labels: impl Iterator<Item = Option<&'l str>>) -> i32 {
-    labels.flatten().map(label_side).find(|side| *side != 0).unwrap_or_default()
-}
-
-/// Joints that a part goes onto: the selected joints in the order of the rig; for a single selected joint, that and those below
-/// it which are children of each other as the part's are, until there is none.
-fn joints_for(rig: &Rig, selected: &[Uid], part: &Rig) -> Vec<Uid> {
-    let [top] = *selected else {
-        return rig.walk().map(|joint| joint.data.uid).filter(|joint| selected.contains(joint)).collect();
-    };
-    let mut pairs: HashMap<Uid, Uid> = HashMap::new();
-    let mut joints = Vec::new();
-    for joint in part.walk() {
-        let below = |parent: Uid| {
-            let number = part.children(Some(parent)).iter().position(|child| *child == joint.data.uid)?;
-            rig.children(Some(*pairs.get(&parent)?)).get(number).copied()
-        };
-        let found = match joint.parent {
-            Some(parent) => below(parent),
-            None => Some(top).filter(|_| joints.is_empty()),
-        };
-        let Some(found) = found else { break };
-        pairs.insert(joint.data.uid, found);
-        joints.push(found);
-    }
-    joints
 }

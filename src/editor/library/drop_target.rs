@@ -1,0 +1,78 @@
+//! Templates that are dragged from the list onto a joint in the viewport.
+
+use bevy::prelude::*;
+use bevy_egui::egui::{self, Align2, DragAndDrop, FontId, Stroke};
+
+use super::{DraggedTemplate, LibraryAct, LibraryRequest};
+use crate::{
+    editor::{
+        ActiveRig,
+        camera::ViewportSight,
+        notice::Notice,
+        panel::{Requests, ViewportPainter},
+        panels::joint_name,
+        style,
+    },
+    plugins::document::JointEntities,
+    rig::{Rig, Uid},
+};
+
+/// Distance in points up to which a joint is meant.
+const REACH: f32 = 48.0;
+
+/// Mark of the joint under a dragged template; it takes the template when it is let go.
+pub(super) struct DropTarget;
+
+/// The joint nearest to a place in the viewport, and where it is.
+fn nearest(world: &World, at: Vec2) -> Option<(Uid, Vec2)> {
+    let active = world.get_resource::<ActiveRig>()?.0;
+    let sight = world.get_resource::<ViewportSight>()?.0?;
+    let (rig, entities) = (world.get::<Rig>(active)?, world.get::<JointEntities>(active)?);
+    let to_rig = world.get::<GlobalTransform>(active).copied().unwrap_or_default().affine().inverse();
+    let seen = rig.walk().filter_map(|joint| {
+        let place = world.get::<GlobalTransform>(entities.get(joint.data.uid)?)?.translation();
+        Some((joint.data.uid, sight.project(to_rig.transform_point3(place))?))
+    });
+    let near = seen.filter(|(_, place)| place.distance(at) <= REACH);
+    near.min_by(|a, b| a.1.distance(at).total_cmp(&b.1.distance(at)))
+}
+
+fn pointer(ctx: &egui::Context, area: egui::Rect) -> Option<Vec2> {
+    let at = ctx.input(|input| input.pointer.latest_pos()).filter(|at| area.contains(*at))?;
+    Some(Vec2::new(at.x - area.min.x, at.y - area.min.y))
+}
+
+impl ViewportPainter for DropTarget {
+    fn paint(&mut self, painter: &egui::Painter, area: egui::Rect, world: &World) {
+        let Some(dragged) = DragAndDrop::payload::<DraggedTemplate>(painter.ctx()) else { return };
+        let Some(at) = pointer(painter.ctx(), area) else { return };
+        let active = world.get_resource::<ActiveRig>().and_then(|active| world.get::<Rig>(active.0));
+        let color = style::ACCENT;
+        let text = match nearest(world, at) {
+            Some((joint, place)) => {
+                painter.circle_stroke(area.min + egui::vec2(place.x, place.y), 10.0, Stroke::new(2.0, color));
+                let name = active.and_then(|rig| rig.joint(joint)).map(|joint| joint_name(&joint.data));
+                format!("{} onto {}", dragged.name, name.unwrap_or_default())
+            }
+            None => format!("{}: drop it on a joint", dragged.name),
+        };
+        let beside = area.min + egui::vec2(at.x + 14.0, at.y + 10.0);
+        painter.text(beside, Align2::LEFT_TOP, text, FontId::proportional(12.0), color);
+    }
+
+    fn widgets(&mut self, ui: &mut egui::Ui, area: egui::Rect, world: &World, requests: &mut Requests) {
+        let ctx = ui.ctx();
+        if !DragAndDrop::has_payload_of_type::<DraggedTemplate>(ctx) || !ctx.input(|input| input.pointer.any_released())
+        {
+            return;
+        }
+        let Some(at) = pointer(ctx, area) else { return };
+        let Some(dragged) = DragAndDrop::take_payload::<DraggedTemplate>(ctx) else { return };
+        match nearest(world, at) {
+            Some((joint, _)) => {
+                requests.send(LibraryRequest { place: dragged.place.clone(), act: LibraryAct::Drop { joint } });
+            }
+            None => requests.send(Notice::warning(format!("{}: there is no joint; drop it on one", dragged.name))),
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! The open rig as a template, with its header and a picture; or some of its joints as a part.
+
+use std::path::{Path, PathBuf};
+
+use bevy::{
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+    window::RequestRedraw,
+};
+
+use super::{
+    listing::{ListTemplates, own_folder},
+    preview::{Preview, PreviewError},
+};
+use crate::{
+    editor::{
+        ActiveRig,
+        files::{ExportRequest, OpenDocument, loading::settled},
+        notice::Notice,
+    },
+    files::{FileKind, RealDisk, SaveError, StoreError, save_atomic, stem, store_rig},
+    instance::RigSource,
+    plugins::document::EditRequest,
+    rig::{
+        EditError, Rig, RigAbout, RigEdit, Uid,
+        extract::{Extraction, extract},
+        operations::Operation,
+    },
+};
+
+/// Name of the step that changes the header.
+const HEADER: &str = "Change header";
+
+/// Request to write a template.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct SaveTemplate {
+    /// The file; `.rig.ron` is added where it has another ending.
+    pub path: PathBuf,
+    /// True to replace a file that is there.
+    pub replace: bool,
+    /// Content of the template.
+    pub content: Written,
+}
+
+/// Content of a template that is written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Written {
+    /// The open rig.
+    Rig {
+        /// True to take a picture in the viewport, which lies beside the template.
+        picture: bool,
+    },
+    /// Joints of the open rig, as a part.
+    Joints(Vec<Uid>),
+}
+
+/// Choices of the form in which a template is written.
+#[derive(Resource, Debug, Clone, PartialEq, Eq)]
+pub struct TemplateDraft {
+    /// True while the form is open.
+    pub is_open: bool,
+    /// The typed path; a suggestion while it is empty.
+    pub path: String,
+    /// True to take a picture in the viewport.
+    pub picture: bool,
+    /// True to replace a file that is there.
+    pub replace: bool,
+}
+
+impl Default for TemplateDraft {
+    fn default() -> Self {
+        Self { is_open: false, path: String::new(), picture: true, replace: false }
+    }
+}
+
+impl TemplateDraft {
+    /// The typed path, or a suggestion: the template that was opened, else one of the rig's name in the document's folder.
+    pub fn file(&self, world: &World) -> PathBuf {
+        if !self.path.trim().is_empty() {
+            return PathBuf::from(self.path.trim());
+        }
+        let document = world.get_resource::<ActiveRig>().and_then(|rig| world.get::<OpenDocument>(rig.0));
+        if let Some(template) = own_template(world) {
+            return template.to_owned();
+        }
+        let name =
+            world.get_resource::<ActiveRig>().and_then(|rig| world.get::<Rig>(rig.0)).map(|rig| &rig.about().name);
+        let name = name.filter(|name| !name.is_empty()).map_or("rig", String::as_str).replace(['/', '\\'], "_");
+        document.and_then(own_folder).unwrap_or_default().join(format!("{name}.rig.ron"))
+    }
+}
+
+/// Reason why a template is not written.
+#[derive(Debug, thiserror::Error)]
+enum SaveFailure {
+    #[error(transparent)]
+    Picture(#[from] PreviewError),
+    #[error(transparent)]
+    Save(#[from] SaveError),
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    #[error(transparent)]
+    Edit(#[from] EditError),
+}
+
+/// Template that is being written.
+#[derive(Resource, Default)]
+pub struct TemplateSave {
+    job: Option<Job>,
+}
+
+impl TemplateSave {
+    /// True while a template or its picture is being written.
+    pub fn is_writing(&self) -> bool {
+        self.job.is_some()
+    }
+}
+
+struct Job {
+    name: String,
+    task: Task<Result<Saved, SaveFailure>>,
+}
+
+/// Finished part of the work.
+enum Saved {
+    /// The picture is there, and the rig can be exported.
+    Picture(PathBuf),
+    /// Joints were extracted: their number, and notes.
+    Joints(usize, Vec<String>),
+}
+
+/// Starts to write.
+pub(super) fn start(mut requests: MessageReader<SaveTemplate>, mut commands: Commands) {
+    for request in requests.read() {
+        let request = request.clone();
+        commands.queue(move |world: &mut World| begin(world, request));
+    }
+}
+
+fn begin(world: &mut World, SaveTemplate { path, replace, content }: SaveTemplate) {
+    let path = completed(&path);
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let may_replace = replace || matches!(content, Written::Rig { .. }) && own_template(world) == Some(path.as_path());
+    if let Some(refused) = refusal(world, &path, &name, may_replace) {
+        world.write_message(Notice::error(refused));
+        return;
+    }
+    let Some(entity) = world.get_resource::<ActiveRig>().map(|active| active.0) else { return };
+    let Some(rig) = settled(world, entity) else { return };
+    let task = match content {
+        Written::Joints(joints) => AsyncComputeTaskPool::get().spawn(async move { write_joints(&path, &rig, &joints) }),
+        Written::Rig { picture: false } => {
+            world.write_message(ExportRequest(path));
+            return;
+        }
+        Written::Rig { picture: true } => {
+            let file = format!("{}.png", stem(&path));
+            let Some(preview) = Preview::of(world, entity) else { return };
+            if rig.about().preview.as_ref() != Some(&file) {
+                let about = RigAbout { preview: Some(file.clone()), ..rig.about().clone() };
+                world.write_message(header_edit(entity, about));
+            }
+            AsyncComputeTaskPool::get().spawn(async move {
+                save_atomic(&RealDisk, &path.with_file_name(file), &preview.png()?)?;
+                Ok(Saved::Picture(path))
+            })
+        }
+    };
+    world.resource_mut::<TemplateSave>().job = Some(Job { name, task });
+}
+
+/// File of the template that is open. One that was only loaded onto the rig is another's.
+fn own_template(world: &World) -> Option<&Path> {
+    let entity = world.get_resource::<ActiveRig>()?.0;
+    let (rig, source) = (world.get::<Rig>(entity)?, world.get::<RigSource>(entity)?);
+    let is_own = source.base().is_some_and(|base| base.uid() == rig.uid());
+    world.get::<OpenDocument>(entity)?.template.as_deref().filter(|_| is_own)
+}
+
+/// Request for another header, as one step.
+pub(in crate::editor) fn header_edit(rig: Entity, about: RigAbout) -> EditRequest {
+    let edits = vec![RigEdit::SetAbout(Box::new(about))];
+    EditRequest::operation(rig, Operation::Named { name: HEADER, edits })
+}
+
+/// The path, absolute and with the ending of a template.
+fn completed(path: &Path) -> PathBuf {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    if FileKind::of(&path) == Some(FileKind::Template) {
+        return path;
+    }
+    let mut named = path.into_os_string();
+    named.push(".rig.ron");
+    named.into()
+}
+
+/// The reason why nothing can be written there.
+fn refusal(world: &World, path: &Path, name: &str, may_replace: bool) -> Option<String> {
+    let Some(active) = world.get_resource::<ActiveRig>() else {
+        return Some("No rig is open: open one first".to_owned());
+    };
+    if world.get::<Rig>(active.0).is_none_or(Rig::is_empty) {
+        return Some("There are no joints to write: place or draw some first".to_owned());
+    }
+    if world.resource::<TemplateSave>().job.is_some() {
+        return Some(format!("{name} has to wait: another template is being written. Write it then"));
+    }
+    if let Some(folder) = path.parent().filter(|folder| !folder.is_dir()) {
+        return Some(format!("There is no folder {}; create it first, or choose another place", folder.display()));
+    }
+    (path.exists() && !may_replace)
+        .then(|| format!("There is a file {name} already: tick Replace, or choose another name"))
+}
+
+fn write_joints(path: &Path, rig: &Rig, joints: &[Uid]) -> Result<Saved, SaveFailure> {
+    let Extraction { rig: out, left } = extract(rig, joints, &stem(path), None)?;
+    let mut notes = store_rig(&RealDisk, path, &out)?;
+    notes.extend(left);
+    Ok(Saved::Joints(out.len(), notes))
+}
+
+/// Goes on with what is being written.
+pub(super) fn go_on(mut save: ResMut<TemplateSave>, mut commands: Commands) {
+    let save = save.bypass_change_detection();
+    let Some(job) = &mut save.job else { return };
+    commands.write_message(RequestRedraw);
+    let Some(result) = check_ready(&mut job.task) else { return };
+    let Some(Job { name, .. }) = save.job.take() else { return };
+    match result {
+        Ok(Saved::Picture(path)) => commands.write_message(ExportRequest(path)),
+        Ok(Saved::Joints(count, notes)) => {
+            let joints = if count == 1 { "1 joint".to_owned() } else { format!("{count} joints") };
+            commands.write_message(Notice::done(format!("Wrote {name}: {joints}")));
+            for note in notes {
+                commands.write_message(Notice::warning(note));
+            }
+            commands.write_message(ListTemplates)
+        }
+        Err(error) => commands.write_message(Notice::error(format!("Could not write {name}: {error}"))),
+    };
+}

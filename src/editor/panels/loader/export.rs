@@ -1,0 +1,139 @@
+//! Form in which the rig is written as a template: its header, its features, and a picture taken in the viewport.
+
+use bevy::prelude::World;
+use bevy_egui::egui::{Button, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
+
+use crate::{
+    editor::{
+        library::{SaveTemplate, TemplateDraft, Written, header_edit},
+        panel::Requests,
+        panels::displayed_rig::{DisplayedRig, Stamp},
+    },
+    rig::{RigAbout, feature::combined_features},
+};
+
+/// The form.
+#[derive(Default)]
+pub(super) struct ExportForm {
+    /// Field of the header that is being typed.
+    typed: Option<(HeaderField, String)>,
+    /// Names of the features, with the state of the rig that they were listed from.
+    features: Option<(Stamp, String)>,
+}
+
+/// Field of the header.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum HeaderField {
+    Name,
+    Version,
+    Author,
+    Kind,
+    Description,
+}
+
+impl HeaderField {
+    const ALL: [Self; 5] = [Self::Name, Self::Version, Self::Author, Self::Kind, Self::Description];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Name => "Name",
+            Self::Version => "Version",
+            Self::Author => "Author",
+            Self::Kind => "Kind",
+            Self::Description => "Description",
+        }
+    }
+
+    fn of(self, about: &mut RigAbout) -> &mut String {
+        match self {
+            Self::Name => &mut about.name,
+            Self::Version => &mut about.version,
+            Self::Author => &mut about.author,
+            Self::Kind => &mut about.kind,
+            Self::Description => &mut about.description,
+        }
+    }
+}
+
+impl ExportForm {
+    /// Draws the form.
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        world: &World,
+        shown: &DisplayedRig,
+        draft: &TemplateDraft,
+        requests: &mut Requests,
+    ) {
+        for field in HeaderField::ALL {
+            self.field(ui, shown, field, requests);
+        }
+        let features = self.features(shown);
+        if !features.is_empty() {
+            ui.add(Label::new(RichText::new(format!("Features: {features}")).small()).wrap());
+        }
+        let mut next = draft.clone();
+        let suggested = TemplateDraft { path: String::new(), ..draft.clone() }.file(world).display().to_string();
+        let typed = TextEdit::singleline(&mut next.path).hint_text(&suggested).desired_width(f32::INFINITY);
+        let typed = ui.add(typed).on_hover_text(format!("The file; without one it is {suggested}"));
+        typed.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Template file"));
+        ui.checkbox(&mut next.picture, "Picture from the viewport").on_hover_text("A .png beside the template");
+        ui.checkbox(&mut next.replace, "Replace").on_hover_text("Replaces a file that is there");
+        let file = next.file(world);
+        let replace = next.replace;
+        ui.horizontal_wrapped(|ui| {
+            let can = !shown.rig.is_empty();
+            let tip = "Header, groups, joints, tags, features and parts, as a .rig.ron";
+            let save = ui.add_enabled(can, Button::new("Save template")).on_hover_text(tip);
+            if save.on_disabled_hover_text("There are no joints").clicked() {
+                let content = Written::Rig { picture: next.picture };
+                requests.send(SaveTemplate { path: file.clone(), replace, content });
+            }
+            let joints = shown.selection.0.clone();
+            let tip = "The selected joints with their tags, as a part of their own";
+            let extract = ui.add_enabled(!joints.is_empty(), Button::new("Extract selected")).on_hover_text(tip);
+            if extract.on_disabled_hover_text("No joint is selected").clicked() {
+                let first =
+                    joints.first().map(|joint| shown.name(*joint).replace(['/', '\\'], "_")).unwrap_or_default();
+                let is_typed = !next.path.trim().is_empty();
+                let path = if is_typed { file } else { file.with_file_name(format!("{first}.rig.ron")) };
+                requests.send(SaveTemplate { path, replace, content: Written::Joints(joints) });
+            }
+        });
+        if next != *draft {
+            requests.set(next);
+        }
+    }
+
+    fn features(&mut self, shown: &DisplayedRig) -> &str {
+        if self.features.as_ref().is_none_or(|(stamp, _)| *stamp != shown.stamp()) {
+            let features = combined_features(&shown.rig);
+            let names = features.iter().map(|feature| feature.key.name.as_str()).filter(|name| !name.is_empty());
+            self.features = Some((shown.stamp(), names.collect::<Vec<_>>().join(", ")));
+        }
+        self.features.as_ref().map_or("", |(_, names)| names)
+    }
+
+    /// Draws a field of the header; what was typed becomes one step when the field is left.
+    fn field(&mut self, ui: &mut Ui, shown: &DisplayedRig, field: HeaderField, requests: &mut Requests) {
+        let mut about = shown.rig.about().clone();
+        let now = field.of(&mut about).clone();
+        let mut text = match &self.typed {
+            Some((of, text)) if *of == field => text.clone(),
+            _ => now.clone(),
+        };
+        let edit = match field {
+            HeaderField::Description => TextEdit::multiline(&mut text).desired_rows(2),
+            _ => TextEdit::singleline(&mut text),
+        };
+        let response = ui.add(edit.hint_text(field.name()).desired_width(f32::INFINITY));
+        response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, field.name()));
+        let response = response.on_hover_text(field.name());
+        if response.has_focus() {
+            self.typed = Some((field, text));
+        } else if response.lost_focus() && self.typed.take_if(|(of, _)| *of == field).is_some() && text != now {
+            *field.of(&mut about) = text;
+            requests.send(header_edit(shown.entity, about));
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! Templates of the library as pictures, found by words and folder. Only the visible rows are drawn.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use bevy::prelude::World;
+use bevy_egui::egui::{
+    Align2, Color32, ComboBox, CornerRadius, FontId, Rect, Response, ScrollArea, Sense, Stroke, StrokeKind,
+    TextureHandle, TextureOptions, Ui, WidgetInfo, WidgetType, pos2, text::LayoutJob, text::TextWrapping, vec2,
+};
+
+use crate::{
+    editor::{
+        library::{
+            DraggedTemplate, LibraryListing, LibraryPictures, ListTemplates, TemplateLibrary, TemplatePicture,
+            WantPictures,
+        },
+        panel::Requests,
+        panels::list,
+        style,
+    },
+    files::{FileState, ListedTemplate, TemplatePlace},
+};
+
+/// Side of a picture, in points.
+const TILE: f32 = 72.0;
+/// Height of the name below it.
+const NAME: f32 = 16.0;
+
+/// Search, folder and textures.
+#[derive(Default)]
+pub(in crate::editor::panels) struct Tiles {
+    words: String,
+    folder: Option<String>,
+    textures: BTreeMap<TemplatePlace, (Option<FileState>, TextureHandle)>,
+    /// Templates that were found, with what they were found from.
+    found: Vec<Arc<ListedTemplate>>,
+    from: Option<(u64, String, Option<String>, bool)>,
+}
+
+/// Choice of what is shown.
+pub(in crate::editor::panels) struct TilesShown<'a> {
+    /// True to leave out what is no part.
+    pub parts_only: bool,
+    /// Largest height of the pictures.
+    pub height: f32,
+    /// The chosen template.
+    pub chosen: Option<&'a TemplatePlace>,
+}
+
+impl Tiles {
+    /// Draws search, folders and pictures; returns the template that was clicked.
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        world: &World,
+        wanted: TilesShown,
+        requests: &mut Requests,
+    ) -> Option<Arc<ListedTemplate>> {
+        let library = world.get_resource::<TemplateLibrary>()?;
+        let listing = library.listing().clone();
+        self.bar(ui, &listing, wanted.parts_only, requests);
+        self.refresh(&listing, wanted.parts_only);
+        for problem in self.problems(&listing) {
+            ui.colored_label(style::obstacle(ui.visuals()), problem);
+        }
+        if self.found.is_empty() {
+            let is_listing = library.is_listing() || !library.is_begun();
+            let text = if is_listing { "Looking for templates …" } else { "No template is like that." };
+            list::nothing(ui, text);
+            return None;
+        }
+        let columns = ((ui.available_width() + 4.0) / (TILE + 4.0)).floor().max(1.0) as usize;
+        let rows = self.found.len().div_ceil(columns);
+        let (mut clicked, mut missing) = (None, Vec::new());
+        let pictures = world.get_resource::<LibraryPictures>();
+        let area = ScrollArea::vertical().id_salt("templates").max_height(wanted.height).auto_shrink([false, true]);
+        let mut row = |ui: &mut Ui, row: usize| {
+            let in_row: Vec<_> = self.found.iter().skip(row * columns).take(columns).cloned().collect();
+            for listed in in_row {
+                let picture = pictures.and_then(|pictures| pictures.get(&listed));
+                if picture.is_none() && pictures.is_some_and(|pictures| !pictures.is_wanted(&listed)) {
+                    missing.push(listed.clone());
+                }
+                let is_chosen = wanted.chosen == Some(&listed.place);
+                if self.tile(ui, &listed, picture, is_chosen).clicked() {
+                    clicked = Some(listed);
+                }
+            }
+        };
+        ui.scope(|ui| {
+            ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+            area.show_rows(ui, TILE + NAME, rows, |ui, visible| {
+                visible.for_each(|number| {
+                    ui.horizontal(|ui| row(ui, number));
+                });
+            });
+        });
+        if !missing.is_empty() {
+            requests.send(WantPictures(missing));
+        }
+        clicked
+    }
+
+    fn bar(&mut self, ui: &mut Ui, listing: &LibraryListing, parts_only: bool, requests: &mut Requests) {
+        let tip = "Templates whose name, kind, author or description contain all of these words";
+        list::search_bar(ui, "Search templates", tip, &mut self.words, |ui| {
+            if list::symbol_button(ui, "⟳", "List the templates again") {
+                requests.send(ListTemplates);
+            }
+        });
+        // The list of a box within a menu would close the menu.
+        if listing.folders.len() < 2 || parts_only {
+            return;
+        }
+        let all = "All folders";
+        let text = self.folder.clone().unwrap_or_else(|| all.to_owned());
+        let width = ui.available_width() - 8.0;
+        let menu = ComboBox::from_id_salt("folder").selected_text(text).width(width).truncate().show_ui(ui, |ui| {
+            ui.selectable_value(&mut self.folder, None, all);
+            for folder in &listing.folders {
+                ui.selectable_value(&mut self.folder, Some(folder.name.clone()), &folder.name);
+            }
+        });
+        menu.response.widget_info(|| WidgetInfo::labeled(WidgetType::ComboBox, true, "Folder of templates"));
+    }
+
+    /// Finds the templates again after a change of the list, the words or the folder.
+    fn refresh(&mut self, listing: &LibraryListing, parts_only: bool) {
+        if self.folder.as_ref().is_some_and(|name| listing.folders.iter().all(|folder| folder.name != *name)) {
+            self.folder = None;
+        }
+        let from = Some((listing.number, self.words.clone(), self.folder.clone(), parts_only));
+        if self.from == from {
+            return;
+        }
+        let folders = listing.folders.iter();
+        let folders = folders.filter(|folder| self.folder.as_ref().is_none_or(|name| folder.name == *name));
+        let found = folders.flat_map(|folder| &folder.templates);
+        let found = found.filter(|listed| (!parts_only || listed.is_part()) && listed.has_words(&self.words));
+        self.found = found.cloned().collect();
+        self.from = from;
+    }
+
+    /// Reasons why something of the shown folders is left out.
+    fn problems(&self, listing: &LibraryListing) -> Vec<String> {
+        let folders = listing.folders.iter();
+        let folders = folders.filter(|folder| self.folder.as_ref().is_none_or(|name| folder.name == *name));
+        folders.flat_map(|folder| &folder.problems).take(3).cloned().collect()
+    }
+
+    /// Draws a picture with the name below; it can be dragged onto a joint.
+    fn tile(
+        &mut self,
+        ui: &mut Ui,
+        listed: &Arc<ListedTemplate>,
+        picture: Option<&TemplatePicture>,
+        is_chosen: bool,
+    ) -> Response {
+        let (rect, response) = ui.allocate_exact_size(vec2(TILE, TILE + NAME), Sense::click_and_drag());
+        let name = listed.name().replace('_', " ");
+        let kind = if listed.is_part() { "Part" } else { "Template" };
+        let said = format!("{kind} {name}");
+        response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, is_chosen, &said));
+        if listed.header.is_ok() {
+            response.dnd_set_drag_payload(DraggedTemplate { place: listed.place.clone(), name: name.clone() });
+        }
+        let square = Rect::from_min_size(rect.min, vec2(TILE, TILE));
+        let visuals = ui.visuals();
+        let line = match (is_chosen, response.hovered() || response.has_focus()) {
+            (true, _) => Stroke::new(2.0, style::accent(visuals)),
+            (false, true) => Stroke::new(1.0, style::accent(visuals)),
+            (false, false) => Stroke::new(1.0, visuals.widgets.noninteractive.bg_stroke.color),
+        };
+        ui.painter().rect(square, CornerRadius::same(4), visuals.extreme_bg_color, line, StrokeKind::Inside);
+        self.paint(ui, square.shrink(3.0), listed, picture);
+        let is_ok = listed.header.is_ok();
+        let color = if is_ok { ui.visuals().text_color() } else { ui.visuals().error_fg_color };
+        let mut job = LayoutJob::simple_singleline(name, FontId::proportional(11.0), color);
+        job.wrap = TextWrapping::truncate_at_width(TILE);
+        let galley = ui.painter().layout_job(job);
+        let left = square.center().x - galley.size().x / 2.0;
+        ui.painter().galley(pos2(left, square.bottom() + 1.0), galley, color);
+        let tip = match &listed.header {
+            Ok(header) if header.description.is_empty() => listed.place.to_string(),
+            Ok(header) => format!("{}\n{}", header.description, listed.place),
+            Err(error) => format!("{}: {error}", listed.place),
+        };
+        response.on_hover_text(tip)
+    }
+
+    fn paint(&mut self, ui: &Ui, square: Rect, listed: &ListedTemplate, picture: Option<&TemplatePicture>) {
+        match picture {
+            Some(TemplatePicture::Bones(bones)) => {
+                let visuals = ui.visuals();
+                bones.paint(ui.painter(), square, style::quiet(visuals), visuals.strong_text_color());
+            }
+            Some(TemplatePicture::Image(image)) => {
+                let known = self.textures.get(&listed.place).filter(|(state, _)| *state == listed.state);
+                let texture = match known {
+                    Some((_, texture)) => texture.id(),
+                    None => {
+                        let name = format!("template {}", listed.place);
+                        let texture = ui.ctx().load_texture(name, (**image).clone(), TextureOptions::LINEAR);
+                        let id = texture.id();
+                        self.textures.insert(listed.place.clone(), (listed.state, texture));
+                        id
+                    }
+                };
+                let [width, height] = image.size.map(|side| side as f32);
+                let size = vec2(width, height) * (square.width() / width.max(height).max(1.0));
+                let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+                ui.painter().image(texture, Rect::from_center_size(square.center(), size), whole, Color32::WHITE);
+            }
+            Some(TemplatePicture::Nothing) => {
+                let color = style::quiet(ui.visuals());
+                ui.painter().text(square.center(), Align2::CENTER_CENTER, "?", FontId::proportional(20.0), color);
+            }
+            None => {}
+        }
+    }
+}
