@@ -14,6 +14,7 @@ mod align;
 mod analysis;
 mod assign;
 mod branches;
+mod caps;
 mod choose;
 mod clean;
 mod confidence;

@@ -6,7 +6,7 @@
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::eigen::eigen;
+use super::{caps, eigen::eigen};
 use crate::mesh::adjacency;
 
 /// Share of the whole surface below which a loose island may be a speck.
@@ -55,7 +55,8 @@ pub(super) struct CleanMesh {
 
 /// Cleans a mesh; `None` if no triangle with finite corners and an area is left.
 pub(super) fn clean(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<CleanMesh> {
-    let (points, triangles) = sorted(points, triangles);
+    let (mut points, mut triangles) = sorted(points, triangles);
+    caps::close_holes(&mut points, &mut triangles);
     let corners = |t: &[u32; 3]| t.map(|c| points[c as usize].as_dvec3());
     // Areas relative to the extent, so that squares of huge and tiny coordinates stay in range.
     let extent = points.iter().fold(0.0f64, |m, p| m.max(p.as_dvec3().abs().max_element()));
