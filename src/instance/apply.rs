@@ -190,7 +190,8 @@ fn exchange(world: &mut World, going: &[DueInstance]) -> (Vec<ChangedNodes>, Ent
     for (entity, runtime, mut running) in query.iter_mut(world) {
         let Some(DueInstance { built, program: to, .. }) = wanted.get(&entity) else { continue };
         let before = std::mem::replace(&mut running.0, built.clone());
-        let known = descriptions.iter().find(|known| Arc::ptr_eq(&known.from, &before) && Arc::ptr_eq(&known.to, built));
+        let known =
+            descriptions.iter().find(|known| Arc::ptr_eq(&known.from, &before) && Arc::ptr_eq(&known.to, built));
         let described = known.map(|known| known.nodes.clone()).unwrap_or_else(|| {
             let nodes: Arc<[usize]> = described_otherwise(&before.built, &built.built).into();
             descriptions.push(ChangedDescriptions { from: before, to: built.clone(), nodes: nodes.clone() });
@@ -217,7 +218,11 @@ fn exchange(world: &mut World, going: &[DueInstance]) -> (Vec<ChangedNodes>, Ent
         });
         let is_other = exchanges[number].is_other;
         if is_other || !described.is_empty() {
-            others.push(ChangedNodes { entity, built: built.clone(), described: Some(described).filter(|_| !is_other) });
+            others.push(ChangedNodes {
+                entity,
+                built: built.clone(),
+                described: Some(described).filter(|_| !is_other),
+            });
         }
         steps.push(Step { entity, runtime, program: to, exchange: number, kept: None });
     }

@@ -32,8 +32,8 @@ use super::{
 };
 use crate::{
     plugins::schema::{
-        CommandTag, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf, NodeSlot,
-        Null, ParkedNode, Tag, TagOf, Tags,
+        CommandTag, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf,
+        NodeSlot, Null, ParkedNode, Tag, TagOf, Tags,
     },
     rig::{RestTransform, Rig, RigEdit, Uid, UidSource},
 };
