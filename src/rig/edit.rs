@@ -9,22 +9,22 @@ mod effect;
 mod inputs;
 mod poses;
 mod skin_weights;
+mod skins;
+mod weight_patch;
 
 use std::{collections::HashSet, sync::Arc};
 
 use ron::value::RawValue;
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    mesh::model::Weights,
-    rig::{
-        FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput, RigJoint,
-        StoredPose, TagData, TagKind, Uid,
-        animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
-        document::{RigAbout, SkinData},
-        format::source::ron_options,
-        part::DroppedPart,
-    },
+pub use self::weight_patch::{PatchFault, WeightPatch, joint_numbers, weight_edit};
+use crate::rig::{
+    FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput, RigJoint,
+    StoredPose, TagData, TagKind, Uid,
+    animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
+    document::{RigAbout, SkinData},
+    format::source::ron_options,
+    part::DroppedPart,
 };
 
 /// A change of a rig.
@@ -149,6 +149,8 @@ pub enum RigEdit {
     SetInputs(Vec<RigInput>),
     /// Replaces the record of parts that were dropped onto joints; what they brought stays.
     SetDroppedParts(Vec<DroppedPart>),
+    /// Changes the influences of some points of a bound mesh; all others stay.
+    SetWeights(Uid, Box<WeightPatch>),
 }
 
 /// Error of applying an edit. The rig is unchanged.
@@ -212,6 +214,12 @@ pub enum EditError {
     /// Weights that are inconsistent.
     #[error("the weights are not finite or their lists do not fit together; skin the mesh again")]
     BadWeights,
+    /// A change of weights of a mesh that has none.
+    #[error("mesh {0} has no weights to change; skin it first")]
+    NoSkin(Uid),
+    /// A change of weights that does not fit the weights of the mesh.
+    #[error("the weights of mesh {0} would get {1}")]
+    BadPatch(Uid, PatchFault),
     /// A colour that is not finite.
     #[error("the colour of local group {0} is not finite; use numbers from 0 to 1")]
     BadColor(Uid),
@@ -328,6 +336,7 @@ impl Rig {
                 RigEdit::SetFace(*uid, old.map(Box::new))
             }
             RigEdit::SetInputs(inputs) => self.set_inputs(inputs)?,
+            RigEdit::SetWeights(mesh, patch) => self.set_weights(*mesh, patch)?,
             RigEdit::SetDroppedParts(parts) => {
                 RigEdit::SetDroppedParts(std::mem::replace(&mut self.dropped, parts.clone()))
             }
@@ -443,24 +452,6 @@ impl Rig {
         self.joint_mut(uid)?.parent = parent;
         Ok(RigEdit::SetParent { joint: uid, parent: old_parent, index: old_index })
     }
-
-    fn set_skin(&mut self, mesh: Uid, skin: Option<&Arc<SkinData>>) -> Result<RigEdit, EditError> {
-        if let Some(skin) = skin {
-            // Joints deleted after skinning stay in the list: undoing the deletion brings their weights back.
-            let beyond = skin.weights.joints.iter().filter(|j| **j as usize >= skin.joints.len()).count();
-            if beyond > 0 {
-                return Err(EditError::BadSkin(beyond));
-            }
-            if !is_whole(&skin.weights) {
-                return Err(EditError::BadWeights);
-            }
-        }
-        let old = match skin {
-            Some(skin) => self.skins.insert(mesh, skin.clone()),
-            None => self.skins.remove(&mesh),
-        };
-        Ok(RigEdit::SetSkin(mesh, old))
-    }
 }
 
 /// Largest depth of brackets in a tag's parameters, so that the template around them can still be read.
@@ -481,14 +472,4 @@ fn checked(tag: &TagData) -> Result<TagData, EditError> {
 
 fn check_color(group: &GroupData) -> Result<(), EditError> {
     if group.color.iter().all(|part| part.is_finite()) { Ok(()) } else { Err(EditError::BadColor(group.uid)) }
-}
-
-fn is_whole(weights: &Weights) -> bool {
-    let rising = weights.starts.is_sorted() && weights.starts.first().is_none_or(|first| *first == 0);
-    let ends = weights.starts.last().map_or(0, |last| *last as usize);
-    rising
-        && ends == weights.joints.len()
-        && ends == weights.values.len()
-        // Counting is several times as fast as searching, and there may be millions of weights.
-        && weights.values.iter().filter(|w| !w.is_finite()).count() == 0
 }
