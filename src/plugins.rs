@@ -57,6 +57,7 @@ pub mod history;
 pub mod journal;
 pub mod landing;
 pub mod mesh_reload;
+pub mod painting;
 pub mod picking;
 pub mod placement;
 pub mod runtime;
@@ -89,6 +90,7 @@ use bevy::{
 /// | [`stroke::StrokePlugin`] | chains from strokes |
 /// | [`gesture::GesturePlugin`] | lists of gestures that drive all of the above |
 /// | [`skinning::SkinningPlugin`] | automatic weights in the background |
+/// | [`painting::PaintingPlugin`] | weights by hand: brushes, normalising, pruning, copying between meshes |
 /// | [`face::FacePlugin`] | faces: bones, weights and expressions |
 /// | [`fit::FitPlugin`] | templates moved into meshes |
 /// | [`mesh_reload::MeshReloadPlugin`] | meshes exchanged for other versions of them, with their weights |
@@ -110,6 +112,7 @@ impl PluginGroup for RigPlugins {
             .add(stroke::StrokePlugin)
             .add(gesture::GesturePlugin)
             .add(skinning::SkinningPlugin)
+            .add(painting::PaintingPlugin)
             .add(face::FacePlugin)
             .add(fit::FitPlugin)
             .add(mesh_reload::MeshReloadPlugin)
