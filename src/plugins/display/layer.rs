@@ -51,6 +51,13 @@ impl PartialEq for LayerKey {
     }
 }
 
+impl LayerKey {
+    /// True if the other state differs in its weights alone.
+    fn is_repainted_by(&self, other: &Self) -> bool {
+        self.colors == other.colors && self.skin.is_some() && other.skin.is_some()
+    }
+}
+
 /// Pieces into which a model is cut, computed once and kept.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Plans {
@@ -94,6 +101,8 @@ pub(super) struct Layer {
     /// Entities of replaced pieces, and the number of frames that they stay.
     retiring: Vec<(Entity, u8)>,
     job: Option<Job>,
+    /// Marks that other weights wait until those that are being built are on the screen.
+    waits: bool,
 }
 
 #[derive(Debug)]
@@ -127,11 +136,31 @@ impl Queue {
 impl Layer {
     /// A layer without pieces.
     pub fn new(kind: DisplayPiece) -> Self {
-        Self { kind, key: None, pieces: Vec::new(), stale: Vec::new(), retiring: Vec::new(), job: None }
+        Self { kind, key: None, pieces: Vec::new(), stale: Vec::new(), retiring: Vec::new(), job: None, waits: false }
     }
 
-    /// Starts to build the pieces for `key`; the current pieces stay until they are replaced.
+    /// True if [`Self::start`] has to be called again in the next frame.
+    pub fn waits(&self) -> bool {
+        self.waits
+    }
+
+    /// Ends the wait of [`Self::waits`]; the layer is out of date until the next start.
+    pub fn stop_waiting(&mut self) {
+        self.waits = false;
+    }
+
+    /// Starts to build the pieces for `key`, unless it is the state that they are or become; the current pieces stay until
+    /// they are replaced.
+    ///
+    /// Weights that change with every frame, as under a brush, wait for pieces that are being built: otherwise no piece of
+    /// a large mesh would ever be finished.
     pub fn start(&mut self, model: &Arc<Model>, plans: &Plans, key: LayerKey) {
+        let is_other = self.key.as_ref() != Some(&key);
+        let is_building = self.job.as_ref().is_some_and(|job| job.key.is_repainted_by(&key));
+        self.waits = is_other && is_building;
+        if !is_other || self.waits {
+            return;
+        }
         let queue = Arc::new(Queue::default());
         let (kind, model, plans, wanted, out) = (self.kind, model.clone(), plans.clone(), key.clone(), queue.clone());
         let vertices: usize = model.parts.iter().map(|part| part.vertices.len()).sum();
@@ -152,6 +181,7 @@ impl Layer {
         self.stale.extend(self.pieces.drain(..).map(|shown| shown.entity));
         self.key = None;
         self.job = None;
+        self.waits = false;
     }
 
     /// Finished share of a running job, 0 to 1.
