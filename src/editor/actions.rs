@@ -6,7 +6,7 @@
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{mode::Mode, panels::timeline::TimelineAction};
+use super::{mode::Mode, panels::timeline::TimelineAction, tools::paint::brush::BrushAction};
 
 /// An action that a person can request with a key, a menu entry or a button.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -121,6 +121,8 @@ pub enum Action {
     Contrast,
     /// An action of the timeline.
     Timeline(TimelineAction),
+    /// An action of painting.
+    Brush(BrushAction),
 }
 
 impl Action {
@@ -182,7 +184,8 @@ impl Action {
             Self::Contrast,
         ];
         let of_timeline = TimelineAction::ALL.into_iter().map(Self::Timeline);
-        Mode::ALL.into_iter().map(Self::Mode).chain(others).chain(of_timeline).collect()
+        let of_brush = BrushAction::ALL.into_iter().map(Self::Brush);
+        Mode::ALL.into_iter().map(Self::Mode).chain(others).chain(of_timeline).chain(of_brush).collect()
     }
 }
 

@@ -41,6 +41,8 @@ const POINTER: &[(&str, &str)] = &[
     ("Right drag, or Shift + middle drag", "pan"),
     ("Wheel, or Alt + right drag", "zoom (with Ctrl while a tool has the wheel)"),
     ("Trackpad: two fingers / Shift / Ctrl", "orbit / pan / zoom"),
+    ("Paint: Ctrl, Shift", "the opposite of the brush, smooth"),
+    ("Paint: Ctrl + Shift", "select points; a drag selects all within the brush"),
     ("Timeline: drag in the ruler", "scrub (with Shift between frames)"),
     ("Timeline: click, or drag a box", "select keys (with Shift more, with Ctrl one more or less)"),
     ("Timeline: drag selected keys", "move (with Alt between frames); with Ctrl scale about the playhead"),
@@ -115,6 +117,7 @@ pub fn describe(action: Action) -> String {
         Action::Theme => "Dark or light theme",
         Action::Contrast => "High contrast",
         Action::Timeline(action) => action.name(),
+        Action::Brush(action) => action.name(),
     };
     text.to_owned()
 }

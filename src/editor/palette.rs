@@ -12,6 +12,7 @@ use super::{
     panel::{EditorOverlay, PanelApp, Requests},
     panels::timeline,
     style,
+    tools::paint::brush,
 };
 use crate::{
     plugins::{commands::Processor, document::Selection, history::RigHistory, surface::RigMeshes},
@@ -52,6 +53,9 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
     let Some(entity) = world.get_resource::<ActiveRig>().map(|rig| rig.0) else { return Some("no rig is open") };
     if let Action::Timeline(action) = action {
         return timeline::obstacle(world, action);
+    }
+    if let Action::Brush(action) = action {
+        return brush::obstacle(world, action);
     }
     let rig = world.get::<Rig>(entity)?;
     let history = world.get::<RigHistory>(entity);

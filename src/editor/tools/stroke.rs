@@ -170,7 +170,7 @@ fn begin(rig: &EditedRig, sight: &Sight, at: Vec2, threshold: f32) -> StrokeRequ
 
 /// Turns an undo during drawing into a cancel: the drawing is dropped and the last step stays. Runs after keys are read
 /// and before actions are carried out.
-fn drop_instead_of_undo(tool: Res<StrokeTool>, mut actions: MessageMutator<ActionRequest>) {
+pub(super) fn drop_instead_of_undo(tool: Res<StrokeTool>, mut actions: MessageMutator<ActionRequest>) {
     if matches!(tool.state, StrokeState::Idle) {
         return;
     }
@@ -194,7 +194,7 @@ struct Outcomes<'w> {
     notices: MessageWriter<'w, Notice>,
 }
 
-fn draw(
+pub(super) fn draw(
     mut tool: ResMut<StrokeTool>,
     mode: Res<Mode>,
     mut pointers: MessageReader<ToolPointer>,
