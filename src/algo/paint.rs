@@ -10,6 +10,8 @@ mod row;
 mod stroke;
 mod tidy;
 
+use glam::Vec3;
+
 pub use canvas::{Canvas, Spot};
 pub use row::{RowRules, assign, towards};
 pub use stroke::PaintStroke;
@@ -142,6 +144,22 @@ pub struct Brush {
     pub reach: BrushReach,
     /// Smooths and sharpens the weights of all free joints together if `true`, those of one joint if `false`.
     pub all_joints: bool,
+}
+
+/// Plane across which strokes are mirrored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mirror {
+    /// A point of the plane.
+    pub point: Vec3,
+    /// Normal of the plane, of unit length.
+    pub normal: Vec3,
+}
+
+impl Mirror {
+    /// The mirror image of a place.
+    pub fn image(&self, place: Vec3) -> Vec3 {
+        place - self.normal * (2.0 * (place - self.point).dot(self.normal))
+    }
 }
 
 /// Reason why a brush cannot paint; a sentence without its full stop.

@@ -7,8 +7,13 @@ use std::{
 
 use glam::Vec3;
 
-use super::BrushReach;
+use super::{BrushReach, Mirror};
 use crate::{algo::weights::fill::Graph, mesh::surface::Surface};
+
+/// Largest distance of a point from the mirror image of another that is its partner, as a share of the radius.
+const SAME: f32 = 0.01;
+/// Least share of points with a partner where a mesh counts as its own mirror image.
+const MIRRORED: f32 = 0.9;
 
 /// A mesh at rest, prepared for brushes. Points at one place count as one, so that seams stay closed.
 pub struct Canvas {
@@ -102,6 +107,38 @@ impl Canvas {
         match reach {
             BrushReach::Volume => self.in_ball(spot.place, radius),
             BrushReach::Surface => self.along_edges(spot, radius),
+        }
+    }
+
+    /// Nodes within a radius of the mirror image of a spot, rising, each with its distance. `near` are those of the spot.
+    ///
+    /// Where the mesh is its own mirror image, distances are those of the nodes on this side, so that both sides get the
+    /// same even if their triangles run across other diagonals.
+    pub(super) fn images(
+        &self,
+        near: &[(u32, f32)],
+        spot: &Spot,
+        mirror: &Mirror,
+        radius: f32,
+        reach: BrushReach,
+    ) -> Vec<(u32, f32)> {
+        let mut images: BTreeMap<u32, f32> = BTreeMap::new();
+        let mut found = 0;
+        for (node, far) in near {
+            let image = mirror.image(self.graph.place(*node as usize));
+            let there = self.in_ball(image, radius * SAME).into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
+            if let Some((other, _)) = there {
+                found += 1;
+                images.entry(other).and_modify(|known| *known = known.min(*far)).or_insert(*far);
+            }
+        }
+        if found as f32 >= MIRRORED * near.len() as f32 {
+            return images.into_iter().collect();
+        }
+        let image = mirror.image(spot.place);
+        match self.nearest(image).filter(|found| found.place.distance(image) < radius) {
+            Some(there) => self.nodes_within(&there, radius, reach),
+            None => Vec::new(),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Brush, BrushError, BrushMode, Canvas, Row, RowRules, Spot, assign, towards};
+use super::{Brush, BrushError, BrushMode, Canvas, Mirror, Row, RowRules, Spot, assign, towards};
 use crate::mesh::model::Weights;
 
 /// A stroke that is being painted. It holds what it has changed and leaves the weights of the mesh alone.
@@ -60,14 +60,16 @@ impl PaintStroke {
         &self.brush
     }
 
-    /// Paints at a spot and, for the partner, at its mirror image. `weights` are those of the mesh before the stroke; points
+    /// Paints at a spot and, with a plane, for the partner at its mirror image. `weights` are those of the mesh before the stroke; points
     /// past their end stay. The cost grows with the number of points within the radius, and in the volume with the points
     /// in a slab of the radius.
-    pub fn dab(&mut self, canvas: &Canvas, weights: &Weights, at: &Spot, mirrored: Option<&Spot>) {
+    pub fn dab(&mut self, canvas: &Canvas, weights: &Weights, at: &Spot, mirror: Option<&Mirror>) {
+        let Brush { radius, reach, .. } = self.brush;
+        let near = canvas.nodes_within(at, radius, reach);
+        let images = mirror.map(|mirror| canvas.images(&near, at, mirror, radius, reach));
         let mut effects: BTreeMap<u32, [f32; 2]> = BTreeMap::new();
-        for (side, spot) in [Some(at), mirrored].into_iter().enumerate() {
-            let Some(spot) = spot else { continue };
-            for (node, far) in canvas.nodes_within(spot, self.brush.radius, self.brush.reach) {
+        for (side, nodes) in [near, images.unwrap_or_default()].into_iter().enumerate() {
+            for (node, far) in nodes {
                 let effect = self.brush.effect(far);
                 if effect > 0.0 {
                     effects.entry(node).or_default()[side] = effect;

@@ -30,6 +30,7 @@ use super::{
 use crate::{
     editor::{
         actions::{Action, ActionRequest},
+        dock::ShowPanel,
         mode::Mode,
         notice::{Notice, StatusLine},
         panel::PanelApp,
@@ -53,6 +54,7 @@ impl Plugin for PaintPlugin {
         }
         app.init_resource::<PaintTool>()
             .init_resource::<CanvasUse>()
+            .add_message::<ShowPanel>()
             .add_systems(
                 RunFixedMainLoop,
                 cancel_instead_of_undo
@@ -184,8 +186,12 @@ fn paint(
                 if dragged {
                     stroke.line_to(rig, &meshes, sight, pointer.at);
                 }
-                let rig = stroke.rig;
-                edits.write(EditRequest { rig, change: stroke.preview() });
+                let (rig, change) = (stroke.rig, stroke.preview());
+                if matches!(change, Change::CancelPreview) {
+                    let why = "the points have these weights already, or no other free joint can take the rest";
+                    notices.write(Notice::info(format!("Nothing was painted: {why}.")));
+                }
+                edits.write(EditRequest { rig, change });
                 edits.write(EditRequest { rig, change: Change::Commit });
                 is_painted = false;
             }
@@ -235,9 +241,13 @@ fn show(
     (scene, meshes): (Scene, PaintMeshes),
     arrived: Query<(), Changed<PaintCanvas>>,
     mut wanted: ResMut<CanvasUse>,
+    mut panels: MessageWriter<ShowPanel>,
     mut status: ResMut<StatusLine>,
 ) {
     let is_on = *mode == Mode::Paint || tool.is_painting();
+    if mode.is_changed() && *mode == Mode::Paint {
+        panels.write(ShowPanel("Weights"));
+    }
     let rig = scene.rig();
     wanted.set_if_neq(CanvasUse(rig.as_ref().map(|rig| rig.entity).filter(|_| is_on)));
     if !is_on {

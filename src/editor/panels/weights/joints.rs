@@ -10,7 +10,7 @@ use crate::{
     editor::{
         panel::Requests,
         panels::{
-            displayed_rig::{DisplayedRig, Stamp},
+            displayed_rig::{self, DisplayedRig, Stamp},
             list::{self, List},
         },
     },
@@ -140,6 +140,6 @@ fn draw(
 
 /// Colour of a joint by its place in the weights.
 fn color(number: usize) -> Color32 {
-    let [red, green, blue, _] = joint_color(number).to_srgba().to_u8_array();
-    Color32::from_rgb(red, green, blue)
+    let color = joint_color(number).to_srgba();
+    displayed_rig::color([color.red, color.green, color.blue])
 }

@@ -9,6 +9,7 @@ use super::{in_area, listed_points};
 use crate::{
     editor::{
         actions::{Action, ActionRequest},
+        notice::Notice,
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
@@ -20,7 +21,7 @@ use crate::{
     plugins::{
         commands::BuildResult,
         document::{Change, EditRequest},
-        painting::{PaintableJoint, paintable, row_edit},
+        painting::{PaintableJoint, locks, paintable, row_edit},
         surface::RigMesh,
     },
     rig::{SkinData, Uid, proportion::Quantity},
@@ -157,6 +158,10 @@ impl PointTable {
                 Some(if edit == NumberEdit::Commit { Change::Commit } else { Change::CancelPreview })
             }
         };
+        if change.is_none() && matches!(edit, NumberEdit::Set(_)) {
+            let why = "no other free joint of the point can take the rest; give one a weight first";
+            requests.send(Notice::warning(format!("The weight stays as it was: {why}.")));
+        }
         if let Some(change) = change {
             requests.send(EditRequest { rig: shown.entity, change });
         }
@@ -216,8 +221,12 @@ fn draw(
     let mut ui = ui.new_child(UiBuilder::new().id_salt(&said).max_rect(rect.shrink2(vec2(4.0, 1.0))).layout(layout));
     let width = (ui.available_width() * 0.55).max(40.0);
     let (label, response) = ui.allocate_exact_size(vec2(width, ui.spacing().interact_size.y), Sense::hover());
-    if list::line(&ui, label, &text, ui.visuals().text_color()) {
-        response.on_hover_text(text);
+    let is_locked = locks(&shown.rig, [(joint.uid, joint.subject)]).contains(&true);
+    if list::line(&ui, label, &text, ui.visuals().text_color()) || is_locked {
+        response.on_hover_text(if is_locked { format!("{text}: locked, its weights stay") } else { text });
+    }
+    if is_locked {
+        ui.disable();
     }
     let size = vec2(ui.available_width().max(30.0), ui.spacing().interact_size.y);
     let edit = numbers.field(&mut ui, &said, RichText::new(""), value, WEIGHT, size)?;

@@ -9,14 +9,14 @@ use super::{
     brush::{PaintBrush, mode_of},
 };
 use crate::{
-    algo::paint::{Canvas, PaintStroke},
+    algo::paint::{Canvas, Mirror, PaintStroke},
     editor::{pointer::ModifierKeys, tools::scene::EditedRig},
     plugins::{
         document::Change,
         painting::{locks, opposite_of, paintable, stroke_edit},
         viewport::Sight,
     },
-    rig::{SkinData, Uid, joint_numbers, operations::MirrorPlane},
+    rig::{SkinData, Uid, joint_numbers},
 };
 
 /// A stroke that is being painted on one mesh; over others it pauses.
@@ -31,7 +31,7 @@ pub(super) struct RunningStroke {
     canvas: Arc<Canvas>,
     stroke: PaintStroke,
     /// Plane of the mirror images, if the stroke has any.
-    plane: Option<MirrorPlane>,
+    mirror: Option<Mirror>,
     /// Pixel of the last dab.
     last: Vec2,
 }
@@ -105,7 +105,7 @@ impl RunningStroke {
             added,
             canvas,
             stroke,
-            plane: plane.filter(|_| has_sides),
+            mirror: plane.filter(|_| has_sides).map(|plane| Mirror { point: plane.point, normal: plane.normal }),
             last: Vec2::ZERO,
         })
     }
@@ -133,12 +133,7 @@ impl RunningStroke {
             return;
         }
         let Some(spot) = self.canvas.spot(place.triangle, place.barycentric) else { return };
-        let radius = self.stroke.brush().radius;
-        let mirrored = self.plane.and_then(|plane| {
-            let image = plane.mirrored(spot.place);
-            self.canvas.nearest(image).filter(|found| found.place.distance(image) < radius)
-        });
-        self.stroke.dab(&self.canvas, &self.before.weights, &spot, mirrored.as_ref());
+        self.stroke.dab(&self.canvas, &self.before.weights, &spot, self.mirror.as_ref());
     }
 
     /// The preview of the stroke as far as it has gone.
