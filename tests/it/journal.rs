@@ -5,6 +5,7 @@ mod damage;
 mod evidence;
 mod places;
 mod trouble;
+mod weights;
 
 use std::{fs, path::Path, sync::Arc, time::Duration};
 

@@ -20,6 +20,8 @@ pub struct Canvas {
     graph: Graph,
     surface: Surface,
     triangles: Vec<[u32; 3]>,
+    /// Number of points of the mesh.
+    count: usize,
     /// Points of each node, one node after the other.
     points: Vec<u32>,
     starts: Vec<u32>,
@@ -61,6 +63,7 @@ impl Canvas {
         Self {
             surface: Surface::build(points, triangles),
             triangles: triangles.to_vec(),
+            count: points.len(),
             graph,
             points: listed,
             starts,
@@ -86,7 +89,7 @@ impl Canvas {
     pub fn point_at(&self, spot: &Spot) -> Option<u32> {
         let corners = self.triangles.get(spot.triangle as usize)?;
         let far = |point: u32| {
-            let node = self.graph.node(point as usize)?;
+            let node = self.node(point)?;
             Some((self.graph.place(node).distance_squared(spot.place), point))
         };
         let nearest = corners.iter().filter_map(|point| far(*point)).min_by(|a, b| a.0.total_cmp(&b.0));
@@ -153,10 +156,14 @@ impl Canvas {
         self.graph.neighbours(node as usize)
     }
 
+    /// The node of a point; `None` for a point that the mesh does not have, or that is not finite.
+    fn node(&self, point: u32) -> Option<usize> {
+        if (point as usize) < self.count { self.graph.node(point as usize) } else { None }
+    }
+
     fn corners(&self, triangle: u32) -> Option<[usize; 3]> {
         let [a, b, c] = *self.triangles.get(triangle as usize)?;
-        let node = |point: u32| self.graph.node(point as usize);
-        Some([node(a)?, node(b)?, node(c)?])
+        Some([self.node(a)?, self.node(b)?, self.node(c)?])
     }
 
     fn in_ball(&self, middle: Vec3, radius: f32) -> Vec<(u32, f32)> {
