@@ -4,6 +4,7 @@ pub(crate) mod desk;
 mod face;
 mod features;
 mod tags;
+mod weights;
 
 use std::collections::HashSet;
 

@@ -110,7 +110,10 @@ fn numbers_that_no_brush_has_are_refused_with_words() {
     assert_eq!(stroke(good, Some(0), 0), Some(BrushError::Influences));
     let all = Brush { mode: BrushMode::Smooth, all_joints: true, ..good };
     assert_eq!(stroke(all, None, 4), None, "all joints need no chosen one");
-    assert_eq!(stroke(Brush { radius: f32::NAN, ..all }, None, 4).map(|error| error.to_string().is_empty()), Some(false));
+    assert_eq!(
+        stroke(Brush { radius: f32::NAN, ..all }, None, 4).map(|error| error.to_string().is_empty()),
+        Some(false)
+    );
 }
 
 #[test]
@@ -501,9 +504,7 @@ fn app() -> (RigBench, [Entity; 2], Vec<Uid>) {
 fn change(bench: &mut RigBench, mesh: Entity, change: WeightChange) -> Result<usize, WeightChangeError> {
     bench.messages::<WeightChangeAnswer>();
     bench.send(WeightChangeRequest { mesh, change });
-    bench.wait("the answer", |bench| {
-        !bench.app.world().resource::<Messages<WeightChangeAnswer>>().is_empty()
-    });
+    bench.wait("the answer", |bench| !bench.app.world().resource::<Messages<WeightChangeAnswer>>().is_empty());
     bench.app.update();
     bench.messages::<WeightChangeAnswer>().remove(0).result
 }
@@ -513,11 +514,9 @@ fn whole_meshes_change_as_one_step_and_undo_gives_the_first_bytes() {
     for number in 0..3 {
         let (mut bench, [one, other], _) = app();
         let prune = PruneSettings { below: 0.5, most: 1 };
-        let (mesh, what) = [
-            (one, WeightChange::Normalise),
-            (one, WeightChange::Prune(prune)),
-            (other, WeightChange::CopyFrom(one)),
-        ][number];
+        let (mesh, what) =
+            [(one, WeightChange::Normalise), (one, WeightChange::Prune(prune)), (other, WeightChange::CopyFrom(one))]
+                [number];
         let uid = bench.get::<RigMesh>(mesh).unwrap().uid;
         let before = (bench.rig().clone(), bytes(bench.rig()));
         let steps = bench.get::<RigHistory>(bench.rig).unwrap().steps().1;
@@ -569,12 +568,8 @@ fn changes_of_whole_meshes_are_refused_with_the_reason() {
 #[test]
 fn copied_weights_keep_to_the_locks_of_the_target() {
     let (mut bench, [one, other], joints) = app();
-    let fresh = SkinData {
-        joints: vec![joints[1]],
-        weights: same(8, &[(0, 0.25)]),
-        at_rest: true,
-        ..SkinData::default()
-    };
+    let fresh =
+        SkinData { joints: vec![joints[1]], weights: same(8, &[(0, 0.25)]), at_rest: true, ..SkinData::default() };
     bench.edit(Operation::Edits(vec![RigEdit::SetSkin(Uid(0x51), Some(Arc::new(fresh)))]));
     bench.edit(Operation::Lock(vec![joints[1]], true));
     assert_eq!(change(&mut bench, other, WeightChange::CopyFrom(one)), Ok(8));

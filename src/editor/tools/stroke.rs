@@ -181,14 +181,14 @@ pub(super) fn drop_instead_of_undo(tool: Res<StrokeTool>, mut actions: MessageMu
 
 /// Position of the press, and the view at that moment, which holds for the whole line.
 #[derive(Debug, Clone, Copy)]
-struct Press {
+pub(super) struct Press {
     sight: Sight,
     at: Vec2,
 }
 
 /// Output of the stroke tool.
 #[derive(SystemParam)]
-struct Outcomes<'w> {
+pub(super) struct Outcomes<'w> {
     strokes: MessageWriter<'w, StrokeRequest>,
     picks: MessageWriter<'w, PickRequest>,
     notices: MessageWriter<'w, Notice>,
