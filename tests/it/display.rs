@@ -413,6 +413,48 @@ fn weights_have_colours() {
     assert_eq!(bench.entities(DisplayPiece::Surface).len(), 1);
 }
 
+/// Under a brush the weights change in every frame: a large mesh is repainted meanwhile, and at last as it is.
+#[test]
+fn weights_that_change_with_every_frame_are_shown_meanwhile() {
+    let mut bench = Bench::new(field(250));
+    let joints = bench.chain(&[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    let count = bench.app.world().get::<RigMesh>(bench.mesh).unwrap().rest.points.len();
+    let skins: Vec<Arc<SkinData>> = [0.25, 0.5, 0.75]
+        .into_iter()
+        .map(|share| {
+            let mut weights = Weights::default();
+            (0..count).for_each(|_| weights.push([(0, 1.0 - share), (1, share)]));
+            Arc::new(SkinData { joints: joints.clone(), weights, at_rest: true, ..Default::default() })
+        })
+        .collect();
+    bench.bind((*skins[0]).clone());
+    bench.show(MeshDisplay { weights: WeightColors::Joint(joints[1]), ..default() });
+    let shown = |bench: &mut Bench| {
+        let entities = bench.entities(DisplayPiece::Surface);
+        let mesh = |entity| bench.app.world().get::<Mesh3d>(entity).unwrap().0.id();
+        entities.into_iter().map(mesh).collect::<Vec<_>>()
+    };
+    let before = shown(&mut bench);
+    let (started, mut frame) = (Instant::now(), 0);
+    while shown(&mut bench) == before {
+        assert!(started.elapsed() < HANG, "no picture is ever finished");
+        frame += 1;
+        bench.edit(Operation::Edits(vec![RigEdit::SetSkin(MESH, Some(skins[frame % 3].clone()))]));
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    bench.edit(Operation::Edits(vec![RigEdit::SetSkin(MESH, Some(skins[2].clone()))]));
+    bench.settle();
+    let wanted = weight_color(0.75).to_linear().to_f32_array();
+    for mesh in bench.meshes(DisplayPiece::Surface) {
+        for color in colors(&mesh).unwrap() {
+            assert!(color.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-5), "{color:?} is not {wanted:?}");
+        }
+    }
+    // A picture that waits does not keep an idle app busy.
+    bench.app.update();
+    assert!(bench.app.world().get::<DisplayJob>(bench.mesh).is_none());
+}
+
 #[test]
 fn the_ramp_gets_lighter_with_the_weight() {
     let lightness = |weight: f32| Oklaba::from(weight_color(weight).to_linear()).lightness;
