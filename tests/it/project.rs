@@ -607,7 +607,7 @@ fn painted_weights_are_saved_with_the_project() {
     let mut rows = Weights { starts: vec![0], ..Weights::default() };
     rows.push([(3, 0.75), (0, 0.25)]);
     rows.push([(1, 1.0)]);
-    let patch = WeightPatch::new(&before, vec![(Uid(0x77), None)], vec![2, 7], rows);
+    let patch = WeightPatch::new(&before, vec![(Uid(0x77), Some(before.joints[0]))], vec![2, 7], rows);
     let inverse = project.rigs[0].apply(&RigEdit::SetWeights(mesh, Box::new(patch))).unwrap();
     folder.save(&project);
     assert_ne!(folder.text(), text, "the file names other weights");

@@ -9,6 +9,7 @@ use crate::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
+        files::attend,
         pointer::ModifierKeys,
         tools::ToolSystems,
     },
@@ -30,7 +31,7 @@ impl Plugin for BrushPlugin {
             .init_resource::<SelectedPoints>()
             .add_message::<ActionRequest>()
             .add_message::<WeightChangeRequest>()
-            .add_systems(Update, carry_out.before(ToolSystems::Tools).before(RigSystems::Script));
+            .add_systems(Update, carry_out.after(attend).before(ToolSystems::Tools).before(RigSystems::Script));
     }
 }
 
