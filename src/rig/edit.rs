@@ -58,7 +58,7 @@ pub enum RigEdit {
     SetGroup(Uid, Option<Uid>),
     /// Sets the joint on the other side, one way; a pair needs both directions.
     SetMirror(Uid, Option<Uid>),
-    /// Locks a joint's weights against automatic skinning, or unlocks them.
+    /// Locks a joint's weights against automatic skinning and brushes, or unlocks them.
     SetLocked(Uid, bool),
     /// Adds a tag as the `index`-th of a joint.
     AddTag {

@@ -307,12 +307,13 @@ fn strokes_are_refused_with_the_reason() {
     let told = |bench: &mut Bench, from: Vec2, words: &str| {
         let (rig, steps) = (bench.rig().clone(), bench.steps());
         bench.notices();
-        bench.drag(PLAIN, from, to);
-        let notices = bench.notices();
-        bench.point(PLAIN, &[(to, DROPPED)]);
-        let later = bench.notices();
-        let found = notices.iter().chain(&later).any(|notice| notice.text.contains(words));
-        assert!(found, "{words}: {notices:?} {later:?}");
+        let mut notices = Vec::new();
+        // Messages are kept for two frames.
+        for act in [(from, PointerAct::Pressed), (from.lerp(to, 0.5), PointerAct::Dragged), (to, DROPPED)] {
+            bench.point(PLAIN, &[act]);
+            notices.extend(bench.notices());
+        }
+        assert!(notices.iter().any(|notice| notice.text.contains(words)), "{words}: {notices:?}");
         assert_eq!((bench.rig(), bench.steps()), (&rig, steps), "{words}");
     };
     bench.act(Action::SelectNone);
