@@ -18,7 +18,7 @@ use crate::{
     editor::{
         notice::Notice,
         panel::{EditorPanel, Requests},
-        tools::paint::{SelectedPoints, brush::BrushPlugin},
+        tools::paint::brush::BrushPlugin,
     },
     plugins::{
         painting::{WeightChange, WeightChangeAnswer},
@@ -118,14 +118,4 @@ fn named(ui: &Ui, widget: Id, name: &str) {
 fn in_area(ui: &mut Ui, salt: &str, height: f32, draw: impl FnOnce(&mut Ui)) {
     let (_, rect) = ui.allocate_space(vec2(ui.available_width(), height));
     draw(&mut ui.new_child(UiBuilder::new().id_salt(salt).max_rect(rect)));
-}
-
-/// Points of the table: the selected ones, or else the one that was last under the pointer.
-fn listed_points(world: &World) -> Option<(Uid, Vec<u32>)> {
-    let selected = world.get_resource::<SelectedPoints>()?;
-    if let (Some(mesh), false) = (selected.mesh, selected.points.is_empty()) {
-        return Some((mesh, selected.points.iter().copied().collect()));
-    }
-    let (mesh, point) = world.get_resource::<crate::editor::tools::paint::PaintTool>()?.under?;
-    Some((mesh, vec![point]))
 }

@@ -2,10 +2,10 @@
 
 use std::sync::{Arc, Weak};
 
-use bevy::prelude::*;
+use bevy::{ecs::change_detection::Tick, prelude::*};
 use bevy_egui::egui::{Align, Layout, Rect, RichText, Sense, Ui, UiBuilder, vec2};
 
-use super::{in_area, listed_points};
+use super::in_area;
 use crate::{
     editor::{
         actions::{Action, ActionRequest},
@@ -16,7 +16,7 @@ use crate::{
             fields::{CommonValue, Look, NumberEdit, Numbers},
             list::{self, List},
         },
-        tools::paint::brush::BrushAction,
+        tools::paint::{PaintTool, SelectedPoints, brush::BrushAction},
     },
     plugins::{
         commands::BuildResult,
@@ -32,6 +32,7 @@ use crate::{
 pub(super) struct PointTable {
     numbers: Numbers,
     made_from: Option<TableKey>,
+    points: Vec<u32>,
     lines: Vec<Line>,
     /// Weights before a number was dragged: previews are edits of these.
     before: Option<(Uid, Arc<SkinData>)>,
@@ -41,8 +42,39 @@ pub(super) struct PointTable {
 struct TableKey {
     mesh: Uid,
     skin: Weak<SkinData>,
-    points: Vec<u32>,
+    listed: Listed,
     active: Option<Uid>,
+}
+
+/// Points that the table lists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Listed {
+    /// The selected ones, as of a change of the selection.
+    Selected(Tick),
+    /// The one that was last under the pointer.
+    Under(u32),
+}
+
+impl Listed {
+    /// The selected points, or else the one that was last under the pointer, with their mesh.
+    fn of(world: &World) -> Option<(Uid, Self)> {
+        let selected = world.get_resource_ref::<SelectedPoints>()?;
+        if let (Some(mesh), false) = (selected.mesh, selected.points.is_empty()) {
+            return Some((mesh, Self::Selected(selected.last_changed())));
+        }
+        let (mesh, point) = world.get_resource::<PaintTool>()?.under?;
+        Some((mesh, Self::Under(point)))
+    }
+
+    fn points(self, world: &World) -> Vec<u32> {
+        match self {
+            Self::Selected(_) => {
+                let selected = world.get_resource::<SelectedPoints>();
+                selected.map(|selected| selected.points.iter().copied().collect()).unwrap_or_default()
+            }
+            Self::Under(point) => vec![point],
+        }
+    }
 }
 
 /// Line of the table.
@@ -73,7 +105,7 @@ impl PointTable {
         meshes: &[(Entity, &RigMesh)],
         requests: &mut Requests,
     ) {
-        let Some((mesh, points)) = listed_points(world) else {
+        let Some((mesh, listed)) = Listed::of(world) else {
             ui.weak(
                 "Points: in Paint mode, Ctrl+Shift and click selects some; else the one under the pointer is listed.",
             );
@@ -84,9 +116,10 @@ impl PointTable {
             ui.weak("The mesh of the points has no weights.");
             return;
         };
-        self.refresh(world, shown, mesh, skin, &points);
+        self.refresh(world, shown, mesh, skin, listed);
+        let count = self.points.len();
         ui.horizontal(|ui| {
-            ui.strong(if points.len() == 1 { "1 point".to_owned() } else { format!("{} points", points.len()) });
+            ui.strong(if count == 1 { "1 point".to_owned() } else { format!("{count} points") });
             if ui.button("Select no points").clicked() {
                 requests.send(ActionRequest(Action::Brush(BrushAction::NoPoints)));
             }
@@ -94,7 +127,7 @@ impl PointTable {
         let height = ui.spacing().interact_size.y + 2.0;
         let rows = self.lines.len().min(ROWS) as f32;
         let mut edited: Option<WeightEdit> = None;
-        let (numbers, lines) = (&mut self.numbers, &self.lines);
+        let (numbers, lines, points) = (&mut self.numbers, &self.lines, &self.points);
         in_area(ui, "points", rows * height, |ui| {
             let list = List { id: "points", count: lines.len(), height, reveal: None, follow: false };
             list.show(ui, |ui, range, row| {
@@ -114,10 +147,14 @@ impl PointTable {
         if let Some(edit) = edited {
             self.edit(shown, mesh, skin, edit, requests);
         }
+        // A drag whose line has gone ends without an edit.
+        if ui.ctx().dragged_id().is_none() {
+            self.before = None;
+        }
     }
 
     /// Lists the influences again after a change of the weights or of the points.
-    fn refresh(&mut self, world: &World, shown: &DisplayedRig, mesh: Uid, skin: &Arc<SkinData>, points: &[u32]) {
+    fn refresh(&mut self, world: &World, shown: &DisplayedRig, mesh: Uid, skin: &Arc<SkinData>, listed: Listed) {
         if self.before.is_some() {
             // A dragged number stays in its line, even if others lose all of their weight to it.
             self.made_from = None;
@@ -128,7 +165,7 @@ impl PointTable {
         let is_same = |key: &TableKey| {
             key.mesh == mesh
                 && std::ptr::eq(key.skin.as_ptr(), Arc::as_ptr(skin))
-                && key.points == points
+                && key.listed == listed
                 && key.active == active
         };
         if self.made_from.as_ref().is_some_and(is_same) {
@@ -136,9 +173,9 @@ impl PointTable {
         }
         let built = world.get::<BuildResult>(shown.entity).map(|built| &*built.0);
         let chosen = active.and_then(|active| paintable(&shown.rig, built, active).ok());
-        self.lines = lines(skin, points, chosen);
-        let (skin, points) = (Arc::downgrade(skin), points.to_vec());
-        self.made_from = Some(TableKey { mesh, skin, points, active });
+        self.points = listed.points(world);
+        self.lines = lines(skin, &self.points, chosen);
+        self.made_from = Some(TableKey { mesh, skin: Arc::downgrade(skin), listed, active });
     }
 
     /// Sends the change of a weight.
