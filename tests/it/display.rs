@@ -24,7 +24,7 @@ use rigsmith::{
     },
     plugins::display::{DisplayJob, DisplayNote, DisplayPiece, DisplayPlugin, MeshDisplay, WeightColors, weight_color},
     prelude::*,
-    rig::SkinData,
+    rig::{SkinData, WeightPatch},
     test_app::strict_app,
 };
 use serde_json::json;
@@ -450,6 +450,20 @@ fn weights_that_change_with_every_frame_are_shown_meanwhile() {
             assert!(color.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-5), "{color:?} is not {wanted:?}");
         }
     }
+    // One point is in one piece: the others stay on the screen as they are.
+    let before = shown(&mut bench);
+    assert!(before.len() > 1);
+    let mut row = Weights { starts: vec![0], ..Weights::default() };
+    row.push([(0, 1.0)]);
+    let patch = WeightPatch::new(bench.rig().skin(MESH).unwrap(), Vec::new(), vec![0], row);
+    bench.edit(Operation::Edits(vec![RigEdit::SetWeights(MESH, Box::new(patch))]));
+    bench.settle();
+    let after = shown(&mut bench);
+    assert_eq!(before.iter().zip(&after).filter(|(before, after)| before != after).count(), 1);
+    let grey = weight_color(0.0).to_linear().to_f32_array();
+    let all: Vec<[f32; 4]> =
+        bench.meshes(DisplayPiece::Surface).iter().flat_map(|mesh| colors(mesh).unwrap()).collect();
+    assert_eq!(all.iter().filter(|color| **color == grey).count(), 1);
     // A picture that waits does not keep an idle app busy.
     bench.app.update();
     assert!(bench.app.world().get::<DisplayJob>(bench.mesh).is_none());
