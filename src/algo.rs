@@ -6,6 +6,7 @@ pub mod fit;
 pub mod fit_template;
 pub mod kmeans;
 pub mod linkage;
+pub mod paint;
 pub mod picking;
 pub mod placement;
 pub mod stroke;

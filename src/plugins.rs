@@ -58,6 +58,7 @@ pub mod journal;
 pub mod landing;
 pub mod limits;
 pub mod mesh_reload;
+pub mod painting;
 pub mod picking;
 pub mod placement;
 pub mod runtime;
@@ -90,6 +91,7 @@ use bevy::{
 /// | [`stroke::StrokePlugin`] | chains from strokes |
 /// | [`gesture::GesturePlugin`] | lists of gestures that drive all of the above |
 /// | [`skinning::SkinningPlugin`] | automatic weights in the background |
+/// | [`painting::PaintingPlugin`] | weights by hand: brushes, normalising, pruning, copying between meshes |
 /// | [`face::FacePlugin`] | faces: bones, weights and expressions |
 /// | [`fit::FitPlugin`] | templates moved into meshes |
 /// | [`mesh_reload::MeshReloadPlugin`] | meshes exchanged for other versions of them, with their weights |
@@ -111,6 +113,7 @@ impl PluginGroup for RigPlugins {
             .add(stroke::StrokePlugin)
             .add(gesture::GesturePlugin)
             .add(skinning::SkinningPlugin)
+            .add(painting::PaintingPlugin)
             .add(face::FacePlugin)
             .add(fit::FitPlugin)
             .add(mesh_reload::MeshReloadPlugin)

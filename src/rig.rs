@@ -43,7 +43,7 @@ pub use constraint::{
     AimUp, AngleLimits, ChainSolver, Channel, Collider, Constraint, Dependency, KeyEase, Output, Scalar, Target,
 };
 pub use document::{Rig, RigAbout, SkinData};
-pub use edit::{EditError, RigEdit};
+pub use edit::{EditError, PatchFault, RigEdit, WeightPatch, joint_numbers, weight_edit};
 pub use format::source::SourceError;
 pub use format::{project, skin, template, text};
 pub(crate) use format::{

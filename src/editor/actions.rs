@@ -10,6 +10,7 @@ use super::{
     library::LibraryAction,
     mode::Mode,
     panels::{graph::GraphAction, timeline::TimelineAction},
+    tools::paint::brush::BrushAction,
 };
 
 /// An action that a person can request with a key, a menu entry or a button.
@@ -133,6 +134,8 @@ pub enum Action {
     Graph(GraphAction),
     /// An action of the library of templates.
     Library(LibraryAction),
+    /// An action of painting.
+    Brush(BrushAction),
 }
 
 impl Action {
@@ -198,7 +201,8 @@ impl Action {
         let of_timeline = TimelineAction::ALL.into_iter().map(Self::Timeline);
         let of_graph = GraphAction::ALL.into_iter().map(Self::Graph);
         let of_library = LibraryAction::ALL.into_iter().map(Self::Library);
-        let of_panels = of_timeline.chain(of_graph).chain(of_library);
+        let of_brush = BrushAction::ALL.into_iter().map(Self::Brush);
+        let of_panels = of_timeline.chain(of_graph).chain(of_library).chain(of_brush);
         Mode::ALL.into_iter().map(Self::Mode).chain(others).chain(of_panels).collect()
     }
 }

@@ -52,7 +52,7 @@ impl Default for Layout {
         let tree = dock.main_surface_mut();
         let [centre, _] = tree.split_left(NodeIndex::root(), 0.19, tabs(&["Hierarchy", "Loader", "Groups", "Process"]));
         let [centre, right] =
-            tree.split_right(centre, 0.75, tabs(&["Properties", "Tags", "Controls", "Skinning", "Face"]));
+            tree.split_right(centre, 0.75, tabs(&["Properties", "Tags", "Controls", "Skinning", "Weights", "Face"]));
         let [_, _] = tree.split_below(right, 0.6, tabs(&["History", "Updater", "Poses", "Sets", "Display"]));
         let [_, _] = tree.split_below(centre, 0.78, tabs(&BELOW));
         Self { dock }

@@ -44,6 +44,8 @@ const POINTER: &[(&str, &str)] = &[
     ("Pose mode: drag a joint or a control", "pull it; the joints above follow (with Ctrl in steps)"),
     ("Pose and Select mode: right click", "switches, pose and selection sets of the node"),
     ("Loader: drag a template onto a joint", "add the part there, or merge the template below it"),
+    ("Paint: Ctrl, Shift", "the opposite of the brush, smooth"),
+    ("Paint: Ctrl + Shift", "select points; a drag selects all within the brush"),
     ("Timeline: drag in the ruler", "scrub (with Shift between frames)"),
     ("Timeline: click, or drag a box", "select keys (with Shift more, with Ctrl one more or less)"),
     ("Timeline: drag selected keys", "move (with Alt between frames); with Ctrl scale about the playhead"),
@@ -127,6 +129,7 @@ pub fn describe(action: Action) -> String {
         Action::Timeline(action) => action.name(),
         Action::Graph(action) => action.name(),
         Action::Library(action) => action.name(),
+        Action::Brush(action) => action.name(),
     };
     text.to_owned()
 }

@@ -20,6 +20,7 @@ use super::{
         timeline::{Timeline, TimelineAction, over_timeline},
     },
     pointer::ModifierKeys,
+    tools::paint::brush::BrushAction,
 };
 
 /// Plugin that turns key presses into actions.
@@ -113,6 +114,7 @@ const DEFAULTS: &[(&str, Action)] = &[
     ("R", Action::Mode(Mode::Scale)),
     ("P", Action::Mode(Mode::Pose)),
     ("G", Action::Mode(Mode::Weights)),
+    ("T", Action::Mode(Mode::Paint)),
     ("Ctrl+N", Action::New),
     ("Ctrl+O", Action::Open),
     ("Ctrl+S", Action::Save),
@@ -167,6 +169,13 @@ const DEFAULTS: &[(&str, Action)] = &[
     ("Ctrl+Equal", Action::UiLarger),
     ("Ctrl+Minus", Action::UiSmaller),
     ("Ctrl+0", Action::UiUsual),
+    ("BracketLeft", Action::Brush(BrushAction::Smaller)),
+    ("BracketRight", Action::Brush(BrushAction::Larger)),
+    ("Shift+BracketLeft", Action::Brush(BrushAction::Weaker)),
+    ("Shift+BracketRight", Action::Brush(BrushAction::Stronger)),
+    ("Shift+T", Action::Brush(BrushAction::Reach)),
+    ("Ctrl+T", Action::Brush(BrushAction::Colors)),
+    ("Ctrl+L", Action::Brush(BrushAction::Lock)),
     ("Space", Action::Timeline(TimelineAction::Play)),
     ("Period", Action::Timeline(TimelineAction::NextFrame)),
     ("Comma", Action::Timeline(TimelineAction::PreviousFrame)),

@@ -15,6 +15,7 @@ use super::{
     panel::Requests,
     panels::timeline::TimelineAction,
     settings::EditorSettings,
+    tools::paint::brush::BrushAction,
 };
 
 /// Draws the menu bar.
@@ -118,6 +119,8 @@ pub(super) fn show(
                     None,
                     Some(("Fit", Action::Fit)),
                     Some(("Skin", Action::Skin)),
+                    Some(("Normalise weights", Action::Brush(BrushAction::Normalise))),
+                    Some(("Prune weights", Action::Brush(BrushAction::Prune))),
                     None,
                     Some(("Reset pose", Action::ResetPose)),
                     Some(("Mirror pose", Action::MirrorPose)),

@@ -23,12 +23,23 @@ pub enum Mode {
     Pose,
     /// Shows the weights of the selected joint.
     Weights,
+    /// A brush changes the weights of the selected joint.
+    Paint,
 }
 
 impl Mode {
     /// Every mode, in the order of the toolbar.
-    pub const ALL: [Self; 8] =
-        [Self::Select, Self::Place, Self::Stroke, Self::Move, Self::Rotate, Self::Scale, Self::Pose, Self::Weights];
+    pub const ALL: [Self; 9] = [
+        Self::Select,
+        Self::Place,
+        Self::Stroke,
+        Self::Move,
+        Self::Rotate,
+        Self::Scale,
+        Self::Pose,
+        Self::Weights,
+        Self::Paint,
+    ];
 
     /// The name on the toolbar.
     pub fn name(self) -> &'static str {
@@ -41,6 +52,7 @@ impl Mode {
             Self::Scale => "Scale",
             Self::Pose => "Pose",
             Self::Weights => "Weights",
+            Self::Paint => "Paint",
         }
     }
 }

@@ -13,6 +13,7 @@ use super::{
     panel::{EditorOverlay, PanelApp, Requests},
     panels::{graph, timeline},
     style,
+    tools::paint::brush,
 };
 use crate::{
     plugins::{commands::Processor, document::Selection, history::RigHistory, surface::RigMeshes},
@@ -59,6 +60,9 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
     }
     if let Action::Graph(action) = action {
         return graph::obstacle(world, action);
+    }
+    if let Action::Brush(action) = action {
+        return brush::obstacle(world, action);
     }
     let rig = world.get::<Rig>(entity)?;
     let history = world.get::<RigHistory>(entity);

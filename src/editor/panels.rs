@@ -22,6 +22,7 @@ pub mod tags;
 pub mod timeline;
 pub mod toasts;
 pub mod updater;
+pub mod weights;
 
 mod displayed_rig;
 mod features;
@@ -36,7 +37,7 @@ use super::panel::PanelApp;
 
 pub use displayed_rig::joint_name;
 
-/// Adds all panels, the toasts, and the systems behind the log and the skinning panel.
+/// Adds all panels, the toasts, and the systems behind the log and the panels of weights.
 pub struct PanelsPlugin;
 
 impl Plugin for PanelsPlugin {
@@ -44,6 +45,7 @@ impl Plugin for PanelsPlugin {
         app.add_plugins((
             log::LogPlugin,
             skinning::SkinningPanelPlugin,
+            weights::WeightsPanelPlugin,
             face::FacePanelPlugin,
             poses::PosesPlugin,
             timeline::TimelinePlugin,
@@ -60,6 +62,7 @@ impl Plugin for PanelsPlugin {
         .add_panel(process::ProcessPanel::default())
         .add_panel(local_groups::GroupsPanel::default())
         .add_panel(skinning::SkinningPanel::default())
+        .add_panel(weights::WeightsPanel::default())
         .add_panel(face::FacePanel::default())
         .add_panel(poses::PosesPanel::default())
         .add_panel(selection_sets::SelectionSetsPanel::default())

@@ -111,5 +111,6 @@ fn purpose(mode: Mode) -> &'static str {
         Mode::Scale => "Scale joints at rest",
         Mode::Pose => "Pull and turn joints and see the mesh follow; the rest pose stays",
         Mode::Weights => "See which points a joint moves",
+        Mode::Paint => "Paint the weights of the selected joint",
     }
 }

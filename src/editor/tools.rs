@@ -2,12 +2,13 @@
 //!
 //! | tool | modes | does |
 //! | --- | --- | --- |
-//! | [`select`] | all but Place and Stroke | picks joints, a box of joints, a hierarchy |
+//! | [`select`] | all but Place, Stroke and Paint | picks joints, a box of joints, a hierarchy |
 //! | [`place`] | Place | shows where a joint would go, and puts it there |
 //! | [`stroke`] | Stroke | draws, previews, accepts |
 //! | [`transform`] | Move, Rotate, Scale, Pose | drags the handles of a [`gizmo`](mod@gizmo) |
 //! | [`pull`] | Pose | drags a joint or a control, and the joints above follow |
-//! | [`weights`] | Weights | shows what the selected joint moves |
+//! | [`weights`] | Weights, Paint | shows what the selected joint moves |
+//! | [`paint`] | Paint | changes the weights of the selected joint with a brush |
 //! | [`symmetry`] | all | the plane of live mirroring |
 //!
 //! The planned action of a tool is in its resource, from which [`ghosts`] draws it; the rig does not change before the
@@ -16,6 +17,7 @@
 pub mod actions;
 pub mod ghosts;
 pub mod gizmo;
+pub mod paint;
 pub mod place;
 pub mod pose;
 pub mod pull;
@@ -68,6 +70,7 @@ impl Plugin for ToolsPlugin {
                 place::PlacePlugin,
                 stroke::StrokeToolPlugin,
                 weights::WeightsPlugin,
+                paint::PaintPlugin,
                 transform::TransformPlugin,
                 pull::PullPlugin,
                 ghosts::GhostsPlugin,
@@ -103,6 +106,8 @@ pub enum Tool {
     Gizmo,
     /// A joint or control that is pulled.
     Pull,
+    /// Painting weights.
+    Paint,
 }
 
 impl Tool {
@@ -111,6 +116,7 @@ impl Tool {
         match mode {
             Mode::Place => Self::Place,
             Mode::Stroke => Self::Stroke,
+            Mode::Paint => Self::Paint,
             Mode::Select | Mode::Move | Mode::Rotate | Mode::Scale | Mode::Pose | Mode::Weights => Self::Select,
         }
     }

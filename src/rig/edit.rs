@@ -9,22 +9,22 @@ mod effect;
 mod inputs;
 mod poses;
 mod skin_weights;
+mod skins;
+mod weight_patch;
 
 use std::{collections::HashSet, sync::Arc};
 
 use ron::value::RawValue;
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    mesh::model::Weights,
-    rig::{
-        FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput, RigJoint,
-        SelectionSet, StoredPose, TagData, TagKind, Uid,
-        animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
-        document::{RigAbout, SkinData},
-        format::source::ron_options,
-        part::DroppedPart,
-    },
+pub use self::weight_patch::{PatchFault, WeightPatch, joint_numbers, weight_edit};
+use crate::rig::{
+    FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput, RigJoint,
+    SelectionSet, StoredPose, TagData, TagKind, Uid,
+    animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
+    document::{RigAbout, SkinData},
+    format::source::ron_options,
+    part::DroppedPart,
 };
 
 /// A change of a rig.
@@ -58,7 +58,7 @@ pub enum RigEdit {
     SetGroup(Uid, Option<Uid>),
     /// Sets the joint on the other side, one way; a pair needs both directions.
     SetMirror(Uid, Option<Uid>),
-    /// Locks a joint's weights against automatic skinning, or unlocks them.
+    /// Locks a joint's weights against automatic skinning and brushes, or unlocks them.
     SetLocked(Uid, bool),
     /// Adds a tag as the `index`-th of a joint.
     AddTag {
@@ -151,6 +151,8 @@ pub enum RigEdit {
     SetDroppedParts(Vec<DroppedPart>),
     /// Replaces the selection sets.
     SetSelectionSets(Vec<SelectionSet>),
+    /// Changes the influences of some points of a bound mesh; all others stay.
+    SetWeights(Uid, Box<WeightPatch>),
 }
 
 /// Error of applying an edit. The rig is unchanged.
@@ -214,6 +216,12 @@ pub enum EditError {
     /// Weights that are inconsistent.
     #[error("the weights are not finite or their lists do not fit together; skin the mesh again")]
     BadWeights,
+    /// A change of weights of a mesh that has none.
+    #[error("mesh {0} has no weights to change; skin it first")]
+    NoSkin(Uid),
+    /// A change of weights that does not fit the weights of the mesh.
+    #[error("the weights of mesh {0} would get {1}")]
+    BadPatch(Uid, PatchFault),
     /// A colour that is not finite.
     #[error("the colour of local group {0} is not finite; use numbers from 0 to 1")]
     BadColor(Uid),
@@ -331,6 +339,7 @@ impl Rig {
             }
             RigEdit::SetInputs(inputs) => self.set_inputs(inputs)?,
             RigEdit::SetSelectionSets(sets) => self.set_selection_sets(sets),
+            RigEdit::SetWeights(mesh, patch) => self.set_weights(*mesh, patch)?,
             RigEdit::SetDroppedParts(parts) => {
                 RigEdit::SetDroppedParts(std::mem::replace(&mut self.dropped, parts.clone()))
             }
@@ -446,24 +455,6 @@ impl Rig {
         self.joint_mut(uid)?.parent = parent;
         Ok(RigEdit::SetParent { joint: uid, parent: old_parent, index: old_index })
     }
-
-    fn set_skin(&mut self, mesh: Uid, skin: Option<&Arc<SkinData>>) -> Result<RigEdit, EditError> {
-        if let Some(skin) = skin {
-            // Joints deleted after skinning stay in the list: undoing the deletion brings their weights back.
-            let beyond = skin.weights.joints.iter().filter(|j| **j as usize >= skin.joints.len()).count();
-            if beyond > 0 {
-                return Err(EditError::BadSkin(beyond));
-            }
-            if !is_whole(&skin.weights) {
-                return Err(EditError::BadWeights);
-            }
-        }
-        let old = match skin {
-            Some(skin) => self.skins.insert(mesh, skin.clone()),
-            None => self.skins.remove(&mesh),
-        };
-        Ok(RigEdit::SetSkin(mesh, old))
-    }
 }
 
 /// Largest depth of brackets in a tag's parameters, so that the template around them can still be read.
@@ -484,14 +475,4 @@ fn checked(tag: &TagData) -> Result<TagData, EditError> {
 
 fn check_color(group: &GroupData) -> Result<(), EditError> {
     if group.color.iter().all(|part| part.is_finite()) { Ok(()) } else { Err(EditError::BadColor(group.uid)) }
-}
-
-fn is_whole(weights: &Weights) -> bool {
-    let rising = weights.starts.is_sorted() && weights.starts.first().is_none_or(|first| *first == 0);
-    let ends = weights.starts.last().map_or(0, |last| *last as usize);
-    rising
-        && ends == weights.joints.len()
-        && ends == weights.values.len()
-        // Counting is several times as fast as searching, and there may be millions of weights.
-        && weights.values.iter().filter(|w| !w.is_finite()).count() == 0
 }

@@ -142,7 +142,7 @@ pub struct JointData {
     pub rest: RestTransform,
     /// The joint on the other side. Pairs are identified by uid, never by name; both refer to each other.
     pub mirror: Option<Uid>,
-    /// Lock: automatic skinning leaves the weights of a locked joint unchanged.
+    /// Lock: automatic skinning and brushes leave the weights of a locked joint unchanged.
     pub locked: bool,
     /// Tags in order.
     pub tags: Vec<TagData>,

@@ -140,7 +140,7 @@ pub enum Operation {
         /// Colour for a group that has to be created, or to be recoloured.
         color: Option<[f32; 3]>,
     },
-    /// Locks joints against automatic skinning, or unlocks them.
+    /// Locks the weights of joints against automatic skinning and brushes, or unlocks them.
     Lock(Vec<Uid>, bool),
     /// Poses joints by offsets on top of their rest transforms. Partners get the mirror image.
     Pose(Vec<(Uid, PoseOffset)>),

@@ -24,7 +24,7 @@ use rigsmith::{
     },
     plugins::display::{DisplayJob, DisplayNote, DisplayPiece, DisplayPlugin, MeshDisplay, WeightColors, weight_color},
     prelude::*,
-    rig::SkinData,
+    rig::{SkinData, WeightPatch},
     test_app::strict_app,
 };
 use serde_json::json;
@@ -411,6 +411,62 @@ fn weights_have_colours() {
     bench.show(MeshDisplay::default());
     assert!(colors(&bench.meshes(DisplayPiece::Surface)[0]).is_none());
     assert_eq!(bench.entities(DisplayPiece::Surface).len(), 1);
+}
+
+/// Under a brush the weights change in every frame: a large mesh is repainted meanwhile, and at last as it is.
+#[test]
+fn weights_that_change_with_every_frame_are_shown_meanwhile() {
+    let mut bench = Bench::new(field(250));
+    let joints = bench.chain(&[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    let count = bench.app.world().get::<RigMesh>(bench.mesh).unwrap().rest.points.len();
+    let skins: Vec<Arc<SkinData>> = [0.25, 0.5, 0.75]
+        .into_iter()
+        .map(|share| {
+            let mut weights = Weights::default();
+            (0..count).for_each(|_| weights.push([(0, 1.0 - share), (1, share)]));
+            Arc::new(SkinData { joints: joints.clone(), weights, at_rest: true, ..Default::default() })
+        })
+        .collect();
+    bench.bind((*skins[0]).clone());
+    bench.show(MeshDisplay { weights: WeightColors::Joint(joints[1]), ..default() });
+    let shown = |bench: &mut Bench| {
+        let entities = bench.entities(DisplayPiece::Surface);
+        let mesh = |entity| bench.app.world().get::<Mesh3d>(entity).unwrap().0.id();
+        entities.into_iter().map(mesh).collect::<Vec<_>>()
+    };
+    let before = shown(&mut bench);
+    let (started, mut frame) = (Instant::now(), 0);
+    while shown(&mut bench) == before {
+        assert!(started.elapsed() < HANG, "no picture is ever finished");
+        frame += 1;
+        bench.edit(Operation::Edits(vec![RigEdit::SetSkin(MESH, Some(skins[frame % 3].clone()))]));
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    bench.edit(Operation::Edits(vec![RigEdit::SetSkin(MESH, Some(skins[2].clone()))]));
+    bench.settle();
+    let wanted = weight_color(0.75).to_linear().to_f32_array();
+    for mesh in bench.meshes(DisplayPiece::Surface) {
+        for color in colors(&mesh).unwrap() {
+            assert!(color.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 1e-5), "{color:?} is not {wanted:?}");
+        }
+    }
+    // One point is in one piece: the others stay on the screen as they are.
+    let before = shown(&mut bench);
+    assert!(before.len() > 1);
+    let mut row = Weights { starts: vec![0], ..Weights::default() };
+    row.push([(0, 1.0)]);
+    let patch = WeightPatch::new(bench.rig().skin(MESH).unwrap(), Vec::new(), vec![0], row);
+    bench.edit(Operation::Edits(vec![RigEdit::SetWeights(MESH, Box::new(patch))]));
+    bench.settle();
+    let after = shown(&mut bench);
+    assert_eq!(before.iter().zip(&after).filter(|(before, after)| before != after).count(), 1);
+    let grey = weight_color(0.0).to_linear().to_f32_array();
+    let all: Vec<[f32; 4]> =
+        bench.meshes(DisplayPiece::Surface).iter().flat_map(|mesh| colors(mesh).unwrap()).collect();
+    assert_eq!(all.iter().filter(|color| **color == grey).count(), 1);
+    // A picture that waits does not keep an idle app busy.
+    bench.app.update();
+    assert!(bench.app.world().get::<DisplayJob>(bench.mesh).is_none());
 }
 
 #[test]

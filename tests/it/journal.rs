@@ -6,6 +6,7 @@ mod evidence;
 mod long;
 mod places;
 mod trouble;
+mod weights;
 
 use std::{fs, path::Path, sync::Arc, time::Duration};
 

@@ -174,6 +174,9 @@ mod voxels;
 #[cfg(feature = "cli")]
 mod vrm;
 mod watched_folder;
+mod weight_paint;
+#[cfg(feature = "editor")]
+mod weight_paint_tool;
 mod weights;
 mod weights_bodies;
 mod whole;

@@ -15,7 +15,7 @@ use rigsmith::{
         model::{Model, Weights},
     },
     rig::{
-        PoseOffset, Rig, RigEdit, SkinData, Uid, UidSource,
+        PoseOffset, Rig, RigEdit, SkinData, Uid, UidSource, WeightPatch,
         character::{Character, character, import_skeleton},
         operations::Operation,
         project::{
@@ -593,4 +593,28 @@ fn the_template_that_a_rig_follows_is_kept_with_its_version() {
     folder.save(&project);
     let path = folder.0.path().join("work/../meshes/t.rig.ron");
     assert_eq!(folder.load().templates, [ProjectTemplate { path, ..followed }]);
+}
+
+/// Weights of some points, with a joint that joins the list, are saved with the others; taking them back gives the first file.
+#[test]
+fn painted_weights_are_saved_with_the_project() {
+    let folder = Folder::new();
+    let mut project = cube(&folder.mesh());
+    folder.save(&project);
+    let text = folder.text();
+    let mesh = project.meshes[0].uid;
+    let before = project.rigs[0].skin(mesh).unwrap().clone();
+    let mut rows = Weights { starts: vec![0], ..Weights::default() };
+    rows.push([(3, 0.75), (0, 0.25)]);
+    rows.push([(1, 1.0)]);
+    let patch = WeightPatch::new(&before, vec![(Uid(0x77), Some(before.joints[0]))], vec![2, 7], rows);
+    let inverse = project.rigs[0].apply(&RigEdit::SetWeights(mesh, Box::new(patch))).unwrap();
+    folder.save(&project);
+    assert_ne!(folder.text(), text, "the file names other weights");
+    let loaded = folder.load();
+    assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
+    assert_eq!(loaded.rigs, project.rigs);
+    project.rigs[0].apply(&inverse).unwrap();
+    folder.save(&project);
+    assert_eq!((folder.text(), folder.load().rigs), (text, project.rigs));
 }

@@ -107,6 +107,9 @@ enum NumberError {
     /// The text is no number.
     #[error("\"{0}\" is no number; write one such as 1.5 or -20")]
     NoNumber(String),
+    /// The number is no weight.
+    #[error("{0} is no weight; write one from 0 to 1")]
+    NoWeight(f32),
     /// The number makes no sense on the rig.
     #[error(transparent)]
     Proportion(#[from] ProportionError),
@@ -150,6 +153,11 @@ impl Numbers {
         if let Some((field, reason)) = self.refused.take() {
             requests.send(Notice::warning(format!("{field} stays as it was: {reason}.")));
         }
+    }
+
+    /// Notes that a typed number is no weight, for [`Self::tell`].
+    pub fn refuse_weight(&mut self, field: &str, number: f32) {
+        self.refused = Some((field.to_owned(), NumberError::NoWeight(number)));
     }
 
     /// Three fields, X, Y and Z, beside each other, or below each other in a narrow panel. Returns the axis and its

@@ -150,7 +150,7 @@ fn tell_results(
 }
 
 /// Sends a notice that a finished result waits, so that committing it discards no undone step.
-fn tell_held(mut held: MessageReader<ResultHeld>, mut notices: MessageWriter<Notice>) {
+pub(super) fn tell_held(mut held: MessageReader<ResultHeld>, mut notices: MessageWriter<Notice>) {
     for ResultHeld { reason, .. } in held.read() {
         let reason = reason.to_string();
         let mut letters = reason.chars();
@@ -163,7 +163,8 @@ fn is_cancelled(error: &SkinningError) -> bool {
     *error == SkinningError::Weights(WeightError::Cancelled)
 }
 
-fn mesh_name(mesh: &RigMesh) -> &str {
+/// Name of a mesh for people.
+pub(super) fn mesh_name(mesh: &RigMesh) -> &str {
     if mesh.file.name.is_empty() { "The mesh" } else { &mesh.file.name }
 }
 

@@ -170,7 +170,7 @@ fn begin(rig: &EditedRig, sight: &Sight, at: Vec2, threshold: f32) -> StrokeRequ
 
 /// Turns an undo during drawing into a cancel: the drawing is dropped and the last step stays. Runs after keys are read
 /// and before actions are carried out.
-fn drop_instead_of_undo(tool: Res<StrokeTool>, mut actions: MessageMutator<ActionRequest>) {
+pub(super) fn drop_instead_of_undo(tool: Res<StrokeTool>, mut actions: MessageMutator<ActionRequest>) {
     if matches!(tool.state, StrokeState::Idle) {
         return;
     }
@@ -181,20 +181,20 @@ fn drop_instead_of_undo(tool: Res<StrokeTool>, mut actions: MessageMutator<Actio
 
 /// Position of the press, and the view at that moment, which holds for the whole line.
 #[derive(Debug, Clone, Copy)]
-struct Press {
+pub(super) struct Press {
     sight: Sight,
     at: Vec2,
 }
 
 /// Output of the stroke tool.
 #[derive(SystemParam)]
-struct Outcomes<'w> {
+pub(super) struct Outcomes<'w> {
     strokes: MessageWriter<'w, StrokeRequest>,
     picks: MessageWriter<'w, PickRequest>,
     notices: MessageWriter<'w, Notice>,
 }
 
-fn draw(
+pub(super) fn draw(
     mut tool: ResMut<StrokeTool>,
     mode: Res<Mode>,
     mut pointers: MessageReader<ToolPointer>,

@@ -1,9 +1,10 @@
-//! Weights mode: shows the points that the active joint moves.
+//! Weights as colours, in Weights and Paint mode: the points that the active joint moves, or the colours of all joints.
 
 use bevy::prelude::*;
 
 use super::{
     ToolSystems,
+    paint::brush::PaintBrush,
     scene::{EditedRig, Scene},
 };
 use crate::{
@@ -32,26 +33,33 @@ pub struct WeightsTool {
 pub(super) fn show_weights(
     mut tool: ResMut<WeightsTool>,
     mode: Res<Mode>,
+    brush: Option<Res<PaintBrush>>,
     scene: Scene,
     mut display: ResMut<MeshDisplay>,
     mut status: ResMut<StatusLine>,
 ) {
-    if *mode != Mode::Weights {
+    if !matches!(*mode, Mode::Weights | Mode::Paint) {
         if let Some(before) = tool.before.take() {
             display.weights = before;
         }
         return;
     }
-    if !(mode.is_changed() || scene.is_changed()) {
+    let is_other_brush = brush.as_ref().is_some_and(|brush| brush.is_changed());
+    if !(mode.is_changed() || is_other_brush || scene.is_changed()) {
         return;
     }
     if tool.before.is_none() {
         tool.before = Some(display.weights);
     }
     let Some(rig) = scene.rig() else { return };
-    let wanted = rig.selection.active().map_or(WeightColors::AllJoints, WeightColors::Joint);
+    let active = rig.selection.active().filter(|_| !brush.is_some_and(|brush| brush.all_colors));
+    let wanted = active.map_or(WeightColors::AllJoints, WeightColors::Joint);
     if display.weights != wanted {
         display.weights = wanted;
+    }
+    // The paint tool says what a stroke would do.
+    if *mode != Mode::Weights {
+        return;
     }
     let (hint, obstacle) = describe(&rig);
     let banner = status.banner.clone();

@@ -129,17 +129,18 @@ pub(super) fn start_jobs(
             (Err(_), None) if bodies.contains(of.0) => (None, false),
             (Err(_), None) => continue,
         };
-        if displayed.is_some() && !(display.is_changed() || mesh.is_changed() || is_other) {
+        let is_shown = displayed.as_ref().is_some_and(|displayed| !displayed.waits());
+        if is_shown && !(display.is_changed() || mesh.is_changed() || is_other) {
             continue;
         }
         let surface = LayerKey { skin: skin.clone(), colors: display.weights };
         let edges = LayerKey { skin, colors: WeightColors::Off };
         let start = |displayed: &mut DisplayedMesh| {
-            if displayed.surface.key.as_ref() != Some(&surface) {
-                displayed.surface.start(&displayed.model, &displayed.plans, surface.clone());
-            }
-            if display.wireframe && displayed.edges.key.as_ref() != Some(&edges) {
+            displayed.surface.start(&displayed.model, &displayed.plans, surface.clone());
+            if display.wireframe {
                 displayed.edges.start(&displayed.model, &displayed.plans, edges.clone());
+            } else {
+                displayed.edges.stop_waiting();
             }
         };
         match displayed {
@@ -196,6 +197,11 @@ impl DisplayedMesh {
             }
         });
         self.textures = Some(TextureJob { task, queue, materials, total, landed: 0, missing: Vec::new() });
+    }
+
+    /// True while other weights wait for their turn.
+    fn waits(&self) -> bool {
+        self.surface.waits() || self.edges.waits()
     }
 
     fn progress(&self) -> Option<f32> {

@@ -51,6 +51,13 @@ impl PartialEq for LayerKey {
     }
 }
 
+impl LayerKey {
+    /// True if the other state differs in its weights alone.
+    fn is_repainted_by(&self, other: &Self) -> bool {
+        self.colors == other.colors && self.skin.is_some() && other.skin.is_some()
+    }
+}
+
 /// Pieces into which a model is cut, computed once and kept.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Plans {
@@ -94,6 +101,8 @@ pub(super) struct Layer {
     /// Entities of replaced pieces, and the number of frames that they stay.
     retiring: Vec<(Entity, u8)>,
     job: Option<Job>,
+    /// Marks that other weights wait until those that are being built are on the screen.
+    waits: bool,
 }
 
 #[derive(Debug)]
@@ -107,19 +116,20 @@ struct Job {
 /// Queue of finished pieces.
 #[derive(Debug, Default)]
 struct Queue {
-    pieces: Mutex<VecDeque<Piece>>,
+    /// Pieces in order; `None` for one that is as it is on the screen.
+    pieces: Mutex<VecDeque<Option<Piece>>>,
     /// Number of pieces in all; 0 until the model is cut.
     total: AtomicUsize,
     built: AtomicUsize,
 }
 
 impl Queue {
-    fn push(&self, piece: Piece) {
+    fn push(&self, piece: Option<Piece>) {
         self.pieces.lock().unwrap_or_else(PoisonError::into_inner).push_back(piece);
         self.built.fetch_add(1, Ordering::Relaxed);
     }
 
-    fn pop(&self) -> Option<Piece> {
+    fn pop(&self) -> Option<Option<Piece>> {
         self.pieces.lock().unwrap_or_else(PoisonError::into_inner).pop_front()
     }
 }
@@ -127,15 +137,36 @@ impl Queue {
 impl Layer {
     /// A layer without pieces.
     pub fn new(kind: DisplayPiece) -> Self {
-        Self { kind, key: None, pieces: Vec::new(), stale: Vec::new(), retiring: Vec::new(), job: None }
+        Self { kind, key: None, pieces: Vec::new(), stale: Vec::new(), retiring: Vec::new(), job: None, waits: false }
     }
 
-    /// Starts to build the pieces for `key`; the current pieces stay until they are replaced.
+    /// True if [`Self::start`] has to be called again in the next frame.
+    pub fn waits(&self) -> bool {
+        self.waits
+    }
+
+    /// Ends the wait of [`Self::waits`]; the layer is out of date until the next start.
+    pub fn stop_waiting(&mut self) {
+        self.waits = false;
+    }
+
+    /// Starts to build the pieces for `key`, unless it is the state that they are or become; the current pieces stay until
+    /// they are replaced.
+    ///
+    /// Weights that change with every frame, as under a brush, wait for pieces that are being built: otherwise no piece of
+    /// a large mesh would ever be finished.
     pub fn start(&mut self, model: &Arc<Model>, plans: &Plans, key: LayerKey) {
+        let is_other = self.key.as_ref() != Some(&key);
+        let is_building = self.job.as_ref().is_some_and(|job| job.key.is_repainted_by(&key));
+        self.waits = is_other && is_building;
+        if !is_other || self.waits {
+            return;
+        }
         let queue = Arc::new(Queue::default());
         let (kind, model, plans, wanted, out) = (self.kind, model.clone(), plans.clone(), key.clone(), queue.clone());
         let vertices: usize = model.parts.iter().map(|part| part.vertices.len()).sum();
-        let work = move || build(kind, &model, &plans, &wanted, &out);
+        let shown = self.shown_for(&key);
+        let work = move || build(kind, &model, &plans, &wanted, shown.as_deref(), &out);
         let task = if vertices <= SMALL {
             work();
             None
@@ -147,11 +178,24 @@ impl Layer {
         self.job = Some(Job { task, queue, key, landed: 0 });
     }
 
+    /// Weights that all pieces on the screen were built for, if they differ from those of `key` at some points alone.
+    fn shown_for(&self, key: &LayerKey) -> Option<Arc<SkinData>> {
+        let shown = self.key.as_ref().filter(|_| self.job.is_none() && !self.pieces.is_empty())?;
+        let (before, after) = (shown.skin.as_ref()?, key.skin.as_ref()?);
+        // Palettes of pieces are places in the list of joints, which may only grow.
+        let is_alike = shown.colors == key.colors
+            && before.weights.len() == after.weights.len()
+            && after.joints.starts_with(&before.joints)
+            && self.pieces.iter().all(|piece| piece.key == *shown);
+        is_alike.then(|| before.clone())
+    }
+
     /// Drops the model: its pieces stay until those of another arrive.
     pub fn forget(&mut self) {
         self.stale.extend(self.pieces.drain(..).map(|shown| shown.entity));
         self.key = None;
         self.job = None;
+        self.waits = false;
     }
 
     /// Finished share of a running job, 0 to 1.
@@ -188,12 +232,18 @@ impl Layer {
         if done {
             job.task = None;
         }
-        let mut bytes = 0;
+        let (mut bytes, before) = (0, job.landed);
         while bytes < FRAME_BYTES {
             let Some(piece) = job.queue.pop() else { break };
-            bytes += piece.bytes.max(1);
             let index = job.landed;
             job.landed += 1;
+            let Some(piece) = piece else {
+                if let Some(shown) = self.pieces.get_mut(index) {
+                    shown.key = job.key.clone();
+                }
+                continue;
+            };
+            bytes += piece.bytes.max(1);
             self.stale.drain(..).for_each(|entity| commands.entity(entity).try_despawn());
             let handle = meshes.add(piece.mesh);
             let known = self.pieces.get(index);
@@ -224,12 +274,13 @@ impl Layer {
             let last = self.pieces.len() - 1;
             self.pieces.swap(index, last);
         }
+        let has_landed = job.landed > before;
         if done && job.landed == job.queue.built.load(Ordering::Relaxed) {
             let gone = self.pieces.drain(job.landed.min(self.pieces.len())..).map(|shown| shown.entity);
             gone.chain(self.stale.drain(..)).for_each(|entity| commands.entity(entity).try_despawn());
             self.job = None;
         }
-        bytes > 0
+        has_landed
     }
 }
 
@@ -248,8 +299,18 @@ impl ShownPiece {
 
 /// Builds all pieces, unless the layer has dropped its queue. One task builds all: a single thread may have to build
 /// the hierarchy for rays as well, and people want to see the mesh first.
-fn build(kind: DisplayPiece, model: &Model, plans: &Plans, key: &LayerKey, queue: &Arc<Queue>) {
+///
+/// `shown` are the weights for which the pieces on the screen were built: pieces whose points have not changed stay.
+fn build(
+    kind: DisplayPiece,
+    model: &Model,
+    plans: &Plans,
+    key: &LayerKey,
+    shown: Option<&SkinData>,
+    queue: &Arc<Queue>,
+) {
     let skin = key.skin.as_deref();
+    let is_same = |point: u32| shown.zip(skin).is_some_and(|(before, after)| has_same_row(before, after, point));
     // The layer and this task hold the queue.
     let abandoned = || Arc::strong_count(queue) < 2;
     match kind {
@@ -258,18 +319,39 @@ fn build(kind: DisplayPiece, model: &Model, plans: &Plans, key: &LayerKey, queue
             queue.total.store(plan.len(), Ordering::Relaxed);
             let painter = Painter::new(key.colors, skin);
             for piece in plan.iter().take_while(|_| !abandoned()) {
+                if piece.sources(model).all(|(part, vertex)| is_same(part.vertices[vertex])) {
+                    queue.push(None);
+                    continue;
+                }
                 let material = piece.traits.material.and_then(|material| model.material_set.materials.get(material));
                 let bumps =
                     painter.is_none() && material.is_some_and(|material| material.get("normalTexture").is_some());
-                queue.push(build_surface(model, piece, skin, painter.as_ref(), bumps));
+                queue.push(Some(build_surface(model, piece, skin, painter.as_ref(), bumps)));
             }
         }
         DisplayPiece::Edges => {
             let plan = plans.edges.get_or_init(|| plan_edges(model));
             queue.total.store(plan.len(), Ordering::Relaxed);
             for piece in plan.iter().take_while(|_| !abandoned()) {
-                queue.push(build_edges(model, piece, skin));
+                let is_shown = piece.points.iter().all(|point| is_same(*point));
+                queue.push(if is_shown { None } else { Some(build_edges(model, piece, skin)) });
             }
         }
+    }
+}
+
+/// True if a point has the same influences in two sets of weights; points past their ends have none.
+fn has_same_row(before: &SkinData, after: &SkinData, point: u32) -> bool {
+    let row = |skin: &SkinData| {
+        let [start, end] = [0, 1].map(|next| skin.weights.starts.get(point as usize + next).copied());
+        start.zip(end).map(|(start, end)| start as usize..end as usize)
+    };
+    match (row(before), row(after)) {
+        (Some(a), Some(b)) => {
+            before.weights.joints.get(a.clone()) == after.weights.joints.get(b.clone())
+                && before.weights.values.get(a) == after.weights.values.get(b)
+        }
+        (None, None) => true,
+        _ => false,
     }
 }

@@ -59,7 +59,8 @@ impl Builder {
                 }
                 true
             }
-            RigEdit::SetOffset(..) | RigEdit::SetAttributeValue(..) | RigEdit::SetSkin(..) => true,
+            RigEdit::SetOffset(..) | RigEdit::SetAttributeValue(..) => true,
+            RigEdit::SetSkin(..) | RigEdit::SetWeights(..) => true,
             _ => false,
         }
     }

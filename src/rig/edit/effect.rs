@@ -26,10 +26,13 @@ impl RigEdit {
         }
     }
 
-    /// Bytes of the weights that the edit binds a mesh with: what makes an edit heavy.
+    /// Bytes of the weights that the edit gives to meshes: what makes an edit heavy.
     pub fn weight_bytes(&self) -> usize {
         match self {
             Self::SetSkin(_, Some(skin)) => INFLUENCE * skin.weights.joints.len() + POINT * skin.weights.starts.len(),
+            Self::SetWeights(_, patch) => {
+                INFLUENCE * patch.rows.joints.len() + POINT * (patch.rows.starts.len() + patch.points.len())
+            }
             Self::Batch(edits) => edits.iter().map(Self::weight_bytes).sum(),
             _ => 0,
         }

@@ -8,7 +8,7 @@ use rigsmith::{
     processor::Modules,
     rig::{
         FaceBonePart, FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Rig, RigAbout, RigEdit,
-        RigInput, SkinData, StoredPose, TagData, TagKind, Uid,
+        RigInput, SkinData, StoredPose, TagData, TagKind, Uid, WeightPatch,
         animation::{ClipLayer, LayerMode, RigClip, TrackTarget},
         feature::FeatureKey,
         operations::{Axis, ClipOperation, Operation, TagOperation},
@@ -105,6 +105,15 @@ fn skin(choices: &mut Choices, known: &Known) -> SkinData {
         joints.push(NOBODY);
     }
     SkinData { joints, weights, at_rest: true, ..SkinData::default() }
+}
+
+/// Weights of two points, over a joint that joins their list; the mesh may have fewer points.
+fn patch(rig: &Rig, joint: Uid) -> WeightPatch {
+    let joints = rig.skin(Uid(0x50)).map_or(0, |skin| skin.joints.len() as u32);
+    let mut rows = Weights::default();
+    rows.push([(joints, 1.0)]);
+    rows.push([]);
+    WeightPatch { kept: joints, added: vec![(joint, None)], points: vec![0, 2], rows }
 }
 
 /// A command or a feature.
@@ -269,6 +278,8 @@ fn edit(choices: &mut Choices, rig: &Rig, modules: &Modules, known: &Known, numb
             version: choices.pick(&["", "1.2", "x"]).to_owned(),
             ..RigAbout::default()
         })),
+        // Without a choice of its own, so that findings from before stay what they are.
+        17 if index == 3 && rig.skin(Uid(0x50)).is_some() => RigEdit::SetWeights(Uid(0x50), Box::new(patch(rig, one))),
         17 => RigEdit::SetSkin(Uid(0x50), choices.chance(3).then(|| Arc::new(skin(choices, known)))),
         18 => RigEdit::SetOffset(one, choices.chance(3).then(|| offset(choices))),
         19 => RigEdit::SetAttributeValue(one, choices.pick(&NAMES).to_owned(), Some(choices.any_number())),

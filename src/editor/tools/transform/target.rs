@@ -37,7 +37,7 @@ impl GizmoTarget {
             Mode::Rotate => parts.turns = true,
             Mode::Scale => parts.scales = true,
             Mode::Pose => parts.turns = true,
-            Mode::Select | Mode::Place | Mode::Stroke | Mode::Weights => return None,
+            Mode::Select | Mode::Place | Mode::Stroke | Mode::Weights | Mode::Paint => return None,
         }
         let (rig, sight) = (scene.rig()?, scene.sight()?);
         let joints = one_side(&rig, mode == Mode::Pose, rig.symmetry.0.as_ref());
