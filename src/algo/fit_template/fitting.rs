@@ -18,7 +18,7 @@ const SNAP: f32 = 0.9;
 /// Difference of the residuals of two starts below which the front is uncertain, as a share.
 const UNCERTAIN: f32 = 0.06;
 /// Distance between body model and surface, as a share of the height, above which the model is not used.
-const UNLIKE: f32 = 0.025;
+const UNLIKE: f32 = 0.018;
 
 /// A fit at work.
 pub(super) struct Fit<'a> {
