@@ -228,15 +228,20 @@ pub fn list_templates(
         }
     }
     found.sort_by(|a, b| a.0.cmp(&b.0));
-    let files = || PartFiles::new(disk).with_site(site.clone());
-    let listed = found.into_par_iter().map_init(files, |files, (path, state)| {
-        let read = match known.find(&path, state) {
-            Some(header) => Ok((header.clone(), true)),
-            None => read_header(disk, &path, files),
+    // Each share of the files reads a part once; more shares than threads would only read parts more often.
+    let share = found.len().div_ceil(rayon::current_num_threads()).max(1);
+    let listed = found.par_chunks(share).flat_map_iter(|share| {
+        let mut files = PartFiles::new(disk).with_site(site.clone());
+        let list = |(path, state): &(PathBuf, Option<FileState>)| {
+            let read = match known.find(path, *state) {
+                Some(header) => Ok((header.clone(), true)),
+                None => read_header(disk, path, &mut files),
+            };
+            let is_own = read.as_ref().is_ok_and(|(_, is_own)| *is_own);
+            let header = read.map(|(header, _)| header);
+            ListedTemplate { place: TemplatePlace::File(path.clone()), header, state: *state, is_own }
         };
-        let is_own = read.as_ref().is_ok_and(|(_, is_own)| *is_own);
-        let header = read.map(|(header, _)| header);
-        ListedTemplate { place: TemplatePlace::File(path), header, state, is_own }
+        share.iter().map(list).collect::<Vec<_>>()
     });
     Ok(FolderListing { templates: listed.collect(), left_out })
 }

@@ -222,7 +222,8 @@ impl Work<'_> {
     /// Moves the joints between others to where the centre line bends the way the template does.
     fn bend(&self, limb: &Limb, line: &CentreLine, lengths: &mut [f32], root: Vec3) {
         let whole = lengths[0];
-        for i in 1..lengths.len().saturating_sub(1) {
+        // From the end: where a foot is tells how much is left for the leg above it.
+        for i in (1..lengths.len().saturating_sub(1)).rev() {
             let [before, here, after] = [i - 1, i, i + 1].map(|k| self.template.positions[limb.joints[k]]);
             let chord = (after - before).normalize_or_zero();
             let out = (here - before) - chord * (here - before).dot(chord);
@@ -247,7 +248,13 @@ impl Work<'_> {
                     best = (away, length);
                 }
             }
-            lengths[i] += 0.8 * (best.1 - lengths[i]);
+            let moved = lengths[i] + 0.8 * (best.1 - lengths[i]);
+            let rest = (whole - moved) / (whole - lengths[i]).max(1e-9);
+            let below = lengths[i];
+            if !self.upright() {
+                lengths[1..i].iter_mut().for_each(|length| *length = moved + (*length - below) * rest);
+            }
+            lengths[i] = moved;
         }
     }
 
