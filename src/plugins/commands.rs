@@ -14,7 +14,7 @@ mod run;
 
 use std::{collections::BTreeSet, sync::Arc};
 
-use bevy::prelude::*;
+use bevy::{ecs::message::MessageUpdateSystems, prelude::*};
 
 pub use run::{Programs, RunFailure};
 
@@ -46,7 +46,8 @@ impl Plugin for CommandsPlugin {
             app.insert_resource(RigModules(Arc::new(modules::all())));
         }
         app.register_required_components::<Rig, BuiltEntities>();
-        app.init_resource::<RigLimits>().add_systems(First, limit_builds.run_if(resource_changed::<RigLimits>));
+        app.init_resource::<RigLimits>()
+            .add_systems(First, limit_builds.run_if(resource_changed::<RigLimits>).before(MessageUpdateSystems));
         app.init_resource::<Programs>().add_message::<BuildRequest>().add_message::<BuildDone>().add_systems(
             Update,
             (
