@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs,
     binding::bind,
-    convert::{mark_joints, skeleton_model},
+    convert::skeleton_model,
     explanation::Explanation,
     limits,
     report::{counted, is_json},
@@ -29,7 +29,7 @@ use crate::{
     },
     plugins::commands::BuildStep,
     processor::{Builder, CommandState, RunReport},
-    rig::{BuiltRig, Rig, Uid, bake::baked, operations::Operation, update::edits_between},
+    rig::{BuiltRig, Rig, Uid, bake::baked, character::mark_joints, operations::Operation, update::edits_between},
     solve::program::{CompileOptions, RigProgram},
 };
 

@@ -7,13 +7,10 @@ use clap::Args;
 use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, limits, progress::spinning, skin::load_rig};
 use crate::{
     files::{FileKind, RealDisk, stem, store_model, store_rig, store_rig_over},
-    mesh::{
-        gltf::GltfWriteSettings,
-        model::{Model, SkinBinding},
-    },
+    mesh::{gltf::GltfWriteSettings, model::Model},
     rig::{
         BuiltRig, Rig, UidSource,
-        character::{Character, character, import_skeleton, inverse_bind},
+        character::{Character, character, import_skeleton, mark_joints},
     },
 };
 
@@ -95,17 +92,4 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
 pub(super) fn skeleton_model(rig: &Rig, built: Option<&BuiltRig>) -> Model {
     let empty = Model { name: rig.about().name.clone(), ..Model::default() };
     character(&Character { rig, built, file: &empty, rest: &empty, nodes: &[], skin: None })
-}
-
-/// Lists all joints in a skin, because readers recognise joints by the skins that list them, even without skinned
-/// points.
-pub(super) fn mark_joints(model: &mut Model, rig: &Rig) {
-    let joints = rig.rest_globals();
-    if model.skins.is_empty() && !joints.is_empty() {
-        model.skins = vec![SkinBinding {
-            name: rig.about().name.clone(),
-            joints: (0..joints.len()).collect(),
-            inverse_binds: joints.iter().map(|(_, global)| inverse_bind(global)).collect(),
-        }];
-    }
 }

@@ -9,6 +9,7 @@ use egui_dock::{DockArea, DockState, NodeIndex, TabViewer, tab_viewer::OnCloseRe
 use serde::{Deserialize, Serialize};
 
 use super::{
+    files::attend,
     follow, menu,
     panel::{Panels, Requests},
     pointer::ViewportArea,
@@ -24,7 +25,7 @@ impl Plugin for DockPlugin {
         app.init_resource::<Panels>()
             .init_resource::<Layout>()
             .add_message::<ShowPanel>()
-            .add_systems(Update, show_panels)
+            .add_systems(Update, show_panels.after(attend))
             .add_systems(EguiPrimaryContextPass, draw);
     }
 }

@@ -6,6 +6,7 @@ use bevy_egui::egui::{Color32, Painter, Rect, Stroke, pos2};
 use super::{
     actions::{Action, ActionRequest},
     camera::ViewportSight,
+    files::attend,
     panel::{PanelApp, ViewportPainter},
     panels::{
         poses::put_clip,
@@ -27,7 +28,7 @@ impl Plugin for OnionPlugin {
         app.init_resource::<OnionSkin>()
             .add_message::<ActionRequest>()
             .add_painter(OnionPainter::default())
-            .add_systems(Update, toggle);
+            .add_systems(Update, toggle.after(attend));
     }
 }
 

@@ -170,6 +170,19 @@ pub fn character(parts: &Character) -> Model {
     model
 }
 
+/// Skin that lists all joints of `rig`, added to a model of it that has none: readers recognise joints by the skins that
+/// list them, even without skinned points.
+pub fn mark_joints(model: &mut Model, rig: &Rig) {
+    let joints = rig.rest_globals();
+    if model.skins.is_empty() && !joints.is_empty() {
+        model.skins = vec![SkinBinding {
+            name: rig.about().name.clone(),
+            joints: (0..joints.len()).collect(),
+            inverse_binds: joints.iter().map(|(_, global)| inverse_bind(global)).collect(),
+        }];
+    }
+}
+
 pub(crate) fn inverse_bind(global: &Affine3) -> Mat4 {
     let inverse = Mat4::from(*global).inverse();
     // The last row of an affine matrix is set exactly, as the glTF validator requires; a joint that is flat in one

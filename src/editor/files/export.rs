@@ -33,7 +33,7 @@ use crate::{
     rig::{
         BuiltRig, Rig, Uid,
         bake::baked,
-        character::{Character, character},
+        character::{Character, character, mark_joints},
         skeleton_preset::{SkeletonPreset, apply_preset},
         skin::{SkinFile, SkinJoint},
         vrm::{AvatarError, AvatarSource, ExpressionRecipe, avatar_meta, hang_half_joints},
@@ -121,6 +121,7 @@ impl ExportSource<'_> {
             Some(FileKind::Vrm) => self.avatar(path, options),
             Some(FileKind::Glb | FileKind::Gltf | FileKind::Obj) => {
                 let mut model = self.character();
+                self.mark_joints(&mut model);
                 put_clips(&mut model, rig, self.built, self.modules)?;
                 let mut notes = Vec::new();
                 if options.preset != SkeletonPreset::Plain
@@ -171,6 +172,14 @@ impl ExportSource<'_> {
         })
     }
 
+    /// Skeleton of a model that has no weights, for readers that know joints by skins.
+    fn mark_joints(&self, model: &mut Model) {
+        match self.built {
+            Some(built) => mark_joints(model, &baked(self.rig, built)),
+            None => mark_joints(model, self.rig),
+        }
+    }
+
     /// Writes an avatar of VRM 1.0, as `rigsmith build` does.
     fn avatar(&self, path: &Path, options: &ExportOptions) -> Result<Vec<String>, WriteError> {
         let authors = [options.author.clone()];
@@ -185,6 +194,7 @@ impl ExportSource<'_> {
             joints.push(joint.data.uid);
             node.rest = joint.data.rest.into();
         }
+        self.mark_joints(&mut model);
         let source = AvatarSource { rig: self.rig, built: self.built, joints: &joints };
         hang_half_joints(&mut model, &source);
         put_clips(&mut model, self.rig, self.built, self.modules)?;
