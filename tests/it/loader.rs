@@ -631,6 +631,19 @@ fn a_picture_that_is_not_the_templates_is_replaced_only_if_that_was_said() {
     assert!(fs::read(&texture).unwrap() == b"a texture" && !path.exists() && studio.desk.steps() == steps);
     studio.send(save(true));
     assert!(path.exists() && fs::read(&texture).unwrap() != b"a texture", "{:?}", studio.desk.told());
+    // In the form the tick is for one file.
+    studio.desk.app.insert_resource(TemplateDraft {
+        is_open: true,
+        path: path.display().to_string(),
+        replace: true,
+        ..TemplateDraft::default()
+    });
+    studio.desk.frames(30);
+    let written = fs::metadata(&path).unwrap().modified().unwrap();
+    studio.click("Save template");
+    studio.desk.until("the template", |_| fs::metadata(&path).unwrap().modified().unwrap() != written);
+    studio.settle();
+    assert!(!studio.world().resource::<TemplateDraft>().replace);
     // The template that is open has its own picture, which goes with it.
     let own = SaveTemplate { path: studio.man(), replace: false, content };
     studio.send(own.clone());
