@@ -5,6 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use bevy::{
     asset::UnapprovedPathMode,
     camera::{CameraOutputMode, visibility::RenderLayers},
+    ecs::system::SystemParam,
     prelude::*,
     render::{RenderPlugin, renderer::RenderAdapterInfo, settings::RenderCreation},
     window::{ExitCondition, RequestRedraw, WindowEvent, WindowResolution},
@@ -249,13 +250,32 @@ fn drop_old_modifiers(mut inputs: Query<&mut EguiInput>, mut last: Local<Option<
     }
 }
 
+/// Background work on meshes.
+#[derive(SystemParam)]
+struct RunningJobs<'w, 's> {
+    skinning: Query<'w, 's, &'static SkinningJob>,
+    fits: Query<'w, 's, &'static FitJob>,
+    changes: Query<'w, 's, &'static WeightChangeJob>,
+    pictures: Query<'w, 's, (), Or<(With<DisplayJob>, With<CanvasJob>)>>,
+}
+
+impl RunningJobs<'_, '_> {
+    /// True while something is computed. Results that wait for an undone step come with the event that brings it back.
+    fn are_any(&self) -> bool {
+        !self.pictures.is_empty()
+            || self.skinning.iter().any(|job| !job.waits())
+            || self.fits.iter().any(|job| !job.waits())
+            || self.changes.iter().any(|job| !job.waits())
+    }
+}
+
 /// Keeps the window drawing after an event and while background work runs; otherwise it sleeps until the next event.
 fn keep_drawing(
     mut events: MessageReader<WindowEvent>,
     mut edited: MessageReader<EditReport>,
     mut notices: MessageReader<Notice>,
     loading: Res<LoadJob>,
-    jobs: Query<(), Or<(With<SkinningJob>, With<FitJob>, With<DisplayJob>, With<CanvasJob>, With<WeightChangeJob>)>>,
+    jobs: RunningJobs,
     surfaces: Query<&RigSurface>,
     shapes: Query<&MeasuredShapes>,
     stroke: Res<StrokeTool>,
@@ -267,7 +287,7 @@ fn keep_drawing(
     let told = edited.read().count() + notices.read().count() > 0;
     let surface = surfaces.iter().any(|surface| surface.is_stale() || surface.ready().is_none());
     let busy = loading.what().is_some()
-        || !jobs.is_empty()
+        || jobs.are_any()
         || surface
         || stroke.is_busy()
         || shapes.iter().any(MeasuredShapes::is_busy);

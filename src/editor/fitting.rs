@@ -166,7 +166,9 @@ impl ViewportPainter for FitBar {
                             if ui.button("Cancel").on_hover_text("Esc").clicked() {
                                 requests.send(ActionRequest(Action::Cancel));
                             }
-                            ui.ctx().request_repaint_after_secs(0.1);
+                            if !job.waits() {
+                                ui.ctx().request_repaint_after_secs(0.1);
+                            }
                         }
                         (None, Some(fitted)) => corrections(ui, active.0, fitted, requests),
                         (None, None) => {}

@@ -237,6 +237,11 @@ impl FitJob {
         f32::from_bits(self.progress.load(Ordering::Relaxed))
     }
 
+    /// True if the fit is finished, and waits to be committed.
+    pub fn waits(&self) -> bool {
+        self.held.is_some()
+    }
+
     /// Stops the fit; the rig stays as it was.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);

@@ -3,12 +3,14 @@
 //! A job (weights, a face) starts from a document that people go on editing. Committing its result is a step of the
 //! history, and a step that is committed after an undo cuts off what could be done again. So a result waits while
 //! something can be redone, and while a drag is under way; and it is dropped, with a message, once the joints that it
-//! was computed from are others for good.
+//! was computed from are others for good. Weights are dropped, too, where those of the mesh were painted meanwhile.
+
+use std::sync::Arc;
 
 use bevy::prelude::*;
 
 use super::history::RigHistory;
-use crate::rig::{NodeKind, Rig, Uid};
+use crate::rig::{NodeKind, Rig, SkinData, Uid};
 
 /// Message that the result of a background job waits, because committing it now would discard steps that can be redone.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
@@ -79,6 +81,29 @@ impl JobBasis {
     }
 }
 
+/// State of a document that weights of one mesh are computed for: what they follow from, and the weights that they replace.
+#[derive(Debug, Clone)]
+pub(super) struct BindStart {
+    basis: JobBasis,
+    skin: Option<Arc<SkinData>>,
+}
+
+impl BindStart {
+    /// State of the document as it is now.
+    pub(super) fn of(rig: &Rig, mesh: Uid) -> Self {
+        Self { basis: JobBasis::of(rig, mesh), skin: rig.skin(mesh).cloned() }
+    }
+
+    /// True if the document is in that state. Weights that undo and redo brought back are the same.
+    pub(super) fn holds(&self, rig: &Rig, mesh: Uid) -> bool {
+        let is_same = match (&self.skin, rig.skin(mesh)) {
+            (Some(then), Some(now)) => Arc::ptr_eq(then, now) || then == now,
+            (then, now) => then.is_none() && now.is_none(),
+        };
+        is_same && JobBasis::of(rig, mesh) == self.basis
+    }
+}
+
 /// The decision about a finished job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum JobOutcome {
@@ -86,15 +111,15 @@ pub(super) enum JobOutcome {
     Commit,
     /// The result waits: steps can be redone, or a drag is under way.
     Hold,
-    /// The joints that the result was computed from have changed, and no undone step can restore them.
+    /// What the result was computed from has changed, and no undone step can restore it.
     Drop,
 }
 
-/// Decides about the result of a job that started from `basis`.
-pub(super) fn landing(basis: JobBasis, rig: &Rig, mesh: Uid, history: &RigHistory) -> JobOutcome {
+/// Decides about the result of a job; `is_as_before` tells whether the document is still as the job found it.
+pub(super) fn landing(history: &RigHistory, is_as_before: impl FnOnce() -> bool) -> JobOutcome {
     if history.is_previewing() || history.can_redo() {
         JobOutcome::Hold
-    } else if JobBasis::of(rig, mesh) == basis {
+    } else if is_as_before() {
         JobOutcome::Commit
     } else {
         JobOutcome::Drop

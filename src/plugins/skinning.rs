@@ -36,7 +36,7 @@ use super::{
     configure_sets,
     document::EditRequest,
     history::RigHistory,
-    landing::{HeldResult, JobBasis, JobOutcome, ResultHeld, landing},
+    landing::{BindStart, HeldResult, JobOutcome, ResultHeld, landing},
     limits::{Deadline, LimitError, OutOfTime, RigLimits},
     surface::{RigMesh, SkinOf},
 };
@@ -116,8 +116,11 @@ pub enum SkinningError {
     /// The rig was closed during the computation.
     #[error("the rig was closed meanwhile")]
     Closed,
-    /// The joints were changed during the computation.
-    #[error("the joints were changed while the weights were computed; the weights were dropped: skin the mesh again")]
+    /// The joints, or the weights of the mesh, were changed during the computation.
+    #[error(
+        "the joints or weights were changed while others were computed; the computed weights were dropped: skin the mesh \
+         again"
+    )]
     Changed,
     /// The computation failed or was cancelled.
     #[error(transparent)]
@@ -136,8 +139,8 @@ pub struct SkinningJob {
     progress: Arc<AtomicU32>,
     cancelled: Arc<AtomicBool>,
     task: Task<SkinningResult>,
-    /// Hash of the part of the document that the weights are computed from.
-    basis: JobBasis,
+    /// State of the document that the weights are computed for.
+    start: BindStart,
     /// Finished weights that wait to be committed; see [`landing`](super::landing).
     held: Option<SkinningResult>,
     /// True if a [`BindRequest`] asked for it, which [`BindAnswer`] answers.
@@ -164,7 +167,12 @@ impl SkinningJob {
         f32::from_bits(self.progress.load(Ordering::Relaxed))
     }
 
-    /// Stops the computation; the rig stays as it was.
+    /// True if the weights are finished, and wait to be committed.
+    pub fn waits(&self) -> bool {
+        self.held.is_some()
+    }
+
+    /// Stops the computation, or drops weights that wait; the rig stays as it was.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
@@ -355,7 +363,7 @@ fn start_skinning(
             bound.write(BindAnswer { mesh: request.mesh, result: Err(error.into()) });
             continue;
         }
-        let basis = JobBasis::of(rig, mesh.uid);
+        let start = BindStart::of(rig, mesh.uid);
         let (rig, mesh, request) = (rig.clone(), mesh.clone(), request.clone());
         let built = built.map(|built| built.0.clone());
         let modules = modules.as_deref().map(|modules| modules.0.clone());
@@ -376,7 +384,7 @@ fn start_skinning(
             progress,
             cancelled,
             task,
-            basis,
+            start,
             held: None,
             is_asked: true,
             deadline,
@@ -387,8 +395,8 @@ fn start_skinning(
 fn land_skinning(
     mut commands: Commands,
     mut jobs: Query<(Entity, &mut SkinningJob, &RigMesh, &SkinOf)>,
-    rigs: Query<(&Rig, &RigHistory)>,
-    modules: Option<Res<RigModules>>,
+    rigs: Query<(&Rig, &RigHistory, Option<&BuildResult>)>,
+    (modules, limits): (Option<Res<RigModules>>, Res<RigLimits>),
     mut edits: MessageWriter<EditRequest>,
     mut bound: MessageWriter<BindAnswer>,
     mut held: MessageWriter<ResultHeld>,
@@ -398,6 +406,7 @@ fn land_skinning(
         let late = job.deadline.passed().filter(|_| !was_held);
         let finished = match late {
             Some(late) => Some(Err(late.into())),
+            None if was_held && job.cancelled.load(Ordering::Relaxed) => Some(Err(WeightError::Cancelled.into())),
             None if was_held => job.held.take().map(|held| held.map_err(SkinningError::from)),
             None => check_ready(&mut job.task).map(|result| result.map_err(SkinningError::from)),
         };
@@ -405,7 +414,7 @@ fn land_skinning(
         let result = match (result, rigs.get(of.0)) {
             (Err(error), _) => Err(error),
             (Ok(_), Err(_)) => Err(SkinningError::Closed),
-            (Ok(computed), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
+            (Ok(computed), Ok((rig, history, built))) => match landing(history, || job.start.holds(rig, mesh.uid)) {
                 JobOutcome::Hold => {
                     job.held = Some(Ok(computed));
                     if !was_held && history.can_redo() && job.is_asked {
@@ -413,7 +422,17 @@ fn land_skinning(
                     }
                     continue;
                 }
-                JobOutcome::Drop => Err(SkinningError::Changed),
+                JobOutcome::Drop => {
+                    // Nobody asked for shares of late joints, so nobody would ask again.
+                    let again = built.filter(|_| !job.is_asked);
+                    let again =
+                        again.and_then(|built| late_joints::late_job((rig, built), mesh, modules.as_deref(), &limits));
+                    if let Some(again) = again {
+                        *job = again;
+                        continue;
+                    }
+                    Err(SkinningError::Changed)
+                }
                 JobOutcome::Commit => {
                     let mut changes = Vec::new();
                     if let Some(modules) = &modules {

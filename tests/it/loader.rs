@@ -617,6 +617,42 @@ fn a_template_is_written_with_its_header_and_a_picture() {
 }
 
 #[test]
+fn a_picture_that_is_not_the_templates_is_replaced_only_if_that_was_said() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    // A texture that is called as the character is.
+    let texture = studio.site.join("hero.png");
+    fs::write(&texture, b"a texture").unwrap();
+    let path = studio.site.join("hero.rig.ron");
+    let content = Written::Rig { picture: true };
+    let steps = studio.desk.steps();
+    let save = |replace: bool| SaveTemplate { path: path.clone(), replace, content: content.clone() };
+    studio.send(save(false));
+    assert!(studio.told("a picture hero.png already"), "{:?}", studio.desk.told());
+    assert!(fs::read(&texture).unwrap() == b"a texture" && !path.exists() && studio.desk.steps() == steps);
+    studio.send(save(true));
+    assert!(path.exists() && fs::read(&texture).unwrap() != b"a texture", "{:?}", studio.desk.told());
+    // In the form the tick is for one file.
+    studio.desk.app.insert_resource(TemplateDraft {
+        is_open: true,
+        path: path.display().to_string(),
+        replace: true,
+        ..TemplateDraft::default()
+    });
+    studio.desk.frames(30);
+    fs::write(&texture, b"a texture").unwrap();
+    studio.click("Save template");
+    assert!(fs::read(&texture).unwrap() != b"a texture", "{:?}", studio.desk.told());
+    assert!(!studio.world().resource::<TemplateDraft>().replace);
+    // The template that is open has its own picture, which goes with it.
+    let own = SaveTemplate { path: studio.man(), replace: false, content };
+    studio.send(own.clone());
+    let picture = studio.man().with_file_name("man.png");
+    fs::write(&picture, b"an older picture").unwrap();
+    studio.send(own);
+    assert!(fs::read(&picture).unwrap() != b"an older picture", "{:?}", studio.desk.told());
+}
+
+#[test]
 fn a_template_is_fitted_onto_the_mesh() {
     let mut studio = Studio::new(LoaderPanel::default());
     studio.open(OpenRequest::Model("biped".to_owned()));

@@ -140,7 +140,8 @@ pub(super) fn start(mut requests: MessageReader<SaveTemplate>, mut commands: Com
 fn begin(world: &mut World, SaveTemplate { path, replace, content }: SaveTemplate) {
     let path = completed(&path);
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let may_replace = replace || matches!(content, Written::Rig { .. }) && own_template(world) == Some(path.as_path());
+    let is_own = matches!(content, Written::Rig { .. }) && own_template(world) == Some(path.as_path());
+    let may_replace = replace || is_own;
     if let Some(refused) = refusal(world, &path, &name, may_replace) {
         world.write_message(Notice::error(refused));
         return;
@@ -155,8 +156,15 @@ fn begin(world: &mut World, SaveTemplate { path, replace, content }: SaveTemplat
         }
         Written::Rig { picture: true } => {
             let file = format!("{}.png", stem(&path));
+            let is_named = rig.about().preview.as_ref() == Some(&file);
+            // Textures of a character are often called as it is.
+            if !(replace || is_own && is_named) && path.with_file_name(&file).exists() {
+                let text = format!("There is a picture {file} already: tick Replace, or leave the picture out");
+                world.write_message(Notice::error(text));
+                return;
+            }
             let Some(preview) = Preview::of(world, entity) else { return };
-            if rig.about().preview.as_ref() != Some(&file) {
+            if !is_named {
                 let about = RigAbout { preview: Some(file.clone()), ..rig.about().clone() };
                 world.write_message(header_edit(entity, about));
             }

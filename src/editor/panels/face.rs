@@ -198,7 +198,9 @@ impl FacePanel {
             if ui.add_sized(egui::vec2(ui.available_width(), 24.0), Button::new("Cancel")).clicked() {
                 requests.send(CancelFace(entity));
             }
-            ui.ctx().request_repaint_after_secs(0.05);
+            if !job.waits() {
+                ui.ctx().request_repaint_after_secs(0.05);
+            }
             return;
         }
         let again = self.shown.as_ref().is_some_and(|drawn| !drawn.known.bones.is_empty());

@@ -240,7 +240,9 @@ fn skin_button(ui: &mut Ui, shown: &DisplayedRig, meshes: usize, running: &[&Ski
     if ui.add_sized(egui::vec2(ui.available_width(), 24.0), Button::new("Cancel")).clicked() {
         requests.send(CancelSkinning);
     }
-    ui.ctx().request_repaint_after_secs(0.1);
+    if !running.iter().all(|job| job.waits()) {
+        ui.ctx().request_repaint_after_secs(0.1);
+    }
 }
 
 /// Draws the settings of the computation, folded by default.

@@ -1,4 +1,4 @@
-//! Payloads: steps and rigs as RON, in which weights are named by the hash of their bytes.
+//! Payloads: steps and rigs as RON, in which weights, and large changes of weights, are named by the hash of their bytes.
 
 use std::{
     borrow::Cow,
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::JournalWriteError;
 use crate::rig::{
-    Rig, RigEdit, SkinData, Uid,
+    Rig, RigEdit, SkinData, Uid, WeightPatch,
     skin::{content_hash, skin_data_bytes},
     step::{Step, edits_from_empty},
 };
@@ -18,11 +18,16 @@ use crate::rig::{
 /// Bytes of RON that one record holds at most.
 pub(super) const MAX_TEXT: usize = 64 << 20;
 
+/// Number of points and influences from which on a change of weights is kept as bytes: as text it takes several times as much,
+/// and a stroke over a large mesh would be longer than a record may be.
+const LARGE_PATCH: usize = 1 << 12;
+
 #[derive(Serialize)]
 enum EditRef<'a> {
     Edit(&'a RigEdit),
     Skin(Uid, u64),
     Batch(Vec<EditRef<'a>>),
+    Weights(Uid, PatchRef<'a>),
 }
 
 #[derive(Deserialize)]
@@ -30,6 +35,26 @@ enum EditText {
     Edit(RigEdit),
     Skin(Uid, u64),
     Batch(Vec<EditText>),
+    Weights(Uid, PatchText),
+}
+
+/// A large [`WeightPatch`].
+#[derive(Serialize)]
+struct PatchRef<'a> {
+    kept: u32,
+    added: &'a [(Uid, Option<Uid>)],
+    /// First point, and the distance of each further one from that before it.
+    points: Vec<u32>,
+    /// Hash of the influences.
+    rows: u64,
+}
+
+#[derive(Deserialize)]
+struct PatchText {
+    kept: u32,
+    added: Vec<(Uid, Option<Uid>)>,
+    points: Vec<u32>,
+    rows: u64,
 }
 
 #[derive(Serialize)]
@@ -82,13 +107,31 @@ impl SkinsOut {
         if let Some((_, hash)) = self.seen.get(&address) {
             return Ok(*hash);
         }
+        let hash = self.keep(skin)?;
+        self.seen.insert(address, (Arc::downgrade(skin), hash));
+        Ok(hash)
+    }
+
+    /// Hash of weights, whose bytes are to be written unless they are already.
+    fn keep(&mut self, skin: &SkinData) -> Result<u64, JournalWriteError> {
         let bytes = skin_data_bytes(skin).ok_or(JournalWriteError::Weights)?;
         let hash = content_hash(&bytes);
-        self.seen.insert(address, (Arc::downgrade(skin), hash));
         if self.known.insert(hash) {
             self.fresh.push((hash, bytes));
         }
         Ok(hash)
+    }
+
+    /// A large change of weights; `None` for one that is text.
+    fn patch<'a>(&mut self, patch: &'a WeightPatch) -> Result<Option<PatchRef<'a>>, JournalWriteError> {
+        let WeightPatch { kept, added, points, rows } = patch;
+        if points.len() + rows.joints.len() < LARGE_PATCH || !points.is_sorted() {
+            return Ok(None);
+        }
+        let mut last = 0;
+        let points = points.iter().map(|point| point - std::mem::replace(&mut last, *point)).collect();
+        let rows = self.keep(&SkinData { weights: rows.clone(), ..SkinData::default() })?;
+        Ok(Some(PatchRef { kept: *kept, added, points, rows }))
     }
 
     fn edits<'a>(&mut self, edits: &'a [RigEdit]) -> Result<Vec<EditRef<'a>>, JournalWriteError> {
@@ -99,6 +142,10 @@ impl SkinsOut {
         Ok(match edit {
             RigEdit::SetSkin(mesh, Some(skin)) => EditRef::Skin(*mesh, self.name(skin)?),
             RigEdit::Batch(edits) => EditRef::Batch(self.edits(edits)?),
+            RigEdit::SetWeights(mesh, patch) => match self.patch(patch)? {
+                Some(patch) => EditRef::Weights(*mesh, patch),
+                None => EditRef::Edit(edit),
+            },
             edit => EditRef::Edit(edit),
         })
     }
@@ -183,5 +230,16 @@ fn edit(text: EditText, skins: &SkinsIn) -> Option<RigEdit> {
         EditText::Edit(edit) => edit,
         EditText::Skin(mesh, hash) => RigEdit::SetSkin(mesh, Some(skins.get(&hash)?.clone())),
         EditText::Batch(list) => RigEdit::Batch(edits(list, skins)?),
+        EditText::Weights(mesh, patch) => RigEdit::SetWeights(mesh, Box::new(weight_patch(patch, skins)?)),
     })
+}
+
+fn weight_patch(PatchText { kept, added, points, rows }: PatchText, skins: &SkinsIn) -> Option<WeightPatch> {
+    let mut last = 0_u32;
+    let sum = |step: u32| {
+        last = last.checked_add(step)?;
+        Some(last)
+    };
+    let points = points.into_iter().map(sum).collect::<Option<Vec<u32>>>()?;
+    Some(WeightPatch { kept, added, points, rows: skins.get(&rows)?.weights.clone() })
 }

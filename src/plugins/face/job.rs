@@ -84,6 +84,11 @@ impl FaceJob {
         steps.last().map(|(step, _)| *step)
     }
 
+    /// True if the face is finished, and waits to be placed.
+    pub fn waits(&self) -> bool {
+        self.held.is_some()
+    }
+
     /// Cancels the job; the rig stays unchanged.
     pub fn cancel(&self) {
         self.progress.cancelled.store(true, Ordering::Relaxed);
@@ -255,7 +260,7 @@ pub(super) fn land(
         };
         let Some(finished) = finished else { continue };
         let result = match (finished, rigs.get(of.0)) {
-            (Ok(done), Ok((rig, history))) => match landing(job.basis, rig, mesh.uid, history) {
+            (Ok(done), Ok((rig, history))) => match landing(history, || JobBasis::of(rig, mesh.uid) == job.basis) {
                 JobOutcome::Commit => Ok(done),
                 JobOutcome::Drop => Err(PlaceFaceError::Changed),
                 JobOutcome::Hold => {

@@ -1,6 +1,6 @@
 //! Changes of all weights of a mesh: worked out in a task, committed as one step.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use bevy::{
     prelude::*,
@@ -13,6 +13,7 @@ use crate::{
         paint::{PruneError, PruneSettings, keep_locked, normalised, pruned},
         transfer::{TransferError, TransferMesh, TransferSettings, transfer_weights},
     },
+    mesh::model::Model,
     plugins::{
         document::EditRequest,
         history::RigHistory,
@@ -79,8 +80,10 @@ pub enum WeightChangeError {
     /// A mesh is to be copied to itself, or from another rig.
     #[error("weights are copied from another mesh of the same rig; choose one")]
     OtherRig,
-    /// The weights were changed during the computation.
-    #[error("the weights were changed meanwhile and stay as they are now; do it again")]
+    /// The weights, their locks or the mesh were changed during the computation.
+    #[error(
+        "the weights, their locks or the mesh were changed meanwhile; the weights stay as they are now: do it again"
+    )]
     Changed,
     /// Another change of the same mesh is being worked out.
     #[error("the weights of the mesh are being changed already; wait for it")]
@@ -100,8 +103,18 @@ pub struct WeightChangeJob {
     task: Task<ChangedSkin>,
     /// Weights that the change started from.
     from: Option<Arc<SkinData>>,
+    /// Mesh and locked joints that it started from.
+    rest: Arc<Model>,
+    locked: BTreeSet<Uid>,
     /// Finished change that waits to be committed.
     held: Option<ChangedSkin>,
+}
+
+impl WeightChangeJob {
+    /// True if the change is finished, and waits to be committed.
+    pub fn waits(&self) -> bool {
+        self.held.is_some()
+    }
 }
 
 /// Changed weights: the edit and the number of points that it changes, or nothing to do.
@@ -129,6 +142,7 @@ pub(super) fn start(
             continue;
         }
         let from = rig.skin(mesh.uid).cloned();
+        let (rest, locked) = (mesh.rest.clone(), locked_joints(rig));
         let task = match change {
             WeightChange::CopyFrom(source) => {
                 let other = meshes.get(*source).ok().filter(|(_, other, _)| other.0 == of.0 && source != entity);
@@ -154,8 +168,14 @@ pub(super) fn start(
             }
         };
         begun.push(*entity);
-        commands.entity(*entity).try_insert(WeightChangeJob { change: *change, task, from, held: None });
+        let job = WeightChangeJob { change: *change, task, from, rest, locked, held: None };
+        commands.entity(*entity).try_insert(job);
     }
+}
+
+/// Joints whose weights are locked.
+fn locked_joints(rig: &Rig) -> BTreeSet<Uid> {
+    rig.walk().filter(|joint| joint.data.locked).map(|joint| joint.data.uid).collect()
 }
 
 /// Joints of weights with the nodes that commands made them for.
@@ -223,9 +243,12 @@ pub(super) fn land(
         let was_held = job.held.is_some();
         let finished = if was_held { job.held.take() } else { check_ready(&mut job.task) };
         let Some(changed) = finished else { continue };
-        let is_same = |now: Option<&Arc<SkinData>>| match (now, &job.from) {
-            (Some(now), Some(then)) => Arc::ptr_eq(now, then),
-            (now, then) => now.is_none() && then.is_none(),
+        let is_same = |rig: &Rig| {
+            let has_same_weights = match (rig.skin(mesh.uid), &job.from) {
+                (Some(now), Some(then)) => Arc::ptr_eq(now, then),
+                (now, then) => now.is_none() && then.is_none(),
+            };
+            has_same_weights && Arc::ptr_eq(&mesh.rest, &job.rest) && locked_joints(rig) == job.locked
         };
         let result = match (changed, rigs.get(of.0)) {
             (_, Err(_)) => Err(WeightChangeError::NoRig),
@@ -239,7 +262,7 @@ pub(super) fn land(
                 }
                 continue;
             }
-            (Ok(Some(_)), Ok((rig, _))) if !is_same(rig.skin(mesh.uid)) => Err(WeightChangeError::Changed),
+            (Ok(Some(_)), Ok((rig, _))) if !is_same(rig) => Err(WeightChangeError::Changed),
             (Ok(Some((edit, count))), Ok(_)) => {
                 let operation = Operation::Named { name: job.change.name(), edits: vec![edit] };
                 commands.write_message(EditRequest::operation(of.0, operation));

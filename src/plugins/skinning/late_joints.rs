@@ -14,7 +14,7 @@ use crate::{
     plugins::{
         commands::{BuildResult, RigModules},
         document::EditReport,
-        landing::JobBasis,
+        landing::BindStart,
         limits::{Deadline, RigLimits},
         surface::{RigMesh, SkinOf},
     },
@@ -50,23 +50,31 @@ pub(super) fn start_late_shares(
     for rig_entity in switched {
         let Ok((rig, built)) = rigs.get(rig_entity) else { continue };
         for (entity, mesh, _) in meshes.iter().filter(|(_, _, of)| of.0 == rig_entity) {
-            let Some(skin) = rig.skin(mesh.uid).filter(|skin| skin.at_rest && lacks_joints(rig, &built.0, skin)) else {
-                continue;
-            };
-            let basis = JobBasis::of(rig, mesh.uid);
-            let (rig, built, mesh) = (rig.clone(), Arc::clone(&built.0), mesh.clone());
-            let skin = Arc::clone(skin);
-            let modules = modules.as_deref().map(|modules| modules.0.clone());
-            let task = AsyncComputeTaskPool::get().spawn(async move {
-                let input = SkinningInput::new(&rig, Some(&built), modules.as_deref(), &mesh, &[]);
-                Ok(input.late_shares(&mesh, &skin))
-            });
-            let (progress, cancelled) = (Arc::new(AtomicU32::new(0)), Arc::new(AtomicBool::new(false)));
-            let deadline = Deadline::new(&limits);
-            let job = SkinningJob { progress, cancelled, task, basis, held: None, is_asked: false, deadline };
-            commands.entity(entity).insert(job);
+            if let Some(job) = late_job((rig, built), mesh, modules.as_deref(), &limits) {
+                commands.entity(entity).insert(job);
+            }
         }
     }
+}
+
+/// The job for a mesh whose weights lack joints that are built now; `None` where they lack none.
+pub(super) fn late_job(
+    (rig, built): (&Rig, &BuildResult),
+    mesh: &RigMesh,
+    modules: Option<&RigModules>,
+    limits: &RigLimits,
+) -> Option<SkinningJob> {
+    let skin = rig.skin(mesh.uid).filter(|skin| skin.at_rest && lacks_joints(rig, &built.0, skin))?;
+    let start = BindStart::of(rig, mesh.uid);
+    let (rig, built, mesh, skin) = (rig.clone(), Arc::clone(&built.0), mesh.clone(), Arc::clone(skin));
+    let modules = modules.map(|modules| modules.0.clone());
+    let task = AsyncComputeTaskPool::get().spawn(async move {
+        let input = SkinningInput::new(&rig, Some(&built), modules.as_deref(), &mesh, &[]);
+        Ok(input.late_shares(&mesh, &skin))
+    });
+    let (progress, cancelled) = (Arc::new(AtomicU32::new(0)), Arc::new(AtomicBool::new(false)));
+    let deadline = Deadline::new(limits);
+    Some(SkinningJob { progress, cancelled, task, start, held: None, is_asked: false, deadline })
 }
 
 /// True if a step enables a command, a feature or a local group.

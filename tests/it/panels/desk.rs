@@ -40,6 +40,8 @@ pub struct Desk {
     pub deaf: bool,
     /// True if the last frame asked for another one at once.
     pub awake: bool,
+    /// Time after which the last frame asked for another one.
+    pub wakes_in: std::time::Duration,
 }
 
 /// A widget.
@@ -83,6 +85,7 @@ impl Desk {
             shapes: 0,
             deaf: false,
             awake: false,
+            wakes_in: std::time::Duration::MAX,
         };
         desk.frame();
         desk
@@ -121,6 +124,8 @@ impl Desk {
             self.app.insert_resource(window);
         }
         self.shapes = output.shapes.len();
+        let delays = output.viewport_output.values().map(|viewport| viewport.repaint_delay);
+        self.wakes_in = delays.min().unwrap_or(std::time::Duration::MAX);
         self.awake = output.viewport_output.values().any(|viewport| viewport.repaint_delay.is_zero());
         output.textures_delta.clear();
         if let Some(update) = output.platform_output.accesskit_update {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy::prelude::*;
-use bevy_egui::egui::Key;
+use bevy_egui::egui::{Key, pos2};
 use rigsmith::{
     algo::paint::{BrushMode, BrushReach, FalloffCurve},
     editor::{
@@ -11,9 +11,12 @@ use rigsmith::{
         tools::paint::{SelectedPoints, brush::PaintBrush},
     },
     mesh::model::Weights,
-    plugins::painting::WeightChangeJob,
+    plugins::{
+        commands::{BuildRequest, BuildStep},
+        painting::WeightChangeJob,
+    },
     prelude::*,
-    rig::{SkinData, skin::skin_data_bytes},
+    rig::{SkinData, TagKind, operations::TagOperation, skin::skin_data_bytes},
 };
 
 use super::desk::Desk;
@@ -222,6 +225,39 @@ fn what_cannot_be_done_is_grey_or_told() {
 }
 
 /// Names of everything that can be clicked, dragged or typed into, in a window of the least size that is supported.
+#[test]
+fn the_joints_are_those_of_the_last_build() {
+    let (mut desk, joints) = desk();
+    let kind = TagKind::Command { module: "insert_joints".to_owned(), feature: None, params: "()".to_owned() };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: vec![joints[0]], kind, index: None }));
+    let listed = |desk: &mut Desk, step: BuildStep| {
+        desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step });
+        desk.frames(4);
+        desk.seen.iter().filter(|seen| seen.label.starts_with("Lock weights of ")).count()
+    };
+    assert_eq!(listed(&mut desk, BuildStep::All), 3, "the inserted joint is there");
+    assert_eq!(listed(&mut desk, BuildStep::RollBack), 2, "it is gone, though the rig has not changed");
+    assert_eq!(listed(&mut desk, BuildStep::All), 3);
+}
+
+#[test]
+fn the_panel_rests_while_a_change_waits_for_an_undone_step() {
+    let (mut desk, joints) = desk();
+    let offset = PoseOffset { translation: Vec3::X, ..PoseOffset::default() };
+    desk.edit(Operation::Pose(vec![(joints[0], offset)]));
+    desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
+    desk.frames(3);
+    desk.click("Normalise");
+    crate::bench::wait(&mut desk, "the change", Desk::frame, |desk| {
+        let jobs = desk.app.world().try_query::<&WeightChangeJob>();
+        jobs.is_some_and(|mut jobs| jobs.iter(desk.app.world()).any(WeightChangeJob::waits))
+    });
+    desk.move_to(pos2(1.0, 1599.0));
+    desk.frames(60);
+    assert!(desk.says("The weights of the mesh are being changed."));
+    assert!(desk.wakes_in > std::time::Duration::from_secs(1), "it is drawn again after {:?}", desk.wakes_in);
+}
+
 #[test]
 fn every_widget_has_a_name_at_the_least_size() {
     let (mut desk, _) = desk();

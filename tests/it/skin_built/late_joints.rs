@@ -10,6 +10,7 @@ use rigsmith::{
         commands::{BuildRequest, BuildStep},
         document::{Change, EditRequest},
         history::RigHistory,
+        painting::{PaintableJoint, row_edit},
         skinning::SkinningJob,
     },
     rig::{
@@ -120,4 +121,38 @@ fn joints_that_are_switched_on_take_their_shares() {
         change(&mut bench, Change::Do(Operation::Edits(on)));
         assert_eq!((steps(&mut bench), bench.weights()), (done + 4, Some(&after)), "{feature}");
     }
+}
+
+/// Weights that are painted while the shares are computed are not lost, and get their shares then.
+#[test]
+fn painted_weights_get_their_shares_too() {
+    let mut bench = app("twist");
+    let (mesh, before) = bench.rig().skins().map(|(mesh, skin)| (mesh, skin.clone())).next().unwrap();
+    let head = bench.rig().find_label("head").unwrap();
+    let number = before.joints.iter().position(|joint| *joint == head).unwrap() as u32;
+    let is_other = |point: &u32| before.weights.of(*point as usize).all(|(joint, _)| joint != number);
+    let point = (0..before.weights.len() as u32).find(is_other).unwrap();
+    let joint = PaintableJoint { uid: head, subject: None };
+    let painted = row_edit(bench.rig(), (mesh, &before), joint, [point], 1.0).unwrap();
+    let (rig, done) = (bench.rig_entity(), steps(&mut bench));
+    let edits = switch(bench.rig(), "twist", true);
+    for change in [Change::Do(Operation::Edits(edits)), Change::Preview(painted)] {
+        bench.app_mut().world_mut().write_message(EditRequest { rig, change });
+        bench.app_mut().update();
+    }
+    let waits = |bench: &mut Workbench| {
+        let world = bench.app_mut().world_mut();
+        world.query::<&SkinningJob>().single(world).expect("the shares wait for the end of the stroke").waits()
+    };
+    while !waits(&mut bench) {
+        bench.app_mut().update();
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    change(&mut bench, Change::Commit);
+    assert_eq!(steps(&mut bench), done + 3, "the switch, the stroke, and the shares");
+    let after = bench.weights().unwrap();
+    assert!(after.joints.iter().any(|joint| !before.joints.contains(joint)), "the new joints have shares");
+    let row: Vec<(Uid, f32)> =
+        after.weights.of(point as usize).map(|(joint, weight)| (after.joints[joint as usize], weight)).collect();
+    assert_eq!(row, [(head, 1.0)], "the stroke stays");
 }

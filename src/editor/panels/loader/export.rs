@@ -80,7 +80,7 @@ impl ExportForm {
         ui.checkbox(&mut next.picture, "Picture from the viewport").on_hover_text("A .png beside the template");
         ui.checkbox(&mut next.replace, "Replace").on_hover_text("Replaces a file that is there");
         let file = next.file(world);
-        let replace = next.replace;
+        let (replace, mut is_sent) = (next.replace, false);
         ui.horizontal_wrapped(|ui| {
             let can = !shown.rig.is_empty();
             let tip = "Header, groups, joints, tags, features and parts, as a .rig.ron";
@@ -88,6 +88,7 @@ impl ExportForm {
             if save.on_disabled_hover_text("There are no joints").clicked() {
                 let content = Written::Rig { picture: next.picture };
                 requests.send(SaveTemplate { path: file.clone(), replace, content });
+                is_sent = true;
             }
             let joints = shown.selection.0.clone();
             let tip = "The selected joints with their tags, as a part of their own";
@@ -98,8 +99,11 @@ impl ExportForm {
                 let is_typed = !next.path.trim().is_empty();
                 let path = if is_typed { file } else { file.with_file_name(format!("{first}.rig.ron")) };
                 requests.send(SaveTemplate { path, replace, content: Written::Joints(joints) });
+                is_sent = true;
             }
         });
+        // The next file is another one, or has been written just now.
+        next.replace &= !is_sent;
         if next != *draft {
             requests.set(next);
         }

@@ -1,6 +1,6 @@
 //! The joints that move a mesh, with their colours and locks.
 
-use bevy::prelude::*;
+use bevy::{ecs::change_detection::Tick, prelude::*};
 use bevy_egui::egui::{
     Align, Checkbox, Color32, CornerRadius, Layout, Rect, Sense, Ui, UiBuilder, WidgetInfo, WidgetType, vec2,
 };
@@ -27,7 +27,7 @@ use crate::{
 /// List of joints.
 #[derive(Default)]
 pub(super) struct JointList {
-    made_from: Option<(Stamp, bool)>,
+    made_from: Option<(Stamp, Option<Tick>)>,
     joints: Vec<ListedJoint>,
     filter: String,
     /// Joint that was last scrolled into view.
@@ -77,8 +77,8 @@ impl JointList {
 
     /// Lists the joints again after a change of the rig.
     fn refresh(&mut self, world: &World, shown: &DisplayedRig) {
-        let built = world.get::<BuildResult>(shown.entity);
-        let key = (shown.stamp(), built.is_some());
+        let built = world.get_entity(shown.entity).ok().and_then(|rig| rig.get_ref::<BuildResult>());
+        let key = (shown.stamp(), built.as_ref().map(|built| built.last_changed()));
         if self.made_from == Some(key) {
             return;
         }

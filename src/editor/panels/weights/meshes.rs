@@ -52,7 +52,8 @@ impl MeshForm {
                 *chosen = Some(next);
             }
         }
-        let is_busy = world.get::<WeightChangeJob>(entity).is_some();
+        let job = world.get::<WeightChangeJob>(entity);
+        let is_busy = job.is_some();
         let obstacle = if is_busy {
             Some("The weights of the mesh are being changed.")
         } else {
@@ -75,7 +76,7 @@ impl MeshForm {
         if let Some(obstacle) = obstacle {
             ui.weak(obstacle);
         }
-        if is_busy {
+        if job.is_some_and(|job| !job.waits()) {
             ui.ctx().request_repaint_after_secs(0.1);
         }
     }
