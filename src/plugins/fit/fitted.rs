@@ -46,6 +46,8 @@ pub struct FittedRig {
     /// Step of the fit; `None` if it changed nothing.
     pub(super) step: Option<Arc<Step>>,
     pub(super) states: Vec<FitState>,
+    /// Number of states whose steps are in effect.
+    pub(super) applied: usize,
     /// Fit that could be corrected until this one took its place.
     pub(super) replaced: Option<Arc<FittedRig>>,
 }
@@ -133,14 +135,18 @@ impl FittedRig {
     /// Notes the present report and markers as those after a correction.
     pub(super) fn note(&mut self, step: &Arc<Step>) {
         let state = FitState { step: step.clone(), report: self.report.clone(), markers: self.markers.clone() };
+        // Undone corrections can no longer be redone.
+        self.states.truncate(self.applied);
         self.states.push(state);
         let old = self.states.len().saturating_sub(MOST_STATES);
         self.states.drain(..old);
+        self.applied = self.states.len();
     }
 
     /// Takes back a correction that was undone. A joint that is still where a marker has put it keeps the marker.
     pub(super) fn go_back(&mut self, step: &Arc<Step>, is_there: impl Fn(Uid, Vec3) -> bool) {
         let at = self.states.iter().position(|state| Arc::ptr_eq(&state.step, step));
+        self.applied = at.unwrap_or(0);
         let undone = std::mem::take(&mut self.markers);
         let before = at.and_then(|at| at.checked_sub(1)).and_then(|at| self.states.get(at));
         (self.report, self.markers) = match before {
@@ -154,7 +160,9 @@ impl FittedRig {
 
     /// Brings back a correction that was redone.
     pub(super) fn go_on(&mut self, step: &Arc<Step>) {
-        let Some(state) = self.states.iter().find(|state| Arc::ptr_eq(&state.step, step)) else { return };
+        let Some(at) = self.states.iter().position(|state| Arc::ptr_eq(&state.step, step)) else { return };
+        let state = &self.states[at];
+        self.applied = at + 1;
         (self.report, self.markers) = (state.report.clone(), state.markers.clone());
     }
 
@@ -162,6 +170,7 @@ impl FittedRig {
     pub(super) fn reopened(&self, rig: &Rig, replaced: Option<FittedRig>) -> Self {
         let mut fitted = self.clone();
         (fitted.report, fitted.markers) = (self.first.clone(), self.begun.clone());
+        fitted.applied = 0;
         fitted.places = fitted.places_in(rig);
         fitted.replaced = replaced.map(Arc::new);
         fitted

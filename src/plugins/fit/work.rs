@@ -180,6 +180,7 @@ impl Work {
             before: None,
             step: None,
             states: Vec::new(),
+            applied: 0,
             replaced: None,
         };
         let target = fitted.target(&self.modules)?;
