@@ -33,7 +33,8 @@ fn a_part_is_fitted_into_a_box() {
     for (corners, ending) in [("0.5,0.7,-0.5,2,1.3,0.5", "_l"), ("-0.5,0.7,-0.5,-2,1.3,0.5", "_r")] {
         let mut texts = Vec::new();
         for part in ["parts/hand", "parts/hand.rig.ron", file.as_str()] {
-            let fitted = run(&["--json", "fit", &body(), "--template", part, "--region", corners, "-o", "hand.rig.ron"]);
+            let fitted =
+                run(&["--json", "fit", &body(), "--template", part, "--region", corners, "-o", "hand.rig.ron"]);
             assert_eq!(fitted.code, 0, "{part}: {}", fitted.err);
             assert_eq!(fitted.json()["joints"].as_array().unwrap().len(), 16);
             texts.push(std::fs::read_to_string(folder.path().join("hand.rig.ron")).unwrap());

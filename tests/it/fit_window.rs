@@ -550,10 +550,7 @@ fn selected_joints_are_fitted_alone() {
 
 #[test]
 fn faces_are_chosen_by_clicks_and_boxes() {
-    let model = crate::gestures::boxes(&[
-        [[-0.5, 0.5, -0.1], [-0.3, 0.7, 0.1]],
-        [[0.3, 0.5, -0.1], [0.5, 0.7, 0.1]],
-    ]);
+    let model = crate::gestures::boxes(&[[[-0.5, 0.5, -0.1], [-0.3, 0.7, 0.1]], [[0.3, 0.5, -0.1], [0.5, 0.7, 0.1]]]);
     let all = model.point_triangles().len();
     let mut window = Window::new(model);
     window.act(Action::FitPart);
