@@ -57,7 +57,7 @@ pub struct FittedRig {
 pub(super) enum FitExtent {
     /// All joints of the rig, or of a template in an empty one.
     Skeleton,
-    /// Some joints of the rig.
+    /// Joints that were chosen, of the rig.
     Joints,
     /// Joints that the fit adds.
     Part(AddedPart),
