@@ -52,7 +52,8 @@ pub use load::{
     load_skin, load_template, stem,
 };
 pub use parts::{
-    BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartFileError, PartFiles, bundled_characters, bundled_parts,
+    BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartFileError, PartFiles, bundled_characters, bundled_part,
+    bundled_parts,
 };
 pub use project::{
     LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote,

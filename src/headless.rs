@@ -29,7 +29,7 @@ use crate::{
             ExpressError, ExpressRequest, ExpressionAnswer, Face, FaceExpressions, FaceJob, FacePlaced,
             FacePreparation, FaceReport, FaceRequest, FaceShape, PlaceFaceError, arkit_shapes,
         },
-        fit::{FitAnswer, FitFailure, FitJob, FitReport, FitRequest, FitTemplates},
+        fit::{FitAnswer, FitFailure, FitJob, FitParts, FitReport, FitRequest, FitTemplates},
         gesture::{Gesture, GestureAnswer, GestureScript},
         limits::{Limit, RigLimits},
         skinning::{BindAnswer, BindRequest, MeshPart, PartBinding, SkinningError, SkinningJob, SkinningReport},
@@ -261,6 +261,11 @@ impl Workbench {
     /// Offers templates that fits may choose.
     pub fn offer_templates(&mut self, templates: FitTemplates) {
         self.app.insert_resource(templates);
+    }
+
+    /// Offers parts that fits may name.
+    pub fn offer_parts(&mut self, parts: FitParts) {
+        self.app.insert_resource(parts);
     }
 
     /// Fits a template to the mesh. `ask` completes the request; `progress` is called with the finished share, 0 to 1.

@@ -39,6 +39,7 @@
 //! | [`surface::RigMeshes`] | Bevy, as the other side of a relation | write [`surface::SkinOf`] instead |
 //! | [`runtime::DrivenMorphs`] | whoever binds a mesh; its weights by the rig | drives other morph targets; weights are overwritten |
 //! | [`face::Face`], [`fit::FittedRig`] | the analysis of a mesh and the fit | opaque; taking it off ends expressions, or corrections of the fit |
+//! | [`fit::FitMarkers`] | corrections of a fit, undo and redo | the next fit starts from them; taking it off forgets them |
 //! | [`RigInstance`](crate::instance::RigInstance), [`RigSource`](crate::instance::RigSource), [`ExposedNodes`](crate::instance::ExposedNodes), `SharedMesh` (feature `draw`) | games | another template or other nodes are spawned; taking it off despawns what came of it |
 //! | [`RunningTemplate`](crate::instance::RunningTemplate), [`UpdateOffer`](crate::instance::UpdateOffer), [`BoundTo`](crate::instance::BoundTo) | instances | opaque; stands until the template, the offer or the mesh changes |
 

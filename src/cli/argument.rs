@@ -14,6 +14,9 @@ pub(super) enum ArgumentError {
     /// The value has to name a joint and its place.
     #[error("write LABEL=X,Y,Z, such as hand_l=0.5,1.1,0.2")]
     NoMarker,
+    /// The value has to name a part of the mesh or give the corners of a box.
+    #[error("write the name of an object or a bone, or two corners X,Y,Z,X,Y,Z, such as 0.5,0.7,-0.5,2,1.3,0.5")]
+    NoRegion,
     /// The value has to name an expression and its strength.
     #[error("write NAME=STRENGTH, such as happiness=0.8")]
     NoStrength,

@@ -19,20 +19,29 @@ use super::{
 };
 use crate::{
     algo::fit_template::FitSymmetry,
-    files::{BUNDLED_CHARACTERS, FileKind, RealDisk, bundled_characters, stem, store_model, store_rig},
+    files::{BUNDLED_CHARACTERS, FileKind, RealDisk, bundled_characters, bundled_part, stem, store_model, store_rig},
     headless::Workbench,
+    mesh::model::Model,
     plugins::{
         commands::BuildStep,
-        fit::{FitReport, FitTemplate, FitTemplates},
+        fit::{
+            FitPart, FitParts, FitRegion, FitReport, FitTemplate, FitTemplates,
+            region::{triangles_held, triangles_in_box},
+        },
     },
+    rig::part::Part,
 };
+
+/// Kind of templates that are parts.
+const PART: &str = "part";
 
 /// Arguments of `rigsmith fit`.
 #[derive(Args, Debug)]
 pub(super) struct FitArgs {
     /// The mesh: .obj, .gltf, .glb or .vrm; a skeleton in it is ignored
     pub mesh: PathBuf,
-    /// The template: biped, quadruped, bird or a .rig.ron; the one whose limbs the mesh shows if left out
+    /// The template: biped, quadruped, bird, a part such as parts/hand, or a .rig.ron; the one whose limbs the mesh shows if
+    /// left out. A part is mirrored where the mesh shows the other side
     #[arg(long, value_name = "NAME|FILE")]
     template: Option<PathBuf>,
     /// Up direction in the mesh: x, y, z, -x, -y or -z; found if left out
@@ -50,6 +59,10 @@ pub(super) struct FitArgs {
     /// Fit into one object of the mesh only, by its name; may be repeated
     #[arg(long = "object", value_name = "NAME")]
     objects: Vec<String>,
+    /// Fit into a part of the mesh only: an object or a bone of the file's skin (with those below it) by its name, or a box by
+    /// two corners; may be repeated
+    #[arg(long = "region", value_name = "NAME|X,Y,Z,X,Y,Z", value_parser = region, allow_hyphen_values = true)]
+    regions: Vec<RegionArg>,
     /// Output file: the fitted template as .rig.ron, the skinned character as .glb or .gltf, an avatar in VRM 1.0 as .vrm, or
     /// a picture as .png
     #[arg(short, long)]
@@ -86,6 +99,28 @@ fn marker(text: &str) -> Result<(String, Vec3), ArgumentError> {
     Ok((label.trim().to_owned(), place.into()))
 }
 
+/// Part of a mesh to fit into.
+#[derive(Debug, Clone)]
+enum RegionArg {
+    /// An object, or a bone of the file's skin.
+    Name(String),
+    /// Two corners of a box.
+    Box([Vec3; 2]),
+}
+
+fn region(text: &str) -> Result<RegionArg, ArgumentError> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([a, b, c, d, e, f]) => {
+            let corners = [Vec3::new(*a, *b, *c), Vec3::new(*d, *e, *f)];
+            let is_finite = corners.iter().all(|corner| corner.is_finite());
+            is_finite.then_some(RegionArg::Box(corners)).ok_or(ArgumentError::NoRegion)
+        }
+        Some([_, _, ..]) => Err(ArgumentError::NoRegion),
+        _ => Ok(RegionArg::Name(text.to_owned())),
+    }
+}
+
 pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
     let is_picture = args.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
     #[cfg(feature = "render")]
@@ -98,23 +133,29 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
         return Err(Failure::Usage(text));
     }
     args.vrm.check(Some(&args.output))?;
-    let file = args.template.as_deref().filter(|name| name.to_str().and_then(bundled_name).is_none());
+    let is_bundled = |name: &str| bundled_name(name).is_some();
+    let is_part = |name: &str| bundled_part(name).is_some();
+    let file = args.template.as_deref().filter(|name| {
+        let text = name.to_str().unwrap_or_default();
+        !is_bundled(text) && (name.exists() || !is_part(text))
+    });
     let inputs: Vec<&Path> = [Some(args.mesh.as_path()), file].into_iter().flatten().collect();
     args.in_place.check(&inputs, Some(&args.output), &[])?;
     let mut report = Report::default();
     let template = template(args, &mut report)?;
     let model = spinning("reading the mesh", || limits::load_model(&args.mesh))?;
     report.notes(model.notes.iter().cloned());
-    let objects = objects(args, &model)?;
+    let region = chosen_region(args, &model)?;
     let mut bench = limits::empty_workbench(&stem(&args.mesh));
     bench.open(model, true)?;
     bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));
+    bench.offer_parts(FitParts(Arc::new(bundled_part)));
     let mut progress = Progress::new("fitting");
     let fitted = bench.fit(
         |request| {
             request.template = template;
             (request.up, request.forward, request.markers) = (args.up, args.forward, args.markers.clone());
-            request.objects = objects;
+            request.region = region;
             request.symmetry = match args.symmetry {
                 SymmetryArg::Auto => FitSymmetry::Auto,
                 SymmetryArg::On => FitSymmetry::On,
@@ -155,22 +196,68 @@ fn bundled_name(name: &str) -> Option<&'static str> {
 
 fn template(args: &FitArgs, report: &mut Report) -> Result<FitTemplate, Failure> {
     let Some(file) = &args.template else { return Ok(FitTemplate::Choose) };
-    if let Some(name) = file.to_str().and_then(bundled_name) {
+    let name = file.to_str().unwrap_or_default();
+    if let Some(name) = bundled_name(name) {
         return Ok(FitTemplate::Named(name.to_owned()));
     }
-    let template = limits::load_template(file)?;
-    report.notes(template.notes);
-    Ok(FitTemplate::Rig(Arc::new(template.rig)))
+    // A file of one's own goes before a part that comes with the program.
+    let known = if file.exists() { None } else { bundled_part(name) };
+    let part = match known {
+        Some(part) => part,
+        None => {
+            let template = limits::load_template(file)?;
+            report.notes(template.notes.iter().cloned());
+            if template.rig.about().kind != PART {
+                return Ok(FitTemplate::Rig(Arc::new(template.rig)));
+            }
+            Arc::new(Part::from(template))
+        }
+    };
+    Ok(FitTemplate::Part { part: FitPart::Given(part), parent: None })
 }
 
-fn objects(args: &FitArgs, model: &crate::mesh::model::Model) -> Result<Vec<usize>, Failure> {
-    let number = |name: &String| {
-        model.objects.iter().position(|object| object.name == *name).ok_or_else(|| {
-            let names: Vec<&str> = model.objects.iter().map(|object| object.name.as_str()).collect();
-            Failure::Input(format!("--object: the mesh has no object \"{name}\"; it has: {}", names.join(", ")).into())
-        })
+fn chosen_region(args: &FitArgs, model: &Model) -> Result<FitRegion, Failure> {
+    let object = |name: &String| model.objects.iter().position(|object| object.name == *name);
+    let known = |option: &str, name: &str, bones: bool| {
+        let objects = model.objects.iter().map(|object| &object.name);
+        let bones = model.nodes.iter().filter(|node| bones && node.joint).map(|node| &node.name);
+        let names: Vec<&str> = objects.chain(bones).map(String::as_str).collect();
+        let what = if names.is_empty() { "nothing with a name".to_owned() } else { names.join(", ") };
+        Failure::Input(format!("--{option}: the mesh has no \"{name}\"; it has: {what}").into())
     };
-    args.objects.iter().map(number).collect()
+    let number = |name: &String| object(name).ok_or_else(|| known("object", name, false));
+    let mut objects = args.objects.iter().map(number).collect::<Result<Vec<_>, _>>()?;
+    if args.regions.is_empty() {
+        return Ok(if objects.is_empty() { FitRegion::Whole } else { FitRegion::Objects(objects) });
+    }
+    let all = model.point_triangles();
+    let mut triangles = Vec::new();
+    for region in &args.regions {
+        match region {
+            RegionArg::Box(corners) => triangles.extend(triangles_in_box(&model.at_rest().points, &all, *corners)),
+            RegionArg::Name(name) => match (object(name), model.nodes.iter().position(|node| node.name == *name)) {
+                (Some(object), _) => objects.push(object),
+                (None, Some(bone)) => triangles.extend(bone_triangles(model, &all, bone)),
+                (None, None) => return Err(known("region", name, true)),
+            },
+        }
+    }
+    triangles.extend(model.triangles_of(|object| objects.contains(&object)));
+    triangles.sort_unstable();
+    triangles.dedup();
+    Ok(FitRegion::Triangles(triangles))
+}
+
+/// Triangles that the file's skin binds to a bone and to those below it.
+fn bone_triangles(model: &Model, triangles: &[[u32; 3]], bone: usize) -> Vec<u32> {
+    let mut is_below = vec![false; model.nodes.len()];
+    // Children stand behind their parents.
+    for (at, node) in model.nodes.iter().enumerate() {
+        is_below[at] = at == bone || node.parent.is_some_and(|parent| is_below.get(parent).copied().unwrap_or(false));
+    }
+    let weights = model.weights.as_ref();
+    let is_wanted = |joint: u32| is_below.get(joint as usize).copied().unwrap_or(false);
+    weights.map(|weights| triangles_held(triangles, weights, is_wanted)).unwrap_or_default()
 }
 
 /// Adds a description of the fit.

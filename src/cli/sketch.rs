@@ -16,9 +16,9 @@ use super::{
     report::{counted, is_json},
 };
 use crate::{
-    files::{FileKind, RealDisk, bundled_characters, load_gestures, stem, store_model, store_rig},
+    files::{FileKind, RealDisk, bundled_characters, bundled_part, load_gestures, stem, store_model, store_rig},
     headless::Workbench,
-    plugins::fit::FitTemplates,
+    plugins::fit::{FitParts, FitTemplates},
     rig::Rig,
 };
 
@@ -54,6 +54,7 @@ pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
     let mut bench = limits::empty_workbench(&stem(&args.mesh));
     bench.open(model, args.mesh_only)?;
     bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));
+    bench.offer_parts(FitParts(Arc::new(bundled_part)));
     let answers = spinning("sketching", || bench.gestures(gestures));
     if let Some(last) = answers.last().filter(|last| last.out_of_time) {
         let (file, number) = (args.gestures.display(), last.number);

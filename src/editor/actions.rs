@@ -56,6 +56,10 @@ pub enum Action {
     NextVolume,
     /// Puts a template into the mesh by itself.
     Fit,
+    /// Chooses faces of the mesh, and puts a part or the selected joints into them.
+    FitPart,
+    /// Selects the next joint that the fit is not sure of.
+    NextDoubt,
     /// Computes weights for all meshes.
     Skin,
     /// Resets the pose of the selected joints, or of all if none is selected.
@@ -161,6 +165,8 @@ impl Action {
             Self::Cancel,
             Self::NextVolume,
             Self::Fit,
+            Self::FitPart,
+            Self::NextDoubt,
             Self::Skin,
             Self::ResetPose,
             Self::MirrorPose,

@@ -1,9 +1,12 @@
-//! Fit in the window: a key puts a template into the mesh, doubtful joints are selected, and moving a joint corrects the fit.
+//! Fit in the window: a key puts a template into the mesh or into chosen faces of it, doubtful joints stand out, and moving a
+//! joint corrects the fit.
 
-use std::sync::Arc;
+mod bar;
+pub mod doubts;
+
+use std::{path::Path, sync::Arc};
 
 use bevy::prelude::*;
-use bevy_egui::egui;
 
 use super::{
     ActiveRig,
@@ -11,19 +14,28 @@ use super::{
     help::{HelpShown, toggle_help},
     mode::Mode,
     notice::Notice,
-    panel::{PanelApp, Requests, ViewportPainter},
+    panel::PanelApp,
     start::{self, StartPage},
+    tools::{
+        ToolSystems,
+        region::{ChosenFaces, RegionSkeleton, RegionTool},
+    },
 };
 use crate::{
-    files::bundled_characters,
+    algo::fit_template::FitError,
+    files::{RealDisk, bundled_characters, bundled_part, load_template},
     plugins::{
         RigSystems,
         document::Selection,
-        fit::{EndFit, FitAnswer, FitFailure, FitJob, FitReport, FitRequest, FitTemplates, FittedRig},
+        fit::{
+            EndFit, FitAnswer, FitFailure, FitJob, FitPart, FitParts, FitRegion, FitReport, FitRequest, FitTemplate,
+            FitTemplates, FittedRig, RemoveMarker,
+        },
         history::RigHistory,
         picking::{Pick, PickRequest},
         surface::{RigMesh, RigMeshes, SkinOf},
     },
+    rig::{Rig, Uid, part::Part},
 };
 
 /// Plugin of fits in the window.
@@ -33,33 +45,65 @@ impl Plugin for FittingPlugin {
     fn build(&self, app: &mut App) {
         app.add_message::<ActionRequest>()
             .add_message::<Notice>()
+            .init_resource::<RegionTool>()
             .insert_resource(FitTemplates(Arc::new(bundled_characters)))
+            .insert_resource(FitParts(Arc::new(part_of_library)))
             .add_message::<FitRequest>()
             .add_message::<EndFit>()
+            .add_message::<RemoveMarker>()
             .add_message::<FitAnswer>()
             .add_message::<PickRequest>()
-            .add_painter(FitBar)
+            .add_message::<ShowDoubt>()
+            .add_painter(bar::FitBar)
             .add_systems(
                 Update,
                 (
-                    act.before(RigSystems::Script).before(toggle_help).before(start::toggle),
+                    (act, show_doubts)
+                        .chain()
+                        .after(ToolSystems::Tools)
+                        .before(RigSystems::Script)
+                        .before(toggle_help)
+                        .before(start::toggle),
                     show_result.after(RigSystems::Bind),
                 ),
             );
     }
 }
 
-/// Starts, accepts and cancels fits.
+/// Part that is fitted where none is chosen.
+const PART: &str = "parts/hand.rig.ron";
+
+/// Request to select a joint that the fit is not sure of, and to go there.
+#[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ShowDoubt(pub Uid);
+
+/// A part that comes with the program, or that of a file.
+fn part_of_library(name: &str) -> Option<Arc<Part>> {
+    let of_file = || load_template(&RealDisk, Path::new(name)).ok();
+    bundled_part(name).or_else(|| of_file().map(|template| Arc::new(Part::from(template))))
+}
+
+type FittableRig = (
+    &'static Rig,
+    Option<&'static RigMeshes>,
+    Option<&'static FittedRig>,
+    &'static RigHistory,
+    Option<&'static Selection>,
+);
+
+/// Starts, accepts and cancels fits, of the mesh and of chosen faces.
 fn act(
     mut actions: MessageReader<ActionRequest>,
     active: Option<Res<ActiveRig>>,
-    rigs: Query<(Option<&RigMeshes>, Has<FittedRig>, &RigHistory)>,
+    rigs: Query<FittableRig>,
     meshes: Query<&RigMesh>,
     jobs: Query<(Entity, &FitJob)>,
     (mode, help, start): (Option<Res<Mode>>, Option<Res<HelpShown>>, Option<Res<StartPage>>),
+    mut region: ResMut<RegionTool>,
     mut commands: Commands,
 ) {
-    let Some((rig, (own, is_fitted, history))) = active.and_then(|active| Some((active.0, rigs.get(active.0).ok()?)))
+    let Some((rig, (data, own, fitted, history, selection))) =
+        active.and_then(|active| Some((active.0, rigs.get(active.0).ok()?)))
     else {
         return;
     };
@@ -67,9 +111,11 @@ fn act(
     let is_covered = help.is_some_and(|help| help.0) || start.is_some_and(|start| start.is_shown());
     let is_free =
         !is_covered && mode.is_none_or(|mode| matches!(*mode, Mode::Select | Mode::Move | Mode::Rotate | Mode::Scale));
+    let selected = selection.map(|selection| selection.0.as_slice()).unwrap_or_default();
+    let active = selected.last().copied().filter(|joint| data.joint(*joint).is_some());
     for ActionRequest(action) in actions.read() {
         match action {
-            Action::Fit => {
+            Action::Fit | Action::FitPart => {
                 let own = own.iter().flat_map(|meshes| meshes.iter());
                 // The body is the mesh with the most points; eyes and clothes lie in it or on it.
                 let body = own.max_by_key(|mesh| meshes.get(*mesh).map_or(0, |mesh| mesh.rest.points.len()));
@@ -81,24 +127,91 @@ fn act(
                     Some(mesh) if jobs.contains(mesh) => {
                         commands.write_message(Notice::info("A fit is running. Wait for it, or press Esc."));
                     }
+                    Some(mesh) if *action == Action::FitPart => {
+                        let skeleton = match active {
+                            Some(_) => RegionSkeleton::Selected,
+                            None => RegionSkeleton::Part(PART.to_owned()),
+                        };
+                        *region = RegionTool::open(rig, mesh, skeleton);
+                        // Faces are chosen at rest.
+                        commands.insert_resource(Mode::Move);
+                    }
                     Some(mesh) => {
+                        *region = RegionTool::default();
                         commands.write_message(FitRequest::new(mesh));
                     }
+                }
+            }
+            Action::Cancel if region.is_open() && !is_covered => *region = RegionTool::default(),
+            Action::Accept if region.is_open() && !is_covered => {
+                let request = region.faces.as_ref().map(|faces| request_of(faces, selected, active));
+                match request {
+                    Some(Ok(request)) => {
+                        *region = RegionTool::default();
+                        commands.write_message(request);
+                    }
+                    Some(Err(missing)) => {
+                        commands.write_message(Notice::warning(missing));
+                    }
+                    None => {}
                 }
             }
             // A drag under way takes the key for itself.
             Action::Cancel if !history.is_previewing() => {
                 jobs.iter().for_each(|(_, job)| job.cancel());
-                if is_fitted && is_free {
+                if fitted.is_some() && is_free {
                     commands.write_message(EndFit { rig, cancel: true });
                 }
             }
-            Action::Accept if is_fitted => {
+            Action::Accept if fitted.is_some() => {
                 commands.write_message(EndFit { rig, cancel: false });
+            }
+            Action::NextDoubt => {
+                let doubts: Vec<Uid> = fitted.iter().flat_map(|fitted| fitted.report.doubtful()).collect();
+                let at = selected.last().and_then(|joint| doubts.iter().position(|doubt| doubt == joint));
+                let next = at.map_or(0, |at| (at + 1) % doubts.len());
+                match doubts.get(next) {
+                    Some(joint) => commands.write_message(ShowDoubt(*joint)),
+                    None => commands.write_message(Notice::info("No fit has doubtful joints.")),
+                };
             }
             _ => {}
         }
     }
+}
+
+/// The request that chosen faces are for, or the reason why there is none.
+fn request_of(faces: &ChosenFaces, selected: &[Uid], active: Option<Uid>) -> Result<FitRequest, &'static str> {
+    if faces.triangles.is_empty() {
+        return Err("No face is chosen: click a piece of the mesh, or drag a box.");
+    }
+    let mut request = FitRequest::new(faces.mesh);
+    request.region = FitRegion::Triangles(faces.triangles.iter().copied().collect());
+    match &faces.skeleton {
+        RegionSkeleton::Selected if selected.is_empty() => {
+            return Err("No joint is selected: select the joints to move, or choose a part.");
+        }
+        RegionSkeleton::Selected => request.joints = selected.to_vec(),
+        RegionSkeleton::Part(name) => {
+            request.template = FitTemplate::Part { part: FitPart::Named(name.clone()), parent: active };
+        }
+    }
+    Ok(request)
+}
+
+/// Selects doubtful joints, and frames them once they are selected.
+fn show_doubts(
+    mut requests: MessageReader<ShowDoubt>,
+    active: Option<Res<ActiveRig>>,
+    mut is_selected: Local<bool>,
+    mut commands: Commands,
+) {
+    if std::mem::take(&mut *is_selected) {
+        commands.write_message(ActionRequest(Action::FrameSelected));
+    }
+    let (Some(ShowDoubt(joint)), Some(active)) = (requests.read().last(), active) else { return };
+    commands.write_message(PickRequest { rig: active.0, what: Pick::Joints(vec![*joint]), add: false });
+    *is_selected = true;
 }
 
 /// Tells what a fit found, and selects the joints that it is not sure of.
@@ -111,7 +224,7 @@ fn show_result(
     for FitAnswer { mesh, result } in answers.read() {
         let report = match result {
             Ok(report) => report,
-            Err(FitFailure::Fit(crate::algo::fit_template::FitError::Cancelled)) => {
+            Err(FitFailure::Fit(FitError::Cancelled)) => {
                 commands.write_message(Notice::info("The fit was cancelled. The rig is as it was."));
                 continue;
             }
@@ -136,70 +249,5 @@ fn show_result(
         }
         // Moving a joint corrects the fit.
         commands.insert_resource(Mode::Move);
-    }
-}
-
-/// Bar of a fit that can be corrected.
-struct FitBar;
-
-impl ViewportPainter for FitBar {
-    fn paint(&mut self, _: &egui::Painter, _: egui::Rect, _: &World) {}
-
-    fn widgets(&mut self, ui: &mut egui::Ui, area: egui::Rect, world: &World, requests: &mut Requests) {
-        let Some(active) = world.get_resource::<ActiveRig>() else { return };
-        let meshes = world.get::<RigMeshes>(active.0);
-        let job = meshes.and_then(|meshes| meshes.iter().find_map(|mesh| world.get::<FitJob>(mesh)));
-        let fitted = world.get::<FittedRig>(active.0);
-        if job.is_none() && fitted.is_none() {
-            return;
-        }
-        egui::Area::new(egui::Id::new("fit bar"))
-            .order(egui::Order::Middle)
-            .pivot(egui::Align2::LEFT_BOTTOM)
-            .fixed_pos(area.left_bottom() + egui::vec2(12.0, -12.0))
-            .constrain_to(area)
-            .show(ui.ctx(), |ui| {
-                egui::Frame::popup(ui.style()).show(ui, |ui| {
-                    ui.horizontal(|ui| match (job, fitted) {
-                        (Some(job), _) => {
-                            ui.add(egui::ProgressBar::new(job.progress()).text("Fitting").desired_width(160.0));
-                            if ui.button("Cancel").on_hover_text("Esc").clicked() {
-                                requests.send(ActionRequest(Action::Cancel));
-                            }
-                            if !job.waits() {
-                                ui.ctx().request_repaint_after_secs(0.1);
-                            }
-                        }
-                        (None, Some(fitted)) => corrections(ui, active.0, fitted, requests),
-                        (None, None) => {}
-                    });
-                });
-            });
-    }
-}
-
-fn corrections(ui: &mut egui::Ui, rig: Entity, fitted: &FittedRig, requests: &mut Requests) {
-    let doubtful = fitted.report.doubtful().count();
-    let doubt = match doubtful {
-        0 => "no doubt".to_owned(),
-        1 => "1 doubtful joint".to_owned(),
-        more => format!("{more} doubtful joints"),
-    };
-    let label = ui.label(format!("{}: {} joints, {doubt}", fitted.report.template, fitted.report.joints.len()));
-    let reasons = fitted.report.joints.iter().zip(&fitted.report.fit.joints);
-    let reasons: Vec<String> = reasons
-        .filter(|(_, joint)| joint.confidence < FitReport::DOUBTFUL)
-        .map(|((_, name), joint)| format!("{name}: {}", joint.reason))
-        .collect();
-    if !reasons.is_empty() {
-        label.on_hover_text(reasons.join("\n"));
-    }
-    ui.separator();
-    ui.weak("Move a joint: the others of its limb follow");
-    ui.separator();
-    for (text, key, cancel) in [("Accept", "Enter", false), ("Cancel", "Esc", true)] {
-        if ui.button(text).on_hover_text(key).clicked() {
-            requests.send(EndFit { rig, cancel });
-        }
     }
 }

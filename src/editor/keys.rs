@@ -135,6 +135,8 @@ const DEFAULTS: &[(&str, Action)] = &[
     ("Escape", Action::Cancel),
     ("Tab", Action::NextVolume),
     ("F", Action::Fit),
+    ("Ctrl+F", Action::FitPart),
+    ("N", Action::NextDoubt),
     ("B", Action::Skin),
     ("Shift+P", Action::ResetPose),
     ("Ctrl+Shift+P", Action::StorePose),

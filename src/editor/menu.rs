@@ -118,6 +118,8 @@ pub(super) fn show(
                     Some(("Last command back", Action::StepBack)),
                     None,
                     Some(("Fit", Action::Fit)),
+                    Some(("Fit into a part of the mesh", Action::FitPart)),
+                    Some(("Next doubtful joint", Action::NextDoubt)),
                     Some(("Skin", Action::Skin)),
                     Some(("Normalise weights", Action::Brush(BrushAction::Normalise))),
                     Some(("Prune weights", Action::Brush(BrushAction::Prune))),

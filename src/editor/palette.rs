@@ -16,7 +16,7 @@ use super::{
     tools::paint::brush,
 };
 use crate::{
-    plugins::{commands::Processor, document::Selection, history::RigHistory, surface::RigMeshes},
+    plugins::{commands::Processor, document::Selection, fit::FittedRig, history::RigHistory, surface::RigMeshes},
     rig::{Rig, TagKind},
 };
 
@@ -81,7 +81,13 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
             rig.is_empty().then_some("there are no joints")
         }
         Action::OnionSkin => timeline::OpenClip::of(world).is_none().then_some("no clip is open"),
-        Action::Fit | Action::Meshes => (!has_mesh).then_some("no mesh is open"),
+        Action::Fit | Action::FitPart | Action::Meshes => (!has_mesh).then_some("no mesh is open"),
+        Action::NextDoubt => {
+            let fitted = world.get::<FittedRig>(entity);
+            fitted
+                .is_none_or(|fitted| fitted.report.doubtful().next().is_none())
+                .then_some("no fit has doubtful joints")
+        }
         Action::Deforming => rig.skins().next().is_none().then_some("no mesh has weights"),
         Action::Skin if !has_mesh => Some("no mesh is open"),
         Action::Skin => rig.is_empty().then_some("there are no joints"),

@@ -9,6 +9,7 @@
 //! | [`pull`] | Pose | drags a joint or a control, and the joints above follow |
 //! | [`weights`] | Weights, Paint | shows what the selected joint moves |
 //! | [`paint`] | Paint | changes the weights of the selected joint with a brush |
+//! | [`region`] | all, while it is open | chooses faces for a fit of a part of the mesh |
 //! | [`symmetry`] | all | the plane of live mirroring |
 //!
 //! The planned action of a tool is in its resource, from which [`ghosts`] draws it; the rig does not change before the
@@ -21,6 +22,7 @@ pub mod paint;
 pub mod place;
 pub mod pose;
 pub mod pull;
+pub mod region;
 pub mod scene;
 pub mod select;
 pub mod stroke;
@@ -73,6 +75,7 @@ impl Plugin for ToolsPlugin {
                 paint::PaintPlugin,
                 transform::TransformPlugin,
                 pull::PullPlugin,
+                region::RegionPlugin,
                 ghosts::GhostsPlugin,
             ));
     }
@@ -108,6 +111,8 @@ pub enum Tool {
     Pull,
     /// Painting weights.
     Paint,
+    /// Choosing faces.
+    Region,
 }
 
 impl Tool {
@@ -146,12 +151,16 @@ pub struct PullHover(pub bool);
 fn route(
     mut pointers: MessageReader<ViewportPointer>,
     mode: Res<Mode>,
-    (gizmo, pull): (Res<GizmoHover>, Res<PullHover>),
+    (gizmo, pull, region): (Res<GizmoHover>, Res<PullHover>, Res<region::RegionTool>),
     mut owner: ResMut<PointerOwner>,
     mut routed: MessageWriter<ToolPointer>,
 ) {
     for pointer in pointers.read() {
-        let free = if gizmo.0 { Tool::Gizmo } else { Tool::of(*mode) };
+        let free = match gizmo.0 {
+            _ if region.is_open() => Tool::Region,
+            true => Tool::Gizmo,
+            false => Tool::of(*mode),
+        };
         let pressed = if pull.0 && free == Tool::Select { Tool::Pull } else { free };
         let tool = owner.0.unwrap_or(free);
         match pointer.act {

@@ -74,6 +74,13 @@ pub fn bundled_parts() -> Vec<(&'static str, Arc<Part>)> {
     BUNDLED_PARTS.iter().filter_map(read).collect()
 }
 
+/// Part that comes with Rigsmith, by its name: `parts/hand`, with or without the ending of its file.
+pub fn bundled_part(name: &str) -> Option<Arc<Part>> {
+    let name = format!("{}.rig.ron", name.strip_suffix(".rig.ron").unwrap_or(name));
+    let whole = || bundled_parts().into_iter().find(|(known, _)| *known == name).map(|(_, part)| part);
+    bundled_alone(&name).or_else(whole)
+}
+
 /// A part that comes with Rigsmith and uses no others, read once.
 fn bundled_alone(name: &str) -> Option<Arc<Part>> {
     static READ: [OnceLock<Option<Arc<Part>>>; BUNDLED_PARTS.len()] = [const { OnceLock::new() }; BUNDLED_PARTS.len()];

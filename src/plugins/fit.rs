@@ -4,16 +4,16 @@
 //! has them moved. From then on the rig has a [`FittedRig`]: a joint that is moved at rest is a marker, and the joints around it
 //! are fitted again, until the fit is accepted or cancelled ([`EndFit`]).
 
+mod fitted;
+mod part;
 mod refit;
+pub mod region;
+mod report;
 mod work;
 
-use std::{
-    collections::BTreeMap,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, AtomicU32, Ordering},
-    },
-    time::Duration,
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, AtomicU32, Ordering},
 };
 
 use bevy::{
@@ -21,7 +21,12 @@ use bevy::{
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
-use self::work::Work;
+use self::{fitted::PendingFit, work::Work};
+pub use self::{
+    fitted::{FitMarkers, FittedRig},
+    region::FitRegion,
+    report::{FitFailure, FitReport},
+};
 use super::{
     RigSystems,
     commands::RigModules,
@@ -29,13 +34,12 @@ use super::{
     document::EditRequest,
     history::RigHistory,
     landing::{HeldResult, ResultHeld},
-    limits::{Deadline, LimitError, OutOfTime, RigLimits},
+    limits::{Deadline, RigLimits},
     surface::{RigMesh, SkinOf},
 };
 use crate::{
-    algo::fit_template::{FitError, FitSettings, FitSymmetry, FittedSkeleton, MeshAnalysis},
-    processor::{Fitting, Modules, fitted_rig},
-    rig::{EditError, Rig, RigEdit, Uid, operations::Operation, step::Step, update::edits_between},
+    algo::fit_template::FitSymmetry,
+    rig::{Rig, Uid, operations::Operation, part::Part, step::Step},
 };
 
 /// Name of the step of a fit.
@@ -50,17 +54,19 @@ impl Plugin for FitPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
         app.init_resource::<FitTemplates>()
+            .init_resource::<FitParts>()
             .init_resource::<RigLimits>()
             .add_message::<FitRequest>()
             .add_message::<FitAnswer>()
             .add_message::<EndFit>()
+            .add_message::<RemoveMarker>()
             .add_message::<ResultHeld>()
             .add_message::<super::document::EditReport>()
             .add_message::<EditRequest>()
             .add_systems(
                 Update,
                 (
-                    (start, land, refit::end).chain().in_set(RigSystems::Gesture),
+                    (start, land, refit::end, refit::remove_markers).chain().in_set(RigSystems::Gesture),
                     refit::follow_moves.after(RigSystems::Edits).before(RigSystems::Build),
                 ),
             );
@@ -82,8 +88,10 @@ pub struct FitRequest {
     pub symmetry: FitSymmetry,
     /// Positions of joints, by their labels.
     pub markers: Vec<(String, Vec3)>,
-    /// Objects of the mesh to fit into; all of it if empty.
-    pub objects: Vec<usize>,
+    /// Part of the mesh to fit into.
+    pub region: FitRegion,
+    /// Joints of the rig to move, with those below them; all if empty. The others stay.
+    pub joints: Vec<Uid>,
 }
 
 impl FitRequest {
@@ -96,7 +104,8 @@ impl FitRequest {
             forward: None,
             symmetry: FitSymmetry::Auto,
             markers: Vec::new(),
-            objects: Vec::new(),
+            region: FitRegion::Whole,
+            joints: Vec::new(),
         }
     }
 }
@@ -110,6 +119,32 @@ pub enum FitTemplate {
     Named(String),
     /// Rig that is given.
     Rig(Arc<Rig>),
+    /// Part, mirrored where the mesh shows the other side; a rig that has joints gets those of the part besides.
+    Part {
+        /// The part.
+        part: FitPart,
+        /// Joint of the rig that the part hangs on.
+        parent: Option<Uid>,
+    },
+}
+
+/// Part of a fit.
+#[derive(Debug, Clone)]
+pub enum FitPart {
+    /// The part that [`FitParts`] gives for this name, such as `parts/hand`.
+    Named(String),
+    /// Part that is given.
+    Given(Arc<Part>),
+}
+
+/// Function that gives a part by its name; it is called in the task of the fit.
+#[derive(Resource, Clone)]
+pub struct FitParts(pub Arc<dyn Fn(&str) -> Option<Arc<Part>> + Send + Sync>);
+
+impl Default for FitParts {
+    fn default() -> Self {
+        Self(Arc::new(|_| None))
+    }
 }
 
 /// Function that gives the templates that a fit may choose; it is called in the task of the fit.
@@ -129,76 +164,6 @@ pub struct FitAnswer {
     pub mesh: Entity,
     /// Report of the fit, or the reason why there is none.
     pub result: Result<Arc<FitReport>, FitFailure>,
-}
-
-/// Report of a fit.
-#[derive(Debug, Clone)]
-pub struct FitReport {
-    /// Name of the template; of the rig if its own joints were moved.
-    pub template: String,
-    /// Limbs that the chosen template has and that the mesh shows, in words; empty if there was no choice.
-    pub choice: String,
-    /// Uid and label of each joint, in the order of the fit.
-    pub joints: Vec<(Uid, String)>,
-    /// The fit, in the space of the mesh.
-    pub fit: FittedSkeleton,
-    /// Duration of analysis and fit.
-    pub time: Duration,
-}
-
-impl FitReport {
-    /// Confidence below which a joint is doubtful.
-    pub const DOUBTFUL: f32 = 0.5;
-
-    /// Joints that the fit is not sure of.
-    pub fn doubtful(&self) -> impl Iterator<Item = Uid> + '_ {
-        let pairs = self.joints.iter().zip(&self.fit.joints);
-        pairs.filter(|(_, joint)| joint.confidence < Self::DOUBTFUL).map(|((uid, _), _)| *uid)
-    }
-}
-
-/// Reason why a template was not fitted; a sentence for people without its full stop.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FitFailure {
-    /// The entity of the request has no mesh, or its mesh no rig.
-    #[error("the mesh belongs to no rig; it may have been closed")]
-    NoRig,
-    /// The rig and the request have no joints.
-    #[error("there is no skeleton to fit; name a template")]
-    NoTemplate,
-    /// No template has the name.
-    #[error("there is no template \"{name}\"{nearest}")]
-    NoName {
-        /// Requested name.
-        name: String,
-        /// Nearest names, as the rest of a sentence.
-        nearest: String,
-    },
-    /// A marker names no joint.
-    #[error("no joint of \"{template}\" is called \"{label}\"{nearest}")]
-    NoJoint {
-        /// Name of the template.
-        template: String,
-        /// Requested label.
-        label: String,
-        /// Nearest labels, as the rest of a sentence.
-        nearest: String,
-    },
-    /// The mesh does not show the template.
-    #[error(transparent)]
-    Fit(#[from] FitError),
-    /// The joints cannot be put there.
-    #[error(transparent)]
-    Edit(#[from] EditError),
-    /// The rig was changed meanwhile.
-    #[error("the joints were changed while the template was fitted; fit again")]
-    Changed,
-    /// The mesh has more points or triangles than [`RigLimits`] allows.
-    #[error(transparent)]
-    Limit(#[from] LimitError),
-    /// The fit took longer than [`RigLimits`] allows.
-    #[error(transparent)]
-    OutOfTime(#[from] OutOfTime),
 }
 
 /// Running fit of a mesh; remove the component or call [`FitJob::cancel`] to stop it.
@@ -254,28 +219,6 @@ impl Drop for FitJob {
     }
 }
 
-/// Fit that can still be corrected, on the rig's entity: moving a joint at rest fits the joints around it again.
-#[derive(Component, Reflect, Clone)]
-#[reflect(opaque)]
-#[reflect(Component, Clone)]
-pub struct FittedRig {
-    /// Report of the present fit.
-    pub report: Arc<FitReport>,
-    /// Places that a person chose, by joint.
-    pub markers: BTreeMap<Uid, Vec3>,
-    analysis: Arc<MeshAnalysis>,
-    settings: FitSettings,
-    /// Skeleton of the template at rest, before it was fitted.
-    template: Arc<Rig>,
-    /// Report of the fit before corrections, from which every correction starts.
-    first: Arc<FitReport>,
-    /// Positions of the joints after the last edit, in the order of the report.
-    places: Vec<Option<Vec3>>,
-    floor: f32,
-    /// Last step before the fit.
-    before: Option<Arc<Step>>,
-}
-
 /// Request to end a fit: joints that are moved from then on move alone.
 #[derive(Message, Debug, Clone, Copy)]
 pub struct EndFit {
@@ -283,6 +226,15 @@ pub struct EndFit {
     pub rig: Entity,
     /// True to undo the fit with all corrections.
     pub cancel: bool,
+}
+
+/// Request to take a marker away: the joint may move again.
+#[derive(Message, Debug, Clone, Copy)]
+pub struct RemoveMarker {
+    /// The rig.
+    pub rig: Entity,
+    /// The joint.
+    pub joint: Uid,
 }
 
 struct FinishedFit {
@@ -294,13 +246,13 @@ fn start(
     mut commands: Commands,
     mut requests: MessageReader<FitRequest>,
     meshes: Query<(&RigMesh, &SkinOf)>,
-    rigs: Query<(&Rig, &RigHistory)>,
-    (modules, templates, limits): (Res<RigModules>, Res<FitTemplates>, Res<RigLimits>),
+    rigs: Query<(&Rig, &RigHistory, Option<&FitMarkers>)>,
+    (modules, templates, parts, limits): (Res<RigModules>, Res<FitTemplates>, Res<FitParts>, Res<RigLimits>),
     mut fitted: MessageWriter<FitAnswer>,
 ) {
     for request in requests.read() {
         let found = meshes.get(request.mesh).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
-        let Some((mesh, (rig, history))) = found else {
+        let Some((mesh, (rig, history, markers))) = found else {
             fitted.write(FitAnswer { mesh: request.mesh, result: Err(FitFailure::NoRig) });
             continue;
         };
@@ -315,6 +267,8 @@ fn start(
             request: request.clone(),
             modules: modules.0.clone(),
             templates: templates.clone(),
+            parts: parts.clone(),
+            markers: markers.map(|markers| markers.held(rig)).unwrap_or_default(),
         };
         let progress = Arc::new(AtomicU32::new(0));
         let cancelled = Arc::new(AtomicBool::new(false));
@@ -374,10 +328,10 @@ fn land(
                         fitted.before = history.last().cloned();
                         let operation = Operation::Named { name: FIT, edits: changes };
                         commands.write_message(EditRequest::operation(of.0, operation));
-                        commands.entity(of.0).try_insert(fitted);
+                        commands.entity(of.0).try_insert(PendingFit(fitted));
                         Ok(report)
                     }
-                    Err(error) => Err(error.into()),
+                    Err(error) => Err(error),
                 }
             }
         };
@@ -392,30 +346,4 @@ fn is_same_skeleton(a: &Rig, b: &Rig) -> bool {
         && a.walk()
             .zip(b.walk())
             .all(|(a, b)| (a.data.uid, a.parent, a.data.rest) == (b.data.uid, b.parent, b.data.rest))
-}
-
-impl FittedRig {
-    /// The template in the body.
-    fn target(&self, modules: &Modules) -> Result<Rig, EditError> {
-        self.placed(&self.template, modules)
-    }
-
-    /// The edits that put the template into a rig without joints, or the rig's own joints to their places. Whatever else
-    /// the rig has, or has got while the fit ran, stays.
-    fn edits(&self, rig: &Rig, target: &Rig, modules: &Modules) -> Result<Vec<RigEdit>, EditError> {
-        if !rig.is_empty() {
-            return edits_between(rig, &self.placed(rig, modules)?);
-        }
-        let mut edits = edits_between(rig, target)?;
-        edits.retain(|edit| !matches!(edit, RigEdit::RemoveLocalGroup(_) | RigEdit::RemoveStoredPose(_)));
-        Ok(edits)
-    }
-
-    fn placed(&self, rig: &Rig, modules: &Modules) -> Result<Rig, EditError> {
-        let FittedSkeleton { up, forward, joints, .. } = &self.report.fit;
-        let places = self.report.joints.iter().zip(joints).map(|((uid, _), joint)| (*uid, joint.position)).collect();
-        let left = up.cross(*forward).normalize_or(Vec3::X);
-        let turn = Quat::from_mat3(&Mat3::from_cols(left, *up, left.cross(*up))).normalize();
-        fitted_rig(rig, &Fitting { places, turn, floor: self.floor }, modules)
-    }
 }

@@ -108,9 +108,10 @@ pub enum Gesture {
     /// Locks the selected joints' weights against skinning, or unlocks them.
     Lock(bool),
     /// Fits a template to the first mesh of the rig: the one with that name, or the one whose limbs the mesh shows. A rig
-    /// that has joints has those moved. Joints that are moved afterwards correct the fit.
+    /// that has joints has those moved; a part (`parts/hand`) is added, below the selected joint. Joints that are moved
+    /// afterwards correct the fit.
     Fit {
-        /// Name of the template.
+        /// Name of the template, or of the part.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         template: Option<String>,
     },

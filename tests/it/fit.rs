@@ -5,12 +5,12 @@ use std::{collections::BTreeMap, path::Path, sync::Arc};
 use bevy::{math::Vec3, prelude::*};
 use rigsmith::{
     algo::fit_template::FitError,
-    files::{RealDisk, bundled_characters, load_model},
+    files::{RealDisk, bundled_characters, bundled_part, load_model},
     headless::{Workbench, WorkbenchError},
     mesh::model::Model,
     plugins::{
         commands::BuildStep,
-        fit::{FitFailure, FitReport, FitTemplate, FitTemplates},
+        fit::{FitFailure, FitParts, FitReport, FitTemplate, FitTemplates},
         gesture::Gesture,
     },
     rig::{NodeType, Rig, operations::Operation, template::write_template},
@@ -182,6 +182,49 @@ fn gestures_fit() {
     assert!(!answers[0].done && answers[0].message.contains("\"biped\""), "{answers:?}");
     assert!(answers[1].done && answers[1].joints_added == character("biped").len(), "{answers:?}");
     assert!(answers[2].done, "{answers:?}");
+}
+
+/// The left hand of the bundled body and the end of its forearm.
+fn hand_mesh() -> Model {
+    let mut model = bundled_body();
+    for part in &mut model.parts {
+        let is_of_hand = |corner: &u32| model.points[part.vertices[*corner as usize] as usize].x > 0.5;
+        part.triangles.retain(|corners| corners.iter().all(is_of_hand));
+        part.faces.starts = (0..=part.triangles.len() as u32).map(|face| 3 * face).collect();
+        part.faces.corners = part.triangles.concat();
+    }
+    model
+}
+
+/// A part is a skeleton of its own in an empty rig, and comes below the selected joint of another one.
+#[test]
+fn gestures_fit_parts() {
+    let mut bench = bench(hand_mesh());
+    bench.offer_parts(FitParts(Arc::new(bundled_part)));
+    let fit = || Gesture::Fit { template: Some("parts/hand".into()) };
+    let answers = bench.gestures(vec![Gesture::Fit { template: Some("parts/hund".into()) }, fit(), Gesture::Undo]);
+    assert!(!answers[0].done && answers[0].message.contains("parts/hund"), "{answers:?}");
+    assert!(answers[1].done && answers[1].joints_added == 16, "{answers:?}");
+    assert!(bench.rig().is_empty());
+
+    let biped = character("biped");
+    let positions = vec![at(&biped, "upper_arm_l"), at(&biped, "forearm_l")];
+    bench.operate(Operation::Chain { positions, parent: None }).unwrap();
+    let arm: Vec<_> = bench.rig().walk().map(|joint| joint.data.uid).collect();
+    bench.operate(Operation::Labels(vec![(arm[1], "forearm_l".into())])).unwrap();
+    let before = write_template(bench.rig());
+    let answers = bench.gestures(vec![Gesture::SelectLabel("forearm_l".into()), fit()]);
+    assert!(answers.iter().all(|answer| answer.done), "{answers:?}");
+    let rig = bench.rig();
+    let hand = rig.find_label("hand_l").unwrap();
+    assert_eq!((rig.len(), rig.joint(hand).unwrap().parent), (18, Some(arm[1])));
+    for joint in rig.walk().filter(|joint| !arm.contains(&joint.data.uid)) {
+        let label = joint.data.label.as_deref().unwrap();
+        let off = at(rig, label).distance(at(&biped, label));
+        assert!(off < 0.06, "{label} is off by {off}");
+    }
+    assert!(bench.gestures(vec![Gesture::Undo])[0].done);
+    assert_eq!(write_template(bench.rig()), before);
 }
 
 /// A rig with joints of its own has those moved: a template that a person opened and changed stays what it is.

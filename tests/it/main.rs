@@ -70,7 +70,12 @@ mod files_read;
 mod files_set;
 mod fill;
 mod fit;
+#[cfg(feature = "cli")]
+mod fit_cli;
 mod fit_data;
+mod fit_hinges;
+#[cfg(feature = "editor")]
+mod fit_window;
 mod fuzz_animation;
 mod fuzz_bvh;
 mod fuzz_gestures;

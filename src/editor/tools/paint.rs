@@ -16,12 +16,11 @@ use bevy::prelude::*;
 use self::{
     brush::{BrushPlugin, PaintBrush, mode_of},
     cursor::CursorPainter,
-    pointed::PaintMeshes,
     running::RunningStroke,
 };
 pub use self::{
     cursor::BrushCursor,
-    pointed::{PaintObstacle, PointedPlace},
+    pointed::{PaintMeshes, PaintObstacle, PointedPlace},
 };
 use super::{
     Tool, ToolPointer, ToolSystems,

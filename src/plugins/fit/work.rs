@@ -1,13 +1,17 @@
 //! Work of a fit in its task: the choice of a template, the fit, and the report.
 
-use std::{sync::Arc, time::Instant};
+use std::{collections::BTreeMap, sync::Arc, time::Instant};
 
 use bevy::prelude::*;
 
-use super::{FinishedFit, FitFailure, FitReport, FitRequest, FitTemplate, FitTemplates, FittedRig};
+use super::{
+    FinishedFit, FitFailure, FitPart, FitParts, FitReport, FitRequest, FitTemplate, FitTemplates, FittedRig,
+    fitted::FitExtent,
+    part::{AddedPart, only, sides, with_hierarchies},
+};
 use crate::{
     algo::fit_template::{
-        FitNote, FitSettings, FittedSkeleton, MeshAnalysis, TemplateJoint, choose_template, fit_template,
+        FitError, FitNote, FitSettings, FittedSkeleton, MeshAnalysis, TemplateJoint, choose_template, fit_template,
     },
     plugins::surface::RigMesh,
     processor::Modules,
@@ -24,6 +28,22 @@ pub(super) struct Work {
     pub(super) request: FitRequest,
     pub(super) modules: Arc<Modules>,
     pub(super) templates: FitTemplates,
+    pub(super) parts: FitParts,
+    /// Places that a person chose for joints of the rig.
+    pub(super) markers: BTreeMap<Uid, Vec3>,
+}
+
+/// Joints that may be fitted.
+struct Candidate {
+    /// The joints as a rig of their own, before the fit.
+    template: Arc<Rig>,
+    extent: FitExtent,
+}
+
+impl Candidate {
+    fn skeleton(template: Arc<Rig>) -> Self {
+        Self { template, extent: FitExtent::Skeleton }
+    }
 }
 
 /// Joints of a rig as the fit takes them, with their uids. Nulls are no part of the body.
@@ -49,95 +69,184 @@ pub(super) fn template_joints<'a>(
 }
 
 impl Work {
-    /// Rigs whose joints may be fitted.
-    fn candidates(&self) -> Result<Vec<Arc<Rig>>, FitFailure> {
-        if self.from.walk().any(|joint| joint.data.kind == NodeKind::Joint) {
-            return Ok(vec![self.from.clone()]);
+    /// Skeletons that may be fitted. Several are a choice by the limbs that the mesh shows, but for the sides of a part.
+    fn candidates(&self) -> Result<Vec<Candidate>, FitFailure> {
+        let from = &self.from;
+        if let FitTemplate::Part { part, parent } = &self.request.template {
+            return self.sides(part, *parent);
         }
-        if !self.from.is_empty() {
+        if !self.request.joints.is_empty() {
+            let kept = with_hierarchies(from, &self.request.joints);
+            let template = Arc::new(only(from, &kept)?);
+            return match kept.is_empty() {
+                true => Err(FitFailure::NoTemplate),
+                false => Ok(vec![Candidate { template, extent: FitExtent::Joints }]),
+            };
+        }
+        if from.walk().any(|joint| joint.data.kind == NodeKind::Joint) {
+            return Ok(vec![Candidate::skeleton(from.clone())]);
+        }
+        if !from.is_empty() {
             return Err(FitFailure::NoTemplate);
         }
         match &self.request.template {
-            FitTemplate::Rig(template) => Ok(vec![template.clone()]),
-            FitTemplate::Choose => Ok((self.templates.0)()),
+            FitTemplate::Rig(template) => Ok(vec![Candidate::skeleton(template.clone())]),
             FitTemplate::Named(name) => {
                 let known = (self.templates.0)();
-                let nearest = || did_you_mean(name, known.iter().map(|rig| rig.about().name.clone()));
-                let found = known.iter().find(|rig| rig.about().name == *name).cloned();
-                let found = found.ok_or_else(|| FitFailure::NoName { name: name.clone(), nearest: nearest() })?;
-                Ok(vec![found])
+                match known.iter().find(|rig| rig.about().name == *name) {
+                    Some(found) => Ok(vec![Candidate::skeleton(found.clone())]),
+                    None => self.sides(&FitPart::Named(name.clone()), None),
+                }
             }
+            _ => Ok((self.templates.0)().into_iter().map(Candidate::skeleton).collect()),
         }
+    }
+
+    /// A part as it may hang on a joint: on one side, or on either of both.
+    fn sides(&self, part: &FitPart, parent: Option<Uid>) -> Result<Vec<Candidate>, FitFailure> {
+        let part = match part {
+            FitPart::Given(part) => part.clone(),
+            FitPart::Named(name) => (self.parts.0)(name).ok_or_else(|| {
+                let known = (self.templates.0)();
+                let nearest = did_you_mean(name, known.iter().map(|rig| rig.about().name.clone()));
+                FitFailure::NoName { name: name.clone(), nearest }
+            })?,
+        };
+        let candidate = |rig: Arc<Rig>| -> Result<Candidate, FitFailure> {
+            if self.from.is_empty() {
+                return Ok(Candidate::skeleton(rig));
+            }
+            let added = AddedPart { rig, parent };
+            Ok(Candidate { template: Arc::new(added.in_rig(&self.from)?), extent: FitExtent::Part(added) })
+        };
+        sides(&part, &self.from, parent, &self.modules).into_iter().map(candidate).collect()
     }
 
     pub(super) fn run(self, progress: &(dyn Fn(f32) -> bool + Sync)) -> Result<FinishedFit, FitFailure> {
         let begin = Instant::now();
         let candidates = self.candidates()?;
-        let Self { from: _, mesh, request, modules, .. } = self;
-        let (region, gear) = region(&mesh, &request.objects);
-        let points = &mesh.rest.points;
-        let analysis = MeshAnalysis::new(points, &mesh.triangles, region.as_deref(), &|part| progress(0.5 * part))?;
-        let skeletons: Vec<_> = candidates.iter().map(|rig| skeleton(rig)).collect();
-        let joints: Vec<Vec<TemplateJoint>> =
-            skeletons.iter().map(|(_, labels, parents, places)| template_joints(labels, parents, places)).collect();
-        let (chosen, choice) = match joints.len() {
-            0 => return Err(FitFailure::NoTemplate),
-            1 => (0, String::new()),
-            _ => {
-                let named: Vec<(&str, &[TemplateJoint])> = candidates
-                    .iter()
-                    .zip(&joints)
-                    .map(|(rig, joints)| (rig.about().name.as_str(), &joints[..]))
-                    .collect();
-                let ranked = choose_template(&analysis, &named)?;
-                let best = ranked.first().ok_or(FitFailure::NoTemplate)?;
-                (best.index, best.to_string())
-            }
+        let (region, gear) = self.request.region.triangles(&self.mesh, &self.from);
+        if region.as_ref().is_some_and(Vec::is_empty) {
+            return Err(FitFailure::EmptyRegion);
+        }
+        let points = &self.mesh.rest.points;
+        let analysis =
+            MeshAnalysis::new(points, &self.mesh.triangles, region.as_deref(), &|part| progress(0.5 * part))?;
+        let (best, choice) = choose(&analysis, &candidates, &self.request.template)?;
+        // The sides of a part are all fitted: the order of its chains tells them apart, but not before.
+        let kept = match best {
+            Some(best) => best..best + 1,
+            None => 0..candidates.len(),
         };
-        let (uids, labels, ..) = &skeletons[chosen];
-        let template = candidates[chosen].clone();
-        let name = template.about().name.clone();
+        let (first, count) = (kept.start, kept.len() as f32);
+        let mut found: Vec<(usize, FitSettings, FittedSkeleton)> = Vec::new();
+        let mut refused: Option<FitFailure> = None;
+        for at in kept {
+            let share = |part: f32| progress(0.5 + 0.5 * ((at - first) as f32 + part) / count);
+            match self.fitted(&analysis, &candidates[at].template, &share) {
+                Ok((settings, fit)) => found.push((at, settings, fit)),
+                Err(FitFailure::Fit(FitError::Cancelled)) => return Err(FitError::Cancelled.into()),
+                Err(error) => refused = refused.or(Some(error)),
+            }
+        }
+        let cost = |fit: &FittedSkeleton| fit.hypotheses.first().map_or(f32::INFINITY, |best| best.cost);
+        let least = found.into_iter().min_by(|a, b| cost(&a.2).total_cmp(&cost(&b.2)));
+        let Some((at, settings, mut fit)) = least else {
+            return Err(refused.unwrap_or(FitFailure::NoTemplate));
+        };
+        let Candidate { template, extent } = &candidates[at];
+        let (uids, labels, ..) = skeleton(template);
+        fit.notes.extend((gear > 0).then_some(FitNote::Gear(gear)));
+        let floor = points.iter().filter(|p| p.is_finite()).map(|p| p.dot(fit.up)).fold(f32::INFINITY, f32::min);
+        let name = match extent {
+            FitExtent::Part(part) => part.rig.about().name.clone(),
+            FitExtent::Skeleton | FitExtent::Joints => template.about().name.clone(),
+        };
+        let joints = uids.iter().copied().zip(labels).collect();
+        let report = Arc::new(FitReport { template: name, choice, joints, fit, time: begin.elapsed() });
+        let markers: BTreeMap<Uid, Vec3> =
+            settings.markers.iter().map(|(joint, place)| (uids[*joint], *place)).collect();
+        let fitted = FittedRig {
+            first: report.clone(),
+            begun: markers.clone(),
+            places: report.fit.joints.iter().map(|joint| Some(joint.position)).collect(),
+            report,
+            markers,
+            analysis: Arc::new(analysis),
+            settings,
+            template: template.clone(),
+            extent: extent.clone(),
+            floor,
+            before: None,
+            step: None,
+            states: Vec::new(),
+            applied: 0,
+            replaced: None,
+        };
+        let target = fitted.target(&self.modules)?;
+        Ok(FinishedFit { fitted, target })
+    }
+
+    /// One skeleton in the mesh, with the settings that it was fitted by.
+    fn fitted(
+        &self,
+        analysis: &MeshAnalysis,
+        template: &Rig,
+        progress: &(dyn Fn(f32) -> bool + Sync),
+    ) -> Result<(FitSettings, FittedSkeleton), FitFailure> {
+        let request = &self.request;
+        let (uids, labels, parents, places) = skeleton(template);
+        let joints = template_joints(&labels, &parents, &places);
         let marker = |(label, place): &(String, Vec3)| match labels.iter().position(|known| known == label) {
             Some(joint) => Ok((joint, *place)),
             None => {
                 let nearest = did_you_mean(label, labels.iter());
-                Err(FitFailure::NoJoint { template: name.clone(), label: label.clone(), nearest })
+                let template = template.about().name.clone();
+                Err(FitFailure::NoJoint { template, label: label.clone(), nearest })
             }
         };
-        let markers = request.markers.iter().map(marker).collect::<Result<Vec<_>, _>>()?;
+        let mut markers = request.markers.iter().map(marker).collect::<Result<Vec<_>, _>>()?;
+        for (uid, place) in &self.markers {
+            let joint = uids.iter().position(|known| known == uid);
+            let is_given = joint.is_some_and(|joint| markers.iter().any(|(given, _)| *given == joint));
+            markers.extend(joint.filter(|_| !is_given).map(|joint| (joint, *place)));
+        }
         let settings = FitSettings {
             up: request.up,
             forward: request.forward,
             symmetry: request.symmetry,
-            markers: markers.clone(),
+            markers,
             ..FitSettings::default()
         };
-        let mut fit = fit_template(&analysis, &joints[chosen], &settings, &|part| progress(0.5 + 0.5 * part))?;
-        centre(&mut fit, labels, &markers);
-        fit.notes.extend((gear > 0).then_some(FitNote::Gear(gear)));
-        let floor = points.iter().filter(|p| p.is_finite()).map(|p| p.dot(fit.up)).fold(f32::INFINITY, f32::min);
-        let report = FitReport {
-            template: name,
-            choice,
-            joints: uids.iter().copied().zip(labels.iter().cloned()).collect(),
-            fit,
-            time: begin.elapsed(),
-        };
-        let report = Arc::new(report);
-        let fitted = FittedRig {
-            first: report.clone(),
-            places: report.fit.joints.iter().map(|joint| Some(joint.position)).collect(),
-            report,
-            markers: markers.iter().map(|(joint, place)| (uids[*joint], *place)).collect(),
-            analysis: Arc::new(analysis),
-            settings,
-            template,
-            floor,
-            before: None,
-        };
-        let target = fitted.target(&modules)?;
-        Ok(FinishedFit { fitted, target })
+        let mut fit = fit_template(analysis, &joints, &settings, progress)?;
+        centre(&mut fit, &labels, &settings.markers);
+        Ok((settings, fit))
     }
+}
+
+/// The candidate whose limbs the mesh shows, with the reason in words; `None` where each has to be fitted to know.
+fn choose(
+    analysis: &MeshAnalysis,
+    candidates: &[Candidate],
+    template: &FitTemplate,
+) -> Result<(Option<usize>, String), FitFailure> {
+    match candidates.len() {
+        0 => return Err(FitFailure::NoTemplate),
+        1 => return Ok((Some(0), String::new())),
+        _ if !matches!(template, FitTemplate::Choose) => return Ok((None, String::new())),
+        _ => {}
+    }
+    let skeletons: Vec<_> = candidates.iter().map(|candidate| skeleton(&candidate.template)).collect();
+    let joints: Vec<Vec<TemplateJoint>> =
+        skeletons.iter().map(|(_, labels, parents, places)| template_joints(labels, parents, places)).collect();
+    let named: Vec<(&str, &[TemplateJoint])> = candidates
+        .iter()
+        .zip(&joints)
+        .map(|(candidate, joints)| (candidate.template.about().name.as_str(), &joints[..]))
+        .collect();
+    let ranked = choose_template(analysis, &named)?;
+    let best = ranked.first().ok_or(FitFailure::NoTemplate)?;
+    Ok((Some(best.index), best.to_string()))
 }
 
 /// Puts joints of neither side that lie beside the rig's plane of symmetry by rounding of the mesh onto it, where mesh and pose
@@ -153,19 +262,5 @@ pub(super) fn centre(fit: &mut FittedSkeleton, labels: &[String], markers: &[(us
         if label_side(label) == 0 && joint.position.x.abs() < tolerance && !is_marked {
             joint.position.x = 0.0;
         }
-    }
-}
-
-/// Numbers of the triangles of some objects; `None` for all. Without a choice, gear that hangs on a bone is left out, and
-/// counted.
-fn region(mesh: &RigMesh, objects: &[usize]) -> (Option<Vec<u32>>, usize) {
-    if !objects.is_empty() {
-        return (Some(mesh.rest.triangles_of(|object| objects.contains(&object))), 0);
-    }
-    // The model at rest has no skins any more.
-    let gear = mesh.file.gear();
-    match gear.len() {
-        0 => (None, 0),
-        count => (Some(mesh.rest.triangles_of(|object| !gear.contains(&object))), count),
     }
 }

@@ -13,7 +13,7 @@ use crate::{
     },
     plugins::{
         document::{Change, EditRefusal, EditReport, EditRequest, Selection, Symmetry},
-        fit::{FIT_AROUND, FitAnswer, FitRequest, FitTemplate},
+        fit::{FIT_AROUND, FitAnswer, FitPart, FitRequest, FitTemplate},
         limits::{Limit, RigLimits},
         picking::{Pick, PickAnswer, PickRequest},
         placement::{PlaceAnswer, PlaceRequest},
@@ -29,6 +29,8 @@ use crate::{
 
 /// Name of a list of gestures in errors.
 const LIST: &str = "gestures";
+/// Beginning of the names of parts.
+const PARTS: &str = "parts/";
 
 /// Gestures to carry out on the rig of this entity, and the answers so far.
 #[derive(Component, Default)]
@@ -345,7 +347,13 @@ impl GestureRun<'_, '_> {
             }
             Gesture::Fit { template } => {
                 let mesh = self.mesh.ok_or(GestureError::NoMesh)?;
-                let template = template.map_or(FitTemplate::Choose, FitTemplate::Named);
+                let template = match template {
+                    // A part comes besides what there is, below the selected joint.
+                    Some(name) if name.starts_with(PARTS) => {
+                        FitTemplate::Part { part: FitPart::Named(name), parent: self.selection.active() }
+                    }
+                    template => template.map_or(FitTemplate::Choose, FitTemplate::Named),
+                };
                 requests.fits.write(FitRequest { template, ..FitRequest::new(mesh) });
                 return Ok(true);
             }

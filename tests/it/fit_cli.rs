@@ -1,0 +1,109 @@
+//! Fits on the command line: parts of the mesh and parts of the library.
+
+use std::path::{Path, PathBuf};
+
+use bevy::math::Vec3;
+use rigsmith::{
+    files::{RealDisk, bundled_characters, load_template},
+    rig::Rig,
+};
+
+use crate::{cli_build::rigsmith, prerequisites::test_data};
+
+fn body() -> String {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/models/biped.obj").display().to_string()
+}
+
+fn template(path: &Path) -> Rig {
+    load_template(&RealDisk, path).unwrap().rig
+}
+
+fn at(rig: &Rig, label: &str) -> Vec3 {
+    rig.position(rig.find_label(label).unwrap_or_else(|| panic!("no joint {label}")))
+}
+
+/// The part onto each hand, by a box; a file of the part is as good as its name, and the same input gives the same bytes.
+#[test]
+fn a_part_is_fitted_into_a_box() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| rigsmith(folder.path(), args);
+    let biped = bundled_characters().into_iter().find(|rig| rig.about().name == "biped").unwrap();
+    let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/templates/parts/hand.rig.ron");
+    let file = file.display().to_string();
+    for (corners, ending) in [("0.5,0.7,-0.5,2,1.3,0.5", "_l"), ("-0.5,0.7,-0.5,-2,1.3,0.5", "_r")] {
+        let mut texts = Vec::new();
+        for part in ["parts/hand", "parts/hand.rig.ron", file.as_str()] {
+            let fitted =
+                run(&["--json", "fit", &body(), "--template", part, "--region", corners, "-o", "hand.rig.ron"]);
+            assert_eq!(fitted.code, 0, "{part}: {}", fitted.err);
+            assert_eq!(fitted.json()["joints"].as_array().unwrap().len(), 16);
+            texts.push(std::fs::read_to_string(folder.path().join("hand.rig.ron")).unwrap());
+            std::fs::remove_file(folder.path().join("hand.rig.ron")).unwrap();
+        }
+        assert!(texts.iter().all(|text| *text == texts[0]), "by name and by file");
+        std::fs::write(folder.path().join("kept.rig.ron"), &texts[0]).unwrap();
+        let hand = template(&folder.path().join("kept.rig.ron"));
+        let mut sum = 0.0;
+        for joint in hand.walk() {
+            let label = joint.data.label.as_deref().unwrap();
+            assert!(label.ends_with(ending), "{label} is of the other side");
+            let off = at(&hand, label).distance(at(&biped, label));
+            assert!(off < 0.06, "{label} is off by {off}");
+            sum += off;
+        }
+        assert!(sum / 16.0 < 0.03, "{}", sum / 16.0);
+    }
+}
+
+#[test]
+fn regions_that_mean_nothing_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |region: &str| rigsmith(folder.path(), &["fit", &body(), "--region", region, "-o", "x.rig.ron"]);
+    let unknown = run("hat");
+    assert!(unknown.code == 1 && unknown.err.contains("body"), "names what there is: {}", unknown.err);
+    let empty = run("5,5,5,6,6,6");
+    assert!(empty.code == 1 && empty.err.contains("no face of the mesh is in the region"), "{}", empty.err);
+    for wrong in ["1,2,3", "1,2,3,4,5,nan"] {
+        assert_eq!(run(wrong).code, 2, "{wrong}");
+    }
+    assert!(!folder.path().join("x.rig.ron").exists());
+    // The only object is the whole mesh.
+    let whole = run("body");
+    assert_eq!(whole.code, 0, "{}", whole.err);
+    assert!(template(&folder.path().join("x.rig.ron")).find_label("hips").is_some());
+}
+
+/// A character that is bound to a skeleton: the part goes into what one of its bones moves.
+#[test]
+fn a_part_is_fitted_into_what_a_bone_moves() {
+    let Some(data) = test_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let fox = data.join("creatures/fox-fox.glb").display().to_string();
+    let run = |args: &[&str]| rigsmith(folder.path(), args);
+    let tail = ["--json", "fit", &fox, "--template", "parts/tail", "--region", "Tail_Base", "-o", "tail.rig.ron"];
+    let fitted = run(&tail);
+    assert_eq!(fitted.code, 0, "{}", fitted.err);
+    let tail = template(&folder.path().join("tail.rig.ron"));
+    // The fox looks along Z; its tail is behind its hind legs.
+    assert!(tail.walk().all(|joint| tail.position(joint.data.uid).z < 0.0), "the tail is behind");
+    let unknown = run(&["fit", &fox, "--region", "Tail_Bass", "-o", "x.rig.ron"]);
+    assert!(unknown.code == 1 && unknown.err.contains("Tail_Base"), "names the bones: {}", unknown.err);
+}
+
+/// The hand of the test data, alone in its file.
+#[test]
+fn a_part_is_fitted_onto_a_hand() {
+    let Some(data) = test_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let hand = data.join("hands/webxr_generic_hand_left.glb").display().to_string();
+    let part = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/templates/parts/hand.rig.ron");
+    let part = part.display().to_string();
+    let fitted = rigsmith(folder.path(), &["--json", "fit", &hand, "--template", &part, "-o", "hand.rig.ron"]);
+    assert_eq!(fitted.code, 0, "{}", fitted.err);
+    let json = fitted.json();
+    println!("confidence {}, {} joints", json["confidence"], json["joints"].as_array().unwrap().len());
+    assert_eq!(json["template"].as_str(), Some("hand"));
+    let rig = template(&folder.path().join("hand.rig.ron"));
+    assert_eq!(rig.len(), 16);
+    assert!(rig.walk().all(|joint| joint.data.label.as_deref().is_some_and(|label| label.ends_with("_l"))));
+}

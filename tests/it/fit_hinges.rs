@@ -1,0 +1,120 @@
+//! Elbows and knees of fitted rigs: they are bent, and bend on, the way that a body can.
+
+use std::{path::Path, sync::Arc};
+
+use bevy::math::Vec3;
+use rigsmith::{
+    files::{RealDisk, bundled_characters, load_model},
+    headless::Workbench,
+    plugins::fit::FitTemplates,
+    rig::Rig,
+};
+
+use crate::prerequisites::{BODIES, test_data};
+
+/// Hinge of a limb, without the ending of its side.
+struct Hinge {
+    above: &'static str,
+    joint: &'static str,
+    below: &'static str,
+    /// Sign of the flexion about the joint's X axis.
+    flexion: f32,
+    /// Sign of the direction in which a straight limb flexes: 1 forwards, -1 backwards.
+    forwards: f32,
+}
+
+const ARM: Hinge = Hinge { above: "upper_arm", joint: "forearm", below: "hand", flexion: 1.0, forwards: 1.0 };
+const LEG: Hinge = Hinge { above: "thigh", joint: "shin", below: "foot", flexion: -1.0, forwards: -1.0 };
+const FRONT_LEG: Hinge = Hinge { below: "carpus", ..ARM };
+const HIND_LEG: Hinge = Hinge { below: "metatarsus", ..LEG };
+
+/// Bend in degrees from which on it says more than the front of the body: the arm may point anywhere.
+const BENT: f32 = 25.0;
+/// Bend in degrees below which a limb counts as straight.
+const STRAIGHT: f32 = 3.0;
+
+/// Flexion axis of a hinge in the rig's space, and the limb's bones above and below it, of unit length.
+fn hinge(rig: &Rig, hinge: &Hinge, side: &str) -> (Vec3, Vec3, Vec3) {
+    let joint = |name: &str| {
+        let label = format!("{name}_{side}");
+        rig.find_label(&label).unwrap_or_else(|| panic!("no joint {label}"))
+    };
+    let [above, at, below] = [hinge.above, hinge.joint, hinge.below].map(joint);
+    let axis = hinge.flexion * Vec3::from(rig.rest_global(at).matrix3.x_axis).normalize();
+    let upper = (rig.position(at) - rig.position(above)).normalize();
+    let lower = (rig.position(below) - rig.position(at)).normalize();
+    (axis, upper, lower)
+}
+
+#[track_caller]
+fn check(name: &str, rig: &Rig, hinges: &[Hinge], forward: Vec3, is_symmetric: bool) {
+    for of in hinges {
+        let sides = ["l", "r"].map(|side| (side, hinge(rig, of, side)));
+        for (side, (axis, upper, lower)) in sides {
+            let label = format!("{name}: {}_{side}", of.joint);
+            assert!(axis.dot(lower).abs() < 0.05, "{label}: the axis is not across the bone");
+            // The limb bends about the axis already, in its sense.
+            let bend = upper.angle_between(lower).to_degrees();
+            if bend > STRAIGHT {
+                let agreement = axis.dot(upper.cross(lower).normalize());
+                assert!(agreement > 0.5, "{label} is bent the wrong way: {agreement} at {bend} degrees");
+            }
+            // By a right angle more, the forearm comes to the front and the shin to the back, towards the bone above.
+            let flexed = axis.cross(lower);
+            if bend < BENT {
+                let ahead = of.forwards * flexed.dot(forward);
+                assert!(ahead > 0.5, "{label} flexes to {flexed}, {ahead}");
+            } else {
+                assert!(flexed.dot(-upper) > 0.0, "{label} flexes away from the bone above, to {flexed}");
+            }
+        }
+        // A rotation's axis is mirrored with its sense.
+        let [(_, (left, ..)), (_, (right, ..))] = sides;
+        let mirrored = Vec3::new(left.x, -left.y, -left.z);
+        if is_symmetric {
+            assert!(right.dot(mirrored) > 0.99, "{name}: {}: {left} and {right} are no pair", of.joint);
+        }
+    }
+}
+
+fn character(name: &str) -> Arc<Rig> {
+    bundled_characters().into_iter().find(|rig| rig.about().name == name).unwrap()
+}
+
+/// Fits the template whose limbs the mesh shows, and checks its hinges.
+#[track_caller]
+fn check_fit(path: &Path, template: &str, hinges: &[Hinge]) {
+    let mut bench = Workbench::new(7, "hinges");
+    bench.open(load_model(&RealDisk, path).unwrap(), true).unwrap();
+    bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));
+    let report = bench.fit(|_| (), &mut |_| ()).unwrap();
+    assert_eq!(report.template, template, "{}: {}", path.display(), report.choice);
+    check(&path.display().to_string(), bench.rig(), hinges, report.fit.forward, report.fit.symmetric());
+}
+
+#[test]
+fn templates_bend_as_bodies_do() {
+    check("biped", &character("biped"), &[ARM, LEG], Vec3::Z, true);
+    check("quadruped", &character("quadruped"), &[FRONT_LEG, HIND_LEG], Vec3::Z, true);
+}
+
+#[test]
+fn the_bundled_body_bends_as_bodies_do() {
+    check_fit(&Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/biped.obj"), "biped", &[ARM, LEG]);
+}
+
+#[test]
+fn fitted_bodies_bend_as_bodies_do() {
+    let Some(data) = test_data() else { return };
+    for name in BODIES {
+        check_fit(&data.join("bodies").join(name).join("body.obj"), "biped", &[ARM, LEG]);
+    }
+}
+
+#[test]
+fn fitted_animals_bend_as_animals_do() {
+    let Some(data) = test_data() else { return };
+    for name in ["fox-fox.glb", "fox-dog.glb"] {
+        check_fit(&data.join("creatures").join(name), "quadruped", &[FRONT_LEG, HIND_LEG]);
+    }
+}

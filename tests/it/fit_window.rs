@@ -1,0 +1,591 @@
+//! Fits in the window: keys, the bar, the pointer, undo and redo, without a display.
+
+use std::{
+    path::Path,
+    sync::{Arc, OnceLock},
+};
+
+use bevy::prelude::*;
+use bevy_egui::egui;
+use rigsmith::{
+    editor::{
+        ActiveRig,
+        actions::{Action, ActionRequest},
+        camera::ViewportSight,
+        fitting::{
+            FittingPlugin,
+            doubts::{FitMarkKind, fit_marks},
+        },
+        notice::Notice,
+        pointer::{ModifierKeys, PointerAct, ViewportPointer},
+        tools::{
+            ToolsPlugin,
+            region::{RegionSkeleton, RegionTool},
+        },
+    },
+    files::{RealDisk, bundled_characters, load_model},
+    headless::headless_app,
+    mesh::model::{Model, Weights},
+    plugins::{
+        document::Change,
+        fit::{FitJob, FitMarkers, FitRegion, FitRequest, FitTemplate, FittedRig},
+        history::RigHistory,
+        surface::RigMesh,
+        viewport::{RigViewport, Sight},
+    },
+    prelude::*,
+    rig::{SkinData, template::write_template},
+    test_app::strict_app,
+};
+
+use super::panels::desk::{Desk, Sheet};
+
+const MESH: Uid = Uid(99);
+const PLAIN: ModifierKeys = ModifierKeys { shift: false, control: false, alt: false };
+const SHIFT: ModifierKeys = ModifierKeys { shift: true, ..PLAIN };
+const CONTROL: ModifierKeys = ModifierKeys { control: true, ..PLAIN };
+
+/// Notices and actions of a window.
+#[derive(Resource, Default)]
+struct Told {
+    notices: Vec<String>,
+    actions: Vec<Action>,
+}
+
+fn collect(mut told: ResMut<Told>, mut notices: MessageReader<Notice>, mut actions: MessageReader<ActionRequest>) {
+    told.notices.extend(notices.read().map(|notice| notice.text.clone()));
+    told.actions.extend(actions.read().map(|action| action.0));
+}
+
+fn front() -> Sight {
+    let camera = Transform::from_xyz(0.0, 0.9, 4.0).looking_at(Vec3::Y * 0.9, Vec3::Y);
+    let projection = Projection::Perspective(PerspectiveProjection { fov: 0.55, ..default() });
+    let viewport = RigViewport { focus: 4.0 };
+    Sight::new(&camera.into(), &projection, &viewport, Vec2::splat(800.0), &GlobalTransform::IDENTITY).unwrap()
+}
+
+fn body() -> Model {
+    static BODY: OnceLock<Model> = OnceLock::new();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/biped.obj");
+    BODY.get_or_init(|| load_model(&RealDisk, &path).unwrap()).clone()
+}
+
+fn character(name: &str) -> Arc<Rig> {
+    bundled_characters().into_iter().find(|rig| rig.about().name == name).unwrap()
+}
+
+/// A window with a mesh and an empty rig.
+struct Window {
+    desk: Desk,
+    mesh: Entity,
+}
+
+impl Window {
+    fn new(model: Model) -> Self {
+        let mut app = headless_app(1);
+        app.add_plugins((ToolsPlugin, FittingPlugin)).init_resource::<Told>().add_systems(Last, collect);
+        let mut app = strict_app(app);
+        let rig = app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
+        app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(front())));
+        let mesh = app.world_mut().spawn((RigMesh::new(MESH, model, Vec::new()), SkinOf(rig))).id();
+        let desk = Desk::of(app, rig, Sheet::Window, egui::vec2(1200.0, 800.0));
+        let mut window = Self { desk, mesh };
+        window.until(|window| {
+            let surface = window.world().get::<RigSurface>(window.desk.rig);
+            surface.is_some_and(|surface| surface.ready().is_some())
+        });
+        window
+    }
+
+    /// The bundled body with the biped in it.
+    fn fitted() -> Self {
+        let mut window = Self::new(body());
+        window.fit();
+        window
+    }
+
+    fn world(&self) -> &World {
+        self.desk.app.world()
+    }
+
+    #[track_caller]
+    fn until(&mut self, is_so: impl Fn(&Self) -> bool) {
+        let start = std::time::Instant::now();
+        while !is_so(self) {
+            assert!(start.elapsed() < crate::bench::HANG, "it does not come: {:?}", self.told().notices);
+            self.desk.frame();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+    }
+
+    fn told(&self) -> &Told {
+        self.world().resource::<Told>()
+    }
+
+    #[track_caller]
+    fn says(&self, part: &str) {
+        let notices = &self.told().notices;
+        assert!(notices.iter().any(|notice| notice.contains(part)), "{part} is not among {notices:?}");
+    }
+
+    fn act(&mut self, action: Action) {
+        self.desk.app.world_mut().write_message(ActionRequest(action));
+        self.desk.frames(3);
+    }
+
+    fn settle(&mut self) {
+        self.until(|window| window.world().get::<FitJob>(window.mesh).is_none());
+        self.desk.frames(4);
+    }
+
+    fn fit(&mut self) {
+        self.act(Action::Fit);
+        self.settle();
+    }
+
+    fn change(&mut self, change: Change) {
+        let rig = self.desk.rig;
+        self.desk.app.world_mut().write_message(EditRequest { rig, change });
+        self.desk.frames(4);
+    }
+
+    fn rig(&self) -> &Rig {
+        self.desk.rig()
+    }
+
+    fn text(&self) -> String {
+        write_template(self.rig())
+    }
+
+    fn joint(&self, label: &str) -> Uid {
+        self.rig().find_label(label).unwrap_or_else(|| panic!("no joint {label}"))
+    }
+
+    fn at(&self, label: &str) -> Vec3 {
+        self.rig().position(self.joint(label))
+    }
+
+    fn steps(&self) -> usize {
+        self.world().get::<RigHistory>(self.desk.rig).unwrap().steps().1
+    }
+
+    fn open(&self) -> Option<&FittedRig> {
+        self.world().get(self.desk.rig)
+    }
+
+    fn markers(&self) -> Vec<Uid> {
+        let markers = self.world().get::<FitMarkers>(self.desk.rig);
+        markers.map(|markers| markers.0.keys().copied().collect()).unwrap_or_default()
+    }
+
+    fn faces(&self) -> usize {
+        self.world().resource::<RegionTool>().faces.as_ref().map_or(0, |faces| faces.triangles.len())
+    }
+
+    /// Moves a joint by hand, and gives its place.
+    fn drag(&mut self, label: &str, by: Vec3) -> Vec3 {
+        let (joint, to) = (self.joint(label), self.at(label) + by);
+        self.change(Change::Do(Operation::Move { to: vec![(joint, to)], with_children: false }));
+        to
+    }
+
+    fn point(&mut self, held: ModifierKeys, acts: &[(Vec2, PointerAct)]) {
+        for (at, act) in acts {
+            self.desk.app.world_mut().write_message(ViewportPointer { at: *at, act: *act, held });
+        }
+        self.desk.frame();
+    }
+
+    fn click(&mut self, held: ModifierKeys, at: Vec3) {
+        let at = front().project(at).unwrap();
+        self.point(held, &[(at, PointerAct::Pressed)]);
+        self.point(held, &[(at, PointerAct::Released { dragged: false, count: 1 })]);
+        self.desk.frame();
+    }
+
+    /// Drags a box around all between two places.
+    fn drag_box(&mut self, held: ModifierKeys, from: Vec3, to: Vec3) {
+        let [from, to] = [from, to].map(|place| front().project(place).unwrap());
+        self.point(held, &[(from, PointerAct::Pressed)]);
+        self.point(held, &[(from.midpoint(to), PointerAct::Dragged), (to, PointerAct::Dragged)]);
+        self.point(held, &[(to, PointerAct::Released { dragged: true, count: 1 })]);
+        self.desk.frame();
+    }
+
+    /// Drags a box around a hand of the bundled body: 1 for the left one, -1 for the right one.
+    fn box_hand(&mut self, side: f32) {
+        self.drag_box(PLAIN, Vec3::new(0.5 * side, 1.3, 0.0), Vec3::new(0.8 * side, 0.6, 0.0));
+    }
+}
+
+#[test]
+fn undo_and_redo_of_a_fit_keep_what_a_drag_needs() {
+    let mut window = Window::fitted();
+    assert!(window.open().is_some() && window.desk.look("Accept").is_some());
+    let steps = window.steps();
+    // Undone, nothing is left of it.
+    window.change(Change::Undo);
+    assert!(window.rig().is_empty() && window.open().is_none() && window.markers().is_empty());
+    assert!(window.desk.look("Accept").is_none(), "the bar is gone");
+    assert!(fit_marks(window.world()).is_empty());
+    // Redone, a drag takes the neighbours along, and is undone and redone itself.
+    window.change(Change::Redo);
+    assert!(window.open().is_some());
+    let hand = window.at("hand_l");
+    let place = window.drag("forearm_l", Vec3::new(0.03, 0.04, 0.0));
+    assert_eq!(window.steps(), steps + 2, "the move and what follows it");
+    assert!(window.at("forearm_l").distance(place) < 1e-4);
+    assert!(window.at("hand_l").distance(hand) > 1e-4, "the hand follows");
+    let elbow = window.joint("forearm_l");
+    assert_eq!(window.markers(), [elbow]);
+    let corrected = window.text();
+    (0..2).for_each(|_| window.change(Change::Undo));
+    assert!(window.open().is_some() && window.markers().is_empty());
+    (0..2).for_each(|_| window.change(Change::Redo));
+    assert_eq!(window.text(), corrected);
+    assert_eq!(window.markers(), [elbow], "a marker comes back with its step");
+    assert_eq!(window.open().unwrap().markers.get(&elbow).map(|at| at.distance(place) < 1e-4), Some(true));
+
+    // An accepted fit as well: redo opens it again.
+    window.act(Action::Accept);
+    assert!(window.open().is_none());
+    (0..3).for_each(|_| window.change(Change::Undo));
+    assert!(window.rig().is_empty() && window.open().is_none());
+    window.change(Change::Redo);
+    let (steps, shin) = (window.steps(), window.at("foot_r"));
+    window.drag("shin_r", Vec3::new(0.02, 0.03, 0.0));
+    assert_eq!(window.steps(), steps + 2, "the drag is followed");
+    assert!(window.at("foot_r").distance(shin) < 0.1);
+    assert!(window.at("forearm_l").distance(place) > 0.01, "of the undone correction nothing comes back");
+}
+
+#[test]
+fn places_that_a_person_chose_are_kept_listed_and_let_go() {
+    let mut window = Window::new(body());
+    let before = window.text();
+    window.fit();
+    let place = window.drag("forearm_l", Vec3::new(0.02, 0.03, 0.0));
+    window.drag("shin_r", Vec3::new(0.02, 0.02, 0.0));
+    let mut placed = vec![window.joint("forearm_l"), window.joint("shin_r")];
+    placed.sort();
+    assert_eq!(window.markers(), placed, "through several drags");
+    assert!(window.at("forearm_l").distance(place) < 1e-4);
+    for label in ["forearm_l ×", "shin_r ×"] {
+        assert!(window.desk.look(label).is_some(), "{label} is listed");
+    }
+    let marks = fit_marks(window.world());
+    assert_eq!(marks.iter().filter(|mark| mark.kind == FitMarkKind::Placed).count(), 2);
+
+    // One is let go, and the fit places it again; undo holds it again.
+    let knee = window.at("shin_r");
+    window.desk.click("shin_r ×");
+    window.desk.frames(4);
+    assert_eq!(window.markers(), [window.joint("forearm_l")]);
+    assert!(window.at("shin_r").distance(knee) > 0.005, "the knee is {} away", window.at("shin_r").distance(knee));
+    assert!(window.at("forearm_l").distance(place) < 1e-4);
+    window.change(Change::Undo);
+    assert_eq!(window.markers(), placed);
+    assert!(window.at("shin_r").distance(knee) < 1e-5);
+
+    // The next fit starts from them, even after this one was accepted.
+    window.act(Action::Accept);
+    assert!(window.open().is_none());
+    assert_eq!(window.markers(), placed);
+    let accepted = window.text();
+    window.fit();
+    assert!(window.at("forearm_l").distance(place) < 1e-4, "the elbow is at {}", window.at("forearm_l"));
+    assert!(window.at("shin_r").distance(knee) < 1e-4);
+    // Cancelled, the rig is as it was before that fit.
+    window.act(Action::Cancel);
+    window.desk.frames(4);
+    assert_eq!(window.text(), accepted);
+    assert!(window.open().is_none());
+
+    // Cancelled at once, no place is left of a fit, and the rig has its first bytes.
+    let mut window = Window::fitted();
+    window.drag("forearm_l", Vec3::new(0.02, 0.03, 0.0));
+    assert_eq!(window.markers().len(), 1);
+    window.act(Action::Cancel);
+    window.desk.frames(4);
+    assert_eq!(window.text(), before);
+    assert!(window.markers().is_empty() && window.open().is_none());
+}
+
+/// The keys of a person: the first fit is open while the second one is cancelled.
+#[test]
+fn a_cancelled_second_fit_leaves_the_first_one_open() {
+    let mut window = Window::fitted();
+    let place = window.drag("forearm_l", Vec3::new(0.02, 0.03, 0.0));
+    let first = window.text();
+    window.fit();
+    assert!(window.at("forearm_l").distance(place) < 1e-4);
+    window.act(Action::Cancel);
+    window.desk.frames(4);
+    assert_eq!(window.text(), first);
+    assert!(window.open().is_some(), "the first fit can be corrected");
+    assert_eq!(window.markers(), [window.joint("forearm_l")]);
+    window.act(Action::Cancel);
+    window.desk.frames(4);
+    assert!(window.rig().is_empty() && window.open().is_none() && window.markers().is_empty());
+}
+
+#[test]
+fn a_running_fit_shows_its_progress_and_is_cancelled() {
+    for by_key in [true, false] {
+        let mut window = Window::new(body());
+        let before = window.text();
+        window.desk.app.world_mut().write_message(ActionRequest(Action::Fit));
+        window.desk.frames(2);
+        let job = window.world().get::<FitJob>(window.mesh);
+        assert!(job.is_some_and(|job| (0.0..=1.0).contains(&job.progress())));
+        window.desk.frame();
+        assert!(window.desk.look("Cancel").is_some(), "the bar has a way out");
+        if by_key {
+            window.act(Action::Cancel);
+        } else {
+            window.desk.click("Cancel");
+        }
+        window.settle();
+        window.says("The fit was cancelled. The rig is as it was.");
+        assert_eq!(window.text(), before);
+        assert_eq!(window.steps(), 0);
+        assert!(window.open().is_none() && window.desk.look("Cancel").is_none());
+    }
+}
+
+/// Meshes that show no figure: an error with the reason or a warning, and nothing that Esc does not take back.
+#[test]
+fn meshes_without_a_figure_change_nothing() {
+    let block = crate::gestures::boxes(&[[[0.0; 3], [1.0, 1.0, 1.0]]]);
+    let mut flat = block.clone();
+    flat.points.iter_mut().for_each(|point| point.z = 0.0);
+    for (name, model, reason) in [("a plane", flat, Some("flat")), ("a block", block, None)] {
+        let mut window = Window::new(model);
+        let before = window.text();
+        window.fit();
+        match reason {
+            Some(reason) => window.says(&format!("No skeleton was fitted: the mesh is {reason}")),
+            None if window.open().is_some() => {
+                window.says("but the mesh may be something else");
+                window.act(Action::Cancel);
+                window.desk.frames(4);
+            }
+            None => window.says("No skeleton was fitted: "),
+        }
+        assert_eq!(window.text(), before, "{name}");
+        assert_eq!(window.steps(), 0, "{name}");
+        assert!(window.open().is_none(), "{name}");
+    }
+    // Without a mesh there is nothing to fit into.
+    let mut window = Window::new(crate::gestures::boxes(&[[[0.0; 3], [1.0, 1.0, 1.0]]]));
+    let mesh = window.mesh;
+    window.desk.app.world_mut().entity_mut(mesh).despawn();
+    window.act(Action::Fit);
+    window.says("There is no mesh to fit a skeleton into");
+}
+
+#[test]
+fn doubtful_joints_stand_out_and_are_visited_one_by_one() {
+    let mut window = Window::new(body());
+    // A body whose left arm ends below the shoulder.
+    let request = FitRequest {
+        template: FitTemplate::Rig(character("biped")),
+        region: FitRegion::Box([Vec3::new(-2.0, -1.0, -1.0), Vec3::new(0.33, 3.0, 1.0)]),
+        ..FitRequest::new(window.mesh)
+    };
+    window.desk.app.world_mut().write_message(request);
+    window.desk.frames(2);
+    window.settle();
+    let report = window.open().unwrap().report.clone();
+    let doubts: Vec<Uid> = report.doubtful().collect();
+    let hand = window.joint("hand_l");
+    assert!(doubts.contains(&hand) && doubts.len() < report.joints.len(), "{} doubts", doubts.len());
+    assert_eq!(window.desk.selected(), doubts, "they are selected");
+    let marks = fit_marks(window.world());
+    let ringed: Vec<Uid> = marks.iter().filter(|mark| mark.kind == FitMarkKind::Doubt).map(|mark| mark.joint).collect();
+    assert_eq!(ringed, doubts);
+    let (_, first, fit) = report.doubts().next().unwrap();
+    let row = format!("{first}: {}", fit.reason);
+    let counted = format!("{}: {} joints, {} doubtful joints", report.template, report.joints.len(), doubts.len());
+    assert!(window.desk.look(&counted).is_some() || window.desk.says(&counted), "{counted}");
+    // A click on a row selects the joint and goes there.
+    window.desk.click(&row);
+    window.desk.frames(4);
+    assert_eq!(window.desk.selected(), [doubts[0]]);
+    assert!(window.told().actions.contains(&Action::FrameSelected));
+    // The key goes on to the next one, and from the last one to the first.
+    for doubt in doubts.iter().skip(1).chain([&doubts[0]]) {
+        window.act(Action::NextDoubt);
+        assert_eq!(window.desk.selected(), [*doubt]);
+    }
+    // Rings stay while other joints are selected, and go with the fit.
+    window.desk.select(&[window.joint("hips")]);
+    assert!(fit_marks(window.world()).len() >= doubts.len());
+    window.act(Action::Accept);
+    assert!(fit_marks(window.world()).is_empty());
+    window.act(Action::NextDoubt);
+    window.says("No fit has doubtful joints.");
+}
+
+/// A part of the library in a box around a hand; the other hand gets the other side.
+#[test]
+fn a_part_is_fitted_into_chosen_faces() {
+    let template = character("biped");
+    for (side, ending) in [(1.0, "_l"), (-1.0, "_r")] {
+        let mut window = Window::new(body());
+        let before = window.text();
+        window.act(Action::FitPart);
+        let faces = window.world().resource::<RegionTool>().faces.clone().unwrap();
+        assert_eq!(faces.skeleton, RegionSkeleton::Part("parts/hand.rig.ron".to_owned()));
+        // Nothing is chosen yet.
+        window.desk.click("Fit");
+        window.desk.frames(3);
+        window.says("No face is chosen");
+        assert!(window.world().resource::<RegionTool>().is_open());
+        window.box_hand(side);
+        let count = window.faces();
+        assert!((500..15_000).contains(&count), "{count} faces of a hand");
+        window.desk.click("Fit");
+        window.desk.frames(3);
+        window.settle();
+        assert!(!window.world().resource::<RegionTool>().is_open());
+        assert_eq!(window.rig().len(), 16, "{:?}", window.told().notices);
+        let mut sum = 0.0;
+        for joint in window.rig().walk() {
+            let label = joint.data.label.clone().unwrap();
+            assert!(label.ends_with(ending), "{label} is of the other side");
+            let known = template.position(template.find_label(&label).unwrap());
+            let off = window.at(&label).distance(known);
+            assert!(off < 0.06, "{label} is off by {off}");
+            sum += off;
+        }
+        println!("hand{ending}: {:.4} off in the mean", sum / 16.0);
+        assert!(sum / 16.0 < 0.03, "{}", sum / 16.0);
+        // One step; Esc takes it back.
+        assert_eq!(window.steps(), 1);
+        window.act(Action::Cancel);
+        window.desk.frames(4);
+        assert_eq!(window.text(), before);
+    }
+}
+
+/// A part that is added below a joint of a rig: the other joints stay, and its own are corrected.
+#[test]
+fn a_part_hangs_on_the_selected_joint() {
+    let mut window = Window::new(body());
+    let (template, arm) = (character("biped"), ["upper_arm_r", "forearm_r"]);
+    let places = arm.map(|label| template.position(template.find_label(label).unwrap()));
+    window.change(Change::Do(Operation::Chain { positions: places.to_vec(), parent: None }));
+    let joints: Vec<Uid> = window.rig().walk().map(|joint| joint.data.uid).collect();
+    let labels = joints.iter().zip(arm).map(|(uid, label)| (*uid, label.to_owned()));
+    window.change(Change::Do(Operation::Labels(labels.collect())));
+    let (before, steps) = (window.text(), window.steps());
+    let places = arm.map(|label| window.at(label));
+    window.desk.select(&[joints[1]]);
+    window.act(Action::FitPart);
+    let faces = window.world().resource::<RegionTool>().faces.clone().unwrap();
+    assert_eq!(faces.skeleton, RegionSkeleton::Selected);
+    window.box_hand(-1.0);
+    let mut tool = window.world().resource::<RegionTool>().clone();
+    tool.faces.as_mut().unwrap().skeleton = RegionSkeleton::Part("parts/hand".to_owned());
+    window.desk.app.insert_resource(tool);
+    window.act(Action::Accept);
+    window.settle();
+    assert_eq!(window.rig().len(), 18, "{:?}", window.told().notices);
+    let hand = window.joint("hand_r");
+    assert_eq!(window.rig().joint(hand).unwrap().parent, Some(joints[1]));
+    assert_eq!(arm.map(|label| window.at(label)), places, "the arm stays");
+    assert!(window.at("middle_02_r").distance(template.position(template.find_label("middle_02_r").unwrap())) < 0.06);
+    assert!(!window.rig().joint(hand).unwrap().data.tags.is_empty(), "it brings its commands");
+    assert_eq!(window.steps(), steps + 1);
+    // A finger that is put right is a marker of the part's fit.
+    let place = window.drag("index_02_r", Vec3::new(0.0, 0.004, 0.004));
+    assert!(window.at("index_02_r").distance(place) < 1e-4);
+    assert_eq!(window.markers(), [window.joint("index_02_r")]);
+    assert_eq!(arm.map(|label| window.at(label)), places);
+    window.act(Action::Cancel);
+    window.desk.frames(4);
+    assert_eq!(window.text(), before);
+}
+
+/// The hand of a whole rig, moved out of its mesh, is fitted into the faces that its weights hold; nothing else moves.
+#[test]
+fn selected_joints_are_fitted_alone() {
+    let mut window = Window::fitted();
+    window.act(Action::Accept);
+    let hand = window.joint("hand_l");
+    let hips = window.joint("hips");
+    let points = window.world().get::<RigMesh>(window.mesh).unwrap().rest.points.clone();
+    let mut weights = Weights { starts: vec![0], ..Weights::default() };
+    points.iter().for_each(|point| weights.push([(u32::from(point.x > 0.5 && point.y < 1.3), 1.0)]));
+    let skin = SkinData { joints: vec![hips, hand], weights, at_rest: true, ..SkinData::default() };
+    window.change(Change::Do(Operation::Edits(vec![RigEdit::SetSkin(MESH, Some(Arc::new(skin)))])));
+    let to = window.at("hand_l") + Vec3::new(0.0, 0.2, 0.3);
+    window.change(Change::Do(Operation::Move { to: vec![(hand, to)], with_children: true }));
+    let (before, steps, was) = (window.text(), window.steps(), window.rig().clone());
+    window.desk.select(&[hand]);
+    window.act(Action::FitPart);
+    window.desk.click("Faces of selected joints");
+    window.desk.frames(2);
+    assert!((500..15_000).contains(&window.faces()), "{} faces", window.faces());
+    window.act(Action::Accept);
+    window.settle();
+    assert_eq!(window.steps(), steps + 1, "{:?}", window.told().notices);
+    let template = character("biped");
+    for joint in was.walk() {
+        let (uid, label) = (joint.data.uid, joint.data.label.clone().unwrap_or_default());
+        let is_of_hand = uid == hand || was.ancestors(uid).any(|above| above.data.uid == hand);
+        let now = window.rig().position(uid);
+        if !is_of_hand {
+            assert_eq!(now, was.position(uid), "{label} stays");
+            continue;
+        }
+        let known = template.position(template.find_label(&label).unwrap());
+        assert!(now.distance(known) < 0.06, "{label} is off by {}", now.distance(known));
+    }
+    assert_eq!(window.rig().joint(hand).unwrap().parent, was.joint(hand).unwrap().parent);
+    window.change(Change::Undo);
+    assert_eq!(window.text(), before);
+}
+
+#[test]
+fn faces_are_chosen_by_clicks_and_boxes() {
+    let model = crate::gestures::boxes(&[[[-0.5, 0.5, -0.1], [-0.3, 0.7, 0.1]], [[0.3, 0.5, -0.1], [0.5, 0.7, 0.1]]]);
+    let all = model.point_triangles().len();
+    let mut window = Window::new(model);
+    window.act(Action::FitPart);
+    let (left, right) = (Vec3::new(-0.4, 0.6, 0.1), Vec3::new(0.4, 0.6, 0.1));
+    window.click(PLAIN, left);
+    assert_eq!(window.faces(), all / 2, "one piece");
+    window.click(SHIFT, right);
+    assert_eq!(window.faces(), all, "and the other");
+    window.click(CONTROL, left);
+    assert_eq!(window.faces(), all / 2, "without the first");
+    window.click(PLAIN, Vec3::new(0.0, 1.5, 0.0));
+    assert_eq!(window.faces(), 0, "beside the mesh: none");
+    window.drag_box(PLAIN, Vec3::new(-0.8, 1.2, 0.0), Vec3::new(0.0, 0.2, 0.0));
+    assert_eq!(window.faces(), all / 2);
+    window.drag_box(SHIFT, Vec3::new(-0.8, 1.2, 0.0), Vec3::new(0.8, 0.2, 0.0));
+    assert_eq!(window.faces(), all);
+    assert!(window.desk.selected().is_empty(), "the tool has the pointer for itself");
+    // Esc closes the tool and nothing else.
+    window.act(Action::Cancel);
+    assert!(!window.world().resource::<RegionTool>().is_open());
+    assert_eq!(window.steps(), 0);
+    window.click(PLAIN, left);
+    assert_eq!(window.faces(), 0);
+}
+
+#[test]
+fn closing_the_region_leaves_an_open_fit() {
+    let mut window = Window::fitted();
+    let before = window.text();
+    window.act(Action::FitPart);
+    window.box_hand(1.0);
+    window.act(Action::Cancel);
+    assert!(window.open().is_some(), "the fit can still be corrected");
+    assert_eq!(window.text(), before);
+    window.act(Action::Cancel);
+    window.desk.frames(4);
+    assert!(window.open().is_none() && window.rig().is_empty());
+}
