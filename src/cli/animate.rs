@@ -255,6 +255,7 @@ fn describe(clips: &[RigClip], report: &mut Report) {
             "seconds": clip.duration(),
             "frame_rate": clip.frame_rate,
             "looped": clip.looped,
+            "markers": clip.markers.len(),
             "tracks": tracks,
             "keys": clip.key_count(),
         })

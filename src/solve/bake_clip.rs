@@ -10,7 +10,9 @@ use crate::{
     mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Trs},
     rig::{
         Uid,
-        animation::{Ease, Key, Property, RigClip, SampledPose, TrackTarget, file_clip::channel_of},
+        animation::{
+            Ease, Key, Property, RigClip, SampledPose, TrackTarget, clip_extras::ClipExtras, file_clip::channel_of,
+        },
         operations::KeyTolerance,
     },
 };
@@ -72,7 +74,7 @@ pub fn strike(state: &mut RigState, pose: &SampledPose) {
 
 /// Plays a clip at a rate and gives the nodes' transforms relative to their parents as channels, whose targets are places among
 /// the nodes. Channels that stay at rest are left out, and keys without which joints stay within the tolerance. A node that
-/// nothing but its keys moves keeps them as they are.
+/// nothing but its keys moves keeps them as they are. Markers, the rate and whether the clip is looped are in the extras.
 ///
 /// Time starts at zero with the clip. Takes some tens of microseconds a frame for a character.
 ///
@@ -130,7 +132,8 @@ pub fn bake_clip(
         .map(|(node, locals)| SampledNode { parent: node.parent, locals: same_side(locals, node.rest.rotation) })
         .collect();
     let keys = reduce_skeleton(&times, &sampled, &fixed, tolerance);
-    let mut baked = Clip { name: clip.name.clone(), ..Clip::default() };
+    let extras = Some(ClipExtras::of(clip, rate).written());
+    let mut baked = Clip { name: clip.name.clone(), extras, ..Clip::default() };
     for (at, (node, mut keys)) in nodes.iter().zip(keys).enumerate() {
         for (part, property) in properties.iter().enumerate() {
             let kept = direct[at][part].take();

@@ -50,7 +50,7 @@ pub enum MotionTarget {
 pub struct RetargetSettings {
     /// Frames a second of the clip; the motion's own, but at most 60, if `None`.
     pub frame_rate: Option<f32>,
-    /// True if the clip is played over and over.
+    /// True if the clip is played over and over; so is that of a motion which says so itself.
     pub looped: bool,
     /// Nodes that get keys.
     pub onto: MotionTarget,
@@ -151,7 +151,9 @@ pub fn retarget(
     let contacts = if settings.lock_feet { Contacts::find(&body, rate) } else { Contacts::none(&body) };
     let has_twist = settings.onto == MotionTarget::Controls;
     let poses = body.poses(&contacts, rate, has_twist);
-    let mut clip = tracks::empty_clip(rig, &motion.name, rate, [0.0, *times.last().unwrap_or(&0.0)], settings.looped);
+    let range = [0.0, *times.last().unwrap_or(&0.0)];
+    let mut clip = tracks::empty_clip(rig, &motion.name, rate, range, settings.looped || motion.looped);
+    clip.markers.clone_from(&motion.markers);
     let program = std::sync::Arc::new(RigProgram::compile(built, &CompileOptions::default())?);
     let (keyed, unmoved) = match settings.onto {
         MotionTarget::Controls => controls::keyed(built, &program, &body, &poses)?,
