@@ -40,6 +40,8 @@
 //! | [`runtime::DrivenMorphs`] | whoever binds a mesh; its weights by the rig | drives other morph targets; weights are overwritten |
 //! | [`face::Face`], [`fit::FittedRig`] | the analysis of a mesh and the fit | opaque; taking it off ends expressions, or corrections of the fit |
 //! | [`RigInstance`](crate::instance::RigInstance), [`RigSource`](crate::instance::RigSource), [`ExposedNodes`](crate::instance::ExposedNodes), `SharedMesh` (feature `draw`) | games | another template or other nodes are spawned; taking it off despawns what came of it |
+//! | [`InstanceClips`](crate::instance::InstanceClips) | games | another file is bound; taking it off leaves the clips |
+//! | [`InstanceAnimations`](crate::instance::InstanceAnimations) | instances with clips | overwritten when file or template change |
 //! | [`RunningTemplate`](crate::instance::RunningTemplate), [`UpdateOffer`](crate::instance::UpdateOffer), [`BoundTo`](crate::instance::BoundTo) | instances | opaque; stands until the template, the offer or the mesh changes |
 
 pub mod animation;

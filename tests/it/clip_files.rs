@@ -183,7 +183,8 @@ fn what_channels_cannot_hold_goes_out_and_in_again() {
 #[test]
 fn damaged_extras_are_passed_over_and_others_stay() {
     let read = |text: &str| ClipExtras::read(Some(&serde_json::from_str(text).unwrap()));
-    for text in ["null", "[]", "7", "{}", r#"{"rigsmith": null}"#, r#"{"rigsmith": {"markers": 3, "frame_rate": "x"}}"#] {
+    for text in ["null", "[]", "7", "{}", r#"{"rigsmith": null}"#, r#"{"rigsmith": {"markers": 3, "frame_rate": "x"}}"#]
+    {
         assert_eq!(read(text), ClipExtras::default(), "{text}");
     }
     let damaged = r#"{"rigsmith": {"frame_rate": -1, "looped": 1, "markers": [
