@@ -63,10 +63,8 @@ impl ValueRange {
         let mut high = [f32::MIN; 3];
         for value in values {
             let own = range.inner(property, *value)?;
-            for axis in 0..3 {
-                range.low[axis] = range.low[axis].min(own[axis]);
-                high[axis] = high[axis].max(own[axis]);
-            }
+            range.low = std::array::from_fn(|axis| range.low[axis].min(own[axis]));
+            high = std::array::from_fn(|axis| high[axis].max(own[axis]));
         }
         range.size = std::array::from_fn(|axis| high[axis] - range.low[axis]);
         range.size.iter().all(|size| size.is_finite()).then_some(range)
