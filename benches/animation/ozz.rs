@@ -108,7 +108,7 @@ fn file(clip: &RigClip) -> Vec<u8> {
 fn packed(turn: [f32; 4]) -> [u16; 3] {
     let largest = (0..4).max_by(|a, b| turn[*a].abs().total_cmp(&turn[*b].abs())).unwrap_or(3);
     let others = (0..4).filter(|part| *part != largest);
-    let mut bits = largest as u64 | u64::from(turn[largest] < 0.0) << 2;
+    let mut bits = largest as u64 | (u64::from(turn[largest] < 0.0) << 2);
     for (number, part) in others.enumerate() {
         let share = (turn[part] * std::f32::consts::FRAC_1_SQRT_2 + 0.5).clamp(0.0, 1.0);
         bits |= ((share * 32767.0).round() as u64) << (3 + 15 * number);

@@ -1,11 +1,13 @@
 //! Packed clips: the motion of a skeleton in few bytes, for the files and the memory of games.
 //!
-//! A clip has for each node its translation, rotation and scale relative to the parent, as lines between keys at frames. Parts
-//! that stay at rest take a byte, constants their numbers. Numbers of keys have as few bits as the tolerance allows, within the
-//! range of their track; rotations are told from the middle one of their track, by three numbers. What is lost by that is part
-//! of what is measured: with its lines *and* its bits, every node is within the tolerance of where it was, at every frame.
+//! A clip has for each node its translation, rotation and scale relative to the parent: as lines between keys at frames, or,
+//! where that takes fewer bytes, as a value for each frame. Parts that stay at rest take a byte, constants their numbers. Numbers
+//! have as few bits as the tolerance allows; rotations are told from the middle one of their track, by three numbers. What is
+//! lost by that is part of what is measured: with its lines *and* its bits, every node is within the tolerance of where it was, at
+//! every frame.
 
 mod bits;
+mod steps;
 mod track;
 
 use std::sync::Arc;
@@ -15,6 +17,7 @@ use serde_json::Value;
 
 use self::{
     bits::{Reader, write_number},
+    steps::Steps,
     track::PackedTrack,
 };
 use super::{
@@ -158,7 +161,12 @@ impl PackedClip {
             let least = tolerance.iter().copied().fold(f32::MAX, f32::min).max(0.1 * track.tolerance);
             let ends = fit_lines(&track.property, times, &track.values, &for_lines);
             let keys: Vec<(u32, [f32; 4])> = ends.into_iter().map(|end| (end as u32, track.values[end])).collect();
-            let packed = PackedTrack::new(&track.property, &keys, (1.0 - LINES) * least);
+            let mut packed = PackedTrack::new(&track.property, &keys, (1.0 - LINES) * least);
+            if packed.len() > 1
+                && let Some(steps) = Steps::new(&track.property, &track.values, least)
+            {
+                packed = packed.smaller(PackedTrack::Steps(steps));
+            }
             let keys = packed.keys(&track.property);
             let line = |(frame, value): (u32, [f32; 4])| Key { time: times[frame as usize], value, ease: Ease::Linear };
             let values = sampled(&track.property, times, keys.into_iter().map(line).collect());

@@ -131,7 +131,7 @@ fn damaged_bytes_are_told_and_never_panic() {
     assert!(matches!(PackedClip::from_bytes(&longer), Err(PackedClipError::Damaged { .. })));
     let mut random = Random(5);
     let mut told = 0;
-    for _ in 0..3000 {
+    for _ in 0..500 {
         let mut damaged = bytes.clone();
         let place = 8 + random.below(damaged.len() - 8);
         damaged[place] ^= 1 << random.below(8);

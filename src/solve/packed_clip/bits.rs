@@ -73,31 +73,52 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Numbers of so many bits each, one after the other, the low bits first.
-pub(super) fn pack_bits(numbers: impl Iterator<Item = u32>, bits: u32) -> Vec<u8> {
-    let (mut out, mut held, mut count) = (Vec::new(), 0_u64, 0);
-    for number in numbers {
-        held |= u64::from(number) << count;
-        count += bits;
-        while count >= 8 {
-            out.push(held as u8);
-            held >>= 8;
-            count -= 8;
-        }
-    }
-    if count > 0 {
-        out.push(held as u8);
-    }
-    out
+/// Bits one after the other, the low ones first.
+#[derive(Default)]
+pub(super) struct BitWriter {
+    out: Vec<u8>,
+    held: u64,
+    count: u32,
 }
 
-/// Number at a place of [`pack_bits`]; zero beyond the end.
-pub(super) fn bits_at(bytes: &[u8], place: usize, bits: u32) -> u32 {
-    let first = place * bits as usize;
-    let from = first / 8;
-    let mut held = 0_u64;
-    for (number, byte) in bytes.iter().skip(from).take(8).enumerate() {
-        held |= u64::from(*byte) << (8 * number);
+impl BitWriter {
+    /// Adds the low bits of a number, at most 40.
+    pub fn push(&mut self, number: u64, bits: u32) {
+        self.held |= number << self.count;
+        self.count += bits;
+        while self.count >= 8 {
+            self.out.push(self.held as u8);
+            self.held >>= 8;
+            self.count -= 8;
+        }
     }
-    ((held >> (first % 8)) & ((1 << bits) - 1)) as u32
+
+    pub fn finish(mut self) -> Vec<u8> {
+        if self.count > 0 {
+            self.out.push(self.held as u8);
+        }
+        self.out
+    }
+}
+
+/// Bits of a [`BitWriter`].
+pub(super) struct BitReader<'a> {
+    bytes: &'a [u8],
+    place: usize,
+}
+
+impl<'a> BitReader<'a> {
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, place: 0 }
+    }
+
+    /// Next bits, at most 40; `None` beyond the end.
+    pub fn take(&mut self, bits: u32) -> Option<u64> {
+        let (from, end) = (self.place / 8, self.place + bits as usize);
+        let bytes = self.bytes.get(from..end.div_ceil(8))?;
+        let held = bytes.iter().rev().fold(0_u64, |held, byte| (held << 8) | u64::from(*byte));
+        let number = (held >> (self.place % 8)) & ((1 << bits) - 1);
+        self.place = end;
+        Some(number)
+    }
 }

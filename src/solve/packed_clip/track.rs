@@ -4,7 +4,8 @@ use bevy::math::{Quat, Vec3};
 
 use super::{
     PackedClipError,
-    bits::{Reader, bits_at, pack_bits, write_number},
+    bits::{BitReader, BitWriter, Reader, write_number},
+    steps::Steps,
     unit,
 };
 use crate::{rig::animation::Property, solve::curve_fit::difference};
@@ -13,6 +14,8 @@ use crate::{rig::animation::Property, solve::curve_fit::difference};
 const BITS: std::ops::RangeInclusive<u32> = 3..=22;
 /// Least cosine of half the angle from the middle rotation of a track to its others.
 const NEAR: f32 = 0.3;
+/// Bound of numbers of ranges; larger ones are damage.
+const MOST: f32 = 1e12;
 
 /// Track of one property of a node.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -26,6 +29,8 @@ pub(super) enum PackedTrack {
     Whole(Vec<(u32, [f32; 4])>),
     /// Keys whose numbers have few bits.
     Few(FewBits),
+    /// A value for each frame.
+    Steps(Steps),
 }
 
 /// Keys whose numbers have few bits.
@@ -39,16 +44,16 @@ pub(super) struct FewBits {
 
 /// Range of the numbers of a track.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct ValueRange {
+pub(super) struct ValueRange {
     /// Rotation from which others are told.
-    middle: [f32; 4],
-    low: [f32; 3],
-    size: [f32; 3],
+    pub middle: [f32; 4],
+    pub low: [f32; 3],
+    pub size: [f32; 3],
 }
 
 impl ValueRange {
     /// Range of values; `None` if rotations are too far from one another.
-    fn of(property: &Property, values: &[[f32; 4]]) -> Option<Self> {
+    pub fn of(property: &Property, values: &[[f32; 4]]) -> Option<Self> {
         let mut range = Self { middle: Property::Rotation.rest(), low: [f32::MAX; 3], size: [0.0; 3] };
         if *property == Property::Rotation {
             let first = unit(*values.first()?);
@@ -67,11 +72,12 @@ impl ValueRange {
             high = std::array::from_fn(|axis| high[axis].max(own[axis]));
         }
         range.size = std::array::from_fn(|axis| high[axis] - range.low[axis]);
-        range.size.iter().all(|size| size.is_finite()).then_some(range)
+        let is_small = |number: &f32| number.abs() <= MOST;
+        range.low.iter().chain(&range.size).all(is_small).then_some(range)
     }
 
     /// Three numbers of a value; `None` for a rotation far from the middle one.
-    fn inner(&self, property: &Property, value: [f32; 4]) -> Option<[f32; 3]> {
+    pub fn inner(&self, property: &Property, value: [f32; 4]) -> Option<[f32; 3]> {
         if *property != Property::Rotation {
             return Some([value[0], value[1], value[2]]);
         }
@@ -81,13 +87,28 @@ impl ValueRange {
     }
 
     /// Value of three numbers.
-    fn outer(&self, property: &Property, own: [f32; 3]) -> [f32; 4] {
+    pub fn outer(&self, property: &Property, own: [f32; 3]) -> [f32; 4] {
         let [x, y, z] = own;
         if *property != Property::Rotation {
             return [x, y, z, 0.0];
         }
         let w = (1.0 - Vec3::new(x, y, z).length_squared()).max(0.0).sqrt();
         (unit(self.middle) * Quat::from_xyzw(x, y, z, w)).normalize().to_array()
+    }
+
+    /// Range of a file, with its size if it has one.
+    pub fn read(reader: &mut Reader, has_size: bool) -> Result<Self, PackedClipError> {
+        let middle = value(reader, &Property::Rotation)?;
+        let at = reader.at();
+        let mut three = || -> Result<[f32; 3], PackedClipError> {
+            Ok([reader.float("a range")?, reader.float("a range")?, reader.float("a range")?])
+        };
+        let low = three()?;
+        let size = if has_size { three()? } else { [0.0; 3] };
+        if low.iter().any(|low| low.abs() > MOST) || size.iter().any(|size| *size < 0.0 || *size > MOST) {
+            return Err(PackedClipError::Damaged { what: "a range", at });
+        }
+        Ok(Self { middle, low, size })
     }
 }
 
@@ -107,7 +128,9 @@ impl PackedTrack {
                     (share.clamp(0.0, 1.0) * top).round() as u32
                 })
             });
-            let numbers = pack_bits(own, bits);
+            let mut numbers = BitWriter::default();
+            own.for_each(|number| numbers.push(u64::from(number), bits));
+            let numbers = numbers.finish();
             FewBits { frames: keys.iter().map(|(frame, _)| *frame).collect(), bits, range, numbers }
         };
         let is_near = |few: &FewBits| {
@@ -119,6 +142,16 @@ impl PackedTrack {
         found.map_or_else(|| Self::Whole(keys.to_vec()), Self::Few)
     }
 
+    /// The track that takes fewer bytes.
+    pub fn smaller(self, other: Self) -> Self {
+        let size = |track: &Self| {
+            let mut bytes = Vec::new();
+            track.write(&mut bytes);
+            bytes.len()
+        };
+        if size(&other) < size(&self) { other } else { self }
+    }
+
     /// Count of keys.
     pub fn len(&self) -> usize {
         match self {
@@ -126,6 +159,7 @@ impl PackedTrack {
             Self::Constant(_) => 1,
             Self::Whole(keys) => keys.len(),
             Self::Few(few) => few.frames.len(),
+            Self::Steps(steps) => steps.len(),
         }
     }
 
@@ -141,6 +175,7 @@ impl PackedTrack {
             Self::Constant(value) => vec![(0, *value)],
             Self::Whole(keys) => keys.clone(),
             Self::Few(few) => few.frames.iter().copied().zip(few.values(property)).collect(),
+            Self::Steps(steps) => (0..).zip(steps.values(property)).collect(),
         }
     }
 
@@ -175,6 +210,10 @@ impl PackedTrack {
                 floats(out, &few.range.size);
                 out.extend_from_slice(&few.numbers);
             }
+            Self::Steps(steps) => {
+                out.push(4);
+                steps.write(out);
+            }
         }
     }
 
@@ -198,18 +237,11 @@ impl PackedTrack {
                 if !BITS.contains(&bits) {
                     return Err(damaged("a count of bits"));
                 }
-                let middle = value(reader, &Property::Rotation)?;
-                let mut float = || reader.float("a range");
-                let low = [float()?, float()?, float()?];
-                let size = [float()?, float()?, float()?];
+                let range = ValueRange::read(reader, true)?;
                 let numbers = reader.bytes((3 * frames.len() * bits as usize).div_ceil(8))?.to_vec();
-                let range = ValueRange { middle, low, size };
-                let is_finite = (0..3).all(|axis| size[axis] >= 0.0 && (low[axis] + size[axis]).is_finite());
-                if !is_finite {
-                    return Err(damaged("a range"));
-                }
                 Ok(Self::Few(FewBits { frames, bits, range, numbers }))
             }
+            4 => Ok(Self::Steps(Steps::read(reader, frames)?)),
             _ => Err(damaged("a kind of track")),
         }
     }
@@ -218,14 +250,15 @@ impl PackedTrack {
 impl FewBits {
     fn values(&self, property: &Property) -> Vec<[f32; 4]> {
         let top = ((1_u32 << self.bits) - 1) as f32;
-        let value = |key: usize| {
+        let mut reader = BitReader::new(&self.numbers);
+        let value = |_: &u32| {
             let own = std::array::from_fn(|axis| {
-                let share = bits_at(&self.numbers, 3 * key + axis, self.bits) as f32 / top;
+                let share = reader.take(self.bits).unwrap_or_default() as f32 / top;
                 self.range.low[axis] + self.range.size[axis] * share
             });
             self.range.outer(property, own)
         };
-        (0..self.frames.len()).map(value).collect()
+        self.frames.iter().map(value).collect()
     }
 }
 
