@@ -3,6 +3,8 @@
 //! Captured motion has noise above its tolerance, which no few keys follow. Its steps beyond what the last frames foretell
 //! are small numbers, and small numbers take few bits (Rice codes).
 
+use bevy::math::Quat;
+
 use super::{
     PackedClipError,
     bits::{BitReader, BitWriter, Reader, write_number},
@@ -24,9 +26,18 @@ const FINER: f32 = 0.85;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Steps {
     count: u32,
-    range: ValueRange,
+    scale: Scale,
+    /// Three numbers, or the four of rotations that are far from one another.
+    numbers: Vec<Residuals>,
+}
+
+/// Values of whole numbers of steps.
+#[derive(Debug, Clone, PartialEq)]
+struct Scale {
+    /// Range with the middle rotation; `None` for all four numbers of a rotation.
+    range: Option<ValueRange>,
+    first: [f32; 4],
     step: f32,
-    numbers: [Residuals; 3],
 }
 
 /// Numbers that are told by what they are off a forecast.
@@ -41,29 +52,34 @@ struct Residuals {
 impl Steps {
     /// Steps of values that are off by at most `most`; degrees for rotations. `None` if there are none.
     pub fn new(property: &Property, values: &[[f32; 4]], most: f32) -> Option<Self> {
-        let mut range = ValueRange::of(property, values)?;
-        let own: Vec<[f32; 3]> = values.iter().map(|value| range.inner(property, *value)).collect::<Option<_>>()?;
-        range.low = *own.first()?;
-        range.size = [0.0; 3];
-        // Three numbers that are off by half a step each; a turn is twice as far off as its numbers.
+        // Only the middle rotation counts.
+        let range = ValueRange::of(property, values).map(|range| ValueRange { low: [0.0; 3], size: [0.0; 3], ..range });
+        if range.is_none() && *property != Property::Rotation {
+            return None;
+        }
+        let own: Vec<[f32; 4]> = values.iter().map(|value| own_numbers(property, &range, value)).collect();
+        let first = *own.first()?;
+        let width = if range.is_some() { 3 } else { 4 };
+        // Numbers are off by half a step each; a turn is twice as far off as its numbers.
         let widest = if *property == Property::Rotation { most.to_radians() / 1.5 } else { most / 0.75 };
         let mut sizes = std::iter::successors(Some(widest), |step| Some(step * FINER)).take(TRIES);
         sizes.find_map(|step| {
+            let scale = Scale { range, first, step };
             let whole = |axis: usize| -> Option<Vec<i64>> {
-                let number = |own: &[f32; 3]| {
-                    let steps = ((own[axis] - range.low[axis]) / step).round();
+                let number = |own: &[f32; 4]| {
+                    let steps = ((own[axis] - first[axis]) / step).round();
                     (steps.abs() < MOST_STEPS as f32).then_some(steps as i64)
                 };
                 own.iter().map(number).collect()
             };
-            let numbers = [whole(0)?, whole(1)?, whole(2)?];
+            let numbers: Vec<Vec<i64>> = (0..width).map(whole).collect::<Option<_>>()?;
             let is_near = |(frame, value): (usize, &[f32; 4])| {
-                let found = value_of(property, &range, step, std::array::from_fn(|axis| numbers[axis][frame]));
-                difference(property, value, &found) <= most
+                difference(property, value, &scale.value(property, &numbers, frame)) <= most
             };
-            values.iter().enumerate().all(is_near).then(|| {
-                let count = values.len() as u32;
-                Self { count, range, step, numbers: numbers.map(|list| Residuals::new(&list)) }
+            let is_good = values.iter().enumerate().all(is_near);
+            is_good.then(|| {
+                let numbers = numbers.iter().map(|list| Residuals::new(list)).collect();
+                Self { count: values.len() as u32, scale, numbers }
             })
         })
     }
@@ -75,15 +91,16 @@ impl Steps {
 
     /// Values, one a frame.
     pub fn values(&self, property: &Property) -> Vec<[f32; 4]> {
-        let [x, y, z] = &self.numbers;
-        let lists = [x, y, z].map(|list| list.numbers(self.count).unwrap_or_default());
-        let number = |frame: usize| lists.each_ref().map(|list| list.get(frame).copied().unwrap_or_default());
-        (0..self.len()).map(|frame| value_of(property, &self.range, self.step, number(frame))).collect()
+        let numbers: Vec<Vec<i64>> =
+            self.numbers.iter().map(|list| list.numbers(self.count).unwrap_or_default()).collect();
+        (0..self.len()).map(|frame| self.scale.value(property, &numbers, frame)).collect()
     }
 
     pub fn write(&self, out: &mut Vec<u8>) {
-        let floats = [&self.range.middle[..], &self.range.low, &[self.step]];
-        floats.into_iter().flatten().for_each(|number| out.extend(number.to_le_bytes()));
+        out.push(u8::from(self.scale.range.is_some()));
+        let middle = self.scale.range.map_or(Property::Rotation.rest(), |range| range.middle);
+        let floats = middle.into_iter().chain(self.scale.first).chain([self.scale.step]);
+        floats.for_each(|number| out.extend(number.to_le_bytes()));
         for list in &self.numbers {
             out.extend([list.order as u8, list.shift as u8]);
             write_number(out, list.bits.len() as u32);
@@ -91,10 +108,20 @@ impl Steps {
         }
     }
 
-    pub fn read(reader: &mut Reader, count: u32) -> Result<Self, PackedClipError> {
+    pub fn read(reader: &mut Reader, property: &Property, count: u32) -> Result<Self, PackedClipError> {
         let at = reader.at();
         let damaged = |what: &'static str| PackedClipError::Damaged { what, at };
-        let range = ValueRange::read(reader, false)?;
+        let has_range = match reader.byte()? {
+            0 if *property == Property::Rotation => false,
+            1 => true,
+            _ => return Err(damaged("a kind of steps")),
+        };
+        let range = ValueRange::of_middle(reader)?;
+        let mut float = || reader.float("a first value");
+        let first = [float()?, float()?, float()?, float()?];
+        if first.iter().any(|number| number.abs() > 1e12) {
+            return Err(damaged("a first value"));
+        }
         let step = reader.float("a step")?;
         if step <= 0.0 || step > 1e6 {
             return Err(damaged("a step"));
@@ -111,14 +138,32 @@ impl Steps {
             let is_small = |number: &i64| number.unsigned_abs() < MOST_STEPS as u64;
             numbers.filter(|numbers| numbers.iter().all(is_small)).map(|_| list).ok_or(damaged("numbers"))
         };
-        let numbers = [list()?, list()?, list()?];
-        Ok(Self { count, range, step, numbers })
+        let numbers = (0..if has_range { 3 } else { 4 }).map(|_| list()).collect::<Result<_, _>>()?;
+        Ok(Self { count, scale: Scale { range: has_range.then_some(range), first, step }, numbers })
     }
 }
 
-/// Value of three whole numbers of steps.
-fn value_of(property: &Property, range: &ValueRange, step: f32, numbers: [i64; 3]) -> [f32; 4] {
-    range.outer(property, std::array::from_fn(|axis| range.low[axis] + numbers[axis] as f32 * step))
+/// Numbers of a value: three within a range, else all four.
+fn own_numbers(property: &Property, range: &Option<ValueRange>, value: &[f32; 4]) -> [f32; 4] {
+    let inner = range.as_ref().and_then(|range| range.inner(property, *value));
+    inner.map_or(*value, |[x, y, z]| [x, y, z, 0.0])
+}
+
+impl Scale {
+    /// Value at a frame of lists of whole numbers.
+    fn value(&self, property: &Property, numbers: &[Vec<i64>], frame: usize) -> [f32; 4] {
+        let number = |axis: usize| {
+            let steps = numbers.get(axis).and_then(|list| list.get(frame)).copied().unwrap_or_default();
+            self.first[axis] + steps as f32 * self.step
+        };
+        match &self.range {
+            Some(range) => range.outer(property, std::array::from_fn(number)),
+            None => {
+                let turn = Quat::from_array(std::array::from_fn(number));
+                if turn.length_squared() > 1e-6 { turn.normalize().to_array() } else { Property::Rotation.rest() }
+            }
+        }
+    }
 }
 
 impl Residuals {

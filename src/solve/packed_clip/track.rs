@@ -96,15 +96,20 @@ impl ValueRange {
         (unit(self.middle) * Quat::from_xyzw(x, y, z, w)).normalize().to_array()
     }
 
-    /// Range of a file, with its size if it has one.
-    pub fn read(reader: &mut Reader, has_size: bool) -> Result<Self, PackedClipError> {
+    /// Range with a middle rotation alone.
+    pub fn of_middle(reader: &mut Reader) -> Result<Self, PackedClipError> {
+        Ok(Self { middle: value(reader, &Property::Rotation)?, low: [0.0; 3], size: [0.0; 3] })
+    }
+
+    /// Range of a file.
+    fn read(reader: &mut Reader) -> Result<Self, PackedClipError> {
         let middle = value(reader, &Property::Rotation)?;
         let at = reader.at();
         let mut three = || -> Result<[f32; 3], PackedClipError> {
             Ok([reader.float("a range")?, reader.float("a range")?, reader.float("a range")?])
         };
         let low = three()?;
-        let size = if has_size { three()? } else { [0.0; 3] };
+        let size = three()?;
         if low.iter().any(|low| low.abs() > MOST) || size.iter().any(|size| *size < 0.0 || *size > MOST) {
             return Err(PackedClipError::Damaged { what: "a range", at });
         }
@@ -237,11 +242,11 @@ impl PackedTrack {
                 if !BITS.contains(&bits) {
                     return Err(damaged("a count of bits"));
                 }
-                let range = ValueRange::read(reader, true)?;
+                let range = ValueRange::read(reader)?;
                 let numbers = reader.bytes((3 * frames.len() * bits as usize).div_ceil(8))?.to_vec();
                 Ok(Self::Few(FewBits { frames, bits, range, numbers }))
             }
-            4 => Ok(Self::Steps(Steps::read(reader, frames)?)),
+            4 => Ok(Self::Steps(Steps::read(reader, property, frames)?)),
             _ => Err(damaged("a kind of track")),
         }
     }
