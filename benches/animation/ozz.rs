@@ -1,4 +1,4 @@
-//! The same clip in ozz-animation-rs: keys of rotations as a file of ozz, and a crowd that samples it.
+//! Peer ozz-animation-rs: keys of rotations as a file of ozz, and a crowd that samples it.
 //!
 //! Every joint of ozz has a translation and a scale, too; here they have one value all the time.
 
