@@ -10,6 +10,9 @@
 //! A [`RigMesh`](crate::plugins::surface::RigMesh) of an instance is bound to the template's joints in the background, once for
 //! all instances with the mesh; [`SkinBound`] tells it. Skinned meshes that Bevy loaded below an instance are moved by it.
 //!
+//! Clips of a `.anim.ron` go onto an instance with [`InstanceClips`]; a [`ClipPlayer`](crate::plugins::animation::ClipPlayer)
+//! plays them where [`ClipPlugin`](crate::plugins::animation::ClipPlugin) is added, or Bevy's own player.
+//!
 //! An instance is as its template says. A rig that people edit has a document of its own: [`RigSource`].
 //!
 //! ```
@@ -31,6 +34,7 @@ mod apply;
 mod asset;
 mod bodies;
 mod builds;
+mod clips;
 mod folders;
 mod skins;
 mod source;
@@ -56,6 +60,7 @@ pub use self::{
     asset::{RigTemplate, RigTemplateLoader, RigTemplateSaver},
     bodies::InstanceSkins,
     builds::BuiltTemplate,
+    clips::{ClipsBound, InstanceAnimations, InstanceClips, RigAnimation, RigAnimationError, RigAnimationLoader},
     folders::{FolderError, FolderFault, FolderRead, GesturesRead, WatchedFolderPlugin},
     skins::{BoundTo, SkinBound},
     source::{AcceptUpdate, RigSource, UPDATE, UpdateOffer},
@@ -118,6 +123,8 @@ impl Plugin for RigInstancePlugin {
         let root = root.map(|root| FileAssetReader::get_base_path().join(root));
         app.init_asset::<RigTemplate>()
             .register_asset_loader(RigTemplateLoader)
+            .init_asset::<RigAnimation>()
+            .register_asset_loader(RigAnimationLoader)
             .insert_resource(RigTemplates {
                 builds: Builds::start(self.look, self.patience),
                 is_live: self.live,
@@ -142,6 +149,7 @@ impl Plugin for RigInstancePlugin {
                     source::bind_meshes,
                 )
                     .chain(),
+                clips::give_clips,
             )
                 .chain(),
         );

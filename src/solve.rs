@@ -19,6 +19,7 @@ mod human_axes;
 pub mod keep_pose;
 pub mod limit;
 pub mod matching;
+pub mod packed_clip;
 pub mod pose_reader;
 pub mod program;
 pub mod pull;

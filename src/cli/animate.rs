@@ -77,6 +77,9 @@ pub(super) struct AnimateArgs {
     /// Let standing feet move as they do in the file
     #[arg(long)]
     free_feet: bool,
+    /// Let hands move as they do in the file where they touch something
+    #[arg(long)]
+    free_hands: bool,
     /// Names and axes of the bones in a .glb, .gltf or .vrm
     #[arg(long, value_enum, default_value = "plain")]
     preset: PresetArg,
@@ -255,6 +258,7 @@ fn describe(clips: &[RigClip], report: &mut Report) {
             "seconds": clip.duration(),
             "frame_rate": clip.frame_rate,
             "looped": clip.looped,
+            "markers": clip.markers.len(),
             "tracks": tracks,
             "keys": clip.key_count(),
         })

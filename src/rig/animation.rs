@@ -6,6 +6,7 @@
 //! ([`PoseOffset`]), and values of attributes. Times are seconds.
 
 mod check;
+pub mod clip_extras;
 pub mod file_clip;
 pub mod humanoid;
 pub mod joint_map;

@@ -10,7 +10,9 @@ use crate::{
     mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Trs},
     rig::{
         Uid,
-        animation::{Ease, Key, Property, RigClip, SampledPose, TrackTarget, file_clip::channel_of},
+        animation::{
+            Ease, Key, Property, RigClip, SampledPose, TrackTarget, clip_extras::ClipExtras, file_clip::channel_of,
+        },
         operations::KeyTolerance,
     },
 };
@@ -72,7 +74,7 @@ pub fn strike(state: &mut RigState, pose: &SampledPose) {
 
 /// Plays a clip at a rate and gives the nodes' transforms relative to their parents as channels, whose targets are places among
 /// the nodes. Channels that stay at rest are left out, and keys without which joints stay within the tolerance. A node that
-/// nothing but its keys moves keeps them as they are.
+/// nothing but its keys moves keeps them as they are. Markers, the rate and whether the clip is looped are in the extras.
 ///
 /// Time starts at zero with the clip. Takes some tens of microseconds a frame for a character.
 ///
@@ -85,6 +87,46 @@ pub fn bake_clip(
     rate: f32,
     tolerance: &KeyTolerance,
 ) -> Result<Clip, BakeError> {
+    let (times, sampled) = sample_nodes(program, clip, nodes, rate)?;
+    let properties = [Property::Translation, Property::Rotation, Property::Scale];
+    let channel = |at: usize, property: &Property| {
+        let base = plain_base(program, nodes, at)?;
+        let (node, target) = (nodes[at].uid, channel_target(at, property));
+        let track = TrackTarget { node, property: property.clone() };
+        if clip.layers.iter().any(|layer| layer.tracks.contains_key(&track)) {
+            return channel_of(clip, node, property, &base, target);
+        }
+        let key = Key { value: part_of(&base, property), ..Key::number(0.0, 0.0) };
+        Some(keyed_channel(target, property.width(), &[key]))
+    };
+    let mut direct: Vec<[Option<Channel>; 3]> =
+        (0..nodes.len()).map(|at| std::array::from_fn(|part| channel(at, &properties[part]))).collect();
+    let fixed: Vec<[bool; 3]> = direct.iter().map(|parts| std::array::from_fn(|part| parts[part].is_some())).collect();
+    let keys = reduce_skeleton(&times, &sampled, &fixed, tolerance);
+    let extras = Some(ClipExtras::of(clip, rate).written());
+    let mut baked = Clip { name: clip.name.clone(), extras, ..Clip::default() };
+    for (at, (node, mut keys)) in nodes.iter().zip(keys).enumerate() {
+        for (part, property) in properties.iter().enumerate() {
+            let kept = direct[at][part].take();
+            let channel = kept.unwrap_or_else(|| {
+                keyed_channel(channel_target(at, property), property.width(), &std::mem::take(&mut keys[part]))
+            });
+            if !is_at_rest(&channel, &part_of(&node.rest, property)) {
+                baked.channels.push(channel);
+            }
+        }
+    }
+    keep_length(&mut baked, clip.duration());
+    Ok(baked)
+}
+
+/// Transforms of nodes relative to their parents, frame by frame, with the times of the frames.
+pub(super) fn sample_nodes(
+    program: &Arc<RigProgram>,
+    clip: &RigClip,
+    nodes: &[BakedNode],
+    rate: f32,
+) -> Result<(Vec<f32>, Vec<SampledNode>), BakeError> {
     let mut state = RigState::new(program.clone());
     let last = (clip.duration() * rate + 1e-3).floor().max(0.0);
     let most = MOST_FRAMES.min(MOST_TRANSFORMS / nodes.len().max(1));
@@ -110,40 +152,12 @@ pub fn bake_clip(
             locals[at].push(local);
         }
     }
-    let properties = [Property::Translation, Property::Rotation, Property::Scale];
-    let channel = |at: usize, property: &Property| {
-        let base = plain_base(program, nodes, at)?;
-        let (node, target) = (nodes[at].uid, channel_target(at, property));
-        let track = TrackTarget { node, property: property.clone() };
-        if clip.layers.iter().any(|layer| layer.tracks.contains_key(&track)) {
-            return channel_of(clip, node, property, &base, target);
-        }
-        let key = Key { value: part_of(&base, property), ..Key::number(0.0, 0.0) };
-        Some(keyed_channel(target, property.width(), &[key]))
-    };
-    let mut direct: Vec<[Option<Channel>; 3]> =
-        (0..nodes.len()).map(|at| std::array::from_fn(|part| channel(at, &properties[part]))).collect();
-    let fixed: Vec<[bool; 3]> = direct.iter().map(|parts| std::array::from_fn(|part| parts[part].is_some())).collect();
-    let sampled: Vec<SampledNode> = nodes
+    let sampled = nodes
         .iter()
         .zip(locals)
         .map(|(node, locals)| SampledNode { parent: node.parent, locals: same_side(locals, node.rest.rotation) })
         .collect();
-    let keys = reduce_skeleton(&times, &sampled, &fixed, tolerance);
-    let mut baked = Clip { name: clip.name.clone(), ..Clip::default() };
-    for (at, (node, mut keys)) in nodes.iter().zip(keys).enumerate() {
-        for (part, property) in properties.iter().enumerate() {
-            let kept = direct[at][part].take();
-            let channel = kept.unwrap_or_else(|| {
-                keyed_channel(channel_target(at, property), property.width(), &std::mem::take(&mut keys[part]))
-            });
-            if !is_at_rest(&channel, &part_of(&node.rest, property)) {
-                baked.channels.push(channel);
-            }
-        }
-    }
-    keep_length(&mut baked, clip.duration());
-    Ok(baked)
+    Ok((times, sampled))
 }
 
 fn channel_target(at: usize, property: &Property) -> ChannelTarget {
@@ -155,7 +169,7 @@ fn channel_target(at: usize, property: &Property) -> ChannelTarget {
 }
 
 /// Numbers of a transform for a property.
-fn part_of(trs: &Trs, property: &Property) -> [f32; 4] {
+pub(super) fn part_of(trs: &Trs, property: &Property) -> [f32; 4] {
     match property {
         Property::Rotation => trs.rotation.to_array(),
         Property::Scale => trs.scale.extend(0.0).to_array(),

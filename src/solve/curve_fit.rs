@@ -27,9 +27,7 @@ struct Samples<'a> {
 /// side each to the next. Lists have the same length. Time is nearly linear in the number of samples.
 pub fn fit_curve(property: &Property, times: &[f32], values: &[[f32; 4]], tolerance: &[f32]) -> Vec<Key> {
     let Some(first) = values.first() else { return Vec::new() };
-    // Half of the tolerance is left to other tracks: a curve of one key is off on one side all the time.
-    let is_same = |(value, tolerance): (&[f32; 4], &f32)| difference(property, value, first) <= 0.5 * tolerance;
-    if values.iter().zip(tolerance).all(is_same) {
+    if is_constant(property, values, tolerance) {
         return vec![Key { time: times[0], value: *first, ease: Ease::Linear }];
     }
     let samples = |is_cubic: bool| Samples { property, times, values, tolerance, is_cubic };
@@ -43,6 +41,26 @@ pub fn fit_curve(property: &Property, times: &[f32], values: &[[f32; 4]], tolera
     }
     let numbers = |keys: &[Key], values: usize| keys.len() * (1 + values * property.width());
     if numbers(&linear, 1) <= numbers(&cubic, 3) { linear } else { cubic }
+}
+
+/// Samples between which lines stay within the tolerance, as [`fit_curve`] has it; the first one alone for a constant.
+pub(super) fn fit_lines(property: &Property, times: &[f32], values: &[[f32; 4]], tolerance: &[f32]) -> Vec<usize> {
+    if values.is_empty() {
+        return Vec::new();
+    }
+    if is_constant(property, values, tolerance) {
+        return vec![0];
+    }
+    let samples = Samples { property, times, values, tolerance, is_cubic: false };
+    std::iter::once(0).chain(samples.segments().into_iter().map(|segment| segment.ends[1])).collect()
+}
+
+/// True if one key stands for all samples.
+fn is_constant(property: &Property, values: &[[f32; 4]], tolerance: &[f32]) -> bool {
+    let Some(first) = values.first() else { return true };
+    // Half of the tolerance is left to other tracks: a curve of one key is off on one side all the time.
+    let is_same = |(value, tolerance): (&[f32; 4], &f32)| difference(property, value, first) <= 0.5 * tolerance;
+    values.iter().zip(tolerance).all(is_same)
 }
 
 /// Values of keys at times.

@@ -2,7 +2,7 @@
 //!
 //! The error of a key matters by what hangs below its node: a tenth of a degree moves a head by nothing and a hand,
 //! seen from the hips, by two millimetres. So tracks are fitted with a tolerance by their reach, the motion is played,
-//! and where a joint is too far off, all tracks are fitted more closely around those frames, until none is.
+//! and where a joint is too far off, the tracks that move it are fitted more closely around those frames, until none is.
 
 use bevy::math::{Quat, Vec3};
 use rayon::prelude::*;
@@ -18,6 +18,8 @@ use crate::{
 
 /// Most rounds of fitting.
 const ROUNDS: usize = 16;
+/// Round from which all tracks are fitted more closely, not only those that move what is off.
+const TOGETHER: usize = 9;
 /// Round from which tracks keep all keys around frames that are still off.
 const LAST_RESORT: usize = 12;
 /// Frames on both sides of a frame that is off at which tracks are fitted more closely.
@@ -37,30 +39,60 @@ pub struct SampledTrack {
 /// Position and rotation of a joint in the rig's space.
 pub type JointPlace = (Vec3, Quat);
 
-/// Keys of tracks with which the motion stays within its bounds. `measure` plays values, a list a track, and gives for
-/// each frame the error in tolerances: 1 is just allowed.
+/// Errors at a frame in tolerances: 1 is just allowed.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FrameErrors {
+    /// Greatest error of all places.
+    pub worst: f32,
+    /// Greatest error of the places that each track moves.
+    pub of_tracks: Vec<f32>,
+}
+
+/// Keys of tracks with which the motion stays within its bounds. `measure` plays values, a list a track, and gives the errors of
+/// each frame.
 pub fn reduce_tracks(
     times: &[f32],
     tracks: &[SampledTrack],
-    measure: impl Fn(&[Vec<[f32; 4]>]) -> Vec<f32>,
+    measure: impl Fn(&[Vec<[f32; 4]>]) -> Vec<FrameErrors>,
 ) -> Vec<Vec<Key>> {
-    let mut shares = vec![1.0_f32; times.len()];
-    for round in 0..ROUNDS {
-        let fit = |track: &SampledTrack| {
-            let tolerance: Vec<f32> = shares.iter().map(|share| share * track.tolerance).collect();
-            let keys = fit_curve(&track.property, times, &track.values, &tolerance);
-            let values = sampled(&track.property, times, keys.clone());
-            (keys, values)
-        };
-        let (keys, values): (Vec<_>, Vec<_>) = tracks.par_iter().map(fit).unzip();
-        let errors = measure(&values);
-        if errors.iter().all(|error| *error <= 1.0) {
-            return keys;
-        }
-        tighten(&mut shares, &errors, round >= LAST_RESORT);
-    }
+    let fit = |track: &SampledTrack, tolerance: &[f32]| {
+        let keys = fit_curve(&track.property, times, &track.values, tolerance);
+        let values = sampled(&track.property, times, keys.clone());
+        (keys, values)
+    };
     let key = |(time, value): (&f32, &[f32; 4])| Key { time: *time, value: *value, ease: Ease::Linear };
-    tracks.iter().map(|track| times.iter().zip(&track.values).map(key).collect()).collect()
+    let all = || tracks.iter().map(|track| times.iter().zip(&track.values).map(key).collect()).collect();
+    fit_within(tracks, measure, fit).unwrap_or_else(all)
+}
+
+/// Curves of tracks with which the motion stays within its bounds, as [`reduce_tracks`] finds them; `fit` gives a curve within
+/// tolerances, one a frame, and its values. `None` if no curves do.
+pub(super) fn fit_within<K: Send>(
+    tracks: &[SampledTrack],
+    measure: impl Fn(&[Vec<[f32; 4]>]) -> Vec<FrameErrors>,
+    fit: impl Fn(&SampledTrack, &[f32]) -> (K, Vec<[f32; 4]>) + Sync,
+) -> Option<Vec<K>> {
+    let mut shares: Vec<Vec<f32>> = tracks.iter().map(|track| vec![1.0; track.values.len()]).collect();
+    for round in 0..ROUNDS {
+        let fitted = |(track, shares): (&SampledTrack, &Vec<f32>)| {
+            let tolerance: Vec<f32> = shares.iter().map(|share| share * track.tolerance).collect();
+            fit(track, &tolerance)
+        };
+        let (curves, values): (Vec<K>, Vec<_>) = tracks.par_iter().zip(&shares).map(fitted).unzip();
+        let errors = measure(&values);
+        if errors.iter().all(|errors| errors.worst <= 1.0) {
+            return Some(curves);
+        }
+        shares.par_iter_mut().enumerate().for_each(|(track, shares)| {
+            let own = |errors: &FrameErrors| match errors.of_tracks.get(track) {
+                Some(own) if round < TOGETHER => *own,
+                _ => errors.worst,
+            };
+            let errors: Vec<f32> = errors.iter().map(own).collect();
+            tighten(shares, &errors, round >= LAST_RESORT);
+        });
+    }
+    None
 }
 
 /// Lowers the shares of the tolerance around frames that are off.
@@ -77,13 +109,13 @@ fn tighten(shares: &mut [f32], errors: &[f32], is_last: bool) {
     }
 }
 
-/// Error of joints at a frame in tolerances: the greatest of all distances and angles.
-pub fn error_of(found: &[JointPlace], wanted: &[JointPlace], tolerance: &KeyTolerance) -> f32 {
+/// Errors of joints at a frame in tolerances: for each the greater one of its distance and its angle.
+pub fn errors_of(found: &[JointPlace], wanted: &[JointPlace], tolerance: &KeyTolerance) -> Vec<f32> {
     let of = |((place, turn), (wanted, wanted_turn)): (&JointPlace, &JointPlace)| {
         let angle = super::curve_fit::difference(&Property::Rotation, &turn.to_array(), &wanted_turn.to_array());
         (place.distance(*wanted) / tolerance.distance).max(angle / tolerance.angle)
     };
-    found.iter().zip(wanted).map(of).fold(0.0, f32::max)
+    found.iter().zip(wanted).map(of).collect()
 }
 
 /// Tolerance of a track that moves joints by `reach` for one unit of its value, a degree for rotations.
@@ -114,31 +146,64 @@ pub fn reduce_skeleton(
     fixed: &[[bool; 3]],
     tolerance: &KeyTolerance,
 ) -> Vec<[Vec<Key>; 3]> {
-    let properties = [Property::Translation, Property::Rotation, Property::Scale];
-    let truth: Vec<Vec<JointPlace>> =
-        (0..times.len()).into_par_iter().map(|frame| places(nodes, |at| nodes[at].locals[frame])).collect();
-    let reaches = reaches(nodes, &truth);
-    let mut tracks: Vec<SampledTrack> = Vec::new();
-    let mut owners: Vec<(usize, usize)> = Vec::new();
-    for (at, node) in nodes.iter().enumerate() {
-        for (part, property) in properties.iter().enumerate().filter(|(part, _)| !fixed[at][*part]) {
-            let reach = match property {
-                Property::Rotation => reaches[at] * 1.0_f32.to_radians(),
-                Property::Scale => reaches[at],
-                Property::Translation | Property::Attribute(_) => 1.0,
-            };
-            let tolerance = track_tolerance(property, reach, tolerance);
-            tracks.push(SampledTrack { property: property.clone(), values: values(&node.locals, part), tolerance });
-            owners.push((at, part));
-        }
+    let skeleton = SampledSkeleton::new(times.len(), nodes, fixed, tolerance);
+    let found = reduce_tracks(times, &skeleton.tracks, |samples| skeleton.errors(samples));
+    let mut keys: Vec<[Vec<Key>; 3]> = vec![Default::default(); nodes.len()];
+    for ((at, part), found) in skeleton.owners.iter().zip(found) {
+        keys[*at][*part] = found;
     }
-    let mut track_of = vec![[None; 3]; nodes.len()];
-    owners.iter().enumerate().for_each(|(track, (at, part))| track_of[*at][*part] = Some(track));
-    let measure = |samples: &[Vec<[f32; 4]>]| {
+    keys
+}
+
+/// Tracks of a skeleton, with where they put its nodes.
+pub(super) struct SampledSkeleton<'a> {
+    nodes: &'a [SampledNode],
+    tolerance: &'a KeyTolerance,
+    truth: Vec<Vec<JointPlace>>,
+    pub tracks: Vec<SampledTrack>,
+    /// Node and part of the transform of each track.
+    pub owners: Vec<(usize, usize)>,
+    track_of: Vec<[Option<usize>; 3]>,
+}
+
+impl<'a> SampledSkeleton<'a> {
+    /// Skeleton of so many frames. `fixed` marks what is played as it is.
+    pub fn new(frames: usize, nodes: &'a [SampledNode], fixed: &[[bool; 3]], tolerance: &'a KeyTolerance) -> Self {
+        let properties = [Property::Translation, Property::Rotation, Property::Scale];
+        let truth: Vec<Vec<JointPlace>> =
+            (0..frames).into_par_iter().map(|frame| places(nodes, |at| nodes[at].locals[frame])).collect();
+        let reaches = reaches(nodes, &truth);
+        let mut skeleton = Self {
+            nodes,
+            tolerance,
+            truth,
+            tracks: Vec::new(),
+            owners: Vec::new(),
+            track_of: vec![[None; 3]; nodes.len()],
+        };
+        for (at, node) in nodes.iter().enumerate() {
+            for (part, property) in properties.iter().enumerate().filter(|(part, _)| !fixed[at][*part]) {
+                let reach = match property {
+                    Property::Rotation => reaches[at] * 1.0_f32.to_radians(),
+                    Property::Scale => reaches[at],
+                    Property::Translation | Property::Attribute(_) => 1.0,
+                };
+                let tolerance = track_tolerance(property, reach, tolerance);
+                skeleton.track_of[at][part] = Some(skeleton.tracks.len());
+                let values = values(&node.locals, part);
+                skeleton.tracks.push(SampledTrack { property: property.clone(), values, tolerance });
+                skeleton.owners.push((at, part));
+            }
+        }
+        skeleton
+    }
+
+    /// Errors of the nodes, frame by frame, with values of the tracks.
+    pub fn errors(&self, samples: &[Vec<[f32; 4]>]) -> Vec<FrameErrors> {
         let at_frame = |frame: usize| {
             let local = |at: usize| {
-                let mut local = nodes[at].locals[frame];
-                let value = |part: usize| track_of[at][part].map(|track: usize| samples[track][frame]);
+                let mut local = self.nodes[at].locals[frame];
+                let value = |part: usize| self.track_of[at][part].map(|track: usize| samples[track][frame]);
                 if let Some([x, y, z, _]) = value(0) {
                     local.translation = Vec3::new(x, y, z);
                 }
@@ -150,15 +215,18 @@ pub fn reduce_skeleton(
                 }
                 local
             };
-            error_of(&places(nodes, local), &truth[frame], tolerance)
+            let mut errors = errors_of(&places(self.nodes, local), &self.truth[frame], self.tolerance);
+            let worst = errors.iter().copied().fold(0.0, f32::max);
+            // A node moves those below it.
+            for (at, node) in self.nodes.iter().enumerate().rev() {
+                if let Some(parent) = node.parent {
+                    errors[parent] = errors[parent].max(errors[at]);
+                }
+            }
+            FrameErrors { worst, of_tracks: self.owners.iter().map(|(at, _)| errors[*at]).collect() }
         };
-        (0..times.len()).into_par_iter().map(at_frame).collect()
-    };
-    let mut keys: Vec<[Vec<Key>; 3]> = vec![Default::default(); nodes.len()];
-    for ((at, part), found) in owners.into_iter().zip(reduce_tracks(times, &tracks, measure)) {
-        keys[at][part] = found;
+        (0..self.truth.len()).into_par_iter().map(at_frame).collect()
     }
-    keys
 }
 
 /// Values of a part of transforms; rotations each lie on the side of the one before.

@@ -4,7 +4,8 @@
 //! beyond *its* rest, after a constant rotation that brings the target's rest pose onto the source's: that takes up T-poses,
 //! A-poses and any roll of bones. Limbs go by the directions of the source's bones, and bend about their own hinges, so that
 //! knees and elbows never bend backwards. The hips move by the ratio of the legs' lengths. While a foot stands ([`Stance`]) it
-//! is held in its place on the ground. The figure travels where a clip walks on the spot.
+//! is held in its place on the ground, and a hand is where it touches something ([`Touch`]), each by the inverse controls of its
+//! limb. The figure travels where a clip walks on the spot.
 //!
 //! The result is a clip of the rig's controls, or of its joints where it has no controls.
 
@@ -16,14 +17,16 @@ mod joints;
 mod limbs;
 mod measure;
 mod player;
+mod touches;
 mod tracks;
 
 use serde::Serialize;
 
-use self::{body::Body, contacts::Contacts, figure::Figure};
+use self::{body::Body, contacts::Contacts, figure::Figure, touches::Touches};
 pub use self::{
     contacts::Stance,
-    measure::{FootReport, measure_feet},
+    measure::{FootReport, HandReport, measure_feet, measure_hands},
+    touches::{Touch, TouchedThing},
 };
 use super::{
     matching::MatchError,
@@ -50,7 +53,7 @@ pub enum MotionTarget {
 pub struct RetargetSettings {
     /// Frames a second of the clip; the motion's own, but at most 60, if `None`.
     pub frame_rate: Option<f32>,
-    /// True if the clip is played over and over.
+    /// True if the clip is played over and over; so is that of a motion which says so itself.
     pub looped: bool,
     /// Nodes that get keys.
     pub onto: MotionTarget,
@@ -58,6 +61,8 @@ pub struct RetargetSettings {
     pub travel: bool,
     /// True to hold standing feet in their places.
     pub lock_feet: bool,
+    /// True to hold hands where they touch something.
+    pub lock_hands: bool,
     /// Distances and angles by which joints may be off at any frame through the removal of keys, on a human in metres.
     pub tolerance: KeyTolerance,
     /// Largest frames of the clip.
@@ -72,6 +77,7 @@ impl Default for RetargetSettings {
             onto: MotionTarget::Controls,
             travel: true,
             lock_feet: true,
+            lock_hands: true,
             tolerance: KeyTolerance::captured(),
             max_frames: 100_000,
         }
@@ -87,6 +93,8 @@ pub struct RetargetedMotion {
     pub keys: [usize; 2],
     /// Times at which feet stand.
     pub stances: Vec<Stance>,
+    /// Times at which hands touch something.
+    pub touches: Vec<Touch>,
     /// Labels of mapped joints that no control moves.
     pub unmoved: Vec<String>,
     /// Remarks, a sentence each.
@@ -150,15 +158,19 @@ pub fn retarget(
     }
     let contacts = if settings.lock_feet { Contacts::find(&body, rate) } else { Contacts::none(&body) };
     let has_twist = settings.onto == MotionTarget::Controls;
-    let poses = body.poses(&contacts, rate, has_twist);
-    let mut clip = tracks::empty_clip(rig, &motion.name, rate, [0.0, *times.last().unwrap_or(&0.0)], settings.looped);
+    let touches = if settings.lock_hands { Touches::find(&body, rate) } else { Touches::default() };
+    let poses = body.poses(&contacts, &touches, rate, has_twist);
+    let range = [0.0, *times.last().unwrap_or(&0.0)];
+    let mut clip = tracks::empty_clip(rig, &motion.name, rate, range, settings.looped || motion.looped);
+    clip.markers.clone_from(&motion.markers);
     let program = std::sync::Arc::new(RigProgram::compile(built, &CompileOptions::default())?);
     let (keyed, unmoved) = match settings.onto {
-        MotionTarget::Controls => controls::keyed(built, &program, &body, &poses)?,
+        MotionTarget::Controls => controls::keyed(built, &program, &body, &poses, touches.hands())?,
         MotionTarget::Joints => (joints::keyed(&body, &poses), Vec::new()),
     };
     let keys = tracks::fill(&mut clip, &keyed, &times, &program, &settings.tolerance.for_height(target.height));
-    Ok(RetargetedMotion { clip, keys, stances: contacts.stances(&body, &times), unmoved, notes })
+    let (stances, touches) = (contacts.stances(&body, &times), touches.list(&times));
+    Ok(RetargetedMotion { clip, keys, stances, touches, unmoved, notes })
 }
 
 /// Frame rate of a motion, divided until it is at most 60.

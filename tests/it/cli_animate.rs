@@ -7,7 +7,10 @@ use rigsmith::{
     mesh::model::{Model, Trs},
     modules,
     processor::Builder,
-    rig::{animation::file_clip::motion_of, bake::baked},
+    rig::{
+        animation::{clip_extras::ClipExtras, file_clip::motion_of},
+        bake::baked,
+    },
     solve::{
         bake_clip::strike,
         program::{CompileOptions, RigProgram, RigState},
@@ -43,6 +46,8 @@ fn a_motion_becomes_a_clip_and_an_animated_character() {
     assert!(answer["unmapped_target"].as_array().unwrap().iter().any(|label| label == "hand_l"));
     assert!(answer["foot_slide"].as_f64().unwrap() <= 1.0, "{answer}");
     assert!(answer["reduction"].as_f64().unwrap() >= 1.0);
+    assert!(answer["touches"].is_array() && answer["hand_slide"].is_number(), "{answer}");
+    run(&["walker.bvh", "--free-hands", "--free-feet", "-o", "free.anim.ron"]);
     let clip = &load_animation(&RealDisk, &folder.path().join("walk.anim.ron")).unwrap().clips[0];
     assert!((clip.duration() - 0.9).abs() < 1e-3 && clip.frame_rate == 20.0, "{} {}", clip.duration(), clip.frame_rate);
 
@@ -56,6 +61,8 @@ fn a_motion_becomes_a_clip_and_an_animated_character() {
     // The file's nodes stand where the program has them.
     let model = load_model(&RealDisk, &folder.path().join("clip.glb")).unwrap();
     assert_eq!((model.clips.len(), model.clips[0].name.as_str()), (1, "walker"));
+    let facts = ClipExtras::read(model.clips[0].extras.as_ref());
+    assert_eq!((facts.looped, facts.frame_rate), (true, Some(20.0)));
     let rig = shipped("biped");
     let built = Builder::build(&rig, &std::sync::Arc::new(modules::all())).unwrap();
     let program = std::sync::Arc::new(RigProgram::compile(&built, &CompileOptions::default()).unwrap());

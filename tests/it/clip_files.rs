@@ -14,7 +14,8 @@ use rigsmith::{
     rig::{
         Rig, Uid, UidSource,
         animation::{
-            Ease, Key, LayerMode, Property, RigClip, Track, TrackTarget,
+            Ease, Key, LayerMode, Marker, Property, RigClip, Track, TrackTarget,
+            clip_extras::{ClipExtras, joined_extras},
             file_clip::{motion_of, own_joints, rig_clips},
         },
         character::import_skeleton,
@@ -100,7 +101,7 @@ fn written(rig: &Rig, model: &Model, joints: &[Uid], clip: &RigClip) -> Vec<u8> 
     let program = Arc::new(RigProgram::compile(&built, &CompileOptions::default()).unwrap());
     let node = |(uid, node): (&Uid, &Node)| BakedNode { uid: *uid, parent: node.parent, rest: node.rest };
     let nodes: Vec<BakedNode> = joints.iter().zip(&model.nodes).map(node).collect();
-    let baked = bake_clip(&program, clip, &nodes, 30.0, &KeyTolerance::default()).unwrap();
+    let baked = bake_clip(&program, clip, &nodes, clip.frame_rate, &KeyTolerance::default()).unwrap();
     let settings = GltfWriteSettings { all_joints: true, ..GltfWriteSettings::default() };
     write_glb(&Model { clips: vec![baked], ..model.clone() }, &settings).unwrap()
 }
@@ -142,6 +143,61 @@ fn keys_go_out_and_in_again() {
         assert_eq!(once, twice);
         assert_eq!(bytes, written(&rig, &model, &joints, twice));
     }
+}
+
+/// Markers, the loop and a rate that no key tells survive a file, and the second round is the same bytes.
+#[test]
+fn what_channels_cannot_hold_goes_out_and_in_again() {
+    let mut random = Random(11);
+    let model = chain(&mut random);
+    let (rig, joints) = rig_of(&model);
+    let mut clip = RigClip { range: [0.5, 2.5], frame_rate: 29.97, looped: true, ..clip_on(&joints, &mut random) };
+    for layer in &mut clip.layers {
+        for track in layer.tracks.values_mut() {
+            Arc::make_mut(track).keys.iter_mut().for_each(|key| key.time += 0.5);
+        }
+    }
+    clip.markers = [(0.5, "start"), (1.1, "left \"foot\""), (2.5, "end"), (2.5, "end")]
+        .map(|(time, name)| Marker { time, name: name.to_owned() })
+        .to_vec();
+    let file = read(&written(&rig, &model, &joints, &clip));
+    let found = own_joints(&file, &rig).unwrap();
+    let [once] = &rig_clips(&rig, &file, &found)[..] else { panic!("not one clip") };
+    assert_eq!((once.looped, once.frame_rate, once.range), (true, 29.97, [0.0, 2.0]));
+    let markers: Vec<(f32, &str)> = once.markers.iter().map(|marker| (marker.time, &*marker.name)).collect();
+    assert_eq!(markers, [(0.0, "start"), (1.1 - 0.5, "left \"foot\""), (2.0, "end"), (2.0, "end")]);
+    let bytes = written(&rig, &model, &joints, once);
+    let [twice] = &rig_clips(&rig, &read(&bytes), &found)[..] else { panic!("not one clip") };
+    assert_eq!((once, &bytes), (twice, &written(&rig, &model, &joints, twice)));
+    // A motion of another skeleton has them, too.
+    let motion = motion_of(&file, &file.clips[0]);
+    assert!(motion.looped && (motion.frame_time * 29.97 - 1.0).abs() < 1e-5);
+    assert_eq!(motion.markers, once.markers);
+
+    // A clip without any says so.
+    let plain = RigClip { looped: false, markers: Vec::new(), ..once.clone() };
+    let file = read(&written(&rig, &model, &joints, &plain));
+    assert_eq!(ClipExtras::read(file.clips[0].extras.as_ref()), ClipExtras::of(&plain, 29.97));
+}
+
+#[test]
+fn damaged_extras_are_passed_over_and_others_stay() {
+    let read = |text: &str| ClipExtras::read(Some(&serde_json::from_str(text).unwrap()));
+    for text in ["null", "[]", "7", "{}", r#"{"rigsmith": null}"#, r#"{"rigsmith": {"markers": 3, "frame_rate": "x"}}"#]
+    {
+        assert_eq!(read(text), ClipExtras::default(), "{text}");
+    }
+    let damaged = r#"{"rigsmith": {"frame_rate": -1, "looped": 1, "markers": [
+        {"time": 2, "name": "b"}, {"time": 1e300, "name": "far"}, {"name": "none"}, 5, {"time": 1, "name": "a"}]}}"#;
+    let found = read(damaged);
+    let names: Vec<&str> = found.markers.iter().map(|marker| &*marker.name).collect();
+    assert_eq!((found.frame_rate, found.looped, names), (None, false, vec!["a", "b"]));
+
+    let own = ClipExtras { looped: true, ..ClipExtras::default() }.written();
+    let of_file = serde_json::json!({ "other": [1, 2], "rigsmith": { "looped": false } });
+    let all = joined_extras(Some(own.clone()), Some(of_file)).unwrap();
+    assert_eq!((all["other"].clone(), all["rigsmith"]["looped"].clone()), (serde_json::json!([1, 2]), true.into()));
+    assert_eq!(joined_extras(Some(own.clone()), None), Some(own));
 }
 
 #[test]

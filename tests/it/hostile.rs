@@ -282,6 +282,25 @@ fn files_and_builds_stay_within_their_memory() {
     }
 }
 
+/// A million frames of motion capture are read, and are too many for a clip.
+#[test]
+fn a_million_frames_of_motion_stay_within_their_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let walker = include_str!("retarget/walker.bvh");
+    let (head, _) = walker.split_once("MOTION").unwrap();
+    let width = rigsmith::rig::format::bvh::read_bvh(walker.as_bytes(), "walker").unwrap().width();
+    let row = "0 90".to_owned() + &" 0".repeat(width - 2) + "\n";
+    let text = format!("{head}MOTION\nFrames: 1000000\nFrame Time: 0.0083333\n{}", row.repeat(1_000_000));
+    fs::write(folder.path().join("long.bvh"), &text).unwrap();
+    for args in [&["info", "long.bvh"][..], &["animate", "biped.rig.ron", "long.bvh", "-o", "long.anim.ron"]] {
+        let (ended, answer) = json_answer(folder.path(), args);
+        assert_eq!(ended.code, Some(i32::from(args[0] == "animate")), "{args:?}: {answer}");
+        assert!(args[0] == "animate" || answer.to_string().contains("1000000"), "{answer}");
+        assert!(ended.memory <= memory_allowance(text.len() as u64), "{args:?}: {} KiB", ended.memory >> 10);
+    }
+    assert!(!folder.path().join("long.anim.ron").exists());
+}
+
 /// Commands that take a hostile file, by its kind.
 fn commands_for(file: &str) -> Vec<Vec<&str>> {
     let kinds: [(&str, &[&[&str]]); 6] = [

@@ -1,5 +1,6 @@
 //! Characters of a game: instances of templates, and templates whose files are saved while they move.
 
+mod clips;
 mod meshes;
 mod reloads;
 

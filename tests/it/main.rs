@@ -125,6 +125,7 @@ mod obj;
 mod obj_materials;
 mod obj_torture;
 #[cfg(feature = "editor")]
+mod packed_clips;
 mod panels;
 mod part_instances;
 mod part_overrides;

@@ -1,6 +1,7 @@
 //! Motion of other skeletons on rigs: measured on the clip as the rig's program plays it.
 
 mod bodies;
+mod hands;
 mod joints;
 mod reduction;
 
@@ -105,7 +106,8 @@ impl PlayedRig {
             worst[0],
             worst[1]
         );
-        assert!(spans >= 2 && seconds > 0.4 * self.done.clip.duration(), "the feet hardly stand");
+        // Of two feet that walk, one stands nearly always.
+        assert!(spans >= 2 && seconds > 0.8 * self.done.clip.duration(), "the feet hardly stand");
         worst
     }
 

@@ -24,7 +24,7 @@ use crate::{
         },
         operations::{ClipOperation, KeyTolerance, Operation},
     },
-    solve::retarget::{MotionTarget, RetargetSettings, RetargetedMotion, measure_feet, retarget},
+    solve::retarget::{MotionTarget, RetargetSettings, RetargetedMotion, measure_feet, measure_hands, retarget},
 };
 
 /// Error of choosing among the clips of the files.
@@ -250,12 +250,13 @@ fn moved(
         onto,
         travel: !args.in_place,
         lock_feet: !args.free_feet,
+        lock_hands: !args.free_hands,
         tolerance: KeyTolerance::captured().scaled(args.tolerance.map_or(1.0, |most| most / 0.5)),
         ..RetargetSettings::default()
     };
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let done = spinning("retargeting", || retarget(bench.rig(), built, motion, &map, &settings))?;
-    let RetargetedMotion { clip, keys, stances, unmoved, notes } = done;
+    let RetargetedMotion { clip, keys, stances, touches, unmoved, notes } = done;
     report.notes(notes);
     if !unmoved.is_empty() {
         report
@@ -265,6 +266,7 @@ fn moved(
     let clip = add(bench, clip)?;
     let program = Arc::clone(bench.runtime()?.state().program());
     let feet = measure_feet(bench.rig(), &program, &clip, &map.target, &stances);
+    let hands = measure_hands(bench.rig(), &program, &clip, &map.target, &touches);
     let reduction = keys[0] as f32 / keys[1].max(1) as f32;
     report.line(format!(
         "{} instead of {} ({reduction:.1} : 1); feet stand {}, slide {:.2} % and are off the ground by {:.2} % of the height at most",
@@ -274,6 +276,13 @@ fn moved(
         feet.slide,
         feet.ankle,
     ));
+    if hands.touches > 0 {
+        report.line(format!(
+            "hands touch something {}, and slide by {:.2} % of the height at most where they hold it",
+            counted(hands.touches, "time", "times"),
+            hands.slide
+        ));
+    }
     entry.extend([
         ("file".to_owned(), path.display().to_string().into()),
         ("clip".to_owned(), clip.name.clone().into()),
@@ -281,6 +290,8 @@ fn moved(
         ("foot_slide".to_owned(), feet.slide.into()),
         ("ankle_off".to_owned(), feet.ankle.into()),
         ("stances".to_owned(), json!(stances)),
+        ("touches".to_owned(), json!(touches)),
+        ("hand_slide".to_owned(), hands.slide.into()),
         ("unmoved".to_owned(), unmoved.into()),
         ("keys_before".to_owned(), keys[0].into()),
         ("keys_after".to_owned(), keys[1].into()),

@@ -8,7 +8,12 @@ use super::error::WriteError;
 use crate::{
     mesh::model::{Channel, ChannelTarget, Clip, Model},
     processor::{Builder, Modules},
-    rig::{BuiltRig, Rig, Uid, animation::RigClip, bake::baked, operations::KeyTolerance},
+    rig::{
+        BuiltRig, Rig, Uid,
+        animation::{RigClip, clip_extras::joined_extras},
+        bake::baked,
+        operations::KeyTolerance,
+    },
     solve::{
         bake_clip::{BakedNode, bake_clip},
         program::{CompileOptions, RigProgram},
@@ -57,7 +62,11 @@ pub(super) fn put_clips(
         clip.channels.retain(|channel| matches!(channel.target, ChannelTarget::MorphWeights(_)));
         match rig.clips().iter().position(|own| own.name == clip.name.trim()) {
             // A baked clip begins at zero.
-            Some(place) => clips[place].channels.extend(earlier(clip.channels, rig.clips()[place].range[0])),
+            Some(place) => {
+                let own = &mut clips[place];
+                own.channels.extend(earlier(clip.channels, rig.clips()[place].range[0]));
+                own.extras = joined_extras(own.extras.take(), clip.extras);
+            }
             None => clips.push(clip),
         }
     }

@@ -14,7 +14,7 @@ use bevy::{
     prelude::*,
 };
 
-use super::play::rest_of;
+use super::{MarkerReached, play::rest_of};
 use crate::{
     plugins::{
         runtime::{ControlPose, InstanceMode, NodeOf, RigRuntime},
@@ -65,7 +65,8 @@ pub(super) fn name_targets(
     }
 }
 
-/// A clip for Bevy's animation of instances of a program, with all layers mixed. Second 0 is the start of the clip.
+/// A clip for Bevy's animation of instances of a program, with all layers mixed. Second 0 is the start of the clip. Markers are
+/// told as [`MarkerReached`] of the entity with the player.
 ///
 /// Nodes that the program does not have or that cannot be posed are left out. A node gets all of its transform from the clip:
 /// where the clip has no keys of it, it is at its base.
@@ -110,6 +111,14 @@ pub fn animation_clip(clip: &RigClip, program: &RigProgram, mode: InstanceMode) 
             }
             (Property::Attribute(_), _) => {}
         }
+    }
+    // The last one of a moment is told first by Bevy.
+    let inside = clip.markers.iter().rev().filter(|marker| (clip.range[0]..=clip.range[1]).contains(&marker.time));
+    for marker in inside {
+        let (uid, name, time) = (clip.uid, marker.name.clone(), marker.time);
+        out.add_event_fn(time - clip.range[0], move |commands: &mut Commands, entity: Entity, _: f32, _: f32| {
+            commands.trigger(MarkerReached { entity, clip: uid, name: name.clone(), time });
+        });
     }
     out.set_duration(clip.duration());
     out

@@ -3,14 +3,16 @@
 //! A file has transforms relative to the parents, a clip has offsets from rest. From one to the other, each number of a
 //! key is a linear function of the numbers of that key, tangents included, so that interpolation between keys stays
 //! what it is. Numbers that come from a file are rounded to a grid which is coarser than what two such steps lose: keys
-//! that went out and in again are the same bits, and so is the file that is written from them.
+//! that went out and in again are the same bits, and so is the file that is written from them. What channels cannot hold,
+//! such as markers, goes through the extras of the animation ([`ClipExtras`]).
 
 use std::sync::Arc;
 
 use bevy::math::{DQuat, DVec3};
 
 use super::{
-    ClipLayer, Ease, Key, LayerMode, Property, RigClip, Track, TrackTarget,
+    ClipLayer, Ease, Key, LayerMode, Marker, Property, RigClip, Track, TrackTarget,
+    clip_extras::ClipExtras,
     motion::{Motion, MotionChannel, MotionJoint},
 };
 use crate::{
@@ -116,6 +118,8 @@ pub fn motion_of(model: &Model, clip: &Clip) -> Motion {
         frame_time: 1.0 / USUAL_RATE,
         ..Motion::default()
     };
+    let facts = ClipExtras::read(clip.extras.as_ref());
+    motion.looped = facts.looped;
     let Some([start, end]) = span(clip) else {
         motion.notes.push(format!("the clip \"{}\" moves no joint", clip.name));
         return motion;
@@ -131,7 +135,9 @@ pub fn motion_of(model: &Model, clip: &Clip) -> Motion {
             Property::Translation | Property::Attribute(_) => MotionChannel::Position(part),
         }));
     }
-    let rate = frame_rate(clip, start);
+    let in_motion = |marker: &Marker| Marker { time: marker.time - start, name: marker.name.clone() };
+    motion.markers = facts.markers.iter().map(in_motion).collect();
+    let rate = facts.frame_rate.unwrap_or_else(|| frame_rate(clip, start));
     motion.frame_time = 1.0 / rate;
     let most = MAX_FRAMES.min(MAX_VALUES / motion.width().max(1));
     let wanted = (f64::from(end - start) * f64::from(rate) + 0.02).floor();
@@ -197,7 +203,14 @@ pub fn rig_clip(rig: &Rig, name: &str, clip: &Clip, joints: &[Option<Uid>]) -> O
     let range = span(clip)?;
     let of = rig.uid().to_string();
     let uids = ["clip", "layer"].map(|what| Uid::derived([of.as_str(), name, what]));
-    let mut made = RigClip { frame_rate: frame_rate(clip, range[0]), range, ..RigClip::new(uids[0], uids[1], name) };
+    let facts = ClipExtras::read(clip.extras.as_ref());
+    let mut made = RigClip {
+        frame_rate: facts.frame_rate.unwrap_or_else(|| frame_rate(clip, range[0])),
+        range,
+        looped: facts.looped,
+        markers: facts.markers,
+        ..RigClip::new(uids[0], uids[1], name)
+    };
     let layer = made.layers.first_mut()?;
     for (node, property, track) in clip.channels.iter().filter_map(track_of) {
         let Some(uid) = joints.get(node).copied().flatten() else { continue };

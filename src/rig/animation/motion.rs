@@ -5,7 +5,7 @@
 
 use bevy::math::{Quat, Vec3};
 
-use super::sample::slerp;
+use super::{Marker, sample::slerp};
 use crate::mesh::model::Trs;
 
 /// Animated value of a joint of a [`Motion`].
@@ -47,6 +47,10 @@ pub struct Motion {
     pub frame_time: f32,
     /// Values of all frames: frame after frame, joint after joint, channel after channel; finite.
     pub values: Vec<f32>,
+    /// True if the file says that the motion is played over and over.
+    pub looped: bool,
+    /// Named moments, by rising time: seconds after the first frame.
+    pub markers: Vec<Marker>,
     /// Remarks of the reader, a sentence each.
     pub notes: Vec<String>,
 }

@@ -7,7 +7,8 @@ use bevy::math::{Quat, Vec3};
 use super::{
     contacts::Contacts,
     figure::Figure,
-    limbs::{Limb, LimbKind},
+    limbs::{Limb, LimbKind, Reach},
+    touches::Touches,
 };
 use crate::{
     mesh::model::Trs,
@@ -28,6 +29,13 @@ pub(super) struct SourceFrame {
     pub turns: Vec<Quat>,
     /// Balls of the left and the right foot.
     pub balls: [Vec3; 2],
+}
+
+/// Places of ankles and wrists at a frame, left and right.
+#[derive(Debug, Clone, Copy, Default)]
+struct LimbGoals {
+    feet: [Option<Reach>; 2],
+    hands: [Option<Reach>; 2],
 }
 
 /// Source and target with everything that is constant for a clip.
@@ -242,16 +250,31 @@ impl<'a> Body<'a> {
     }
 
     /// Transforms of the target's joints in the rig's space, frame by frame.
-    pub fn poses(&self, contacts: &Contacts, rate: f32, has_twist: bool) -> Vec<Vec<Trs>> {
-        let raw: Vec<Vec<Trs>> = (0..self.frames.len()).map(|frame| self.pose(frame, 0.0, None, has_twist)).collect();
-        let goals = contacts.goals(self, &raw, rate);
-        let drops = contacts.drops(self, &raw, &goals, rate);
+    pub fn poses(&self, contacts: &Contacts, touches: &Touches, rate: f32, has_twist: bool) -> Vec<Vec<Trs>> {
         let frames = 0..self.frames.len();
-        frames.map(|frame| self.pose(frame, drops[frame], Some(&goals[frame]), has_twist)).collect()
+        let free = LimbGoals::default();
+        let raw: Vec<Vec<Trs>> = frames.clone().map(|frame| self.pose(frame, 0.0, &free, has_twist)).collect();
+        let feet = contacts.goals(self, &raw, rate);
+        let drops = contacts.drops(self, &raw, &feet, rate);
+        let goals = |frame: usize, hands: [Option<Reach>; 2]| {
+            let feet = feet[frame].map(|place| place.map(|place| Reach { place, share: 1.0 }));
+            LimbGoals { feet, hands }
+        };
+        let standing = |frame: usize| self.pose(frame, drops[frame], &goals(frame, [None; 2]), has_twist);
+        let mut poses: Vec<Vec<Trs>> = frames.map(standing).collect();
+        if touches.is_empty() {
+            return poses;
+        }
+        for (frame, hands) in touches.goals(self, &poses, rate).into_iter().enumerate() {
+            if hands.iter().any(Option::is_some) {
+                poses[frame] = self.pose(frame, drops[frame], &goals(frame, hands), has_twist);
+            }
+        }
+        poses
     }
 
-    /// Transforms of the target's joints at a frame. `goals` are the places of the ankles, left and right.
-    fn pose(&self, frame: usize, drop: f32, goals: Option<&[Option<Vec3>; 2]>, has_twist: bool) -> Vec<Trs> {
+    /// Transforms of the target's joints at a frame.
+    fn pose(&self, frame: usize, drop: f32, goals: &LimbGoals, has_twist: bool) -> Vec<Trs> {
         let hips = self.hips_place(frame, drop);
         let mut globals: Vec<Trs> = Vec::with_capacity(self.target.joints.len());
         let mut solved: BTreeMap<usize, Quat> = BTreeMap::new();
@@ -267,7 +290,10 @@ impl<'a> Body<'a> {
                 global.rotation = (self.frames[frame].turns[*from] * joint.rest.rotation).normalize();
             }
             if let Some(limb) = self.limbs.iter().find(|limb| limb.target[0] == at) {
-                let goal = goals.and_then(|goals| goals[limb.side as usize]);
+                let goal = match limb.kind {
+                    LimbKind::Leg => goals.feet[limb.side as usize],
+                    LimbKind::Arm => goals.hands[limb.side as usize],
+                };
                 let [upper, lower] = limb.solve(self, frame, global.translation, goal, has_twist);
                 global.rotation = upper;
                 solved.insert(limb.target[1], lower);

@@ -15,6 +15,8 @@ use crate::{
 /// Speeds in lengths of a leg a second below which a low foot, and one at any height, stands.
 const SLOW: f32 = 0.9;
 const STILL: f32 = 0.15;
+/// Speed in lengths of a leg a second below which a low ankle stands while its ball is still above the ground.
+const HEEL: f32 = 0.6;
 /// Heights above the ground, in lengths of a leg, below which an ankle and a ball are low.
 const LOW: [f32; 2] = [0.06, 0.05];
 /// Seconds over which the correction of a foot fades.
@@ -53,25 +55,35 @@ pub(super) fn travel(body: &mut Body, rate: f32) -> bool {
     if body.frames.iter().any(|frame| level(frame.places[hips] - start).length() > 0.35 * leg) {
         return false;
     }
-    let mut steps: Vec<Vec3> = Vec::with_capacity(body.frames.len());
-    for pair in body.frames.windows(2) {
-        let points = |frame: &super::body::SourceFrame| {
-            [frame.places[left], frame.places[right], frame.balls[0], frame.balls[1]]
+    let steps_of = |mean: Option<Vec3>| -> Vec<Vec3> {
+        let step = |pair: &[super::body::SourceFrame]| {
+            let points = |frame: &super::body::SourceFrame| {
+                [frame.places[left], frame.places[right], frame.balls[0], frame.balls[1]]
+            };
+            let grounds = [body.source_ankle, body.source_ankle, body.source_ball, body.source_ball];
+            let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+            for ((was, is), ground) in points(&pair[0]).into_iter().zip(points(&pair[1])).zip(grounds) {
+                let height = (0.5 * (was + is).dot(body.up) - ground).max(0.0);
+                let step = level(was - is);
+                // A foot that swings forward just above the ground does not stand on it.
+                let share = mean.map_or(1.0, |mean| (step.dot(mean) / mean.length_squared() - 0.2) / 0.4);
+                let weight = bevy::math::ops::exp(-height / (0.015 * leg)) * share.clamp(1e-3, 1.0);
+                sum += step * weight;
+                weights += weight;
+            }
+            sum / weights.max(1e-12)
         };
-        let grounds = [body.source_ankle, body.source_ankle, body.source_ball, body.source_ball];
-        let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
-        for ((was, is), ground) in points(&pair[0]).into_iter().zip(points(&pair[1])).zip(grounds) {
-            let height = (0.5 * (was + is).dot(body.up) - ground).max(0.0);
-            let weight = bevy::math::ops::exp(-height / (0.015 * leg));
-            sum += level(was - is) * weight;
-            weights += weight;
-        }
-        steps.push(sum / weights.max(1e-12));
-    }
+        body.frames.windows(2).map(step).collect()
+    };
+    let mut steps = steps_of(None);
     let net: Vec3 = steps.iter().sum();
     let way: f32 = steps.iter().map(|step| step.length()).sum();
     if net.length() < 0.5 * leg || net.length() < 0.5 * way {
         return false;
+    }
+    for _ in 0..2 {
+        let mean = steps.iter().sum::<Vec3>() / steps.len() as f32;
+        steps = steps_of(Some(mean).filter(|mean| mean.length_squared() > 0.0));
     }
     let steps = averaged(&steps, (0.04 * rate).round().max(1.0) as usize);
     let mut shift = Vec3::ZERO;
@@ -112,7 +124,9 @@ impl Contacts {
                 let heights = [ankle(at).dot(body.up) - body.source_ankle, ball(at).dot(body.up) - body.source_ball];
                 let [low_ankle, low_ball] = [0, 1].map(|part| heights[part] < LOW[part] * leg);
                 let [of_ankle, of_ball] = [speed(&ankle, at), speed(&ball, at)];
-                if (low_ankle && low_ball && of_ankle < SLOW) || of_ankle < STILL {
+                // A heel stands while the ball comes down.
+                let is_heel = low_ankle && of_ankle < HEEL && heights[1] < 2.5 * LOW[1] * leg;
+                if (low_ankle && low_ball && of_ankle < SLOW) || is_heel || of_ankle < STILL {
                     Contact::Ankle
                 } else if low_ball && of_ball < SLOW {
                     Contact::Ball
@@ -180,21 +194,7 @@ impl Contacts {
             stood.push((all[next].1, all[end - 1].2));
             next = end;
         }
-        // Between two stances the correction fades from one to the other.
-        let fade = (FADE * rate).max(1.0);
-        let count = contacts.len();
-        let (first, last) = (stood.first().copied(), stood.last().copied());
-        let gaps = stood.windows(2).map(|pair| (Some(pair[0].1), Some(pair[1].0)));
-        let ends = [(None, first.map(|(from, _)| from)), (last.map(|(_, to)| to), None)];
-        for (from, to) in gaps.chain(ends) {
-            let (low, high) = (from.map_or(0, |from| from + 1), to.unwrap_or(count));
-            let span = fade.min((high + 1 - low.min(high)) as f32);
-            for at in low..high {
-                let leaving = from.map(|from| (from, 1.0 - smooth((at - from) as f32 / span)));
-                let coming = to.map(|to| (to, 1.0 - smooth((to - at) as f32 / span)));
-                corrections[at] = leaving.into_iter().chain(coming).map(|(of, weight)| corrections[of] * weight).sum();
-            }
-        }
+        fade(&mut corrections, &stood, rate);
         corrections
     }
 
@@ -220,6 +220,27 @@ impl Contacts {
         let around = |at: usize| &needed[at.saturating_sub(by)..(at + by + 1).min(needed.len())];
         let highest: Vec<f32> = (0..needed.len()).map(|at| around(at).iter().copied().fold(0.0, f32::max)).collect();
         averaged(&highest, by)
+    }
+}
+
+/// Lets corrections fade from each span of frames in which they are given to the next one.
+pub(super) fn fade<T>(corrections: &mut [T], spans: &[(usize, usize)], rate: f32)
+where
+    T: Copy + std::iter::Sum + std::ops::Mul<f32, Output = T>,
+{
+    let fade = (FADE * rate).max(1.0);
+    let count = corrections.len();
+    let (first, last) = (spans.first().copied(), spans.last().copied());
+    let gaps = spans.windows(2).map(|pair| (Some(pair[0].1), Some(pair[1].0)));
+    let ends = [(None, first.map(|(from, _)| from)), (last.map(|(_, to)| to), None)];
+    for (from, to) in gaps.chain(ends) {
+        let (low, high) = (from.map_or(0, |from| from + 1), to.unwrap_or(count));
+        let span = fade.min((high + 1 - low.min(high)) as f32);
+        for at in low..high {
+            let leaving = from.map(|from| (from, 1.0 - smooth((at - from) as f32 / span)));
+            let coming = to.map(|to| (to, 1.0 - smooth((to - at) as f32 / span)));
+            corrections[at] = leaving.into_iter().chain(coming).map(|(of, weight)| corrections[of] * weight).sum();
+        }
     }
 }
 
@@ -292,13 +313,13 @@ impl Foot {
     }
 }
 
-/// Runs of the same contact: contact, first and last frame.
-fn runs(contacts: &[Contact]) -> Vec<(Contact, usize, usize)> {
-    let mut runs: Vec<(Contact, usize, usize)> = Vec::new();
-    for (at, contact) in contacts.iter().enumerate() {
+/// Runs of the same value: value, first and last frame.
+pub(super) fn runs<T: Copy + PartialEq>(values: &[T]) -> Vec<(T, usize, usize)> {
+    let mut runs: Vec<(T, usize, usize)> = Vec::new();
+    for (at, value) in values.iter().enumerate() {
         match runs.last_mut() {
-            Some((known, _, last)) if known == contact => *last = at,
-            _ => runs.push((*contact, at, at)),
+            Some((known, _, last)) if known == value => *last = at,
+            _ => runs.push((*value, at, at)),
         }
     }
     runs

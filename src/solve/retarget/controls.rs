@@ -55,15 +55,17 @@ struct Handle {
     corrects: bool,
 }
 
-/// Offsets of the controls that the motion moves, and labels of joints that no control moves.
+/// Offsets of the controls that the motion moves, and labels of joints that no control moves. `hands` tells which hands, left
+/// and right, are held anywhere.
 pub(super) fn keyed(
     built: &BuiltRig,
     program: &Arc<RigProgram>,
     body: &Body,
     poses: &[Vec<Trs>],
+    hands: [bool; 2],
 ) -> Result<(KeyedTracks, Vec<String>), RetargetError> {
     let mut state = RigState::new(program.clone());
-    let limbs = limbs(built, body);
+    let limbs = limbs(built, body, hands);
     for (switch, _, value) in &limbs {
         // A switch that the program lacks is told when the limb is posed.
         let _ = state.set_attribute(switch.control, &switch.attribute, *value);
@@ -118,15 +120,19 @@ struct PosedFrame {
     dials: Vec<f32>,
 }
 
-/// Limbs with switches whose joints the motion moves: legs follow their goals, arms their forward controls.
-fn limbs<'a>(built: &'a BuiltRig, body: &Body) -> Vec<(&'a SwitchData, Vec<usize>, f32)> {
+/// Limbs with switches whose joints the motion moves: legs, and arms of hands that are held, follow their goals, other arms
+/// their forward controls.
+fn limbs<'a>(built: &'a BuiltRig, body: &Body, hands: [bool; 2]) -> Vec<(&'a SwitchData, Vec<usize>, f32)> {
     let limb = |switch: &'a Arc<SwitchData>| {
         let Matching::IkFk { joints, .. } = &switch.matching else { return None };
         let place = |uid: &crate::rig::Uid| body.target.joints.iter().position(|joint| joint.uid == *uid);
         let joints: Vec<usize> = joints.iter().map(place).collect::<Option<_>>()?;
-        let is_leg = |limb: &super::limbs::Limb| limb.kind == LimbKind::Leg && joints.contains(&limb.target[2]);
+        let has_goal = |limb: &super::limbs::Limb| {
+            let is_held = limb.kind == LimbKind::Leg || hands[limb.side as usize];
+            is_held && joints.contains(&limb.target[2])
+        };
         let is_moved = joints.iter().all(|joint| body.is_moved(*joint));
-        is_moved.then(|| (&**switch, joints.clone(), f32::from(u8::from(body.limbs.iter().any(is_leg)))))
+        is_moved.then(|| (&**switch, joints.clone(), f32::from(u8::from(body.limbs.iter().any(has_goal)))))
     };
     built.switches.iter().filter_map(limb).collect()
 }

@@ -26,6 +26,14 @@ impl LimbKind {
     }
 }
 
+/// Place for the end of a limb.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Reach {
+    pub place: Vec3,
+    /// Share from 0 to 1 with which the limb bends about its own hinge rather than as the source does.
+    pub share: f32,
+}
+
 /// Arm or leg of both skeletons. Hinges are unit vectors about which a positive angle takes the upper bone's direction to
 /// that of the lower one.
 #[derive(Debug, Clone)]
@@ -90,9 +98,9 @@ impl Limb {
         })
     }
 
-    /// Rotations of the upper and the lower joint at a frame. A leg reaches for `goal`, or for the place that the source's
-    /// foot has from its hip. Without twist joints the lower bone has the roll of the source's.
-    pub fn solve(&self, body: &Body, frame: usize, root: Vec3, goal: Option<Vec3>, has_twist: bool) -> [Quat; 2] {
+    /// Rotations of the upper and the lower joint at a frame. A limb reaches for `goal`; without one, a leg does for the place
+    /// that the source's foot has from its hip, and an arm has the directions of the source's. Without twist joints the lower bone has the roll of the source's.
+    pub fn solve(&self, body: &Body, frame: usize, root: Vec3, goal: Option<Reach>, has_twist: bool) -> [Quat; 2] {
         let frame = &body.frames[frame];
         let places = self.source.map(|joint| frame.places[joint]);
         let [upper_turn, lower_turn] = self.turns.map(|joint| frame.turns[joint]);
@@ -110,15 +118,17 @@ impl Limb {
             }
         }
         if self.kind == LimbKind::Leg {
-            let goal = goal.unwrap_or(root + places[2] - places[0]);
-            let line = direction(goal - root).unwrap_or(u);
-            hinge = perpendicular_or_any(line, &[hinge, reference]);
-            let [upper, lower] = self.lengths;
-            let far = goal.distance(root).clamp((upper - lower).abs() + 1e-4 * upper, STRETCHED * (upper + lower));
-            let cosine = (upper * upper + far * far - lower * lower) / (2.0 * upper * far);
-            let (sin, cos) = ops::sin_cos(ops::acos(cosine.clamp(-1.0, 1.0)));
-            u = line * cos - hinge.cross(line) * sin;
-            f = direction(line * far - u * upper).unwrap_or(u);
+            let way = goal.map_or(places[2] - places[0], |goal| goal.place - root);
+            hinge = perpendicular_or_any(direction(way).unwrap_or(u), &[hinge, reference]);
+            [u, f] = self.bent(way, hinge, u);
+        } else if let Some(Reach { place, share }) = goal {
+            let (was, way) = (u, place - root);
+            // The plane in which the arm bends already, so that it does not jump when it begins to reach.
+            let plane = direction(u.cross(f)).unwrap_or(hinge);
+            let plane = direction(plane.lerp(hinge, share)).unwrap_or(hinge);
+            let plane = perpendicular_or_any(direction(way).unwrap_or(u), &[plane, hinge]);
+            [u, f] = self.bent(way, plane, u);
+            hinge = arc(was, u, hinge) * hinge;
         }
         let upper = between_frames(self.rest[0], [u, perpendicular_or_any(u, &[hinge])]) * self.rotations[0];
         let lower = if has_twist || self.kind == LimbKind::Leg {
@@ -129,9 +139,21 @@ impl Limb {
         };
         [upper.normalize(), (lower * self.rotations[1]).normalize()]
     }
+
+    /// Directions of both bones that end at `way` from the root, bent about a hinge across it; `u` is that of the upper bone if
+    /// the way has no direction.
+    fn bent(&self, way: Vec3, hinge: Vec3, u: Vec3) -> [Vec3; 2] {
+        let line = direction(way).unwrap_or(u);
+        let [upper, lower] = self.lengths;
+        let far = way.length().clamp((upper - lower).abs() + 1e-4 * upper, STRETCHED * (upper + lower));
+        let cosine = (upper * upper + far * far - lower * lower) / (2.0 * upper * far);
+        let (sin, cos) = ops::sin_cos(ops::acos(cosine.clamp(-1.0, 1.0)));
+        let u = line * cos - hinge.cross(line) * sin;
+        [u, direction(line * far - u * upper).unwrap_or(u)]
+    }
 }
 
-/// Greatest share of a leg's length at which it counts as stretched.
+/// Greatest share of a limb's length at which it counts as stretched.
 pub(super) const STRETCHED: f32 = 0.9995;
 
 /// Directions of two bones.

@@ -1,10 +1,11 @@
-//! Feet of a clip as it is played on the rig: how far standing feet slide, and how high their ankles are.
+//! Feet and hands of a clip as it is played on the rig: how far standing feet slide, how high their ankles are, and how far hands
+//! slide that hold something.
 
 use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::Stance;
+use super::{Stance, Touch, TouchedThing};
 use crate::{
     rig::{
         Rig,
@@ -67,6 +68,48 @@ pub fn measure_feet(
         if (mean - rest.translation.y).abs() < 0.05 * height {
             let off = places.iter().map(|place| (place.y - rest.translation.y).abs()).fold(0.0, f32::max);
             report.ankle = report.ankle.max(100.0 * off / height);
+        }
+    }
+    report
+}
+
+/// Hands of a clip, in hundredths of the height of the rig's joints.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct HandReport {
+    /// Number of times at which a hand touches something.
+    pub touches: usize,
+    /// Largest way of a wrist while its hand touches something that stands still in the world.
+    pub slide: f32,
+}
+
+/// Plays a clip on the rig and measures the wrists at its frames while hands touch something. `bones` are indices in the order of
+/// [`Rig::walk`].
+pub fn measure_hands(
+    rig: &Rig,
+    program: &Arc<RigProgram>,
+    clip: &RigClip,
+    bones: &HumanJoints,
+    touches: &[Touch],
+) -> HandReport {
+    let globals = rig.rest_globals();
+    let heights = || globals.iter().map(|(_, at)| at.translation.y);
+    let height = heights().fold(f32::MIN, f32::max) - heights().fold(f32::MAX, f32::min);
+    let mut report = HandReport { touches: touches.len(), slide: 0.0 };
+    if height.is_nan() || height <= 0.0 {
+        return report;
+    }
+    let mut state = RigState::new(program.clone());
+    for touch in touches.iter().filter(|touch| touch.thing == TouchedThing::World) {
+        let side = if touch.left { BodySide::Left } else { BodySide::Right };
+        let hand = bones.get(&HumanBone::Limb(side, LimbBone::Hand)).and_then(|joints| globals.get(*joints.first()?));
+        let Some((uid, _)) = hand else { continue };
+        let count = ((touch.span[1] - touch.span[0]) * clip.frame_rate).round() as usize;
+        let mut first = None;
+        for frame in 0..=count {
+            strike(&mut state, &clip.sample(touch.span[0] + frame as f32 / clip.frame_rate));
+            let place = state.global(*uid).unwrap_or_default().translation;
+            let way = first.get_or_insert(place).distance(place);
+            report.slide = report.slide.max(100.0 * way / height);
         }
     }
     report

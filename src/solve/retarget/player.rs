@@ -1,6 +1,6 @@
 //! Tracks played on a program, frame by frame, to see where they put the joints.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use bevy::math::{Quat, Vec3};
 use rayon::prelude::*;
@@ -18,6 +18,15 @@ use crate::{
 
 /// Frames that one instance plays.
 const BLOCK: usize = 32;
+
+/// Joints that a track moves.
+#[derive(Debug, Clone, Default)]
+pub(super) struct TrackReach {
+    /// Greatest way of a joint for one unit of the track, a degree for rotations.
+    pub most: f32,
+    /// Places among those of [`Player::each`] that the track moves.
+    pub places: BTreeSet<usize>,
+}
 
 /// Program with the slots that tracks write.
 pub(super) struct Player {
@@ -115,13 +124,12 @@ impl Player {
         played.into_iter().flatten().collect()
     }
 
-    /// Greatest way of a joint for one unit of each track, a degree for rotations: tried at some frames, in all
-    /// directions. `length` is a small distance on the figure.
-    pub fn reaches(&self, tracks: &[SampledTrack], length: f32) -> Vec<f32> {
+    /// Reach of each track: tried at some frames, in all directions. `length` is a small distance on the figure.
+    pub fn reaches(&self, tracks: &[SampledTrack], length: f32) -> Vec<TrackReach> {
         let count = tracks.first().map_or(0, |track| track.values.len());
         let mut frames = [0, count / 4, count / 2, 3 * count / 4, count.saturating_sub(1)].to_vec();
         frames.dedup();
-        let mut reaches = vec![0.0_f32; tracks.len()];
+        let mut reaches = vec![TrackReach::default(); tracks.len()];
         let mut state = RigState::new(self.program.clone());
         for frame in frames.into_iter().filter(|frame| *frame < count) {
             let mut values: Vec<[f32; 4]> = tracks.iter().map(|track| track.values[frame]).collect();
@@ -131,8 +139,15 @@ impl Player {
                 for (changed, by) in tried(&tracks[track].property, value, length) {
                     values[track] = changed;
                     let after = self.places(&mut state, &values);
-                    let ways = before.iter().zip(&after).map(|((from, _), (to, _))| from.distance(*to));
-                    *reach = reach.max(ways.fold(0.0, f32::max) / by);
+                    for (place, ((from, turn), (to, turned))) in before.iter().zip(&after).enumerate() {
+                        let way = from.distance(*to);
+                        reach.most = reach.most.max(way / by);
+                        let angle = turn.inverse() * *turned;
+                        // A hundredth of the way or the angle that was tried counts.
+                        if way > 1e-2 * length || angle.xyz().length_squared() > 1e-8 {
+                            reach.places.insert(place);
+                        }
+                    }
                 }
                 values[track] = value;
             }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::player::Player;
+use super::player::{Player, TrackReach};
 use crate::{
     rig::{
         PoseOffset, Rig, Uid,
@@ -11,7 +11,7 @@ use crate::{
     },
     solve::{
         program::RigProgram,
-        reduction::{JointPlace, SampledTrack, error_of, reduce_tracks, track_tolerance},
+        reduction::{FrameErrors, JointPlace, SampledTrack, errors_of, reduce_tracks, track_tolerance},
     },
 };
 
@@ -46,16 +46,26 @@ pub(super) fn fill(
     let (targets, mut tracks) = keyed.tracks();
     let player = Player::new(program, &targets, &keyed.values);
     let reaches = player.reaches(&tracks, 20.0 * tolerance.distance);
-    for (track, reach) in tracks.iter_mut().zip(reaches) {
+    for (track, reach) in tracks.iter_mut().zip(&reaches) {
         // Numbers that turn joints are angles in degrees.
         let of = KeyTolerance { value: tolerance.angle, ..*tolerance };
-        track.tolerance = track_tolerance(&track.property, reach, &of);
+        track.tolerance = track_tolerance(&track.property, reach.most, &of);
     }
     let count = tracks.len();
     let truth = player.each(times.len(), |track, frame| tracks[track].values[frame], count, |_, places| places);
     let keys = reduce_tracks(times, &tracks, |values| {
-        let error = |frame: usize, places: Vec<JointPlace>| error_of(&places, &truth[frame], tolerance);
-        player.each(times.len(), |track, frame| values[track][frame], count, error)
+        let errors = |frame: usize, places: Vec<JointPlace>| {
+            let errors = errors_of(&places, &truth[frame], tolerance);
+            let of_places = |reach: &TrackReach| {
+                let own = reach.places.iter().filter_map(|place| errors.get(*place));
+                own.copied().fold(0.0, f32::max)
+            };
+            FrameErrors {
+                worst: errors.iter().copied().fold(0.0, f32::max),
+                of_tracks: reaches.iter().map(of_places).collect(),
+            }
+        };
+        player.each(times.len(), |track, frame| values[track][frame], count, errors)
     });
     for (target, keys) in targets.into_iter().zip(keys) {
         counts[0] += times.len();

@@ -1,0 +1,267 @@
+//! Packed clips: the motion of a skeleton in few bytes, for the files and the memory of games.
+//!
+//! A clip has for each node its translation, rotation and scale relative to the parent: as lines between keys at frames, or,
+//! where that takes fewer bytes, as a value for each frame. Parts that stay at rest take a byte, constants their numbers. Numbers
+//! have as few bits as the tolerance allows; rotations are told from the middle one of their track, by three numbers. What is
+//! lost by that is part of what is measured: with its lines *and* its bits, every node is within the tolerance of where it was, at
+//! every frame.
+
+mod bits;
+mod steps;
+mod track;
+
+use std::sync::Arc;
+
+use bevy::math::Quat;
+use serde_json::Value;
+
+use self::{
+    bits::{Reader, write_number},
+    steps::Steps,
+    track::PackedTrack,
+};
+use super::{
+    bake_clip::{BakeError, BakedNode, part_of, sample_nodes},
+    curve_fit::{fit_lines, sampled},
+    program::RigProgram,
+    reduction::{SampledNode, SampledSkeleton, SampledTrack, fit_within},
+};
+use crate::{
+    mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Trs},
+    rig::{
+        animation::{Ease, Key, Property, RigClip, clip_extras::ClipExtras, motion::Motion},
+        operations::KeyTolerance,
+    },
+};
+
+/// First bytes of a packed clip.
+const MAGIC: &[u8; 8] = b"rigclip1";
+/// Share of a track's tolerance that its lines get; the other part is for the bits of its numbers.
+const LINES: f32 = 0.85;
+/// Most frames, nodes, and bytes of texts of a packed clip that is read.
+const MOST_FRAMES: u32 = 10_000_000;
+const MOST_NODES: u32 = 1_000_000;
+const MOST_TEXT: usize = 1 << 20;
+/// Parts of a transform, in the order of their tracks.
+const PARTS: [Property; 3] = [Property::Translation, Property::Rotation, Property::Scale];
+
+/// Motion of a skeleton's nodes in few bytes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PackedClip {
+    name: String,
+    /// Extras as text, empty without any.
+    extras: String,
+    rate: f32,
+    duration: f32,
+    frames: u32,
+    /// Translation, rotation and scale of each node.
+    nodes: Vec<[PackedTrack; 3]>,
+}
+
+/// Reason for not reading a packed clip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum PackedClipError {
+    /// The bytes are something else.
+    #[error("no packed clip of this version; pack the clip again")]
+    Other,
+    /// The bytes end too early.
+    #[error("the packed clip is cut off at byte {0}; copy or pack it again")]
+    CutOff(usize),
+    /// A value that no packed clip has.
+    #[error("the packed clip has {what} at byte {at} that cannot be; copy or pack it again")]
+    Damaged {
+        /// The value.
+        what: &'static str,
+        /// Place of the value.
+        at: usize,
+    },
+}
+
+/// Packs a clip of a rig: plays it at a rate, as [`bake_clip`](super::bake_clip::bake_clip) does, and keeps all nodes within the
+/// tolerance at every frame.
+///
+/// # Errors
+/// A clip with more frames than there is memory for.
+pub fn pack_clip(
+    program: &Arc<RigProgram>,
+    clip: &RigClip,
+    nodes: &[BakedNode],
+    rate: f32,
+    tolerance: &KeyTolerance,
+) -> Result<PackedClip, BakeError> {
+    let (times, sampled) = sample_nodes(program, clip, nodes, rate)?;
+    let rests: Vec<Trs> = nodes.iter().map(|node| node.rest).collect();
+    let extras = ClipExtras::of(clip, rate).written().to_string();
+    let about = PackedClip {
+        name: clip.name.clone(),
+        extras,
+        rate,
+        duration: times.last().copied().unwrap_or_default(),
+        frames: times.len() as u32,
+        nodes: Vec::new(),
+    };
+    Ok(about.packed(&times, &sampled, &rests, tolerance))
+}
+
+/// Packs the motion of a skeleton of its own, whose joints are within the tolerance at every frame.
+pub fn pack_motion(motion: &Motion, tolerance: &KeyTolerance) -> PackedClip {
+    let rests: Vec<Trs> = motion.joints.iter().map(|joint| joint.rest).collect();
+    let mut sampled: Vec<SampledNode> =
+        motion.joints.iter().map(|joint| SampledNode { parent: joint.parent, locals: Vec::new() }).collect();
+    for frame in 0..motion.frames() {
+        for (node, local) in sampled.iter_mut().zip(motion.locals(frame)) {
+            node.locals.push(local);
+        }
+    }
+    let rate = 1.0 / motion.frame_time;
+    let facts = ClipExtras { frame_rate: Some(rate), looped: motion.looped, markers: motion.markers.clone() };
+    let frames = motion.frames() as u32;
+    let mut about = PackedClip {
+        name: motion.name.clone(),
+        extras: facts.written().to_string(),
+        rate,
+        duration: frames.saturating_sub(1) as f32 / rate,
+        frames,
+        nodes: Vec::new(),
+    };
+    let times: Vec<f32> = (0..frames).map(|frame| about.time(frame)).collect();
+    about.duration = times.last().copied().unwrap_or_default();
+    about.packed(&times, &sampled, &rests, tolerance)
+}
+
+impl PackedClip {
+    /// Name of the clip.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Number of frames.
+    pub fn frames(&self) -> usize {
+        self.frames as usize
+    }
+
+    /// Number of keys of all tracks.
+    pub fn key_count(&self) -> usize {
+        self.nodes.iter().flatten().map(PackedTrack::len).sum()
+    }
+
+    /// Second of a frame.
+    fn time(&self, frame: u32) -> f32 {
+        if frame + 1 >= self.frames { self.duration } else { frame as f32 / self.rate }
+    }
+
+    fn packed(mut self, times: &[f32], nodes: &[SampledNode], rests: &[Trs], tolerance: &KeyTolerance) -> Self {
+        self.nodes = vec![Default::default(); nodes.len()];
+        if times.is_empty() {
+            return self;
+        }
+        let skeleton = SampledSkeleton::new(times.len(), nodes, &vec![[false; 3]; nodes.len()], tolerance);
+        let fit = |track: &SampledTrack, tolerance: &[f32]| {
+            let for_lines: Vec<f32> = tolerance.iter().map(|most| most * LINES).collect();
+            let least = tolerance.iter().copied().fold(f32::MAX, f32::min).max(0.1 * track.tolerance);
+            let ends = fit_lines(&track.property, times, &track.values, &for_lines);
+            let keys: Vec<(u32, [f32; 4])> = ends.into_iter().map(|end| (end as u32, track.values[end])).collect();
+            let mut packed = PackedTrack::new(&track.property, &keys, (1.0 - LINES) * least);
+            if packed.len() > 1
+                && let Some(steps) = Steps::new(&track.property, &track.values, least)
+            {
+                packed = packed.smaller(PackedTrack::Steps(steps));
+            }
+            let keys = packed.keys(&track.property);
+            let line = |(frame, value): (u32, [f32; 4])| Key { time: times[frame as usize], value, ease: Ease::Linear };
+            let values = sampled(&track.property, times, keys.into_iter().map(line).collect());
+            (packed, values)
+        };
+        let exact = |track: &SampledTrack| {
+            let keys: Vec<(u32, [f32; 4])> = (0..).zip(track.values.iter().copied()).collect();
+            PackedTrack::new(&track.property, &keys, 0.0)
+        };
+        let found = fit_within(&skeleton.tracks, |samples| skeleton.errors(samples), fit)
+            .unwrap_or_else(|| skeleton.tracks.iter().map(exact).collect());
+        for ((node, part), track) in skeleton.owners.iter().zip(found) {
+            let rest = part_of(&rests[*node], &PARTS[*part]);
+            let is_rest =
+                track.constant().is_some_and(|value| value.iter().zip(&rest).all(|(a, b)| (a - b).abs() < 1e-6));
+            self.nodes[*node][*part] = if is_rest { PackedTrack::default() } else { track };
+        }
+        self
+    }
+
+    /// The clip as channels of linear keys, whose targets are places among the nodes. Parts that stay at rest have none.
+    pub fn unpacked(&self) -> Clip {
+        let mut channels = Vec::new();
+        for (node, tracks) in self.nodes.iter().enumerate() {
+            for (property, track) in PARTS.iter().zip(tracks) {
+                let keys = track.keys(property);
+                if keys.is_empty() {
+                    continue;
+                }
+                let target = match property {
+                    Property::Translation => ChannelTarget::Translation(node),
+                    Property::Rotation => ChannelTarget::Rotation(node),
+                    Property::Scale | Property::Attribute(_) => ChannelTarget::Scale(node),
+                };
+                let times = keys.iter().map(|(frame, _)| self.time(*frame)).collect();
+                let values = keys.iter().flat_map(|(_, value)| value[..property.width()].to_vec()).collect();
+                channels.push(Channel { target, interpolation: Interpolation::Linear, times, values });
+            }
+        }
+        let extras = serde_json::from_str::<Value>(&self.extras).ok();
+        Clip { name: self.name.clone(), channels, extras }
+    }
+
+    /// Bytes of the clip.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut out = MAGIC.to_vec();
+        for text in [&self.name, &self.extras] {
+            write_number(&mut out, text.len() as u32);
+            out.extend_from_slice(text.as_bytes());
+        }
+        out.extend(self.rate.to_le_bytes());
+        out.extend(self.duration.to_le_bytes());
+        write_number(&mut out, self.frames);
+        write_number(&mut out, self.nodes.len() as u32);
+        self.nodes.iter().flatten().for_each(|track| track.write(&mut out));
+        out
+    }
+
+    /// Clip of bytes.
+    ///
+    /// # Errors
+    /// See [`PackedClipError`].
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, PackedClipError> {
+        let rest = bytes.strip_prefix(MAGIC).ok_or(PackedClipError::Other)?;
+        let mut reader = Reader::new(rest, MAGIC.len());
+        let mut text = || -> Result<String, PackedClipError> {
+            let length = reader.number("a length of a text", MOST_TEXT as u32)?;
+            let at = reader.at();
+            let text = std::str::from_utf8(reader.bytes(length as usize)?);
+            Ok(text.map_err(|_| PackedClipError::Damaged { what: "a text", at })?.to_owned())
+        };
+        let (name, extras) = (text()?, text()?);
+        let rate = reader.float("a frame rate")?;
+        let duration = reader.float("a duration")?;
+        if rate <= 0.0 || duration < 0.0 {
+            return Err(PackedClipError::Damaged { what: "a frame rate or duration", at: reader.at() });
+        }
+        let frames = reader.number("a count of frames", MOST_FRAMES)?;
+        let count = reader.number("a count of nodes", MOST_NODES)?;
+        let mut nodes: Vec<[PackedTrack; 3]> = Vec::new();
+        for _ in 0..count {
+            let mut node: [PackedTrack; 3] = Default::default();
+            for (track, property) in node.iter_mut().zip(&PARTS) {
+                *track = PackedTrack::read(&mut reader, property, frames)?;
+            }
+            nodes.push(node);
+        }
+        if !reader.is_empty() {
+            return Err(PackedClipError::Damaged { what: "more bytes", at: reader.at() });
+        }
+        Ok(Self { name, extras, rate, duration, frames, nodes })
+    }
+}
+
+/// Rotation of an array, of unit length.
+fn unit(value: [f32; 4]) -> Quat {
+    Quat::from_array(value).normalize()
+}

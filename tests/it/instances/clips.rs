@@ -1,0 +1,178 @@
+//! Clips of files on instances: loaded by the asset server, bound to the instance's nodes, played, with events at markers.
+
+use std::{fs, path::Path, sync::Arc, time::Duration};
+
+use bevy::{animation::AnimationPlugin, prelude::*, time::TimeUpdateStrategy};
+use rigsmith::{
+    instance::{
+        ClipsBound, InstanceAnimations, InstanceClips, RigAnimation, RigAnimationLoader, RigInstance, RigInstancePlugin,
+    },
+    modules,
+    plugins::{
+        animation::{ClipPlayer, ClipPlugin, ClipTargets, MarkerReached, RigClips},
+        runtime::InstanceMode,
+    },
+    processor::Builder,
+    rig::{
+        Uid,
+        animation::{Key, Marker, NodeNames, Property, RigClip, Track, TrackTarget},
+        format::animation::write_named,
+        template::read_template,
+    },
+};
+
+use super::{Game, TWO, saved};
+
+/// A node that no rig has.
+const GONE: Uid = Uid(0xDEAD);
+
+#[derive(Resource, Default)]
+struct ClipTold {
+    bound: Vec<Vec<Uid>>,
+    markers: Vec<(Entity, String)>,
+}
+
+/// A file in which the control `ctl_a` rises by `way` in a second, with nodes of other uids than any rig has.
+fn file(way: f32) -> String {
+    let rig = read_template(TWO.as_bytes()).unwrap().rig;
+    let built = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
+    let control = built.nodes.iter().find(|node| &*node.name == "ctl_a").unwrap().uid;
+    let keys = vec![Key::vector(0.0, Vec3::ZERO), Key::vector(1.0, Vec3::new(0.0, way, 0.0))];
+    let mut clip = RigClip { looped: true, ..RigClip::new(Uid(0xC1), Uid(0xC2), "rise") };
+    clip.markers = [(0.25, "low"), (0.75, "high")].map(|(time, name)| Marker { time, name: name.into() }).to_vec();
+    for node in [control, GONE] {
+        let target = TrackTarget { node, property: Property::Translation };
+        clip.layers[0].tracks.insert(target, Arc::new(Track { keys: keys.clone() }));
+    }
+    let other = |uid: Uid| if uid == GONE { uid } else { Uid(uid.0 ^ 0x5A5A_0000_0000) };
+    let names = NodeNames::of(&rig, Some(&built)).0.into_iter().map(|(uid, name)| (other(uid), name)).collect();
+    write_named(Uid(0xF1), "two", &NodeNames(names), &[clip.with_nodes(other)])
+}
+
+fn game(folder: &Path) -> Game {
+    let mut game = Game::with(RigInstancePlugin::default(), folder, |app| {
+        app.add_plugins((AnimationPlugin, ClipPlugin))
+            .init_resource::<ClipTold>()
+            .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(100)))
+            .add_observer(|bound: On<ClipsBound>, mut told: ResMut<ClipTold>| told.bound.push(bound.missing.clone()))
+            .add_observer(|reached: On<MarkerReached>, mut told: ResMut<ClipTold>| {
+                told.markers.push((reached.entity, reached.name.clone()));
+            });
+    });
+    game.app.update();
+    game
+}
+
+fn told(game: &Game) -> &ClipTold {
+    game.app.world().resource::<ClipTold>()
+}
+
+/// Updates until clips were bound so many times.
+fn bound(game: &mut Game, count: usize) {
+    let start = std::time::Instant::now();
+    while told(game).bound.len() < count {
+        assert!(start.elapsed() < super::HANG, "the clips do not come");
+        game.app.update();
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_file_of_clips_plays_on_an_instance() {
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = saved(folder.path(), TWO);
+        fs::write(folder.path().join("rise.anim.ron"), file(1.0)).unwrap();
+        let mut game = game(folder.path());
+        let clips = game.app.world().resource::<AssetServer>().load::<RigAnimation>("rise.anim.ron");
+        let instance = game.open(&path, mode);
+        game.app.world_mut().entity_mut(instance).insert(InstanceClips(clips.clone()));
+        bound(&mut game, 1);
+        assert_eq!(told(&game).bound, [vec![GONE]]);
+        let clip = game.app.world().get::<RigClips>(instance).unwrap().0[0].clone();
+        assert!(game.app.world().get::<InstanceAnimations>(instance).is_none());
+        game.app.world_mut().entity_mut(instance).insert(ClipPlayer::new(&clip));
+        for _ in 0..14 {
+            game.app.update();
+        }
+        let player = *game.app.world().get::<ClipPlayer>(instance).unwrap();
+        assert!((player.time - 0.4).abs() < 1e-3, "{}", player.time);
+        let end = game.node(instance, "a_end");
+        let height = |game: &Game| game.app.world().get::<GlobalTransform>(end).unwrap().translation().y;
+        assert!((height(&game) - 1.9).abs() < 1e-3, "{mode:?}: {}", height(&game));
+        let names: Vec<&str> = told(&game).markers.iter().map(|(_, name)| name.as_str()).collect();
+        assert_eq!(names, ["low", "high", "low"], "{mode:?}");
+        assert!(told(&game).markers.iter().all(|(entity, _)| *entity == instance));
+
+        // A changed file is bound anew, and the player goes on with it.
+        let changed = RigAnimation::read(file(2.0).as_bytes()).unwrap();
+        game.app.world_mut().resource_mut::<Assets<RigAnimation>>().insert(clips.id(), changed).unwrap();
+        bound(&mut game, 2);
+        game.app.world_mut().entity_mut(instance).insert(ClipPlayer { time: 0.5, playing: false, ..player });
+        game.app.update();
+        assert!((height(&game) - 2.5).abs() < 1e-3, "{mode:?}: {}", height(&game));
+    }
+}
+
+#[test]
+fn a_file_of_clips_becomes_animations_of_bevy() {
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = saved(folder.path(), TWO);
+        fs::write(folder.path().join("rise.anim.ron"), file(1.0)).unwrap();
+        let mut game = game(folder.path());
+        let clips = game.app.world().resource::<AssetServer>().load::<RigAnimation>("rise.anim.ron");
+        let instance = game.open(&path, mode);
+        game.app.world_mut().entity_mut(instance).insert((InstanceClips(clips.clone()), ClipTargets));
+        bound(&mut game, 1);
+        let animations = game.app.world().get::<InstanceAnimations>(instance).unwrap().clone();
+        assert_eq!(animations.0.len(), 1);
+        let (graph, index) = AnimationGraph::from_clip(animations.0[0].clone());
+        let graph = game.app.world_mut().resource_mut::<Assets<AnimationGraph>>().add(graph);
+        let mut player = AnimationPlayer::default();
+        player.play(index).repeat();
+        game.app.world_mut().entity_mut(instance).insert((player, AnimationGraphHandle(graph)));
+        for _ in 0..30 {
+            game.app.update();
+        }
+        let names: Vec<&str> = told(&game).markers.iter().map(|(_, name)| name.as_str()).collect();
+        assert!(names.len() >= 4 && names.starts_with(&["low", "high", "low", "high"]), "{mode:?}: {names:?}");
+        assert!(told(&game).markers.iter().all(|(entity, _)| *entity == instance));
+        let halt = |game: &mut Game| {
+            let mut player = game.app.world_mut().get_mut::<AnimationPlayer>(instance).unwrap();
+            player.animation_mut(index).unwrap().pause().seek_to(0.5);
+            for _ in 0..4 {
+                game.app.update();
+            }
+            let end = game.node(instance, "a_end");
+            game.app.world().get::<GlobalTransform>(end).unwrap().translation().y
+        };
+        let height = halt(&mut game);
+        assert!((height - 2.0).abs() < 1e-3, "{mode:?}: {height}");
+
+        // Handles stay when the file changes, so that graphs go on.
+        let changed = RigAnimation::read(file(2.0).as_bytes()).unwrap();
+        game.app.world_mut().resource_mut::<Assets<RigAnimation>>().insert(clips.id(), changed).unwrap();
+        bound(&mut game, 2);
+        assert_eq!(*game.app.world().get::<InstanceAnimations>(instance).unwrap(), animations);
+        let height = halt(&mut game);
+        assert!((height - 2.5).abs() < 1e-3, "{mode:?}: {height}");
+    }
+}
+
+#[test]
+fn a_file_without_clips_that_can_be_read_is_an_error() {
+    let error = RigAnimation::read(b"(format: 1, rig: ").unwrap_err();
+    assert!(!error.to_string().is_empty());
+    assert_eq!(bevy::asset::AssetLoader::extensions(&RigAnimationLoader), ["anim.ron"]);
+    let folder = tempfile::tempdir().unwrap();
+    let path = saved(folder.path(), TWO);
+    fs::write(folder.path().join("bad.anim.ron"), "(format: 1, rig: ").unwrap();
+    let mut game = game(folder.path());
+    let clips = game.app.world().resource::<AssetServer>().load::<RigAnimation>("bad.anim.ron");
+    let instance = game.open(&path, InstanceMode::Direct);
+    game.app.world_mut().entity_mut(instance).insert(InstanceClips(clips.clone()));
+    game.go_on(Duration::from_millis(100));
+    assert!(told(&game).bound.is_empty() && game.app.world().get::<RigClips>(instance).is_none());
+    assert!(game.app.world().get::<RigInstance>(instance).is_some());
+}
