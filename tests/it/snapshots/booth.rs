@@ -7,7 +7,7 @@ use std::{collections::VecDeque, path::PathBuf, time::Duration};
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_egui::{
     EguiContext, EguiPrimaryContextPass, PrimaryEguiContext,
-    egui::{self, Pos2, RawInput, Rect, ViewportId, accesskit, vec2},
+    egui::{self, Pos2, RawInput, Rect, Shape, ViewportId, accesskit, vec2},
 };
 use rigsmith::{
     editor::{
@@ -180,13 +180,35 @@ impl Canvas {
         self.textures.apply(std::mem::take(&mut output.textures_delta));
     }
 
-    fn develop(&mut self, frame: Frame, output: egui::FullOutput, ground: egui::Color32) -> Shot {
+    fn develop(&mut self, frame: Frame, mut output: egui::FullOutput, ground: egui::Color32) -> Shot {
+        output.shapes.iter_mut().for_each(|shape| hide_times(&self.ctx, &mut shape.shape));
         let nodes = output.platform_output.accesskit_update.map(|update| update.nodes).unwrap_or_default();
         let texts = texts(&output.shapes);
         let primitives = self.ctx.tessellate(output.shapes, output.pixels_per_point);
         let size = frame.size.map(|side| (f32::from(side) * frame.scale).round() as usize);
         let picture = raster::draw(&self.textures, &primitives, output.pixels_per_point, size, ground);
         Shot { picture, widgets: widgets(&nodes), texts }
+    }
+}
+
+/// Takes the durations of commands out of texts: they differ from run to run.
+fn hide_times(ctx: &egui::Context, shape: &mut Shape) {
+    let is_time = |text: &str| {
+        let number = text.strip_suffix(" ms").or_else(|| text.strip_suffix(" µs"));
+        number.is_some_and(|number| number.parse::<f32>().is_ok())
+    };
+    match shape {
+        Shape::Text(text) if is_time(text.galley.text()) => *shape = Shape::Noop,
+        Shape::Text(text) => {
+            let Some((state, _)) = text.galley.text().split_once(" · ").filter(|(_, time)| is_time(time)) else {
+                return;
+            };
+            let Some(format) = text.galley.job.sections.first().map(|section| section.format.clone()) else { return };
+            let state = state.to_owned();
+            text.galley = ctx.fonts_mut(|fonts| fonts.layout_no_wrap(state, format.font_id, format.color));
+        }
+        Shape::Vec(shapes) => shapes.iter_mut().for_each(|shape| hide_times(ctx, shape)),
+        _ => {}
     }
 }
 
