@@ -79,9 +79,16 @@ pub enum Step {
     Type(&'static str),
 }
 
+/// A step that could not be taken.
+#[derive(Debug, Clone, Copy, thiserror::Error)]
+#[error("nothing called {0:?} is there to be clicked")]
+pub struct StepError(&'static str);
+
 /// A picture, and everything in it that can be asked for.
 pub struct Shot {
     pub picture: Picture,
+    /// Steps that could not be taken.
+    pub missed: Vec<StepError>,
     pub widgets: Vec<Widget>,
     pub texts: Vec<Text>,
 }
@@ -137,17 +144,16 @@ impl Canvas {
         .picture
     }
 
-    /// Queues the input of a step for the next frames.
-    fn queue(&mut self, step: Step, seen: &[Widget]) {
+    /// Queues the input of a step for the next frames; an error if what is to be clicked is not there.
+    fn queue(&mut self, step: Step, seen: &[Widget]) -> Result<(), StepError> {
         match step {
             Step::Click(name) => {
-                let labels: Vec<&str> = seen.iter().map(|widget| widget.label.as_str()).collect();
-                let at = seen.iter().find(|widget| widget.label.starts_with(name));
-                let at = at.unwrap_or_else(|| panic!("{name:?} is not among {labels:?}")).rect.center();
-                self.queue_click(at);
+                let found = seen.iter().find(|widget| widget.label.starts_with(name));
+                self.queue_click(found.ok_or(StepError(name))?.rect.center());
             }
             Step::Type(text) => self.events.push_back(vec![egui::Event::Text(text.to_owned())]),
         }
+        Ok(())
     }
 
     fn queue_click(&mut self, pos: Pos2) {
@@ -187,7 +193,7 @@ impl Canvas {
         let primitives = self.ctx.tessellate(output.shapes, output.pixels_per_point);
         let size = frame.size.map(|side| (f32::from(side) * frame.scale).round() as usize);
         let picture = raster::draw(&self.textures, &primitives, output.pixels_per_point, size, ground);
-        Shot { picture, widgets: widgets(&nodes), texts }
+        Shot { picture, missed: Vec::new(), widgets: widgets(&nodes), texts }
     }
 }
 
@@ -393,9 +399,11 @@ impl Booth {
             (settings.theme, settings.high_contrast) = (frame.look.theme, frame.look.high_contrast);
         }
         let mut output = self.rest(&mut own, subject, frame);
+        let mut missed = Vec::new();
         for step in steps {
             let nodes = output.platform_output.accesskit_update.take().map(|update| update.nodes).unwrap_or_default();
-            own.as_mut().unwrap_or(&mut self.canvas).queue(*step, &widgets(&nodes));
+            let canvas = own.as_mut().unwrap_or(&mut self.canvas);
+            missed.extend(canvas.queue(*step, &widgets(&nodes)).err());
             output = self.rest(&mut own, subject, frame);
         }
         let canvas = own.as_mut().unwrap_or(&mut self.canvas);
@@ -403,7 +411,7 @@ impl Booth {
             Subject::Panel(_) => canvas.ctx.global_style().visuals.panel_fill,
             _ => egui::Color32::from_rgb(70, 78, 92),
         };
-        let shot = canvas.develop(frame, output, ground);
+        let shot = Shot { missed, ..canvas.develop(frame, output, ground) };
         if matches!(subject, Subject::Window) && !steps.is_empty() {
             // A click beside a menu closes it.
             let [width, height] = frame.size.map(f32::from);
@@ -411,6 +419,12 @@ impl Booth {
             self.rest(&mut None, subject, frame);
         }
         shot
+    }
+
+    /// Draws the overlays as they are, without a picture, so that pages notice that they are closed.
+    pub fn draw_overlays(&mut self) {
+        let frame = Frame { size: [1024, 600], scale: 1.0, look: Look::default() };
+        self.rest(&mut None, &mut Subject::Overlays, frame);
     }
 
     /// Draws frames until everything has come to rest; the output of the last one.

@@ -168,7 +168,6 @@ fn typical() -> Vec<Case> {
     cases.extend(windows());
     cases.extend([
         varied("skinning", "settings", 560, states::as_it_is, &[Step::Click("Settings")]),
-        varied("skinning", "parts", 560, states::as_it_is, &[Step::Click("Parts (")]),
         varied("hierarchy", "filtered", 300, states::as_it_is, &[Step::Click("Filter"), Step::Type("hand")]),
         varied("hierarchy", "nothing_found", 300, states::as_it_is, &[Step::Click("Filter"), Step::Type("no such")]),
         varied("log", "searched", 200, states::as_it_is, &[Step::Click("Search"), Step::Type("face")]),
@@ -183,7 +182,13 @@ fn typical() -> Vec<Case> {
 }
 
 fn extreme() -> Vec<Case> {
-    panels(DARK, WIDE, NAMES).chain(panels(CONTRAST, NARROW, NAMES)).chain(extreme_windows()).collect()
+    let mut cases: Vec<Case> =
+        panels(DARK, WIDE, NAMES).chain(panels(CONTRAST, NARROW, NAMES)).chain(extreme_windows()).collect();
+    let parts = varied("skinning", "parts", 560, states::as_it_is, &[Step::Click("Parts (")]);
+    let first_values = varied("tags", "values", 700, states::select_first, &[Step::Click("Values of control")]);
+    let part = varied("loader", "part", 1100, states::choose_part, &[]);
+    cases.extend([parts, first_values, part].map(|case| Case { asked: NAMES, ..case }));
+    cases
 }
 
 fn face() -> Vec<Case> {

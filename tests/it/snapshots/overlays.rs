@@ -109,6 +109,7 @@ fn show_nothing(booth: &mut Booth) {
     booth.app.insert_resource(HelpShown(false));
     booth.app.insert_resource(PaletteShown(false));
     booth.tell([]);
+    booth.draw_overlays();
 }
 
 fn ask(booth: &mut Booth, question: Question) {

@@ -82,7 +82,7 @@ pub struct Asked {
 
 /// Everything that is wrong with a picture of a width, a sentence each.
 pub fn problems(shot: &Shot, width: f32, asked: Asked) -> Vec<String> {
-    let mut problems = Vec::new();
+    let mut problems: Vec<String> = shot.missed.iter().map(ToString::to_string).collect();
     if asked.names {
         problems.extend(unnamed(&shot.widgets));
         problems.extend(ambiguous(&shot.widgets));

@@ -136,6 +136,12 @@ pub fn select_nothing(booth: &mut Booth) {
     booth.select(&[]);
 }
 
+/// Selects the first joint alone.
+pub fn select_first(booth: &mut Booth) {
+    let first = booth.rig().walk().next().map(|joint| joint.data.uid).expect("the rig has joints");
+    booth.select(&[first]);
+}
+
 /// Enters Pose mode.
 pub fn pose_mode(booth: &mut Booth) {
     booth.app.insert_resource(Mode::Pose);
