@@ -60,13 +60,13 @@ fn check(name: &str) {
             // A picture that nobody can tell from the stored one is no change.
             Some(known) if picture.difference(&known).is_none() => {}
             _ if update => picture.save(&path),
-            None => wrong.push(format!("{name}/{}: there is no stored picture; {}", case.name, HOW)),
+            None => wrong.push(format!("{name}/{}: there is no stored picture; {HOW}", case.name)),
             Some(known) => {
                 let file = path.file_name().expect("a file");
                 let seen = Path::new(env!("CARGO_TARGET_TMPDIR")).join("snapshots").join(file);
                 picture.save(&seen);
                 let difference = picture.difference(&known).unwrap_or_default();
-                wrong.push(format!("{name}/{}: {difference}; see {}; {}", case.name, seen.display(), HOW));
+                wrong.push(format!("{name}/{}: {difference}; see {}; {HOW}", case.name, seen.display()));
             }
         }
         if sheets.is_some() {
