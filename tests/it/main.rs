@@ -156,6 +156,8 @@ mod sided_values;
 mod site;
 mod skin_built;
 mod skin_file;
+#[cfg(feature = "editor")]
+mod snapshots;
 mod solvers;
 mod sources;
 mod stages;

@@ -777,7 +777,7 @@ fn the_controls_panel_poses_resets_and_switches() {
         (processor.builder().cursor(), processor.builder().len())
     };
     assert_eq!(place, all);
-    desk.click("◀");
+    desk.click("Take back the last command");
     desk.frames(2);
     assert!(desk.says(&format!("{} of {all} commands", all - 1)));
 }

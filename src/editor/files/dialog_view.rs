@@ -217,6 +217,7 @@ impl DialogView {
             .horizontal(|ui| {
                 let width = ui.available_width() - 90.0;
                 let field = ui.add(egui::TextEdit::singleline(&mut self.text).desired_width(width));
+                field.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::TextEdit, true, "Path"));
                 browse = ui.button("Browse…").clicked();
                 field
             })

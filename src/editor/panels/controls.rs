@@ -7,7 +7,7 @@ use bevy_egui::egui::{self, ComboBox, ScrollArea, Ui};
 use super::{
     displayed_rig::DisplayedRig,
     features::Features,
-    fields::{CommonValue, Look, NumberEdit, Numbers, labelled},
+    fields::{CommonValue, Look, NumberEdit, Numbers, labelled, named},
     list,
 };
 use crate::{
@@ -76,7 +76,12 @@ fn build_state(ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut 
             ("Roll back", "Take back all commands", BuildStep::RollBack, place > 0),
         ];
         for (name, what, step, is_on) in buttons {
-            if ui.add_enabled(is_on, egui::Button::new(name)).on_hover_text(what).clicked() {
+            let button = ui.add_enabled(is_on, egui::Button::new(name));
+            if ["◀", "▶"].contains(&name) {
+                // A symbol says nothing to people who hear it.
+                named(ui, button.id, what);
+            }
+            if button.on_hover_text(what).clicked() {
                 requests.send(BuildRequest { rig: shown.entity, step });
             }
         }
@@ -174,11 +179,12 @@ impl ControlsPanel {
         let before = chosen;
         labelled(ui, name, |ui| {
             let combo = ComboBox::from_id_salt(name).selected_text(choices.get(chosen).map_or("", String::as_str));
-            combo.width(ui.available_width()).show_ui(ui, |ui| {
+            let combo = combo.width(ui.available_width()).show_ui(ui, |ui| {
                 for (number, choice) in choices.iter().enumerate() {
                     ui.selectable_value(&mut chosen, number, choice);
                 }
             });
+            named(ui, combo.response.id, name);
         });
         (chosen != before).then_some(NumberEdit::Set(chosen as f32))
     }

@@ -213,6 +213,7 @@ impl FacePanel {
             ui.spacing_mut().slider_width = (ui.available_width() - 52.0).max(30.0);
             let slider = ui.add(Slider::new(&mut self.settings.bones, 4..=150).logarithmic(true));
             let slider = slider.on_hover_text("Density: bones of the facial skin");
+            fields::named(ui, slider.id, "Bones");
             // Releasing the slider is enough: an existing face is placed again with the new density.
             if again && (slider.drag_stopped() || slider.lost_focus()) {
                 requests.send(FaceRequest { mesh: entity, settings: self.settings.clone(), fit: None });
@@ -224,8 +225,9 @@ impl FacePanel {
     fn options(&mut self, ui: &mut Ui, world: &World, entity: Entity) {
         CollapsingHeader::new("Settings").show(ui, |ui| {
             fields::labelled(ui, "Seed", |ui| {
-                ui.add(DragValue::new(&mut self.settings.seed).speed(0.1))
-                    .on_hover_text("The same seed gives the same bones");
+                let field = ui.add(DragValue::new(&mut self.settings.seed).speed(0.1));
+                fields::named(ui, field.id, "Seed");
+                field.on_hover_text("The same seed gives the same bones");
             });
             ui.checkbox(&mut self.settings.symmetric, "Symmetric").on_hover_text("Pairs of bones on both sides");
             ui.checkbox(&mut self.settings.extras, "Jaw and eyes")
@@ -248,12 +250,14 @@ fn axis(ui: &mut Ui, name: &str, value: &mut Option<Vec3>) {
         [("X", Vec3::X), ("Y", Vec3::Y), ("Z", Vec3::Z), ("-X", Vec3::NEG_X), ("-Y", Vec3::NEG_Y), ("-Z", Vec3::NEG_Z)];
     let text = axes.iter().find(|(_, axis)| *value == Some(*axis)).map_or("Guess", |(name, _)| name);
     fields::labelled(ui, name, |ui| {
-        egui::ComboBox::from_id_salt(name).selected_text(text).width(ui.available_width()).show_ui(ui, |ui| {
+        let combo = egui::ComboBox::from_id_salt(name).selected_text(text).width(ui.available_width());
+        let combo = combo.show_ui(ui, |ui| {
             ui.selectable_value(value, None, "Guess");
             for (name, axis) in axes {
                 ui.selectable_value(value, Some(axis), name);
             }
         });
+        fields::named(ui, combo.response.id, &format!("{name} axis of the head"));
     });
 }
 

@@ -57,6 +57,11 @@ pub(super) fn labelled<R>(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui) -> 
     .inner
 }
 
+/// Names a widget for screen readers.
+pub(super) fn named(ui: &Ui, widget: Id, name: &str) {
+    ui.ctx().accesskit_node_builder(widget, |node| node.set_label(name));
+}
+
 /// Result of editing a name in place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Renaming {

@@ -11,7 +11,7 @@ pub mod rows;
 use std::collections::HashSet;
 
 use bevy::prelude::*;
-use bevy_egui::egui::{self, DragAndDrop, Rect, Sense, Ui};
+use bevy_egui::egui::{self, DragAndDrop, Rect, Sense, Ui, WidgetInfo, WidgetType};
 
 use super::{
     displayed_rig::{DisplayedRig, Stamp},
@@ -181,6 +181,7 @@ impl HierarchyPanel {
         List { id: "joints", count: tree.rows.len(), height, reveal, follow: false }.show(ui, |ui, range, place| {
             let view = ui.clip_rect();
             let ground = ui.interact(view, ui.id().with("ground"), Sense::click());
+            ground.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, "Space below the joints"));
             for number in range {
                 drawn |= renamed == Some(tree.rows[number].joint);
                 row::show(self, ui, place(number), &tree, number, shown, requests);

@@ -5,6 +5,7 @@ use bevy_egui::egui::{self, Checkbox, Key, ScrollArea, TextEdit, Ui, WidgetInfo,
 
 use super::{
     displayed_rig::{DisplayedRig, color},
+    fields::named,
     list,
 };
 use crate::{
@@ -142,6 +143,7 @@ impl GroupsPanel {
                 _ => group.color,
             };
             let color_field = ui.color_edit_button_rgb(&mut rgb);
+            named(ui, color_field.id, &format!("Colour of {}", group.name));
             if color_field.on_hover_text("Colour").changed() {
                 self.colored = Some((group.uid, rgb));
                 request =
@@ -176,6 +178,7 @@ impl GroupsPanel {
         let Some((_, text)) = self.renamed.as_mut().filter(|(uid, _)| *uid == group.uid) else {
             let text = egui::RichText::new(&group.name).color(color(group.color));
             let label = ui.add(egui::Label::new(text).truncate().sense(egui::Sense::click()));
+            label.widget_info(|| WidgetInfo::labeled(WidgetType::Link, true, &group.name));
             let label = label.on_hover_text("Click selects its joints, a double click renames it");
             if label.double_clicked() {
                 self.renamed = Some((group.uid, group.name.clone()));

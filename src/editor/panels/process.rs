@@ -1,7 +1,9 @@
 //! Process panel: the list of commands with their states, steps in both directions, breakpoints.
 
 use bevy::{ecs::change_detection::Tick, prelude::*};
-use bevy_egui::egui::{self, Color32, Rect, RichText, Sense, Ui, Visuals, WidgetInfo, WidgetType, pos2, vec2};
+use bevy_egui::egui::{
+    self, Align, Color32, Layout, Rect, RichText, Sense, Ui, Visuals, WidgetInfo, WidgetType, pos2, vec2,
+};
 
 use super::{
     displayed_rig::{DisplayedRig, Stamp},
@@ -144,8 +146,13 @@ impl ProcessPanel {
             }
             ui.label(format!("{done} of {total}"));
             let micros: f32 = self.rows.iter().filter_map(|row| Some(row.status.as_ref()?.micros)).sum();
-            ui.weak(format!("{:.1} ms", micros / 1000.0))
-                .on_hover_text("Time of the last run of each command, together");
+            // As wide for any time, so that nothing moves while commands run.
+            let size = vec2(62.0, ui.spacing().interact_size.y);
+            ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+                ui.set_min_width(size.x);
+                ui.weak(format!("{:.1} ms", micros / 1000.0))
+                    .on_hover_text("Time of the last run of each command, together");
+            });
         });
         ui.horizontal_wrapped(|ui| {
             let mut live = follows;

@@ -11,7 +11,7 @@ use bevy_egui::egui::{self, Checkbox, ComboBox, Key, ScrollArea, TextEdit, Ui, W
 
 use super::{
     displayed_rig::{DisplayedRig, color},
-    fields::{CommonValue, Look, MIXED, NumberEdit, Numbers, labelled, short},
+    fields::{CommonValue, Look, MIXED, NumberEdit, Numbers, labelled, named, short},
     groups, list,
 };
 use crate::{
@@ -144,7 +144,9 @@ impl PropertiesPanel {
                 let stored = color(group.color);
                 let kept = self.color.as_ref().filter(|(name, _)| *name == group.name).map(|(_, color)| *color);
                 let mut rgb = kept.unwrap_or([stored.r(), stored.g(), stored.b()]);
-                if ui.color_edit_button_srgb(&mut rgb).on_hover_text("Colour of the group").changed() {
+                let field = ui.color_edit_button_srgb(&mut rgb).on_hover_text("Colour of the group");
+                named(ui, field.id, "Colour of the group");
+                if field.changed() {
                     self.color = Some((group.name.clone(), rgb));
                 }
                 let holding = ui.input(|input| input.pointer.any_down()) || ui.ctx().egui_wants_keyboard_input();
@@ -155,11 +157,12 @@ impl PropertiesPanel {
             }
             let current = if mixed { None } else { Some(group.as_ref().map_or("", |group| group.name.as_str())) };
             let combo = ComboBox::from_id_salt("group").selected_text(text).truncate().width(ui.available_width());
-            combo.close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside).show_ui(ui, |ui| {
+            let combo = combo.close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside).show_ui(ui, |ui| {
                 if let Some(name) = groups::choose(ui, &shown.rig, current, &mut self.group) {
                     operation = Some(Operation::Group { joints: joints.clone(), name, color: None });
                 }
             });
+            named(ui, combo.response.id, "Group");
         });
         if let Some(operation) = operation {
             self.send(operation, shown, requests);
@@ -183,7 +186,10 @@ impl PropertiesPanel {
                 Some(other) => {
                     let text = egui::RichText::new(shown.name(other)).color(ui.visuals().hyperlink_color);
                     let link = egui::Label::new(text).truncate().sense(egui::Sense::click());
-                    if ui.add(link).on_hover_text("Select it").clicked() {
+                    let link = ui.add(link).on_hover_text("Select it");
+                    let said = format!("{name}: {}", shown.name(other));
+                    link.widget_info(|| WidgetInfo::labeled(WidgetType::Link, true, &said));
+                    if link.clicked() {
                         let what = Pick::Joints(vec![other]);
                         requests.send(PickRequest { rig: shown.entity, what, add: false });
                     }

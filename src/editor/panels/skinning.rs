@@ -253,23 +253,25 @@ fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
         fields::labelled(ui, "Method", |ui| {
             let names = [(Method::Auto, "Automatic"), (Method::Heat, "Heat"), (Method::Voxel, "Voxels")];
             let name = names.iter().find(|(method, _)| *method == next.0.method).map_or("", |(_, name)| name);
-            ComboBox::from_id_salt("method").selected_text(name).width(ui.available_width()).truncate().show_ui(
-                ui,
-                |ui| {
-                    for (method, name) in names {
-                        ui.selectable_value(&mut next.0.method, method, name);
-                    }
-                },
-            );
+            let combo = ComboBox::from_id_salt("method").selected_text(name).width(ui.available_width()).truncate();
+            let combo = combo.show_ui(ui, |ui| {
+                for (method, name) in names {
+                    ui.selectable_value(&mut next.0.method, method, name);
+                }
+            });
+            fields::named(ui, combo.response.id, "Method");
         });
         fields::labelled(ui, "Smoothing", |ui| {
             ui.spacing_mut().slider_width = (ui.available_width() - 52.0).max(30.0);
             let slider = Slider::new(&mut next.0.smoothing, 0.25..=4.0).logarithmic(true).max_decimals(2);
-            ui.add(slider).on_hover_text("Width of the blend between joints: 1 is usual, less is stiffer");
+            let field = ui.add(slider).on_hover_text("Width of the blend between joints: 1 is usual, less is stiffer");
+            fields::named(ui, field.id, "Smoothing");
         });
         fields::labelled(ui, "Influences", |ui| {
             let field = DragValue::new(&mut next.0.max_influences).range(1..=16).speed(0.05);
-            ui.add(field).on_hover_text("The largest number of joints that move one point; many games allow 4");
+            let field = ui.add(field);
+            fields::named(ui, field.id, "Influences");
+            field.on_hover_text("The largest number of joints that move one point; many games allow 4");
         });
         fields::labelled(ui, "Parts", |ui| {
             let field = Checkbox::new(&mut next.0.stiff_parts, "stiff");
@@ -278,7 +280,8 @@ fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
         });
         fields::labelled(ui, "Voxels", |ui| {
             let field = DragValue::new(&mut next.0.voxel_resolution).range(32..=1024).speed(2.0);
-            ui.add(field).on_hover_text("Voxels along the longest side, where voxels are used");
+            let field = ui.add(field).on_hover_text("Voxels along the longest side, where voxels are used");
+            fields::named(ui, field.id, "Voxels");
         });
         if next.0 != WeightSettings::default() && ui.button("Defaults").clicked() {
             next = SkinningSettings::default();

@@ -155,6 +155,7 @@ impl EditorOverlay for Toasts {
                 .fade_in(false)
                 .show(ctx, |ui| draw(ui, toast, width));
             ctx.move_to_top(shown.response.layer_id);
+            shown.response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, "Show in the log"));
             if shown.inner {
                 closed = Some(toast.id);
             } else if shown.response.clicked() {

@@ -6,7 +6,7 @@ mod meshes;
 mod points;
 
 use bevy::prelude::*;
-use bevy_egui::egui::{Id, ScrollArea, Ui, UiBuilder, vec2};
+use bevy_egui::egui::{ScrollArea, Ui, UiBuilder, vec2};
 
 use super::{
     displayed_rig::DisplayedRig,
@@ -107,11 +107,6 @@ fn meshes_of(world: &World, rig: Entity) -> Vec<(Entity, &RigMesh)> {
         meshes.filter_map(|mesh| Some((mesh, world.get::<RigMesh>(mesh)?))).collect();
     list.sort_by_key(|(_, mesh)| mesh.uid);
     list
-}
-
-/// Names a widget for screen readers.
-fn named(ui: &Ui, widget: Id, name: &str) {
-    ui.ctx().accesskit_node_builder(widget, |node| node.set_label(name));
 }
 
 /// Draws a list in an area of its own height within a scrolled panel.

@@ -1,6 +1,6 @@
 //! The merge history in depth as a tree, with its cut.
 
-use bevy_egui::egui::{self, Color32, Pos2, Rect, Sense, Stroke, Ui, vec2};
+use bevy_egui::egui::{self, Color32, Pos2, Rect, Sense, Stroke, Ui, WidgetInfo, WidgetType, vec2};
 
 use crate::algo::{
     face::{auto::FaceAnalysis, grouping::HeadGroup},
@@ -30,6 +30,7 @@ pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usi
     };
     let size = vec2(ui.available_width(), 110.0);
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, "Merge history"));
     let area = rect.shrink2(vec2(8.0, 8.0));
     // The square root makes small heights visible.
     let level = |height: f32| area.bottom() - area.height() * (height / top).max(0.0).sqrt();

@@ -8,7 +8,7 @@ use bevy_egui::egui::{self, CollapsingHeader, Slider, Ui, vec2};
 use super::{set, thumbnail::Pictures};
 use crate::{
     algo::face::expression::{Expression, MAX_STRENGTH},
-    editor::panel::Requests,
+    editor::{panel::Requests, panels::fields::named},
     plugins::{
         face::{ExpressRequest, Expressions, Face},
         surface::RigMesh,
@@ -104,6 +104,7 @@ fn strength(ui: &mut Ui, name: &str, strengths: &mut BTreeMap<String, f32>) -> (
     let mut value = strengths.get(name).copied().unwrap_or(0.0);
     ui.spacing_mut().slider_width = (ui.available_width() - 56.0).max(40.0);
     let slider = ui.push_id(name, |ui| ui.add(Slider::new(&mut value, 0.0..=MAX_STRENGTH).max_decimals(2))).inner;
+    named(ui, slider.id, &format!("Strength of {}", name.replace('_', " ")));
     if slider.changed() {
         strengths.insert(name.to_owned(), value);
     }

@@ -44,6 +44,10 @@ pub(super) fn show(
     }
     let fold = row.parent.then(|| fold_rect(ui, rect, tree, row));
     let fold = fold.map(|fold| ui.interact(fold, id.with("fold"), Sense::click()));
+    if let Some(fold) = &fold {
+        let said = format!("{} {name}", if row.open { "Fold" } else { "Unfold" });
+        fold.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, &said));
+    }
     let cut = paint(ui, rect, tree, row, selected, shown, &response, fold.as_ref());
     if fold.is_some_and(|fold| fold.clicked()) && panel.filter.trim().is_empty() {
         let deep = ui.input(|input| input.modifiers.shift || input.modifiers.command);

@@ -11,7 +11,10 @@ use bevy_egui::egui::{CollapsingHeader, ComboBox, Ui};
 use crate::{
     editor::{
         panel::Requests,
-        panels::{displayed_rig::DisplayedRig, fields::labelled},
+        panels::{
+            displayed_rig::DisplayedRig,
+            fields::{labelled, named},
+        },
     },
     plugins::{
         skinning::{MeshPart, PartBinding, held_objects},
@@ -79,11 +82,12 @@ pub(super) fn show(
             let name = if object.name.is_empty() { format!("object {}", number + 1) } else { object.name.clone() };
             labelled(ui, &name, |ui| {
                 let combo = ComboBox::from_id_salt(("part", key)).selected_text(text).width(ui.available_width());
-                combo.truncate().show_ui(ui, |ui| {
+                let combo = combo.truncate().show_ui(ui, |ui| {
                     for (option, text) in &options {
                         ui.selectable_value(&mut choice, *option, text);
                     }
                 });
+                named(ui, combo.response.id, &format!("Binding of {name}"));
             });
             if choice != chosen {
                 match choice {

@@ -18,7 +18,7 @@ use crate::{
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
-            fields::{CommonValue, Look, MIXED, NumberEdit, Numbers, labelled},
+            fields::{CommonValue, Look, MIXED, NumberEdit, Numbers, labelled, named},
             list,
         },
     },
@@ -344,7 +344,9 @@ impl Values {
                 }
                 return;
             };
-            if ui.color_edit_button_rgb(&mut rgb).changed() {
+            let field = ui.color_edit_button_rgb(&mut rgb);
+            named(ui, field.id, label);
+            if field.changed() {
                 ui.data_mut(|data| data.insert_temp(id, rgb));
             }
             let holding = ui.input(|input| input.pointer.any_down());

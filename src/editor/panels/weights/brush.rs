@@ -3,7 +3,6 @@
 use bevy::prelude::*;
 use bevy_egui::egui::{Checkbox, ComboBox, Ui};
 
-use super::named;
 use crate::{
     algo::paint::{BrushError, BrushMode, BrushReach, FalloffCurve},
     editor::{
@@ -14,7 +13,7 @@ use crate::{
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
-            fields::{Look, NumberEdit, Numbers, labelled},
+            fields::{Look, NumberEdit, Numbers, labelled, named},
         },
         tools::paint::brush::{BrushAction, PaintBrush, rig_size},
     },

@@ -3,7 +3,6 @@
 use bevy::prelude::*;
 use bevy_egui::egui::{Button, ComboBox, Ui};
 
-use super::named;
 use crate::{
     algo::paint::PruneSettings,
     editor::{
@@ -11,7 +10,7 @@ use crate::{
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
-            fields::{Look, NumberEdit, Numbers, labelled},
+            fields::{Look, NumberEdit, Numbers, labelled, named},
         },
         tools::paint::brush::PaintBrush,
     },

@@ -54,7 +54,9 @@ fn contents(ui: &mut egui::Ui, preview: &StrokePreview, size: f32, requests: &mu
     };
     let most = MOST.max(count);
     let drag = egui::DragValue::new(&mut count).range(2..=most).speed(0.05).suffix(" joints");
-    if ui.add(drag).on_hover_text("Exactly so many joints (wheel)").changed() {
+    let field = ui.add(drag).on_hover_text("Exactly so many joints (wheel)");
+    ui.ctx().accesskit_node_builder(field.id, |node| node.set_label("Number of joints"));
+    if field.changed() {
         requests.send(StrokeTune::Choice(ChainChoice::Joints(count)));
     }
     ui.separator();
