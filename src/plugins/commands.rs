@@ -230,16 +230,24 @@ fn build_rigs(
         };
         let mut fresh;
         let mut stored;
-        let is_fresh = processor.is_none() || *step == BuildStep::Restart;
+        let is_fresh = processor.is_none();
+        let begun = || {
+            let mut processor = Processor::new(&modules);
+            processor.builder.sync(rig);
+            processor.revision = rig.revision().clone();
+            processor
+        };
         let processor: &mut Processor = match processor {
-            Some(found) if !is_fresh => {
+            Some(mut found) => {
+                // In its place, so that further requests of this frame go on with it.
+                if *step == BuildStep::Restart {
+                    *found = begun();
+                }
                 stored = found;
                 &mut stored
             }
-            _ => {
-                fresh = Processor::new(&modules);
-                fresh.builder.sync(rig);
-                fresh.revision = rig.revision().clone();
+            None => {
+                fresh = begun();
                 &mut fresh
             }
         };

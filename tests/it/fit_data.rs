@@ -201,7 +201,7 @@ fn one_drag_mends_a_limb() {
         else {
             continue;
         };
-        if before < 4.0 {
+        if before < 3.0 {
             continue;
         }
         let place = fitted.figure.truth.iter().find(|(known, _)| known == label).unwrap().1;
