@@ -21,7 +21,7 @@ const HALF_STRAIN: f32 = 0.6;
 
 /// Share of a limb's free length from its end from which on the trunk makes its joints uncertain, and the share over which
 /// that fades.
-const ROOTED: f32 = 0.6;
+const ROOTED: f32 = 0.63;
 const FREE: f32 = 0.2;
 
 fn trust(value: f32, half: f32) -> f32 {
