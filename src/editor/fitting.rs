@@ -151,7 +151,7 @@ fn act(
                         commands.write_message(request);
                     }
                     Some(Err(missing)) => {
-                        commands.write_message(Notice::warning(missing));
+                        commands.write_message(Notice::warning(missing.to_string()));
                     }
                     None => {}
                 }
@@ -180,16 +180,27 @@ fn act(
     }
 }
 
+/// Reason why chosen faces are for no fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+enum RegionError {
+    /// No faces.
+    #[error("No face is chosen: click a piece of the mesh, or drag a box.")]
+    NoFaces,
+    /// No joints.
+    #[error("No joint is selected: select the joints to move, or choose a part.")]
+    NoJoints,
+}
+
 /// The request that chosen faces are for, or the reason why there is none.
-fn request_of(faces: &ChosenFaces, selected: &[Uid], active: Option<Uid>) -> Result<FitRequest, &'static str> {
+fn request_of(faces: &ChosenFaces, selected: &[Uid], active: Option<Uid>) -> Result<FitRequest, RegionError> {
     if faces.triangles.is_empty() {
-        return Err("No face is chosen: click a piece of the mesh, or drag a box.");
+        return Err(RegionError::NoFaces);
     }
     let mut request = FitRequest::new(faces.mesh);
     request.region = FitRegion::Triangles(faces.triangles.iter().copied().collect());
     match &faces.skeleton {
         RegionSkeleton::Selected if selected.is_empty() => {
-            return Err("No joint is selected: select the joints to move, or choose a part.");
+            return Err(RegionError::NoJoints);
         }
         RegionSkeleton::Selected => request.joints = selected.to_vec(),
         RegionSkeleton::Part(name) => {

@@ -215,10 +215,10 @@ pub fn list_templates(
         for name in names {
             let path = folder.join(&name);
             match disk.entry(&path, false) {
-                Ok(entry) if entry.kind == EntryKind::Folder => {
-                    if depth > 0 && !name.to_string_lossy().starts_with('.') {
-                        folders.push((path, depth - 1));
-                    }
+                Ok(entry)
+                    if entry.kind == EntryKind::Folder && depth > 0 && !name.to_string_lossy().starts_with('.') =>
+                {
+                    folders.push((path, depth - 1));
                 }
                 Ok(entry) if entry.kind == EntryKind::File && FileKind::of(&path) == Some(FileKind::Template) => {
                     found.push((path, FileState::of(&entry)));

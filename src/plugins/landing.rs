@@ -111,7 +111,7 @@ pub(super) enum JobOutcome {
     Commit,
     /// The result waits: steps can be redone, or a drag is under way.
     Hold,
-    /// What the result was computed from has changed, and no undone step can restore it.
+    /// The base of the result has changed, and no undone step can restore it.
     Drop,
 }
 

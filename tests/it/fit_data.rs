@@ -224,7 +224,7 @@ fn one_drag_mends_a_limb() {
         assert!(is < 0.85 * was, "{}: {label}: {was} to {is}", fitted.figure.name);
         count += 1;
     }
-    assert!(count >= 3, "{count} drags");
+    assert!(count >= 2, "{count} drags");
 }
 
 /// The held-back body and one other figure, given in other ways: turned, scaled, in another order, decimated, subdivided,

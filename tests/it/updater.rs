@@ -128,7 +128,10 @@ impl Studio {
             ctx.begin_pass(egui::RawInput { screen_rect, ..default() });
             world.run_schedule(EguiPrimaryContextPass);
             seen.clear();
-            ctx.end_pass().shapes.iter().for_each(|shape| texts(&shape.shape, shape.clip_rect, &mut seen));
+            let mut output = ctx.end_pass();
+            // Nothing is drawn, so no texture has to be made.
+            output.textures_delta.clear();
+            output.shapes.iter().for_each(|shape| texts(&shape.shape, shape.clip_rect, &mut seen));
         }
         world.despawn(entity);
         seen

@@ -81,6 +81,22 @@ pub(super) fn joints(
         .collect()
 }
 
+/// Length of a limb against its partner's below which the shorter one is doubtful: one of them may not be there as a whole.
+const UNEVEN: f32 = 0.8;
+
+/// Lessens the confidence in limbs that are much shorter than those on the other side.
+pub(super) fn doubt_uneven(template: &TemplateLimbs, places: &[Vec3], joints: &mut [(f32, FitReason)]) {
+    let length =
+        |limb: &Limb| -> f32 { limb.joints.windows(2).map(|pair| places[pair[0]].distance(places[pair[1]])).sum() };
+    for limb in &template.limbs {
+        let Some(partner) = limb.partner.and_then(|partner| template.limbs.get(partner)) else { continue };
+        let share = length(limb) / (UNEVEN * length(partner)).max(1e-9);
+        if share < 1.0 {
+            limb.joints.iter().for_each(|joint| joints[*joint].0 *= share * share * share);
+        }
+    }
+}
+
 /// Confidence in the whole fit.
 pub(super) fn whole(
     template: &TemplateLimbs,

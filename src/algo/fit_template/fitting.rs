@@ -89,6 +89,7 @@ impl<'a> Fit<'a> {
         };
         let with_body = body.as_ref().map(|b| (b, near.as_slice()));
         let mut trusted = confidence::joints(&placement, with_body, best, &analysis.voxels, &analysis.graph, &places);
+        confidence::doubt_uneven(&self.template, &places, &mut trusted);
         let confidence = confidence::whole(&self.template, best, body.as_ref(), &trusted);
         for marker in &self.markers {
             trusted[marker.joint] = (1.0, FitReason::Marker);

@@ -100,8 +100,8 @@ pub(super) fn rename(ui: &mut Ui, rect: Rect, id: Id, said: &str, text: &mut Str
 #[derive(Default)]
 pub(super) struct Numbers {
     dragged: Option<DraggedNumber>,
-    /// The field left by Escape: egui returns the typed text once more in the next frame.
-    dropped: Option<Id>,
+    /// The field left in this frame: egui returns the typed text once more in the next one.
+    left: Option<Id>,
     /// The last typed text that was not taken: its field and the reason.
     refused: Option<(String, NumberError)>,
 }
@@ -176,7 +176,8 @@ impl Numbers {
     ) -> Option<(usize, NumberEdit)> {
         ui.label(name);
         let mut edited = None;
-        let narrow = ui.available_width() < 170.0;
+        // Three angles such as "Z -123.45°" beside each other need about 200 pixels.
+        let narrow = ui.available_width() < 200.0;
         let height = ui.spacing().interact_size.y;
         let mut fields = |ui: &mut Ui| {
             ui.spacing_mut().item_spacing.x = 3.0;
@@ -258,15 +259,17 @@ impl Numbers {
             let dropped = escaped || !response.drag_stopped() || value == from;
             return Some(if dropped { NumberEdit::Cancel } else { NumberEdit::Commit });
         }
-        let dropped = self.dropped.take_if(|dropped| *dropped == id).is_some();
-        if escaped && response.lost_focus() {
-            self.dropped = Some(id);
+        let is_repeated = self.left.take_if(|left| *left == id).is_some();
+        let wrong = wrong.take();
+        let is_read = typed.get().is_some() || wrong.is_some();
+        if response.lost_focus() && !is_repeated && (escaped || is_read) {
+            self.left = Some(id);
         }
-        if escaped || dropped {
+        if escaped || is_repeated {
             return None;
         }
         let Some(number) = typed.get().or(response.changed().then_some(value)) else {
-            if let Some(text) = wrong.take() {
+            if let Some(text) = wrong {
                 self.refused = Some((said.to_owned(), NumberError::NoNumber(text)));
             }
             return None;

@@ -208,7 +208,7 @@ impl GraphPanel {
         let (graph, words) = (&self.graph, &mut self.words);
         ui.horizontal(|ui| {
             let bench = Bench { rig: &shown.rig, modules, graph };
-            ui.menu_button("＋ Add", |ui| add_to_selected(ui, shown, &bench, words, requests));
+            ui.menu_button("+ Add", |ui| add_to_selected(ui, shown, &bench, words, requests));
             button(ui, world, GraphAction::LayOut, "Lay out again", requests);
             button(ui, world, GraphAction::ShowAll, "Show all", requests);
             let count = match graph.nodes.len() {

@@ -164,7 +164,7 @@ impl GroupsPanel {
             self.name(ui, group, &mut request);
             ui.weak(format!("{}", joints.len()));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let menu = ui.menu_button("⋮", |ui| menu(ui, group, shown, selected, &joints));
+                let menu = ui.menu_button("…", |ui| menu(ui, group, shown, selected, &joints));
                 let said = format!("Menu of {}", group.name);
                 menu.response.widget_info(move || WidgetInfo::labeled(WidgetType::Button, true, &said));
                 request = request.take().or(menu.inner.flatten());

@@ -106,7 +106,7 @@ impl TagsPanel {
             };
             ui.strong(name);
             let to = joints.clone();
-            ui.menu_button("＋ Add", |ui| {
+            ui.menu_button("+ Add", |ui| {
                 if let Some(module) = library::library(ui, modules, &mut self.words) {
                     let kind = TagKind::Command { module: module.to_owned(), feature: None, params: "()".to_owned() };
                     send(TagOperation::Add { joints: to.clone(), kind, index: None }, shown, requests);
@@ -229,13 +229,22 @@ impl TagsPanel {
                         self.open.insert(tag)
                     };
                 }
-                request = enabled(ui, shown, entry);
-                state_of(ui, world, shown, entry);
+                // The menu takes its room first; in narrow panels the title is cut.
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    let menu = ui.menu_button("⋮", |ui| card_menu(ui, shown, entries, number));
+                    let menu = ui.menu_button("…", |ui| card_menu(ui, shown, entries, number));
                     let said = format!("Menu of {title}");
                     menu.response.widget_info(move || WidgetInfo::labeled(WidgetType::Button, true, &said));
-                    request = request.take().or(menu.inner.flatten());
+                    let chosen = menu.inner.flatten();
+                    ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                        let state_width = if entry.module().is_some() { 40.0 } else { 0.0 };
+                        let clicked = ui.scope(|ui| {
+                            ui.set_max_width((ui.available_width() - state_width).max(30.0));
+                            ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Truncate);
+                            enabled(ui, shown, entry)
+                        });
+                        request = clicked.inner.or(chosen);
+                        state_of(ui, world, shown, entry);
+                    });
                 });
             });
             let summary = entry.summary();
@@ -285,8 +294,10 @@ fn enabled(ui: &mut Ui, shown: &DisplayedRig, entry: &Entry) -> Option<CardReque
     let mixed = count > 0 && count < tags.len();
     let title = entry.title();
     let several = if tags.len() > 1 { format!("{title} ({})", tags.len()) } else { title };
+    let comment = if entry.first.comment.is_empty() { "on or off" } else { &entry.first.comment };
+    // The title may be cut.
+    let about = format!("{several}: {comment}");
     let field = Checkbox::new(&mut value, RichText::new(several).strong()).indeterminate(mixed);
-    let about = if entry.first.comment.is_empty() { "On or off" } else { &entry.first.comment };
     let clicked = ui.add(field).on_hover_text(about).clicked();
     clicked.then_some(CardRequest::Operation(TagOperation::Enable(tags, mixed || value)))
 }

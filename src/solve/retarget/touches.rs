@@ -42,7 +42,7 @@ pub struct Touch {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TouchedThing {
-    /// Something that stands still in the world, such as a rail or the ground.
+    /// Thing that stands still in the world, such as a rail or the ground.
     World,
     /// The other hand, or something that both hands hold.
     OtherHand,

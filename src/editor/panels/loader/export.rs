@@ -1,6 +1,6 @@
 //! Form in which the rig is written as a template: its header, its features, and a picture taken in the viewport.
 
-use bevy::prelude::World;
+use bevy::prelude::{Entity, World};
 use bevy_egui::egui::{Button, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 
 use crate::{
@@ -15,8 +15,8 @@ use crate::{
 /// The form.
 #[derive(Default)]
 pub(super) struct ExportForm {
-    /// Field of the header that is being typed.
-    typed: Option<(HeaderField, String)>,
+    /// Field of a rig's header that is being typed.
+    typed: Option<(Entity, HeaderField, String)>,
     /// Names of the features, with the state of the rig that they were listed from.
     features: Option<(Stamp, String)>,
 }
@@ -123,7 +123,7 @@ impl ExportForm {
         let mut about = shown.rig.about().clone();
         let now = field.of(&mut about).clone();
         let mut text = match &self.typed {
-            Some((of, text)) if *of == field => text.clone(),
+            Some((rig, of, text)) if (*rig, *of) == (shown.entity, field) => text.clone(),
             _ => now.clone(),
         };
         let edit = match field {
@@ -133,9 +133,15 @@ impl ExportForm {
         let response = ui.add(edit.hint_text(field.name()).desired_width(f32::INFINITY));
         response.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, field.name()));
         let response = response.on_hover_text(field.name());
+        // The next field has the focus before this one is drawn without it, so the focus alone replaces no typed text.
+        if response.changed() {
+            self.typed = Some((shown.entity, field, text));
+        }
         if response.has_focus() {
-            self.typed = Some((field, text));
-        } else if response.lost_focus() && self.typed.take_if(|(of, _)| *of == field).is_some() && text != now {
+            return;
+        }
+        let typed = self.typed.take_if(|(rig, of, _)| (*rig, *of) == (shown.entity, field));
+        if let Some((_, _, text)) = typed.filter(|(_, _, text)| *text != now) {
             *field.of(&mut about) = text;
             requests.send(header_edit(shown.entity, about));
         }

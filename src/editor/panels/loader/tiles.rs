@@ -73,7 +73,10 @@ impl Tiles {
         let rows = self.found.len().div_ceil(columns);
         let (mut clicked, mut missing) = (None, Vec::new());
         let pictures = world.get_resource::<LibraryPictures>();
-        let area = ScrollArea::vertical().id_salt("templates").max_height(wanted.height).auto_shrink([false, true]);
+        // A menu gives no more room than it took before, when the list was still being made.
+        let least = if wanted.parts_only { wanted.height } else { 64.0 };
+        let area = ScrollArea::vertical().id_salt("templates").max_height(wanted.height).min_scrolled_height(least);
+        let area = area.auto_shrink([false, true]);
         let mut row = |ui: &mut Ui, row: usize| {
             let in_row: Vec<_> = self.found.iter().skip(row * columns).take(columns).cloned().collect();
             for listed in in_row {

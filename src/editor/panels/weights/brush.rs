@@ -78,6 +78,11 @@ impl BrushForm {
             named(ui, combo.response.id, "Falloff curve");
         });
         labelled(ui, "Distances", |ui| {
+            // Both buttons stand beside each other in the narrowest panel, too.
+            if ui.available_width() < 130.0 {
+                ui.spacing_mut().item_spacing.x = 3.0;
+                ui.spacing_mut().button_padding.x = 4.0;
+            }
             for (reach, name, tip) in [
                 (BrushReach::Surface, "Surface", "Along the edges of the mesh: other fingers are far away"),
                 (BrushReach::Volume, "Volume", "Straight through: everything in a ball"),
