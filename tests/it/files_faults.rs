@@ -146,7 +146,7 @@ impl Single {
     fn save(self, disk: &dyn Disk, folder: &Path, version: u32) -> Result<Vec<String>, StoreError> {
         let path = folder.join(self.name());
         match self {
-            Self::Template | Self::Skeleton => store_rig(disk, &path, &rig(version)),
+            Self::Template | Self::Skeleton => store_rig(disk, &path, rig(version)),
             Self::Over | Self::OverWithPart => {
                 let rig = changed(folder, self.name(), version);
                 store_rig_over(disk, &path, &rig, &[&path])

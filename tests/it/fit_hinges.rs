@@ -40,7 +40,7 @@ fn hinge(rig: &Rig, hinge: &Hinge, side: &str) -> (Vec3, Vec3, Vec3) {
         rig.find_label(&label).unwrap_or_else(|| panic!("no joint {label}"))
     };
     let [above, at, below] = [hinge.above, hinge.joint, hinge.below].map(joint);
-    let axis = hinge.flexion * Vec3::from(rig.rest_global(at).matrix3.x_axis).normalize();
+    let axis = hinge.flexion * rig.rest_global(at).matrix3.x_axis.normalize();
     let upper = (rig.position(at) - rig.position(above)).normalize();
     let lower = (rig.position(below) - rig.position(at)).normalize();
     (axis, upper, lower)

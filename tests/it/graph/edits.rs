@@ -158,7 +158,7 @@ fn a_module_is_dropped_on_a_wire() {
     desk.select(&[c]);
     settle(&mut desk);
     let (before, steps) = (bytes(&desk), desk.steps().1);
-    desk.click("＋ Add");
+    desk.click("+ Add");
     desk.frames(3);
     desk.type_text("null");
     desk.frames(3);

@@ -379,7 +379,9 @@ impl Booth {
         let work = world.resource::<LoadJob>().what().is_some()
             || world.resource::<SaveJob>().what().is_some()
             || world.resource::<Recovery>().is_looking()
-            || library.is_listing();
+            || library.is_listing()
+            // There are always those that come with Rigsmith.
+            || library.is_begun() && library.listing().templates().next().is_none();
         let mut jobs = world.query_filtered::<(), Or<(With<SkinningJob>, With<FaceJob>, With<FitJob>)>>();
         let has_jobs = jobs.iter(world).count() > 0;
         !is_open || work || is_drawing || has_jobs

@@ -17,8 +17,8 @@ pub struct Picture {
 
 /// Distance of two colours from which on people see a difference: 0 for the same colour, 1 for black and white.
 const SEEN: f32 = 0.08;
-/// Share of pixels that may be seen to differ: less than a letter of a panel.
-const SHARE: f32 = 3e-5;
+/// Share of pixels that may be seen to differ: less than a word of a panel.
+const SHARE: f32 = 1e-3;
 /// Pixels that may be seen to differ in the smallest picture.
 const FEW: usize = 3;
 

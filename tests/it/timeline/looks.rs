@@ -67,7 +67,7 @@ fn the_onion_skin_shows_frames_or_keys_beside_the_playhead() {
     // Each is the skeleton of the clip at its moment.
     let end = desk.rig().position(left).y;
     for ghost in &ghosts {
-        let bone = ghost.bones.iter().map(|ends| ends[1]).filter(|at| at.y > end).last().expect("a bone above");
+        let bone = ghost.bones.iter().map(|ends| ends[1]).rfind(|at| at.y > end).expect("a bone above");
         let arm = bone - Vec3::Y * end;
         let turn = arm.angle_between(Vec3::Y);
         assert!(
