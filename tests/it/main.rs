@@ -124,8 +124,8 @@ mod mutate;
 mod obj;
 mod obj_materials;
 mod obj_torture;
-#[cfg(feature = "editor")]
 mod packed_clips;
+#[cfg(feature = "editor")]
 mod panels;
 mod part_instances;
 mod part_overrides;
