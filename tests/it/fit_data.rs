@@ -77,12 +77,12 @@ fn mean(list: impl IntoIterator<Item = f32>) -> f32 {
 fn joints_are_where_they_should_be() {
     let Some(all) = all() else { return };
     let bounds: BTreeMap<&str, f32> = [
-        ("gltf_skinned/CesiumMan.glb", 3.45),
-        ("gltf_skinned/RobotExpressive.glb", 5.1),
-        ("characters/Mage.glb", 3.45),
+        ("gltf_skinned/CesiumMan.glb", 3.4),
+        ("gltf_skinned/RobotExpressive.glb", 4.45),
+        ("characters/Mage.glb", 3.3),
         ("creatures/fox-fox.glb", 3.85),
         ("creatures/fox-dog.glb", 5.0),
-        ("creatures/bird-eagle.glb", 13.8),
+        ("creatures/bird-eagle.glb", 12.0),
     ]
     .into();
     for fitted in all {
@@ -220,8 +220,7 @@ fn one_drag_mends_a_limb() {
         let (was, is) = (limb(&fitted.fit), limb(&again));
         println!("{}: {label} put right: the limb is {is:.1} off, before {was:.1}", fitted.figure.name);
         assert!(again.joints[at].position.distance(place) < 1e-3 * fitted.fit.height);
-        // A half was asked for; the worst limb keeps four fifths.
-        assert!(is < 0.85 * was, "{}: {label}: {was} to {is}", fitted.figure.name);
+        assert!(is < 0.5 * was, "{}: {label}: {was} to {is}", fitted.figure.name);
         count += 1;
     }
     assert!(count >= 2, "{count} drags");
@@ -345,6 +344,33 @@ fn half_figures_and_rooms_are_doubted() {
             Err(error) => println!("{name}: {error}"),
         }
     }
+}
+
+/// Bodies whose left arm ends above the elbow: what the body model folds into the trunk instead is doubtful, fingers too.
+#[test]
+fn an_arm_that_is_not_there_is_doubted() {
+    let Some(all) = all() else { return };
+    let mut count = 0;
+    for FittedFigure { figure, .. } in all.iter().filter(|fitted| !fitted.figure.name.contains('.')) {
+        let (low, high) = figure
+            .points
+            .iter()
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), point| (low.min(*point), high.max(*point)));
+        let end = 0.5 * (low.x + high.x) + 0.16 * (high.y - low.y);
+        // Arms that hang down do not reach so far.
+        if !figure.truth.iter().any(|(label, place)| *label == "hand_l" && place.x > end) {
+            continue;
+        }
+        let is_kept = |corners: &&[u32; 3]| corners.iter().all(|corner| figure.points[*corner as usize].x < end);
+        let triangles: Vec<[u32; 3]> = figure.triangles.iter().filter(is_kept).copied().collect();
+        let fit = fitted(&figure.points, &triangles, "biped").unwrap();
+        for (joint, label) in fit.joints.iter().zip(labels("biped")) {
+            let is_gone = label.ends_with("_l") && (label == "hand_l" || label == "forearm_l" || is_finger(&label));
+            assert!(!is_gone || joint.confidence < 0.5, "{}: {label} {}", figure.name, joint.confidence);
+        }
+        count += 1;
+    }
+    assert!(count >= 3, "{count} bodies");
 }
 
 #[test]

@@ -387,10 +387,10 @@ fn meshes_without_a_figure_change_nothing() {
 #[test]
 fn doubtful_joints_stand_out_and_are_visited_one_by_one() {
     let mut window = Window::new(body());
-    // A body whose left arm is cut off.
+    // A body whose left arm ends below the shoulder.
     let request = FitRequest {
         template: FitTemplate::Rig(character("biped")),
-        region: FitRegion::Box([Vec3::new(-2.0, -1.0, -1.0), Vec3::new(0.14, 3.0, 1.0)]),
+        region: FitRegion::Box([Vec3::new(-2.0, -1.0, -1.0), Vec3::new(0.33, 3.0, 1.0)]),
         ..FitRequest::new(window.mesh)
     };
     window.desk.app.world_mut().write_message(request);

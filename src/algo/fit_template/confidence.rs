@@ -8,6 +8,7 @@ use super::{
     limbs::{Limb, LimbKind, TemplateLimbs},
     place::Placement,
     report::FitReason,
+    tree::Tree,
     volume::VoxelGraph,
 };
 use crate::mesh::voxels::Voxels;
@@ -95,6 +96,47 @@ pub(super) fn doubt_uneven(template: &TemplateLimbs, places: &[Vec3], joints: &m
             limb.joints.iter().for_each(|joint| joints[*joint].0 *= share * share * share);
         }
     }
+}
+
+/// Length of the branch of a limb against the limb's below which it is doubtful: the limb ends before its joints do, and they
+/// lie folded into what is there.
+const SHORT: f32 = 0.85;
+
+/// Confidence that is left to a limb of the body model for which there is no branch: an arm beside the hips that it touches is
+/// right, one that is not there is folded into the trunk.
+const UNSEEN: f32 = 0.55;
+
+/// Lessens the confidence in limbs of the body model that have no branch or are much longer than theirs, and in what hangs on
+/// them.
+pub(super) fn doubt_folded(
+    template: &TemplateLimbs,
+    tree: &Tree,
+    best: &Hypothesis,
+    places: &[Vec3],
+    joints: &mut [(f32, FitReason)],
+) {
+    let mut doubts = vec![1.0f32; joints.len()];
+    for (limb, leaf) in template.limbs.iter().zip(&best.leaves) {
+        if !matches!(limb.kind, LimbKind::Arm | LimbKind::Leg) {
+            continue;
+        }
+        let Some(leaf) = *leaf else {
+            limb.joints.iter().for_each(|joint| doubts[*joint] *= UNSEEN);
+            continue;
+        };
+        let line = tree.lines[leaf].among(&tree.branches, &best.leaves);
+        let branch = line.free + line.at(line.free).distance(places[limb.joints[0]]);
+        let bones: f32 = limb.joints.windows(2).map(|pair| places[pair[0]].distance(places[pair[1]])).sum();
+        let share = branch / (SHORT * (bones + limb.beyond * best.alignment.scale)).max(1e-9);
+        if share < 1.0 {
+            limb.joints.iter().for_each(|joint| doubts[*joint] *= share * share * share);
+        }
+    }
+    for &joint in &template.order {
+        let above = template.parents[joint].map_or(1.0, |parent| doubts[parent]);
+        doubts[joint] = doubts[joint].min(above);
+    }
+    joints.iter_mut().zip(doubts).for_each(|(joint, doubt)| joint.0 *= doubt);
 }
 
 /// Confidence in the whole fit.

@@ -89,6 +89,9 @@ impl<'a> Fit<'a> {
         };
         let with_body = body.as_ref().map(|b| (b, near.as_slice()));
         let mut trusted = confidence::joints(&placement, with_body, best, &analysis.voxels, &analysis.graph, &places);
+        if body.is_some() {
+            confidence::doubt_folded(&self.template, tree, best, &places, &mut trusted);
+        }
         confidence::doubt_uneven(&self.template, &places, &mut trusted);
         let confidence = confidence::whole(&self.template, best, body.as_ref(), &trusted);
         for marker in &self.markers {

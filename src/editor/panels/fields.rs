@@ -268,7 +268,9 @@ impl Numbers {
         if escaped || is_repeated {
             return None;
         }
-        let Some(number) = typed.get().or(response.changed().then_some(value)) else {
+        // While a text is being typed the field has changed, but not its number: of several numbers it shows the first.
+        let other = (value != f64::from(shown.value)).then_some(value);
+        let Some(number) = typed.get().or(other) else {
             if let Some(text) = wrong {
                 self.refused = Some((said.to_owned(), NumberError::NoNumber(text)));
             }

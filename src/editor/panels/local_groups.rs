@@ -161,13 +161,16 @@ impl GroupsPanel {
             if field.on_hover_text("Builds the joints of this group").clicked() {
                 request = Some(RowRequest::Operation(Operation::Tags(TagOperation::EnableGroup(group.uid, enabled))));
             }
-            self.name(ui, group, &mut request);
-            ui.weak(format!("{}", joints.len()));
+            // The menu and the count take their room first; a long name is cut.
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 let menu = ui.menu_button("…", |ui| menu(ui, group, shown, selected, &joints));
                 let said = format!("Menu of {}", group.name);
                 menu.response.widget_info(move || WidgetInfo::labeled(WidgetType::Button, true, &said));
                 request = request.take().or(menu.inner.flatten());
+                ui.weak(format!("{}", joints.len()));
+                ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                    self.name(ui, group, &mut request)
+                });
             });
         });
         request

@@ -99,6 +99,8 @@ fn send(operation: TagOperation, shown: &DisplayedRig, requests: &mut Requests) 
 impl TagsPanel {
     fn header(&mut self, ui: &mut Ui, world: &World, modules: &Modules, shown: &DisplayedRig, requests: &mut Requests) {
         ui.horizontal_wrapped(|ui| {
+            // Buttons go on in the next row, not letter by letter.
+            ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
             let joints = &self.stack.joints;
             let name = match joints[..] {
                 [joint] => shown.name(joint).into_owned(),

@@ -100,19 +100,13 @@ fn every_action_is_a_step_that_undo_takes_back() {
     });
     let row: Vec<(u32, f32)> = after.skin(MESH).unwrap().weights.of(3).collect();
     assert_eq!(row, [(1, 0.75), (0, 0.25)]);
-    let before = bytes(&desk);
-    desk.click("Weight of high at all points");
-    desk.type_text("0.5");
-    desk.key(Key::Enter);
-    settle(&mut desk);
-    let after = desk.rig().clone();
+    let after = one_step(&mut desk, "a weight of all points", |desk| {
+        desk.click("Weight of high at all points");
+        desk.type_text("0.5");
+        desk.key(Key::Enter);
+    });
     for point in [3, 5] {
         assert!(after.skin(MESH).unwrap().weights.of(point).eq([(0, 0.5), (1, 0.5)]));
-    }
-    while bytes(&desk) != before {
-        assert!(desk.steps().1 > 3, "undo gives the first weights");
-        desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
-        desk.frames(3);
     }
     let after = one_step(&mut desk, "a dragged weight", |desk| {
         let at = desk.find("Weight of high at point 5").rect.center();

@@ -189,7 +189,7 @@ fn a_hand_on_a_rail_stays_there_while_the_body_sways() {
         // The made motion turns elbows quickly itself.
         let [held, free] = [&poses, &others].map(|poses| jump(poses, joint));
         println!("largest jump of joint {joint}: {held} held, {free} free");
-        assert!(held < free + 0.04, "a jump of {held}, {free} without the hold");
+        assert!(held < 1.05 * free + 0.002, "a jump of {held}, {free} without the hold");
     }
     for (pose, other) in poses.iter().zip(&others) {
         assert!(pose[2].translation.distance(other[2].translation) < 2e-3);

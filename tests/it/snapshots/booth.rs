@@ -435,6 +435,9 @@ impl Booth {
         let mut last = None;
         let mut frames = 0;
         while frames < FRAMES {
+            let is_whole = matches!(subject, Subject::Overlays | Subject::Window);
+            // What ends between a frame and the look at it is not in its picture.
+            let was_busy = self.is_busy() || is_whole && self.is_starting();
             let canvas = own.as_mut().unwrap_or(&mut self.canvas);
             style::apply(&canvas.ctx, frame.look);
             canvas.ctx.all_styles_mut(|style| style.visuals.text_cursor.blink = false);
@@ -451,9 +454,8 @@ impl Booth {
             last = Some(output);
             self.app.update();
             frames += 1;
-            let is_whole = matches!(subject, Subject::Overlays | Subject::Window);
-            if frames == FRAMES && (self.is_busy() || is_whole && self.is_starting()) {
-                // What the first frame asked for is not there yet: lists and pictures of files.
+            if was_busy || self.is_busy() || is_whole && self.is_starting() {
+                // What the frame asked for is not there yet: lists and pictures of files.
                 assert!(started.elapsed() < HANG, "something never ends");
                 std::thread::sleep(Duration::from_millis(20));
                 self.settle();

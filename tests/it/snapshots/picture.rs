@@ -17,8 +17,8 @@ pub struct Picture {
 
 /// Distance of two colours from which on people see a difference: 0 for the same colour, 1 for black and white.
 const SEEN: f32 = 0.08;
-/// Share of pixels that may be seen to differ: less than a word of a panel.
-const SHARE: f32 = 1e-3;
+/// Share of pixels that may be seen to differ: less than a letter of a panel.
+const SHARE: f32 = 3e-5;
 /// Pixels that may be seen to differ in the smallest picture.
 const FEW: usize = 3;
 
@@ -76,14 +76,25 @@ impl Picture {
             .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     }
 
+    /// Number of pixels that another picture of the same size has neither there nor right beside: where a text stands between
+    /// two rows of pixels, rounding decides.
+    fn unmatched(&self, other: &Self) -> usize {
+        let is_there = |x: usize, y: usize| {
+            let own = self.pixel(x, y);
+            let is_near = |x: usize, y: usize| distance(&own, &other.pixel(x, y)) <= SEEN;
+            let (columns, rows) = (x.saturating_sub(1)..=(x + 1).min(self.width - 1), y.saturating_sub(1)..=y + 1);
+            is_near(x, y) || rows.filter(|y| *y < self.height).any(|y| columns.clone().any(|x| is_near(x, y)))
+        };
+        (0..self.height).map(|y| (0..self.width).filter(|x| !is_there(*x, y)).count()).sum()
+    }
+
     /// The reason why people would call two pictures different, if so.
     pub fn difference(&self, stored: &Self) -> Option<String> {
         if (self.width, self.height) != (stored.width, stored.height) {
             let [now, then] = [self, stored].map(|picture| format!("{}x{}", picture.width, picture.height));
             return Some(format!("it is {now} now and was {then}"));
         }
-        let pairs = self.rgb.chunks_exact(3).zip(stored.rgb.chunks_exact(3));
-        let far = pairs.filter(|(now, then)| now != then && distance(now, then) > SEEN).count();
+        let far = self.unmatched(stored).max(stored.unmatched(self));
         let most = ((self.width * self.height) as f32 * SHARE).max(FEW as f32) as usize;
         (far > most).then(|| format!("{far} pixels differ, of which {most} may"))
     }
