@@ -130,24 +130,22 @@ impl TagsPanel {
                 let tags = self.stack.entries.iter().flat_map(Entry::uids).collect::<Vec<_>>();
                 self.copied(TagClipboard::copy_tags(&shown.rig, &tags), requests);
             }
-            let clipboard = self.clipboard.clone();
-            ui.add_enabled_ui(clipboard.is_some(), |ui| {
-                ui.menu_button("Paste", |ui| {
-                    let Some(clipboard) = &clipboard else { return };
-                    let both = [
-                        ("Tags", PasteWhat::Tags),
-                        ("Values", PasteWhat::Values),
-                        ("Tags and values", PasteWhat::Both),
-                    ];
-                    for (name, what) in both {
-                        if ui.button(name).clicked() {
-                            let to = PasteTo::Joints(self.stack.joints.clone());
-                            let clipboard = Arc::clone(clipboard);
-                            send(TagOperation::Paste { clipboard, what, to }, shown, requests);
-                            ui.close();
-                        }
+            // Not in `add_enabled_ui`: what is within another `Ui` does not go on in the next row.
+            let Some(clipboard) = self.clipboard.clone() else {
+                ui.add_enabled(false, egui::Button::new("Paste"));
+                return;
+            };
+            ui.menu_button("Paste", |ui| {
+                let both =
+                    [("Tags", PasteWhat::Tags), ("Values", PasteWhat::Values), ("Tags and values", PasteWhat::Both)];
+                for (name, what) in both {
+                    if ui.button(name).clicked() {
+                        let to = PasteTo::Joints(self.stack.joints.clone());
+                        let clipboard = Arc::clone(&clipboard);
+                        send(TagOperation::Paste { clipboard, what, to }, shown, requests);
+                        ui.close();
                     }
-                });
+                }
             });
         });
     }
