@@ -10,9 +10,7 @@ use crate::{
     mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Trs},
     rig::{
         Uid,
-        animation::{
-            Ease, Key, Property, RigClip, SampledPose, TrackTarget, clip_extras::ClipExtras, file_clip::channel_of,
-        },
+        animation::{Key, Property, RigClip, SampledPose, TrackTarget, clip_extras::ClipExtras, file_clip::channel_of},
         operations::KeyTolerance,
     },
 };
@@ -73,8 +71,8 @@ pub fn strike(state: &mut RigState, pose: &SampledPose) {
 }
 
 /// Plays a clip at a rate and gives the nodes' transforms relative to their parents as channels, whose targets are places among
-/// the nodes. Channels that stay at rest are left out, and keys without which joints stay within the tolerance. A node that
-/// nothing but its keys moves keeps them as they are. Markers, the rate and whether the clip is looped are in the extras.
+/// the nodes. Channels that stay at rest are left out, and keys without which joints stay within the tolerance; the others are
+/// linear. A node that nothing but its keys moves keeps them as they are, cubic ones, too. Markers, the rate and whether the clip is looped are in the extras.
 ///
 /// Time starts at zero with the clip. Takes some tens of microseconds a frame for a character.
 ///
@@ -185,20 +183,13 @@ fn same_side(mut locals: Vec<Trs>, rest: glam::Quat) -> Vec<Trs> {
     locals
 }
 
-/// Channel of keys that are all linear or all cubic.
+/// Channel of linear keys.
 fn keyed_channel(target: ChannelTarget, width: usize, keys: &[Key]) -> Channel {
-    let is_cubic = keys.iter().any(|key| matches!(key.ease, Ease::Cubic { .. }));
-    let numbers = |key: &Key| match key.ease {
-        Ease::Cubic { arrive, leave } => {
-            [arrive, key.value, leave].iter().flat_map(|part| part[..width].to_vec()).collect()
-        }
-        Ease::Linear | Ease::Stepped => key.value[..width].to_vec(),
-    };
     Channel {
         target,
-        interpolation: if is_cubic { Interpolation::CubicSpline } else { Interpolation::Linear },
+        interpolation: Interpolation::Linear,
         times: keys.iter().map(|key| key.time).collect(),
-        values: keys.iter().flat_map(numbers).collect(),
+        values: keys.iter().flat_map(|key| key.value[..width].iter().copied()).collect(),
     }
 }
 

@@ -7,7 +7,7 @@
 use bevy::math::{Quat, Vec3};
 use rayon::prelude::*;
 
-use super::curve_fit::{fit_curve, sampled};
+use super::curve_fit::{fit_curve, fit_lines, sampled};
 use crate::{
     mesh::model::Trs,
     rig::{
@@ -48,21 +48,52 @@ pub struct FrameErrors {
     pub of_tracks: Vec<f32>,
 }
 
+/// Curves that keys may make.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum CurveKind {
+    /// Cubic where that needs fewer numbers, else linear.
+    #[default]
+    Fewest,
+    /// Linear alone, for files: many importers drop tangents (Blender's does), and joints whose tracks have their keys at
+    /// different times are then centimetres off. Takes a sixth more numbers for captured motion.
+    Linear,
+}
+
+impl CurveKind {
+    fn fit(self, property: &Property, times: &[f32], values: &[[f32; 4]], tolerance: &[f32]) -> Vec<Key> {
+        match self {
+            Self::Fewest => fit_curve(property, times, values, tolerance),
+            Self::Linear => fit_lines(property, times, values, tolerance)
+                .into_iter()
+                .map(|frame| linear_key((&times[frame], &values[frame])))
+                .collect(),
+        }
+    }
+}
+
 /// Keys of tracks with which the motion stays within its bounds. `measure` plays values, a list a track, and gives the errors of
 /// each frame.
 pub fn reduce_tracks(
     times: &[f32],
     tracks: &[SampledTrack],
+    curves: CurveKind,
     measure: impl Fn(&[Vec<[f32; 4]>]) -> Vec<FrameErrors>,
 ) -> Vec<Vec<Key>> {
     let fit = |track: &SampledTrack, tolerance: &[f32]| {
-        let keys = fit_curve(&track.property, times, &track.values, tolerance);
+        let keys = curves.fit(&track.property, times, &track.values, tolerance);
         let values = sampled(&track.property, times, keys.clone());
         (keys, values)
     };
-    let key = |(time, value): (&f32, &[f32; 4])| Key { time: *time, value: *value, ease: Ease::Linear };
-    let all = || tracks.iter().map(|track| times.iter().zip(&track.values).map(key).collect()).collect();
-    fit_within(tracks, measure, fit).unwrap_or_else(all)
+    fit_within(tracks, measure, fit).unwrap_or_else(|| all_keys(times, tracks))
+}
+
+/// Linear keys at every frame.
+fn all_keys(times: &[f32], tracks: &[SampledTrack]) -> Vec<Vec<Key>> {
+    tracks.iter().map(|track| times.iter().zip(&track.values).map(linear_key).collect()).collect()
+}
+
+fn linear_key((time, value): (&f32, &[f32; 4])) -> Key {
+    Key { time: *time, value: *value, ease: Ease::Linear }
 }
 
 /// Curves of tracks with which the motion stays within its bounds, as [`reduce_tracks`] finds them; `fit` gives a curve within
@@ -138,7 +169,7 @@ pub struct SampledNode {
     pub locals: Vec<Trs>,
 }
 
-/// Keys of the transforms of a skeleton's nodes: translation, rotation and scale. Joints are within the tolerance of
+/// Linear keys of the transforms of a skeleton's nodes: translation, rotation and scale. Joints are within the tolerance of
 /// where they were at every frame. `fixed` marks what is played as it is, and gets no keys.
 pub fn reduce_skeleton(
     times: &[f32],
@@ -147,7 +178,7 @@ pub fn reduce_skeleton(
     tolerance: &KeyTolerance,
 ) -> Vec<[Vec<Key>; 3]> {
     let skeleton = SampledSkeleton::new(times.len(), nodes, fixed, tolerance);
-    let found = reduce_tracks(times, &skeleton.tracks, |samples| skeleton.errors(samples));
+    let found = reduce_tracks(times, &skeleton.tracks, CurveKind::Linear, |samples| skeleton.errors(samples));
     let mut keys: Vec<[Vec<Key>; 3]> = vec![Default::default(); nodes.len()];
     for ((at, part), found) in skeleton.owners.iter().zip(found) {
         keys[*at][*part] = found;

@@ -31,6 +31,7 @@ pub use self::{
 use super::{
     matching::MatchError,
     program::{CompileOptions, ProgramError, RigProgram},
+    reduction::CurveKind,
 };
 use crate::rig::{
     BuiltRig, Rig,
@@ -65,6 +66,8 @@ pub struct RetargetSettings {
     pub lock_hands: bool,
     /// Distances and angles by which joints may be off at any frame through the removal of keys, on a human in metres.
     pub tolerance: KeyTolerance,
+    /// Curves of the keys.
+    pub curves: CurveKind,
     /// Largest frames of the clip.
     pub max_frames: usize,
 }
@@ -79,6 +82,7 @@ impl Default for RetargetSettings {
             lock_feet: true,
             lock_hands: true,
             tolerance: KeyTolerance::captured(),
+            curves: CurveKind::Fewest,
             max_frames: 100_000,
         }
     }
@@ -168,7 +172,8 @@ pub fn retarget(
         MotionTarget::Controls => controls::keyed(built, &program, &body, &poses, touches.hands())?,
         MotionTarget::Joints => (joints::keyed(&body, &poses), Vec::new()),
     };
-    let keys = tracks::fill(&mut clip, &keyed, &times, &program, &settings.tolerance.for_height(target.height));
+    let tolerance = settings.tolerance.for_height(target.height);
+    let keys = tracks::fill(&mut clip, &keyed, &times, &program, &tolerance, settings.curves);
     let (stances, touches) = (contacts.stances(&body, &times), touches.list(&times));
     Ok(RetargetedMotion { clip, keys, stances, touches, unmoved, notes })
 }

@@ -24,7 +24,10 @@ use crate::{
         },
         operations::{ClipOperation, KeyTolerance, Operation},
     },
-    solve::retarget::{MotionTarget, RetargetSettings, RetargetedMotion, measure_feet, measure_hands, retarget},
+    solve::{
+        reduction::CurveKind,
+        retarget::{MotionTarget, RetargetSettings, RetargetedMotion, measure_feet, measure_hands, retarget},
+    },
 };
 
 /// Error of choosing among the clips of the files.
@@ -244,6 +247,8 @@ fn moved(
         save_atomic(&RealDisk, path, text.as_bytes()).map_err(|error| Failure::Input(Box::new(error)))?;
         report.line(format!("wrote {}", path.display()));
     }
+    // Keys of joints go into such files as they are.
+    let is_written = onto == MotionTarget::Joints && FileKind::of(&args.output).is_some_and(FileKind::is_gltf);
     let settings = RetargetSettings {
         frame_rate: args.fps,
         looped: args.looped,
@@ -252,6 +257,7 @@ fn moved(
         lock_feet: !args.free_feet,
         lock_hands: !args.free_hands,
         tolerance: KeyTolerance::captured().scaled(args.tolerance.map_or(1.0, |most| most / 0.5)),
+        curves: if is_written { CurveKind::Linear } else { CurveKind::Fewest },
         ..RetargetSettings::default()
     };
     let built = bench.built().ok_or(PoseError::NotBuilt)?;

@@ -11,7 +11,7 @@ use crate::{
     },
     solve::{
         program::RigProgram,
-        reduction::{FrameErrors, JointPlace, SampledTrack, errors_of, reduce_tracks, track_tolerance},
+        reduction::{CurveKind, FrameErrors, JointPlace, SampledTrack, errors_of, reduce_tracks, track_tolerance},
     },
 };
 
@@ -39,6 +39,7 @@ pub(super) fn fill(
     times: &[f32],
     program: &Arc<RigProgram>,
     tolerance: &KeyTolerance,
+    curves: CurveKind,
 ) -> [usize; 2] {
     let mut counts = [0, 0];
     let start = times.first().copied().unwrap_or_default();
@@ -53,7 +54,7 @@ pub(super) fn fill(
     }
     let count = tracks.len();
     let truth = player.each(times.len(), |track, frame| tracks[track].values[frame], count, |_, places| places);
-    let keys = reduce_tracks(times, &tracks, |values| {
+    let keys = reduce_tracks(times, &tracks, curves, |values| {
         let errors = |frame: usize, places: Vec<JointPlace>| {
             let errors = errors_of(&places, &truth[frame], tolerance);
             let of_places = |reach: &TrackReach| {
