@@ -31,7 +31,6 @@ use rigsmith::{
         fit::{FitJob, FitMarkers, FitRegion, FitRequest, FitTemplate, FittedRig},
         history::RigHistory,
         surface::RigMesh,
-        viewport::{RigViewport, Sight},
     },
     prelude::*,
     rig::{SkinData, template::write_template},
@@ -39,12 +38,10 @@ use rigsmith::{
 };
 
 use super::panels::desk::{Desk, Sheet};
-use crate::bench::{begin_drag, new_clip, undo_meanwhile};
-
-const MESH: Uid = Uid(99);
-const PLAIN: ModifierKeys = ModifierKeys { shift: false, control: false, alt: false };
-const SHIFT: ModifierKeys = ModifierKeys { shift: true, ..PLAIN };
-const CONTROL: ModifierKeys = ModifierKeys { control: true, ..PLAIN };
+use crate::{
+    bench::{begin_drag, new_clip, undo_meanwhile},
+    viewport_app::{CONTROL, MESH, PLAIN, SHIFT, front},
+};
 
 /// Notices and actions of a window.
 #[derive(Resource, Default)]
@@ -56,13 +53,6 @@ struct Told {
 fn collect(mut told: ResMut<Told>, mut notices: MessageReader<Notice>, mut actions: MessageReader<ActionRequest>) {
     told.notices.extend(notices.read().map(|notice| notice.text.clone()));
     told.actions.extend(actions.read().map(|action| action.0));
-}
-
-fn front() -> Sight {
-    let camera = Transform::from_xyz(0.0, 0.9, 4.0).looking_at(Vec3::Y * 0.9, Vec3::Y);
-    let projection = Projection::Perspective(PerspectiveProjection { fov: 0.55, ..default() });
-    let viewport = RigViewport { focus: 4.0 };
-    Sight::new(&camera.into(), &projection, &viewport, Vec2::splat(800.0), &GlobalTransform::IDENTITY).unwrap()
 }
 
 fn body() -> Model {
