@@ -619,6 +619,18 @@ fn a_template_is_written_with_its_header_and_a_picture() {
 }
 
 #[test]
+fn a_picture_that_cannot_be_written_leaves_neither_a_file_nor_its_name() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let (picture, path) = (studio.site.join("hero.png"), studio.site.join("hero.rig.ron"));
+    fs::create_dir(&picture).unwrap();
+    let (before, done) = (studio.desk.rig().clone(), studio.desk.steps().1);
+    studio.send(SaveTemplate { path: path.clone(), replace: true, content: Written::Rig { picture: true } });
+    assert!(studio.told("Could not write hero.rig.ron"), "{:?}", studio.desk.told());
+    assert!(picture.is_dir() && !path.exists());
+    assert_eq!((studio.desk.rig(), studio.desk.steps().1), (&before, done), "the header is as before");
+}
+
+#[test]
 fn a_picture_that_is_not_the_templates_is_replaced_only_if_that_was_said() {
     let mut studio = Studio::new(LoaderPanel::default());
     // A texture that is called as the character is.

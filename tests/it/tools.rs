@@ -39,22 +39,13 @@ struct Bench {
 
 const CLICKED: PointerAct = PointerAct::Released { dragged: false, count: 1 };
 
-fn sight(from: Vec3, to: Vec3, orthographic: bool) -> Sight {
-    let camera = GlobalTransform::from(Transform::from_translation(from).looking_at(to, Vec3::Y));
-    let viewport = RigViewport { focus: from.distance(to) };
-    let projection = if orthographic {
-        let mut flat = OrthographicProjection::default_3d();
-        flat.area = Rect::from_center_half_size(Vec2::ZERO, Vec2::splat(1.1));
-        Projection::Orthographic(flat)
-    } else {
-        Projection::Perspective(PerspectiveProjection { fov: 0.55, ..default() })
-    };
-    Sight::new(&camera, &projection, &viewport, Vec2::splat(800.0), &GlobalTransform::IDENTITY).unwrap()
-}
-
 /// From the character's left, without perspective.
 fn left() -> Sight {
-    sight(Vec3::new(4.0, 0.9, 0.0), Vec3::new(0.0, 0.9, 0.0), true)
+    let camera = Transform::from_xyz(4.0, 0.9, 0.0).looking_at(Vec3::Y * 0.9, Vec3::Y);
+    let mut flat = OrthographicProjection::default_3d();
+    flat.area = Rect::from_center_half_size(Vec2::ZERO, Vec2::splat(1.1));
+    let (projection, viewport) = (Projection::Orthographic(flat), RigViewport { focus: 4.0 });
+    Sight::new(&camera.into(), &projection, &viewport, Vec2::splat(800.0), &GlobalTransform::IDENTITY).unwrap()
 }
 
 impl Bench {
