@@ -186,6 +186,7 @@ impl Landing {
     }
 
     /// True if no step was made, undone or redone since the start, or all of that was taken back.
+    #[cfg(feature = "editor")]
     pub fn is_as_at_start(&self, history: &RigHistory) -> bool {
         self.from.is_of(history)
     }
