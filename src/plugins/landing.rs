@@ -2,7 +2,7 @@
 //!
 //! A job (weights, a face, a fit, a template, motion) starts from a document that people go on editing. Committing its result
 //! is a step of the history, and a step that is committed after an undo cuts off what could be done again. So every job
-//! asks its [`Landing`] first: a result waits while a step can be redone that was undone since the job was asked for, and
+//! asks its landing first: a result waits while a step can be redone that was undone since the job was asked for, and
 //! while a drag is under way. Steps that were undone before a person asked for the job go with its result, as with any
 //! other edit; a job that nobody asked for (a mesh whose file was saved, shares of late joints) waits for them, too. Redone
 //! or followed by another edit, the result lands; and it is dropped, with a message, once the joints that it was computed
