@@ -35,6 +35,7 @@ mod asset;
 mod bodies;
 mod builds;
 mod clips;
+mod exchange;
 mod folders;
 mod skins;
 mod source;

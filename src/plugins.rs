@@ -57,6 +57,7 @@ pub mod face;
 pub mod fit;
 pub mod gesture;
 pub mod history;
+mod job_control;
 pub mod journal;
 pub mod landing;
 pub mod limits;

@@ -92,14 +92,15 @@ pub(super) fn run(args: &SkinArgs) -> Result<Report, Failure> {
         None => bind(&mut bench, args.weights.settings(), &args.weights.claim, parts, &mut report)?,
     }
     let weights_file = if FileKind::of(&args.output) == Some(FileKind::Skin) { Some(&args.output) } else { None };
-    for path in weights_file.into_iter().chain(&args.save_weights) {
-        store_skin(&RealDisk, path, &skin_file(&bench)?)?;
-        report.line(format!("wrote {}", path.display()));
-    }
+    // The character first: where it cannot be written, weights beside an older one stay as they belong to that.
     if weights_file.is_none() {
         let write = || store_model(&RealDisk, &args.output, &bench.character(), &args.export.settings());
         report.notes(spinning("writing", write)?);
         report.line(format!("wrote {}", args.output.display()));
+    }
+    for path in weights_file.into_iter().chain(&args.save_weights) {
+        store_skin(&RealDisk, path, &skin_file(&bench)?)?;
+        report.line(format!("wrote {}", path.display()));
     }
     report.set("joints", bench.rig().len());
     report.set("output", args.output.display().to_string());

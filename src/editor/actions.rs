@@ -216,3 +216,22 @@ impl Action {
 /// Request for an action.
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ActionRequest(pub Action);
+
+/// Queues the requests of a panel, each for `answer`, and the actions that are its `own`, each for `act`: both need the whole
+/// world, before the edits of the same frame.
+pub(super) fn queue_requests<R: Message + Clone, A: Send + 'static>(
+    mut requests: MessageReader<R>,
+    answer: fn(&mut World, R),
+    mut actions: MessageReader<ActionRequest>,
+    own: fn(Action) -> Option<A>,
+    act: fn(&mut World, A),
+    mut commands: Commands,
+) {
+    for request in requests.read() {
+        let request = request.clone();
+        commands.queue(move |world: &mut World| answer(world, request));
+    }
+    for action in actions.read().filter_map(|request| own(request.0)) {
+        commands.queue(move |world: &mut World| act(world, action));
+    }
+}

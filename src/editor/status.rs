@@ -68,6 +68,10 @@ fn doing(world: &World) -> Option<String> {
     {
         return Some(format!("Reading {what}"));
     }
+    let import = world.get_resource::<ClipImport>().and_then(|import| import.waits().map(str::to_owned));
+    if let Some(name) = import.or_else(|| world.get_resource::<LibraryJobs>()?.waits()) {
+        return Some(format!("{name} waits: redo, or go on editing"));
+    }
     let rig = world.get_resource::<ActiveRig>()?.0;
     let jobs = world.get::<RigMeshes>(rig)?.iter().filter_map(|mesh| world.get::<SkinningJob>(mesh));
     let progress: Vec<f32> = jobs.map(SkinningJob::progress).collect();

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::{
     BuiltTemplate, ExposedNodes, RigBuilt, RigFailed, RigInstance, RigTemplate, RigTemplates, RigUpdated,
     RunningTemplate, TemplateError, Users,
+    exchange::{Exchange, described_otherwise},
 };
 use crate::{
     plugins::{
@@ -15,10 +16,10 @@ use crate::{
         schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer},
     },
     processor::PoseNote,
-    rig::{AttributeValues, BuiltNode, BuiltRig, PoseOffset, RestTransform, Uid},
+    rig::{AttributeValues, BuiltNode, PoseOffset, RestTransform, Uid},
     solve::{
-        keep_pose::{KeptPose, PoseKeeper},
-        program::{Carry, ProgramError, ProgramNode, RigProgram, RigState},
+        keep_pose::KeptPose,
+        program::{ProgramError, RigProgram, RigState},
     },
 };
 
@@ -80,16 +81,6 @@ struct Step<'a> {
     exchange: usize,
     /// The pose of the instance where its offsets have to change, so that its joints stand as before.
     kept: Option<KeptPose>,
-}
-
-/// Exchange of one program for another, the same for all of its instances.
-struct Exchange {
-    from: Arc<RigProgram>,
-    to: Arc<RigProgram>,
-    carry: Carry,
-    keeper: PoseKeeper,
-    /// The nodes are not the same, in the same places.
-    is_other: bool,
 }
 
 /// Gives every instance the program of its template: all of them in this frame.
@@ -184,7 +175,7 @@ struct ChangedDescriptions {
 fn exchange(world: &mut World, going: &[DueInstance]) -> (Vec<ChangedNodes>, EntityHashMap<KeptPose>) {
     let wanted: EntityHashMap<&DueInstance> = going.iter().map(|due| (due.entity, due)).collect();
     let mut query = world.query::<(Entity, &mut RigRuntime, &mut RunningTemplate)>();
-    let mut exchanges: Vec<Exchange> = Vec::new();
+    let mut exchanges: Vec<Arc<Exchange>> = Vec::new();
     let mut descriptions: Vec<ChangedDescriptions> = Vec::new();
     let (mut steps, mut others) = (Vec::new(), Vec::new());
     for (entity, runtime, mut running) in query.iter_mut(world) {
@@ -193,7 +184,8 @@ fn exchange(world: &mut World, going: &[DueInstance]) -> (Vec<ChangedNodes>, Ent
         let known =
             descriptions.iter().find(|known| Arc::ptr_eq(&known.from, &before) && Arc::ptr_eq(&known.to, built));
         let described = known.map(|known| known.nodes.clone()).unwrap_or_else(|| {
-            let nodes: Arc<[usize]> = described_otherwise(&before.built, &built.built).into();
+            let prepared = built.way.as_ref().and_then(|way| way.described_since(&before)).cloned();
+            let nodes = prepared.unwrap_or_else(|| described_otherwise(&before.built, &built.built).into());
             descriptions.push(ChangedDescriptions { from: before, to: built.clone(), nodes: nodes.clone() });
             nodes
         });
@@ -205,15 +197,10 @@ fn exchange(world: &mut World, going: &[DueInstance]) -> (Vec<ChangedNodes>, Ent
             }
             continue;
         }
-        let known = exchanges.iter().position(|known| Arc::ptr_eq(&known.from, from) && Arc::ptr_eq(&known.to, to));
+        let known = exchanges.iter().position(|known| known.is_between(from, to));
         let number = known.unwrap_or_else(|| {
-            exchanges.push(Exchange {
-                carry: Carry::between(from, to),
-                keeper: PoseKeeper::between(from, to),
-                is_other: !has_same_nodes(from, to),
-                from: from.clone(),
-                to: to.clone(),
-            });
+            let prepared = built.way.as_ref().and_then(|way| way.exchange(from, to)).cloned();
+            exchanges.push(prepared.unwrap_or_else(|| Arc::new(Exchange::between(from, to))));
             exchanges.len() - 1
         });
         let is_other = exchanges[number].is_other;
@@ -227,13 +214,15 @@ fn exchange(world: &mut World, going: &[DueInstance]) -> (Vec<ChangedNodes>, Ent
         steps.push(Step { entity, runtime, program: to, exchange: number, kept: None });
     }
     steps.par_iter_mut().for_each(|Step { runtime, program, exchange, kept, .. }| {
-        let Exchange { carry, keeper, .. } = &exchanges[*exchange];
-        if !keeper.is_idle() {
+        let Exchange { carry, keeper, .. } = &*exchanges[*exchange];
+        if let Some(keeper) = keeper {
             let (offsets, values) = pose_of(runtime.state());
             *kept = Some(keeper.keep(&offsets, &values))
                 .filter(|kept| kept.offsets != offsets || !kept.deviations.is_empty());
         }
-        runtime.exchange(program, carry);
+        // Where nodes and entities stay as they are, the run marks the instances of which something is another.
+        let changed = if carry.is_aligned() { runtime.bypass_change_detection() } else { &mut **runtime };
+        changed.exchange(program, carry);
         for slot in 0..program.nodes().len() {
             let Some(kept) = kept else { break };
             let offset = kept.offsets.get(&program.nodes()[slot].uid).copied().unwrap_or_default();
@@ -268,26 +257,6 @@ fn pose_controls(world: &mut World, instance: Entity, kept: &KeptPose) {
             pose.set_if_neq(kept.offsets.get(&uid).copied().unwrap_or_default().into());
         }
     }
-}
-
-/// True if two programs have the same nodes in the same order, with the same parents and kinds.
-fn has_same_nodes(a: &RigProgram, b: &RigProgram) -> bool {
-    let (a, b) = (a.nodes(), b.nodes());
-    let same = |(a, b): (&ProgramNode, &ProgramNode)| {
-        (a.uid, a.parent, a.kind, a.is_posable(), &a.label) == (b.uid, b.parent, b.kind, b.is_posable(), &b.label)
-    };
-    a.len() == b.len() && a.iter().zip(b).all(same)
-}
-
-/// Indices of the nodes of the second build that get other components from [`describe`] than those of the first.
-fn described_otherwise(before: &BuiltRig, now: &BuiltRig) -> Vec<usize> {
-    let known: BTreeMap<Uid, &BuiltNode> = before.nodes.iter().map(|node| (node.uid, node)).collect();
-    let same = |a: &BuiltNode, b: &BuiltNode| {
-        (a.base, &a.name, &a.label, &a.control, &a.layer, &a.origin)
-            == (b.base, &b.name, &b.label, &b.control, &b.layer, &b.origin)
-    };
-    let is_other = |node: &BuiltNode| known.get(&node.uid).is_none_or(|known| !same(known, node));
-    now.nodes.iter().enumerate().filter(|(_, node)| is_other(node)).map(|(number, _)| number).collect()
 }
 
 /// Writes the components that describe built nodes to the entities that an instance has of them.

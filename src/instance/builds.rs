@@ -13,7 +13,7 @@ use std::{
 
 use bevy::{asset::AssetId, log::error};
 
-use super::{RigTemplate, TemplateError};
+use super::{RigTemplate, TemplateError, exchange::NextVersion};
 use crate::{
     files::{PartFiles, RealDisk, TemplateWatch},
     processor::{BuildError, Builder, Modules, SourceText},
@@ -49,6 +49,8 @@ pub struct BuiltTemplate {
     pub changes: Arc<[Change]>,
     /// Tags of the commands that ran, in their order.
     pub ran: Arc<[Uid]>,
+    /// Way from the build before to this one.
+    pub(super) way: Option<NextVersion>,
 }
 
 #[cfg(feature = "remote")]
@@ -331,14 +333,24 @@ impl TemplateBuild {
             .and_then(|whole| Ok((whole, program(&lean_options(vec![ExposedNode::Controls], &sockets, &built))?)));
         let (whole, lean) = programs.map_err(|source| TemplateError::CannotRun { file: self.file.clone(), source })?;
         let (source, changes, ran) = (source.clone(), changes.into(), report.executed.into());
-        let some = Mutex::default();
-        let template = BuiltTemplate { rig, source, built, whole, lean, sockets, file_sockets, some, changes, ran };
         // What instances expose is compiled here, and not in the frame that takes the template over.
         let before = self.good.as_ref().map(|good| good.some.lock().unwrap_or_else(PoisonError::into_inner).clone());
-        for (exposed, _) in before.into_iter().flatten() {
+        let (mut some, mut pairs) = (Vec::new(), Vec::new());
+        for (exposed, program) in before.into_iter().flatten() {
+            self.programs.adopt(&program);
+            let options = lean_options(exposed.clone(), &sockets, &built);
             // A node that is gone is told by the instance that wants it.
-            let _ = template.exposing(&exposed);
+            let Ok(now) = self.programs.get(&built, &options) else { continue };
+            some.push((exposed, now.clone()));
+            pairs.push((program, now));
         }
+        let way = self.good.as_ref().map(|good| {
+            let pairs = pairs.iter().map(|(before, now)| (before, now));
+            NextVersion::between(good, &built, [(&good.whole, &whole), (&good.lean, &lean)].into_iter().chain(pairs))
+        });
+        let some = Mutex::new(some);
+        let template =
+            BuiltTemplate { rig, source, built, whole, lean, sockets, file_sockets, some, changes, ran, way };
         Ok(Arc::new(template))
     }
 

@@ -9,6 +9,7 @@ use crate::{
     plugins::{
         commands::{BuildFailure, BuildRequest, BuildResult, BuildStep, RigModules},
         document::{Change, EditRefusal, EditReport, EditRequest},
+        history::RigHistory,
         skinning::BindRequest,
         surface::{RigMesh, RigMeshes},
     },
@@ -30,8 +31,8 @@ pub const UPDATE: &str = "Update from template";
 /// An entity without a [`Rig`] gets the template's, built; meshes of it without weights are bound. When the template changes,
 /// the base (the version accepted last), the rig as it is now and the template are compared: what the template changed is
 /// taken over, what was changed or added here stays. A `live` rig takes it over at once, as one step of its history, unless
-/// both changed the same field to different values; such an update, and every one of a rig that is not live, is an
-/// [`UpdateOffer`] until an [`AcceptUpdate`]. Undoing the step brings the base back, and nothing more is taken over until the
+/// both changed the same field to different values, or steps of another kind were undone, which it would discard; such an
+/// update, and every one of a rig that is not live, is an [`UpdateOffer`] until an [`AcceptUpdate`]. Undoing the step brings the base back, and nothing more is taken over until the
 /// file changes again. An update that cannot be built is taken back and told ([`RigFailed`]).
 #[derive(Component, Reflect, Debug, Clone)]
 #[reflect(opaque)]
@@ -226,12 +227,12 @@ pub(super) fn try_updates(
 pub(super) fn compare_templates(
     templates: Res<RigTemplates>,
     modules: Res<RigModules>,
-    mut sources: Query<(Entity, &mut RigSource, Option<&Rig>, Has<BuildFailure>)>,
+    mut sources: Query<(Entity, &mut RigSource, Option<&Rig>, Option<&RigHistory>, Has<BuildFailure>)>,
     mut edits: MessageWriter<EditRequest>,
     mut builds: MessageWriter<BuildRequest>,
     mut commands: Commands,
 ) {
-    for (entity, mut source, rig, had_failed) in &mut sources {
+    for (entity, mut source, rig, history, had_failed) in &mut sources {
         let Some(built) = templates.built.get(&source.template.id()) else { continue };
         if source.seen.as_ref().is_some_and(|seen| Arc::ptr_eq(seen, built)) {
             continue;
@@ -251,7 +252,10 @@ pub(super) fn compare_templates(
         let (updated, poses) = updated(source.base.as_deref(), rig, &built.rig, &Take::Mine.into(), &modules);
         if updated.changes.is_empty() {
             source.base = Some(built.rig.clone());
-        } else if source.is_live && updated.conflicts() == 0 {
+        } else if source.is_live
+            && updated.conflicts() == 0
+            && history.is_none_or(|history| !discards(&source, history))
+        {
             source.had_failed = had_failed;
             source.notes = poses;
             take_over(entity, rig, updated, built, &mut source, &mut edits, &mut commands);
@@ -262,6 +266,12 @@ pub(super) fn compare_templates(
             commands.entity(entity).try_insert(offer);
         }
     }
+}
+
+/// True if a step discards undone steps that are no updates. An undone update gives way to the next version.
+fn discards(source: &RigSource, history: &RigHistory) -> bool {
+    let is_update = |step: &Arc<Step>| source.steps.iter().any(|known| Arc::ptr_eq(&known.step, step));
+    history.undone_steps().any(|step| !is_update(step))
 }
 
 /// Carries out accepted offers.

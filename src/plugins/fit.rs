@@ -11,10 +11,7 @@ pub mod region;
 mod report;
 mod work;
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicBool, AtomicU32, Ordering},
-};
+use std::sync::Arc;
 
 use bevy::{
     prelude::*,
@@ -33,13 +30,14 @@ use super::{
     configure_sets,
     document::EditRequest,
     history::RigHistory,
-    landing::{HeldResult, ResultHeld},
+    job_control::JobControl,
+    landing::{HeldResult, JobOutcome, Landing, ResultHeld},
     limits::{Deadline, RigLimits},
     surface::{RigMesh, SkinOf},
 };
 use crate::{
-    algo::fit_template::FitSymmetry,
-    rig::{Rig, Uid, operations::Operation, part::Part, step::Step},
+    algo::fit_template::{FitError, FitSymmetry},
+    rig::{Rig, Uid, operations::Operation, part::Part},
 };
 
 /// Name of the step of a fit.
@@ -169,37 +167,20 @@ pub struct FitAnswer {
 /// Running fit of a mesh; remove the component or call [`FitJob::cancel`] to stop it.
 #[derive(Component)]
 pub struct FitJob {
-    progress: Arc<AtomicU32>,
-    cancelled: Arc<AtomicBool>,
+    control: JobControl,
     task: Task<Result<FinishedFit, FitFailure>>,
     /// The rig that the fit started from.
     from: Arc<Rig>,
-    /// Last step and number of undone steps when the fit was asked for.
-    history: HistoryState,
+    landing: Landing,
     /// Finished fit that waits to be committed.
     held: Option<FinishedFit>,
     deadline: Deadline,
 }
 
-/// Last step of a history and its number of undone steps: a new step discards those.
-type HistoryState = (Option<Arc<Step>>, usize);
-
-fn state_of(history: &RigHistory) -> HistoryState {
-    (history.last().cloned(), history.undone())
-}
-
-fn is_same_state(a: &HistoryState, b: &HistoryState) -> bool {
-    let is_same = match (&a.0, &b.0) {
-        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
-        (a, b) => a.is_none() && b.is_none(),
-    };
-    is_same && a.1 == b.1
-}
-
 impl FitJob {
     /// Finished share, 0 to 1.
     pub fn progress(&self) -> f32 {
-        f32::from_bits(self.progress.load(Ordering::Relaxed))
+        self.control.progress()
     }
 
     /// True if the fit is finished, and waits to be committed.
@@ -209,13 +190,7 @@ impl FitJob {
 
     /// Stops the fit; the rig stays as it was.
     pub fn cancel(&self) {
-        self.cancelled.store(true, Ordering::Relaxed);
-    }
-}
-
-impl Drop for FitJob {
-    fn drop(&mut self) {
-        self.cancel();
+        self.control.cancel();
     }
 }
 
@@ -270,21 +245,14 @@ fn start(
             parts: parts.clone(),
             markers: markers.map(|markers| markers.held(rig)).unwrap_or_default(),
         };
-        let progress = Arc::new(AtomicU32::new(0));
-        let cancelled = Arc::new(AtomicBool::new(false));
-        let (share, stop) = (progress.clone(), cancelled.clone());
-        let task = AsyncComputeTaskPool::get().spawn(async move {
-            work.run(&|part| {
-                share.store(part.to_bits(), Ordering::Relaxed);
-                !stop.load(Ordering::Relaxed)
-            })
-        });
+        let control = JobControl::default();
+        let reporter = control.reporter();
+        let task = AsyncComputeTaskPool::get().spawn(async move { work.run(&|part| reporter.report(part)) });
         commands.entity(request.mesh).insert(FitJob {
-            progress,
-            cancelled,
+            control,
             task,
             from,
-            history: state_of(history),
+            landing: Landing::asked(history),
             held: None,
             deadline: Deadline::new(&limits),
         });
@@ -299,8 +267,10 @@ fn land(
     mut answers: MessageWriter<FitAnswer>,
 ) {
     for (entity, mut job, of) in &mut jobs {
+        let job = &mut *job;
         let was_held = job.held.is_some();
         let finished = match job.deadline.passed() {
+            _ if was_held && job.control.is_cancelled() => Some(Err(FitError::Cancelled.into())),
             _ if was_held => job.held.take().map(Ok),
             Some(late) => Some(Err(late.into())),
             None => check_ready(&mut job.task),
@@ -309,35 +279,39 @@ fn land(
         let result = match (result, rigs.get(of.0)) {
             (Err(error), _) => Err(error),
             (Ok(_), Err(_)) => Err(FitFailure::NoRig),
-            // Steps that were undone while the fit ran are not lost to it; those from before are, as to any other edit.
-            (Ok(finished), Ok((_, history)))
-                if history.is_previewing()
-                    || history.can_redo() && !is_same_state(&job.history, &state_of(history)) =>
-            {
-                job.held = Some(finished);
-                if !was_held && history.can_redo() {
-                    commands.write_message(ResultHeld { mesh: entity, reason: HeldResult::Fit });
-                }
-                continue;
-            }
-            (Ok(_), Ok((rig, _))) if !is_same_skeleton(rig, &job.from) => Err(FitFailure::Changed),
-            (Ok(FinishedFit { mut fitted, target }), Ok((rig, history))) => {
-                match fitted.edits(rig, &target, &modules.0) {
-                    Ok(changes) => {
-                        let report = fitted.report.clone();
-                        fitted.before = history.last().cloned();
-                        let operation = Operation::Named { name: FIT, edits: changes };
-                        commands.write_message(EditRequest::operation(of.0, operation));
-                        commands.entity(of.0).try_insert(PendingFit(fitted));
-                        Ok(report)
+            (Ok(finished), Ok((rig, history))) => {
+                match job.landing.decide(history, || is_same_skeleton(rig, &job.from)) {
+                    JobOutcome::Hold { is_news } => {
+                        job.held = Some(finished);
+                        if is_news {
+                            commands.write_message(ResultHeld { mesh: entity, reason: HeldResult::Fit });
+                        }
+                        continue;
                     }
-                    Err(error) => Err(error),
+                    JobOutcome::Drop => Err(FitFailure::Changed),
+                    JobOutcome::Commit => commit(of.0, finished, (rig, history), &modules, &mut commands),
                 }
             }
         };
         answers.write(FitAnswer { mesh: entity, result });
         commands.entity(entity).try_remove::<FitJob>();
     }
+}
+
+/// Requests the edits of a finished fit.
+fn commit(
+    rig_entity: Entity,
+    FinishedFit { mut fitted, target }: FinishedFit,
+    (rig, history): (&Rig, &RigHistory),
+    modules: &RigModules,
+    commands: &mut Commands,
+) -> Result<Arc<FitReport>, FitFailure> {
+    let edits = fitted.edits(rig, &target, &modules.0)?;
+    let report = fitted.report.clone();
+    fitted.before = history.last().cloned();
+    commands.write_message(EditRequest::operation(rig_entity, Operation::Named { name: FIT, edits }));
+    commands.entity(rig_entity).try_insert(PendingFit(fitted));
+    Ok(report)
 }
 
 /// True if two rigs have the same joints at the same places.

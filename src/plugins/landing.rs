@@ -1,16 +1,19 @@
 //! Results of background jobs: each is committed to the document that it was computed for, or dropped.
 //!
-//! A job (weights, a face) starts from a document that people go on editing. Committing its result is a step of the
-//! history, and a step that is committed after an undo cuts off what could be done again. So a result waits while
-//! something can be redone, and while a drag is under way; and it is dropped, with a message, once the joints that it
-//! was computed from are others for good. Weights are dropped, too, where those of the mesh were painted meanwhile.
+//! A job (weights, a face, a fit, a template, motion) starts from a document that people go on editing. Committing its result
+//! is a step of the history, and a step that is committed after an undo cuts off what could be done again. So every job
+//! asks its landing first: a result waits while a step can be redone that was undone since the job was asked for, and
+//! while a drag is under way. Steps that were undone before a person asked for the job go with its result, as with any
+//! other edit; a job that nobody asked for (a mesh whose file was saved, shares of late joints) waits for them, too. Redone
+//! or followed by another edit, the result lands; and it is dropped, with a message, once the joints that it was computed
+//! from are others for good. Weights are dropped, too, where those of the mesh were painted meanwhile.
 
 use std::sync::Arc;
 
 use bevy::prelude::*;
 
 use super::history::RigHistory;
-use crate::rig::{NodeKind, Rig, SkinData, Uid};
+use crate::rig::{NodeKind, Rig, SkinData, Uid, step::Step};
 
 /// Message that the result of a background job waits, because committing it now would discard steps that can be redone.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
@@ -48,6 +51,28 @@ pub enum HeldResult {
          editing, and it follows"
     )]
     Mesh,
+    /// A template that was read for the rig.
+    #[error(
+        "the template is read, but using it now would lose the steps that were undone; redo them, or go on editing, and \
+         it follows; asking for another drops it"
+    )]
+    Template,
+    /// Clips that were read from a file.
+    #[error(
+        "the motion is read, but importing it now would lose the steps that were undone; redo them, or go on editing, and \
+         it follows; another import drops it"
+    )]
+    Motion,
+}
+
+impl HeldResult {
+    /// The reason as a sentence.
+    pub fn sentence(self) -> String {
+        let reason = self.to_string();
+        let mut letters = reason.chars();
+        let first = letters.next().map(char::to_uppercase).into_iter().flatten();
+        format!("{}{}.", first.collect::<String>(), letters.as_str())
+    }
 }
 
 /// Hash of everything in a document that a job on one mesh depends on: the joints with their rest poses and, if any
@@ -104,24 +129,83 @@ impl BindStart {
     }
 }
 
+/// Place of a history: its last step and the number of undone ones.
+#[derive(Debug, Clone)]
+struct HistoryPlace {
+    last: Option<Arc<Step>>,
+    undone: usize,
+}
+
+impl HistoryPlace {
+    fn of(history: &RigHistory) -> Self {
+        Self { last: history.last().cloned(), undone: history.undone() }
+    }
+
+    fn is_of(&self, history: &RigHistory) -> bool {
+        let is_same = match (&self.last, history.last()) {
+            (Some(then), Some(now)) => Arc::ptr_eq(then, now),
+            (then, now) => then.is_none() && now.is_none(),
+        };
+        is_same && self.undone == history.undone()
+    }
+}
+
+/// Landing of a job's result: when it may be committed.
+#[derive(Debug, Clone)]
+pub(crate) struct Landing {
+    from: HistoryPlace,
+    /// True if a person asked for the job.
+    is_asked: bool,
+    /// True if it was told that the result waits.
+    is_told: bool,
+}
+
 /// The decision about a finished job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum JobOutcome {
+pub(crate) enum JobOutcome {
     /// The result is committed.
     Commit,
     /// The result waits: steps can be redone, or a drag is under way.
-    Hold,
+    Hold {
+        /// True if it has to be told that steps can be redone.
+        is_news: bool,
+    },
     /// The base of the result has changed, and no undone step can restore it.
     Drop,
 }
 
-/// Decides about the result of a job; `is_as_before` tells whether the document is still as the job found it.
-pub(super) fn landing(history: &RigHistory, is_as_before: impl FnOnce() -> bool) -> JobOutcome {
-    if history.is_previewing() || history.can_redo() {
-        JobOutcome::Hold
-    } else if is_as_before() {
-        JobOutcome::Commit
-    } else {
-        JobOutcome::Drop
+impl Landing {
+    /// Landing of a job that is asked for now.
+    pub fn asked(history: &RigHistory) -> Self {
+        Self { from: HistoryPlace::of(history), is_asked: true, is_told: false }
+    }
+
+    /// Landing of a job that starts by itself.
+    pub fn unasked(history: &RigHistory) -> Self {
+        Self { is_asked: false, ..Self::asked(history) }
+    }
+
+    /// True if no step was made, undone or redone since the start, or all of that was taken back.
+    #[cfg(feature = "editor")]
+    pub fn is_as_at_start(&self, history: &RigHistory) -> bool {
+        self.from.is_of(history)
+    }
+
+    /// True if a step would discard steps that were undone since the start.
+    pub fn would_discard(&self, history: &RigHistory) -> bool {
+        history.can_redo() && !(self.is_asked && self.from.is_of(history))
+    }
+
+    /// Decides about the result; `is_as_before` tells whether the document is still as the job found it.
+    pub fn decide(&mut self, history: &RigHistory, is_as_before: impl FnOnce() -> bool) -> JobOutcome {
+        let would_discard = self.would_discard(history);
+        let was_told = std::mem::replace(&mut self.is_told, would_discard);
+        if would_discard || history.is_previewing() {
+            JobOutcome::Hold { is_news: would_discard && !was_told }
+        } else if is_as_before() {
+            JobOutcome::Commit
+        } else {
+            JobOutcome::Drop
+        }
     }
 }

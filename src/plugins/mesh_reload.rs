@@ -14,7 +14,7 @@ use super::{
     RigSystems, configure_sets,
     document::{EditReport, EditRequest},
     history::RigHistory,
-    landing::{HeldResult, ResultHeld},
+    landing::{HeldResult, JobOutcome, Landing, ResultHeld},
     surface::{RigMesh, SkinOf},
 };
 use crate::{
@@ -102,6 +102,7 @@ pub struct ReloadJob {
     /// The version, and the weights that are transferred to it.
     model: Arc<Model>,
     from: Option<Arc<SkinData>>,
+    landing: Landing,
     /// Finished exchange that waits to be committed.
     held: Option<FinishedReload>,
 }
@@ -124,19 +125,21 @@ fn start(
     mut commands: Commands,
     mut requests: MessageReader<ReloadRequest>,
     meshes: Query<(&RigMesh, &SkinOf)>,
-    rigs: Query<&Rig>,
+    rigs: Query<(&Rig, &RigHistory)>,
     mut answers: MessageWriter<ReloadAnswer>,
 ) {
     for ReloadRequest { mesh: entity, model } in requests.read() {
         let found = meshes.get(*entity).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
-        let Some((mesh, rig)) = found else {
+        let Some((mesh, (rig, history))) = found else {
             answers.write(ReloadAnswer { mesh: *entity, result: Err(ReloadError::NoRig) });
             continue;
         };
         let from = rig.skin(mesh.uid).cloned();
         let (mesh, next, skin) = (mesh.clone(), model.clone(), from.clone());
         let task = AsyncComputeTaskPool::get().spawn(async move { reloaded(&mesh, &next, skin.as_deref()) });
-        commands.entity(*entity).insert(ReloadJob { task, model: model.clone(), from, held: None });
+        // A file that was saved asks for it, not the person who undoes steps.
+        let (model, landing) = (model.clone(), Landing::unasked(history));
+        commands.entity(*entity).insert(ReloadJob { task, model, from, landing, held: None });
     }
 }
 
@@ -177,26 +180,28 @@ fn land(
     mut answers: MessageWriter<ReloadAnswer>,
 ) {
     for (entity, mut job, mesh, of, versions) in &mut jobs {
-        let was_held = job.held.is_some();
-        let finished = if was_held { job.held.take().map(Ok) } else { check_ready(&mut job.task) };
-        let Some(mut result) = finished else { continue };
-        if let Ok((rig, history)) = rigs.get(of.0) {
-            // The step of the exchange would discard steps that can be redone.
-            if let (Ok(finished), true) = (&mut result, history.is_previewing() || history.can_redo()) {
-                job.held = Some(finished.clone());
-                if !was_held && history.can_redo() {
-                    commands.write_message(ResultHeld { mesh: entity, reason: HeldResult::Mesh });
-                }
-                continue;
-            }
-            // Weights that were computed or painted meanwhile are transferred instead.
-            let is_same = match (rig.skin(mesh.uid), &job.from) {
+        let job = &mut *job;
+        let finished = if job.held.is_some() { job.held.take().map(Ok) } else { check_ready(&mut job.task) };
+        let Some(result) = finished else { continue };
+        if let (Ok(finished), Ok((rig, history))) = (&result, rigs.get(of.0)) {
+            let has_same_weights = || match (rig.skin(mesh.uid), &job.from) {
                 (Some(now), Some(then)) => Arc::ptr_eq(now, then),
                 (now, then) => now.is_none() && then.is_none(),
             };
-            if !is_same {
-                commands.write_message(ReloadRequest { mesh: entity, model: job.model.clone() });
-                continue;
+            match job.landing.decide(history, has_same_weights) {
+                JobOutcome::Hold { is_news } => {
+                    job.held = Some(finished.clone());
+                    if is_news {
+                        commands.write_message(ResultHeld { mesh: entity, reason: HeldResult::Mesh });
+                    }
+                    continue;
+                }
+                // Weights that were computed or painted meanwhile are transferred instead.
+                JobOutcome::Drop => {
+                    commands.write_message(ReloadRequest { mesh: entity, model: job.model.clone() });
+                    continue;
+                }
+                JobOutcome::Commit => {}
             }
         }
         commands.entity(entity).try_remove::<ReloadJob>();

@@ -96,6 +96,8 @@ pub struct RigRuntime {
     /// Slots whose `Transform` other code wrote; the next run writes them again even if the node has not moved.
     rewritten: Vec<bool>,
     has_rewritten: bool,
+    /// True if the next run compares attribute values with the entities that hold them, even if no operation runs.
+    attributes_due: bool,
     /// Slots of the attributes that each entity holds.
     attributes: BTreeMap<Entity, Vec<u32>>,
     /// Attribute values last written to or read from entities.
@@ -126,6 +128,7 @@ impl RigRuntime {
             shown: vec![Transform::IDENTITY; if mode == InstanceMode::Hierarchy { program.nodes().len() } else { 0 }],
             rewritten: vec![false; program.nodes().len()],
             has_rewritten: false,
+            attributes_due: false,
             attributes: BTreeMap::new(),
             values: vec![f32::NAN; program.attributes().len()],
             driven_writes: Vec::new(),
@@ -285,7 +288,10 @@ impl RigRuntime {
     pub fn exchange(&mut self, program: &Arc<RigProgram>, carry: &Carry) {
         if carry.is_aligned() {
             self.state.exchange(program, carry);
-            self.forget_driven();
+            // Values that no operation computes may be others, too.
+            self.attributes_due = true;
+            // Poses that the bounds of before cut off may be free now.
+            self.is_due |= !carry.has_same_bounds();
             // Results that no operation computes any more have other values, too.
             self.all_due |= self.mode == InstanceMode::Hierarchy && !carry.is_partial();
             if self.mode == InstanceMode::Hierarchy {
@@ -300,13 +306,10 @@ impl RigRuntime {
 
     /// Lets the next run write all driven attributes. A build writes its defaults to the same entities, which is no write
     /// of other code.
-    fn forget_driven(&mut self) {
+    pub(super) fn forget_driven(&mut self) {
         let driven = self.values.iter_mut().zip(self.state.program().attributes());
         driven.filter(|(_, attribute)| !attribute.is_settable).for_each(|(value, _)| *value = f32::NAN);
-        if !self.attributes.is_empty() {
-            self.is_due = true;
-            self.has_rewritten = true;
-        }
+        self.attributes_due = true;
     }
 }
 

@@ -6,14 +6,7 @@ mod late_joints;
 mod parts;
 mod report;
 
-use std::{
-    collections::BTreeMap,
-    ops::Range,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, AtomicU32, Ordering},
-    },
-};
+use std::{collections::BTreeMap, ops::Range, sync::Arc};
 
 use bevy::{
     prelude::*,
@@ -36,7 +29,8 @@ use super::{
     configure_sets,
     document::EditRequest,
     history::RigHistory,
-    landing::{BindStart, HeldResult, JobOutcome, ResultHeld, landing},
+    job_control::JobControl,
+    landing::{BindStart, HeldResult, JobOutcome, Landing, ResultHeld},
     limits::{Deadline, LimitError, OutOfTime, RigLimits},
     surface::{RigMesh, SkinOf},
 };
@@ -136,11 +130,11 @@ pub enum SkinningError {
 /// Running computation of weights; remove the component or call [`SkinningJob::cancel`] to stop it.
 #[derive(Component)]
 pub struct SkinningJob {
-    progress: Arc<AtomicU32>,
-    cancelled: Arc<AtomicBool>,
+    control: JobControl,
     task: Task<SkinningResult>,
     /// State of the document that the weights are computed for.
     start: BindStart,
+    landing: Landing,
     /// Finished weights that wait to be committed; see [`landing`](super::landing).
     held: Option<SkinningResult>,
     /// True if a [`BindRequest`] asked for it, which [`BindAnswer`] answers.
@@ -164,7 +158,7 @@ pub struct BoundSkin {
 impl SkinningJob {
     /// Finished share, 0 to 1.
     pub fn progress(&self) -> f32 {
-        f32::from_bits(self.progress.load(Ordering::Relaxed))
+        self.control.progress()
     }
 
     /// True if the weights are finished, and wait to be committed.
@@ -174,13 +168,7 @@ impl SkinningJob {
 
     /// Stops the computation, or drops weights that wait; the rig stays as it was.
     pub fn cancel(&self) {
-        self.cancelled.store(true, Ordering::Relaxed);
-    }
-}
-
-impl Drop for SkinningJob {
-    fn drop(&mut self) {
-        self.cancel();
+        self.control.cancel();
     }
 }
 
@@ -349,13 +337,13 @@ fn start_skinning(
     mut commands: Commands,
     mut requests: MessageReader<BindRequest>,
     meshes: Query<(&RigMesh, &SkinOf)>,
-    rigs: Query<(&Rig, Option<&BuildResult>)>,
+    rigs: Query<(&Rig, &RigHistory, Option<&BuildResult>)>,
     (modules, limits): (Option<Res<RigModules>>, Res<RigLimits>),
     mut bound: MessageWriter<BindAnswer>,
 ) {
     for request in requests.read() {
         let found = meshes.get(request.mesh).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
-        let Some((mesh, (rig, built))) = found else {
+        let Some((mesh, (rig, history, built))) = found else {
             bound.write(BindAnswer { mesh: request.mesh, result: Err(SkinningError::NoRig) });
             continue;
         };
@@ -363,28 +351,24 @@ fn start_skinning(
             bound.write(BindAnswer { mesh: request.mesh, result: Err(error.into()) });
             continue;
         }
-        let start = BindStart::of(rig, mesh.uid);
+        let (start, landing) = (BindStart::of(rig, mesh.uid), Landing::asked(history));
         let (rig, mesh, request) = (rig.clone(), mesh.clone(), request.clone());
         let built = built.map(|built| built.0.clone());
         let modules = modules.as_deref().map(|modules| modules.0.clone());
         let entity = request.mesh;
-        let progress = Arc::new(AtomicU32::new(0));
-        let cancelled = Arc::new(AtomicBool::new(false));
-        let (told, stop) = (progress.clone(), cancelled.clone());
+        let control = JobControl::default();
+        let reporter = control.reporter();
         let task = AsyncComputeTaskPool::get().spawn(async move {
             let mut input = SkinningInput::new(&rig, built.as_deref(), modules.as_deref(), &mesh, &request.parts);
             input.claim(&request.claims);
-            input.compute(&mesh, &request.settings, &|part| {
-                told.store(part.to_bits(), Ordering::Relaxed);
-                !stop.load(Ordering::Relaxed)
-            })
+            input.compute(&mesh, &request.settings, &|part| reporter.report(part))
         });
         let deadline = Deadline::new(&limits);
         commands.entity(entity).insert(SkinningJob {
-            progress,
-            cancelled,
+            control,
             task,
             start,
+            landing,
             held: None,
             is_asked: true,
             deadline,
@@ -402,11 +386,12 @@ fn land_skinning(
     mut held: MessageWriter<ResultHeld>,
 ) {
     for (entity, mut job, mesh, of) in &mut jobs {
+        let job = &mut *job;
         let was_held = job.held.is_some();
         let late = job.deadline.passed().filter(|_| !was_held);
         let finished = match late {
             Some(late) => Some(Err(late.into())),
-            None if was_held && job.cancelled.load(Ordering::Relaxed) => Some(Err(WeightError::Cancelled.into())),
+            None if was_held && job.control.is_cancelled() => Some(Err(WeightError::Cancelled.into())),
             None if was_held => job.held.take().map(|held| held.map_err(SkinningError::from)),
             None => check_ready(&mut job.task).map(|result| result.map_err(SkinningError::from)),
         };
@@ -414,35 +399,38 @@ fn land_skinning(
         let result = match (result, rigs.get(of.0)) {
             (Err(error), _) => Err(error),
             (Ok(_), Err(_)) => Err(SkinningError::Closed),
-            (Ok(computed), Ok((rig, history, built))) => match landing(history, || job.start.holds(rig, mesh.uid)) {
-                JobOutcome::Hold => {
-                    job.held = Some(Ok(computed));
-                    if !was_held && history.can_redo() && job.is_asked {
-                        held.write(ResultHeld { mesh: entity, reason: HeldResult::Weights });
-                    }
-                    continue;
-                }
-                JobOutcome::Drop => {
-                    // Nobody asked for shares of late joints, so nobody would ask again.
-                    let again = built.filter(|_| !job.is_asked);
-                    let again =
-                        again.and_then(|built| late_joints::late_job((rig, built), mesh, modules.as_deref(), &limits));
-                    if let Some(again) = again {
-                        *job = again;
+            (Ok(computed), Ok((rig, history, built))) => {
+                match job.landing.decide(history, || job.start.holds(rig, mesh.uid)) {
+                    JobOutcome::Hold { is_news } => {
+                        job.held = Some(Ok(computed));
+                        if is_news && job.is_asked {
+                            held.write(ResultHeld { mesh: entity, reason: HeldResult::Weights });
+                        }
                         continue;
                     }
-                    Err(SkinningError::Changed)
-                }
-                JobOutcome::Commit => {
-                    let mut changes = Vec::new();
-                    if let Some(modules) = &modules {
-                        changes = push_edits(rig, &modules.0, mesh.uid, &computed);
+                    JobOutcome::Drop => {
+                        // Nobody asked for shares of late joints, so nobody would ask again.
+                        let again = built.filter(|_| !job.is_asked);
+                        let again = again.and_then(|built| {
+                            late_joints::late_job((rig, history, built), mesh, modules.as_deref(), &limits)
+                        });
+                        if let Some(again) = again {
+                            *job = again;
+                            continue;
+                        }
+                        Err(SkinningError::Changed)
                     }
-                    changes.push(RigEdit::SetSkin(mesh.uid, Some(computed.skin)));
-                    edits.write(EditRequest::operation(of.0, Operation::Edits(changes)));
-                    Ok(computed.report)
+                    JobOutcome::Commit => {
+                        let mut changes = Vec::new();
+                        if let Some(modules) = &modules {
+                            changes = push_edits(rig, &modules.0, mesh.uid, &computed);
+                        }
+                        changes.push(RigEdit::SetSkin(mesh.uid, Some(computed.skin)));
+                        edits.write(EditRequest::operation(of.0, Operation::Edits(changes)));
+                        Ok(computed.report)
+                    }
                 }
-            },
+            }
         };
         if job.is_asked {
             bound.write(BindAnswer { mesh: entity, result });

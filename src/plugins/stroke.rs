@@ -19,6 +19,8 @@ pub use plan::{StrokePlan, StrokeScene, plan_stroke, stroke_kind};
 use super::{
     RigSystems, configure_sets,
     document::{EditRequest, JointEntities, Selection, Symmetry},
+    history::RigHistory,
+    landing::Landing,
     picking::{PickAnswer, posed_joints},
     surface::{Answer, RigMeshes, RigSurface, answer},
 };
@@ -120,6 +122,9 @@ pub enum StrokeFailure {
     /// The stroke starts and ends on the same joint.
     #[error("the stroke ends where it starts; draw it further")]
     TooShort,
+    /// Steps were undone before the stroke was followed, and its step would discard them.
+    #[error("steps were undone while the stroke was followed, and its joints would lose them; draw it again")]
+    Undone,
     /// The stroke cannot be followed through the mesh.
     #[error(transparent)]
     Stroke(#[from] StrokeError),
@@ -135,6 +140,7 @@ struct WaitingStroke {
     since: Option<u64>,
     /// Task that computes its chain.
     chain: Option<Task<FoundChain>>,
+    landing: Landing,
 }
 
 /// Result of following a stroke.
@@ -150,6 +156,7 @@ type StrokeTarget<'a> = (
     Option<&'a StrokeTips>,
     Option<&'a RigSurface>,
     Option<&'a RigMeshes>,
+    &'a RigHistory,
 );
 
 fn stroke(
@@ -163,13 +170,17 @@ fn stroke(
     if waiting.0.is_empty() && requests.is_empty() {
         return;
     }
-    let arrived = requests.read().map(|request| WaitingStroke { request: request.clone(), since: None, chain: None });
+    let arrived = requests.read().filter_map(|request| {
+        let (.., history) = rigs.get(request.rig).ok()?;
+        let landing = Landing::asked(history);
+        Some(WaitingStroke { request: request.clone(), since: None, chain: None, landing })
+    });
     waiting.0.extend(arrived);
     // Only one stroke of a rig is processed at a time: the next may start on a joint that it adds.
     let mut busy: Vec<Entity> = Vec::new();
-    waiting.0.retain_mut(|WaitingStroke { request, since, chain }| {
+    waiting.0.retain_mut(|WaitingStroke { request, since, chain, landing }| {
         let Ok(drawn) = rigs.get(request.rig) else { return false };
-        let (rig, selection, entities, place, symmetry, tips, surface, meshes) = drawn;
+        let (rig, selection, entities, place, symmetry, tips, surface, meshes, history) = drawn;
         if busy.contains(&request.rig) {
             return true;
         }
@@ -185,6 +196,8 @@ fn stroke(
             },
         };
         let result = match answer(since, meshes.is_some(), surface) {
+            // A chain that waited would be in the way of the strokes after it.
+            _ if landing.would_discard(history) => Some(StrokeResult::Nothing(StrokeFailure::Undone)),
             Answer::Wait => None,
             Answer::Now(None) => Some(StrokeResult::Nothing(StrokeFailure::NoMesh)),
             Answer::Now(Some(surface)) => {

@@ -7,6 +7,7 @@ use rigsmith::{
     files::{RealDisk, load_template},
     plugins::document::JointEntities,
     prelude::*,
+    rig::operations::ClipOperation,
     test_app::test_app,
 };
 
@@ -28,6 +29,25 @@ pub fn wait<B>(bench: &mut B, what: &str, frame: impl Fn(&mut B), done: impl Fn(
         std::thread::sleep(Duration::from_millis(1));
         frame(bench);
     }
+}
+
+/// A step that fits every rig, and that no job depends on.
+pub fn new_clip(name: &str) -> Operation {
+    Operation::Clips(ClipOperation::Create { name: name.to_owned(), frame_rate: 24.0, range: [0.0, 1.0] })
+}
+
+/// Begins a drag: until it ends, no result of a job lands.
+pub fn begin_drag(app: &mut App, rig: Entity) {
+    app.world_mut().write_message(EditRequest { rig, change: Change::Preview(new_clip("dragged")) });
+    app.update();
+}
+
+/// Ends a drag with a step that is undone in the same frame.
+pub fn undo_meanwhile(app: &mut App, rig: Entity, step: Operation) {
+    for change in [Change::Do(step), Change::Undo] {
+        app.world_mut().write_message(EditRequest { rig, change });
+    }
+    app.update();
 }
 
 /// An app with one rig.

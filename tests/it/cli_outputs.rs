@@ -65,6 +65,15 @@ fn images_of_a_model_replace_no_photographs() {
 }
 
 #[test]
+fn weights_are_saved_beside_a_character_that_is_there() {
+    let folder = folder();
+    let before = contents(folder.path());
+    let args = ["skin", "a.rig", "b.obj", "-o", "missing/c.glb", "--save-weights", "c.skin"];
+    let (code, said) = rigsmith(folder.path(), &args);
+    assert_eq!((code, contents(folder.path())), (1, before), "{said}");
+}
+
+#[test]
 fn an_input_is_no_output() {
     let folder = folder();
     let run = |args: &[&str]| rigsmith(folder.path(), args);

@@ -27,7 +27,11 @@ use rigsmith::{
     rig::{NodeKind, Rig, Uid, operations::Operation},
 };
 
-use crate::{bench::wait, heads, prerequisites::test_data};
+use crate::{
+    bench::{begin_drag, new_clip, undo_meanwhile, wait},
+    heads,
+    prerequisites::test_data,
+};
 
 /// A file of the test data; `None`, with a word, where there is none.
 fn data(name: &str) -> Option<Model> {
@@ -313,15 +317,48 @@ fn bad_meshes_are_told_in_words() {
     }
 }
 
+/// The entity of the mesh.
+fn mesh_of(bench: &mut Workbench) -> Entity {
+    let world = bench.app_mut().world_mut();
+    world.query_filtered::<Entity, With<RigMesh>>().single(world).unwrap()
+}
+
+#[test]
+fn a_face_waits_for_steps_that_were_undone_while_it_was_placed() {
+    let mut bench = bench(bundled("head.obj"));
+    let (mesh, rig) = (mesh_of(&mut bench), bench.rig_entity());
+    let app = bench.app_mut();
+    let waits = |app: &App| app.world().get::<FaceJob>(mesh).is_some_and(FaceJob::waits);
+    let waiting = |app: &mut App, step: &str| {
+        begin_drag(app, rig);
+        app.world_mut().write_message(FaceRequest { mesh, settings: settings(24), fit: None });
+        wait(app, "the face", App::update, waits);
+        undo_meanwhile(app, rig, new_clip(step));
+        (0..3).for_each(|_| app.update());
+        let history = app.world().get::<RigHistory>(rig).unwrap();
+        assert!(waits(app) && history.can_redo() && app.world().get::<Rig>(rig).unwrap().is_empty());
+    };
+    let redo = |app: &mut App| {
+        app.world_mut().write_message(EditRequest { rig, change: Change::Redo });
+        wait(app, "the end of the job", App::update, |app| app.world().get::<FaceJob>(mesh).is_none());
+        (0..2).for_each(|_| app.update());
+    };
+    // It can be dropped, and the step can be redone.
+    waiting(app, "wave");
+    app.world().get::<FaceJob>(mesh).unwrap().cancel();
+    redo(app);
+    assert!(app.world().get::<Rig>(rig).unwrap().is_empty());
+    // After a redo it lands.
+    waiting(app, "run");
+    redo(app);
+    assert_eq!(bench.rig().clips().len(), 2);
+    assert!(!bench.rig().is_empty());
+}
+
 #[test]
 fn placing_can_be_cancelled() {
     let mut bench = bench(bundled("head.obj"));
-    let mesh = bench
-        .app_mut()
-        .world_mut()
-        .query_filtered::<Entity, With<rigsmith::plugins::surface::RigMesh>>()
-        .single(bench.app_mut().world_mut())
-        .unwrap();
+    let mesh = mesh_of(&mut bench);
     let before = bench.rig().clone();
     let app = bench.app_mut();
     app.world_mut().write_message(FaceRequest { mesh, settings: settings(60), fit: None });

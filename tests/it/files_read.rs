@@ -11,6 +11,8 @@ use rigsmith::files::{
 };
 use tempfile::{TempDir, tempdir};
 
+use crate::disks::only_read;
+
 fn fresh() -> TempDir {
     tempdir().unwrap()
 }
@@ -72,30 +74,7 @@ impl Disk for LyingDisk {
             false => RealDisk.open(path),
         }
     }
-    fn read_link(&self, _: &Path) -> io::Result<PathBuf> {
-        unreachable!()
-    }
-    fn canonical(&self, _: &Path) -> io::Result<PathBuf> {
-        unreachable!()
-    }
-    fn create(&self, _: &Path) -> io::Result<Box<dyn DiskFile>> {
-        unreachable!()
-    }
-    fn rename(&self, _: &Path, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn hard_link(&self, _: &Path, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn sync_folder(&self, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn remove(&self, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn create_folder(&self, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
+    only_read!();
 }
 
 #[test]

@@ -23,7 +23,7 @@ use rigsmith::{
 };
 use tempfile::TempDir;
 
-use crate::files_faults::plans;
+use crate::{disks::as_on_the_disk, files_faults::plans};
 
 /// A set of each kind that Rigsmith saves, in versions that can be told apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -373,39 +373,13 @@ impl DiskFile for DecayingFile {
 }
 
 impl Disk for PassThroughDisk {
-    fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
-        RealDisk.entry(path, follow)
-    }
-    fn read_link(&self, path: &Path) -> io::Result<PathBuf> {
-        RealDisk.read_link(path)
-    }
-    fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
-        RealDisk.canonical(path)
-    }
-    fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
-        RealDisk.list(folder, limit)
-    }
+    as_on_the_disk!();
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
         let file = RealDisk.create(path)?;
         Ok(if self.decays { Box::new(DecayingFile(file)) } else { file })
     }
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        RealDisk.rename(from, to)
-    }
     fn hard_link(&self, existing: &Path, path: &Path) -> io::Result<()> {
         if self.hard_links { RealDisk.hard_link(existing, path) } else { Err(io::ErrorKind::Unsupported.into()) }
-    }
-    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-        RealDisk.sync_folder(folder)
-    }
-    fn remove(&self, path: &Path) -> io::Result<()> {
-        RealDisk.remove(path)
-    }
-    fn create_folder(&self, path: &Path) -> io::Result<()> {
-        RealDisk.create_folder(path)
-    }
-    fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>> {
-        RealDisk.open(path)
     }
 }
 

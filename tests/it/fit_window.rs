@@ -31,7 +31,6 @@ use rigsmith::{
         fit::{FitJob, FitMarkers, FitRegion, FitRequest, FitTemplate, FittedRig},
         history::RigHistory,
         surface::RigMesh,
-        viewport::{RigViewport, Sight},
     },
     prelude::*,
     rig::{SkinData, template::write_template},
@@ -39,11 +38,10 @@ use rigsmith::{
 };
 
 use super::panels::desk::{Desk, Sheet};
-
-const MESH: Uid = Uid(99);
-const PLAIN: ModifierKeys = ModifierKeys { shift: false, control: false, alt: false };
-const SHIFT: ModifierKeys = ModifierKeys { shift: true, ..PLAIN };
-const CONTROL: ModifierKeys = ModifierKeys { control: true, ..PLAIN };
+use crate::{
+    bench::{begin_drag, new_clip, undo_meanwhile},
+    viewport_app::{CONTROL, MESH, PLAIN, SHIFT, front},
+};
 
 /// Notices and actions of a window.
 #[derive(Resource, Default)]
@@ -55,13 +53,6 @@ struct Told {
 fn collect(mut told: ResMut<Told>, mut notices: MessageReader<Notice>, mut actions: MessageReader<ActionRequest>) {
     told.notices.extend(notices.read().map(|notice| notice.text.clone()));
     told.actions.extend(actions.read().map(|action| action.0));
-}
-
-fn front() -> Sight {
-    let camera = Transform::from_xyz(0.0, 0.9, 4.0).looking_at(Vec3::Y * 0.9, Vec3::Y);
-    let projection = Projection::Perspective(PerspectiveProjection { fov: 0.55, ..default() });
-    let viewport = RigViewport { focus: 4.0 };
-    Sight::new(&camera.into(), &projection, &viewport, Vec2::splat(800.0), &GlobalTransform::IDENTITY).unwrap()
 }
 
 fn body() -> Model {
@@ -257,6 +248,35 @@ fn undo_and_redo_of_a_fit_keep_what_a_drag_needs() {
     assert_eq!(window.steps(), steps + 2, "the drag is followed");
     assert!(window.at("foot_r").distance(shin) < 0.1);
     assert!(window.at("forearm_l").distance(place) > 0.01, "of the undone correction nothing comes back");
+}
+
+#[test]
+fn a_fit_waits_for_steps_that_were_undone_while_it_ran() {
+    let mut window = Window::new(body());
+    let rig = window.desk.rig;
+    let job = |window: &Window| window.world().get::<FitJob>(window.mesh).map(FitJob::waits);
+    let waiting = |window: &mut Window, step: &str| {
+        begin_drag(&mut window.desk.app, rig);
+        window.act(Action::Fit);
+        window.until(|window| job(window) == Some(true));
+        undo_meanwhile(&mut window.desk.app, rig, new_clip(step));
+        window.desk.frames(3);
+        assert!(window.rig().is_empty() && job(window) == Some(true));
+    };
+    // Esc drops it, and the step can be redone.
+    waiting(&mut window, "wave");
+    window.act(Action::Cancel);
+    window.settle();
+    window.says("The fit was cancelled");
+    window.change(Change::Redo);
+    assert!(window.rig().is_empty());
+    assert_eq!((window.rig().clips().len(), window.steps()), (1, 1));
+    // After the redo it lands.
+    waiting(&mut window, "run");
+    window.change(Change::Redo);
+    window.settle();
+    assert!(!window.rig().is_empty());
+    assert_eq!((window.rig().clips().len(), window.steps()), (2, 3));
 }
 
 #[test]

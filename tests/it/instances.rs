@@ -3,6 +3,7 @@
 mod clips;
 mod meshes;
 mod reloads;
+mod work;
 
 use std::{
     collections::BTreeMap,

@@ -8,7 +8,12 @@ mod places;
 mod trouble;
 mod weights;
 
-use std::{fs, path::Path, sync::Arc, time::Duration};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
 
 use bevy::prelude::*;
 use proptest::prelude::*;
@@ -459,15 +464,18 @@ fn recovered_work_is_safe_from_the_next_crash() {
     }
 }
 
+/// A journal apart from projects, in which two joints were placed before its process ended: its bytes and its path.
+fn of_two_joints(folder: &Path) -> (Vec<u8>, PathBuf) {
+    let mut desk = Desk::apart(folder);
+    desk.place(1);
+    desk.place(2);
+    (desk.bytes(), desk.journal.path().unwrap())
+}
+
 #[test]
 fn what_could_not_be_replayed_is_kept() {
     let folder = fresh();
-    let mut desk = Desk::apart(folder.path());
-    desk.place(1);
-    desk.place(2);
-    let bytes = desk.bytes();
-    let path = desk.journal.path().unwrap();
-    drop(desk);
+    let (bytes, path) = of_two_joints(folder.path());
     let recovered = recover(&bytes).unwrap();
     // The rig has the second joint already.
     let mut other = recovered.base().unwrap().clone();

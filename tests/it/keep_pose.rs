@@ -165,7 +165,7 @@ fn reparent(rig: &mut Rig, joint: Uid, parent: Uid) {
 }
 
 /// Turns a joint's axes; what hangs on it stays where it is.
-fn flip(rig: &mut Rig, label: &str, turn: Quat) {
+pub fn flip(rig: &mut Rig, label: &str, turn: Quat) {
     let joint = rig.find_label(label).unwrap();
     let children: Vec<_> = rig.children(Some(joint)).iter().map(|child| (*child, rig.rest_global(*child))).collect();
     let mut rest = rig.joint(joint).unwrap().data.rest;

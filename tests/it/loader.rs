@@ -1,5 +1,7 @@
 //! The Loader panel, the Part menu and the library behind them: templates found, loaded, merged, injected, dropped and written.
 
+mod landing;
+
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -614,6 +616,18 @@ fn a_template_is_written_with_its_header_and_a_picture() {
     // Undo of the header's steps gives the rig of before.
     (0..4).for_each(|_| studio.change(Change::Undo));
     assert_eq!(studio.desk.rig().about().author, "");
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_leaves_neither_a_file_nor_its_name() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let (picture, path) = (studio.site.join("hero.png"), studio.site.join("hero.rig.ron"));
+    fs::create_dir(&picture).unwrap();
+    let (before, done) = (studio.desk.rig().clone(), studio.desk.steps().1);
+    studio.send(SaveTemplate { path: path.clone(), replace: true, content: Written::Rig { picture: true } });
+    assert!(studio.told("Could not write hero.rig.ron"), "{:?}", studio.desk.told());
+    assert!(picture.is_dir() && !path.exists());
+    assert_eq!((studio.desk.rig(), studio.desk.steps().1), (&before, done), "the header is as before");
 }
 
 #[test]

@@ -34,6 +34,7 @@ mod clip_files;
 mod commands;
 mod control_sizes;
 mod custom_module;
+mod disks;
 #[cfg(feature = "draw")]
 mod display;
 #[cfg(feature = "draw")]
@@ -178,6 +179,8 @@ mod transfer;
 mod update;
 #[cfg(feature = "editor")]
 mod updater;
+#[cfg(feature = "editor")]
+mod viewport_app;
 mod voxels;
 #[cfg(feature = "cli")]
 mod vrm;

@@ -10,6 +10,8 @@ use std::{
 
 use rigsmith::files::{Disk, DiskFile, Entry, LOOK, PartFiles, RealDisk, SearchPaths, TemplateWatch};
 
+use crate::disks::only_read;
+
 /// A disk whose files seem to stay as they are; it can only be read. It counts the files that are opened.
 #[derive(Default)]
 struct MuteDisk {
@@ -27,30 +29,7 @@ impl Disk for MuteDisk {
         self.opened.fetch_add(1, Ordering::Relaxed);
         RealDisk.open(path)
     }
-    fn read_link(&self, _: &Path) -> io::Result<PathBuf> {
-        unreachable!()
-    }
-    fn canonical(&self, _: &Path) -> io::Result<PathBuf> {
-        unreachable!()
-    }
-    fn create(&self, _: &Path) -> io::Result<Box<dyn DiskFile>> {
-        unreachable!()
-    }
-    fn rename(&self, _: &Path, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn hard_link(&self, _: &Path, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn sync_folder(&self, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn remove(&self, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn create_folder(&self, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
+    only_read!();
 }
 
 const TEMPLATE: &str =

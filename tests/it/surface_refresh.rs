@@ -16,13 +16,16 @@ use rigsmith::{
         skinning::skin_points,
         surface::Surface,
     },
-    plugins::document::{HoveredNode, JointEntities},
+    plugins::{
+        document::{HoveredNode, JointEntities},
+        stroke::StrokeFailure,
+    },
     prelude::*,
     rig::SkinData,
 };
 
 use crate::{
-    bench::{HANG, RigBench},
+    bench::{HANG, RigBench, new_clip, undo_meanwhile},
     gestures::boxes,
 };
 
@@ -329,26 +332,52 @@ fn requests_wait_for_the_surface_and_hovering_does_not() {
     assert!(bench.messages::<PlaceAnswer>().is_empty());
 }
 
-#[test]
-fn strokes_are_followed_in_the_background_one_after_another() {
-    let mut bench = RigBench::biped();
-    let rig = bench.rig;
-    let surface = bench.surface().unwrap().shared().unwrap();
+/// A stroke along the left arm.
+fn along_arm(bench: &RigBench) -> StrokeRequest {
     let plane = ViewPlane::orthographic(View::Front, bench.surface().unwrap().bounds());
-    let (shoulder, hand) =
-        (bench.rig().position(bench.labelled("upper_arm_l")), bench.rig().position(bench.labelled("hand_l")));
-    let points: Vec<Vec2> = (0..=40).map(|i| shoulder.lerp(hand, i as f32 / 40.0).truncate()).collect();
-    let request = StrokeRequest {
-        rig,
+    let [shoulder, hand] = ["upper_arm_l", "hand_l"].map(|label| bench.rig().position(bench.labelled(label)));
+    StrokeRequest {
+        rig: bench.rig,
         plane,
-        points: points.clone(),
+        points: (0..=40).map(|i| shoulder.lerp(hand, i as f32 / 40.0).truncate()).collect(),
         choice: ChainChoice::Joints(3),
         settings: StrokeSettings::default(),
         chain_only: true,
         reach: 0.0,
         parent: StrokeParent::default(),
         chain: None,
-    };
+    }
+}
+
+#[test]
+fn a_stroke_does_not_cut_off_steps_that_were_undone_while_it_was_followed() {
+    let mut bench = RigBench::biped();
+    let request = along_arm(&bench);
+    let before = bench.rig().clone();
+    bench.messages::<StrokeDone>();
+    // The mesh has far too many triangles to follow a stroke in the frame that asks for it.
+    bench.app.world_mut().write_message(request.clone());
+    undo_meanwhile(&mut bench.app, bench.rig, new_clip("wave"));
+    bench.wait("the answer", |bench| !bench.app.world().resource::<Messages<StrokeDone>>().is_empty());
+    let done = bench.messages::<StrokeDone>().remove(0).result;
+    assert!(matches!(done, StrokeResult::Nothing(StrokeFailure::Undone)), "{done:?}");
+    assert_eq!(*bench.rig(), before);
+    bench.change(Change::Redo);
+    assert_eq!(bench.rig().clips().len(), before.clips().len() + 1);
+    // Drawn again, it is no different from any other.
+    bench.app.world_mut().write_message(request);
+    bench.wait("the answer", |bench| !bench.app.world().resource::<Messages<StrokeDone>>().is_empty());
+    let done = bench.messages::<StrokeDone>().remove(0).result;
+    assert!(matches!(done, StrokeResult::Chain { .. }), "{done:?}");
+}
+
+#[test]
+fn strokes_are_followed_in_the_background_one_after_another() {
+    let mut bench = RigBench::biped();
+    let rig = bench.rig;
+    let surface = bench.surface().unwrap().shared().unwrap();
+    let request = along_arm(&bench);
+    let (plane, points) = (request.plane, request.points.clone());
     let expected = stroke_chain(&surface, &plane, &points, request.settings, request.choice).unwrap();
     let before = bench.rig().len();
     bench.messages::<StrokeDone>();

@@ -4,24 +4,18 @@ use bevy::prelude::*;
 use rigsmith::{
     algo::placement::Placement,
     editor::{
-        ActiveRig,
         actions::{Action, ActionRequest},
         camera::ViewportSight,
         mode::Mode,
         notice::{Notice, StatusLine},
         pointer::{ModifierKeys, PointerAct, ViewportPointer, WheelUse},
         tools::{
-            ToolsPlugin,
             place::PlaceTool,
             select::SelectTool,
             stroke::{StrokeState, StrokeTool, StrokeTune},
         },
     },
-    headless::headless_app,
-    mesh::{
-        model::Weights,
-        obj::{ObjSettings, read_model},
-    },
+    mesh::model::Weights,
     plugins::{
         display::{MeshDisplay, WeightColors},
         document::HoveredNode,
@@ -31,63 +25,40 @@ use rigsmith::{
     },
     prelude::*,
     rig::{PoseOffset, SkinData},
-    test_app::strict_app,
 };
 
-use crate::bench::wait;
+use crate::{
+    bench::wait,
+    viewport_app::{CONTROL, DROPPED, PLAIN, SHIFT, front, open_body, tools_app},
+};
 
 struct Bench {
     app: App,
     rig: Entity,
 }
 
-const PLAIN: ModifierKeys = ModifierKeys { shift: false, control: false, alt: false };
-const SHIFT: ModifierKeys = ModifierKeys { shift: true, ..PLAIN };
-const CONTROL: ModifierKeys = ModifierKeys { control: true, ..PLAIN };
 const CLICKED: PointerAct = PointerAct::Released { dragged: false, count: 1 };
-const DROPPED: PointerAct = PointerAct::Released { dragged: true, count: 1 };
-
-fn sight(from: Vec3, to: Vec3, orthographic: bool) -> Sight {
-    let camera = GlobalTransform::from(Transform::from_translation(from).looking_at(to, Vec3::Y));
-    let viewport = RigViewport { focus: from.distance(to) };
-    let projection = if orthographic {
-        let mut flat = OrthographicProjection::default_3d();
-        flat.area = Rect::from_center_half_size(Vec2::ZERO, Vec2::splat(1.1));
-        Projection::Orthographic(flat)
-    } else {
-        Projection::Perspective(PerspectiveProjection { fov: 0.55, ..default() })
-    };
-    Sight::new(&camera, &projection, &viewport, Vec2::splat(800.0), &GlobalTransform::IDENTITY).unwrap()
-}
-
-fn front() -> Sight {
-    sight(Vec3::new(0.0, 0.9, 4.0), Vec3::new(0.0, 0.9, 0.0), false)
-}
 
 /// From the character's left, without perspective.
 fn left() -> Sight {
-    sight(Vec3::new(4.0, 0.9, 0.0), Vec3::new(0.0, 0.9, 0.0), true)
+    let camera = Transform::from_xyz(4.0, 0.9, 0.0).looking_at(Vec3::Y * 0.9, Vec3::Y);
+    let mut flat = OrthographicProjection::default_3d();
+    flat.area = Rect::from_center_half_size(Vec2::ZERO, Vec2::splat(1.1));
+    let (projection, viewport) = (Projection::Orthographic(flat), RigViewport { focus: 4.0 });
+    Sight::new(&camera.into(), &projection, &viewport, Vec2::splat(800.0), &GlobalTransform::IDENTITY).unwrap()
 }
 
 impl Bench {
     /// The bundled character without joints, seen from the front.
     fn new(mode: Mode) -> Self {
         let mut bench = Self::empty(mode);
-        let text = std::fs::read("assets/models/biped.obj").unwrap();
-        let model = read_model(text.as_slice(), "biped", &ObjSettings::default(), &mut |_| None).unwrap();
-        bench.app.world_mut().spawn((RigMesh::new(Uid(99), model, Vec::new()), SkinOf(bench.rig)));
-        bench.wait("the surface", |bench| {
-            bench.app.world().get::<RigSurface>(bench.rig).is_some_and(|surface| surface.ready().is_some())
-        });
+        open_body(&mut bench.app, bench.rig);
         bench
     }
 
     fn empty(mode: Mode) -> Self {
-        let mut app = headless_app(1);
-        app.add_plugins(ToolsPlugin);
-        let mut app = strict_app(app);
-        let rig = app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
-        app.insert_resource(ActiveRig(rig)).insert_resource(mode).insert_resource(ViewportSight(Some(front())));
+        let (mut app, rig) = tools_app();
+        app.insert_resource(mode);
         app.update();
         Self { app, rig }
     }

@@ -26,7 +26,10 @@ use rigsmith::{
     rig::{EditError, PatchFault, SkinData, WeightPatch, skin::skin_data_bytes, weight_edit},
 };
 
-use crate::{bench::RigBench, gestures::boxes};
+use crate::{
+    bench::{RigBench, begin_drag, undo_meanwhile},
+    gestures::boxes,
+};
 
 const MESH: Uid = Uid(0x50);
 
@@ -615,12 +618,12 @@ fn single_weights_and_strokes_become_edits_of_their_points() {
     assert_eq!(bench.rig(), &rig);
 }
 
-/// Makes a step that can be redone, asks for something, and waits until its result waits for that step.
+/// Asks for something, makes and undoes a step before it lands, and waits until its result waits for that step.
 fn held<M: Message>(bench: &mut RigBench, undone: Operation, request: M) {
-    bench.edit(undone);
-    bench.change(Change::Undo);
     bench.messages::<ResultHeld>();
+    begin_drag(&mut bench.app, bench.rig);
     bench.send(request);
+    undo_meanwhile(&mut bench.app, bench.rig, undone);
     bench.wait("the word that the result waits", |bench| {
         !bench.app.world().resource::<Messages<ResultHeld>>().is_empty()
     });
@@ -650,6 +653,7 @@ fn weights_that_were_painted_meanwhile_are_not_replaced_by_computed_ones() {
     assert_eq!(*bench.rig(), painted, "the stroke stays");
     // Weights that are there again are the same.
     bench.change(Change::Undo);
+    begin_drag(&mut bench.app, bench.rig);
     bench.send(BindRequest::new(one));
     bench.change(Change::Redo);
     assert_eq!(answer(&mut bench), Err(SkinningError::Changed), "computed for the weights before the stroke");
@@ -672,6 +676,21 @@ fn computed_weights_that_wait_can_be_dropped() {
     bench.change(Change::Redo);
     bench.change(Change::Undo);
     assert_eq!(*bench.rig(), before);
+}
+
+/// What was undone before a person asked goes with the result, as with any other edit.
+#[test]
+fn weights_that_are_asked_for_after_an_undo_do_not_wait_for_it() {
+    let (mut bench, [one, other], joints) = app();
+    bench.edit(posed(joints[0]));
+    bench.change(Change::Undo);
+    bench.send(BindRequest::new(other));
+    bench.wait("the weights", |bench| bench.rig().skin(Uid(0x51)).is_some());
+    assert!(!bench.get::<RigHistory>(bench.rig).unwrap().can_redo());
+    bench.edit(posed(joints[0]));
+    bench.change(Change::Undo);
+    assert_eq!(change(&mut bench, one, WeightChange::Normalise), Ok(8));
+    assert!(bench.messages::<ResultHeld>().is_empty());
 }
 
 #[test]

@@ -1,63 +1,43 @@
 //! The paint tool without a window: strokes under the pointer become one step each, or are refused with the reason.
 
-use std::{fs, sync::Arc};
+use std::sync::Arc;
 
 use bevy::prelude::*;
 use rigsmith::{
     algo::paint::{BrushMode, BrushReach},
     editor::{
-        ActiveRig,
         actions::{Action, ActionRequest},
-        camera::ViewportSight,
         keys::KeyBindings,
         mode::Mode,
         notice::{Notice, StatusLine},
         pointer::{ModifierKeys, PointerAct, ViewportPointer},
-        tools::{
-            ToolsPlugin,
-            paint::{
-                PaintTool, SelectedPoints,
-                brush::{BrushAction, PaintBrush},
-            },
+        tools::paint::{
+            PaintTool, SelectedPoints,
+            brush::{BrushAction, PaintBrush},
         },
     },
-    headless::headless_app,
-    mesh::{
-        model::Weights,
-        obj::{ObjSettings, read_model},
-    },
+    mesh::model::Weights,
     plugins::{
         display::{MeshDisplay, WeightColors},
         history::RigHistory,
         painting::PaintCanvas,
-        viewport::{RigViewport, Sight},
     },
     prelude::*,
     rig::{SkinData, skin::skin_data_bytes},
-    test_app::strict_app,
 };
 
-use crate::bench::wait;
+use crate::{
+    bench::wait,
+    viewport_app::{CONTROL, DROPPED, MESH, PLAIN, SHIFT, front, open_body, tools_app},
+};
 
-const MESH: Uid = Uid(99);
-const PLAIN: ModifierKeys = ModifierKeys { shift: false, control: false, alt: false };
-const SHIFT: ModifierKeys = ModifierKeys { shift: true, ..PLAIN };
-const CONTROL: ModifierKeys = ModifierKeys { control: true, ..PLAIN };
 const BOTH: ModifierKeys = ModifierKeys { shift: true, ..CONTROL };
-const DROPPED: PointerAct = PointerAct::Released { dragged: true, count: 1 };
 
 struct Bench {
     app: App,
     rig: Entity,
     mesh: Entity,
     joints: Vec<Uid>,
-}
-
-fn front() -> Sight {
-    let camera = Transform::from_xyz(0.0, 0.9, 4.0).looking_at(Vec3::Y * 0.9, Vec3::Y);
-    let projection = Projection::Perspective(PerspectiveProjection { fov: 0.55, ..default() });
-    let viewport = RigViewport { focus: 4.0 };
-    Sight::new(&camera.into(), &projection, &viewport, Vec2::splat(800.0), &GlobalTransform::IDENTITY).unwrap()
 }
 
 impl Bench {
@@ -76,18 +56,9 @@ impl Bench {
     }
 
     fn without_weights() -> Self {
-        let mut app = headless_app(1);
-        app.add_plugins(ToolsPlugin);
-        let mut app = strict_app(app);
-        let rig = app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
-        app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(front())));
-        let text = fs::read("assets/models/biped.obj").unwrap();
-        let model = read_model(text.as_slice(), "biped", &ObjSettings::default(), &mut |_| None).unwrap();
-        let mesh = app.world_mut().spawn((RigMesh::new(MESH, model, Vec::new()), SkinOf(rig))).id();
+        let (mut app, rig) = tools_app();
+        let mesh = open_body(&mut app, rig);
         let mut bench = Self { app, rig, mesh, joints: Vec::new() };
-        bench.wait("the surface", |bench| {
-            bench.app.world().get::<RigSurface>(bench.rig).is_some_and(|surface| surface.ready().is_some())
-        });
         let chain = |places: [[f32; 3]; 3], parent| Operation::Chain {
             positions: places.into_iter().map(Vec3::from).collect(),
             parent,

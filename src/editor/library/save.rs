@@ -20,11 +20,15 @@ use crate::{
     },
     files::{FileKind, RealDisk, SaveError, StoreError, save_atomic, stem, store_rig},
     instance::RigSource,
-    plugins::document::EditRequest,
+    plugins::{
+        document::{Change, EditRequest},
+        history::RigHistory,
+    },
     rig::{
         EditError, Rig, RigAbout, RigEdit, Uid,
         extract::{Extraction, extract},
         operations::Operation,
+        step::Step,
     },
 };
 
@@ -118,6 +122,8 @@ impl TemplateSave {
 
 struct Job {
     name: String,
+    /// The rig whose header got the name of the picture for it.
+    named: Option<(Entity, String)>,
     task: Task<Result<Saved, SaveFailure>>,
 }
 
@@ -148,6 +154,7 @@ fn begin(world: &mut World, SaveTemplate { path, replace, content }: SaveTemplat
     }
     let Some(entity) = world.get_resource::<ActiveRig>().map(|active| active.0) else { return };
     let Some(rig) = settled(world, entity) else { return };
+    let mut named = None;
     let task = match content {
         Written::Joints(joints) => AsyncComputeTaskPool::get().spawn(async move { write_joints(&path, &rig, &joints) }),
         Written::Rig { picture: false } => {
@@ -167,6 +174,7 @@ fn begin(world: &mut World, SaveTemplate { path, replace, content }: SaveTemplat
             if !is_named {
                 let about = RigAbout { preview: Some(file.clone()), ..rig.about().clone() };
                 world.write_message(header_edit(entity, about));
+                named = Some((entity, file.clone()));
             }
             AsyncComputeTaskPool::get().spawn(async move {
                 save_atomic(&RealDisk, &path.with_file_name(file), &preview.png()?)?;
@@ -174,7 +182,7 @@ fn begin(world: &mut World, SaveTemplate { path, replace, content }: SaveTemplat
             })
         }
     };
-    world.resource_mut::<TemplateSave>().job = Some(Job { name, task });
+    world.resource_mut::<TemplateSave>().job = Some(Job { name, named, task });
 }
 
 /// File of the template that is open. One that was only loaded onto the rig is another's.
@@ -228,22 +236,37 @@ fn write_joints(path: &Path, rig: &Rig, joints: &[Uid]) -> Result<Saved, SaveFai
 }
 
 /// Goes on with what is being written.
-pub(super) fn go_on(mut save: ResMut<TemplateSave>, mut commands: Commands) {
+pub(super) fn go_on(mut save: ResMut<TemplateSave>, histories: Query<&RigHistory>, mut commands: Commands) {
     let save = save.bypass_change_detection();
     let Some(job) = &mut save.job else { return };
     commands.write_message(RequestRedraw);
     let Some(result) = check_ready(&mut job.task) else { return };
-    let Some(Job { name, .. }) = save.job.take() else { return };
+    let Some(Job { name, named, .. }) = save.job.take() else { return };
     match result {
-        Ok(Saved::Picture(path)) => commands.write_message(ExportRequest(path)),
+        Ok(Saved::Picture(path)) => {
+            commands.write_message(ExportRequest(path));
+        }
         Ok(Saved::Joints(count, notes)) => {
             let joints = if count == 1 { "1 joint".to_owned() } else { format!("{count} joints") };
             commands.write_message(Notice::done(format!("Wrote {name}: {joints}")));
             for note in notes {
                 commands.write_message(Notice::warning(note));
             }
-            commands.write_message(ListTemplates)
+            commands.write_message(ListTemplates);
         }
-        Err(error) => commands.write_message(Notice::error(format!("Could not write {name}: {error}"))),
-    };
+        Err(error) => {
+            commands.write_message(Notice::error(format!("Could not write {name}: {error}")));
+            // The header names no picture that is not there.
+            if let Some((rig, file)) = named
+                && histories.get(rig).ok().and_then(RigHistory::last).is_some_and(|step| names_picture(step, &file))
+            {
+                commands.write_message(EditRequest { rig, change: Change::Undo });
+            }
+        }
+    }
+}
+
+/// True if a step gives a header the name of a picture, and nothing else.
+fn names_picture(step: &Step, file: &str) -> bool {
+    matches!(&step.forward[..], [RigEdit::SetAbout(about)] if about.preview.as_deref() == Some(file))
 }

@@ -27,6 +27,7 @@ use crate::{
         commands::RigModules,
         document::EditRequest,
         history::RigHistory,
+        landing::{HeldResult, JobOutcome, Landing},
         surface::{RigMesh, RigMeshes},
     },
     processor::{Modules, keep_clips, keep_poses},
@@ -34,7 +35,6 @@ use crate::{
         EditError, Rig, RigEdit, Uid,
         operations::{Operation, TagOperation},
         part::{Part, PartError},
-        step::Step,
         template::Template,
         update::{Take, clip_edits, edits_between, pose_edits, update, with_identities},
     },
@@ -112,9 +112,15 @@ pub struct LibraryJobs {
 struct Job {
     request: LibraryRequest,
     rig: Entity,
-    /// Last step and number of undone steps of the rig that the work started from.
-    from: (Option<Arc<Step>>, usize),
-    task: Task<Result<Ready, WorkError>>,
+    landing: Landing,
+    work: Work,
+}
+
+/// Work of a job.
+enum Work {
+    Runs(Task<Result<Ready, WorkError>>),
+    /// Finished work that waits to be put onto the rig.
+    Waits(Ready),
 }
 
 /// Finished work.
@@ -128,7 +134,14 @@ enum Ready {
 impl LibraryJobs {
     /// Name of the template that is being read.
     pub fn what(&self) -> Option<String> {
-        self.job.as_ref().map(|job| job.request.place.stem())
+        let running = self.job.as_ref().filter(|job| matches!(job.work, Work::Runs(_)));
+        running.map(|job| job.request.place.stem())
+    }
+
+    /// Name of the template that is read, but waits, because using it would discard steps that can be redone.
+    pub fn waits(&self) -> Option<String> {
+        let waiting = self.job.as_ref().filter(|job| matches!(job.work, Work::Waits(_)));
+        waiting.map(|job| job.request.place.stem())
     }
 }
 
@@ -150,6 +163,13 @@ pub(super) fn start(
 ) {
     let jobs = jobs.bypass_change_detection();
     jobs.waiting.extend(requests.read().cloned());
+    // What waits for a redo would else be in the way of all that is asked for after it.
+    if !jobs.waiting.is_empty()
+        && let Some(dropped) = jobs.job.take_if(|job| matches!(job.work, Work::Waits(_)))
+    {
+        let name = dropped.request.place.stem();
+        commands.write_message(Notice::info(format!("{name} is not used: another was asked for while it waited")));
+    }
     if jobs.job.is_none()
         && let Some(request) = jobs.waiting.pop_front()
     {
@@ -164,18 +184,17 @@ fn begin(world: &mut World, request: LibraryRequest) {
         return;
     };
     let (Some(data), Some(modules)) = (settled(world, rig), world.get_resource::<RigModules>()) else { return };
-    let history = world.get::<RigHistory>(rig);
+    let Some(history) = world.get::<RigHistory>(rig) else { return };
     let snapshot = Snapshot {
         rig: data,
         modules: modules.0.clone(),
         folders: world.get_resource::<LibraryFolders>().cloned().unwrap_or_default(),
         beside: world.get::<OpenDocument>(rig).and_then(own_folder),
-        stroke: added_by(history.and_then(RigHistory::last).map(Arc::as_ref)),
+        stroke: added_by(history.last().map(Arc::as_ref)),
     };
-    let from = history.map(|history| (history.last().cloned(), history.undone())).unwrap_or_default();
-    let work = request.clone();
-    let task = AsyncComputeTaskPool::get().spawn(async move { snapshot.run(&work) });
-    world.resource_mut::<LibraryJobs>().job = Some(Job { request, rig, from, task });
+    let (landing, asked) = (Landing::asked(history), request.clone());
+    let work = Work::Runs(AsyncComputeTaskPool::get().spawn(async move { snapshot.run(&asked) }));
+    world.resource_mut::<LibraryJobs>().job = Some(Job { request, rig, landing, work });
     world.write_message(RequestRedraw);
 }
 
@@ -246,12 +265,24 @@ fn merging(template: Template, parent: Option<Uid>) -> Operation {
 /// Takes over finished work.
 pub(super) fn land(mut jobs: ResMut<LibraryJobs>, mut commands: Commands) {
     let jobs = jobs.bypass_change_detection();
-    let Some(job) = &mut jobs.job else { return };
-    commands.write_message(RequestRedraw);
-    let Some(result) = check_ready(&mut job.task) else { return };
-    let Some(Job { request, rig, from, .. }) = jobs.job.take() else { return };
+    let Some(mut job) = jobs.job.take() else { return };
+    let result = match job.work {
+        Work::Waits(ready) => Ok(ready),
+        Work::Runs(mut task) => {
+            commands.write_message(RequestRedraw);
+            match check_ready(&mut task) {
+                Some(result) => result,
+                None => {
+                    job.work = Work::Runs(task);
+                    jobs.job = Some(job);
+                    return;
+                }
+            }
+        }
+    };
+    let Job { request, rig, landing, .. } = job;
     commands.queue(move |world: &mut World| match result {
-        Ok(ready) => put(world, rig, request, &from, ready),
+        Ok(ready) => put(world, rig, request, landing, ready),
         Err(error) => {
             let name = request.place.stem();
             world.write_message(Notice::error(format!("{name} is not used: {error}")));
@@ -259,11 +290,30 @@ pub(super) fn land(mut jobs: ResMut<LibraryJobs>, mut commands: Commands) {
     });
 }
 
-fn put(world: &mut World, rig: Entity, request: LibraryRequest, from: &(Option<Arc<Step>>, usize), ready: Ready) {
+fn put(world: &mut World, rig: Entity, request: LibraryRequest, mut landing: Landing, ready: Ready) {
     let name = request.place.stem();
-    if world.get_resource::<ActiveRig>().is_none_or(|active| active.0 != rig) {
+    let history = world.get::<RigHistory>(rig);
+    let is_active = world.get_resource::<ActiveRig>().is_some_and(|active| active.0 == rig);
+    let Some(history) = history.filter(|_| is_active) else {
         world.write_message(Notice::info(format!("{name} is not used: another rig was opened meanwhile")));
         return;
+    };
+    let is_as_before = landing.is_as_at_start(history);
+    match landing.decide(history, || is_as_before) {
+        JobOutcome::Hold { is_news } => {
+            let mut jobs = world.resource_mut::<LibraryJobs>();
+            jobs.bypass_change_detection().job = Some(Job { request, rig, landing, work: Work::Waits(ready) });
+            if is_news {
+                world.write_message(Notice::warning(HeldResult::Template.sentence()));
+            }
+            return;
+        }
+        // The rig was edited while the template was read: the work begins anew.
+        JobOutcome::Drop => {
+            world.resource_mut::<LibraryJobs>().waiting.push_front(request);
+            return;
+        }
+        JobOutcome::Commit => {}
     }
     let (edits, base, notes) = match ready {
         Ready::Operation(operation) => {
@@ -272,19 +322,6 @@ fn put(world: &mut World, rig: Entity, request: LibraryRequest, from: &(Option<A
         }
         Ready::Load { edits, base, notes } => (edits, base, notes),
     };
-    let is_as_before = world.get::<RigHistory>(rig).is_some_and(|history| {
-        let is_same = match (history.last(), &from.0) {
-            (Some(now), Some(before)) => Arc::ptr_eq(now, before),
-            (None, None) => true,
-            _ => false,
-        };
-        is_same && history.undone() == from.1
-    });
-    if !is_as_before {
-        // The rig was edited while the template was read: the work begins anew.
-        world.resource_mut::<LibraryJobs>().waiting.push_front(request);
-        return;
-    }
     let is_fit = matches!(request.act, LibraryAct::Fit { .. });
     let mesh = if is_fit { body(world, rig) } else { None };
     if is_fit && mesh.is_none() {

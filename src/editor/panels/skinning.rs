@@ -152,10 +152,7 @@ fn tell_results(
 /// Sends a notice that a finished result waits, so that committing it discards no undone step.
 pub(super) fn tell_held(mut held: MessageReader<ResultHeld>, mut notices: MessageWriter<Notice>) {
     for ResultHeld { reason, .. } in held.read() {
-        let reason = reason.to_string();
-        let mut letters = reason.chars();
-        let first = letters.next().map(char::to_uppercase).into_iter().flatten();
-        notices.write(Notice::warning(format!("{}{}.", first.collect::<String>(), letters.as_str())));
+        notices.write(Notice::warning(reason.sentence()));
     }
 }
 

@@ -80,6 +80,7 @@ pub(super) fn run_built(
                 let runtime = runtime.bypass_change_detection();
                 let carry = Carry::between(runtime.state().program(), &program);
                 runtime.exchange(&program, &carry);
+                runtime.forget_driven();
                 runtime
             }
             None => {

@@ -31,7 +31,7 @@ use crate::{
     plugins::{
         document::EditRequest,
         history::RigHistory,
-        landing::{HeldResult, JobBasis, JobOutcome, ResultHeld, landing},
+        landing::{HeldResult, JobBasis, JobOutcome, Landing, ResultHeld},
         limits::{Deadline, RigLimits},
         surface::{RigMesh, SkinOf},
     },
@@ -47,6 +47,7 @@ pub struct FaceJob {
     task: Task<Result<JobResult, FaceError>>,
     /// The part of the document that the face is placed into.
     basis: JobBasis,
+    landing: Landing,
     /// A face that is finished and waits; see [`landing`](crate::plugins::landing).
     held: Option<JobResult>,
     deadline: Deadline,
@@ -131,13 +132,13 @@ pub(super) fn start(
     mut commands: Commands,
     mut requests: MessageReader<FaceRequest>,
     meshes: Query<(&RigMesh, &SkinOf, Option<&Face>)>,
-    rigs: Query<&Rig>,
+    rigs: Query<(&Rig, &RigHistory)>,
     (expressions, limits): (Res<FaceExpressions>, Res<RigLimits>),
     mut placed: MessageWriter<FacePlaced>,
 ) {
     for FaceRequest { mesh: entity, settings, fit } in requests.read() {
         let found = meshes.get(*entity).ok().and_then(|(mesh, of, face)| Some((mesh, rigs.get(of.0).ok()?, face)));
-        let Some((mesh, rig, face)) = found else {
+        let Some((mesh, (rig, history), face)) = found else {
             placed.write(FacePlaced { mesh: *entity, result: Err(PlaceFaceError::NoRig) });
             continue;
         };
@@ -145,7 +146,7 @@ pub(super) fn start(
             placed.write(FacePlaced { mesh: *entity, result: Err(error.into()) });
             continue;
         }
-        let basis = JobBasis::of(rig, mesh.uid);
+        let (basis, landing) = (JobBasis::of(rig, mesh.uid), Landing::asked(history));
         let ready = face.filter(|face| face.serves(&mesh.rest, settings)).map(|face| face.analysis.clone());
         let work = JobInput {
             rig: rig.clone(),
@@ -159,7 +160,8 @@ pub(super) fn start(
         let told = progress.clone();
         let task = AsyncComputeTaskPool::get().spawn(async move { work.run(&told) });
         let deadline = Deadline::new(&limits);
-        commands.entity(*entity).insert(FaceJob { progress, shapes: fit.clone(), task, basis, held: None, deadline });
+        let shapes = fit.clone();
+        commands.entity(*entity).insert(FaceJob { progress, shapes, task, basis, landing, held: None, deadline });
     }
 }
 
@@ -252,25 +254,28 @@ pub(super) fn land(
     mut placed: MessageWriter<FacePlaced>,
 ) {
     for (entity, mut job, mesh, of) in &mut jobs {
-        let was_held = job.held.is_some();
+        let job = &mut *job;
         let finished = match (job.held.take(), job.deadline.passed()) {
+            (Some(_), _) if job.progress.cancelled.load(Ordering::Relaxed) => Some(Err(FaceError::Cancelled.into())),
             (Some(held), _) => Some(Ok(held)),
             (None, Some(late)) => Some(Err(late.into())),
             (None, None) => check_ready(&mut job.task).map(|result| result.map_err(PlaceFaceError::from)),
         };
         let Some(finished) = finished else { continue };
         let result = match (finished, rigs.get(of.0)) {
-            (Ok(done), Ok((rig, history))) => match landing(history, || JobBasis::of(rig, mesh.uid) == job.basis) {
-                JobOutcome::Commit => Ok(done),
-                JobOutcome::Drop => Err(PlaceFaceError::Changed),
-                JobOutcome::Hold => {
-                    job.held = Some(done);
-                    if !was_held && history.can_redo() {
-                        commands.write_message(ResultHeld { mesh: entity, reason: HeldResult::Face });
+            (Ok(done), Ok((rig, history))) => {
+                match job.landing.decide(history, || JobBasis::of(rig, mesh.uid) == job.basis) {
+                    JobOutcome::Commit => Ok(done),
+                    JobOutcome::Drop => Err(PlaceFaceError::Changed),
+                    JobOutcome::Hold { is_news } => {
+                        job.held = Some(done);
+                        if is_news {
+                            commands.write_message(ResultHeld { mesh: entity, reason: HeldResult::Face });
+                        }
+                        continue;
                     }
-                    continue;
                 }
-            },
+            }
             (result, _) => result,
         };
         let shapes = job.shapes.clone();

@@ -17,7 +17,7 @@ use crate::{
     plugins::{
         document::EditRequest,
         history::RigHistory,
-        landing::{HeldResult, ResultHeld},
+        landing::{HeldResult, JobOutcome, Landing, ResultHeld},
         surface::{RigMesh, SkinOf},
     },
     rig::{Rig, RigEdit, SkinData, Uid, deform::replaced_joints, joint_numbers, operations::Operation, weight_edit},
@@ -106,6 +106,7 @@ pub struct WeightChangeJob {
     /// Mesh and locked joints that it started from.
     rest: Arc<Model>,
     locked: BTreeSet<Uid>,
+    landing: Landing,
     /// Finished change that waits to be committed.
     held: Option<ChangedSkin>,
 }
@@ -124,7 +125,7 @@ pub(super) fn start(
     mut commands: Commands,
     mut requests: MessageReader<WeightChangeRequest>,
     meshes: Query<(&RigMesh, &SkinOf, Has<WeightChangeJob>)>,
-    rigs: Query<&Rig>,
+    rigs: Query<(&Rig, &RigHistory)>,
     mut answers: MessageWriter<WeightChangeAnswer>,
 ) {
     let mut begun: Vec<Entity> = Vec::new();
@@ -133,7 +134,7 @@ pub(super) fn start(
             answers.write(WeightChangeAnswer { mesh: *entity, change: *change, result: Err(error) });
         };
         let found = meshes.get(*entity).ok().and_then(|(mesh, of, busy)| Some((mesh, of, busy, rigs.get(of.0).ok()?)));
-        let Some((mesh, of, is_busy, rig)) = found else {
+        let Some((mesh, of, is_busy, (rig, history))) = found else {
             answer(WeightChangeError::NoRig);
             continue;
         };
@@ -168,7 +169,8 @@ pub(super) fn start(
             }
         };
         begun.push(*entity);
-        let job = WeightChangeJob { change: *change, task, from, rest, locked, held: None };
+        let landing = Landing::asked(history);
+        let job = WeightChangeJob { change: *change, task, from, rest, locked, landing, held: None };
         commands.entity(*entity).try_insert(job);
     }
 }
@@ -240,8 +242,8 @@ pub(super) fn land(
     mut answers: MessageWriter<WeightChangeAnswer>,
 ) {
     for (entity, mut job, mesh, of) in &mut jobs {
-        let was_held = job.held.is_some();
-        let finished = if was_held { job.held.take() } else { check_ready(&mut job.task) };
+        let job = &mut *job;
+        let finished = if job.held.is_some() { job.held.take() } else { check_ready(&mut job.task) };
         let Some(changed) = finished else { continue };
         let is_same = |rig: &Rig| {
             let has_same_weights = match (rig.skin(mesh.uid), &job.from) {
@@ -254,20 +256,21 @@ pub(super) fn land(
             (_, Err(_)) => Err(WeightChangeError::NoRig),
             (Err(error), _) => Err(error),
             (Ok(None), _) => Ok(0),
-            // The step would discard steps that can be redone, or end a drag.
-            (Ok(Some(changed)), Ok((_, history))) if history.is_previewing() || history.can_redo() => {
-                job.held = Some(Ok(Some(changed)));
-                if !was_held && history.can_redo() {
-                    commands.write_message(ResultHeld { mesh: entity, reason: HeldResult::Weights });
+            (Ok(Some((edit, count))), Ok((rig, history))) => match job.landing.decide(history, || is_same(rig)) {
+                JobOutcome::Hold { is_news } => {
+                    job.held = Some(Ok(Some((edit, count))));
+                    if is_news {
+                        commands.write_message(ResultHeld { mesh: entity, reason: HeldResult::Weights });
+                    }
+                    continue;
                 }
-                continue;
-            }
-            (Ok(Some(_)), Ok((rig, _))) if !is_same(rig) => Err(WeightChangeError::Changed),
-            (Ok(Some((edit, count))), Ok(_)) => {
-                let operation = Operation::Named { name: job.change.name(), edits: vec![edit] };
-                commands.write_message(EditRequest::operation(of.0, operation));
-                Ok(count)
-            }
+                JobOutcome::Drop => Err(WeightChangeError::Changed),
+                JobOutcome::Commit => {
+                    let operation = Operation::Named { name: job.change.name(), edits: vec![edit] };
+                    commands.write_message(EditRequest::operation(of.0, operation));
+                    Ok(count)
+                }
+            },
         };
         answers.write(WeightChangeAnswer { mesh: entity, change: job.change, result });
         commands.entity(entity).try_remove::<WeightChangeJob>();

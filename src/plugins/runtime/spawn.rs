@@ -38,7 +38,7 @@ pub fn furnish_instance(world: &mut World, rig: Entity) {
                         world.entity_mut(entity).insert(ChildOf(parent));
                     }
                     let mut entity = world.entity_mut(entity);
-                    entity.insert(NodeSlot(slot as u32));
+                    number_node(&mut entity, slot);
                     describe_node(&mut entity, node, mode);
                     continue;
                 }
@@ -51,7 +51,7 @@ pub fn furnish_instance(world: &mut World, rig: Entity) {
                 let is_joint = node.kind == NodeType::Joint;
                 if let Some(entity) = known {
                     let mut entity = world.entity_mut(entity);
-                    entity.insert(NodeSlot(slot as u32));
+                    number_node(&mut entity, slot);
                     describe_node(&mut entity, node, mode);
                     continue;
                 }
@@ -89,6 +89,14 @@ pub fn furnish_instance(world: &mut World, rig: Entity) {
     }
     if let Some(mut found) = world.get_mut::<RigRuntime>(rig) {
         *found = runtime;
+    }
+}
+
+/// Writes the slot of a node where it is another.
+fn number_node(entity: &mut EntityWorldMut, slot: usize) {
+    let slot = NodeSlot(slot as u32);
+    if entity.get::<NodeSlot>() != Some(&slot) {
+        entity.insert(slot);
     }
 }
 

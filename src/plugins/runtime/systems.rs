@@ -10,7 +10,7 @@ use super::{ControlPose, DrivenMorphs, InstanceMode, NodeOf, NodeSlot, RigRuntim
 use crate::{
     mesh::model::Trs,
     plugins::schema::Attributes,
-    rig::{PoseOffset, RestTransform},
+    rig::{PoseOffset, RestTransform, Uid},
     solve::program::{LANES, RigState},
 };
 
@@ -81,12 +81,13 @@ pub(super) fn solve(
         let ran = RigState::evaluate_together(std::array::from_fn(|_| states.next()), dt);
         for (runtime, ran) in runtimes.iter_mut().flatten().zip(ran) {
             // Transforms that other code wrote have to be checked even if the program did not run.
-            if ran || runtime.all_due || runtime.has_rewritten {
+            if ran || runtime.all_due || runtime.has_rewritten || runtime.attributes_due {
                 runtime.set_changed();
             }
         }
     };
-    let due = rigs.iter_mut().filter(|runtime| runtime.is_due || runtime.state.is_dirty(dt));
+    let due = |runtime: &Mut<RigRuntime>| runtime.is_due || runtime.attributes_due || runtime.state.is_dirty(dt);
+    let due = rigs.iter_mut().filter(due);
     in_batches::<BATCH, _>(due, LANES, run);
 }
 
@@ -130,6 +131,7 @@ fn gather(
         shown,
         rewritten,
         has_rewritten,
+        attributes_due,
         attributes: holders,
         values,
         driven_writes,
@@ -164,14 +166,19 @@ fn gather(
         let Ok(Attributes(told)) = attributes.get(*entity) else { continue };
         for slot in slots {
             let slot = *slot as usize;
-            let value = told.get(&*state.program().attributes()[slot].name).copied();
-            if let Some(value) = value.filter(|value| !values[slot].is_nan() && *value != values[slot]) {
+            let Some(value) = told.get(&*state.program().attributes()[slot].name).copied() else {
+                // Other code took it off; the run writes it again.
+                values[slot] = f32::NAN;
+                *attributes_due = true;
+                continue;
+            };
+            if !values[slot].is_nan() && value != values[slot] {
                 if !state.set_attribute_at(slot, value) {
                     driven_writes.push((*entity, slot as u32));
                 }
                 // Written again after the run, which may do nothing, if the value is not allowed or driven.
                 values[slot] = value;
-                *has_rewritten = true;
+                *attributes_due = true;
             }
         }
     }
@@ -199,6 +206,9 @@ pub(super) fn scatter_locals(
         let RigRuntime { state, written, shown, rewritten, has_rewritten, all_due, .. } =
             runtime.bypass_change_detection();
         let is_all = std::mem::take(all_due);
+        if !is_all && !*has_rewritten && !state.is_any_moved() {
+            continue;
+        }
         let nodes = state.program().nodes();
         for (slot, entity) in written.iter() {
             let at = *slot as usize;
@@ -222,20 +232,27 @@ pub(super) fn scatter_locals(
     }
 }
 
-/// Writes attribute values to the entities that hold them.
+/// Writes attribute values that are others than the last written or read ones to the entities that hold them.
 pub(super) fn scatter_attributes(
     mut rigs: Query<&mut RigRuntime, Changed<RigRuntime>>,
     mut holders: Query<&mut Attributes>,
 ) {
     for mut runtime in &mut rigs {
-        let RigRuntime { state, attributes, values, mode, has_rewritten, .. } = runtime.bypass_change_detection();
-        // In a hierarchy it is needed for transforms, too.
-        *has_rewritten &= *mode == InstanceMode::Hierarchy;
+        let RigRuntime { state, attributes, values, attributes_due, .. } = runtime.bypass_change_detection();
+        *attributes_due = false;
         for (entity, slots) in attributes.iter() {
+            let is_other = |slot: &&u32| {
+                let slot = **slot as usize;
+                values[slot].to_bits() != state.attribute_at(slot).to_bits()
+            };
+            let Some(first) = slots.iter().position(|slot| is_other(&slot)) else { continue };
             let Ok(mut told) = holders.get_mut(*entity) else { continue };
-            for slot in slots {
+            for slot in &slots[first..] {
                 let slot = *slot as usize;
                 let value = state.attribute_at(slot);
+                if values[slot].to_bits() == value.to_bits() {
+                    continue;
+                }
                 values[slot] = value;
                 let name = &*state.program().attributes()[slot].name;
                 if told.0.get(name) != Some(&value) {
@@ -287,27 +304,52 @@ pub(super) fn show_morphs(
 
 /// Corrects the world transforms of nodes where Bevy's propagation differs from the program: below an unevenly scaled
 /// node Bevy multiplies matrices, which shear, while programs never do.
+///
+/// What neither Bevy nor the program has moved was correct before, and is not looked up.
 pub(super) fn correct_globals(
     rigs: Query<(&RigRuntime, &GlobalTransform), Or<(Changed<RigRuntime>, Changed<GlobalTransform>)>>,
-    mut nodes: Query<&mut GlobalTransform, Without<RigRuntime>>,
+    mut nodes: ParamSet<(Query<&mut GlobalTransform, Without<RigRuntime>>, Query<MovedNode, MovedByBevy>)>,
 ) {
-    for (runtime, world) in rigs.iter().filter(|(runtime, _)| runtime.mode == InstanceMode::Hierarchy) {
+    let is_hierarchy = |(runtime, _): &(&RigRuntime, &GlobalTransform)| runtime.mode == InstanceMode::Hierarchy;
+    if !rigs.iter().any(|found| is_hierarchy(&found)) {
+        return;
+    }
+    let correct = |(runtime, world): (&RigRuntime, &GlobalTransform), slot: usize, mut node: Mut<GlobalTransform>| {
         let world = world.affine();
+        let wanted = world * runtime.state.global_at(slot).affine();
         let height = runtime.height * world.matrix3.y_axis.length();
-        for (slot, entity) in &runtime.written {
-            let Ok(mut node) = nodes.get_mut(*entity) else { continue };
-            // What neither Bevy nor the program has moved was correct before.
-            if !node.is_changed() && !runtime.state.is_moved(*slot as usize) {
-                continue;
-            }
-            let wanted = world * runtime.state.global_at(*slot as usize).affine();
-            let now = node.affine();
-            if !is_same_place(&now, &wanted, height) {
-                *node = GlobalTransform::from(wanted);
+        if !is_same_place(&node.affine(), &wanted, height) {
+            *node = GlobalTransform::from(wanted);
+        }
+    };
+    // Nodes in the order of memory; those of one rig mostly follow one another.
+    let (mut last, mut rig) = (Entity::PLACEHOLDER, None);
+    for (entity, NodeOf(of), slot, uid, node) in &mut nodes.p1() {
+        if last != *of {
+            (last, rig) = (*of, rigs.get(*of).ok().filter(is_hierarchy));
+        }
+        let Some(rig) = rig else { continue };
+        let slot = slot.map(|slot| slot.0 as usize).or_else(|| rig.0.state.program().node(*uid?));
+        let Some(slot) = slot.filter(|slot| rig.0.entity(*slot) == Some(entity)) else { continue };
+        // Those that the program has moved follow below.
+        if !rig.0.state.is_moved(slot) {
+            correct(rig, slot, node);
+        }
+    }
+    let mut nodes = nodes.p0();
+    for rig in rigs.iter().filter(is_hierarchy).filter(|(runtime, _)| runtime.state.is_any_moved()) {
+        for (slot, entity) in rig.0.written.iter().filter(|(slot, _)| rig.0.state.is_moved(*slot as usize)) {
+            if let Ok(node) = nodes.get_mut(*entity) {
+                correct(rig, *slot as usize, node);
             }
         }
     }
 }
+
+/// Nodes that Bevy's propagation has moved.
+type MovedByBevy = (Changed<GlobalTransform>, Without<RigRuntime>);
+type MovedNode =
+    (Entity, &'static NodeOf, Option<&'static NodeSlot>, Option<&'static Uid>, &'static mut GlobalTransform);
 
 /// True if two world transforms of a node differ only by rounding: by less than a share of the rig's height or, far from
 /// the origin, by the last digits of its coordinates.

@@ -1,10 +1,7 @@
 //! Created joints that are built after a mesh was bound: when a feature or group is switched on, its twist and half joints take
 //! their shares from the weights that the mesh has.
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicBool, AtomicU32},
-};
+use std::sync::Arc;
 
 use bevy::{prelude::*, tasks::AsyncComputeTaskPool};
 
@@ -14,7 +11,9 @@ use crate::{
     plugins::{
         commands::{BuildResult, RigModules},
         document::EditReport,
-        landing::BindStart,
+        history::RigHistory,
+        job_control::JobControl,
+        landing::{BindStart, Landing},
         limits::{Deadline, RigLimits},
         surface::{RigMesh, SkinOf},
     },
@@ -35,7 +34,7 @@ pub(super) fn start_late_shares(
     mut commands: Commands,
     mut edited: MessageReader<EditReport>,
     meshes: Query<(Entity, &RigMesh, &SkinOf), Without<SkinningJob>>,
-    rigs: Query<(&Rig, &BuildResult)>,
+    rigs: Query<(&Rig, &RigHistory, &BuildResult)>,
     (modules, limits): (Option<Res<RigModules>>, Res<RigLimits>),
 ) {
     let mut switched: Vec<Entity> = Vec::new();
@@ -48,9 +47,9 @@ pub(super) fn start_late_shares(
         }
     }
     for rig_entity in switched {
-        let Ok((rig, built)) = rigs.get(rig_entity) else { continue };
+        let Ok(found) = rigs.get(rig_entity) else { continue };
         for (entity, mesh, _) in meshes.iter().filter(|(_, _, of)| of.0 == rig_entity) {
-            if let Some(job) = late_job((rig, built), mesh, modules.as_deref(), &limits) {
+            if let Some(job) = late_job(found, mesh, modules.as_deref(), &limits) {
                 commands.entity(entity).insert(job);
             }
         }
@@ -59,22 +58,21 @@ pub(super) fn start_late_shares(
 
 /// The job for a mesh whose weights lack joints that are built now; `None` where they lack none.
 pub(super) fn late_job(
-    (rig, built): (&Rig, &BuildResult),
+    (rig, history, built): (&Rig, &RigHistory, &BuildResult),
     mesh: &RigMesh,
     modules: Option<&RigModules>,
     limits: &RigLimits,
 ) -> Option<SkinningJob> {
     let skin = rig.skin(mesh.uid).filter(|skin| skin.at_rest && lacks_joints(rig, &built.0, skin))?;
-    let start = BindStart::of(rig, mesh.uid);
+    let (start, landing) = (BindStart::of(rig, mesh.uid), Landing::unasked(history));
     let (rig, built, mesh, skin) = (rig.clone(), Arc::clone(&built.0), mesh.clone(), Arc::clone(skin));
     let modules = modules.map(|modules| modules.0.clone());
     let task = AsyncComputeTaskPool::get().spawn(async move {
         let input = SkinningInput::new(&rig, Some(&built), modules.as_deref(), &mesh, &[]);
         Ok(input.late_shares(&mesh, &skin))
     });
-    let (progress, cancelled) = (Arc::new(AtomicU32::new(0)), Arc::new(AtomicBool::new(false)));
-    let deadline = Deadline::new(limits);
-    Some(SkinningJob { progress, cancelled, task, start, held: None, is_asked: false, deadline })
+    let (control, deadline) = (JobControl::default(), Deadline::new(limits));
+    Some(SkinningJob { control, task, start, landing, held: None, is_asked: false, deadline })
 }
 
 /// True if a step enables a command, a feature or a local group.

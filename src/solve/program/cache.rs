@@ -44,6 +44,14 @@ impl ProgramCache {
         Ok(program)
     }
 
+    /// Takes note of a program that was compiled elsewhere, so that it is shared by equal content, too.
+    pub fn adopt(&mut self, program: &Arc<RigProgram>) {
+        let known = self.programs.entry(program.hash()).or_default();
+        if known.strong_count() == 0 {
+            *known = Arc::downgrade(program);
+        }
+    }
+
     /// Number of programs that are in use.
     pub fn len(&self) -> usize {
         self.programs.values().filter(|program| program.strong_count() > 0).count()

@@ -448,6 +448,11 @@ impl RigState {
         self.moved.get(register / 64).is_some_and(|word| word & (1 << (register % 64)) != 0)
     }
 
+    /// Returns `true` if the last evaluation changed (or may have changed) the rig transform of any node.
+    pub fn is_any_moved(&self) -> bool {
+        self.moved.iter().any(|word| *word != 0)
+    }
+
     /// Value of an attribute, after all constraints.
     pub fn attribute(&self, node: Uid, name: &str) -> Option<f32> {
         self.program.attribute(node, name).map(|slot| self.n[slot])

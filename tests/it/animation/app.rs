@@ -24,7 +24,7 @@ use rigsmith::{
     test_app::strict_app,
 };
 
-use super::{BASE, CLIP, animated, apply, biped, controls, program, target};
+use super::{BASE, CLIP, animated, apply, biped, controls, keep::state, program, target};
 
 #[derive(Resource, Default)]
 struct Markers(Vec<(String, f32)>);
@@ -63,18 +63,7 @@ fn joints(app: &mut App, rig: Entity) -> Vec<(Uid, Affine3A)> {
 
 /// Joints where a clip puts them, by the program alone.
 fn expected(program: &Arc<RigProgram>, clip: &RigClip, time: f32) -> RigState {
-    let mut state = RigState::new(program.clone());
-    let pose = clip.sample(time);
-    for (node, offset) in pose.offsets {
-        let _ = state.set_offset(node, offset);
-    }
-    for (node, values) in pose.values {
-        for (name, value) in values {
-            let _ = state.set_attribute(node, &name, value);
-        }
-    }
-    state.evaluate(0.0);
-    state
+    state(program, Some(clip), time)
 }
 
 #[track_caller]

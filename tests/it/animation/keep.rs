@@ -17,11 +17,13 @@ use rigsmith::{
 };
 
 use super::{BASE, CLIP, Random, animated, apply, biped, controls, program, target, turn};
+use crate::keep_pose::flip;
 
 /// Metres and degrees.
 const NEAR: (f32, f32) = (1e-4, 0.05);
 
-fn state(program: &Arc<RigProgram>, clip: Option<&RigClip>, time: f32) -> RigState {
+/// An instance where a clip puts it, by the program alone.
+pub fn state(program: &Arc<RigProgram>, clip: Option<&RigClip>, time: f32) -> RigState {
     let mut state = RigState::new(program.clone());
     if let Some(clip) = clip {
         let pose = clip.sample(time);
@@ -76,19 +78,6 @@ fn check(what: &str, before: &Rig, after: &Rig, most_frames: usize) -> Rig {
     }
     assert!(plain.0 > NEAR.0 || plain.1 > NEAR.1, "{what}: the change moves nothing");
     kept
-}
-
-/// Turns a joint's axes; what hangs on it stays where it is.
-fn flip(rig: &mut Rig, label: &str, turn: Quat) {
-    let joint = rig.find_label(label).unwrap();
-    let children: Vec<_> = rig.children(Some(joint)).iter().map(|child| (*child, rig.rest_global(*child))).collect();
-    let mut rest = rig.joint(joint).unwrap().data.rest;
-    rest.rotation = (rest.rotation * turn).normalize();
-    apply(rig, RigEdit::SetRest(joint, rest));
-    for (child, global) in children {
-        let rest = rig.local_rest(Some(joint), &global);
-        apply(rig, RigEdit::SetRest(child, rest));
-    }
 }
 
 #[test]

@@ -77,15 +77,21 @@ fn bound(game: &mut Game, count: usize) {
     }
 }
 
+/// A game with an instance, and the file of a clip in which its control rises.
+fn rising(folder: &Path, mode: InstanceMode) -> (Game, Handle<RigAnimation>, Entity) {
+    let path = saved(folder, TWO);
+    fs::write(folder.join("rise.anim.ron"), file(1.0)).unwrap();
+    let mut game = game(folder);
+    let clips = game.app.world().resource::<AssetServer>().load::<RigAnimation>("rise.anim.ron");
+    let instance = game.open(&path, mode);
+    (game, clips, instance)
+}
+
 #[test]
 fn a_file_of_clips_plays_on_an_instance() {
     for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
         let folder = tempfile::tempdir().unwrap();
-        let path = saved(folder.path(), TWO);
-        fs::write(folder.path().join("rise.anim.ron"), file(1.0)).unwrap();
-        let mut game = game(folder.path());
-        let clips = game.app.world().resource::<AssetServer>().load::<RigAnimation>("rise.anim.ron");
-        let instance = game.open(&path, mode);
+        let (mut game, clips, instance) = rising(folder.path(), mode);
         game.app.world_mut().entity_mut(instance).insert(InstanceClips(clips.clone()));
         bound(&mut game, 1);
         assert_eq!(told(&game).bound, [vec![GONE]]);
@@ -118,11 +124,7 @@ fn a_file_of_clips_plays_on_an_instance() {
 fn a_file_of_clips_becomes_animations_of_bevy() {
     for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
         let folder = tempfile::tempdir().unwrap();
-        let path = saved(folder.path(), TWO);
-        fs::write(folder.path().join("rise.anim.ron"), file(1.0)).unwrap();
-        let mut game = game(folder.path());
-        let clips = game.app.world().resource::<AssetServer>().load::<RigAnimation>("rise.anim.ron");
-        let instance = game.open(&path, mode);
+        let (mut game, clips, instance) = rising(folder.path(), mode);
         game.app.world_mut().entity_mut(instance).insert((InstanceClips(clips.clone()), ClipTargets));
         bound(&mut game, 1);
         let animations = game.app.world().get::<InstanceAnimations>(instance).unwrap().clone();

@@ -12,12 +12,7 @@ use super::{
 #[test]
 fn a_damaged_journal_is_kept_whatever_becomes_of_its_work() {
     let folder = fresh();
-    let mut desk = Desk::apart(folder.path());
-    desk.place(1);
-    desk.place(2);
-    let bytes = desk.bytes();
-    let path = desk.journal.path().unwrap();
-    drop(desk);
+    let (bytes, path) = of_two_joints(folder.path());
     let first = records(&bytes).into_iter().find(|record| record.2 == 3).unwrap();
     let bytes = damaged(&bytes, first);
     let mut taken = path.clone().into_os_string();

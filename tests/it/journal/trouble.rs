@@ -15,6 +15,7 @@ use rigsmith::{
 };
 
 use super::*;
+use crate::disks::as_on_the_disk;
 
 #[test]
 fn the_next_place_is_taken_where_one_cannot_be_written() {
@@ -169,38 +170,12 @@ impl DiskFile for SwitchedFile {
 }
 
 impl Disk for SwitchedDisk {
-    fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
-        RealDisk.entry(path, follow)
-    }
-    fn read_link(&self, path: &Path) -> io::Result<PathBuf> {
-        RealDisk.read_link(path)
-    }
-    fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
-        RealDisk.canonical(path)
-    }
-    fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
-        RealDisk.list(folder, limit)
-    }
+    as_on_the_disk!();
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
         Ok(Box::new(SwitchedFile(self.check()?.create(path)?, Self(self.0.clone()))))
     }
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        RealDisk.rename(from, to)
-    }
     fn hard_link(&self, existing: &Path, path: &Path) -> io::Result<()> {
         RealDisk.hard_link(existing, path)
-    }
-    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
-        RealDisk.sync_folder(folder)
-    }
-    fn remove(&self, path: &Path) -> io::Result<()> {
-        RealDisk.remove(path)
-    }
-    fn create_folder(&self, path: &Path) -> io::Result<()> {
-        RealDisk.create_folder(path)
-    }
-    fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>> {
-        RealDisk.open(path)
     }
 }
 

@@ -306,6 +306,28 @@ impl Desk {
         (steps.len(), done)
     }
 
+    /// Does something that is one step or none: without one, what is saved is as before; with one, after its undo. Returns true
+    /// if it was a step.
+    #[track_caller]
+    pub fn is_one_step(&mut self, what: &str, saved: impl Fn(&Self) -> String, act: impl FnOnce(&mut Self)) -> bool {
+        let (before, (steps, done)) = (saved(self), self.steps());
+        act(self);
+        match self.steps().1 - done {
+            0 => {
+                assert_eq!((saved(self), self.steps()), (before, (steps, done)), "{what}");
+                false
+            }
+            1 => {
+                assert_ne!(saved(self), before, "{what}");
+                self.app.world_mut().write_message(EditRequest { rig: self.rig, change: Change::Undo });
+                self.frames(3);
+                assert_eq!((saved(self), self.steps().1), (before, done), "{what}");
+                true
+            }
+            more => panic!("{what} makes {more} steps"),
+        }
+    }
+
     pub fn told(&self) -> Vec<String> {
         let book = self.app.world().resource::<LogBook>();
         book.entries().map(|entry| entry.notice.text.clone()).collect()

@@ -1,11 +1,12 @@
 //! Clips, layers, markers, keys that are set aside, and motion from files.
 
 use rigsmith::{
-    editor::panels::timeline::import::ClipImport,
+    editor::panels::timeline::import::{ClipImport, MapRequest},
     rig::animation::{LayerMode, Marker},
 };
 
 use super::*;
+use crate::bench::{begin_drag, new_clip, undo_meanwhile};
 
 fn names(desk: &Desk) -> Vec<&str> {
     desk.rig().clips().iter().map(|clip| clip.name.as_str()).collect()
@@ -229,6 +230,42 @@ fn motion_is_imported_in_one_step() {
     import(&mut desk, path);
     assert!(desk.told().last().is_some_and(|told| told.contains("Could not import broken.bvh")), "{:?}", desk.told());
     assert_eq!(bytes(&desk), before);
+}
+
+#[test]
+fn imported_motion_waits_for_steps_that_were_undone_meanwhile() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut desk, _) = desk_with(TimelinePanel::default());
+    let path = folder.path().join("run.anim.ron");
+    let clip = RigClip { name: "run".into(), ..RigClip::new(Uid(77), Uid(78), "run") };
+    std::fs::write(&path, write_animation(desk.rig(), None, &[clip])).unwrap();
+    let waits = |desk: &Desk| desk.app.world().resource::<ClipImport>().waits().is_some();
+    let waiting = |desk: &mut Desk| {
+        let rig = desk.rig;
+        begin_drag(&mut desk.app, rig);
+        desk.app.world_mut().write_message(ImportRequest(path.clone()));
+        desk.until("the motion", waits);
+        undo_meanwhile(&mut desk.app, rig, new_clip("wave"));
+        desk.frames(3);
+    };
+    let (before, steps) = (bytes(&desk), desk.steps().1);
+    waiting(&mut desk);
+    assert_eq!((bytes(&desk), desk.steps()), (before.clone(), (steps + 1, steps)));
+    assert!(desk.told().iter().any(|told| told.contains("would lose the steps that were undone")), "{:?}", desk.told());
+    change(&mut desk, Change::Redo);
+    desk.until("the clip", |desk| desk.steps() == (steps + 2, steps + 2));
+    assert_eq!(names(&desk), ["walk", "wave", "run"]);
+    (0..2).for_each(|_| undo(&mut desk));
+    assert_eq!(bytes(&desk), before);
+
+    // Motion that waits can be dropped.
+    waiting(&mut desk);
+    desk.app.world_mut().write_message(MapRequest::Cancel);
+    desk.frames(3);
+    assert!(!waits(&desk));
+    change(&mut desk, Change::Redo);
+    desk.frames(3);
+    assert_eq!((names(&desk), desk.steps()), (vec!["walk", "wave"], (steps + 1, steps + 1)));
 }
 
 /// The bundled biped beside a capture of a human, whose map waits.

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     editor::{
         ActiveRig,
-        actions::{Action, ActionRequest},
+        actions::{Action, ActionRequest, queue_requests},
         dock::Layout,
         notice::Notice,
     },
@@ -29,20 +29,9 @@ use crate::{
 };
 
 /// Carries out what panels, keys and menus ask for, before the picks and edits of the same frame.
-pub(super) fn attend(
-    mut requests: MessageReader<GraphRequest>,
-    mut actions: MessageReader<ActionRequest>,
-    mut commands: Commands,
-) {
-    for request in requests.read() {
-        let request = request.clone();
-        commands.queue(move |world: &mut World| answer(world, request));
-    }
-    for ActionRequest(action) in actions.read() {
-        if let Action::Graph(action) = *action {
-            commands.queue(move |world: &mut World| act(world, action));
-        }
-    }
+pub(super) fn attend(requests: MessageReader<GraphRequest>, actions: MessageReader<ActionRequest>, commands: Commands) {
+    let own = |action| if let Action::Graph(action) = action { Some(action) } else { None };
+    queue_requests(requests, answer, actions, own, act, commands);
 }
 
 fn answer(world: &mut World, request: GraphRequest) {

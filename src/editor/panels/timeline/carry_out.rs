@@ -14,7 +14,7 @@ use super::{
 use crate::{
     editor::{
         ActiveRig,
-        actions::{Action, ActionRequest},
+        actions::{Action, ActionRequest, queue_requests},
         notice::Notice,
     },
     plugins::{
@@ -34,19 +34,12 @@ const LENGTH: f32 = 2.0;
 
 /// Carries out what panels, keys and menus ask for, before the edits of the same frame.
 pub(super) fn attend(
-    mut requests: MessageReader<TimelineRequest>,
-    mut actions: MessageReader<ActionRequest>,
-    mut commands: Commands,
+    requests: MessageReader<TimelineRequest>,
+    actions: MessageReader<ActionRequest>,
+    commands: Commands,
 ) {
-    for request in requests.read() {
-        let request = request.clone();
-        commands.queue(move |world: &mut World| answer(world, request));
-    }
-    for ActionRequest(action) in actions.read() {
-        if let Action::Timeline(action) = *action {
-            commands.queue(move |world: &mut World| act(world, action));
-        }
-    }
+    let own = |action| if let Action::Timeline(action) = action { Some(action) } else { None };
+    queue_requests(requests, answer, actions, own, act, commands);
 }
 
 fn answer(world: &mut World, request: TimelineRequest) {

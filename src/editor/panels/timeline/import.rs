@@ -25,6 +25,7 @@ use crate::{
         commands::RigModules,
         document::EditRequest,
         history::RigHistory,
+        landing::{HeldResult, JobOutcome, Landing},
         limits::{LimitError, RigLimits},
     },
     processor::{BuildError, Builder, Modules},
@@ -69,7 +70,15 @@ pub struct ClipImport {
 struct Job {
     rig: Entity,
     name: String,
-    task: Task<Result<ReadMotion, ImportError>>,
+    landing: Landing,
+    work: Work,
+}
+
+/// Work of a job.
+enum Work {
+    Runs(Task<Result<ReadMotion, ImportError>>),
+    /// Clips that wait to be put onto the rig.
+    Waits(ImportedMotion),
 }
 
 /// Result of reading a file, or of retargeting.
@@ -117,7 +126,17 @@ impl MapDraft {
 impl ClipImport {
     /// Name of the file that is being read.
     pub fn what(&self) -> Option<&str> {
-        self.job.as_ref().map(|job| job.name.as_str())
+        self.job.as_ref().filter(|job| matches!(job.work, Work::Runs(_))).map(|job| job.name.as_str())
+    }
+
+    /// Name of the file that is read, but waits, because importing it would discard steps that can be redone.
+    pub fn waits(&self) -> Option<&str> {
+        self.job.as_ref().filter(|job| matches!(job.work, Work::Waits(_))).map(|job| job.name.as_str())
+    }
+
+    /// Drops clips that wait, in favour of another import; returns the name of their file.
+    fn drop_waiting(&mut self) -> Option<String> {
+        self.job.take_if(|job| matches!(job.work, Work::Waits(_))).map(|job| job.name)
     }
 
     /// Motion that waits until its map is accepted.
@@ -180,19 +199,29 @@ fn begin(world: &mut World, path: &Path) {
         world.write_message(Notice::info(format!("{name} has to wait: another file is being read. Import it then.")));
         return;
     }
-    let Some((rig, modules)) = snapshot(world, entity) else { return };
+    let Some((rig, modules, landing)) = snapshot(world, entity) else { return };
     let (path, of_file) = (path.to_owned(), name.clone());
     let limits = world.get_resource::<RigLimits>().cloned().unwrap_or_default();
     let task = AsyncComputeTaskPool::get().spawn(async move { read(&path, &of_file, entity, &rig, &modules, &limits) });
-    world.resource_mut::<ClipImport>().job = Some(Job { rig: entity, name, task });
+    begun(world, Job { rig: entity, name, landing, work: Work::Runs(task) });
 }
 
-/// The rig without the preview of a current drag, and the modules of its commands.
-fn snapshot(world: &World, entity: Entity) -> Option<(Rig, Arc<Modules>)> {
+/// Takes note of a job; clips that wait are dropped for it.
+fn begun(world: &mut World, job: Job) {
+    let mut import = world.resource_mut::<ClipImport>();
+    let dropped = import.drop_waiting();
+    import.job = Some(job);
+    if let Some(name) = dropped {
+        let text = format!("{name} is not imported: another import was asked for while it waited");
+        world.write_message(Notice::info(text));
+    }
+}
+
+/// The rig without the preview of a current drag, the modules of its commands, and the landing of a job that starts now.
+fn snapshot(world: &World, entity: Entity) -> Option<(Rig, Arc<Modules>, Landing)> {
     let modules = world.get_resource::<RigModules>().map(|modules| Arc::clone(&modules.0))?;
-    let rig = world.get::<Rig>(entity)?;
-    let rig = world.get::<RigHistory>(entity).map_or_else(|| rig.clone(), |history| history.settled(rig).into_owned());
-    Some((rig, modules))
+    let (rig, history) = (world.get::<Rig>(entity)?, world.get::<RigHistory>(entity)?);
+    Some((history.settled(rig).into_owned(), modules, Landing::asked(history)))
 }
 
 /// Carries out changes of the map that waits.
@@ -205,7 +234,7 @@ pub(super) fn change_map(mut requests: MessageReader<MapRequest>, mut commands: 
 
 fn answer(world: &mut World, request: &MapRequest) {
     let mut import = world.resource_mut::<ClipImport>();
-    if import.job.is_some() {
+    if import.what().is_some() {
         return;
     }
     match request {
@@ -215,14 +244,17 @@ fn answer(world: &mut World, request: &MapRequest) {
                 *known = *target;
             }
         }
-        MapRequest::Cancel => import.draft = None,
+        MapRequest::Cancel => {
+            import.draft = None;
+            import.drop_waiting();
+        }
         MapRequest::Accept => {
             let Some(draft) = import.draft.clone() else { return };
-            let Some((rig, modules)) = snapshot(world, draft.rig) else { return };
+            let Some((rig, modules, landing)) = snapshot(world, draft.rig) else { return };
             let (entity, name) = (draft.rig, draft.name.clone());
             let task = AsyncComputeTaskPool::get()
                 .spawn(async move { retargeted(&draft, &rig, &modules).map(ReadMotion::Clips) });
-            world.resource_mut::<ClipImport>().job = Some(Job { rig: entity, name, task });
+            begun(world, Job { rig: entity, name, landing, work: Work::Runs(task) });
         }
     }
 }
@@ -344,17 +376,23 @@ impl ImportedMotion {
 
 /// Takes over motion that has been read: one step of the history, and the first clip is open.
 pub(super) fn land(mut import: ResMut<ClipImport>, mut commands: Commands) {
-    let Some(job) = &mut import.bypass_change_detection().job else { return };
-    let Some(result) = check_ready(&mut job.task) else {
-        commands.write_message(RequestRedraw);
-        return;
+    let import = import.bypass_change_detection();
+    let Some(mut job) = import.job.take() else { return };
+    let result = match job.work {
+        Work::Waits(imported) => Ok(ReadMotion::Clips(imported)),
+        Work::Runs(mut task) => match check_ready(&mut task) {
+            Some(result) => result,
+            None => {
+                commands.write_message(RequestRedraw);
+                job.work = Work::Runs(task);
+                import.job = Some(job);
+                return;
+            }
+        },
     };
-    let Some(Job { rig, name, .. }) = import.job.take() else { return };
+    let Job { rig, name, landing, .. } = job;
     commands.queue(move |world: &mut World| match result {
-        Ok(ReadMotion::Clips(imported)) => {
-            world.resource_mut::<ClipImport>().draft = None;
-            add(world, rig, &name, imported);
-        }
+        Ok(ReadMotion::Clips(imported)) => put(world, rig, name, landing, imported),
         Ok(ReadMotion::Draft(draft)) => {
             let text = format!("{name}: check in the Timeline which joints its motion goes to, then import it.");
             world.write_message(Notice::info(text));
@@ -367,9 +405,29 @@ pub(super) fn land(mut import: ResMut<ClipImport>, mut commands: Commands) {
     });
 }
 
+/// Puts clips onto the rig, now or once nothing is lost by it. Keys of joints that are gone meanwhile are set aside, so clips fit
+/// whatever was edited.
+fn put(world: &mut World, rig: Entity, name: String, mut landing: Landing, imported: ImportedMotion) {
+    let is_active = world.get_resource::<ActiveRig>().is_some_and(|active| active.0 == rig);
+    let Some(history) = world.get::<RigHistory>(rig).filter(|_| is_active) else {
+        world.resource_mut::<ClipImport>().draft = None;
+        world.write_message(Notice::info(format!("{name} is not imported: another rig was opened meanwhile")));
+        return;
+    };
+    if let JobOutcome::Hold { is_news } = landing.decide(history, || true) {
+        let mut import = world.resource_mut::<ClipImport>();
+        import.bypass_change_detection().job = Some(Job { rig, name, landing, work: Work::Waits(imported) });
+        if is_news {
+            world.write_message(Notice::warning(HeldResult::Motion.sentence()));
+        }
+        return;
+    }
+    world.resource_mut::<ClipImport>().draft = None;
+    add(world, rig, &name, imported);
+}
+
 fn add(world: &mut World, entity: Entity, name: &str, imported: ImportedMotion) {
-    let is_active = world.get_resource::<ActiveRig>().is_some_and(|active| active.0 == entity);
-    let Some(mut rig) = world.get::<Rig>(entity).filter(|_| is_active).cloned() else { return };
+    let Some(mut rig) = world.get::<Rig>(entity).cloned() else { return };
     let count = imported.clips.len();
     let (mut edits, before) = (Vec::new(), rig.clips().len());
     let added: Result<(), OperationError> = imported.clips.into_iter().try_for_each(|clip| {

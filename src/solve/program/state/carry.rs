@@ -20,6 +20,9 @@ pub struct Carry {
     is_aligned: bool,
     /// True if also poses, inputs and springs have the same places, so that an instance can go on with its own lists.
     is_in_place: bool,
+    /// Slots of nodes whose poses have other bounds, and of attributes with another range, if the places are the same.
+    bounds: Vec<u32>,
+    ranges: Vec<u32>,
     /// Differences of two programs of one layout; `None` for programs of different layouts.
     changes: Option<Changes>,
 }
@@ -95,8 +98,21 @@ impl Carry {
             && in_order(&inputs)
             && in_order(&springs)
             && to.nodes.iter().zip(&from.nodes).all(|(a, b)| a.pose == b.pose);
-        let changes = if is_in_place { Changes::between(from, to) } else { None };
-        Self { nodes, attributes, is_aligned, inputs, springs, is_in_place, changes }
+        let (mut bounds, mut ranges, mut changes) = (Vec::new(), Vec::new(), None);
+        if is_in_place {
+            let has_other_bounds = |slot: &u32| {
+                let slot = *slot as usize;
+                to.nodes[slot].freedom != from.nodes[slot].freedom
+            };
+            let has_other_range = |slot: &u32| {
+                let (a, b) = (&to.attributes[*slot as usize], &from.attributes[*slot as usize]);
+                (&a.kind, a.default.to_bits(), a.is_settable) != (&b.kind, b.default.to_bits(), b.is_settable)
+            };
+            bounds = (0..to.nodes.len() as u32).filter(has_other_bounds).collect();
+            ranges = (0..to.attributes.len() as u32).filter(has_other_range).collect();
+            changes = Changes::between(from, to);
+        }
+        Self { nodes, attributes, is_aligned, inputs, springs, is_in_place, bounds, ranges, changes }
     }
 
     /// Slot, for each node slot of the new program, of the same node in the old one.
@@ -107,6 +123,11 @@ impl Carry {
     /// True if both programs have the same nodes and attributes in the same slots.
     pub fn is_aligned(&self) -> bool {
         self.is_aligned
+    }
+
+    /// True if poses have the same bounds in both programs, so that every pose goes on as it is.
+    pub fn has_same_bounds(&self) -> bool {
+        self.is_in_place && self.bounds.is_empty()
     }
 
     /// True if an instance that remembers all registers runs only what differs between the programs.
@@ -132,7 +153,7 @@ impl RigState {
             return;
         }
         if let Some(changes) = carry.changes.as_ref().filter(|_| self.memory == Memory::Whole) {
-            self.exchange_changes(program, changes);
+            self.exchange_changes(program, changes, carry);
             return;
         }
         let inputs = program.nodes.len() + 1..program.nodes.len() + 1 + program.inputs.len();
@@ -142,14 +163,18 @@ impl RigState {
             self.x.clone_from(&program.x);
             self.n.clone_from(&program.n);
             self.x[inputs].copy_from_slice(&x);
-            settable.clone().for_each(|(slot, _)| self.n[slot] = n[slot]);
+            settable.for_each(|(slot, _)| self.n[slot] = n[slot]);
             self.dirty.clear();
             self.dirty.resize(program.ops.len().div_ceil(64), 0);
         }
-        for (slot, attribute) in settable {
-            self.n[slot] = attribute.kind.clamp(self.n[slot], attribute.default);
+        // Values are within the ranges and bounds of before.
+        for slot in carry.ranges.iter().map(|slot| *slot as usize) {
+            let attribute = &program.attributes[slot];
+            if attribute.is_settable {
+                self.n[slot] = attribute.kind.clamp(self.n[slot], attribute.default);
+            }
         }
-        for node in program.nodes.iter() {
+        for node in carry.bounds.iter().map(|slot| &program.nodes[*slot as usize]) {
             if let (Some(freedom), Some(pose)) = (node.freedom, self.poses.get_mut(node.pose.0 as usize))
                 && *pose != PoseOffset::IDENTITY
             {
@@ -161,7 +186,7 @@ impl RigState {
     }
 
     /// Goes on with a program of the same layout: what depends on a difference has to run.
-    fn exchange_changes(&mut self, program: &Arc<RigProgram>, changes: &Changes) {
+    fn exchange_changes(&mut self, program: &Arc<RigProgram>, changes: &Changes, carry: &Carry) {
         let layout = &program.layout;
         mark(&mut self.dirty, &changes.ops);
         for at in changes.x.iter().map(|at| *at as usize) {
@@ -172,14 +197,18 @@ impl RigState {
             self.n[at] = program.n[at];
             mark(&mut self.dirty, layout.readers.get(program.x.len() + at));
         }
-        for (slot, attribute) in program.attributes.iter().enumerate().filter(|(_, attribute)| attribute.is_settable) {
+        for slot in carry.ranges.iter().map(|slot| *slot as usize) {
+            let attribute = &program.attributes[slot];
+            if !attribute.is_settable {
+                continue;
+            }
             let value = attribute.kind.clamp(self.n[slot], attribute.default);
             if self.n[slot].to_bits() != value.to_bits() {
                 self.n[slot] = value;
                 mark(&mut self.dirty, layout.attribute_readers.get(slot));
             }
         }
-        for node in program.nodes.iter() {
+        for node in carry.bounds.iter().map(|slot| &program.nodes[*slot as usize]) {
             let Some((freedom, pose)) = node.freedom.zip(self.poses.get_mut(node.pose.0 as usize)) else { continue };
             let clamped = if *pose == PoseOffset::IDENTITY { *pose } else { freedom.clamp(*pose) };
             if *pose != clamped {
