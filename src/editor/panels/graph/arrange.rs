@@ -1,0 +1,83 @@
+//! Places of nodes and folded frames: laid out, or where a person moved them.
+
+use std::collections::BTreeMap;
+
+use bevy_egui::egui::{Pos2, Rect, Vec2, vec2};
+
+use super::{
+    GraphPanel,
+    gesture::{Gesture, moved},
+    layout::{LayoutNode, lay_out},
+    state::GraphView,
+    wires::{BOX, node_size},
+};
+
+impl GraphPanel {
+    /// Lays the graph out again if its shape changed, or frames were opened or folded.
+    pub(super) fn arrange(&mut self, view: &GraphView) {
+        let graph = &self.graph;
+        let count = graph.nodes.len();
+        let open: Vec<bool> = graph.frames.iter().map(|frame| view.is_open(frame.uid, count)).collect();
+        if !std::mem::take(&mut self.is_stale) && self.open == open {
+            return;
+        }
+        let mut items: Vec<LayoutNode> = Vec::with_capacity(count);
+        // Item of each command, and of each folded frame.
+        let mut item_of: Vec<usize> = Vec::with_capacity(count);
+        let mut boxes: BTreeMap<usize, usize> = BTreeMap::new();
+        for node in &graph.nodes {
+            let next = items.len();
+            let item = match node.frame.filter(|frame| !open[*frame]) {
+                Some(frame) => *boxes.entry(frame).or_insert(next),
+                None => next,
+            };
+            if item == next {
+                let is_folded = node.frame.is_some_and(|frame| !open[frame]);
+                let size = if is_folded { BOX } else { node_size(node.inputs.len()) };
+                items.push(LayoutNode { size, frame: node.frame, is_folded });
+            }
+            item_of.push(item);
+        }
+        let ends = graph.wires.iter().map(|wire| (item_of[wire.from], item_of[wire.to]));
+        let edges: Vec<(usize, usize)> = ends.filter(|(from, to)| from != to).collect();
+        let laid_out = (items, edges);
+        if self.laid_out != laid_out || self.open != open {
+            let places = lay_out(&laid_out.0, &laid_out.1);
+            let of_node = |(number, item): (usize, &usize)| {
+                let is_shown = graph.nodes[number].frame.is_none_or(|frame| open[frame]);
+                is_shown.then(|| places[*item])
+            };
+            self.places = item_of.iter().enumerate().map(of_node).collect();
+            self.folded = (0..open.len()).map(|frame| boxes.get(&frame).map(|item| places[*item])).collect();
+            self.laid_out = laid_out;
+            self.refits = self.sees_all;
+        }
+        self.open = open;
+    }
+
+    /// Rectangles of all nodes: where the layout or a person put them, and where a drag has them; nothing in folded frames.
+    pub(super) fn rects(&self, view: &GraphView, by: Vec2) -> Vec<Rect> {
+        let dragged = match &self.gesture {
+            Some(Gesture::Nodes(tags, _)) => Some(tags),
+            _ => None,
+        };
+        let nodes = self.graph.nodes.iter().zip(&self.places);
+        nodes
+            .map(|(node, place)| {
+                let Some(place) = place else { return Rect::NOTHING };
+                let [width, height] = node_size(node.inputs.len());
+                let place = view.moved.get(&node.tag).copied().unwrap_or(*place);
+                let rect = moved(Rect::from_min_size(Pos2::ZERO, vec2(width, height)), place);
+                let is_dragged = dragged.is_some_and(|tags| tags.contains(&node.tag));
+                if is_dragged { rect.translate(by) } else { rect }
+            })
+            .collect()
+    }
+
+    /// Rectangles of folded frames.
+    pub(super) fn boxes(&self) -> Vec<Option<Rect>> {
+        let folded =
+            |place: &Option<[f32; 2]>| place.map(|[x, y]| Rect::from_min_size(Pos2::new(x, y), vec2(BOX[0], BOX[1])));
+        self.folded.iter().map(folded).collect()
+    }
+}
