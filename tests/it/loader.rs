@@ -1,5 +1,7 @@
 //! The Loader panel, the Part menu and the library behind them: templates found, loaded, merged, injected, dropped and written.
 
+mod sides;
+
 use std::{
     fs,
     path::{Path, PathBuf},
