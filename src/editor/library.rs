@@ -27,7 +27,7 @@ pub use self::{
 };
 pub(in crate::editor) use self::{
     drop_target::{dropping, goes_onto_both},
-    save::header_edit,
+    save::{header_edit, header_step},
     sides::{partner, partners},
 };
 use super::{

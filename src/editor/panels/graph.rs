@@ -278,7 +278,7 @@ impl GraphPanel {
             self.gesture = None;
         }
         let (rest, boxes) = (self.rects(view, egui::Vec2::ZERO), self.boxes());
-        let want = self.wanted(shown.entity, view, (&rest, &boxes), area);
+        let want = self.wanted(shown.entity, view, (rest.as_slice(), boxes.as_slice()), area);
         let transform = want.unwrap_or(self.transform);
         let inverse = transform.inverse();
         let at = ui.input(|input| input.pointer.latest_pos()).map(|at| inverse * at);
