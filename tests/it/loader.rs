@@ -1,5 +1,6 @@
 //! The Loader panel, the Part menu and the library behind them: templates found, loaded, merged, injected, dropped and written.
 
+#[cfg(feature = "cli")]
 mod authoring;
 mod sides;
 

@@ -1,4 +1,5 @@
-//! Options and sockets of a template, written in the window: each change is a step, the file has them, and uses of the part set them.
+//! Options and sockets of a template, written in the window: each change is a step, the file has them, and uses of the part
+//! set them.
 
 use bevy_egui::egui::Key;
 use rigsmith::rig::{
@@ -110,14 +111,16 @@ fn options_are_written_in_the_window_and_set_where_the_part_is_used() {
     studio.desk.until("the template", |_| fs::read_to_string(&path).unwrap().contains("walks along"));
     studio.settle();
     let written = fs::read_to_string(&path).unwrap();
-    assert!(written.contains("// ") == LIMB.contains("// ") && written.contains("name: \"limb_l\""), "{written}");
+    let kept = "tags: [Feature(kind: \"fk\", name: \"fk\"), control(feature: \"fk\", size: 0.5)],";
+    assert!(LIMB.contains(kept) && written.contains(kept), "{written}");
     let (code, said) = rigsmith(path.parent().unwrap(), &["list", "--json"]);
     assert!(code == 0 && said.contains("\"walks along\"") && said.contains("Moves with the limb."), "{said}");
     let read = load_template(&RealDisk, &path).unwrap();
     assert_eq!(read.options, options(&studio));
 
-    // The part with the option is put onto an arm.
-    studio.open(OpenRequest::File(studio.man()));
+    // The part with the option is put onto an arm of another rig.
+    let mut studio = Studio::new(LoaderPanel::default());
+    fs::copy(&path, studio.site.join("limbs").join("limb.rig.ron")).unwrap();
     let arm = studio.joint("arm_l");
     let values = vec![("walks along".to_owned(), "true".to_owned()), ("size".to_owned(), "1.5".to_owned())];
     studio.act(studio.limb(), LibraryAct::Part { joints: vec![arm], options: values });
@@ -173,7 +176,7 @@ fn sockets_are_written_in_the_window_and_others_hang_there() {
     let parts = "(part: \"limb.rig.ron\", name: \"first\"), \
                  (part: \"limb.rig.ron\", name: \"second\", socket: \"first.top\", prefix: \"b_\")";
     let host = path.with_file_name("two.rig.ron");
-    fs::write(&host, format!("(format: 2, name: \"two\", joints: [], parts: [{parts}])")).unwrap();
+    fs::write(&host, format!("(format: 2, name: \"two\", joints: [(label: \"body\")], parts: [{parts}])")).unwrap();
     let two = load_template(&RealDisk, &host).unwrap();
     let [first, second] = ["upper_l", "b_upper_l"].map(|label| two.rig.find_label(label).unwrap());
     assert_eq!(two.rig.joint(second).unwrap().parent, Some(first));
