@@ -93,7 +93,9 @@ pub struct GraphPanel {
     graph: Graph,
     /// Nodes and edges that the layout was made of.
     laid_out: (Vec<LayoutNode>, Vec<(usize, usize)>),
-    /// Place of each command in the layout; `None` where its frame is folded.
+    /// Places of the layout.
+    laid: Vec<[f32; 2]>,
+    /// Place of each command; `None` where its frame is folded.
     places: Vec<Option<[f32; 2]>>,
     /// Place of each folded frame.
     folded: Vec<Option<[f32; 2]>>,

@@ -132,7 +132,7 @@ fn the_check_is_on_with_symmetry_and_a_person_may_say_otherwise() {
 fn joints_without_a_partner_take_one_part() {
     let mut studio = Studio::new(LoaderPanel::default());
     mirror(&mut studio, true);
-    // The hips have no other side: nothing is said about it.
+    // The hips have no other side, which the person is told where other joints have one.
     let hips = studio.joint("hips");
     let [arm_l, elbow_l, elbow_r] = ["arm_l", "elbow_l", "elbow_r"].map(|label| studio.joint(label));
     let told = studio.desk.told().len();
@@ -144,7 +144,7 @@ fn joints_without_a_partner_take_one_part() {
         studio.desk.told()
     );
     studio.change(Change::Undo);
-    // A joint that has lost its partner is told; the pair that is left is by label or by being paired.
+    // A joint that has lost its partner is told, too.
     studio.desk.edit(Operation::Delete { joints: vec![elbow_r], keep_children: false });
     studio.act(studio.limb(), LibraryAct::Drop { joint: arm_l });
     assert_eq!(parts(&studio), [(vec![arm_l, elbow_l], false)]);

@@ -41,17 +41,16 @@ impl GraphPanel {
         let ends = graph.wires.iter().map(|wire| (item_of[wire.from], item_of[wire.to]));
         let edges: Vec<(usize, usize)> = ends.filter(|(from, to)| from != to).collect();
         let laid_out = (items, edges);
-        if self.laid_out != laid_out || self.open != open {
-            let places = lay_out(&laid_out.0, &laid_out.1);
-            let of_node = |(number, item): (usize, &usize)| {
-                let is_shown = graph.nodes[number].frame.is_none_or(|frame| open[frame]);
-                is_shown.then(|| places[*item])
-            };
-            self.places = item_of.iter().enumerate().map(of_node).collect();
-            self.folded = (0..open.len()).map(|frame| boxes.get(&frame).map(|item| places[*item])).collect();
+        if self.laid_out != laid_out {
+            self.laid = lay_out(&laid_out.0, &laid_out.1);
             self.laid_out = laid_out;
             self.refits = self.sees_all;
         }
+        let laid = &self.laid;
+        let shown = graph.nodes.iter().zip(&item_of);
+        let places = shown.map(|(node, item)| node.frame.is_none_or(|frame| open[frame]).then(|| laid[*item]));
+        self.places = places.collect();
+        self.folded = (0..open.len()).map(|frame| boxes.get(&frame).map(|item| laid[*item])).collect();
         self.open = open;
     }
 

@@ -19,13 +19,13 @@ use crate::{
 /// Numbers of the commands of a frame by their states.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(super) struct Tally {
-    /// All commands.
+    /// Number of commands.
     pub commands: usize,
-    /// Those that are built.
+    /// Number of built commands.
     pub built: usize,
-    /// Those that failed.
+    /// Number of failed commands.
     pub failed: usize,
-    /// The first of the failed ones, or else the first that is not built, or else the first: its state is the frame's.
+    /// Command whose state is the frame's: the first that failed, or else that is not built, or else that is.
     first: Option<usize>,
 }
 

@@ -44,8 +44,8 @@ impl Columns {
         }
         // Length of the longest path to each node.
         let mut depths: Vec<usize> = vec![0; count];
-        for node in 0..count {
-            depths[node] = before[node].iter().map(|before| depths[*before] + 1).max().unwrap_or(0);
+        for (node, before) in before.iter().enumerate() {
+            depths[node] = before.iter().map(|other: &usize| depths[*other] + 1).max().unwrap_or(0);
         }
         let mut cells: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for (node, depth) in depths.iter().enumerate() {
@@ -89,12 +89,12 @@ impl Columns {
         let height = |node: &usize| on_grid(sizes[*node][1]) + ROW_GAP;
         let tall = |column: &[usize]| column.iter().map(height).sum::<f32>();
         let columns: Vec<&[usize]> = self.cells.iter().flat_map(|cell| cell.chunks(longest)).collect();
-        let tallest = columns.iter().map(|column| tall(column)).fold(0.0, f32::max);
+        let tallest = columns.iter().copied().map(tall).fold(0.0, f32::max);
         let mut places = vec![[0.0; 2]; sizes.len()];
         let mut x = 0.0;
-        for column in &columns {
+        for column in columns {
             let mut y = ((tallest - tall(column)) / (2.0 * GRID)).floor() * GRID;
-            for node in *column {
+            for node in column {
                 places[*node] = [x, y];
                 y += height(node);
             }
