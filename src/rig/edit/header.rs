@@ -45,7 +45,8 @@ impl Rig {
             if about.options[..number].iter().any(|other| other.name == option.name) {
                 return Err(HeaderFault::OptionTwice(option.name.clone()).into());
             }
-            if let Err(error) = ron_options().from_str::<Box<RawValue>>(&option.default) {
+            let read: Result<Box<RawValue>, _> = ron_options().from_str(&option.default);
+            if let Err(error) = read {
                 return Err(HeaderFault::OptionDefault(option.name.clone(), error.code.to_string()).into());
             }
             option.check(&option.default).map_err(HeaderFault::OptionForm)?;

@@ -46,7 +46,7 @@ impl SocketList {
         let selected = selected_joint(shown);
         let button = ui.add_enabled(selected.is_ok(), bevy_egui::egui::Button::new("+ Socket"));
         let button = button.on_hover_text("A place on the selected joint that other parts hang on");
-        let reason = selected.err().unwrap_or_default();
+        let reason = selected.as_ref().err().copied().unwrap_or_default();
         if button.on_disabled_hover_text(reason).clicked()
             && let Ok((joint, label)) = selected
         {

@@ -13,9 +13,8 @@ pub(super) struct TypedFields {
 impl TypedFields {
     /// Draws a field with a name for screen readers; returns another text once the field is left.
     pub fn text(&mut self, ui: &mut Ui, rig: Entity, name: &str, now: &str, width: f32) -> Option<String> {
-        let is_own = |typed: &(Entity, String, String)| typed.0 == rig && typed.1 == name;
         let mut text = match &self.typed {
-            Some(typed) if is_own(typed) => typed.2.clone(),
+            Some((of, field, text)) if *of == rig && field == name => text.clone(),
             _ => now.to_owned(),
         };
         let response = ui.add(TextEdit::singleline(&mut text).hint_text(name).desired_width(width));
@@ -28,7 +27,7 @@ impl TypedFields {
         if response.has_focus() {
             return None;
         }
-        let typed = self.typed.take_if(|typed| is_own(typed));
+        let typed = self.typed.take_if(|(of, field, _)| *of == rig && field.as_str() == name);
         typed.map(|(_, _, text)| text).filter(|text| text != now)
     }
 
