@@ -95,6 +95,8 @@ pub struct GraphPanel {
     laid_out: (Vec<LayoutNode>, Vec<(usize, usize)>),
     /// Places of the layout.
     laid: Vec<[f32; 2]>,
+    /// Commands that each command read in its last run.
+    reads: BTreeMap<Uid, Vec<Uid>>,
     /// Place of each command; `None` where its frame is folded.
     places: Vec<Option<[f32; 2]>>,
     /// Place of each folded frame.

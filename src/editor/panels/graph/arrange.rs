@@ -8,8 +8,13 @@ use super::{
     GraphPanel,
     gesture::{Gesture, moved},
     layout::{LayoutNode, lay_out},
+    model::Graph,
     state::GraphView,
     wires::{BOX, node_size},
+};
+use crate::{
+    processor::{CommandState, CommandStatus},
+    rig::Uid,
 };
 
 impl GraphPanel {
@@ -21,6 +26,7 @@ impl GraphPanel {
         if !std::mem::take(&mut self.is_stale) && self.open == open {
             return;
         }
+        let links = links(graph, &self.statuses, &mut self.reads);
         let mut items: Vec<LayoutNode> = Vec::with_capacity(count);
         // Item of each command, and of each folded frame.
         let mut item_of: Vec<usize> = Vec::with_capacity(count);
@@ -38,7 +44,7 @@ impl GraphPanel {
             }
             item_of.push(item);
         }
-        let ends = graph.wires.iter().map(|wire| (item_of[wire.from], item_of[wire.to]));
+        let ends = links.into_iter().map(|(from, to)| (item_of[from], item_of[to]));
         let edges: Vec<(usize, usize)> = ends.filter(|(from, to)| from != to).collect();
         let laid_out = (items, edges);
         if self.laid_out != laid_out {
@@ -79,4 +85,31 @@ impl GraphPanel {
             |place: &Option<[f32; 2]>| place.map(|[x, y]| Rect::from_min_size(Pos2::new(x, y), vec2(BOX[0], BOX[1])));
         self.folded.iter().map(folded).collect()
     }
+}
+
+/// Dependencies between commands, from what is read to what reads it. A command that has failed, or waits to be run again, has
+/// those of its last run besides, so that nothing moves while a build goes back and forth; `reads` remembers them.
+fn links(
+    graph: &Graph,
+    statuses: &[Option<CommandStatus>],
+    reads: &mut BTreeMap<Uid, Vec<Uid>>,
+) -> Vec<(usize, usize)> {
+    let mut links = Vec::with_capacity(graph.wires.len());
+    let mut wires = graph.wires.as_slice();
+    for (number, node) in graph.nodes.iter().enumerate() {
+        let (own, rest) = wires.split_at(wires.partition_point(|wire| wire.to <= number));
+        wires = rest;
+        let mut sources: Vec<Uid> = own.iter().map(|wire| graph.nodes[wire.from].tag).collect();
+        let state = statuses.get(number).and_then(|status| status.as_ref()).map(|status| status.state);
+        if matches!(state, Some(CommandState::Done | CommandState::Skipped)) {
+            reads.insert(node.tag, sources.clone());
+        } else {
+            let before = reads.get(&node.tag).into_iter().flatten();
+            let missing: Vec<Uid> = before.filter(|source| !sources.contains(source)).copied().collect();
+            sources.extend(missing);
+        }
+        links.extend(sources.iter().filter_map(|source| Some((*graph.at.get(source)?, number))));
+    }
+    reads.retain(|tag, _| graph.at.contains_key(tag));
+    links
 }
