@@ -85,7 +85,7 @@ impl OptionList {
             }
         });
         ui.horizontal(|ui| {
-            self.form(ui, shown, number, option, requests);
+            choose_form(ui, shown, number, option, requests);
             self.default(ui, shown, number, option, requests);
         });
         self.limits(ui, shown, number, option, requests);
@@ -111,33 +111,6 @@ impl OptionList {
             if !option.sets.contains(&target) {
                 change(shown, CHANGE, requests, |about| about.options[number].sets.push(target));
             }
-        }
-    }
-
-    /// Draws the choice of the form; a default that the other form does not take becomes one that it takes.
-    fn form(&self, ui: &mut Ui, shown: &DisplayedRig, number: usize, option: &PartOption, requests: &mut Requests) {
-        let said = format!("Form of option {}", option.name);
-        let forms = [
-            None,
-            Some(OptionForm::Slider { min: 0.0, max: 1.0, step: None }),
-            Some(OptionForm::Number),
-            Some(OptionForm::Check),
-            Some(OptionForm::Menu { options: vec!["one".to_owned(), "two".to_owned()] }),
-            Some(OptionForm::Text),
-        ];
-        let mut chosen = None;
-        let now = form_name(option.form.as_ref());
-        let menu = ComboBox::from_id_salt(&said).selected_text(now).width(84.0).show_ui(ui, |ui| {
-            for form in forms {
-                let name = form_name(form.as_ref());
-                if ui.selectable_label(name == now, name).clicked() && name != now {
-                    chosen = Some(form);
-                }
-            }
-        });
-        menu.response.widget_info(|| WidgetInfo::labeled(WidgetType::ComboBox, true, &said));
-        if let Some(form) = chosen {
-            change(shown, CHANGE, requests, |about| reform(&mut about.options[number], form));
         }
     }
 
@@ -205,6 +178,33 @@ impl OptionList {
             }
             _ => {}
         }
+    }
+}
+
+/// Draws the choice of the form; a default that the other form does not take becomes one that it takes.
+fn choose_form(ui: &mut Ui, shown: &DisplayedRig, number: usize, option: &PartOption, requests: &mut Requests) {
+    let said = format!("Form of option {}", option.name);
+    let forms = [
+        None,
+        Some(OptionForm::Slider { min: 0.0, max: 1.0, step: None }),
+        Some(OptionForm::Number),
+        Some(OptionForm::Check),
+        Some(OptionForm::Menu { options: vec!["one".to_owned(), "two".to_owned()] }),
+        Some(OptionForm::Text),
+    ];
+    let mut chosen = None;
+    let now = form_name(option.form.as_ref());
+    let menu = ComboBox::from_id_salt(&said).selected_text(now).width(84.0).show_ui(ui, |ui| {
+        for form in forms {
+            let name = form_name(form.as_ref());
+            if ui.selectable_label(name == now, name).clicked() && name != now {
+                chosen = Some(form);
+            }
+        }
+    });
+    menu.response.widget_info(|| WidgetInfo::labeled(WidgetType::ComboBox, true, &said));
+    if let Some(form) = chosen {
+        change(shown, CHANGE, requests, |about| reform(&mut about.options[number], form));
     }
 }
 
