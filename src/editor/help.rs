@@ -52,6 +52,7 @@ const POINTER: &[(&str, &str)] = &[
     ("Timeline: drag selected keys", "move (with Alt between frames); with Ctrl scale about the playhead"),
     ("Timeline: Ctrl + wheel, Shift + wheel", "zoom, pan in time"),
     ("Graph: click, or drag a box", "select commands (with Shift more, with Ctrl one more or less)"),
+    ("Graph: click on a frame's title or box", "fold the frame to a box, or open it"),
     ("Graph: drag selected nodes", "move them on the grid; the document stays as it is"),
     ("Graph: drag from an output to an input", "refer to what the command makes (with Shift besides what is there)"),
     ("Graph: right click on a wire", "remove its reference, or insert a command"),

@@ -12,17 +12,23 @@ mod listing;
 mod pictures;
 mod preview;
 mod save;
+mod sides;
 mod work;
 
 use bevy::prelude::*;
 
-pub(in crate::editor) use self::save::header_edit;
 pub use self::{
     action::{LibraryAction, obstacle},
     listing::{LibraryFolder, LibraryFolders, LibraryListing, ListTemplates, TemplateLibrary},
     pictures::{LibraryPictures, TemplatePicture, WantPictures},
     save::{SaveTemplate, TemplateDraft, TemplateSave, Written},
+    sides::PartSides,
     work::{LOAD, LibraryAct, LibraryJobs, LibraryRequest},
+};
+pub(in crate::editor) use self::{
+    drop_target::{dropping, goes_onto_both},
+    save::{header_edit, header_step},
+    sides::{partner, partners},
 };
 use super::{
     actions::ActionRequest,
@@ -53,6 +59,7 @@ impl Plugin for LibraryPlugin {
             .init_resource::<LibraryJobs>()
             .init_resource::<ChosenTemplate>()
             .init_resource::<TemplateDraft>()
+            .init_resource::<PartSides>()
             .init_resource::<follow::LoadSteps>()
             .init_resource::<TemplateSave>()
             .init_resource::<SaveJob>()

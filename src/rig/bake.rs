@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::{BuiltRig, GroupData, JointData, NodeKind, NodeType, Rig, RigEdit, Uid};
+use super::{BuiltRig, GroupData, JointData, NodeKind, NodeType, Rig, RigAbout, RigEdit, Uid};
 
 /// Makes a rig without tags from the joints of a built one and the nodes that carry them. Uids, labels and groups stay,
 /// so that weights fit; controls and nulls that carry no joint are left out, other nodes become nulls.
@@ -18,7 +18,8 @@ pub fn baked(rig: &Rig, built: &BuiltRig) -> Rig {
     let groups = rig.groups().iter().cloned().enumerate();
     // An edit is refused only for a rotation that is far from a unit quaternion; that joint is then left out.
     let mut apply = |edit: RigEdit| drop(baked.apply(&edit));
-    apply(RigEdit::SetAbout(Box::new(rig.about().clone())));
+    // Without commands there is nothing that an option could set.
+    apply(RigEdit::SetAbout(Box::new(RigAbout { options: Vec::new(), ..rig.about().clone() })));
     groups.for_each(|(at, group)| apply(RigEdit::AddLocalGroup(GroupData { enabled: true, ..group }, at)));
     let known: HashSet<Uid> = rig.groups().iter().map(|group| group.uid).collect();
     for (at, node) in built.nodes.iter().enumerate().filter(|(at, _)| kept.contains(at)) {

@@ -11,7 +11,9 @@ use crate::{
     mesh::model::Weights,
     rig::{
         AttributeValues, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint, SelectionSet,
-        StoredPose, TagData, Uid, animation::RigClip, part::DroppedPart,
+        StoredPose, TagData, Uid,
+        animation::RigClip,
+        part::{DroppedPart, HeaderSocket, PartOption},
     },
 };
 
@@ -59,6 +61,12 @@ pub struct RigAbout {
     pub description: String,
     /// File name of a picture beside the template.
     pub preview: Option<String>,
+    /// Places that others hang on, but for those of the rig's parts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sockets: Vec<HeaderSocket>,
+    /// Values that uses of the rig as a part may set.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub options: Vec<PartOption>,
 }
 
 /// Weights of one mesh over joints of the rig.

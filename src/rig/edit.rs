@@ -6,6 +6,7 @@
 
 mod clips;
 mod effect;
+mod header;
 mod inputs;
 mod poses;
 mod skin_weights;
@@ -17,6 +18,7 @@ use std::{collections::HashSet, sync::Arc};
 use ron::value::RawValue;
 use serde::{Deserialize, Serialize};
 
+pub use self::header::HeaderFault;
 pub use self::weight_patch::{PatchFault, WeightPatch, joint_numbers, weight_edit};
 use crate::rig::{
     FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput, RigJoint,
@@ -158,6 +160,9 @@ pub enum RigEdit {
 /// Error of applying an edit. The rig is unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EditError {
+    /// A socket or option that no template can have.
+    #[error(transparent)]
+    Header(#[from] HeaderFault),
     /// A joint that does not exist.
     #[error("there is no joint {0} in the rig; it may have been deleted: select another")]
     NoJoint(Uid),
@@ -309,9 +314,7 @@ impl Rig {
                 let old = self.groups.iter_mut().find(|g| g.uid == group.uid).ok_or(EditError::NoGroup(group.uid))?;
                 RigEdit::SetLocalGroup(std::mem::replace(old, group.clone()))
             }
-            RigEdit::SetAbout(about) => {
-                RigEdit::SetAbout(Box::new(std::mem::replace(&mut self.about, (**about).clone())))
-            }
+            RigEdit::SetAbout(about) => self.set_about(about)?,
             RigEdit::SetSkin(mesh, skin) => self.set_skin(*mesh, skin.as_ref())?,
             RigEdit::SetOffset(joint, offset) => self.set_offset(*joint, *offset)?,
             RigEdit::SetAttributeValue(node, name, value) => self.set_attribute_value(*node, name, *value)?,

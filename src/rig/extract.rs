@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::{
     EditError, Rig, RigAbout, RigEdit, RigInput, TagData, TagKind, Uid, UidSource,
+    part::{HeaderSocket, PartInstance, PartOption},
     reference::{NameKind, Names, references_in},
     remap::Remap,
 };
@@ -95,7 +96,31 @@ pub fn extract(rig: &Rig, joints: &[Uid], name: &str, uids: Option<&mut UidSourc
     if !inputs.is_empty() {
         out.apply(&RigEdit::SetInputs(inputs))?;
     }
+    let about = RigAbout {
+        sockets: header_sockets(rig, &chosen, &remap),
+        options: rig.about().options.iter().filter(|option| can_set(&out, option)).cloned().collect(),
+        ..out.about().clone()
+    };
+    if about != *out.about() {
+        out.apply(&RigEdit::SetAbout(Box::new(about)))?;
+    }
     Ok(Extraction { rig: out, left })
+}
+
+/// Sockets on chosen joints.
+fn header_sockets(rig: &Rig, chosen: &HashSet<Uid>, remap: &Remap) -> Vec<HeaderSocket> {
+    let inside = rig.about().sockets.iter().filter(|socket| chosen.contains(&socket.joint));
+    let here = |socket: &HeaderSocket| HeaderSocket {
+        joint: remap.get(socket.joint).unwrap_or(socket.joint),
+        ..socket.clone()
+    };
+    inside.map(here).collect()
+}
+
+/// True if a rig has all that an option sets.
+fn can_set(rig: &Rig, option: &PartOption) -> bool {
+    let plain = PartInstance::default();
+    option.sets.iter().all(|(tag, _)| plain.find_tag(rig, tag).is_ok())
 }
 
 /// Inputs that a tag refers to.

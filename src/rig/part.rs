@@ -28,7 +28,7 @@ pub use option::{OptionError, OptionForm, PartOption};
 pub use overrides::PartOverride;
 pub(in crate::rig) use resize::MOST_JOINTS;
 pub use resize::PartChain;
-pub use socket::{PartSocket, SocketError};
+pub use socket::{HeaderSocket, PartSocket, SocketError};
 
 use crate::rig::{
     NodeRef, Rig, RigJoint, TagKind, Uid,
@@ -81,6 +81,11 @@ impl PartNeeds {
         }
         Self { joints: part.walk().take(least).map(name_of).collect(), sockets }
     }
+}
+
+/// Name by which the options of a rig's template call one of its tags, and no other.
+pub fn tag_name(rig: &Rig, tag: Uid) -> String {
+    PartInstance::default().name_of_tag(rig, tag)
 }
 
 /// Label of a joint, or its uid where it has none.

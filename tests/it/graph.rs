@@ -1,6 +1,7 @@
 //! The Graph panel: it shows what the rig and its builder say, and what a person does there reaches the document as one step.
 
 mod edits;
+mod frames;
 mod layout;
 
 use std::collections::BTreeSet;

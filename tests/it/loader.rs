@@ -1,6 +1,9 @@
 //! The Loader panel, the Part menu and the library behind them: templates found, loaded, merged, injected, dropped and written.
 
+#[cfg(feature = "cli")]
+mod authoring;
 mod landing;
+mod sides;
 
 use std::{
     fs,

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, DragAndDrop, FontId, Stroke};
 
-use super::{DraggedTemplate, LibraryAct, LibraryRequest};
+use super::{DraggedTemplate, LibraryAct, LibraryRequest, PartSides, TemplateLibrary, partner};
 use crate::{
     editor::{
         ActiveRig,
@@ -37,6 +37,21 @@ fn nearest(world: &World, at: Vec2) -> Option<(Uid, Vec2)> {
     near.min_by(|a, b| a.1.distance(at).total_cmp(&b.1.distance(at)))
 }
 
+/// True if a dragged template is a part that goes onto both sides.
+pub(in crate::editor) fn goes_onto_both(world: &World, dragged: &DraggedTemplate) -> bool {
+    let listing = world.get_resource::<TemplateLibrary>().map(TemplateLibrary::listing);
+    let listed = listing.and_then(|listing| listing.find(&dragged.place));
+    PartSides::are_both(world) && listed.is_some_and(|listed| listed.is_part())
+}
+
+/// Effect of a drop on a joint, in words; `both` for a part that goes onto the joint's partner, too.
+pub(in crate::editor) fn dropping(rig: &Rig, dragged: &DraggedTemplate, joint: Uid, both: bool) -> String {
+    let name = |joint: Uid| rig.joint(joint).map(|joint| joint_name(&joint.data).into_owned()).unwrap_or_default();
+    let other = partner(rig, joint).filter(|_| both);
+    let also = other.map_or_else(String::new, |other| format!(" and {}", name(other)));
+    format!("{} onto {}{also}", dragged.name, name(joint))
+}
+
 fn pointer(ctx: &egui::Context, area: egui::Rect) -> Option<Vec2> {
     let at = ctx.input(|input| input.pointer.latest_pos()).filter(|at| area.contains(*at))?;
     Some(Vec2::new(at.x - area.min.x, at.y - area.min.y))
@@ -51,8 +66,7 @@ impl ViewportPainter for DropTarget {
         let text = match nearest(world, at) {
             Some((joint, place)) => {
                 painter.circle_stroke(area.min + egui::vec2(place.x, place.y), 10.0, Stroke::new(2.0, color));
-                let name = active.and_then(|rig| rig.joint(joint)).map(|joint| joint_name(&joint.data));
-                format!("{} onto {}", dragged.name, name.unwrap_or_default())
+                active.map_or_else(String::new, |rig| dropping(rig, &dragged, joint, goes_onto_both(world, &dragged)))
             }
             None => format!("{}: drop it on a joint", dragged.name),
         };

@@ -5,19 +5,29 @@ use std::{
     sync::Arc,
 };
 
+use super::sides::{partner, partners};
 use crate::{
     processor::Modules,
     rig::{
         Rig, RigEdit, Uid,
         label::label_side,
-        operations::TagOperation,
+        operations::{PartSide, TagOperation},
         part::{Part, PartError, PartInstance},
         step::Step,
     },
 };
 
+/// An operation that adds a part.
+pub(super) struct Added {
+    /// The operation.
+    pub operation: TagOperation,
+    /// Joint without a partner, for which a part that was to go onto both sides goes onto one.
+    pub lonely: Option<Uid>,
+}
+
 /// The operation that puts a part onto the chosen joints of a rig, so that it stays a part: mirrored where these are on the
 /// other side than its own. `name` is that by which the rig's file calls the part; `stroke` are the joints of the last step.
+/// With `both`, a mirrored one goes onto the partners of the joints in the same step.
 ///
 /// # Errors
 /// A part that does not take so many joints, or one of its options that does not take the value.
@@ -26,18 +36,32 @@ pub(super) fn added(
     (chosen, stroke): (&[Uid], &[Uid]),
     (name, part): (String, Part),
     options: &[(String, String)],
+    both: bool,
     modules: &Modules,
-) -> Result<TagOperation, PartError> {
+) -> Result<Added, PartError> {
     let joints = joints_for(rig, chosen, stroke, &part);
     part.sized_for(joints.len())?;
     let label = |joint: &Uid| rig.joint(*joint).and_then(|joint| joint.data.label.as_deref());
     let of_part = side(part.rig.walk().map(|joint| joint.data.label.as_deref()));
     let mirror = of_part != 0 && side(joints.iter().map(label)) == -of_part;
-    let instance =
-        PartInstance { part: name.clone(), onto: vec![String::new(); joints.len()], mirror, ..PartInstance::default() };
     let mirrored = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
-    let fitted = instance.fitted(&part.with_options(options)?, &mirrored)?;
-    Ok(TagOperation::AddPart { part: name, fitted: Arc::new(fitted), joints, mirror })
+    let part = part.with_options(options)?;
+    let on = |joints: Vec<Uid>, mirror: bool| -> Result<PartSide, PartError> {
+        let onto = vec![String::new(); joints.len()];
+        let instance = PartInstance { part: name.clone(), onto, mirror, ..PartInstance::default() };
+        Ok(PartSide { fitted: Arc::new(instance.fitted(&part, &mirrored)?), joints, mirror })
+    };
+    let others = if both { partners(rig, &joints) } else { None };
+    if let Some(others) = others {
+        let sides = [on(joints, mirror)?, on(others, !mirror)?];
+        return Ok(Added { operation: TagOperation::AddPair { part: name, sides }, lonely: None });
+    }
+    // Parts of the trunk have no other side.
+    let (with, without): (Vec<Uid>, Vec<Uid>) =
+        joints.iter().copied().partition(|joint| partner(rig, *joint).is_some());
+    let lonely = without.first().filter(|_| both && !with.is_empty()).copied();
+    let PartSide { fitted, joints, mirror } = on(joints, mirror)?;
+    Ok(Added { operation: TagOperation::AddPart { part: name, fitted, joints, mirror }, lonely })
 }
 
 /// Side of the first label that names one: see [`label_side`].

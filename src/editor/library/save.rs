@@ -195,8 +195,13 @@ fn own_template(world: &World) -> Option<&Path> {
 
 /// Request for another header, as one step.
 pub(in crate::editor) fn header_edit(rig: Entity, about: RigAbout) -> EditRequest {
+    header_step(rig, HEADER, about)
+}
+
+/// Request for another header, as one step of that name.
+pub(in crate::editor) fn header_step(rig: Entity, name: &'static str, about: RigAbout) -> EditRequest {
     let edits = vec![RigEdit::SetAbout(Box::new(about))];
-    EditRequest::operation(rig, Operation::Named { name: HEADER, edits })
+    EditRequest::operation(rig, Operation::Named { name, edits })
 }
 
 /// The path, absolute and with the ending of a template.

@@ -10,8 +10,9 @@ use bevy::{
 
 use super::{
     follow::{LoadSteps, PendingLoad},
-    joints::{added, added_by},
+    joints::{Added, added, added_by},
     listing::{LibraryFolders, own_folder},
+    sides::PartSides,
 };
 use crate::{
     editor::{
@@ -21,6 +22,7 @@ use crate::{
             loading::{replacing, settled},
         },
         notice::Notice,
+        panels::joint_name,
     },
     files::{LibraryError, RealDisk, SearchPaths, SiteError, TemplatePlace, read_listed},
     plugins::{
@@ -75,14 +77,14 @@ pub enum LibraryAct {
         /// The joints.
         joints: Vec<Uid>,
     },
-    /// Puts a part onto joints, so that it stays a part.
+    /// Puts a part onto joints, so that it stays a part; onto their partners, too, if [`PartSides`] says so.
     Part {
         /// The joints; of a single one, the chain that ends or begins there.
         joints: Vec<Uid>,
         /// Values of the part's options, as RON.
         options: Vec<(String, String)>,
     },
-    /// Puts a part onto the chain at a joint; merges any other template below it.
+    /// Puts a part onto the chain at a joint, and onto its partner's as for `Part`; merges any other template below it.
     Drop {
         /// The joint.
         joint: Uid,
@@ -127,8 +129,8 @@ enum Work {
 enum Ready {
     /// Edits that put a template in place of the rig, and what the rig has then come from.
     Load { edits: Vec<RigEdit>, base: Arc<Rig>, notes: Vec<String> },
-    /// An operation.
-    Operation(Box<Operation>),
+    /// An operation, and what is to be said about it.
+    Operation(Box<Operation>, Option<String>),
 }
 
 impl LibraryJobs {
@@ -153,6 +155,8 @@ struct Snapshot {
     beside: Option<std::path::PathBuf>,
     /// Joints that the last step added.
     stroke: Vec<Uid>,
+    /// True to put parts onto both sides.
+    both: bool,
 }
 
 /// Starts the next request.
@@ -191,6 +195,7 @@ fn begin(world: &mut World, request: LibraryRequest) {
         folders: world.get_resource::<LibraryFolders>().cloned().unwrap_or_default(),
         beside: world.get::<OpenDocument>(rig).and_then(own_folder),
         stroke: added_by(history.last().map(Arc::as_ref)),
+        both: PartSides::are_both(world),
     };
     let (landing, asked) = (Landing::asked(history), request.clone());
     let work = Work::Runs(AsyncComputeTaskPool::get().spawn(async move { snapshot.run(&asked) }));
@@ -205,7 +210,7 @@ impl Snapshot {
         let operation = match &request.act {
             LibraryAct::Load { keep } | LibraryAct::Fit { keep } => return self.loaded(template, *keep),
             LibraryAct::Drop { joint } if template.rig.about().kind == "part" => {
-                self.part(&request.place, template, &site, &[*joint], &[])?
+                return Ok(self.part(&request.place, template, &site, &[*joint], &[])?);
             }
             LibraryAct::Drop { joint } => merging(template, Some(*joint)),
             LibraryAct::Merge { parent } => merging(template, *parent),
@@ -214,9 +219,11 @@ impl Snapshot {
                 joints: joints.clone(),
                 bindings: default(),
             }),
-            LibraryAct::Part { joints, options } => self.part(&request.place, template, &site, joints, options)?,
+            LibraryAct::Part { joints, options } => {
+                return Ok(self.part(&request.place, template, &site, joints, options)?);
+            }
         };
-        Ok(Ready::Operation(Box::new(operation)))
+        Ok(Ready::Operation(Box::new(operation), None))
     }
 
     fn part(
@@ -226,10 +233,16 @@ impl Snapshot {
         site: &SearchPaths,
         joints: &[Uid],
         options: &[(String, String)],
-    ) -> Result<Operation, PartError> {
+    ) -> Result<Ready, PartError> {
         let name = place.part_name(self.beside.as_deref(), site);
         let part = (name, Part::from(template));
-        Ok(Operation::Tags(added(&self.rig, (joints, &self.stroke), part, options, &self.modules)?))
+        let joints = (joints, self.stroke.as_slice());
+        let Added { operation, lonely } = added(&self.rig, joints, part, options, self.both, &self.modules)?;
+        let note = lonely.and_then(|joint| self.rig.joint(joint)).map(|joint| {
+            let (part, joint) = (place.stem(), joint_name(&joint.data));
+            format!("{part} went onto one side only: {joint} has no partner on the other; mirror the joints first")
+        });
+        Ok(Ready::Operation(Box::new(Operation::Tags(operation)), note))
     }
 
     /// Edits that put a template in place of the rig. Where poses and keys are kept, things of the rig that the template has,
@@ -316,8 +329,11 @@ fn put(world: &mut World, rig: Entity, request: LibraryRequest, mut landing: Lan
         JobOutcome::Commit => {}
     }
     let (edits, base, notes) = match ready {
-        Ready::Operation(operation) => {
+        Ready::Operation(operation, note) => {
             world.write_message(EditRequest::operation(rig, *operation));
+            if let Some(note) = note {
+                world.write_message(Notice::info(note));
+            }
             return;
         }
         Ready::Load { edits, base, notes } => (edits, base, notes),

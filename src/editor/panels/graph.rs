@@ -1,13 +1,17 @@
-//! Graph panel: commands as nodes, references as wires, features as frames.
+//! Graph panel: commands as nodes, references as wires, features and local groups as frames.
 //!
 //! The same document as the Tags and the Process panel, seen as a graph that lays itself out: the graph is derived from the
-//! rig and its builder whenever one of them changes, and every edit is an operation on tags. Only places of nodes that a
-//! person moved are the graph's own ([`GraphView`]); they last as long as the window, since no document has a place for
-//! them.
+//! rig and its builder whenever one of them changes, and every edit is an operation on tags. In a graph of many commands
+//! frames are folded to boxes, but for those of selected joints. Only places of nodes that a person moved, and frames that
+//! a person opened or folded, are the graph's own ([`GraphView`]); they last as long as the window, since no document has a
+//! place for them.
 
 mod action;
+mod arrange;
+mod boxes;
 mod canvas;
 mod carry_out;
+mod chart;
 mod edits;
 mod gesture;
 pub mod layout;
@@ -19,28 +23,27 @@ mod state;
 mod wires;
 mod words;
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    sync::Arc,
-};
+use std::{collections::BTreeMap, sync::Arc};
 
 use bevy::{ecs::change_detection::Tick, prelude::*};
-use bevy_egui::egui::{self, Id, Popup, Pos2, Rect, Response, SetOpenCommand, Ui, emath::TSTransform, vec2};
+use bevy_egui::egui::{self, Id, Popup, Rect, Response, SetOpenCommand, Ui, emath::TSTransform};
 use egui_snarl::{NodeId, Snarl};
 
 pub use self::{
     action::{GraphAction, obstacle, over_graph},
-    state::{GraphLook, GraphRequest, GraphView},
+    chart::{ChartFrame, GraphChart},
+    state::{FEW, GraphLook, GraphRequest, GraphView},
 };
 use self::{
+    boxes::Tally,
     canvas::{Canvas, NodePart, SCALES, Scene},
     edits::Bench,
-    gesture::{Gesture, Hand, Outcome, is_dropped, moved, pointer},
-    layout::{LayoutNode, lay_out},
+    gesture::{Gesture, Hand, Outcome, is_dropped, pointer},
+    layout::LayoutNode,
     look::ModuleLooks,
     menu::{Menu, MenuTarget, add_to_selected, button, send},
     model::Graph,
-    wires::{frames, node_size},
+    wires::Spots,
 };
 use super::{
     displayed_rig::{DisplayedRig, Stamp},
@@ -91,7 +94,18 @@ pub struct GraphPanel {
     /// Nodes and edges that the layout was made of.
     laid_out: (Vec<LayoutNode>, Vec<(usize, usize)>),
     /// Places of the layout.
-    places: Vec<[f32; 2]>,
+    laid: Vec<[f32; 2]>,
+    /// Commands that each command read in its last run.
+    reads: BTreeMap<Uid, Vec<Uid>>,
+    /// Place of each command; `None` where its frame is folded.
+    places: Vec<Option<[f32; 2]>>,
+    /// Place of each folded frame.
+    folded: Vec<Option<[f32; 2]>>,
+    /// Frames that are open.
+    open: Vec<bool>,
+    /// True if the graph was made again since it was laid out.
+    is_stale: bool,
+    tallies: Vec<Tally>,
     statuses: Vec<Option<CommandStatus>>,
     /// Number of runs of each command when the graph was made last; `None` before that.
     runs: Option<BTreeMap<Uid, u32>>,
@@ -128,6 +142,7 @@ impl EditorPanel for GraphPanel {
         }
         let now = ui.input(|input| input.time);
         self.refresh(world, &shown, &modules.0, now);
+        self.arrange(view);
         self.bar(ui, world, &shown, view, &modules.0, requests);
         if self.graph.nodes.is_empty() {
             self.gesture = None;
@@ -138,7 +153,7 @@ impl EditorPanel for GraphPanel {
 }
 
 impl GraphPanel {
-    /// Makes the graph again if the rig or its build changed, and lays it out if its shape did.
+    /// Makes the graph again if the rig or its build changed.
     fn refresh(&mut self, world: &World, shown: &DisplayedRig, modules: &Arc<Modules>, now: f64) {
         let processor = world.get_entity(shown.entity).ok().and_then(|rig| rig.get_ref::<Processor>());
         let made_from = Some((shown.stamp(), processor.as_ref().map(|processor| processor.last_changed())));
@@ -161,15 +176,8 @@ impl GraphPanel {
         self.graph = Graph::of(&shown.rig, builder, modules, &mut self.looks, known);
         self.statuses = self.graph.nodes.iter().map(|node| builder?.status(node.tag)).collect();
         self.note_runs(now);
-        let nodes = self.graph.nodes.iter();
-        let nodes = nodes.map(|node| LayoutNode { size: node_size(node.inputs.len()), frame: node.frame });
-        let edges = self.graph.wires.iter().map(|wire| (wire.from, wire.to));
-        let laid_out = (nodes.collect(), edges.collect::<BTreeSet<_>>().into_iter().collect());
-        if self.laid_out != laid_out {
-            self.places = lay_out(&laid_out.0, &laid_out.1);
-            self.laid_out = laid_out;
-            self.refits = self.sees_all;
-        }
+        self.tallies = Tally::all(&self.graph, &self.statuses);
+        self.is_stale = true;
     }
 
     /// Lets the commands flash that ran since the last look.
@@ -211,6 +219,10 @@ impl GraphPanel {
             ui.menu_button("+ Add", |ui| add_to_selected(ui, shown, &bench, words, requests));
             button(ui, world, GraphAction::LayOut, "Lay out again", requests);
             button(ui, world, GraphAction::ShowAll, "Show all", requests);
+            if !graph.frames.is_empty() {
+                button(ui, world, GraphAction::OpenFrames, "Open all", requests);
+                button(ui, world, GraphAction::FoldFrames, "Fold all", requests);
+            }
             let count = match graph.nodes.len() {
                 1 => "1 command".to_owned(),
                 count => format!("{count} commands"),
@@ -221,26 +233,14 @@ impl GraphPanel {
         });
     }
 
-    /// Rectangles of all nodes: where the layout or a person put them, and where a drag has them.
-    fn rects(&self, view: &GraphView, by: egui::Vec2) -> Vec<Rect> {
-        let dragged = match &self.gesture {
-            Some(Gesture::Nodes(tags, _)) => Some(tags),
-            _ => None,
-        };
-        let nodes = self.graph.nodes.iter().zip(&self.places);
-        nodes
-            .map(|(node, place)| {
-                let [width, height] = node_size(node.inputs.len());
-                let place = view.moved.get(&node.tag).copied().unwrap_or(*place);
-                let rect = moved(Rect::from_min_size(Pos2::ZERO, vec2(width, height)), place);
-                let is_dragged = dragged.is_some_and(|tags| tags.contains(&node.tag));
-                if is_dragged { rect.translate(by) } else { rect }
-            })
-            .collect()
-    }
-
     /// The transform that brings into view what was asked for; `None` if nothing was.
-    fn wanted(&mut self, rig: Entity, view: &GraphView, rects: &[Rect], area: Rect) -> Option<TSTransform> {
+    fn wanted(
+        &mut self,
+        rig: Entity,
+        view: &GraphView,
+        (rects, boxes): (&[Rect], &[Option<Rect>]),
+        area: Rect,
+    ) -> Option<TSTransform> {
         let (number, look) = view.look;
         let is_other = self.looked.is_none_or(|(known, _)| known != rig);
         let refits = std::mem::take(&mut self.refits);
@@ -251,10 +251,11 @@ impl GraphPanel {
         let look = if is_asked { look } else { GraphLook::All };
         self.looked = Some((rig, number));
         let is_meant = |tag: &Uid| look == GraphLook::All || view.selected.contains(tag);
-        let nodes = self.graph.nodes.iter().zip(rects).filter(|(node, _)| is_meant(&node.tag));
-        let mut space = nodes.fold(Rect::NOTHING, |space, (_, rect)| space.union(*rect));
+        let spots = Spots { graph: &self.graph, rects, boxes };
+        let nodes = self.graph.nodes.iter().enumerate().filter(|(_, node)| is_meant(&node.tag));
+        let mut space = nodes.fold(Rect::NOTHING, |space, (number, _)| space.union(spots.shown(number)));
         if look == GraphLook::All {
-            space = frames(&self.graph, rects).into_iter().filter(|frame| frame.is_finite()).fold(space, Rect::union);
+            space = spots.frames().into_iter().filter(|frame| frame.is_finite()).fold(space, Rect::union);
         }
         if !space.is_finite() {
             return None;
@@ -280,8 +281,8 @@ impl GraphPanel {
         if is_dropped(ui) {
             self.gesture = None;
         }
-        let rest = self.rects(view, egui::Vec2::ZERO);
-        let want = self.wanted(shown.entity, view, &rest, area);
+        let (rest, boxes) = (self.rects(view, egui::Vec2::ZERO), self.boxes());
+        let want = self.wanted(shown.entity, view, (rest.as_slice(), boxes.as_slice()), area);
         let transform = want.unwrap_or(self.transform);
         let inverse = transform.inverse();
         let at = ui.input(|input| input.pointer.latest_pos()).map(|at| inverse * at);
@@ -289,6 +290,7 @@ impl GraphPanel {
         let hand = Hand {
             graph: &self.graph,
             rects: &rest,
+            boxes: &boxes,
             selected: &view.selected,
             at,
             pressed: None,
@@ -309,6 +311,8 @@ impl GraphPanel {
             scene: Scene {
                 graph: &self.graph,
                 rects: &rects,
+                boxes: &boxes,
+                tallies: &self.tallies,
                 statuses: &self.statuses,
                 glow: &glow,
                 selected: &view.selected,
@@ -326,7 +330,10 @@ impl GraphPanel {
         };
         let ground = canvas.show(ui, &mut self.snarl);
         self.transform = canvas.transform;
-        self.sees_all = canvas.visible.len() == rects.len();
+        let shown_nodes = rects.iter().filter(|rect| rect.is_finite()).count();
+        let space = canvas.view();
+        self.sees_all =
+            canvas.visible.len() == shown_nodes && boxes.iter().flatten().all(|rect| rect.intersects(space));
         let (at, pressed) = pointer(ui, &canvas);
         let hand = Hand { at, pressed, scale: canvas.transform.scaling, ..hand };
         let mut outcomes = Vec::new();
@@ -344,6 +351,7 @@ impl GraphPanel {
         for outcome in outcomes {
             match outcome {
                 Outcome::Select(tags) => requests.send(GraphRequest::Select(tags)),
+                Outcome::Fold(frame, is_open) => requests.send(GraphRequest::Fold(frame, is_open)),
                 Outcome::Move(list) => requests.send(GraphRequest::Move(list)),
                 Outcome::Edit(operation) => send(operation, shown, requests),
                 Outcome::Refused(error) => requests.send(Notice::error(format!("The wire was not set: {error}."))),

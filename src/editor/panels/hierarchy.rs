@@ -19,6 +19,7 @@ use super::{
 };
 use crate::{
     editor::{
+        library::{DraggedTemplate, goes_onto_both},
         notice::Notice,
         panel::{EditorPanel, Requests},
     },
@@ -49,6 +50,8 @@ pub struct HierarchyPanel {
     pointed: Option<Uid>,
     /// The joint of the row under the pointer.
     under: Option<Uid>,
+    /// True if a part is dragged that goes onto both sides.
+    is_for_both: bool,
 }
 
 /// The listed rows with the state they were made from.
@@ -89,6 +92,8 @@ impl EditorPanel for HierarchyPanel {
         keys::press(self, ui, &shown, requests);
         let reveal = self.newly_active(&shown);
         self.under = None;
+        let dragged = DragAndDrop::payload::<DraggedTemplate>(ui.ctx());
+        self.is_for_both = dragged.is_some_and(|dragged| goes_onto_both(world, &dragged));
         let drawn = self.list(ui, &shown, reveal, requests);
         self.end_rename(&shown, drawn, requests);
         if self.under != self.pointed {

@@ -39,7 +39,7 @@ pub use text_patch::write_template_over;
 pub(crate) use text_patch::{PartRigs, says_the_same, with_instances, without_instances, write_parts_over};
 pub use tidy::{UidStyle, format_template};
 pub use write::write_template;
-pub(in crate::rig) use write::{quoted, vector, write_without_poses};
+pub(in crate::rig) use write::{option_text, quoted, socket_text, vector, write_without_poses};
 
 use crate::rig::{
     Rig, Uid,

@@ -112,6 +112,13 @@ pub enum TagOperation {
         /// True for a part of the other side of the character.
         mirror: bool,
     },
+    /// Drops a part onto two chains of joints, one on each side, so that both stay parts.
+    AddPair {
+        /// File of the part, as a template names it.
+        part: String,
+        /// The two sides.
+        sides: [PartSide; 2],
+    },
     /// Turns a combined feature on or off.
     SetFeature(FeatureKey, bool),
     /// Turns one part of a combined feature on or off.
@@ -120,6 +127,17 @@ pub enum TagOperation {
     ChooseSwitch(FeatureKey, String),
     /// Enables a local group or not.
     EnableGroup(Uid, bool),
+}
+
+/// Part on the joints of one side.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PartSide {
+    /// The part as it is [fitted](crate::rig::part::PartInstance::fitted) to these joints.
+    pub fitted: Arc<Rig>,
+    /// The joints, in order.
+    pub joints: Vec<Uid>,
+    /// True for a part of the other side of the character.
+    pub mirror: bool,
 }
 
 /// Error of an operation on tags. The rig is unchanged.
@@ -218,6 +236,7 @@ impl TagOperation {
             Self::Paste { .. } => "Paste tags",
             Self::Drop { .. } => "Drop part",
             Self::AddPart { .. } => "Add part",
+            Self::AddPair { .. } => "Add part on both sides",
             Self::SetFeature(_, true) | Self::SetSwitch(_, _, true) => "Turn feature on",
             Self::SetFeature(_, false) | Self::SetSwitch(_, _, false) => "Turn feature off",
             Self::ChooseSwitch(..) => "Choose switch",
@@ -287,6 +306,9 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
         TagOperation::Drop { part, joints, bindings } => part::drop_sized(draft, part, joints, bindings),
         TagOperation::AddPart { part, fitted, joints, mirror } => {
             part::drop_instance(draft, part, fitted, joints, *mirror)
+        }
+        TagOperation::AddPair { part, sides } => {
+            sides.iter().try_for_each(|side| part::drop_instance(draft, part, &side.fitted, &side.joints, side.mirror))
         }
         TagOperation::SetFeature(key, on) => apply(draft, feature::set_feature(draft.rig(), key, *on)?),
         TagOperation::SetSwitch(key, switch, on) => apply(draft, feature::set_switch(draft.rig(), key, switch, *on)?),

@@ -6,6 +6,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use bevy::math::Vec3;
+
 use super::{OptionError, PartChain, PartChange, PartError, PartOption, PartSocket};
 use crate::rig::{
     JointData, RestTransform, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
@@ -204,7 +206,9 @@ impl PartInstance {
                 true => RestTransform::from_affine(&plane.mirrored_affine(&socket.rest.affine())),
                 false => socket.rest,
             };
-            Some(PartSocket { name, joint: Some(joint), rest, ..socket.clone() })
+            let turned = Vec3::new(socket.angles.x, -socket.angles.y, -socket.angles.z);
+            let angles = if self.mirror { turned } else { socket.angles };
+            Some(PartSocket { name, joint: Some(joint), rest, angles, ..socket.clone() })
         };
         part.sockets.iter().filter_map(here).collect()
     }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::PartError;
 
 /// A value that a part lets its uses set.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PartOption {
     /// Name, by which an instance sets it.
     pub name: String,

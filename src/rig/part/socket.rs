@@ -1,6 +1,22 @@
 //! Sockets: places of a part, or of a rig, that others hang on.
 
+use bevy::math::Vec3;
+use serde::{Deserialize, Serialize};
+
 use crate::rig::{RestTransform, Rig, Uid, nearest::did_you_mean};
+
+/// A socket of a rig itself, as people write it in the header of its template.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HeaderSocket {
+    /// Name, without points.
+    pub name: String,
+    /// Joint of the socket.
+    pub joint: Uid,
+    /// Translation relative to the joint.
+    pub translation: Vec3,
+    /// Rotation relative to the joint: degrees about X, Y and Z.
+    pub rotation: Vec3,
+}
 
 /// A place of a part, or of a rig, that other parts hang on, and that things of a game are attached to.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +29,8 @@ pub struct PartSocket {
     pub joint: Option<Uid>,
     /// Place relative to the joint.
     pub rest: RestTransform,
+    /// Rotation of that place as files have it: degrees about X, Y and Z.
+    pub angles: Vec3,
     /// Place in the text that has the socket, in bytes.
     pub offset: usize,
 }
@@ -41,6 +59,12 @@ pub enum SocketError {
 }
 
 impl PartSocket {
+    /// The socket as the header of its template has it; `None` without its joint.
+    pub(in crate::rig) fn header(&self) -> Option<HeaderSocket> {
+        let (joint, translation) = (self.joint?, self.rest.translation);
+        Some(HeaderSocket { name: self.name.clone(), joint, translation, rotation: self.angles })
+    }
+
     /// The socket with its joint, found by label.
     ///
     /// # Errors

@@ -5,9 +5,10 @@ use std::collections::BTreeSet;
 use crate::rig::{
     GroupData, JointData, Rig, RigAbout, RigInput, StoredPose, TagData, TagKind, Uid,
     format::{
-        template::{quoted, vector},
+        template::{option_text, quoted, socket_text, vector},
         tree::Tree,
     },
+    part::HeaderSocket,
     reference::{given_name, refresh_names},
 };
 
@@ -31,6 +32,12 @@ fn written(text: &str) -> Option<String> {
 }
 
 pub(super) fn about_fields() -> Vec<Field<'static, RigAbout>> {
+    let listed = |elements: Vec<String>| (!elements.is_empty()).then(|| format!("[{}]", elements.join(", ")));
+    let sockets = move |about: &RigAbout| {
+        let text = |socket: &HeaderSocket| socket_text(socket, &socket.joint.to_string());
+        listed(about.sockets.iter().map(text).collect())
+    };
+    let options = move |about: &RigAbout| listed(about.options.iter().map(option_text).collect());
     vec![
         field("name", |a: &RigAbout| written(&a.name), |a, b| a.name.clone_from(&b.name)),
         field("version", |a: &RigAbout| written(&a.version), |a, b| a.version.clone_from(&b.version)),
@@ -38,6 +45,8 @@ pub(super) fn about_fields() -> Vec<Field<'static, RigAbout>> {
         field("author", |a: &RigAbout| written(&a.author), |a, b| a.author.clone_from(&b.author)),
         field("description", |a: &RigAbout| written(&a.description), |a, b| a.description.clone_from(&b.description)),
         field("preview", |a: &RigAbout| a.preview.as_deref().map(quoted), |a, b| a.preview.clone_from(&b.preview)),
+        field("sockets", sockets, |a, b| a.sockets.clone_from(&b.sockets)),
+        field("options", options, |a, b| a.options.clone_from(&b.options)),
     ]
 }
 

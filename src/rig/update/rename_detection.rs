@@ -110,6 +110,7 @@ pub(super) fn with_uids(rig: &Rig, uids: HashMap<Uid, Uid>) -> Rig {
     let get = |uid: Uid| remap.get(uid).unwrap_or(uid);
     let joints = rig.walk().map(|joint| (get(joint.data.uid), (remap.joint(&joint.data), joint.parent.map(get))));
     let mut out = rig.clone();
+    out.about.sockets.iter_mut().for_each(|socket| socket.joint = get(socket.joint));
     out.clips = rig.clips().iter().map(|clip| clip.with_nodes(get)).collect();
     out.set_joints(joints.collect(), |parent| {
         let own = parent.map(|parent| before.get(&parent).copied().unwrap_or(parent));

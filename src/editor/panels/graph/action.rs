@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::state::GraphView;
+use super::{model::has_frames, state::GraphView};
 use crate::{
     editor::{ActiveRig, actions::Action},
     rig::{Rig, TagKind},
@@ -18,6 +18,10 @@ pub enum GraphAction {
     ShowAll,
     /// Brings the selected nodes into view.
     ShowSelected,
+    /// Opens all frames.
+    OpenFrames,
+    /// Folds all frames.
+    FoldFrames,
     /// Selects all commands.
     SelectAll,
     /// Selects no command.
@@ -30,10 +34,12 @@ pub enum GraphAction {
 
 impl GraphAction {
     /// Every action.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::LayOut,
         Self::ShowAll,
         Self::ShowSelected,
+        Self::OpenFrames,
+        Self::FoldFrames,
         Self::SelectAll,
         Self::SelectNone,
         Self::Toggle,
@@ -46,6 +52,8 @@ impl GraphAction {
             Self::LayOut => "Lay the graph out again",
             Self::ShowAll => "Whole graph in the panel",
             Self::ShowSelected => "Selected commands in the panel",
+            Self::OpenFrames => "Open all frames of the graph",
+            Self::FoldFrames => "Fold all frames of the graph",
             Self::SelectAll => "Select all commands",
             Self::SelectNone => "Select no commands",
             Self::Toggle => "Selected commands on or off",
@@ -80,6 +88,9 @@ pub fn obstacle(world: &World, action: GraphAction) -> Option<&'static str> {
     match action {
         GraphAction::LayOut => view.moved.is_empty().then_some("no node was moved by hand"),
         GraphAction::ShowAll | GraphAction::SelectAll => None,
+        GraphAction::OpenFrames | GraphAction::FoldFrames => {
+            (!has_frames(rig)).then_some("no command is in a feature or a local group")
+        }
         GraphAction::ShowSelected | GraphAction::SelectNone | GraphAction::Toggle | GraphAction::Delete => {
             view.selected.is_empty().then_some("no command is selected in the Graph")
         }

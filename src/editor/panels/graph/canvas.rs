@@ -15,9 +15,10 @@ use egui_snarl::{
 };
 
 use super::{
+    boxes::{self, Tally},
     model::{Graph, GraphWire},
     node,
-    wires::{self, WireInk},
+    wires::{self, Spots, WireInk},
 };
 use crate::{
     editor::{panels::process, style},
@@ -55,12 +56,22 @@ pub(super) enum Ink {
 pub(super) struct Scene<'a> {
     pub graph: &'a Graph,
     pub rects: &'a [Rect],
+    /// Rectangle of each folded frame.
+    pub boxes: &'a [Option<Rect>],
+    /// Numbers of the commands of each frame.
+    pub tallies: &'a [Tally],
     pub statuses: &'a [Option<CommandStatus>],
     /// Strength of each node's flash, 0 to 1.
     pub glow: &'a [f32],
     pub selected: &'a BTreeSet<Uid>,
     pub hovered: Option<GraphWire>,
     pub ink: Option<&'a Ink>,
+}
+
+impl Scene<'_> {
+    fn spots(&self) -> Spots<'_> {
+        Spots { graph: self.graph, rects: self.rects, boxes: self.boxes }
+    }
 }
 
 /// A drawing of the graph.
@@ -105,6 +116,15 @@ impl Canvas<'_> {
         ui.input_mut(|input| input.modifiers = held);
         let ground = ground.inner;
         self.name(&ground, self.view(), "Graph of commands", None);
+        for (number, space) in self.scene.spots().frames().into_iter().enumerate() {
+            let (frame, on_screen) = (&self.scene.graph.frames[number], self.transform * space);
+            if space.intersects(self.view()) {
+                // What the pointer does there, the ground tells.
+                let named =
+                    ui.interact(on_screen.intersect(self.area), self.id.with(("frame", frame.uid.0)), Sense::hover());
+                self.name(&named, space, &boxes::said(&self.scene, number), None);
+            }
+        }
         ground
     }
 
@@ -142,23 +162,6 @@ impl Canvas<'_> {
             let at = scene.rects[*number].min + egui::vec2(14.0, 6.0);
             let title = &scene.graph.nodes[*number].title;
             painter.text(at, Align2::LEFT_TOP, title, FontId::proportional(15.0), visuals.text_color());
-        }
-    }
-
-    fn frames(&self, painter: &Painter, view: Rect, look: &Style) {
-        let visuals = &look.visuals;
-        let unit = 1.0 / self.transform.scaling.max(1e-3);
-        for (frame, rect) in self.scene.graph.frames.iter().zip(wires::frames(self.scene.graph, self.scene.rects)) {
-            if !rect.intersects(view) {
-                continue;
-            }
-            let stroke = Stroke::new(unit.max(1.0), visuals.widgets.noninteractive.bg_stroke.color);
-            painter.rect(rect, 6.0, visuals.faint_bg_color, stroke, StrokeKind::Inside);
-            let off = if frame.enabled { "" } else { " (off)" };
-            let color = style::quiet(visuals);
-            let font = FontId::proportional(14.0f32.max(11.0 * unit).min(40.0));
-            let at = rect.min + egui::vec2(10.0, 6.0);
-            painter.text(at, Align2::LEFT_TOP, format!("{}{off}", frame.name), font, color);
         }
     }
 
@@ -249,7 +252,8 @@ impl SnarlViewer<Uid> for Canvas<'_> {
         _: &Snarl<Uid>,
     ) {
         let visuals = &look.visuals;
-        self.frames(painter, *viewport, look);
+        let unit = 1.0 / self.transform.scaling.max(1e-3);
+        boxes::draw(painter, *viewport, &self.scene, visuals, unit);
         let (graph, selected) = (self.scene.graph, self.scene.selected);
         let ink = WireInk {
             reference: visuals.text_color().gamma_multiply(0.6),
@@ -257,9 +261,10 @@ impl SnarlViewer<Uid> for Canvas<'_> {
             selected: style::accent(visuals),
             is_selected: &|number: usize| selected.contains(&graph.nodes[number].tag),
             hovered: self.scene.hovered,
-            unit: 1.0 / self.transform.scaling.max(1e-3),
+            unit,
         };
-        wires::draw(painter, *viewport, graph, self.scene.rects, &ink);
+        wires::draw(painter, *viewport, self.scene.spots(), &ink);
+        boxes::draw_folded(painter, *viewport, &self.scene, visuals, unit);
         if !self.is_detailed() {
             self.rectangles(painter, look);
         }

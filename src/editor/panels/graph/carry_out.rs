@@ -9,7 +9,8 @@ use super::{
     TITLE,
     action::{GraphAction, obstacle},
     layout::snapped,
-    state::{GraphLook, GraphRequest, GraphView},
+    model::frame_of,
+    state::{FEW, GraphLook, GraphRequest, GraphView},
 };
 use crate::{
     editor::{
@@ -42,6 +43,9 @@ fn answer(world: &mut World, request: GraphRequest) {
             let list: Vec<_> = list.map(|(tag, place)| (tag, snapped(place))).collect();
             world.resource_mut::<GraphView>().moved.extend(list);
         }
+        GraphRequest::Fold(frame, is_open) => {
+            world.resource_mut::<GraphView>().folds.insert(frame, is_open);
+        }
         GraphRequest::Hover(is_over) => world.resource_mut::<GraphView>().hovered = is_over,
     }
 }
@@ -52,8 +56,27 @@ fn select(world: &mut World, tags: BTreeSet<Uid>) {
     let Some(document) = world.get::<Rig>(rig) else { return };
     let joints = joints_of(document, &tags);
     let what = if joints.is_empty() { Pick::None } else { Pick::Joints(joints.into_iter().collect()) };
-    world.resource_mut::<GraphView>().selected = tags;
+    let frames = frames_of(document, &tags);
+    let mut view = world.resource_mut::<GraphView>();
+    view.selected = tags;
+    // A click in the graph folds nothing that is in view.
+    open(&mut view, frames);
     world.write_message(PickRequest { rig, what, add: false });
+}
+
+/// Frames of selected commands, unless there are too many.
+fn frames_of(rig: &Rig, tags: &BTreeSet<Uid>) -> BTreeSet<Uid> {
+    if tags.len() > FEW {
+        return BTreeSet::new();
+    }
+    let found = tags.iter().filter_map(|tag| rig.find_tag(*tag));
+    found.filter_map(|(joint, tag)| frame_of(rig, &joint.data, tag)).collect()
+}
+
+/// Opens the frames of selected commands, those that were folded by hand, too.
+fn open(view: &mut GraphView, frames: BTreeSet<Uid>) {
+    view.folds.retain(|frame, is_open| *is_open || !frames.contains(frame));
+    view.lit.extend(frames);
 }
 
 /// Joints that carry tags.
@@ -89,6 +112,8 @@ fn act(world: &mut World, action: GraphAction) {
         }
         GraphAction::ShowAll => look(&mut world.resource_mut::<GraphView>(), GraphLook::All),
         GraphAction::ShowSelected => look(&mut world.resource_mut::<GraphView>(), GraphLook::Selected),
+        GraphAction::OpenFrames => fold_all(&mut world.resource_mut::<GraphView>(), true),
+        GraphAction::FoldFrames => fold_all(&mut world.resource_mut::<GraphView>(), false),
         GraphAction::SelectAll => {
             let all = commands_of(rig, None);
             select(world, all);
@@ -101,6 +126,13 @@ fn act(world: &mut World, action: GraphAction) {
         }
         GraphAction::Delete => send(world, TagOperation::Delete(selected)),
     }
+}
+
+fn fold_all(view: &mut GraphView, are_open: bool) {
+    view.folds.clear();
+    view.lit.clear();
+    view.every = Some(are_open);
+    look(view, GraphLook::All);
 }
 
 fn look(view: &mut GraphView, at: GraphLook) {
@@ -133,8 +165,14 @@ pub(super) fn follow_selection(
     let joints: BTreeSet<Uid> = selection.0.iter().copied().filter(|uid| rig.joint(*uid).is_some()).collect();
     if joints_of(&rig, &view.selected) != joints {
         let tags = commands_of(&rig, Some(&selection.0));
+        let frames = frames_of(&rig, &tags);
         if view.selected != tags {
             view.selected = tags;
+        }
+        // What an earlier selection opened is folded again.
+        if view.lit != frames || frames.iter().any(|frame| view.folds.get(frame) == Some(&false)) {
+            view.lit.clear();
+            open(&mut view, frames);
         }
     }
 }

@@ -10,7 +10,7 @@ use super::{
     layout::snapped,
     menu::MenuTarget,
     model::{Graph, GraphWire},
-    wires::{frames, input_pin, output_pin, wire_at},
+    wires::{Spots, TITLE, input_pin, output_pin, wire_at},
 };
 use crate::rig::{Uid, operations::TagOperation};
 
@@ -36,6 +36,8 @@ pub(super) enum Outcome {
     Move(Vec<(Uid, [f32; 2])>),
     Edit(TagOperation),
     Refused(WireError),
+    /// Frame that opens, or is folded.
+    Fold(Uid, bool),
     /// Menu at the pointer; `true` if it opens, `false` if it closes.
     Menu(MenuTarget),
     CloseMenu,
@@ -45,6 +47,7 @@ pub(super) enum Outcome {
 pub(super) struct Hand<'a> {
     pub graph: &'a Graph,
     pub rects: &'a [Rect],
+    pub boxes: &'a [Option<Rect>],
     pub selected: &'a BTreeSet<Uid>,
     /// The pointer, if it is anywhere.
     pub at: Option<Pos2>,
@@ -60,6 +63,21 @@ impl Hand<'_> {
         REACH / self.scale.max(1e-3)
     }
 
+    fn spots(&self) -> Spots<'_> {
+        Spots { graph: self.graph, rects: self.rects, boxes: self.boxes }
+    }
+
+    /// The frame that a click at a point opens or folds: a folded one, or the title of an open one.
+    fn fold_at(&self, at: Pos2) -> Option<(Uid, bool)> {
+        let spaces = self.spots().frames();
+        let hit = |number: usize, space: &Rect| match self.boxes.get(number).copied().flatten() {
+            Some(folded) => folded.contains(at).then_some(true),
+            None => (space.contains(at) && at.y <= space.top() + TITLE).then_some(false),
+        };
+        let mut found = spaces.iter().enumerate().filter_map(|(number, space)| Some((number, hit(number, space)?)));
+        found.next().map(|(number, opens)| (self.graph.frames[number].uid, opens))
+    }
+
     /// The topmost node at a point.
     pub fn node_at(&self, at: Pos2) -> Option<usize> {
         self.rects.iter().rposition(|rect| rect.contains(at))
@@ -68,7 +86,7 @@ impl Hand<'_> {
     /// The wire under the pointer, where no node is.
     pub fn wire_at(&self) -> Option<GraphWire> {
         let at = self.at.filter(|at| self.node_at(*at).is_none())?;
-        wire_at(self.graph, self.rects, at, self.reach() * 0.8)
+        wire_at(self.spots(), at, self.reach() * 0.8)
     }
 
     /// Subject under the pointer: a node, a wire, a frame, or the ground.
@@ -78,8 +96,8 @@ impl Hand<'_> {
         let wire = || self.wire_at().map(|wire| MenuTarget::Wire(tag(wire.to), wire.input, tag(wire.from)));
         let frame = || {
             let at = self.at?;
-            let place = frames(self.graph, self.rects).iter().position(|frame| frame.contains(at))?;
-            Some(MenuTarget::Frame(self.graph.frames[place].tag))
+            let place = self.spots().frames().iter().position(|frame| frame.contains(at))?;
+            Some(MenuTarget::Frame(self.graph.frames[place].uid))
         };
         node.map(MenuTarget::Node).or_else(wire).or_else(frame).unwrap_or(MenuTarget::Ground)
     }
@@ -166,7 +184,12 @@ impl Hand<'_> {
                 outcomes.push(Outcome::Select(BTreeSet::from([tag])));
             }
         }
-        if response.clicked_by(PointerButton::Primary) {
+        let is_clicked = response.clicked_by(PointerButton::Primary);
+        let can_fold = is_clicked && tag.is_none() && self.held.is_none();
+        let fold = self.at.filter(|_| can_fold).and_then(|at| self.fold_at(at));
+        if let Some((frame, opens)) = fold {
+            outcomes.extend([Outcome::Fold(frame, opens), Outcome::CloseMenu]);
+        } else if is_clicked {
             let selected = tag.map_or_else(BTreeSet::new, |tag| self.with(tag));
             let adds = self.held.shift || self.held.command;
             if tag.is_some() || !adds && !self.selected.is_empty() {
@@ -199,8 +222,10 @@ impl Hand<'_> {
             }
             Gesture::Box(from) => {
                 let space = Rect::from_two_pos(from, self.at?);
-                let nodes = self.graph.nodes.iter().zip(self.rects);
-                let inside = nodes.filter(|(_, rect)| rect.intersects(space)).map(|(node, _)| node.tag);
+                let (nodes, spots) = (self.graph.nodes.iter().enumerate(), self.spots());
+                // With a folded frame all of its commands are meant.
+                let inside =
+                    nodes.filter(|(number, _)| spots.shown(*number).intersects(space)).map(|(_, node)| node.tag);
                 let mut selected = if self.held.shift { self.selected.clone() } else { BTreeSet::new() };
                 for tag in inside {
                     if self.held.command && self.selected.contains(&tag) {

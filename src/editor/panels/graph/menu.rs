@@ -7,7 +7,7 @@ use super::{
     action::{GraphAction, obstacle},
     edits::Bench,
     model::GraphWire,
-    state::GraphRequest,
+    state::{GraphRequest, GraphView},
 };
 use crate::{
     editor::{
@@ -29,7 +29,7 @@ pub(super) enum MenuTarget {
     Node(Uid),
     /// Wire between two commands: (command that reads, input, command that is read from).
     Wire(Uid, usize, Uid),
-    /// Feature tag.
+    /// Feature tag, or local group.
     Frame(Uid),
     Ground,
 }
@@ -55,7 +55,7 @@ impl Menu<'_> {
         match target {
             MenuTarget::Node(tag) => self.node(ui, tag, requests),
             MenuTarget::Wire(to, input, from) => self.wire(ui, (to, input, from), requests),
-            MenuTarget::Frame(tag) => self.frame(ui, tag, requests),
+            MenuTarget::Frame(uid) => self.frame(ui, uid, requests),
             MenuTarget::Ground => self.ground(ui, requests),
         }
     }
@@ -108,16 +108,26 @@ impl Menu<'_> {
         }
     }
 
-    fn frame(&mut self, ui: &mut Ui, tag: Uid, requests: &mut Requests) {
+    fn frame(&mut self, ui: &mut Ui, uid: Uid, requests: &mut Requests) {
         let graph = self.bench.graph;
-        let Some(place) = graph.frames.iter().position(|frame| frame.tag == tag) else {
-            ui.weak("The feature is gone.");
+        let Some(place) = graph.frames.iter().position(|frame| frame.uid == uid) else {
+            ui.weak("The frame is gone.");
             return;
         };
         let frame = &graph.frames[place];
+        let view = self.world.get_resource::<GraphView>();
+        let is_open = view.is_none_or(|view| view.is_open(uid, graph.nodes.len()));
+        if ui.button(if is_open { "Fold the frame" } else { "Open the frame" }).clicked() {
+            requests.send(GraphRequest::Fold(uid, !is_open));
+            ui.close();
+        }
         let name = format!("Turn {} {}", frame.name, if frame.enabled { "off" } else { "on" });
         if ui.button(name).clicked() {
-            send(TagOperation::Enable(vec![tag], !frame.enabled), self.shown, requests);
+            let operation = match frame.is_feature {
+                true => TagOperation::Enable(vec![uid], !frame.enabled),
+                false => TagOperation::EnableGroup(uid, !frame.enabled),
+            };
+            send(operation, self.shown, requests);
             ui.close();
         }
         if ui.button("Select its commands").clicked() {
@@ -189,7 +199,14 @@ impl Menu<'_> {
     fn ground(&mut self, ui: &mut Ui, requests: &mut Requests) {
         ui.menu_button("Add command", |ui| add_to_selected(ui, self.shown, &self.bench, self.words, requests));
         ui.separator();
-        let all = [GraphAction::SelectAll, GraphAction::SelectNone, GraphAction::ShowAll, GraphAction::LayOut];
+        let all = [
+            GraphAction::SelectAll,
+            GraphAction::SelectNone,
+            GraphAction::ShowAll,
+            GraphAction::OpenFrames,
+            GraphAction::FoldFrames,
+            GraphAction::LayOut,
+        ];
         for action in all {
             self.entry(ui, action, requests);
         }

@@ -1,4 +1,5 @@
-//! The graph of a rig: a node for each command, a wire for each dependency, a frame for each feature that has commands.
+//! The graph of a rig: a node for each command, a wire for each dependency, a frame for each feature that has commands, and
+//! for each local group with commands that are in no feature.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,7 +25,7 @@ pub(super) struct Graph {
     pub at: BTreeMap<Uid, usize>,
     /// Dependencies, sorted.
     pub wires: Vec<GraphWire>,
-    /// Features that have commands, in the order of the rig.
+    /// Frames that have commands, in the order of their first ones.
     pub frames: Vec<GraphFrame>,
 }
 
@@ -43,7 +44,7 @@ pub(super) struct GraphNode {
     pub summary: String,
     /// Names of the parameters that take references; what the command reads besides comes in below them.
     pub inputs: Vec<String>,
-    /// Index of its feature among the frames.
+    /// Index of its frame.
     pub frame: Option<usize>,
     /// The tag's own switch.
     pub enabled: bool,
@@ -78,15 +79,55 @@ pub(super) struct GraphWire {
     pub from: usize,
 }
 
-/// A feature.
+/// A feature, or a local group.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct GraphFrame {
-    /// The feature tag.
-    pub tag: Uid,
+    /// The feature tag, or the group.
+    pub uid: Uid,
+    /// True for a feature.
+    pub is_feature: bool,
     /// Name for people.
     pub name: String,
-    /// Switch of the feature tag.
+    /// Local group of the joint that carries the feature tag, which tells one limb from another; empty for a group.
+    pub place: String,
+    /// Switch of the feature tag, or of the group.
     pub enabled: bool,
+}
+
+impl GraphFrame {
+    /// Name with the place, as a title.
+    pub fn title(&self) -> String {
+        match self.place.as_str() {
+            "" => self.name.clone(),
+            place => format!("{place} · {}", self.name),
+        }
+    }
+}
+
+/// Frame of a command: its feature, or else the local group of its joint.
+pub(super) fn frame_of(rig: &Rig, joint: &JointData, tag: &TagData) -> Option<Uid> {
+    let TagKind::Command { feature, .. } = &tag.kind else { return None };
+    let is_feature = |uid: &Uid| rig.find_tag(*uid).is_some_and(|(_, tag)| matches!(tag.kind, TagKind::Feature { .. }));
+    feature.filter(is_feature).or(joint.group)
+}
+
+/// True if a command of a rig is in a frame.
+pub(super) fn has_frames(rig: &Rig) -> bool {
+    let mut tags = rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (&joint.data, tag)));
+    tags.any(|(joint, tag)| frame_of(rig, joint, tag).is_some())
+}
+
+/// A frame by its uid; `None` for one that is gone.
+fn frame(rig: &Rig, uid: Uid) -> Option<GraphFrame> {
+    if let Some(group) = rig.group(uid) {
+        let (name, place, enabled) = (group.name.clone(), String::new(), group.enabled);
+        return Some(GraphFrame { uid, is_feature: false, name, place, enabled });
+    }
+    let (joint, tag) = rig.find_tag(uid)?;
+    let TagKind::Feature { kind, name, switch, .. } = &tag.kind else { return None };
+    let name = words::feature(kind, name, switch);
+    let place = joint.data.group.and_then(|group| rig.group(group)).map(|group| group.name.clone());
+    Some(GraphFrame { uid, is_feature: true, name, place: place.unwrap_or_default(), enabled: tag.enabled })
 }
 
 impl Graph {
@@ -95,39 +136,27 @@ impl Graph {
     pub fn of(rig: &Rig, builder: Option<&Builder>, modules: &Modules, looks: &mut ModuleLooks, known: Self) -> Self {
         let mut known: BTreeMap<Uid, GraphNode> = known.nodes.into_iter().map(|node| (node.tag, node)).collect();
         let mut graph = Self::default();
-        let mut features: Vec<Option<Uid>> = Vec::new();
-        let mut names: BTreeMap<Uid, GraphFrame> = BTreeMap::new();
+        let mut frames: BTreeMap<Uid, Option<usize>> = BTreeMap::new();
         for joint in rig.walk() {
             for tag in &joint.data.tags {
-                match &tag.kind {
-                    TagKind::Feature { kind, name, switch, .. } => {
-                        let name = words::feature(kind, name, switch);
-                        names.insert(tag.uid, GraphFrame { tag: tag.uid, name, enabled: tag.enabled });
+                let TagKind::Command { module, params, .. } = &tag.kind else { continue };
+                let name = joint_name(&joint.data);
+                let same =
+                    known.remove(&tag.uid).filter(|node| node.module == *module && node.source.is(&name, tag, params));
+                let frame = frame_of(rig, &joint.data, tag).and_then(|uid| {
+                    *frames.entry(uid).or_insert_with(|| {
+                        graph.frames.push(frame(rig, uid)?);
+                        Some(graph.frames.len() - 1)
+                    })
+                });
+                graph.add(match same {
+                    Some(node) => GraphNode { joint: joint.data.uid, frame, enabled: tag.enabled, ..node },
+                    None => {
+                        let node = node(&joint.data, tag, (module, params), looks.of(module, modules));
+                        GraphNode { frame, ..node }
                     }
-                    TagKind::Command { module, params, feature } => {
-                        features.push(*feature);
-                        let name = joint_name(&joint.data);
-                        let same = known
-                            .remove(&tag.uid)
-                            .filter(|node| node.module == *module && node.source.is(&name, tag, params));
-                        graph.add(match same {
-                            Some(node) => {
-                                GraphNode { joint: joint.data.uid, frame: None, enabled: tag.enabled, ..node }
-                            }
-                            None => node(&joint.data, tag, (module, params), looks.of(module, modules)),
-                        });
-                    }
-                }
+                });
             }
-        }
-        for (number, feature) in features.into_iter().enumerate() {
-            let Some(found) = feature.and_then(|feature| names.get(&feature)) else { continue };
-            let known = graph.frames.iter().position(|frame| frame.tag == found.tag);
-            let frame = known.unwrap_or_else(|| {
-                graph.frames.push(found.clone());
-                graph.frames.len() - 1
-            });
-            graph.nodes[number].frame = Some(frame);
         }
         graph.wire(builder);
         graph

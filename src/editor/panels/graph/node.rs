@@ -86,6 +86,6 @@ pub(super) fn about(ui: &mut Ui, scene: &Scene, number: usize) {
         ui.weak(&node.summary);
     }
     if let Some(frame) = node.frame.and_then(|frame| scene.graph.frames.get(frame)) {
-        ui.weak(format!("In {}", frame.name));
+        ui.weak(format!("In {}", frame.title()));
     }
 }

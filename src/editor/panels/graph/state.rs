@@ -1,4 +1,4 @@
-//! State of the graph: selected commands, nodes that were moved by hand, what is in view. It belongs to the window and lasts
+//! State of the graph: selected commands, nodes that were moved by hand, frames that are folded, what is in view. It belongs to the window and lasts
 //! as long as it; no document has any of it.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,10 +16,27 @@ pub struct GraphView {
     pub selected: BTreeSet<Uid>,
     /// Places of nodes that were moved by hand, on the grid.
     pub moved: BTreeMap<Uid, [f32; 2]>,
+    /// Frames that a person opened or folded: `true` for open ones.
+    pub folds: BTreeMap<Uid, bool>,
+    /// Choice for all other frames; `None` opens them in a graph of few commands.
+    pub every: Option<bool>,
+    /// Frames that are open because of the selection.
+    pub lit: BTreeSet<Uid>,
     /// Request of the view, with the number of requests before it.
     pub look: (u64, GraphLook),
     /// True while the pointer is over the graph, which then takes the keys that delete and select.
     pub hovered: bool,
+}
+
+/// Most commands of a graph whose frames are open at first, and of a selection that opens frames.
+pub const FEW: usize = 60;
+
+impl GraphView {
+    /// True if a frame is open in a graph of so many commands.
+    pub fn is_open(&self, frame: Uid, commands: usize) -> bool {
+        let usual = || self.every.unwrap_or(commands <= FEW) || self.lit.contains(&frame);
+        self.folds.get(&frame).copied().unwrap_or_else(usual)
+    }
 }
 
 /// Part of the graph that is brought into view.
@@ -39,6 +56,8 @@ pub enum GraphRequest {
     Select(BTreeSet<Uid>),
     /// Puts nodes to places.
     Move(Vec<(Uid, [f32; 2])>),
+    /// Opens a frame, or folds it.
+    Fold(Uid, bool),
     /// Tells whether the pointer is over the graph.
     Hover(bool),
 }

@@ -1,7 +1,9 @@
-//! Shapes of wires and frames, and the wire under the pointer.
+//! Places of nodes, wires and frames, and the wire under the pointer.
 //!
 //! The panel draws its wires itself. Snarl would walk all wires for each pin of each node, and only knows wires between
 //! nodes that are drawn, where those that leave the view are to be seen, too.
+
+use std::collections::BTreeSet;
 
 use bevy_egui::egui::{Color32, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
@@ -15,6 +17,10 @@ pub(super) const HEAD: f32 = 44.0;
 pub(super) const ROW: f32 = 18.0;
 /// Height from the top of a node to its output, and to what it reads besides its inputs.
 const PIN_Y: f32 = 14.0;
+/// Width and height of a folded frame.
+pub(super) const BOX: [f32; 2] = [240.0, 60.0];
+/// Height of the title of an open frame.
+pub(super) const TITLE: f32 = 30.0;
 /// Number of straight parts of a wire.
 const PARTS: usize = 14;
 /// Most wires that are drawn as curves; more are straight.
@@ -37,9 +43,60 @@ pub(super) fn input_pin(node: Rect, input: usize, inputs: usize) -> Pos2 {
     pos2(node.left(), node.top() + y)
 }
 
-/// Ends of a wire.
-pub(super) fn ends(graph: &Graph, rects: &[Rect], wire: GraphWire) -> [Pos2; 2] {
-    [output_pin(rects[wire.from]), input_pin(rects[wire.to], wire.input, graph.nodes[wire.to].inputs.len())]
+/// Pins of a folded frame: what its commands read from others, and what others read from them.
+pub(super) fn box_pins(folded: Rect) -> [Pos2; 2] {
+    [folded.left_center(), folded.right_center()]
+}
+
+/// A graph with the places of its nodes and folded frames.
+#[derive(Clone, Copy)]
+pub(super) struct Spots<'a> {
+    pub graph: &'a Graph,
+    /// Rectangle of each command; nothing where its frame is folded.
+    pub rects: &'a [Rect],
+    /// Rectangle of each folded frame.
+    pub boxes: &'a [Option<Rect>],
+}
+
+impl Spots<'_> {
+    /// The folded frame that a command is in.
+    fn folded(&self, number: usize) -> Option<(usize, Rect)> {
+        let frame = self.graph.nodes[number].frame?;
+        Some((frame, (*self.boxes.get(frame)?)?))
+    }
+
+    /// Rectangle of a command, or of the folded frame that it is in.
+    pub fn shown(&self, number: usize) -> Rect {
+        self.folded(number).map_or(self.rects[number], |(_, folded)| folded)
+    }
+
+    /// Ends of a wire; `None` inside of a folded frame.
+    pub fn ends(&self, wire: GraphWire) -> Option<[Pos2; 2]> {
+        let (from, to) = (self.folded(wire.from), self.folded(wire.to));
+        if from.is_some() && from.map(|(frame, _)| frame) == to.map(|(frame, _)| frame) {
+            return None;
+        }
+        let start = from.map_or_else(|| output_pin(self.rects[wire.from]), |(_, folded)| box_pins(folded)[1]);
+        let inputs = self.graph.nodes[wire.to].inputs.len();
+        let end =
+            to.map_or_else(|| input_pin(self.rects[wire.to], wire.input, inputs), |(_, folded)| box_pins(folded)[0]);
+        Some([start, end])
+    }
+
+    /// Space of each frame: that of its nodes, with room for its title, or the box of a folded one.
+    pub fn frames(&self) -> Vec<Rect> {
+        let mut frames = vec![Rect::NOTHING; self.graph.frames.len()];
+        for (node, rect) in self.graph.nodes.iter().zip(self.rects) {
+            if let Some(frame) = node.frame {
+                frames[frame] = frames[frame].union(*rect);
+            }
+        }
+        let framed = |(number, frame): (usize, Rect)| match self.boxes.get(number).copied().flatten() {
+            Some(folded) => folded,
+            None => Rect { min: frame.min - vec2(16.0, 34.0), max: frame.max + vec2(16.0, 16.0) },
+        };
+        frames.into_iter().enumerate().map(framed).collect()
+    }
 }
 
 /// Points of a curve that leaves its ends level.
@@ -90,12 +147,16 @@ impl WireInk<'_> {
 }
 
 /// Draws the wires that cross the view: curves, or straight lines in one shape where there are many.
-pub(super) fn draw(painter: &Painter, view: Rect, graph: &Graph, rects: &[Rect], ink: &WireInk) {
+pub(super) fn draw(painter: &Painter, view: Rect, spots: Spots, ink: &WireInk) {
+    let graph = spots.graph;
+    // Of the wires between two folded frames one is drawn.
+    let mut drawn: BTreeSet<[u32; 4]> = BTreeSet::new();
+    let mut is_new = |[from, to]: [Pos2; 2]| drawn.insert([from.x, from.y, to.x, to.y].map(f32::to_bits));
     let seen: Vec<(GraphWire, [Pos2; 2])> = graph
         .wires
         .iter()
-        .map(|wire| (*wire, ends(graph, rects, *wire)))
-        .filter(|(_, ends)| bounds(*ends).intersects(view))
+        .filter_map(|wire| Some((*wire, spots.ends(*wire)?)))
+        .filter(|(_, ends)| bounds(*ends).intersects(view) && is_new(*ends))
         .collect();
     if seen.len() <= MOST_CURVES {
         painter.extend(seen.into_iter().map(|(wire, ends)| Shape::line(curve(ends), ink.stroke(graph, wire))));
@@ -121,10 +182,10 @@ fn add_line(mesh: &mut Mesh, [from, to]: [Pos2; 2], stroke: Stroke) {
 }
 
 /// The wire that is nearest to a point, within a reach.
-pub(super) fn wire_at(graph: &Graph, rects: &[Rect], at: Pos2, reach: f32) -> Option<GraphWire> {
+pub(super) fn wire_at(spots: Spots, at: Pos2, reach: f32) -> Option<GraphWire> {
     let mut nearest: Option<(f32, GraphWire)> = None;
-    for wire in &graph.wires {
-        let ends = ends(graph, rects, *wire);
+    for wire in &spots.graph.wires {
+        let Some(ends) = spots.ends(*wire) else { continue };
         if !bounds(ends).expand(reach).contains(at) {
             continue;
         }
@@ -140,18 +201,4 @@ fn distance(at: Pos2, [from, to]: [Pos2; 2]) -> f32 {
     let along = to - from;
     let t = ((at - from).dot(along) / along.length_sq().max(1e-6)).clamp(0.0, 1.0);
     at.distance(from + along * t)
-}
-
-/// Space of each frame: that of its nodes, with room for its title.
-pub(super) fn frames(graph: &Graph, rects: &[Rect]) -> Vec<Rect> {
-    let mut frames = vec![Rect::NOTHING; graph.frames.len()];
-    for (node, rect) in graph.nodes.iter().zip(rects) {
-        if let Some(frame) = node.frame {
-            frames[frame] = frames[frame].union(*rect);
-        }
-    }
-    frames
-        .into_iter()
-        .map(|frame| Rect { min: frame.min - vec2(16.0, 34.0), max: frame.max + vec2(16.0, 16.0) })
-        .collect()
 }

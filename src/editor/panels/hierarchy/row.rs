@@ -8,7 +8,7 @@ use bevy_egui::egui::{
 use super::{DraggedJoints, HierarchyPanel, Tree, menu, obstacle, reparent, rows::Row, select, tops};
 use crate::{
     editor::{
-        library::{DraggedTemplate, LibraryAct, LibraryRequest},
+        library::{DraggedTemplate, LibraryAct, LibraryRequest, dropping},
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
@@ -185,7 +185,7 @@ fn drag(
     requests: &mut Requests,
 ) {
     if DragAndDrop::has_payload_of_type::<DraggedTemplate>(ui.ctx()) {
-        drop_template(ui, response, rect, joint, shown, requests);
+        drop_template(ui, response, rect, (joint, panel.is_for_both), shown, requests);
         return;
     }
     if response.drag_started_by(PointerButton::Primary) {
@@ -211,11 +211,18 @@ fn drag(
 }
 
 /// Marks the row under a template of the library, and uses the template there when it is let go.
-fn drop_template(ui: &Ui, response: &Response, rect: Rect, joint: Uid, shown: &DisplayedRig, requests: &mut Requests) {
+fn drop_template(
+    ui: &Ui,
+    response: &Response,
+    rect: Rect,
+    (joint, both): (Uid, bool),
+    shown: &DisplayedRig,
+    requests: &mut Requests,
+) {
     if let Some(dragged) = response.dnd_hover_payload::<DraggedTemplate>() {
         let color = ui.visuals().selection.stroke.color;
         ui.painter().rect_stroke(rect.shrink(0.5), 3.0, Stroke::new(1.5, color), StrokeKind::Inside);
-        beside_pointer(ui, format!("{} onto {}", dragged.name, shown.name(joint)));
+        beside_pointer(ui, dropping(&shown.rig, &dragged, joint, both));
     }
     if let Some(dragged) = response.dnd_release_payload::<DraggedTemplate>() {
         requests.send(LibraryRequest { place: dragged.place.clone(), act: LibraryAct::Drop { joint } });

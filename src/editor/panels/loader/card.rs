@@ -9,7 +9,7 @@ use bevy_egui::egui::{
 
 use crate::{
     editor::{
-        library::{LibraryAct, LibraryAction, LibraryListing, LibraryRequest, obstacle},
+        library::{LibraryAct, LibraryAction, LibraryListing, LibraryRequest, PartSides, obstacle, partners},
         panel::Requests,
         panels::displayed_rig::DisplayedRig,
         style,
@@ -154,6 +154,9 @@ impl Card {
         requests: &mut Requests,
     ) {
         let selected = shown.map(|shown| shown.selection.0.clone()).unwrap_or_default();
+        if let Some(shown) = shown.filter(|_| listed.is_part()) {
+            both_sides(ui, world, shown, requests);
+        }
         let keep_tip = "Joints and controls of the same identity keep their poses and keys; weights stay";
         ui.checkbox(&mut self.keep, "Keep poses and keys").on_hover_text(keep_tip);
         let keep = self.keep;
@@ -180,6 +183,19 @@ impl Card {
             let tip = "Its tags onto the selected joints, in the order in which they were selected";
             button("Inject", tip, LibraryAction::Inject, LibraryAct::Inject { joints: selected.clone() });
         });
+    }
+}
+
+/// Draws the check that puts parts onto both sides; it is on while live mirroring is, until a person says otherwise.
+pub(in crate::editor::panels) fn both_sides(ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut Requests) {
+    let mut both = PartSides::are_both(world);
+    let check = ui.checkbox(&mut both, "Both sides");
+    let tip = match partners(&shown.rig, &shown.selection.0).is_some() {
+        true => "A mirrored one on the joints of the other side, in the same step",
+        false => "Where the joint that a part is dropped on has a partner, a mirrored one goes there in the same step",
+    };
+    if check.on_hover_text(tip).changed() {
+        requests.set(PartSides::choice(world, both));
     }
 }
 

@@ -1,4 +1,9 @@
-//! Form in which the rig is written as a template: its header, its features, and a picture taken in the viewport.
+//! Form in which the rig is written as a template: its header, its features, its options and sockets, and a picture taken in
+//! the viewport.
+
+mod options;
+mod sockets;
+mod typed;
 
 use bevy::prelude::{Entity, World};
 use bevy_egui::egui::{Button, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
@@ -9,8 +14,11 @@ use crate::{
         panel::Requests,
         panels::displayed_rig::{DisplayedRig, Stamp},
     },
+    plugins::commands::RigModules,
     rig::{RigAbout, feature::combined_features},
 };
+use options::OptionList;
+use sockets::SocketList;
 
 /// The form.
 #[derive(Default)]
@@ -19,6 +27,8 @@ pub(super) struct ExportForm {
     typed: Option<(Entity, HeaderField, String)>,
     /// Names of the features, with the state of the rig that they were listed from.
     features: Option<(Stamp, String)>,
+    options: OptionList,
+    sockets: SocketList,
 }
 
 /// Field of the header.
@@ -72,6 +82,11 @@ impl ExportForm {
         if !features.is_empty() {
             ui.add(Label::new(RichText::new(format!("Features: {features}")).small()).wrap());
         }
+        if let Some(modules) = world.get_resource::<RigModules>() {
+            self.options.show(ui, shown, &modules.0, requests);
+        }
+        self.sockets.show(ui, shown, requests);
+        ui.separator();
         let mut next = draft.clone();
         let suggested = TemplateDraft { path: String::new(), ..draft.clone() }.file(world).display().to_string();
         let typed = TextEdit::singleline(&mut next.path).hint_text(&suggested).desired_width(f32::INFINITY);
@@ -83,7 +98,7 @@ impl ExportForm {
         let (replace, mut is_sent) = (next.replace, false);
         ui.horizontal_wrapped(|ui| {
             let can = !shown.rig.is_empty();
-            let tip = "Header, groups, joints, tags, features and parts, as a .rig.ron";
+            let tip = "Header, options, sockets, groups, joints, tags, features and parts, as a .rig.ron";
             let save = ui.add_enabled(can, Button::new("Save template")).on_hover_text(tip);
             if save.on_disabled_hover_text("There are no joints").clicked() {
                 let content = Written::Rig { picture: next.picture };

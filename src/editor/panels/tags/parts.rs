@@ -14,7 +14,7 @@ use crate::{
         panels::{
             displayed_rig::DisplayedRig,
             loader::{
-                card::{Card, about},
+                card::{Card, about, both_sides},
                 tiles::{Tiles, TilesShown},
             },
         },
@@ -48,6 +48,7 @@ impl PartMenu {
         ui.set_max_width(312.0);
         ui.checkbox(&mut self.options_first, "Options first")
             .on_hover_text("Shows a part's options before it is added");
+        both_sides(ui, world, shown, requests);
         let adding = |place: &TemplatePlace, options: Vec<(String, String)>| {
             let act = LibraryAct::Part { joints: shown.selection.0.clone(), options };
             LibraryRequest { place: place.clone(), act }

@@ -26,6 +26,7 @@ use crate::rig::{
     format::scan::{self, Field},
     format::source::{parse_ron, ron_options, utf8},
     format::version::{Format, blanked},
+    part::PartSocket,
     reference::{bind_names, refresh_names},
 };
 
@@ -109,6 +110,7 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
         author: file.author,
         description: file.description,
         preview: file.preview,
+        ..RigAbout::default()
     };
     let mut seen = HashSet::new();
     for (number, group) in file.groups.into_iter().enumerate() {
@@ -134,12 +136,14 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
     let chains = parts::chains(&rig, file.chains, &mut notes);
     let mut sockets = parts::sockets(places, file.sockets, faults);
     let options = parts::options(places, file.options, faults);
+    rig.about.options.clone_from(&options);
     add_poses(&mut rig, file.poses, &mut |uid, nth, field, message| {
         faults.push(places.error(uid, nth, field, message));
     });
     let mut unbound = Vec::new();
     if instances.is_empty() {
         parts::place_sockets(&rig, &mut sockets, places.text, faults);
+        rig.about.sockets = sockets.iter().filter_map(PartSocket::header).collect();
         // References may name what parts bring.
         bind_references(&mut rig, &mut unbound);
         if file.features.is_some_and(|features| feature_summaries(&rig) != sorted(features)) {

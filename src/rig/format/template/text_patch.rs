@@ -69,8 +69,11 @@ pub(crate) fn says_the_same(a: &Rig, b: &Rig, own: &Rig) -> bool {
     said(a).is_some_and(|said_a| said(b) == Some(said_a))
 }
 
-/// A rig whose parameters do not depend on blanks, comments and the order of fields.
+/// A rig whose header does not depend on the order of sockets and options, and whose parameters do not depend on blanks,
+/// comments and the order of fields.
 pub(super) fn comparable(mut rig: Rig) -> Rig {
+    rig.about.sockets.sort_by(|a, b| a.name.cmp(&b.name));
+    rig.about.options.sort_by(|a, b| a.name.cmp(&b.name));
     for joint in rig.joints.values_mut() {
         for tag in &mut joint.data.tags {
             if let TagKind::Command { params, .. } = &mut tag.kind {

@@ -11,7 +11,7 @@ use super::{FORMAT, FeatureSummary, NeedsSummary};
 use crate::rig::{
     FacePlacement, GroupData, NodeKind, RestTransform, Rig, RigInput, RigJoint, StoredPose, TagData, TagKind, Uid,
     format::poses::{write_stored_pose, write_stored_poses},
-    part::PartNeeds,
+    part::{HeaderSocket, OptionForm, PartNeeds, PartOption},
     reference::refresh_names,
 };
 
@@ -46,6 +46,13 @@ fn write_into(out: &mut String, rig: &Rig, with_poses: bool) -> std::fmt::Result
     if let Some(needs) = needs_text(rig) {
         writeln!(out, "    needs: {needs},")?;
     }
+    for (field, elements) in [("sockets", socket_list(rig)), ("options", option_list(rig))] {
+        if !elements.is_empty() {
+            writeln!(out, "    {field}: [")?;
+            elements.iter().try_for_each(|element| writeln!(out, "        {element},"))?;
+            writeln!(out, "    ],")?;
+        }
+    }
     writeln!(out, "    groups: [")?;
     for group in rig.groups() {
         writeln!(out, "        {},", group_text(group))?;
@@ -76,7 +83,9 @@ pub(super) fn needed_format(rig: &Rig) -> u32 {
 fn format_without_poses(rig: &Rig) -> u32 {
     let has_choice = |tag: &TagData| matches!(&tag.kind, TagKind::Feature { choice, .. } if !choice.is_empty());
     let is_newer = |joint: &RigJoint| joint.data.face.is_some() || joint.data.tags.iter().any(has_choice);
-    if rig.about().kind == "part" || !rig.inputs().is_empty() || rig.walk().any(is_newer) { FORMAT } else { 1 }
+    let about = rig.about();
+    let has_lists = !(rig.inputs().is_empty() && about.sockets.is_empty() && about.options.is_empty());
+    if about.kind == "part" || has_lists || rig.walk().any(is_newer) { FORMAT } else { 1 }
 }
 
 /// The list of named features, an element a line.
@@ -93,6 +102,70 @@ pub(super) fn feature_list(rig: &Rig) -> String {
     }
     out.push_str("    ]");
     out
+}
+
+/// Sockets of a rig with the labels of their joints; those whose joint is gone or has no label are left out.
+pub(super) fn labelled_sockets(rig: &Rig) -> impl Iterator<Item = (&HeaderSocket, &str)> {
+    let label = |socket: &HeaderSocket| rig.joint(socket.joint)?.data.label.as_deref();
+    rig.about().sockets.iter().filter_map(move |socket| Some((socket, label(socket)?)))
+}
+
+/// Sockets, an element each.
+pub(super) fn socket_list(rig: &Rig) -> Vec<String> {
+    labelled_sockets(rig).map(|(socket, label)| socket_text(socket, label)).collect()
+}
+
+/// A socket on the joint of a label.
+pub(in crate::rig) fn socket_text(socket: &HeaderSocket, label: &str) -> String {
+    let mut out = format!("(name: {}, joint: {}", quoted(&socket.name), quoted(label));
+    for (field, value) in [("translation", socket.translation), ("rotation", socket.rotation)] {
+        if value != Vec3::ZERO {
+            out.push_str(&format!(", {field}: {}", vector(value)));
+        }
+    }
+    out.push(')');
+    out
+}
+
+/// Options, an element each.
+pub(super) fn option_list(rig: &Rig) -> Vec<String> {
+    rig.about().options.iter().map(option_text).collect()
+}
+
+/// An option.
+pub(in crate::rig) fn option_text(option: &PartOption) -> String {
+    let mut out = format!("(name: {}, default: {}", quoted(&option.name), option.default);
+    if !option.description.is_empty() {
+        out.push_str(&format!(", description: {}", quoted(&option.description)));
+    }
+    if let Some(form) = &option.form {
+        out.push_str(&format!(", form: {}", form_text(form)));
+    }
+    out.push_str(&format!(", sets: {})", targets_text(option)));
+    out
+}
+
+/// Form of an option.
+pub(super) fn form_text(form: &OptionForm) -> String {
+    match form {
+        OptionForm::Slider { min, max, step: None } => format!("Slider(min: {min:?}, max: {max:?})"),
+        OptionForm::Slider { min, max, step: Some(step) } => {
+            format!("Slider(min: {min:?}, max: {max:?}, step: {step:?})")
+        }
+        OptionForm::Number => "Number".to_owned(),
+        OptionForm::Check => "Check".to_owned(),
+        OptionForm::Menu { options } => {
+            let options: Vec<String> = options.iter().map(|option| quoted(option)).collect();
+            format!("Menu(options: [{}])", options.join(", "))
+        }
+        OptionForm::Text => "Text".to_owned(),
+    }
+}
+
+/// Parameters that an option sets.
+pub(super) fn targets_text(option: &PartOption) -> String {
+    let target = |(tag, param): &(String, String)| format!("(tag: {}, param: {})", quoted(tag), quoted(param));
+    format!("[{}]", option.sets.iter().map(target).collect::<Vec<_>>().join(", "))
 }
 
 /// Needs of a part as text; `None` for another rig.

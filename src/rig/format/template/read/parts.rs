@@ -81,7 +81,8 @@ pub(super) fn sockets(places: &Places, files: Vec<SocketFile>, faults: &mut Vec<
         } else if !rest.is_valid() {
             "the place of the socket is not finite; correct the numbers".to_owned()
         } else {
-            found.push(PartSocket { name, label: joint, joint: None, rest, offset });
+            let angles = <[f32; 3]>::from(rotation).into();
+            found.push(PartSocket { name, label: joint, joint: None, rest, angles, offset });
             continue;
         };
         faults.push(SourceError::at(places.text, offset, fault));
@@ -427,6 +428,7 @@ impl Template {
             }
         }
         place_sockets(&self.rig, &mut self.sockets, source, &mut faults);
+        self.rig.about.sockets = self.sockets.iter().filter_map(PartSocket::header).collect();
         self.sockets.extend(of_parts);
         if !self.instances.is_empty() {
             pair_sides(&mut self.rig);

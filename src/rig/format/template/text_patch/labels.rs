@@ -1,35 +1,110 @@
-//! Labels of joints in the header of a text.
+//! Sockets, options and chains in the header of a text.
 
-use super::patch::Patch;
+use super::{super::write, patch::Patch};
 use crate::rig::{
     Rig,
-    format::{template::quoted, tree::Tree},
+    format::{
+        template::quoted,
+        tree::{Item, Tree},
+    },
 };
 
-/// Writes the labels of joints that sockets and chains name, where these are others now. A socket whose joint is gone goes.
+/// Fields before which sockets and options are put: what lists headers reads the beginning of a file alone.
+const BEHIND_HEADER: [&str; 5] = ["groups", "inputs", "joints", "parts", "poses"];
+
+/// Writes sockets and options that are others now, and the labels of joints that sockets and chains name. A socket whose joint is
+/// gone goes.
 pub(super) fn header_labels(patch: &mut Patch, tree: &Tree, before: &Rig, rig: &Rig) {
-    let root = tree.root();
-    let joint = |label: &str| before.find_label(label);
+    sockets(patch, tree, before, rig);
+    options(patch, tree, before, rig);
     let renamed = |label: &str| {
-        let now = rig.joint(joint(label)?)?.data.label.clone()?;
+        let now = rig.joint(before.find_label(label)?)?.data.label.clone()?;
         (now != label).then(|| quoted(&now))
     };
-    let mut gone = Vec::new();
-    for (place, item) in tree.elements(root, "sockets").iter().enumerate() {
-        let Some(label) = tree.string(item.value, "joint") else { continue };
-        if joint(&label).is_some_and(|joint| rig.joint(joint).is_none()) {
-            gone.push(place);
-        } else if let Some(now) = renamed(&label) {
-            patch.set(item.value, "joint", &now);
-        }
-    }
-    patch.exchange(root, "sockets", &gone, &[]);
-    for chain in tree.elements(root, "chains") {
+    for chain in tree.elements(tree.root(), "chains") {
         for item in tree.elements(chain.value, "joints") {
             let label: Option<String> = ron::from_str(tree.written(item.value)).ok();
             if let Some(now) = label.as_deref().and_then(renamed) {
                 patch.replace(item.value, &now);
             }
         }
+    }
+}
+
+fn sockets(patch: &mut Patch, tree: &Tree, before: &Rig, rig: &Rig) {
+    let elements = tree.elements(tree.root(), "sockets");
+    let now: Vec<_> = write::labelled_sockets(rig).collect();
+    let names: Vec<&str> = now.iter().map(|(socket, _)| socket.name.as_str()).collect();
+    let pairs = Pairs::of(tree, &elements, &names);
+    for (place, number) in &pairs.both {
+        let (node, (socket, label)) = (elements[*place].value, now[*number]);
+        let name = tree.string(node, "name").unwrap_or_default();
+        let Some(was) = before.about().sockets.iter().find(|was| was.name == name) else { continue };
+        if name != socket.name {
+            patch.set(node, "name", &quoted(&socket.name));
+        }
+        if tree.string(node, "joint").is_none_or(|written| written != label) {
+            patch.set(node, "joint", &quoted(label));
+        }
+        patch.set_numbers(node, "translation", &was.translation.to_array(), &socket.translation.to_array());
+        patch.set_numbers(node, "rotation", &was.rotation.to_array(), &socket.rotation.to_array());
+    }
+    let fresh: Vec<String> =
+        pairs.fresh.iter().map(|number| write::socket_text(now[*number].0, now[*number].1)).collect();
+    patch.exchange_before(tree.root(), "sockets", (pairs.gone.as_slice(), fresh.as_slice()), &BEHIND_HEADER);
+}
+
+fn options(patch: &mut Patch, tree: &Tree, before: &Rig, rig: &Rig) {
+    let elements = tree.elements(tree.root(), "options");
+    let now = &rig.about().options;
+    let names: Vec<&str> = now.iter().map(|option| option.name.as_str()).collect();
+    let pairs = Pairs::of(tree, &elements, &names);
+    for (place, number) in &pairs.both {
+        let (node, option) = (elements[*place].value, &now[*number]);
+        let name = tree.string(node, "name").unwrap_or_default();
+        let Some(was) = before.about().options.iter().find(|was| was.name == name) else { continue };
+        if was.name != option.name {
+            patch.set(node, "name", &quoted(&option.name));
+        }
+        if was.default != option.default {
+            patch.set(node, "default", &option.default);
+        }
+        if was.description != option.description {
+            let text = Some(quoted(&option.description)).filter(|_| !option.description.is_empty());
+            patch.set_or_remove(node, "description", text.as_deref());
+        }
+        if was.form != option.form {
+            patch.set_or_remove(node, "form", option.form.as_ref().map(write::form_text).as_deref());
+        }
+        if was.sets != option.sets {
+            patch.set(node, "sets", &write::targets_text(option));
+        }
+    }
+    let fresh: Vec<String> = pairs.fresh.iter().map(|number| write::option_text(&now[*number])).collect();
+    patch.exchange_before(tree.root(), "options", (pairs.gone.as_slice(), fresh.as_slice()), &BEHIND_HEADER);
+}
+
+/// Elements of a list in a text, and what the list is to have.
+struct Pairs {
+    /// Elements that stay, each with the number of what it is now.
+    both: Vec<(usize, usize)>,
+    /// Elements that go.
+    gone: Vec<usize>,
+    /// Numbers of what comes.
+    fresh: Vec<usize>,
+}
+
+impl Pairs {
+    /// Pairs by name. As many as go and come are the same ones with other names.
+    fn of(tree: &Tree, elements: &[Item], names: &[&str]) -> Self {
+        let written: Vec<Option<String>> = elements.iter().map(|item| tree.string(item.value, "name")).collect();
+        let find = |place: usize| names.iter().position(|name| written[place].as_deref() == Some(*name));
+        let mut both: Vec<(usize, usize)> = (0..elements.len()).filter_map(|at| Some((at, find(at)?))).collect();
+        let mut gone: Vec<usize> = (0..elements.len()).filter(|at| both.iter().all(|(place, _)| place != at)).collect();
+        let mut fresh: Vec<usize> = (0..names.len()).filter(|at| both.iter().all(|(_, number)| number != at)).collect();
+        if gone.len() == fresh.len() {
+            both.extend(gone.drain(..).zip(fresh.drain(..)));
+        }
+        Self { both, gone, fresh }
     }
 }

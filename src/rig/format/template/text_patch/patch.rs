@@ -147,6 +147,23 @@ impl<'d, 'a> Patch<'d, 'a> {
         }
     }
 
+    /// [`exchange`](Self::exchange) of elements that go and that come; a list that is not there yet comes before the first field
+    /// of those names.
+    pub fn exchange_before(
+        &mut self,
+        node: NodeId,
+        field: &str,
+        (gone, fresh): (&[usize], &[String]),
+        before: &[&str],
+    ) {
+        let items = &self.tree.node(node).items;
+        let place = items.iter().position(|item| item.key.is_some_and(|key| before.contains(&key)));
+        match place.filter(|_| !fresh.is_empty() && self.tree.field(node, field).is_none()) {
+            Some(place) => self.insert(node, place.checked_sub(1), &format!("{field}: [{}]", fresh.join(", "))),
+            None => self.exchange(node, field, gone, fresh),
+        }
+    }
+
     /// Puts elements behind the last one of the list that is the value of a field, each in its layout.
     pub fn append(&mut self, node: NodeId, field: &str, elements: &[String]) {
         match self.tree.field(node, field).map(|item| item.value) {

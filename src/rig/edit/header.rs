@@ -1,0 +1,56 @@
+//! Edits of the header of a rig's template.
+
+use ron::value::RawValue;
+
+use super::EditError;
+use crate::rig::{Rig, RigAbout, RigEdit, degrees, format::source::ron_options, part::OptionError};
+
+/// Fault of a socket or an option, with which no template could be read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum HeaderFault {
+    /// Name of a socket that cannot be told from that of a part's.
+    #[error("a socket has a name without points, and \"{0}\" is none; type another")]
+    SocketName(String),
+    /// Two sockets with one name.
+    #[error("two sockets are called \"{0}\"; give the second another name")]
+    SocketTwice(String),
+    /// Place of a socket with numbers that are not finite.
+    #[error("the place of the socket \"{0}\" is not finite; correct the numbers")]
+    SocketPlace(String),
+    /// Two options with one name.
+    #[error("two options are called \"{0}\"; give the second another name")]
+    OptionTwice(String),
+    /// Default of an option that is no value at all.
+    #[error("the default of the option \"{0}\" is no value as in a file: {1}; correct it")]
+    OptionDefault(String, String),
+    /// Default that the form of its option does not take.
+    #[error("the default does not fit: {0}; correct it, or choose another form")]
+    OptionForm(OptionError),
+}
+
+impl Rig {
+    pub(super) fn set_about(&mut self, about: &RigAbout) -> Result<RigEdit, EditError> {
+        for (number, socket) in about.sockets.iter().enumerate() {
+            if socket.name.is_empty() || socket.name.contains('.') {
+                return Err(HeaderFault::SocketName(socket.name.clone()).into());
+            }
+            if about.sockets[..number].iter().any(|other| other.name == socket.name) {
+                return Err(HeaderFault::SocketTwice(socket.name.clone()).into());
+            }
+            if !socket.translation.is_finite() || !degrees(socket.rotation).is_finite() {
+                return Err(HeaderFault::SocketPlace(socket.name.clone()).into());
+            }
+        }
+        for (number, option) in about.options.iter().enumerate() {
+            if about.options[..number].iter().any(|other| other.name == option.name) {
+                return Err(HeaderFault::OptionTwice(option.name.clone()).into());
+            }
+            let read: Result<Box<RawValue>, _> = ron_options().from_str(&option.default);
+            if let Err(error) = read {
+                return Err(HeaderFault::OptionDefault(option.name.clone(), error.code.to_string()).into());
+            }
+            option.check(&option.default).map_err(HeaderFault::OptionForm)?;
+        }
+        Ok(RigEdit::SetAbout(Box::new(std::mem::replace(&mut self.about, about.clone()))))
+    }
+}
