@@ -15,6 +15,7 @@ use super::{
     panel::Requests,
     panels::timeline::TimelineAction,
     settings::EditorSettings,
+    toolbar,
     tools::paint::brush::BrushAction,
 };
 
@@ -200,7 +201,8 @@ pub(super) fn show(
         });
         ui.menu_button("Window", |ui| {
             for panel in panels {
-                if ui.selectable_label(layout.shows(panel), *panel).clicked() {
+                // One that stands behind others is looked for, not to be hidden.
+                if ui.selectable_label(layout.is_forward(panel), *panel).clicked() {
                     toggled = Some(panel);
                     ui.close();
                 }
@@ -225,6 +227,7 @@ pub(super) fn show(
         ui.menu_button("Help", |ui| {
             entries(ui, &[Some(("All actions", Action::Palette)), Some(("Help", Action::Help))])
         });
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| toolbar::update(ui, world, requests));
     });
     if let Some(path) = recent {
         requests.send(OpenRequest::File(path));
@@ -233,7 +236,11 @@ pub(super) fn show(
         requests.set(Layout::default());
     } else if let Some(panel) = toggled {
         let mut next = layout.clone();
-        next.toggle(panel);
+        if next.is_forward(panel) {
+            next.toggle(panel);
+        } else {
+            next.bring_forward(panel);
+        }
         requests.set(next);
     }
 }

@@ -50,7 +50,6 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
         if ui.button("Fit").on_hover_text(tip(what, Action::Fit)).clicked() {
             requests.send(ActionRequest(Action::Fit));
         }
-        update(ui, world, requests);
         ui.separator();
         let mut switch = |ui: &mut egui::Ui, on: bool, name: &str, what: &str, action: Action| {
             if ui.selectable_label(on, name).on_hover_text(tip(what, action)).clicked() {
@@ -88,8 +87,9 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
     });
 }
 
-/// Draws the badge of a template's file that is newer than the rig.
-fn update(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
+/// Draws the badge of a template's file that is newer than the rig. It stands beside the menus, which leave room for it, so that
+/// nothing moves when it comes.
+pub(super) fn update(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
     let Some(offer) = follow::offer(world) else { return };
     let text = egui::RichText::new("⬆ Update").strong().color(style::accent(ui.visuals()));
     let said = format!("Update: {}", follow::counts(offer));

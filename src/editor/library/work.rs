@@ -31,7 +31,7 @@ use crate::{
     },
     processor::{Modules, keep_clips, keep_poses},
     rig::{
-        EditError, Rig, RigEdit, Uid,
+        EditError, Rig, RigEdit, TagKind, Uid,
         operations::{Operation, TagOperation},
         part::{Part, PartError},
         step::Step,
@@ -267,6 +267,9 @@ fn put(world: &mut World, rig: Entity, request: LibraryRequest, from: &(Option<A
     }
     let (edits, base, notes) = match ready {
         Ready::Operation(operation) => {
+            if let Some(warning) = doubled(world, rig, &name, &operation) {
+                world.write_message(warning);
+            }
             world.write_message(EditRequest::operation(rig, *operation));
             return;
         }
@@ -299,6 +302,19 @@ fn put(world: &mut World, rig: Entity, request: LibraryRequest, from: &(Option<A
     world.resource_mut::<LoadSteps>().pending = Some(PendingLoad { rig, template, base, mesh });
     world.write_message(EditRequest::operation(rig, Operation::Named { name: LOAD, edits }));
     world.write_message(Notice::done(format!("Loaded {name}: {joints} joints; Ctrl+Z takes it back")));
+}
+
+/// Warning about a part that goes onto joints with commands of their own, which stay.
+fn doubled(world: &World, rig: Entity, name: &str, operation: &Operation) -> Option<Notice> {
+    let Operation::Tags(TagOperation::AddPart { joints, .. }) = operation else { return None };
+    let rig = world.get::<Rig>(rig)?;
+    let tags = joints.iter().filter_map(|joint| rig.joint(*joint)).flat_map(|joint| &joint.data.tags);
+    let count = tags.filter(|tag| matches!(tag.kind, TagKind::Command { .. })).count();
+    (count > 0).then(|| {
+        Notice::warning(format!(
+            "{name} was added to joints that have {count} commands of their own, which stay. Ctrl+Z takes it back"
+        ))
+    })
 }
 
 /// The mesh with the most points, which is the body: eyes and clothes lie in it or on it.

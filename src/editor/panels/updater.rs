@@ -161,8 +161,8 @@ impl UpdaterPanel {
                 let text = match change.kind {
                     ChangeKind::Added => "added".to_owned(),
                     ChangeKind::Removed => "removed".to_owned(),
-                    ChangeKind::Changed => format!("{mine} → {theirs}"),
-                    ChangeKind::Renamed => format!("renamed {mine} → {theirs}"),
+                    ChangeKind::Changed => format!("{mine} ➡ {theirs}"),
+                    ChangeKind::Renamed => format!("renamed {mine} ➡ {theirs}"),
                 };
                 told(ui, lower, &text, quiet);
             }
