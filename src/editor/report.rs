@@ -68,6 +68,8 @@ pub struct WindowReport {
     pub posed: usize,
     /// Positions of joints in pixels of the window, by uid.
     pub places: BTreeMap<String, [f32; 2]>,
+    /// Uids of joints by their labels.
+    pub labels: BTreeMap<String, String>,
     /// The viewport in the window: left, top, width and height.
     pub viewport: [f32; 4],
     /// Positions in pixels of the window of the corners (0,0,0), (1,0,0), (0,1,0) and (0,0,1) of the unit cube at the
@@ -196,6 +198,9 @@ fn write(
             let pixel = |place: Vec3| sight.project(place).map(|at| (at + area.min).round().to_array());
             report.axes = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(pixel);
             for joint in rig.walk() {
+                if let Some(label) = &joint.data.label {
+                    report.labels.insert(label.clone(), joint.data.uid.to_string());
+                }
                 let place = entities.get(joint.data.uid).and_then(|entity| places.get(entity).ok());
                 if let Some(at) = place.and_then(|place| pixel(place.translation())) {
                     report.places.insert(joint.data.uid.to_string(), at);

@@ -201,9 +201,10 @@ fn drag(
                 preview = None;
                 match (held.drag, scene.sight()) {
                     (Some(mut drag), _) if dragged => {
-                        // What was pulled is what a key is set on, and what panels show.
-                        if !rig.selection.0.contains(&held.node) {
-                            let what = Pick::Joints(vec![held.node]);
+                        // What was posed is what a key is set on, and what panels show.
+                        let posed = drag.posed(held.node);
+                        if !rig.selection.0.contains(&posed) {
+                            let what = Pick::Joints(vec![posed]);
                             picks.write(PickRequest { rig: held.rig, what, add: pointer.held.shift });
                         }
                         drag.gizmo.to(pointer.at, pointer.held.control.then_some(drag.step));
@@ -266,6 +267,14 @@ impl Drag {
             step: transform::step(rig),
             way,
         })
+    }
+
+    /// The pulled node, or the control next to it that moves it.
+    fn posed(&self, node: Uid) -> Uid {
+        match &self.way {
+            Way::Controls(pull) => pull.handles().last().copied().unwrap_or(node),
+            Way::Joints(..) | Way::Itself(_) => node,
+        }
     }
 
     /// Movement of the pulled node.
