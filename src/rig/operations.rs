@@ -31,8 +31,8 @@ pub use place::settle;
 pub use symmetry::MirrorPlane;
 pub(in crate::rig) use tags::drop_part;
 pub use tags::{
-    CopiedIdentifiers, CopiedJoint, PartOrder, PasteTo, PasteWhat, Rewiring, TagClipboard, TagError, TagOperation,
-    TagScope,
+    CopiedIdentifiers, CopiedJoint, FittedSide, PartOrder, PasteTo, PasteWhat, Rewiring, TagClipboard, TagError,
+    TagOperation, TagScope,
 };
 pub use whole_pose::WholePose;
 

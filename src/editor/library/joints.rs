@@ -10,7 +10,7 @@ use crate::{
     rig::{
         Rig, RigEdit, Uid,
         label::label_side,
-        operations::TagOperation,
+        operations::{FittedSide, TagOperation},
         part::{Part, PartError, PartInstance},
         step::Step,
     },
@@ -18,6 +18,7 @@ use crate::{
 
 /// The operation that puts a part onto the chosen joints of a rig, so that it stays a part: mirrored where these are on the
 /// other side than its own. `name` is that by which the rig's file calls the part; `stroke` are the joints of the last step.
+/// With live symmetry it goes onto their partners, too.
 ///
 /// # Errors
 /// A part that does not take so many joints, or one of its options that does not take the value.
@@ -27,17 +28,33 @@ pub(super) fn added(
     (name, part): (String, Part),
     options: &[(String, String)],
     modules: &Modules,
+    is_symmetric: bool,
 ) -> Result<TagOperation, PartError> {
     let joints = joints_for(rig, chosen, stroke, &part);
     part.sized_for(joints.len())?;
     let label = |joint: &Uid| rig.joint(*joint).and_then(|joint| joint.data.label.as_deref());
     let of_part = side(part.rig.walk().map(|joint| joint.data.label.as_deref()));
     let mirror = of_part != 0 && side(joints.iter().map(label)) == -of_part;
-    let instance =
-        PartInstance { part: name.clone(), onto: vec![String::new(); joints.len()], mirror, ..PartInstance::default() };
     let mirrored = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
-    let fitted = instance.fitted(&part.with_options(options)?, &mirrored)?;
-    Ok(TagOperation::AddPart { part: name, fitted: Arc::new(fitted), joints, mirror })
+    let part = part.with_options(options)?;
+    let fitted = |mirror: bool| {
+        let onto = vec![String::new(); joints.len()];
+        let instance = PartInstance { part: name.clone(), onto, mirror, ..PartInstance::default() };
+        instance.fitted(&part, &mirrored).map(Arc::new)
+    };
+    if let Some(partners) = partners(rig, &joints).filter(|_| is_symmetric && of_part != 0) {
+        let others = FittedSide { fitted: fitted(!mirror)?, joints: partners, mirror: !mirror };
+        let own = FittedSide { fitted: fitted(mirror)?, joints, mirror };
+        return Ok(TagOperation::AddPair { part: name, sides: Box::new([own, others]) });
+    }
+    let fitted = fitted(mirror)?;
+    Ok(TagOperation::AddPart { part: name, fitted, joints, mirror })
+}
+
+/// The joints on the other side; `None` if one of them has no partner, or the partner is among them.
+fn partners(rig: &Rig, joints: &[Uid]) -> Option<Vec<Uid>> {
+    let partner = |joint: &Uid| rig.joint(*joint)?.data.mirror.filter(|partner| !joints.contains(partner));
+    joints.iter().map(partner).collect()
 }
 
 /// Side of the first label that names one: see [`label_side`].

@@ -25,7 +25,7 @@ use crate::{
     files::{LibraryError, RealDisk, SearchPaths, SiteError, TemplatePlace, read_listed},
     plugins::{
         commands::RigModules,
-        document::EditRequest,
+        document::{EditRequest, Symmetry},
         history::RigHistory,
         surface::{RigMesh, RigMeshes},
     },
@@ -140,6 +140,8 @@ struct Snapshot {
     beside: Option<std::path::PathBuf>,
     /// Joints that the last step added.
     stroke: Vec<Uid>,
+    /// True if what is done on one side happens on the other, too.
+    is_symmetric: bool,
 }
 
 /// Starts the next request.
@@ -171,6 +173,7 @@ fn begin(world: &mut World, request: LibraryRequest) {
         folders: world.get_resource::<LibraryFolders>().cloned().unwrap_or_default(),
         beside: world.get::<OpenDocument>(rig).and_then(own_folder),
         stroke: added_by(history.and_then(RigHistory::last).map(Arc::as_ref)),
+        is_symmetric: world.get::<Symmetry>(rig).is_some_and(|symmetry| symmetry.0.is_some()),
     };
     let from = history.map(|history| (history.last().cloned(), history.undone())).unwrap_or_default();
     let work = request.clone();
@@ -210,7 +213,16 @@ impl Snapshot {
     ) -> Result<Operation, PartError> {
         let name = place.part_name(self.beside.as_deref(), site);
         let part = (name, Part::from(template));
-        Ok(Operation::Tags(added(&self.rig, (joints, &self.stroke), part, options, &self.modules)?))
+        Ok(Operation::Tags(self.added(joints, part, options)?))
+    }
+
+    fn added(
+        &self,
+        joints: &[Uid],
+        part: (String, Part),
+        options: &[(String, String)],
+    ) -> Result<TagOperation, PartError> {
+        added(&self.rig, (joints, &self.stroke), part, options, &self.modules, self.is_symmetric)
     }
 
     /// Edits that put a template in place of the rig. Where poses and keys are kept, things of the rig that the template has,
@@ -306,7 +318,13 @@ fn put(world: &mut World, rig: Entity, request: LibraryRequest, from: &(Option<A
 
 /// Warning about a part that goes onto joints with commands of their own, which stay.
 fn doubled(world: &World, rig: Entity, name: &str, operation: &Operation) -> Option<Notice> {
-    let Operation::Tags(TagOperation::AddPart { joints, .. }) = operation else { return None };
+    let joints: Vec<Uid> = match operation {
+        Operation::Tags(TagOperation::AddPart { joints, .. }) => joints.clone(),
+        Operation::Tags(TagOperation::AddPair { sides, .. }) => {
+            sides.iter().flat_map(|side| side.joints.iter().copied()).collect()
+        }
+        _ => return None,
+    };
     let rig = world.get::<Rig>(rig)?;
     let tags = joints.iter().filter_map(|joint| rig.joint(*joint)).flat_map(|joint| &joint.data.tags);
     let count = tags.filter(|tag| matches!(tag.kind, TagKind::Command { .. })).count();

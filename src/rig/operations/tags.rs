@@ -23,6 +23,17 @@ use crate::rig::{
     reference::{BadReference, NameKind, bind_names, refresh_names},
 };
 
+/// Part as it is [fitted](crate::rig::part::PartInstance::fitted) to a chain of joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FittedSide {
+    /// The fitted part.
+    pub fitted: Arc<Rig>,
+    /// The joints, in order.
+    pub joints: Vec<Uid>,
+    /// True for a part of the other side of the character.
+    pub mirror: bool,
+}
+
 /// A change of tags that a person requests. Tags are identified by their uids, wherever in the rig they are.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TagOperation {
@@ -111,6 +122,13 @@ pub enum TagOperation {
         joints: Vec<Uid>,
         /// True for a part of the other side of the character.
         mirror: bool,
+    },
+    /// Drops a part onto the chains of both sides, as [`AddPart`](Self::AddPart) does onto one.
+    AddPair {
+        /// File of the part, as a template names it.
+        part: String,
+        /// The part on each side.
+        sides: Box<[FittedSide; 2]>,
     },
     /// Turns a combined feature on or off.
     SetFeature(FeatureKey, bool),
@@ -217,7 +235,7 @@ impl TagOperation {
             Self::Paste { to: PasteTo::Mirror, .. } => "Paste tags mirrored",
             Self::Paste { .. } => "Paste tags",
             Self::Drop { .. } => "Drop part",
-            Self::AddPart { .. } => "Add part",
+            Self::AddPart { .. } | Self::AddPair { .. } => "Add part",
             Self::SetFeature(_, true) | Self::SetSwitch(_, _, true) => "Turn feature on",
             Self::SetFeature(_, false) | Self::SetSwitch(_, _, false) => "Turn feature off",
             Self::ChooseSwitch(..) => "Choose switch",
@@ -287,6 +305,9 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
         TagOperation::Drop { part, joints, bindings } => part::drop_sized(draft, part, joints, bindings),
         TagOperation::AddPart { part, fitted, joints, mirror } => {
             part::drop_instance(draft, part, fitted, joints, *mirror)
+        }
+        TagOperation::AddPair { part, sides } => {
+            sides.iter().try_for_each(|side| part::drop_instance(draft, part, &side.fitted, &side.joints, side.mirror))
         }
         TagOperation::SetFeature(key, on) => apply(draft, feature::set_feature(draft.rig(), key, *on)?),
         TagOperation::SetSwitch(key, switch, on) => apply(draft, feature::set_switch(draft.rig(), key, switch, *on)?),
