@@ -89,6 +89,8 @@ mod fuzz_skin;
 mod fuzz_template;
 mod fuzz_whole;
 mod generate;
+#[cfg(feature = "editor")]
+mod gesture_counts;
 mod gestures;
 #[cfg(feature = "editor")]
 mod gizmo;
