@@ -3,6 +3,7 @@
 //! Needs `Xvfb`, `xdotool` and a graphics adapter (a software one will do); it says what is missing, and fails for it
 //! where `RIGSMITH_REQUIRE_GPU=1`. `RIGSMITH_SHOTS` names a folder for pictures of the window on the way.
 
+mod pictures;
 mod whole_job;
 
 use std::{
