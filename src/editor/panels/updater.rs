@@ -39,7 +39,10 @@ impl EditorPanel for UpdaterPanel {
             return list::nothing(ui, "No rig is open.");
         };
         let Some(source) = world.get::<RigSource>(rig) else {
-            return list::nothing(ui, "This rig follows no file. It does once a template's file is opened or loaded.");
+            return list::nothing(
+                ui,
+                "This rig follows no file. It does once a template's file is opened, loaded or saved.",
+            );
         };
         head(ui, world.get::<OpenDocument>(rig), source, requests);
         let Some(offer) = world.get::<UpdateOffer>(rig) else {
