@@ -97,6 +97,8 @@ mod gizmo;
 mod gltf;
 mod gltf_torture;
 #[cfg(feature = "editor")]
+mod glyphs;
+#[cfg(feature = "editor")]
 mod graph;
 mod growth;
 mod heads;

@@ -79,7 +79,7 @@ impl Plugin for GraphPlugin {
 const TITLE: &str = "Graph";
 
 /// Scale of the first look at a graph that does not fit into the panel at a larger one: names can be read.
-const FIRST_SCALE: f32 = 0.5;
+const FIRST_SCALE: f32 = 0.7;
 
 /// Seconds for which a command that ran flashes.
 const FLASH: f64 = 0.7;
