@@ -47,7 +47,7 @@ pub(super) fn show(
     };
     let mut recent: Option<PathBuf> = None;
     let mut toggled: Option<&'static str> = None;
-    let mut reset = false;
+    let (mut reset, mut updates) = (false, false);
     egui::MenuBar::new().ui(ui, |ui| {
         ui.menu_button("File", |ui| {
             entries(
@@ -227,10 +227,14 @@ pub(super) fn show(
         ui.menu_button("Help", |ui| {
             entries(ui, &[Some(("All actions", Action::Palette)), Some(("Help", Action::Help))])
         });
-        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| toolbar::update(ui, world, requests));
+        let right = egui::Layout::right_to_left(egui::Align::Center);
+        updates = ui.with_layout(right, |ui| toolbar::update(ui, world)).inner;
     });
     if let Some(path) = recent {
         requests.send(OpenRequest::File(path));
+    }
+    if updates {
+        requests.send(ActionRequest(Action::Library(LibraryAction::Updater)));
     }
     if reset {
         requests.set(Layout::default());
