@@ -155,8 +155,14 @@ fn hover(
         return;
     }
     let aim = GizmoTarget::new(*mode, settings.gizmo_space, moves.0, &scene);
-    let shapes = aim.zip(scene.sight()).map(|(aim, sight)| aim.frame.shapes(aim.parts, &sight));
-    let handle = shapes.zip(press.or(last)).and_then(|(shapes, at)| handle_at(&shapes, at));
+    let found = aim.zip(scene.sight()).zip(press.or(last));
+    let handle = found.and_then(|((aim, sight), at)| {
+        let handle = handle_at(&aim.frame.shapes(aim.parts, &sight), at)?;
+        // Rings that are seen from the side run through the joint, which is pulled there.
+        let is_ring = *mode == Mode::Pose && matches!(handle, Handle::Ring(_));
+        let is_joint = is_ring && sight.project(aim.frame.origin).is_some_and(|middle| middle.distance(at) <= REACH);
+        (!is_joint).then_some(handle)
+    });
     if tool.hovered != handle {
         tool.hovered = handle;
     }
