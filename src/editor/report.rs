@@ -1,8 +1,8 @@
 //! Report of the window's state, as a line of JSON in a file: for programs that drive the window with mouse and
 //! keyboard.
 //!
-//! The report is off unless `RIGSMITH_WINDOW_REPORT` names the file. Every change replaces the file in one rename. While it is on,
-//! panels tell their widgets as they tell screen readers, so that a program finds a button by its name.
+//! The report is off unless `RIGSMITH_WINDOW_REPORT` names the file. Every change replaces the file in one rename. While it
+//! is on, panels tell their widgets as they tell screen readers, so that a program finds a button by its name.
 
 use std::{collections::BTreeMap, path::PathBuf};
 
