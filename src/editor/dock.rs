@@ -216,7 +216,7 @@ impl TabViewer for Tabs<'_> {
     fn title(&mut self, tab: &mut String) -> egui::WidgetText {
         match tab.as_str() {
             UPDATER if follow::offer(self.world).is_some() => {
-                egui::RichText::new(format!("{UPDATER} ●")).color(style::ACCENT).into()
+                egui::RichText::new(format!("{UPDATER} ⬆")).color(style::ACCENT).into()
             }
             name => name.into(),
         }

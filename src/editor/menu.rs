@@ -15,6 +15,7 @@ use super::{
     panel::Requests,
     panels::timeline::TimelineAction,
     settings::EditorSettings,
+    toolbar,
     tools::paint::brush::BrushAction,
 };
 
@@ -46,7 +47,7 @@ pub(super) fn show(
     };
     let mut recent: Option<PathBuf> = None;
     let mut toggled: Option<&'static str> = None;
-    let mut reset = false;
+    let (mut reset, mut updates) = (false, false);
     egui::MenuBar::new().ui(ui, |ui| {
         ui.menu_button("File", |ui| {
             entries(
@@ -200,7 +201,8 @@ pub(super) fn show(
         });
         ui.menu_button("Window", |ui| {
             for panel in panels {
-                if ui.selectable_label(layout.shows(panel), *panel).clicked() {
+                // One that stands behind others is looked for, not to be hidden.
+                if ui.selectable_label(layout.is_forward(panel), *panel).clicked() {
                     toggled = Some(panel);
                     ui.close();
                 }
@@ -225,15 +227,24 @@ pub(super) fn show(
         ui.menu_button("Help", |ui| {
             entries(ui, &[Some(("All actions", Action::Palette)), Some(("Help", Action::Help))])
         });
+        let right = egui::Layout::right_to_left(egui::Align::Center);
+        updates = ui.with_layout(right, |ui| toolbar::update(ui, world)).inner;
     });
     if let Some(path) = recent {
         requests.send(OpenRequest::File(path));
+    }
+    if updates {
+        requests.send(ActionRequest(Action::Library(LibraryAction::Updater)));
     }
     if reset {
         requests.set(Layout::default());
     } else if let Some(panel) = toggled {
         let mut next = layout.clone();
-        next.toggle(panel);
+        if next.is_forward(panel) {
+            next.toggle(panel);
+        } else {
+            next.bring_forward(panel);
+        }
         requests.set(next);
     }
 }

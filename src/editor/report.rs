@@ -1,11 +1,13 @@
 //! Report of the window's state, as a line of JSON in a file: for programs that drive the window with mouse and
 //! keyboard.
 //!
-//! The report is off unless `RIGSMITH_WINDOW_REPORT` names the file. Every change replaces the file in one rename.
+//! The report is off unless `RIGSMITH_WINDOW_REPORT` names the file. Every change replaces the file in one rename. While it
+//! is on, panels tell their widgets as they tell screen readers, so that a program finds a button by its name.
 
 use std::{collections::BTreeMap, path::PathBuf};
 
-use bevy::prelude::*;
+use bevy::{ecs::system::SystemParam, prelude::*};
+use bevy_egui::{EguiContext, EguiOutput, PrimaryEguiContext, egui::accesskit};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -17,14 +19,16 @@ use super::{
     pointer::ViewportArea,
 };
 use crate::{
+    instance::UpdateOffer,
     plugins::{
+        commands::{BuildDone, Processor},
         document::{JointEntities, Selection},
         fit::FitJob,
         history::RigHistory,
         skinning::SkinningJob,
         surface::{RigMeshes, RigSurface},
     },
-    rig::Rig,
+    rig::{Rig, Uid, animation::RigClip},
 };
 
 /// Plugin that writes the report if the environment requests it.
@@ -33,7 +37,9 @@ pub struct ReportPlugin;
 impl Plugin for ReportPlugin {
     fn build(&self, app: &mut App) {
         if let Some(path) = std::env::var_os("RIGSMITH_WINDOW_REPORT").filter(|path| !path.is_empty()) {
-            app.insert_resource(ReportFile { path: path.into(), written: None }).add_systems(Last, write);
+            app.insert_resource(ReportFile { path: path.into(), written: None, ran: 0 })
+                .add_systems(PostStartup, tell_widgets)
+                .add_systems(Last, write);
         }
     }
 }
@@ -62,6 +68,8 @@ pub struct WindowReport {
     pub posed: usize,
     /// Positions of joints in pixels of the window, by uid.
     pub places: BTreeMap<String, [f32; 2]>,
+    /// Uids of joints by their labels.
+    pub labels: BTreeMap<String, String>,
     /// The viewport in the window: left, top, width and height.
     pub viewport: [f32; 4],
     /// Positions in pixels of the window of the corners (0,0,0), (1,0,0), (0,1,0) and (0,0,1) of the unit cube at the
@@ -69,6 +77,32 @@ pub struct WindowReport {
     pub axes: [Option<[f32; 2]>; 4],
     /// The status line.
     pub status: String,
+    /// Number of commands in effect, and of all.
+    pub commands: [usize; 2],
+    /// Number of commands that the last build carried out.
+    pub ran: usize,
+    /// Number of keys of all clips.
+    pub keys: usize,
+    /// Number of changes that the file of the rig's template offers.
+    pub offered: usize,
+    /// Labels of the selected joints and nodes; the uid of one without.
+    pub selection: Vec<String>,
+    /// Widgets of the last frame that have a name, in the order of drawing.
+    pub widgets: Vec<ReportedWidget>,
+}
+
+/// Widget of the window, as screen readers know it.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq, Default)]
+#[serde(default)]
+pub struct ReportedWidget {
+    /// Name.
+    pub name: String,
+    /// Value of a field.
+    pub value: String,
+    /// Left, top, width and height in pixels of the window.
+    pub place: [f32; 4],
+    /// Marks a widget that can be used.
+    pub enabled: bool,
 }
 
 /// File of the report.
@@ -76,6 +110,42 @@ pub struct WindowReport {
 struct ReportFile {
     path: PathBuf,
     written: Option<WindowReport>,
+    ran: usize,
+}
+
+/// Lets panels tell their widgets.
+fn tell_widgets(mut contexts: Query<&mut EguiContext, With<PrimaryEguiContext>>) {
+    for mut context in &mut contexts {
+        context.get_mut().enable_accesskit();
+    }
+}
+
+/// Widgets of the panels, from what they tell.
+fn widgets(output: &EguiOutput) -> Vec<ReportedWidget> {
+    let update = output.platform_output.accesskit_update.as_ref();
+    let nodes = update.map_or(&[] as &[_], |update| update.nodes.as_slice());
+    nodes.iter().filter_map(|(_, node)| reported(node)).collect()
+}
+
+fn reported(node: &accesskit::Node) -> Option<ReportedWidget> {
+    let bounds = node.bounds()?;
+    let (name, value) = (node.label().unwrap_or_default(), node.value().unwrap_or_default());
+    let place = [bounds.x0, bounds.y0, bounds.x1 - bounds.x0, bounds.y1 - bounds.y0].map(|side| side.round() as f32);
+    let is_told = !(name.is_empty() && value.is_empty());
+    is_told.then(|| ReportedWidget {
+        name: name.to_owned(),
+        value: value.to_owned(),
+        place,
+        enabled: !node.is_disabled(),
+    })
+}
+
+/// Builds and panels, for the report.
+#[derive(SystemParam)]
+struct Progress<'w, 's> {
+    rigs: Query<'w, 's, (Option<&'static Processor>, Option<&'static UpdateOffer>)>,
+    builds: MessageReader<'w, 's, BuildDone>,
+    outputs: Query<'w, 's, &'static EguiOutput, With<PrimaryEguiContext>>,
 }
 
 fn write(
@@ -86,6 +156,7 @@ fn write(
     jobs: Query<(), Or<(With<SkinningJob>, With<FitJob>)>>,
     (mode, loading, status): (Res<Mode>, Res<LoadJob>, Res<StatusLine>),
     (area, sight, dialog): (Res<ViewportArea>, Res<ViewportSight>, Res<Dialog>),
+    mut progress: Progress,
 ) {
     let mut report = WindowReport {
         mode: mode.name().to_owned(),
@@ -94,8 +165,24 @@ fn write(
         status: status.obstacle.clone().unwrap_or_else(|| status.hint.clone()),
         ..default()
     };
+    if let Some(done) = progress.builds.read().last() {
+        file.ran = done.report.executed.len();
+    }
+    report.ran = file.ran;
+    report.widgets = progress.outputs.iter().next().map(widgets).unwrap_or_default();
     let mut surface_busy = false;
-    if let Some((rig, selection, history, entities, meshes, surface)) = rig.and_then(|rig| rigs.get(rig.0).ok()) {
+    let active = rig.map(|rig| rig.0);
+    if let Some((processor, offer)) = active.and_then(|rig| progress.rigs.get(rig).ok()) {
+        report.commands = processor.map_or([0; 2], |processor| {
+            let builder = processor.builder();
+            [builder.cursor(), builder.len()]
+        });
+        report.offered = offer.map_or(0, |offer| offer.changes.len());
+    }
+    if let Some((rig, selection, history, entities, meshes, surface)) = active.and_then(|rig| rigs.get(rig).ok()) {
+        report.keys = rig.clips().iter().map(RigClip::key_count).sum();
+        let label = |node: &Uid| rig.joint(*node).and_then(|joint| joint.data.label.clone());
+        report.selection = selection.0.iter().map(|node| label(node).unwrap_or_else(|| node.to_string())).collect();
         let (steps, head) = history.steps();
         report.joints = rig.len();
         report.selected = selection.0.len();
@@ -111,6 +198,9 @@ fn write(
             let pixel = |place: Vec3| sight.project(place).map(|at| (at + area.min).round().to_array());
             report.axes = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(pixel);
             for joint in rig.walk() {
+                if let Some(label) = &joint.data.label {
+                    report.labels.insert(label.clone(), joint.data.uid.to_string());
+                }
                 let place = entities.get(joint.data.uid).and_then(|entity| places.get(entity).ok());
                 if let Some(at) = place.and_then(|place| pixel(place.translation())) {
                     report.places.insert(joint.data.uid.to_string(), at);

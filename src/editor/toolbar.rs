@@ -8,7 +8,6 @@ use super::{
     actions::{Action, ActionRequest},
     follow,
     keys::KeyBindings,
-    library::LibraryAction,
     mode::Mode,
     panel::Requests,
     settings::EditorSettings,
@@ -50,7 +49,6 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
         if ui.button("Fit").on_hover_text(tip(what, Action::Fit)).clicked() {
             requests.send(ActionRequest(Action::Fit));
         }
-        update(ui, world, requests);
         ui.separator();
         let mut switch = |ui: &mut egui::Ui, on: bool, name: &str, what: &str, action: Action| {
             if ui.selectable_label(on, name).on_hover_text(tip(what, action)).clicked() {
@@ -88,16 +86,15 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
     });
 }
 
-/// Draws the badge of a template's file that is newer than the rig.
-fn update(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
-    let Some(offer) = follow::offer(world) else { return };
+/// Draws the badge of a template's file that is newer than the rig; returns `true` if it was clicked. It stands beside the menus,
+/// which leave room for it, so that nothing moves when it comes.
+pub(super) fn update(ui: &mut egui::Ui, world: &World) -> bool {
+    let Some(offer) = follow::offer(world) else { return false };
     let text = egui::RichText::new("⬆ Update").strong().color(style::accent(ui.visuals()));
     let said = format!("Update: {}", follow::counts(offer));
     let badge = ui.button(text);
     badge.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, &said));
-    if badge.on_hover_text(&said).clicked() {
-        requests.send(ActionRequest(Action::Library(LibraryAction::Updater)));
-    }
+    badge.on_hover_text(&said).clicked()
 }
 
 /// Purpose of a mode, for its tooltip.

@@ -265,7 +265,8 @@ impl Operation {
             Self::Tags(operation) => operation.name(),
             Self::Merge { .. } => "Merge rig",
             Self::Edits(edits) => match edits[..] {
-                [RigEdit::SetSkin(_, Some(_))] => "Skin mesh",
+                // Binding may give half joints their place, too.
+                [.., RigEdit::SetSkin(_, Some(_))] => "Skin mesh",
                 _ => "Edit rig",
             },
             Self::SetPose { name, .. } | Self::Named { name, .. } => name,

@@ -310,7 +310,9 @@ fn many(count: usize) -> Desk {
 #[test]
 fn a_thousand_commands_are_few_shapes() {
     let [few, all] = [400, 1_000].map(|count| {
-        let desk = many(count);
+        let mut desk = many(count);
+        assert!(desk.look("Null · a: output").is_some(), "the first look is one at names");
+        act(&mut desk, GraphAction::ShowAll);
         (desk.seen.len(), desk.shapes)
     });
     assert_eq!(few, all, "widgets and shapes");

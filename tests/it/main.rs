@@ -90,11 +90,15 @@ mod fuzz_skin;
 mod fuzz_template;
 mod fuzz_whole;
 mod generate;
+#[cfg(feature = "editor")]
+mod gesture_counts;
 mod gestures;
 #[cfg(feature = "editor")]
 mod gizmo;
 mod gltf;
 mod gltf_torture;
+#[cfg(feature = "editor")]
+mod glyphs;
 #[cfg(feature = "editor")]
 mod graph;
 mod growth;

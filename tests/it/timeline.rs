@@ -390,3 +390,26 @@ fn nothing_is_cut_off_in_a_narrow_timeline() {
         }
     }
 }
+
+#[test]
+fn a_key_brings_a_clip_where_none_is_open() {
+    let mut desk = Desk::new(TimelinePanel::default());
+    let joints = desk.chain(&["a", "b"]);
+    desk.select(&[]);
+    act(&mut desk, TimelineAction::Key);
+    assert!(desk.told().last().is_some_and(|told| told.contains("nothing is selected")), "{:?}", desk.told());
+    desk.select(&[joints[1]]);
+    let turn = rigsmith::rig::PoseOffset::from_rotation(Quat::from_rotation_z(0.4));
+    desk.edit(rigsmith::rig::operations::Operation::Pose(vec![(joints[1], turn)]));
+    act(&mut desk, TimelineAction::Key);
+    desk.frames(4);
+    let keys = |desk: &Desk| desk.rig().clips().iter().map(|clip| clip.key_count()).collect::<Vec<_>>();
+    assert_eq!(keys(&desk).len(), 1, "{:?}", desk.told());
+    assert!(keys(&desk)[0] > 0);
+    assert_eq!(timeline(&desk).clip, Some(desk.rig().clips()[0].uid));
+    // The next key goes into the same clip.
+    act(&mut desk, TimelineAction::NextFrame);
+    act(&mut desk, TimelineAction::Key);
+    desk.frames(4);
+    assert_eq!(keys(&desk).len(), 1);
+}

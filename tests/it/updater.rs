@@ -176,7 +176,7 @@ fn texts(shape: &egui::Shape, clip: egui::Rect, seen: &mut Vec<(String, egui::Re
 #[test]
 fn a_newer_file_has_a_badge_on_the_tab_in_the_toolbar_and_in_the_status_line() {
     let mut studio = Studio::new();
-    let badges = ["Updater ●", "⬆ Update", "the template's file is newer"];
+    let badges = ["Updater ⬆", "⬆ Update", "the template's file is newer"];
     let find = |seen: &[(String, egui::Rect)], part: &str| seen.iter().find(|(text, _)| text.contains(part)).cloned();
     let before = studio.window(1280.0, 720.0);
     assert!(find(&before, "Updater").is_some(), "the tab is there: {before:?}");

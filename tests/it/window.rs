@@ -3,7 +3,11 @@
 //! Needs `Xvfb`, `xdotool` and a graphics adapter (a software one will do); it says what is missing, and fails for it
 //! where `RIGSMITH_REQUIRE_GPU=1`. `RIGSMITH_SHOTS` names a folder for pictures of the window on the way.
 
+mod pictures;
+mod whole_job;
+
 use std::{
+    cell::RefCell,
     io::{BufRead, BufReader},
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
@@ -49,6 +53,8 @@ struct Hands<'a> {
     display: &'a Display,
     folder: &'a Path,
     program: Child,
+    /// Everything that the hands did: presses to releases, and keys.
+    gestures: RefCell<Vec<String>>,
 }
 
 impl Drop for Hands<'_> {
@@ -78,7 +84,7 @@ impl<'a> Hands<'a> {
             .stderr(log)
             .spawn()
             .unwrap();
-        let hands = Self { display, folder, program };
+        let hands = Self { display, folder, program, gestures: RefCell::default() };
         hands.until("the file is open", |report| !report.busy && report.viewport[2] > 0.0);
         let window = hands.xdotool(&["search", "--name", "Rigsmith"]);
         let window = window.split_whitespace().next().unwrap_or_else(|| panic!("there is no window"));
@@ -126,11 +132,17 @@ impl<'a> Hands<'a> {
         None
     }
 
+    fn count(&self, gesture: String) {
+        self.gestures.borrow_mut().push(gesture);
+    }
+
     fn key(&self, key: &str) {
+        self.count(key.to_owned());
         self.xdotool(&["key", "--clearmodifiers", key]);
     }
 
     fn write(&self, text: &str) {
+        text.chars().for_each(|letter| self.count(letter.to_string()));
         self.xdotool(&["type", "--delay", "25", text]);
     }
 
@@ -171,6 +183,7 @@ impl<'a> Hands<'a> {
     }
 
     fn drag(&self, line: &[[f32; 2]]) {
+        self.count("drag".to_owned());
         let place = |at: [f32; 2]| [at[0].round().to_string(), at[1].round().to_string()];
         let [x, y] = place(line[0]);
         self.xdotool(&["mousemove", &x, &y]);
@@ -188,9 +201,33 @@ impl<'a> Hands<'a> {
     }
 
     fn click(&self, at: [f32; 2]) {
+        self.count("click".to_owned());
         self.xdotool(&["mousemove", &at[0].round().to_string(), &at[1].round().to_string()]);
         sleep(Duration::from_millis(300));
         self.xdotool(&["click", "1"]);
+    }
+
+    /// The middle of the last drawn widget that is meant, once it stands still and can be used: popups are drawn last.
+    fn widget(&self, what: &str, is_meant: impl Fn(&str) -> bool) -> [f32; 2] {
+        let find = |report: &WindowReport| {
+            let found = report.widgets.iter().rev().find(|widget| widget.enabled && is_meant(&widget.name));
+            found.map(|widget| widget.place)
+        };
+        let start = Instant::now();
+        loop {
+            let seen = self.until(&format!("there is {what}"), |report| find(report).is_some());
+            sleep(Duration::from_millis(700));
+            let again = self.report().as_ref().and_then(find);
+            if let Some([left, top, width, height]) = again.filter(|again| find(&seen) == Some(*again)) {
+                return [left + 0.5 * width, top + 0.5 * height];
+            }
+            assert!(start.elapsed() < PATIENCE, "{what} never stands still");
+        }
+    }
+
+    /// Clicks the widget with that name.
+    fn press(&self, name: &str) {
+        self.click(self.widget(name, |known| known == name));
     }
 
     /// Time of processors that the program has used, in hundredths of a second.

@@ -100,7 +100,11 @@ pub(super) fn export(world: &mut World, path: PathBuf) {
             notes.push(format!("only the first mesh was exported; {more} more are open"));
         }
         let checked = check(&path);
-        let template = (template.as_deref() == Some(&path)).then(|| Arc::new(data));
+        let is_followed = match &template {
+            Some(template) => *template == path,
+            None => FileKind::of(&path) == Some(FileKind::Template),
+        };
+        let template = is_followed.then(|| (path, Arc::new(data)));
         Ok(SavedContent::Export { checked, notes, template })
     });
     world.resource_mut::<SaveJob>().begin(Job { name, rig, step, task, then: None });

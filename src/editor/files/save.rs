@@ -84,12 +84,13 @@ pub(super) enum SavedContent {
         notes: Vec<String>,
         bundled: Option<PathBuf>,
     },
-    /// Export; `template` is the rig if it was saved to the template that was opened.
+    /// Export; `template` is the rig and its file, if that is the template that was opened, or the first one of a rig that
+    /// has come from none.
     Export {
         /// Content that Rigsmith's own reader finds in the file.
         checked: Result<String, LoadError>,
         notes: Vec<String>,
-        template: Option<Arc<Rig>>,
+        template: Option<(PathBuf, Arc<Rig>)>,
     },
 }
 
@@ -117,6 +118,11 @@ pub(super) fn completed(path: &Path, purpose: Purpose) -> PathBuf {
         _ => path.to_owned(),
     };
     let mut path = std::path::absolute(&path).unwrap_or(path);
+    // A name with an ending that is typed over the proposed name leaves the proposed ending behind it.
+    let typed = path.extension().filter(|ending| *ending == "glb").map(|_| path.with_extension(""));
+    if let Some(typed) = typed.filter(|typed| purpose == Purpose::Export && FileKind::of(typed).is_some()) {
+        path = typed;
+    }
     let kind = FileKind::of(&path);
     let ending = match purpose {
         Purpose::Save if kind == Some(FileKind::Project) => "",
@@ -248,15 +254,17 @@ pub(super) fn poll(world: &mut World) {
             tell(world, notes);
         }
         Ok(SavedContent::Export { checked, notes, template }) => {
-            if let (Some(template), Some(mut source)) = (template, world.get_mut::<RigSource>(rig)) {
-                source.rebase(template);
-            }
+            let begins = template.and_then(|(path, saved)| follow(world, rig, path, saved));
             world.write_message(match checked {
                 Ok(found) if found.is_empty() => Notice::done(format!("Exported {name}")),
                 Ok(found) => Notice::done(format!("Exported {name}; read back: {found}")),
                 Err(error) => Notice::error(format!("Exported {name}, but it cannot be read back: {error}")),
             });
             tell(world, notes);
+            if let Some(name) = begins {
+                let text = format!("The rig follows {name} from now on: what is changed there comes to the Updater");
+                world.write_message(Notice::info(text));
+            }
         }
         Err(error) => {
             world.write_message(Notice::error(format!("Could not write {name}: {error}")));
@@ -269,6 +277,22 @@ pub(super) fn poll(world: &mut World) {
         // Changes may have been made while it was being saved.
         after_asking(world, then);
     }
+}
+
+/// Follows the template that the rig was saved to; returns the file's name if it did not follow it before.
+fn follow(world: &mut World, rig: Entity, path: PathBuf, saved: Arc<Rig>) -> Option<String> {
+    if let Some(mut source) = world.get_mut::<RigSource>(rig) {
+        source.rebase(saved);
+        return None;
+    }
+    let mut document = world.get_mut::<OpenDocument>(rig)?;
+    // Another template may have been loaded meanwhile.
+    let is_first = document.template.is_none();
+    let name = file_name(&path);
+    if is_first {
+        (document.template, document.base) = (Some(path), Some(saved));
+    }
+    is_first.then_some(name)
 }
 
 fn tell(world: &mut World, notes: Vec<String>) {

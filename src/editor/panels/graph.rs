@@ -81,6 +81,9 @@ impl Plugin for GraphPlugin {
 /// Name of the panel.
 const TITLE: &str = "Graph";
 
+/// Scale of the first look at a graph that does not fit into the panel at a larger one: names can be read.
+const FIRST_SCALE: f32 = 0.7;
+
 /// Seconds for which a command that ran flashes.
 const FLASH: f64 = 0.7;
 
@@ -262,8 +265,15 @@ impl GraphPanel {
         }
         let space = space.expand(30.0);
         let fitting = area.size() / space.size();
-        let scale = fitting.min_elem().clamp(SCALES[0], 1.0);
-        let from = area.center() - scale * space.center().to_vec2();
+        let fitted = fitting.min_elem().clamp(SCALES[0], 1.0);
+        let (mut scale, mut centre) = (fitted, space.center());
+        if is_other && fitted < FIRST_SCALE {
+            // The first look at a large graph is one at its beginning, or at what is selected, where names can be read.
+            let selected = self.graph.nodes.iter().zip(rects).find(|(node, _)| view.selected.contains(&node.tag));
+            let start = space.min + area.size() / (2.0 * FIRST_SCALE);
+            (scale, centre) = (FIRST_SCALE, selected.map_or(start, |(_, rect)| rect.center()));
+        }
+        let from = area.center() - scale * centre.to_vec2();
         Some(TSTransform::new(from.to_vec2(), scale))
     }
 

@@ -1,10 +1,12 @@
 //! Groups panel: the local groups of a rig with their colours and joints; create, rename, recolour, assign, merge, remove.
 
+use std::{collections::BTreeMap, sync::Arc};
+
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Checkbox, Key, ScrollArea, TextEdit, Ui, WidgetInfo, WidgetType};
 
 use super::{
-    displayed_rig::{DisplayedRig, color},
+    displayed_rig::{DisplayedRig, Stamp, color},
     fields::named,
     list,
 };
@@ -29,6 +31,9 @@ pub struct GroupsPanel {
     renamed: Option<(Uid, String)>,
     /// Group whose colour is being chosen.
     colored: Option<(Uid, [f32; 3])>,
+    /// State of the rig that the joints of groups were taken from.
+    made_from: Option<Stamp>,
+    members: BTreeMap<Uid, Arc<[Uid]>>,
 }
 
 /// Colours of new groups in turn: far apart, and all readable on dark and light ground.
@@ -62,10 +67,11 @@ impl EditorPanel for GroupsPanel {
         };
         let selected: Vec<Uid> =
             shown.selection.0.iter().copied().filter(|joint| shown.rig.joint(*joint).is_some()).collect();
+        self.refresh(&shown);
         self.create(ui, &shown, &selected, requests);
         ui.separator();
         let empty: Vec<Uid> =
-            shown.rig.groups().iter().map(|group| group.uid).filter(|uid| members(&shown, *uid).is_empty()).collect();
+            shown.rig.groups().iter().map(|group| group.uid).filter(|uid| self.of(*uid).is_empty()).collect();
         if !empty.is_empty() {
             let text = format!("Remove {} empty", empty.len());
             if ui.button(text).on_hover_text("Groups without joints").clicked() {
@@ -87,7 +93,7 @@ impl EditorPanel for GroupsPanel {
                         requests.send(EditRequest::operation(shown.entity, operation));
                     }
                     Some(RowRequest::Select) => {
-                        let what = Pick::Joints(members(&shown, group.uid));
+                        let what = Pick::Joints(self.of(group.uid).to_vec());
                         requests.send(PickRequest { rig: shown.entity, what, add: false });
                     }
                     None => {}
@@ -101,11 +107,23 @@ fn send(edits: Vec<RigEdit>, shown: &DisplayedRig, requests: &mut Requests) {
     requests.send(EditRequest::operation(shown.entity, Operation::Edits(edits)));
 }
 
-fn members(shown: &DisplayedRig, group: Uid) -> Vec<Uid> {
-    TagScope::Group(group).joints(&shown.rig).unwrap_or_default()
-}
-
 impl GroupsPanel {
+    /// Collects the joints of all groups again after a change of the rig.
+    fn refresh(&mut self, shown: &DisplayedRig) {
+        let stamp = Some(shown.stamp());
+        if self.made_from == stamp {
+            return;
+        }
+        self.made_from = stamp;
+        let members = |group: Uid| TagScope::Group(group).joints(&shown.rig).unwrap_or_default();
+        self.members = shown.rig.groups().iter().map(|group| (group.uid, members(group.uid).into())).collect();
+    }
+
+    /// Joints of a group.
+    fn of(&self, group: Uid) -> Arc<[Uid]> {
+        self.members.get(&group).cloned().unwrap_or_default()
+    }
+
     /// A field for the name of a new group, which takes the selected joints.
     fn create(&mut self, ui: &mut Ui, shown: &DisplayedRig, selected: &[Uid], requests: &mut Requests) {
         ui.horizontal(|ui| {
@@ -135,7 +153,7 @@ impl GroupsPanel {
     }
 
     fn row(&mut self, ui: &mut Ui, group: &GroupData, shown: &DisplayedRig, selected: &[Uid]) -> Option<RowRequest> {
-        let joints = members(shown, group.uid);
+        let joints = self.of(group.uid);
         let mut request = None;
         ui.horizontal(|ui| {
             let mut rgb = match self.colored {

@@ -1,5 +1,7 @@
 //! Process panel: the list of commands with their states, steps in both directions, breakpoints.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use bevy::{ecs::change_detection::Tick, prelude::*};
 use bevy_egui::egui::{
     self, Align, Color32, Layout, Rect, RichText, Sense, Ui, Visuals, WidgetInfo, WidgetType, pos2, vec2,
@@ -10,7 +12,10 @@ use super::{
     list::{self, List},
 };
 use crate::{
-    editor::panel::{EditorPanel, Requests},
+    editor::{
+        panel::{EditorPanel, Requests},
+        style,
+    },
     plugins::{
         commands::{BuildRequest, BuildStep, Processor},
         picking::{Pick, PickRequest},
@@ -25,6 +30,8 @@ use crate::{
 pub struct ProcessPanel {
     made_from: Option<(Stamp, Tick)>,
     rows: Vec<Row>,
+    /// Commands that ran when the list changed last.
+    ran: BTreeSet<Uid>,
     /// Search text: words that rows have to contain.
     filter: String,
     /// Rows that contain the words.
@@ -43,6 +50,14 @@ struct Row {
     name: String,
     status: Option<CommandStatus>,
     is_breakpoint: bool,
+}
+
+impl Row {
+    /// The command with the number of its runs.
+    fn runs(&self) -> Option<(Uid, u32)> {
+        let status = self.status.as_ref()?;
+        (status.runs > 0).then_some((self.entry.command, status.runs))
+    }
 }
 
 impl EditorPanel for ProcessPanel {
@@ -99,6 +114,7 @@ impl ProcessPanel {
             return;
         }
         let breakpoints = builder.breakpoints();
+        let before: BTreeMap<Uid, u32> = self.rows.iter().filter_map(Row::runs).collect();
         let row = |entry: ListEntry| Row {
             joint: shown.name(entry.joint).into_owned(),
             name: name(shown, &entry),
@@ -107,6 +123,13 @@ impl ProcessPanel {
             entry,
         };
         self.rows = builder.list().into_iter().map(row).collect();
+        let is_more = |(command, runs): &(Uid, u32)| before.get(command).is_none_or(|before| before < runs);
+        let ran: BTreeSet<Uid> = self.rows.iter().filter_map(Row::runs).filter(is_more).map(|(uid, _)| uid).collect();
+        // Of the whole list nothing stands out, and what else changes leaves the marks.
+        if before.is_empty() || !ran.is_empty() {
+            let all = self.rows.iter().filter_map(Row::runs).count();
+            self.ran = if ran.len() < all { ran } else { BTreeSet::new() };
+        }
         self.made_from = made_from;
         self.filtered = None;
     }
@@ -145,6 +168,11 @@ impl ProcessPanel {
                 });
             }
             ui.label(format!("{done} of {total}"));
+            if !self.ran.is_empty() {
+                let ran = format!("{} ran", self.ran.len());
+                ui.label(RichText::new(ran).color(style::accent(ui.visuals())))
+                    .on_hover_text("Commands that the last change made run again; the others keep what they built");
+            }
             let micros: f32 = self.rows.iter().filter_map(|row| Some(row.status.as_ref()?.micros)).sum();
             // As wide for any time, so that nothing moves while commands run.
             let size = vec2(62.0, ui.spacing().interact_size.y);
@@ -181,7 +209,8 @@ impl ProcessPanel {
         let id = ui.id().with(row.entry.command.0);
         let response = ui.interact(rect, id, Sense::click());
         let state = state_word(row.status.as_ref());
-        let said = format!("{} {} {state}", row.joint, row.name);
+        let has_run = self.ran.contains(&row.entry.command);
+        let said = format!("{} {} {state}{}", row.joint, row.name, if has_run { ", ran" } else { "" });
         response.widget_info(move || WidgetInfo::labeled(WidgetType::SelectableLabel, true, &said));
         let painter = ui.painter();
         if response.hovered() {
@@ -193,6 +222,9 @@ impl ProcessPanel {
         painter.circle_filled(dot.center(), 4.0, color);
         if row.is_breakpoint {
             painter.circle_stroke(dot.center(), 6.0, (2.0, ui.visuals().error_fg_color));
+        }
+        if has_run {
+            painter.vline(rect.left() + 1.0, rect.y_range(), (2.0, style::accent(ui.visuals())));
         }
         // The next command to be carried out.
         if number == cursor {

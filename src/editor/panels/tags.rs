@@ -217,7 +217,7 @@ impl TagsPanel {
         let card = frame.show(ui, |ui| {
             ui.set_width(ui.available_width());
             ui.horizontal(|ui| {
-                let handle = ui.add(egui::Label::new(RichText::new("⠿").weak()).sense(Sense::drag()));
+                let handle = ui.add(egui::Label::new(RichText::new("☰").weak()).sense(Sense::drag()));
                 handle.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, format!("Drag {}", entry.title())));
                 handle.dnd_set_drag_payload(number);
                 let is_open = self.open.contains(&tag);

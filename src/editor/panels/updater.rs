@@ -39,7 +39,10 @@ impl EditorPanel for UpdaterPanel {
             return list::nothing(ui, "No rig is open.");
         };
         let Some(source) = world.get::<RigSource>(rig) else {
-            return list::nothing(ui, "This rig follows no file. It does once a template's file is opened or loaded.");
+            return list::nothing(
+                ui,
+                "This rig follows no file. It does once a template's file is opened, loaded or saved.",
+            );
         };
         head(ui, world.get::<OpenDocument>(rig), source, requests);
         let Some(offer) = world.get::<UpdateOffer>(rig) else {
@@ -161,8 +164,8 @@ impl UpdaterPanel {
                 let text = match change.kind {
                     ChangeKind::Added => "added".to_owned(),
                     ChangeKind::Removed => "removed".to_owned(),
-                    ChangeKind::Changed => format!("{mine} → {theirs}"),
-                    ChangeKind::Renamed => format!("renamed {mine} → {theirs}"),
+                    ChangeKind::Changed => format!("{mine} ➡ {theirs}"),
+                    ChangeKind::Renamed => format!("renamed {mine} ➡ {theirs}"),
                 };
                 told(ui, lower, &text, quiet);
             }

@@ -26,7 +26,7 @@ use crate::{
             outline::{ControlNodes, control_at},
         },
         document::{Change, EditReport, EditRequest, HoveredNode},
-        picking::PickRequest,
+        picking::{Pick, PickRequest},
         schema::RigNodes,
         viewport::Sight,
     },
@@ -132,7 +132,7 @@ fn node_at(
 }
 
 /// The joint nearest to a pixel within reach; the selected one of several at the same distance.
-fn joint_at(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<Uid> {
+pub(super) fn joint_at(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<Uid> {
     let near = scene.posed(rig).into_iter().filter_map(|(joint, place)| {
         let distance = sight.project(place)?.distance(at);
         (distance <= select::REACH).then_some((joint, distance, rig.selection.active() != Some(joint)))
@@ -201,6 +201,12 @@ fn drag(
                 preview = None;
                 match (held.drag, scene.sight()) {
                     (Some(mut drag), _) if dragged => {
+                        // What was posed is what a key is set on, and what panels show.
+                        let posed = drag.posed(held.node);
+                        if !rig.selection.0.contains(&posed) {
+                            let what = Pick::Joints(vec![posed]);
+                            picks.write(PickRequest { rig: held.rig, what, add: pointer.held.shift });
+                        }
                         drag.gizmo.to(pointer.at, pointer.held.control.then_some(drag.step));
                         edits.write(EditRequest { rig: held.rig, change: drag.preview() });
                         edits.write(EditRequest { rig: held.rig, change: Change::Commit });
@@ -261,6 +267,14 @@ impl Drag {
             step: transform::step(rig),
             way,
         })
+    }
+
+    /// The pulled node, or the control next to it that moves it.
+    fn posed(&self, node: Uid) -> Uid {
+        match &self.way {
+            Way::Controls(pull) => pull.handles().last().copied().unwrap_or(node),
+            Way::Joints(..) | Way::Itself(_) => node,
+        }
     }
 
     /// Movement of the pulled node.

@@ -69,11 +69,13 @@ pub struct StrokeTool {
     pub state: StrokeState,
     /// Largest distance of a stroke from its bones, as a share of the character's size, for the next preview.
     pub threshold: f32,
+    /// Number of joints that was chosen for the last chain; `None` if it followed from the stroke.
+    pub count: Option<usize>,
 }
 
 impl Default for StrokeTool {
     fn default() -> Self {
-        Self { state: StrokeState::Idle, threshold: 0.02 }
+        Self { state: StrokeState::Idle, threshold: 0.02, count: None }
     }
 }
 
@@ -300,6 +302,10 @@ fn take(tool: &mut ResMut<StrokeTool>, strokes: &mut MessageWriter<StrokeRequest
         return;
     }
     let StrokeState::Preview(preview) = std::mem::take(&mut tool.state) else { return };
+    tool.count = match preview.request.choice {
+        ChainChoice::Joints(count) => Some(count),
+        ChainChoice::Threshold(_) | ChainChoice::Limb(_) => None,
+    };
     // The chain is left out while the stroke is still being followed: the engine then waits for the same result.
     let chain = preview.chain().filter(|_| !preview.is_followed()).cloned();
     strokes.write(StrokeRequest { chain, ..preview.request });
@@ -307,9 +313,14 @@ fn take(tool: &mut ResMut<StrokeTool>, strokes: &mut MessageWriter<StrokeRequest
 
 /// Ends the line: a chain is previewed, other strokes are carried out at once.
 fn release(tool: &mut ResMut<StrokeTool>, scene: &Scene, rig: &EditedRig, strokes: &mut MessageWriter<StrokeRequest>) {
-    let StrokeState::Drawing(request) = std::mem::take(&mut tool.state) else { return };
-    match stroke_kind(&request, &rig.rig, &scene.posed(rig)) {
-        StrokeKind::Chain { .. } if rig.has_mesh => {
+    let StrokeState::Drawing(mut request) = std::mem::take(&mut tool.state) else { return };
+    let posed = scene.posed(rig);
+    match stroke_kind(&request, &rig.rig, &posed) {
+        StrokeKind::Chain { start, .. } if rig.has_mesh => {
+            let beside = |count: &usize| start.is_some_and(|start| is_beside(*count, &request, rig, &posed, start));
+            if let Some(count) = tool.count.filter(beside) {
+                request.choice = ChainChoice::Joints(count);
+            }
             let preview =
                 StrokePreview { request: *request, plan: None, followed: None, task: None, on: None, turned: 0.0 };
             tool.state = StrokeState::Preview(Box::new(preview));
@@ -318,6 +329,24 @@ fn release(tool: &mut ResMut<StrokeTool>, scene: &Scene, rig: &EditedRig, stroke
             strokes.write(*request);
         }
     }
+}
+
+/// True if a stroke starts on a joint from which a chain of as many joints goes the same way already: it draws the next finger.
+fn is_beside(count: usize, request: &StrokeRequest, rig: &EditedRig, posed: &[(Uid, Vec3)], start: usize) -> bool {
+    let (Some(from), Some(to)) = (request.points.first(), request.points.last()) else { return false };
+    let end_of = |child: Uid| {
+        // The joint that it starts on counts, too.
+        let (mut number, mut end) = (2, child);
+        while let [next] = *rig.rig.children(Some(end)) {
+            (number, end) = (number + 1, next);
+        }
+        (number, end)
+    };
+    rig.rig.children(Some(posed[start].0)).iter().any(|child| {
+        let (number, end) = end_of(*child);
+        let place = posed.iter().find(|(joint, _)| *joint == end).and_then(|(_, place)| request.plane.project(*place));
+        number == count && place.is_some_and(|place| (place - *from).dot(*to - *from) > 0.0)
+    })
 }
 
 fn tune(tool: &mut ResMut<StrokeTool>, change: StrokeTune, rig: Option<EditedRig>) {

@@ -1,7 +1,8 @@
 //! Moving, turning and scaling joints with the handles of a gizmo: the rest pose, or the pose.
 //!
 //! A drag only previews; the release makes one step of the history, Escape restores the rig to the bit. A press on a
-//! handle that does not become a drag is a click like any other: a handle never hides the next joint.
+//! handle that does not become a drag is a click like any other: a handle never hides the next joint. In Move mode a joint is
+//! a handle of its own, selected or not: it follows the pointer at its depth.
 
 mod paint;
 mod show;
@@ -13,8 +14,9 @@ pub use target::GizmoTarget;
 
 use super::{
     GizmoHover, PointerOwner, Tool, ToolPointer, ToolSystems,
-    gizmo::{Delta, GizmoDrag, Handle, HandleShape, handle_at},
+    gizmo::{Delta, GizmoDrag, GizmoFrame, Handle, HandleShape, handle_at},
     pose::PosedJoint,
+    pull::joint_at,
     scene::{EditedRig, Scene, joints},
     select::{self, REACH},
 };
@@ -28,7 +30,7 @@ use crate::{
         settings::{EditorSettings, GizmoSpace},
     },
     plugins::{
-        document::{Change, EditReport, EditRequest},
+        document::{Change, EditReport, EditRequest, HoveredNode},
         picking::{Pick, PickRequest},
     },
     rig::{
@@ -68,6 +70,8 @@ pub struct GizmoTool {
     /// The handle under the pointer.
     pub hovered: Option<Handle>,
     pointer: Option<Vec2>,
+    /// Joint under the last press in Move mode, where no handle is.
+    grabbed: Option<Uid>,
     drag: Option<Drag>,
     /// Marks that the banner describes a drag.
     has_banner: bool,
@@ -89,6 +93,8 @@ pub struct PoseMoves(pub bool);
 struct Drag {
     rig: Entity,
     gizmo: GizmoDrag,
+    /// Joint that was pressed itself.
+    grabbed: Option<Uid>,
     /// Index of the joint's own axis that every joint turns about, for local rings in Pose mode.
     own: Option<usize>,
     name: String,
@@ -149,12 +155,23 @@ fn hover(
         return;
     }
     let aim = GizmoTarget::new(*mode, settings.gizmo_space, moves.0, &scene);
-    let shapes = aim.zip(scene.sight()).map(|(aim, sight)| aim.frame.shapes(aim.parts, &sight));
-    let handle = shapes.zip(press.or(last)).and_then(|(shapes, at)| handle_at(&shapes, at));
+    let found = aim.zip(scene.sight()).zip(press.or(last));
+    let handle = found.and_then(|((aim, sight), at)| {
+        let handle = handle_at(&aim.frame.shapes(aim.parts, &sight), at)?;
+        // Rings that are seen from the side run through the joint, which is pulled there.
+        let is_ring = *mode == Mode::Pose && matches!(handle, Handle::Ring(_));
+        let is_joint = is_ring && sight.project(aim.frame.origin).is_some_and(|middle| middle.distance(at) <= REACH);
+        (!is_joint).then_some(handle)
+    });
     if tool.hovered != handle {
         tool.hovered = handle;
     }
-    hover.set_if_neq(GizmoHover(handle.is_some()));
+    let grabbed = press.filter(|_| handle.is_none() && *mode == Mode::Move);
+    let grabbed = grabbed.and_then(|at| joint_at(&scene, &scene.rig()?, &scene.sight()?, at));
+    if tool.grabbed != grabbed {
+        tool.grabbed = grabbed;
+    }
+    hover.set_if_neq(GizmoHover(handle.is_some() || grabbed.is_some()));
 }
 
 pub(super) fn drag(
@@ -162,7 +179,7 @@ pub(super) fn drag(
     mut actions: MessageReader<ActionRequest>,
     mut edited: MessageReader<EditReport>,
     (mode, settings, moves): (Res<Mode>, Res<EditorSettings>, Res<PoseMoves>),
-    scene: Scene,
+    (scene, hovered): (Scene, Query<&HoveredNode>),
     mut tool: ResMut<GizmoTool>,
     mut status: ResMut<StatusLine>,
     mut edits: MessageWriter<EditRequest>,
@@ -185,21 +202,36 @@ pub(super) fn drag(
         }
         match pointer.act {
             PointerAct::Pressed => {
-                tool.drag = press(&scene, *mode, settings.gizmo_space, moves.0, pointer.at);
+                tool.drag = match tool.grabbed.take() {
+                    Some(joint) => grab(&scene, joint, pointer.at),
+                    None => press(&scene, *mode, settings.gizmo_space, moves.0, pointer.at),
+                };
             }
             PointerAct::Dragged => {
                 let Some(drag) = &mut tool.drag else { continue };
+                if let (Some(joint), Some(rig)) = (drag.grabbed, &rig)
+                    && !rig.selection.0.contains(&joint)
+                {
+                    picks.write(PickRequest { rig: drag.rig, what: Pick::Joints(vec![joint]), add: false });
+                }
                 drag.gizmo.to(pointer.at, drag.snap(pointer.held));
                 preview = Some(drag.preview(settings.move_children));
             }
-            PointerAct::Released { dragged, .. } => {
+            PointerAct::Released { dragged, count } => {
                 let (Some(mut drag), Some(rig)) = (tool.drag.take(), &rig) else { continue };
                 let commit = if dragged {
                     drag.gizmo.to(pointer.at, drag.snap(pointer.held));
                     edits.write(EditRequest { rig: drag.rig, change: drag.preview(settings.move_children) });
                     Change::Commit
                 } else {
-                    picks.write_batch(clicked(&scene, rig, pointer.at, pointer.held));
+                    let pick = match (drag.grabbed, scene.sight()) {
+                        (Some(_), Some(sight)) => {
+                            let hovered = hovered.get(rig.entity).ok();
+                            Some(select::clicked(&scene, rig, &sight, pointer.at, pointer.held, count, hovered))
+                        }
+                        _ => clicked(&scene, rig, pointer.at, pointer.held),
+                    };
+                    picks.write_batch(pick);
                     Change::CancelPreview
                 };
                 edits.write(EditRequest { rig: drag.rig, change: commit });
@@ -236,9 +268,32 @@ fn press(scene: &Scene, mode: Mode, space: GizmoSpace, moves: bool, at: Vec2) ->
     Some(Drag {
         rig: rig.entity,
         gizmo: GizmoDrag::new(handle, aim.frame, sight, at),
+        grabbed: None,
         own,
         name,
         from,
+        step: step(&rig),
+    })
+}
+
+/// Starts a drag with a press on a joint: it moves as it is seen, and with it the others that are selected if it is.
+fn grab(scene: &Scene, joint: Uid, at: Vec2) -> Option<Drag> {
+    let (rig, sight) = (scene.rig()?, scene.sight()?);
+    let selected = one_side(&rig, false, rig.symmetry.0.as_ref());
+    let together = if selected.contains(&joint) { selected } else { vec![joint] };
+    let name = match together.as_slice() {
+        [only] => rig.name(*only),
+        several => joints(several.len()),
+    };
+    let axes = [sight.plane.right, sight.plane.up, sight.plane.towards()];
+    let frame = GizmoFrame { origin: rig.rig.position(joint), axes };
+    Some(Drag {
+        rig: rig.entity,
+        gizmo: GizmoDrag::new(Handle::MoveView, frame, sight, at),
+        grabbed: Some(joint),
+        own: None,
+        name,
+        from: Start::Rest(together.into_iter().map(|joint| (joint, rig.rig.position(joint))).collect()),
         step: step(&rig),
     })
 }

@@ -138,6 +138,13 @@ fn base(
         Some(base) if base.contains("leg") => return "toe",
         _ => {}
     }
+    // Joints of templates have names without numbers.
+    let label =
+        rig.joint(parent).and_then(|joint| joint.data.label.as_deref()).unwrap_or_default().to_ascii_lowercase();
+    let below = [("head", "face"), ("hand", "finger"), ("foot", "toe")];
+    if let Some((_, base)) = below.into_iter().find(|(part, _)| label.contains(part)) {
+        return base;
+    }
     let way = if positions.len() > 1 { way } else { last - rig.position(parent) };
     let share = way.normalize_or_zero();
     let trunk = Trunk::new(rig, parent);

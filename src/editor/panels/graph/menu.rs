@@ -181,7 +181,7 @@ impl Menu<'_> {
         };
         let wire = GraphWire { to, input, from };
         let nodes = &self.bench.graph.nodes;
-        ui.weak(format!("{} → {}", nodes[from].title, nodes[to].title));
+        ui.weak(format!("{} ➡ {}", nodes[from].title, nodes[to].title));
         if ui.button("Remove reference").clicked() {
             match self.bench.disconnected(wire) {
                 Ok(operation) => send(operation, self.shown, requests),

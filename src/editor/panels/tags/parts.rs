@@ -9,6 +9,7 @@ use bevy_egui::egui::{
 
 use crate::{
     editor::{
+        actions::{Action, ActionRequest},
         library::{LibraryAct, LibraryRequest, ListTemplates, TemplateLibrary},
         panel::Requests,
         panels::{
@@ -18,6 +19,7 @@ use crate::{
                 tiles::{Tiles, TilesShown},
             },
         },
+        tools::stroke::{StrokeState, StrokeTool},
     },
     files::TemplatePlace,
 };
@@ -44,6 +46,12 @@ impl PartMenu {
         if !library.is_begun() {
             requests.send(ListTemplates);
         }
+        // A part goes onto the stroke that was drawn last, which may still wait to be accepted.
+        if world.get_resource::<StrokeTool>().is_some_and(|tool| matches!(tool.state, StrokeState::Preview(_))) {
+            requests.send(ActionRequest(Action::Accept));
+        }
+        // All parts that come with Rigsmith stand side by side where the window is high enough.
+        let height = (ui.ctx().content_rect().height() - 250.0).clamp(180.0, 470.0);
         ui.set_min_size(vec2(312.0, 60.0));
         ui.set_max_width(312.0);
         ui.checkbox(&mut self.options_first, "Options first")
@@ -70,7 +78,7 @@ impl PartMenu {
             }
             ui.separator();
         }
-        let wanted = TilesShown { parts_only: true, height: 320.0, chosen: chosen.as_ref() };
+        let wanted = TilesShown { parts_only: true, height, chosen: chosen.as_ref() };
         if let Some(listed) = self.tiles.show(ui, world, wanted, requests) {
             if self.options_first {
                 self.chosen = Some(listed.place.clone());

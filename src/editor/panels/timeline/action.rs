@@ -200,6 +200,16 @@ pub fn obstacle(world: &World, action: TimelineAction) -> Option<&'static str> {
         }
         _ => {}
     }
+    if matches!(action, TimelineAction::Key | TimelineAction::KeyAll) && OpenClip::of(world).is_none() {
+        // The key brings a clip with it.
+        let is_selected = world.get::<Selection>(active.0).is_some_and(|selected| !selected.0.is_empty());
+        return match action {
+            _ if rig.is_empty() => Some("there are no joints"),
+            _ if shows_rest(world, active.0) => Some("the rig is shown at rest: change to Select or Pose mode"),
+            TimelineAction::Key if !is_selected => Some("nothing is selected"),
+            _ => None,
+        };
+    }
     let Some(open) = OpenClip::of(world) else { return Some("no clip is open: choose or make one in the Timeline") };
     let has_keys = || open.clip.layers.iter().any(|layer| !layer.tracks.is_empty());
     match action {

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use bevy::prelude::*;
+use bevy::{prelude::*, window::RequestRedraw};
 
 use super::{
     action::{TimelineAction, obstacle},
@@ -117,6 +117,17 @@ fn act(world: &mut World, action: TimelineAction) {
     if let Some(reason) = obstacle(world, action) {
         let text = format!("{}: {reason}.", action.name());
         world.write_message(Notice::info(text));
+        return;
+    }
+    let is_key = matches!(action, TimelineAction::Key | TimelineAction::KeyAll);
+    // A clip that is refused is not begun again and again.
+    let has_begun = is_key && std::mem::take(&mut world.resource_mut::<Timeline>().begun);
+    if is_key && !has_begun && OpenClip::of(world).is_none() {
+        begin_clip(world);
+        // The clip reaches the document within this frame.
+        world.resource_mut::<Timeline>().begun = true;
+        world.write_message(ActionRequest(Action::Timeline(action)));
+        world.write_message(RequestRedraw);
         return;
     }
     match action {
@@ -275,6 +286,15 @@ fn play(world: &mut World) {
         timeline = world.resource_mut::<Timeline>();
     }
     (timeline.playing, timeline.starting) = (true, true);
+}
+
+/// Opens the first clip of the rig, or one that is made for it.
+fn begin_clip(world: &mut World) {
+    let rig = world.get_resource::<ActiveRig>().and_then(|active| world.get::<Rig>(active.0));
+    match rig.and_then(|rig| rig.clips().first()).cloned() {
+        Some(clip) => open(world, Some(&clip)),
+        None => new_clip(world),
+    }
 }
 
 fn new_clip(world: &mut World) {

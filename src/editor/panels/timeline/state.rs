@@ -30,6 +30,8 @@ pub struct Timeline {
     pub playing: bool,
     /// True if the playback begins with the next frame: this one may have lasted as long as the window slept.
     pub(super) starting: bool,
+    /// True once a clip was begun for a key that is set in the next frame.
+    pub(super) begun: bool,
     /// First and last visible second.
     pub span: [f32; 2],
     /// True to set keys with each finished pose.
@@ -57,6 +59,7 @@ impl Default for Timeline {
             time: 0.0,
             playing: false,
             starting: false,
+            begun: false,
             span: [0.0, 1.0],
             auto_key: false,
             keys: KeyTimes::new(),

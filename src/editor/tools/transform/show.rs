@@ -73,6 +73,7 @@ pub(super) fn show(
         Some(aim) => describe(&rig, *mode, aim, handle, &settings),
         None if rig.rig.is_empty() => "There are no joints yet: press A to place one, S to draw a stroke.".to_owned(),
         None if *mode == Mode::Pose => "Drag a joint or a control to pull it; click one to pose it.".to_owned(),
+        None if *mode == Mode::Move => "Drag a joint to move it.".to_owned(),
         None => format!("Click a joint to {} it.", verb(*mode)),
     };
     let mut notes = Vec::new();
@@ -124,6 +125,7 @@ fn describe(
         None if mode == Mode::Pose => {
             format!("Drag a handle to pose {what} ({space} axes: V), or any joint or control to pull it.")
         }
+        None if mode == Mode::Move => format!("Drag a handle to move {what} ({space} axes: V), or any joint."),
         None => format!("Drag a handle to {} {what} ({space} axes: V).", verb(mode)),
     };
     let children = match (mode, settings.move_children) {

@@ -1,0 +1,42 @@
+//! Signs of the window: the fonts that it draws with have a glyph for each of them.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::{Path, PathBuf},
+};
+
+use bevy_egui::egui::{self, FontId};
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn every_sign_of_the_window_can_be_drawn() {
+    let mut files = Vec::new();
+    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/editor"), &mut files);
+    let mut signs: BTreeMap<char, BTreeSet<String>> = BTreeMap::new();
+    for file in &files {
+        let text = fs::read_to_string(file).unwrap();
+        for line in text.lines().filter(|line| !line.trim_start().starts_with("//")) {
+            for sign in line.chars().filter(|sign| !sign.is_ascii()) {
+                signs.entry(sign).or_default().insert(file.display().to_string());
+            }
+        }
+    }
+    assert!(signs.len() > 20, "the signs were not found: {signs:?}");
+    let ctx = egui::Context::default();
+    let mut output = ctx.run_ui(egui::RawInput::default(), |_| ());
+    output.textures_delta.clear();
+    let font = FontId::proportional(14.0);
+    ctx.fonts_mut(|fonts| signs.retain(|sign, _| !fonts.has_glyph(&font, *sign)));
+    assert!(signs.is_empty(), "signs without a glyph are drawn as boxes: {signs:?}");
+}
