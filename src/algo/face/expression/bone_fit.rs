@@ -34,7 +34,7 @@ use crate::{
 };
 
 /// Weight of the pull towards the mean of the field over a bone's patch, as a share of the patch's weight.
-const HOLD: f64 = 0.02;
+const HOLD: f64 = 0.01;
 /// Stiffness between bones with common skin.
 const STIFF: f64 = 0.01;
 /// Factor of the field. What bones cannot follow is lost, and makes the rest smaller than the field on average.

@@ -18,9 +18,11 @@ use crate::{
 /// Number of passes; each solves the bones' movements anew.
 const PASSES: usize = 2;
 /// Rounds of averaging in a pass.
-const ROUNDS: usize = 24;
+const ROUNDS: usize = 40;
 /// Round from which neighbours of the corners are averaged, too.
-const WIDEN: usize = 6;
+const WIDEN: usize = 1;
+/// Share of its own weights that a place keeps in a round.
+const OWN: f32 = 0.25;
 /// Largest number of influences of a point.
 const INFLUENCES: usize = 8;
 
@@ -181,7 +183,7 @@ impl AveragedWeights<'_> {
                 places.sort_unstable();
                 places.dedup();
             }
-            let averages: Vec<Influences> = places.par_iter().map(|&place| self.average(place)).collect();
+            let averages: Vec<Influences> = places.par_iter().map(|&place| self.average(points, place)).collect();
             for (&place, influences) in places.iter().zip(averages) {
                 self.own[place as usize] = influences;
             }
@@ -212,18 +214,29 @@ impl AveragedWeights<'_> {
         weights
     }
 
-    /// Half a place's own weights plus half the mean of its neighbours'.
-    fn average(&self, place: u32) -> Influences {
+    /// A share of a place's own weights plus the mean of its neighbours', in which near ones count more.
+    ///
+    /// A triangle folds where weights change much over a short way, mostly where tiny triangles meet large ones. With
+    /// shares by the square of the distance the change is even along the surface, not from one point to the next.
+    fn average(&self, points: &[Vec3], place: u32) -> Influences {
         let mut sum: BTreeMap<u32, f32> = BTreeMap::new();
         let mut add = |place: u32, share: f32| {
             for (joint, weight) in self.of_place(place) {
                 *sum.entry(joint).or_default() += weight * share;
             }
         };
-        add(place, 0.5);
+        let position = |place: u32| {
+            let point = self.neighbourhood.points[place as usize].first();
+            point.map_or(Vec3::ZERO, |point| points[*point as usize])
+        };
+        let near = |other: u32| 1.0 / position(other).distance_squared(position(place)).max(f32::MIN_POSITIVE);
         let next = &self.neighbourhood.corners[place as usize];
-        for &other in next {
-            add(other, 0.5 / next.len() as f32);
+        let all: f32 = next.iter().map(|other| near(*other)).sum();
+        if all.is_finite() && all > 0.0 {
+            add(place, OWN);
+            next.iter().for_each(|other| add(*other, (1.0 - OWN) * near(*other) / all));
+        } else {
+            add(place, 1.0);
         }
         let mut all: Influences = sum.into_iter().filter(|(_, weight)| *weight > 1e-4).collect();
         keep_strongest(&mut all, INFLUENCES, 0.0);

@@ -16,7 +16,7 @@ const SAMPLES: usize = 1600;
 /// Weight of a landmark, as a share of the whole skin's weight.
 const LANDMARK: f64 = 0.002;
 /// Weight of the distance of two landmarks, as a share of the whole skin's weight.
-const PAIR: f64 = 0.02;
+const PAIR: f64 = 0.01;
 /// Landmarks whose distance matters more than their positions: lips, lids, corners of the mouth, inner brows.
 const PAIRS: [[usize; 2]; 9] =
     [[61, 67], [62, 66], [63, 65], [37, 41], [38, 40], [43, 47], [44, 46], [54, 48], [22, 21]];
