@@ -24,13 +24,13 @@ impl PoseProblems {
 }
 
 impl FittedFace {
-    /// Repairs a pose as far as it may; alike on both sides if `is_alike`.
-    pub(super) fn repair(&self, poses: &mut [BonePose], is_alike: bool) {
+    /// Repairs a pose as far as it may; alike on both sides if `is_alike`. Returns the triangles that stay folded.
+    pub(super) fn repair(&self, poses: &mut [BonePose], is_alike: bool) -> Vec<u32> {
         let furthest = poses.iter().map(|pose| pose.translation.length()).fold(0.0, f32::max);
         let solved: Vec<Vec3> = poses.iter().map(|pose| pose.translation).collect();
         let mut apart = vec![0.0; poses.len()];
         if self.moving.triangles.is_empty() && self.moving.apart.is_empty() {
-            return;
+            return Vec::new();
         }
         let mut posed = PosedSkin::new(&self.moving, self.matrices(poses));
         let (mut fewest, mut in_vain) = (usize::MAX, 0);
@@ -55,6 +55,7 @@ impl FittedFace {
             }
             posed.update(self.matrices(poses));
         }
+        posed.folded_numbers()
     }
 
     /// Matrices of neck, head and each bone.
