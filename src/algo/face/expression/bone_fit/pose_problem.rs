@@ -8,6 +8,9 @@ use crate::algo::face::{
     expression::{BonePose, limited},
 };
 
+/// Distance of lids and lips that counts as closed, as a share of that at rest.
+const CLOSED: f32 = 0.2;
+
 /// Problems of a pose.
 #[derive(Default)]
 struct PoseProblems {
@@ -81,7 +84,7 @@ impl FittedFace {
             let gap = |points: &[Vec3]| points[above as usize].y - points[below as usize].y;
             let rest = gap(&self.moving.points);
             // Lips that touch at rest may keep touching.
-            let least = if rest > slack { 0.3 * rest } else { rest - slack };
+            let least = if rest > slack { CLOSED * rest } else { rest - slack };
             let now = gap(&posed.points);
             if now < least {
                 crossed.push(([above, below], least - now));
