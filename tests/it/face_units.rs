@@ -151,7 +151,7 @@ const ACTIONS: [(&str, &str); 5] = [
 ];
 
 /// Distance of the eyes, in metres, on the adult that the actions were drawn for.
-const ADULT: f32 = 0.085;
+const ADULT: f32 = 0.083;
 
 #[test]
 fn units_do_what_another_source_shows() {
