@@ -25,7 +25,7 @@ fn posed(mesh: &Path, expressions: &[&str]) -> BTreeMap<String, Vec<Moved>> {
     let glb = exports.unwrap_or_else(|| folder.path().to_owned()).join(format!("parts_{}.glb", expressions.len()));
     let (mesh, glb) = (mesh.display().to_string(), glb.display().to_string());
     let mut args = vec!["face", &mesh, "-o", &glb];
-    args.extend(expressions.iter().flat_map(|expression| ["--expression", expression]));
+    args.extend(expressions.iter().flat_map(|expression| ["--expression", *expression]));
     let answer = rigsmith(folder.path(), &args);
     assert_eq!(answer.code, 0, "{}", answer.err);
     let model = load_model(&RealDisk, Path::new(&glb)).unwrap();
@@ -84,9 +84,9 @@ fn object(
     let mut numbers: BTreeMap<u32, usize> = BTreeMap::new();
     let mut faces = String::new();
     for corners in triangles {
-        let Some(_) = corners.iter().map(|corner| place(points[*corner as usize])).collect::<Option<Vec<_>>>() else {
+        if corners.iter().any(|corner| place(points[*corner as usize]).is_none()) {
             continue;
-        };
+        }
         faces.push('f');
         for corner in corners {
             let number = *numbers.entry(*corner).or_insert_with(|| {
