@@ -63,7 +63,7 @@ fn the_shapes_of_arkit_are_those_of_the_bones() {
 }
 
 /// Points of a model skinned by its nodes as they stand.
-fn skinned(model: &Model) -> Vec<Vec3> {
+pub fn skinned(model: &Model) -> Vec<Vec3> {
     let mut globals: Vec<Affine3A> = Vec::new();
     for node in &model.nodes {
         let own = Affine3A::from_scale_rotation_translation(node.rest.scale, node.rest.rotation, node.rest.translation);

@@ -172,9 +172,8 @@ fn check_head(name: &str, density: usize, most_folds: usize) {
     }
 }
 
-/// Each of the six expressions reaches what it must, folds no more triangles than a tenth above what was measured (in
-/// the corners of mouth and eyes; the true shapes of the heads fold up to 0.5 % of the mask) and keeps lips and lids
-/// apart.
+/// Each of the six expressions reaches what it must, folds no more triangles than a thousandth of the mask (the true
+/// shapes of the heads fold up to five of a thousand) and keeps lips and lids apart.
 #[track_caller]
 fn check_six(head: &Head, name: &str, density: usize, most_folds: usize) {
     for expression in ExpressionSet::bundled().six() {
@@ -200,7 +199,7 @@ fn check_six(head: &Head, name: &str, density: usize, most_folds: usize) {
 
 #[test]
 fn the_bundled_head_shows_the_six() {
-    check_six(&bundled(40), "the bundled head", 40, 13);
+    check_six(&bundled(40), "the bundled head", 40, 5);
 }
 
 #[test]
@@ -210,12 +209,12 @@ fn few_bones_show_the_six() {
 
 #[test]
 fn forty_bones_show_the_six() {
-    HEADS.into_iter().zip([25, 17, 47]).for_each(|(name, most_folds)| check_head(name, 40, most_folds));
+    HEADS.into_iter().for_each(|name| check_head(name, 40, 13));
 }
 
 #[test]
 fn many_bones_show_the_six() {
-    check_head(HEADS[2], 80, 59);
+    check_head(HEADS[2], 80, 13);
 }
 
 #[test]

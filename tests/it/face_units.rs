@@ -8,14 +8,17 @@ use rigsmith::algo::face::{
     expression::{ExpressionSet, Mix, Sides, apply},
 };
 
-use crate::{heads, prerequisites::test_data};
+use crate::{
+    heads,
+    prerequisites::{BODIES, test_data},
+};
 
 /// True displacements of a head by name.
-fn true_shapes(folder: &Path) -> Vec<(String, Vec<Vec3>)> {
-    let text = std::fs::read_to_string(folder.join("heads/ict_expressions.json")).unwrap();
+fn true_shapes(folder: &Path, file: &str) -> Vec<(String, Vec<Vec3>)> {
+    let text = std::fs::read_to_string(folder.join(format!("heads/{file}.json"))).unwrap();
     let json: serde_json::Value = serde_json::from_str(&text).unwrap();
     let count = json["vertices"].as_u64().unwrap() as usize;
-    let bytes = std::fs::read(folder.join("heads/ict_expressions.f32")).unwrap();
+    let bytes = std::fs::read(folder.join(format!("heads/{file}.f32"))).unwrap();
     let (numbers, _) = bytes.as_chunks::<4>();
     let numbers: Vec<f32> = numbers.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
     let (points, _) = numbers.as_chunks::<3>();
@@ -78,7 +81,7 @@ fn beside_truth(name: &str) -> Option<([f64; 3], [f64; REGIONS.len()])> {
     let mut sums = [0.0; 3];
     let mut of_regions = [[0.0; 2]; REGIONS.len()];
     let mut count = 0.0;
-    for (shape, truth) in true_shapes(&folder) {
+    for (shape, truth) in true_shapes(&folder, "ict_expressions") {
         // Lips that meet only come together where the jaw is open.
         if shape.starts_with("PupilDilate") || shape == "mouthClose" {
             continue;
@@ -123,14 +126,61 @@ fn beside_truth(name: &str) -> Option<([f64; 3], [f64; REGIONS.len()])> {
 fn units_do_what_the_true_shapes_do() {
     // The last head was kept away from the measurement of the units.
     for (name, most) in
-        [("ict_neutral", 0.44), ("ict_identity_1", 0.44), ("ict_identity_2", 0.46), ("ict_identity_3", 0.49)]
+        [("ict_neutral", 0.41), ("ict_identity_1", 0.42), ("ict_identity_2", 0.42), ("ict_identity_3", 0.475)]
     {
         let Some(([residual, cosine, amplitude], regions)) = beside_truth(name) else { return };
         assert!(residual <= most, "{name}: {residual} of the shapes is left");
-        assert!(cosine >= 0.89, "{name}: cosine {cosine}");
-        assert!((0.8..=1.1).contains(&amplitude), "{name}: amplitude {amplitude}");
+        assert!(cosine >= 0.9, "{name}: cosine {cosine}");
+        assert!((0.85..=1.1).contains(&amplitude), "{name}: amplitude {amplitude}");
+        // The shapes are those of the neutral head, and the last head is a tenth larger.
+        let most = if name == "ict_identity_3" { 1.2 } else { 1.15 };
         for (region, size) in REGIONS.iter().zip(regions) {
-            assert!((0.53..=1.2).contains(&size), "{name}, {region}: amplitude {size}");
+            assert!((0.85..=most).contains(&size), "{name}, {region}: amplitude {size}");
         }
     }
+}
+
+/// Actions of MakeHuman, which other people drew, and the units that mean the same. Its lids, brows and noses move other skin
+/// than those of the heads that the units were measured on.
+const ACTIONS: [(&str, &str); 5] = [
+    ("mouth-open", "jaw_open"),
+    ("mouth-corner-puller", "mouth_smile"),
+    ("mouth-elevation", "mouth_upper_up"),
+    ("mouth-pursing", "mouth_pucker"),
+    ("mouth-protusion", "mouth_funnel"),
+];
+
+/// Distance of the eyes, in metres, on the adult that the actions were drawn for.
+const ADULT: f32 = 0.083;
+
+#[test]
+fn units_do_what_another_source_shows() {
+    let Some(folder) = test_data() else { return };
+    let actions = true_shapes(&folder, "makehuman_actions");
+    let units = ExpressionSet::bundled().unit_set();
+    let mut wrong = Vec::new();
+    for name in BODIES {
+        let (points, triangles) = heads::mesh(&folder.join(format!("bodies/{name}/body.obj")));
+        let head = Posable::new(&points, &triangles);
+        let analysis = &head.analysis;
+        let size = analysis.landmarks.eye_distance() / ADULT;
+        for (action, unit) in ACTIONS {
+            let (_, truth) = actions.iter().find(|(known, _)| known == action).unwrap();
+            let moved = head.moved(units.index(unit).unwrap(), Sides::Both);
+            let (mut along, mut own, mut square) = (0.0, 0.0, 0.0);
+            for (point, moved) in moved.iter().enumerate().filter(|(point, _)| analysis.groups.mask[*point]) {
+                let truth = truth[analysis.mesh_point(point)] * size;
+                along += f64::from(moved.dot(truth));
+                own += f64::from(moved.length_squared());
+                square += f64::from(truth.length_squared());
+            }
+            let (cosine, amplitude) = (along / (own * square).sqrt(), along / square);
+            let told = format!("{name}, {action} beside {unit}: cosine {cosine:.2}, amplitude {amplitude:.2}");
+            println!("{told}");
+            if cosine < 0.7 || !(0.6..=1.4).contains(&amplitude) {
+                wrong.push(told);
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

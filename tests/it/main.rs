@@ -19,6 +19,8 @@ mod cli_check;
 #[cfg(feature = "cli")]
 mod cli_face;
 #[cfg(feature = "cli")]
+mod cli_face_parts;
+#[cfg(feature = "cli")]
 mod cli_limits;
 #[cfg(feature = "cli")]
 mod cli_outputs;

@@ -163,7 +163,9 @@ fn density(part: Part, near: f32) -> f64 {
         Part::Nose => 1.3,
         Part::Forehead => 0.8,
         Part::Temple => 0.5,
-        Part::Cheek | Part::Jaw => 1.0,
+        // Cheeks are wide and follow the mouth, the nose and the lids at once.
+        Part::Cheek => 1.5,
+        Part::Jaw => 1.0,
         _ => return 1.0,
     };
     own * (0.25 + f64::from(near))

@@ -9,6 +9,7 @@
 mod moving_skin;
 mod pose_problem;
 mod samples;
+mod targets;
 
 use std::sync::OnceLock;
 
@@ -18,6 +19,7 @@ use rayon::prelude::*;
 use self::{
     moving_skin::MovingSkin,
     samples::{Mark, Sample},
+    targets::UnitTargets,
 };
 use super::{
     BonePose, Mix, UnitSet,
@@ -34,7 +36,7 @@ use crate::{
 };
 
 /// Weight of the pull towards the mean of the field over a bone's patch, as a share of the patch's weight.
-const HOLD: f64 = 0.02;
+const HOLD: f64 = 0.01;
 /// Stiffness between bones with common skin.
 const STIFF: f64 = 0.01;
 /// Factor of the field. What bones cannot follow is lost, and makes the rest smaller than the field on average.
@@ -61,6 +63,8 @@ pub struct FittedFace {
     samples: Vec<Sample>,
     /// The Cholesky factor.
     factor: Vec<f64>,
+    /// What the units ask of the samples, kept for other weights.
+    targets: Option<UnitTargets>,
     /// Movements of the skin bones for each unit on the left and the right side at full strength, without the jaw.
     unit_movements: Vec<[OnceLock<Vec<DVec3>>; 2]>,
     jaw: JawMovements,
@@ -105,7 +109,8 @@ impl FittedFace {
             opening_lines: OpeningLines::new(landmarks),
             samples: Vec::new(),
             factor: Vec::new(),
-            unit_movements: units.units().iter().map(|_| [OnceLock::new(), OnceLock::new()]).collect(),
+            targets: None,
+            unit_movements: unsolved(units),
             jaw: JawMovements::default(),
             moving: MovingSkin::default(),
             pairs: mirrored_pairs(bones, landmarks),
@@ -126,12 +131,39 @@ impl FittedFace {
     /// apart.
     /// Cost: points that bones move times rounds of repair, and for each unit once samples times moves of the field.
     pub fn pose(&self, mix: &Mix) -> Vec<BonePose> {
-        let rest = vec![BonePose::REST; self.bones.len()];
+        self.pose_and_folds(mix).0
+    }
+
+    /// The pose of each bone, and the triangles that stay folded, in rising order.
+    pub(super) fn pose_and_folds(&self, mix: &Mix) -> (Vec<BonePose>, Vec<u32>) {
+        let rest = (vec![BonePose::REST; self.bones.len()], Vec::new());
         let Some(opening_lines) = self.opening_lines.as_ref().filter(|_| !mix.is_rest()) else { return rest };
         let Some(field) = Field::new(mix, &self.units, &self.bones, &self.landmarks) else { return rest };
         let mut poses = self.solve(mix, &field, opening_lines);
-        self.repair(&mut poses, mix.strengths.iter().all(|[left, right]| left == right));
-        poses
+        let folded = self.repair(&mut poses, mix.strengths.iter().all(|[left, right]| left == right));
+        (poses, folded)
+    }
+
+    /// The same face, which keeps what units ask of its skin for [`FittedFace::with_weights`].
+    pub(super) fn keeping_targets(mut self) -> Self {
+        self.targets = Some(UnitTargets::new(&self.units));
+        self
+    }
+
+    /// The same head with other weights, as [`FittedFace::new`] makes it; what is known of units is kept.
+    pub(super) fn with_weights(
+        self,
+        points: &[Vec3],
+        triangles: &[[u32; 3]],
+        mask: &[bool],
+        weights: &Weights,
+    ) -> Self {
+        let Self { bones, landmarks, units, samples, targets, .. } = self;
+        let mut face = Self::new(points, triangles, mask, weights, &bones, &landmarks, &units);
+        if let (Some(targets), Some(lines)) = (targets, &face.opening_lines) {
+            face.targets = Some(targets.for_samples(&samples, &face.samples, &units, lines, &landmarks));
+        }
+        face
     }
 
     /// Sums the normal equations and factorises them.
@@ -164,15 +196,15 @@ impl FittedFace {
 
     /// Movements of the skin bones whose skin follows a displacement best.
     fn movements(&self, displacement: impl Fn(&Mark) -> DVec3) -> Vec<DVec3> {
+        self.movements_to(self.samples.iter().map(|sample| sample.target(&displacement)))
+    }
+
+    /// Movements of the skin bones that bring each sample nearest to its target.
+    fn movements_to(&self, targets: impl Iterator<Item = DVec3>) -> Vec<DVec3> {
         let mut right = vec![DVec3::ZERO; self.skin.len()];
-        for sample in &self.samples {
-            let mut target = displacement(&sample.mark);
+        for (sample, target) in self.samples.iter().zip(targets) {
             // The mean of the field over a bone's patch is a target, too.
-            let mut counts = sample.counts * (1.0 + HOLD);
-            if let Some(minus) = &sample.minus {
-                target -= displacement(minus);
-                counts = sample.counts;
-            }
+            let counts = if sample.minus.is_none() { sample.counts * (1.0 + HOLD) } else { sample.counts };
             for &(unknown, weight) in &sample.influences {
                 right[unknown as usize] += counts * weight * target;
             }
@@ -195,7 +227,10 @@ impl FittedFace {
     fn unit_movements(&self, unit: usize, side: usize, opening_lines: &OpeningLines) -> &[DVec3] {
         self.unit_movements[unit][side].get_or_init(|| {
             let field = Field::of_unit(&self.units.units()[unit], side, opening_lines, &self.landmarks);
-            self.movements(|mark| field.at(mark.place, mark.known).as_dvec3() * GAIN)
+            match &self.targets {
+                Some(targets) => self.movements_to(targets.of(unit, side, &self.samples, &field).iter().copied()),
+                None => self.movements(|mark| asked(&field, mark)),
+            }
         })
     }
 
@@ -238,6 +273,16 @@ impl FittedFace {
         }
         poses
     }
+}
+
+/// Displacement that a field asks of a place.
+fn asked(field: &Field, mark: &Mark) -> DVec3 {
+    field.at(mark.place, mark.known).as_dvec3() * GAIN
+}
+
+/// A place for what is solved for each unit on both sides.
+fn unsolved<T>(units: &UnitSet) -> Vec<[OnceLock<T>; 2]> {
+    units.units().iter().map(|_| [OnceLock::new(), OnceLock::new()]).collect()
 }
 
 /// Bones of skin that are each nearest to the other's mirror image, and near it.

@@ -4,23 +4,23 @@
 //! movement that opens the two flips it. Holding the bones back would weaken the expression; averaging the weights of
 //! the triangle's corners with their neighbours' is not visible.
 
-use std::collections::BTreeMap;
-
 use glam::{Affine3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
 use super::{ExpressionSet, FittedFace, Mix, bone_fit::SLIVER, text::Expression};
 use crate::{
     algo::face::{bones::FaceBone, landmarks::Landmarks, weights::Mirror},
-    mesh::{adjacency::weld, influences::keep_strongest, model::Weights, skinning::skin_points},
+    mesh::{adjacency::weld, influences::keep_strongest, model::Weights},
 };
 
 /// Number of passes; each solves the bones' movements anew.
 const PASSES: usize = 2;
 /// Rounds of averaging in a pass.
-const ROUNDS: usize = 24;
+const ROUNDS: usize = 40;
 /// Round from which neighbours of the corners are averaged, too.
-const WIDEN: usize = 6;
+const WIDEN: usize = 1;
+/// Share of its own weights that a place keeps in a round.
+const OWN: f32 = 0.25;
 /// Largest number of influences of a point.
 const INFLUENCES: usize = 8;
 
@@ -45,19 +45,22 @@ pub fn repair_folds(
         return 0;
     }
     let six: Vec<&Expression> = set.six().collect();
-    let with_area = with_area(points, triangles);
-    let mut neighbourhood: Option<Neighbourhood> = None;
+    let mut surface: Option<Surface> = None;
     let mut best: Option<(usize, Weights)> = None;
     let mirror = Mirror::new(points, bones, landmarks);
+    let mut face =
+        FittedFace::new(points, triangles, mask, weights, bones, landmarks, set.unit_set()).keeping_targets();
     for pass in 0..=PASSES {
-        let face = FittedFace::new(points, triangles, mask, weights, bones, landmarks, set.unit_set());
-        let matrices = |expression: &&Expression| -> Vec<Affine3A> {
-            let posed = face.pose(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
-            let moved = posed.into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
-            [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
+        if pass > 0 {
+            face = face.with_weights(points, triangles, mask, weights);
+        }
+        let posed = |expression: &&Expression| {
+            let (poses, folded) = face.pose_and_folds(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
+            let moved = poses.into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
+            ([Affine3A::IDENTITY; 2].into_iter().chain(moved).collect(), folded)
         };
-        let poses: Vec<Vec<Affine3A>> = six.par_iter().map(matrices).collect();
-        let (sum, folded) = all_folded(points, triangles, &with_area, weights, &poses);
+        let (poses, all): (Vec<Vec<Affine3A>>, Vec<Vec<u32>>) = six.par_iter().map(posed).unzip();
+        let sum = all.iter().map(Vec::len).sum();
         // A pass that helped nothing is the last.
         if best.as_ref().is_some_and(|(least, _)| sum >= *least) {
             break;
@@ -66,10 +69,19 @@ pub fn repair_folds(
         if sum == 0 || pass == PASSES {
             break;
         }
-        let neighbourhood = neighbourhood.get_or_insert_with(|| Neighbourhood::new(points, triangles));
-        let mut averaged =
-            AveragedWeights { neighbourhood, weights, own: vec![Vec::new(); neighbourhood.points.len()] };
-        averaged.smooth(points, triangles, folded, &poses);
+        let surface = surface.get_or_insert_with(|| Surface::new(points, triangles));
+        let mut folded = all.concat();
+        sort(&mut folded);
+        let mut averaged = AveragedWeights {
+            surface,
+            points,
+            triangles,
+            weights,
+            poses: &poses,
+            own: vec![Vec::new(); surface.first.len()],
+            posed: vec![Vec::new(); surface.first.len()],
+        };
+        averaged.smooth(folded);
         *weights = averaged.weights();
         if let Some(mirror) = &mirror {
             mirror.apply(weights);
@@ -80,120 +92,104 @@ pub fn repair_folds(
     left
 }
 
-/// Indices of triangles that are not slivers: slivers have no orientation.
-fn with_area(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
-    let has_area = |index: &u32| {
-        let [a, b, c] = triangles[*index as usize].map(|corner| points[corner as usize]);
-        let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
-        (b - a).cross(c - a).length() > SLIVER * longest
-    };
-    (0..triangles.len() as u32).filter(has_area).collect()
+/// Sorts numbers and drops those that come again.
+fn sort(numbers: &mut Vec<u32>) {
+    numbers.sort_unstable();
+    numbers.dedup();
 }
 
-/// Triangles whose normals the pose turns by more than a right angle.
-fn turned(rest: &[Vec3], triangles: &[[u32; 3]], which: &[u32], posed: &[Vec3]) -> Vec<u32> {
-    let normal = |points: &[Vec3], corners: [u32; 3]| {
-        let [a, b, c] = corners.map(|corner| points[corner as usize]);
-        (b - a).cross(c - a)
-    };
-    let is_turned = |index: &u32| {
-        let corners = triangles[*index as usize];
-        normal(rest, corners).dot(normal(posed, corners)) < 0.0
-    };
-    which.iter().copied().filter(is_turned).collect()
-}
-
-/// Folds of all poses, and the triangles whose orientation any of them flips, in rising order.
-fn all_folded(
-    points: &[Vec3],
-    triangles: &[[u32; 3]],
-    which: &[u32],
-    weights: &Weights,
-    poses: &[Vec<Affine3A>],
-) -> (usize, Vec<u32>) {
-    let of_pose = |matrices: &Vec<Affine3A>| {
-        let mut posed = Vec::new();
-        skin_points(points, weights, matrices, &mut posed);
-        turned(points, triangles, which, &posed)
-    };
-    let all: Vec<Vec<u32>> = poses.par_iter().map(of_pose).collect();
-    let sum = all.iter().map(Vec::len).sum();
-    let mut all = all.concat();
-    all.sort_unstable();
-    all.dedup();
-    (sum, all)
-}
-
-/// Neighbourhood of each place of the welded surface.
-struct Neighbourhood {
+/// The welded surface.
+struct Surface {
+    /// Place of each point.
     place_of: Vec<u32>,
-    points: Vec<Vec<u32>>,
-    triangles: Vec<Vec<u32>>,
-    corners: Vec<Vec<u32>>,
+    /// The first point at each place.
+    first: Vec<u32>,
+    /// Triangles around each place: where its list starts, with one more entry at the end.
+    starts: Vec<u32>,
+    triangles: Vec<u32>,
 }
 
-impl Neighbourhood {
+impl Surface {
     fn new(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let (place_of, count) = weld(points);
-        let mut neighbourhood = Self {
-            place_of,
-            points: vec![Vec::new(); count],
-            triangles: vec![Vec::new(); count],
-            corners: vec![Vec::new(); count],
-        };
-        for (point, &place) in neighbourhood.place_of.iter().enumerate() {
-            neighbourhood.points[place as usize].push(point as u32);
+        let mut first = vec![u32::MAX; count];
+        for (point, &place) in place_of.iter().enumerate() {
+            let first = &mut first[place as usize];
+            *first = (*first).min(point as u32);
         }
+        let mut starts = vec![0_u32; count + 1];
+        for corner in triangles.iter().flatten() {
+            starts[place_of[*corner as usize] as usize + 1] += 1;
+        }
+        for place in 0..count {
+            starts[place + 1] += starts[place];
+        }
+        let mut next = starts.clone();
+        let mut around = vec![0_u32; 3 * triangles.len()];
         for (index, triangle) in triangles.iter().enumerate() {
-            let places = triangle.map(|corner| neighbourhood.place_of[corner as usize]);
-            for place in places {
-                neighbourhood.triangles[place as usize].push(index as u32);
-                neighbourhood.corners[place as usize].extend(places.iter().filter(|&&other| other != place));
+            for corner in triangle {
+                let next = &mut next[place_of[*corner as usize] as usize];
+                around[*next as usize] = index as u32;
+                *next += 1;
             }
         }
-        for corners in &mut neighbourhood.corners {
-            corners.sort_unstable();
-            corners.dedup();
-        }
-        neighbourhood
+        Self { place_of, first, starts, triangles: around }
+    }
+
+    fn triangles_of(&self, place: u32) -> &[u32] {
+        let [from, to] = [0, 1].map(|next| self.starts[place as usize + next] as usize);
+        &self.triangles[from..to]
     }
 }
 
 /// Weights of a surface, some of them averaged.
 struct AveragedWeights<'a> {
-    neighbourhood: &'a Neighbourhood,
+    surface: &'a Surface,
+    points: &'a [Vec3],
+    triangles: &'a [[u32; 3]],
     weights: &'a Weights,
+    /// Matrices of the joints in each pose.
+    poses: &'a [Vec<Affine3A>],
     /// Averaged weights of each place; empty where they are as they were.
     own: Vec<Influences>,
+    /// The place in each pose; empty where nobody has asked yet.
+    posed: Vec<Vec<Vec3A>>,
 }
 
 impl AveragedWeights<'_> {
     /// Averages until no triangle is folded or all rounds are over.
-    fn smooth(&mut self, points: &[Vec3], triangles: &[[u32; 3]], mut folded: Vec<u32>, poses: &[Vec<Affine3A>]) {
+    fn smooth(&mut self, mut folded: Vec<u32>) {
         for round in 0..ROUNDS {
-            let corners = folded.iter().flat_map(|&triangle| triangles[triangle as usize]);
-            let mut places: Vec<u32> = corners.map(|corner| self.neighbourhood.place_of[corner as usize]).collect();
-            places.sort_unstable();
-            places.dedup();
+            let mut places: Vec<u32> = folded.iter().flat_map(|&triangle| self.places(triangle)).collect();
+            sort(&mut places);
             if round >= WIDEN {
-                let next = places.iter().flat_map(|&place| &self.neighbourhood.corners[place as usize]);
-                places = next.chain(&places).copied().collect();
-                places.sort_unstable();
-                places.dedup();
+                let next: Vec<u32> = places.iter().flat_map(|&place| self.next_to(place)).collect();
+                places.extend(next);
+                sort(&mut places);
             }
-            let averages: Vec<Influences> = places.par_iter().map(|&place| self.average(place)).collect();
-            for (&place, influences) in places.iter().zip(averages) {
+            let averaged = |&place: &u32| {
+                let influences = self.average(place);
+                let posed = self.posed_with(place, || influences.iter().copied());
+                (influences, posed)
+            };
+            let averages: Vec<(Influences, Vec<Vec3A>)> = places.par_iter().map(averaged).collect();
+            for (&place, (influences, posed)) in places.iter().zip(averages) {
                 self.own[place as usize] = influences;
+                self.posed[place as usize] = posed;
             }
             // The corners of all folded triangles have changed, so that no other triangle can be folded.
             let mut near: Vec<u32> =
-                places.iter().flat_map(|&place| &self.neighbourhood.triangles[place as usize]).copied().collect();
-            near.sort_unstable();
-            near.dedup();
-            folded = near
-                .into_par_iter()
-                .filter(|&triangle| self.is_folded(points, triangles[triangle as usize], poses))
-                .collect();
+                places.iter().flat_map(|&place| self.surface.triangles_of(place)).copied().collect();
+            sort(&mut near);
+            let mut unknown: Vec<u32> = near.iter().flat_map(|&triangle| self.places(triangle)).collect();
+            unknown.retain(|&place| self.posed[place as usize].is_empty());
+            sort(&mut unknown);
+            let posed: Vec<Vec<Vec3A>> =
+                unknown.par_iter().map(|&place| self.posed_with(place, || self.weights_of(place))).collect();
+            for (&place, posed) in unknown.iter().zip(posed) {
+                self.posed[place as usize] = posed;
+            }
+            folded = near.into_par_iter().filter(|&triangle| self.is_folded(triangle)).collect();
             if folded.is_empty() {
                 return;
             }
@@ -203,7 +199,7 @@ impl AveragedWeights<'_> {
     /// The weights of all points.
     fn weights(&self) -> Weights {
         let mut weights = Weights::default();
-        for (point, &place) in self.neighbourhood.place_of.iter().enumerate() {
+        for (point, &place) in self.surface.place_of.iter().enumerate() {
             match self.own[place as usize].as_slice() {
                 [] => weights.push(self.weights.of(point)),
                 own => weights.push(own.iter().copied()),
@@ -212,55 +208,81 @@ impl AveragedWeights<'_> {
         weights
     }
 
-    /// Half a place's own weights plus half the mean of its neighbours'.
+    /// A share of a place's own weights plus the mean of its neighbours', in which near ones count more.
+    ///
+    /// A triangle folds where weights change much over a short way, mostly where tiny triangles meet large ones. With
+    /// shares by the square of the distance the change is even along the surface, not from one point to the next.
     fn average(&self, place: u32) -> Influences {
-        let mut sum: BTreeMap<u32, f32> = BTreeMap::new();
+        let near = |other: u32| 1.0 / self.at(other).distance_squared(self.at(place)).max(f32::MIN_POSITIVE);
+        let next = self.next_to(place);
+        let all: f32 = next.iter().map(|other| near(*other)).sum();
+        let mut sum: Influences = Vec::with_capacity(4 * INFLUENCES);
         let mut add = |place: u32, share: f32| {
-            for (joint, weight) in self.of_place(place) {
-                *sum.entry(joint).or_default() += weight * share;
+            let mut add_one = |(joint, weight): (u32, f32)| match sum.binary_search_by_key(&joint, |entry| entry.0) {
+                Ok(known) => sum[known].1 += weight * share,
+                Err(at) => sum.insert(at, (joint, weight * share)),
+            };
+            match self.own[place as usize].as_slice() {
+                [] => self.weights_of(place).for_each(&mut add_one),
+                own => own.iter().copied().for_each(&mut add_one),
             }
         };
-        add(place, 0.5);
-        let next = &self.neighbourhood.corners[place as usize];
-        for &other in next {
-            add(other, 0.5 / next.len() as f32);
+        if all.is_finite() && all > 0.0 {
+            add(place, OWN);
+            next.iter().for_each(|other| add(*other, (1.0 - OWN) * near(*other) / all));
+        } else {
+            add(place, 1.0);
         }
-        let mut all: Influences = sum.into_iter().filter(|(_, weight)| *weight > 1e-4).collect();
-        keep_strongest(&mut all, INFLUENCES, 0.0);
-        all
+        sum.retain(|(_, weight)| *weight > 1e-4);
+        keep_strongest(&mut sum, INFLUENCES, 0.0);
+        sum
     }
 
-    fn of_place(&self, place: u32) -> Influences {
-        match self.own[place as usize].as_slice() {
-            [] => {
-                let point = self.neighbourhood.points[place as usize].first();
-                point.map(|&point| self.weights.of(point as usize).collect()).unwrap_or_default()
-            }
-            own => own.to_vec(),
-        }
+    fn at(&self, place: u32) -> Vec3 {
+        self.points[self.surface.first[place as usize] as usize]
+    }
+
+    /// Places of a triangle's corners.
+    fn places(&self, triangle: u32) -> [u32; 3] {
+        self.triangles[triangle as usize].map(|corner| self.surface.place_of[corner as usize])
+    }
+
+    /// Places that share a triangle with a place, in rising order.
+    fn next_to(&self, place: u32) -> Vec<u32> {
+        let all = self.surface.triangles_of(place).iter().flat_map(|&triangle| self.places(triangle));
+        let mut next: Vec<u32> = all.filter(|&other| other != place).collect();
+        sort(&mut next);
+        next
+    }
+
+    /// Weights of a place as they were.
+    fn weights_of(&self, place: u32) -> impl Iterator<Item = (u32, f32)> + '_ {
+        self.weights.of(self.surface.first[place as usize] as usize)
+    }
+
+    /// A place with some weights, in each pose.
+    fn posed_with<I: Iterator<Item = (u32, f32)>>(&self, place: u32, influences: impl Fn() -> I) -> Vec<Vec3A> {
+        let rest = Vec3A::from(self.at(place));
+        let posed = |matrices: &Vec<Affine3A>| {
+            let moved = influences()
+                .filter_map(|(joint, weight)| Some(matrices.get(joint as usize)?.transform_point3a(rest) * weight));
+            moved.fold(Vec3A::ZERO, |sum, moved| sum + moved)
+        };
+        self.poses.iter().map(posed).collect()
     }
 
     /// True if any of the poses flips the orientation of a triangle.
-    fn is_folded(&self, points: &[Vec3], corners: [u32; 3], poses: &[Vec<Affine3A>]) -> bool {
-        let normal = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a);
-        let rest = corners.map(|corner| points[corner as usize]);
-        let [a, b, c] = rest;
+    fn is_folded(&self, triangle: u32) -> bool {
+        let normal = |[a, b, c]: [Vec3A; 3]| (b - a).cross(c - a);
+        let places = self.places(triangle);
+        let [a, b, c] = places.map(|place| Vec3A::from(self.at(place)));
         let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
-        if normal(rest).length() <= SLIVER * longest {
-            return false;
-        }
-        let influences = corners.map(|corner| self.of_place(self.neighbourhood.place_of[corner as usize]));
-        poses.iter().any(|matrices| {
-            let posed = [0, 1, 2].map(|k| {
-                let mut sum = Vec3A::ZERO;
-                for &(joint, weight) in &influences[k] {
-                    if let Some(matrix) = matrices.get(joint as usize) {
-                        sum += matrix.transform_point3a(rest[k].into()) * weight;
-                    }
-                }
-                Vec3::from(sum)
-            });
-            normal(rest).dot(normal(posed)) < 0.0
-        })
+        let rest = normal([a, b, c]);
+        // Slivers have no orientation.
+        rest.length() > SLIVER * longest
+            && (0..self.poses.len()).any(|pose| {
+                let posed = places.map(|place| self.posed[place as usize].get(pose).copied().unwrap_or_default());
+                rest.dot(normal(posed)) < 0.0
+            })
     }
 }

@@ -14,6 +14,8 @@ pub struct End {
     /// Upper corner of its box.
     pub high: Vec3,
     length: f32,
+    /// Area of the connected surface that it bounds.
+    area: f32,
 }
 
 impl End {
@@ -28,7 +30,7 @@ impl End {
     }
 }
 
-/// The longest border of a mesh, if it has any.
+/// The longest border of the largest connected surface of a mesh, if it has any; hair has a longer rim than a neck.
 pub fn largest(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<End> {
     let (welded, count) = adjacency::weld(points);
     let mut place = vec![Vec3::ZERO; count];
@@ -43,10 +45,18 @@ pub fn largest(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<End> {
     let edges = lonely(&joined, count);
     let sides: Vec<[u32; 3]> = edges.iter().map(|[a, b]| [*a, *b, *b]).collect();
     let (loop_of, loops) = adjacency::islands(&sides, count);
-    let mut ends: Vec<End> =
-        (0..loops).map(|_| End { center: Vec3::ZERO, low: Vec3::MAX, high: Vec3::MIN, length: 0.0 }).collect();
+    let mut ends: Vec<End> = (0..loops)
+        .map(|_| End { center: Vec3::ZERO, low: Vec3::MAX, high: Vec3::MIN, length: 0.0, area: 0.0 })
+        .collect();
+    let (island_of, islands) = adjacency::islands(&joined, count);
+    let mut areas = vec![0.0_f32; islands];
+    for triangle in &joined {
+        let [a, b, c] = triangle.map(|corner| place[corner as usize]);
+        areas[island_of[triangle[0] as usize] as usize] += (b - a).cross(c - a).length();
+    }
     for [a, b] in edges {
         let end = &mut ends[loop_of[a as usize] as usize];
+        end.area = areas[island_of[a as usize] as usize];
         let (a, b) = (place[a as usize], place[b as usize]);
         let length = a.distance(b);
         end.center += (a + b) * 0.5 * length;
@@ -54,7 +64,9 @@ pub fn largest(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<End> {
         end.low = end.low.min(a).min(b);
         end.high = end.high.max(a).max(b);
     }
-    let mut end = ends.into_iter().filter(|end| end.length > 0.0).max_by(|a, b| a.length.total_cmp(&b.length))?;
+    let largest = areas.iter().copied().fold(0.0, f32::max);
+    let bounds = |end: &End| end.length > 0.0 && end.area >= largest;
+    let mut end = ends.into_iter().filter(bounds).max_by(|a, b| a.length.total_cmp(&b.length))?;
     end.center /= end.length;
     Some(end)
 }

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use glam::Vec3;
+
 use super::{
     Face, HEAD, NECK, Row,
     sides::{Rim, Sides},
@@ -20,10 +22,13 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
             ShellKind::Inside => members.entry(shell[v]).or_default().push(v),
         }
     }
-    for members in members.values() {
-        if in_mouth(face, members) {
-            mouth(face, members, rows);
-        } else if !lashes(face, sides, members, rows) {
+    let (inside, outside): (Vec<_>, Vec<_>) = members.values().partition(|members| in_mouth(face, members));
+    let inside: Vec<MouthPart> = inside.into_iter().map(|members| MouthPart::new(face, members)).collect();
+    for part in &inside {
+        mouth(face, part, &inside, rows);
+    }
+    for members in outside {
+        if !lashes(face, sides, members, rows) {
             for &v in members {
                 let neck = face.neck_share(face.places[v]);
                 rows[v] = vec![(HEAD, 1.0 - neck), (NECK, neck)];
@@ -37,32 +42,80 @@ fn in_mouth(face: &Face, members: &[usize]) -> bool {
     if !face.map.trusted {
         return false;
     }
-    let middle = members.iter().map(|&v| face.places[v]).sum::<glam::Vec3>() / members.len().max(1) as f32;
+    let middle = members.iter().map(|&v| face.places[v]).sum::<Vec3>() / members.len().max(1) as f32;
     let (half, p) = face.map.fold(middle);
     let corner = half.lip_corner();
     let e = face.map.scale;
     p.x < 1.3 * corner.x && (p.y - corner.y).abs() < 0.4 * e && p.z < half.lip_line()[0].z + 0.02 * e
 }
 
-/// Fills the rows of teeth and tongue: a part below the lips follows the jaw fully; a bag that spans both is shared
-/// smoothly.
-fn mouth(face: &Face, members: &[usize], rows: &mut [Row]) {
+/// A shell in the mouth: a row of teeth, a tooth, the tongue, or a bag around them.
+struct MouthPart<'a> {
+    members: &'a [usize],
+    /// Distance of each vertex below the lips.
+    below: Vec<f32>,
+    /// Mean of those distances.
+    mean: f32,
+    /// True if much of it lies on either side of the lips.
+    spans: bool,
+    low: Vec3,
+    high: Vec3,
+}
+
+impl<'a> MouthPart<'a> {
+    fn new(face: &Face, members: &'a [usize]) -> Self {
+        let below: Vec<f32> = members.iter().map(|&v| face.below_lips(face.places[v])).collect();
+        let top = below.iter().copied().fold(f32::INFINITY, f32::min);
+        let bottom = below.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let mean = below.iter().sum::<f32>() / below.len().max(1) as f32;
+        let e = face.map.scale;
+        let spans = top < -0.1 * e && bottom > 0.1 * e && mean.abs() < 0.3 * (bottom - top);
+        let places = || members.iter().map(|&v| face.places[v]);
+        let (low, high) = (places().fold(Vec3::INFINITY, Vec3::min), places().fold(Vec3::NEG_INFINITY, Vec3::max));
+        Self { members, below, mean, spans, low, high }
+    }
+
+    /// True for parts of which one lies over the other, as an upper tooth over a lower one, and not within it.
+    fn faces(&self, other: &Self, e: f32) -> bool {
+        let overlap = self.high.min(other.high) - self.low.max(other.low);
+        let least = 0.5 * (self.high - self.low).min(other.high - other.low);
+        let within = |inner: &Self, outer: &Self| {
+            let margin = Vec3::splat(0.03 * e);
+            inner.low.cmpge(outer.low - margin).all() && inner.high.cmple(outer.high + margin).all()
+        };
+        overlap.x >= least.x
+            && overlap.z >= least.z
+            && (self.mean - other.mean).abs() > 0.05 * e
+            && !within(self, other)
+            && !within(other, self)
+    }
+}
+
+/// Fills the rows of a part of the mouth.
+///
+/// A part below the lips follows the jaw fully, one above them the head; a bag that spans both is shared smoothly. Upper
+/// teeth often hang below the lips: of parts that face each other near the lips the upper one belongs to the head and the
+/// lower one to the jaw, and both are stiff.
+fn mouth(face: &Face, part: &MouthPart, all: &[MouthPart], rows: &mut [Row]) {
     let Some(jaw) = face.jaw else {
-        for &v in members {
+        for &v in part.members {
             rows[v] = vec![(HEAD, 1.0)];
         }
         return;
     };
-    let below: Vec<f32> = members.iter().map(|&v| face.below_lips(face.places[v])).collect();
-    let low = below.iter().copied().fold(f32::INFINITY, f32::min);
-    let high = below.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    let mean = below.iter().sum::<f32>() / below.len().max(1) as f32;
     let e = face.map.scale;
-    let spans = low < -0.1 * e && high > 0.1 * e && mean.abs() < 0.3 * (high - low);
-    for (&v, &below) in members.iter().zip(&below) {
-        let share = match spans {
+    let facing: Vec<&MouthPart> = all.iter().filter(|other| part.faces(other, e)).collect();
+    let is_upper = !facing.is_empty() && facing.iter().all(|other| other.mean > part.mean);
+    let is_lower = !facing.is_empty() && facing.iter().all(|other| other.mean < part.mean);
+    let follows_jaw = match part.mean {
+        mean if is_upper && mean < 0.15 * e => false,
+        mean if is_lower && mean > -0.15 * e => true,
+        mean => mean > 0.0,
+    };
+    for (&v, &below) in part.members.iter().zip(&part.below) {
+        let share = match part.spans && facing.is_empty() {
             true => smooth(-0.06 * e, 0.06 * e, below),
-            false => f32::from(u8::from(mean > 0.0)),
+            false => f32::from(u8::from(follows_jaw)),
         };
         rows[v] = vec![(jaw, share), (HEAD, 1.0 - share)];
     }
@@ -75,15 +128,15 @@ fn lashes(face: &Face, sides: &Sides, members: &[usize], rows: &mut [Row]) -> bo
         return false;
     }
     let e = face.map.scale;
-    let middle = members.iter().map(|&v| face.places[v]).sum::<glam::Vec3>() / members.len().max(1) as f32;
+    let middle = members.iter().map(|&v| face.places[v]).sum::<Vec3>() / members.len().max(1) as f32;
     let (half, p) = face.map.fold(middle);
     let near = half.eye().distance(p) < 0.3 * e || line_distance(&half.brow, p) < 0.15 * e;
     if !near {
         return false;
     }
-    let low = members.iter().fold(glam::Vec3::INFINITY, |a, &v| a.min(face.places[v]));
-    let high = members.iter().fold(glam::Vec3::NEG_INFINITY, |a, &v| a.max(face.places[v]));
-    let margin = glam::Vec3::splat(0.12 * e);
+    let low = members.iter().fold(Vec3::INFINITY, |a, &v| a.min(face.places[v]));
+    let high = members.iter().fold(Vec3::NEG_INFINITY, |a, &v| a.max(face.places[v]));
+    let margin = Vec3::splat(0.12 * e);
     let skin: Vec<usize> = (0..face.places.len())
         .filter(|&v| face.mask[v] && (face.places[v].cmpge(low - margin) & face.places[v].cmple(high + margin)).all())
         .collect();

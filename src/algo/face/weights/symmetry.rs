@@ -3,9 +3,8 @@
 //! Triangles of a mesh that was drawn symmetric are often cut along other diagonals on the two sides, and distances along
 //! the surface differ by that.
 
-use std::collections::HashMap;
-
 use glam::{IVec3, Vec3};
+use rayon::prelude::*;
 
 use super::{FIRST, INFLUENCES, PRUNE};
 use crate::{
@@ -17,10 +16,69 @@ use crate::{
 const NEAR: f32 = 2e-4;
 /// Largest distance between a bone and the mirror image of its partner, as a share of the distance of the eyes.
 const APART: f32 = 0.01;
+/// Width of a cell, as a multiple of the largest distance of partners: most points meet one cell only.
+const CELL: f32 = 4.0;
 /// Largest number of a cell along each axis.
 const FAR: f32 = 1e9;
 /// Largest number of different places in a cell; others have no partner.
-const CROWD: usize = 16;
+const CROWD: usize = 64;
+
+/// Points by the cells of a grid, for points near a place.
+struct Cells<'a> {
+    points: &'a [Vec3],
+    width: f32,
+    /// A number for the cell of each point, and the point, in order; one point for each place.
+    sorted: Vec<(u64, u32)>,
+}
+
+impl<'a> Cells<'a> {
+    fn new(points: &'a [Vec3], width: f32) -> Self {
+        let mut sorted: Vec<(u64, u32)> = Vec::with_capacity(points.len());
+        let mut cells = Self { points, width, sorted: Vec::new() };
+        sorted.extend(points.iter().enumerate().map(|(index, point)| (number(cells.cell(*point)), index as u32)));
+        sorted.par_sort_unstable_by(|a, b| {
+            let [p, q] = [a, b].map(|entry| points[entry.1 as usize]);
+            let place = p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z));
+            a.0.cmp(&b.0).then(place).then(a.1.cmp(&b.1))
+        });
+        // Points at one place have equal weights: one of them stands for all.
+        sorted.dedup_by(|next, kept| next.0 == kept.0 && points[next.1 as usize] == points[kept.1 as usize]);
+        cells.sorted = sorted;
+        cells
+    }
+
+    fn cell(&self, point: Vec3) -> IVec3 {
+        (point / self.width).floor().clamp(Vec3::splat(-FAR), Vec3::splat(FAR)).as_ivec3()
+    }
+
+    /// The point nearest to a place, at most `reach` away; the first of equals.
+    fn nearest(&self, place: Vec3, reach: f32) -> Option<u32> {
+        let [low, high] = [-reach, reach].map(|by| self.cell(place + Vec3::splat(by)));
+        let mut best: Option<(f32, u32)> = None;
+        for x in low.x..=high.x {
+            for y in low.y..=high.y {
+                for z in low.z..=high.z {
+                    let cell = number(IVec3::new(x, y, z));
+                    let from = self.sorted.partition_point(|entry| entry.0 < cell);
+                    let inside = self.sorted[from..].iter().take(CROWD).take_while(|entry| entry.0 == cell);
+                    for &(_, point) in inside {
+                        let distance = self.points[point as usize].distance_squared(place);
+                        if distance <= reach * reach && best.is_none_or(|best| (distance, point) < best) {
+                            best = Some((distance, point));
+                        }
+                    }
+                }
+            }
+        }
+        best.map(|(_, point)| point)
+    }
+}
+
+/// A number for a cell. Two cells of one number only cost time: points are compared by their distance.
+fn number(cell: IVec3) -> u64 {
+    let [x, y, z] = cell.to_array().map(|value| u64::from(value as u32));
+    (x << 42) ^ (y << 21) ^ z
+}
 
 /// Mirrored points and joints of a head.
 pub(crate) struct Mirror {
@@ -39,25 +97,9 @@ impl Mirror {
         if !(landmarks.symmetric && near > 0.0 && near.is_finite()) {
             return None;
         }
-        let cell = |point: Vec3| (point / near).round().clamp(Vec3::splat(-FAR), Vec3::splat(FAR)).as_ivec3();
-        let mut cells: HashMap<IVec3, Vec<u32>> = HashMap::with_capacity(points.len());
-        for (index, point) in points.iter().enumerate() {
-            // Points at one place have equal weights: one of them stands for all.
-            let cell = cells.entry(cell(*point)).or_default();
-            if cell.len() < CROWD && !cell.iter().any(|other| points[*other as usize] == *point) {
-                cell.push(index as u32);
-            }
-        }
-        let partner = |point: &Vec3| {
-            let image = point.with_x(2.0 * landmarks.middle - point.x);
-            let distance = |other: &u32| points[*other as usize].distance_squared(image);
-            let at = cell(image);
-            let around = (0..27).map(|number| at + IVec3::new(number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1));
-            let found = around.filter_map(|cell| cells.get(&cell)).flatten().copied();
-            let nearest = found.min_by(|a, b| distance(a).total_cmp(&distance(b)).then(a.cmp(b)));
-            nearest.filter(|other| distance(other) <= near * near)
-        };
-        let partners: Vec<Option<u32>> = points.iter().map(partner).collect();
+        let cells = Cells::new(points, CELL * near);
+        let partner = |point: &Vec3| cells.nearest(point.with_x(2.0 * landmarks.middle - point.x), near);
+        let partners: Vec<Option<u32>> = points.par_iter().map(partner).collect();
         let is_mutual = |(point, other): (&Vec3, Option<u32>)| {
             let back = partners[other? as usize]?;
             (points[back as usize] == *point).then_some(other?)

@@ -23,6 +23,8 @@ pub(super) struct MovingSkin {
     pub weights: Weights,
     /// Triangles with an area.
     pub triangles: Vec<[u32; 3]>,
+    /// Numbers of the triangles in the mesh.
+    numbers: Vec<u32>,
     /// Normals of the triangles at rest, of any length.
     normals: Vec<Vec3>,
     /// Triangles that each bone moves.
@@ -52,7 +54,7 @@ impl MovingSkin {
             }
             *known
         };
-        for corners in triangles {
+        for (triangle, corners) in triangles.iter().enumerate() {
             if corners.iter().any(|&corner| corner as usize >= points.len())
                 || !corners.iter().any(|&corner| moved[corner as usize])
             {
@@ -77,6 +79,7 @@ impl MovingSkin {
                 }
             }
             skin.triangles.push(corners);
+            skin.numbers.push(triangle as u32);
             skin.normals.push(normal);
         }
         skin.apart = apart.iter().map(|pair| pair.map(|point| number(&mut skin, point))).collect();
@@ -112,6 +115,12 @@ impl<'a> PosedSkin<'a> {
     /// Triangles that turn by more than a right angle.
     pub fn folded(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         self.skin.triangles.iter().zip(&self.folded).filter(|(_, is_folded)| **is_folded).map(|(corners, _)| *corners)
+    }
+
+    /// Numbers in the mesh of the triangles that turn by more than a right angle, in rising order.
+    pub fn folded_numbers(&self) -> Vec<u32> {
+        let all = self.skin.numbers.iter().zip(&self.folded);
+        all.filter(|(_, is_folded)| **is_folded).map(|(number, _)| *number).collect()
     }
 
     fn update_all(&mut self) {

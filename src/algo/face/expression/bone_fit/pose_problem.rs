@@ -8,6 +8,9 @@ use crate::algo::face::{
     expression::{BonePose, limited},
 };
 
+/// Distance of lids and lips that counts as closed, as a share of that at rest.
+const CLOSED: f32 = 0.2;
+
 /// Problems of a pose.
 #[derive(Default)]
 struct PoseProblems {
@@ -24,13 +27,13 @@ impl PoseProblems {
 }
 
 impl FittedFace {
-    /// Repairs a pose as far as it may; alike on both sides if `is_alike`.
-    pub(super) fn repair(&self, poses: &mut [BonePose], is_alike: bool) {
+    /// Repairs a pose as far as it may; alike on both sides if `is_alike`. Returns the triangles that stay folded.
+    pub(super) fn repair(&self, poses: &mut [BonePose], is_alike: bool) -> Vec<u32> {
         let furthest = poses.iter().map(|pose| pose.translation.length()).fold(0.0, f32::max);
         let solved: Vec<Vec3> = poses.iter().map(|pose| pose.translation).collect();
         let mut apart = vec![0.0; poses.len()];
         if self.moving.triangles.is_empty() && self.moving.apart.is_empty() {
-            return;
+            return Vec::new();
         }
         let mut posed = PosedSkin::new(&self.moving, self.matrices(poses));
         let (mut fewest, mut in_vain) = (usize::MAX, 0);
@@ -55,6 +58,7 @@ impl FittedFace {
             }
             posed.update(self.matrices(poses));
         }
+        posed.folded_numbers()
     }
 
     /// Matrices of neck, head and each bone.
@@ -80,7 +84,7 @@ impl FittedFace {
             let gap = |points: &[Vec3]| points[above as usize].y - points[below as usize].y;
             let rest = gap(&self.moving.points);
             // Lips that touch at rest may keep touching.
-            let least = if rest > slack { 0.3 * rest } else { rest - slack };
+            let least = if rest > slack { CLOSED * rest } else { rest - slack };
             let now = gap(&posed.points);
             if now < least {
                 crossed.push(([above, below], least - now));

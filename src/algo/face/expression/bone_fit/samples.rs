@@ -1,6 +1,7 @@
 //! Samples of the skin that should follow the field.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use crate::{
     algo::face::{
@@ -16,7 +17,7 @@ const SAMPLES: usize = 1600;
 /// Weight of a landmark, as a share of the whole skin's weight.
 const LANDMARK: f64 = 0.002;
 /// Weight of the distance of two landmarks, as a share of the whole skin's weight.
-const PAIR: f64 = 0.02;
+const PAIR: f64 = 0.01;
 /// Landmarks whose distance matters more than their positions: lips, lids, corners of the mouth, inner brows.
 const PAIRS: [[usize; 2]; 9] =
     [[61, 67], [62, 66], [63, 65], [37, 41], [38, 40], [43, 47], [44, 46], [54, 48], [22, 21]];
@@ -37,12 +38,33 @@ pub(super) struct Mark {
 /// A point of the skin that should follow the field.
 #[derive(Clone)]
 pub(super) struct Sample {
+    /// Number of the point; landmarks and pairs of them come after the points.
+    pub number: usize,
     pub mark: Mark,
     /// The other end of a pair whose difference counts.
     pub minus: Option<Mark>,
     pub counts: f64,
     /// Numbers of skin bones among the skin bones, and their weights.
     pub influences: Vec<(u32, f64)>,
+}
+
+impl Sample {
+    /// What a displacement field asks of the sample.
+    pub fn target(&self, displacement: impl Fn(&Mark) -> DVec3) -> DVec3 {
+        let own = displacement(&self.mark);
+        self.minus.as_ref().map_or(own, |minus| own - displacement(minus))
+    }
+
+    /// True if every field asks the same of both samples.
+    pub fn asks_like(&self, other: &Self) -> bool {
+        let same = |a: &Mark, b: &Mark| a.place == b.place && a.known == b.known;
+        let minus = match (&self.minus, &other.minus) {
+            (Some(a), Some(b)) => same(a, b),
+            (None, None) => true,
+            _ => false,
+        };
+        self.number == other.number && minus && same(&self.mark, &other.mark)
+    }
 }
 
 /// A face whose skin is sampled.
@@ -52,6 +74,8 @@ struct Skin<'a> {
     bones: &'a [FaceBone],
     /// Number of each bone among the skin bones.
     unknown_of: Vec<u32>,
+    /// Marks the jaw and bones below the mouth's line.
+    is_lower: Vec<bool>,
 }
 
 /// The influences of a point; none past the end of `weights`.
@@ -79,24 +103,36 @@ pub(super) fn gather(
     for (unknown, bone) in skin_bones.enumerate() {
         unknown_of[bone] = unknown as u32;
     }
-    let skin = Skin { points, weights, bones, unknown_of };
-    let lower_share: Vec<f32> = (0..points.len()).map(|index| skin.lower_share(index, opening_lines)).collect();
+    let is_lower =
+        bones.iter().map(|bone| bone.kind == FaceBoneKind::Jaw || !opening_lines.above_mouth(bone.position)).collect();
+    let skin = Skin { points, weights, bones, unknown_of, is_lower };
+    let lower_share: Vec<f32> = (0..points.len()).map(|index| skin.lower_share(index)).collect();
     let mut samples = skin.everywhere(mask, landmarks, opening_lines, &lower_share);
     let candidates: Vec<usize> =
         (0..points.len()).filter(|&index| mask.is_empty() || mask.get(index).copied().unwrap_or(false)).collect();
-    let mut at_marks = Vec::new();
-    for (mark, &place) in landmarks.points.iter().enumerate() {
+    let nearest = |(mark, place): (usize, &Vec3)| {
         let known = OpeningSide::of_landmark(mark);
         let fits = |index: usize| match known.upper_lip {
             None => true,
             Some(upper) => (lower_share[index] < 0.5) == upper,
         };
-        let nearest = candidates.iter().copied().filter(|&index| fits(index)).min_by(|&a, &b| {
-            let [a, b] = [a, b].map(|index| points[index].distance_squared(place));
-            a.total_cmp(&b)
-        });
+        // The first of equals, as few comparisons as there are points.
+        let mut best: Option<(f32, usize)> = None;
+        for &index in &candidates {
+            let distance = points[index].distance_squared(*place);
+            if best.is_none_or(|(least, _)| distance < least) && fits(index) {
+                best = Some((distance, index));
+            }
+        }
+        best.map(|(_, index)| index)
+    };
+    let all_nearest: Vec<Option<usize>> = landmarks.points.par_iter().enumerate().map(nearest).collect();
+    let mut at_marks = Vec::new();
+    for (mark, (&place, nearest)) in landmarks.points.iter().zip(all_nearest).enumerate() {
+        let known = OpeningSide::of_landmark(mark);
         let sample = nearest.and_then(|index| skin.sample(index, place));
         if let Some(mut sample) = sample.clone() {
+            sample.number = points.len() + mark;
             sample.mark.known = known;
             sample.counts = LANDMARK;
             samples.push(sample);
@@ -109,7 +145,8 @@ pub(super) fn gather(
             continue;
         };
         let minus = Mark { known: OpeningSide::of_landmark(b), ..other.mark.clone() };
-        let mut pair = Sample { counts: PAIR, minus: Some(minus), ..one.clone() };
+        let number_of_pair = points.len() + landmarks.points.len() + number;
+        let mut pair = Sample { number: number_of_pair, counts: PAIR, minus: Some(minus), ..one.clone() };
         pair.mark.known = OpeningSide::of_landmark(a);
         for &(unknown, weight) in &other.influences {
             match pair.influences.iter_mut().find(|(known, _)| *known == unknown) {
@@ -131,13 +168,12 @@ impl Skin<'_> {
     }
 
     /// Share of a point's weights that belongs to the jaw and to bones below the mouth's line.
-    fn lower_share(&self, index: usize, opening_lines: &OpeningLines) -> f32 {
+    fn lower_share(&self, index: usize) -> f32 {
         let (mut lower, mut all) = (0.0, 0.0);
         for (joint, weight) in influences(self.weights, index) {
             let Some(bone) = self.bone(joint) else { continue };
             all += weight;
-            let bone = &self.bones[bone];
-            if bone.kind == FaceBoneKind::Jaw || !opening_lines.above_mouth(bone.position) {
+            if self.is_lower[bone] {
                 lower += weight;
             }
         }
@@ -198,7 +234,7 @@ impl Skin<'_> {
     /// A sample of a point, if bones move it at all.
     fn sample(&self, index: usize, place: Vec3) -> Option<Sample> {
         let mark = Mark { place, known: OpeningSide::default(), jaw: 0.0 };
-        let mut sample = Sample { mark, minus: None, counts: 0.0, influences: Vec::new() };
+        let mut sample = Sample { number: index, mark, minus: None, counts: 0.0, influences: Vec::new() };
         let mut all = 0.0;
         for (joint, weight) in influences(self.weights, index) {
             let Some(bone) = self.bone(joint).filter(|_| weight.is_finite()) else { continue };

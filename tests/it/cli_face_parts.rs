@@ -1,0 +1,144 @@
+//! Heads of several parts on the command line: eyes, teeth, tongue, brows and hair, read back from the written file.
+
+use std::{
+    collections::BTreeMap,
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use glam::Vec3;
+use rigsmith::{
+    algo::face::auto::{AutoSettings, FaceAnalysis},
+    files::{RealDisk, load_model},
+};
+
+use crate::{cli_build::rigsmith, face_arkit::skinned, heads, prerequisites::test_data};
+
+/// A point at rest and posed.
+type Moved = [Vec3; 2];
+
+/// Points of the written character by object.
+fn posed(mesh: &Path, expressions: &[&str]) -> BTreeMap<String, Vec<Moved>> {
+    let folder = tempfile::tempdir().unwrap();
+    let exports = std::env::var_os("RIGSMITH_EXPORTS").map(PathBuf::from);
+    let glb = exports.unwrap_or_else(|| folder.path().to_owned()).join(format!("parts_{}.glb", expressions.len()));
+    let (mesh, glb) = (mesh.display().to_string(), glb.display().to_string());
+    let mut args = vec!["face", &mesh, "-o", &glb];
+    args.extend(expressions.iter().flat_map(|expression| ["--expression", *expression]));
+    let answer = rigsmith(folder.path(), &args);
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    let model = load_model(&RealDisk, Path::new(&glb)).unwrap();
+    let moved = skinned(&model);
+    let mut objects: BTreeMap<String, Vec<Moved>> = BTreeMap::new();
+    for part in &model.parts {
+        let points = part.vertices.iter().map(|point| [model.points[*point as usize], moved[*point as usize]]);
+        objects.entry(model.objects[part.object].name.clone()).or_default().extend(points);
+    }
+    objects
+}
+
+fn furthest(points: &[Moved]) -> f32 {
+    points.iter().map(|[rest, moved]| rest.distance(*moved)).fold(0.0, f32::max)
+}
+
+/// Largest change of the distance of two points.
+fn bent(points: &[Moved]) -> f32 {
+    let anchors: Vec<&Moved> = points.iter().step_by(points.len() / 8 + 1).collect();
+    let change = |point: &Moved, anchor: &Moved| (point[0].distance(anchor[0]) - point[1].distance(anchor[1])).abs();
+    points.iter().flat_map(|point| anchors.iter().map(|anchor| change(point, anchor))).fold(0.0, f32::max)
+}
+
+#[test]
+fn eyes_teeth_and_tongue_are_stiff() {
+    let Some(data) = test_data() else { return };
+    let objects = posed(&data.join("bodies/female_young/full.obj"), &["jawOpen=1", "eyeLookUpLeft=1"]);
+    let [left, right, upper, lower, tongue] =
+        ["helper-l-eye", "helper-r-eye", "helper-upper-teeth", "helper-lower-teeth", "helper-tongue"]
+            .map(|name| objects.get(name).unwrap_or_else(|| panic!("no object {name} in {:?}", objects.keys())));
+    // In metres.
+    for (name, points) in [("eye", left), ("upper teeth", upper), ("lower teeth", lower), ("tongue", tongue)] {
+        println!("{name}: moves {:.5}, bent {:.6}", furthest(points), bent(points));
+        assert!(bent(points) < 2e-5, "{name} is bent by {}", bent(points));
+    }
+    for (name, points) in [("the other eye", right), ("upper teeth", upper)] {
+        assert!(furthest(points) < 2e-5, "{name} moves by {}", furthest(points));
+    }
+    for (name, points) in [("lower teeth", lower), ("tongue", tongue)] {
+        assert!(furthest(points) > 0.005, "{name} moves by {}", furthest(points));
+    }
+    let middle = |at: usize| left.iter().map(|point| point[at]).sum::<Vec3>() / left.len() as f32;
+    let shift = middle(0).distance(middle(1));
+    assert!(furthest(left) > 0.002 && shift < 0.5 * furthest(left), "the eye turns: {} {shift}", furthest(left));
+}
+
+/// A copy of the triangles whose corners are all kept, with its points moved, as an object of an OBJ file.
+fn object(
+    text: &mut String,
+    name: &str,
+    (points, triangles): &heads::Mesh,
+    first: &mut usize,
+    place: impl Fn(Vec3) -> Option<Vec3>,
+) {
+    writeln!(text, "o {name}").unwrap();
+    let mut numbers: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut faces = String::new();
+    for corners in triangles {
+        if corners.iter().any(|corner| place(points[*corner as usize]).is_none()) {
+            continue;
+        }
+        faces.push('f');
+        for corner in corners {
+            let number = *numbers.entry(*corner).or_insert_with(|| {
+                let at = place(points[*corner as usize]).unwrap();
+                writeln!(text, "v {} {} {}", at.x, at.y, at.z).unwrap();
+                *first += 1;
+                *first
+            });
+            write!(faces, " {number}").unwrap();
+        }
+        faces.push('\n');
+    }
+    text.push_str(&faces);
+}
+
+/// Brows and hair that are meshes of their own move as the skin under them does, and hair does not turn the head over.
+#[test]
+fn brows_and_hair_ride_along() {
+    let mesh = heads::bundled();
+    let analysis = FaceAnalysis::new(&mesh.0, &mesh.1, &AutoSettings::default(), &|_, _| true).unwrap();
+    let (eyes, marks) = (analysis.landmarks.eye_distance(), &analysis.landmarks.points);
+    let center = mesh.0.iter().sum::<Vec3>() / mesh.0.len() as f32;
+    let brow = |point: Vec3| {
+        let away = marks[17..27].iter().map(|mark| mark.truncate().distance(point.truncate())).fold(f32::MAX, f32::min);
+        (away < 0.06 * eyes && point.z > marks[36].z - 0.1 * eyes).then(|| point + 0.012 * eyes * Vec3::Z)
+    };
+    let hair = |point: Vec3| {
+        let is_top = point.y > marks[19].y.max(marks[24].y) + 0.45 * eyes;
+        let is_back = point.z < marks[0].z - 0.2 * eyes && point.y > marks[30].y;
+        (is_top || is_back).then(|| point + 0.06 * eyes * (point - center).normalize_or_zero())
+    };
+    let (mut text, mut first) = (String::new(), 0);
+    object(&mut text, "head", &mesh, &mut first, Some);
+    object(&mut text, "brows", &mesh, &mut first, brow);
+    object(&mut text, "hair", &mesh, &mut first, hair);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("dressed.obj");
+    fs::write(&file, text).unwrap();
+    let objects = posed(&file, &["surprise=1"]);
+    let head = &objects["head"];
+    for (name, least, most) in [("brows", 0.05, 0.03), ("hair", 0.0, 0.06)] {
+        let points = &objects[name];
+        assert!(points.len() > 100, "{name} has {} points", points.len());
+        let off = |point: &Moved| {
+            let nearest =
+                head.iter().min_by(|a, b| a[0].distance_squared(point[0]).total_cmp(&b[0].distance_squared(point[0])));
+            let below = nearest.map_or(Vec3::ZERO, |[rest, moved]| *moved - *rest);
+            (point[1] - point[0]).distance(below)
+        };
+        let worst = points.iter().map(off).fold(0.0, f32::max) / eyes;
+        let moved = furthest(points) / eyes;
+        println!("{name}: moves {moved:.3} eye distances, {worst:.3} off the skin");
+        assert!(moved >= least && worst <= most, "{name}: moves {moved}, {worst} off the skin");
+    }
+}
