@@ -374,7 +374,6 @@ fn a_stroke_does_not_cut_off_steps_that_were_undone_while_it_was_followed() {
 #[test]
 fn strokes_are_followed_in_the_background_one_after_another() {
     let mut bench = RigBench::biped();
-    let rig = bench.rig;
     let surface = bench.surface().unwrap().shared().unwrap();
     let request = along_arm(&bench);
     let (plane, points) = (request.plane, request.points.clone());
