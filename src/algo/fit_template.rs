@@ -13,6 +13,7 @@
 mod align;
 mod analysis;
 mod assign;
+mod bends;
 mod branches;
 mod caps;
 mod choose;

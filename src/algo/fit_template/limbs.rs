@@ -79,6 +79,21 @@ impl TemplateLimbs {
         self.positions[end] + direction * limb.beyond
     }
 
+    /// Index in the limb of the joint that turns it in the trunk: a shoulder or a hip.
+    pub(super) fn ball_joint(&self, limb: &Limb) -> Option<usize> {
+        let whole = self.length(limb.attach, limb.joints[limb.joints.len() - 1]);
+        match limb.kind {
+            LimbKind::Leg => Some(0),
+            // A clavicle is short, or begins at the plane of symmetry.
+            LimbKind::Arm => {
+                let next = self.length(limb.joints[0], *limb.joints.get(1)?);
+                let central = self.positions[limb.joints[0]].x.abs() < 0.04 * self.size;
+                Some(usize::from(central && next < 0.35 * whole))
+            }
+            _ => None,
+        }
+    }
+
     /// Number of limbs of a kind.
     pub(super) fn count(&self, kind: LimbKind) -> usize {
         self.limbs.iter().filter(|l| l.kind == kind).count()

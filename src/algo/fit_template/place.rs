@@ -193,7 +193,7 @@ impl Work<'_> {
             let (lengths, whole) = self.neck_lengths(limb, line, attach);
             return Reach { lengths, root: attach, whole, measured: scale };
         }
-        let (measured, root) = match self.ball_joint(limb) {
+        let (measured, root) = match self.template.ball_joint(limb) {
             // The ball of a shoulder or hip lies about the limb's radius behind where the limb leaves the trunk.
             Some(ball) if self.upright() => {
                 let place = self.ball_place(limb.kind, line);
@@ -298,29 +298,13 @@ impl Work<'_> {
         root + left * (wide - (root - attach).dot(left)) * LEG_WIDTH
     }
 
-    /// Index in the limb of the joint that turns it in the trunk: a shoulder or a hip.
-    fn ball_joint(&self, limb: &Limb) -> Option<usize> {
-        let template = self.template;
-        let whole = template.length(limb.attach, limb.joints[limb.joints.len() - 1]);
-        match limb.kind {
-            LimbKind::Leg => Some(0),
-            // A clavicle is short, or begins at the plane of symmetry.
-            LimbKind::Arm => {
-                let next = template.length(limb.joints[0], *limb.joints.get(1)?);
-                let central = template.positions[limb.joints[0]].x.abs() < 0.04 * template.size;
-                Some(usize::from(central && next < 0.35 * whole))
-            }
-            _ => None,
-        }
-    }
-
     /// Distance between the middles of shoulders and of hips over that of the template.
     fn ball_scale(&self) -> f32 {
         let middle = |kind: LimbKind| {
             let (mut mesh, mut rest, mut count) = (Vec3::ZERO, Vec3::ZERO, 0.0);
             for (limb, line) in self.template.limbs.iter().zip(&self.lines) {
                 let Some(line) = line.as_ref().filter(|_| limb.kind == kind) else { continue };
-                let Some(ball) = self.ball_joint(limb) else { continue };
+                let Some(ball) = self.template.ball_joint(limb) else { continue };
                 mesh += self.ball_place(limb.kind, line);
                 rest += self.template.positions[limb.joints[ball]];
                 count += 1.0;
@@ -384,7 +368,7 @@ impl Work<'_> {
                 let Some(line) = line.as_ref().filter(|_| limb.attach == joint && limb.partner.is_some()) else {
                     continue;
                 };
-                let wanted = match self.ball_joint(limb).filter(|_| upright) {
+                let wanted = match self.template.ball_joint(limb).filter(|_| upright) {
                     Some(ball) => {
                         let away = template.positions[joint] - template.positions[limb.joints[ball]];
                         (self.ball_place(limb.kind, line) + turn * away * balls).dot(along)
