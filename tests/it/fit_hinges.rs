@@ -6,6 +6,7 @@ use bevy::math::Vec3;
 use rigsmith::{
     files::{RealDisk, bundled_characters, load_model},
     headless::Workbench,
+    mesh::model::Model,
     plugins::fit::FitTemplates,
     rig::Rig,
 };
@@ -84,8 +85,13 @@ fn character(name: &str) -> Arc<Rig> {
 /// Fits the template whose limbs the mesh shows, and checks its hinges.
 #[track_caller]
 fn check_fit(path: &Path, template: &str, hinges: &[Hinge]) {
+    check_model(load_model(&RealDisk, path).unwrap(), path, template, hinges);
+}
+
+#[track_caller]
+fn check_model(model: Model, path: &Path, template: &str, hinges: &[Hinge]) {
     let mut bench = Workbench::new(7, "hinges");
-    bench.open(load_model(&RealDisk, path).unwrap(), true).unwrap();
+    bench.open(model, true).unwrap();
     bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));
     let report = bench.fit(|_| (), &mut |_| ()).unwrap();
     assert_eq!(report.template, template, "{}: {}", path.display(), report.choice);
@@ -108,6 +114,45 @@ fn fitted_bodies_bend_as_bodies_do() {
     let Some(data) = test_data() else { return };
     for name in BODIES {
         check_fit(&data.join("bodies").join(name).join("body.obj"), "biped", &[ARM, LEG]);
+    }
+}
+
+/// Figures of other makers, in armour and with short limbs; the bends of stout limbs are within their thickness.
+const CHARACTERS: [&str; 3] = ["characters/Mage.glb", "gltf_skinned/CesiumMan.glb", "gltf_skinned/RobotExpressive.glb"];
+
+#[test]
+fn fitted_characters_bend_as_bodies_do() {
+    let Some(data) = test_data() else { return };
+    for name in CHARACTERS {
+        check_fit(&data.join(name), "biped", &[ARM, LEG]);
+    }
+}
+
+/// The same figures stouter, thinner, and with shorter and longer legs.
+#[test]
+fn figures_of_other_builds_bend_as_bodies_do() {
+    let Some(data) = test_data() else { return };
+    let legs = |by: f32| move |point: Vec3, hip: f32| Vec3::new(point.x, hip + (point.y - hip) * by, point.z);
+    let wide = |by: f32| move |point: Vec3, _: f32| Vec3::new(point.x * by, point.y, point.z * by);
+    type Build = Box<dyn Fn(Vec3, f32) -> Vec3>;
+    let builds: [(&str, Build); 4] = [
+        ("stout", Box::new(wide(1.25))),
+        ("thin", Box::new(wide(0.8))),
+        ("short legs", Box::new(move |p, hip| if p.y < hip { legs(0.65)(p, hip) } else { p })),
+        ("long legs", Box::new(move |p, hip| if p.y < hip { legs(1.35)(p, hip) } else { p })),
+    ];
+    for (name, hip) in [("characters/Mage.glb", 0.17), ("gltf_skinned/CesiumMan.glb", 0.35)] {
+        let whole = load_model(&RealDisk, &data.join(name)).unwrap();
+        let gear = whole.gear();
+        for (build, of) in &builds {
+            let mut model = whole.at_rest();
+            // Without its skins, gear is no longer known as such.
+            model.parts.retain(|part| !gear.contains(&part.object));
+            let height = model.points.iter().map(|point| point.y).fold(0.0, f32::max);
+            model.points.iter_mut().for_each(|point| *point = of(*point, hip * height));
+            println!("{name}, {build}");
+            check_model(model, &data.join(name), "biped", &[ARM, LEG]);
+        }
     }
 }
 

@@ -60,7 +60,8 @@ fn hinges<'a>(template: &TemplateLimbs, limb: &'a Limb) -> impl DoubleEndedItera
         _ => true,
     };
     let ball = template.ball_joint(limb).unwrap_or(0).min(limb.joints.len());
-    let end = limb.joints.iter().skip(ball).position(|joint| is_end(*joint)).map_or(limb.joints.len(), |at| ball + at + 1);
+    let end =
+        limb.joints.iter().skip(ball).position(|joint| is_end(*joint)).map_or(limb.joints.len(), |at| ball + at + 1);
     limb.joints[ball..end].windows(3)
 }
 

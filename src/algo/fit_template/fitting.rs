@@ -6,8 +6,7 @@ use super::{
     FitError, FitNote, FitReason, FitSettings, FitSymmetry, FittedSkeleton, HypothesisSummary, JointFit, MeshAnalysis,
     TemplateJoint, align,
     assign::Hypothesis,
-    bends,
-    confidence,
+    bends, chain, confidence,
     human::{self, Role},
     limbs::{self, TemplateLimbs},
     markers::{self, Marker},
@@ -38,6 +37,9 @@ impl<'a> Fit<'a> {
     ) -> Result<Self, FitError> {
         if let Some(joint) = joints.iter().position(|j| !j.position.is_finite()) {
             return Err(FitError::Joint { joint });
+        }
+        if settings.root.is_some_and(|place| !place.is_finite()) {
+            return Err(FitError::Root);
         }
         for (direction, name) in [(settings.up, "up"), (settings.forward, "forward")] {
             if direction.is_some_and(|d| d.normalize_or_zero() == Vec3::ZERO) {
@@ -72,6 +74,9 @@ impl<'a> Fit<'a> {
         let tree = &analysis.trees[best.tree];
         let placement = place::place(&self.template, tree, &analysis.graph, best);
         let mut places = placement.places.clone();
+        if let Some(leaf) = best.leaves.first().copied().flatten().filter(|_| chain::is_lone(&self.template)) {
+            chain::spread(&self.template, tree, leaf, analysis.root(self.settings), &mut places);
+        }
         let human = human::is_human(&self.template) && !self.settings.without_body_model;
         let roles = human.then(|| human::roles(self.joints, &self.template));
         let body = match &roles {
