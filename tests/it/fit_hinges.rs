@@ -132,24 +132,23 @@ fn fitted_characters_bend_as_bodies_do() {
 #[test]
 fn figures_of_other_builds_bend_as_bodies_do() {
     let Some(data) = test_data() else { return };
-    let legs = |by: f32| move |point: Vec3, hip: f32| Vec3::new(point.x, hip + (point.y - hip) * by, point.z);
-    let wide = |by: f32| move |point: Vec3, _: f32| Vec3::new(point.x * by, point.y, point.z * by);
-    type Build = Box<dyn Fn(Vec3, f32) -> Vec3>;
-    let builds: [(&str, Build); 4] = [
-        ("stout", Box::new(wide(1.25))),
-        ("thin", Box::new(wide(0.8))),
-        ("short legs", Box::new(move |p, hip| if p.y < hip { legs(0.65)(p, hip) } else { p })),
-        ("long legs", Box::new(move |p, hip| if p.y < hip { legs(1.35)(p, hip) } else { p })),
-    ];
+    // Factors of what is across the height, and of the legs' length.
+    let builds = [("stout", 1.25, 1.0), ("thin", 0.8, 1.0), ("short legs", 1.0, 0.65), ("long legs", 1.0, 1.35)];
     for (name, hip) in [("characters/Mage.glb", 0.17), ("gltf_skinned/CesiumMan.glb", 0.35)] {
         let whole = load_model(&RealDisk, &data.join(name)).unwrap();
         let gear = whole.gear();
-        for (build, of) in &builds {
+        for (build, wide, long) in builds {
             let mut model = whole.at_rest();
             // Without its skins, gear is no longer known as such.
             model.parts.retain(|part| !gear.contains(&part.object));
-            let height = model.points.iter().map(|point| point.y).fold(0.0, f32::max);
-            model.points.iter_mut().for_each(|point| *point = of(*point, hip * height));
+            let used = model.point_triangles().into_iter().flatten().map(|corner| model.points[corner as usize].y);
+            let (low, high) = used.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)));
+            let hip = low + hip * (high - low);
+            let of = |point: Vec3| {
+                let y = if point.y < hip { hip + (point.y - hip) * long } else { point.y };
+                Vec3::new(point.x * wide, y, point.z * wide)
+            };
+            model.points.iter_mut().for_each(|point| *point = of(*point));
             println!("{name}, {build}");
             check_model(model, &data.join(name), "biped", &[ARM, LEG]);
         }
