@@ -141,6 +141,7 @@ fn figures_of_other_builds_bend_as_bodies_do() {
             let mut model = whole.at_rest();
             // Without its skins, gear is no longer known as such.
             model.parts.retain(|part| !gear.contains(&part.object));
+            model.weights = None;
             let used = model.point_triangles().into_iter().flatten().map(|corner| model.points[corner as usize].y);
             let (low, high) = used.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)));
             let hip = low + hip * (high - low);
