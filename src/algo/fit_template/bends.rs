@@ -20,6 +20,8 @@ const ASIDE: f32 = 0.6;
 const TURNED: f32 = 2.5;
 /// Bend that is left to a joint that is bent the wrong way, as a share of the distance of its neighbours.
 const STRAIGHT: f32 = 0.01;
+/// Part of a knee's wrong bend for which its hip moves.
+const HIP: f32 = 0.5;
 /// Height above the lowest joint, as a share of the template's size, below which a leg's joint is a foot.
 const STANDING: f32 = 0.1;
 /// Number of chains that a hand has at least.
@@ -43,6 +45,13 @@ pub(super) fn follow_template(
             }
             let around = [before, here, after].map(|joint| places[joint]);
             let rest = [before, here, after].map(|joint| template.positions[joint]);
+            let Some(place) = bent(limb, rest, around, turn, radius(number, places[here])) else { continue };
+            if limb.kind == LimbKind::Leg && before == limb.joints[0] && template.is_upright() {
+                // The flesh of the trunk hides the hip, and the knee is where it shows: the hip takes a half.
+                let share = 1.0 - (here_share(around)).clamp(0.2, 0.8);
+                places[before] += (places[here] - place) * HIP / share;
+            }
+            let around = [before, here, after].map(|joint| places[joint]);
             if let Some(place) = bent(limb, rest, around, turn, radius(number, places[here])) {
                 places[here] = place;
             }
@@ -91,6 +100,12 @@ fn bent(limb: &Limb, rest: [Vec3; 3], [from, here, to]: [Vec3; 3], turn: Quat, r
     }
     let along = along.max(STRAIGHT * chord.length());
     Some(foot + way * along + across.clamp_length_max(aside * along))
+}
+
+/// Share of the way between two places at which the one between them is.
+fn here_share([from, here, to]: [Vec3; 3]) -> f32 {
+    let chord = to - from;
+    (here - from).dot(chord) / chord.length_squared().max(1e-12)
 }
 
 /// The way from the line between the first and the last place to the one between them, and where it begins.

@@ -11,6 +11,9 @@ const LIMB_LENGTH: f32 = 0.2;
 /// Distance from the plane of symmetry within which a joint is on it, as a share of the largest side.
 const ON_PLANE: f32 = 0.02;
 
+/// Cosine of the angle between the trunk and up above which the trunk stands upright.
+const UPRIGHT: f32 = 0.6;
+
 /// Kind of a limb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LimbKind {
@@ -92,6 +95,14 @@ impl TemplateLimbs {
             }
             _ => None,
         }
+    }
+
+    /// True if the trunk stands upright.
+    pub(super) fn is_upright(&self) -> bool {
+        let trunk = &self.trunk;
+        let (Some(&first), Some(&last)) = (trunk.first(), trunk.last()) else { return false };
+        let along = (self.positions[last] - self.positions[first]).normalize_or_zero();
+        first != last && along.y > UPRIGHT
     }
 
     /// Number of limbs of a kind.
