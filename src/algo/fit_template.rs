@@ -13,8 +13,10 @@
 mod align;
 mod analysis;
 mod assign;
+mod bends;
 mod branches;
 mod caps;
+mod chain;
 mod choose;
 mod clean;
 mod confidence;
@@ -74,6 +76,8 @@ pub struct FitSettings {
     pub symmetry: FitSymmetry,
     /// Joints (index into the template) that have to be at a position.
     pub markers: Vec<(usize, Vec3)>,
+    /// Place that the skeleton hangs on, such as the joint of a body that gets a tail; found if not given.
+    pub root: Option<Vec3>,
     /// True to leave the body model out and place the joints of human figures on centre lines, too.
     pub without_body_model: bool,
 }

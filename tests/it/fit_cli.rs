@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use bevy::math::Vec3;
 use rigsmith::{
-    files::{RealDisk, bundled_characters, load_template},
+    files::{RealDisk, bundled_characters, load_model, load_template, store_model},
+    mesh::gltf::GltfWriteSettings,
     rig::Rig,
 };
 
@@ -88,6 +89,35 @@ fn a_part_is_fitted_into_what_a_bone_moves() {
     assert!(tail.walk().all(|joint| tail.position(joint.data.uid).z < 0.0), "the tail is behind");
     let unknown = run(&["fit", &fox, "--region", "Tail_Bass", "-o", "x.rig.ron"]);
     assert!(unknown.code == 1 && unknown.err.contains("Tail_Base"), "names the bones: {}", unknown.err);
+}
+
+/// The root of a tail is where it hangs on the body, without a word about the front.
+#[test]
+fn a_tail_begins_at_the_body() {
+    let Some(data) = test_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for (name, tip) in [("fox-fox", Vec3::new(0.0, 1.1, -2.07)), ("fox-dog", Vec3::new(0.0, 1.1, -2.01))] {
+        let skinned = data.join("creatures").join(name).with_extension("glb");
+        // The mesh alone, too, in which no bone names the part.
+        let bare = folder.path().join(name).with_extension("obj");
+        let rest = load_model(&RealDisk, &skinned).unwrap().at_rest();
+        store_model(&RealDisk, &bare, &rest, &GltfWriteSettings::default()).unwrap();
+        let inputs = [
+            (&skinned, "Tail_Base", -0.83, "skinned.rig.ron"),
+            (&bare, "-0.4,0.7,-1.05,0.4,1.6,-3", -1.05, "bare.rig.ron"),
+        ];
+        for (mesh, region, base, output) in inputs {
+            let mesh = mesh.display().to_string();
+            let output = format!("{name}_{output}");
+            let args = ["fit", &mesh, "--template", "parts/tail", "--region", region, "-o", &output];
+            let fitted = rigsmith(folder.path(), &args);
+            assert_eq!(fitted.code, 0, "{output}: {}", fitted.err);
+            let rig = template(&folder.path().join(&output));
+            let (first, last) = (at(&rig, "tail_1"), at(&rig, "tail_6"));
+            assert!(first.distance(Vec3::new(0.0, 1.07, base)) < 0.3, "{output}: begins at {first}");
+            assert!(last.distance(tip) < 0.3, "{output}: ends at {last}");
+        }
+    }
 }
 
 /// The hand of the test data, alone in its file.

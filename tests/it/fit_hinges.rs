@@ -6,6 +6,7 @@ use bevy::math::Vec3;
 use rigsmith::{
     files::{RealDisk, bundled_characters, load_model},
     headless::Workbench,
+    mesh::model::Model,
     plugins::fit::FitTemplates,
     rig::Rig,
 };
@@ -84,8 +85,13 @@ fn character(name: &str) -> Arc<Rig> {
 /// Fits the template whose limbs the mesh shows, and checks its hinges.
 #[track_caller]
 fn check_fit(path: &Path, template: &str, hinges: &[Hinge]) {
+    check_model(load_model(&RealDisk, path).unwrap(), path, template, hinges);
+}
+
+#[track_caller]
+fn check_model(model: Model, path: &Path, template: &str, hinges: &[Hinge]) {
     let mut bench = Workbench::new(7, "hinges");
-    bench.open(load_model(&RealDisk, path).unwrap(), true).unwrap();
+    bench.open(model, true).unwrap();
     bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));
     let report = bench.fit(|_| (), &mut |_| ()).unwrap();
     assert_eq!(report.template, template, "{}: {}", path.display(), report.choice);
@@ -108,6 +114,45 @@ fn fitted_bodies_bend_as_bodies_do() {
     let Some(data) = test_data() else { return };
     for name in BODIES {
         check_fit(&data.join("bodies").join(name).join("body.obj"), "biped", &[ARM, LEG]);
+    }
+}
+
+/// Figures of other makers, in armour and with short limbs; the bends of stout limbs are within their thickness.
+const CHARACTERS: [&str; 3] = ["characters/Mage.glb", "gltf_skinned/CesiumMan.glb", "gltf_skinned/RobotExpressive.glb"];
+
+#[test]
+fn fitted_characters_bend_as_bodies_do() {
+    let Some(data) = test_data() else { return };
+    for name in CHARACTERS {
+        check_fit(&data.join(name), "biped", &[ARM, LEG]);
+    }
+}
+
+/// The same figures stouter, thinner, and with shorter and longer legs.
+#[test]
+fn figures_of_other_builds_bend_as_bodies_do() {
+    let Some(data) = test_data() else { return };
+    // Factors of what is across the height, and of the legs' length.
+    let builds = [("stout", 1.25, 1.0), ("thin", 0.8, 1.0), ("short legs", 1.0, 0.65), ("long legs", 1.0, 1.35)];
+    for (name, hip) in [("characters/Mage.glb", 0.17), ("gltf_skinned/CesiumMan.glb", 0.35)] {
+        let whole = load_model(&RealDisk, &data.join(name)).unwrap();
+        let gear = whole.gear();
+        for (build, wide, long) in builds {
+            let mut model = whole.at_rest();
+            // Without its skins, gear is no longer known as such.
+            model.parts.retain(|part| !gear.contains(&part.object));
+            model.weights = None;
+            let used = model.point_triangles().into_iter().flatten().map(|corner| model.points[corner as usize].y);
+            let (low, high) = used.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)));
+            let hip = low + hip * (high - low);
+            let of = |point: Vec3| {
+                let y = if point.y < hip { hip + (point.y - hip) * long } else { point.y };
+                Vec3::new(point.x * wide, y, point.z * wide)
+            };
+            model.points.iter_mut().for_each(|point| *point = of(*point));
+            println!("{name}, {build}");
+            check_model(model, &data.join(name), "biped", &[ARM, LEG]);
+        }
     }
 }
 

@@ -12,6 +12,18 @@ pub(super) struct Similarity {
     pub(super) offset: Vec3,
 }
 
+impl Similarity {
+    /// The same with another rotation about the middle of the pairs that it was made from.
+    pub(super) fn turned(self, rotation: Quat, pairs: &Pairs) -> Self {
+        let weight = pairs.iter().map(|pair| pair.2).sum::<f32>().max(1e-9);
+        let (from, to) = pairs
+            .iter()
+            .fold((Vec3::ZERO, Vec3::ZERO), |(from, to), pair| (from + pair.0 * pair.2, to + pair.1 * pair.2));
+        let offset = (to - rotation * (from * self.scale)) / weight;
+        Self { rotation, offset, ..self }
+    }
+}
+
 /// Pairs of points with weights: (from, to, weight).
 pub(super) type Pairs = [(Vec3, Vec3, f32)];
 

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{
     FitError, FitSettings,
     assign::{self, Directions, Hypothesis, LimbMarker},
-    clean,
+    chain, clean,
     limbs::TemplateLimbs,
     markers::Marker,
     symmetry::{self, MirrorPlane},
@@ -33,6 +33,8 @@ pub struct MeshAnalysis {
     pub(super) trees: Vec<Tree>,
     /// Plane of symmetry, if the mesh has one.
     pub(super) mirror: Option<MirrorPlane>,
+    /// Where the part of the mesh hangs on the rest of it, in unit space.
+    pub(super) seam: Option<Vec3>,
 }
 
 impl MeshAnalysis {
@@ -51,6 +53,7 @@ impl MeshAnalysis {
     ) -> Result<Self, FitError> {
         let step = |share: f32| if progress(share) { Ok(()) } else { Err(FitError::Cancelled) };
         step(0.0)?;
+        let seam = region.and_then(|region| chain::seam(points, triangles, region));
         let chosen: Vec<[u32; 3]>;
         let triangles = match region {
             Some(region) => {
@@ -88,7 +91,8 @@ impl MeshAnalysis {
         if trees.is_empty() {
             return Err(FitError::NoSurface);
         }
-        Ok(Self { mesh, voxels, surface, target, graph, trees, mirror })
+        let seam = seam.map(|place| mesh.space.to_unit(place));
+        Ok(Self { mesh, voxels, surface, target, graph, trees, mirror, seam })
     }
 
     /// Ends of the mesh's branches in its space, longest first: limbs, and what hangs on them.
@@ -107,6 +111,11 @@ impl MeshAnalysis {
         tree.branches.leaves.iter().map(line).collect()
     }
 
+    /// Place, in unit space, that the skeleton hangs on.
+    pub(super) fn root(&self, settings: &FitSettings) -> Option<Vec3> {
+        settings.root.map(|place| self.mesh.space.to_unit(place)).or(self.seam)
+    }
+
     /// Assignments of a template's limbs to branches, best first.
     pub(super) fn hypotheses(
         &self,
@@ -120,6 +129,7 @@ impl MeshAnalysis {
             forward: settings.forward.map(|d| space.direction_to_unit(d)),
             file_axes: [Vec3::X, Vec3::Y, Vec3::Z].map(|d| space.direction_to_unit(d)),
             mirror: self.mirror.map(|plane| (plane.point, plane.normal)),
+            root: self.root(settings),
         };
         let of_limb = |marker: &Marker| {
             let limb = template.limbs.iter().position(|l| l.joints.contains(&marker.joint))?;

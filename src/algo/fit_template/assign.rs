@@ -8,6 +8,7 @@ use glam::Vec3;
 
 use super::{
     align::{self, Similarity},
+    chain,
     limbs::{LimbKind, TemplateLimbs},
     tree::Tree,
     volume::VoxelGraph,
@@ -86,6 +87,8 @@ pub(super) struct Directions {
     pub(super) file_axes: [Vec3; 3],
     /// A point and the normal of the mesh's plane of symmetry.
     pub(super) mirror: Option<(Vec3, Vec3)>,
+    /// Place that the skeleton hangs on.
+    pub(super) root: Option<Vec3>,
 }
 
 /// A place, in unit space, at which a person has put a joint of a limb.
@@ -377,10 +380,19 @@ impl Search<'_> {
         if !template.limbs.iter().any(|l| l.stem) {
             pairs.push((middle, centre, 0.1 * template.size));
         }
-        let (alignment, rest) = align::similarity(&pairs)?;
+        let (mut alignment, rest) = align::similarity(&pairs)?;
+        let mut cost = cost;
+        if chain::is_lone(template) {
+            if let Some(leaf) = leaves.first().copied().flatten() {
+                cost += chain::penalty(self.tree, self.leaves, leaf, self.directions.root);
+            }
+            if let Some(level) = chain::level(template, alignment.rotation, &self.directions) {
+                alignment = alignment.turned(level, &pairs);
+            }
+        }
         let free = template.limbs.iter().all(|l| l.kind == LimbKind::Free);
         let weight = if free { RIGID } else { POSED };
-        let mut cost = cost + weight * rest;
+        cost += weight * rest;
         let drift = bevy::math::ops::ln(alignment.scale / scale).abs();
         cost += 0.15 * (drift - 0.1).max(0.0);
         let up = alignment.rotation * Vec3::Y;

@@ -1,12 +1,12 @@
 //! Fitting: the steps of one fit, from the assignment of limbs to the report.
 
-use glam::Vec3;
+use glam::{Mat3, Quat, Vec3};
 
 use super::{
     FitError, FitNote, FitReason, FitSettings, FitSymmetry, FittedSkeleton, HypothesisSummary, JointFit, MeshAnalysis,
     TemplateJoint, align,
     assign::Hypothesis,
-    confidence,
+    bends, chain, confidence,
     human::{self, Role},
     limbs::{self, TemplateLimbs},
     markers::{self, Marker},
@@ -37,6 +37,9 @@ impl<'a> Fit<'a> {
     ) -> Result<Self, FitError> {
         if let Some(joint) = joints.iter().position(|j| !j.position.is_finite()) {
             return Err(FitError::Joint { joint });
+        }
+        if settings.root.is_some_and(|place| !place.is_finite()) {
+            return Err(FitError::Root);
         }
         for (direction, name) in [(settings.up, "up"), (settings.forward, "forward")] {
             if direction.is_some_and(|d| d.normalize_or_zero() == Vec3::ZERO) {
@@ -71,6 +74,9 @@ impl<'a> Fit<'a> {
         let tree = &analysis.trees[best.tree];
         let placement = place::place(&self.template, tree, &analysis.graph, best);
         let mut places = placement.places.clone();
+        if let Some(leaf) = best.leaves.first().copied().flatten().filter(|_| chain::is_lone(&self.template)) {
+            chain::spread(&self.template, tree, leaf, analysis.root(self.settings), &mut places);
+        }
         let human = human::is_human(&self.template) && !self.settings.without_body_model;
         let roles = human.then(|| human::roles(self.joints, &self.template));
         let body = match &roles {
@@ -83,6 +89,8 @@ impl<'a> Fit<'a> {
         step(0.95)?;
         let plane = self.make_symmetric(&mut places);
         markers::warp(&self.template, &mut places, &self.markers, body.is_some());
+        let (up, forward) = self.directions(best, body.as_ref());
+        self.bend_as_template(best, up, forward, &mut places);
         let near: Vec<Option<f32>> = match (&body, &roles) {
             (Some(body), Some(roles)) => roles.iter().map(|r| r.map(|r| body.place(r).1)).collect(),
             _ => vec![None; places.len()],
@@ -97,7 +105,6 @@ impl<'a> Fit<'a> {
         for marker in &self.markers {
             trusted[marker.joint] = (1.0, FitReason::Marker);
         }
-        let (up, forward) = self.directions(best, body.as_ref());
         let space = &analysis.mesh.space;
         let position = |joint: usize| {
             let marker = self.settings.markers.iter().rev().find(|m| m.0 == joint);
@@ -233,6 +240,18 @@ impl<'a> Fit<'a> {
             symmetry::centre(&self.template, places, (plane.point, plane.normal));
         }
         found
+    }
+
+    /// Bends elbows and knees as the template does; a place that a person gave stays with its neighbours.
+    fn bend_as_template(&self, best: &Hypothesis, up: Vec3, forward: Vec3, places: &mut [Vec3]) {
+        let space = &self.analysis.mesh.space;
+        let (up, forward) = (space.direction_to_unit(up), space.direction_to_unit(forward));
+        let Some(left) = up.cross(forward).try_normalize() else { return };
+        let turn = Quat::from_mat3(&Mat3::from_cols(left, up, left.cross(up))).normalize();
+        let lines = &self.analysis.trees[best.tree].lines;
+        let radius = |limb: usize, place: Vec3| best.leaves[limb].map_or(0.0, |leaf| lines[leaf].radius_at(place));
+        let is_fixed = |joint: usize| self.markers.iter().any(|marker| marker.joint == joint);
+        bends::follow_template(&self.template, turn, is_fixed, radius, places);
     }
 
     /// Directions up and forward in the mesh's space: the file's axes where they are near.

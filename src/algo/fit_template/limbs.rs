@@ -11,6 +11,9 @@ const LIMB_LENGTH: f32 = 0.2;
 /// Distance from the plane of symmetry within which a joint is on it, as a share of the largest side.
 const ON_PLANE: f32 = 0.02;
 
+/// Cosine of the angle between the trunk and up above which the trunk stands upright.
+const UPRIGHT: f32 = 0.6;
+
 /// Kind of a limb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LimbKind {
@@ -77,6 +80,29 @@ impl TemplateLimbs {
         let parent = self.parents[end].unwrap_or(end);
         let direction = (self.positions[end] - self.positions[parent]).normalize_or_zero();
         self.positions[end] + direction * limb.beyond
+    }
+
+    /// Index in the limb of the joint that turns it in the trunk: a shoulder or a hip.
+    pub(super) fn ball_joint(&self, limb: &Limb) -> Option<usize> {
+        let whole = self.length(limb.attach, limb.joints[limb.joints.len() - 1]);
+        match limb.kind {
+            LimbKind::Leg => Some(0),
+            // A clavicle is short, or begins at the plane of symmetry.
+            LimbKind::Arm => {
+                let next = self.length(limb.joints[0], *limb.joints.get(1)?);
+                let central = self.positions[limb.joints[0]].x.abs() < 0.04 * self.size;
+                Some(usize::from(central && next < 0.35 * whole))
+            }
+            _ => None,
+        }
+    }
+
+    /// True if the trunk stands upright.
+    pub(super) fn is_upright(&self) -> bool {
+        let trunk = &self.trunk;
+        let (Some(&first), Some(&last)) = (trunk.first(), trunk.last()) else { return false };
+        let along = (self.positions[last] - self.positions[first]).normalize_or_zero();
+        first != last && along.y > UPRIGHT
     }
 
     /// Number of limbs of a kind.

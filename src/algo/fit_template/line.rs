@@ -117,6 +117,20 @@ impl CentreLine {
         self.nearest(position).1
     }
 
+    /// Mean radius of a share of the free part, from its end.
+    pub(super) fn radius_within(&self, share: f32) -> f32 {
+        let count = self.lengths[..self.free_count].partition_point(|&length| length <= share * self.free).max(2);
+        let part = self.radii.get(1..count.min(self.radii.len())).unwrap_or_default();
+        part.iter().sum::<f32>() / part.len().max(1) as f32
+    }
+
+    /// Radius of the branch about the place of the free part that is nearest to a position.
+    pub(super) fn radius_at(&self, position: Vec3) -> f32 {
+        let along = self.nearest(position).0;
+        let at = self.lengths.partition_point(|&length| length < along);
+        self.radii.get(at).or(self.radii.last()).copied().unwrap_or(0.0)
+    }
+
     /// Length from the end of the nearest place on the free part, and its distance.
     pub(super) fn nearest(&self, position: Vec3) -> (f32, f32) {
         let mut best = (0.0, f32::INFINITY);

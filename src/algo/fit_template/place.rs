@@ -21,8 +21,6 @@ const BALL_OF_SHOULDER: f32 = 1.2;
 const BALL_OF_HIP: f32 = 1.4;
 /// Distance of a joint from the line between its neighbours above which a limb is bent, as a share of their distance.
 const BENT: f32 = 0.04;
-/// Cosine of the angle between the trunk and up above which the trunk stands upright.
-const UPRIGHT: f32 = 0.6;
 
 /// Shoulder, elbow and wrist of a spread wing with feathers, as shares of the way from shoulder to feathers' end.
 const WING: [f32; 3] = [0.0, 0.17, 0.38];
@@ -179,7 +177,7 @@ impl Work<'_> {
         // A long body has no longer shoulders: the limb's place at its joint of the trunk keeps the template's shape.
         let beside = template.positions[first] - template.positions[limb.attach];
         let mut root = attach + self.hypothesis.alignment.rotation * (beside * self.standing);
-        if !self.upright() {
+        if !self.template.is_upright() {
             root = self.over_leg(limb, line, attach, root);
         }
         if limb.kind == LimbKind::Wing {
@@ -189,13 +187,13 @@ impl Work<'_> {
         }
         let rest: Vec<f32> = limb.joints.iter().map(|&j| template.length(j, end) + limb.beyond).collect();
         let whole = rest[0];
-        if self.upright() && limb.kind == LimbKind::Head {
+        if self.template.is_upright() && limb.kind == LimbKind::Head {
             let (lengths, whole) = self.neck_lengths(limb, line, attach);
             return Reach { lengths, root: attach, whole, measured: scale };
         }
-        let (measured, root) = match self.ball_joint(limb) {
+        let (measured, root) = match self.template.ball_joint(limb) {
             // The ball of a shoulder or hip lies about the limb's radius behind where the limb leaves the trunk.
-            Some(ball) if self.upright() => {
+            Some(ball) if self.template.is_upright() => {
                 let place = self.ball_place(limb.kind, line);
                 let ratio = (line.free + place.distance(line.at(line.free))) / rest[ball];
                 let beside = self.hypothesis.alignment.rotation * (beside * self.ball_scale());
@@ -251,7 +249,7 @@ impl Work<'_> {
             let moved = lengths[i] + 0.8 * (best.1 - lengths[i]);
             let rest = (whole - moved) / (whole - lengths[i]).max(1e-9);
             let below = lengths[i];
-            if !self.upright() {
+            if !self.template.is_upright() {
                 lengths[1..i].iter_mut().for_each(|length| *length = moved + (*length - below) * rest);
             }
             lengths[i] = moved;
@@ -261,7 +259,7 @@ impl Work<'_> {
     /// Draws the joints of an animal's leg that lie where the leg runs into the trunk to the shape that the template has
     /// between their neighbours: the flesh about a knee hides its bend.
     fn hold_bends(&self, limb: &Limb, line: &CentreLine, lengths: &[f32], places: &mut [Option<Vec3>]) {
-        if limb.kind != LimbKind::Leg || self.upright() {
+        if limb.kind != LimbKind::Leg || self.template.is_upright() {
             return;
         }
         for (joints, length) in limb.joints.windows(3).zip(lengths.iter().skip(1)) {
@@ -298,29 +296,13 @@ impl Work<'_> {
         root + left * (wide - (root - attach).dot(left)) * LEG_WIDTH
     }
 
-    /// Index in the limb of the joint that turns it in the trunk: a shoulder or a hip.
-    fn ball_joint(&self, limb: &Limb) -> Option<usize> {
-        let template = self.template;
-        let whole = template.length(limb.attach, limb.joints[limb.joints.len() - 1]);
-        match limb.kind {
-            LimbKind::Leg => Some(0),
-            // A clavicle is short, or begins at the plane of symmetry.
-            LimbKind::Arm => {
-                let next = template.length(limb.joints[0], *limb.joints.get(1)?);
-                let central = template.positions[limb.joints[0]].x.abs() < 0.04 * template.size;
-                Some(usize::from(central && next < 0.35 * whole))
-            }
-            _ => None,
-        }
-    }
-
     /// Distance between the middles of shoulders and of hips over that of the template.
     fn ball_scale(&self) -> f32 {
         let middle = |kind: LimbKind| {
             let (mut mesh, mut rest, mut count) = (Vec3::ZERO, Vec3::ZERO, 0.0);
             for (limb, line) in self.template.limbs.iter().zip(&self.lines) {
                 let Some(line) = line.as_ref().filter(|_| limb.kind == kind) else { continue };
-                let Some(ball) = self.ball_joint(limb) else { continue };
+                let Some(ball) = self.template.ball_joint(limb) else { continue };
                 mesh += self.ball_place(limb.kind, line);
                 rest += self.template.positions[limb.joints[ball]];
                 count += 1.0;
@@ -354,19 +336,12 @@ impl Work<'_> {
         (limb.joints.iter().map(|&j| below + (head - below) * share(j)).collect(), below)
     }
 
-    fn upright(&self) -> bool {
-        let trunk = &self.template.trunk;
-        let (Some(&first), Some(&last)) = (trunk.first(), trunk.last()) else { return false };
-        let along = (self.template.positions[last] - self.template.positions[first]).normalize_or_zero();
-        first != last && along.y > UPRIGHT
-    }
-
     /// Places of the trunk's joints: between the limbs that its ends carry, and in the trunk's sections across it.
     fn trunk_places(&self) -> Vec<Vec3> {
         let (template, stretch) = (self.template, &self.stretch);
         let trunk = &template.trunk;
         let mut places: Vec<Vec3> = trunk.iter().map(|&j| stretch.apply(template.positions[j])).collect();
-        let upright = self.upright();
+        let upright = self.template.is_upright();
         let turn = self.hypothesis.alignment.rotation;
         let along = match (places.first(), places.last()) {
             (Some(a), Some(b)) if trunk.len() > 1 => {
@@ -384,7 +359,7 @@ impl Work<'_> {
                 let Some(line) = line.as_ref().filter(|_| limb.attach == joint && limb.partner.is_some()) else {
                     continue;
                 };
-                let wanted = match self.ball_joint(limb).filter(|_| upright) {
+                let wanted = match self.template.ball_joint(limb).filter(|_| upright) {
                     Some(ball) => {
                         let away = template.positions[joint] - template.positions[limb.joints[ball]];
                         (self.ball_place(limb.kind, line) + turn * away * balls).dot(along)

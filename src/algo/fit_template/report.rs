@@ -183,6 +183,9 @@ pub enum FitError {
         /// Number of joints of the template.
         joints: usize,
     },
+    /// The place that the skeleton hangs on is not finite.
+    #[error("the place that the skeleton hangs on is not finite; give another or none")]
+    Root,
     /// A chosen direction is not finite or has no length.
     #[error("the {0} direction is not finite or has no length")]
     Direction(&'static str),

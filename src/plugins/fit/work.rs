@@ -187,6 +187,18 @@ impl Work {
         Ok(FinishedFit { fitted, target })
     }
 
+    /// Place of the joint that a part or chosen joints hang on.
+    fn root(&self, template: &Rig) -> Option<Vec3> {
+        let parent = match &self.request.template {
+            FitTemplate::Part { parent, .. } if self.request.joints.is_empty() => *parent,
+            _ => {
+                let first = template.walk().next()?.data.uid;
+                self.from.ancestors(first).map(|above| above.data.uid).find(|above| template.joint(*above).is_none())
+            }
+        };
+        parent.filter(|parent| self.from.joint(*parent).is_some()).map(|parent| self.from.position(parent))
+    }
+
     /// One skeleton in the mesh, with the settings that it was fitted by.
     fn fitted(
         &self,
@@ -216,6 +228,7 @@ impl Work {
             forward: request.forward,
             symmetry: request.symmetry,
             markers,
+            root: self.root(template),
             ..FitSettings::default()
         };
         let mut fit = fit_template(analysis, &joints, &settings, progress)?;

@@ -160,6 +160,35 @@ const OTHERS: [KnownMesh; 6] = [
     },
 ];
 
+/// Creature that no bound and no constant of the fit was chosen on.
+const HELD_BACK: KnownMesh = KnownMesh {
+    file: "gltf_skinned/Fox.glb",
+    template: "quadruped",
+    joints: &[
+        ("hips", "b_Hip_01"),
+        ("spine_1", "b_Spine01_02"),
+        ("chest", "b_Spine02_03"),
+        ("neck", "b_Neck_04"),
+        ("head", "b_Head_05"),
+        ("upper_arm_r", "b_RightUpperArm_06"),
+        ("forearm_r", "b_RightForeArm_07"),
+        ("carpus_r", "b_RightHand_08"),
+        ("upper_arm_l", "b_LeftUpperArm_09"),
+        ("forearm_l", "b_LeftForeArm_010"),
+        ("carpus_l", "b_LeftHand_011"),
+        ("tail_1", "b_Tail01_012"),
+        ("thigh_l", "b_LeftLeg01_015"),
+        ("shin_l", "b_LeftLeg02_016"),
+        ("metatarsus_l", "b_LeftFoot01_017"),
+        ("foot_l", "b_LeftFoot02_018"),
+        ("thigh_r", "b_RightLeg01_019"),
+        ("shin_r", "b_RightLeg02_020"),
+        ("metatarsus_r", "b_RightFoot01_021"),
+        ("foot_r", "b_RightFoot02_022"),
+    ],
+    sides: ["", ""],
+};
+
 /// Mesh with the places of joints that a template should find.
 pub struct Figure {
     pub name: String,
@@ -182,17 +211,27 @@ pub fn figures(data: &Path) -> Result<Vec<Figure>, Box<dyn Error>> {
         };
         figures.push(Figure::new(body, (&model, &[]), "biped", HUMAN, ["l", "r"], &place));
     }
-    for KnownMesh { file, template, joints, sides } in OTHERS {
-        let model = load_model(&RealDisk, &data.join(file))?;
-        let globals = model.rest_globals();
-        let place = |name: &str| {
-            let node = model.nodes.iter().position(|node| node.name == name)?;
-            Some(globals[node].translation.into())
-        };
-        // As the app fits: without what hangs on a bone.
-        figures.push(Figure::new(file, (&model.at_rest(), &model.gear()), template, joints, sides, &place));
+    for known in &OTHERS {
+        figures.push(figure(data, known)?);
     }
     Ok(figures)
+}
+
+/// The creature that is held back from all tuning.
+pub fn held_back(data: &Path) -> Result<Figure, Box<dyn Error>> {
+    figure(data, &HELD_BACK)
+}
+
+fn figure(data: &Path, known: &KnownMesh) -> Result<Figure, Box<dyn Error>> {
+    let KnownMesh { file, template, joints, sides } = *known;
+    let model = load_model(&RealDisk, &data.join(file))?;
+    let globals = model.rest_globals();
+    let place = |name: &str| {
+        let node = model.nodes.iter().position(|node| node.name == name)?;
+        Some(globals[node].translation.into())
+    };
+    // As the app fits: without what hangs on a bone.
+    Ok(Figure::new(file, (&model.at_rest(), &model.gear()), template, joints, sides, &place))
 }
 
 impl Figure {
