@@ -27,7 +27,7 @@ pub use self::{
 };
 pub(in crate::editor) use self::{
     drop_target::{dropping, goes_onto_both},
-    save::{header_edit, header_step},
+    save::{HEADER, header_step},
     sides::{partner, partners},
 };
 use super::{
@@ -84,18 +84,12 @@ impl Plugin for LibraryPlugin {
             .add_systems(
                 Update,
                 (
-                    (
-                        action::carry_out,
-                        work::start,
-                        work::land,
-                        save::start,
-                        save::go_on,
-                        listing::list,
-                        pictures::draw,
-                    )
+                    (action::carry_out, work::start, work::land, listing::list, pictures::draw)
                         .chain()
                         .after(attend)
                         .before(RigSystems::Script),
+                    // What was typed before a click on Save is in the rig, and the picture's name is before it is taken back.
+                    (save::go_on, save::start).chain().after(RigSystems::Edits).before(RigSystems::Build),
                     follow::follow_loads.after(RigSystems::Edits).before(RigSystems::Build),
                     follow::watch_fits.after(RigSystems::Bind),
                 ),

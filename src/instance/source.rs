@@ -32,8 +32,9 @@ pub const UPDATE: &str = "Update from template";
 /// the base (the version accepted last), the rig as it is now and the template are compared: what the template changed is
 /// taken over, what was changed or added here stays. A `live` rig takes it over at once, as one step of its history, unless
 /// both changed the same field to different values, or steps of another kind were undone, which it would discard; such an
-/// update, and every one of a rig that is not live, is an [`UpdateOffer`] until an [`AcceptUpdate`]. Undoing the step brings the base back, and nothing more is taken over until the
-/// file changes again. An update that cannot be built is taken back and told ([`RigFailed`]).
+/// update, and every one of a rig that is not live, is an [`UpdateOffer`] until an [`AcceptUpdate`]. Undoing the step brings
+/// the base back, and nothing more is taken over until the file changes again. An update that cannot be built is taken back
+/// and told ([`RigFailed`]).
 #[derive(Component, Reflect, Debug, Clone)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug)]

@@ -129,24 +129,25 @@ impl BindStart {
     }
 }
 
-/// Place of a history: its last step and the number of undone ones.
+/// Place of a history: its last step and the undone ones. Those are known by the furthest of them, which only another edit
+/// takes away: as many undone steps may be others.
 #[derive(Debug, Clone)]
 struct HistoryPlace {
     last: Option<Arc<Step>>,
-    undone: usize,
+    furthest: Option<Arc<Step>>,
 }
 
 impl HistoryPlace {
     fn of(history: &RigHistory) -> Self {
-        Self { last: history.last().cloned(), undone: history.undone() }
+        Self { last: history.last().cloned(), furthest: history.undone_steps().next().cloned() }
     }
 
     fn is_of(&self, history: &RigHistory) -> bool {
-        let is_same = match (&self.last, history.last()) {
+        let is_same = |then: &Option<Arc<Step>>, now: Option<&Arc<Step>>| match (then, now) {
             (Some(then), Some(now)) => Arc::ptr_eq(then, now),
             (then, now) => then.is_none() && now.is_none(),
         };
-        is_same && self.undone == history.undone()
+        is_same(&self.last, history.last()) && is_same(&self.furthest, history.undone_steps().next())
     }
 }
 

@@ -72,7 +72,8 @@ pub fn strike(state: &mut RigState, pose: &SampledPose) {
 
 /// Plays a clip at a rate and gives the nodes' transforms relative to their parents as channels, whose targets are places among
 /// the nodes. Channels that stay at rest are left out, and keys without which joints stay within the tolerance; the others are
-/// linear. A node that nothing but its keys moves keeps them as they are, cubic ones, too. Markers, the rate and whether the clip is looped are in the extras.
+/// linear. A node that nothing but its keys moves keeps them as they are, cubic ones, too. Markers, the rate and whether the
+/// clip is looped are in the extras.
 ///
 /// Time starts at zero with the clip. Takes some tens of microseconds a frame for a character.
 ///

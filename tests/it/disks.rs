@@ -1,4 +1,5 @@
-//! Methods of disks that tests put in the place of the real one. Call them where `Disk` is implemented, with what it names in scope.
+//! Methods of disks that tests put in the place of the real one. Call them where `Disk` is implemented, with what it names
+//! in scope.
 
 /// Methods that change something, or ask for more than content, of a disk that is only read.
 macro_rules! only_read {

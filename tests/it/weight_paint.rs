@@ -694,6 +694,21 @@ fn weights_that_are_asked_for_after_an_undo_do_not_wait_for_it() {
 }
 
 #[test]
+fn a_step_that_takes_the_place_of_an_undone_one_is_no_less_kept() {
+    let (mut bench, [one, _], joints) = app();
+    bench.edit(posed(joints[0]));
+    bench.change(Change::Undo);
+    // One step is undone when the weights are asked for, and one, another, when they are ready.
+    held(&mut bench, posed(joints[1]), BindRequest::new(one));
+    bench.messages::<BindAnswer>();
+    let before = bench.rig().clone();
+    bench.change(Change::Redo);
+    assert_ne!(bench.rig().pose(), before.pose(), "the step can be redone");
+    bench.wait("the answer", |bench| !bench.app.world().resource::<Messages<BindAnswer>>().is_empty());
+    assert!(bench.messages::<BindAnswer>().remove(0).result.is_ok());
+}
+
+#[test]
 fn a_lock_during_a_change_of_weights_keeps_them() {
     let (mut bench, [one, _], joints) = app();
     let request = WeightChangeRequest { mesh: one, change: WeightChange::Normalise };

@@ -281,18 +281,18 @@ pub(super) fn poll(world: &mut World) {
 
 /// Follows the template that the rig was saved to; returns the file's name if it did not follow it before.
 fn follow(world: &mut World, rig: Entity, path: PathBuf, saved: Arc<Rig>) -> Option<String> {
-    if let Some(mut source) = world.get_mut::<RigSource>(rig) {
-        source.rebase(saved);
-        return None;
-    }
     let mut document = world.get_mut::<OpenDocument>(rig)?;
-    // Another template may have been loaded meanwhile.
-    let is_first = document.template.is_none();
-    let name = file_name(&path);
-    if is_first {
+    let Some(template) = &document.template else {
+        let name = file_name(&path);
         (document.template, document.base) = (Some(path), Some(saved));
+        return Some(name);
+    };
+    // Another template may have been loaded meanwhile; what was saved is no base of that.
+    let is_same = *template == path;
+    if let Some(mut source) = world.get_mut::<RigSource>(rig).filter(|_| is_same) {
+        source.rebase(saved);
     }
-    is_first.then_some(name)
+    None
 }
 
 fn tell(world: &mut World, notes: Vec<String>) {

@@ -33,7 +33,7 @@ use crate::{
 };
 
 /// Name of the step that changes the header.
-const HEADER: &str = "Change header";
+pub(in crate::editor) const HEADER: &str = "Change header";
 
 /// Request to write a template.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
@@ -173,7 +173,7 @@ fn begin(world: &mut World, SaveTemplate { path, replace, content }: SaveTemplat
             let Some(preview) = Preview::of(world, entity) else { return };
             if !is_named {
                 let about = RigAbout { preview: Some(file.clone()), ..rig.about().clone() };
-                world.write_message(header_edit(entity, about));
+                world.write_message(header_step(entity, HEADER, about));
                 named = Some((entity, file.clone()));
             }
             AsyncComputeTaskPool::get().spawn(async move {
@@ -191,11 +191,6 @@ fn own_template(world: &World) -> Option<&Path> {
     let (rig, source) = (world.get::<Rig>(entity)?, world.get::<RigSource>(entity)?);
     let is_own = source.base().is_some_and(|base| base.uid() == rig.uid());
     world.get::<OpenDocument>(entity)?.template.as_deref().filter(|_| is_own)
-}
-
-/// Request for another header, as one step.
-pub(in crate::editor) fn header_edit(rig: Entity, about: RigAbout) -> EditRequest {
-    header_step(rig, HEADER, about)
 }
 
 /// Request for another header, as one step of that name.
@@ -271,7 +266,12 @@ pub(super) fn go_on(mut save: ResMut<TemplateSave>, histories: Query<&RigHistory
     }
 }
 
-/// True if a step gives a header the name of a picture, and nothing else.
+/// True if a step gives a header the name of a picture, which a later change of the header has before and after it.
 fn names_picture(step: &Step, file: &str) -> bool {
-    matches!(&step.forward[..], [RigEdit::SetAbout(about)] if about.preview.as_deref() == Some(file))
+    match (&step.forward[..], &step.backward[..]) {
+        ([RigEdit::SetAbout(after)], [RigEdit::SetAbout(before)]) => {
+            after.preview.as_deref() == Some(file) && before.preview.as_deref() != Some(file)
+        }
+        _ => false,
+    }
 }

@@ -269,9 +269,9 @@ impl GraphPanel {
         let (mut scale, mut centre) = (fitted, space.center());
         if is_other && fitted < FIRST_SCALE {
             // The first look at a large graph is one at its beginning, or at what is selected, where names can be read.
-            let selected = self.graph.nodes.iter().zip(rects).find(|(node, _)| view.selected.contains(&node.tag));
+            let selected = self.graph.nodes.iter().position(|node| view.selected.contains(&node.tag));
             let start = space.min + area.size() / (2.0 * FIRST_SCALE);
-            (scale, centre) = (FIRST_SCALE, selected.map_or(start, |(_, rect)| rect.center()));
+            (scale, centre) = (FIRST_SCALE, selected.map_or(start, |number| spots.shown(number).center()));
         }
         let from = area.center() - scale * centre.to_vec2();
         Some(TSTransform::new(from.to_vec2(), scale))

@@ -28,29 +28,40 @@ pub enum HeaderFault {
     OptionForm(OptionError),
 }
 
-impl Rig {
-    pub(super) fn set_about(&mut self, about: &RigAbout) -> Result<RigEdit, EditError> {
-        for (number, socket) in about.sockets.iter().enumerate() {
+impl RigAbout {
+    /// Check of sockets and options.
+    ///
+    /// # Errors
+    /// A socket or an option with which no template could be read.
+    pub fn check(&self) -> Result<(), HeaderFault> {
+        for (number, socket) in self.sockets.iter().enumerate() {
             if socket.name.is_empty() || socket.name.contains('.') {
-                return Err(HeaderFault::SocketName(socket.name.clone()).into());
+                return Err(HeaderFault::SocketName(socket.name.clone()));
             }
-            if about.sockets[..number].iter().any(|other| other.name == socket.name) {
-                return Err(HeaderFault::SocketTwice(socket.name.clone()).into());
+            if self.sockets[..number].iter().any(|other| other.name == socket.name) {
+                return Err(HeaderFault::SocketTwice(socket.name.clone()));
             }
             if !socket.translation.is_finite() || !degrees(socket.rotation).is_finite() {
-                return Err(HeaderFault::SocketPlace(socket.name.clone()).into());
+                return Err(HeaderFault::SocketPlace(socket.name.clone()));
             }
         }
-        for (number, option) in about.options.iter().enumerate() {
-            if about.options[..number].iter().any(|other| other.name == option.name) {
-                return Err(HeaderFault::OptionTwice(option.name.clone()).into());
+        for (number, option) in self.options.iter().enumerate() {
+            if self.options[..number].iter().any(|other| other.name == option.name) {
+                return Err(HeaderFault::OptionTwice(option.name.clone()));
             }
             let read: Result<Box<RawValue>, _> = ron_options().from_str(&option.default);
             if let Err(error) = read {
-                return Err(HeaderFault::OptionDefault(option.name.clone(), error.code.to_string()).into());
+                return Err(HeaderFault::OptionDefault(option.name.clone(), error.code.to_string()));
             }
             option.check(&option.default).map_err(HeaderFault::OptionForm)?;
         }
+        Ok(())
+    }
+}
+
+impl Rig {
+    pub(super) fn set_about(&mut self, about: &RigAbout) -> Result<RigEdit, EditError> {
+        about.check()?;
         Ok(RigEdit::SetAbout(Box::new(std::mem::replace(&mut self.about, about.clone()))))
     }
 }

@@ -3,9 +3,12 @@
 
 use std::sync::{Arc, Mutex};
 
-use rigsmith::editor::{
-    panel::{EditorPanel, Requests},
-    panels::graph::{ChartFrame, GraphChart},
+use rigsmith::{
+    editor::{
+        panel::{EditorPanel, Requests},
+        panels::graph::{ChartFrame, FEW, GraphChart},
+    },
+    plugins::picking::{Pick, PickRequest},
 };
 
 use super::*;
@@ -33,15 +36,21 @@ struct Biped {
 
 impl Biped {
     fn new() -> Self {
+        let mut biped = Self::unseen();
+        biped.desk.app.world_mut().write_message(BuildRequest { rig: biped.desk.rig, step: BuildStep::All });
+        biped.desk.frames(2);
+        settle(&mut biped.desk);
+        biped
+    }
+
+    /// The rig before the panel is drawn, not built.
+    fn unseen() -> Self {
         let panel = Shared::default();
         let mut desk = Desk::with(Sheet::Panel(Box::new(panel.clone())), egui::vec2(900.0, 330.0));
         let rig = desk.app.world_mut().spawn(shipped("biped")).id();
         desk.app.insert_resource(rigsmith::editor::ActiveRig(rig));
         desk.rig = rig;
         desk.app.update();
-        desk.app.world_mut().write_message(BuildRequest { rig, step: BuildStep::All });
-        desk.frames(2);
-        settle(&mut desk);
         Self { desk, panel }
     }
 
@@ -177,6 +186,44 @@ fn selected_joints_open_their_frames() {
     assert_eq!(view(&biped.desk).selected.len(), all.len());
     assert!(biped.open_frames().is_empty());
     assert_eq!(bytes(&biped.desk), before);
+}
+
+#[test]
+fn the_first_look_is_at_a_selection_that_is_folded() {
+    let mut biped = Biped::unseen();
+    let rig = biped.desk.rig();
+    let joints: Vec<Uid> = rig.walk().filter(|joint| joint.data.group.is_some()).map(|joint| joint.data.uid).collect();
+    let request = PickRequest { rig: biped.desk.rig, what: Pick::Joints(joints), add: false };
+    biped.desk.app.world_mut().write_message(request);
+    (0..3).for_each(|_| biped.desk.app.update());
+    biped.desk.frames(3);
+    assert!(view(&biped.desk).selected.len() > FEW && biped.open_frames().is_empty());
+    let names: Vec<&str> = biped.desk.seen.iter().map(|seen| seen.label.as_str()).collect();
+    assert!(names.iter().any(|name| name.starts_with("Frame ") && name.contains(", folded, ")), "{names:?}");
+}
+
+#[test]
+fn selected_commands_of_folded_frames_are_not_moved() {
+    let mut biped = Biped::new();
+    act(&mut biped.desk, GraphAction::SelectAll);
+    let arm = biped.chart().frames.into_iter().find(|frame| frame.title == "arm_l · ik").unwrap();
+    biped.desk.app.world_mut().write_message(GraphRequest::Fold(arm.uid, true));
+    biped.desk.frames(2);
+    act(&mut biped.desk, GraphAction::ShowAll);
+    let (chart, arm) = (biped.chart(), biped.frame(arm.uid));
+    // From the graph to the panel.
+    let seen = biped.seen(&arm).rect;
+    let scale = seen.width() / arm.rect.width();
+    let (_, rect) = chart.commands.iter().find(|(tag, _)| *tag == arm.commands[0]).unwrap();
+    let at = seen.min + scale * (rect.center() - arm.rect.min);
+    biped.desk.drag(at, at + scale * egui::vec2(3.0 * GRID, 0.0));
+    biped.desk.frames(2);
+    let moved = &view(&biped.desk).moved;
+    let shown: BTreeSet<Uid> = chart.commands.iter().map(|(tag, _)| *tag).collect();
+    assert_eq!(moved.keys().copied().collect::<BTreeSet<_>>(), shown, "those that are seen");
+    assert!(shown.len() < commands(&biped.desk).len());
+    act(&mut biped.desk, GraphAction::OpenFrames);
+    assert!(biped.chart().space().is_finite());
 }
 
 #[test]

@@ -22,14 +22,19 @@ fn opened() -> Studio {
     studio
 }
 
-/// Types a text in place of that of a field, and leaves it.
-fn retype(studio: &mut Studio, field: &str, text: &str) {
+/// Types a text in place of that of a field.
+fn type_over(studio: &mut Studio, field: &str, text: &str) {
     studio.desk.click(field);
     studio.desk.hold(egui::Modifiers::COMMAND);
     studio.desk.key(Key::A);
     studio.desk.hold(egui::Modifiers::NONE);
     studio.desk.type_text(text);
     studio.desk.frames(2);
+}
+
+/// Types a text in place of that of a field, and leaves it.
+fn retype(studio: &mut Studio, field: &str, text: &str) {
+    type_over(studio, field, text);
     studio.click("Author");
     studio.desk.key(Key::Escape);
     studio.settle();
@@ -156,9 +161,12 @@ fn sockets_are_written_in_the_window_and_others_hang_there() {
     assert_eq!(sockets(&studio)[0].joint, upper);
     studio.change(Change::Undo);
     let (text, steps) = (studio.text(), studio.desk.steps());
-    for (field, wrong) in
-        [("Place of socket top", "high"), ("Name of socket top", "a.b"), ("Name of socket top", "end")]
-    {
+    for (field, wrong) in [
+        ("Place of socket top", "high"),
+        ("Place of socket top", "1, x, 2, 3"),
+        ("Name of socket top", "a.b"),
+        ("Name of socket top", "end"),
+    ] {
         retype(&mut studio, field, wrong);
     }
     for told in ["is not three numbers", "a name without points", "two sockets are called"] {
@@ -191,6 +199,40 @@ fn sockets_are_written_in_the_window_and_others_hang_there() {
     studio.settle();
     let read = load_template(&RealDisk, &path).unwrap();
     assert_eq!((read.sockets.len(), read.options.len()), (1, 0));
+}
+
+/// A click leaves a field in the frame in which it does what it does: neither takes the other back.
+#[test]
+fn a_click_keeps_what_was_typed_before_it() {
+    let mut studio = opened();
+    let steps = studio.desk.steps().1;
+    type_over(&mut studio, "Description of option size", "How large it is.");
+    studio.click("Remove socket end");
+    assert_eq!(options(&studio)[0].description, "How large it is.");
+    assert!(sockets(&studio).is_empty(), "{:?}", studio.desk.told());
+    studio.change(Change::Undo);
+    assert_eq!((sockets(&studio).len(), studio.desk.steps().1), (1, steps + 1));
+    // What is removed stands above what was typed.
+    type_over(&mut studio, "Name of socket end", "tip");
+    studio.click("Remove option size");
+    assert_eq!((options(&studio).len(), sockets(&studio)[0].name.as_str()), (0, "tip"));
+    // A text that is refused does not stop the click.
+    let upper = studio.joint("upper_l");
+    studio.desk.select(&[upper]);
+    studio.settle();
+    type_over(&mut studio, "Name of socket tip", "a.b");
+    studio.click("+ Socket");
+    assert!(studio.told("a name without points"), "{:?}", studio.desk.told());
+    let names: Vec<&str> = sockets(&studio).iter().map(|socket| socket.name.as_str()).collect();
+    assert_eq!(names, ["tip", "upper_l"]);
+    // A template has what was typed last, and its picture's name.
+    type_over(&mut studio, "Author", "Ada");
+    studio.click("Save template");
+    let path = studio.site.join("limbs").join("limb.rig.ron");
+    studio.desk.until("the template", |_| fs::read_to_string(&path).unwrap().contains("\"Ada\""));
+    studio.settle();
+    let about = load_template(&RealDisk, &path).unwrap().rig.about().clone();
+    assert_eq!((about.author.as_str(), about.preview.as_deref()), ("Ada", Some("limb.png")));
 }
 
 /// A template with comments beside its lists.

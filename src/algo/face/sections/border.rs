@@ -30,7 +30,8 @@ impl End {
     }
 }
 
-/// The longest border of the largest connected surface of a mesh, if it has any; hair has a longer rim than a neck.
+/// The longest border of the largest connected surface of a mesh that has one: hair has a longer rim than a neck, or, where it is
+/// closed, a larger surface than a head.
 pub fn largest(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<End> {
     let (welded, count) = adjacency::weld(points);
     let mut place = vec![Vec3::ZERO; count];
@@ -64,8 +65,9 @@ pub fn largest(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<End> {
         end.low = end.low.min(a).min(b);
         end.high = end.high.max(a).max(b);
     }
-    let largest = areas.iter().copied().fold(0.0, f32::max);
-    let bounds = |end: &End| end.length > 0.0 && end.area >= largest;
+    ends.retain(|end| end.length > 0.0);
+    let largest = ends.iter().map(|end| end.area).fold(0.0, f32::max);
+    let bounds = |end: &End| end.area >= largest;
     let mut end = ends.into_iter().filter(bounds).max_by(|a, b| a.length.total_cmp(&b.length))?;
     end.center /= end.length;
     Some(end)
@@ -102,4 +104,49 @@ fn lonely(triangles: &[[u32; 3]], count: usize) -> Vec<[u32; 2]> {
         found.extend(same.map(|same| [place as u32, same[0]]));
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Adds a box of twelve triangles, or without the two at its bottom.
+    fn add_box(mesh: &mut (Vec<Vec3>, Vec<[u32; 3]>), low: Vec3, size: Vec3, is_closed: bool) {
+        let first = mesh.0.len() as u32;
+        let corner = |at: u32| Vec3::new((at & 1) as f32, (at >> 1 & 1) as f32, (at >> 2) as f32);
+        mesh.0.extend((0..8).map(|at| low + size * corner(at)));
+        let bottom = [[0, 1, 5], [0, 5, 4]];
+        let others = [
+            [2, 6, 7],
+            [2, 7, 3],
+            [0, 4, 6],
+            [0, 6, 2],
+            [1, 3, 7],
+            [1, 7, 5],
+            [0, 2, 3],
+            [0, 3, 1],
+            [4, 5, 7],
+            [4, 7, 6],
+        ];
+        let all = bottom.iter().filter(|_| is_closed).chain(&others);
+        mesh.1.extend(all.map(|corners| corners.map(|corner: u32| first + corner)));
+    }
+
+    #[test]
+    fn the_border_is_the_necks_beside_hair() {
+        let head = (Vec3::ZERO, Vec3::ONE);
+        // Closed hair with a larger surface than the head, and a small open piece with a long rim.
+        for (low, size, is_closed) in
+            [(Vec3::new(-1.0, 2.0, -1.0), Vec3::splat(3.0), true), (Vec3::Y * 3.0, Vec3::new(6.0, 0.1, 0.1), false)]
+        {
+            let mut mesh = (Vec::new(), Vec::new());
+            add_box(&mut mesh, head.0, head.1, false);
+            add_box(&mut mesh, low, size, is_closed);
+            let end = largest(&mesh.0, &mesh.1).expect("the head is open");
+            assert_eq!((end.low, end.high), (Vec3::ZERO, Vec3::new(1.0, 0.0, 1.0)), "{is_closed}");
+        }
+        let mut closed = (Vec::new(), Vec::new());
+        add_box(&mut closed, head.0, head.1, true);
+        assert!(largest(&closed.0, &closed.1).is_none());
+    }
 }

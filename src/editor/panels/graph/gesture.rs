@@ -214,9 +214,10 @@ impl Hand<'_> {
                     return None;
                 }
                 // The rectangles are where the gesture has brought them.
+                // Selected commands in folded frames have none, and stay.
                 let place = |tag: &Uid| {
-                    let at = self.rects[self.number(*tag)?].min;
-                    Some((*tag, [at.x, at.y]))
+                    let rect = self.rects[self.number(*tag)?];
+                    rect.is_finite().then_some((*tag, [rect.min.x, rect.min.y]))
                 };
                 Some(Outcome::Move(tags.iter().filter_map(place).collect()))
             }

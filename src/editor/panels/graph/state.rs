@@ -1,5 +1,5 @@
-//! State of the graph: selected commands, nodes that were moved by hand, frames that are folded, what is in view. It belongs to the window and lasts
-//! as long as it; no document has any of it.
+//! State of the graph: selected commands, nodes that were moved by hand, frames that are folded, what is in view. It belongs
+//! to the window and lasts as long as it; no document has any of it.
 
 use std::collections::{BTreeMap, BTreeSet};
 

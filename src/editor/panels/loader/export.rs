@@ -1,6 +1,7 @@
 //! Form in which the rig is written as a template: its header, its features, its options and sockets, and a picture taken in
 //! the viewport.
 
+mod draft;
 mod options;
 mod sockets;
 mod typed;
@@ -10,13 +11,14 @@ use bevy_egui::egui::{Button, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetT
 
 use crate::{
     editor::{
-        library::{SaveTemplate, TemplateDraft, Written, header_edit},
+        library::{HEADER, SaveTemplate, TemplateDraft, Written},
         panel::Requests,
         panels::displayed_rig::{DisplayedRig, Stamp},
     },
     plugins::commands::RigModules,
     rig::{RigAbout, feature::combined_features},
 };
+use draft::HeaderDraft;
 use options::OptionList;
 use sockets::SocketList;
 
@@ -75,17 +77,18 @@ impl ExportForm {
         draft: &TemplateDraft,
         requests: &mut Requests,
     ) {
+        let mut header = HeaderDraft::of(shown);
         for field in HeaderField::ALL {
-            self.field(ui, shown, field, requests);
+            self.field(ui, shown, field, &mut header, requests);
         }
         let features = self.features(shown);
         if !features.is_empty() {
             ui.add(Label::new(RichText::new(format!("Features: {features}")).small()).wrap());
         }
         if let Some(modules) = world.get_resource::<RigModules>() {
-            self.options.show(ui, shown, &modules.0, requests);
+            self.options.show(ui, shown, &modules.0, &mut header, requests);
         }
-        self.sockets.show(ui, shown, requests);
+        self.sockets.show(ui, shown, &mut header, requests);
         ui.separator();
         let mut next = draft.clone();
         let suggested = TemplateDraft { path: String::new(), ..draft.clone() }.file(world).display().to_string();
@@ -134,9 +137,15 @@ impl ExportForm {
     }
 
     /// Draws a field of the header; what was typed becomes one step when the field is left.
-    fn field(&mut self, ui: &mut Ui, shown: &DisplayedRig, field: HeaderField, requests: &mut Requests) {
-        let mut about = shown.rig.about().clone();
-        let now = field.of(&mut about).clone();
+    fn field(
+        &mut self,
+        ui: &mut Ui,
+        shown: &DisplayedRig,
+        field: HeaderField,
+        header: &mut HeaderDraft,
+        requests: &mut Requests,
+    ) {
+        let now = field.of(&mut shown.rig.about().clone()).clone();
         let mut text = match &self.typed {
             Some((rig, of, text)) if (*rig, *of) == (shown.entity, field) => text.clone(),
             _ => now.clone(),
@@ -157,8 +166,7 @@ impl ExportForm {
         }
         let typed = self.typed.take_if(|(rig, of, _)| (*rig, *of) == (shown.entity, field));
         if let Some((_, _, text)) = typed.filter(|(_, _, text)| *text != now) {
-            *field.of(&mut about) = text;
-            requests.send(header_edit(shown.entity, about));
+            header.change(HEADER, requests, |about| *field.of(about) = text);
         }
     }
 }

@@ -114,14 +114,14 @@ fn seek(world: &mut World, time: f32) {
 }
 
 fn act(world: &mut World, action: TimelineAction) {
+    let is_key = matches!(action, TimelineAction::Key | TimelineAction::KeyAll);
+    // A clip that is refused is not begun again and again; a key with an obstacle is no longer waited for.
+    let has_begun = is_key && std::mem::take(&mut world.resource_mut::<Timeline>().begun);
     if let Some(reason) = obstacle(world, action) {
         let text = format!("{}: {reason}.", action.name());
         world.write_message(Notice::info(text));
         return;
     }
-    let is_key = matches!(action, TimelineAction::Key | TimelineAction::KeyAll);
-    // A clip that is refused is not begun again and again.
-    let has_begun = is_key && std::mem::take(&mut world.resource_mut::<Timeline>().begun);
     if is_key && !has_begun && OpenClip::of(world).is_none() {
         begin_clip(world);
         // The clip reaches the document within this frame.

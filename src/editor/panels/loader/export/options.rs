@@ -2,12 +2,10 @@
 
 use std::sync::Arc;
 
+use bevy::prelude::Entity;
 use bevy_egui::egui::{Checkbox, ComboBox, Frame, Label, RichText, Ui, WidgetInfo, WidgetType};
 
-use super::{
-    sockets::{change, free_name},
-    typed::TypedFields,
-};
+use super::{draft::HeaderDraft, sockets::free_name, typed::TypedFields};
 use crate::{
     editor::{
         notice::Notice,
@@ -39,60 +37,74 @@ struct Target {
 
 impl OptionList {
     /// Draws the options.
-    pub fn show(&mut self, ui: &mut Ui, shown: &DisplayedRig, modules: &Arc<Modules>, requests: &mut Requests) {
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        shown: &DisplayedRig,
+        modules: &Arc<Modules>,
+        draft: &mut HeaderDraft,
+        requests: &mut Requests,
+    ) {
         ui.strong("Options");
         let about = shown.rig.about();
         if !about.options.is_empty() && about.kind != "part" {
             let text = "Options are set where the template is used as a part: its kind is to be \"part\".";
             ui.add(Label::new(RichText::new(text).small()).wrap());
         }
+        let mut removed = None;
         for (number, option) in about.options.iter().enumerate() {
             Frame::group(ui.style()).inner_margin(4.0).show(ui, |ui| {
                 ui.set_width(ui.available_width());
-                self.option(ui, shown, modules, (number, option), requests);
+                if self.option(ui, shown, modules, (number, option), draft, requests) {
+                    removed = Some(number);
+                }
             });
         }
         let target = ui.menu_button("+ Option", |ui| parameters(ui, shown, modules)).inner.flatten();
         if let Some(target) = target {
             match fresh(shown, modules, &target) {
-                Some(option) => change(shown, "Add option", requests, |about| about.options.push(option)),
+                Some(option) => draft.change("Add option", requests, |about| about.options.push(option)),
                 None => {
                     requests.send(Notice::error("The parameters of the command cannot be read: correct them first"))
                 }
             }
         }
+        if let Some(number) = removed {
+            draft.change("Remove option", requests, |about| drop(about.options.remove(number)));
+        }
     }
 
+    /// Draws an option; returns true if it is to go.
     fn option(
         &mut self,
         ui: &mut Ui,
         shown: &DisplayedRig,
         modules: &Arc<Modules>,
         (number, option): (usize, &PartOption),
+        draft: &mut HeaderDraft,
         requests: &mut Requests,
-    ) {
+    ) -> bool {
         let (name, rig) = (&option.name, shown.entity);
+        let mut is_removed = false;
         ui.horizontal(|ui| {
             let width = (ui.available_width() - 34.0).max(60.0);
             if let Some(text) = self.fields.text(ui, rig, &format!("Name of option {name}"), name, width) {
                 match text.trim() {
                     "" => requests.send(Notice::warning(format!("The option {name} stays: an option needs a name"))),
-                    text => change(shown, CHANGE, requests, |about| about.options[number].name = text.to_owned()),
+                    text => draft.change(CHANGE, requests, |about| about.options[number].name = text.to_owned()),
                 }
             }
-            if list::symbol_button(ui, "✖", &format!("Remove option {name}")) {
-                change(shown, "Remove option", requests, |about| drop(about.options.remove(number)));
-            }
+            is_removed = list::symbol_button(ui, "✖", &format!("Remove option {name}"));
         });
         ui.horizontal(|ui| {
-            choose_form(ui, shown, number, option, requests);
-            self.default(ui, shown, number, option, requests);
+            choose_form(ui, (number, option), draft, requests);
+            self.default(ui, rig, (number, option), draft, requests);
         });
-        self.limits(ui, shown, number, option, requests);
+        self.limits(ui, rig, (number, option), draft, requests);
         let width = ui.available_width();
         let said = format!("Description of option {name}");
         if let Some(text) = self.fields.text(ui, rig, &said, &option.description, width) {
-            change(shown, CHANGE, requests, |about| about.options[number].description = text);
+            draft.change(CHANGE, requests, |about| about.options[number].description = text);
         }
         for (place, (tag, param)) in option.sets.iter().enumerate() {
             ui.horizontal(|ui| {
@@ -101,7 +113,7 @@ impl OptionList {
                 if option.sets.len() > 1
                     && list::symbol_button(ui, "✖", &format!("Option {name} leaves {param} of {tag}"))
                 {
-                    change(shown, CHANGE, requests, |about| drop(about.options[number].sets.remove(place)));
+                    draft.change(CHANGE, requests, |about| drop(about.options[number].sets.remove(place)));
                 }
             });
         }
@@ -109,17 +121,18 @@ impl OptionList {
         if let Some(Target { tag, param }) = also.inner.flatten() {
             let target = (tag_name(&shown.rig, tag), param);
             if !option.sets.contains(&target) {
-                change(shown, CHANGE, requests, |about| about.options[number].sets.push(target));
+                draft.change(CHANGE, requests, |about| about.options[number].sets.push(target));
             }
         }
+        is_removed
     }
 
     fn default(
         &mut self,
         ui: &mut Ui,
-        shown: &DisplayedRig,
-        number: usize,
-        option: &PartOption,
+        rig: Entity,
+        (number, option): (usize, &PartOption),
+        draft: &mut HeaderDraft,
         requests: &mut Requests,
     ) {
         let said = format!("Default of option {}", option.name);
@@ -135,11 +148,11 @@ impl OptionList {
                 false => option.default.clone(),
             };
             let width = ui.available_width();
-            let typed = self.fields.text(ui, shown.entity, &said, &now, width);
+            let typed = self.fields.text(ui, rig, &said, &now, width);
             typed.map(|text| if is_text { ron_text(&text) } else { text.trim().to_owned() })
         };
         if let Some(value) = value {
-            change(shown, CHANGE, requests, |about| about.options[number].default = value);
+            draft.change(CHANGE, requests, |about| about.options[number].default = value);
         }
     }
 
@@ -147,18 +160,18 @@ impl OptionList {
     fn limits(
         &mut self,
         ui: &mut Ui,
-        shown: &DisplayedRig,
-        number: usize,
-        option: &PartOption,
+        rig: Entity,
+        (number, option): (usize, &PartOption),
+        draft: &mut HeaderDraft,
         requests: &mut Requests,
     ) {
-        let (width, rig, name) = (ui.available_width(), shown.entity, &option.name);
+        let (width, name) = (ui.available_width(), &option.name);
         match &option.form {
             Some(OptionForm::Slider { min, max, step }) => {
                 match self.fields.numbers(ui, rig, &format!("Range of option {name}"), [*min, *max], width) {
                     Some(Ok([min, max])) if min < max => {
                         let form = OptionForm::Slider { min, max, step: *step };
-                        change(shown, CHANGE, requests, |about| reform(&mut about.options[number], Some(form)));
+                        draft.change(CHANGE, requests, |about| reform(&mut about.options[number], Some(form)));
                     }
                     Some(_) => {
                         let text =
@@ -173,7 +186,7 @@ impl OptionList {
                 if let Some(text) = self.fields.text(ui, rig, &said, &options.join(", "), width) {
                     let texts = text.split(',').map(str::trim).filter(|text| !text.is_empty());
                     let form = OptionForm::Menu { options: texts.map(str::to_owned).collect() };
-                    change(shown, CHANGE, requests, |about| reform(&mut about.options[number], Some(form)));
+                    draft.change(CHANGE, requests, |about| reform(&mut about.options[number], Some(form)));
                 }
             }
             _ => {}
@@ -182,7 +195,7 @@ impl OptionList {
 }
 
 /// Draws the choice of the form; a default that the other form does not take becomes one that it takes.
-fn choose_form(ui: &mut Ui, shown: &DisplayedRig, number: usize, option: &PartOption, requests: &mut Requests) {
+fn choose_form(ui: &mut Ui, (number, option): (usize, &PartOption), draft: &mut HeaderDraft, requests: &mut Requests) {
     let said = format!("Form of option {}", option.name);
     let forms = [
         None,
@@ -204,7 +217,7 @@ fn choose_form(ui: &mut Ui, shown: &DisplayedRig, number: usize, option: &PartOp
     });
     menu.response.widget_info(|| WidgetInfo::labeled(WidgetType::ComboBox, true, &said));
     if let Some(form) = chosen {
-        change(shown, CHANGE, requests, |about| reform(&mut about.options[number], form));
+        draft.change(CHANGE, requests, |about| reform(&mut about.options[number], form));
     }
 }
 

@@ -3,10 +3,9 @@
 use bevy::math::Vec3;
 use bevy_egui::egui::{Label, RichText, Ui};
 
-use super::typed::TypedFields;
+use super::{draft::HeaderDraft, typed::TypedFields};
 use crate::{
     editor::{
-        library::header_step,
         notice::Notice,
         panel::Requests,
         panels::{
@@ -15,7 +14,7 @@ use crate::{
         },
     },
     rig::{
-        RigAbout, Uid,
+        Uid,
         part::{HeaderSocket, PartNeeds},
     },
 };
@@ -30,7 +29,7 @@ pub(super) struct SocketList {
 
 impl SocketList {
     /// Draws the sockets.
-    pub fn show(&mut self, ui: &mut Ui, shown: &DisplayedRig, requests: &mut Requests) {
+    pub fn show(&mut self, ui: &mut Ui, shown: &DisplayedRig, draft: &mut HeaderDraft, requests: &mut Requests) {
         ui.strong("Sockets");
         let needs = self.needs(shown);
         if !needs.is_empty() {
@@ -40,8 +39,11 @@ impl SocketList {
             ui.add(Label::new(text).wrap()).on_hover_text(tip);
         }
         let about = shown.rig.about();
+        let mut removed = None;
         for (number, socket) in about.sockets.iter().enumerate() {
-            self.socket(ui, shown, number, socket, requests);
+            if self.socket(ui, shown, (number, socket), draft, requests) {
+                removed = Some(number);
+            }
         }
         let selected = selected_joint(shown);
         let button = ui.add_enabled(selected.is_ok(), bevy_egui::egui::Button::new("+ Socket"));
@@ -52,7 +54,10 @@ impl SocketList {
         {
             let name = free_name(label.replace('.', "_"), about.sockets.iter().map(|socket| socket.name.as_str()));
             let socket = HeaderSocket { name, joint, translation: Vec3::ZERO, rotation: Vec3::ZERO };
-            change(shown, "Add socket", requests, |about| about.sockets.push(socket));
+            draft.change("Add socket", requests, |about| about.sockets.push(socket));
+        }
+        if let Some(number) = removed {
+            draft.change("Remove socket", requests, |about| drop(about.sockets.remove(number)));
         }
     }
 
@@ -65,31 +70,32 @@ impl SocketList {
         self.needs.as_ref().map_or("", |(_, needs)| needs)
     }
 
+    /// Draws a socket; returns true if it is to go.
     fn socket(
         &mut self,
         ui: &mut Ui,
         shown: &DisplayedRig,
-        number: usize,
-        socket: &HeaderSocket,
+        (number, socket): (usize, &HeaderSocket),
+        draft: &mut HeaderDraft,
         requests: &mut Requests,
-    ) {
+    ) -> bool {
         let name = &socket.name;
+        let mut is_removed = false;
         ui.horizontal(|ui| {
             let width = (ui.available_width() - 66.0).max(60.0);
             if let Some(name) = self.fields.text(ui, shown.entity, &format!("Name of socket {name}"), name, width) {
-                change(shown, "Change socket", requests, |about| about.sockets[number].name = name);
+                let name = name.trim().to_owned();
+                draft.change("Change socket", requests, |about| about.sockets[number].name = name);
             }
             if list::symbol_button(ui, "⌖", &format!("Socket {name} onto the selected joint")) {
                 match selected_joint(shown) {
                     Ok((joint, _)) => {
-                        change(shown, "Change socket", requests, |about| about.sockets[number].joint = joint);
+                        draft.change("Change socket", requests, |about| about.sockets[number].joint = joint);
                     }
                     Err(reason) => requests.send(Notice::warning(format!("The socket {name} stays: {reason}"))),
                 }
             }
-            if list::symbol_button(ui, "✖", &format!("Remove socket {name}")) {
-                change(shown, "Remove socket", requests, |about| drop(about.sockets.remove(number)));
-            }
+            is_removed = list::symbol_button(ui, "✖", &format!("Remove socket {name}"));
         });
         let is_there = shown.rig.joint(socket.joint).is_some();
         let gone = if is_there { "" } else { ", which is gone: the file will not have the socket" };
@@ -102,7 +108,7 @@ impl SocketList {
                 let width = ui.available_width();
                 let tip = if row == 0 { "x, y, z" } else { "degrees about X, Y, Z" };
                 match self.fields.numbers(ui, shown.entity, &field, now.to_array(), width) {
-                    Some(Ok(numbers)) => change(shown, "Change socket", requests, |about| {
+                    Some(Ok(numbers)) => draft.change("Change socket", requests, |about| {
                         let socket = &mut about.sockets[number];
                         let of_row = if row == 0 { &mut socket.translation } else { &mut socket.rotation };
                         *of_row = Vec3::from(numbers);
@@ -115,19 +121,8 @@ impl SocketList {
                 }
             });
         }
+        is_removed
     }
-}
-
-/// Sends a change of the header as one step.
-pub(super) fn change(
-    shown: &DisplayedRig,
-    name: &'static str,
-    requests: &mut Requests,
-    change: impl FnOnce(&mut RigAbout),
-) {
-    let mut about = shown.rig.about().clone();
-    change(&mut about);
-    requests.send(header_step(shown.entity, name, about));
 }
 
 /// A name, with a number if it is taken.

@@ -31,8 +31,8 @@ impl TypedFields {
         typed.map(|(_, _, text)| text).filter(|text| text != now)
     }
 
-    /// Draws a field with numbers that are separated by commas; returns them once the field is left, or the typed text if it is not
-    /// so many numbers.
+    /// Draws a field with numbers that are separated by commas; returns them once the field is left, or the typed text if it
+    /// is not so many numbers.
     pub fn numbers<const N: usize>(
         &mut self,
         ui: &mut Ui,
@@ -43,9 +43,9 @@ impl TypedFields {
     ) -> Option<Result<[f32; N], String>> {
         let shown = now.map(|number| number.to_string()).join(", ");
         let text = self.text(ui, rig, name, &shown, width)?;
-        let numbers: Vec<f32> = text.split([',', ';']).filter_map(|part| part.trim().parse().ok()).collect();
-        match <[f32; N]>::try_from(numbers) {
-            Ok(numbers) if numbers.iter().all(|number| number.is_finite()) => Some(Ok(numbers)),
+        let numbers: Result<Vec<f32>, _> = text.split([',', ';']).map(|part| part.trim().parse::<f32>()).collect();
+        match numbers.map(<[f32; N]>::try_from) {
+            Ok(Ok(numbers)) if numbers.iter().all(|number| number.is_finite()) => Some(Ok(numbers)),
             _ => Some(Err(text)),
         }
     }
