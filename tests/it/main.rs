@@ -39,6 +39,8 @@ mod custom_module;
 mod disks;
 #[cfg(feature = "draw")]
 mod display;
+#[cfg(feature = "editor")]
+mod dock;
 #[cfg(feature = "draw")]
 mod drawing;
 #[cfg(feature = "render")]
