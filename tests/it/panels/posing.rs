@@ -116,6 +116,32 @@ fn poses_are_mirrored_and_reset_in_one_step() {
 }
 
 #[test]
+fn no_card_of_a_pose_is_cut_and_each_is_reached_at_every_height() {
+    let (mut desk, _) = arms(PosesPanel::default());
+    let names: Vec<String> = (1..=5).map(|number| format!("Pose {number}")).collect();
+    names.iter().for_each(|_| desk.click("Store"));
+    desk.frames(3);
+    for height in (140..=640).step_by(25) {
+        let (width, height) = (257.0, height as f32);
+        desk.resize(width, height);
+        let middle = egui::pos2(width / 2.0, height - 20.0);
+        desk.scroll(middle, 5000.0);
+        let is_high = height > 350.0;
+        if is_high {
+            assert!(desk.find("Store").rect.bottom() < height && desk.look("Pose 1").is_some(), "{height}");
+            for card in desk.seen.iter().filter(|seen| names.contains(&seen.label)) {
+                assert!(card.rect.bottom() <= height, "{} at {height}: {:?}", card.label, card.rect);
+            }
+        }
+        desk.scroll(middle, -5000.0);
+        let last = desk.find("Pose 5").rect;
+        assert!(last.top() >= 0.0 && last.bottom() <= height, "the last one at {height}: {last:?}");
+        let apply = desk.seen.iter().rev().find(|seen| seen.label == "Delete").unwrap().rect;
+        assert!(last.contains_rect(apply), "its buttons at {height}: {apply:?} in {last:?}");
+    }
+}
+
+#[test]
 fn a_stored_pose_goes_to_all_to_the_selection_or_to_the_other_side() {
     let (mut desk, [hips, left, right]) = arms(PosesPanel::default());
     desk.edit(Operation::Pose(vec![(hips, bent(0.3))]));
