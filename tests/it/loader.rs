@@ -3,6 +3,7 @@
 #[cfg(feature = "cli")]
 mod authoring;
 mod landing;
+mod older_projects;
 mod sides;
 
 use std::{
