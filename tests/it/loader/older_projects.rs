@@ -118,7 +118,7 @@ fn what_is_added_in_an_older_project_comes_to_what_the_file_has_and_can_be_remov
 fn a_socket_goes_with_its_joint_in_an_older_project_too() {
     let (mut studio, template) = opened(true);
     let point = studio.joint("point");
-    studio.change(Change::Do(Operation::Delete(vec![point])));
+    studio.change(Change::Do(Operation::Delete { joints: vec![point], keep_children: false }));
     save(&mut studio, &template);
     let kept = ["end", "side"].map(str::to_owned).to_vec();
     assert_eq!(lists(&template), (kept, vec!["size".to_owned()]), "{:?}", studio.desk.told());
