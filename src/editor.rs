@@ -11,6 +11,7 @@ pub mod dock;
 pub mod files;
 pub mod fitting;
 pub mod follow;
+pub mod held;
 pub mod help;
 pub mod keys;
 pub mod labels;

@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     files::attend,
-    follow, menu,
+    follow,
+    held::HeldPlugin,
+    menu,
     panel::{Panels, Requests},
     pointer::ViewportArea,
     settings::EditorSettings,
@@ -22,7 +24,8 @@ pub struct DockPlugin;
 
 impl Plugin for DockPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Panels>()
+        app.add_plugins(HeldPlugin)
+            .init_resource::<Panels>()
             .init_resource::<Layout>()
             .add_message::<ShowPanel>()
             .add_systems(Update, show_panels.after(attend))
@@ -184,7 +187,7 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
         .frame(style::bar(&ctx))
         .show(&mut ui, |ui| menu::show(ui, world, &layout, &titles, &mut requests));
     egui::Panel::top("toolbar").frame(style::bar(&ctx)).show(&mut ui, |ui| toolbar::show(ui, world, &mut requests));
-    egui::Panel::bottom("status").frame(style::bar(&ctx)).show(&mut ui, |ui| status::show(ui, world));
+    egui::Panel::bottom("status").frame(style::bar(&ctx)).show(&mut ui, |ui| status::show(ui, world, &mut requests));
     egui::CentralPanel::no_frame().show(&mut ui, |ui| {
         let mut tabs =
             Tabs { panels: &mut panels, world, requests: &mut requests, viewport: &mut viewport, closed: None };
