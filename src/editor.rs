@@ -39,6 +39,7 @@ mod status;
 pub mod style;
 mod toolbar;
 pub mod tools;
+pub mod typing;
 
 use bevy::prelude::*;
 

@@ -18,11 +18,11 @@ use rigsmith::{
 };
 
 /// Size of the window as it opens.
-const USUAL: [f32; 2] = [1280.0, 720.0];
+pub const USUAL: [f32; 2] = [1280.0, 720.0];
 
 /// The window without a system's window: frames are run with raw input.
-struct Frames {
-    app: App,
+pub struct Frames {
+    pub app: App,
     ctx: egui::Context,
     size: egui::Vec2,
     time: f64,
@@ -33,7 +33,7 @@ struct Frames {
 }
 
 impl Frames {
-    fn new([width, height]: [f32; 2]) -> Self {
+    pub fn new([width, height]: [f32; 2]) -> Self {
         let state = tempfile::tempdir().unwrap();
         let mut app = headless_app(7);
         app.insert_resource(StateFolder(Some(state.path().to_owned())))
@@ -49,7 +49,7 @@ impl Frames {
         frames
     }
 
-    fn frame(&mut self) {
+    pub fn frame(&mut self) {
         self.time += 0.4;
         self.ctx.begin_pass(RawInput {
             screen_rect: Some(Rect::from_min_size(Pos2::ZERO, self.size)),
@@ -66,7 +66,7 @@ impl Frames {
         self.app.update();
     }
 
-    fn click(&mut self, at: Pos2, button: PointerButton) {
+    pub fn click(&mut self, at: Pos2, button: PointerButton) {
         self.events.push(Event::PointerMoved(at));
         self.frame();
         for pressed in [true, false] {
@@ -74,6 +74,12 @@ impl Frames {
             self.frame();
         }
         (0..2).for_each(|_| self.frame());
+    }
+
+    /// Place of a text of the last frame, as far as it is seen.
+    pub fn find(&self, text: &str) -> Option<Rect> {
+        let (_, rect, clip) = self.words.iter().find(|(word, ..)| word == text)?;
+        Some(rect.intersect(*clip)).filter(Rect::is_positive)
     }
 
     fn layout(&self) -> &Layout {

@@ -36,6 +36,8 @@ mod clip_files;
 mod commands;
 mod control_sizes;
 mod custom_module;
+#[cfg(feature = "editor")]
+mod discard;
 mod disks;
 #[cfg(feature = "draw")]
 mod display;
@@ -184,6 +186,8 @@ mod timeline;
 #[cfg(feature = "editor")]
 mod tools;
 mod transfer;
+#[cfg(feature = "editor")]
+mod typing;
 mod update;
 #[cfg(feature = "editor")]
 mod updater;
