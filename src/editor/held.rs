@@ -22,7 +22,7 @@ impl Plugin for HeldPlugin {
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DiscardResult(pub HeldResult);
 
-/// A result that waits, and its name for people; the first one if there are several.
+/// Kind of a result that waits, and the words for it: "The face waits"; the first one if there are several.
 pub fn waiting(world: &World) -> Option<(HeldResult, String)> {
     let rig = world.get_resource::<ActiveRig>()?.0;
     // While something is dragged results wait, too, for the end of the drag.
@@ -30,21 +30,21 @@ pub fn waiting(world: &World) -> Option<(HeldResult, String)> {
         return None;
     }
     if let Some(name) = world.get_resource::<ClipImport>().and_then(ClipImport::waits) {
-        return Some((HeldResult::Motion, name.to_owned()));
+        return Some((HeldResult::Motion, format!("{name} waits")));
     }
     if let Some(name) = world.get_resource::<LibraryJobs>().and_then(LibraryJobs::waits) {
-        return Some((HeldResult::Template, name));
+        return Some((HeldResult::Template, format!("{name} waits")));
     }
     let meshes = world.get::<RigMeshes>(rig)?;
     let found = meshes.iter().find_map(|mesh| of_mesh(world, mesh))?;
-    let name = match found {
-        HeldResult::Weights => "Weights",
-        HeldResult::Face => "Face",
-        HeldResult::Fit => "Fit",
-        HeldResult::Mesh => "Changed mesh",
+    let words = match found {
+        HeldResult::Weights => "The weights wait",
+        HeldResult::Face => "The face waits",
+        HeldResult::Fit => "The fit waits",
+        HeldResult::Mesh => "The changed mesh waits",
         HeldResult::Template | HeldResult::Motion => return None,
     };
-    Some((found, name.to_owned()))
+    Some((found, words.to_owned()))
 }
 
 /// Kind of a mesh's result that waits.

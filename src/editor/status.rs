@@ -47,8 +47,8 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
             if let Some(doing) = doing(world) {
                 ui.add(egui::Spinner::new().size(12.0));
                 ui.label(egui::RichText::new(doing).color(accent));
-            } else if let Some((kind, name)) = waiting(world) {
-                let text = egui::RichText::new(format!("{name} waits: redo, or go on editing")).color(accent);
+            } else if let Some((kind, words)) = waiting(world) {
+                let text = egui::RichText::new(format!("{words}: redo, or go on editing")).color(accent);
                 ui.label(text).on_hover_text(kind.sentence());
                 let button = ui.small_button("Discard").on_hover_text("Drops what waits; the rig stays as it is");
                 if button.clicked() {

@@ -5,9 +5,16 @@ use std::sync::Arc;
 use bevy::prelude::*;
 use bevy_egui::egui::PointerButton;
 use rigsmith::{
-    editor::{ActiveRig, held::waiting},
+    algo::face::auto::AutoSettings,
+    editor::{
+        ActiveRig,
+        held::waiting,
+        panels::timeline::import::{ClipImport, ImportRequest},
+    },
+    files::{RealDisk, load_model},
     mesh::model::{Model, Weights},
     plugins::{
+        face::{FaceJob, FaceRequest},
         history::RigHistory,
         landing::HeldResult,
         mesh_reload::{ReloadAnswer, ReloadError, ReloadJob, ReloadRequest},
@@ -16,7 +23,7 @@ use rigsmith::{
         surface::{RigMesh, SkinOf},
     },
     prelude::*,
-    rig::SkinData,
+    rig::{SkinData, animation::RigClip, format::animation::write_animation},
 };
 
 use crate::{
@@ -59,7 +66,8 @@ fn held<M: Message>(frames: &mut Frames, rig: Entity, request: M) {
     begin_drag(&mut frames.app, rig);
     frames.app.world_mut().write_message(request);
     frames.frame();
-    undo_meanwhile(&mut frames.app, rig, new_clip("wave"));
+    let number = frames.app.world().get::<Rig>(rig).unwrap().clips().len();
+    undo_meanwhile(&mut frames.app, rig, new_clip(&format!("wave {number}")));
     wait(frames, "the button", Frames::frame, |frames| frames.find("Discard").is_some());
 }
 
@@ -82,28 +90,21 @@ fn discard(frames: &mut Frames, (rig, kind): (Entity, HeldResult), is_gone: impl
 fn weights_that_wait_are_discarded_in_the_status_line() {
     let (mut frames, rig, mesh) = opened();
     held(&mut frames, rig, BindRequest::new(mesh));
-    assert!(frames.find("Weights waits: redo, or go on editing").is_some());
+    assert!(frames.find("The weights wait: redo, or go on editing").is_some());
     discard(&mut frames, (rig, HeldResult::Weights), |world| world.get::<SkinningJob>(mesh).is_none());
 }
 
 #[test]
 fn a_change_of_weights_that_waits_is_discarded_in_the_status_line() {
     let (mut frames, rig, mesh) = opened();
-    let mut reader = frames.app.world().resource::<Messages<WeightChangeAnswer>>().get_cursor_current();
-    held(&mut frames, rig, WeightChangeRequest { mesh, change: WeightChange::Normalise });
-    let button = frames.find("Discard").unwrap();
-    frames.click(button.center(), PointerButton::Primary);
-    let mut answers = Vec::new();
-    for _ in 0..4 {
-        let messages = frames.app.world().resource::<Messages<WeightChangeAnswer>>();
-        answers.extend(reader.read(messages).map(|answer| answer.result.clone()));
-        frames.frame();
-    }
-    assert!(answers.is_empty() || answers == [Err(WeightChangeError::Discarded)], "{answers:?}");
-    assert!(frames.app.world().get::<WeightChangeJob>(mesh).is_none());
-    change(&mut frames, rig, Change::Redo);
-    held(&mut frames, rig, WeightChangeRequest { mesh, change: WeightChange::Normalise });
+    let request = || WeightChangeRequest { mesh, change: WeightChange::Normalise };
+    held(&mut frames, rig, request());
     discard(&mut frames, (rig, HeldResult::Weights), |world| world.get::<WeightChangeJob>(mesh).is_none());
+    // Asked for again, it is done.
+    let before = frames.app.world().get::<Rig>(rig).unwrap().skin(MESH).cloned();
+    frames.app.world_mut().write_message(request());
+    let skin = |frames: &Frames| frames.app.world().get::<Rig>(rig).unwrap().skin(MESH).cloned();
+    wait(&mut frames, "the change", Frames::frame, |frames| skin(frames) != before);
 }
 
 #[test]
@@ -120,12 +121,46 @@ fn a_version_of_a_mesh_that_waits_is_discarded_in_the_status_line() {
 }
 
 #[test]
+fn a_face_that_waits_is_discarded_in_the_status_line() {
+    let (mut frames, rig, _) = opened();
+    let head = load_model(&RealDisk, "assets/models/head.obj".as_ref()).unwrap();
+    let head = (RigMesh::new(Uid(0x51), head, Vec::new()), SkinOf(rig));
+    let mesh = frames.app.world_mut().spawn(head).id();
+    frames.frame();
+    let settings = AutoSettings { bones: 24, ..AutoSettings::default() };
+    held(&mut frames, rig, FaceRequest { mesh, settings, fit: None });
+    assert!(frames.find("The face waits: redo, or go on editing").is_some());
+    discard(&mut frames, (rig, HeldResult::Face), |world| world.get::<FaceJob>(mesh).is_none());
+}
+
+#[test]
+fn motion_that_waits_is_discarded_in_the_status_line() {
+    let (mut frames, rig, _) = opened();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.anim.ron");
+    let clip = RigClip::new(Uid(0x77), Uid(0x78), "run");
+    let text = write_animation(frames.app.world().get::<Rig>(rig).unwrap(), None, &[clip]);
+    std::fs::write(&path, text).unwrap();
+    held(&mut frames, rig, ImportRequest(path));
+    assert!(frames.find("run.anim.ron waits: redo, or go on editing").is_some());
+    let is_gone = |world: &World| world.resource::<ClipImport>().waits().is_none();
+    discard(&mut frames, (rig, HeldResult::Motion), is_gone);
+}
+
+#[test]
 fn jobs_answer_that_their_result_was_discarded() {
     let (mut frames, rig, mesh) = opened();
     held(&mut frames, rig, ReloadRequest { mesh, model: Arc::new(tower(2.0)) });
-    frames.app.world_mut().get_mut::<ReloadJob>(mesh).unwrap().discard();
     frames.app.world_mut().resource_mut::<Messages<ReloadAnswer>>().clear();
+    frames.app.world_mut().get_mut::<ReloadJob>(mesh).unwrap().discard();
     frames.app.update();
-    let answers: Vec<ReloadAnswer> = frames.app.world_mut().resource_mut::<Messages<ReloadAnswer>>().drain().collect();
-    assert_eq!(answers.first().map(|answer| answer.result.clone()), Some(Err(ReloadError::Discarded)));
+    let answer = frames.app.world_mut().resource_mut::<Messages<ReloadAnswer>>().drain().next();
+    assert_eq!(answer.map(|answer| answer.result), Some(Err(ReloadError::Discarded)));
+
+    held(&mut frames, rig, WeightChangeRequest { mesh, change: WeightChange::Normalise });
+    frames.app.world_mut().resource_mut::<Messages<WeightChangeAnswer>>().clear();
+    frames.app.world_mut().get_mut::<WeightChangeJob>(mesh).unwrap().discard();
+    frames.app.update();
+    let answer = frames.app.world_mut().resource_mut::<Messages<WeightChangeAnswer>>().drain().next();
+    assert_eq!(answer.map(|answer| answer.result), Some(Err(WeightChangeError::Discarded)));
 }
