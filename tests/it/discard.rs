@@ -157,6 +157,7 @@ fn jobs_answer_that_their_result_was_discarded() {
     let answer = frames.app.world_mut().resource_mut::<Messages<ReloadAnswer>>().drain().next();
     assert_eq!(answer.map(|answer| answer.result), Some(Err(ReloadError::Discarded)));
 
+    change(&mut frames, rig, Change::Redo);
     held(&mut frames, rig, WeightChangeRequest { mesh, change: WeightChange::Normalise });
     frames.app.world_mut().resource_mut::<Messages<WeightChangeAnswer>>().clear();
     frames.app.world_mut().get_mut::<WeightChangeJob>(mesh).unwrap().discard();
