@@ -29,7 +29,9 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
     ui.horizontal(|ui| {
         ui.set_min_height(18.0);
         let status = world.get_resource::<StatusLine>().cloned().unwrap_or_default();
-        let counts = match next_step(world) {
+        let held = waiting(world);
+        // What waits is decided about first, and its button needs room.
+        let counts = match next_step(world).filter(|_| held.is_none()) {
             Some(next) => format!("Next: {next}  ·  {}", counts(world)),
             None => counts(world),
         };
@@ -47,7 +49,7 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
             if let Some(doing) = doing(world) {
                 ui.add(egui::Spinner::new().size(12.0));
                 ui.label(egui::RichText::new(doing).color(accent));
-            } else if let Some((kind, words)) = waiting(world) {
+            } else if let Some((kind, words)) = held {
                 let text = egui::RichText::new(format!("{words}: redo, or go on editing")).color(accent);
                 ui.label(text).on_hover_text(kind.sentence());
                 let button = ui.small_button("Discard").on_hover_text("Drops what waits; the rig stays as it is");
