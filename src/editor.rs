@@ -11,6 +11,7 @@ pub mod dock;
 pub mod files;
 pub mod fitting;
 pub mod follow;
+pub mod held;
 pub mod help;
 pub mod keys;
 pub mod labels;
@@ -38,6 +39,7 @@ mod status;
 pub mod style;
 mod toolbar;
 pub mod tools;
+pub mod typing;
 
 use bevy::prelude::*;
 

@@ -24,6 +24,7 @@ mod fault;
 mod folder;
 mod identity;
 pub mod journal;
+mod kept_lists;
 mod library;
 mod load;
 mod parts;
@@ -62,6 +63,8 @@ pub use project::{
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
 pub use site::{SITE_FILE, SearchPaths, SiteError, TEMPLATES_VARIABLE};
-pub use store::{StoreError, store_animation, store_avatar, store_model, store_rig, store_rig_over, store_skin};
+pub use store::{
+    StoreError, store_animation, store_avatar, store_document_over, store_model, store_rig, store_rig_over, store_skin,
+};
 pub(crate) use template_text::template_text;
 pub use watch::{FileWatch, LOOK, TemplateWatch};

@@ -145,7 +145,7 @@ impl Plugin for EditorPlugin {
             ReportPlugin,
             FilesPlugin,
             super::building::BuildingPlugin,
-            (super::fitting::FittingPlugin, super::mesh_watch::MeshWatchPlugin),
+            (super::fitting::FittingPlugin, super::mesh_watch::MeshWatchPlugin, super::typing::TypingPlugin),
             super::follow::FollowPlugin,
             super::render_errors::RenderErrorsPlugin,
         ))
@@ -176,6 +176,7 @@ fn spawn_interface(mut commands: Commands, mut settings: ResMut<EguiGlobalSettin
     settings.auto_create_primary_context = false;
     commands.spawn((
         PrimaryEguiContext,
+        super::typing::context_settings(),
         Camera2d,
         RenderLayers::none(),
         Camera {

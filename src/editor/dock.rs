@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     files::attend,
-    follow, menu,
+    follow,
+    held::HeldPlugin,
+    menu,
     panel::{Panels, Requests},
     pointer::ViewportArea,
     settings::EditorSettings,
@@ -22,7 +24,8 @@ pub struct DockPlugin;
 
 impl Plugin for DockPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<Panels>()
+        app.add_plugins(HeldPlugin)
+            .init_resource::<Panels>()
             .init_resource::<Layout>()
             .add_message::<ShowPanel>()
             .add_systems(Update, show_panels.after(attend))
@@ -36,8 +39,20 @@ pub const VIEWPORT: &str = "Viewport";
 /// Name of the panel whose tab has a mark while there is an update.
 const UPDATER: &str = "Updater";
 
+/// Panels at the left of the viewport.
+const LEFT: &[&str] = &["Hierarchy", "Loader", "Groups", "Sets"];
+
+/// Panels at the right of the viewport, above [`LOWER_RIGHT`].
+const RIGHT: &[&str] = &["Properties", "Tags", "Controls", "Skinning"];
+
+/// Panels at the right of the viewport, in the lower half.
+const LOWER_RIGHT: &[&str] = &["History", "Poses", "Weights", "Face"];
+
 /// Panels below the viewport, which are wide and low.
-const BELOW: [&str; 4] = ["Timeline", "Curves", "Graph", "Log"];
+const BELOW: &[&str] = &["Timeline", "Curves", "Graph", "Process", "Updater", "Display", "Log"];
+
+/// Size of the letters of tabs. All tabs of a place have to fit into its bar in a window of 1280 pixels.
+const TAB_TEXT: f32 = 12.0;
 
 /// Arrangement of the panels; stored between runs.
 #[derive(Resource, Clone, Serialize, Deserialize)]
@@ -51,11 +66,10 @@ impl Default for Layout {
         let mut dock = DockState::new(vec![VIEWPORT.to_owned()]);
         let tabs = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let tree = dock.main_surface_mut();
-        let [centre, _] = tree.split_left(NodeIndex::root(), 0.19, tabs(&["Hierarchy", "Loader", "Groups", "Process"]));
-        let [centre, right] =
-            tree.split_right(centre, 0.75, tabs(&["Properties", "Tags", "Controls", "Skinning", "Weights", "Face"]));
-        let [_, _] = tree.split_below(right, 0.6, tabs(&["History", "Updater", "Poses", "Sets", "Display"]));
-        let [_, _] = tree.split_below(centre, 0.78, tabs(&BELOW));
+        let [centre, _] = tree.split_left(NodeIndex::root(), 0.19, tabs(LEFT));
+        let [centre, right] = tree.split_right(centre, 0.75, tabs(RIGHT));
+        let [_, _] = tree.split_below(right, 0.5, tabs(LOWER_RIGHT));
+        let [_, _] = tree.split_below(centre, 0.78, tabs(BELOW));
         Self { dock }
     }
 }
@@ -75,24 +89,39 @@ impl Layout {
             Some(path) => {
                 self.dock.remove_tab(path);
             }
-            None if BELOW.contains(&title) => self.show_below(title),
-            None => self.dock.push_to_first_leaf(title.to_owned()),
+            None => self.put_back(title),
         }
     }
 
-    /// Shows a panel beside the others below the viewport, or below the viewport if there are none.
-    fn show_below(&mut self, title: &str) {
-        let beside = self.dock.find_tab_from(|tab| BELOW.contains(&tab.as_str()));
+    /// Shows a panel beside the others of its place in the usual layout. Where none of them is shown, a panel of the place
+    /// below the viewport gets it anew, and any other goes to the first place.
+    fn put_back(&mut self, title: &str) {
+        let places = [LEFT, RIGHT, LOWER_RIGHT, BELOW];
+        let neighbours = places.into_iter().find(|place| place.contains(&title)).unwrap_or_default();
+        let beside = self.dock.find_tab_from(|tab| neighbours.contains(&tab.as_str()));
         if let Some(leaf) = beside.and_then(|path| self.dock.leaf_mut(path.node_path()).ok()) {
             leaf.append_tab(title.to_owned());
             return;
         }
-        match self.dock.find_main_surface_tab(&VIEWPORT.to_owned()) {
+        let viewport = self.dock.find_main_surface_tab(&VIEWPORT.to_owned()).filter(|_| BELOW.contains(&title));
+        match viewport {
             Some((viewport, _)) => {
                 self.dock.main_surface_mut().split_below(viewport, 0.78, vec![title.to_owned()]);
             }
             None => self.dock.push_to_first_leaf(title.to_owned()),
         }
+    }
+
+    /// Panels of each place, in the order of their tabs.
+    pub fn places(&self) -> Vec<Vec<&str>> {
+        let leaves = self.dock.iter_leaves();
+        leaves.map(|(_, leaf)| leaf.tabs.iter().map(String::as_str).collect()).collect()
+    }
+
+    /// Area of the place that a panel is in, with its bar of tabs, as it was drawn last.
+    pub fn area(&self, title: &str) -> Option<egui::Rect> {
+        let path = self.dock.find_tab_from(|tab| tab == title)?;
+        self.dock.leaf(path.node_path()).ok().map(|leaf| leaf.rect)
     }
 
     /// Returns `true` if a panel is in front of the others in its place.
@@ -158,14 +187,20 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
         .frame(style::bar(&ctx))
         .show(&mut ui, |ui| menu::show(ui, world, &layout, &titles, &mut requests));
     egui::Panel::top("toolbar").frame(style::bar(&ctx)).show(&mut ui, |ui| toolbar::show(ui, world, &mut requests));
-    egui::Panel::bottom("status").frame(style::bar(&ctx)).show(&mut ui, |ui| status::show(ui, world));
+    egui::Panel::bottom("status").frame(style::bar(&ctx)).show(&mut ui, |ui| status::show(ui, world, &mut requests));
     egui::CentralPanel::no_frame().show(&mut ui, |ui| {
-        let mut tabs = Tabs { panels: &mut panels, world, requests: &mut requests, viewport: &mut viewport };
+        let mut tabs =
+            Tabs { panels: &mut panels, world, requests: &mut requests, viewport: &mut viewport, closed: None };
+        // A button on each tab would take as much room as a word.
         DockArea::new(&mut layout.dock)
             .style(style::dock(&ctx))
+            .show_close_buttons(false)
             .show_leaf_close_all_buttons(false)
             .show_leaf_collapse_buttons(false)
             .show_inside(ui, &mut tabs);
+        if let Some(closed) = tabs.closed.filter(|closed| layout.shows(closed)) {
+            layout.toggle(&closed);
+        }
     });
     for overlay in &mut panels.overlays {
         overlay.show(&ctx, world, &mut requests);
@@ -204,6 +239,8 @@ struct Tabs<'a> {
     world: &'a World,
     requests: &'a mut Requests,
     viewport: &'a mut Option<egui::Rect>,
+    /// Panel that a person closes.
+    closed: Option<String>,
 }
 
 impl TabViewer for Tabs<'_> {
@@ -216,9 +253,24 @@ impl TabViewer for Tabs<'_> {
     fn title(&mut self, tab: &mut String) -> egui::WidgetText {
         match tab.as_str() {
             UPDATER if follow::offer(self.world).is_some() => {
-                egui::RichText::new(format!("{UPDATER} ⬆")).color(style::ACCENT).into()
+                egui::RichText::new(format!("{UPDATER} ⬆")).size(TAB_TEXT).color(style::ACCENT).into()
             }
-            name => name.into(),
+            name => egui::RichText::new(name).size(TAB_TEXT).into(),
+        }
+    }
+
+    /// A tab tells its name to screen readers; the middle button closes its panel.
+    fn on_tab_button(&mut self, tab: &mut String, response: &egui::Response) {
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, format!("Show {tab}")));
+        if tab != VIEWPORT && response.middle_clicked() {
+            self.closed = Some(tab.clone());
+        }
+    }
+
+    fn context_menu(&mut self, ui: &mut egui::Ui, tab: &mut String, _path: egui_dock::NodePath) {
+        if tab != VIEWPORT && ui.button("Close").on_hover_text("The Window menu shows it again").clicked() {
+            self.closed = Some(tab.clone());
+            ui.close();
         }
     }
 

@@ -21,7 +21,7 @@ use crate::{
     plugins::{
         RigSystems,
         limits::RigLimits,
-        mesh_reload::{ReloadAnswer, ReloadRequest},
+        mesh_reload::{ReloadAnswer, ReloadError, ReloadRequest},
         surface::RigMesh,
     },
 };
@@ -127,6 +127,7 @@ fn tell(mut answers: MessageReader<ReloadAnswer>, meshes: Query<&RigMesh>, mut c
                 let moved = report.moved;
                 Notice::done(format!("{name} was read again: {points}points moved by {moved:.4} at most{weights}."))
             }
+            Err(error @ ReloadError::Discarded) => Notice::info(format!("{name} was not read again: {error}.")),
             Err(error) => Notice::error(format!("{name} was not read again: {error}.")),
         };
         commands.write_message(notice);

@@ -4,8 +4,16 @@ use bevy::prelude::*;
 use bevy_egui::egui;
 
 use super::{
-    ActiveRig, files::LoadJob, follow, library::LibraryJobs, next_step::next_step, notice::StatusLine,
-    panels::timeline::import::ClipImport, style,
+    ActiveRig,
+    files::LoadJob,
+    follow,
+    held::{DiscardResult, waiting},
+    library::LibraryJobs,
+    next_step::next_step,
+    notice::StatusLine,
+    panel::Requests,
+    panels::timeline::import::ClipImport,
+    style,
 };
 use crate::{
     plugins::{
@@ -17,11 +25,13 @@ use crate::{
 };
 
 /// Draws the status line.
-pub(super) fn show(ui: &mut egui::Ui, world: &World) {
+pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
     ui.horizontal(|ui| {
         ui.set_min_height(18.0);
         let status = world.get_resource::<StatusLine>().cloned().unwrap_or_default();
-        let counts = match next_step(world) {
+        let held = waiting(world);
+        // What waits is decided about first, and its button needs room.
+        let counts = match next_step(world).filter(|_| held.is_none()) {
             Some(next) => format!("Next: {next}  ·  {}", counts(world)),
             None => counts(world),
         };
@@ -39,6 +49,13 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World) {
             if let Some(doing) = doing(world) {
                 ui.add(egui::Spinner::new().size(12.0));
                 ui.label(egui::RichText::new(doing).color(accent));
+            } else if let Some((kind, words)) = held {
+                let text = egui::RichText::new(format!("{words}: redo, or go on editing")).color(accent);
+                ui.label(text).on_hover_text(kind.sentence());
+                let button = ui.small_button("Discard").on_hover_text("Drops what waits; the rig stays as it is");
+                if button.clicked() {
+                    requests.send(DiscardResult(kind));
+                }
             }
             let label = ui.add(egui::Label::new(text).truncate());
             if let Some(hover) = status.obstacle.as_ref().or(Some(&status.hint)).filter(|hint| !hint.is_empty()) {
@@ -68,13 +85,9 @@ fn doing(world: &World) -> Option<String> {
     {
         return Some(format!("Reading {what}"));
     }
-    let import = world.get_resource::<ClipImport>().and_then(|import| import.waits().map(str::to_owned));
-    if let Some(name) = import.or_else(|| world.get_resource::<LibraryJobs>()?.waits()) {
-        return Some(format!("{name} waits: redo, or go on editing"));
-    }
     let rig = world.get_resource::<ActiveRig>()?.0;
     let jobs = world.get::<RigMeshes>(rig)?.iter().filter_map(|mesh| world.get::<SkinningJob>(mesh));
-    let progress: Vec<f32> = jobs.map(SkinningJob::progress).collect();
+    let progress: Vec<f32> = jobs.filter(|job| !job.waits()).map(SkinningJob::progress).collect();
     let least = progress.iter().copied().reduce(f32::min)?;
     Some(format!("Skinning {:.0} %", least * 100.0))
 }

@@ -6,7 +6,9 @@ use std::{
 };
 
 use super::{
-    Disk, FileKind, FileSet, LoadError, PartFiles, ReadError, SaveError, read_capped, save_atomic, save_set, stem,
+    Disk, FileKind, FileSet, LoadError, PartFiles, ReadError, SaveError,
+    kept_lists::with_kept_lists,
+    read_capped, save_atomic, save_set, stem,
     template_text::{TemplateText, template_text},
     verify,
 };
@@ -290,6 +292,29 @@ pub fn store_rig_over(
     drop((rig, found));
     save_template(disk, path, &text)?;
     Ok(note.into_iter().chain(is_unread.then_some(SOURCE_UNREAD)).map(str::to_owned).collect())
+}
+
+/// Saves a document over its template as [`store_rig_over`] does, and keeps the sockets and options of the file that neither the
+/// document nor its base has; a note names them. The base is the version of the template that the document took over last.
+///
+/// # Errors
+/// Those of [`store_rig_over`].
+pub fn store_document_over(
+    disk: &dyn Disk,
+    path: &Path,
+    rig: &Rig,
+    base: Option<&Rig>,
+    sources: &[&Path],
+) -> Result<Vec<String>, StoreError> {
+    let is_template = FileKind::of(path) == Some(FileKind::Template);
+    let mut texts = sources.iter().filter_map(|source| template_of(disk, source, rig.uid()).ok().flatten());
+    let text = if is_template { texts.next() } else { None };
+    let Some((kept, note)) = text.and_then(|text| with_kept_lists(rig, base, &text)) else {
+        return store_rig_over(disk, path, rig, sources);
+    };
+    let mut notes = store_rig_over(disk, path, kept, sources)?;
+    notes.push(note);
+    Ok(notes)
 }
 
 /// The text of the template of a rig in a file; `None` if the file is not there, or is something else.

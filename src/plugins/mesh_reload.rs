@@ -90,6 +90,9 @@ pub enum ReloadError {
     /// The new version has no points.
     #[error("the new version of the mesh has no points; the one before stays")]
     Empty,
+    /// The version waited, and a person discarded it.
+    #[error("the new version was discarded while it waited; the next save of the file brings another")]
+    Discarded,
     /// The weights cannot be transferred.
     #[error(transparent)]
     Weights(#[from] TransferError),
@@ -105,6 +108,20 @@ pub struct ReloadJob {
     landing: Landing,
     /// Finished exchange that waits to be committed.
     held: Option<FinishedReload>,
+    /// True if a person discards the version that waits.
+    is_discarded: bool,
+}
+
+impl ReloadJob {
+    /// True if the version is ready, and waits to be taken.
+    pub fn waits(&self) -> bool {
+        self.held.is_some()
+    }
+
+    /// Discards a version that waits; the mesh stays as it is.
+    pub fn discard(&mut self) {
+        self.is_discarded = self.held.is_some();
+    }
 }
 
 #[derive(Clone)]
@@ -139,7 +156,7 @@ fn start(
         let task = AsyncComputeTaskPool::get().spawn(async move { reloaded(&mesh, &next, skin.as_deref()) });
         // A file that was saved asks for it, not the person who undoes steps.
         let (model, landing) = (model.clone(), Landing::unasked(history));
-        commands.entity(*entity).insert(ReloadJob { task, model, from, landing, held: None });
+        commands.entity(*entity).insert(ReloadJob { task, model, from, landing, held: None, is_discarded: false });
     }
 }
 
@@ -181,7 +198,11 @@ fn land(
 ) {
     for (entity, mut job, mesh, of, versions) in &mut jobs {
         let job = &mut *job;
-        let finished = if job.held.is_some() { job.held.take().map(Ok) } else { check_ready(&mut job.task) };
+        let finished = match job.held.take() {
+            Some(_) if job.is_discarded => Some(Err(ReloadError::Discarded)),
+            Some(held) => Some(Ok(held)),
+            None => check_ready(&mut job.task),
+        };
         let Some(result) = finished else { continue };
         if let (Ok(finished), Ok((rig, history))) = (&result, rigs.get(of.0)) {
             let has_same_weights = || match (rig.skin(mesh.uid), &job.from) {

@@ -166,6 +166,11 @@ impl SkinningJob {
         self.held.is_some()
     }
 
+    /// True if a [`BindRequest`] asked for the weights; shares of late joints are computed unasked.
+    pub fn is_asked(&self) -> bool {
+        self.is_asked
+    }
+
     /// Stops the computation, or drops weights that wait; the rig stays as it was.
     pub fn cancel(&self) {
         self.control.cancel();

@@ -16,6 +16,7 @@ use rigsmith::{
             FittingPlugin,
             doubts::{FitMarkKind, fit_marks},
         },
+        held::{self, DiscardResult, HeldPlugin},
         notice::Notice,
         pointer::{ModifierKeys, PointerAct, ViewportPointer},
         tools::{
@@ -30,6 +31,7 @@ use rigsmith::{
         document::Change,
         fit::{FitJob, FitMarkers, FitRegion, FitRequest, FitTemplate, FittedRig},
         history::RigHistory,
+        landing::HeldResult,
         surface::RigMesh,
     },
     prelude::*,
@@ -74,7 +76,7 @@ struct Window {
 impl Window {
     fn new(model: Model) -> Self {
         let mut app = headless_app(1);
-        app.add_plugins((ToolsPlugin, FittingPlugin)).init_resource::<Told>().add_systems(Last, collect);
+        app.add_plugins((ToolsPlugin, FittingPlugin, HeldPlugin)).init_resource::<Told>().add_systems(Last, collect);
         let mut app = strict_app(app);
         let rig = app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
         app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(front())));
@@ -271,12 +273,20 @@ fn a_fit_waits_for_steps_that_were_undone_while_it_ran() {
     window.change(Change::Redo);
     assert!(window.rig().is_empty());
     assert_eq!((window.rig().clips().len(), window.steps()), (1, 1));
+    // So does the button of the status line.
+    waiting(&mut window, "jump");
+    assert_eq!(held::waiting(window.world()).map(|(kind, _)| kind), Some(HeldResult::Fit));
+    window.desk.app.world_mut().write_message(DiscardResult(HeldResult::Fit));
+    window.settle();
+    assert_eq!(job(&window), None);
+    window.change(Change::Redo);
+    assert!(window.rig().is_empty());
     // After the redo it lands.
     waiting(&mut window, "run");
     window.change(Change::Redo);
     window.settle();
     assert!(!window.rig().is_empty());
-    assert_eq!((window.rig().clips().len(), window.steps()), (2, 3));
+    assert_eq!((window.rig().clips().len(), window.steps()), (3, 4));
 }
 
 #[test]

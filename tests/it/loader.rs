@@ -3,6 +3,7 @@
 #[cfg(feature = "cli")]
 mod authoring;
 mod landing;
+mod older_projects;
 mod sides;
 
 use std::{
@@ -21,6 +22,7 @@ use rigsmith::{
         camera::ViewportSight,
         files::{FilesPlugin, LoadJob, OpenRequest, SaveJob, StateFolder},
         follow::FollowPlugin,
+        held::HeldPlugin,
         library::{
             ChosenTemplate, DraggedTemplate, LibraryAct, LibraryAction, LibraryFolders, LibraryJobs, LibraryPictures,
             LibraryRequest, SaveTemplate, TemplateDraft, TemplateLibrary, TemplatePicture, TemplateSave, Written,
@@ -124,7 +126,7 @@ impl Studio {
         let mut app = headless_app(7);
         app.insert_resource(StateFolder(Some(folder.path().join("state"))))
             .insert_resource(LibraryFolders(Some(SearchPaths { folders: vec![site.clone()] })))
-            .add_plugins((FilesPlugin, FollowPlugin, PanelsPlugin))
+            .add_plugins((FilesPlugin, FollowPlugin, PanelsPlugin, HeldPlugin))
             .add_message::<AppExit>();
         let size = egui::vec2(620.0, 1400.0);
         let desk = Desk::of(strict_app(app), Entity::PLACEHOLDER, sheet, size);

@@ -36,9 +36,13 @@ mod clip_files;
 mod commands;
 mod control_sizes;
 mod custom_module;
+#[cfg(feature = "editor")]
+mod discard;
 mod disks;
 #[cfg(feature = "draw")]
 mod display;
+#[cfg(feature = "editor")]
+mod dock;
 #[cfg(feature = "draw")]
 mod drawing;
 #[cfg(feature = "render")]
@@ -182,6 +186,8 @@ mod timeline;
 #[cfg(feature = "editor")]
 mod tools;
 mod transfer;
+#[cfg(feature = "editor")]
+mod typing;
 mod update;
 #[cfg(feature = "editor")]
 mod updater;

@@ -327,13 +327,13 @@ fn recent_files_are_kept_and_missing_ones_are_grey() {
 #[test]
 fn a_panel_comes_forward() {
     let mut layout = Layout::default();
-    assert!(layout.is_forward("Properties") && !layout.is_forward("Face"));
-    layout.bring_forward("Face");
-    assert!(layout.is_forward("Face") && !layout.is_forward("Properties"));
-    layout.toggle("Face");
-    assert!(!layout.is_forward("Face"));
-    layout.bring_forward("Face");
-    assert!(layout.shows("Face") && layout.is_forward("Face"), "a closed one is opened");
+    assert!(layout.is_forward("Properties") && !layout.is_forward("Skinning"));
+    layout.bring_forward("Skinning");
+    assert!(layout.is_forward("Skinning") && !layout.is_forward("Properties"));
+    layout.toggle("Skinning");
+    assert!(!layout.is_forward("Skinning"));
+    layout.bring_forward("Skinning");
+    assert!(layout.shows("Skinning") && layout.is_forward("Skinning"), "a closed one is opened");
 }
 
 /// Weights for all points of a mesh, held by one joint.

@@ -22,8 +22,9 @@ use crate::{
     algo::face::expression::{ExpressionSet, vrm_mixes},
     files::{
         FileKind, LoadError, RealDisk, load_animation, load_model, load_rig_text, load_skin, load_template, stem,
-        store_animation, store_avatar, store_model, store_rig_over, store_skin,
+        store_animation, store_avatar, store_document_over, store_model, store_skin,
     },
+    instance::RigSource,
     mesh::{gltf::GltfWriteSettings, model::Model},
     plugins::{
         commands::{BuildResult, RigModules},
@@ -91,10 +92,14 @@ pub(super) fn export(world: &mut World, path: PathBuf) {
     let (step, name) = (last_step(world, rig), file_name(&path));
     let built = world.get::<BuildResult>(rig).map(|built| built.0.clone());
     let Some(modules) = world.get_resource::<RigModules>().map(|modules| modules.0.clone()) else { return };
-    let template = world.get::<OpenDocument>(rig).and_then(|document| document.template.clone());
+    let document = world.get::<OpenDocument>(rig);
+    let template = document.and_then(|document| document.template.clone());
+    let base = document.and_then(|document| document.base.as_ref());
+    let base = world.get::<RigSource>(rig).and_then(RigSource::base).or(base).cloned();
     let options = world.get_resource::<ExportOptions>().cloned().unwrap_or_default();
     let task = spawn(move || {
-        let source = ExportSource { rig: &data, built: built.as_deref(), modules: &modules, mesh: mesh.as_ref() };
+        let (built, base) = (built.as_deref(), base.as_deref());
+        let source = ExportSource { rig: &data, built, modules: &modules, mesh: mesh.as_ref(), base };
         let mut notes = source.write(&path, template.as_deref(), &options)?;
         if more > 0 {
             notes.push(format!("only the first mesh was exported; {more} more are open"));
@@ -116,6 +121,8 @@ struct ExportSource<'a> {
     built: Option<&'a BuiltRig>,
     modules: &'a Arc<Modules>,
     mesh: Option<&'a RigMesh>,
+    /// The version of the template that the document took over last.
+    base: Option<&'a Rig>,
 }
 
 impl ExportSource<'_> {
@@ -147,7 +154,8 @@ impl ExportSource<'_> {
             }
             Some(FileKind::Template | FileKind::RigText) => {
                 let sources = [Some(path), template];
-                Ok(store_rig_over(&RealDisk, path, rig, &sources.into_iter().flatten().collect::<Vec<_>>())?)
+                let sources: Vec<&Path> = sources.into_iter().flatten().collect();
+                Ok(store_document_over(&RealDisk, path, rig, self.base, &sources)?)
             }
             Some(FileKind::Skin) => {
                 let both = mesh.and_then(|mesh| Some((mesh, rig.skin(mesh.uid)?)));

@@ -145,6 +145,12 @@ impl LibraryJobs {
         let waiting = self.job.as_ref().filter(|job| matches!(job.work, Work::Waits(_)));
         waiting.map(|job| job.request.place.stem())
     }
+
+    /// Drops a template that waits; returns its name.
+    pub fn drop_waiting(&mut self) -> Option<String> {
+        let dropped = self.job.take_if(|job| matches!(job.work, Work::Waits(_)));
+        dropped.map(|job| job.request.place.stem())
+    }
 }
 
 /// Snapshot of the open rig for the work.
@@ -169,9 +175,8 @@ pub(super) fn start(
     jobs.waiting.extend(requests.read().cloned());
     // What waits for a redo would else be in the way of all that is asked for after it.
     if !jobs.waiting.is_empty()
-        && let Some(dropped) = jobs.job.take_if(|job| matches!(job.work, Work::Waits(_)))
+        && let Some(name) = jobs.drop_waiting()
     {
-        let name = dropped.request.place.stem();
         commands.write_message(Notice::info(format!("{name} is not used: another was asked for while it waited")));
     }
     if jobs.job.is_none()

@@ -48,6 +48,24 @@ impl List<'_> {
     }
 }
 
+/// Draws those rows of one height that are visible in the scroll area around them.
+pub(super) fn visible_rows(
+    ui: &mut Ui,
+    count: usize,
+    height: f32,
+    draw: impl FnOnce(&mut Ui, Range<usize>, &dyn Fn(usize) -> Rect),
+) {
+    let size = vec2(ui.available_width(), height * count as f32);
+    let (_, area) = ui.allocate_space(size);
+    let row = |number: usize| -> Rect {
+        Rect::from_min_size(area.min + vec2(0.0, height * number as f32), vec2(area.width(), height))
+    };
+    let seen = ui.clip_rect();
+    let first = (((seen.top() - area.top()) / height).floor().max(0.0) as usize).min(count);
+    let last = (((seen.bottom() - area.top()) / height).ceil().max(0.0) as usize).min(count);
+    draw(ui, first..last.max(first), &row);
+}
+
 /// Draws one line of text in a rectangle, vertically centred and cut with an ellipsis; returns `true` if it was cut.
 pub(super) fn line(ui: &Ui, rect: Rect, text: &str, color: Color32) -> bool {
     let font = TextStyle::Body.resolve(ui.style());

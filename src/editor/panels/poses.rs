@@ -4,9 +4,11 @@ mod picture;
 mod shown;
 mod tween;
 
+use std::ops::Range;
+
 use bevy::prelude::*;
 use bevy_egui::egui::{
-    self, Align, Button, Key, Layout, Rect, Sense, Stroke, TextEdit, Ui, UiBuilder, WidgetInfo, WidgetType,
+    self, Align, Button, Key, Layout, Rect, ScrollArea, Sense, Stroke, TextEdit, Ui, UiBuilder, WidgetInfo, WidgetType,
 };
 
 pub(in crate::editor) use self::shown::{PosedRig, put_clip};
@@ -93,6 +95,8 @@ pub struct PosesPanel {
     rename: Option<Rename>,
     tween: Tween,
     pictures: Pictures,
+    /// Height of everything above the cards, as it was drawn last.
+    head: f32,
 }
 
 /// Name of a stored pose that is being typed.
@@ -112,15 +116,14 @@ impl EditorPanel for PosesPanel {
             return list::nothing(ui, "No rig is open.");
         };
         let Some(posed) = PosedRig::of(world, shown.entity) else { return };
-        let mut operation = current(ui, &posed, &shown);
-        operation = self.store(ui, &posed).or(operation);
-        self.tween.show(ui, world, &posed, requests);
-        if posed.rig.stored_poses().is_empty() {
-            list::nothing(ui, "No pose is stored.");
+        // Where no two cards fit below the buttons, all of the panel scrolls.
+        let is_low = ui.available_height() < self.head + 2.0 * CARD;
+        let operation = if is_low {
+            let area = ScrollArea::vertical().id_salt("low poses").auto_shrink(false).min_scrolled_height(0.0);
+            area.show(ui, |ui| self.content(ui, world, (&posed, &shown), true, requests)).inner
         } else {
-            self.pictures.refresh(world, posed.entity, posed.rig);
-            operation = self.stored(ui, world, &posed).or(operation);
-        }
+            self.content(ui, world, (&posed, &shown), false, requests)
+        };
         if let Some(operation) = operation {
             requests.send(EditRequest::operation(posed.entity, operation));
         }
@@ -166,6 +169,28 @@ fn current(ui: &mut Ui, posed: &PosedRig, shown: &DisplayedRig) -> Option<Operat
 }
 
 impl PosesPanel {
+    /// Draws the buttons, then the cards: below each other in a panel that scrolls, else in a list that scrolls.
+    fn content(
+        &mut self,
+        ui: &mut Ui,
+        world: &World,
+        (posed, shown): (&PosedRig, &DisplayedRig),
+        is_low: bool,
+        requests: &mut Requests,
+    ) -> Option<Operation> {
+        let top = ui.cursor().top();
+        let mut operation = current(ui, posed, shown);
+        operation = self.store(ui, posed).or(operation);
+        self.tween.show(ui, world, posed, requests);
+        self.head = ui.cursor().top() - top;
+        if posed.rig.stored_poses().is_empty() {
+            list::nothing(ui, "No pose is stored.");
+            return operation;
+        }
+        self.pictures.refresh(world, posed.entity, posed.rig);
+        self.stored(ui, world, posed, is_low).or(operation)
+    }
+
     /// Draws a name field and a button that stores the pose under it.
     fn store(&mut self, ui: &mut Ui, posed: &PosedRig) -> Option<Operation> {
         let free = free_name(posed.rig);
@@ -188,22 +213,29 @@ impl PosesPanel {
     }
 
     /// The stored poses.
-    fn stored(&mut self, ui: &mut Ui, world: &World, posed: &PosedRig) -> Option<Operation> {
+    fn stored(&mut self, ui: &mut Ui, world: &World, posed: &PosedRig, is_low: bool) -> Option<Operation> {
         let poses = posed.rig.stored_poses();
         let mut operation = None;
         let mut drawn = false;
-        List { id: "poses", count: poses.len(), height: CARD, reveal: None, follow: false }.show(
-            ui,
-            |ui, range, row| {
-                for number in range {
-                    let pose = &poses[number];
-                    drawn |= self.rename.as_ref().is_some_and(|rename| rename.pose == pose.uid);
-                    let rect = row(number).shrink2(egui::vec2(0.0, 1.0));
-                    let asked = self.card(ui, rect, pose, world, posed);
-                    operation = asked.or(operation.take());
-                }
-            },
-        );
+        let draw = |ui: &mut Ui, range: Range<usize>, row: &dyn Fn(usize) -> Rect| {
+            for number in range {
+                let pose = &poses[number];
+                drawn |= self.rename.as_ref().is_some_and(|rename| rename.pose == pose.uid);
+                let rect = row(number).shrink2(egui::vec2(0.0, 1.0));
+                let asked = self.card(ui, rect, pose, world, posed);
+                operation = asked.or(operation.take());
+            }
+        };
+        if is_low {
+            list::visible_rows(ui, poses.len(), CARD, draw);
+        } else {
+            // The list ends between two cards.
+            let whole = (ui.available_height() / CARD).floor().max(1.0) * CARD;
+            ui.scope(|ui| {
+                ui.set_max_height(whole);
+                List { id: "poses", count: poses.len(), height: CARD, reveal: None, follow: false }.show(ui, draw);
+            });
+        }
         // The typed text is also accepted when the field disappears.
         if !drawn && self.rename.as_ref().is_some_and(|rename| rename.focused) {
             let rename = self.rename.take()?;

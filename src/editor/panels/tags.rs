@@ -5,6 +5,7 @@
 pub(super) mod library;
 mod parameter_text;
 mod parts;
+mod read_values;
 mod references;
 mod stack;
 mod values;
@@ -88,6 +89,7 @@ impl EditorPanel for TagsPanel {
             }
         });
         self.stack.entries = entries;
+        self.values.keep(&self.open);
         self.values.tell(requests);
     }
 }

@@ -21,7 +21,7 @@ use crate::{
         tools::paint::brush::BrushPlugin,
     },
     plugins::{
-        painting::{WeightChange, WeightChangeAnswer},
+        painting::{WeightChange, WeightChangeAnswer, WeightChangeError},
         surface::{RigMesh, RigMeshes},
     },
     rig::Uid,
@@ -57,6 +57,9 @@ fn tell_answers(
         notices.write(match result {
             Ok(0) => Notice::info(format!("The weights of {name} are {what} already; nothing changed.")),
             Ok(count) => Notice::done(format!("The weights of {name} are {what}: {count} points changed.")),
+            Err(error @ WeightChangeError::Discarded) => {
+                Notice::info(format!("The weights of {name} were not {what}: {error}."))
+            }
             Err(error) => Notice::warning(format!("The weights of {name} were not {what}: {error}.")),
         });
     }

@@ -85,6 +85,9 @@ pub enum WeightChangeError {
         "the weights, their locks or the mesh were changed meanwhile; the weights stay as they are now: do it again"
     )]
     Changed,
+    /// The finished change waited, and a person discarded it.
+    #[error("the change was discarded while it waited; the weights stay as they are")]
+    Discarded,
     /// Another change of the same mesh is being worked out.
     #[error("the weights of the mesh are being changed already; wait for it")]
     Running,
@@ -115,6 +118,13 @@ impl WeightChangeJob {
     /// True if the change is finished, and waits to be committed.
     pub fn waits(&self) -> bool {
         self.held.is_some()
+    }
+
+    /// Discards a change that waits; the weights stay as they are.
+    pub fn discard(&mut self) {
+        if self.held.is_some() {
+            self.held = Some(Err(WeightChangeError::Discarded));
+        }
     }
 }
 

@@ -1,5 +1,10 @@
 //! Templates that are read while steps are undone.
 
+use rigsmith::{
+    editor::held::{self, DiscardResult},
+    plugins::landing::HeldResult,
+};
+
 use super::*;
 use crate::bench::{begin_drag, new_clip, undo_meanwhile};
 
@@ -55,4 +60,17 @@ fn another_request_takes_the_place_of_a_template_that_waits() {
     assert!(studio.told("another was asked for while it waited"), "{:?}", studio.desk.told());
     assert_eq!((studio.desk.rig().len(), studio.height("hips")), (joints + 2, 1.0));
     assert_eq!(studio.desk.steps(), (1, 1));
+}
+
+#[test]
+fn a_template_that_waits_can_be_discarded() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let (before, tall) = (studio.desk.rig().clone(), studio.tall());
+    waiting(&mut studio, tall, LibraryAct::Load { keep: true });
+    assert_eq!(held::waiting(studio.world()), Some((HeldResult::Template, "tall_man waits".to_owned())));
+    studio.send(DiscardResult(HeldResult::Template));
+    assert!(held::waiting(studio.world()).is_none() && studio.told("it was discarded"), "{:?}", studio.desk.told());
+    assert_eq!(*studio.desk.rig(), before);
+    studio.change(Change::Redo);
+    assert_eq!((studio.height("hips"), studio.desk.steps()), (1.0, (1, 1)), "the step is done again, and nothing else");
 }

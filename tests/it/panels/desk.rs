@@ -187,6 +187,18 @@ impl Desk {
         self.frame();
     }
 
+    /// Turns the wheel over a place until what lies there does not move any more.
+    pub fn scroll(&mut self, at: Pos2, points: f32) {
+        self.move_to(at);
+        self.events.push(Event::MouseWheel {
+            unit: egui::MouseWheelUnit::Point,
+            delta: egui::vec2(0.0, points),
+            phase: egui::TouchPhase::Move,
+            modifiers: self.held,
+        });
+        self.frames(40);
+    }
+
     pub fn press(&mut self, at: Pos2) {
         self.move_to(at);
         self.button(at, PointerButton::Primary, true);

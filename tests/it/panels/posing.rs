@@ -25,7 +25,7 @@ use rigsmith::{
     },
 };
 
-use super::desk::{Desk, Sheet};
+use super::desk::{Desk, Sheet, ShownWidget};
 
 /// Two arms that are partners, with the left one bent.
 fn arms(panel: impl rigsmith::editor::panel::EditorPanel) -> (Desk, [Uid; 3]) {
@@ -113,6 +113,33 @@ fn poses_are_mirrored_and_reset_in_one_step() {
     one_step(&mut desk, act, |desk| assert_turned(desk, right, -0.8));
     desk.select(&[]);
     one_step(&mut desk, act, |desk| assert_turned(desk, left, 0.0));
+}
+
+#[test]
+fn no_card_of_a_pose_is_cut_and_each_is_reached_at_every_height() {
+    let (mut desk, _) = arms(PosesPanel::default());
+    let names: Vec<String> = (1..=5).map(|number| format!("Pose {number}")).collect();
+    names.iter().for_each(|_| desk.click("Store"));
+    desk.frames(3);
+    for height in (140..=640).step_by(25) {
+        let (width, height) = (257.0, height as f32);
+        desk.resize(width, height);
+        // A list that ends between cards may end this side of the panel's edge.
+        let middle = egui::pos2(width / 2.0, height - 75.0);
+        desk.scroll(middle, 5000.0);
+        let is_high = height > 350.0;
+        if is_high {
+            assert!(desk.find("Store").rect.bottom() < height && desk.look("Pose 1").is_some(), "{height}");
+            for card in desk.seen.iter().filter(|seen| names.contains(&seen.label)) {
+                assert!(card.rect.bottom() <= height, "{} at {height}: {:?}", card.label, card.rect);
+            }
+        }
+        desk.scroll(middle, -5000.0);
+        let last = desk.find("Pose 5").rect;
+        assert!(last.top() >= 0.0 && last.bottom() <= height, "the last one at {height}: {last:?}");
+        let is_whole = |seen: &ShownWidget| seen.label == "Delete" && last.contains_rect(seen.rect);
+        assert!(desk.seen.iter().any(is_whole), "its buttons at {height}: {:?}", desk.seen);
+    }
 }
 
 #[test]

@@ -1,16 +1,26 @@
 //! The list of a joint's tags tells what became of each command.
 
-use std::fs;
+use std::{
+    fs,
+    sync::atomic::{AtomicUsize, Ordering},
+};
 
+use bevy::prelude::*;
 use rigsmith::{
     editor::panels::{properties::PropertiesPanel, tags::TagsPanel},
     files::{RealDisk, load_template, store_rig_over},
     plugins::{
-        commands::{BuildRequest, BuildStep},
+        commands::{BuildRequest, BuildStep, RegisterRigModule},
         document::{Change, EditRequest},
     },
-    rig::{Uid, template::read_template},
+    processor::{BuildScope, ModuleError, RigModule},
+    rig::{
+        RigEdit, TagData, TagKind, Uid,
+        operations::{Operation, TagOperation},
+        template::read_template,
+    },
 };
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::desk::Desk;
 
@@ -80,4 +90,76 @@ fn a_part_that_is_added_stays_a_part() {
     desk.frames(3);
     assert_eq!(*desk.rig(), before);
     assert!(!save(&desk).contains("parts"));
+}
+
+/// How often parameters of [`Counted`] were read.
+static READS: AtomicUsize = AtomicUsize::new(0);
+
+/// A module that counts how often its parameters are read.
+#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Default)]
+#[serde(default, deny_unknown_fields)]
+struct Counted {
+    #[serde(deserialize_with = "counted")]
+    size: f32,
+}
+
+fn counted<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
+    READS.fetch_add(1, Ordering::Relaxed);
+    f32::deserialize(deserializer)
+}
+
+impl RigModule for Counted {
+    const NAME: &'static str = "counted";
+    const DOC: &'static str = "Counts how often it is read.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[("size", "A number.")];
+
+    fn construct(&self, _scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        Ok(())
+    }
+}
+
+#[test]
+fn open_cards_read_their_values_only_when_they_change() {
+    let mut desk = Desk::new(TagsPanel::default());
+    desk.resize(400.0, 1200.0);
+    desk.app.register_rig_module::<Counted>();
+    let joints = desk.chain(&["a", "b"]);
+    let tag = |uid: u64, params: &str| TagData {
+        uid: Uid(uid),
+        enabled: true,
+        comment: String::new(),
+        kind: TagKind::Command { module: "counted".to_owned(), feature: None, params: params.to_owned() },
+    };
+    let add = |joint: Uid, tag: TagData| RigEdit::AddTag { joint, tag: Box::new(tag), index: usize::MAX };
+    let edits = vec![add(joints[0], tag(0xa1, "(size: 2.5)")), add(joints[1], tag(0xa2, "(size: 2.5)"))];
+    desk.edit(Operation::Edits(edits));
+    desk.select(&joints);
+    let reads = |desk: &mut Desk, frames: usize| {
+        let before = READS.load(Ordering::Relaxed);
+        desk.frames(frames);
+        READS.load(Ordering::Relaxed) - before
+    };
+    let shows = |desk: &Desk, value: &str| desk.seen.iter().any(|seen| seen.value == value);
+    assert!(!shows(&desk, "2.5"), "the card is closed");
+    desk.click("Values of counted");
+    desk.frames(5);
+    assert!(shows(&desk, "2.5"), "{:?}", desk.seen);
+    assert_eq!(reads(&mut desk, 40), 0, "nothing changes");
+    // Of another joint nothing is read again.
+    desk.edit(Operation::Labels(vec![(joints[1], "c".to_owned())]));
+    desk.frames(5);
+    assert_eq!(reads(&mut desk, 40), 0, "a name changes");
+    let before = READS.load(Ordering::Relaxed);
+    desk.edit(Operation::Tags(TagOperation::Params(vec![(Uid(0xa1), "(size: 3.5)".to_owned())])));
+    desk.frames(5);
+    assert!(READS.load(Ordering::Relaxed) > before && shows(&desk, "mixed"), "{:?}", desk.seen);
+    desk.edit(Operation::Tags(TagOperation::Params(vec![(Uid(0xa2), "(size: 3.5)".to_owned())])));
+    desk.frames(5);
+    assert!(shows(&desk, "3.5"), "{:?}", desk.seen);
+    assert_eq!(reads(&mut desk, 40), 0, "nothing changes");
+    // Parameters that cannot be read are told, and not read again and again either.
+    desk.edit(Operation::Tags(TagOperation::Params(vec![(Uid(0xa2), "(size: 3.5, width: 1)".to_owned())])));
+    desk.frames(5);
+    assert!(desk.seen.iter().any(|seen| seen.label.contains("line 1") || seen.value.contains("line 1")));
+    assert_eq!(reads(&mut desk, 40), 0, "nothing changes");
 }

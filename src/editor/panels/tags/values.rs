@@ -1,6 +1,9 @@
 //! Values of commands: the form of their module, an element a row.
 
-use std::collections::HashMap;
+use std::{
+    collections::{HashMap, HashSet},
+    sync::Arc,
+};
 
 use bevy_egui::egui::{
     Checkbox, CollapsingHeader, ComboBox, Key, RichText, TextEdit, TextStyle, Ui, WidgetInfo, WidgetType,
@@ -9,7 +12,8 @@ use bevy_egui::egui::{
 use serde::Serialize;
 
 use super::{
-    parameter_text::{ValueError, plain, read, typed_number},
+    parameter_text::{ValueError, read, typed_number},
+    read_values::{CommandValues, ReadValues},
     references,
     stack::Entry,
 };
@@ -23,7 +27,7 @@ use crate::{
         },
     },
     processor::{
-        Builder, ModuleInfo, ParameterValues,
+        Builder, ModuleInfo,
         form::{Form, FormElement, read_module_form},
     },
     rig::{Uid, proportion::Quantity, ron_text},
@@ -53,6 +57,7 @@ pub(super) struct Values {
     numbers: Numbers,
     draft: Option<Draft>,
     forms: HashMap<&'static str, Form>,
+    read: ReadValues,
 }
 
 /// A text being typed.
@@ -68,7 +73,7 @@ pub(super) struct Subject<'a> {
     pub builder: Option<&'a Builder>,
     pub module: &'a ModuleInfo,
     pub entry: &'a Entry,
-    values: Vec<ParameterValues>,
+    values: Arc<CommandValues>,
 }
 
 impl Subject<'_> {
@@ -78,15 +83,16 @@ impl Subject<'_> {
 
     /// RON of a value in the last command, with a mark if other commands have another value.
     fn value(&self, path: &str) -> CommonValue<&str> {
-        let values = self.values.iter().map(|values| values.get(path).unwrap_or("None"));
-        CommonValue::of(values).unwrap_or_default()
+        let known = self.values.get(path);
+        known.map_or(CommonValue { value: "None", mixed: false }, |known| CommonValue {
+            value: &known.text,
+            mixed: known.mixed,
+        })
     }
 
-    /// Three numbers of all commands.
-    fn vector(&self, path: &str) -> Option<[CommonValue<f32>; 3]> {
-        let all = self.values.iter().map(|values| read(values.get(path)?));
-        let all = all.collect::<Option<Vec<[f32; 3]>>>()?;
-        Some([0, 1, 2].map(|axis| CommonValue::of(all.iter().map(|numbers| numbers[axis])).unwrap_or_default()))
+    /// The value without quotation marks.
+    fn plain(&self, path: &str) -> &str {
+        self.values.get(path).map_or("None", |known| &known.plain)
     }
 
     /// Parameters of all commands with the first of some texts that the module takes as the value.
@@ -154,23 +160,29 @@ impl Values {
         module: &ModuleInfo,
         entry: &Entry,
     ) -> Option<ValueEdit> {
-        let values: Result<Vec<_>, _> = entry.params.iter().map(|params| module.values(params)).collect();
-        let values = match values {
-            Ok(values) => values,
+        let form = self.forms.remove(module.name).unwrap_or_else(|| form_of(module));
+        let edit = match self.read.of(module, &form, entry) {
+            Ok(values) => {
+                let subject = Subject { shown, builder, module, entry, values };
+                let edit = self.elements(ui, &subject, &form.content);
+                let source = CollapsingHeader::new("As text")
+                    .id_salt((entry.first.uid, "text"))
+                    .show(ui, |ui| if entry.tags.len() == 1 { self.source(ui, entry) } else { None });
+                edit.or(source.body_returned.flatten())
+            }
             Err(error) => {
                 let reason = format!("line {}, column {}: {}", error.line, error.column, error.message);
                 ui.colored_label(ui.visuals().error_fg_color, reason);
-                return self.source(ui, entry);
+                self.source(ui, entry)
             }
         };
-        let subject = Subject { shown, builder, module, entry, values };
-        let form = self.forms.remove(module.name).unwrap_or_else(|| form_of(module));
-        let edit = self.elements(ui, &subject, &form.content);
         self.forms.insert(module.name, form);
-        let source = CollapsingHeader::new("As text")
-            .id_salt((entry.first.uid, "text"))
-            .show(ui, |ui| if entry.tags.len() == 1 { self.source(ui, entry) } else { None });
-        edit.or(source.body_returned.flatten())
+        edit
+    }
+
+    /// Forgets the values of cards that are not open.
+    pub fn keep(&mut self, open: &HashSet<Uid>) {
+        self.read.keep(open);
     }
 
     /// The parameters as they are written.
@@ -213,7 +225,7 @@ impl Values {
         if let Some(about) = about.filter(|about| !about.doc.is_empty()) {
             row.response.clone().on_hover_text(about.doc);
         }
-        if subject.values.iter().any(|values| !values.is_default(path)) {
+        if subject.values.get(path).is_some_and(|known| !known.is_default) {
             let mut reset = false;
             row.response.context_menu(|ui| {
                 reset = ui.button("Reset to default").clicked();
@@ -236,14 +248,18 @@ impl Values {
                 clicked.then(|| subject.set_to(path, &(mixed || on)))
             }
             FormElement::Menu { options, .. } => {
-                let shown = if mixed { MIXED.to_owned() } else { plain(value) };
-                let shown = if shown == "None" { "—".to_owned() } else { shown.replace('_', " ") };
+                let now = subject.plain(path);
+                let shown = match now {
+                    _ if mixed => MIXED.to_owned(),
+                    "None" => "—".to_owned(),
+                    now => now.replace('_', " "),
+                };
                 let mut chosen = None;
                 labelled(ui, &label, |ui| {
                     let combo = ComboBox::from_id_salt((subject.tag(), path)).selected_text(shown).truncate();
                     let response = combo.width(ui.available_width()).show_ui(ui, |ui| {
                         for option in options {
-                            let is_it = !mixed && plain(value) == *option;
+                            let is_it = !mixed && now == option;
                             if ui.selectable_label(is_it, option.replace('_', " ")).clicked() {
                                 chosen = Some(option.clone());
                             }
@@ -265,7 +281,7 @@ impl Values {
                     Err(_) => self.optional_number(ui, subject, path, &label),
                 }
             }
-            FormElement::Vector(_) => match subject.vector(path) {
+            FormElement::Vector(_) => match subject.values.get(path).and_then(|known| known.vector) {
                 Some(shown) => {
                     let look = Look { speed: 0.01, decimals: 4, suffix: "", quantity: Quantity::Plain };
                     let (axis, edit) = self.numbers.vector(ui, &label, shown, look)?;
@@ -276,14 +292,14 @@ impl Values {
             FormElement::Limits(_) => self.limits(ui, subject, path, &label),
             FormElement::Color(_) => self.color(ui, subject, path, &label),
             FormElement::Node(_) => {
-                let text = plain(if mixed { "\"\"" } else { value });
-                let typed = self.text(ui, subject.tag(), path, &label, &text, false);
-                let picked = references::about(ui, subject, &label, (!mixed).then_some(text.as_str()));
+                let text = if mixed { "" } else { subject.plain(path) };
+                let typed = self.text(ui, subject.tag(), path, &label, text, false);
+                let picked = references::about(ui, subject, &label, (!mixed).then_some(text));
                 typed.or(picked).map(|text| subject.set_to(path, &text))
             }
             FormElement::Text(_) | FormElement::Amount(_) => {
-                let shown = if mixed || value == "None" { String::new() } else { plain(value) };
-                let text = self.text(ui, subject.tag(), path, &label, &shown, false)?;
+                let shown = if mixed || value == "None" { "" } else { subject.plain(path) };
+                let text = self.text(ui, subject.tag(), path, &label, shown, false)?;
                 let text = text.trim();
                 Some(match (element, text.parse::<f32>()) {
                     (FormElement::Amount(_), Ok(number)) => subject.set_to(path, &number),
@@ -310,7 +326,7 @@ impl Values {
 
     /// Three pairs of lowest and highest values; empty fields are open, and so are limits that are left out.
     fn limits(&mut self, ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
-        let limits: [(Option<f32>, Option<f32>); 3] = read(subject.value(path).value).unwrap_or_default();
+        let limits = subject.values.get(path).map(|known| known.limits).unwrap_or_default();
         let mut pairs = limits.map(|(low, high)| [low, high]);
         ui.label(label);
         let mut edit = None;
@@ -334,7 +350,7 @@ impl Values {
 
     fn color(&mut self, ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
         let id = ui.make_persistent_id((subject.tag(), path, "colour"));
-        let stored = read(subject.value(path).value);
+        let stored = subject.values.get(path).and_then(|known| known.color);
         let kept: Option<[f32; 3]> = ui.data(|data| data.get_temp(id));
         let mut edit = None;
         labelled(ui, label, |ui| {
@@ -432,7 +448,9 @@ fn made_form(module: &ModuleInfo) -> Form {
 fn axis_edit(subject: &Subject, path: &str, axis: usize, edit: NumberEdit) -> ValueEdit {
     let each = |number: f32| -> Result<Vec<(Uid, String)>, ValueError> {
         let mut changed = Vec::new();
-        for (((_, tag), params), values) in subject.entry.tags.iter().zip(&subject.entry.params).zip(&subject.values) {
+        for (((_, tag), params), values) in
+            subject.entry.tags.iter().zip(&subject.entry.params).zip(&subject.values.commands)
+        {
             let mut vector: [f32; 3] = values.get(path).and_then(read).unwrap_or_default();
             vector[axis] = number;
             changed.push((*tag, subject.module.with_value(params, path, &ron_text(&vector))?));
@@ -450,7 +468,7 @@ fn axis_edit(subject: &Subject, path: &str, axis: usize, edit: NumberEdit) -> Va
 /// Three boxes to check; the text of a value that is no vector.
 fn boxes(ui: &mut Ui, subject: &Subject, path: &str, label: &str) -> Option<ValueEdit> {
     let text = subject.value(path).value;
-    let mut boxes: Option<[bool; 3]> = read(text);
+    let mut boxes = subject.values.get(path).and_then(|known| known.boxes);
     let mut changed = false;
     labelled(ui, label, |ui| match &mut boxes {
         Some(boxes) => {

@@ -134,8 +134,8 @@ impl ClipImport {
         self.job.as_ref().filter(|job| matches!(job.work, Work::Waits(_))).map(|job| job.name.as_str())
     }
 
-    /// Drops clips that wait, in favour of another import; returns the name of their file.
-    fn drop_waiting(&mut self) -> Option<String> {
+    /// Drops clips that wait; returns the name of their file.
+    pub fn drop_waiting(&mut self) -> Option<String> {
         self.job.take_if(|job| matches!(job.work, Work::Waits(_))).map(|job| job.name)
     }
 

@@ -1,0 +1,188 @@
+//! The dock of the window: every panel's tab lies in the bar of its place and is reached with one click.
+
+use bevy::prelude::*;
+use bevy_egui::{
+    EguiContext, EguiPrimaryContextPass, PrimaryEguiContext,
+    egui::{self, Event, Modifiers, PointerButton, Pos2, RawInput, Rect},
+};
+use rigsmith::{
+    editor::{
+        dock::{DockPlugin, Layout, VIEWPORT},
+        files::{FilesPlugin, StateFolder},
+        follow::FollowPlugin,
+        panel::Panels,
+        panels::PanelsPlugin,
+    },
+    headless::headless_app,
+    test_app::strict_app,
+};
+
+/// Size of the window as it opens.
+pub const USUAL: [f32; 2] = [1280.0, 720.0];
+
+/// The window without a system's window: frames are run with raw input.
+pub struct Frames {
+    pub app: App,
+    ctx: egui::Context,
+    size: egui::Vec2,
+    time: f64,
+    events: Vec<Event>,
+    /// Words of the last frame: where they are, and the part of the window in which they are seen.
+    words: Vec<(String, Rect, Rect)>,
+    _state: tempfile::TempDir,
+}
+
+impl Frames {
+    pub fn new([width, height]: [f32; 2]) -> Self {
+        let state = tempfile::tempdir().unwrap();
+        let mut app = headless_app(7);
+        app.insert_resource(StateFolder(Some(state.path().to_owned())))
+            .add_plugins((FilesPlugin, FollowPlugin, PanelsPlugin, DockPlugin))
+            .add_message::<AppExit>();
+        let mut app = strict_app(app);
+        app.update();
+        let entity = app.world_mut().spawn(PrimaryEguiContext).id();
+        let ctx = app.world_mut().get_mut::<EguiContext>(entity).unwrap().get_mut().clone();
+        let size = egui::vec2(width, height);
+        let mut frames = Self { app, ctx, size, time: 0.0, events: Vec::new(), words: Vec::new(), _state: state };
+        (0..4).for_each(|_| frames.frame());
+        frames
+    }
+
+    pub fn frame(&mut self) {
+        self.time += 0.4;
+        self.ctx.begin_pass(RawInput {
+            screen_rect: Some(Rect::from_min_size(Pos2::ZERO, self.size)),
+            time: Some(self.time),
+            events: std::mem::take(&mut self.events),
+            ..default()
+        });
+        self.app.world_mut().run_schedule(EguiPrimaryContextPass);
+        let mut output = self.ctx.end_pass();
+        // Nothing is drawn, so no texture has to be made.
+        output.textures_delta.clear();
+        self.words.clear();
+        output.shapes.iter().for_each(|shape| words(&shape.shape, shape.clip_rect, &mut self.words));
+        self.app.update();
+    }
+
+    pub fn click(&mut self, at: Pos2, button: PointerButton) {
+        self.events.push(Event::PointerMoved(at));
+        self.frame();
+        for pressed in [true, false] {
+            self.events.push(Event::PointerButton { pos: at, button, pressed, modifiers: Modifiers::NONE });
+            self.frame();
+        }
+        (0..2).for_each(|_| self.frame());
+    }
+
+    /// Place of a text of the last frame, as far as it is seen.
+    pub fn find(&self, text: &str) -> Option<Rect> {
+        let (_, rect, clip) = self.words.iter().find(|(word, ..)| word == text)?;
+        Some(rect.intersect(*clip)).filter(Rect::is_positive)
+    }
+
+    fn layout(&self) -> &Layout {
+        self.app.world().resource::<Layout>()
+    }
+
+    /// The word on a panel's tab, which is in the bar at the top of its place, and the part of the window that shows it.
+    fn tab(&self, title: &str) -> (Rect, Rect) {
+        let area = self.layout().area(title).unwrap_or_else(|| panic!("{title} is not shown"));
+        let bar = Rect::from_min_size(area.min, egui::vec2(area.width(), 24.0));
+        let is_it = |(word, rect, _): &&(String, Rect, Rect)| word == title && bar.y_range().contains(rect.center().y);
+        let near = |(_, rect, _): &&(String, Rect, Rect)| rect.left() >= bar.left() - 1.0;
+        let found = self.words.iter().filter(is_it).find(near);
+        found.map(|(_, rect, clip)| (*rect, *clip)).unwrap_or_else(|| panic!("{title} has no tab: {:?}", self.words))
+    }
+}
+
+fn words(shape: &egui::Shape, clip: Rect, seen: &mut Vec<(String, Rect, Rect)>) {
+    match shape {
+        egui::Shape::Text(text) => {
+            let rect = Rect::from_min_size(text.pos, text.galley.size());
+            seen.push((text.galley.text().to_owned(), rect, clip));
+        }
+        egui::Shape::Vec(shapes) => shapes.iter().for_each(|shape| words(shape, clip, seen)),
+        _ => {}
+    }
+}
+
+fn titles(frames: &Frames) -> Vec<&'static str> {
+    frames.app.world().resource::<Panels>().panels.iter().map(|panel| panel.title()).collect()
+}
+
+#[test]
+fn all_tabs_of_the_usual_layout_lie_in_their_bars() {
+    let frames = Frames::new(USUAL);
+    for title in titles(&frames) {
+        let (word, clip) = frames.tab(title);
+        let area = frames.layout().area(title).unwrap();
+        assert!(clip.contains_rect(word), "{title} is cut: {word:?} in {clip:?}");
+        assert!(area.x_range().contains(word.left() - 7.0), "{title}: {word:?} in {area:?}");
+        assert!(area.x_range().contains(word.right() + 7.0), "{title}: {word:?} in {area:?}");
+    }
+}
+
+#[test]
+fn each_panel_is_reached_with_one_click_on_its_tab() {
+    let mut frames = Frames::new(USUAL);
+    let mut titles = titles(&frames);
+    titles.reverse();
+    let front = |frames: &Frames| titles.iter().filter(|title| frames.layout().is_forward(title)).count();
+    let places = front(&frames) + 1;
+    assert_eq!(frames.layout().places().len(), places, "the viewport has a place of its own");
+    for title in &titles {
+        let (word, _) = frames.tab(title);
+        frames.click(word.center(), PointerButton::Primary);
+        assert!(frames.layout().is_forward(title), "{title}");
+    }
+    assert_eq!(front(&frames) + 1, places);
+}
+
+#[test]
+fn a_closed_panel_comes_back_beside_its_neighbours() {
+    let mut frames = Frames::new(USUAL);
+    let of = |frames: &Frames, title: &str| {
+        let places = frames.layout().places();
+        places.iter().find(|place| place.contains(&title)).map(|place| place.len())
+    };
+    for title in ["Face", "Skinning", "Sets", "Graph"] {
+        let before = of(&frames, title);
+        let (word, _) = frames.tab(title);
+        frames.click(word.center(), PointerButton::Middle);
+        assert_eq!(of(&frames, title), None, "{title} is closed");
+        let mut layout = frames.layout().clone();
+        layout.bring_forward(title);
+        frames.app.insert_resource(layout);
+        (0..3).for_each(|_| frames.frame());
+        assert_eq!(of(&frames, title), before, "{title} is where it was");
+        assert!(frames.layout().is_forward(title));
+    }
+    // The menu of a tab closes its panel, too; the viewport stays.
+    let (word, _) = frames.tab("Log");
+    frames.click(word.center(), PointerButton::Secondary);
+    let close = frames.words.iter().find(|(text, ..)| text == "Close").map(|(_, rect, _)| rect.center());
+    frames.click(close.expect("the menu has an entry"), PointerButton::Primary);
+    assert!(!frames.layout().shows("Log"));
+    let (word, _) = frames.tab(VIEWPORT);
+    frames.click(word.center(), PointerButton::Middle);
+    assert!(frames.layout().shows(VIEWPORT));
+}
+
+#[test]
+fn a_panel_whose_neighbours_are_all_closed_is_shown_all_the_same() {
+    let mut layout = Layout::default();
+    for place in [["Timeline", "Curves", "Graph", "Process"], ["Updater", "Display", "Log", "Face"]] {
+        place.into_iter().for_each(|title| layout.toggle(title));
+    }
+    let places = layout.places().len();
+    layout.bring_forward("Graph");
+    assert!(layout.is_forward("Graph"));
+    assert_eq!(layout.places().len(), places + 1, "it is below the viewport again");
+    for title in ["Properties", "Tags", "Controls", "Skinning"] {
+        layout.toggle(title);
+    }
+    layout.bring_forward("Tags");
+    assert!(layout.is_forward("Tags"));
+}
