@@ -228,18 +228,18 @@ pub(super) fn try_updates(
 pub(super) fn compare_templates(
     templates: Res<RigTemplates>,
     modules: Res<RigModules>,
-    mut sources: Query<(Entity, &mut RigSource, Option<&Rig>, Option<&RigHistory>, Has<BuildFailure>)>,
+    mut sources: Query<(Entity, &mut RigSource, Option<(&Rig, &RigHistory)>, Has<BuildFailure>)>,
     mut edits: MessageWriter<EditRequest>,
     mut builds: MessageWriter<BuildRequest>,
     mut commands: Commands,
 ) {
-    for (entity, mut source, rig, history, had_failed) in &mut sources {
+    for (entity, mut source, rig, had_failed) in &mut sources {
         let Some(built) = templates.built.get(&source.template.id()) else { continue };
         if source.seen.as_ref().is_some_and(|seen| Arc::ptr_eq(seen, built)) {
             continue;
         }
         source.seen = Some(built.clone());
-        let Some(rig) = rig else {
+        let Some((rig, history)) = rig else {
             source.base = Some(built.rig.clone());
             commands.entity(entity).try_insert((*built.rig).clone());
             builds.write(BuildRequest { rig: entity, step: BuildStep::All });
@@ -253,10 +253,7 @@ pub(super) fn compare_templates(
         let (updated, poses) = updated(source.base.as_deref(), rig, &built.rig, &Take::Mine.into(), &modules);
         if updated.changes.is_empty() {
             source.base = Some(built.rig.clone());
-        } else if source.is_live
-            && updated.conflicts() == 0
-            && history.is_none_or(|history| !discards(&source, history))
-        {
+        } else if source.is_live && updated.conflicts() == 0 && !discards(history) {
             source.had_failed = had_failed;
             source.notes = poses;
             take_over(entity, rig, updated, built, &mut source, &mut edits, &mut commands);
@@ -269,10 +266,10 @@ pub(super) fn compare_templates(
     }
 }
 
-/// True if a step discards undone steps that are no updates. An undone update gives way to the next version.
-fn discards(source: &RigSource, history: &RigHistory) -> bool {
-    let is_update = |step: &Arc<Step>| source.steps.iter().any(|known| Arc::ptr_eq(&known.step, step));
-    history.undone_steps().any(|step| !is_update(step))
+/// True if a step discards undone steps of a person. Updates that were undone wait for the next version.
+fn discards(history: &RigHistory) -> bool {
+    let (steps, done) = history.steps();
+    steps[done..].iter().any(|step| *step != UPDATE)
 }
 
 /// Carries out accepted offers.
