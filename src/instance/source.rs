@@ -9,7 +9,6 @@ use crate::{
     plugins::{
         commands::{BuildFailure, BuildRequest, BuildResult, BuildStep, RigModules},
         document::{Change, EditRefusal, EditReport, EditRequest},
-        history::RigHistory,
         skinning::BindRequest,
         surface::{RigMesh, RigMeshes},
     },
@@ -31,10 +30,9 @@ pub const UPDATE: &str = "Update from template";
 /// An entity without a [`Rig`] gets the template's, built; meshes of it without weights are bound. When the template changes,
 /// the base (the version accepted last), the rig as it is now and the template are compared: what the template changed is
 /// taken over, what was changed or added here stays. A `live` rig takes it over at once, as one step of its history, unless
-/// both changed the same field to different values, or steps of another kind were undone, which it would discard; such an
-/// update, and every one of a rig that is not live, is an [`UpdateOffer`] until an [`AcceptUpdate`]. Undoing the step brings
-/// the base back, and nothing more is taken over until the file changes again. An update that cannot be built is taken back
-/// and told ([`RigFailed`]).
+/// both changed the same field to different values; such an update, and every one of a rig that is not live, is an
+/// [`UpdateOffer`] until an [`AcceptUpdate`]. Undoing the step brings the base back, and nothing more is taken over until the
+/// file changes again. An update that cannot be built is taken back and told ([`RigFailed`]).
 #[derive(Component, Reflect, Debug, Clone)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug)]
@@ -228,7 +226,7 @@ pub(super) fn try_updates(
 pub(super) fn compare_templates(
     templates: Res<RigTemplates>,
     modules: Res<RigModules>,
-    mut sources: Query<(Entity, &mut RigSource, Option<(&Rig, &RigHistory)>, Has<BuildFailure>)>,
+    mut sources: Query<(Entity, &mut RigSource, Option<&Rig>, Has<BuildFailure>)>,
     mut edits: MessageWriter<EditRequest>,
     mut builds: MessageWriter<BuildRequest>,
     mut commands: Commands,
@@ -239,7 +237,7 @@ pub(super) fn compare_templates(
             continue;
         }
         source.seen = Some(built.clone());
-        let Some((rig, history)) = rig else {
+        let Some(rig) = rig else {
             source.base = Some(built.rig.clone());
             commands.entity(entity).try_insert((*built.rig).clone());
             builds.write(BuildRequest { rig: entity, step: BuildStep::All });
@@ -253,7 +251,7 @@ pub(super) fn compare_templates(
         let (updated, poses) = updated(source.base.as_deref(), rig, &built.rig, &Take::Mine.into(), &modules);
         if updated.changes.is_empty() {
             source.base = Some(built.rig.clone());
-        } else if source.is_live && updated.conflicts() == 0 && !discards(history) {
+        } else if source.is_live && updated.conflicts() == 0 {
             source.had_failed = had_failed;
             source.notes = poses;
             take_over(entity, rig, updated, built, &mut source, &mut edits, &mut commands);
@@ -264,12 +262,6 @@ pub(super) fn compare_templates(
             commands.entity(entity).try_insert(offer);
         }
     }
-}
-
-/// True if a step discards undone steps of a person. Updates that were undone wait for the next version.
-fn discards(history: &RigHistory) -> bool {
-    let (steps, done) = history.steps();
-    steps[done..].iter().any(|step| *step != UPDATE)
 }
 
 /// Carries out accepted offers.

@@ -169,23 +169,6 @@ fn a_live_rig_takes_over_what_the_file_changed_and_keeps_what_is_its_own() {
 }
 
 #[test]
-fn a_live_update_does_not_cut_off_undone_steps() {
-    let mut studio = Studio::new(true);
-    let tip = studio.joint("tail_3");
-    studio.edit(RigEdit::SetLocked(tip, true));
-    studio.request(Change::Undo);
-    studio.save(&CHAIN.replace("(0, 1, 0)", "(0, 1.5, 0)"));
-    studio.until("the offer", |world, rig| world.get::<UpdateOffer>(rig).is_some());
-    assert_eq!((studio.height("tail_1"), studio.instance_report().updated), (1.0, 0));
-    studio.request(Change::Redo);
-    assert!(studio.rig().joint(tip).unwrap().data.locked, "the step was not lost");
-    studio.app.world_mut().write_message(AcceptUpdate { rig: studio.rig, choices: Take::Mine.into() });
-    (0..4).for_each(|_| studio.app.update());
-    assert_eq!((studio.height("tail_1"), studio.instance_report().updated), (1.5, 1));
-    assert!(studio.rig().joint(tip).unwrap().data.locked);
-}
-
-#[test]
 fn a_conflict_is_offered_and_decided_by_a_choice() {
     for (take, height) in [(Take::Mine, 2.0), (Take::Theirs, 1.5)] {
         let mut studio = Studio::new(true);
