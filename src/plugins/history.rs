@@ -250,6 +250,11 @@ impl RigHistory {
         (done.iter().chain(undone.iter().rev()).map(|step| step.name.as_ref()).collect(), done.len())
     }
 
+    /// Steps that can be redone, the next one last.
+    pub fn undone_steps(&self) -> impl Iterator<Item = &Arc<Step>> {
+        self.stacks.undone.iter()
+    }
+
     /// Number of undone steps.
     pub fn undone(&self) -> usize {
         self.stacks.undone.len()

@@ -311,7 +311,9 @@ fn a_biped_with_inverse_kinematics_is_made_of_parts() {
     session.key("Enter");
     session.tab("Tags");
     session.part("spine");
-    session.drag(&[at("clavicle_l"), at("upper_arm_l"), at("forearm_l"), at("hand_l")]);
+    // What begins next to the plane of symmetry begins on it.
+    let clavicle = at("clavicle_l").lerp(at("upper_arm_l"), 0.35);
+    session.drag(&[clavicle, at("upper_arm_l"), at("forearm_l"), at("hand_l")]);
     session.joints(4);
     session.part("arm");
     session.drag(&[at("thigh_l"), at("shin_l"), at("foot_l"), at("toe_l")]);

@@ -13,7 +13,7 @@ pub(super) struct Similarity {
 }
 
 impl Similarity {
-    /// The same with another rotation about the middle of the pairs that it was made from.
+    /// Alignment with another rotation about the middle of the pairs that it was made from.
     pub(super) fn turned(self, rotation: Quat, pairs: &Pairs) -> Self {
         let weight = pairs.iter().map(|pair| pair.2).sum::<f32>().max(1e-9);
         let (from, to) = pairs

@@ -33,7 +33,7 @@ pub struct MeshAnalysis {
     pub(super) trees: Vec<Tree>,
     /// Plane of symmetry, if the mesh has one.
     pub(super) mirror: Option<MirrorPlane>,
-    /// Where the part of the mesh hangs on the rest of it, in unit space.
+    /// Seam on which the part of the mesh hangs on the rest of it, in unit space.
     pub(super) seam: Option<Vec3>,
 }
 

@@ -25,7 +25,7 @@ const END_RADII: f32 = 2.0;
 /// Length of a chain's level part below which it hangs down or stands up.
 const LEVEL: f32 = 0.3;
 
-/// Where the triangles of a region hang on all others; `None` where they hang on nothing.
+/// Seam on which the triangles of a region hang on all others; `None` where they hang on nothing.
 pub(super) fn seam(points: &[Vec3], triangles: &[[u32; 3]], region: &[u32]) -> Option<Vec3> {
     let inside: BTreeSet<u32> = region.iter().copied().collect();
     let is_sound = |corners: &&[u32; 3]| {

@@ -104,7 +104,7 @@ const SHORT: f32 = 0.85;
 
 /// Confidence that is left to a limb of the body model for which there is no branch: an arm beside the hips that it touches is
 /// right, one that is not there is folded into the trunk.
-const UNSEEN: f32 = 0.55;
+const UNSEEN: f32 = 0.5;
 
 /// Lessens the confidence in limbs of the body model that have no branch or are much longer than theirs, and in what hangs on
 /// them.

@@ -158,9 +158,18 @@ fn hover(
     let found = aim.zip(scene.sight()).zip(press.or(last));
     let handle = found.and_then(|((aim, sight), at)| {
         let handle = handle_at(&aim.frame.shapes(aim.parts, &sight), at)?;
-        // Rings that are seen from the side run through the joint, which is pulled there.
-        let is_ring = *mode == Mode::Pose && matches!(handle, Handle::Ring(_));
-        let is_joint = is_ring && sight.project(aim.frame.origin).is_some_and(|middle| middle.distance(at) <= REACH);
+        // Rings that are seen from the side run through the joint, which is pulled there; so does the middle of a control, which
+        // moves nothing while its limb turns forwards.
+        let yields = match handle {
+            Handle::Ring(_) => *mode == Mode::Pose,
+            Handle::MoveView => {
+                *mode == Mode::Pose
+                    && !moves.0
+                    && scene.rig().is_some_and(|rig| joint_at(&scene, &rig, &sight, at).is_some())
+            }
+            _ => false,
+        };
+        let is_joint = yields && sight.project(aim.frame.origin).is_some_and(|middle| middle.distance(at) <= REACH);
         (!is_joint).then_some(handle)
     });
     if tool.hovered != handle {

@@ -246,10 +246,10 @@ fn the_joints_are_those_of_the_last_build() {
 fn the_panel_rests_while_a_change_waits_for_an_undone_step() {
     let (mut desk, joints) = desk();
     let offset = PoseOffset { translation: Vec3::X, ..PoseOffset::default() };
-    desk.edit(Operation::Pose(vec![(joints[0], offset)]));
-    desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
-    desk.frames(3);
+    let step = Operation::Pose(vec![(joints[0], offset)]);
+    crate::bench::begin_drag(&mut desk.app, desk.rig);
     desk.click("Normalise");
+    crate::bench::undo_meanwhile(&mut desk.app, desk.rig, step);
     crate::bench::wait(&mut desk, "the change", Desk::frame, |desk| {
         let jobs = desk.app.world().try_query::<&WeightChangeJob>();
         jobs.is_some_and(|mut jobs| jobs.iter(desk.app.world()).any(WeightChangeJob::waits))

@@ -95,6 +95,7 @@ fn an_unseen_body_becomes_an_animated_character_by_hand_on_a_display_and_gpu() {
     hands.until("all is built", |report| report.commands[0] == added.commands[1]);
 
     // A value is typed: what depends on it runs, and nothing else.
+    show(&hands, "Process");
     hands.press("Values of control");
     hands.press("Relative size");
     sleep(Duration::from_millis(1500));
@@ -102,7 +103,6 @@ fn an_unseen_body_becomes_an_animated_character_by_hand_on_a_display_and_gpu() {
     hands.key("Return");
     let changed = hands.until("the value is set", |report| report.steps.len() > added.steps.len() && !report.busy);
     assert!((1..changed.commands[1] / 4).contains(&changed.ran), "{} of {:?} ran", changed.ran, changed.commands);
-    show(&hands, "Process");
     let said = format!("{} ran", changed.ran);
     hands.until("the panel says how many ran", |report| {
         report.widgets.iter().any(|widget| widget.name == said || widget.value == said)

@@ -63,7 +63,7 @@ pub struct FittedFace {
     samples: Vec<Sample>,
     /// The Cholesky factor.
     factor: Vec<f64>,
-    /// What the units ask of the samples, kept for other weights.
+    /// Targets of the units at the samples, kept for other weights.
     targets: Option<UnitTargets>,
     /// Movements of the skin bones for each unit on the left and the right side at full strength, without the jaw.
     unit_movements: Vec<[OnceLock<Vec<DVec3>>; 2]>,
@@ -144,13 +144,13 @@ impl FittedFace {
         (poses, folded)
     }
 
-    /// The same face, which keeps what units ask of its skin for [`FittedFace::with_weights`].
+    /// Face as it is, which keeps what units ask of its skin for [`FittedFace::with_weights`].
     pub(super) fn keeping_targets(mut self) -> Self {
         self.targets = Some(UnitTargets::new(&self.units));
         self
     }
 
-    /// The same head with other weights, as [`FittedFace::new`] makes it; what is known of units is kept.
+    /// Head with other weights, as [`FittedFace::new`] makes it; what is known of units is kept.
     pub(super) fn with_weights(
         self,
         points: &[Vec3],

@@ -26,7 +26,7 @@ pub(super) type Limits = [(Option<f32>, Option<f32>); 3];
 pub(super) struct KnownValue {
     /// RON of the value in the last command.
     pub text: String,
-    /// The same without quotation marks.
+    /// Value without quotation marks.
     pub plain: String,
     /// True if other commands have another value.
     pub mixed: bool,

@@ -49,7 +49,7 @@ pub(super) struct Sample {
 }
 
 impl Sample {
-    /// What a displacement field asks of the sample.
+    /// Displacement that a field asks of the sample.
     pub fn target(&self, displacement: impl Fn(&Mark) -> DVec3) -> DVec3 {
         let own = displacement(&self.mark);
         self.minus.as_ref().map_or(own, |minus| own - displacement(minus))

@@ -1,4 +1,4 @@
-//! What units ask of the samples of a skin, kept while only the weights change.
+//! Targets of units at the samples of a skin, kept while only the weights change.
 //!
 //! The field of a unit does not know the weights of the skin, and costs more than solving for the bones does.
 
@@ -29,7 +29,7 @@ impl UnitTargets {
             .get_or_init(|| samples.iter().map(|sample| sample.target(|mark| asked(field, mark))).collect())
     }
 
-    /// The same for samples of other weights: most are what they were.
+    /// Targets for samples of other weights: most are what they were.
     pub fn for_samples(
         self,
         before: &[Sample],

@@ -3,7 +3,10 @@
 use bevy::math::Vec3;
 use bevy_egui::egui::{Label, RichText, Ui};
 
-use super::{draft::HeaderDraft, typed::TypedFields};
+use super::{
+    draft::HeaderDraft,
+    typed::{NoNumbers, TypedFields},
+};
 use crate::{
     editor::{
         notice::Notice,
@@ -48,7 +51,7 @@ impl SocketList {
         let selected = selected_joint(shown);
         let button = ui.add_enabled(selected.is_ok(), bevy_egui::egui::Button::new("+ Socket"));
         let button = button.on_hover_text("A place on the selected joint that other parts hang on");
-        let reason = selected.as_ref().err().copied().unwrap_or_default();
+        let reason = selected.as_ref().err().map(ToString::to_string).unwrap_or_default();
         if button.on_disabled_hover_text(reason).clicked()
             && let Ok((joint, label)) = selected
         {
@@ -113,7 +116,7 @@ impl SocketList {
                         let of_row = if row == 0 { &mut socket.translation } else { &mut socket.rotation };
                         *of_row = Vec3::from(numbers);
                     }),
-                    Some(Err(text)) => {
+                    Some(Err(NoNumbers(text))) => {
                         let text = format!("{field} stays as it was: \"{text}\" is not three numbers ({tip})");
                         requests.send(Notice::warning(text));
                     }
@@ -132,12 +135,23 @@ pub(super) fn free_name<'n>(name: String, taken: impl Iterator<Item = &'n str> +
     std::iter::once(name.clone()).chain(numbered).find(is_free).unwrap_or_default()
 }
 
-/// The active joint with its label, or the reason why it can bear no socket.
-fn selected_joint(shown: &DisplayedRig) -> Result<(Uid, String), &'static str> {
-    let joint = shown.selection.0.last().and_then(|joint| shown.rig.joint(*joint)).ok_or("Select its joint first")?;
-    let label = joint.data.label.clone().ok_or("The file names the joint by its label: name the joint first")?;
+/// Reason why the active joint can bear no socket; its text says what to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+enum NoSocket {
+    #[error("Select its joint first")]
+    NoJoint,
+    #[error("The file names the joint by its label: name the joint first")]
+    NoLabel,
+    #[error("Another joint has the same label, by which the file names it: rename one of them first")]
+    SameLabel,
+}
+
+/// The active joint with its label.
+fn selected_joint(shown: &DisplayedRig) -> Result<(Uid, String), NoSocket> {
+    let joint = shown.selection.0.last().and_then(|joint| shown.rig.joint(*joint)).ok_or(NoSocket::NoJoint)?;
+    let label = joint.data.label.clone().ok_or(NoSocket::NoLabel)?;
     match shown.rig.walk().filter(|other| other.data.label.as_ref() == Some(&label)).count() {
         1 => Ok((joint.data.uid, label)),
-        _ => Err("Another joint has the same label, by which the file names it: rename one of them first"),
+        _ => Err(NoSocket::SameLabel),
     }
 }

@@ -3,6 +3,11 @@
 use bevy::prelude::Entity;
 use bevy_egui::egui::{TextEdit, Ui, WidgetInfo, WidgetType};
 
+/// Typed text that is not as many numbers as a field takes.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("\"{0}\" is not the numbers that the field takes; separate them by commas")]
+pub(super) struct NoNumbers(pub String);
+
 /// Fields of a form, of which one is being typed.
 #[derive(Default)]
 pub(super) struct TypedFields {
@@ -40,13 +45,13 @@ impl TypedFields {
         name: &str,
         now: [f32; N],
         width: f32,
-    ) -> Option<Result<[f32; N], String>> {
+    ) -> Option<Result<[f32; N], NoNumbers>> {
         let shown = now.map(|number| number.to_string()).join(", ");
         let text = self.text(ui, rig, name, &shown, width)?;
         let numbers: Result<Vec<f32>, _> = text.split([',', ';']).map(|part| part.trim().parse::<f32>()).collect();
         match numbers.map(<[f32; N]>::try_from) {
             Ok(Ok(numbers)) if numbers.iter().all(|number| number.is_finite()) => Some(Ok(numbers)),
-            _ => Some(Err(text)),
+            _ => Some(Err(NoNumbers(text))),
         }
     }
 }
