@@ -23,7 +23,7 @@ use rigsmith::{
 };
 
 use self::{
-    known_joints::{Figure, figures, is_finger, template_joints},
+    known_joints::{Figure, figures, held_back, is_finger, template_joints},
     random::Random,
 };
 
@@ -35,7 +35,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let variants = std::env::args().any(|argument| argument == "variants");
     let characters = bundled_characters();
     println!("{:<28} {:>6} {:>8} {:>6} {:>22} {:>7} {:>11}", "mesh", "body", "fingers", "worst", "at", "doubt", "ms");
-    for figure in figures(Path::new(&data))? {
+    let data = Path::new(&data);
+    for figure in figures(data)?.into_iter().chain([held_back(data)?]) {
         let rig = characters.iter().find(|rig| rig.about().name == figure.template).ok_or("no template")?;
         let joints = template_joints(rig);
         if variants {

@@ -3,7 +3,7 @@
 
 use bevy::prelude::*;
 
-use super::{ActiveRig, library::LibraryJobs, notice::Notice, panels::timeline::import::ClipImport};
+use super::{ActiveRig, files::attend, library::LibraryJobs, notice::Notice, panels::timeline::import::ClipImport};
 use crate::plugins::{
     face::FaceJob, fit::FitJob, history::RigHistory, landing::HeldResult, mesh_reload::ReloadJob,
     painting::WeightChangeJob, skinning::SkinningJob, surface::RigMeshes,
@@ -14,7 +14,7 @@ pub struct HeldPlugin;
 
 impl Plugin for HeldPlugin {
     fn build(&self, app: &mut App) {
-        app.add_message::<DiscardResult>().add_message::<Notice>().add_systems(Update, discard);
+        app.add_message::<DiscardResult>().add_message::<Notice>().add_systems(Update, discard.after(attend));
     }
 }
 

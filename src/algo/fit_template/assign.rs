@@ -386,7 +386,7 @@ impl Search<'_> {
             if let Some(leaf) = leaves.first().copied().flatten() {
                 cost += chain::penalty(self.tree, self.leaves, leaf, self.directions.root);
             }
-            if let Some(level) = chain::level(template, alignment.rotation, &self.directions) {
+            if let Some(level) = chain::level(template, alignment.rotation, self.directions) {
                 alignment = alignment.turned(level, &pairs);
             }
         }

@@ -141,6 +141,15 @@ pub(super) fn joint_at(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) 
     nearest.map(|(joint, ..)| joint)
 }
 
+/// True if the joint under a pixel is pulled by other controls than the selected one.
+pub(super) fn pulls_by_others(scene: &Scene, sight: &Sight, at: Vec2) -> bool {
+    let Some(rig) = scene.rig() else { return false };
+    let (Some(built), Some(runtime)) = (rig.built, rig.runtime.as_ref()) else { return false };
+    let Some(joint) = joint_at(scene, &rig, sight, at) else { return false };
+    let pull = ControlPull::find(&rig.rig, &built.0, runtime.state(), joint);
+    pull.is_ok_and(|pull| rig.selection.active().is_none_or(|selected| !pull.handles().contains(&selected)))
+}
+
 fn drag(
     mut pointers: MessageReader<ToolPointer>,
     mut actions: MessageReader<ActionRequest>,

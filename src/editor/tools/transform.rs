@@ -16,7 +16,7 @@ use super::{
     GizmoHover, PointerOwner, Tool, ToolPointer, ToolSystems,
     gizmo::{Delta, GizmoDrag, GizmoFrame, Handle, HandleShape, handle_at},
     pose::PosedJoint,
-    pull::joint_at,
+    pull::{joint_at, pulls_by_others},
     scene::{EditedRig, Scene, joints},
     select::{self, REACH},
 };
@@ -162,11 +162,7 @@ fn hover(
         // moves nothing while its limb turns forwards.
         let yields = match handle {
             Handle::Ring(_) => *mode == Mode::Pose,
-            Handle::MoveView => {
-                *mode == Mode::Pose
-                    && !moves.0
-                    && scene.rig().is_some_and(|rig| joint_at(&scene, &rig, &sight, at).is_some())
-            }
+            Handle::MoveView => *mode == Mode::Pose && !moves.0 && pulls_by_others(&scene, &sight, at),
             _ => false,
         };
         let is_joint = yields && sight.project(aim.frame.origin).is_some_and(|middle| middle.distance(at) <= REACH);

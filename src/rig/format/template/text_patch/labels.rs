@@ -35,7 +35,7 @@ fn sockets(patch: &mut Patch, tree: &Tree, before: &Rig, rig: &Rig) {
     let elements = tree.elements(tree.root(), "sockets");
     let now: Vec<_> = write::labelled_sockets(rig).collect();
     let names: Vec<&str> = now.iter().map(|(socket, _)| socket.name.as_str()).collect();
-    let pairs = Pairs::of(tree, &elements, &names);
+    let pairs = Pairs::of(tree, elements, &names);
     for (place, number) in &pairs.both {
         let (node, (socket, label)) = (elements[*place].value, now[*number]);
         let name = tree.string(node, "name").unwrap_or_default();
@@ -58,7 +58,7 @@ fn options(patch: &mut Patch, tree: &Tree, before: &Rig, rig: &Rig) {
     let elements = tree.elements(tree.root(), "options");
     let now = &rig.about().options;
     let names: Vec<&str> = now.iter().map(|option| option.name.as_str()).collect();
-    let pairs = Pairs::of(tree, &elements, &names);
+    let pairs = Pairs::of(tree, elements, &names);
     for (place, number) in &pairs.both {
         let (node, option) = (elements[*place].value, &now[*number]);
         let name = tree.string(node, "name").unwrap_or_default();
