@@ -30,8 +30,12 @@ impl End {
     }
 }
 
-/// The longest border of the largest connected surface of a mesh that has one: hair has a longer rim than a neck, or, where it is
-/// closed, a larger surface than a head.
+/// Share of the largest connected surface from which on a surface may be the head: closed hair is larger than a head, and open
+/// brows and hair beside a closed body are smaller than half of it.
+const HEAD: f32 = 0.5;
+
+/// The longest border of the largest connected surface of a mesh that has one and may be the head; hair has a longer rim than a
+/// neck.
 pub fn largest(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<End> {
     let (welded, count) = adjacency::weld(points);
     let mut place = vec![Vec3::ZERO; count];
@@ -65,7 +69,8 @@ pub fn largest(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<End> {
         end.low = end.low.min(a).min(b);
         end.high = end.high.max(a).max(b);
     }
-    ends.retain(|end| end.length > 0.0);
+    let least = HEAD * areas.iter().copied().fold(0.0, f32::max);
+    ends.retain(|end| end.length > 0.0 && end.area >= least);
     let largest = ends.iter().map(|end| end.area).fold(0.0, f32::max);
     let bounds = |end: &End| end.area >= largest;
     let mut end = ends.into_iter().filter(bounds).max_by(|a, b| a.length.total_cmp(&b.length))?;
@@ -137,7 +142,7 @@ mod tests {
         let head = (Vec3::ZERO, Vec3::ONE);
         // Closed hair with a larger surface than the head, and a small open piece with a long rim.
         for (low, size, is_closed) in
-            [(Vec3::new(-1.0, 2.0, -1.0), Vec3::splat(3.0), true), (Vec3::Y * 3.0, Vec3::new(6.0, 0.1, 0.1), false)]
+            [(Vec3::new(-0.1, 2.0, -0.1), Vec3::splat(1.2), true), (Vec3::Y * 3.0, Vec3::new(6.0, 0.1, 0.1), false)]
         {
             let mut mesh = (Vec::new(), Vec::new());
             add_box(&mut mesh, head.0, head.1, false);
@@ -145,8 +150,10 @@ mod tests {
             let end = largest(&mesh.0, &mesh.1).expect("the head is open");
             assert_eq!((end.low, end.high), (Vec3::ZERO, Vec3::new(1.0, 0.0, 1.0)), "{is_closed}");
         }
+        // A closed body has no border, whatever small open pieces lie on it.
         let mut closed = (Vec::new(), Vec::new());
         add_box(&mut closed, head.0, head.1, true);
+        add_box(&mut closed, Vec3::Y * 3.0, Vec3::new(6.0, 0.05, 0.05), false);
         assert!(largest(&closed.0, &closed.1).is_none());
     }
 }

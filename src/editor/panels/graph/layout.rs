@@ -2,8 +2,8 @@
 //! whole has about the shape of a panel.
 //!
 //! Within a frame a node stands right of everything there that it depends on, and sweeps sort each column by the mean place
-//! of the neighbours ([`inside`]). Frames stand in columns by the depth of their dependencies, too, and the columns are
-//! broken into rows ([`packing`]). A frame that is folded is one node. Nodes that are in no frame share a block without a
+//! of the neighbours (`inside`). Frames stand in columns by the depth of their dependencies, too, and the columns are
+//! broken into rows (`packing`). A frame that is folded is one node. Nodes that are in no frame share a block without a
 //! title. The time grows with the number of nodes and edges, but for the sorting of columns; the same graph always gives
 //! the same places.
 
