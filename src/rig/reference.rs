@@ -40,6 +40,7 @@
 //! `control/hand_l`, `control/hand_ik_l`, `control/hand_l/hand_ik_l`. The name of a label is the label.
 
 mod error;
+mod index;
 mod names;
 mod params;
 mod text;
@@ -51,6 +52,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
 use crate::rig::{NodeType, Uid};
 
 pub use error::{PickError, ReferenceError, ReferenceProblem};
+pub use index::RigNameIndex;
 pub use names::{NameKind, NameScope, Names, RigNames, label_text};
 pub use params::{
     BadReference, FoundReference, bind_known_names, bind_names, given_names, map_references, map_unions,

@@ -8,7 +8,7 @@ use std::{
 
 use bevy::{ecs::system::RunSystemOnce, prelude::*};
 use rigsmith::{
-    files::{BUNDLED_CHARACTERS, PartFiles, RealDisk, load_template, store_rig_over},
+    files::{BUNDLED_CHARACTERS, BUNDLED_PARTS, PartFiles, RealDisk, load_template, store_rig_over},
     instance::{
         ExposedNodes, InstanceNodes, RigBuilt, RigFailed, RigInstance, RigInstancePlugin, RigTemplate, RigUpdated,
     },
@@ -338,6 +338,13 @@ fn a_header_counts_what_parts_bring_as_the_template_has_it() {
         let counted = (header.joint_count, header.features.clone());
         header.complete_from(&whole);
         assert_eq!(counted.1, header.features, "{name}");
+        assert_eq!(written, counted, "{name} says so itself");
+    }
+    for (name, text) in BUNDLED_PARTS {
+        let written = read_header(text.as_bytes()).unwrap();
+        let mut counted = written.clone();
+        let none = BTreeMap::new();
+        counted.complete_from(&PartFiles::given(&none).complete(Path::new(name), text.as_bytes()).unwrap().rig);
         assert_eq!(written, counted, "{name} says so itself");
     }
 }

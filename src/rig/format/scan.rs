@@ -181,11 +181,14 @@ pub(in crate::rig) fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
     std::iter::from_fn(move || {
         loop {
             let mut start = at;
-            if let Some(blank) = text[at..].chars().next().filter(|c| is_blank(*c)) {
-                at += blank.len_utf8();
-                continue;
+            let first = *bytes.get(at)?;
+            if first >= 0x80 || first.is_ascii_whitespace() || first == 0x0B {
+                if let Some(blank) = text[at..].chars().next().filter(|c| is_blank(*c)) {
+                    at += blank.len_utf8();
+                    continue;
+                }
             }
-            match *bytes.get(at)? {
+            match first {
                 b'/' if bytes.get(at + 1) == Some(&b'/') => {
                     at = text[at..].find('\n').map_or(text.len(), |n| at + n);
                     continue;
@@ -197,8 +200,7 @@ pub(in crate::rig) fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
                 b'"' => at = quote_end(bytes, at + 1, b'"'),
                 b'\'' => at = character_end(text, at + 1),
                 c if is_word(c) => {
-                    let word = text[at..].find(|c: char| c.is_ascii() && !is_word(c as u8) || is_blank(c));
-                    at = word.map_or(text.len(), |length| at + length);
+                    at = word_end(text, at);
                     if matches!(&text[start..at], "r" | "br")
                         && let Some(end) = raw_end(bytes, at)
                     {
@@ -210,6 +212,20 @@ pub(in crate::rig) fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
             return Some(Token { text: &text[start..at], start });
         }
     })
+}
+
+/// End of a word that begins at `at`: at a mark, or at white space.
+fn word_end(text: &str, at: usize) -> usize {
+    let bytes = text.as_bytes();
+    let ascii = bytes[at..].iter().take_while(|byte| byte.is_ascii() && is_word(**byte)).count();
+    let end = at + ascii;
+    match bytes.get(end) {
+        Some(byte) if !byte.is_ascii() => {
+            let rest = text[end..].find(|c: char| c.is_ascii() && !is_word(c as u8) || is_blank(c));
+            rest.map_or(text.len(), |length| end + length)
+        }
+        _ => end,
+    }
 }
 
 /// True for characters that RON treats as white space.

@@ -3,7 +3,7 @@
 use std::{borrow::Cow, fmt};
 
 use super::{
-    GroupScope, RigScope,
+    GroupScope, RigNameIndex, RigScope,
     params::{self, text_field},
 };
 use crate::rig::{Rig, RigJoint, TagData, TagKind, Uid};
@@ -97,9 +97,7 @@ impl Names for Rig {
             NameKind::Rig => (self.about().name == name).then_some(self.uid()).into_iter().collect(),
             NameKind::Group => self.groups().iter().filter(|group| group.name == name).map(|group| group.uid).collect(),
             NameKind::Input => self.inputs().iter().filter(|input| input.name == name).map(|input| input.uid).collect(),
-            NameKind::Joint => labelled(self, name).map(|joint| joint.data.uid).collect(),
-            NameKind::Label => bearer(self, scope.group, name).into_iter().collect(),
-            NameKind::Command => find_commands(self, name),
+            NameKind::Joint | NameKind::Label | NameKind::Command => RigNameIndex::new(self).find(scope, kind, name),
         }
     }
 
@@ -175,53 +173,18 @@ pub fn label_text(rig: &Rig, bearer: Uid) -> Option<Cow<'_, str>> {
     }
 }
 
-/// The first bearer of a label, in the group if one is named; joints before commands.
-fn bearer(rig: &Rig, group: GroupScope, label: &str) -> Option<Uid> {
-    let joints = labelled(rig, label).map(|joint| (joint.data.group, joint.data.uid));
-    let given = commands(rig).filter(|(_, tag)| given_label(tag).is_some_and(|given| given == label));
-    let all: Vec<_> = joints.chain(given.map(|(joint, tag)| (joint.data.group, tag.uid))).collect();
-    let in_group = |(own, _): &&(Option<Uid>, Uid)| match group {
-        GroupScope::Group(group) => *own == Some(group),
-        _ => true,
-    };
-    all.iter().find(in_group).or(all.first()).map(|(_, uid)| *uid)
-}
-
-/// Commands with a name: the module, and behind a `/` the label of the joint, which decides, or the name that the command
-/// gives its nodes, or both with a `/` between.
-fn find_commands(rig: &Rig, name: &str) -> Vec<Uid> {
-    let by_joint = |(joint, tag): &(&RigJoint, &TagData)| {
-        module(tag) == Some(name) || command_name(joint, tag).is_some_and(|own| own == name)
-    };
-    let found: Vec<Uid> = commands(rig).filter(by_joint).map(|(_, tag)| tag.uid).collect();
-    let Some((wanted, rest)) = name.split_once('/').filter(|_| found.len() != 1) else { return found };
-    let by_given = |(joint, tag): &(&RigJoint, &TagData)| {
-        module(tag) == Some(wanted)
-            && given_name(tag).is_some_and(|given| {
-                let on_joint = rest.strip_suffix(given.as_str()).and_then(|joint| joint.strip_suffix('/'));
-                given == rest || on_joint.is_some() && on_joint == joint.data.label.as_deref()
-            })
-    };
-    let given: Vec<Uid> = commands(rig).filter(by_given).map(|(_, tag)| tag.uid).collect();
-    if given.len() == 1 || found.is_empty() { given } else { found }
-}
-
 /// Name that a command gives its nodes, or what else it makes.
-fn given_name(tag: &TagData) -> Option<String> {
+pub(super) fn given_name(tag: &TagData) -> Option<String> {
     let TagKind::Command { params, .. } = &tag.kind else { return None };
     params::given_name(params)
 }
 
-fn labelled<'a>(rig: &'a Rig, label: &'a str) -> impl Iterator<Item = &'a RigJoint> {
-    rig.walk().filter(move |joint| joint.data.label.as_deref() == Some(label))
-}
-
-fn commands(rig: &Rig) -> impl Iterator<Item = (&RigJoint, &TagData)> {
+pub(super) fn commands(rig: &Rig) -> impl Iterator<Item = (&RigJoint, &TagData)> {
     let tags = rig.walk().flat_map(|joint| joint.data.tags.iter().map(move |tag| (joint, tag)));
     tags.filter(|(_, tag)| matches!(tag.kind, TagKind::Command { .. }))
 }
 
-fn module(tag: &TagData) -> Option<&str> {
+pub(super) fn module(tag: &TagData) -> Option<&str> {
     match &tag.kind {
         TagKind::Command { module, .. } => Some(module),
         TagKind::Feature { .. } => None,
@@ -236,7 +199,7 @@ fn command_name<'a>(joint: &'a RigJoint, tag: &'a TagData) -> Option<Cow<'a, str
     })
 }
 
-fn given_label(tag: &TagData) -> Option<Cow<'_, str>> {
+pub(super) fn given_label(tag: &TagData) -> Option<Cow<'_, str>> {
     let TagKind::Command { params, .. } = &tag.kind else { return None };
     if !params.contains("label") {
         return None;

@@ -211,6 +211,7 @@ pub(in crate::rig) fn map_text_fields(
 
 /// Names that a command gives its nodes: texts of the fields `name` of its parameters, at most two brackets deep.
 pub fn given_names(params: &str) -> impl Iterator<Item = String> {
+    let params = if params.contains("name") { params } else { "" };
     text_fields(params, &["name"]).map(|literal| literal.text)
 }
 
@@ -261,7 +262,11 @@ fn decoded(params: &str, token: &Token) -> Option<Literal> {
         return None;
     }
     let range = token.start - usize::from(raw)..token.start + token.text.len();
-    let text = ron::from_str(&params[range.clone()]).ok()?;
+    let inside = token.text.strip_prefix('"').and_then(|text| text.strip_suffix('"'));
+    let text = match inside.filter(|text| !raw && !text.contains(['\\', '"'])) {
+        Some(plain) => plain.to_owned(),
+        None => ron::from_str(&params[range.clone()]).ok()?,
+    };
     Some(Literal { range, text, raw })
 }
 

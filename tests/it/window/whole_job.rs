@@ -32,6 +32,8 @@ pub(super) fn until_there(path: &Path) {
 pub(super) fn show(hands: &Hands, panel: &str) {
     hands.press("Window");
     hands.press(panel);
+    // The pointer stays until the menu has gone: a click is where the pointer is in the frame that takes it.
+    hands.until("the menu is closed", |report| report.widgets.iter().all(|widget| widget.name != "Reset layout"));
 }
 
 #[test]

@@ -27,7 +27,7 @@ use crate::rig::{
     format::source::{parse_ron, ron_options, utf8},
     format::version::{Format, blanked},
     part::PartSocket,
-    reference::{bind_names, refresh_names},
+    reference::{RigNameIndex, bind_names, refresh_names},
 };
 
 pub use survey::survey_template;
@@ -170,14 +170,15 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
 /// told with their commands.
 pub(super) fn bind_references(rig: &mut Rig, unbound: &mut Vec<(Uid, String)>) {
     let mut edits = Vec::new();
+    let names = RigNameIndex::new(rig);
     for joint in rig.walk() {
         for tag in &joint.data.tags {
             let TagKind::Command { module, params, feature } = &tag.kind else { continue };
-            let (bound, bad) = bind_names(params, rig);
+            let (bound, bad) = bind_names(params, &names);
             let on = joint.data.label.as_deref().unwrap_or("without a label");
             let told = |bad| format!("{module} {} on joint {on}: {bad}; it stays as it is", tag.uid);
             unbound.extend(bad.iter().map(|bad| (tag.uid, told(bad))));
-            let named = refresh_names(&bound, rig);
+            let named = refresh_names(&bound, &names);
             if *named != **params {
                 let kind = TagKind::Command { module: module.clone(), params: named.into_owned(), feature: *feature };
                 edits.push(RigEdit::SetTag(joint.data.uid, Box::new(TagData { kind, ..tag.clone() })));

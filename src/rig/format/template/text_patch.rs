@@ -28,7 +28,7 @@ use crate::rig::{
         template::{quoted, vector},
         tree::{Item, NodeId, Tree},
     },
-    reference::{bind_names, given_name, refresh_names, without_uids},
+    reference::{RigNameIndex, bind_names, given_name, refresh_names, without_uids},
 };
 use labels::header_labels;
 use order::reordered;
@@ -166,6 +166,7 @@ struct Rewriter<'d, 'a> {
     /// True in a text that leaves uids out: it gets names.
     with_names: bool,
     names: Rc<NamesInUse>,
+    index: RigNameIndex<'d>,
     patch: Patch<'d, 'a>,
 }
 
@@ -179,6 +180,7 @@ impl<'d, 'a> Rewriter<'d, 'a> {
             declared,
             with_names,
             names: Rc::new(NamesInUse::of(rig)),
+            index: RigNameIndex::new(rig),
             patch: Patch::new(&declared.tree),
         }
     }
@@ -397,7 +399,7 @@ impl<'d, 'a> Rewriter<'d, 'a> {
 
     fn parameters(&mut self, declared: &Declaration, is_short: bool, params: &str) {
         let (tree, node) = (self.tree(), declared.node);
-        let current = refresh_names(params, self.rig);
+        let current = refresh_names(params, &self.index);
         let Some(now) = Tree::parse(&current) else { return };
         let field = tree.field(node, "params");
         match (is_short, field) {
@@ -423,8 +425,8 @@ impl<'d, 'a> Rewriter<'d, 'a> {
             let node = tree.node(id);
             node.bracket == Some('(') && !node.items.is_empty() && node.items.iter().all(|item| item.key.is_some())
         };
-        let (bound, _) = bind_names(tree.written(node), self.rig);
-        if canonical(&refresh_names(&bound, self.rig)) == canonical(now.written(value)) {
+        let (bound, _) = bind_names(tree.written(node), &self.index);
+        if canonical(&refresh_names(&bound, &self.index)) == canonical(now.written(value)) {
             return;
         }
         if is_struct(tree, node) && is_struct(now, value) && tree.node(node).name == now.node(value).name {
@@ -458,6 +460,6 @@ impl<'d, 'a> Rewriter<'d, 'a> {
 
     /// A value as it is written into this text: references without uids where the text has names.
     fn styled(&self, text: &str) -> String {
-        if self.with_names { without_uids(text, self.rig, |_| true).into_owned() } else { text.to_owned() }
+        if self.with_names { without_uids(text, &self.index, |_| true).into_owned() } else { text.to_owned() }
     }
 }

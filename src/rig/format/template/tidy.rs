@@ -14,7 +14,7 @@ use crate::rig::{
         template::quoted,
         tree::{Item, NodeId, Tree},
     },
-    reference::{NameKind, bind_names, without_uids},
+    reference::{NameKind, RigNameIndex, bind_names, without_uids},
 };
 
 /// Treatment of uids when a template is formatted.
@@ -55,7 +55,7 @@ pub fn format_template(source: &str, uids: UidStyle) -> Result<String, SourceErr
 
 struct Uids<'d, 'a> {
     declared: &'d Declarations<'a>,
-    rig: &'d Rig,
+    names: RigNameIndex<'d>,
     style: UidStyle,
     has_parts: bool,
     called: NameIndex<'d, 'a>,
@@ -71,7 +71,7 @@ impl<'d, 'a> Uids<'d, 'a> {
         let derived = declared.all().filter(follows).map(|one| one.uid).collect();
         let (called, patch) = (NameIndex::new(declared), Patch::new(&declared.tree));
         let by_uid = declared.all().map(|one| (one.uid, one)).collect();
-        Self { declared, called, by_uid, rig, style, has_parts, derived, patch }
+        Self { declared, called, by_uid, names: RigNameIndex::new(rig), style, has_parts, derived, patch }
     }
 
     fn text(mut self) -> String {
@@ -163,10 +163,10 @@ impl<'d, 'a> Uids<'d, 'a> {
                 continue;
             }
             let text = match self.style {
-                UidStyle::Written => bind_names(written, self.rig).0,
+                UidStyle::Written => bind_names(written, &self.names).0,
                 // A name alone may be that of something that a part brings, too.
                 UidStyle::Derived if self.has_parts => continue,
-                UidStyle::Derived => without_uids(written, self.rig, |uid| self.derived.contains(&uid)),
+                UidStyle::Derived => without_uids(written, &self.names, |uid| self.derived.contains(&uid)),
                 UidStyle::Kept => continue,
             };
             if text != written {

@@ -14,6 +14,7 @@ use crate::rig::{
         tree::{NodeId, Tree},
     },
     part::{PartInstance, switch_name},
+    reference::RigNameIndex,
 };
 use change::{FieldChange, JointDiff, TagDiff, Words, short_tag};
 pub(crate) use instance::{with_instances, without_instances};
@@ -73,7 +74,7 @@ pub(crate) fn write_parts_over(
     let mut writer = Overrides {
         rig,
         rigs,
-        words: Words { rig, with_names },
+        words: Words { names: RigNameIndex::new(rig), with_names },
         features: feature_uids(rig),
         patch: Patch::new(&tree),
         tree: &tree,

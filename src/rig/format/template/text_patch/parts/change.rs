@@ -11,7 +11,7 @@ use crate::rig::{
         template::{quoted, shorthand::TAG_FIELDS, text_patch::canonical, vector},
         tree::{Item, Tree},
     },
-    reference::{bind_names, refresh_names, without_uids},
+    reference::{RigNameIndex, bind_names, refresh_names, without_uids},
 };
 
 /// A field of a change that is written, or taken out where it has no value.
@@ -19,7 +19,7 @@ pub(super) type FieldChange = (&'static str, Option<String>);
 
 /// Style of values in changes.
 pub(super) struct Words<'d> {
-    pub rig: &'d Rig,
+    pub names: RigNameIndex<'d>,
     /// True for references without uids.
     pub with_names: bool,
 }
@@ -27,12 +27,12 @@ pub(super) struct Words<'d> {
 impl Words<'_> {
     /// A value as it is written into the text.
     pub fn styled(&self, text: &str) -> String {
-        if self.with_names { without_uids(text, self.rig, |_| true).into_owned() } else { text.to_owned() }
+        if self.with_names { without_uids(text, &self.names, |_| true).into_owned() } else { text.to_owned() }
     }
 
     /// Parameters with the current names beside the uids.
     fn current(&self, params: &str) -> String {
-        refresh_names(&bind_names(params, self.rig).0, self.rig).into_owned()
+        refresh_names(&bind_names(params, &self.names).0, &self.names).into_owned()
     }
 
     /// Returns `true` if two tags say something different.
