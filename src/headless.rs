@@ -183,6 +183,11 @@ impl Workbench {
         if edits.is_empty() { Ok(()) } else { self.operate(Operation::Edits(edits)) }
     }
 
+    /// Puts a mesh that the rig knows already below it, such as one of a project: its weights are those that the rig has for it.
+    pub fn attach(&mut self, mesh: RigMesh) {
+        self.mesh = Some(self.app.world_mut().spawn((mesh, SkinOf(self.rig))).id());
+    }
+
     /// Runs one operation as one step of the history.
     pub fn operate(&mut self, operation: Operation) -> Result<(), WorkbenchError> {
         self.forget_refusals();

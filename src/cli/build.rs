@@ -27,7 +27,10 @@ use crate::{
         gltf::GltfWriteSettings,
         model::{Model, Trs},
     },
-    plugins::commands::BuildStep,
+    plugins::{
+        commands::{BuildStep, Processor},
+        surface::RigMesh,
+    },
     processor::{Builder, CommandState, RunReport},
     rig::{BuiltRig, Rig, Uid, bake::baked, character::mark_joints, operations::Operation, update::edits_between},
     solve::program::{CompileOptions, RigProgram},
@@ -207,15 +210,48 @@ pub(super) fn character_of(
     report: &mut Report,
 ) -> Result<(Model, GltfWriteSettings), Failure> {
     let Some(mesh) = mesh else { return posed_skeleton(bench, export) };
-    // The mesh is bound elsewhere, so that no time passes for the pose.
-    let mut own = limits::workbench(bench.rig().clone());
-    if let Some(built) = bench.built() {
-        own.set_built(Arc::new(built.clone()));
-    }
     let model = limits::load_model(mesh)?;
     report.notes(model.notes.iter().cloned());
-    own.open(model, true)?;
-    bind(&mut own, weights.settings(), &weights.claim, Vec::new(), report)?;
+    character_with(bench, MeshSource::Model(model), weights, export, report)
+}
+
+/// Mesh for a rig.
+pub(super) enum MeshSource {
+    /// A file's mesh, which is bound to what is built.
+    Model(Model),
+    /// A mesh of a project, which keeps its weights if it has some.
+    Open(RigMesh),
+}
+
+impl MeshSource {
+    /// Puts the mesh on a workbench, whose rig is built, and binds it where it has no weights.
+    pub fn open(self, bench: &mut Workbench, weights: &WeightArgs, report: &mut Report) -> Result<(), Failure> {
+        match self {
+            Self::Model(model) => bench.open(model, true)?,
+            Self::Open(mesh) => bench.attach(mesh),
+        }
+        if bench.weights().is_some() {
+            return Ok(());
+        }
+        bind(bench, weights.settings(), &weights.claim, Vec::new(), report)
+    }
+}
+
+/// Character as [`character_of`] makes it, with this mesh.
+pub(super) fn character_with(
+    bench: &mut Workbench,
+    mesh: MeshSource,
+    weights: &WeightArgs,
+    export: &ExportArgs,
+    report: &mut Report,
+) -> Result<(Model, GltfWriteSettings), Failure> {
+    // The mesh is bound elsewhere, so that no time passes for the pose.
+    let mut own = limits::workbench(bench.rig().clone());
+    own.build(match bench.processor().map(Processor::builder) {
+        Some(builder) if builder.cursor() < builder.len() => BuildStep::To(builder.cursor()),
+        _ => BuildStep::All,
+    });
+    mesh.open(&mut own, weights, report)?;
     let edits = edits_between(bench.rig(), own.rig()).map_err(|error| Failure::Input(Box::new(error)))?;
     if !edits.is_empty() {
         bench.operate(Operation::Edits(edits))?;
@@ -223,7 +259,6 @@ pub(super) fn character_of(
     let posed = bench.posed_nodes()?;
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let joints: Vec<Uid> = baked(bench.rig(), built).walk().map(|joint| joint.data.uid).collect();
-    own.set_built(Arc::new(built.clone()));
     let mut model = own.character();
     pose(&mut model, &joints, built, &posed);
     Ok((model, export.settings()))

@@ -7,16 +7,20 @@ use clap::Args;
 use serde_json::Value;
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs, build, limits, report::counted, skin,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
+    build::{self, MeshSource},
+    limits,
+    report::counted,
+    skin,
     switches::SwitchArgs,
 };
 use crate::{
-    files::{FileKind, RealDisk, store_model, store_rig},
+    files::{FileKind, LoadedMesh, MeshState, RealDisk, store_model, store_rig},
     headless::{
         Workbench,
         posing::{ControlWrite, HeldValue, PoseError},
     },
-    plugins::commands::BuildStep,
+    plugins::{commands::BuildStep, surface::RigMesh},
     rig::{Rig, RigEdit, bake::baked, operations::Operation},
 };
 
@@ -106,8 +110,13 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
         [Some(&args.rig), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
     args.in_place.check(&inputs, args.output.as_deref(), &[])?;
     let writes = parsed(&args.steps)?;
+    if args.mesh.is_some() && (kind == Some(Some(FileKind::Template)) || kind.is_none()) {
+        return Err(Failure::Usage(
+            "--mesh is for a character or a picture; write one with -o NAME.glb or .png".to_owned(),
+        ));
+    }
     let mut report = Report::default();
-    let mut rig = read(args, &mut report)?;
+    let (mut rig, own_mesh) = read(args, &mut report)?;
     args.steps.parts.apply(&mut rig)?;
     let mut bench = limits::workbench(rig);
     let held = run_steps(&mut bench, &args.steps, &writes)?;
@@ -120,9 +129,9 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     report.set("error", error);
     if let Some(output) = &args.output {
         if is_picture {
-            picture(args, output, &bench, &mut report)?;
+            picture(args, own_mesh, output, &bench, &mut report)?;
         } else {
-            write(args, output, &mut bench, &mut report)?;
+            write(args, own_mesh, output, &mut bench, &mut report)?;
         }
         report.line(format!("wrote {}", output.display()));
         report.set("output", output.display().to_string());
@@ -158,16 +167,38 @@ pub(super) fn run_steps(
         switches.push((name.trim(), value.trim()));
     }
     let held = bench.pose_through(writes, &switches)?;
-    bench.frames(steps.frames);
+    bench.frames(steps.frames).map_err(PoseError::from)?;
     Ok(held)
 }
 
-fn read(args: &PoseArgs, report: &mut Report) -> Result<Rig, Failure> {
+/// The rig, and the mesh that it has in a project.
+fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Option<RigMesh>), Failure> {
+    let mut own_mesh = None;
     let mut rig = if FileKind::of(&args.rig) == Some(FileKind::Project) {
         let mut project = limits::load_project(&args.rig)?;
         report.notes(project.notes);
-        let empty = || Failure::Input(format!("`{}` has no rig to pose", args.rig.display()).into());
-        (!project.rigs.is_empty()).then(|| project.rigs.swap_remove(0)).ok_or_else(empty)?
+        if project.rigs.is_empty() {
+            return Err(Failure::Input(format!("`{}` has no rig to pose", args.rig.display()).into()));
+        }
+        let rig = project.rigs.remove(0);
+        for other in &project.rigs {
+            report
+                .notes
+                .push(format!("the rig \"{}\" of the project is left out: the first one is posed", other.about().name));
+        }
+        for LoadedMesh { uid, nodes, shape, .. } in project.meshes.into_iter().filter(|mesh| mesh.rig == rig.uid()) {
+            // The notes mention a missing mesh already.
+            let MeshState::Open { model, .. } = shape else { continue };
+            if own_mesh.is_some() {
+                report.notes.push(format!("the mesh \"{}\" is left out: the rig's first one is posed", model.name));
+                continue;
+            }
+            own_mesh = Some(RigMesh::new(uid, *model, nodes.to_vec()));
+        }
+        if args.mesh.is_some() && own_mesh.take().is_some() {
+            report.notes.push("--mesh stands in for the mesh of the project".to_owned());
+        }
+        rig
     } else {
         skin::load_rig(&args.rig, report)?
     };
@@ -182,11 +213,17 @@ fn read(args: &PoseArgs, report: &mut Report) -> Result<Rig, Failure> {
         let applied = Operation::ApplyPose(stored).run(&mut rig, &mut uids, None);
         applied.map_err(|error| Failure::Input(Box::new(error)))?;
     }
-    Ok(rig)
+    Ok((rig, own_mesh))
 }
 
 /// Writes the character, or the skeleton, in the pose of the entities.
-fn write(args: &PoseArgs, output: &Output, bench: &mut Workbench, report: &mut Report) -> Result<(), Failure> {
+fn write(
+    args: &PoseArgs,
+    own_mesh: Option<RigMesh>,
+    output: &Output,
+    bench: &mut Workbench,
+    report: &mut Report,
+) -> Result<(), Failure> {
     if FileKind::of(output) == Some(FileKind::Template) {
         let built = bench.built().ok_or(PoseError::NotBuilt)?;
         let posed = bench.posed_nodes()?;
@@ -202,18 +239,36 @@ fn write(args: &PoseArgs, output: &Output, bench: &mut Workbench, report: &mut R
         report.notes(store_rig(&RealDisk, output, &skeleton)?);
         return Ok(());
     }
-    let (model, settings) = build::character_of(bench, args.mesh.as_deref(), &args.weights, &args.export, report)?;
+    let (model, settings) = match own_mesh {
+        Some(mesh) => build::character_with(bench, MeshSource::Open(mesh), &args.weights, &args.export, report)?,
+        None => build::character_of(bench, args.mesh.as_deref(), &args.weights, &args.export, report)?,
+    };
     report.notes(store_model(&RealDisk, output, &model, &settings)?);
     Ok(())
 }
 
 #[cfg(feature = "render")]
-fn picture(args: &PoseArgs, output: &Output, bench: &Workbench, report: &mut Report) -> Result<(), Failure> {
-    super::render::picture_of(bench, args.mesh.as_deref(), &args.weights, args.deform, output, report)
+fn picture(
+    args: &PoseArgs,
+    own_mesh: Option<RigMesh>,
+    output: &Output,
+    bench: &Workbench,
+    report: &mut Report,
+) -> Result<(), Failure> {
+    let mesh = match (own_mesh, &args.mesh) {
+        (Some(mesh), _) => Some(MeshSource::Open(mesh)),
+        (None, Some(path)) => {
+            let model = limits::load_model(path)?;
+            report.notes(model.notes.iter().cloned());
+            Some(MeshSource::Model(model))
+        }
+        (None, None) => None,
+    };
+    super::render::picture_of(bench, mesh, &args.weights, args.deform, output, report)
 }
 
 #[cfg(not(feature = "render"))]
-fn picture(_: &PoseArgs, output: &Output, _: &Workbench, _: &mut Report) -> Result<(), Failure> {
+fn picture(_: &PoseArgs, _: Option<RigMesh>, output: &Output, _: &Workbench, _: &mut Report) -> Result<(), Failure> {
     let reason = format!("cannot draw `{}`: this program was built without pictures", output.display());
     Err(Failure::Usage(reason))
 }

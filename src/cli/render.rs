@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{
     ArgumentError, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
-    binding::bind,
+    build::MeshSource,
     device_selection, limits,
     pose::{self, PoseSteps},
     progress::spinning,
@@ -226,7 +226,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
 /// Draws a rig as it stands on a workbench, with a mesh skinned to its built joints if there is one.
 pub(super) fn picture_of(
     posed: &Workbench,
-    mesh: Option<&Path>,
+    mesh: Option<MeshSource>,
     weights: &WeightArgs,
     deform: DeformArgs,
     output: &Path,
@@ -236,10 +236,7 @@ pub(super) fn picture_of(
     bench.build(BuildStep::All);
     let mut meshes = Vec::new();
     if let Some(mesh) = mesh {
-        let model = limits::load_model(mesh)?;
-        report.notes(model.notes.iter().cloned());
-        bench.open(model, true)?;
-        bind(&mut bench, weights.settings(), &weights.claim, Vec::new(), report)?;
+        mesh.open(&mut bench, weights, report)?;
         meshes.extend(bench.mesh().cloned());
     }
     let state = Some(posed.runtime()?.state().clone());

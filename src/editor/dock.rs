@@ -10,11 +10,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     files::attend,
-    follow,
-    held::HeldPlugin,
-    menu,
+    follow, menu,
     panel::{Panels, Requests},
     pointer::ViewportArea,
+    result_queue::HeldPlugin,
     settings::EditorSettings,
     status, style, toolbar,
 };

@@ -4,7 +4,7 @@
 //! when it is complete. Actions that would lose unsaved changes ask first; see [`dialog`] for the questions. Every
 //! document has a journal from its first frame; see [`recovery`] for work left by a crash.
 
-mod bundled;
+mod bundle;
 mod clips;
 pub mod dialog;
 mod dialog_view;
@@ -28,7 +28,7 @@ use bevy::{
 };
 
 pub use self::{
-    bundled::{BODY, BUNDLED_MODELS, BundledModel, HEAD},
+    bundle::{BODY, BUNDLED_MODELS, BundledModel, HEAD},
     document::{MeshSource, OpenDocument, StateFolder},
     export::ExportOptions,
     open::LoadJob,
@@ -132,7 +132,7 @@ pub enum FollowUp {
 /// Parts shared with [`recovery`] and [`render_errors`](super::render_errors).
 pub(super) mod loading {
     pub(in crate::editor) use super::{
-        bundled::{BundledModel, describe as describe_bundled, template as bundled_template},
+        bundle::{BundledModel, describe as describe_bundled, template as bundled_template},
         document::{Context, MeshSource, places},
         error::{OpenError, WriteError},
         open::{LoadedDocument, LoadedFile, Work, begin, document, hash_of, project, spawn},

@@ -21,7 +21,7 @@ pub use self::{
     action::{LibraryAction, obstacle},
     listing::{LibraryFolder, LibraryFolders, LibraryListing, ListTemplates, TemplateLibrary},
     pictures::{LibraryPictures, TemplatePicture, WantPictures},
-    save::{SaveTemplate, TemplateDraft, TemplateSave, Written},
+    save::{SaveTemplate, TemplateContent, TemplateDraft, TemplateSave},
     sides::PartSides,
     work::{LOAD, LibraryAct, LibraryJobs, LibraryRequest},
 };

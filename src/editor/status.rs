@@ -7,12 +7,12 @@ use super::{
     ActiveRig,
     files::LoadJob,
     follow,
-    held::{DiscardResult, waiting},
     library::LibraryJobs,
     next_step::next_step,
     notice::StatusLine,
     panel::Requests,
     panels::timeline::import::ClipImport,
+    result_queue::{DiscardResult, waiting},
     style,
 };
 use crate::{

@@ -1,10 +1,16 @@
 //! Look-up of the nodes that a pose names.
 
+use std::collections::BTreeSet;
+
 use super::{
     Workbench,
     posing::{PoseError, WriteValue},
 };
-use crate::rig::{BuiltNode, Matching, NodeType, Uid, feature::off_at, nearest::did_you_mean};
+use crate::rig::{
+    BuiltNode, Matching, NodeType, Uid,
+    feature::off_at,
+    nearest::{did_you_mean, listed},
+};
 
 impl Workbench {
     /// Error of an attribute that a node does not have.
@@ -42,7 +48,18 @@ impl Workbench {
         if found.is_empty() && name.starts_with('@') {
             let processor = self.processor().ok_or(PoseError::NotBuilt)?;
             let uids = processor.builder().find(self.rig(), name)?;
-            found = uids.iter().filter_map(|uid| built.node(*uid)).filter(|node| is_meant(node)).collect();
+            let named: Vec<&BuiltNode> = uids.iter().filter_map(|uid| built.node(*uid)).collect();
+            found = named.iter().copied().filter(|node| is_meant(node)).collect();
+            if found.is_empty() && !named.is_empty() {
+                let labels: BTreeSet<&str> = named.iter().filter_map(|node| node.label.as_deref()).collect();
+                let there = |label: &&&str| of_kind().any(|node| node.label.as_deref() == Some(**label));
+                let labels: Vec<&str> = labels.iter().filter(there).copied().collect();
+                let nearest = match labels[..] {
+                    [] => String::new(),
+                    _ => format!("; write {}", listed(&labels, "or")),
+                };
+                return Err(PoseError::OtherKind { what, name: name.to_owned(), nearest });
+            }
         }
         if let Some(attribute) = attribute {
             let with: Vec<&BuiltNode> = found

@@ -111,6 +111,16 @@ pub enum PoseError {
         /// Nearest names, as the rest of a sentence.
         nearest: String,
     },
+    /// The nodes that a reference finds are of another kind.
+    #[error("\"{name}\" finds nodes, but no {what}{nearest}")]
+    OtherKind {
+        /// Requested kind of node, in words.
+        what: &'static str,
+        /// The reference.
+        name: String,
+        /// Labels that name nodes of the kind, as the rest of a sentence.
+        nearest: String,
+    },
     /// The node is not built, because something is off.
     #[error("\"{name}\" is not built: {off}; turn it on")]
     Off {
@@ -372,11 +382,18 @@ impl Workbench {
     }
 
     /// Runs `count` frames of a sixtieth of a second each, so that springs move. No other time passes in a workbench.
-    pub fn frames(&mut self, count: u32) {
+    ///
+    /// # Errors
+    /// If the time of [`Workbench::set_limits`] is over.
+    pub fn frames(&mut self, count: u32) -> Result<(), WorkbenchError> {
         let step = TimeUpdateStrategy::ManualDuration(Duration::from_nanos(16_666_667));
         self.app.insert_resource(step);
-        (0..count).for_each(|_| self.app.update());
+        let done = (0..count).try_for_each(|_| {
+            self.app.update();
+            self.check_time("the frames")
+        });
         self.app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+        done
     }
 
     /// Nodes of the built rig with the transforms of their entities and of the program.

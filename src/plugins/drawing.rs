@@ -8,7 +8,7 @@
 //! Sizes in pixels are logical pixels. If several cameras are marked, the first active one by order counts.
 
 pub mod controls;
-mod deforming;
+mod deform_joints;
 pub mod ghosts;
 pub mod grid;
 pub mod ink;
@@ -21,7 +21,7 @@ pub mod theme;
 
 use bevy::{asset::AssetEventSystems, camera::CameraUpdateSystems, camera::visibility::VisibilitySystems, prelude::*};
 
-pub use deforming::deforming_joints;
+pub use deform_joints::deforming_joints;
 pub use ghosts::{GhostJoint, Ghosts};
 pub use labels::{LETTER, LabelCandidate, label_places};
 pub use theme::{BACKGROUND, Theme};

@@ -4,7 +4,7 @@
 //! has them moved. From then on the rig has a [`FittedRig`]: a joint that is moved at rest is a marker, and the joints around it
 //! are fitted again, until the fit is accepted or cancelled ([`EndFit`]).
 
-mod fitted;
+mod fitted_rig;
 mod part;
 mod refit;
 pub mod region;
@@ -18,9 +18,9 @@ use bevy::{
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
-use self::{fitted::PendingFit, work::Work};
+use self::{fitted_rig::PendingFit, work::Work};
 pub use self::{
-    fitted::{FitMarkers, FittedRig},
+    fitted_rig::{FitMarkers, FittedRig},
     region::FitRegion,
     report::{FitFailure, FitReport},
 };

@@ -7,14 +7,14 @@ use std::sync::{
 
 /// The side of a job that an app sees. The task stops soon after this is dropped.
 #[derive(Debug, Default)]
-pub(super) struct JobControl(Arc<Shared>);
+pub(super) struct JobControl(Arc<JobState>);
 
 /// The side of a job that its task sees.
 #[derive(Debug, Clone)]
-pub(super) struct JobReporter(Arc<Shared>);
+pub(super) struct JobReporter(Arc<JobState>);
 
 #[derive(Debug, Default)]
-struct Shared {
+struct JobState {
     progress: AtomicU32,
     cancelled: AtomicBool,
 }

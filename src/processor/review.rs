@@ -48,7 +48,7 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
 }
 
 /// Problems of commands that are found without running them, and these commands with their readable parameters.
-fn problems_before_run(rig: &Rig, modules: &Modules) -> (Vec<BuildError>, Vec<Repaired>) {
+fn problems_before_run(rig: &Rig, modules: &Modules) -> (Vec<BuildError>, Vec<Repair>) {
     let (mut problems, mut repaired) = (Vec::new(), Vec::new());
     let mut judged: HashMap<(&str, &str), SurveyedParams> = HashMap::new();
     for joint in rig.walk() {
@@ -69,14 +69,14 @@ fn problems_before_run(rig: &Rig, modules: &Modules) -> (Vec<BuildError>, Vec<Re
                 problem: problem.clone(),
             }));
             let rest = survey.rest.as_ref().filter(|_| repaired.len() < MOST);
-            repaired.extend(rest.map(|rest| Repaired { command: tag.uid, params: rest.clone(), only_ranges: true }));
+            repaired.extend(rest.map(|rest| Repair { command: tag.uid, params: rest.clone(), only_ranges: true }));
         }
     }
     (problems, repaired)
 }
 
 /// Command that failed, with its faulty parameters left out.
-struct Repaired {
+struct Repair {
     command: Uid,
     params: String,
     /// True if parameters are left out that say where the command works: what else it says then may follow from that.
@@ -84,17 +84,17 @@ struct Repaired {
 }
 
 /// A command with a wrong value, with the default in place of that value.
-fn repaired_by_default(rig: &Rig, error: &BuildError) -> Option<Repaired> {
+fn repaired_by_default(rig: &Rig, error: &BuildError) -> Option<Repair> {
     let (_, tag) = rig.find_tag(error.command)?;
     let TagKind::Command { params, .. } = &tag.kind else { return None };
     let params = without_field(params, value_at_fault(&error.problem, params)?)?;
     let only_ranges = !matches!(error.problem, BuildProblem::Module(ModuleError::OutOfRange { .. }));
-    Some(Repaired { command: error.command, params, only_ranges })
+    Some(Repair { command: error.command, params, only_ranges })
 }
 
 /// Problems of commands that are found when these run without the parameters whose faults are known, which are left out of
 /// `repaired`. `running` is the rig without all commands that fail.
-fn further_problems(rig: &Rig, running: &Rig, builder: &mut Builder, repaired: &mut [Repaired]) -> Vec<BuildError> {
+fn further_problems(rig: &Rig, running: &Rig, builder: &mut Builder, repaired: &mut [Repair]) -> Vec<BuildError> {
     let mut found = Vec::new();
     let mut runs = 0;
     for next in repaired {
@@ -124,7 +124,7 @@ fn further_problems(rig: &Rig, running: &Rig, builder: &mut Builder, repaired: &
 
 /// Problems of commands that wait for others that fail: those of values that they say themselves, found with the others
 /// running as far as they can be read.
-fn problems_behind(rig: &Rig, known: &[BuildError], repaired: &[Repaired], builder: &mut Builder) -> Vec<BuildError> {
+fn problems_behind(rig: &Rig, known: &[BuildError], repaired: &[Repair], builder: &mut Builder) -> Vec<BuildError> {
     let failing: HashSet<Uid> = known.iter().map(|error| error.command).collect();
     if repaired.is_empty() {
         return Vec::new();
@@ -160,7 +160,7 @@ fn value_at_fault<'p>(problem: &'p BuildProblem, params: &str) -> Option<&'p str
 }
 
 /// The running rig together with a repaired command; `None` if that command is not there.
-fn with_params(rig: &Rig, running: &Rig, repaired: &Repaired) -> Option<Rig> {
+fn with_params(rig: &Rig, running: &Rig, repaired: &Repair) -> Option<Rig> {
     let (joint, tag) = rig.find_tag(repaired.command)?;
     let TagKind::Command { module, feature, .. } = &tag.kind else { return None };
     let kind = TagKind::Command { module: module.clone(), params: repaired.params.clone(), feature: *feature };

@@ -1,9 +1,13 @@
 //! Building rigs on the command line: the real binary, real files, exit codes.
 
-use std::{collections::BTreeSet, fs, path::Path, process::Command};
+use std::{collections::BTreeSet, fs, path::Path, process::Command, sync::Arc};
 
 use rigsmith::{
-    files::{RealDisk, load_model, load_template},
+    files::{BUNDLED_CHARACTERS, RealDisk, load_model, load_template},
+    headless::Workbench,
+    modules,
+    plugins::commands::BuildStep,
+    processor::Builder,
     rig::template,
 };
 use serde_json::Value;
@@ -630,5 +634,28 @@ fn check_tells_every_problem_of_a_template_with_its_place() {
             let answer = rigsmith(folder.path(), &["check", path.to_str().unwrap()]);
             assert_eq!(answer.code, 0, "{}", answer.out);
         }
+    }
+}
+
+#[test]
+fn the_command_builds_what_an_app_builds() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in BUNDLED_CHARACTERS {
+        let path = folder.path().join("t.rig.ron");
+        fs::write(&path, text).unwrap();
+        let rig = load_template(&RealDisk, &path).unwrap().rig;
+        let alone = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
+        let mut bench = Workbench::with_rig(1, rig);
+        bench.build(BuildStep::All);
+        assert!(bench.built() == Some(&alone), "{name}: the processor of an app builds the same");
+        let json = rigsmith(folder.path(), &["build", "t.rig.ron", "--json"]).json();
+        let told = |key: &str| json[key].as_u64().unwrap() as usize;
+        assert_eq!((told("nodes"), told("constraints")), (alone.nodes.len(), alone.constraints.len()), "{name}");
+        let count = bench.processor().unwrap().builder().cursor();
+        // As far as a build that stops on the way.
+        let until = (count / 2).to_string();
+        let json = rigsmith(folder.path(), &["build", "t.rig.ron", "--json", "--until", &until]).json();
+        bench.build(BuildStep::To(count / 2));
+        assert_eq!(json["nodes"].as_u64().unwrap() as usize, bench.built().unwrap().nodes.len(), "{name}, half");
     }
 }

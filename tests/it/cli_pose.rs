@@ -1,14 +1,15 @@
 //! `rigsmith pose` and `render --build`: the app on the command line, with the real binary, real files and exit codes.
 
-use std::{collections::BTreeSet, fs, path::Path};
+use std::{collections::BTreeSet, fs, path::Path, sync::Arc};
 
 use bevy::math::{Quat, Vec3};
 use rigsmith::{
-    files::{RealDisk, load_model, load_template},
+    files::{MeshShape, MeshToSave, ProjectToSave, RealDisk, load_model, load_template, store_project},
     headless::Workbench,
+    mesh::model::Weights,
     plugins::commands::BuildStep,
     rig::{
-        NodeType, PoseOffset, Uid,
+        JointData, NodeType, PoseOffset, Rig, RigEdit, SkinData, Uid,
         operations::Operation,
         project::{Project, ProjectRig, write_project},
     },
@@ -557,4 +558,67 @@ fn pictures_show_the_pose_and_its_controls_on_a_gpu() {
     }
     let wrong = rigsmith(folder.path(), &["render", "crane.rig.ron", "--set", "lift", "-o", "no.png"]);
     assert!(wrong.code == 2 && !folder.path().join("no.png").exists(), "{}", wrong.err);
+}
+
+#[test]
+fn the_mesh_of_a_project_is_posed_with_its_own_weights() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+    fs::write(path("square.obj"), square).unwrap();
+    let (mut rig, mesh) = (Rig::new(Uid(1), "rig"), Uid(0x50));
+    for number in 0..2 {
+        let mut joint = JointData { uid: Uid(10 + number), label: Some(format!("j{number}")), ..Default::default() };
+        joint.rest.translation = Vec3::Y * number as f32;
+        rig.apply(&RigEdit::AddJoint { joint: Box::new(joint), parent: None, index: usize::MAX }).unwrap();
+    }
+    let model = load_model(&RealDisk, &path("square.obj")).unwrap();
+    let mut weights = Weights::default();
+    // No binding would give these.
+    model.points.iter().for_each(|_| weights.push([(1, 0.75), (0, 0.25)]));
+    let skin = SkinData { joints: vec![Uid(10), Uid(11)], weights, at_rest: true, ..Default::default() };
+    rig.apply(&RigEdit::SetSkin(mesh, Some(Arc::new(skin)))).unwrap();
+    let shape = MeshShape::Open { triangles: model.point_triangles().into(), rest: Arc::new(model.at_rest()) };
+    let mesh = MeshToSave { uid: mesh, rig: rig.uid(), path: path("square.obj"), nodes: Arc::default(), shape };
+    let rigs = vec![rig, Rig::new(Uid(2), "bystander")];
+    let project = ProjectToSave { name: "square".into(), rigs, meshes: vec![mesh], ..Default::default() };
+    store_project(&RealDisk, &path("square.rigsmith.ron"), &project).unwrap();
+
+    let answer = rigsmith(folder.path(), &["pose", "square.rigsmith.ron", "-o", "square.glb"]);
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    assert!(answer.err.contains("bystander"), "what is left out is told: {}", answer.err);
+    let written = load_model(&RealDisk, &path("square.glb")).unwrap();
+    assert_eq!(written.points.len(), 4);
+    let weights = written.weights.unwrap();
+    let shares: Vec<f32> = (0..4).flat_map(|point| weights.of(point).map(|(_, share)| share)).collect();
+    assert!(shares.len() == 8 && shares.iter().all(|share| (share - 0.25).abs() < 1e-3 || (share - 0.75).abs() < 1e-3));
+    // A mesh that is given stands in for it.
+    fs::write(path("other.obj"), format!("{square}v 0 2 0\nf 4 3 5\n")).unwrap();
+    let args = ["pose", "square.rigsmith.ron", "--mesh", "other.obj", "-o", "other.glb"];
+    let answer = rigsmith(folder.path(), &args);
+    assert!(answer.code == 0 && answer.err.contains("stands in"), "{}", answer.err);
+    assert_eq!(load_model(&RealDisk, &path("other.glb")).unwrap().points.len(), 5);
+    // Without a file to write, a mesh would be for nothing.
+    let answer = rigsmith(folder.path(), &["pose", "square.rigsmith.ron", "--mesh", "other.obj"]);
+    assert!(answer.code == 2 && answer.err.contains("-o"), "{}", answer.err);
+}
+
+#[test]
+fn a_reference_to_joints_says_what_names_their_controls() {
+    let folder = folder();
+    let args = ["pose", "crane.rig.ron", "--set", "@hierarchy root type:joint.translate=(0,0.1,0)"];
+    let answer = rigsmith(folder.path(), &args);
+    assert_eq!(answer.code, 1);
+    assert!(answer.err.contains("no control") && !answer.err.contains("did you mean"), "{}", answer.err);
+    let biped = bundled("biped");
+    let answer = rigsmith(folder.path(), &["pose", &biped, "--set", "@joint hand_l.translate=(0,0.1,0)"]);
+    assert!(answer.code == 1 && answer.err.contains("write \"hand_l\""), "{}", answer.err);
+}
+
+#[test]
+fn frames_end_with_the_time_that_a_command_may_take() {
+    let folder = folder();
+    let args = ["--limit", "seconds=1", "pose", "crane.rig.ron", "--frames", "100000000"];
+    let answer = rigsmith(folder.path(), &args);
+    assert!(answer.code == 1 && answer.err.contains("frames"), "{}", answer.err);
 }

@@ -8,8 +8,8 @@ use rigsmith::{
     algo::face::auto::AutoSettings,
     editor::{
         ActiveRig,
-        held::waiting,
         panels::timeline::import::{ClipImport, ImportRequest},
+        result_queue::waiting,
     },
     files::{RealDisk, load_model},
     mesh::model::{Model, Weights},

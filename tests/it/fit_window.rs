@@ -16,9 +16,9 @@ use rigsmith::{
             FittingPlugin,
             doubts::{FitMarkKind, fit_marks},
         },
-        held::{self, DiscardResult, HeldPlugin},
         notice::Notice,
         pointer::{ModifierKeys, PointerAct, ViewportPointer},
+        result_queue::{self, DiscardResult, HeldPlugin},
         tools::{
             ToolsPlugin,
             region::{RegionSkeleton, RegionTool},
@@ -275,7 +275,7 @@ fn a_fit_waits_for_steps_that_were_undone_while_it_ran() {
     assert_eq!((window.rig().clips().len(), window.steps()), (1, 1));
     // So does the button of the status line.
     waiting(&mut window, "jump");
-    assert_eq!(held::waiting(window.world()).map(|(kind, _)| kind), Some(HeldResult::Fit));
+    assert_eq!(result_queue::waiting(window.world()).map(|(kind, _)| kind), Some(HeldResult::Fit));
     window.desk.app.world_mut().write_message(DiscardResult(HeldResult::Fit));
     window.settle();
     assert_eq!(job(&window), None);

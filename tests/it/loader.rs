@@ -22,15 +22,15 @@ use rigsmith::{
         camera::ViewportSight,
         files::{FilesPlugin, LoadJob, OpenRequest, SaveJob, StateFolder},
         follow::FollowPlugin,
-        held::HeldPlugin,
         library::{
             ChosenTemplate, DraggedTemplate, LibraryAct, LibraryAction, LibraryFolders, LibraryJobs, LibraryPictures,
-            LibraryRequest, SaveTemplate, TemplateDraft, TemplateLibrary, TemplatePicture, TemplateSave, Written,
-            obstacle,
+            LibraryRequest, SaveTemplate, TemplateContent, TemplateDraft, TemplateLibrary, TemplatePicture,
+            TemplateSave, obstacle,
         },
         palette,
         panel::{EditorPanel, Requests},
         panels::{PanelsPlugin, hierarchy::HierarchyPanel, loader::LoaderPanel, tags::TagsPanel},
+        result_queue::HeldPlugin,
     },
     files::{HeaderMemory, RealDisk, SearchPaths, TemplatePlace, list_templates, load_template},
     headless::headless_app,
@@ -554,7 +554,7 @@ fn templates_are_merged_injected_and_extracted() {
     // Selected joints become a part of their own, which the list has then.
     studio.desk.select(&joints);
     let path = studio.site.join("arm_of_man");
-    let content = Written::Joints(joints.to_vec());
+    let content = TemplateContent::Joints(joints.to_vec());
     studio.send(SaveTemplate { path: path.clone(), replace: false, content });
     let file = studio.site.join("arm_of_man.rig.ron");
     let part = load_template(&RealDisk, &file).unwrap().rig;
@@ -563,7 +563,7 @@ fn templates_are_merged_injected_and_extracted() {
     // A file that is there is replaced only if that was said.
     let text = fs::read(&file).unwrap();
     let all: Vec<Uid> = studio.desk.rig().walk().map(|joint| joint.data.uid).collect();
-    let content_of_all = Written::Joints(all);
+    let content_of_all = TemplateContent::Joints(all);
     studio.send(SaveTemplate { path: path.clone(), replace: false, content: content_of_all.clone() });
     assert!(fs::read(&file).unwrap() == text && studio.told("tick Replace"), "{:?}", studio.desk.told());
     studio.send(SaveTemplate { path, replace: true, content: content_of_all });
@@ -576,7 +576,7 @@ fn templates_are_merged_injected_and_extracted() {
     let file = studio.man().with_file_name("arm_r.rig.ron");
     assert_eq!(load_template(&RealDisk, &file).unwrap().rig.len(), 2);
     let path = studio.man();
-    studio.send(SaveTemplate { path, replace: false, content: Written::Joints(joints.to_vec()) });
+    studio.send(SaveTemplate { path, replace: false, content: TemplateContent::Joints(joints.to_vec()) });
     assert!(fs::read(studio.man()).unwrap() == text);
 }
 
@@ -629,7 +629,7 @@ fn a_picture_that_cannot_be_written_leaves_neither_a_file_nor_its_name() {
     let (picture, path) = (studio.site.join("hero.png"), studio.site.join("hero.rig.ron"));
     fs::create_dir(&picture).unwrap();
     let (before, done) = (studio.desk.rig().clone(), studio.desk.steps().1);
-    studio.send(SaveTemplate { path: path.clone(), replace: true, content: Written::Rig { picture: true } });
+    studio.send(SaveTemplate { path: path.clone(), replace: true, content: TemplateContent::Rig { picture: true } });
     assert!(studio.told("Could not write hero.rig.ron"), "{:?}", studio.desk.told());
     assert!(picture.is_dir() && !path.exists());
     assert_eq!((studio.desk.rig(), studio.desk.steps().1), (&before, done), "the header is as before");
@@ -642,7 +642,7 @@ fn a_picture_that_is_not_the_templates_is_replaced_only_if_that_was_said() {
     let texture = studio.site.join("hero.png");
     fs::write(&texture, b"a texture").unwrap();
     let path = studio.site.join("hero.rig.ron");
-    let content = Written::Rig { picture: true };
+    let content = TemplateContent::Rig { picture: true };
     let steps = studio.desk.steps();
     let save = |replace: bool| SaveTemplate { path: path.clone(), replace, content: content.clone() };
     studio.send(save(false));

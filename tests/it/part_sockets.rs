@@ -382,3 +382,47 @@ fn a_header_has_the_features_that_changes_of_parts_leave() {
     let added = "(joint: \"bone\", tags: [Feature(kind: \"hand\", name: \"fingers\", switch: \"curl\")])";
     assert_eq!(named(added), of(&[("twist", ""), ("fingers", "curl"), ("ik", "stretch")]));
 }
+
+#[test]
+fn bundled_parts_say_where_others_hang_and_what_may_be_set() {
+    let text = r#"(
+    format: 2,
+    name: "t",
+    joints: [(label: "hips", translation: (0, 1, 0))],
+    parts: [
+        (part: "parts/tail.rig.ron", name: "tail", parent: "hips", adds: true, count: 9, options: {"frequency": 5}),
+        (part: "parts/spring_chain.rig.ron", name: "tuft", adds: true, socket: "tail.tip"),
+    ],
+)"#;
+    let none = BTreeMap::new();
+    let template = PartFiles::given(&none).complete(Path::new("t.rig.ron"), text.as_bytes()).unwrap();
+    let rig = &template.rig;
+    let parent = |label: &str| {
+        let joint = rig.joint(rig.find_label(label).unwrap()).unwrap();
+        rig.joint(joint.parent.unwrap()).unwrap().data.label.clone().unwrap()
+    };
+    assert_eq!(
+        (parent("chain_1").as_str(), parent("tail_9").as_str()),
+        ("tail_9", "tail_8"),
+        "the end of a tail of nine"
+    );
+    let set = |label: &str| {
+        let joint = rig.joint(rig.find_label(label).unwrap()).unwrap();
+        let commands = joint.data.tags.iter().filter_map(|tag| match &tag.kind {
+            TagKind::Command { params, .. } if params.contains("\"frequency\",") => Some(params.clone()),
+            _ => None,
+        });
+        commands.collect::<Vec<String>>().concat()
+    };
+    assert!(set("tail_1").contains("default: 5") && set("chain_1").contains("default: 2"), "{}", set("tail_1"));
+    // Every socket is on a joint of its part, and options say what their tags say already.
+    let mut told = 0;
+    for (name, text) in BUNDLED_PARTS {
+        let part = PartFiles::given(&none).complete(Path::new(name), text.as_bytes()).unwrap();
+        let used = format!("(format: 2, name: \"t\", parts: [(part: \"{name}\", name: \"p\", adds: true)])");
+        let alone = PartFiles::given(&none).complete(Path::new("t.rig.ron"), used.as_bytes()).unwrap();
+        assert_eq!(alone.sockets.len(), part.sockets.len(), "{name}");
+        told += part.sockets.len() + part.rig.about().options.len();
+    }
+    assert!(told >= 18, "{told}");
+}

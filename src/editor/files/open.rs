@@ -9,7 +9,7 @@ use bevy::{
 
 use super::{
     DocumentLanded, FollowUp, OpenRequest, active,
-    bundled::{self, BundledModel},
+    bundle::{self, BundledModel},
     dialog::{Dialog, Question},
     document::{
         Context, ContextMesh, MeshSource, OpenDocument, SavedAt, close_journal, disk, is_same, is_unsaved, last_step,
@@ -169,7 +169,7 @@ pub(super) fn is_rig_file(path: &Path) -> bool {
 pub(super) fn start(world: &mut World, request: OpenRequest) {
     let mut uids = UidSource::seeded(world.resource_mut::<UidSource>().next_uid().0);
     let (name, task) = match request {
-        OpenRequest::Bundled => model(bundled::BODY.to_owned(), uids),
+        OpenRequest::Bundled => model(bundle::BODY.to_owned(), uids),
         OpenRequest::Model(name) => model(name, uids),
         OpenRequest::Template(name) => {
             (format!("the bundled {name} template"), spawn(move || template_document(&name)))
@@ -206,7 +206,7 @@ pub(in crate::editor) fn document(opened: LoadedDocument) -> LoadedFile {
 
 /// Starts to read a bundled mesh.
 fn model(name: String, mut uids: UidSource) -> (String, Task<Result<LoadedFile, OpenError>>) {
-    let about = bundled::describe(&name);
+    let about = bundle::describe(&name);
     let open = move || {
         let model = BundledModel::named(&name)?.read()?;
         let (source, origin) = (MeshSource::Bundled(name.clone()), Origin::Bundled(name));
@@ -217,7 +217,7 @@ fn model(name: String, mut uids: UidSource) -> (String, Task<Result<LoadedFile, 
 
 /// Reads a bundled template, as a document of its own.
 fn template_document(name: &str) -> Result<LoadedFile, OpenError> {
-    let mut opened = LoadedDocument::named(name, bundled::template(name)?);
+    let mut opened = LoadedDocument::named(name, bundle::template(name)?);
     opened.origin = OpenRequest::origin_of_template(name);
     Ok(document(opened))
 }

@@ -14,7 +14,7 @@ use bevy::{
 
 use super::{
     FollowUp, active, after_asking,
-    bundled::{BODY, BundledModel},
+    bundle::{BODY, BundledModel},
     dialog::Purpose,
     document::{Context, ContextMesh, MeshSource, OpenDocument, SavedAt, last_step, meshes, places},
     error::WriteError,

@@ -42,7 +42,7 @@ pub(super) struct PendingLoad {
 
 /// Template that a document follows.
 #[derive(Clone, Default)]
-struct Followed {
+struct FollowState {
     template: Option<PathBuf>,
     base: Option<Arc<Rig>>,
     source: Option<RigSource>,
@@ -52,8 +52,8 @@ struct Followed {
 struct Crossing {
     rig: Entity,
     step: Arc<Step>,
-    before: Followed,
-    after: Followed,
+    before: FollowState,
+    after: FollowState,
 }
 
 /// Follows loads through the history.
@@ -84,7 +84,7 @@ fn cross(world: &mut World, rig: Entity, commit: &Commit) {
     let step = commit.step();
     if let Commit::Done(_) = commit {
         let Some(pending) = loads.pending.take_if(|pending| pending.rig == rig) else { return };
-        let after = Followed { template: pending.template, base: Some(pending.base), source: None };
+        let after = FollowState { template: pending.template, base: Some(pending.base), source: None };
         loads.fit = pending.mesh.map(|mesh| (rig, mesh, step.clone()));
         // There is one document at a time.
         loads.steps.retain(|known| known.rig == rig);
@@ -114,22 +114,22 @@ fn cross(world: &mut World, rig: Entity, commit: &Commit) {
 fn settle(world: &mut World, rig: Entity) {
     let mut loads = world.resource_mut::<LoadSteps>();
     let Some(pending) = loads.pending.take_if(|pending| pending.rig == rig) else { return };
-    set(world, rig, Followed { template: pending.template, base: Some(pending.base), source: None });
+    set(world, rig, FollowState { template: pending.template, base: Some(pending.base), source: None });
     if let Some(mesh) = pending.mesh {
         world.write_message(FitRequest::new(mesh));
     }
 }
 
-fn followed(world: &World, rig: Entity) -> Followed {
+fn followed(world: &World, rig: Entity) -> FollowState {
     let document = world.get::<OpenDocument>(rig);
-    Followed {
+    FollowState {
         template: document.and_then(|document| document.template.clone()),
         base: document.and_then(|document| document.base.clone()),
         source: world.get::<RigSource>(rig).cloned(),
     }
 }
 
-fn set(world: &mut World, rig: Entity, next: Followed) {
+fn set(world: &mut World, rig: Entity, next: FollowState) {
     if let Some(mut document) = world.get_mut::<OpenDocument>(rig) {
         document.template = next.template;
         document.base = next.base;

@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// An operation that adds a part.
-pub(super) struct Added {
+pub(super) struct PartAddition {
     /// The operation.
     pub operation: TagOperation,
     /// Joint without a partner, for which a part that was to go onto both sides goes onto one.
@@ -38,7 +38,7 @@ pub(super) fn added(
     options: &[(String, String)],
     both: bool,
     modules: &Modules,
-) -> Result<Added, PartError> {
+) -> Result<PartAddition, PartError> {
     let joints = joints_for(rig, chosen, stroke, &part);
     part.sized_for(joints.len())?;
     let label = |joint: &Uid| rig.joint(*joint).and_then(|joint| joint.data.label.as_deref());
@@ -54,14 +54,14 @@ pub(super) fn added(
     let others = if both { partners(rig, &joints) } else { None };
     if let Some(others) = others {
         let sides = [on(joints, mirror)?, on(others, !mirror)?];
-        return Ok(Added { operation: TagOperation::AddPair { part: name, sides }, lonely: None });
+        return Ok(PartAddition { operation: TagOperation::AddPair { part: name, sides }, lonely: None });
     }
     // Parts of the trunk have no other side.
     let (with, without): (Vec<Uid>, Vec<Uid>) =
         joints.iter().copied().partition(|joint| partner(rig, *joint).is_some());
     let lonely = without.first().filter(|_| both && !with.is_empty()).copied();
     let PartSide { fitted, joints, mirror } = on(joints, mirror)?;
-    Ok(Added { operation: TagOperation::AddPart { part: name, fitted, joints, mirror }, lonely })
+    Ok(PartAddition { operation: TagOperation::AddPart { part: name, fitted, joints, mirror }, lonely })
 }
 
 /// Side of the first label that names one: see [`label_side`].

@@ -42,13 +42,13 @@ pub enum TemplatePicture {
     Nothing,
 }
 
-type Drawn = Vec<(TemplatePlace, Option<FileState>, TemplatePicture)>;
+type PictureList = Vec<(TemplatePlace, Option<FileState>, TemplatePicture)>;
 
 /// The pictures.
 #[derive(Resource, Default)]
 pub struct LibraryPictures {
     known: BTreeMap<TemplatePlace, (Option<FileState>, TemplatePicture)>,
-    task: Option<Task<Drawn>>,
+    task: Option<Task<PictureList>>,
     waiting: BTreeMap<TemplatePlace, Arc<ListedTemplate>>,
     drawn: BTreeSet<TemplatePlace>,
 }

@@ -43,12 +43,12 @@ pub struct SaveTemplate {
     /// True to replace a file that is there.
     pub replace: bool,
     /// Content of the template.
-    pub content: Written,
+    pub content: TemplateContent,
 }
 
 /// Content of a template that is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Written {
+pub enum TemplateContent {
     /// The open rig.
     Rig {
         /// True to take a picture in the viewport, which lies beside the template.
@@ -124,11 +124,11 @@ struct Job {
     name: String,
     /// The rig whose header got the name of the picture for it.
     named: Option<(Entity, String)>,
-    task: Task<Result<Saved, SaveFailure>>,
+    task: Task<Result<SaveProgress, SaveFailure>>,
 }
 
 /// Finished part of the work.
-enum Saved {
+enum SaveProgress {
     /// The picture is there, and the rig can be exported.
     Picture(PathBuf),
     /// Joints were extracted: their number, and notes.
@@ -146,7 +146,7 @@ pub(super) fn start(mut requests: MessageReader<SaveTemplate>, mut commands: Com
 fn begin(world: &mut World, SaveTemplate { path, replace, content }: SaveTemplate) {
     let path = completed(&path);
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let is_own = matches!(content, Written::Rig { .. }) && own_template(world) == Some(path.as_path());
+    let is_own = matches!(content, TemplateContent::Rig { .. }) && own_template(world) == Some(path.as_path());
     let may_replace = replace || is_own;
     if let Some(refused) = refusal(world, &path, &name, may_replace) {
         world.write_message(Notice::error(refused));
@@ -156,12 +156,14 @@ fn begin(world: &mut World, SaveTemplate { path, replace, content }: SaveTemplat
     let Some(rig) = settled(world, entity) else { return };
     let mut named = None;
     let task = match content {
-        Written::Joints(joints) => AsyncComputeTaskPool::get().spawn(async move { write_joints(&path, &rig, &joints) }),
-        Written::Rig { picture: false } => {
+        TemplateContent::Joints(joints) => {
+            AsyncComputeTaskPool::get().spawn(async move { write_joints(&path, &rig, &joints) })
+        }
+        TemplateContent::Rig { picture: false } => {
             world.write_message(ExportRequest(path));
             return;
         }
-        Written::Rig { picture: true } => {
+        TemplateContent::Rig { picture: true } => {
             let file = format!("{}.png", stem(&path));
             let is_named = rig.about().preview.as_ref() == Some(&file);
             // Textures of a character are often called as it is.
@@ -178,7 +180,7 @@ fn begin(world: &mut World, SaveTemplate { path, replace, content }: SaveTemplat
             }
             AsyncComputeTaskPool::get().spawn(async move {
                 save_atomic(&RealDisk, &path.with_file_name(file), &preview.png()?)?;
-                Ok(Saved::Picture(path))
+                Ok(SaveProgress::Picture(path))
             })
         }
     };
@@ -228,11 +230,11 @@ fn refusal(world: &World, path: &Path, name: &str, may_replace: bool) -> Option<
         .then(|| format!("There is a file {name} already: tick Replace, or choose another name"))
 }
 
-fn write_joints(path: &Path, rig: &Rig, joints: &[Uid]) -> Result<Saved, SaveFailure> {
+fn write_joints(path: &Path, rig: &Rig, joints: &[Uid]) -> Result<SaveProgress, SaveFailure> {
     let Extraction { rig: out, left } = extract(rig, joints, &stem(path), None)?;
     let mut notes = store_rig(&RealDisk, path, &out)?;
     notes.extend(left);
-    Ok(Saved::Joints(out.len(), notes))
+    Ok(SaveProgress::Joints(out.len(), notes))
 }
 
 /// Goes on with what is being written.
@@ -243,10 +245,10 @@ pub(super) fn go_on(mut save: ResMut<TemplateSave>, histories: Query<&RigHistory
     let Some(result) = check_ready(&mut job.task) else { return };
     let Some(Job { name, named, .. }) = save.job.take() else { return };
     match result {
-        Ok(Saved::Picture(path)) => {
+        Ok(SaveProgress::Picture(path)) => {
             commands.write_message(ExportRequest(path));
         }
-        Ok(Saved::Joints(count, notes)) => {
+        Ok(SaveProgress::Joints(count, notes)) => {
             let joints = if count == 1 { "1 joint".to_owned() } else { format!("{count} joints") };
             commands.write_message(Notice::done(format!("Wrote {name}: {joints}")));
             for note in notes {

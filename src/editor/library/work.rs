@@ -10,7 +10,7 @@ use bevy::{
 
 use super::{
     follow::{LoadSteps, PendingLoad},
-    joints::{Added, added, added_by},
+    joints::{PartAddition, added, added_by},
     listing::{LibraryFolders, own_folder},
     sides::PartSides,
 };
@@ -242,7 +242,7 @@ impl Snapshot {
         let name = place.part_name(self.beside.as_deref(), site);
         let part = (name, Part::from(template));
         let joints = (joints, self.stroke.as_slice());
-        let Added { operation, lonely } = added(&self.rig, joints, part, options, self.both, &self.modules)?;
+        let PartAddition { operation, lonely } = added(&self.rig, joints, part, options, self.both, &self.modules)?;
         let note = lonely.and_then(|joint| self.rig.joint(joint)).map(|joint| {
             let (part, joint) = (place.stem(), joint_name(&joint.data));
             format!("{part} went onto one side only: {joint} has no partner on the other; mirror the joints first")

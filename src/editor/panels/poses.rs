@@ -1,7 +1,7 @@
 //! Poses panel: the pose of the rig, and its library of stored poses as cards with pictures. The rest pose never changes here.
 
 mod picture;
-mod shown;
+mod pose_view;
 mod tween;
 
 use std::ops::Range;
@@ -11,7 +11,7 @@ use bevy_egui::egui::{
     self, Align, Button, Key, Layout, Rect, ScrollArea, Sense, Stroke, TextEdit, Ui, UiBuilder, WidgetInfo, WidgetType,
 };
 
-pub(in crate::editor) use self::shown::{PosedRig, put_clip};
+pub(in crate::editor) use self::pose_view::{PosedRig, put_clip};
 use self::{
     picture::Pictures,
     tween::{Tween, TweenTarget},

@@ -6,7 +6,7 @@
 
 pub mod brush;
 mod cursor;
-mod pointed;
+mod hover;
 mod running;
 
 use std::collections::BTreeSet;
@@ -20,7 +20,7 @@ use self::{
 };
 pub use self::{
     cursor::BrushCursor,
-    pointed::{PaintMeshes, PaintObstacle, PointedPlace},
+    hover::{PaintMeshes, PaintObstacle, PointedPlace},
 };
 use super::{
     Tool, ToolPointer, ToolSystems,

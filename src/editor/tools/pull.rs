@@ -51,7 +51,7 @@ impl Plugin for PullPlugin {
 pub struct PullTool {
     /// Joint or control under the last press.
     aim: Option<Uid>,
-    held: Option<Held>,
+    held: Option<NodePress>,
     /// Marks that the banner describes a drag.
     has_banner: bool,
 }
@@ -65,7 +65,7 @@ impl PullTool {
 
 /// A press on a node, and its drag.
 #[derive(Debug)]
-struct Held {
+struct NodePress {
     rig: Entity,
     node: Uid,
     at: Vec2,
@@ -181,7 +181,7 @@ fn drag(
         match pointer.act {
             PointerAct::Pressed => {
                 let pressed = tool.aim.take().zip(rig.as_ref());
-                tool.held = pressed.map(|(node, rig)| Held {
+                tool.held = pressed.map(|(node, rig)| NodePress {
                     rig: rig.entity,
                     node,
                     at: pointer.at,

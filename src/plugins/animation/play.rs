@@ -29,7 +29,7 @@ pub struct PlayedClip {
     compiled: Option<CompiledClip>,
     /// Time up to which markers were told.
     told: Option<f32>,
-    due: Due,
+    due: PendingWrite,
     /// Revision of the document that was followed last.
     revision: Option<Revision>,
     /// Properties that a clip has moved and moves no longer: they go back to the pose of the document.
@@ -38,7 +38,7 @@ pub struct PlayedClip {
 
 /// Nodes of a halted clip that the next frame writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-enum Due {
+enum PendingWrite {
     /// None: what was posed on top of the clip stays.
     #[default]
     None,
@@ -90,7 +90,7 @@ pub(super) fn compile(
             _ => true,
         };
         if is_other_rig || player.is_changed() || rest.is_some_and(|rest| rest.is_changed()) {
-            played.due = Due::All;
+            played.due = PendingWrite::All;
         }
         if is_other_rig {
             played.revision = revision;
@@ -109,10 +109,10 @@ pub(super) fn compile(
             continue;
         }
         if known == Some(player.clip) {
-            played.due = played.due.max(Due::Changed);
+            played.due = played.due.max(PendingWrite::Changed);
         } else {
             played.told = None;
-            played.due = Due::All;
+            played.due = PendingWrite::All;
         }
         let mut next = CompiledClip::new(clip);
         if let Some(before) = played.compiled.take() {
@@ -212,10 +212,10 @@ pub(super) fn play(
                 motion.delta = Transform::from_isometry(motion.delta.to_isometry() * step);
             }
             *told = Some(player.time);
-            *due = Due::All;
+            *due = PendingWrite::All;
         }
         let due = std::mem::take(due);
-        if due == Due::None {
+        if due == PendingWrite::None {
             continue;
         }
         // A rig that is shown at rest waits for its pose.
@@ -226,7 +226,7 @@ pub(super) fn play(
         sampler.sample(player.time, cursor, values);
         let held = motion.as_ref().map(|motion| motion.node);
         for node in nodes.iter() {
-            if due == Due::Changed && node.places().all(|at| written[at] == Some(values[at])) {
+            if due == PendingWrite::Changed && node.places().all(|at| written[at] == Some(values[at])) {
                 continue;
             }
             let Some(place) = NodePlace::of(node.uid, runtime.as_deref(), rig, joints) else { continue };

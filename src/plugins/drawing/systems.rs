@@ -11,7 +11,7 @@ use bevy::{
 use super::{
     DrawingCounts, Ghosts, LETTER, LabelCandidate, LabelChoice, RigDrawing, RigLabels,
     controls::draw_controls,
-    deforming::DeformingJoints,
+    deform_joints::DeformingJoints,
     ghosts, grid,
     ink::Ink,
     label_places,

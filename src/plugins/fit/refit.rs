@@ -11,7 +11,7 @@ use bevy::prelude::*;
 
 use super::{
     EndFit, FIT, FIT_AROUND, FitMarkers, FitReport, FittedRig, RemoveMarker,
-    fitted::{PastFits, PendingFit},
+    fitted_rig::{PastFits, PendingFit},
     work::{centre, skeleton, template_joints},
 };
 use crate::{
@@ -47,7 +47,7 @@ pub(super) fn follow_moves(
         if fitted.is_none() && pending.is_none() && past.is_none() && markers.is_none() {
             continue;
         }
-        let mut followed = Followed {
+        let mut followed = FitHistory {
             rig,
             fitted: fitted.cloned(),
             pending: pending.map(|pending| pending.0.clone()),
@@ -65,7 +65,7 @@ pub(super) fn follow_moves(
 }
 
 /// The fits of a rig while edits are followed.
-struct Followed<'a> {
+struct FitHistory<'a> {
     rig: &'a Rig,
     fitted: Option<FittedRig>,
     pending: Option<FittedRig>,
@@ -74,7 +74,7 @@ struct Followed<'a> {
     is_changed: bool,
 }
 
-impl Followed<'_> {
+impl FitHistory<'_> {
     fn follow(&mut self, report: &EditReport, modules: &RigModules) -> Option<Operation> {
         let is_fit = report.name == FIT;
         match &report.committed {

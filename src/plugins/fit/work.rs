@@ -6,7 +6,7 @@ use bevy::prelude::*;
 
 use super::{
     FinishedFit, FitFailure, FitPart, FitParts, FitReport, FitRequest, FitTemplate, FitTemplates, FittedRig,
-    fitted::FitExtent,
+    fitted_rig::FitExtent,
     part::{AddedPart, only, sides, with_hierarchies},
 };
 use crate::{

@@ -63,7 +63,7 @@ enum Way {
 }
 
 /// Control that was tried.
-struct Tried {
+struct Trial {
     slot: usize,
     /// Joints that it moves, as slots.
     moved: BTreeSet<usize>,
@@ -111,15 +111,15 @@ impl ControlPull {
                 moving.extend(tried_move(&mut state, handle, slot, size));
             }
         }
-        let is_local = |tried: &&Tried| tried.moved.is_subset(&in_limb);
+        let is_local = |tried: &&Trial| tried.moved.is_subset(&in_limb);
         // Forward controls that are moved carry the limb away; goals turn it.
-        let turns_chain = |tried: &&Tried| above.is_empty() || above.iter().any(|joint| tried.turned.contains(joint));
+        let turns_chain = |tried: &&Trial| above.is_empty() || above.iter().any(|joint| tried.turned.contains(joint));
         let local = |least: f32| {
             let good = moving.iter().filter(is_local).filter(turns_chain).filter(|tried| tried.gain >= least);
             good.min_by_key(|tried| tried.moved.len())
         };
-        let as_move = |tried: &Tried| Way::Move { handle: tried.slot, gain: tried.gain };
-        let mut chain_controls: Vec<&Tried> = turning.iter().filter(|tried| tried.moved.is_subset(&in_chain)).collect();
+        let as_move = |tried: &Trial| Way::Move { handle: tried.slot, gain: tried.gain };
+        let mut chain_controls: Vec<&Trial> = turning.iter().filter(|tried| tried.moved.is_subset(&in_chain)).collect();
         // A control that moves more stands above; of two that move the same joints the later one hangs below.
         chain_controls.sort_by_key(|tried| std::cmp::Reverse(tried.moved.len()));
         if chain.len() == 1 && chain_controls.len() > 1 {
@@ -270,12 +270,12 @@ fn nodes_below(built: &BuiltRig, state: &RigState, top: Option<Uid>) -> BTreeSet
 
 /// Joints that moved or turned, as slots.
 #[derive(Default)]
-struct Moved {
+struct JointMotion {
     joints: BTreeSet<usize>,
     turned: BTreeSet<usize>,
 }
 
-impl Moved {
+impl JointMotion {
     /// Adds the joints that differ between the state and what it was before.
     fn add(&mut self, state: &RigState, before: &[Trs], size: f32) {
         let nodes = state.program().nodes().iter().zip(before).enumerate();
@@ -293,7 +293,7 @@ impl Moved {
 }
 
 /// Joints that a turn of a control moves, and the movement of a pulled node; `None` for a control that cannot turn.
-fn with_turn(state: &mut RigState, slot: usize, pulled: Option<usize>, size: f32) -> Option<(Moved, f32)> {
+fn with_turn(state: &mut RigState, slot: usize, pulled: Option<usize>, size: f32) -> Option<(JointMotion, f32)> {
     let (offset, before) = (state.offset_at(slot), state.globals().to_vec());
     for sign in [1.0, -1.0] {
         // An axis along none of the control's own turns it about each that is free.
@@ -301,7 +301,7 @@ fn with_turn(state: &mut RigState, slot: usize, pulled: Option<usize>, size: f32
         state.set_offset_at(slot, PoseOffset { rotation: (offset.rotation * by).normalize(), ..offset });
         let is_turned = state.offset_at(slot) != offset;
         state.evaluate(0.0);
-        let mut moved = Moved::default();
+        let mut moved = JointMotion::default();
         moved.add(state, &before, size);
         let by = pulled.map_or(0.0, |at| state.global_at(at).translation.distance(before[at].translation));
         state.set_offset_at(slot, offset);
@@ -313,14 +313,14 @@ fn with_turn(state: &mut RigState, slot: usize, pulled: Option<usize>, size: f32
     None
 }
 
-fn tried_turn(state: &mut RigState, handle: usize, slot: usize, size: f32) -> Option<Tried> {
+fn tried_turn(state: &mut RigState, handle: usize, slot: usize, size: f32) -> Option<Trial> {
     let (moved, by) = with_turn(state, handle, Some(slot), size)?;
-    (by > STILL * size).then_some(Tried { slot: handle, moved: moved.joints, turned: moved.turned, gain: 0.0 })
+    (by > STILL * size).then_some(Trial { slot: handle, moved: moved.joints, turned: moved.turned, gain: 0.0 })
 }
 
-fn tried_move(state: &mut RigState, handle: usize, slot: usize, size: f32) -> Option<Tried> {
+fn tried_move(state: &mut RigState, handle: usize, slot: usize, size: f32) -> Option<Trial> {
     let (offset, before) = (state.offset_at(handle), state.globals().to_vec());
-    let (mut gain, mut moved) = (0.0_f32, Moved::default());
+    let (mut gain, mut moved) = (0.0_f32, JointMotion::default());
     let far = TRIED_DISTANCE * size;
     let axes = Vec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
     for axis in std::iter::once(Vec3::new(0.55, 0.62, 0.56)).chain(axes) {
@@ -338,7 +338,7 @@ fn tried_move(state: &mut RigState, handle: usize, slot: usize, size: f32) -> Op
             break;
         }
     }
-    (gain >= LEAST_GAIN).then_some(Tried {
+    (gain >= LEAST_GAIN).then_some(Trial {
         slot: handle,
         moved: moved.joints,
         turned: moved.turned,

@@ -112,7 +112,7 @@ fn options_are_written_in_the_window_and_set_where_the_part_is_used() {
 
     // Saved over the file they are in its header, where the command reads them.
     let path = studio.site.join("limbs").join("limb.rig.ron");
-    studio.send(SaveTemplate { path: path.clone(), replace: true, content: Written::Rig { picture: false } });
+    studio.send(SaveTemplate { path: path.clone(), replace: true, content: TemplateContent::Rig { picture: false } });
     studio.desk.until("the template", |_| fs::read_to_string(&path).unwrap().contains("walks along"));
     studio.settle();
     let written = fs::read_to_string(&path).unwrap();
@@ -175,7 +175,7 @@ fn sockets_are_written_in_the_window_and_others_hang_there() {
     assert_eq!((studio.text(), studio.desk.steps()), (text, steps));
 
     let path = studio.site.join("limbs").join("limb.rig.ron");
-    studio.send(SaveTemplate { path: path.clone(), replace: true, content: Written::Rig { picture: false } });
+    studio.send(SaveTemplate { path: path.clone(), replace: true, content: TemplateContent::Rig { picture: false } });
     studio.desk.until("the template", |_| fs::read_to_string(&path).unwrap().contains("\"top\""));
     studio.settle();
     let (code, said) = rigsmith(path.parent().unwrap(), &["list", "--json"]);
@@ -194,7 +194,7 @@ fn sockets_are_written_in_the_window_and_others_hang_there() {
     // Removed, they leave the file.
     step(&mut studio, |studio| studio.click("Remove socket end"));
     step(&mut studio, |studio| studio.click("Remove option size"));
-    studio.send(SaveTemplate { path: path.clone(), replace: true, content: Written::Rig { picture: false } });
+    studio.send(SaveTemplate { path: path.clone(), replace: true, content: TemplateContent::Rig { picture: false } });
     studio.desk.until("the template", |_| !fs::read_to_string(&path).unwrap().contains("\"end\""));
     studio.settle();
     let read = load_template(&RealDisk, &path).unwrap();

@@ -1,7 +1,7 @@
 //! Templates that are read while steps are undone.
 
 use rigsmith::{
-    editor::held::{self, DiscardResult},
+    editor::result_queue::{self, DiscardResult},
     plugins::landing::HeldResult,
 };
 
@@ -67,9 +67,13 @@ fn a_template_that_waits_can_be_discarded() {
     let mut studio = Studio::new(LoaderPanel::default());
     let (before, tall) = (studio.desk.rig().clone(), studio.tall());
     waiting(&mut studio, tall, LibraryAct::Load { keep: true });
-    assert_eq!(held::waiting(studio.world()), Some((HeldResult::Template, "tall_man waits".to_owned())));
+    assert_eq!(result_queue::waiting(studio.world()), Some((HeldResult::Template, "tall_man waits".to_owned())));
     studio.send(DiscardResult(HeldResult::Template));
-    assert!(held::waiting(studio.world()).is_none() && studio.told("it was discarded"), "{:?}", studio.desk.told());
+    assert!(
+        result_queue::waiting(studio.world()).is_none() && studio.told("it was discarded"),
+        "{:?}",
+        studio.desk.told()
+    );
     assert_eq!(*studio.desk.rig(), before);
     studio.change(Change::Redo);
     assert_eq!((studio.height("hips"), studio.desk.steps()), (1.0, (1, 1)), "the step is done again, and nothing else");

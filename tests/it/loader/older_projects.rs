@@ -61,7 +61,11 @@ fn opened(follows: bool) -> (Studio, PathBuf) {
 }
 
 fn save(studio: &mut Studio, path: &Path) -> String {
-    studio.send(SaveTemplate { path: path.to_owned(), replace: true, content: Written::Rig { picture: false } });
+    studio.send(SaveTemplate {
+        path: path.to_owned(),
+        replace: true,
+        content: TemplateContent::Rig { picture: false },
+    });
     fs::read_to_string(path).unwrap()
 }
 

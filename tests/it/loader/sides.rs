@@ -80,7 +80,7 @@ fn a_part_goes_onto_both_sides_in_one_step() {
 
     // A file has both as parts, and what is read from it is the same.
     let path = home.join("both.rig.ron");
-    studio.send(SaveTemplate { path: path.clone(), replace: false, content: Written::Rig { picture: false } });
+    studio.send(SaveTemplate { path: path.clone(), replace: false, content: TemplateContent::Rig { picture: false } });
     studio.desk.until("the template", |_| path.exists());
     studio.settle();
     let read = load_template(&RealDisk, &path).unwrap();

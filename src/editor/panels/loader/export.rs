@@ -4,14 +4,14 @@
 mod draft;
 mod options;
 mod sockets;
-mod typed;
+mod text_entry;
 
 use bevy::prelude::{Entity, World};
 use bevy_egui::egui::{Button, Label, RichText, TextEdit, Ui, WidgetInfo, WidgetType};
 
 use crate::{
     editor::{
-        library::{HEADER, SaveTemplate, TemplateDraft, Written},
+        library::{HEADER, SaveTemplate, TemplateContent, TemplateDraft},
         panel::Requests,
         panels::displayed_rig::{DisplayedRig, Stamp},
     },
@@ -104,7 +104,7 @@ impl ExportForm {
             let tip = "Header, options, sockets, groups, joints, tags, features and parts, as a .rig.ron";
             let save = ui.add_enabled(can, Button::new("Save template")).on_hover_text(tip);
             if save.on_disabled_hover_text("There are no joints").clicked() {
-                let content = Written::Rig { picture: next.picture };
+                let content = TemplateContent::Rig { picture: next.picture };
                 requests.send(SaveTemplate { path: file.clone(), replace, content });
                 is_sent = true;
             }
@@ -116,7 +116,7 @@ impl ExportForm {
                     joints.first().map(|joint| shown.name(*joint).replace(['/', '\\'], "_")).unwrap_or_default();
                 let is_typed = !next.path.trim().is_empty();
                 let path = if is_typed { file } else { file.with_file_name(format!("{first}.rig.ron")) };
-                requests.send(SaveTemplate { path, replace, content: Written::Joints(joints) });
+                requests.send(SaveTemplate { path, replace, content: TemplateContent::Joints(joints) });
                 is_sent = true;
             }
         });

@@ -4,7 +4,7 @@
 use bevy::prelude::*;
 use bevy_egui::egui::{ComboBox, Key, Slider, Ui, WidgetInfo, WidgetType};
 
-use super::shown::PosedRig;
+use super::pose_view::PosedRig;
 use crate::{
     editor::{
         panel::Requests,

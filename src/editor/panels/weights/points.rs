@@ -42,20 +42,20 @@ pub(super) struct PointTable {
 struct TableKey {
     mesh: Uid,
     skin: Weak<SkinData>,
-    listed: Listed,
+    listed: PointChoice,
     active: Option<Uid>,
 }
 
 /// Points that the table lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Listed {
+enum PointChoice {
     /// The selected ones, as of a change of the selection.
     Selected(Tick),
     /// The one that was last under the pointer.
     Under(u32),
 }
 
-impl Listed {
+impl PointChoice {
     /// The selected points, or else the one that was last under the pointer, with their mesh.
     fn of(world: &World) -> Option<(Uid, Self)> {
         let selected = world.get_resource_ref::<SelectedPoints>()?;
@@ -105,7 +105,7 @@ impl PointTable {
         meshes: &[(Entity, &RigMesh)],
         requests: &mut Requests,
     ) {
-        let Some((mesh, listed)) = Listed::of(world) else {
+        let Some((mesh, listed)) = PointChoice::of(world) else {
             ui.weak(
                 "Points: in Paint mode, Ctrl+Shift and click selects some; else the one under the pointer is listed.",
             );
@@ -154,7 +154,7 @@ impl PointTable {
     }
 
     /// Lists the influences again after a change of the weights or of the points.
-    fn refresh(&mut self, world: &World, shown: &DisplayedRig, mesh: Uid, skin: &Arc<SkinData>, listed: Listed) {
+    fn refresh(&mut self, world: &World, shown: &DisplayedRig, mesh: Uid, skin: &Arc<SkinData>, listed: PointChoice) {
         if self.before.is_some() {
             // A dragged number stays in its line, even if others lose all of their weight to it.
             self.made_from = None;

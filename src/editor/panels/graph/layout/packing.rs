@@ -41,7 +41,7 @@ struct Column {
 
 /// Upper left corners of blocks. `links` are the numbers of edges from a block to another.
 pub(super) fn pack(blocks: &[Block], links: &BTreeMap<(usize, usize), usize>) -> Vec<[f32; 2]> {
-    let waiting = Waiting::new(blocks, links);
+    let waiting = BlockQueue::new(blocks, links);
     let mut best: Option<(f32, Vec<[f32; 2]>)> = None;
     let mut limit = LIMITS.0;
     for _ in 0..LIMIT_COUNT {
@@ -59,12 +59,12 @@ pub(super) fn pack(blocks: &[Block], links: &BTreeMap<(usize, usize), usize>) ->
 }
 
 /// Blocks in the order in which they are put into columns, each with those that come before it.
-struct Waiting {
+struct BlockQueue {
     order: Vec<usize>,
     before: Vec<Vec<usize>>,
 }
 
-impl Waiting {
+impl BlockQueue {
     fn new(blocks: &[Block], links: &BTreeMap<(usize, usize), usize>) -> Self {
         let order = order(blocks, links);
         let mut place = vec![0; blocks.len()];

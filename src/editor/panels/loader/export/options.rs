@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bevy::prelude::Entity;
 use bevy_egui::egui::{Checkbox, ComboBox, Frame, Label, RichText, Ui, WidgetInfo, WidgetType};
 
-use super::{draft::HeaderDraft, sockets::free_name, typed::TypedFields};
+use super::{draft::HeaderDraft, sockets::free_name, text_entry::TypedFields};
 use crate::{
     editor::{
         notice::Notice,

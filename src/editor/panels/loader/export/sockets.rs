@@ -5,7 +5,7 @@ use bevy_egui::egui::{Label, RichText, Ui};
 
 use super::{
     draft::HeaderDraft,
-    typed::{NoNumbers, TypedFields},
+    text_entry::{NoNumbers, TypedFields},
 };
 use crate::{
     editor::{
