@@ -11,7 +11,7 @@ use super::{
     switches::SwitchArgs,
 };
 use crate::{
-    files::{FileKind, RealDisk, store_model, store_rig},
+    files::{FileKind, RealDisk, store_model},
     headless::{
         Workbench,
         posing::{ControlWrite, HeldValue, PoseError},
@@ -199,7 +199,8 @@ fn write(args: &PoseArgs, output: &Output, bench: &mut Workbench, report: &mut R
                 skeleton.apply(&set).map_err(|error| Failure::Input(Box::new(error)))?;
             }
         }
-        report.notes(store_rig(&RealDisk, output, &skeleton)?);
+        let has_commands = bench.rig().walk().any(|joint| !joint.data.tags.is_empty());
+        report.notes(build::store_built(output, &args.rig, skeleton, has_commands)?);
         return Ok(());
     }
     let (model, settings) = build::character_of(bench, args.mesh.as_deref(), &args.weights, &args.export, report)?;
