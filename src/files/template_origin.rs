@@ -184,7 +184,9 @@ fn straight(path: &Path) -> Vec<Component<'_>> {
     for component in path.components() {
         match component {
             Component::CurDir => {}
-            Component::ParentDir if matches!(out.last(), Some(Component::Normal(_))) => drop(out.pop()),
+            Component::ParentDir if matches!(out.last(), Some(Component::Normal(_))) => {
+                out.pop();
+            }
             component => out.push(component),
         }
     }
