@@ -33,6 +33,7 @@ mod read;
 mod shapes;
 mod site;
 mod store;
+mod template_origin;
 mod template_text;
 mod verify;
 mod watch;
@@ -64,7 +65,9 @@ pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
 pub use site::{SITE_FILE, SearchPaths, SiteError, TEMPLATES_VARIABLE};
 pub use store::{
-    StoreError, store_animation, store_avatar, store_document_over, store_model, store_rig, store_rig_over, store_skin,
+    StoreError, is_template_of, store_animation, store_avatar, store_document_over, store_model, store_rig,
+    store_rig_over, store_skin,
 };
+pub use template_origin::{TemplateOrigin, has_parts, store_rig_from};
 pub(crate) use template_text::template_text;
 pub use watch::{FileWatch, LOOK, TemplateWatch};

@@ -21,7 +21,7 @@ use super::{
     vrm::AvatarDraft,
 };
 use crate::{
-    files::{FileKind, RealDisk, store_model, store_rig},
+    files::{FileKind, RealDisk, StoreError, has_parts, store_model, store_rig, store_rig_over},
     headless::{Workbench, posing::PoseError},
     mesh::{
         gltf::GltfWriteSettings,
@@ -108,7 +108,7 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
     let notes = if FileKind::of(output) == Some(FileKind::Template) {
         let skeleton = baked(&rig, &built);
         drop((rig, built));
-        store_rig(&RealDisk, output, skeleton)?
+        store_built(output, &args.rig, skeleton, has_commands)?
     } else if args.mesh.is_none() && !has_commands && rig.pose().is_empty() && meta.is_none() {
         let mut model = skeleton_model(&rig, Some(&built));
         mark_joints(&mut model, &baked(&rig, &built));
@@ -134,6 +134,27 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
     report.line(format!("wrote {}", output.display()));
     report.set("output", output.display().to_string());
     Ok(())
+}
+
+/// Note about a template whose parts a skeleton cannot have.
+const BUILT_ALONE: &str = "the file has the built skeleton alone, without commands and parts: what changes in the files of the \
+                           template and its parts comes to it when it is built again";
+
+/// Saves the skeleton that was built of a rig. Parts of the rig's file stay parts in it unless they have commands, which a
+/// skeleton has no more.
+pub(super) fn store_built(
+    output: &Path,
+    source: &Path,
+    skeleton: Rig,
+    has_commands: bool,
+) -> Result<Vec<String>, StoreError> {
+    let has_parts = has_parts(&RealDisk, source);
+    if has_parts && !has_commands {
+        return store_rig_over(&RealDisk, output, skeleton, &[source]);
+    }
+    let mut notes = store_rig(&RealDisk, output, skeleton)?;
+    notes.extend(has_parts.then(|| BUILT_ALONE.to_owned()));
+    Ok(notes)
 }
 
 /// Adds what a build came to. A command that stopped it is a fault of the input.

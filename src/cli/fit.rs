@@ -15,11 +15,15 @@ use super::{
     limits,
     progress::{Progress, spinning},
     report::counted,
+    update::companion,
     vrm::AvatarDraft,
 };
 use crate::{
     algo::fit_template::FitSymmetry,
-    files::{BUNDLED_CHARACTERS, FileKind, RealDisk, bundled_characters, bundled_part, stem, store_model, store_rig},
+    files::{
+        BUNDLED_CHARACTERS, FileKind, RealDisk, StoreError, TemplateOrigin, bundled_characters, bundled_part,
+        save_atomic, stem, store_model, store_rig_from, store_rig_over,
+    },
     headless::Workbench,
     mesh::model::Model,
     plugins::{
@@ -29,7 +33,7 @@ use crate::{
             region::{triangles_held, triangles_in_box},
         },
     },
-    rig::part::Part,
+    rig::{Rig, part::Part, template::write_template},
 };
 
 /// Kind of templates that are parts.
@@ -63,8 +67,8 @@ pub(super) struct FitArgs {
     /// two corners; may be repeated
     #[arg(long = "region", value_name = "NAME|X,Y,Z,X,Y,Z", value_parser = region, allow_hyphen_values = true)]
     regions: Vec<RegionArg>,
-    /// Output file: the fitted template as .rig.ron, the skinned character as .glb or .gltf, an avatar in VRM 1.0 as .vrm, or
-    /// a picture as .png
+    /// Output file: the fitted template as .rig.ron, with its parts (OUT.base beside it keeps the template for updates), the
+    /// skinned character as .glb or .gltf, an avatar in VRM 1.0 as .vrm, or a picture as .png
     #[arg(short, long)]
     output: Output,
     #[command(flatten)]
@@ -169,7 +173,8 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
     if is_picture {
         picture(args, &bench)?;
     } else if kind == Some(FileKind::Template) {
-        report.notes(store_rig(&RealDisk, &args.output, bench.rig())?);
+        let origin = origin(args, &fitted.template)?;
+        store_made(&args.output, bench.rig(), origin, &mut report)?;
     } else {
         // The file has the joints that commands make, too, as after a build.
         if let Some(error) = bench.build(BuildStep::All).error {
@@ -188,6 +193,37 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
     report.line(format!("wrote {}", args.output.display()));
     report.set("output", args.output.display().to_string());
     Ok(report)
+}
+
+/// The template that was fitted, whose name is `fitted`.
+fn origin(args: &FitArgs, fitted: &str) -> Result<Option<TemplateOrigin>, Failure> {
+    let Some(file) = &args.template else { return Ok(TemplateOrigin::bundled(fitted)) };
+    let name = file.to_str().unwrap_or_default();
+    if bundled_name(name).is_some() || !file.exists() && bundled_part(name).is_some() {
+        return Ok(TemplateOrigin::bundled(name));
+    }
+    Ok(Some(TemplateOrigin::read(&RealDisk, file)?))
+}
+
+/// Saves a rig that was made from a template as changes of its text, so that parts stay parts, and keeps the template as it is
+/// beside it: an update tells from that what has changed.
+pub(super) fn store_made(
+    output: &Path,
+    rig: &Rig,
+    origin: Option<TemplateOrigin>,
+    report: &mut Report,
+) -> Result<(), Failure> {
+    let Some(origin) = origin else {
+        report.notes(store_rig_over(&RealDisk, output, rig, &[])?);
+        return Ok(());
+    };
+    let rig = origin.adopted(rig).map_err(|error| Failure::Input(Box::new(error)))?;
+    report.notes(store_rig_from(&RealDisk, output, &rig, &origin)?);
+    let base = companion(output);
+    save_atomic(&RealDisk, &base, write_template(origin.rig()).as_bytes()).map_err(StoreError::from)?;
+    report.line(format!("wrote {}, the template as it is now, for `rigsmith update`", base.display()));
+    report.set("base", base.display().to_string());
+    Ok(())
 }
 
 fn bundled_name(name: &str) -> Option<&'static str> {

@@ -15,7 +15,7 @@ use super::{
     switches::SwitchArgs,
 };
 use crate::{
-    files::{FileKind, LoadedMesh, MeshState, RealDisk, store_model, store_rig},
+    files::{FileKind, LoadedMesh, MeshState, RealDisk, store_model},
     headless::{
         Workbench,
         posing::{ControlWrite, HeldValue, PoseError},
@@ -236,7 +236,8 @@ fn write(
                 skeleton.apply(&set).map_err(|error| Failure::Input(Box::new(error)))?;
             }
         }
-        report.notes(store_rig(&RealDisk, output, &skeleton)?);
+        let has_commands = bench.rig().walk().any(|joint| !joint.data.tags.is_empty());
+        report.notes(build::store_built(output, &args.rig, skeleton, has_commands)?);
         return Ok(());
     }
     let (model, settings) = match own_mesh {

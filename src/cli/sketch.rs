@@ -11,12 +11,16 @@ use serde_json::{Value, json};
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, WeightArgs,
     binding::bind,
+    fit::store_made,
     limits,
     progress::spinning,
     report::{counted, is_json},
 };
 use crate::{
-    files::{FileKind, RealDisk, bundled_characters, bundled_part, load_gestures, stem, store_model, store_rig},
+    files::{
+        FileKind, RealDisk, TemplateOrigin, bundled_characters, bundled_part, load_gestures, stem, store_model,
+        store_rig,
+    },
     headless::Workbench,
     plugins::fit::{FitParts, FitTemplates},
     rig::Rig,
@@ -97,7 +101,9 @@ fn save(
     report: &mut Report,
 ) -> Result<(), Failure> {
     match kind {
-        FileKind::Template | FileKind::RigText => report.notes(store_rig(&RealDisk, path, bench.rig())?),
+        // A gesture may have fitted a template.
+        FileKind::Template => store_made(path, bench.rig(), TemplateOrigin::of(bench.rig()), report)?,
+        FileKind::RigText => report.notes(store_rig(&RealDisk, path, bench.rig())?),
         _ => {
             bind(bench, args.weights.settings(), &args.weights.claim, Vec::new(), report)?;
             let write = || store_model(&RealDisk, path, &bench.character(), &args.export.settings());

@@ -129,7 +129,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
 }
 
 /// File beside a rig that has the version of the template that it was made from, or updated to last.
-fn companion(rig: &Path) -> PathBuf {
+pub(super) fn companion(rig: &Path) -> PathBuf {
     let mut name = rig.as_os_str().to_owned();
     name.push(".base");
     name.into()

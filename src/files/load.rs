@@ -220,12 +220,17 @@ fn load_gltf(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
 /// Reads a template with its parts: see [`PartFiles`]. Where there is no such file, a relative path is the name of a template, with
 /// or without its ending, in the folders of the site ([`SearchPaths`](super::SearchPaths)), or of one that comes with Rigsmith.
 pub fn load_template(disk: &dyn Disk, path: &Path) -> Result<Template, LoadError> {
-    let (path, bytes) = match read_capped(disk, path, template::MAX_BYTES as u64) {
-        Ok(bytes) => (path.to_owned(), bytes),
-        Err(error @ ReadError::Missing { .. }) => named_template(disk, path)?.ok_or(error)?,
-        Err(error) => return Err(error.into()),
-    };
+    let (path, bytes) = template_file(disk, path)?;
     PartFiles::new(disk).complete(&path, &bytes).map_err(|source| in_source(&path, &bytes, source))
+}
+
+/// The file that [`load_template`] reads, with its content.
+pub(super) fn template_file(disk: &dyn Disk, path: &Path) -> Result<(PathBuf, Vec<u8>), LoadError> {
+    match read_capped(disk, path, template::MAX_BYTES as u64) {
+        Ok(bytes) => Ok((path.to_owned(), bytes)),
+        Err(error @ ReadError::Missing { .. }) => Ok(named_template(disk, path)?.ok_or(error)?),
+        Err(error) => Err(error.into()),
+    }
 }
 
 /// Reads clips.

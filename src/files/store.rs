@@ -9,6 +9,7 @@ use super::{
     Disk, FileKind, FileSet, LoadError, PartFiles, ReadError, SaveError,
     kept_lists::with_kept_lists,
     read_capped, save_atomic, save_set, stem,
+    template_origin::moved_text,
     template_text::{TemplateText, template_text},
     verify,
 };
@@ -256,9 +257,9 @@ const SOURCE_UNREAD: &str =
 
 /// Saves a rig over a template that was read: only what changed is written into its text, see
 /// [`write_template_over`](template::write_template_over). That is the first of the files in `sources` that is a template
-/// of the same rig; without one, and for another kind of file, it is saved as by [`store_rig`]. Returns notes, a sentence each:
-/// about what the format cannot hold, and about a text that had to be written anew. A rig that is handed over is dropped as by
-/// [`store_rig`].
+/// of the same rig, with parts beside it called by their way from `path`; without one, and for another kind of file, it is
+/// saved as by [`store_rig`]. Returns notes, a sentence each: about what the format cannot hold, and about a text that had to
+/// be written anew. A rig that is handed over is dropped as by [`store_rig`].
 ///
 /// # Errors
 /// [`StoreError`]; the former file is unchanged. A file at `path` that is one of the sources and cannot be read is not
@@ -287,9 +288,17 @@ pub fn store_rig_over(
         }
     }
     is_unread &= found.is_none();
-    let source = found.as_ref().map(|(source, text)| (*source, text.as_str()));
-    let TemplateText { text, note } = template_text(rig.borrow(), source, path, &|| PartFiles::new(disk));
-    drop((rig, found));
+    let reader = || PartFiles::new(disk);
+    // Parts beside the one file may not be there beside the other. Those that were dropped are known by the names that they had.
+    let has_dropped = !rig.borrow().dropped_parts().is_empty();
+    let elsewhere = found.as_ref().filter(|(source, _)| !has_dropped && source.parent() != path.parent());
+    let moved = elsewhere.and_then(|(source, text)| moved_text(text, source, path, &reader));
+    let source = match &moved {
+        Some(text) => Some((path, text.as_str())),
+        None => found.as_ref().map(|(source, text)| (*source, text.as_str())),
+    };
+    let TemplateText { text, note } = template_text(rig.borrow(), source, path, &reader);
+    drop((rig, found, moved));
     save_template(disk, path, &text)?;
     Ok(note.into_iter().chain(is_unread.then_some(SOURCE_UNREAD)).map(str::to_owned).collect())
 }
@@ -329,7 +338,12 @@ fn template_of(disk: &dyn Disk, path: &Path, rig: Uid) -> Result<Option<String>,
     Ok(text.map(|text| text.strip_prefix('\u{FEFF}').map(str::to_owned).unwrap_or(text)))
 }
 
-fn save_template(disk: &dyn Disk, path: &Path, text: &str) -> Result<(), StoreError> {
+/// True if a file is the template of a rig, or cannot be read to tell.
+pub fn is_template_of(disk: &dyn Disk, path: &Path, rig: Uid) -> bool {
+    !matches!(template_of(disk, path, rig), Ok(None))
+}
+
+pub(super) fn save_template(disk: &dyn Disk, path: &Path, text: &str) -> Result<(), StoreError> {
     if text.len() > template::MAX_BYTES {
         return Err(StoreError::TooLarge { path: path.into(), mebibytes: text.len() >> 20 });
     }

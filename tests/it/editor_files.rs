@@ -19,7 +19,10 @@ use rigsmith::{
         recovery::{Recovery, can_recover, describe},
         settings::EditorSettings,
     },
-    files::{Disk, RealDisk, journal::journal_beside, load_animation, load_model, load_template, store_rig},
+    files::{
+        Disk, RealDisk, bundled_characters, journal::journal_beside, load_animation, load_model, load_template,
+        store_rig,
+    },
     headless::headless_app,
     plugins::{
         document::{Change, EditRequest},
@@ -32,6 +35,7 @@ use rigsmith::{
         animation::{Key, Property, RigClip, Track, TrackTarget},
         operations::Operation,
         skeleton_preset::SkeletonPreset,
+        update::{diff, edits_between},
     },
     test_app::strict_app,
 };
@@ -572,6 +576,31 @@ fn exports_can_be_read_back() {
     assert!(matches!(window.question(), Some(Question::Replace { .. })), "it is there already");
     window.answer(Answer::Save);
     assert!(window.is_unsaved(), "an export is no save");
+}
+
+/// A character of Rigsmith in a document's rig, as a fit puts it there, keeps its parts in the first file and in the next ones.
+#[test]
+fn what_a_fit_made_keeps_its_parts_in_its_first_file() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    let biped = bundled_characters().into_iter().find(|rig| rig.about().name == "biped").expect("the biped");
+    let edits = edits_between(&window.rig(), &biped).expect("edits");
+    window.change(Change::Do(Operation::Named { name: "Fit", edits }));
+    for height in [0.25, 0.5] {
+        let thigh = window.rig().find_label("thigh_l").expect("a thigh");
+        let mut rest = window.rig().joint(thigh).expect("a thigh").data.rest;
+        rest.translation.y = height;
+        window.change(Change::Do(Operation::Edits(vec![RigEdit::SetRest(thigh, rest)])));
+        let path = window.export("hero.rig.ron");
+        if matches!(window.question(), Some(Question::Replace { .. })) {
+            window.answer(Answer::Save);
+        }
+        let read = load_template(&RealDisk, &path).expect("a template");
+        let parts: Vec<&str> = read.instances.iter().map(|instance| instance.part.as_str()).collect();
+        assert_eq!((parts.len(), parts[0]), (8, "parts/spine.rig.ron"), "{:?}", window.notices);
+        assert_eq!((read.rig.uid(), diff(&read.rig, &window.rig())), (window.rig().uid(), Vec::new()));
+        assert_eq!(read.rig.joint(thigh).expect("a thigh").data.rest.translation.y, height);
+    }
 }
 
 #[test]

@@ -81,6 +81,8 @@ mod fit;
 mod fit_cli;
 mod fit_data;
 mod fit_hinges;
+#[cfg(feature = "cli")]
+mod fit_parts;
 #[cfg(feature = "editor")]
 mod fit_window;
 mod fuzz_animation;

@@ -21,8 +21,9 @@ use super::{
 use crate::{
     algo::face::expression::{ExpressionSet, vrm_mixes},
     files::{
-        FileKind, LoadError, RealDisk, load_animation, load_model, load_rig_text, load_skin, load_template, stem,
-        store_animation, store_avatar, store_document_over, store_model, store_skin,
+        FileKind, LoadError, RealDisk, StoreError, TemplateOrigin, is_template_of, load_animation, load_model,
+        load_rig_text, load_skin, load_template, stem, store_animation, store_avatar, store_document_over, store_model,
+        store_rig_from, store_skin,
     },
     instance::RigSource,
     mesh::{gltf::GltfWriteSettings, model::Model},
@@ -155,7 +156,7 @@ impl ExportSource<'_> {
             Some(FileKind::Template | FileKind::RigText) => {
                 let sources = [Some(path), template];
                 let sources: Vec<&Path> = sources.into_iter().flatten().collect();
-                Ok(store_document_over(&RealDisk, path, rig, self.base, &sources)?)
+                Ok(self.store_rig(path, &sources)?)
             }
             Some(FileKind::Skin) => {
                 let both = mesh.and_then(|mesh| Some((mesh, rig.skin(mesh.uid)?)));
@@ -167,6 +168,17 @@ impl ExportSource<'_> {
                 Ok(Vec::new())
             }
             _ => Err(WriteError::Ending),
+        }
+    }
+
+    /// Saves the rig over its template. One that is in no file yet keeps the parts of the template of Rigsmith that it was made
+    /// from, by a fit for example.
+    fn store_rig(&self, path: &Path, sources: &[&Path]) -> Result<Vec<String>, StoreError> {
+        let is_known = sources.iter().any(|source| is_template_of(&RealDisk, source, self.rig.uid()));
+        let is_first = FileKind::of(path) == Some(FileKind::Template) && !is_known;
+        match is_first.then(|| TemplateOrigin::of(self.rig)).flatten() {
+            Some(origin) => store_rig_from(&RealDisk, path, self.rig, &origin),
+            None => store_document_over(&RealDisk, path, self.rig, self.base, sources),
         }
     }
 

@@ -22,6 +22,7 @@
 mod comment_placement;
 mod file;
 mod header;
+mod moved_text;
 mod read;
 mod shorthand;
 mod text_patch;
@@ -32,6 +33,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
+pub(crate) use moved_text::{with_changes_on_lines, with_part_files, with_rig_uid};
 pub(in crate::rig) use read::read_text;
 pub use read::{read_header, read_template, survey_template, text_of};
 pub use shorthand::{Explicit, explicit};
