@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use bevy::math::Vec3;
+use bevy::math::{Affine3, Vec3};
 
 use super::{OptionError, PartChain, PartChange, PartError, PartOption, PartSocket};
 use crate::rig::{
@@ -343,12 +343,18 @@ impl PartInstance {
             (None, Some(socket)) => socket.rest.affine() * self.rest.affine(),
             (None, None) => self.rest.affine(),
         };
+        let beside = joints.first().filter(|_| parent.is_none()).copied();
+        let beside = beside.map(|first| (first, self.moved_onto(draft.rig(), part, first)));
         let mut of: HashMap<Uid, Uid> = part.walk().map(|joint| joint.data.uid).zip(joints.iter().copied()).collect();
         for joint in part.walk().skip(joints.len()) {
             let (uid, rest) = (self.uid_of(joint.data.uid), joint.data.rest);
-            let (above, rest) = match joint.parent {
-                Some(above) => (of.get(&above).copied(), rest),
-                None => (parent, RestTransform::from_affine(&(place * rest.affine()))),
+            let (above, rest) = match (joint.parent, beside) {
+                (Some(above), _) => (of.get(&above).copied(), rest),
+                (None, Some((first, moved))) => {
+                    let above = draft.rig().joint(first).and_then(|first| first.parent);
+                    (above, draft.rig().local_rest(above, &(moved * rest.affine())))
+                }
+                (None, None) => (parent, RestTransform::from_affine(&(place * rest.affine()))),
             };
             of.insert(joint.data.uid, uid);
             let mirror = joint.data.mirror.map(|mirror| self.uid_of(mirror));
@@ -358,6 +364,16 @@ impl PartInstance {
             joints.push(uid);
         }
         Ok(())
+    }
+
+    /// The way from the places of the part's roots in its file to those in the rig, where its first joint goes onto `first`: they
+    /// stand beside that as they do there, along the axes of the rig, whatever axes the joint has.
+    fn moved_onto(&self, rig: &Rig, part: &Rig, first: Uid) -> Affine3 {
+        if self.is_world {
+            return self.rest.affine();
+        }
+        let in_file = part.walk().next().map_or(Vec3::ZERO, |own| own.data.rest.translation);
+        Affine3::from_translation(rig.position(first)) * self.rest.affine() * Affine3::from_translation(-in_file)
     }
 
     fn turn_off(&self, draft: &mut Draft, part: &Rig) -> Result<(), PartError> {
