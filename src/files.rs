@@ -31,6 +31,7 @@ mod parts;
 mod project;
 mod read;
 mod shapes;
+mod similar_parts;
 mod site;
 mod store;
 mod template_text;
