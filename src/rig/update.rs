@@ -4,7 +4,8 @@
 //! template as it is in the *file*. What the file changed is taken, what a person changed or added stays, and where both
 //! changed the same field to different values there is a conflict, which is decided by a choice and never by itself. Things
 //! are matched by the copy of the template that they came with, and by their uids there; what seems to have got another name,
-//! because it stands at the same place with the same content, keeps its uid. Clips are a person's: every update leaves them as they are, with the keys of nodes that are gone.
+//! because it stands at the same place with the same content, keeps its uid. Clips are a person's: every update leaves them as
+//! they are, with the keys of nodes that are gone.
 
 mod change;
 mod choices;

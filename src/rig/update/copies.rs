@@ -96,8 +96,8 @@ impl PlacedCopy<'_> {
         let usual = roots.find_map(|root| self.rig.joint(here(*root))).and_then(|root| root.parent);
         for joint in version.walk() {
             let mut data = remap.joint(&joint.data);
-            let own = self.rig.joint(data.uid).and_then(|own| own.data.label.as_deref());
-            data.label = data.label.take().map(|label| names.here(&label, own, &names.labels));
+            let called = self.rig.joint(data.uid).and_then(|joint| joint.data.label.as_deref());
+            data.label = data.label.take().map(|label| names.here(&label, called, &names.labels));
             for tag in &mut data.tags {
                 if let TagKind::Command { params, .. } = &mut tag.kind {
                     *params = refresh_names(params, &index).into_owned();
