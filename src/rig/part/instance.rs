@@ -265,7 +265,7 @@ impl PartInstance {
         (values.into_iter().map(change).collect(), errors)
     }
 
-    /// What is wrong with an instance whose part cannot be put into `rig`: the joints that are not there, or the reason that is
+    /// Faults of an instance whose part cannot be put into `rig`: the joints that are not there, or the reason that is
     /// given, and options, features and changes that do not fit the part. Changes come with their number.
     pub(in crate::rig) fn faults(
         &self,

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use super::{PartError, PartInstance, SocketError};
 use crate::rig::Rig;
 
-/// What is not there because parts are at fault: that others do not find it is no fault of theirs.
+/// Joints and sockets that are not there because parts are at fault: that others do not find them is no fault of theirs.
 #[derive(Default)]
 pub(in crate::rig) struct Lacking {
     labels: HashSet<String>,
