@@ -31,6 +31,7 @@ mod parts;
 mod project;
 mod read;
 mod shapes;
+mod similar_parts;
 mod site;
 mod store;
 mod template_origin;
@@ -46,8 +47,8 @@ pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use identity::is_same_file;
 pub use library::{
-    FileState, FolderListError, FolderListing, HeaderError, HeaderMemory, LibraryError, ListedTemplate, TemplatePlace,
-    list_bundled, list_templates, newest_versions, read_listed,
+    FileState, FolderListError, FolderListing, HeaderError, HeaderMemory, LibraryError, ListedTemplate, NewestVersions,
+    TemplatePlace, VersionedTemplate, list_bundled, list_templates, newest_versions, read_listed,
 };
 pub use load::{
     FileKind, LoadError, load_animation, load_gestures, load_joint_map, load_model, load_motion, load_rig_text,

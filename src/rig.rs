@@ -30,6 +30,7 @@ pub mod shapes;
 pub mod skeleton_preset;
 pub mod step;
 mod tag;
+mod template_copy;
 mod uid;
 pub mod update;
 pub mod version;

@@ -1,6 +1,6 @@
 //! `rigsmith list`: templates of a folder, or of all folders in which templates are looked for, by their headers alone.
 
-use std::{cmp::Ordering, collections::BTreeMap, path::PathBuf};
+use std::{cmp::Ordering, path::PathBuf};
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -8,11 +8,10 @@ use serde_json::{Value, json};
 use super::{Failure, Report, report::counted};
 use crate::{
     files::{
-        FolderListError, FolderListing, HeaderMemory, ListedTemplate, RealDisk, SearchPaths, TemplatePlace,
-        list_bundled, list_templates, newest_versions,
+        FolderListError, FolderListing, HeaderMemory, ListedTemplate, NewestVersions, RealDisk, SearchPaths,
+        VersionedTemplate, list_bundled, list_templates, newest_versions,
     },
     rig::{
-        Uid,
         template::{FeatureSummary, TemplateHeader},
         version::compare,
     },
@@ -82,7 +81,7 @@ fn left_out(error: &FolderListError) -> String {
 }
 
 /// Tells a template in a line; returns what programs read of it.
-fn tell(one: &ListedTemplate, newest: &BTreeMap<Uid, (&str, &TemplatePlace)>, report: &mut Report) -> Value {
+fn tell(one: &ListedTemplate, newest: &NewestVersions, report: &mut Report) -> Value {
     let ListedTemplate { place, header, .. } = one;
     let file = &place.to_string();
     let header = match header {
@@ -93,7 +92,8 @@ fn tell(one: &ListedTemplate, newest: &BTreeMap<Uid, (&str, &TemplatePlace)>, re
         }
     };
     let mut value = value(file, header);
-    let newer = newest.get(&header.uid).filter(|(version, _)| compare(&header.version, version) == Ordering::Less);
+    let newer = newest.get(&VersionedTemplate::of(header));
+    let newer = newer.filter(|(version, _)| compare(&header.version, version) == Ordering::Less);
     let newer = newer.map(|(version, at)| {
         value["newer"] = json!({ "version": version, "file": at.to_string() });
         format!("; {version} is in {at}")

@@ -267,14 +267,33 @@ pub fn list_bundled(is_whole: bool) -> Vec<ListedTemplate> {
     listed
 }
 
+/// Template of which there may be several versions. Files are versions of one template if uid and kind agree; where the uid only
+/// follows from the name, which many templates may have, the author, too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct VersionedTemplate<'a> {
+    uid: Uid,
+    kind: &'a str,
+    /// Empty where the uid is the template's own.
+    author: &'a str,
+}
+
+impl<'a> VersionedTemplate<'a> {
+    /// The template of which a file with that header is a version.
+    pub fn of(header: &'a TemplateHeader) -> Self {
+        let author = if header.has_uid_of_name() { header.author.as_str() } else { "" };
+        Self { uid: header.uid, kind: &header.kind, author }
+    }
+}
+
+/// Newest version of each template, and where it is.
+pub type NewestVersions<'a> = BTreeMap<VersionedTemplate<'a>, (&'a str, &'a TemplatePlace)>;
+
 /// The newest version of each template, and where it is.
-pub fn newest_versions<'a>(
-    all: impl Iterator<Item = &'a ListedTemplate>,
-) -> BTreeMap<Uid, (&'a str, &'a TemplatePlace)> {
-    let mut newest: BTreeMap<Uid, (&str, &TemplatePlace)> = BTreeMap::new();
+pub fn newest_versions<'a>(all: impl Iterator<Item = &'a ListedTemplate>) -> NewestVersions<'a> {
+    let mut newest: NewestVersions<'a> = BTreeMap::new();
     for ListedTemplate { place, header, .. } in all {
         let Ok(header) = header else { continue };
-        let known = newest.entry(header.uid).or_insert((&header.version, place));
+        let known = newest.entry(VersionedTemplate::of(header)).or_insert((&header.version, place));
         if compare(known.0, &header.version) == Ordering::Less {
             *known = (&header.version, place);
         }

@@ -6,14 +6,15 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
-use super::{Disk, ReadError, SearchPaths, SiteError, read::is_missing, read_capped};
+use super::{Disk, ReadError, SearchPaths, SiteError, read::is_missing, read_capped, similar_parts::similar_parts};
 use crate::{
     modules,
     processor::Modules,
     rig::{
         Rig, SourceError,
+        nearest::listed,
         part::{Part, PartError, PartInstance},
-        template::{self, Template, read_template, text_of},
+        template::{self, PartSource, Template, read_template, text_of},
     },
 };
 
@@ -140,6 +141,14 @@ pub enum PartFileError {
         source: ReadError,
         /// Number of folders of the site.
         folders: usize,
+    },
+    /// A file that no folder has, and parts that are called alike.
+    #[error("there is no file `{}`; did you mean {nearest}?", path.display())]
+    Similar {
+        /// File of the part, beside its template.
+        path: PathBuf,
+        /// Names of such parts as a template calls them.
+        nearest: String,
     },
     /// A site file that cannot be read.
     #[error(transparent)]
@@ -342,7 +351,7 @@ impl<'a> PartFiles<'a> {
                     return Ok(part);
                 }
                 (None, Some(text)) => (first.to_owned(), text.as_bytes().to_vec()),
-                (None, None) => return Err(self.nowhere(first)),
+                (None, None) => return Err(self.nowhere(first, name)),
             },
         };
         if self.open.contains(&path) || self.open.len() >= DEPTH {
@@ -351,8 +360,13 @@ impl<'a> PartFiles<'a> {
         self.open.push(path.clone());
         let template = self.complete(&path, &bytes);
         self.open.pop();
-        let template = template.map_err(|source| PartFileError::Template { path, source })?;
-        let part = Arc::new(Part::from(template));
+        let template = match template {
+            Ok(template) => template,
+            Err(source) => return Err(PartFileError::Template { path, source }),
+        };
+        let (file, text) = (path.display().to_string(), text_of(&bytes).unwrap_or_default().to_owned());
+        let source = PartSource { file, text, origins: template.origins.clone() };
+        let part = Arc::new(Part { source: Some(Arc::new(source)), ..Part::from(template) });
         self.known.insert(first.to_owned(), part.clone());
         Ok(part)
     }
@@ -405,11 +419,16 @@ impl<'a> PartFiles<'a> {
     }
 
     /// The error of a part that no folder has.
-    fn nowhere(&self, first: &Path) -> PartFileError {
-        let missing = match self.source {
-            Source::Disk(disk) => read_capped(disk, first, 0).err(),
+    fn nowhere(&self, first: &Path, name: &str) -> PartFileError {
+        let disk = match self.source {
+            Source::Disk(disk) => Some(disk),
             Source::Contents(_) | Source::Found(_) => None,
         };
+        let nearest = similar_parts(disk, first, name);
+        if !nearest.is_empty() {
+            return PartFileError::Similar { path: first.to_owned(), nearest: listed(&nearest, "or") };
+        }
+        let missing = disk.and_then(|disk| read_capped(disk, first, 0).err());
         match (missing, self.site.as_ref().map_or(0, |site| site.folders.len())) {
             (None, _) => PartFileError::Missing { path: first.to_owned() },
             (Some(error), 0) => error.into(),

@@ -14,7 +14,7 @@ use crate::rig::{
     Field, Rig, RigEdit, SourceError, TagData, TagKind, Uid, fields,
     reference::{GroupScope, references_in},
     same_place,
-    template::{Explicit, PartOrigin},
+    template::{self, Explicit, PartOrigin},
 };
 
 /// Largest number of failing commands that a review looks for, and of runs for further faults of theirs.
@@ -271,15 +271,19 @@ impl<'a> SourceText<'a> {
             BuildProblem::Parameters(inner) => inner.message.clone(),
             other => other.to_string(),
         };
-        let PartOrigin { title, offset } = origin;
-        let message = format!("part \"{title}\": {} on joint {}: {problem}", error.module, error.joint_label);
+        let PartOrigin { title, offset, .. } = origin;
         let source = self.explicit.source();
         let fields = self.of_source.get_or_init(|| fields(source));
         let params = fields.iter().position(|field| field.start == *offset && field.name == "params");
+        let parameter = faulty_parameter(rig, error);
         let faulty = params.and_then(|params| {
-            let name = faulty_parameter(rig, error)?;
+            let name = parameter.as_ref()?;
             fields.iter().find(|field| field.parent == Some(params) && field.name == name)
         });
+        // What the instance itself does not say stands in the part's file.
+        let places = if faulty.is_some() { Vec::new() } else { places_in_parts(origin, parameter.as_deref()) };
+        let place = if places.is_empty() { String::new() } else { format!(" ({})", places.join(", ")) };
+        let message = format!("part \"{title}\"{place}: {} on joint {}: {problem}", error.module, error.joint_label);
         SourceError::at(source, faulty.map_or(*offset, |field| field.start), message)
     }
 
@@ -289,6 +293,35 @@ impl<'a> SourceText<'a> {
         let named = self.fields.iter().find(|other| other.bracket == declared.bracket && other.name == field);
         self.at(named.unwrap_or(declared).start, message)
     }
+}
+
+/// Places of a command of a part, or of its parameter of that name, in the file of the part, and of the part's part that has it.
+fn places_in_parts(origin: &PartOrigin, parameter: Option<&str>) -> Vec<String> {
+    let mut places = Vec::new();
+    let mut next = Some(origin);
+    while let Some((origin, source)) = next.and_then(|origin| Some((origin, origin.source.as_deref()?))) {
+        next = source.origins.get(&origin.tag);
+        let at = match next {
+            Some(inner) => Some(inner.offset),
+            None => offset_of_command(&source.text, origin.tag, parameter),
+        };
+        let Some(at) = at else { break };
+        let SourceError { line, column, .. } = SourceError::at(&source.text, at, "");
+        places.push(format!("{}:{line}:{column}", source.file));
+    }
+    places
+}
+
+/// Place in a text of a command, or of its parameter of that name, in bytes.
+fn offset_of_command(text: &str, command: Uid, parameter: Option<&str>) -> Option<usize> {
+    let explicit = template::explicit(text);
+    let (text, fields) = (&*explicit.text, fields(&explicit.text));
+    let tag = declaration(text, &fields, command)?;
+    let at_tag = tag.end - text[tag.value..tag.end].trim_start().len();
+    let params = fields.iter().position(|field| field.bracket == tag.bracket && field.name == "params");
+    let faulty =
+        fields.iter().find(|field| params.is_some() && field.parent == params && Some(field.name) == parameter);
+    Some(explicit.in_source(faulty.map_or(at_tag, |field| field.start)))
 }
 
 /// Name of the parameter that is wrong, if the problem is one of a parameter.

@@ -3,83 +3,32 @@
 //! An update compares three rigs: the *base*, which is the version that was accepted last, the rig as it is *now*, and the
 //! template as it is in the *file*. What the file changed is taken, what a person changed or added stays, and where both
 //! changed the same field to different values there is a conflict, which is decided by a choice and never by itself. Things
-//! are matched by uid; a joint or tag that seems to have got another name, because it stands at the same place with the
-//! same content, keeps its uid. Clips are a person's: every update leaves them as they are, with the keys of nodes that are gone.
+//! are matched by the copy of the template that they came with, and by their uids there; what seems to have got another name,
+//! because it stands at the same place with the same content, keeps its uid. Clips are a person's: every update leaves them as
+//! they are, with the keys of nodes that are gone.
 
+mod change;
 mod choices;
+mod copies;
 mod edits;
 mod fields;
 mod order;
 mod rename_detection;
 
-use std::{
-    collections::{BTreeMap, HashMap, HashSet},
-    fmt,
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use super::{
+    GroupData, JointData, Rig, RigInput, StoredPose, TagData, Uid, document::circles, template_copy::TemplateCopy,
 };
-
-use serde::Serialize;
-
-use super::{GroupData, JointData, Rig, RigInput, StoredPose, TagData, Uid, document::circles};
+use copies::{PlacedCopy, is_host};
 use fields::{
     Field, about_fields, group_fields, input_fields, joint_fields, joint_title, pose_fields, tag_fields, tag_title,
 };
 use order::merged_order;
 
+pub use change::{Change, ChangeKind};
 pub use choices::{Choices, Take};
 pub use edits::{clip_edits, edits_between, pose_edits};
-
-/// Kind of a change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ChangeKind {
-    /// New thing.
-    Added,
-    /// Thing that is gone.
-    Removed,
-    /// A field has another value.
-    Changed,
-    /// Thing with another name that is the same otherwise.
-    Renamed,
-}
-
-/// One change of an update.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Change {
-    /// Kind of the change.
-    pub kind: ChangeKind,
-    /// Uid of the joint, tag, group or pose; of the rig for its header.
-    pub uid: Uid,
-    /// Label of the joint, or of the joint of the tag; its uid without one. `None` for groups, poses and the header.
-    pub joint: Option<String>,
-    /// Module or kind of feature, and the name that the tag gives after a `/`; `None` if no tag is concerned.
-    pub tag: Option<String>,
-    /// Name of the field; of a parameter as `params.NAME`; `group NAME` or `pose NAME` for those.
-    pub field: Option<String>,
-    /// Value before, as it is written in files.
-    pub from: Option<String>,
-    /// Value after.
-    pub to: Option<String>,
-    /// True where both sides changed the field; `from` is the value now and `to` that of the file.
-    pub conflict: bool,
-}
-
-impl fmt::Display for Change {
-    /// The change in a line.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let parts = [self.joint.as_deref(), self.tag.as_deref(), self.field.as_deref()];
-        let what = parts.into_iter().flatten().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ");
-        let [from, to] = [&self.from, &self.to].map(|value| value.as_deref().unwrap_or("nothing"));
-        match (self.kind, self.conflict) {
-            (ChangeKind::Added, false) => write!(f, "added    {what}"),
-            (ChangeKind::Added, true) => write!(f, "conflict {what}: deleted here, changed there"),
-            (ChangeKind::Removed, false) => write!(f, "removed  {what}"),
-            (ChangeKind::Removed, true) => write!(f, "conflict {what}: changed here, deleted there"),
-            (ChangeKind::Changed, false) => write!(f, "changed  {what}: {from} to {to}"),
-            (ChangeKind::Changed, true) => write!(f, "conflict {what}: {from} here, {to} there"),
-            (ChangeKind::Renamed, _) => write!(f, "renamed  {from} to {to}?"),
-        }
-    }
-}
 
 /// An update.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,13 +67,42 @@ pub fn update(base: Option<&Rig>, now: &Rig, file: &Rig, take: Take) -> Update {
     update_with(base, now, file, &take.into())
 }
 
-/// [`update`] with a choice for each conflict.
+/// [`update`] with a choice for each conflict. A rig into which the template was merged or injected, however often, gets the
+/// content in each of its copies, and keeps its own header.
 pub fn update_with(base: Option<&Rig>, now: &Rig, file: &Rig, choices: &Choices) -> Update {
+    let versions: Vec<&Rig> = base.into_iter().chain([file]).collect();
+    let is_host = is_host(now, &versions);
+    let mut updated: Option<Update> = None;
+    let copies = TemplateCopy::all_in(now, &versions);
+    for &copy in &copies {
+        let others = copy.others(&copies, &versions);
+        let rig = updated.as_ref().map_or(now, |updated| &updated.rig);
+        let next = if copy.is_plain() && !is_host {
+            update_copy(base, rig, file, (choices, &others))
+        } else {
+            let placed = PlacedCopy { copy, rig, versions: &versions };
+            let base = base.map(|base| placed.place(base));
+            update_copy(base.as_ref(), rig, &placed.place(file), (choices, &others))
+        };
+        updated = Some(match updated.take() {
+            Some(mut before) => {
+                before.changes.extend(next.changes);
+                before.identities.extend(next.identities);
+                Update { rig: next.rig, ..before }
+            }
+            None => next,
+        });
+    }
+    updated.unwrap_or_else(|| Update { rig: now.clone(), changes: Vec::new(), identities: HashMap::new() })
+}
+
+/// The update of one copy, of which the base and the file have the uids. Nothing of the `others` is what has another name.
+fn update_copy(base: Option<&Rig>, now: &Rig, file: &Rig, (choices, others): (&Choices, &HashSet<Uid>)) -> Update {
     let mut changes = Vec::new();
     // What was renamed by an earlier update has the name of the base here, and an older uid.
-    let known = base.and_then(|base| rename_detection::renamed(now, base, &mut Vec::new()));
+    let known = base.and_then(|base| rename_detection::renamed(now, base, others, &mut Vec::new()));
     let base = known.as_ref().map(|(known, _)| known).or(base);
-    let renamed = rename_detection::renamed(base.unwrap_or(now), file, &mut changes);
+    let renamed = rename_detection::renamed(base.unwrap_or(now), file, others, &mut changes);
     changes.retain(|change: &Change| change.from != change.to);
     let file = renamed.as_ref().map_or(file, |(renamed, _)| renamed);
     let told = changes.iter().map(|change| change.uid).collect();
@@ -363,7 +341,8 @@ impl Merge<'_> {
         (base, now, file): (Option<&T>, Option<&T>, Option<&T>),
         named: &ChangeSubject,
     ) -> Fate<T> {
-        let same = |a: &T, b: &T| fields.iter().all(|field| (field.text)(a) == (field.text)(b));
+        let is_same = |field: &Field<T>, a: &T, b: &T| (field.text)(a) == (field.text)(b) || (field.is_close)(a, b);
+        let same = |a: &T, b: &T| fields.iter().all(|field| is_same(field, a, b));
         match (now, file) {
             (None, None) => Fate::Absent,
             (Some(now), Some(file)) => Fate::Kept(self.fields(fields, base, now, file, named)),
@@ -406,11 +385,19 @@ impl Merge<'_> {
         let is_renamed = self.renamed.contains(&named.uid);
         for field in fields.iter().filter(|field| field.is_own) {
             let (mine, theirs) = ((field.text)(now), (field.text)(file));
-            let base = base.map(&field.text);
-            if mine == theirs || base.as_ref() == Some(&theirs) {
+            let was = base.map(&field.text);
+            if mine == theirs || was.as_ref() == Some(&theirs) {
                 continue;
             }
-            let conflict = base != Some(mine.clone());
+            let is_close_to_base = |side: &T| base.is_some_and(|base| (field.is_close)(base, side));
+            // Rounding is no change to tell of. It is taken along, so that the rig is bit by bit what the file says.
+            if (field.is_close)(now, file) || is_close_to_base(file) {
+                if was == Some(mine) {
+                    (field.take)(&mut merged, file);
+                }
+                continue;
+            }
+            let conflict = was.as_ref() != Some(&mine) && !is_close_to_base(now);
             let name = format!("{}{}", named.prefix, field.name);
             let take = self.choices.of(named.uid, Some(&name));
             let told = Change {
@@ -421,7 +408,7 @@ impl Merge<'_> {
                 conflict,
                 ..named.change()
             };
-            if conflict || !is_renamed || field.name != "label" {
+            if conflict || !is_renamed || !matches!(field.name.as_str(), "label" | "name" | "switch") {
                 self.changes.push(told);
             }
             if !conflict || take == Take::Theirs {

@@ -158,3 +158,81 @@ fn a_command_that_fails_hides_no_faults_of_those_behind_it() {
 )"#;
     tells_what_it_says(folder.path(), "x.rig.ron", text);
 }
+
+/// Each wrong name of an instance is told, and a wrong joint of one hides nothing of the others.
+#[test]
+fn wrong_names_of_instances_are_told_all_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = r#"(
+    format: 2,
+    name: "ok",
+    kind: "part",
+    joints: [(label: "g", tags: [Feature(kind: "generic", name: "fk"), control(feature: "fk")])],
+)"#;
+    fs::write(folder.path().join("ok.rig.ron"), part).unwrap();
+    let text = r#"(
+    format: 2,
+    name: "host",
+    colour: 3, // there is no field `colour` here; remove it
+    groups: [(name: "g", colour: (1, 0, 0))], // there is no field `colour` here; did you mean `color`?
+    joints: [
+        (label: "body"),
+        (label: "arm", parnt: "body"), // there is no field `parnt` here; did you mean `parent`?
+    ],
+    parts: [
+        (part: "ok.rig.ron", name: "one", onto: ["bdy"], off: ["ffk"]), // part "one": there is no joint "bdy"; did you mean "body"? // part "one": the part has no feature "ffk"; did you mean "fk"?
+        (part: "ok.rig.ron", name: "two", onto: ["amr"]), // part "two": there is no joint "amr"; did you mean "arm"?
+        (part: "ok.rig.ron", name: "three", prefix: "c_", off: ["fkk", "gg.x"], options: {"x": 1, "y": 2}), // no feature "fkk" // no feature "gg.x" // no option "x" // no option "y"
+        (part: "oks.rig.ron", name: "four", prefix: "d_"), // there is no file `oks.rig.ron`; did you mean "ok.rig.ron"?
+        (part: "parts/arm.rig.rn", name: "five"), // there is no file `parts/arm.rig.rn`; did you mean "parts/arm.rig.ron"?
+        (part: "ok.rig.ron", name: "six", prefix: "e_", socket: "hat"), // part "six": there is no socket "hat"
+    ],
+)"#;
+    tells_what_it_says(folder.path(), "host.rig.ron", text);
+}
+
+/// What a part lacks because another one could not be put into the rig is no fault of its own.
+#[test]
+fn what_a_part_at_fault_would_bring_is_not_missed() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("ok.rig.ron"), PART).unwrap();
+    let text = r#"(
+    format: 2,
+    name: "host",
+    joints: [(label: "body")],
+    parts: [
+        (part: "ok.rig.ron", name: "one", parent: "bdy"), // part "one": there is no joint "bdy"
+        (part: "ok.rig.ron", name: "two", onto: ["g"]),
+        (part: "ok.rig.ron", name: "three", onto: ["gg"]), // part "three": there is no joint "gg"
+    ],
+)"#;
+    tells_what_it_says(folder.path(), "host.rig.ron", text);
+}
+
+/// A command that the file of a part gets wrong is told with its place in that file.
+#[test]
+fn faults_of_a_parts_file_have_their_own_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = r#"(
+    format: 2,
+    name: "p",
+    kind: "part",
+    joints: [(label: "k", tags: [
+        contrl(shape: "ring"),
+        control(size: 1.0, shap: "ring"),
+    ])],
+)"#;
+    fs::write(folder.path().join("p.rig.ron"), part).unwrap();
+    let outer = "(\nformat: 2, name: \"q\", kind: \"part\",\nparts: [(part: \"p.rig.ron\", name: \"inner\")])";
+    fs::write(folder.path().join("q.rig.ron"), outer).unwrap();
+    let text = r#"(
+    format: 2,
+    name: "host",
+    joints: [(label: "body")],
+    parts: [
+        (part: "p.rig.ron", name: "pp"), // part "pp" (p.rig.ron:6:9): contrl on joint k // part "pp" (p.rig.ron:7:28): control on joint k
+        (part: "q.rig.ron", name: "qq", prefix: "x_"), // part "qq" (q.rig.ron:3:10, p.rig.ron:6:9): contrl // part "qq" (q.rig.ron:3:10, p.rig.ron:7:28): control
+    ],
+)"#;
+    tells_what_it_says(folder.path(), "host.rig.ron", text);
+}

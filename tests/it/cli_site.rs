@@ -66,3 +66,38 @@ fn templates_of_the_site_are_listed_named_and_compared() {
     assert_eq!(code, 1);
     assert!(told.to_string().contains("rigsmith.ron"), "{told}");
 }
+
+/// Files are versions of one template if kind and uid agree, and authors where the uid follows from the name.
+#[test]
+fn templates_of_one_name_are_no_versions_of_each_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for place in ["project", "config", "rigs"] {
+        fs::create_dir(at(place)).unwrap();
+    }
+    let write = |name: &str, header: &str| {
+        let text = format!("(format: 2, {header}, joints: [(label: \"foot\")])");
+        fs::write(at("project").join(format!("{name}.rig.ron")), text).unwrap();
+    };
+    // As somebody begins: the name of a part that comes with Rigsmith, and nothing more.
+    write("a_tail", "name: \"tail\"");
+    for (name, header, kind) in [
+        ("b_old", "version: \"1.0\", author: \"me\"", "prop"),
+        ("c_new", "version: \"2.0\", author: \"me\"", "prop"),
+        ("d_other", "version: \"1.0\", author: \"you\"", "prop"),
+        ("e_part", "version: \"1.0\", author: \"me\"", "part"),
+        ("f_old", "uid: \"00000000000000f0\", version: \"1.0\", author: \"me\"", "prop"),
+        ("g_new", "uid: \"00000000000000f0\", version: \"2.0\", author: \"you\"", "prop"),
+        ("h_part", "uid: \"00000000000000f0\", version: \"1.0\", author: \"me\"", "part"),
+    ] {
+        write(name, &format!("name: \"mast\", kind: \"{kind}\", {header}"));
+    }
+    let (code, listed) = rigsmith(&at("project"), &[&at("rigs")], &at("config"), &["list"]);
+    assert_eq!(code, 0, "{listed}");
+    let newer = |list: &str| -> Vec<String> {
+        let told = listed[list].as_array().unwrap().iter().filter(|one| one["newer"].is_object());
+        told.map(|one| one["file"].as_str().unwrap().rsplit(['/', '\\']).next().unwrap().to_owned()).collect()
+    };
+    assert_eq!(newer("templates"), ["b_old.rig.ron", "f_old.rig.ron"], "{listed}");
+    assert_eq!(newer("bundled"), Vec::<String>::new(), "the hand is no old version of the character \"hand\"");
+}

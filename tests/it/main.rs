@@ -181,6 +181,7 @@ mod surface;
 mod surface_refresh;
 mod tags;
 mod template;
+mod template_copies;
 mod template_text;
 mod three_strokes;
 #[cfg(feature = "editor")]

@@ -18,8 +18,8 @@ use crate::{
         files::{DocumentLanded, OpenDocument, SaveJob},
     },
     files::{
-        HeaderMemory, ListedTemplate, RealDisk, SearchPaths, SiteError, TemplatePlace, list_bundled, list_templates,
-        newest_versions,
+        HeaderMemory, ListedTemplate, RealDisk, SearchPaths, SiteError, TemplatePlace, VersionedTemplate, list_bundled,
+        list_templates, newest_versions,
     },
 };
 
@@ -74,13 +74,13 @@ impl LibraryListing {
 
     /// Version and place of a newer version of a listed template.
     pub fn newer(&self, listed: &ListedTemplate) -> Option<(&str, &TemplatePlace)> {
+        let template = VersionedTemplate::of(listed.header.as_ref().ok()?);
+        let is_version = |other: &&ListedTemplate| {
+            other.header.as_ref().is_ok_and(|header| VersionedTemplate::of(header) == template)
+        };
+        let newest = newest_versions(self.templates().map(Arc::as_ref).filter(is_version));
+        let (version, place) = newest.get(&template)?;
         let header = listed.header.as_ref().ok()?;
-        let of_uid = self
-            .templates()
-            .map(Arc::as_ref)
-            .filter(|other| other.header.as_ref().is_ok_and(|other| other.uid == header.uid));
-        let newest = newest_versions(of_uid);
-        let (version, place) = newest.get(&header.uid)?;
         (**place != listed.place && crate::rig::version::compare(&header.version, version).is_lt())
             .then_some((*version, *place))
     }

@@ -194,4 +194,19 @@ pub struct PartOrigin {
     pub title: Arc<str>,
     /// Place in the template's text, in bytes, of the parameters that the instance gives the command, else of the instance.
     pub offset: usize,
+    /// Uid of the command in the part.
+    pub tag: Uid,
+    /// Text of the part; `None` where it has no file.
+    pub source: Option<Arc<PartSource>>,
+}
+
+/// Text of a part, in which its commands stand.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PartSource {
+    /// File of the part, for messages.
+    pub file: String,
+    /// Content of the file.
+    pub text: String,
+    /// Origins of the commands that its own parts brought.
+    pub origins: BTreeMap<Uid, PartOrigin>,
 }

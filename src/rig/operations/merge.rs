@@ -3,11 +3,11 @@
 use std::collections::{HashMap, HashSet};
 
 use super::{Draft, OperationError};
-use crate::rig::{EditError, GroupData, Rig, RigEdit, RigInput, Uid, remap::Remap};
+use crate::rig::{EditError, GroupData, Rig, RigEdit, RigInput, Uid, remap::Remap, template_copy::TemplateCopy};
 
 /// Puts the joints of another rig, with groups, tags and clips, into the draft's. The roots hang on `parent`, in the place that they
-/// have in their own rig. Uids, labels and group names stay where they are free; others are new, and labels and names get
-/// the other rig's name in front.
+/// have in their own rig. Uids stay where all of them are free; else they are those of a [copy](TemplateCopy). Labels and names stay
+/// where they are free; others get the other rig's name in front, with a number where that makes none of them free.
 pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Result<(), OperationError> {
     if let Some(parent) = parent.filter(|parent| draft.rig().joint(*parent).is_none()) {
         return Err(EditError::NoJoint(parent).into());
@@ -16,13 +16,9 @@ pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Resu
     let joints = other.walk().flat_map(|joint| {
         std::iter::once(joint.data.uid).chain(joint.data.tags.iter().map(|tag| tag.uid)).collect::<Vec<_>>()
     });
-    let mut uids: HashMap<Uid, Uid> = HashMap::new();
-    for uid in groups.chain(joints) {
-        if draft.rig().is_taken(uid) {
-            uids.insert(uid, draft.next_uid());
-        }
-    }
-    let moved = uids.len();
+    let copy = TemplateCopy::merged(draft.rig(), other);
+    let mut uids: HashMap<Uid, Uid> = groups.chain(joints).map(|uid| (uid, copy.uid_of(uid))).collect();
+    let moved = if copy.is_plain() { 0 } else { uids.len() };
     let mut inputs = draft.rig().inputs().to_vec();
     for input in other.inputs() {
         // The two mean the same thing outside of them.
@@ -30,7 +26,8 @@ pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Resu
             uids.insert(input.uid, own.uid);
             continue;
         }
-        let uid = if draft.rig().is_taken(input.uid) { draft.next_uid() } else { input.uid };
+        let uid = copy.uid_of(input.uid);
+        let uid = if draft.rig().is_taken(uid) { draft.next_uid() } else { uid };
         uids.insert(input.uid, uid);
         inputs.push(RigInput { uid, ..input.clone() });
     }
@@ -38,7 +35,7 @@ pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Resu
         draft.apply(RigEdit::SetInputs(inputs))?;
     }
     let remap = Remap { uids, ..Remap::default() };
-    let prefix = &other.about().name;
+    let prefix = prefix(draft.rig(), other);
     for group in other.groups() {
         let named = draft.rig().groups().iter().any(|own| own.name == group.name);
         let name = if named { format!("{prefix}_{}", group.name) } else { group.name.clone() };
@@ -68,11 +65,15 @@ pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Resu
         draft.apply(RigEdit::AddJoint { joint: Box::new(data), parent: above, index: usize::MAX })?;
     }
     if moved > 0 {
-        draft.note(format!("{moved} things of {prefix} got new uids, because the rig has theirs already"));
+        let name = &other.about().name;
+        draft.note(format!(
+            "{moved} things of {name} got new uids, because the rig has theirs, or some of them, already"
+        ));
     }
     if renamed > 0 {
+        let name = &other.about().name;
         draft.note(format!(
-            "{renamed} joints of {prefix} are called {prefix}_..., because the rig has their labels already"
+            "{renamed} joints of {name} are called {prefix}_..., because the rig has their labels already"
         ));
     }
     for clip in other.clips() {
@@ -88,8 +89,31 @@ pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Resu
         draft.apply(RigEdit::AddClip(Box::new(clip), usize::MAX))?;
     }
     if !other.stored_poses().is_empty() {
-        draft.note(format!("the stored poses of {prefix} are left out"));
+        draft.note(format!("the stored poses of {} are left out", other.about().name));
     }
     draft.select(selected);
     Ok(())
+}
+
+/// Text that stands before the other rig's labels and names that the rig has already: the other rig's name, with a number where
+/// one of them would not be free with the name alone.
+fn prefix(rig: &Rig, other: &Rig) -> String {
+    let labels = |rig: &Rig| rig.walk().filter_map(|joint| joint.data.label.clone()).collect::<HashSet<String>>();
+    let groups = |rig: &Rig| rig.groups().iter().map(|group| group.name.clone()).collect::<HashSet<String>>();
+    let clips = |rig: &Rig| rig.clips().iter().map(|clip| clip.name.clone()).collect::<HashSet<String>>();
+    let kinds = [(labels(rig), labels(other)), (groups(rig), groups(other)), (clips(rig), clips(other))];
+    let is_free = |prefix: &String| {
+        kinds.iter().all(|(own, others)| {
+            others
+                .intersection(own)
+                .map(|name| format!("{prefix}_{name}"))
+                .all(|name| !own.contains(&name) && !others.contains(&name))
+        })
+    };
+    let name = match other.about().name.as_str() {
+        "" => "rig",
+        name => name,
+    };
+    let numbered = (2..).map(|number| format!("{name}_{number}"));
+    std::iter::once(name.to_owned()).chain(numbered).find(is_free).unwrap_or_default()
 }

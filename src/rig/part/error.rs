@@ -131,10 +131,3 @@ pub enum PartError {
     #[error(transparent)]
     Drop(#[from] OperationError),
 }
-
-impl PartError {
-    /// True for the lack of a joint or socket that another part may bring.
-    pub(in crate::rig) fn is_of_host(&self) -> bool {
-        matches!(self, Self::UnknownHostJoint { .. } | Self::Socket(_))
-    }
-}

@@ -4,14 +4,20 @@
 //! it has uids that follow from those of the instance and of the part's joints and tags, so that a part can be used many times,
 //! and a later version of it changes what it changes and no more: see [`update`](crate::rig::update).
 
-use std::collections::{BTreeMap, HashMap};
+use std::{
+    collections::{BTreeMap, HashMap},
+    sync::Arc,
+};
 
-use bevy::math::Vec3;
+use bevy::math::{Affine3, Vec3};
 
 use super::{OptionError, PartChain, PartChange, PartError, PartOption, PartSocket};
 use crate::rig::{
     JointData, RestTransform, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
-    format::{template::Template, tree::with_field},
+    format::{
+        template::{PartSource, Template},
+        tree::with_field,
+    },
     label::mirrored_label,
     nearest::did_you_mean,
     operations::{Draft, MirrorPlane, drop_part},
@@ -34,6 +40,8 @@ pub struct Part {
     pub sockets: Vec<PartSocket>,
     /// Values that its uses may set.
     pub options: Vec<PartOption>,
+    /// Text of its file, if it has one.
+    pub source: Option<Arc<PartSource>>,
 }
 
 impl Part {
@@ -48,7 +56,11 @@ impl Part {
     /// An option that the part does not have, or that does not take the value.
     pub fn with_options(mut self, values: &[(String, String)]) -> Result<Self, PartError> {
         let nameless = PartInstance { options: values.to_vec(), ..PartInstance::default() };
-        for (tag, param, value) in nameless.option_values(&self)? {
+        let (values, errors) = nameless.option_values(&self);
+        if let Some(error) = errors.into_iter().next() {
+            return Err(error.into());
+        }
+        for (tag, param, value) in values {
             let Some((joint, found)) = self.rig.find_tag(tag) else { continue };
             let (joint, mut found) = (joint.data.uid, found.clone());
             if let TagKind::Command { params, .. } = &mut found.kind {
@@ -63,14 +75,14 @@ impl Part {
 impl From<Rig> for Part {
     /// A part that is as it is everywhere: no chain of another length, no sockets and no options.
     fn from(rig: Rig) -> Self {
-        Self { rig, chains: Vec::new(), sockets: Vec::new(), options: Vec::new() }
+        Self { rig, chains: Vec::new(), sockets: Vec::new(), options: Vec::new(), source: None }
     }
 }
 
 impl From<Template> for Part {
     fn from(template: Template) -> Self {
         let Template { rig, chains, sockets, options, .. } = template;
-        Self { rig, chains, sockets, options }
+        Self { rig, chains, sockets, options, source: None }
     }
 }
 
@@ -152,11 +164,9 @@ impl PartInstance {
         mirror: MirrorParams,
         socket: Option<&PartSocket>,
     ) -> Result<PutPart, PartError> {
-        let mut faults = Vec::new();
-        let options = self.option_changes(part, mirror).unwrap_or_else(|error| {
-            faults.push((None, PartError::from(error)));
-            Vec::new()
-        });
+        let (options, errors) = self.option_changes(part, mirror);
+        let mut faults: Vec<(Option<usize>, PartError)> =
+            errors.into_iter().map(|error| (None, PartError::from(error))).collect();
         let part = fitted;
         let mut uids = UidSource::seeded(self.uid.0);
         let mut draft = Draft::new(rig, &mut uids, None);
@@ -167,7 +177,7 @@ impl PartInstance {
                 return Err(error);
             }
         };
-        faults.extend(self.turn_off(&mut draft, part).err().map(|error| (None, error)));
+        faults.extend(self.turn_off(&mut draft, part).into_iter().map(|error| (None, error)));
         let changes = self.changes.iter().enumerate().map(|(number, change)| (Some(number), change));
         for (number, change) in options.iter().map(|option| (None, option)).chain(changes) {
             let done = self.change(&mut draft, part, &joints, change);
@@ -213,28 +223,34 @@ impl PartInstance {
         part.sockets.iter().filter_map(here).collect()
     }
 
-    /// Parameters that the instance's options set: tag, parameter and value.
-    fn option_values(&self, part: &Part) -> Result<Vec<(Uid, String, String)>, OptionError> {
-        let mut values = Vec::new();
+    /// Parameters that the instance's options set: tag, parameter and value; and what is wrong with its options.
+    fn option_values(&self, part: &Part) -> (Vec<(Uid, String, String)>, Vec<OptionError>) {
+        let (mut values, mut errors) = (Vec::new(), Vec::new());
         for (name, value) in &self.options {
             let Some(option) = part.options.iter().find(|option| option.name == *name) else {
                 let known: Vec<&str> = part.options.iter().map(|option| option.name.as_str()).collect();
-                return Err(OptionError::Unknown { name: name.clone(), nearest: did_you_mean(name, known) });
+                errors.push(OptionError::Unknown { name: name.clone(), nearest: did_you_mean(name, known) });
+                continue;
             };
-            option.check(value)?;
+            if let Err(error) = option.check(value) {
+                errors.push(error);
+                continue;
+            }
             for (tag, param) in &option.sets {
                 // The option names tags as the part's file does.
-                let in_file = PartInstance::default().find_tag(&part.rig, tag);
-                let tag =
-                    in_file.map_err(|reason| OptionError::Target { name: name.clone(), reason: Box::new(reason) })?;
-                values.push((tag, param.clone(), value.clone()));
+                match PartInstance::default().find_tag(&part.rig, tag) {
+                    Ok(tag) => values.push((tag, param.clone(), value.clone())),
+                    Err(reason) => {
+                        errors.push(OptionError::Target { name: name.clone(), reason: Box::new(reason) });
+                    }
+                }
             }
         }
-        Ok(values)
+        (values, errors)
     }
 
-    /// Changes that the instance's options make.
-    fn option_changes(&self, part: &Part, mirror: MirrorParams) -> Result<Vec<PartChange>, OptionError> {
+    /// Changes that the instance's options make, and what is wrong with its options.
+    fn option_changes(&self, part: &Part, mirror: MirrorParams) -> (Vec<PartChange>, Vec<OptionError>) {
         let change = |(tag, param, value): (Uid, String, String)| {
             let params = with_field("()", &param, &value);
             let module = part.rig.find_tag(tag).and_then(|(_, tag)| match &tag.kind {
@@ -245,7 +261,34 @@ impl PartInstance {
             let params = Some(mirrored.unwrap_or(params));
             PartChange { tag: Some(tag.to_string()), params, ..PartChange::default() }
         };
-        Ok(self.option_values(part)?.into_iter().map(change).collect())
+        let (values, errors) = self.option_values(part);
+        (values.into_iter().map(change).collect(), errors)
+    }
+
+    /// Faults of an instance whose part cannot be put into `rig`: the joints that are not there, or the reason that is
+    /// given, and options, features and changes that do not fit the part. Changes come with their number.
+    pub(in crate::rig) fn faults(
+        &self,
+        rig: &Rig,
+        part: &Part,
+        fitted: &Rig,
+        reason: PartError,
+    ) -> Vec<(Option<usize>, PartError)> {
+        let labels = self.onto.iter().chain(&self.parent);
+        let mut errors: Vec<PartError> = labels.filter_map(|label| labelled(rig, label).err()).collect();
+        // The reason may be one of these.
+        if !errors.contains(&reason) {
+            errors.insert(0, reason);
+        }
+        errors.extend(self.option_values(part).1.into_iter().map(PartError::from));
+        errors.extend(self.off.iter().filter_map(|name| self.tags_called(fitted, name).err()));
+        let of_change = |(number, change): (usize, &PartChange)| {
+            let tag = change.tag.as_ref().and_then(|name| self.find_tag(fitted, name).err());
+            let joint = change.joint.as_ref().and_then(|label| self.find_joint(fitted, label).err());
+            tag.or(joint).map(|error| (Some(number), error))
+        };
+        let of_changes = self.changes.iter().enumerate().filter_map(of_change);
+        errors.into_iter().map(|error| (None, error)).chain(of_changes).collect()
     }
 
     /// The part with the joints, names and values that it has here, before its changes.
@@ -343,12 +386,18 @@ impl PartInstance {
             (None, Some(socket)) => socket.rest.affine() * self.rest.affine(),
             (None, None) => self.rest.affine(),
         };
+        let beside = joints.first().filter(|_| parent.is_none()).copied();
+        let beside = beside.map(|first| (first, self.moved_onto(draft.rig(), part, first)));
         let mut of: HashMap<Uid, Uid> = part.walk().map(|joint| joint.data.uid).zip(joints.iter().copied()).collect();
         for joint in part.walk().skip(joints.len()) {
             let (uid, rest) = (self.uid_of(joint.data.uid), joint.data.rest);
-            let (above, rest) = match joint.parent {
-                Some(above) => (of.get(&above).copied(), rest),
-                None => (parent, RestTransform::from_affine(&(place * rest.affine()))),
+            let (above, rest) = match (joint.parent, beside) {
+                (Some(above), _) => (of.get(&above).copied(), rest),
+                (None, Some((first, moved))) => {
+                    let above = draft.rig().joint(first).and_then(|first| first.parent);
+                    (above, draft.rig().local_rest(above, &(moved * rest.affine())))
+                }
+                (None, None) => (parent, RestTransform::from_affine(&(place * rest.affine()))),
             };
             of.insert(joint.data.uid, uid);
             let mirror = joint.data.mirror.map(|mirror| self.uid_of(mirror));
@@ -360,21 +409,38 @@ impl PartInstance {
         Ok(())
     }
 
-    fn turn_off(&self, draft: &mut Draft, part: &Rig) -> Result<(), PartError> {
-        let names = switch_name;
-        for off in &self.off {
-            let tags = || part.walk().flat_map(|joint| &joint.data.tags);
-            let found: Vec<Uid> =
-                tags().filter(|tag| names(tag).as_ref() == Some(off)).map(|tag| self.uid_of(tag.uid)).collect();
-            if found.is_empty() {
-                let known: Vec<String> = tags().filter_map(names).collect();
-                return Err(PartError::UnknownFeature { name: off.clone(), nearest: did_you_mean(off, known) });
-            }
-            for tag in found {
-                set_tag(draft, tag, |tag| tag.enabled = false)?;
-            }
+    /// The way from the places of the part's roots in its file to those in the rig, where its first joint goes onto `first`: they
+    /// stand beside that as they do there, along the axes of the rig, whatever axes the joint has.
+    fn moved_onto(&self, rig: &Rig, part: &Rig, first: Uid) -> Affine3 {
+        if self.is_world {
+            return self.rest.affine();
         }
-        Ok(())
+        let in_file = part.walk().next().map_or(Vec3::ZERO, |own| own.data.rest.translation);
+        Affine3::from_translation(rig.position(first)) * self.rest.affine() * Affine3::from_translation(-in_file)
+    }
+
+    /// Turns off what the instance turns off; returns what is wrong with it.
+    fn turn_off(&self, draft: &mut Draft, part: &Rig) -> Vec<PartError> {
+        let mut errors = Vec::new();
+        for name in &self.off {
+            let turned = self.tags_called(part, name).and_then(|tags| {
+                tags.into_iter().try_for_each(|tag| set_tag(draft, self.uid_of(tag), |tag| tag.enabled = false))
+            });
+            errors.extend(turned.err());
+        }
+        errors
+    }
+
+    /// Tags of the part that are turned off by a name.
+    fn tags_called(&self, part: &Rig, name: &str) -> Result<Vec<Uid>, PartError> {
+        let tags = || part.walk().flat_map(|joint| &joint.data.tags);
+        let is_called = |tag: &&TagData| switch_name(tag).as_deref() == Some(name);
+        let found: Vec<Uid> = tags().filter(is_called).map(|tag| tag.uid).collect();
+        if found.is_empty() {
+            let known: Vec<String> = tags().filter_map(switch_name).collect();
+            return Err(PartError::UnknownFeature { name: name.to_owned(), nearest: did_you_mean(name, known) });
+        }
+        Ok(found)
     }
 }
 

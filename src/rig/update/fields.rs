@@ -19,12 +19,28 @@ pub(super) struct Field<'a, T> {
     pub text: Box<dyn Fn(&T) -> Option<String> + 'a>,
     /// Takes it over from another one.
     pub take: Box<dyn Fn(&mut T, &T) + 'a>,
+    /// Returns `true` for values that differ by rounding alone.
+    pub is_close: Box<dyn Fn(&T, &T) -> bool + 'a>,
     /// False for what is compared by itself, and says here only whether something is as it was.
     pub is_own: bool,
 }
 
 fn field<'a, T>(name: &str, text: impl Fn(&T) -> Option<String> + 'a, take: impl Fn(&mut T, &T) + 'a) -> Field<'a, T> {
-    Field { name: name.to_owned(), text: Box::new(text), take: Box::new(take), is_own: true }
+    let (name, is_close) = (name.to_owned(), Box::new(|_: &T, _: &T| false));
+    Field { name, text: Box::new(text), take: Box::new(take), is_close, is_own: true }
+}
+
+/// Difference that places have by rounding, in proportion to their size: a place that follows from others, such as that of what
+/// hangs on a chain of another length, is the same in all but its last digits.
+const ROUNDING: f32 = 1e-6;
+
+/// A field of numbers, which are as close as their rounding makes them.
+fn rounded<'a, T>(field: Field<'a, T>, numbers: impl Fn(&T) -> Vec<f32> + 'a) -> Field<'a, T> {
+    let is_close = move |a: &T, b: &T| {
+        let close = |(a, b): (f32, f32)| (a - b).abs() <= ROUNDING * (1.0 + a.abs().max(b.abs()));
+        numbers(a).into_iter().zip(numbers(b)).all(close)
+    };
+    Field { is_close: Box::new(is_close), ..field }
 }
 
 fn written(text: &str) -> Option<String> {
@@ -69,13 +85,21 @@ pub(super) fn input_fields() -> Vec<Field<'static, RigInput>> {
     };
     vec![
         field("name", |a: &RigInput| Some(quoted(&a.name)), |a, b| a.name.clone_from(&b.name)),
-        field(
-            "translation",
-            |a: &RigInput| Some(vector(a.rest.translation)),
-            |a, b| a.rest.translation = b.rest.translation,
+        rounded(
+            field(
+                "translation",
+                |a: &RigInput| Some(vector(a.rest.translation)),
+                |a, b| a.rest.translation = b.rest.translation,
+            ),
+            |a: &RigInput| a.rest.translation.to_array().to_vec(),
         ),
-        field("rotation", rotation, |a, b| a.rest.rotation = b.rest.rotation),
-        field("scale", |a: &RigInput| Some(vector(a.rest.scale)), |a, b| a.rest.scale = b.rest.scale),
+        rounded(field("rotation", rotation, |a, b| a.rest.rotation = b.rest.rotation), |a: &RigInput| {
+            a.rest.rotation.to_array().to_vec()
+        }),
+        rounded(
+            field("scale", |a: &RigInput| Some(vector(a.rest.scale)), |a, b| a.rest.scale = b.rest.scale),
+            |a: &RigInput| a.rest.scale.to_array().to_vec(),
+        ),
     ]
 }
 
@@ -113,13 +137,21 @@ pub(super) fn joint_fields<'a>(now: &'a Rig, file: &'a Rig) -> Vec<Field<'a, (Jo
         field("mirror", move |(a, _): &Joint| a.mirror.map(joint), |(a, _), (b, _)| a.mirror = b.mirror),
         field("kind", |(a, _): &Joint| Some(format!("{:?}", a.kind)), |(a, _), (b, _)| a.kind = b.kind),
         field("locked", |(a, _): &Joint| Some(a.locked.to_string()), |(a, _), (b, _)| a.locked = b.locked),
-        field(
-            "translation",
-            |(a, _): &Joint| Some(vector(a.rest.translation)),
-            |(a, _), (b, _)| a.rest.translation = b.rest.translation,
+        rounded(
+            field(
+                "translation",
+                |(a, _): &Joint| Some(vector(a.rest.translation)),
+                |(a, _), (b, _)| a.rest.translation = b.rest.translation,
+            ),
+            |(a, _): &Joint| a.rest.translation.to_array().to_vec(),
         ),
-        field("rotation", rotation, |(a, _), (b, _)| a.rest.rotation = b.rest.rotation),
-        field("scale", |(a, _): &Joint| Some(vector(a.rest.scale)), |(a, _), (b, _)| a.rest.scale = b.rest.scale),
+        rounded(field("rotation", rotation, |(a, _), (b, _)| a.rest.rotation = b.rest.rotation), |(a, _): &Joint| {
+            a.rest.rotation.to_array().to_vec()
+        }),
+        rounded(
+            field("scale", |(a, _): &Joint| Some(vector(a.rest.scale)), |(a, _), (b, _)| a.rest.scale = b.rest.scale),
+            |(a, _): &Joint| a.rest.scale.to_array().to_vec(),
+        ),
         field("face", face, |(a, _), (b, _)| a.face.clone_from(&b.face)),
         Field { is_own: false, ..field("tags", |(a, _): &Joint| Some(format!("{:?}", a.tags)), |_, _| {}) },
     ]

@@ -13,7 +13,7 @@ use crate::rig::{Rig, Uid, part::PartInstance};
 /// joints and the named features. What parts bring is in other files: see [`TemplateHeader::complete_from`].
 pub(super) fn complete(mut header: TemplateHeader, text: &str) -> TemplateHeader {
     if header.uid == Uid::default() {
-        header.uid = Uid::derived(["rig", &header.name]);
+        header.uid = uid_of_name(&header.name);
     }
     if header.joint_count > 0 {
         return header;
@@ -31,7 +31,17 @@ pub(super) fn complete(mut header: TemplateHeader, text: &str) -> TemplateHeader
     header
 }
 
+/// Uid of a rig whose file says none.
+fn uid_of_name(name: &str) -> Uid {
+    Uid::derived(["rig", name])
+}
+
 impl TemplateHeader {
+    /// Returns `true` for a uid that follows from the name, as where the file says none.
+    pub fn has_uid_of_name(&self) -> bool {
+        self.uid == uid_of_name(&self.name)
+    }
+
     /// Sets what follows from joints and tags: the number of joints, the named features, and what a part needs.
     pub fn complete_from(&mut self, rig: &Rig) {
         self.joint_count = rig.len();

@@ -12,6 +12,7 @@ use crate::rig::{
     part::{DroppedPart, Part, PartError, PartInstance, PartNeeds, left_out, name_of, unpaired_sides},
     reference::{NameKind, NameScope, Names, RigScope, map_references, references_in},
     remap::Remap,
+    template_copy::TemplateCopy,
 };
 
 /// Joint that is not next below another one as its counterpart in a part is.
@@ -54,7 +55,8 @@ pub(super) fn drop_sized(
     check_joints(draft.rig(), &sized, joints)?;
     check_needs(draft.rig(), &sized, joints, bindings, sized.len())?;
     check_order(draft.rig(), &sized, joints)?;
-    drop_part(draft, &sized, joints, bindings, &mut |draft, _| draft.next_uid())?;
+    let copy = TemplateCopy::injected(draft.rig(), &sized);
+    drop_part(draft, &sized, joints, bindings, &mut |_, uid| copy.uid_of(uid))?;
     note_left_over(draft, &sized, joints);
     Ok(())
 }

@@ -25,8 +25,8 @@ use crate::rig::{
         source::ron_text,
     },
     part::{
-        MOST_BROUGHT, MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption,
-        PartSocket, unpaired_sides,
+        Lacking, MOST_BROUGHT, MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance,
+        PartOption, PartSocket, unpaired_sides,
     },
 };
 
@@ -345,7 +345,7 @@ impl InstancePlaces<'_> {
 impl PartInstance {
     /// Origins of the commands that come of the instance; `fitted` is what comes of the part, and `places` are those of the
     /// changes.
-    fn origins(&self, fitted: &Rig, places: &[(usize, Option<usize>)]) -> Vec<(Uid, PartOrigin)> {
+    fn origins(&self, part: &Part, fitted: &Rig, places: &[(usize, Option<usize>)]) -> Vec<(Uid, PartOrigin)> {
         let changes = self.changes.iter().zip(places).filter(|(change, _)| change.params.is_some());
         let changed: HashMap<Uid, usize> = changes
             .filter_map(|(change, place)| Some((self.find_tag(fitted, change.tag.as_deref()?).ok()?, place.1?)))
@@ -355,6 +355,8 @@ impl PartInstance {
         let origin = |tag: &TagData| PartOrigin {
             title: title.clone(),
             offset: changed.get(&tag.uid).copied().unwrap_or(self.offset),
+            tag: tag.uid,
+            source: part.source.clone(),
         };
         tags.map(|tag| (self.uid_of(tag.uid), origin(tag))).collect()
     }
@@ -388,43 +390,56 @@ impl Template {
         mirror: MirrorParams,
     ) -> (Self, Vec<SourceError>) {
         let mut of_parts: Vec<PartSocket> = Vec::new();
-        let (mut faults, mut is_one_missing, mut brings) = (Vec::new(), false, 0);
+        let (mut faults, mut lacking, mut brings) = (Vec::new(), Lacking::default(), 0);
         let places = InstancePlaces { fields: fields(source) };
         for instance in std::mem::take(&mut self.parts) {
             let message = |error: &dyn fmt::Display| format!("part \"{}\": {error}", instance.title());
-            let put = part(&instance.part).map_err(|error| (message(&error), false)).and_then(|part| {
-                let told = |error: PartError| (message(&E::from(error.clone())), error.is_of_host());
+            let found = part(&instance.part).and_then(|part| {
                 brings += part.size();
                 if brings > MOST_BROUGHT {
-                    return Err(told(PartError::TooLarge { most: MOST_BROUGHT }));
+                    return Err(PartError::TooLarge { most: MOST_BROUGHT }.into());
                 }
-                let among = self.sockets.iter().chain(&of_parts);
-                let socket = instance.socket.as_deref().map(|name| PartSocket::find(name, among, &self.rig));
-                let socket = socket.transpose().map_err(|error| told(error.into()))?;
-                let fitted = instance.fitted(&part, mirror).map_err(told)?;
-                let brought = instance.sockets_in(&self.rig, &part, &fitted);
-                let told_put = instance.put_into(&mut self.rig, &part, &fitted, mirror, socket.as_ref());
-                Ok((told_put.map_err(told)?, brought, fitted))
+                let fitted = instance.fitted(&part, mirror)?;
+                Ok((part, fitted))
             });
-            match put {
-                Ok((put, brought, fitted)) => {
+            let (part, fitted) = match found {
+                Ok(found) => found,
+                Err(error) => {
+                    faults.push(SourceError::at(source, instance.offset, message(&error)));
+                    lacking.add_unknown(&instance);
+                    continue;
+                }
+            };
+            let among = self.sockets.iter().chain(&of_parts);
+            let socket = instance.socket.as_deref().map(|name| PartSocket::find(name, among, &self.rig));
+            let brought = instance.sockets_in(&self.rig, &part, &fitted);
+            let put = socket
+                .transpose()
+                .map_err(PartError::from)
+                .and_then(|socket| instance.put_into(&mut self.rig, &part, &fitted, mirror, socket.as_ref()));
+            let changes = places.changes(instance.offset);
+            let is_put = put.is_ok();
+            let found = match put {
+                Ok(put) => {
                     self.notes.extend(put.notes);
                     of_parts.extend(brought);
-                    let changes = places.changes(instance.offset);
-                    self.origins.extend(instance.origins(&fitted, &changes));
-                    faults.extend(put.faults.into_iter().map(|(change, error)| {
-                        let change = change.and_then(|number| changes.get(number));
-                        let at = change.map_or(instance.offset, |(start, _)| *start);
-                        SourceError::at(source, at, message(&E::from(error)))
-                    }));
-                    self.instances.push(instance);
+                    self.origins.extend(instance.origins(&part, &fitted, &changes));
+                    put.faults
                 }
-                Err((message, is_of_host)) => {
-                    if !(is_of_host && is_one_missing) {
-                        faults.push(SourceError::at(source, instance.offset, message));
-                    }
-                    is_one_missing = true;
+                Err(reason) => {
+                    let mut found = instance.faults(&self.rig, &part, &fitted, reason);
+                    found.retain(|(_, error)| !lacking.explains(error));
+                    lacking.add(&instance, &fitted);
+                    found
                 }
+            };
+            faults.extend(found.into_iter().map(|(change, error)| {
+                let change = change.and_then(|number| changes.get(number));
+                let at = change.map_or(instance.offset, |(start, _)| *start);
+                SourceError::at(source, at, message(&E::from(error)))
+            }));
+            if is_put {
+                self.instances.push(instance);
             }
         }
         place_sockets(&self.rig, &mut self.sockets, source, &mut faults);

@@ -5,7 +5,7 @@ use std::{borrow::Cow, ops::Range};
 use super::{
     super::{
         Template,
-        file::TemplateFile,
+        file::{TemplateFile, known_names},
         shorthand::{Explicit, explicit},
     },
     Places, TEMPLATE, build, in_text, text_of,
@@ -16,6 +16,7 @@ use crate::rig::{
         scan::{self, Field, elements_around},
         source::ron_options,
     },
+    nearest::nearest,
     template::quoted,
 };
 
@@ -40,7 +41,15 @@ pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec
     // In a file of a newer format they are notes.
     let unknown = if matches!(readable, Cow::Borrowed(_)) { TEMPLATE.unknown(&fields) } else { Vec::new() };
     for field in &unknown {
-        let message = format!("there is no field `{}` here; remove it or correct its name", field.name);
+        let near = nearest(field.name, known_names(&fields, field).into_iter().flatten(), 3);
+        let remedy = match near.is_empty() {
+            true => "remove it or correct its name".to_owned(),
+            false => format!(
+                "did you mean {}?",
+                near.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" or ")
+            ),
+        };
+        let message = format!("there is no field `{}` here; {remedy}", field.name);
         faults.push(SourceError::at(text, field.start, message));
     }
     let mut survey = Survey { text, fields: &fields, blank: Vec::new(), left_out: Vec::new(), stand_ins: Vec::new() };
