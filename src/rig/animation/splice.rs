@@ -119,8 +119,14 @@ fn point(from: &Key, to: &Key, property: &Property, time: f32) -> ([f32; 4], [f3
     });
     if *property == Property::Rotation {
         // The curve is normalised, and so is its tangent: what points along the value changes nothing.
+        let plain: [f32; 4] = std::array::from_fn(|axis| {
+            (2.0 * share - 3.0) * share * share * (from.value[axis] - to.value[axis])
+                + from.value[axis]
+                + (share - 1.0) * share * span * ((share - 1.0) * leave[axis] + share * arrive[axis])
+        });
         let (value, slope) = (Quat::from_array(value), Quat::from_array(slope));
-        return (value.to_array(), (slope - value * value.dot(slope)).to_array());
+        let length = Quat::from_array(plain).length().max(1e-6);
+        return (value.to_array(), ((slope - value * value.dot(slope)) * length.recip()).to_array());
     }
     (value, slope)
 }

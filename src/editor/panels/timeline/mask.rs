@@ -20,11 +20,12 @@ pub(super) fn button(ui: &mut Ui, said: &str, layer: &ClipLayer, context: &RowCo
     };
     let enabled = is_masked || !selected.is_empty();
     let response = ui.add_enabled(enabled, Button::selectable(is_masked, text.as_str()));
-    let said_mask = format!("Mask of {said}: {text}");
+    let listed = if is_masked { names(layer, context) } else { text.clone() };
+    let said_mask = format!("Mask of {said}: {listed}");
     response.widget_info(|| WidgetInfo::selected(WidgetType::Button, enabled, is_masked, &said_mask));
     let clicked = response.clicked();
     let tip = match is_masked {
-        true => format!("The layer concerns {}.\nA click lets it concern all nodes", names(layer, context)),
+        true => format!("The layer concerns {listed}.\nA click lets it concern all nodes"),
         false => "The layer concerns all nodes.\nA click lets it concern only the selected ones".to_owned(),
     };
     response.on_hover_text(tip).on_disabled_hover_text("The layer concerns all nodes; select some to mask the others");
