@@ -278,6 +278,10 @@ fn layer(
         if mute.clicked() {
             requests.send(EditRequest::operation(open.entity, set(&|about| about.muted = !layer.muted)));
         }
+        // A narrow timeline has masks in the menu of the layer alone.
+        if ui.available_width() < 70.0 {
+            return;
+        }
         if let Some(mask) = mask::button(ui, &said, layer, context) {
             requests.send(EditRequest::operation(open.entity, set(&|about| about.mask.clone_from(&mask))));
         }
