@@ -148,8 +148,8 @@ fn switches_over_a_range_are_one_step_each() {
     for action in both {
         assert_eq!(reason(&desk, action), Some("nothing is selected"));
     }
-    let root = desk.rig().roots()[0];
-    desk.select(&[root]);
+    let finger = desk.rig().find_label("index_02_l").unwrap();
+    desk.select(&[finger]);
     assert_eq!(reason(&desk, both[0]), Some("no control of a limb with IK and FK is selected"));
     assert_eq!(reason(&desk, both[1]), Some("no control that has spaces is selected"));
     let hand = named(&desk, "hand_ik_l");
