@@ -3,6 +3,7 @@
 mod source;
 #[cfg(feature = "render")]
 mod strip;
+mod switch;
 
 use std::path::{Path, PathBuf};
 
@@ -91,6 +92,8 @@ pub(super) struct AnimateArgs {
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=64))]
     frames: u16,
     #[command(flatten)]
+    switches: switch::SwitchOverArgs,
+    #[command(flatten)]
     weights: WeightArgs,
     #[command(flatten)]
     export: ExportArgs,
@@ -160,7 +163,8 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
         return Err(Failure::Input(Box::new(error)));
     }
     bench.runtime()?;
-    let clips = source::clips(args, onto, &mut bench, &mut report)?;
+    let mut clips = source::clips(args, onto, &mut bench, &mut report)?;
+    switch::throw(&args.switches, &mut bench, &mut clips, &mut report)?;
     describe(&clips, &mut report);
     if is_picture {
         picture(args, &mut bench, &clips, &mut report)?;

@@ -169,6 +169,10 @@ pub(super) fn show(
             entries(ui, &list(&[TimelineAction::Marker, TimelineAction::NewLayer]));
             ui.separator();
             entries(ui, &list(&[TimelineAction::Copy, TimelineAction::Paste, TimelineAction::Mirror]));
+            ui.separator();
+            entries(ui, &list(&[TimelineAction::BakeClip, TimelineAction::ReduceClip]));
+            entries(ui, &list(&[TimelineAction::Longer, TimelineAction::Shorter]));
+            entries(ui, &list(&[TimelineAction::SwitchKinematics, TimelineAction::SwitchSpace]));
         });
         ui.menu_button("View", |ui| {
             entries(

@@ -89,6 +89,12 @@ pub struct MarkerReached {
 
 /// Root motion: movement of one node that is handed to the game in place of the pose. The node stands where it stands at the
 /// start of the clip, and the game multiplies the rig's `Transform` by `delta` after each frame.
+///
+/// Motion of another skeleton that was put onto joints (`MotionTarget::Joints`, `rigsmith animate --onto joints`) has all of its
+/// travel on the hips, which are the node to give. Motion on controls suits only where one control carries all others and has all
+/// of the travel; goals that have keys of their own in the rig's space would stay behind. Bevy's own animation of
+/// [`animation_clip`] hands no motion over: there the node moves, or a mask leaves it out and the game moves the rig itself, by
+/// the way of the node in [`RigClip::value`](crate::rig::animation::RigClip::value).
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component)]
 pub struct RootMotion {

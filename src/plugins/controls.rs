@@ -4,6 +4,7 @@
 //! attribute like any other, so the controls of inverse kinematics hide while a limb follows the forward ones.
 
 pub mod outline;
+mod over;
 pub mod size;
 
 use std::collections::BTreeSet;
@@ -23,8 +24,10 @@ use crate::{
         AttributeKind, BuiltRig, Matching, Rig, SwitchData, Uid, feature::off_at, nearest::did_you_mean,
         operations::Operation,
     },
-    solve::matching::{MatchError, match_switch},
+    solve::matching::{MatchError, SwitchOverError, match_switch},
 };
+
+pub use over::{SwitchOverRequest, SwitchedOver, switch_over};
 
 pub use crate::rig::VISIBLE;
 
@@ -36,9 +39,11 @@ impl Plugin for ControlsPlugin {
         configure_sets(app);
         app.init_resource::<ControlsInUse>()
             .add_message::<SwitchRequest>()
+            .add_message::<SwitchOverRequest>()
+            .add_message::<SwitchedOver>()
             .add_message::<EditRequest>()
             .add_message::<EditRefusal>()
-            .add_systems(Update, throw_switches.in_set(RigSystems::Gesture))
+            .add_systems(Update, (throw_switches, over::throw_over).chain().in_set(RigSystems::Gesture))
             .register_type::<size::ShapeFactor>()
             .add_systems(
                 PostUpdate,
@@ -123,9 +128,15 @@ pub enum SwitchError {
     /// The rig is not built, or cannot run.
     #[error("the rig is not built, so it has no switches; build it first")]
     NotBuilt,
+    /// The rig has no such clip.
+    #[error("the rig has no such clip; choose another one")]
+    NoClip,
     /// See [`MatchError`].
     #[error(transparent)]
     Match(#[from] MatchError),
+    /// See [`SwitchOverError`].
+    #[error(transparent)]
+    Over(#[from] SwitchOverError),
 }
 
 fn throw_switches(

@@ -14,6 +14,7 @@ pub mod motion;
 mod names;
 mod sample;
 mod sampler;
+mod splice;
 mod tracks;
 
 use std::{
@@ -32,6 +33,7 @@ pub use self::{
     names::{KnownNode, NodeNames, OrphanedKeys, orphaned_keys},
     sample::SampledPose,
     sampler::{ClipSampler, SampleCursor},
+    splice::Splice,
 };
 use crate::rig::{PoseOffset, Rig, Uid};
 

@@ -7,12 +7,15 @@
 
 mod followers;
 mod limb;
+mod over;
 
 use crate::{
     mesh::model::Trs,
     rig::{BuiltRig, Matching, PoseOffset, RigEdit, Scalar, SwitchData, Uid},
     solve::program::{RigState, StateError},
 };
+
+pub use over::{SwitchNote, SwitchOverError, SwitchRange, SwitchedRange, match_switch_over, tolerance_of};
 
 /// Error of matching a switch.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

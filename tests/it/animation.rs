@@ -6,6 +6,7 @@ mod keep;
 mod keys;
 mod random;
 mod sampler;
+mod switch_over;
 
 use std::sync::Arc;
 

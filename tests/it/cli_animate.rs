@@ -8,7 +8,7 @@ use rigsmith::{
     modules,
     processor::Builder,
     rig::{
-        animation::{clip_extras::ClipExtras, file_clip::motion_of},
+        animation::{RigClip, clip_extras::ClipExtras, file_clip::motion_of},
         bake::baked,
     },
     solve::{
@@ -341,4 +341,114 @@ fn clips_of_morph_targets_are_passed_over() {
     assert_eq!((answer["clips"].as_array().unwrap().len(), &answer["clips"][0]["name"]), (1, &"turn".into()));
     let answer = rigsmith(folder.path(), &["animate", "stand.rig.ron", "blink.gltf", "-o", "no.anim.ron"]);
     assert!(answer.code == 1 && answer.err.contains("no clips that move joints"), "{} {}", answer.code, answer.err);
+}
+
+/// A switch is thrown over frames of a clip, and the joints stay; what is asked for wrongly is told.
+#[test]
+fn switches_are_thrown_over_clips() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("walker.bvh"), WALKER).unwrap();
+    let run = |args: &[&str]| json(folder.path(), &[&["animate", "biped.rig.ron"], args].concat());
+    run(&["walker.bvh", "-o", "walk.anim.ron"]);
+    let read = |name: &str| load_animation(&RealDisk, &path(name)).unwrap().clips.swap_remove(0);
+    let first = read("walk.anim.ron");
+    let rig = shipped("biped");
+    let built = Builder::build(&rig, &std::sync::Arc::new(modules::all())).unwrap();
+    let program = std::sync::Arc::new(RigProgram::compile(&built, &CompileOptions::default()).unwrap());
+    let switch = built.switches.iter().find(|switch| {
+        let thigh = rig.find_label("thigh_l").unwrap();
+        matches!(&switch.matching, rigsmith::rig::Matching::IkFk { joints, .. } if joints.contains(&thigh))
+    });
+    let switch = switch.unwrap();
+    let attribute = rigsmith::rig::animation::TrackTarget {
+        node: switch.control,
+        property: rigsmith::rig::animation::Property::Attribute(switch.attribute.to_string()),
+    };
+    let default = RigState::new(program.clone()).attribute(switch.control, &switch.attribute).unwrap();
+    let at = |clip: &RigClip, time: f32| clip.value(&attribute, time).map_or(default, |value| value[0]);
+    let (other, number) = if at(&first, 0.0) >= 0.5 { ("fk", 0.0) } else { ("ik", 1.0) };
+    let thrown = format!("thigh_l={other}");
+    let answer = run(&["walk.anim.ron", "--switch", &thrown, "--range", "4..12", "-o", "over.anim.ron"]);
+    let told = &answer["switched"][0];
+    assert_eq!((&told["clip"], &told["off"]), (&"walker".into(), &Value::Array(vec![])), "{answer}");
+    assert!(told["frames"].as_u64().unwrap() >= 9 && told["keys"].as_u64().unwrap() >= 1, "{answer}");
+    let over = read("over.anim.ron");
+    let mut states = [RigState::new(program.clone()), RigState::new(program.clone())];
+    for frame in 0..=18u8 {
+        let time = f32::from(frame) / 20.0;
+        let wanted = if (4..12).contains(&frame) { number } else { at(&first, time) };
+        assert_eq!(at(&over, time), wanted, "frame {frame}");
+        for (state, clip) in states.iter_mut().zip([&first, &over]) {
+            strike(state, &clip.sample(time));
+        }
+        for (slot, node) in program.nodes().iter().enumerate() {
+            if node.kind == rigsmith::rig::NodeType::Joint {
+                let [was, is] = [0, 1].map(|state: usize| states[state].global_at(slot).translation);
+                assert!(was.distance(is) <= 1e-4, "{:?} in frame {frame}: {}", node.label, was.distance(is));
+            }
+        }
+    }
+
+    // The whole clip; a second time there is nothing to do.
+    run(&["walk.anim.ron", "--switch", &thrown, "-o", "whole.anim.ron"]);
+    assert!((0..=18u8).all(|frame| at(&read("whole.anim.ron"), f32::from(frame) / 20.0) == number));
+    let answer = run(&["whole.anim.ron", "--switch", &thrown, "-o", "again.anim.ron"]);
+    assert_eq!(answer["switched"], Value::Array(vec![]));
+    assert!(answer["notes"].to_string().contains("holds in the whole range already"), "{answer}");
+    assert_eq!(read("whole.anim.ron"), read("again.anim.ron"));
+
+    let check = |args: &[&str], code: i32, told: &str| {
+        let args = [&["animate", "biped.rig.ron", "walk.anim.ron", "-o", "x.anim.ron"], args].concat();
+        let answer = rigsmith(folder.path(), &args);
+        assert_eq!(answer.code, code, "{args:?}: {}", answer.err);
+        assert!(answer.err.contains(told), "{args:?}: {}", answer.err);
+    };
+    check(&["--switch", "thigh_l"], 2, "NAME=VALUE");
+    check(&["--switch", "thigh_l=sideways"], 1, "has no value");
+    check(&["--switch", "nobody=fk"], 1, "no switch");
+    check(&["--switch", &thrown, "--range", "12..4"], 2, "write two frames");
+    check(&["--range", "4..12"], 2, "--switch");
+    assert!(!path("x.anim.ron").exists());
+}
+
+/// What is above the joints, such as a hat, is in the strip; and the strip says that it shows one clip of several.
+#[cfg(feature = "render")]
+#[test]
+fn a_strip_shows_the_whole_mesh() {
+    if rigsmith::render::adapter().is_none() {
+        crate::prerequisites::skip("there is no graphics adapter, not even a software one", "RIGSMITH_REQUIRE_GPU");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("walker.bvh"), WALKER).unwrap();
+    let body = include_str!("../../assets/models/biped.obj");
+    let points = || body.lines().filter_map(|line| line.strip_prefix("v "));
+    let top = points().map(|line| line.split_whitespace().nth(1).unwrap().parse::<f32>().unwrap()).fold(0.0, f32::max);
+    let count = points().count();
+    // A hat half a metre high.
+    let mut hat = String::from("o hat\n");
+    for (x, y, z) in [(-0.1, -0.1, -0.1), (0.1, -0.1, -0.1), (0.1, -0.1, 0.1), (-0.1, -0.1, 0.1), (0.0, 0.5, 0.0)] {
+        hat += &format!("v {x} {} {z}\n", top + y);
+    }
+    for [a, b, c] in [[1, 2, 3], [1, 3, 4], [1, 5, 2], [2, 5, 3], [3, 5, 4], [4, 5, 1]] {
+        hat += &format!("f {} {} {}\n", count + a, count + b, count + c);
+    }
+    fs::write(path("hatter.obj"), format!("{body}\n{hat}")).unwrap();
+    let args = ["animate", "biped.rig.ron", "walker.bvh", "walker.bvh", "--mesh", "hatter.obj", "--frames", "2"];
+    let answer = json(folder.path(), &[&args[..], &["-o", "strip.png"]].concat());
+    assert!(answer["notes"].to_string().contains("the first of 2 clips"), "{answer}");
+    let strip = image::open(path("strip.png")).unwrap().to_rgb8();
+    let (width, height) = strip.dimensions();
+    for frame in 0..2 {
+        let (left, right) = (frame * width / 2, (frame + 1) * width / 2);
+        let apart = |x: u32, y: u32| {
+            let (a, b) = (strip.get_pixel(x, y), strip.get_pixel(left, y));
+            a.0.iter().zip(b.0).map(|(a, b)| a.abs_diff(b)).max().unwrap()
+        };
+        let is_empty = |y: u32| (left..right).all(|x| apart(x, y) < 12);
+        assert!(is_empty(0) && is_empty(1), "frame {frame}: something is cut off at the top");
+        assert!((2..height / 3).any(|y| !is_empty(y)), "frame {frame}: nothing is at the top");
+    }
 }

@@ -4,6 +4,7 @@ mod curves;
 mod keys;
 mod looks;
 mod parts;
+mod whole_clip;
 
 use std::{sync::Arc, time::Duration};
 
@@ -264,6 +265,12 @@ fn every_action_is_one_step_or_none() {
         TimelineAction::DuplicateClip,
         TimelineAction::DeleteClip,
         TimelineAction::NewLayer,
+        TimelineAction::Bake,
+        TimelineAction::BakeClip,
+        TimelineAction::Reduce,
+        TimelineAction::ReduceClip,
+        TimelineAction::Longer,
+        TimelineAction::Shorter,
     ];
     assert_eq!(edits, wanted);
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bevy::math::{UVec2, Vec3};
+use bevy::math::{Affine3A, UVec2, Vec3};
 use image::{ImageFormat, RgbImage};
 
 use super::AnimateArgs;
@@ -11,11 +11,13 @@ use crate::{
     cli::{Failure, Report, binding::bind, limits, progress::spinning},
     files::{RealDisk, save_atomic},
     headless::Workbench,
+    mesh::skinning::skin_points,
     plugins::drawing::RigDrawing,
     render::{PictureError, PictureSettings, take_picture},
     rig::{
-        NodeType, PoseOffset, Rig, RigEdit,
+        NodeType, PoseOffset, Rig, RigEdit, SkinData, Uid,
         animation::{RigClip, SampledPose},
+        deform::DeformSkeleton,
     },
     solve::{bake_clip::strike, program::RigState},
 };
@@ -33,6 +35,13 @@ pub(super) fn draw(
     report: &mut Report,
 ) -> Result<(), Failure> {
     let Some(clip) = clips.first() else { return Ok(()) };
+    if clips.len() > 1 {
+        report.notes.push(format!(
+            "the strip shows \"{}\", the first of {} clips; choose another one with --clip",
+            clip.name,
+            clips.len()
+        ));
+    }
     if let Some(mesh) = &args.mesh {
         let model = limits::load_model(mesh)?;
         report.notes(model.notes.iter().cloned());
@@ -83,25 +92,71 @@ fn posed(rig: &Rig, pose: &SampledPose) -> Result<Rig, Failure> {
     Ok(rig)
 }
 
-/// Boxes of one size around the joints in each pose, with some room for flesh.
+/// Weighted points of the mesh, which follow the joints.
+struct Body<'a> {
+    points: &'a [Vec3],
+    skin: Option<&'a SkinData>,
+    /// Joint of each joint of the weights, with its inverse at rest.
+    holders: Vec<Option<(Uid, Affine3A)>>,
+}
+
+impl<'a> Body<'a> {
+    /// Points of the workbench's mesh; `None` without any.
+    fn of(bench: &'a Workbench) -> Option<Self> {
+        let points = &bench.mesh()?.rest.points[..];
+        let skin = bench.weights();
+        let skeleton = DeformSkeleton::new(bench.rig(), bench.built());
+        let held = skin.map(|skin| skeleton.holders(bench.rig(), skin)).unwrap_or_default();
+        let holder = |at: usize| {
+            let joint = &skeleton.joints()[at];
+            (joint.uid, Affine3A::from(joint.rest).inverse())
+        };
+        let holders = held.into_iter().map(|at| at.map(holder)).collect();
+        (!points.is_empty()).then_some(Self { points, skin, holders })
+    }
+
+    /// Box around the points in a pose.
+    fn around(&self, state: &RigState) -> [Vec3; 2] {
+        let Some(skin) = self.skin else { return around(self.points.iter().copied()) };
+        let moved = |holder: &Option<(Uid, Affine3A)>| {
+            let (joint, back) = holder.as_ref()?;
+            Some(state.global(*joint)?.affine() * *back)
+        };
+        let matrices: Vec<Affine3A> =
+            self.holders.iter().map(|holder| moved(holder).unwrap_or(Affine3A::IDENTITY)).collect();
+        let mut posed = Vec::new();
+        skin_points(self.points, &skin.weights, &matrices, &mut posed);
+        around(posed.into_iter())
+    }
+}
+
+fn around(places: impl Iterator<Item = Vec3>) -> [Vec3; 2] {
+    places.fold([Vec3::MAX, Vec3::MIN], |[low, high], place| [low.min(place), high.max(place)])
+}
+
+/// Boxes of one size around the mesh in each pose, or around the joints, with some room for flesh.
 fn boxes(bench: &Workbench, poses: &[SampledPose]) -> Result<Vec<[Vec3; 2]>, Failure> {
     let program = bench.runtime()?.state().program();
     let mut state = RigState::new(Arc::clone(program));
+    let body = Body::of(bench);
     let around: Vec<[Vec3; 2]> = poses
         .iter()
         .map(|pose| {
             strike(&mut state, pose);
             let joints = program.nodes().iter().zip(state.globals()).filter(|(node, _)| node.kind == NodeType::Joint);
-            let places = || joints.clone().map(|(_, at)| at.translation);
-            [places().fold(Vec3::MAX, Vec3::min), places().fold(Vec3::MIN, Vec3::max)]
+            body.as_ref().map_or_else(|| around(joints.map(|(_, at)| at.translation)), |body| body.around(&state))
         })
         .collect();
-    let half = around.iter().map(|[low, high]| 0.55 * (*high - *low)).fold(Vec3::ZERO, Vec3::max);
+    let room = if body.is_some() { 0.51 } else { 0.55 };
+    let mut half = around.iter().map(|[low, high]| room * (*high - *low)).fold(Vec3::ZERO, Vec3::max);
+    // All pictures have one ground, and room for the highest pose.
     let low = around.iter().map(|[low, _]| low.y).fold(f32::MAX, f32::min);
+    let high = around.iter().map(|[_, high]| high.y).fold(f32::MIN, f32::max);
+    half.y = room * (high - low);
     Ok(around
         .iter()
         .map(|[a, b]| {
-            let middle = a.midpoint(*b).with_y(low + half.y);
+            let middle = a.midpoint(*b).with_y(low.midpoint(high));
             [middle - half, middle + half]
         })
         .collect())

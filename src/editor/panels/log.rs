@@ -12,6 +12,7 @@ use crate::{
         panel::{EditorPanel, Requests},
     },
     plugins::{
+        controls::SwitchedOver,
         document::{ChangeError, EditRefusal},
         limits::RigLimits,
     },
@@ -26,8 +27,9 @@ impl Plugin for LogPlugin {
             .add_message::<Notice>()
             .add_message::<ClearLog>()
             .add_message::<EditRefusal>()
+            .add_message::<SwitchedOver>()
             .add_message::<RequestRedraw>()
-            .add_systems(Last, (tell_refusals, keep_notices).chain().in_set(LogSystems));
+            .add_systems(Last, (tell_refusals, tell_switches, keep_notices).chain().in_set(LogSystems));
     }
 }
 
@@ -104,6 +106,23 @@ fn tell_refusals(mut refused: MessageReader<EditRefusal>, mut notices: MessageWr
             // A key that was pressed once too often has done no harm.
             ChangeError::NothingToUndo | ChangeError::NothingToRedo => Notice::info(text),
             _ => Notice::error(text),
+        });
+    }
+}
+
+/// Tells what a switch over a range did, and the joints that it could not hold.
+fn tell_switches(mut switched: MessageReader<SwitchedOver>, mut notices: MessageWriter<Notice>) {
+    for SwitchedOver { frames, keys, notes, .. } in switched.read() {
+        notices.write(match notes.first() {
+            None => Notice::done(format!("Switched over {frames} frames with {keys} keys; all joints move as before.")),
+            Some(first) => {
+                let more = match notes.len() {
+                    1 => String::new(),
+                    count => format!(" So do {} more.", count - 1),
+                };
+                let text = "Switched, but not all joints could be held:";
+                Notice::warning(format!("{text} {first}.{more}"))
+            }
         });
     }
 }

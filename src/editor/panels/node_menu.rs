@@ -8,7 +8,7 @@ use super::{
     controls::values_of,
     poses::PosedRig,
     selection_sets::{free_name, recall},
-    timeline::{TimelineAction, obstacle},
+    timeline::{OpenClip, Timeline, TimelineAction, obstacle, range, requested},
 };
 use crate::{
     editor::{
@@ -101,7 +101,7 @@ fn entries(ui: &mut Ui, world: &World, open: &OpenMenu, requests: &mut Requests)
     ui.strong(name_of(document, built, node));
     let mut is_chosen = false;
     if let (Some(built), Some(runtime)) = (built, runtime) {
-        is_chosen |= switches(ui, built, runtime.state(), open, requests);
+        is_chosen |= switches(ui, world, built, runtime.state(), open, requests);
     }
     ui.separator();
     let mut entry = |ui: &mut Ui, text: &str, why_not: Option<&str>| {
@@ -145,9 +145,18 @@ fn entries(ui: &mut Ui, world: &World, open: &OpenMenu, requests: &mut Requests)
     is_chosen
 }
 
-/// Draws the switches that concern a node, each with its values; true if one was thrown.
-fn switches(ui: &mut Ui, built: &BuiltRig, state: &RigState, open: &OpenMenu, requests: &mut Requests) -> bool {
+/// Draws the switches that concern a node, each with its values, for the pose and over the range of the open clip; true if one
+/// was thrown.
+fn switches(
+    ui: &mut Ui,
+    world: &World,
+    built: &BuiltRig,
+    state: &RigState,
+    open: &OpenMenu,
+    requests: &mut Requests,
+) -> bool {
     let mut is_thrown = false;
+    let clip = OpenClip::of(world).filter(|clip| clip.entity == open.rig).zip(world.get_resource::<Timeline>());
     for switch in built.switches.iter().filter(|switch| concerns(built, switch, open.node)) {
         let Some(node) = built.node(switch.control) else { continue };
         let value = state.attribute(switch.control, &switch.attribute).unwrap_or_default();
@@ -169,12 +178,23 @@ fn switches(ui: &mut Ui, built: &BuiltRig, state: &RigState, open: &OpenMenu, re
                 }
             }
         });
+        let Some((clip, timeline)) = &clip else { continue };
+        let [from, to] = range(clip, timeline).map(|time| (time * clip.clip.frame_rate).round());
+        ui.horizontal_wrapped(|ui| {
+            for (number, name) in values_of(node, switch).iter().enumerate() {
+                let button = ui.button(format!("{name}, frames {from} to {to}"));
+                if button.on_hover_text("Sets keys so that everything moves as before").clicked() {
+                    is_thrown = true;
+                    requests.send(requested(clip, timeline, switch, number as f32));
+                }
+            }
+        });
     }
     is_thrown
 }
 
 /// True if a switch moves a node, or is set on it.
-fn concerns(built: &BuiltRig, switch: &SwitchData, node: Uid) -> bool {
+pub(super) fn concerns(built: &BuiltRig, switch: &SwitchData, node: Uid) -> bool {
     // Goals hang below the controls that people move.
     let carries = |below: Uid| {
         let index = built.nodes.iter().position(|known| known.uid == below);

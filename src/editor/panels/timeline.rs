@@ -16,17 +16,20 @@ mod follow;
 pub mod import;
 mod joint_table;
 mod marks;
+mod mask;
 mod menu;
 mod row;
 mod ruler;
 mod sheet;
 mod shown_pose;
 mod state;
+mod switches;
 
 use bevy::{prelude::*, window::RequestRedraw};
 use bevy_egui::egui::{Rangef, Rect, Sense, Stroke, Ui, UiBuilder, WidgetInfo, WidgetType, pos2, vec2};
 
 pub(in crate::editor) use self::state::key_times;
+pub(super) use self::switches::{range, requested};
 pub use self::{
     action::{TimelineAction, obstacle, over_timeline},
     axis::TimeAxis,

@@ -69,7 +69,8 @@ pub(super) fn name_targets(
 /// told as [`MarkerReached`] of the entity with the player.
 ///
 /// Nodes that the program does not have or that cannot be posed are left out. A node gets all of its transform from the clip:
-/// where the clip has no keys of it, it is at its base.
+/// where the clip has no keys of it, it is at its base. Root motion is not taken out: see
+/// [`RootMotion`](super::RootMotion).
 pub fn animation_clip(clip: &RigClip, program: &RigProgram, mode: InstanceMode) -> AnimationClip {
     let mut out = AnimationClip::default();
     let targets: std::collections::BTreeSet<&TrackTarget> =

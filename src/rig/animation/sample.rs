@@ -121,6 +121,22 @@ impl RigClip {
         value
     }
 
+    /// Value of a property at a second, all layers mixed, where a layer has the value `own` in place of its keys.
+    pub fn value_with(&self, layer: usize, target: &TrackTarget, time: f32, own: [f32; 4]) -> Option<[f32; 4]> {
+        let mut value = None;
+        let is_on = |layer: &ClipLayer| !layer.muted && layer.weight > 0.0 && layer.concerns(target.node);
+        for (place, known) in self.layers.iter().enumerate().filter(|(_, known)| is_on(known)) {
+            let of = match place == layer {
+                true => Some(own),
+                false => known.tracks.get(target).and_then(|track| track.sample(&target.property, time)),
+            };
+            if let Some(own) = of {
+                value = Some(known.mixed(&target.property, value, own));
+            }
+        }
+        value
+    }
+
     /// Value of a layer's key with which the layers up to this one give `wanted`. A layer without weight cannot give it, and
     /// gets the value as if it had full weight.
     pub fn value_for(&self, layer: usize, target: &TrackTarget, time: f32, wanted: [f32; 4]) -> [f32; 4] {

@@ -87,6 +87,22 @@ pub enum ClipOperation {
         /// Seconds at which the span begins and ends afterwards.
         to: [f32; 2],
     },
+    /// Sets the frame rate of a clip so that all keys and markers stay on their frames: it takes longer at a lower rate.
+    SetRate {
+        /// The clip.
+        clip: Uid,
+        /// Frames a second.
+        rate: f32,
+    },
+    /// Replaces the keys of all layers by linear ones at the clip's frame rate; steps stay steps.
+    Bake(Uid),
+    /// Removes keys of all layers without which their tracks stay within a tolerance.
+    Reduce {
+        /// The clip.
+        clip: Uid,
+        /// Largest differences.
+        tolerance: KeyTolerance,
+    },
     /// Changes keys of a layer.
     Keys {
         /// The clip.
@@ -198,6 +214,9 @@ impl ClipOperation {
             Self::MoveLayer { .. } => "Move animation layer",
             Self::DeleteLayer { .. } => "Delete animation layer",
             Self::Retime { .. } => "Retime clip",
+            Self::SetRate { .. } => "Retime clip to frame rate",
+            Self::Bake(_) => "Bake clip",
+            Self::Reduce { .. } => "Reduce clip",
             Self::Keys { change, .. } => match change {
                 KeyOperation::Pose { .. } | KeyOperation::Values { .. } | KeyOperation::Set(_) => "Set keys",
                 KeyOperation::Move { .. } | KeyOperation::Place(_) => "Move keys",
@@ -254,8 +273,27 @@ pub(super) fn run(draft: &mut Draft, operation: &ClipOperation) -> Result<(), Op
             Ok(draft.apply(RigEdit::RemoveLayer { clip: *clip, layer: *layer })?)
         }
         ClipOperation::Retime { clip, from, to } => time::retime(draft, *clip, *from, *to),
+        ClipOperation::SetRate { clip, rate } => time::set_rate(draft, *clip, *rate),
+        ClipOperation::Bake(clip) => {
+            let rate = find(draft, *clip)?.frame_rate;
+            on_all_keys(draft, *clip, |targets| KeyOperation::Bake { targets, rate })
+        }
+        ClipOperation::Reduce { clip, tolerance } => {
+            on_all_keys(draft, *clip, |targets| KeyOperation::Reduce { targets, tolerance: *tolerance })
+        }
         ClipOperation::Keys { clip, layer, change } => keys::run(draft, *clip, *layer, change),
     }
+}
+
+/// Changes the tracks of each layer of a clip.
+fn on_all_keys(
+    draft: &mut Draft,
+    clip: Uid,
+    change: impl Fn(Vec<TrackTarget>) -> KeyOperation,
+) -> Result<(), OperationError> {
+    let tracks = |layer: &ClipLayer| (layer.uid, layer.tracks.keys().cloned().collect());
+    let layers: Vec<(Uid, Vec<TrackTarget>)> = find(draft, clip)?.layers.iter().map(tracks).collect();
+    layers.into_iter().try_for_each(|(layer, targets)| keys::run(draft, clip, layer, &change(targets)))
 }
 
 fn add(draft: &mut Draft, clip: &RigClip) -> Result<(), OperationError> {

@@ -11,16 +11,20 @@ use rigsmith::{
             target_id,
         },
         commands::{BuildRequest, BuildStep},
-        document::{Change, EditRequest},
+        document::{Change, EditRequest, JointEntities},
         history::RigHistory,
         runtime::{InstanceMode, NodeSlot, RigRuntime, spawn_instance},
     },
     rig::{
         NodeType, PoseOffset, Rig, RigEdit, Uid,
-        animation::{Key, Marker, Property, RigClip, Track},
+        animation::{Key, Marker, Property, RigClip, Track, joint_map::JointMap},
+        format::bvh::read_bvh,
         operations::Operation,
     },
-    solve::program::{RigProgram, RigState},
+    solve::{
+        program::{RigProgram, RigState},
+        retarget::{MotionTarget, RetargetSettings, retarget},
+    },
     test_app::strict_app,
 };
 
@@ -281,6 +285,49 @@ fn bevys_masks_leave_nodes_out() {
     assert!(slots.iter(app.world()).count() > 0);
 }
 
+/// Bevy's own graph blends two clips of a rig by their weights.
+#[test]
+fn bevys_graph_blends_two_clips() {
+    let program = program(&biped());
+    let node = controls(&program)[0];
+    let still = |number: u64, place: Vec3, angle: f32| {
+        let mut clip = RigClip::new(Uid(CLIP.0 + number), Uid(BASE.0 + number), "still");
+        let keys = [0.0, 1.0].map(|time| Key::vector(time, place)).to_vec();
+        clip.layers[0].tracks.insert(target(node, Property::Translation), Arc::new(Track { keys }));
+        let keys = [0.0, 1.0].map(|time| Key::rotation(time, Quat::from_rotation_y(angle))).to_vec();
+        clip.layers[0].tracks.insert(target(node, Property::Rotation), Arc::new(Track { keys }));
+        clip
+    };
+    let clips = [still(0, Vec3::new(0.0, 0.0, 0.2), 0.4), still(0x10, Vec3::new(0.4, 0.0, 0.0), 0.8)];
+    for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
+        for share in [0.0, 0.25, 0.5, 1.0] {
+            let mut app = app();
+            let entity = app.world_mut().spawn((Transform::IDENTITY, ClipTargets)).id();
+            spawn_instance(app.world_mut(), entity, &program, mode);
+            let mut graph = AnimationGraph::new();
+            let blend = graph.add_blend(1.0, graph.root);
+            let mut player = AnimationPlayer::default();
+            for (clip, weight) in clips.iter().zip([1.0 - share, share]) {
+                let for_bevy = animation_clip(clip, &program, mode);
+                let handle = app.world_mut().resource_mut::<Assets<AnimationClip>>().add(for_bevy);
+                let index = graph.add_clip(handle, 1.0, blend);
+                player.play(index).set_weight(weight).pause().seek_to(0.5);
+            }
+            let graph = app.world_mut().resource_mut::<Assets<AnimationGraph>>().add(graph);
+            app.world_mut().entity_mut(entity).insert((player, AnimationGraphHandle(graph)));
+            for _ in 0..4 {
+                app.update();
+            }
+            let state = app.world().get::<RigRuntime>(entity).unwrap().state();
+            let offset = state.offset_at(program.node(node).unwrap());
+            let place = Vec3::new(0.0, 0.0, 0.2).lerp(Vec3::new(0.4, 0.0, 0.0), share);
+            let off = offset.translation.distance(place);
+            let turned = offset.rotation.angle_between(Quat::from_rotation_y(0.4 + 0.4 * share));
+            assert!(off < 1e-4 && turned < 2e-3, "{mode:?}, {share}: {offset:?} is off by {off} and {turned}");
+        }
+    }
+}
+
 /// A clip of one second that walks half a metre, with markers.
 fn walk(node: Uid) -> RigClip {
     let mut clip = RigClip { looped: true, ..RigClip::new(CLIP, BASE, "walk") };
@@ -348,6 +395,58 @@ fn root_motion_goes_to_the_game() {
     app.world_mut().get_mut::<ClipPlayer>(entity).unwrap().playing = false;
     app.update();
     assert_eq!(app.world().get::<RootMotion>(entity).unwrap().delta, Transform::IDENTITY);
+}
+
+/// Motion of another skeleton onto joints has its travel on the hips.
+#[test]
+fn root_motion_of_an_imported_clip_goes_to_the_game() {
+    let mut rig = biped();
+    let tags = rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag.uid)));
+    let edits = tags.map(|(joint, tag)| RigEdit::RemoveTag(joint, tag)).collect();
+    apply(&mut rig, RigEdit::Batch(edits));
+    let motion = read_bvh(include_bytes!("../retarget/walker.bvh"), "walker").unwrap();
+    let map = JointMap::new(&motion, &rig, &[]).unwrap();
+    let settings = RetargetSettings { onto: MotionTarget::Joints, ..RetargetSettings::default() };
+    let clip = retarget(&rig, &super::built(&rig), &motion, &map, &settings).unwrap().clip;
+    let hips = rig.find_label("hips").unwrap();
+    let moved = clip
+        .nodes()
+        .into_iter()
+        .filter(|node| clip.layers[0].tracks.contains_key(&target(*node, Property::Translation)));
+    assert_eq!(moved.collect::<Vec<_>>(), [hips], "the travel is on the hips alone");
+    apply(&mut rig, RigEdit::AddClip(Box::new(clip.clone()), 0));
+
+    // The hips in the rig's space; no joint above them has keys.
+    let program = program(&rig);
+    let at = |time: f32| state(&program, Some(&clip), time).global(hips).unwrap();
+    let (start, end) = (at(clip.range[0]), at(clip.range[1]));
+    let travel = start.translation.distance(end.translation);
+    assert!(travel > 0.02, "{travel}");
+    let mut app = app();
+    let entity = app.world_mut().spawn(rig).id();
+    app.update();
+    let hips_stand = |app: &App| {
+        let joint = app.world().get::<JointEntities>(entity).unwrap().get(hips).unwrap();
+        app.world().get::<GlobalTransform>(joint).unwrap().translation()
+    };
+    app.world_mut()
+        .entity_mut(entity)
+        .insert((ClipPlayer { looped: false, ..ClipPlayer::new(&clip) }, RootMotion::of(hips)));
+    let mut walked = Transform::IDENTITY;
+    for _ in 0..15 {
+        app.update();
+        walked = walked.mul_transform(app.world().get::<RootMotion>(entity).unwrap().delta);
+        let off = hips_stand(&app).distance(start.translation);
+        assert!(off < 1e-3, "the hips stand where they begin: {off}");
+    }
+    let local = walked.translation.length();
+    assert!(walked.translation.is_finite() && local > 0.02, "{walked:?}");
+    // Where the game puts a rig that has walked, the hips are where the clip has them at its end.
+    let begun = Isometry3d::new(start.translation, start.rotation);
+    let ended = Isometry3d::new(end.translation, end.rotation);
+    let wanted = ended * begun.inverse();
+    let off = walked.translation.distance(Vec3::from(wanted.translation));
+    assert!(off < 2e-3 && walked.rotation.angle_between(wanted.rotation) < 5e-3, "{walked:?} {wanted:?}");
 }
 
 #[test]

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     import::ClipImport,
     state::{OpenClip, Timeline, has_any},
+    switches,
 };
 use crate::{
     editor::{ActiveRig, actions::Action},
@@ -78,11 +79,29 @@ pub enum TimelineAction {
     Import,
     /// Adds a layer on top of the clip, which adds to those below.
     NewLayer,
+    /// Replaces the keys of the tracks with selected keys by linear ones, one a frame.
+    Bake,
+    /// Replaces all keys of the clip by linear ones, one a frame.
+    BakeClip,
+    /// Removes what nobody would miss of the tracks with selected keys.
+    Reduce,
+    /// Removes what nobody would miss of all tracks of the clip.
+    ReduceClip,
+    /// Makes the clip take twice as long, with its keys and markers.
+    Longer,
+    /// Makes the clip take half as long, with its keys and markers.
+    Shorter,
+    /// Stretches keys and markers with the range and the frame rate of the clip when these are changed, or no longer.
+    Stretch,
+    /// Throws the switch of kinematics of the selected control over the selected keys, or the whole clip.
+    SwitchKinematics,
+    /// Gives the selected control its next space over the selected keys, or the whole clip.
+    SwitchSpace,
 }
 
 impl TimelineAction {
     /// Every action.
-    pub const ALL: [Self; 31] = [
+    pub const ALL: [Self; 40] = [
         Self::Play,
         Self::NextFrame,
         Self::PreviousFrame,
@@ -114,6 +133,15 @@ impl TimelineAction {
         Self::DeleteClip,
         Self::Import,
         Self::NewLayer,
+        Self::Bake,
+        Self::BakeClip,
+        Self::Reduce,
+        Self::ReduceClip,
+        Self::Longer,
+        Self::Shorter,
+        Self::Stretch,
+        Self::SwitchKinematics,
+        Self::SwitchSpace,
     ];
 
     /// Description in a few words.
@@ -150,6 +178,15 @@ impl TimelineAction {
             Self::DeleteClip => "Delete clip",
             Self::Import => "Import motion",
             Self::NewLayer => "New animation layer",
+            Self::Bake => "Bake tracks to frames",
+            Self::BakeClip => "Bake the whole clip to frames",
+            Self::Reduce => "Reduce keys of tracks",
+            Self::ReduceClip => "Reduce keys of the whole clip",
+            Self::Longer => "Clip twice as long",
+            Self::Shorter => "Clip half as long",
+            Self::Stretch => "Stretch keys with range and rate",
+            Self::SwitchKinematics => "Switch IK and FK over range",
+            Self::SwitchSpace => "Switch space over range",
         }
     }
 
@@ -167,6 +204,8 @@ impl TimelineAction {
                 | Self::Slower
                 | Self::Faster
                 | Self::Reverse
+                | Self::Bake
+                | Self::Reduce
         )
     }
 }
@@ -188,7 +227,7 @@ pub fn obstacle(world: &World, action: TimelineAction) -> Option<&'static str> {
     let rig = world.get::<Rig>(active.0)?;
     let timeline = world.get_resource::<Timeline>()?;
     match action {
-        TimelineAction::AutoKey => return None,
+        TimelineAction::AutoKey | TimelineAction::Stretch => return None,
         TimelineAction::NewClip => return rig.is_empty().then_some("there are no joints"),
         TimelineAction::Import => {
             let is_busy = world.get_resource::<ClipImport>().is_some_and(|import| import.what().is_some());
@@ -214,7 +253,11 @@ pub fn obstacle(world: &World, action: TimelineAction) -> Option<&'static str> {
     let has_keys = || open.clip.layers.iter().any(|layer| !layer.tracks.is_empty());
     match action {
         TimelineAction::NextKey | TimelineAction::PreviousKey => (!has_keys()).then_some("the clip has no keys"),
-        TimelineAction::Play => (open.clip.duration() <= 0.0).then_some("the clip has no length"),
+        TimelineAction::BakeClip | TimelineAction::ReduceClip => (!has_keys()).then_some("the clip has no keys"),
+        TimelineAction::SwitchKinematics | TimelineAction::SwitchSpace => switches::request(world, &open, action).err(),
+        TimelineAction::Play | TimelineAction::Longer | TimelineAction::Shorter => {
+            (open.clip.duration() <= 0.0).then_some("the clip has no length")
+        }
         TimelineAction::Key | TimelineAction::KeyAll if shows_rest(world, open.entity) => {
             Some("the rig is shown at rest: change to Select or Pose mode")
         }

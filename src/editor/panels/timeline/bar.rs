@@ -32,6 +32,24 @@ use crate::{
 pub(super) struct Bar {
     rename: Option<Rename>,
     numbers: Numbers,
+    /// Clip whose range or frame rate is being dragged, as it was before, where its keys are stretched with them.
+    dragged: Option<Stretched>,
+}
+
+/// Range and frame rate of a clip before its keys are stretched.
+#[derive(Debug, Clone, Copy)]
+struct Stretched {
+    clip: Uid,
+    range: [f32; 2],
+    rate: f32,
+}
+
+/// Field of a clip's header.
+#[derive(Debug, Clone, Copy)]
+enum Header {
+    Start,
+    End,
+    Rate,
 }
 
 /// Name of a clip that is being typed.
@@ -115,7 +133,8 @@ impl Bar {
             tool(ui, "⌖", TimelineAction::Fit, None, requests);
             if let Some(open) = &open {
                 line(ui);
-                self.frames(ui, open, &fit, requests);
+                let is_stretched = world.get_resource::<Timeline>().is_some_and(|timeline| timeline.stretch);
+                self.frames(ui, open, &fit, is_stretched, requests);
             }
         });
     }
@@ -180,6 +199,17 @@ impl Bar {
             entry(ui, world, TimelineAction::NewLayer, requests);
             entry(ui, world, TimelineAction::KeyAll, requests);
             ui.separator();
+            entry(ui, world, TimelineAction::BakeClip, requests);
+            entry(ui, world, TimelineAction::ReduceClip, requests);
+            entry(ui, world, TimelineAction::Longer, requests);
+            entry(ui, world, TimelineAction::Shorter, requests);
+            let mut is_stretched = world.get_resource::<Timeline>().is_some_and(|timeline| timeline.stretch);
+            let stretch = ui.checkbox(&mut is_stretched, TimelineAction::Stretch.name());
+            if stretch.on_hover_text("Keys and markers go along when start, end or frame rate are changed").clicked() {
+                requests.send(ActionRequest(Action::Timeline(TimelineAction::Stretch)));
+                ui.close();
+            }
+            ui.separator();
             RARER.into_iter().for_each(|action| entry(ui, world, action, requests));
         });
         menu.response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, "Menu of the clip"));
@@ -187,7 +217,7 @@ impl Bar {
     }
 
     /// The frame of the playhead, the range and the frame rate.
-    fn frames(&mut self, ui: &mut Ui, open: &OpenClip, fit: &Fit, requests: &mut Requests) {
+    fn frames(&mut self, ui: &mut Ui, open: &OpenClip, fit: &Fit, is_stretched: bool, requests: &mut Requests) {
         let clip = open.clip;
         let height = ui.spacing().interact_size.y;
         let seconds = |frame: f32| (f64::from(frame) / f64::from(clip.frame_rate)) as f32;
@@ -206,14 +236,30 @@ impl Bar {
         }
         let [start, end] = clip.range.map(|time| frames(clip, time));
         let edits = [
-            field(ui, "Start frame", "from ", start, FRAMES, of_start)
-                .map(|edit| changed(clip, edit, |about, frame| about.range[0] = seconds(frame).min(about.range[1]))),
-            field(ui, "End frame", "to ", end, FRAMES, of_end)
-                .map(|edit| changed(clip, edit, |about, frame| about.range[1] = seconds(frame).max(about.range[0]))),
-            field(ui, "Frames a second", "fps ", clip.frame_rate, RATE, of_rate)
-                .map(|edit| changed(clip, edit, |about, rate| about.frame_rate = rate.clamp(0.1, 1000.0))),
+            (Header::Start, field(ui, "Start frame", "from ", start, FRAMES, of_start)),
+            (Header::End, field(ui, "End frame", "to ", end, FRAMES, of_end)),
+            (Header::Rate, field(ui, "Frames a second", "fps ", clip.frame_rate, RATE, of_rate)),
         ];
-        for change in edits.into_iter().flatten() {
+        // A drag previews from what was before it, not from its own preview.
+        if !ui.input(|input| input.pointer.any_down()) {
+            self.dragged = None;
+        }
+        for (header, edit) in edits {
+            let Some(edit) = edit else { continue };
+            let change = if is_stretched {
+                let now = Stretched { clip: clip.uid, range: clip.range, rate: clip.frame_rate };
+                let before = self.dragged.filter(|before| before.clip == clip.uid).unwrap_or(now);
+                if matches!(edit, NumberEdit::Preview(_)) {
+                    self.dragged = Some(before);
+                }
+                as_change(edit, |value| stretched(&before, header, value))
+            } else {
+                changed(clip, edit, |about, value| match header {
+                    Header::Start => about.range[0] = seconds(value).min(about.range[1]),
+                    Header::End => about.range[1] = seconds(value).max(about.range[0]),
+                    Header::Rate => about.frame_rate = value.clamp(0.1, 1000.0),
+                })
+            };
             requests.send(EditRequest { rig: open.entity, change });
         }
     }
@@ -221,13 +267,29 @@ impl Bar {
 
 /// Change of a clip's header by a number.
 pub(super) fn changed(clip: &RigClip, edit: NumberEdit, set: impl Fn(&mut ClipAbout, f32)) -> Change {
-    let operation = |value: f32| about(clip, |about| set(about, value));
+    as_change(edit, |value| about(clip, |about| set(about, value)))
+}
+
+/// Change by a number.
+fn as_change(edit: NumberEdit, operation: impl Fn(f32) -> Operation) -> Change {
     match edit {
         NumberEdit::Set(value) => Change::Do(operation(value)),
         NumberEdit::Preview(value) => Change::Preview(operation(value)),
         NumberEdit::Commit => Change::Commit,
         NumberEdit::Cancel => Change::CancelPreview,
     }
+}
+
+/// Operation that stretches a clip to another start, end or frame rate; a clip is a frame long at least.
+fn stretched(before: &Stretched, header: Header, value: f32) -> Operation {
+    let Stretched { clip, range: [start, end], rate } = *before;
+    let (seconds, frame) = (value / rate, 1.0 / rate);
+    let to = match header {
+        Header::Start => [seconds.min(end - frame), end],
+        Header::End => [start, seconds.max(start + frame)],
+        Header::Rate => return Operation::Clips(ClipOperation::SetRate { clip, rate: value.clamp(0.1, 1000.0) }),
+    };
+    Operation::Clips(ClipOperation::Retime { clip, from: [start, end], to })
 }
 
 /// Operation that changes the header of a clip.

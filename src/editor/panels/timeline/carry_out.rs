@@ -10,6 +10,7 @@ use super::{
     import,
     shown_pose::{all_nodes, shown_values},
     state::{OpenClip, Timeline, TimelineRequest, all_keys, fitted, frame_at, key_times, second_of, snapped},
+    switches,
 };
 use crate::{
     editor::{
@@ -25,7 +26,7 @@ use crate::{
     rig::{
         Rig, Uid, UidSource,
         animation::{ClipAbout, LayerMode, Marker, RigClip},
-        operations::{ClipOperation, KeyClipboard, KeyEase, KeyOperation, KeyTimes, Operation},
+        operations::{ClipOperation, KeyClipboard, KeyEase, KeyOperation, KeyTimes, KeyTolerance, Operation},
     },
 };
 
@@ -135,6 +136,18 @@ fn act(world: &mut World, action: TimelineAction) {
             let mut timeline = world.resource_mut::<Timeline>();
             timeline.auto_key = !timeline.auto_key;
         }
+        TimelineAction::Stretch => {
+            let mut timeline = world.resource_mut::<Timeline>();
+            timeline.stretch = !timeline.stretch;
+        }
+        TimelineAction::SwitchKinematics | TimelineAction::SwitchSpace => {
+            let request = OpenClip::of(world).and_then(|open| switches::request(world, &open, action).ok());
+            if let Some(request) = request {
+                world.write_message(request);
+                // Switches are thrown before the timeline attends to anything.
+                world.write_message(RequestRedraw);
+            }
+        }
         TimelineAction::NewClip => new_clip(world),
         TimelineAction::Import => import::ask(world),
         _ => {
@@ -195,6 +208,20 @@ fn edit(world: &World, open: &OpenClip, action: TimelineAction) -> Option<Operat
         TimelineAction::Slower => scale(2.0),
         TimelineAction::Faster => scale(0.5),
         TimelineAction::Reverse => scale(-1.0),
+        TimelineAction::Bake => {
+            let targets = timeline.keys.keys().cloned().collect();
+            on_layer(KeyOperation::Bake { targets, rate: open.clip.frame_rate })
+        }
+        TimelineAction::Reduce => {
+            let targets = timeline.keys.keys().cloned().collect();
+            on_layer(KeyOperation::Reduce { targets, tolerance: KeyTolerance::default() })
+        }
+        TimelineAction::BakeClip => Some(Operation::Clips(ClipOperation::Bake(clip))),
+        TimelineAction::ReduceClip => {
+            Some(Operation::Clips(ClipOperation::Reduce { clip, tolerance: KeyTolerance::default() }))
+        }
+        TimelineAction::Longer => retimed(open.clip, 2.0),
+        TimelineAction::Shorter => retimed(open.clip, 0.5),
         TimelineAction::DeleteClip => Some(Operation::Clips(ClipOperation::Delete(clip))),
         TimelineAction::NewLayer => {
             let name = format!("Layer {}", open.clip.layers.len() + 1);
@@ -202,6 +229,13 @@ fn edit(world: &World, open: &OpenClip, action: TimelineAction) -> Option<Operat
         }
         _ => None,
     }
+}
+
+/// The clip with another length, from its start on.
+fn retimed(clip: &RigClip, factor: f32) -> Option<Operation> {
+    let [start, end] = clip.range;
+    let to = [start, start + (end - start) * factor];
+    Some(Operation::Clips(ClipOperation::Retime { clip: clip.uid, from: clip.range, to }))
 }
 
 /// Header of a clip with a marker more.

@@ -7,10 +7,11 @@ use super::{action::TimelineAction, bar::entry};
 use crate::editor::panel::Requests;
 
 /// Entries of the menu, group by group.
-const GROUPS: [&[TimelineAction]; 5] = [
+const GROUPS: [&[TimelineAction]; 6] = [
     &[TimelineAction::Stepped, TimelineAction::Linear, TimelineAction::Cubic],
     &[TimelineAction::Copy, TimelineAction::Paste, TimelineAction::Mirror, TimelineAction::Delete],
     &[TimelineAction::Slower, TimelineAction::Faster, TimelineAction::Reverse, TimelineAction::Snap],
+    &[TimelineAction::Bake, TimelineAction::Reduce, TimelineAction::SwitchKinematics, TimelineAction::SwitchSpace],
     &[TimelineAction::Key, TimelineAction::KeyAll, TimelineAction::Marker],
     &[TimelineAction::SelectAll, TimelineAction::SelectNone, TimelineAction::Fit],
 ];

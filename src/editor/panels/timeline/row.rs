@@ -10,6 +10,7 @@ use super::{
     TimelinePanel,
     bar::entry,
     colors::KeyColors,
+    mask,
     sheet::Row,
     state::{OpenClip, Timeline, TimelineRequest, add},
 };
@@ -223,6 +224,10 @@ fn layer(
                 ui.close();
             }
         }
+        if let Some(mask) = mask::entries(ui, layer, context) {
+            let about = Box::new(LayerAbout { mask, ..layer.about() });
+            requests.send(operate(ClipOperation::SetLayer { clip, layer: uid, about }));
+        }
         entry(ui, context.world, super::TimelineAction::NewLayer, requests);
         if ui.add_enabled(count > 1, Button::new("Delete layer")).clicked() {
             requests.send(operate(ClipOperation::DeleteLayer { clip, layer: uid }));
@@ -272,6 +277,13 @@ fn layer(
         mute.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, layer.muted, &said_mute));
         if mute.clicked() {
             requests.send(EditRequest::operation(open.entity, set(&|about| about.muted = !layer.muted)));
+        }
+        // A narrow timeline has masks in the menu of the layer alone.
+        if ui.available_width() < 70.0 {
+            return;
+        }
+        if let Some(mask) = mask::button(ui, &said, layer, context) {
+            requests.send(EditRequest::operation(open.entity, set(&|about| about.mask.clone_from(&mask))));
         }
         let keys: usize = layer.tracks.values().map(|track| track.keys.len()).sum();
         let text = RichText::new(format!("{} tracks, {keys} keys", layer.tracks.len()))

@@ -36,6 +36,8 @@ pub struct Timeline {
     pub span: [f32; 2],
     /// True to set keys with each finished pose.
     pub auto_key: bool,
+    /// True to stretch keys and markers with the range and the frame rate.
+    pub stretch: bool,
     /// Selected keys, times rising.
     pub keys: KeyTimes,
     /// Number of changes of the selected keys.
@@ -62,6 +64,7 @@ impl Default for Timeline {
             begun: false,
             span: [0.0, 1.0],
             auto_key: false,
+            stretch: false,
             keys: KeyTimes::new(),
             changes: 0,
             copied: None,

@@ -113,6 +113,26 @@ pub(super) fn retime(draft: &mut Draft, uid: Uid, from: [f32; 2], to: [f32; 2]) 
     Ok(())
 }
 
+/// Sets the frame rate of a clip, whose keys and markers stay on their frames.
+pub(super) fn set_rate(draft: &mut Draft, uid: Uid, rate: f32) -> Result<(), OperationError> {
+    if !rate.is_finite() || rate <= 0.0 {
+        return Err(OperationError::BadNumber("a frame rate is a positive number; use 30, for example"));
+    }
+    let clip = find(draft, uid)?;
+    let (factor, about) = (clip.frame_rate / rate, clip.about());
+    // Keys beside the range stay on their frames, too.
+    let keys = clip.key_times();
+    let markers = about.markers.iter().map(|marker| marker.time);
+    let times = || keys.iter().copied().chain(markers.clone()).chain(about.range);
+    let from = [times().fold(f32::MAX, f32::min), times().fold(f32::MIN, f32::max)];
+    let to = from.map(|time| time * factor);
+    if from[1] > from[0] {
+        retime(draft, uid, from, to)?;
+    }
+    let about = ClipAbout { frame_rate: rate, ..find(draft, uid)?.about() };
+    super::set_about(draft, uid, about)
+}
+
 /// The key that can be put between two keys of a track without a change of the curve; `None` where there is a key, or none
 /// on one of the sides. Cubic rotations are left whole.
 fn split(track: &Track, property: &Property, time: f32) -> Option<Key> {
