@@ -27,6 +27,7 @@ pub mod journal;
 mod kept_lists;
 mod library;
 mod load;
+mod model_watch;
 mod parts;
 mod project;
 mod read;
@@ -52,6 +53,7 @@ pub use load::{
     FileKind, LoadError, load_animation, load_gestures, load_joint_map, load_model, load_motion, load_rig_text,
     load_skin, load_template, stem,
 };
+pub use model_watch::{ModelWatch, SETTLE};
 pub use parts::{
     BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartFileError, PartFiles, bundled_characters, bundled_part,
     bundled_parts,

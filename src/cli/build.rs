@@ -207,12 +207,22 @@ pub(super) fn character_of(
     report: &mut Report,
 ) -> Result<(Model, GltfWriteSettings), Failure> {
     let Some(mesh) = mesh else { return posed_skeleton(bench, export) };
+    let mut own = bound_mesh(bench, limits::load_model(mesh)?, weights, report)?;
+    posed_character(bench, &mut own, export)
+}
+
+/// Workbench with a mesh that is bound to the built rig of another one, which gets what binding changes.
+pub(super) fn bound_mesh(
+    bench: &mut Workbench,
+    model: Model,
+    weights: &WeightArgs,
+    report: &mut Report,
+) -> Result<Workbench, Failure> {
     // The mesh is bound elsewhere, so that no time passes for the pose.
     let mut own = limits::workbench(bench.rig().clone());
     if let Some(built) = bench.built() {
         own.set_built(Arc::new(built.clone()));
     }
-    let model = limits::load_model(mesh)?;
     report.notes(model.notes.iter().cloned());
     own.open(model, true)?;
     bind(&mut own, weights.settings(), &weights.claim, Vec::new(), report)?;
@@ -220,6 +230,15 @@ pub(super) fn character_of(
     if !edits.is_empty() {
         bench.operate(Operation::Edits(edits))?;
     }
+    Ok(own)
+}
+
+/// Built skeleton of a workbench as posed, with the mesh that is bound to it in another one, and the settings for writing it.
+pub(super) fn posed_character(
+    bench: &Workbench,
+    own: &mut Workbench,
+    export: &ExportArgs,
+) -> Result<(Model, GltfWriteSettings), Failure> {
     let posed = bench.posed_nodes()?;
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let joints: Vec<Uid> = baked(bench.rig(), built).walk().map(|joint| joint.data.uid).collect();
@@ -230,7 +249,7 @@ pub(super) fn character_of(
 }
 
 /// Built skeleton of a workbench as posed, without a mesh, and the settings for writing it.
-fn posed_skeleton(bench: &Workbench, export: &ExportArgs) -> Result<(Model, GltfWriteSettings), Failure> {
+pub(super) fn posed_skeleton(bench: &Workbench, export: &ExportArgs) -> Result<(Model, GltfWriteSettings), Failure> {
     let posed = bench.posed_nodes()?;
     let (rig, built) = (bench.rig(), bench.built().ok_or(PoseError::NotBuilt)?);
     let skeleton = baked(rig, built);

@@ -2,7 +2,7 @@
 
 use std::{
     cell::OnceCell,
-    collections::{HashMap, HashSet},
+    collections::{BTreeMap, HashMap, HashSet},
     sync::Arc,
 };
 
@@ -281,6 +281,14 @@ impl<'a> SourceText<'a> {
             fields.iter().find(|field| field.parent == Some(params) && field.name == name)
         });
         SourceError::at(source, faulty.map_or(*offset, |field| field.start), message)
+    }
+
+    /// The place of a command's problem in the text of a template with parts: `origins` tells the commands that parts brought.
+    pub fn locate_with_parts(&self, rig: &Rig, error: &BuildError, origins: &BTreeMap<Uid, PartOrigin>) -> SourceError {
+        match origins.get(&error.command) {
+            Some(origin) => self.locate_in_part(rig, error, origin),
+            None => self.locate(rig, error),
+        }
     }
 
     /// The place where a joint, group or tag with that uid is declared, or of its field of that name, if it has one.
