@@ -8,7 +8,8 @@
 //! taken over.
 //!
 //! A [`RigMesh`](crate::plugins::surface::RigMesh) of an instance is bound to the template's joints in the background, once for
-//! all instances with the mesh; [`SkinBound`] tells it. Skinned meshes that Bevy loaded below an instance are moved by it.
+//! all instances with the mesh; [`SkinBound`] tells it. With a [`ModelFile`] and the [`ModelFilesPlugin`] it follows its file.
+//! Skinned meshes that Bevy loaded below an instance are moved by it.
 //!
 //! Clips of a `.anim.ron` go onto an instance with [`InstanceClips`]; a [`ClipPlayer`](crate::plugins::animation::ClipPlayer)
 //! plays them where [`ClipPlugin`](crate::plugins::animation::ClipPlugin) is added, or Bevy's own player.
@@ -37,6 +38,7 @@ mod builds;
 mod clips;
 mod exchange;
 mod folders;
+mod model_files;
 mod skins;
 mod source;
 
@@ -63,6 +65,7 @@ pub use self::{
     builds::BuiltTemplate,
     clips::{ClipsBound, InstanceAnimations, InstanceClips, RigAnimation, RigAnimationError, RigAnimationLoader},
     folders::{FolderError, FolderFault, FolderRead, GesturesRead, WatchedFolderPlugin},
+    model_files::{ModelFault, ModelFile, ModelFileError, ModelFilesPlugin},
     skins::{BoundTo, SkinBound},
     source::{AcceptUpdate, RigSource, UPDATE, UpdateOffer},
 };

@@ -128,6 +128,7 @@ mod mesh_reload;
 #[cfg(feature = "editor")]
 mod mesh_watch;
 mod mirror;
+mod model_files;
 mod models;
 mod modules_nodes;
 mod modules_rigs;
