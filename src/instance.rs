@@ -64,7 +64,7 @@ pub use self::{
     bodies::InstanceSkins,
     builds::BuiltTemplate,
     clips::{ClipsBound, InstanceAnimations, InstanceClips, RigAnimation, RigAnimationError, RigAnimationLoader},
-    folders::{FolderError, FolderFault, FolderRead, GesturesRead, WatchedFolderPlugin},
+    folders::{FolderError, FolderFault, FolderRead, GesturesRead, WatchedFolder, WatchedFolderPlugin, WatchedFolders},
     model_files::{ModelFault, ModelFile, ModelFileError, ModelFilesPlugin},
     skins::{BoundTo, SkinBound},
     source::{AcceptUpdate, RigSource, UPDATE, UpdateOffer},

@@ -83,6 +83,8 @@ mod fit_data;
 mod fit_hinges;
 #[cfg(feature = "editor")]
 mod fit_window;
+#[cfg(feature = "editor")]
+mod folder_watch;
 mod fuzz_animation;
 mod fuzz_bvh;
 mod fuzz_gestures;
