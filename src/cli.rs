@@ -14,6 +14,7 @@ mod demo;
 #[cfg(feature = "render")]
 mod device_selection;
 mod explanation;
+mod expressions;
 mod face;
 mod fit;
 mod format;

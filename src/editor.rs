@@ -10,6 +10,7 @@ pub mod camera;
 pub mod dock;
 pub mod files;
 pub mod fitting;
+pub mod folder_watch;
 pub mod follow;
 pub mod help;
 pub mod keys;

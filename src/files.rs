@@ -20,6 +20,7 @@ mod allowed_folders;
 mod atomic;
 mod disk;
 mod disk_error;
+mod expressions;
 mod fault;
 mod folder;
 mod identity;
@@ -27,6 +28,7 @@ pub mod journal;
 mod kept_lists;
 mod library;
 mod load;
+mod model_watch;
 mod parts;
 mod project;
 mod read;
@@ -43,6 +45,7 @@ pub use allowed_folders::{AllowedError, AllowedFolders};
 pub use atomic::{FileSet, SaveError, SaveStep, is_temp_name, remove_stale_temps, save_atomic, save_set};
 pub use disk::{Disk, DiskFile, Entry, EntryKind, Hold, RealDisk};
 pub use disk_error::DiskError;
+pub use expressions::{ExpressionFileError, SITE_DEPTH, files_below, is_expression_file, load_expressions};
 pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use identity::is_same_file;
@@ -54,6 +57,7 @@ pub use load::{
     FileKind, LoadError, load_animation, load_gestures, load_joint_map, load_model, load_motion, load_rig_text,
     load_skin, load_template, stem,
 };
+pub use model_watch::{ModelWatch, SETTLE};
 pub use parts::{
     BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartFileError, PartFiles, bundled_characters, bundled_part,
     bundled_parts,

@@ -6,6 +6,7 @@
 mod held_values;
 mod node_lookup;
 pub mod posing;
+mod reloading;
 
 use std::{
     collections::BTreeMap,
@@ -32,6 +33,7 @@ use crate::{
         fit::{FitAnswer, FitFailure, FitJob, FitParts, FitReport, FitRequest, FitTemplates},
         gesture::{Gesture, GestureAnswer, GestureScript},
         limits::{Limit, RigLimits},
+        mesh_reload::ReloadError,
         skinning::{BindAnswer, BindRequest, MeshPart, PartBinding, SkinningError, SkinningJob, SkinningReport},
         surface::{RigMesh, SkinOf},
         task_pools,
@@ -79,6 +81,9 @@ pub enum WorkbenchError {
     /// The template was not fitted.
     #[error(transparent)]
     Fit(#[from] FitFailure),
+    /// The mesh was not exchanged for another version.
+    #[error(transparent)]
+    Reload(#[from] ReloadError),
     /// Work took longer than it may.
     #[error("{work} took longer than {seconds} s and was given up; simplify the input, or raise the limit `seconds`")]
     OutOfTime {

@@ -8,7 +8,9 @@
 //! taken over.
 //!
 //! A [`RigMesh`](crate::plugins::surface::RigMesh) of an instance is bound to the template's joints in the background, once for
-//! all instances with the mesh; [`SkinBound`] tells it. Skinned meshes that Bevy loaded below an instance are moved by it.
+//! all instances with the mesh; [`SkinBound`] tells it. With a [`ModelFile`] and the [`ModelFilesPlugin`] it follows its file.
+//! Skinned meshes that Bevy loaded below an instance are moved by it, and by the file's own clips where no command of the rig drives
+//! a joint; [`JointsHeld`] tells the others.
 //!
 //! Clips of a `.anim.ron` go onto an instance with [`InstanceClips`]; a [`ClipPlayer`](crate::plugins::animation::ClipPlayer)
 //! plays them where [`ClipPlugin`](crate::plugins::animation::ClipPlugin) is added, or Bevy's own player.
@@ -36,7 +38,9 @@ mod bodies;
 mod builds;
 mod clips;
 mod exchange;
+mod file_nodes;
 mod folders;
+mod model_files;
 mod skins;
 mod source;
 
@@ -48,7 +52,7 @@ use std::{
 };
 
 use bevy::{
-    app::MainScheduleOrder,
+    app::{AnimationSystems, MainScheduleOrder},
     asset::{AssetId, AssetLoadFailedEvent, AssetPlugin, io::file::FileAssetReader},
     ecs::{schedule::ScheduleLabel, system::SystemParam},
     prelude::*,
@@ -62,7 +66,8 @@ pub use self::{
     bodies::InstanceSkins,
     builds::BuiltTemplate,
     clips::{ClipsBound, InstanceAnimations, InstanceClips, RigAnimation, RigAnimationError, RigAnimationLoader},
-    folders::{FolderError, FolderFault, FolderRead, GesturesRead, WatchedFolderPlugin},
+    folders::{FolderError, FolderFault, FolderRead, GesturesRead, WatchedFolder, WatchedFolderPlugin, WatchedFolders},
+    model_files::{ModelFault, ModelFile, ModelFileError, ModelFilesPlugin},
     skins::{BoundTo, SkinBound},
     source::{AcceptUpdate, RigSource, UPDATE, UpdateOffer},
 };
@@ -72,6 +77,8 @@ use crate::{
     mesh::model::Trs,
     modules,
     plugins::{
+        RigSystems,
+        animation::ClipSystems,
         commands::{BuildResult, RigModules},
         runtime::{ControlPose, InstanceMode, NodeOf, RigRuntime, RuntimePlugin},
     },
@@ -159,7 +166,21 @@ impl Plugin for RigInstancePlugin {
             UpdateInstances,
             (bodies::land_bodies, bodies::give_bodies, bodies::bind_bodies).chain().after(apply::update_instances),
         );
-        app.add_systems(UpdateInstances, skins::bind_skins.run_if(skins::is_due).after(apply::update_instances));
+        app.add_systems(
+            UpdateInstances,
+            (skins::bind_skins.run_if(skins::is_due), file_nodes::fit_skins.run_if(file_nodes::fit_is_due))
+                .chain()
+                .after(apply::update_instances),
+        )
+        .add_systems(
+            PostUpdate,
+            (
+                file_nodes::note_rests.before(AnimationSystems),
+                file_nodes::follow_nodes.after(AnimationSystems).before(ClipSystems).before(RigSystems::Solve),
+            )
+                // Cameras have transforms, too; these are those of files' nodes and of rigs alone.
+                .ambiguous_with_all(),
+        );
         #[cfg(feature = "draw")]
         app.add_systems(UpdateInstances, skins::share_meshes.after(apply::update_instances).before(skins::bind_skins));
         app.add_observer(apply::leave);

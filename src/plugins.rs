@@ -41,6 +41,7 @@
 //! | [`face::Face`], [`fit::FittedRig`] | the analysis of a mesh and the fit | opaque; taking it off ends expressions, or corrections of the fit |
 //! | [`fit::FitMarkers`] | corrections of a fit, undo and redo | the next fit starts from them; taking it off forgets them |
 //! | [`RigInstance`](crate::instance::RigInstance), [`RigSource`](crate::instance::RigSource), [`ExposedNodes`](crate::instance::ExposedNodes), `SharedMesh` (feature `draw`) | games | another template or other nodes are spawned; taking it off despawns what came of it |
+//! | [`ModelFile`](crate::instance::ModelFile) | games and the window | another file is followed; taking it off leaves the mesh |
 //! | [`InstanceClips`](crate::instance::InstanceClips) | games | another file is bound; taking it off leaves the clips |
 //! | [`InstanceAnimations`](crate::instance::InstanceAnimations) | instances with clips | overwritten when file or template change |
 //! | [`RunningTemplate`](crate::instance::RunningTemplate), [`UpdateOffer`](crate::instance::UpdateOffer), [`BoundTo`](crate::instance::BoundTo) | instances | opaque; stands until the template, the offer or the mesh changes |

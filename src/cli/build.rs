@@ -266,6 +266,17 @@ pub(super) fn character_with(
     export: &ExportArgs,
     report: &mut Report,
 ) -> Result<(Model, GltfWriteSettings), Failure> {
+    let own = bound_mesh(bench, mesh, weights, report)?;
+    posed_character(bench, &own, export)
+}
+
+/// Workbench with a mesh that is bound to the built rig of another one, which gets what binding changes.
+pub(super) fn bound_mesh(
+    bench: &mut Workbench,
+    mesh: MeshSource,
+    weights: &WeightArgs,
+    report: &mut Report,
+) -> Result<Workbench, Failure> {
     // The mesh is bound elsewhere, so that no time passes for the pose.
     let mut own = limits::workbench(bench.rig().clone());
     own.build(match bench.processor().map(Processor::builder) {
@@ -277,6 +288,15 @@ pub(super) fn character_with(
     if !edits.is_empty() {
         bench.operate(Operation::Edits(edits))?;
     }
+    Ok(own)
+}
+
+/// Built skeleton of a workbench as posed, with the mesh that is bound to it in another one, and the settings for writing it.
+pub(super) fn posed_character(
+    bench: &Workbench,
+    own: &Workbench,
+    export: &ExportArgs,
+) -> Result<(Model, GltfWriteSettings), Failure> {
     let posed = bench.posed_nodes()?;
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let joints: Vec<Uid> = baked(bench.rig(), built).walk().map(|joint| joint.data.uid).collect();
@@ -286,7 +306,7 @@ pub(super) fn character_with(
 }
 
 /// Built skeleton of a workbench as posed, without a mesh, and the settings for writing it.
-fn posed_skeleton(bench: &Workbench, export: &ExportArgs) -> Result<(Model, GltfWriteSettings), Failure> {
+pub(super) fn posed_skeleton(bench: &Workbench, export: &ExportArgs) -> Result<(Model, GltfWriteSettings), Failure> {
     let posed = bench.posed_nodes()?;
     let (rig, built) = (bench.rig(), bench.built().ok_or(PoseError::NotBuilt)?);
     let skeleton = baked(rig, built);

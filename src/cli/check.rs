@@ -238,10 +238,7 @@ struct CommandProblems {
 }
 
 fn problems_of_commands(rig: &Rig, places: &SourceText, origins: &BTreeMap<Uid, PartOrigin>) -> CommandProblems {
-    let locate = |error: &BuildError| match origins.get(&error.command) {
-        Some(origin) => places.locate_in_part(rig, error, origin),
-        None => places.locate(rig, error),
-    };
+    let locate = |error: &BuildError| places.locate_with_parts(rig, error, origins);
     let modules = Arc::new(limits::modules());
     let problems = review(rig, &modules);
     if problems.is_empty() {

@@ -27,13 +27,22 @@ pub(super) struct Explanation {
 impl Explanation {
     /// An error of the input. `subject` is the file that the command works on, for errors that name no file themselves.
     pub fn of_error(error: &(dyn Error + 'static), subject: &str) -> Self {
+        Self::of_error_or(error, subject, SEE_HELP)
+    }
+
+    /// An error of the input, with a remedy for one that names none.
+    pub fn of_error_or(error: &(dyn Error + 'static), subject: &str, remedy: &str) -> Self {
         let place = place(error).unwrap_or_else(|| subject.to_owned());
-        Self::at(place, &error.to_string())
+        Self::parted(place, &error.to_string(), remedy)
     }
 
     /// A fault at a place, told by a text that ends in the remedy: texts of errors are written as `fault; remedy`.
     pub fn at(place: String, text: &str) -> Self {
-        let (what, remedy) = text.rsplit_once("; ").unwrap_or((text, SEE_HELP));
+        Self::parted(place, text, SEE_HELP)
+    }
+
+    fn parted(place: String, text: &str, otherwise: &str) -> Self {
+        let (what, remedy) = text.rsplit_once("; ").unwrap_or((text, otherwise));
         Self { what: limits::message(what), place, remedy: limits::message(remedy) }
     }
 

@@ -13,7 +13,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::{
-    ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, limits,
+    ArgumentError, ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, expressions, limits,
     progress::{Progress, spinning},
     report::counted,
     vrm::AvatarDraft,
@@ -22,12 +22,12 @@ use crate::{
     algo::face::{
         auto::{AutoSettings, FaceStep},
         bones::FaceBoneKind,
-        expression::{ExpressionSet, MAX_STRENGTH},
+        expression::MAX_STRENGTH,
     },
     files::{FileKind, RealDisk, load_shapes, stem, store_model, store_rig},
     headless::Workbench,
     mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Model, Morph},
-    plugins::face::{FaceReport, FaceShape, mixed},
+    plugins::face::{FaceExpressions, FaceReport, FaceShape, mixed},
     rig::{Rig, StoredPose},
 };
 
@@ -129,6 +129,7 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     let shapes = args.fit.as_ref().map(|path| spinning("reading shapes", || load_shapes(&RealDisk, path, &model)));
     let shapes = shapes.transpose()?.map(Arc::new);
     let mut bench = limits::empty_workbench(&stem(&args.mesh));
+    bench.app_mut().insert_resource(FaceExpressions(expressions::of_site(&mut report)?));
     bench.open(model, false)?;
     let settings = AutoSettings {
         bones: args.bones,
@@ -220,7 +221,8 @@ fn output_kind(args: &FaceArgs) -> Result<OutputKind, Failure> {
 fn express(args: &FaceArgs, bench: &mut Workbench, report: &mut Report) -> Result<(), Failure> {
     let strengths: BTreeMap<String, f32> = args.expression.iter().cloned().collect();
     // A wrong name is wrong usage; a fault of the face is not.
-    mixed(ExpressionSet::bundled(), &strengths).map_err(|reason| Failure::Usage(format!("--expression: {reason}")))?;
+    let known = expressions::of_site(report)?;
+    mixed(&known, &strengths).map_err(|reason| Failure::Usage(format!("--expression: {reason}")))?;
     bench.express(strengths.clone())?;
     report.set("expressions", json!(strengths));
     Ok(())

@@ -5,9 +5,9 @@ use std::path::Path;
 use clap::Args;
 use serde_json::json;
 
-use super::{Failure, Report, progress::spinning, report::counted};
+use super::{Failure, Report, expressions, progress::spinning, report::counted};
 use crate::{
-    algo::face::expression::{ExpressionSet, vrm_mixes},
+    algo::face::expression::vrm_mixes,
     files::{FileKind, RealDisk, stem, store_avatar},
     mesh::{gltf::GltfWriteSettings, model::Model, vrm::VrmMeta},
     rig::{
@@ -91,7 +91,8 @@ impl<'a> AvatarDraft<'a> {
         report: &mut Report,
     ) -> Result<(), Failure> {
         let recipe = |(preset, shapes)| ExpressionRecipe { preset, shapes };
-        let recipes: Vec<ExpressionRecipe> = vrm_mixes(ExpressionSet::bundled()).into_iter().map(recipe).collect();
+        let recipes: Vec<ExpressionRecipe> =
+            vrm_mixes(&expressions::of_site(report)?).into_iter().map(recipe).collect();
         let made = make_avatar(model, &self.source(), meta, &recipes)?;
         report.notes(&made.notes);
         let (vrm, springs) = (&made.avatar.vrm, &made.avatar.springs);

@@ -1,7 +1,7 @@
-//! `rigsmith watch`: builds a template again whenever its file is saved.
+//! `rigsmith watch`: builds a template again whenever its file is saved, or that of its mesh.
 
 use std::{
-    collections::HashMap,
+    collections::{BTreeMap, HashMap},
     path::{Path, PathBuf},
     thread::sleep,
     time::{Duration, Instant},
@@ -12,24 +12,31 @@ use serde_json::{Value, json};
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Report, WeightArgs,
-    build::character_of,
+    build::{MeshSource, bound_mesh, posed_character, posed_skeleton},
     explanation::Explanation,
     limits,
     report::{counted, print, print_json},
 };
 use crate::{
-    files::{FileKind, LOOK, LoadError, PartFiles, RealDisk, StoreError, TemplateWatch, store_model},
+    files::{FileKind, LOOK, LoadError, ModelWatch, PartFiles, RealDisk, StoreError, TemplateWatch, store_model},
     headless::Workbench,
-    plugins::commands::BuildStep,
-    rig::{Rig, RigEdit, TagKind, Uid, operations::Operation, update::edits_between},
+    mesh::model::Model,
+    plugins::{commands::BuildStep, mesh_reload::ReloadReport},
+    processor::{BuildError, SourceText},
+    rig::{
+        Rig, RigEdit, TagKind, Uid,
+        operations::Operation,
+        template::{self, PartOrigin, Template},
+        update::edits_between,
+    },
 };
 
 /// Arguments of `rigsmith watch`.
 #[derive(Args, Debug)]
 pub(super) struct WatchArgs {
-    /// The template, `.rig.ron`
+    /// The template, `.rig.ron`; it is waited for where it is not there yet, or broken
     pub template: PathBuf,
-    /// A mesh to bind to what is built
+    /// A mesh to bind to what is built. When it is saved, joints stay, and its weights are transferred
     #[arg(long)]
     mesh: Option<PathBuf>,
     /// The character to write after every build, .glb or .gltf
@@ -52,6 +59,9 @@ const NAMED: usize = 6;
 /// Pause before a character that could not be written is written again.
 const AGAIN: Duration = Duration::from_secs(1);
 
+/// Remedy where the text of an error names none.
+const SAVE_AGAIN: &str = "correct it and save the file again, which is waited for";
+
 pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
     if FileKind::of(&args.template) != Some(FileKind::Template) {
         return Err(Failure::Usage(format!("`{}` is no template; give a .rig.ron", args.template.display())));
@@ -59,140 +69,271 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
     if !matches!(FileKind::of(&args.output), Some(FileKind::Glb | FileKind::Gltf)) {
         return Err(Failure::Usage(format!("cannot write `{}`; give .glb or .gltf", args.output.display())));
     }
+    if let Some(mesh) = &args.mesh
+        && !FileKind::of(mesh).is_some_and(|kind| kind == FileKind::Obj || kind.is_gltf())
+    {
+        return Err(Failure::Usage(format!("`{}` is no mesh; give .obj, .gltf, .glb or .vrm", mesh.display())));
+    }
     let inputs: Vec<&Path> =
         [Some(&args.template), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
     args.in_place.check(&inputs, Some(&args.output), &[])?;
-    let mut file = TemplateWatch::new(&args.template);
-    let first = file.read(&RealDisk).map_err(|error| Failure::Input(Box::new(error)))?;
-    let rig = parsed(&mut file, &args.template, &first)?;
-    let mut watch = Watch { args, bench: limits::workbench(rig), is_json, again: None };
-    let first = Instant::now();
-    let all = watch.build(first, &[], None)?;
-    let mut is_heard = watch.say(&all);
-    let mut builds = 1;
+    let mut watch = Watch {
+        args,
+        is_json,
+        template: TemplateWatch::new(&args.template),
+        mesh: args.mesh.as_deref().map(ModelWatch::new),
+        bench: None,
+        file: None,
+        model: None,
+        bound: None,
+        again: None,
+    };
+    let mut news = vec![News::Mesh, News::FirstTemplate];
+    let (mut builds, mut is_heard) = (0, true);
     // What is tried again fails for the same reason again and again.
     let mut last_error = None;
-    while is_heard && args.count.is_none_or(|count| builds < count) {
-        let bytes = next(&mut file, watch.again);
-        let start = Instant::now();
-        let is_again = bytes.is_none();
-        let built = match bytes {
-            Some(bytes) => watch.update(&mut file, &bytes, start),
-            None => watch.build(start, &watch.runs(), None),
-        };
-        let (told, error) = match built {
-            Ok(told) => {
-                builds += 1;
-                (told, None)
-            }
-            Err(Failure::Input(error)) => {
-                let subject = args.template.display().to_string();
-                let error = Explanation::of_error(error.as_ref(), &subject).json();
-                (json!({ "ok": false, "error": error }), Some(error))
-            }
-            Err(usage) => return Err(usage),
-        };
-        if !is_again || error.is_none() || error != last_error {
-            is_heard = watch.say(&told);
-        }
-        last_error = error;
-    }
-    Ok(Report { at_fault: !is_heard, ..Report::default() })
-}
-
-/// The template's content once it or a part has a new one; `None` at the time `again`, if there is none until then.
-fn next(file: &mut TemplateWatch, again: Option<Instant>) -> Option<Vec<u8>> {
     loop {
-        sleep(LOOK);
-        let content = file.look(&RealDisk);
-        if content.is_some() || again.is_some_and(|again| Instant::now() >= again) {
-            return content;
+        for one in news {
+            let is_again = matches!(one, News::Again);
+            let subject = watch.subject(&one);
+            let (told, error) = match watch.take(one) {
+                Ok(None) => continue,
+                Ok(Some(told)) => {
+                    builds += 1;
+                    (told, None)
+                }
+                Err(Failure::Input(error)) => {
+                    let error = Explanation::of_error_or(error.as_ref(), &subject, SAVE_AGAIN).json();
+                    (json!({ "ok": false, "error": error }), Some(error))
+                }
+                Err(usage) => return Err(usage),
+            };
+            if !is_again || error.is_none() || error != last_error {
+                is_heard = watch.say(&told);
+            }
+            last_error = error;
+            if !is_heard || args.count.is_some_and(|count| builds >= count) {
+                return Ok(Report { at_fault: !is_heard, ..Report::default() });
+            }
         }
+        news = watch.next();
     }
 }
 
-/// The rig of a template, whose parts are watched from now on.
-fn parsed(file: &mut TemplateWatch, path: &Path, bytes: &[u8]) -> Result<Rig, Failure> {
-    let text = String::from_utf8_lossy(bytes).into_owned();
-    let mut files = PartFiles::new(&RealDisk);
-    let read = files.complete(path, bytes);
-    file.follow(files.asked, read.is_ok());
-    let rig = read.map_err(|source| LoadError::Source { path: path.into(), text, source })?.rig;
-    limits::check_rig(path, &rig)?;
-    Ok(rig)
+/// Reason to build or to write.
+enum News {
+    /// The template is read for the first time.
+    FirstTemplate,
+    /// The template, or a part of it, was saved; the template's content.
+    Template(Vec<u8>),
+    /// The mesh was saved, or is read for the first time.
+    Mesh,
+    /// The character could not be written, and may be now.
+    Again,
+}
+
+/// Content of the template's file that was read last, for places of errors.
+struct TemplateFile {
+    text: String,
+    rig: Rig,
+    origins: BTreeMap<Uid, PartOrigin>,
+}
+
+/// A mesh that is bound to what is built.
+struct BoundMesh {
+    /// The rig with what binding changes; the rig of the watch stays as its file has it.
+    bench: Workbench,
+    /// The mesh with its weights.
+    own: Workbench,
 }
 
 struct Watch<'a> {
     args: &'a WatchArgs,
-    bench: Workbench,
     is_json: bool,
+    template: TemplateWatch,
+    mesh: Option<ModelWatch>,
+    /// The rig of the last template that could be built; `None` until there is one.
+    bench: Option<Workbench>,
+    file: Option<TemplateFile>,
+    /// The mesh as it was read last; `None` until it can be read.
+    model: Option<Model>,
+    bound: Option<BoundMesh>,
     /// Time at which the character is written again, because it could not be: the disk may be full only for a while.
     again: Option<Instant>,
 }
 
 impl Watch<'_> {
-    /// Takes over a saved file. If it cannot be read or built, the rig stays as it was.
-    fn update(&mut self, file: &mut TemplateWatch, bytes: &[u8], start: Instant) -> Result<Value, Failure> {
-        let file = parsed(file, &self.args.template, bytes)?;
-        let (before, runs) = (self.bench.rig().clone(), self.runs());
-        self.change(&before, &file)?;
-        self.build(start, &runs, Some(&before))
+    /// Waits for news.
+    fn next(&mut self) -> Vec<News> {
+        loop {
+            sleep(LOOK);
+            let is_mesh = self.mesh.as_mut().is_some_and(|mesh| mesh.look(&RealDisk));
+            let template = self.template.look(&RealDisk).map(News::Template);
+            let mut news: Vec<News> = is_mesh.then_some(News::Mesh).into_iter().chain(template).collect();
+            if news.is_empty() && self.again.is_some_and(|again| Instant::now() >= again) {
+                news.push(News::Again);
+            }
+            if !news.is_empty() {
+                return news;
+            }
+        }
     }
 
-    fn change(&mut self, from: &Rig, to: &Rig) -> Result<(), Failure> {
-        let edits: Vec<RigEdit> = edits_between(from, to).map_err(|error| Failure::Input(Box::new(error)))?;
-        Ok(self.bench.operate(Operation::Edits(edits))?)
+    /// The file that an error is of, if it names none itself.
+    fn subject(&self, news: &News) -> String {
+        let mesh = self.args.mesh.as_ref().filter(|_| matches!(news, News::Mesh));
+        mesh.unwrap_or(&self.args.template).display().to_string()
+    }
+
+    /// Takes over what is new, and writes the character; `None` while the template or the mesh is waited for. What cannot be
+    /// read or built changes nothing.
+    fn take(&mut self, news: News) -> Result<Option<Value>, Failure> {
+        let start = Instant::now();
+        let runs = self.runs();
+        match news {
+            News::FirstTemplate => {
+                let bytes = self.template.read(&RealDisk).map_err(|error| Failure::Input(Box::new(error)))?;
+                self.take_template(start, &runs, &bytes)
+            }
+            News::Template(bytes) => self.take_template(start, &runs, &bytes),
+            News::Mesh => self.take_mesh(start, &runs),
+            News::Again => self.write(start, start.elapsed(), &runs, None),
+        }
+    }
+
+    /// Takes over a saved template. If it cannot be read or built, the rig stays as it was.
+    fn take_template(&mut self, start: Instant, runs: &[(Uid, u32)], bytes: &[u8]) -> Result<Option<Value>, Failure> {
+        let rig = self.parsed(bytes)?;
+        let before = self.bench.as_ref().map(|bench| bench.rig().clone());
+        match (&mut self.bench, &before) {
+            (Some(bench), Some(before)) => change(bench, before, &rig)?,
+            _ => self.bench = Some(limits::workbench(rig)),
+        }
+        let Some(bench) = &mut self.bench else { return Ok(None) };
+        if let Some(error) = bench.build(BuildStep::All).error {
+            match &before {
+                Some(before) => {
+                    let now = bench.rig().clone();
+                    change(bench, &now, before)?;
+                    bench.build(BuildStep::All);
+                }
+                None => self.bench = None,
+            }
+            return Err(self.placed(&error));
+        }
+        self.bound = None;
+        self.write(start, start.elapsed(), runs, None)
+    }
+
+    /// Takes over a saved mesh: joints stay, and weights that it has are transferred.
+    fn take_mesh(&mut self, start: Instant, runs: &[(Uid, u32)]) -> Result<Option<Value>, Failure> {
+        let (Some(mesh), Some(path)) = (&mut self.mesh, &self.args.mesh) else { return Ok(None) };
+        // A file that changed while it was read is told again.
+        let Some(model) = mesh.read(&RealDisk) else { return Ok(None) };
+        let model = model?;
+        limits::check_model(path, &model)?;
+        let mut reloaded = None;
+        if let Some(BoundMesh { own, .. }) = &mut self.bound {
+            // The time that work may take counts from now on.
+            own.set_rig_limits(limits::chosen());
+            reloaded = Some(own.reload(model.clone())?);
+        }
+        self.model = Some(model);
+        self.write(start, start.elapsed(), runs, reloaded)
+    }
+
+    /// The rig of a template, whose parts are watched from now on.
+    fn parsed(&mut self, bytes: &[u8]) -> Result<Rig, Failure> {
+        let path = &self.args.template;
+        let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)).into_owned();
+        let mut files = PartFiles::new(&RealDisk);
+        let read = files.complete(path, bytes);
+        self.template.follow(files.asked, read.is_ok());
+        let Template { rig, origins, .. } = match read {
+            Ok(read) => read,
+            Err(source) => return Err(LoadError::Source { path: path.clone(), text, source }.into()),
+        };
+        limits::check_rig(path, &rig)?;
+        self.file = Some(TemplateFile { text, rig: rig.clone(), origins });
+        Ok(rig)
+    }
+
+    /// An error of a command at its place in the template's text.
+    fn placed(&self, error: &BuildError) -> Failure {
+        let Some(TemplateFile { text, rig, origins }) = &self.file else {
+            return Failure::Input(error.to_string().into());
+        };
+        let explicit = template::explicit(text);
+        let source = SourceText::new(&explicit).locate_with_parts(rig, error, origins);
+        LoadError::Source { path: self.args.template.clone(), text: text.clone(), source }.into()
     }
 
     /// Number of runs of every command, in the order of the build list.
     fn runs(&self) -> Vec<(Uid, u32)> {
-        let Some(processor) = self.bench.processor() else { return Vec::new() };
+        let Some(processor) = self.bench.as_ref().and_then(Workbench::processor) else { return Vec::new() };
         let builder = processor.builder();
         let runs = |tag: Uid| Some((tag, builder.status(tag)?.runs));
         builder.list().iter().filter_map(|entry| runs(entry.command)).collect()
     }
 
-    /// Builds, writes the character and says which commands ran since `runs`; goes back to `before` if it cannot be built.
-    fn build(&mut self, start: Instant, runs: &[(Uid, u32)], before: Option<&Rig>) -> Result<Value, Failure> {
+    /// Writes the character and says which commands ran since `runs`, and how a mesh was exchanged. `None` while there is no
+    /// template, or no mesh where one is to be bound.
+    fn write(
+        &mut self,
+        start: Instant,
+        built_in: Duration,
+        runs: &[(Uid, u32)],
+        reloaded: Option<ReloadReport>,
+    ) -> Result<Option<Value>, Failure> {
         self.again = None;
-        let outcome = self.bench.build(BuildStep::All);
-        if let Some(error) = outcome.error {
-            let message = format!("`{}`: {error} (tag {})", self.args.template.display(), error.command);
-            if let Some(before) = before {
-                let now = self.bench.rig().clone();
-                self.change(&now, before)?;
-                self.bench.build(BuildStep::All);
-            }
-            return Err(Failure::Input(message.into()));
-        }
-        let built_in = start.elapsed();
-        let mut report = Report::default();
         let args = self.args;
-        let mesh = args.mesh.as_deref();
-        // Binding a mesh may change commands, and the rig here stays as its file has it.
-        let mut bound = mesh.map(|_| {
-            let mut bench = limits::workbench(self.bench.rig().clone());
-            bench.build(BuildStep::All);
-            bench
-        });
-        let bench = bound.as_mut().unwrap_or(&mut self.bench);
-        let (model, settings) = character_of(bench, mesh, &args.weights, &args.export, &mut report)?;
+        let Some(bench) = &self.bench else { return Ok(None) };
+        let (model, settings) = if self.mesh.is_none() {
+            posed_skeleton(bench, &args.export)?
+        } else {
+            let BoundMesh { bench, own } = match &mut self.bound {
+                Some(bound) => bound,
+                none => {
+                    let Some(model) = self.model.clone() else { return Ok(None) };
+                    // Binding a mesh may change commands, and the rig here stays as its file has it.
+                    let mut bench = limits::workbench(bench.rig().clone());
+                    bench.build(BuildStep::All);
+                    let own = bound_mesh(&mut bench, MeshSource::Model(model), &args.weights, &mut Report::default())?;
+                    none.insert(BoundMesh { bench, own })
+                }
+            };
+            posed_character(bench, own, &args.export)?
+        };
         let stored = store_model(&RealDisk, &args.output, &model, &settings);
         self.again = matches!(stored, Err(StoreError::Save(_))).then(|| Instant::now() + AGAIN);
         stored?;
         let runs: HashMap<Uid, u32> = runs.iter().copied().collect();
         let is_newer = |(tag, count): &(Uid, u32)| *count > runs.get(tag).copied().unwrap_or_default();
-        let ran: Vec<String> =
-            self.runs().iter().filter(|run| is_newer(run)).map(|(tag, _)| named(self.bench.rig(), *tag)).collect();
+        let now = self.runs();
+        let ran: Vec<String> = match &self.bench {
+            Some(bench) => now.iter().filter(|run| is_newer(run)).map(|(tag, _)| named(bench.rig(), *tag)).collect(),
+            None => Vec::new(),
+        };
         let milliseconds = |time: Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
-        Ok(json!({
+        let mut told = json!({
             "ok": true,
             "ran": ran,
-            "commands": outcome.cursor,
+            "commands": now.len(),
             "build_ms": milliseconds(built_in),
             "total_ms": milliseconds(start.elapsed()),
             "output": args.output.display().to_string(),
-        }))
+        });
+        if let Some(ReloadReport { points, moved, weights }) = reloaded {
+            told["mesh"] = json!({
+                "points": points,
+                "moved": moved,
+                "weights": weights.map(|weights| json!({
+                    "copied": weights.copied, "matched": weights.matched,
+                    "inpainted": weights.inpainted, "nearest": weights.nearest,
+                })),
+            });
+        }
+        Ok(Some(told))
     }
 
     /// Says at once what happened; `false` if nobody can read it any more.
@@ -210,9 +351,24 @@ impl Watch<'_> {
         let what = if ran.is_empty() { String::new() } else { format!(": {names}{more}") };
         let commands = told["commands"].as_u64().and_then(|count| usize::try_from(count).ok()).unwrap_or_default();
         let of = counted(commands, "command", "commands");
+        let mesh = told.get("mesh").map(said_of_mesh).unwrap_or_default();
         let (count, built, written) = (ran.len(), &told["build_ms"], &told["total_ms"]);
-        print([format!("{count} of {of} ran{what}; built in {built} ms, written in {written} ms").as_str()])
+        print([format!("{mesh}{count} of {of} ran{what}; built in {built} ms, written in {written} ms").as_str()])
     }
+}
+
+/// Clause about a mesh that was exchanged.
+fn said_of_mesh(mesh: &Value) -> String {
+    let (before, now) = (&mesh["points"][0], &mesh["points"][1]);
+    let points = if before == now { String::new() } else { format!("{now} points instead of {before}, ") };
+    let weights = if mesh["weights"].is_null() { "" } else { ", weights transferred" };
+    let moved = mesh["moved"].as_f64().unwrap_or_default();
+    format!("mesh read again: {points}points moved by {moved:.4} at most{weights}; ")
+}
+
+fn change(bench: &mut Workbench, from: &Rig, to: &Rig) -> Result<(), Failure> {
+    let edits: Vec<RigEdit> = edits_between(from, to).map_err(|error| Failure::Input(Box::new(error)))?;
+    Ok(bench.operate(Operation::Edits(edits))?)
 }
 
 /// Module and joint of a command.

@@ -146,7 +146,7 @@ impl Plugin for EditorPlugin {
             FilesPlugin,
             super::building::BuildingPlugin,
             (super::fitting::FittingPlugin, super::mesh_watch::MeshWatchPlugin, super::typing::TypingPlugin),
-            super::follow::FollowPlugin,
+            (super::follow::FollowPlugin, super::folder_watch::FolderWatchPlugin),
             super::render_errors::RenderErrorsPlugin,
         ))
         .insert_resource(WinitSettings {

@@ -71,7 +71,7 @@ pub(super) fn give_bodies(
 
 /// Binds meshes of instances that are new, or whose joints at rest are others now.
 pub(super) fn bind_bodies(
-    meshes: Query<(Entity, Ref<RigMesh>, Ref<SkinOf>, Option<&InstanceSkin>)>,
+    meshes: Query<(Entity, Ref<RigMesh>, Ref<SkinOf>, Option<Ref<InstanceSkin>>)>,
     bodies: Query<Ref<InstanceBody>>,
     modules: Res<RigModules>,
     mut skins: ResMut<InstanceSkins>,
@@ -87,6 +87,16 @@ pub(super) fn bind_bodies(
         skins.known.retain(|(key, skin)| key.mesh.strong_count() > 0 && skin.strong_count() > 0);
         for job in &mut skins.running {
             job.waiting.retain(|(waiting, _)| *waiting != entity);
+        }
+        // Weights that came with another version of the mesh, transferred to it, are those of all meshes like it.
+        if let Some(own) = own.as_ref().filter(|own| own.is_changed() && mesh.is_changed())
+            && !of.is_changed()
+            && !body.is_changed()
+        {
+            if skins.known.iter().all(|(known, _)| *known != key) {
+                skins.known.push((key, Arc::downgrade(&own.0)));
+            }
+            continue;
         }
         if let Some(skin) = skins.known.iter().find(|(known, _)| *known == key).and_then(|(_, skin)| skin.upgrade()) {
             if of.is_changed() || own.is_none_or(|own| !Arc::ptr_eq(&own.0, &skin)) {

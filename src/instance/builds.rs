@@ -365,10 +365,7 @@ impl TemplateBuild {
     fn placed(&self, template: &RigTemplate, error: &BuildError) -> TemplateError {
         let explicit = template::explicit(template.text());
         let text = SourceText::new(&explicit);
-        let source = match template.origins().get(&error.command) {
-            Some(origin) => text.locate_in_part(template.rig(), error, origin),
-            None => text.locate(template.rig(), error),
-        };
+        let source = text.locate_with_parts(template.rig(), error, template.origins());
         TemplateError::Source { file: self.file.clone(), source }
     }
 }

@@ -1,11 +1,11 @@
-//! A watched folder of forms, expressions and gestures: what is saved there is in use at once.
+//! Watched folders of forms, expressions and gestures: what is saved there is in use at once.
 //!
 //! `NAME.ui.ron` is the form of the module of that name, `*.expr.ron` and `*.units.ron` are expressions and units of faces beside
 //! the bundled ones (a file takes the place of the bundled one with its name), `*.gestures.ron` are lists of gestures, which
-//! are handed out as [`GesturesRead`]. A file that cannot be read changes nothing and is told ([`FolderFault`]).
+//! are handed out as [`GesturesRead`]. A file takes the place of one of its name in a later folder. A file that cannot be read changes nothing and is told ([`FolderFault`]).
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
     sync::Arc,
     time::{Duration, Instant},
@@ -18,7 +18,7 @@ use bevy::{
 
 use crate::{
     algo::face::expression::{ExpressionError, ExpressionSet},
-    files::{Disk, EntryKind, FileWatch, RealDisk, stem},
+    files::{FileWatch, RealDisk, files_below, is_expression_file, stem},
     plugins::{
         commands::RigModules,
         face::FaceExpressions,
@@ -28,33 +28,59 @@ use crate::{
     rig::SourceError,
 };
 
-/// Plugin that watches a folder, with the folders in it.
+/// Plugin that watches folders.
 #[derive(Debug, Clone)]
 pub struct WatchedFolderPlugin {
-    /// The folder. It need not be there yet.
-    pub folder: PathBuf,
-    /// Time between two looks at its files.
+    /// The folders at the start; [`WatchedFolders`] has others.
+    pub folders: Vec<WatchedFolder>,
+    /// Time between two looks at their files.
     pub look: Duration,
 }
 
+impl Default for WatchedFolderPlugin {
+    /// Plugin that looks four times a second, at no folder yet.
+    fn default() -> Self {
+        Self { folders: Vec::new(), look: Duration::from_millis(250) }
+    }
+}
+
 impl WatchedFolderPlugin {
-    /// Plugin that looks at a folder four times a second.
+    /// Plugin that looks at a folder, with the folders in it, four times a second.
     pub fn new(folder: impl Into<PathBuf>) -> Self {
-        Self { folder: folder.into(), look: Duration::from_millis(250) }
+        Self { folders: vec![WatchedFolder { path: folder.into(), depth: DEPTH }], ..Self::default() }
     }
 }
 
 impl Plugin for WatchedFolderPlugin {
     fn build(&self, app: &mut App) {
-        let files = Some(FolderFiles { folder: self.folder.clone(), watches: BTreeMap::new() });
         app.init_resource::<FaceExpressions>()
-            .insert_resource(WatchedFolder { look: self.look, looked: None, files, task: None, faces: BTreeMap::new() })
+            .insert_resource(WatchedFolders(self.folders.clone()))
+            .insert_resource(FolderLooks {
+                look: self.look,
+                looked: None,
+                files: Some(FolderFiles::default()),
+                task: None,
+                faces: BTreeMap::new(),
+            })
             .add_message::<GesturesRead>()
             .add_message::<FolderRead>()
             .add_message::<FolderFault>()
-            .add_systems(PreUpdate, follow_folder);
+            .add_systems(PreUpdate, follow_folders);
     }
 }
+
+/// Folder whose files are followed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WatchedFolder {
+    /// The folder. It need not be there yet.
+    pub path: PathBuf,
+    /// Levels of folders in it that are followed, too.
+    pub depth: usize,
+}
+
+/// Folders that are watched, first those whose files count first. Files of a folder that is taken out are gone.
+#[derive(Resource, Debug, Clone, PartialEq, Eq, Default)]
+pub struct WatchedFolders(pub Vec<WatchedFolder>);
 
 /// A list of gestures was saved.
 #[derive(Message, Debug, Clone, PartialEq)]
@@ -98,9 +124,9 @@ pub enum FolderError {
     Text,
 }
 
-/// Files of a watched folder.
+/// Looks at the files of watched folders.
 #[derive(Resource)]
-struct WatchedFolder {
+struct FolderLooks {
     look: Duration,
     looked: Option<Instant>,
     /// The files, unless a task looks at them.
@@ -116,13 +142,13 @@ struct SavedFile {
     content: Option<Vec<u8>>,
 }
 
+#[derive(Default)]
 struct FolderFiles {
-    folder: PathBuf,
     watches: BTreeMap<PathBuf, FileWatch>,
 }
 
-/// Most files of a folder that are looked at.
-const MOST: usize = 1000;
+/// Levels of folders in a folder that are followed unless somebody says otherwise.
+const DEPTH: usize = 8;
 
 /// Kind of a file of the folder.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -138,7 +164,7 @@ impl Kind {
         let ends = |ending: &str| name.ends_with(ending);
         if ends(".ui.ron") {
             Some(Self::Form)
-        } else if ends(".expr.ron") || ends(".units.ron") {
+        } else if is_expression_file(path) {
             Some(Self::Face)
         } else {
             ends(".gestures.ron").then_some(Self::Gestures)
@@ -147,20 +173,12 @@ impl Kind {
 }
 
 impl FolderFiles {
-    /// Looks at all files. Returns those with another content.
-    fn look(&mut self) -> Vec<SavedFile> {
-        let (mut found, mut folders) = (Vec::new(), vec![self.folder.clone()]);
-        while let Some(folder) = folders.pop() {
-            // A folder that is not there has no files.
-            for name in RealDisk.list(&folder, MOST).unwrap_or_default() {
-                let path = folder.join(&name);
-                match RealDisk.entry(&path, true).map(|entry| entry.kind) {
-                    Ok(EntryKind::Folder) if !name.to_string_lossy().starts_with('.') => folders.push(path),
-                    Ok(EntryKind::File) if Kind::of(&path).is_some() && found.len() < MOST => found.push(path),
-                    _ => {}
-                }
-            }
-        }
+    /// Looks at all files of the folders. Returns those with another content.
+    fn look(&mut self, folders: &[WatchedFolder]) -> Vec<SavedFile> {
+        let is_wanted = |path: &Path| Kind::of(path).is_some();
+        let below = |folder: &WatchedFolder| files_below(&RealDisk, &folder.path, folder.depth, &is_wanted);
+        // A folder may lie in another one.
+        let found: BTreeSet<PathBuf> = folders.iter().flat_map(below).collect();
         let mut saved = Vec::new();
         self.watches.retain(|file, _| {
             let is_there = found.contains(file);
@@ -175,36 +193,40 @@ impl FolderFiles {
                 saved.push(SavedFile { content: Some(content.to_vec()), file });
             }
         }
+        // Expressions may use units that are saved with them.
+        saved.sort_by_key(|saved| !saved.file.to_string_lossy().ends_with(".units.ron"));
         saved
     }
 }
 
-/// Takes over what was saved in the folder.
-fn follow_folder(
-    mut folder: ResMut<WatchedFolder>,
+/// Takes over what was saved in the folders.
+fn follow_folders(
+    folders: Res<WatchedFolders>,
+    mut looks: ResMut<FolderLooks>,
     mut modules: Option<ResMut<RigModules>>,
     mut expressions: ResMut<FaceExpressions>,
     mut gestures: MessageWriter<GesturesRead>,
     mut read: MessageWriter<FolderRead>,
     mut faults: MessageWriter<FolderFault>,
 ) {
-    let folder = folder.bypass_change_detection();
-    let is_due = folder.looked.is_none_or(|looked| looked.elapsed() >= folder.look);
-    if let Some(mut files) = folder.files.take_if(|_| is_due) {
-        folder.looked = Some(Instant::now());
-        folder.task = Some(AsyncComputeTaskPool::get().spawn(async move {
-            let saved = files.look();
+    let looks = looks.bypass_change_detection();
+    let is_due = looks.looked.is_none_or(|looked| looked.elapsed() >= looks.look);
+    if let Some(mut files) = looks.files.take_if(|_| is_due) {
+        looks.looked = Some(Instant::now());
+        let folders = folders.0.clone();
+        looks.task = Some(AsyncComputeTaskPool::get().spawn(async move {
+            let saved = files.look(&folders);
             (files, saved)
         }));
     }
-    let Some((files, saved)) = folder.task.as_mut().and_then(check_ready) else { return };
-    folder.task = None;
-    folder.files = Some(files);
+    let Some((files, saved)) = looks.task.as_mut().and_then(check_ready) else { return };
+    looks.task = None;
+    looks.files = Some(files);
     for SavedFile { file, content } in saved {
         let text = content.map(String::from_utf8).transpose().map_err(|_| FolderError::Text);
         let taken = text.and_then(|text| match (Kind::of(&file), text) {
             (Some(Kind::Form), Some(text)) => Ok(take_form(modules.as_deref_mut(), &file, &text)?),
-            (Some(Kind::Face), text) => Ok(take_face(&mut folder.faces, &mut expressions, &file, text)?),
+            (Some(Kind::Face), text) => Ok(take_face(&mut looks.faces, &mut expressions, &folders, &file, text)?),
             (Some(Kind::Gestures), Some(text)) => {
                 gestures.write(GesturesRead { file: file.clone(), gestures: read_gestures(text.as_bytes())? });
                 Ok(())
@@ -234,6 +256,7 @@ fn take_form(modules: Option<&mut RigModules>, file: &Path, text: &str) -> Resul
 fn take_face(
     faces: &mut BTreeMap<PathBuf, String>,
     expressions: &mut FaceExpressions,
+    folders: &WatchedFolders,
     file: &Path,
     text: Option<String>,
 ) -> Result<(), ExpressionError> {
@@ -242,15 +265,12 @@ fn take_face(
         Some(text) => drop(next.insert(file.to_owned(), text)),
         None => drop(next.remove(file)),
     }
-    let called = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
-    let own: Vec<String> = next.keys().filter_map(|path| called(path)).collect();
-    let bundled = ExpressionSet::bundled_files()
-        .filter(|(name, _)| called(Path::new(name)).is_none_or(|name| !own.contains(&name)))
-        .map(|(name, text)| (name.to_owned(), text.to_owned()));
-    let own = next.iter().map(|(path, text)| (path.display().to_string(), text.clone()));
-    let files: Vec<(String, String)> = bundled.chain(own).collect();
-    let files: Vec<(&str, &str)> = files.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect();
-    expressions.0 = Arc::new(ExpressionSet::parse(&files)?);
+    let rank = |path: &Path| folders.0.iter().position(|folder| path.starts_with(&folder.path));
+    let mut own: Vec<(&PathBuf, &String)> = next.iter().collect();
+    own.sort_by_key(|(path, _)| rank(path).unwrap_or(usize::MAX));
+    let own: Vec<(String, String)> =
+        own.into_iter().map(|(path, text)| (path.display().to_string(), text.clone())).collect();
+    expressions.0 = Arc::new(ExpressionSet::bundled_with(&own)?);
     *faces = next;
     Ok(())
 }

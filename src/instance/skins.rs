@@ -2,7 +2,10 @@
 
 use bevy::{mesh::skinning::SkinnedMesh, prelude::*};
 
-use super::{RigInstance, RunningTemplate};
+use super::{
+    RigInstance, RunningTemplate,
+    file_nodes::{FileRest, LoadedSkin, file_rests},
+};
 use crate::{
     plugins::{runtime::RigRuntime, schema::NodeOf},
     rig::{BuiltNode, Uid},
@@ -40,24 +43,43 @@ pub(super) fn bind_skins(
     instances: Query<(&RunningTemplate, &RigRuntime), With<RigInstance>>,
     joints: Query<(Option<&Uid>, Option<&Name>)>,
     own: Query<&NodeOf>,
+    files: Query<(&Transform, Option<&FileRest>), Without<NodeOf>>,
     mut commands: Commands,
 ) {
     for (mesh, mut skin) in &mut skins {
         let Some(instance) = parents.iter_ancestors(mesh).find(|above| instances.contains(*above)) else { continue };
         let Ok((template, runtime)) = instances.get(instance) else { continue };
-        let node = |joint: Entity| {
-            if own.get(joint).is_ok_and(|own| own.0 == instance) {
-                return Some(joint);
-            }
+        let program = runtime.state().program();
+        let slot = |joint: Entity| {
             let (uid, name) = joints.get(joint).ok()?;
-            let program = runtime.state().program();
             let by_name = || {
                 let name = name?.as_str();
                 let named = |node: &&BuiltNode| node.label.as_deref() == Some(name) || &*node.name == name;
                 program.node(template.get().built.nodes.iter().find(named)?.uid)
             };
-            runtime.entity(uid.and_then(|uid| program.node(*uid)).or_else(by_name)?)
+            uid.and_then(|uid| program.node(*uid)).or_else(by_name)
         };
+        let node = |joint: Entity| {
+            if own.get(joint).is_ok_and(|own| own.0 == instance) {
+                return Some(joint);
+            }
+            runtime.entity(slot(joint)?)
+        };
+        if skin.joints.iter().any(|joint| !own.contains(*joint)) {
+            let rests = file_rests(&skin.joints, instance, &parents, &files);
+            let above = |node: &Entity| parents.get(*node).ok().map(ChildOf::parent).filter(|above| *above != instance);
+            let taken = |node: &Entity| slot(*node).filter(|slot| runtime.entity(*slot).is_some());
+            commands.entity(mesh).try_insert(LoadedSkin {
+                bindposes: skin.inverse_bindposes.clone(),
+                joints: skin.joints.clone(),
+                parents: rests.keys().filter_map(|node| Some((*node, above(node)?))).collect(),
+                nodes: rests.keys().filter_map(|node| Some((*node, program.nodes()[taken(node)?].uid))).collect(),
+                rests: rests.clone(),
+            });
+            for (node, rest) in rests {
+                commands.entity(node).try_insert_if_new(rest);
+            }
+        }
         let mut unknown = Vec::new();
         for joint in &mut skin.joints {
             if let Some(node) = node(*joint) {

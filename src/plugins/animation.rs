@@ -29,11 +29,16 @@ impl Plugin for ClipPlugin {
             PostUpdate,
             (release::end_playback, play::compile, release::release, play::play, play::follow_player)
                 .chain()
+                .in_set(ClipSystems)
                 .after(AnimationSystems)
                 .before(RigSystems::Solve),
         );
     }
 }
+
+/// Systems that play clips in `PostUpdate`, between Bevy's animation and [`RigSystems::Solve`].
+#[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
+pub struct ClipSystems;
 
 /// Playback of a clip on a rig. A clip that is halted poses the rig when its time or its keys change: what is posed on top of it
 /// in between stays. Nodes that a clip moves no longer go back to the pose of the document.

@@ -1,9 +1,10 @@
 //! Another version of a mesh in place of the one that a rig moves: joints stay, weights are transferred.
 //!
 //! A [`ReloadRequest`] transfers the weights in a task and ends as one step of the history, with the mesh exchanged in the same
-//! frame. Undoing the step brings both back, redoing it exchanges both again.
+//! frame. Undoing the step brings both back, redoing it exchanges both again. A mesh of an instance, which has no document, gets
+//! the version and its weights alone.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use bevy::{
     prelude::*,
@@ -15,6 +16,7 @@ use super::{
     document::{EditReport, EditRequest},
     history::RigHistory,
     landing::{HeldResult, JobOutcome, Landing, ResultHeld},
+    skinning::InstanceSkin,
     surface::{RigMesh, SkinOf},
 };
 use crate::{
@@ -105,7 +107,8 @@ pub struct ReloadJob {
     /// The version, and the weights that are transferred to it.
     model: Arc<Model>,
     from: Option<Arc<SkinData>>,
-    landing: Landing,
+    /// Landing in the history; `None` for a mesh of a rig without a document.
+    landing: Option<Landing>,
     /// Finished exchange that waits to be committed.
     held: Option<FinishedReload>,
     /// True if a person discards the version that waits.
@@ -138,24 +141,61 @@ pub(super) struct MeshVersions {
     next: Option<RigMesh>,
 }
 
+/// Exchange that several requests of a frame ask for: those of the instances of a crowd, which share their mesh.
+struct SharedReload {
+    mesh: RigMesh,
+    model: Arc<Model>,
+    from: Option<Arc<SkinData>>,
+    result: Arc<OnceLock<Result<FinishedReload, ReloadError>>>,
+}
+
+impl SharedReload {
+    fn is_of(&self, mesh: &RigMesh, model: &Arc<Model>, from: Option<&Arc<SkinData>>) -> bool {
+        self.mesh.uid == mesh.uid
+            && Arc::ptr_eq(&self.mesh.file, &mesh.file)
+            && Arc::ptr_eq(&self.mesh.rest, &mesh.rest)
+            && Arc::ptr_eq(&self.mesh.nodes, &mesh.nodes)
+            && Arc::ptr_eq(&self.model, model)
+            && is_same_skin(self.from.as_ref(), from)
+    }
+}
+
+fn is_same_skin(a: Option<&Arc<SkinData>>, b: Option<&Arc<SkinData>>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (a, b) => a.is_none() && b.is_none(),
+    }
+}
+
 fn start(
     mut commands: Commands,
     mut requests: MessageReader<ReloadRequest>,
-    meshes: Query<(&RigMesh, &SkinOf)>,
+    meshes: Query<(&RigMesh, &SkinOf, Option<&InstanceSkin>)>,
     rigs: Query<(&Rig, &RigHistory)>,
     mut answers: MessageWriter<ReloadAnswer>,
 ) {
+    let mut shared: Vec<SharedReload> = Vec::new();
     for ReloadRequest { mesh: entity, model } in requests.read() {
-        let found = meshes.get(*entity).ok().and_then(|(mesh, of)| Some((mesh, rigs.get(of.0).ok()?)));
-        let Some((mesh, (rig, history))) = found else {
+        let Ok((mesh, of, own)) = meshes.get(*entity) else {
             answers.write(ReloadAnswer { mesh: *entity, result: Err(ReloadError::NoRig) });
             continue;
         };
-        let from = rig.skin(mesh.uid).cloned();
+        // An instance has no document, and so no steps that could be undone.
+        let (from, landing) = match rigs.get(of.0) {
+            // A file that was saved asks for it, not the person who undoes steps.
+            Ok((rig, history)) => (rig.skin(mesh.uid).cloned(), Some(Landing::unasked(history))),
+            Err(_) => (own.map(|own| own.0.clone()), None),
+        };
+        let known = shared.iter().find(|known| known.is_of(mesh, model, from.as_ref()));
+        let result = known.map(|known| known.result.clone()).unwrap_or_default();
+        if known.is_none() {
+            let (mesh, model, from) = (mesh.clone(), model.clone(), from.clone());
+            shared.push(SharedReload { mesh, model, from, result: result.clone() });
+        }
         let (mesh, next, skin) = (mesh.clone(), model.clone(), from.clone());
-        let task = AsyncComputeTaskPool::get().spawn(async move { reloaded(&mesh, &next, skin.as_deref()) });
-        // A file that was saved asks for it, not the person who undoes steps.
-        let (model, landing) = (model.clone(), Landing::unasked(history));
+        let task = AsyncComputeTaskPool::get()
+            .spawn(async move { result.get_or_init(|| reloaded(&mesh, &next, skin.as_deref())).clone() });
+        let model = model.clone();
         commands.entity(*entity).insert(ReloadJob { task, model, from, landing, held: None, is_discarded: false });
     }
 }
@@ -190,13 +230,22 @@ fn reloaded(before: &RigMesh, model: &Model, skin: Option<&SkinData>) -> Result<
     Ok(FinishedReload { mesh, skin, report })
 }
 
+type LandingMesh = (
+    Entity,
+    &'static mut ReloadJob,
+    &'static RigMesh,
+    &'static SkinOf,
+    Option<&'static InstanceSkin>,
+    Option<&'static mut MeshVersions>,
+);
+
 fn land(
     mut commands: Commands,
-    mut jobs: Query<(Entity, &mut ReloadJob, &RigMesh, &SkinOf, Option<&mut MeshVersions>)>,
+    mut jobs: Query<LandingMesh>,
     rigs: Query<(&Rig, &RigHistory)>,
     mut answers: MessageWriter<ReloadAnswer>,
 ) {
-    for (entity, mut job, mesh, of, versions) in &mut jobs {
+    for (entity, mut job, mesh, of, own, versions) in &mut jobs {
         let job = &mut *job;
         let finished = match job.held.take() {
             Some(_) if job.is_discarded => Some(Err(ReloadError::Discarded)),
@@ -204,12 +253,16 @@ fn land(
             None => check_ready(&mut job.task),
         };
         let Some(result) = finished else { continue };
-        if let (Ok(finished), Ok((rig, history))) = (&result, rigs.get(of.0)) {
-            let has_same_weights = || match (rig.skin(mesh.uid), &job.from) {
-                (Some(now), Some(then)) => Arc::ptr_eq(now, then),
-                (now, then) => now.is_none() && then.is_none(),
+        let document = rigs.get(of.0).ok();
+        if let Ok(finished) = &result {
+            let now = document.map_or(own.map(|own| &own.0), |(rig, _)| rig.skin(mesh.uid));
+            let has_same_weights = || is_same_skin(now, job.from.as_ref());
+            let outcome = match (document, &mut job.landing) {
+                (Some((_, history)), Some(landing)) => landing.decide(history, has_same_weights),
+                _ if has_same_weights() => JobOutcome::Commit,
+                _ => JobOutcome::Drop,
             };
-            match job.landing.decide(history, has_same_weights) {
+            match outcome {
                 JobOutcome::Hold { is_news } => {
                     job.held = Some(finished.clone());
                     if is_news {
@@ -228,6 +281,9 @@ fn land(
         commands.entity(entity).try_remove::<ReloadJob>();
         let result = result.map(|FinishedReload { mesh, skin, report }| {
             match skin {
+                Some(skin) if document.is_none() => {
+                    commands.entity(entity).try_insert((mesh, InstanceSkin(skin)));
+                }
                 Some(skin) => {
                     let edits = vec![RigEdit::SetSkin(mesh.uid, Some(skin))];
                     commands.write_message(EditRequest::operation(of.0, Operation::Named { name: RELOAD, edits }));

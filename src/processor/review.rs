@@ -2,7 +2,7 @@
 
 use std::{
     cell::OnceCell,
-    collections::{HashMap, HashSet},
+    collections::{BTreeMap, HashMap, HashSet},
     sync::Arc,
 };
 
@@ -285,6 +285,14 @@ impl<'a> SourceText<'a> {
         let place = if places.is_empty() { String::new() } else { format!(" ({})", places.join(", ")) };
         let message = format!("part \"{title}\"{place}: {} on joint {}: {problem}", error.module, error.joint_label);
         SourceError::at(source, faulty.map_or(*offset, |field| field.start), message)
+    }
+
+    /// The place of a command's problem in the text of a template with parts: `origins` tells the commands that parts brought.
+    pub fn locate_with_parts(&self, rig: &Rig, error: &BuildError, origins: &BTreeMap<Uid, PartOrigin>) -> SourceError {
+        match origins.get(&error.command) {
+            Some(origin) => self.locate_in_part(rig, error, origin),
+            None => self.locate(rig, error),
+        }
     }
 
     /// The place where a joint, group or tag with that uid is declared, or of its field of that name, if it has one.

@@ -101,3 +101,27 @@ fn templates_of_one_name_are_no_versions_of_each_other() {
     assert_eq!(newer("templates"), ["b_old.rig.ron", "f_old.rig.ron"], "{listed}");
     assert_eq!(newer("bundled"), Vec::<String>::new(), "the hand is no old version of the character \"hand\"");
 }
+
+#[test]
+fn expressions_of_the_site_are_shown_and_broken_ones_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for place in ["site/faces", "none", "config"] {
+        fs::create_dir_all(at(place)).unwrap();
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let smile = fs::read_to_string(root.join("assets/expressions/happiness.expr.ron")).unwrap();
+    fs::write(at("site/faces/beaming.expr.ron"), smile.replace("\"happiness\"", "\"beaming\"")).unwrap();
+    fs::write(at("site/broken.expr.ron"), &smile[..smile.len() / 2]).unwrap();
+    let head = root.join("assets/models/head.obj").display().to_string();
+    let beaming = ["face", &head, "--bones", "8", "--expression", "beaming=1", "-o", "face.rig.ron"];
+    let (code, told) = rigsmith(folder.path(), &[&at("site")], &at("config"), &beaming);
+    assert_eq!(code, 0, "{told}");
+    assert_eq!(told["expressions"]["beaming"], 1.0, "{told}");
+    let notes = told["notes"].to_string();
+    assert!(notes.contains("broken.expr.ron"), "{told}");
+    assert_eq!(notes.matches("broken.expr.ron").count(), 1, "{told}");
+    // Without the folder nobody knows it.
+    let (code, told) = rigsmith(folder.path(), &[&at("none")], &at("config"), &beaming);
+    assert!(code == 2 && told.to_string().contains("beaming"), "{told}");
+}

@@ -13,7 +13,8 @@ use std::{
 };
 
 use rigsmith::{
-    files::{RealDisk, load_template},
+    files::{RealDisk, load_model, load_template},
+    mesh::model::Model,
     modules,
     processor::{Builder, review},
     rig::Rig,
@@ -196,9 +197,14 @@ impl Drop for Watch {
 
 impl Watch {
     fn start(folder: &Path, output: &str, count: &str) -> Self {
+        Self::with(folder, output, count, &[])
+    }
+
+    fn with(folder: &Path, output: &str, count: &str, more: &[&str]) -> Self {
         let process = Command::new(env!("CARGO_BIN_EXE_rigsmith"))
             .current_dir(folder)
             .args(["watch", "a.rig.ron", "-o", output, "--count", count, "--json"])
+            .args(more)
             .stdout(Stdio::piped())
             .spawn();
         let mut process = process.unwrap();
@@ -240,6 +246,11 @@ fn a_watched_template_is_built_at_every_save_and_no_broken_one_is_taken_over() {
     fs::write(at("a.rig.ron"), text.replace("square", "no such shape")).unwrap();
     let told = watch.next();
     assert!(crate::cli::explained(&told).contains("no such shape"), "{told}");
+    // The command is told by its line and column, and no program is told to start over.
+    let (line, column) = place_of(&text, "square");
+    let place = told["error"]["where"].as_str().unwrap().to_owned();
+    assert!(place.starts_with(&format!("a.rig.ron:{line}:")) && !place.ends_with(":1"), "{place}, not {line}:{column}");
+    assert!(!told.to_string().contains("(tag ") && !told.to_string().contains("run the command again"), "{told}");
     let after_cube = glb();
     fs::write(at("a.rig.ron"), text.replace("(0, 0.3, 0)", "(0, 0.5, 0)")).unwrap();
     assert_eq!(watch.next()["ok"], true);
@@ -267,6 +278,99 @@ fn a_character_that_could_not_be_written_is_written_as_soon_as_it_can_be() {
     fs::create_dir(at("out")).unwrap();
     let told = watch.next();
     assert!(told["ok"] == true && at("out/a.glb").exists(), "{told}");
+    assert!(watch.ended());
+}
+
+/// Line and column of the first place of a word.
+fn place_of(text: &str, word: &str) -> (usize, usize) {
+    let at = text.find(word).unwrap();
+    let start = text[..at].rfind('\n').map_or(0, |end| end + 1);
+    (text[..at].matches('\n').count() + 1, at - start + 1)
+}
+
+/// A box around the chain of `rigsmith new chain`, that wide, with a ring of points every so often.
+fn column(width: f32, rings: u32) -> String {
+    let mut text = String::new();
+    for ring in 0..rings {
+        let y = 0.9 + ring as f32 * 1.2 / (rings - 1) as f32;
+        for (x, z) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
+            text.push_str(&format!("v {} {y} {}\n", x * width, z * width));
+        }
+    }
+    for ring in 0..rings - 1 {
+        for side in 0..4 {
+            let (a, b) = (ring * 4 + side + 1, ring * 4 + (side + 1) % 4 + 1);
+            text.push_str(&format!("f {a} {b} {} {}\n", b + 4, a + 4));
+        }
+    }
+    text
+}
+
+#[test]
+fn a_first_template_and_a_first_mesh_are_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "new.rig.ron"]).0, 0);
+    let text = fs::read_to_string(at("new.rig.ron")).unwrap();
+    let mut watch = Watch::with(folder.path(), "a.glb", "1", &["--mesh", "a.obj"]);
+    // Neither is there yet.
+    for file in ["a.obj", "a.rig.ron"] {
+        let told = watch.next();
+        assert!(told["ok"] == false && told["error"]["where"] == file, "{told}");
+        assert!(!told.to_string().contains("run the command again"), "{told}");
+    }
+    // A broken template, and one whose command fails, end nothing either.
+    fs::write(at("a.rig.ron"), &text[..200]).unwrap();
+    assert_eq!(watch.next()["ok"], false);
+    fs::write(at("a.rig.ron"), text.replace("square", "no such shape")).unwrap();
+    let told = watch.next();
+    let line = place_of(&text, "square").0;
+    assert!(told["error"]["where"].as_str().unwrap().starts_with(&format!("a.rig.ron:{line}:")), "{told}");
+    // With both of them there, the character is written.
+    fs::write(at("a.obj"), column(0.1, 5)).unwrap();
+    fs::write(at("a.rig.ron"), &text).unwrap();
+    let told = watch.next();
+    assert!(told["ok"] == true && at("a.glb").exists(), "{told}");
+    assert!(watch.ended());
+}
+
+#[test]
+fn a_saved_mesh_is_written_with_its_weights() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "a.rig.ron"]).0, 0);
+    fs::write(at("a.obj"), column(0.1, 5)).unwrap();
+    let mut watch = Watch::with(folder.path(), "a.glb", "4", &["--mesh", "a.obj"]);
+    let glb = || load_model(&RealDisk, &at("a.glb")).unwrap();
+    assert_eq!(watch.next()["ok"], true);
+    let first = glb();
+    // Wider: as many points, and nothing of the rig runs.
+    fs::write(at("a.obj"), column(0.2, 5)).unwrap();
+    let told = watch.next();
+    assert_eq!((&told["ok"], &told["ran"]), (&Value::from(true), &serde_json::json!([])), "{told}");
+    let moved = told["mesh"]["moved"].as_f64().unwrap();
+    assert!((moved - 0.1 * 2f64.sqrt()).abs() < 1e-4, "{told}");
+    assert_eq!(told["mesh"]["points"], serde_json::json!([20, 20]));
+    let wider = glb();
+    let width = |model: &Model| model.points.iter().map(|point| point.x).fold(0.0, f32::max);
+    assert!((width(&wider) - 0.2).abs() < 1e-5 && (width(&first) - 0.1).abs() < 1e-5);
+    let joints = |model: &Model| model.nodes.iter().map(|node| node.name.clone()).collect::<Vec<_>>();
+    assert_eq!(joints(&wider), joints(&first));
+    // More points, each of them held by joints.
+    fs::write(at("a.obj"), column(0.2, 9)).unwrap();
+    let told = watch.next();
+    assert_eq!(told["mesh"]["points"], serde_json::json!([20, 36]), "{told}");
+    assert!(told["mesh"]["weights"]["copied"].as_u64().unwrap() >= 20, "{told}");
+    let more = glb();
+    assert!(more.points.len() >= 36 && !more.skins.is_empty());
+    // A broken mesh changes nothing, and the next good one is taken.
+    let written = fs::read(at("a.glb")).unwrap();
+    fs::write(at("a.obj"), "v 1 2\nf 1 2 3 4 5 6 7 8 9\n").unwrap();
+    let told = watch.next();
+    assert!(told["ok"] == false && told["error"]["where"].as_str().unwrap().contains("a.obj"), "{told}");
+    assert_eq!(fs::read(at("a.glb")).unwrap(), written);
+    fs::write(at("a.obj"), column(0.1, 5)).unwrap();
+    assert_eq!(watch.next()["mesh"]["points"], serde_json::json!([36, 20]));
     assert!(watch.ended());
 }
 

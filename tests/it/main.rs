@@ -85,6 +85,8 @@ mod fit_hinges;
 mod fit_parts;
 #[cfg(feature = "editor")]
 mod fit_window;
+#[cfg(feature = "editor")]
+mod folder_watch;
 mod fuzz_animation;
 mod fuzz_bvh;
 mod fuzz_gestures;
@@ -130,6 +132,7 @@ mod mesh_reload;
 #[cfg(feature = "editor")]
 mod mesh_watch;
 mod mirror;
+mod model_files;
 mod models;
 mod modules_nodes;
 mod modules_rigs;

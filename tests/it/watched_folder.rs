@@ -9,7 +9,7 @@ use std::{
 use bevy::{ecs::message::MessageCursor, prelude::*};
 use rigsmith::{
     headless::headless_app,
-    instance::{FolderFault, FolderRead, GesturesRead, WatchedFolderPlugin},
+    instance::{FolderFault, FolderRead, GesturesRead, WatchedFolderPlugin, WatchedFolders},
     plugins::{commands::RigModules, face::FaceExpressions},
 };
 
@@ -129,4 +129,34 @@ fn gestures_of_a_folder_are_handed_out_at_every_save() {
     watched.save("draw.gestures.ron", "[Nothing(");
     watched.until("the fault", |watched| watched.faults.len() == 1);
     assert_eq!(watched.read.len(), 2);
+}
+
+#[test]
+fn folders_come_and_go_and_the_first_of_them_counts() {
+    let mut watched = WatchedFolder::new();
+    let other = tempfile::tempdir().unwrap();
+    let smile = asset("expressions/happiness.expr.ron");
+    let named = |name: &str| smile.replace("\"happiness\"", &format!("\"{name}\""));
+    fs::write(other.path().join("smile.expr.ron"), named("broad")).unwrap();
+    watched.save("smile.expr.ron", &named("narrow"));
+    watched.until("the first folder", |watched| watched.has("narrow"));
+    let folders = |watched: &mut WatchedFolder, change: &dyn Fn(&mut WatchedFolders)| {
+        change(&mut watched.app.world_mut().resource_mut::<WatchedFolders>());
+    };
+    let first = watched.app.world().resource::<WatchedFolders>().0[0].clone();
+    let second = rigsmith::instance::WatchedFolder { path: other.path().to_owned(), depth: 0 };
+    folders(&mut watched, &|folders| folders.0.push(second.clone()));
+    watched.until("the file of the second", |watched| watched.read.len() == 2);
+    assert!(watched.has("narrow") && !watched.has("broad"));
+    folders(&mut watched, &|folders| folders.0 = vec![second.clone()]);
+    watched.until("the second folder alone", |watched| watched.has("broad"));
+    assert!(!watched.has("narrow"));
+    folders(&mut watched, &|folders| folders.0 = vec![first.clone()]);
+    watched.until("the first folder again", |watched| watched.has("narrow") && !watched.has("broad"));
+    // What lies deeper than a folder is followed for is not looked at.
+    fs::create_dir(other.path().join("deep")).unwrap();
+    fs::write(other.path().join("deep/grin.expr.ron"), named("grin")).unwrap();
+    folders(&mut watched, &|folders| folders.0 = vec![second.clone()]);
+    watched.until("the second folder", |watched| watched.has("broad"));
+    assert!(!watched.has("grin"));
 }

@@ -29,6 +29,7 @@ use crate::{
     mesh::{gltf::GltfWriteSettings, model::Model},
     plugins::{
         commands::{BuildResult, RigModules},
+        face::FaceExpressions,
         surface::RigMesh,
     },
     processor::Modules,
@@ -98,9 +99,11 @@ pub(super) fn export(world: &mut World, path: PathBuf) {
     let base = document.and_then(|document| document.base.as_ref());
     let base = world.get::<RigSource>(rig).and_then(RigSource::base).or(base).cloned();
     let options = world.get_resource::<ExportOptions>().cloned().unwrap_or_default();
+    let FaceExpressions(expressions) = world.get_resource().cloned().unwrap_or_default();
     let task = spawn(move || {
         let (built, base) = (built.as_deref(), base.as_deref());
-        let source = ExportSource { rig: &data, built, modules: &modules, mesh: mesh.as_ref(), base };
+        let (mesh, expressions) = (mesh.as_ref(), &*expressions);
+        let source = ExportSource { rig: &data, built, modules: &modules, expressions, mesh, base };
         let mut notes = source.write(&path, template.as_deref(), &options)?;
         if more > 0 {
             notes.push(format!("only the first mesh was exported; {more} more are open"));
@@ -121,6 +124,8 @@ struct ExportSource<'a> {
     rig: &'a Rig,
     built: Option<&'a BuiltRig>,
     modules: &'a Arc<Modules>,
+    /// Expressions of faces.
+    expressions: &'a ExpressionSet,
     mesh: Option<&'a RigMesh>,
     /// The version of the template that the document took over last.
     base: Option<&'a Rig>,
@@ -223,7 +228,7 @@ impl ExportSource<'_> {
         hang_half_joints(&mut model, &source);
         put_clips(&mut model, self.rig, self.built, self.modules)?;
         let recipe = |(preset, shapes)| ExpressionRecipe { preset, shapes };
-        let recipes: Vec<ExpressionRecipe> = vrm_mixes(ExpressionSet::bundled()).into_iter().map(recipe).collect();
+        let recipes: Vec<ExpressionRecipe> = vrm_mixes(self.expressions).into_iter().map(recipe).collect();
         let made = make_avatar(&mut model, &source, meta, &recipes)?;
         // Bones of the human are written whether skin hangs on them or not.
         let settings = GltfWriteSettings { all_joints: true, ..default() };

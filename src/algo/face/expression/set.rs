@@ -1,6 +1,6 @@
 //! Sets of units and expressions, with the bundled ones.
 
-use std::{borrow::Cow, sync::LazyLock};
+use std::{borrow::Cow, collections::BTreeSet, sync::LazyLock};
 
 use super::text::{Expression, ExpressionError, Sides, Unit, UnitUse, last_quoted, located};
 
@@ -105,6 +105,11 @@ impl UnitSet {
     }
 }
 
+/// Name of a file without its folder.
+fn without_folder(name: &str) -> &str {
+    name.rsplit(['/', '\\']).next().unwrap_or(name)
+}
+
 /// A name without the ending of a side, and the side.
 fn one_side<'a>(name: &'a str, [left, right]: [&str; 2]) -> Option<(&'a str, Sides)> {
     let left = name.strip_suffix(left).map(|base| (base, Sides::Left));
@@ -149,6 +154,28 @@ impl ExpressionSet {
     /// The bundled files: name and text, files of units first.
     pub fn bundled_files() -> impl Iterator<Item = (&'static str, &'static str)> {
         UNITS.into_iter().chain(EXPRESSIONS)
+    }
+
+    /// The bundled set with further files, each a name, with or without its folder, and a text. A file takes the place of a later
+    /// or bundled one of its name.
+    ///
+    /// # Errors
+    /// See [`parse`](Self::parse).
+    pub fn bundled_with(own: &[(String, String)]) -> Result<Self, ExpressionError> {
+        let mut names = BTreeSet::new();
+        let own: Vec<(&str, &str)> = own
+            .iter()
+            .map(|(name, text)| (name.as_str(), text.as_str()))
+            .filter(|&(name, _)| names.insert(without_folder(name)))
+            .collect();
+        let mut files: Vec<(&str, &str)> = Vec::new();
+        for (name, text) in Self::bundled_files() {
+            if !names.contains(without_folder(name)) {
+                files.push((name, text));
+            }
+        }
+        files.extend(own);
+        Self::parse(&files)
     }
 
     /// The expressions, in the order in which they were added.
