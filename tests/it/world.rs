@@ -8,6 +8,7 @@ mod poses;
 mod random;
 mod springs;
 mod switches;
+mod visibility;
 mod writes;
 
 use std::{path::PathBuf, sync::Arc};
