@@ -62,7 +62,7 @@ impl Plugin for DocumentPlugin {
                 Update,
                 (
                     (adopt::adopt_writes, apply_edits).chain().in_set(RigSystems::Edits),
-                    (follow::follow_rigs, follow::follow_tags).chain().in_set(RigSystems::Build),
+                    (follow::follow_rigs, follow::order_groups, follow::follow_tags).chain().in_set(RigSystems::Build),
                 ),
             );
     }

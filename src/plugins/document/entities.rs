@@ -80,6 +80,21 @@ impl EntityIndex {
     }
 }
 
+/// Members of a relation that have to be added again, in this order, so that those with ranks stand by rank; none if they do.
+pub(in crate::plugins) fn misplaced(
+    members: impl Iterator<Item = Entity>,
+    ranks: &EntityHashMap<usize>,
+) -> Vec<Entity> {
+    let members: Vec<Entity> = members.filter(|member| ranks.contains_key(member)).collect();
+    let mut sorted = members.clone();
+    sorted.sort_by_key(|member| ranks.get(member).copied());
+    let mut kept = 0;
+    for member in &members {
+        kept += usize::from(sorted.get(kept) == Some(member));
+    }
+    sorted.split_off(kept)
+}
+
 /// The entities of a rig's joints.
 #[derive(Component, Debug, Default)]
 pub struct JointEntities {

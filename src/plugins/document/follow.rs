@@ -2,17 +2,20 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use bevy::prelude::*;
+use bevy::{ecs::entity::EntityHashMap, prelude::*};
 
 use super::{
     ShowRest,
-    entities::{EntityIndex, EntityPart, GroupEntities, JointEntities, MirroredJoint, MirroredTag, TagEntities},
+    entities::{
+        EntityIndex, EntityPart, GroupEntities, JointEntities, MirroredJoint, MirroredTag, TagEntities, misplaced,
+    },
 };
 use crate::{
     plugins::{
         runtime::RigRuntime,
         schema::{
-            CommandTag, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf, Null, Tag, TagOf,
+            CommandTag, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, LocalGroups, NodeLabel, NodeOf,
+            Null, Tag, TagOf,
         },
     },
     rig::{NodeKind, PoseOffset, RestTransform, Rig, TagKind, Uid},
@@ -230,6 +233,21 @@ fn follow_groups(
                 index.insert(entity, rig_entity, group.uid, EntityPart::Group);
                 known.groups.insert(group.uid, (entity, group.clone()));
             }
+        }
+    }
+}
+
+/// Puts the local groups of rigs into the order of the document, where the document or other code changed the order.
+pub(in crate::plugins) fn order_groups(
+    mut commands: Commands,
+    rigs: Query<(Entity, &Rig, &GroupEntities, &LocalGroups), Or<(Changed<Rig>, Changed<LocalGroups>)>>,
+) {
+    for (rig_entity, rig, known, groups) in &rigs {
+        let ranks: EntityHashMap<usize> =
+            (rig.groups().iter().enumerate()).filter_map(|(rank, group)| Some((known.get(group.uid)?, rank))).collect();
+        for group in misplaced(groups.iter(), &ranks) {
+            // Removing and inserting each group in turn puts it behind the ones before it.
+            commands.entity(group).try_remove::<GroupOf>().try_insert(GroupOf(rig_entity));
         }
     }
 }
