@@ -9,6 +9,7 @@
 mod groups;
 mod joints;
 mod removal;
+mod rigs;
 mod sorting;
 mod tags;
 mod trial;
@@ -31,9 +32,12 @@ use super::{
     error::{EntityWrite, EntityWriteError},
 };
 use crate::{
-    plugins::schema::{
-        CommandTag, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf,
-        NodeSlot, Null, ParkedNode, Tag, TagOf, Tags,
+    plugins::{
+        history::RigHistory,
+        schema::{
+            CommandTag, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf,
+            NodeSlot, Null, ParkedNode, Tag, TagOf, Tags,
+        },
     },
     rig::{RestTransform, Rig, RigEdit, Uid, UidSource},
 };
@@ -94,10 +98,13 @@ pub(super) struct WrittenEntities<'w, 's> {
         's,
         Entity,
         (
-            (Or<(Changed<LocalGroup>, Changed<GroupOf>, Changed<Name>)>, Or<(With<LocalGroup>, With<GroupOf>)>),
+            Or<(Changed<LocalGroup>, Changed<GroupOf>, Changed<Name>, Changed<Uid>)>,
+            Or<(With<LocalGroup>, With<GroupOf>)>,
             Allow<Disabled>,
         ),
     >,
+    /// Rigs whose name or uid was written, and fresh ones: the history comes with the rig.
+    of_rigs: Query<'w, 's, Entity, (Or<(Changed<Name>, Changed<Uid>, Added<RigHistory>)>, With<Rig>, Allow<Disabled>)>,
     uid: RemovedComponents<'w, 's, Uid>,
     of_joints: (
         RemovedComponents<'w, 's, Joint>,
@@ -125,7 +132,14 @@ struct WrittenByKind {
     joints: BTreeSet<Entity>,
     tags: BTreeSet<Entity>,
     groups: BTreeSet<Entity>,
+    rigs: BTreeSet<Entity>,
     uids: BTreeSet<Entity>,
+}
+
+impl WrittenByKind {
+    fn is_empty(&self) -> bool {
+        [&self.joints, &self.tags, &self.groups, &self.rigs, &self.uids].into_iter().all(BTreeSet::is_empty)
+    }
 }
 
 impl WrittenEntities<'_, '_> {
@@ -134,11 +148,14 @@ impl WrittenEntities<'_, '_> {
         touched.joints.extend(self.nodes.iter());
         touched.tags.extend(self.tags.iter());
         touched.groups.extend(self.groups.iter());
+        touched.rigs.extend(self.of_rigs.iter());
         touched.uids.extend(self.uid.read());
+        touched.rigs.extend(&touched.uids);
         let (joint, null, name, label, group, rest, child_of) = &mut self.of_joints;
-        // Groups have names, too.
+        // Groups and rigs have names, too.
         let names: Vec<Entity> = name.read().collect();
         touched.groups.extend(&names);
+        touched.rigs.extend(&names);
         let markers = joint.read().chain(null.read()).chain(names).chain(label.read());
         touched.joints.extend(markers.chain(group.read()).chain(rest.read()).chain(child_of.read()));
         let (tag, command, feature, tag_of, in_feature) = &mut self.of_tags;
@@ -182,7 +199,7 @@ pub(super) fn adopt_writes(
             commands.entity(entity).try_despawn();
         }
     }
-    if touched.joints.is_empty() && touched.tags.is_empty() && touched.groups.is_empty() && touched.uids.is_empty() {
+    if touched.is_empty() {
         return;
     }
     // Usually only this plugin has written, so that nothing differs.
@@ -200,6 +217,7 @@ pub(super) fn adopt_writes(
             groups: groups.bypass_change_detection(),
             built: built.as_mut().map(|built| built.bypass_change_detection()),
         };
+        adoption.rig_written(&writes);
         adoption.groups_written(&writes);
         adoption.joints_spawned(&writes);
         adoption.joints_written(&writes);

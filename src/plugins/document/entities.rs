@@ -101,6 +101,9 @@ pub struct JointEntities {
     pub(super) joints: HashMap<Uid, MirroredJoint>,
     /// Pose offsets of the document that the joints' transforms were last set to.
     pub(super) posed: BTreeMap<Uid, PoseOffset>,
+    /// Uid and name last written to the entity of the rig, or adopted from it.
+    pub(super) rig_uid: Option<Uid>,
+    pub(super) rig_name: Option<String>,
     /// Revision of the document that all entities of the rig follow; `None` if one of them has to be written again.
     revision: Option<Revision>,
     /// Revision that the entities of joints and groups follow, while those of tags and nodes may lag behind.

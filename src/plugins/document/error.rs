@@ -133,6 +133,9 @@ pub enum EntityWrite {
     /// Joints were despawned.
     #[error("a despawned joint")]
     DespawnedJoint,
+    /// The name of a rig was written.
+    #[error("a write to the name of a rig")]
+    RigName,
     /// The label of a joint was written.
     #[error("a write to a label")]
     Label,

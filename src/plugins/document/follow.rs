@@ -42,13 +42,20 @@ pub(in crate::plugins) fn follow_rigs(
 ) {
     for (rig_entity, rig, mut joints, mut groups, show_rest, is_running, name, uid) in &mut rigs {
         let rig: &Rig = &rig;
-        if name.is_none_or(|name| name.as_str() != rig.about().name) {
-            commands.entity(rig_entity).try_insert(Name::new(rig.about().name.clone()));
-        }
-        if uid != Some(&rig.uid()) {
-            commands.entity(rig_entity).try_insert(rig.uid());
-        }
         let known = joints.bypass_change_detection();
+        // A name or uid that other code gave to the rig, and that this plugin has not written, waits for its adoption.
+        if known.rig_name.as_ref() != Some(&rig.about().name) {
+            if known.rig_name.is_some() || name.is_none() {
+                commands.entity(rig_entity).try_insert(Name::new(rig.about().name.clone()));
+            }
+            known.rig_name = Some(rig.about().name.clone());
+        }
+        if known.rig_uid != Some(rig.uid()) {
+            if known.rig_uid.is_some() || uid.is_none() {
+                commands.entity(rig_entity).try_insert(rig.uid());
+            }
+            known.rig_uid = Some(rig.uid());
+        }
         let is_posed = !show_rest.is_some_and(|show_rest| show_rest.0);
         if known.follow(rig) {
             follow_pose(known, rig, is_posed, is_running, &mut places);

@@ -31,6 +31,12 @@ use crate::random::Random;
 #[track_caller]
 fn check(stage: &mut Stage, what: &str) {
     let rig = stage.document().clone();
+    assert_eq!(
+        stage.get::<Name>(stage.rig).map(Name::as_str),
+        Some(rig.about().name.as_str()),
+        "{what}: the rig's name"
+    );
+    assert_eq!(stage.get::<Uid>(stage.rig), Some(&rig.uid()), "{what}: the rig's uid");
     // Commands may put joints below other nodes.
     let built = stage.get::<BuildResult>(stage.rig).map(|built| built.0.clone()).unwrap_or_default();
     let parents: BTreeMap<Uid, Option<Uid>> =
@@ -469,6 +475,12 @@ fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
         }
         (36, Some(entity), ..) => {
             world.entity_mut(entity).insert(Name::new(format!("m{number}")));
+        }
+        (37, ..) if number.is_multiple_of(3) => {
+            world.entity_mut(rig_entity).insert(Name::new(format!("m{number}")));
+        }
+        (37, ..) if number % 3 == 1 => {
+            world.entity_mut(rig_entity).remove::<(Name, Uid)>();
         }
         (37, _, _, Some(group)) => {
             world.entity_mut(group).insert(Name::new(format!("m{number}")));

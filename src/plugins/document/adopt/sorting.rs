@@ -24,6 +24,8 @@ pub(super) struct RigWrites {
     pub groups: Vec<(Entity, Uid)>,
     pub spawned_groups: Vec<Entity>,
     pub dead: Vec<(Entity, IndexedEntity)>,
+    /// True if the entity of the rig itself was written.
+    pub is_rig_written: bool,
 }
 
 /// Largest depth of a hierarchy; a longer chain of parents is a cycle.
@@ -51,6 +53,9 @@ pub(super) fn sort_by_rig(
         }
         None
     };
+    for rig in touched.rigs.iter().filter(|entity| is_rig(**entity)) {
+        rigs.entry(*rig).or_default().is_rig_written = true;
+    }
     for entity in &touched.uids {
         let Some(indexed) = index.get(*entity) else { continue };
         let writes = rigs.entry(indexed.rig).or_default();
