@@ -52,6 +52,7 @@ impl Plugin for CommandsPlugin {
             Update,
             (
                 build_rigs,
+                guard::keep_results,
                 nodes::follow_nodes,
                 nodes::unsorted_rigs.pipe(nodes::order_siblings),
                 nodes::despawn_parked,
@@ -161,12 +162,17 @@ impl Processor {
     }
 }
 
-/// Result of the commands that a rig has run so far (nodes, constraints, switches); replaced only when it differs.
+/// Result of the commands that a rig has run so far (nodes, constraints, switches); replaced only when it differs. A
+/// result that other code inserts is put back in the same frame, and told.
 #[derive(Component, Reflect, Debug, Clone, Default)]
 #[component(immutable)]
 #[reflect(opaque)]
 #[reflect(Component, Debug, Clone, Default)]
 pub struct BuildResult(pub Arc<BuiltRig>);
+
+/// Marks a rig whose [`BuildResult`] comes from a caller, who built it elsewhere, and not from its processor.
+#[derive(Component)]
+pub(crate) struct SuppliedBuild;
 
 /// Error that stopped a rig's build; absent if the build has no error.
 #[derive(Component, Reflect, Debug, Clone, PartialEq)]
@@ -308,7 +314,7 @@ fn finish(
     let mut entity = commands.entity(rig);
     let built = builder.shared_built();
     if before.is_none_or(|before| !Arc::ptr_eq(&before.0, &built) && before.0 != built) {
-        entity.try_insert(BuildResult(built));
+        entity.try_insert(BuildResult(built)).try_remove::<SuppliedBuild>();
     }
     match &report.error {
         Some(error) => {

@@ -5,17 +5,11 @@
 
 pub mod outline;
 pub mod size;
+mod visibility;
 
 use std::collections::BTreeSet;
 
-use bevy::{
-    ecs::{
-        entity_disabling::Disabled,
-        query::{Allow, QueryData},
-        system::SystemParam,
-    },
-    prelude::*,
-};
+use bevy::prelude::*;
 
 use super::{
     RigSystems,
@@ -23,7 +17,6 @@ use super::{
     configure_sets,
     document::{EditRefusal, EditRequest},
     runtime::RigRuntime,
-    schema::{Attributes, Control, NodeLayer},
 };
 use crate::{
     rig::{
@@ -49,7 +42,7 @@ impl Plugin for ControlsPlugin {
             .register_type::<size::ShapeFactor>()
             .add_systems(
                 PostUpdate,
-                (show_nodes.after(RigSystems::Solve), size::measure_shapes.after(RigSystems::Surface)),
+                (visibility::show_nodes.after(RigSystems::Solve), size::measure_shapes.after(RigSystems::Surface)),
             );
     }
 }
@@ -259,58 +252,4 @@ fn choices<'a>(built: &'a BuiltRig, switch: &SwitchData) -> Vec<&'a str> {
 pub(crate) fn number_of(choices: &[&str], value: &str) -> Option<f32> {
     let number = choices.iter().position(|choice| *choice == value).map(|number| number as f32);
     number.or_else(|| value.parse().ok().filter(|number: &f32| number.is_finite()))
-}
-
-/// Components that the visibility of a node follows from, taken off.
-#[derive(SystemParam)]
-struct LostComponents<'w, 's> {
-    layers: RemovedComponents<'w, 's, NodeLayer>,
-    attributes: RemovedComponents<'w, 's, Attributes>,
-    controls: RemovedComponents<'w, 's, Control>,
-}
-
-impl LostComponents<'_, '_> {
-    fn entities(&mut self) -> BTreeSet<Entity> {
-        self.layers.read().chain(self.attributes.read()).chain(self.controls.read()).collect()
-    }
-}
-
-/// Nodes whose layer, attributes or control were written; parked ones, too.
-type ShownNodes = (
-    Or<(With<Control>, With<NodeLayer>)>,
-    Or<(Changed<NodeLayer>, Changed<Attributes>, Changed<Control>)>,
-    Allow<Disabled>,
-);
-
-/// Components of a node that decide whether it is visible.
-#[derive(QueryData)]
-struct ShownNode {
-    layer: Option<&'static NodeLayer>,
-    attributes: Option<&'static Attributes>,
-    is_control: Has<Control>,
-    shown: Option<&'static NodeVisible>,
-}
-
-/// Updates the visibility of nodes whose layer, attributes or control changed or are gone.
-fn show_nodes(
-    mut commands: Commands,
-    mut lost: LostComponents,
-    written: Query<Entity, ShownNodes>,
-    nodes: Query<ShownNode, Allow<Disabled>>,
-) {
-    let mut entities = lost.entities();
-    entities.extend(written.iter());
-    for entity in entities {
-        let Ok(node) = nodes.get(entity) else { continue };
-        let is_in = node.layer.is_none_or(|layer| layer.0.visible);
-        let is_on = node.attributes.and_then(|attributes| attributes.0.get(VISIBLE)).is_none_or(|value| *value >= 0.5);
-        let wanted = (node.is_control || node.layer.is_some()).then_some(NodeVisible(is_in && is_on));
-        if node.shown.copied() == wanted {
-            continue;
-        }
-        match wanted {
-            Some(visible) => commands.entity(entity).try_insert(visible),
-            None => commands.entity(entity).try_remove::<NodeVisible>(),
-        };
-    }
 }

@@ -9,6 +9,7 @@ mod adopt;
 pub(in crate::plugins) mod entities;
 mod error;
 pub(in crate::plugins) mod follow;
+pub(in crate::plugins) mod refusals;
 
 use std::{borrow::Cow, sync::Arc};
 

@@ -6,6 +6,7 @@ mod leftovers;
 pub mod limits;
 mod poses;
 mod random;
+mod refusals;
 mod rig_entity;
 mod springs;
 mod switches;

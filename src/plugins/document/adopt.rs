@@ -30,13 +30,14 @@ use super::{
     EditRefusal,
     entities::{BuiltEntities, EntityIndex, EntityPart, GroupEntities, JointEntities, TagEntities},
     error::{EntityWrite, EntityWriteError},
+    refusals::{Bearer, ToldRefusals},
 };
 use crate::{
     plugins::{
         history::RigHistory,
         schema::{
-            CommandTag, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf,
-            NodeSlot, Null, ParkedNode, Tag, TagOf, Tags,
+            CommandTag, ConstraintKind, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup,
+            NodeLabel, NodeOf, NodeSlot, Null, ParkedNode, Tag, TagOf, Tags,
         },
     },
     rig::{RestTransform, Rig, RigEdit, Uid, UidSource},
@@ -91,7 +92,8 @@ type OfDocument = (Without<NodeSlot>, Allow<Disabled>);
 /// Entities that were written since the last frame, by this plugin or by other code.
 #[derive(SystemParam)]
 pub(super) struct WrittenEntities<'w, 's> {
-    nodes: Query<'w, 's, Entity, (Or<(With<Joint>, With<CreatedRole>)>, JointWritten, OfDocument)>,
+    nodes:
+        Query<'w, 's, Entity, (Or<(With<Joint>, With<CreatedRole>, With<ConstraintKind>)>, JointWritten, OfDocument)>,
     tags: Query<'w, 's, Entity, (TagWritten, OfDocument)>,
     groups: Query<
         'w,
@@ -190,6 +192,7 @@ pub(super) fn adopt_writes(
     mut edits: ResMut<EntityEdits>,
     mut refused: MessageWriter<EditRefusal>,
     parked: Query<(), (With<ParkedNode>, Allow<Disabled>)>,
+    mut told: Local<ToldRefusals>,
 ) {
     let touched = written.take();
     let closed: HashSet<Entity> = written.rigs.read().filter(|rig| !rigs.contains(*rig)).collect();
@@ -204,6 +207,7 @@ pub(super) fn adopt_writes(
     }
     // Usually only this plugin has written, so that nothing differs.
     let by_rig = sorting::sort_by_rig(&touched, &views, &index, |entity| rigs.contains(entity));
+    let mut has_told = false;
     for (rig_entity, writes) in by_rig {
         let Ok((mut rig, mut joints, mut tags, mut groups, mut built)) = rigs.get_mut(rig_entity) else { continue };
         let mut trial = Trial::new(rig_entity, rig.bypass_change_detection(), &mut uids);
@@ -225,10 +229,11 @@ pub(super) fn adopt_writes(
         adoption.despawned(&writes);
         // Among the tags that are left: one of them may have been despawned in the same frame.
         adoption.orders_written(&writes);
-        let outcome = trial.finish();
-        for reason in outcome.refused {
+        let mut outcome = trial.finish();
+        for reason in outcome.take_refused(&mut told) {
             warn!("{reason}");
             refused.write(EditRefusal { rig: rig_entity, reason: reason.into() });
+            has_told = true;
         }
         if outcome.respawn {
             rig.set_changed();
@@ -238,6 +243,12 @@ pub(super) fn adopt_writes(
         if !outcome.edits.is_empty() {
             edits.0.push((rig_entity, outcome.edits));
         }
+    }
+    if has_told {
+        told.retain(|bearer| match bearer {
+            Bearer::Part(rig, _) => rigs.contains(rig),
+            Bearer::Entity(entity) => views.contains(entity),
+        });
     }
 }
 

@@ -10,6 +10,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
     pub fn rig_written(&mut self, writes: &RigWrites) {
         let entity = self.trial.rig_entity;
         let Some(view) = self.views.get(entity).ok().filter(|_| writes.is_rig_written) else { return };
+        self.trial.look_at_entity(entity);
         let (uid, told) = (self.rig().uid(), view.uid.copied());
         // A rig that was spawned since the last frame has no uid yet, unless other code gave it one.
         if told != self.joints.rig_uid {

@@ -18,6 +18,7 @@ use crate::{
 pub(super) struct RigWrites {
     pub joints: Vec<(Entity, Uid)>,
     pub spawned_joints: Vec<Entity>,
+    /// Created nodes and constraints.
     pub nodes: Vec<(Entity, Uid)>,
     pub tags: Vec<(Entity, Uid)>,
     pub spawned_tags: Vec<Entity>,
@@ -72,7 +73,7 @@ pub(super) fn sort_by_rig(
             Some(IndexedEntity { rig, uid, part: EntityPart::Joint }) => {
                 rigs.entry(rig).or_default().joints.push((*entity, uid))
             }
-            Some(IndexedEntity { rig, uid, part: EntityPart::Node }) => {
+            Some(IndexedEntity { rig, uid, part: EntityPart::Node | EntityPart::Constraint }) => {
                 rigs.entry(rig).or_default().nodes.push((*entity, uid))
             }
             Some(_) => {}
