@@ -135,13 +135,16 @@ pub struct BuildDone {
 
 /// Command processor of a rig, inserted by the first [`BuildRequest`]. Other code reads it; a [`BuildRequest`] changes
 /// what is built.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component, from_reflect = false)]
 pub struct Processor {
+    #[reflect(ignore)]
     builder: Builder,
     /// Number of commands that an edit rebuilds up to; `None` for all commands.
     goal: Option<usize>,
     follow: bool,
     /// Revision of the document that the builder follows.
+    #[reflect(ignore)]
     revision: Revision,
 }
 

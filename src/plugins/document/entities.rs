@@ -80,7 +80,7 @@ impl EntityIndex {
     }
 }
 
-/// Members of a relation that have to be added again, in this order, so that those with ranks stand by rank; none if they do.
+/// Members of a relation that have to be added again, in this order, so that the members with ranks stand by rank.
 pub(in crate::plugins) fn misplaced(
     members: impl Iterator<Item = Entity>,
     ranks: &EntityHashMap<usize>,
@@ -96,7 +96,9 @@ pub(in crate::plugins) fn misplaced(
 }
 
 /// The entities of a rig's joints.
-#[derive(Component, Debug, Default)]
+#[derive(Component, Reflect, Debug, Clone, Default)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, Default)]
 pub struct JointEntities {
     pub(super) joints: HashMap<Uid, MirroredJoint>,
     /// Pose offsets of the document that the joints' transforms were last set to.
@@ -184,7 +186,9 @@ fn is_of(revision: Option<&Revision>, rig: &Rig) -> bool {
 }
 
 /// The entities of a rig's tags.
-#[derive(Component, Debug, Default)]
+#[derive(Component, Reflect, Debug, Clone, Default)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, Default)]
 pub struct TagEntities {
     pub(super) tags: HashMap<Uid, MirroredTag>,
 }
@@ -205,7 +209,9 @@ impl TagEntities {
 }
 
 /// The entities of a rig's local groups.
-#[derive(Component, Debug, Default)]
+#[derive(Component, Reflect, Debug, Clone, Default)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, Default)]
 pub struct GroupEntities {
     pub(super) groups: HashMap<Uid, (Entity, GroupData)>,
 }
@@ -218,7 +224,9 @@ impl GroupEntities {
 }
 
 /// The entities of the nodes and constraints that a rig's commands created, parked ones included.
-#[derive(Component, Debug, Default)]
+#[derive(Component, Reflect, Debug, Clone, Default)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, Default)]
 pub struct BuiltEntities {
     pub(in crate::plugins) nodes: BTreeMap<Uid, MirroredNode>,
     pub(in crate::plugins) constraints: BTreeMap<Uid, MirroredConstraint>,
