@@ -14,7 +14,7 @@
 //! | a spawned [`Joint`](schema::Joint) below a rig or joint, a tag on a joint, a group of a rig | | added to the document; the entity stays the same and gets a [`Uid`](crate::rig::Uid) |
 //! | a despawned joint, tag or group | | deleted, joints with their subtree; undoing spawns others |
 //! | `Transform` of a joint or created node | the program, and the document where its pose changes | becomes the node's pose in the same frame, within the channels and limits of a control; a driven node answers with what its constraints make of it |
-//! | [`Attributes`](schema::Attributes) | the program, and the document where its values change | drives the rig in the same frame; a driven value is put back and told for each entity and name ([`document::EntityWriteError::DrivenAttribute`]) |
+//! | [`Attributes`](schema::Attributes) | the program, and the document where its values change | drives the rig in the same frame; a driven value is put back and told for each entity and name ([`document::EntityWriteError::DrivenAttribute`]); where all are taken off, they are put back and told |
 //! | `GlobalTransform` of a node | propagation, corrected where Bevy would shear | overwritten |
 //! | [`Null`](schema::Null) | the document, for joints without weights, and the build, for created nulls | on a joint: an edit, it is without weights; on a created node it is put back and told |
 //! | `Uid` | the document, and the build | immutable in place; what is inserted or removed, on a rig, too, is put back in the same frame and told ([`document::EntityWriteError::Uid`]); a part that is spawned with a free one keeps it |

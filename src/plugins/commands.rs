@@ -57,7 +57,7 @@ impl Plugin for CommandsPlugin {
                 nodes::unsorted_rigs.pipe(nodes::order_siblings),
                 nodes::despawn_parked,
                 constraints::follow_constraints,
-                (guard::keep_built, guard::keep_places, constraints::order_constraints).chain(),
+                (guard::keep_built, guard::keep_places, guard::keep_attributes, constraints::order_constraints).chain(),
                 (run::run_built, report_commands),
                 nodes::note_revisions,
             )

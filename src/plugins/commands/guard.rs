@@ -17,11 +17,11 @@ use crate::{
         },
         runtime::RigRuntime,
         schema::{
-            Constrains, ConstraintKind, ConstraintTargets, Control, CreatedBy, CreatedRole, Joint, NodeLayer, NodeOf,
-            NodeSlot, Null, ParkedNode,
+            Attributes, Constrains, ConstraintKind, ConstraintTargets, Control, CreatedBy, CreatedRole, Joint,
+            NodeLayer, NodeOf, NodeSlot, Null, ParkedNode,
         },
     },
-    rig::{BuiltNode, NodeType, RestTransform, Rig, Uid},
+    rig::{Attribute, BuiltNode, NodeType, RestTransform, Rig, Uid},
 };
 
 /// Components that a build gives to nodes and constraints.
@@ -193,6 +193,40 @@ pub(super) fn keep_places(
         let reason = EntityWriteError::BuiltContent { name, component: Transform::short_type_path() };
         bare_nodes.insert(Bearer::Part(rig, uid));
         for reason in told.look(Bearer::Part(rig, uid), vec![reason]) {
+            warn!("{reason}");
+            refused.write(EditRefusal { rig, reason: reason.into() });
+        }
+    }
+    told.look_at_others(&bare_nodes);
+}
+
+/// Gives `Attributes` back to nodes from which other code took them, with the values that are in effect.
+pub(super) fn keep_attributes(
+    mut commands: Commands,
+    mut removed: RemovedComponents<Attributes>,
+    bare: Query<(), (Without<Attributes>, Allow<Disabled>)>,
+    rigs: Query<(&Rig, &BuiltEntities, Option<&RigRuntime>)>,
+    index: Res<EntityIndex>,
+    mut refused: MessageWriter<EditRefusal>,
+    mut told: Local<ToldRefusals>,
+) {
+    let mut bare_nodes: BTreeSet<Bearer> = BTreeSet::new();
+    for entity in removed.read().filter(|entity| bare.contains(*entity)) {
+        let Some(IndexedEntity { rig, uid, .. }) = index.get(entity) else { continue };
+        let Ok((document, built, runtime)) = rigs.get(rig) else { continue };
+        let joint = built.joints.get(&uid).filter(|(of, _)| *of == entity).map(|(_, node)| node);
+        let created = || built.nodes.get(&uid).filter(|mirrored| mirrored.entity == entity)?.node.as_ref();
+        let Some(node) = joint.or_else(created).filter(|node| !node.attributes.is_empty()) else { continue };
+        let value_of = |attribute: &Attribute| {
+            let now = runtime.and_then(|runtime| runtime.state().attribute(uid, &attribute.name));
+            let set = || document.attribute_value(uid, &attribute.name).unwrap_or(attribute.default);
+            now.unwrap_or_else(|| attribute.clamp(set()))
+        };
+        let values = node.attributes.iter().map(|attribute| (attribute.name.to_string(), value_of(attribute)));
+        commands.entity(entity).try_insert(Attributes(values.collect()));
+        let (name, component) = (node.name.to_string(), Attributes::short_type_path());
+        bare_nodes.insert(Bearer::Part(rig, uid));
+        for reason in told.look(Bearer::Part(rig, uid), vec![EntityWriteError::BuiltContent { name, component }]) {
             warn!("{reason}");
             refused.write(EditRefusal { rig, reason: reason.into() });
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bevy::prelude::*;
 use rigsmith::{
     plugins::{
-        commands::{BuildResult, BuildStep, BuiltEntities},
+        commands::{Attributes, BuildResult, BuildStep, BuiltEntities},
         controls::NodeVisible,
         document::{ChangeError, GroupEntities},
         runtime::RigRuntime,
@@ -45,7 +45,9 @@ fn a_write_that_is_repeated_is_told_once() {
     let group = stage.document().groups()[0].uid;
     let group = stage.get::<GroupEntities>(stage.rig).unwrap().get(group).unwrap();
     let rig = stage.rig;
-    let table: [(Entity, &str, Write); 14] = [
+    let valued = built.nodes.iter().find(|node| !node.attributes.is_empty()).unwrap();
+    let (valued, names) = (stage.node(valued.uid).unwrap(), valued.attributes.clone());
+    let table: [(Entity, &str, Write); 15] = [
         (control, "NodeLabel", |node, _, round| {
             node.insert(NodeLabel(format!("mine {round}")));
         }),
@@ -69,6 +71,9 @@ fn a_write_that_is_repeated_is_told_once() {
         }),
         (control, "Transform", |node, _, _| {
             node.remove::<Transform>();
+        }),
+        (valued, "Attributes", |node, _, _| {
+            node.remove::<Attributes>();
         }),
         (joint, "ChildOf", |node, stranger, _| {
             node.insert(ChildOf(stranger));
@@ -108,14 +113,17 @@ fn a_write_that_is_repeated_is_told_once() {
             stage.app.update();
             told.extend(refused(&mut stage));
         }
-        // A `Transform` that is left alone for some frames counts as written anew.
-        let is_counted = if component == "Transform" { (1..=5).contains(&told.len()) } else { told.len() == 1 };
+        // What is whole for some frames counts as taken off anew.
+        let is_anew = ["Transform", "Attributes"].contains(&component);
+        let is_counted = if is_anew { (1..=5).contains(&told.len()) } else { told.len() == 1 };
         assert!(is_counted && told.iter().all(|of| *of == component), "{component}: {told:?}");
         let off = stage.off();
         assert!(off <= NEAR, "{component}: {off}");
     }
     let now = &stage.get::<BuildResult>(stage.rig).unwrap().0;
     assert_eq!(*now, built);
+    let values = stage.get::<Attributes>(valued).unwrap();
+    assert!(names.iter().all(|attribute| values.0.contains_key(&*attribute.name)), "{values:?}");
 }
 
 /// A created node that is despawned in every frame comes back each time, and is told once.
