@@ -24,7 +24,7 @@ use crate::{
     mesh::{model::Model, shapes::Shapes},
     plugins::{
         RigPlugins,
-        commands::{BuildResult, RigModules},
+        commands::{BuildResult, RigModules, SuppliedBuild},
         document::{ChangeError, EditRefusal, EditRequest},
         face::{
             ExpressError, ExpressRequest, ExpressionAnswer, Face, FaceExpressions, FaceJob, FacePlaced,
@@ -223,7 +223,7 @@ impl Workbench {
 
     /// Sets the result of the rig's commands, so that meshes are bound to the built joints and exported with them.
     pub fn set_built(&mut self, built: Arc<BuiltRig>) {
-        self.app.world_mut().entity_mut(self.rig).insert(BuildResult(built));
+        self.app.world_mut().entity_mut(self.rig).insert((BuildResult(built), SuppliedBuild));
         self.app.update();
     }
 

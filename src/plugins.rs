@@ -8,18 +8,21 @@
 //! | component | written by | somebody else writes it |
 //! | --- | --- | --- |
 //! | `Rig` | the edit path ([`document`]) | only with [`document::EditRequest`]; a replaced component is another document without its history |
-//! | [`NodeLabel`](schema::NodeLabel), [`InGroup`](schema::InGroup), [`RestTransform`](crate::rig::RestTransform), `ChildOf` of a joint | the document | an edit, one step of the history a frame; a value that the document refuses is put back and told once |
+//! | [`NodeLabel`](schema::NodeLabel), [`InGroup`](schema::InGroup), [`RestTransform`](crate::rig::RestTransform), `ChildOf` of a joint | the document | an edit, one step of the history a frame; a value that the document refuses is put back and told |
 //! | [`RestTransform`](crate::rig::RestTransform) of a node of a game's instance | the instance: the built rest pose, below the built parent; that of a joint of the document is the document's instead | no effect on the pose; overwritten by the next template |
 //! | [`LocalGroup`](schema::LocalGroup), [`Tag`](schema::Tag), [`CommandTag`](schema::CommandTag), [`FeatureTag`](schema::FeatureTag), [`TagOf`](schema::TagOf), [`GroupOf`](schema::GroupOf), the order of [`Tags`](schema::Tags), [`InFeature`](schema::InFeature) | the document | an edit, as above |
 //! | a spawned [`Joint`](schema::Joint) below a rig or joint, a tag on a joint, a group of a rig | | added to the document; the entity stays the same and gets a [`Uid`](crate::rig::Uid) |
 //! | a despawned joint, tag or group | | deleted, joints with their subtree; undoing spawns others |
 //! | `Transform` of a joint or created node | the program, and the document where its pose changes | becomes the node's pose in the same frame, within the channels and limits of a control; a driven node answers with what its constraints make of it |
-//! | [`Attributes`](schema::Attributes) | the program, and the document where its values change | drives the rig in the same frame; a driven value is put back and told once for each entity and name ([`document::EntityWriteError::DrivenAttribute`]) |
+//! | [`Attributes`](schema::Attributes) | the program, and the document where its values change | drives the rig in the same frame; a driven value is put back and told for each entity and name ([`document::EntityWriteError::DrivenAttribute`]); where all are taken off, they are put back and told |
 //! | `GlobalTransform` of a node | propagation, corrected where Bevy would shear | overwritten |
 //! | [`Null`](schema::Null) | the document, for joints without weights, and the build, for created nulls | on a joint: an edit, it is without weights; on a created node it is put back and told |
-//! | `Uid`, [`CreatedRole`](schema::CreatedRole), [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`ParkedNode`](schema::ParkedNode), [`commands::CommandReport`], [`commands::BuildResult`], [`commands::BuildFailure`], [`commands::RunFailure`], [`ConstraintKind`](schema::ConstraintKind), [`ConstraintTargets`](schema::ConstraintTargets), [`controls::NodeVisible`] | the build | immutable in place; what is inserted or removed is put back in the same frame and told ([`document::EntityWriteError::BuiltContent`]); reports and failures stand until the next build |
+//! | `Uid` | the document, and the build | immutable in place; what is inserted or removed, on a rig, too, is put back in the same frame and told ([`document::EntityWriteError::Uid`]); a part that is spawned with a free one keeps it |
+//! | [`CreatedRole`](schema::CreatedRole), [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`ParkedNode`](schema::ParkedNode), [`commands::BuildResult`], [`ConstraintKind`](schema::ConstraintKind), [`ConstraintTargets`](schema::ConstraintTargets), [`controls::NodeVisible`] | the build | immutable in place; what is inserted or removed is put back in the same frame and told ([`document::EntityWriteError::BuiltContent`]) |
+//! | [`commands::CommandReport`], [`commands::BuildFailure`], [`commands::RunFailure`] | the build | immutable in place; what is inserted or removed stands until the build writes it again |
+//! | [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`CreatedRole`](schema::CreatedRole), [`NodeOf`](schema::NodeOf), [`Null`](schema::Null), [`NodeLabel`](schema::NodeLabel) and `Name` of a node of a game's instance | the instance | not guarded, because an instance has no document: stands until the instance takes another template over; [`controls::NodeVisible`] follows it, and is put back and told here as well |
 //! | [`controls::size::ShapeFactor`] | the measurement of shapes on a mesh | stands until the mesh or the build changes |
-//! | [`CreatedBy`](schema::CreatedBy), [`Constrains`](schema::Constrains), [`NodeOf`](schema::NodeOf) | the build, and the document for its joints | put back in the same frame and told |
+//! | [`CreatedBy`](schema::CreatedBy), [`Constrains`](schema::Constrains), [`NodeOf`](schema::NodeOf) | the build, and the document for its joints | put back in the same frame and told, but on nodes of games' instances |
 //! | a despawned constraint | | spawned again and told: change the command instead |
 //! | [`RigNodes`](schema::RigNodes), [`LocalGroups`](schema::LocalGroups), [`GroupMembers`](schema::GroupMembers), [`FeatureCommands`](schema::FeatureCommands), [`CreatedNodes`](schema::CreatedNodes), [`NodeConstraints`](schema::NodeConstraints) | Bevy, as the other side of a relation | write the relation instead |
 //! | [`NodeSlot`](schema::NodeSlot) | the instance of a game | immutable |
@@ -30,7 +33,7 @@
 //! | label, group, rest and parent of a created node, and the node itself | the build | put back and told: change the command instead |
 //! | [`face::Expressions`] of a mesh | an [`face::ExpressRequest`] | becomes one, an edit of the pose in the same frame; what is shown already is none; unknown names are told by [`face::ExpressionAnswer`] |
 //! | [`animation::ClipPlayer`] | a person or a game; its time by the playback | plays from there |
-//! | `Name` of joints and groups | the label or name | an edit of the label or name; of a created node it stands until the build writes it |
+//! | `Name` of rigs, joints and groups | the name or label | an edit of the name or label; a rig takes over the one that it is spawned with; one that is removed comes back; of a created node it is put back and told |
 //! | [`document::ShowRest`], [`document::Symmetry`], [`animation::AutoKey`] | the editor | takes effect with the next edit |
 //! | [`selection::HoveredNode`] | picking | stands until the pointer moves |
 //! | [`stage::RigStage`] | the build | immutable; send a [`stage::StageRequest`] |
@@ -44,7 +47,32 @@
 //! | [`ModelFile`](crate::instance::ModelFile) | games and the window | another file is followed; taking it off leaves the mesh |
 //! | [`InstanceClips`](crate::instance::InstanceClips) | games | another file is bound; taking it off leaves the clips |
 //! | [`InstanceAnimations`](crate::instance::InstanceAnimations) | instances with clips | overwritten when file or template change |
+//! | [`history::RigHistory`] | the edit path | opaque; a replaced one forgets what can be undone |
+//! | [`document::JointEntities`], [`document::TagEntities`], [`document::GroupEntities`], [`commands::BuiltEntities`] | the document and the build | opaque; other code reads them: one that is replaced or taken off loses the entities of its rig |
+//! | [`commands::Processor`] | a [`commands::BuildRequest`] | other code reads it; where it is taken off, the next request builds from the beginning |
+//! | [`runtime::RigRuntime`] | the build, and instances | opaque; poses and values that are set with [`runtime::RigRuntime::state_mut`] take effect in the same frame; where it is taken off, the rig stands still until it is built otherwise |
+//! | [`journal::RigJournal`] | whoever opens a document | opaque; taking it off ends the storing of changes |
+//! | [`surface::RigSurface`] | the refresh of surfaces | other code reads it |
+//! | [`gesture::GestureScript`] | whoever has gestures to carry out | its gestures are carried out; taking it off ends them |
+//! | [`stroke::StrokeTips`] | strokes | opaque; stands until the next stroke |
+//! | [`skinning::InstanceBody`], [`skinning::InstanceSkin`] | instances with meshes | opaque; stands until the template or the mesh changes |
+//! | [`painting::PaintCanvas`] | the preparation of a mesh for brushes | opaque; taking it off prepares the mesh anew |
+//! | `RigViewport` (feature `draw`) | whoever spawns the camera | takes effect in the same frame |
+//! | `RigLabels`, `DisplayJob`, `DisplayPiece` (feature `draw`) | the drawing of rigs and meshes | stands until that draws anew |
 //! | [`RunningTemplate`](crate::instance::RunningTemplate), [`UpdateOffer`](crate::instance::UpdateOffer), [`BoundTo`](crate::instance::BoundTo) | instances | opaque; stands until the template, the offer or the mesh changes |
+//!
+//! "Told" means an [`EditRefusal`](document::EditRefusal) and a warning, once for each entity and component, until a write
+//! is accepted or the component has its right value anew.
+//!
+//! Running tasks and notes of the plugins are components without reflection:
+//!
+//! | component without reflection | written by | somebody else writes it |
+//! | --- | --- | --- |
+//! | [`face::FaceJob`], [`skinning::SkinningJob`], [`fit::FitJob`] | a request | taking it off stops the task; its result is dropped |
+//! | [`face::FacePreparation`], [`mesh_reload::ReloadJob`], [`painting::WeightChangeJob`], [`painting::CanvasJob`] | a request, and changed files | taking it off drops the task and its result |
+//! | [`stage::Deletions`] | stages of a rig | other code leaves it alone |
+//! | [`controls::size::MeasuredShapes`] | the measurement of shapes on a mesh | taking it off ends the measurement |
+//! | `PlayedClip` | the playback of a clip | other code leaves it alone |
 
 pub mod animation;
 pub mod commands;

@@ -52,11 +52,12 @@ impl Plugin for CommandsPlugin {
             Update,
             (
                 build_rigs,
+                guard::keep_results,
                 nodes::follow_nodes,
                 nodes::unsorted_rigs.pipe(nodes::order_siblings),
                 nodes::despawn_parked,
                 constraints::follow_constraints,
-                (guard::keep_built, guard::keep_places).chain(),
+                (guard::keep_built, guard::keep_places, guard::keep_attributes, constraints::order_constraints).chain(),
                 (run::run_built, report_commands),
                 nodes::note_revisions,
             )
@@ -134,13 +135,16 @@ pub struct BuildDone {
 
 /// Command processor of a rig, inserted by the first [`BuildRequest`]. Other code reads it; a [`BuildRequest`] changes
 /// what is built.
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component, from_reflect = false)]
 pub struct Processor {
+    #[reflect(ignore)]
     builder: Builder,
     /// Number of commands that an edit rebuilds up to; `None` for all commands.
     goal: Option<usize>,
     follow: bool,
     /// Revision of the document that the builder follows.
+    #[reflect(ignore)]
     revision: Revision,
 }
 
@@ -161,12 +165,17 @@ impl Processor {
     }
 }
 
-/// Result of the commands that a rig has run so far (nodes, constraints, switches); replaced only when it differs.
+/// Result of the commands that a rig has run so far (nodes, constraints, switches); replaced only when it differs. A
+/// result that other code inserts is put back in the same frame, and told.
 #[derive(Component, Reflect, Debug, Clone, Default)]
 #[component(immutable)]
 #[reflect(opaque)]
 #[reflect(Component, Debug, Clone, Default)]
 pub struct BuildResult(pub Arc<BuiltRig>);
+
+/// Marks a rig whose [`BuildResult`] comes from a caller, who built it elsewhere, and not from its processor.
+#[derive(Component)]
+pub(crate) struct SuppliedBuild;
 
 /// Error that stopped a rig's build; absent if the build has no error.
 #[derive(Component, Reflect, Debug, Clone, PartialEq)]
@@ -308,7 +317,7 @@ fn finish(
     let mut entity = commands.entity(rig);
     let built = builder.shared_built();
     if before.is_none_or(|before| !Arc::ptr_eq(&before.0, &built) && before.0 != built) {
-        entity.try_insert(BuildResult(built));
+        entity.try_insert(BuildResult(built)).try_remove::<SuppliedBuild>();
     }
     match &report.error {
         Some(error) => {

@@ -6,6 +6,7 @@
 pub mod outline;
 mod over;
 pub mod size;
+mod visibility;
 
 use std::collections::BTreeSet;
 
@@ -17,7 +18,6 @@ use super::{
     configure_sets,
     document::{EditRefusal, EditRequest},
     runtime::RigRuntime,
-    schema::{Attributes, Control, NodeLayer},
 };
 use crate::{
     rig::{
@@ -47,7 +47,7 @@ impl Plugin for ControlsPlugin {
             .register_type::<size::ShapeFactor>()
             .add_systems(
                 PostUpdate,
-                (show_nodes.after(RigSystems::Solve), size::measure_shapes.after(RigSystems::Surface)),
+                (visibility::show_nodes.after(RigSystems::Solve), size::measure_shapes.after(RigSystems::Surface)),
             );
     }
 }
@@ -263,22 +263,4 @@ fn choices<'a>(built: &'a BuiltRig, switch: &SwitchData) -> Vec<&'a str> {
 pub(crate) fn number_of(choices: &[&str], value: &str) -> Option<f32> {
     let number = choices.iter().position(|choice| *choice == value).map(|number| number as f32);
     number.or_else(|| value.parse().ok().filter(|number: &f32| number.is_finite()))
-}
-
-/// Updates the visibility of nodes whose layer, attributes or control changed.
-fn show_nodes(
-    mut commands: Commands,
-    nodes: Query<
-        (Entity, Option<&NodeLayer>, Option<&Attributes>, Option<&NodeVisible>),
-        (Or<(With<Control>, With<NodeLayer>)>, Or<(Changed<NodeLayer>, Changed<Attributes>, Changed<Control>)>),
-    >,
-) {
-    for (entity, layer, attributes, shown) in &nodes {
-        let is_in = layer.is_none_or(|layer| layer.0.visible);
-        let is_on = attributes.and_then(|attributes| attributes.0.get(VISIBLE)).is_none_or(|value| *value >= 0.5);
-        let visible = NodeVisible(is_in && is_on);
-        if shown != Some(&visible) {
-            commands.entity(entity).try_insert(visible);
-        }
-    }
 }

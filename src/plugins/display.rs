@@ -91,7 +91,8 @@ pub enum WeightColors {
 
 /// Progress of meshes and textures that are still being built or handed to the renderer; on the entity with the
 /// [`RigMesh`](super::surface::RigMesh), and removed when all is on the screen.
-#[derive(Component, Debug)]
+#[derive(Component, Reflect, Debug)]
+#[reflect(Component)]
 pub struct DisplayJob {
     done: f32,
 }
@@ -104,7 +105,8 @@ impl DisplayJob {
 }
 
 /// A child of a mesh's entity that draws a piece of it.
-#[derive(Component, Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[reflect(Component)]
 pub enum DisplayPiece {
     /// Triangles of the surface.
     Surface,

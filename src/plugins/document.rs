@@ -9,6 +9,7 @@ mod adopt;
 pub(in crate::plugins) mod entities;
 mod error;
 pub(in crate::plugins) mod follow;
+pub(in crate::plugins) mod refusals;
 
 use std::{borrow::Cow, sync::Arc};
 
@@ -62,7 +63,7 @@ impl Plugin for DocumentPlugin {
                 Update,
                 (
                     (adopt::adopt_writes, apply_edits).chain().in_set(RigSystems::Edits),
-                    (follow::follow_rigs, follow::follow_tags).chain().in_set(RigSystems::Build),
+                    (follow::follow_rigs, follow::order_groups, follow::follow_tags).chain().in_set(RigSystems::Build),
                 ),
             );
     }

@@ -130,7 +130,8 @@ pub enum LabelChoice {
 
 /// Labels of a rig with their positions: pixels from the viewport's top left corner to the left end of each text, at
 /// half its height. The component is on every rig that has been drawn, and empty while [`RigDrawing::labels`] is off.
-#[derive(Component, Debug, Clone, PartialEq, Default)]
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
+#[reflect(Component, Default)]
 pub struct RigLabels(pub Vec<(Vec2, String)>);
 
 /// Numbers of built pictures, which show that idle frames build none.

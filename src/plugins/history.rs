@@ -21,7 +21,9 @@ pub const MOST_STEPS: usize = 10_000;
 pub const MOST_WEIGHT_BYTES: usize = 1 << 30;
 
 /// Steps done to a rig and steps that can be redone, with the preview of a drag.
-#[derive(Component, Default)]
+#[derive(Component, Reflect, Clone, Default)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Default)]
 pub struct RigHistory {
     stacks: UndoStacks,
     /// Last step that was dropped; it stays in effect.
@@ -32,6 +34,7 @@ pub struct RigHistory {
 }
 
 /// Preview of a drag: its edits are applied to the rig but not recorded.
+#[derive(Clone)]
 struct Preview {
     name: &'static str,
     /// Title of the step that it becomes.

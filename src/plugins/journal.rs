@@ -34,7 +34,9 @@ impl Plugin for JournalPlugin {
 }
 
 /// Sink of the changes of a rig. Remove the component to stop.
-#[derive(Component, Clone)]
+#[derive(Component, Reflect, Clone)]
+#[reflect(opaque)]
+#[reflect(Component, Clone)]
 pub struct RigJournal {
     sink: Arc<dyn StepSink>,
     reported: Arc<Mutex<Option<SinkError>>>,

@@ -80,7 +80,9 @@ pub enum InstanceMode {
 }
 
 /// Running instance of a [`RigProgram`], on the entity of a rig.
-#[derive(Component, Debug, Clone)]
+#[derive(Component, Reflect, Debug, Clone)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone)]
 pub struct RigRuntime {
     state: RigState,
     mode: InstanceMode,

@@ -111,20 +111,27 @@ pub struct RigMeshes(Vec<Entity>);
 ///
 /// `Changed<RigSurface>` reports that another pose was requested, or that a refresh has ended. An app that sleeps while
 /// nothing moves must run frames while the surface [is stale](RigSurface::is_stale).
-#[derive(Component)]
+#[derive(Component, Reflect)]
+#[reflect(Component, from_reflect = false)]
 pub struct RigSurface {
     /// The current surface, and the number of the state that it shows.
+    #[reflect(ignore)]
     landed: Option<(Arc<Surface>, u64)>,
     /// Marks a surface that can be refitted to any pose.
     is_whole: bool,
     /// The state that it should show.
+    #[reflect(ignore)]
     wanted: Vec<PosedMesh>,
     number: u64,
     /// The current refresh, and the number of the state that it will show.
+    #[reflect(ignore)]
     task: Option<(Task<RefreshedSurface>, u64)>,
     /// The meshes that `landed` was built from, or that the task builds from.
+    #[reflect(ignore)]
     built: Vec<PosedMesh>,
+    #[reflect(ignore)]
     spare: Option<Surface>,
+    #[reflect(ignore)]
     points: Vec<Vec3>,
 }
 

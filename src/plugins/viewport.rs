@@ -22,7 +22,8 @@ pub fn framing(bounds: [Vec3; 2], axes: [Vec3; 3], aspect: f32) -> (Vec3, f32) {
 }
 
 /// Marks the camera of the viewport.
-#[derive(Component, Debug, Clone, Copy)]
+#[derive(Component, Reflect, Debug, Clone, Copy)]
+#[reflect(Component, Default)]
 pub struct RigViewport {
     /// Distance from the camera of the point that it orbits, in world units. Strokes in a perspective view are measured
     /// on the plane at that distance.

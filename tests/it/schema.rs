@@ -1,10 +1,17 @@
 //! The schema of rigs: components that are registered for reflection, and the same ones in a game as in the editor.
 
-use std::{any::TypeId, collections::BTreeSet};
+use std::{
+    any::TypeId,
+    collections::{BTreeMap, BTreeSet},
+    path::{Path, PathBuf},
+};
 
 use bevy::{
     asset::AssetPlugin,
-    ecs::reflect::{AppTypeRegistry, ReflectComponent},
+    ecs::{
+        reflect::{AppTypeRegistry, ReflectComponent},
+        resource::IsResource,
+    },
     prelude::*,
 };
 use rigsmith::{
@@ -18,17 +25,21 @@ use rigsmith::{
         schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer, NodeOf, NodeSlot, Null},
     },
     rig::{NodeKind, RestTransform, Rig, RigEdit, Uid, operations::Operation},
+    test_app::test_app,
 };
 
 use super::bench::HANG;
 
-/// Names of components in the first column of the table of `plugins`, without the module in front.
-fn table_components() -> BTreeSet<String> {
+/// Names of components in the first column of a table of `plugins`, without the module in front.
+fn table_components(head: &str) -> BTreeSet<String> {
     let text = include_str!("../../src/plugins.rs");
-    let rows = text.lines().filter_map(|line| line.strip_prefix("//! | ")).skip(1);
-    let cells = rows.take_while(|row| !row.contains("plugin |")).filter_map(|row| row.split(" | ").next());
+    let rows = text
+        .lines()
+        .map(|line| line.strip_prefix("//! | "))
+        .skip_while(|row| row.is_none_or(|row| !row.starts_with(head)));
+    let cells = rows.map_while(|row| row?.split(" | ").next());
     let mut names = BTreeSet::new();
-    for cell in cells {
+    for cell in cells.filter(|cell| cfg!(feature = "draw") || !cell.contains("(feature `draw`)")) {
         for piece in cell.split('`').skip(1).step_by(2) {
             let name = piece.rsplit("::").next().unwrap();
             if name.starts_with(char::is_uppercase) {
@@ -39,9 +50,19 @@ fn table_components() -> BTreeSet<String> {
     names
 }
 
+/// Components that inspectors and remote tools show.
+fn reflected_components() -> BTreeSet<String> {
+    table_components("component | ")
+}
+
+/// Tasks and notes of the plugins, which have no reflection.
+fn hidden_components() -> BTreeSet<String> {
+    table_components("component without reflection | ")
+}
+
 #[test]
 fn every_component_of_the_table_is_registered() {
-    let names = table_components();
+    let names = reflected_components();
     assert!(names.len() > 30, "the table was not read: {names:?}");
     for name in ["Rig", "NodeSlot", "BuildFailure", "RunFailure", "ParkedNode", "Constrains"] {
         assert!(names.contains(name), "the table lacks {name}");
@@ -68,7 +89,7 @@ fn every_registered_component_is_told() {
         RigInstancePlugin::default(),
     ));
     let registry = app.world().resource::<AppTypeRegistry>().read();
-    let names = table_components();
+    let names = reflected_components();
     let registered = registry.iter().filter(|of| of.data::<ReflectComponent>().is_some());
     // The editor's own components describe its windows, not rigs.
     let own = registered
@@ -92,7 +113,7 @@ fn every_registered_component_is_told() {
 fn every_component_of_the_schema_is_told() {
     let text = include_str!("../../src/plugins/schema.rs");
     let mut lines = text.lines();
-    let names = table_components();
+    let names = reflected_components();
     let mut count = 0;
     while let Some(line) = lines.next() {
         if !line.starts_with("#[derive(Component") {
@@ -104,6 +125,82 @@ fn every_component_of_the_schema_is_told() {
         count += 1;
     }
     assert!(count > 25, "the schema was not read");
+}
+
+/// Components that the sources of a folder declare, with their files: public ones, and all others.
+fn declared(folder: &Path, public: &mut BTreeMap<String, PathBuf>, private: &mut BTreeSet<String>) {
+    let mut entries: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    entries.sort();
+    for path in entries {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        // The window, the command line and the remote calls have components of their own, which tell nothing of rigs.
+        if ["editor", "cli", "remote"].contains(&name.trim_end_matches(".rs")) {
+            continue;
+        }
+        if path.is_dir() {
+            declared(&path, public, private);
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut lines = text.lines();
+        while let Some(line) = lines.next() {
+            let derived = line.strip_prefix("#[derive(").map(|line| line.trim_end_matches(")]"));
+            if !derived.is_some_and(|derived| derived.split(", ").any(|name| name == "Component")) {
+                continue;
+            }
+            let is_declaration = |line: &&str| line.contains("struct ") || line.contains("enum ");
+            let declaration = lines.by_ref().filter(|line| !line.starts_with(['#', '/'])).find(is_declaration);
+            let declaration = declaration.unwrap_or_else(|| panic!("{}: {line}", path.display()));
+            let (_, rest) = declaration.split_once("struct ").or_else(|| declaration.split_once("enum ")).unwrap();
+            let name: String = rest.chars().take_while(|letter| letter.is_alphanumeric()).collect();
+            if declaration.starts_with("pub ") {
+                public.insert(name, path.clone());
+            } else {
+                private.insert(name);
+            }
+        }
+    }
+}
+
+/// Every public component has a row, and so has every component that a built rig brings into the world.
+#[test]
+fn every_public_component_has_a_row() {
+    let (mut public, mut private) = (BTreeMap::new(), BTreeSet::new());
+    declared(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut public, &mut private);
+    assert!(public.len() > 80 && private.len() > 5, "the sources were not read: {public:?}, {private:?}");
+    let text = include_str!("../../src/plugins.rs");
+    let (reflected, hidden) = (reflected_components(), hidden_components());
+    assert!(hidden.contains("SkinningJob"), "{hidden:?}");
+    // Without the feature `draw` its components are in no table.
+    let is_told = |name: &String| {
+        let is_drawn = !cfg!(feature = "draw") && text.contains(&format!("`{name}`"));
+        reflected.contains(name) || hidden.contains(name) || is_drawn
+    };
+    let missing: Vec<_> = public.iter().filter(|(name, _)| !is_told(name)).collect();
+    assert!(missing.is_empty(), "the tables of `plugins` lack {missing:?}");
+    let both: Vec<&String> = reflected.intersection(&hidden).collect();
+    assert!(both.is_empty(), "{both:?} are in both tables");
+
+    let mut app = test_app();
+    let rig = app.world_mut().spawn(template().1.rig().as_ref().clone()).id();
+    app.world_mut().write_message(BuildRequest { rig, step: BuildStep::All });
+    for _ in 0..3 {
+        app.update();
+    }
+    let world = app.world();
+    assert!(world.get::<RigRuntime>(rig).is_some());
+    let mut found = BTreeSet::new();
+    for entity in world.iter_entities().filter(|entity| !entity.contains::<IsResource>()) {
+        for component in entity.archetype().components() {
+            let name = world.components().get_name(*component).map(|name| name.to_string()).unwrap_or_default();
+            if name.starts_with("rigsmith::") {
+                found.insert(name.rsplit("::").next().unwrap().to_owned());
+            }
+        }
+    }
+    assert!(found.len() > 25, "{found:?}");
+    let missing: Vec<_> = found.iter().filter(|name| !is_told(name) && !private.contains(*name)).collect();
+    assert!(missing.is_empty(), "the tables of `plugins` lack {missing:?}, which a built rig has");
 }
 
 fn template() -> (&'static str, RigTemplate) {

@@ -6,8 +6,11 @@ mod leftovers;
 pub mod limits;
 mod poses;
 mod random;
+mod refusals;
+mod rig_entity;
 mod springs;
 mod switches;
+mod visibility;
 mod writes;
 
 use std::{path::PathBuf, sync::Arc};

@@ -1,17 +1,17 @@
 //! Constraints as entities: the node that each drives, the nodes that it reads, and their order of evaluation.
 
-use std::{collections::HashSet, sync::Arc};
+use std::{collections::BTreeSet, sync::Arc};
 
-use bevy::prelude::*;
+use bevy::{ecs::entity::EntityHashMap, prelude::*};
 
 use super::BuildResult;
 use crate::{
     plugins::{
         document::{
             JointEntities, TagEntities,
-            entities::{BuiltEntities, EntityIndex, EntityPart, MirroredConstraint},
+            entities::{BuiltEntities, EntityIndex, EntityPart, MirroredConstraint, misplaced},
         },
-        schema::{Constrains, ConstraintKind, ConstraintTarget, ConstraintTargets, CreatedBy},
+        schema::{Constrains, ConstraintKind, ConstraintTarget, ConstraintTargets, CreatedBy, NodeConstraints, NodeOf},
     },
     rig::{Constraint, Dependency, Scalar, Uid},
 };
@@ -40,14 +40,11 @@ pub(super) fn follow_constraints(
                 }
             }
         }
-        // Nodes with a constraint that came to the end of their list: the ones after it are put behind it again.
-        let mut reordered: HashSet<Uid> = HashSet::new();
         for constraint in constraints {
             let entity_of = |node: Uid| joints.get(node).or_else(|| known.get(node));
             if let Some(mirrored) = known.constraints.get(&constraint.uid)
                 && Arc::ptr_eq(&mirrored.constraint, &constraint.constraint)
                 && mirrored.uids.iter().zip(&mirrored.nodes).all(|(uid, entity)| entity_of(*uid) == *entity)
-                && !mirrored.uids.first().is_some_and(|driven| reordered.contains(driven))
             {
                 continue;
             }
@@ -61,12 +58,7 @@ pub(super) fn follow_constraints(
             let read: Vec<Uid> = read.collect();
             let uids: Vec<Uid> = driven.iter().chain(&read).copied().collect();
             let nodes: Vec<Option<Entity>> = uids.iter().map(|node| entity_of(*node)).collect();
-            let is_behind = driven.is_some_and(|driven| reordered.contains(&driven));
-            if let Some(mirrored) = known.constraints.get(&constraint.uid).filter(|m| m.is_same(constraint, &nodes)) {
-                if let Some(driven) = driven.filter(|_| is_behind).and_then(entity_of) {
-                    let mut target = commands.entity(mirrored.entity);
-                    target.try_remove::<Constrains>().try_insert(Constrains(driven));
-                }
+            if known.constraints.get(&constraint.uid).is_some_and(|mirrored| mirrored.is_same(constraint, &nodes)) {
                 continue;
             }
             let kind = constraint.constraint.kind();
@@ -85,13 +77,11 @@ pub(super) fn follow_constraints(
                     {
                         target.try_insert(targets);
                     }
-                    let is_other = before.nodes.first().copied().flatten() != driven_entity;
-                    if is_other || is_behind {
+                    if before.nodes.first().copied().flatten() != driven_entity {
                         target.try_remove::<Constrains>();
                         if let Some(driven_entity) = driven_entity {
                             target.try_insert(Constrains(driven_entity));
                         }
-                        reordered.extend(driven);
                     }
                     before.entity
                 }
@@ -100,7 +90,6 @@ pub(super) fn follow_constraints(
                     let mut fresh = commands.spawn((named, ConstraintKind(kind), targets));
                     if let Some(driven_entity) = driven_entity {
                         fresh.insert(Constrains(driven_entity));
-                        reordered.extend(driven);
                     }
                     if let Some(tag) = tags.get(constraint.command) {
                         fresh.insert(CreatedBy(tag));
@@ -117,6 +106,34 @@ pub(super) fn follow_constraints(
                 nodes,
             };
             known.constraints.insert(constraint.uid, mirrored);
+        }
+    }
+}
+
+/// Puts the constraints on each node into the order in which they run, where a build or other code changed the order.
+pub(super) fn order_constraints(
+    mut commands: Commands,
+    rebuilt: Query<Entity, Changed<BuildResult>>,
+    written: Query<&NodeOf, Changed<NodeConstraints>>,
+    rigs: Query<(&BuildResult, &BuiltEntities)>,
+    constrained: Query<&Constrains>,
+    lists: Query<(Entity, &NodeConstraints)>,
+) {
+    let mut unsorted: BTreeSet<Entity> = rebuilt.iter().collect();
+    unsorted.extend(written.iter().map(|of| of.0));
+    for (built, known) in unsorted.into_iter().filter_map(|rig| rigs.get(rig).ok()) {
+        let mut ranks: EntityHashMap<usize> = EntityHashMap::default();
+        let mut driven: BTreeSet<Entity> = BTreeSet::new();
+        for (rank, constraint) in built.0.constraints.iter().enumerate() {
+            let Some(entity) = known.constraint(constraint.uid) else { continue };
+            ranks.insert(entity, rank);
+            driven.extend(constrained.get(entity).map(|constrains| constrains.0));
+        }
+        for (node, constraints) in driven.into_iter().filter_map(|node| lists.get(node).ok()) {
+            for constraint in misplaced(constraints.iter(), &ranks) {
+                // Removing and inserting each constraint in turn puts it behind the ones before it.
+                commands.entity(constraint).try_remove::<Constrains>().try_insert(Constrains(node));
+            }
         }
     }
 }

@@ -1,26 +1,27 @@
 //! Components that only a build writes: what other code writes to them is reverted in the same frame, and told.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, sync::Arc};
 
 use bevy::{
     ecs::{entity_disabling::Disabled, query::Allow, query::QueryData, system::SystemParam},
     prelude::*,
 };
 
-use super::constraints::targets;
+use super::{BuildResult, Processor, SuppliedBuild, constraints::targets};
 use crate::{
     plugins::{
         document::{
             EditRefusal, EntityWriteError, JointEntities, TagEntities,
             entities::{BuiltEntities, EntityIndex, EntityPart, IndexedEntity},
+            refusals::{Bearer, ToldRefusals},
         },
         runtime::RigRuntime,
         schema::{
-            Constrains, ConstraintKind, ConstraintTargets, Control, CreatedBy, CreatedRole, Joint, NodeLayer, NodeOf,
-            NodeSlot, Null, ParkedNode,
+            Attributes, Constrains, ConstraintKind, ConstraintTargets, Control, CreatedBy, CreatedRole, Joint,
+            NodeLayer, NodeOf, NodeSlot, Null, ParkedNode,
         },
     },
-    rig::{BuiltNode, NodeType, RestTransform, Rig, Uid},
+    rig::{Attribute, BuiltNode, NodeType, RestTransform, Rig, Uid},
 };
 
 /// Components that a build gives to nodes and constraints.
@@ -95,7 +96,9 @@ pub(super) fn keep_built(
     rigs: Query<GuardedRig>,
     index: Res<EntityIndex>,
     mut refused: MessageWriter<EditRefusal>,
+    mut told: Local<ToldRefusals>,
 ) {
+    let mut has_told = false;
     let mut entities = removed.entities();
     entities.extend(written.iter());
     for entity in entities {
@@ -103,18 +106,64 @@ pub(super) fn keep_built(
             continue;
         };
         let Ok((joints, tags, built)) = rigs.get(rig) else { continue };
-        let mut guard = Guard { commands: &mut commands, entity, name: None };
+        let mut guard = Guard { commands: &mut commands, entity, written: Vec::new(), name: String::new() };
         match part {
             EntityPart::Joint => guard.joint(rig, uid, built, &view),
             EntityPart::Node => guard.node(rig, uid, tags, built, &view),
             EntityPart::Constraint => guard.constraint(uid, (joints, tags, built), &view),
             EntityPart::Tag | EntityPart::Group => {}
         }
-        if let Some(name) = guard.name {
-            let reason = EntityWriteError::BuiltContent { name };
+        let Guard { written, name, .. } = guard;
+        let reasons =
+            written.into_iter().map(|component| EntityWriteError::BuiltContent { name: name.clone(), component });
+        for reason in told.look(Bearer::Part(rig, uid), reasons.collect()) {
             warn!("{reason}");
             refused.write(EditRefusal { rig, reason: reason.into() });
+            has_told = true;
         }
+    }
+    if has_told {
+        told.retain(|bearer| matches!(bearer, Bearer::Part(rig, _) if rigs.contains(rig)));
+    }
+}
+
+/// Puts the result of a build back that other code wrote or removed, before anything follows it. A rig that is not built
+/// has no result but a supplied one.
+pub(super) fn keep_results(
+    mut commands: Commands,
+    written: Query<Entity, (Changed<BuildResult>, Without<SuppliedBuild>)>,
+    mut removed: RemovedComponents<BuildResult>,
+    mut rigs: Query<(&Rig, Option<&BuildResult>, Option<&mut Processor>), Without<SuppliedBuild>>,
+    mut refused: MessageWriter<EditRefusal>,
+    mut told: Local<ToldRefusals>,
+) {
+    let mut has_told = false;
+    let entities: BTreeSet<Entity> = removed.read().chain(written.iter()).collect();
+    for entity in entities {
+        let Ok((rig, found, processor)) = rigs.get_mut(entity) else { continue };
+        let wanted = processor.map(|mut processor| processor.bypass_change_detection().builder.shared_built());
+        let is_kept = match (found, &wanted) {
+            (Some(found), Some(wanted)) => Arc::ptr_eq(&found.0, wanted) || found.0 == *wanted,
+            (None, None) => true,
+            _ => false,
+        };
+        let mut reasons = Vec::new();
+        if !is_kept {
+            match wanted {
+                Some(wanted) => commands.entity(entity).try_insert(BuildResult(wanted)),
+                None => commands.entity(entity).try_remove::<BuildResult>(),
+            };
+            let (name, component) = (rig.about().name.clone(), BuildResult::short_type_path());
+            reasons.push(EntityWriteError::BuiltContent { name, component });
+        }
+        for reason in told.look(Bearer::Entity(entity), reasons) {
+            warn!("{reason}");
+            refused.write(EditRefusal { rig: entity, reason: reason.into() });
+            has_told = true;
+        }
+    }
+    if has_told {
+        told.retain(|bearer| matches!(bearer, Bearer::Entity(rig) if rigs.contains(rig)));
     }
 }
 
@@ -126,7 +175,9 @@ pub(super) fn keep_places(
     rigs: Query<(&Rig, Option<&RigRuntime>)>,
     index: Res<EntityIndex>,
     mut refused: MessageWriter<EditRefusal>,
+    mut told: Local<ToldRefusals>,
 ) {
+    let mut bare_nodes: BTreeSet<Bearer> = BTreeSet::new();
     for entity in removed.read() {
         let Some(IndexedEntity { rig, uid, part: EntityPart::Joint | EntityPart::Node }) = index.get(entity) else {
             continue;
@@ -138,23 +189,64 @@ pub(super) fn keep_places(
         };
         let place = runtime.and_then(|runtime| runtime.shown_at(uid)).unwrap_or_else(posed);
         commands.entity(entity).try_insert(place);
-        let reason = EntityWriteError::BuiltContent { name: name.map_or_else(|| uid.to_string(), Name::to_string) };
-        warn!("{reason}");
-        refused.write(EditRefusal { rig, reason: reason.into() });
+        let name = name.map_or_else(|| uid.to_string(), Name::to_string);
+        let reason = EntityWriteError::BuiltContent { name, component: Transform::short_type_path() };
+        bare_nodes.insert(Bearer::Part(rig, uid));
+        for reason in told.look(Bearer::Part(rig, uid), vec![reason]) {
+            warn!("{reason}");
+            refused.write(EditRefusal { rig, reason: reason.into() });
+        }
     }
+    told.look_at_others(&bare_nodes);
+}
+
+/// Gives `Attributes` back to nodes from which other code took them, with the values that are in effect.
+pub(super) fn keep_attributes(
+    mut commands: Commands,
+    mut removed: RemovedComponents<Attributes>,
+    bare: Query<(), (Without<Attributes>, Allow<Disabled>)>,
+    rigs: Query<(&Rig, &BuiltEntities, Option<&RigRuntime>)>,
+    index: Res<EntityIndex>,
+    mut refused: MessageWriter<EditRefusal>,
+    mut told: Local<ToldRefusals>,
+) {
+    let mut bare_nodes: BTreeSet<Bearer> = BTreeSet::new();
+    for entity in removed.read().filter(|entity| bare.contains(*entity)) {
+        let Some(IndexedEntity { rig, uid, .. }) = index.get(entity) else { continue };
+        let Ok((document, built, runtime)) = rigs.get(rig) else { continue };
+        let joint = built.joints.get(&uid).filter(|(of, _)| *of == entity).map(|(_, node)| node);
+        let created = || built.nodes.get(&uid).filter(|mirrored| mirrored.entity == entity)?.node.as_ref();
+        let Some(node) = joint.or_else(created).filter(|node| !node.attributes.is_empty()) else { continue };
+        let value_of = |attribute: &Attribute| {
+            let now = runtime.and_then(|runtime| runtime.state().attribute(uid, &attribute.name));
+            let set = || document.attribute_value(uid, &attribute.name).unwrap_or(attribute.default);
+            now.unwrap_or_else(|| attribute.clamp(set()))
+        };
+        let values = node.attributes.iter().map(|attribute| (attribute.name.to_string(), value_of(attribute)));
+        commands.entity(entity).try_insert(Attributes(values.collect()));
+        let (name, component) = (node.name.to_string(), Attributes::short_type_path());
+        bare_nodes.insert(Bearer::Part(rig, uid));
+        for reason in told.look(Bearer::Part(rig, uid), vec![EntityWriteError::BuiltContent { name, component }]) {
+            warn!("{reason}");
+            refused.write(EditRefusal { rig, reason: reason.into() });
+        }
+    }
+    told.look_at_others(&bare_nodes);
 }
 
 /// Restoration of one entity.
 struct Guard<'a, 'w, 's> {
     commands: &'a mut Commands<'w, 's>,
     entity: Entity,
-    /// Name of the thing that other code wrote to.
-    name: Option<String>,
+    /// Names of the components that other code wrote.
+    written: Vec<&'static str>,
+    /// Name of the node or constraint, if other code wrote to it.
+    name: String,
 }
 
 impl Guard<'_, '_, '_> {
     /// Puts a component back where it differs; returns whether it did.
-    fn hold<C: Component + Clone + PartialEq>(&mut self, found: Option<&C>, wanted: Option<C>) -> bool {
+    fn put_back<C: Component + Clone + PartialEq>(&mut self, found: Option<&C>, wanted: Option<C>) -> bool {
         if found == wanted.as_ref() {
             return false;
         }
@@ -165,54 +257,64 @@ impl Guard<'_, '_, '_> {
         true
     }
 
-    /// Puts a marker back where it differs; returns whether it did.
-    fn mark<C: Component + Default>(&mut self, is_found: bool, is_wanted: bool) -> bool {
+    /// Puts a component back where it differs.
+    fn hold<C: Component + Clone + PartialEq + TypePath>(&mut self, found: Option<&C>, wanted: Option<C>) {
+        if self.put_back(found, wanted) {
+            self.written.push(C::short_type_path());
+        }
+    }
+
+    /// Puts a marker back where it differs.
+    fn mark<C: Component + Default + TypePath>(&mut self, is_found: bool, is_wanted: bool) {
         match (is_found, is_wanted) {
             (false, true) => self.commands.entity(self.entity).try_insert(C::default()),
             (true, false) => self.commands.entity(self.entity).try_remove::<C>(),
-            _ => return false,
+            _ => return,
         };
-        true
+        self.written.push(C::short_type_path());
     }
 
     /// A relation: silent where Bevy took it away together with its target.
-    fn relate<C: Component + Clone + PartialEq>(&mut self, found: Option<&C>, wanted: Option<C>) -> bool {
-        self.hold(found, wanted) && found.is_some()
+    fn relate<C: Component + Clone + PartialEq + TypePath>(&mut self, found: Option<&C>, wanted: Option<C>) {
+        if self.put_back(found, wanted) && found.is_some() {
+            self.written.push(C::short_type_path());
+        }
     }
 
     fn joint(&mut self, rig: Entity, uid: Uid, built: &BuiltEntities, view: &GuardedComponentsItem) {
         let node = built.joints.get(&uid).filter(|(of, _)| *of == self.entity).map(|(_, node)| node);
         let layer = node.and_then(|node| node.layer.as_deref()).cloned().map(NodeLayer);
-        let mut is_other = self.hold(view.of, Some(NodeOf(rig)));
-        is_other |= self.hold(view.layer, layer);
-        is_other |= self.hold(view.control, None);
-        is_other |= self.hold(view.role, None);
-        is_other |= self.mark::<ParkedNode>(view.is_parked, false);
-        if is_other {
-            self.name = Some(node.map_or_else(|| uid.to_string(), |node| node.name.to_string()));
+        self.hold(view.of, Some(NodeOf(rig)));
+        self.hold(view.layer, layer);
+        self.hold(view.control, None);
+        self.hold(view.role, None);
+        self.mark::<ParkedNode>(view.is_parked, false);
+        if !self.written.is_empty() {
+            self.name = node.map_or_else(|| uid.to_string(), |node| node.name.to_string());
         }
     }
 
     fn node(&mut self, rig: Entity, uid: Uid, tags: &TagEntities, built: &BuiltEntities, view: &GuardedComponentsItem) {
         let Some(mirrored) = built.nodes.get(&uid).filter(|mirrored| mirrored.entity == self.entity) else { return };
         if mirrored.is_parked {
-            if self.mark::<ParkedNode>(view.is_parked, true) {
+            self.mark::<ParkedNode>(view.is_parked, true);
+            if !self.written.is_empty() {
                 self.commands.entity(self.entity).try_insert(Disabled);
-                self.name = Some(uid.to_string());
+                self.name = uid.to_string();
             }
             return;
         }
         let Some(node) = &mirrored.node else { return };
-        let mut is_other = self.hold(view.of, Some(NodeOf(rig)));
-        is_other |= self.hold(view.role, role_of(node));
-        is_other |= self.hold(view.layer, node.layer.as_deref().cloned().map(NodeLayer));
-        is_other |= self.hold(view.control, node.control.as_deref().cloned().map(Control));
-        is_other |= self.mark::<Null>(view.is_null, node.kind == NodeType::Null);
-        is_other |= self.mark::<Joint>(view.is_joint, node.kind == NodeType::Joint);
-        is_other |= self.mark::<ParkedNode>(view.is_parked, false);
-        is_other |= self.relate(view.by, tags.get(mirrored.command).map(CreatedBy));
-        if is_other {
-            self.name = Some(node.name.to_string());
+        self.hold(view.of, Some(NodeOf(rig)));
+        self.hold(view.role, role_of(node));
+        self.hold(view.layer, node.layer.as_deref().cloned().map(NodeLayer));
+        self.hold(view.control, node.control.as_deref().cloned().map(Control));
+        self.mark::<Null>(view.is_null, node.kind == NodeType::Null);
+        self.mark::<Joint>(view.is_joint, node.kind == NodeType::Joint);
+        self.mark::<ParkedNode>(view.is_parked, false);
+        self.relate(view.by, tags.get(mirrored.command).map(CreatedBy));
+        if !self.written.is_empty() {
+            self.name = node.name.to_string();
         }
     }
 
@@ -223,14 +325,14 @@ impl Guard<'_, '_, '_> {
         let nodes: Vec<Option<Entity>> =
             mirrored.uids.iter().map(|node| joints.get(*node).or_else(|| built.get(*node))).collect();
         let driven = mirrored.constraint.drives().len().min(1);
-        let mut is_other = self.hold(view.kind, Some(ConstraintKind(mirrored.constraint.kind())));
+        self.hold(view.kind, Some(ConstraintKind(mirrored.constraint.kind())));
         let sources = nodes.get(driven..).unwrap_or_default();
-        is_other |= self.hold(view.targets, Some(targets(&mirrored.constraint, sources)));
+        self.hold(view.targets, Some(targets(&mirrored.constraint, sources)));
         let constrains = nodes.first().copied().flatten().filter(|_| driven > 0).map(Constrains);
-        is_other |= self.relate(view.constrains, constrains);
-        is_other |= self.relate(view.by, tags.get(mirrored.command).map(CreatedBy));
-        if is_other {
-            self.name = Some(mirrored.constraint.kind().to_owned());
+        self.relate(view.constrains, constrains);
+        self.relate(view.by, tags.get(mirrored.command).map(CreatedBy));
+        if !self.written.is_empty() {
+            self.name = mirrored.constraint.kind().to_owned();
         }
     }
 }

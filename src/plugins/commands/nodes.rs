@@ -112,7 +112,11 @@ pub(super) fn follow_nodes(
             let parent = joint.parent.and_then(|parent| joints.get(parent)).unwrap_or(rig_entity);
             writer.place_joint(joints, joint.data.uid, parent, &parents);
         }
-        known.joints.retain(|uid, _| built_uids.contains(uid));
+        let mut gone: Vec<Uid> = known.joints.keys().filter(|uid| !built_uids.contains(*uid)).copied().collect();
+        gone.sort_unstable();
+        for (entity, before) in gone.into_iter().filter_map(|uid| known.joints.remove(&uid)) {
+            writer.undescribe(entity, &before);
+        }
     }
 }
 
@@ -285,6 +289,18 @@ impl Writer<'_, '_, '_> {
             };
         }
         self.describe_any(entity, rig, node, before);
+    }
+
+    /// Takes layer and attributes off a joint of the document that is not built any more. Once it is built again, it gets
+    /// the ones of then.
+    fn undescribe(&mut self, entity: Entity, before: &BuiltNode) {
+        let mut target = self.commands.entity(entity);
+        if before.layer.is_some() {
+            target.try_remove::<NodeLayer>();
+        }
+        if !before.attributes.is_empty() {
+            target.try_remove::<Attributes>();
+        }
     }
 
     /// Writes the components that a build gives both to created nodes and to joints of the document: layer and

@@ -9,6 +9,7 @@
 mod groups;
 mod joints;
 mod removal;
+mod rigs;
 mod sorting;
 mod tags;
 mod trial;
@@ -29,11 +30,15 @@ use super::{
     EditRefusal,
     entities::{BuiltEntities, EntityIndex, EntityPart, GroupEntities, JointEntities, TagEntities},
     error::{EntityWrite, EntityWriteError},
+    refusals::{Bearer, ToldRefusals},
 };
 use crate::{
-    plugins::schema::{
-        CommandTag, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf,
-        NodeSlot, Null, ParkedNode, Tag, TagOf, Tags,
+    plugins::{
+        history::RigHistory,
+        schema::{
+            CommandTag, ConstraintKind, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup,
+            NodeLabel, NodeOf, NodeSlot, Null, ParkedNode, Tag, TagOf, Tags,
+        },
     },
     rig::{RestTransform, Rig, RigEdit, Uid, UidSource},
 };
@@ -87,17 +92,21 @@ type OfDocument = (Without<NodeSlot>, Allow<Disabled>);
 /// Entities that were written since the last frame, by this plugin or by other code.
 #[derive(SystemParam)]
 pub(super) struct WrittenEntities<'w, 's> {
-    nodes: Query<'w, 's, Entity, (Or<(With<Joint>, With<CreatedRole>)>, JointWritten, OfDocument)>,
+    nodes:
+        Query<'w, 's, Entity, (Or<(With<Joint>, With<CreatedRole>, With<ConstraintKind>)>, JointWritten, OfDocument)>,
     tags: Query<'w, 's, Entity, (TagWritten, OfDocument)>,
     groups: Query<
         'w,
         's,
         Entity,
         (
-            (Or<(Changed<LocalGroup>, Changed<GroupOf>, Changed<Name>)>, Or<(With<LocalGroup>, With<GroupOf>)>),
+            Or<(Changed<LocalGroup>, Changed<GroupOf>, Changed<Name>, Changed<Uid>)>,
+            Or<(With<LocalGroup>, With<GroupOf>)>,
             Allow<Disabled>,
         ),
     >,
+    /// Rigs whose name or uid was written, and fresh ones: the history comes with the rig.
+    of_rigs: Query<'w, 's, Entity, (Or<(Changed<Name>, Changed<Uid>, Added<RigHistory>)>, With<Rig>, Allow<Disabled>)>,
     uid: RemovedComponents<'w, 's, Uid>,
     of_joints: (
         RemovedComponents<'w, 's, Joint>,
@@ -125,7 +134,14 @@ struct WrittenByKind {
     joints: BTreeSet<Entity>,
     tags: BTreeSet<Entity>,
     groups: BTreeSet<Entity>,
+    rigs: BTreeSet<Entity>,
     uids: BTreeSet<Entity>,
+}
+
+impl WrittenByKind {
+    fn is_empty(&self) -> bool {
+        [&self.joints, &self.tags, &self.groups, &self.rigs, &self.uids].into_iter().all(BTreeSet::is_empty)
+    }
 }
 
 impl WrittenEntities<'_, '_> {
@@ -134,11 +150,14 @@ impl WrittenEntities<'_, '_> {
         touched.joints.extend(self.nodes.iter());
         touched.tags.extend(self.tags.iter());
         touched.groups.extend(self.groups.iter());
+        touched.rigs.extend(self.of_rigs.iter());
         touched.uids.extend(self.uid.read());
+        touched.rigs.extend(&touched.uids);
         let (joint, null, name, label, group, rest, child_of) = &mut self.of_joints;
-        // Groups have names, too.
+        // Groups and rigs have names, too.
         let names: Vec<Entity> = name.read().collect();
         touched.groups.extend(&names);
+        touched.rigs.extend(&names);
         let markers = joint.read().chain(null.read()).chain(names).chain(label.read());
         touched.joints.extend(markers.chain(group.read()).chain(rest.read()).chain(child_of.read()));
         let (tag, command, feature, tag_of, in_feature) = &mut self.of_tags;
@@ -173,6 +192,7 @@ pub(super) fn adopt_writes(
     mut edits: ResMut<EntityEdits>,
     mut refused: MessageWriter<EditRefusal>,
     parked: Query<(), (With<ParkedNode>, Allow<Disabled>)>,
+    mut told: Local<ToldRefusals>,
 ) {
     let touched = written.take();
     let closed: HashSet<Entity> = written.rigs.read().filter(|rig| !rigs.contains(*rig)).collect();
@@ -182,11 +202,12 @@ pub(super) fn adopt_writes(
             commands.entity(entity).try_despawn();
         }
     }
-    if touched.joints.is_empty() && touched.tags.is_empty() && touched.groups.is_empty() && touched.uids.is_empty() {
+    if touched.is_empty() {
         return;
     }
     // Usually only this plugin has written, so that nothing differs.
     let by_rig = sorting::sort_by_rig(&touched, &views, &index, |entity| rigs.contains(entity));
+    let mut has_told = false;
     for (rig_entity, writes) in by_rig {
         let Ok((mut rig, mut joints, mut tags, mut groups, mut built)) = rigs.get_mut(rig_entity) else { continue };
         let mut trial = Trial::new(rig_entity, rig.bypass_change_detection(), &mut uids);
@@ -200,6 +221,7 @@ pub(super) fn adopt_writes(
             groups: groups.bypass_change_detection(),
             built: built.as_mut().map(|built| built.bypass_change_detection()),
         };
+        adoption.rig_written(&writes);
         adoption.groups_written(&writes);
         adoption.joints_spawned(&writes);
         adoption.joints_written(&writes);
@@ -207,10 +229,11 @@ pub(super) fn adopt_writes(
         adoption.despawned(&writes);
         // Among the tags that are left: one of them may have been despawned in the same frame.
         adoption.orders_written(&writes);
-        let outcome = trial.finish();
-        for reason in outcome.refused {
+        let mut outcome = trial.finish();
+        for reason in outcome.take_refused(&mut told) {
             warn!("{reason}");
             refused.write(EditRefusal { rig: rig_entity, reason: reason.into() });
+            has_told = true;
         }
         if outcome.respawn {
             rig.set_changed();
@@ -220,6 +243,12 @@ pub(super) fn adopt_writes(
         if !outcome.edits.is_empty() {
             edits.0.push((rig_entity, outcome.edits));
         }
+    }
+    if has_told {
+        told.retain(|bearer| match bearer {
+            Bearer::Part(rig, _) => rigs.contains(rig),
+            Bearer::Entity(entity) => views.contains(entity),
+        });
     }
 }
 

@@ -80,12 +80,32 @@ impl EntityIndex {
     }
 }
 
+/// Members of a relation that have to be added again, in this order, so that the members with ranks stand by rank.
+pub(in crate::plugins) fn misplaced(
+    members: impl Iterator<Item = Entity>,
+    ranks: &EntityHashMap<usize>,
+) -> Vec<Entity> {
+    let members: Vec<Entity> = members.filter(|member| ranks.contains_key(member)).collect();
+    let mut sorted = members.clone();
+    sorted.sort_by_key(|member| ranks.get(member).copied());
+    let mut kept = 0;
+    for member in &members {
+        kept += usize::from(sorted.get(kept) == Some(member));
+    }
+    sorted.split_off(kept)
+}
+
 /// The entities of a rig's joints.
-#[derive(Component, Debug, Default)]
+#[derive(Component, Reflect, Debug, Clone, Default)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, Default)]
 pub struct JointEntities {
     pub(super) joints: HashMap<Uid, MirroredJoint>,
     /// Pose offsets of the document that the joints' transforms were last set to.
     pub(super) posed: BTreeMap<Uid, PoseOffset>,
+    /// Uid and name last written to the entity of the rig, or adopted from it.
+    pub(super) rig_uid: Option<Uid>,
+    pub(super) rig_name: Option<String>,
     /// Revision of the document that all entities of the rig follow; `None` if one of them has to be written again.
     revision: Option<Revision>,
     /// Revision that the entities of joints and groups follow, while those of tags and nodes may lag behind.
@@ -166,7 +186,9 @@ fn is_of(revision: Option<&Revision>, rig: &Rig) -> bool {
 }
 
 /// The entities of a rig's tags.
-#[derive(Component, Debug, Default)]
+#[derive(Component, Reflect, Debug, Clone, Default)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, Default)]
 pub struct TagEntities {
     pub(super) tags: HashMap<Uid, MirroredTag>,
 }
@@ -187,7 +209,9 @@ impl TagEntities {
 }
 
 /// The entities of a rig's local groups.
-#[derive(Component, Debug, Default)]
+#[derive(Component, Reflect, Debug, Clone, Default)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, Default)]
 pub struct GroupEntities {
     pub(super) groups: HashMap<Uid, (Entity, GroupData)>,
 }
@@ -200,7 +224,9 @@ impl GroupEntities {
 }
 
 /// The entities of the nodes and constraints that a rig's commands created, parked ones included.
-#[derive(Component, Debug, Default)]
+#[derive(Component, Reflect, Debug, Clone, Default)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, Default)]
 pub struct BuiltEntities {
     pub(in crate::plugins) nodes: BTreeMap<Uid, MirroredNode>,
     pub(in crate::plugins) constraints: BTreeMap<Uid, MirroredConstraint>,

@@ -62,10 +62,12 @@ pub enum EntityWriteError {
         kind: &'static str,
     },
     /// A component that only a build writes was inserted, replaced or removed.
-    #[error("components of \"{name}\" that the build gives stay as they are built; change the command instead")]
+    #[error("`{component}` of \"{name}\" stays as the build gives it; change the command instead")]
     BuiltContent {
-        /// Name of the node, or kind of the constraint.
+        /// Name of the node or rig, or kind of the constraint.
         name: String,
+        /// Name of the component.
+        component: &'static str,
     },
     /// An attribute that a constraint drives was written.
     #[error(
@@ -81,10 +83,12 @@ pub enum EntityWriteError {
         driver: String,
     },
     /// A created node was written.
-    #[error("\"{name}\" was created by a command and stays as that says; change the command")]
+    #[error("`{component}` of \"{name}\", which a command created, stays as that says; change the command")]
     CreatedContent {
         /// Name of the node.
         name: String,
+        /// Name of the component.
+        component: &'static str,
     },
     /// A joint was spawned outside of the document.
     #[error("a joint was spawned below an entity that is no joint of the document; spawn it below a joint or the rig")]
@@ -124,6 +128,27 @@ pub enum EntityWriteError {
     },
 }
 
+impl EntityWriteError {
+    /// Name of the component whose write was refused; `Entity` where an entity was spawned or despawned.
+    pub fn component(&self) -> &'static str {
+        match self {
+            Self::Refused { write, .. } => write.component(),
+            Self::Uid { .. } => "Uid",
+            Self::CreatedNode | Self::CreatedConstraint { .. } => "Entity",
+            Self::BuiltContent { component, .. } | Self::CreatedContent { component, .. } => *component,
+            Self::DrivenAttribute { .. } => "Attributes",
+            Self::JointParent | Self::ForeignParent(_) => "ChildOf",
+            Self::JointMarker(_) => "Joint",
+            Self::ForeignGroup(_) => "InGroup",
+            Self::TagBearer | Self::TagJoint(_) => "TagOf",
+            Self::ForeignFeature => "InFeature",
+            Self::TagContent(_) => "CommandTag",
+            Self::GroupRig { .. } => "GroupOf",
+            Self::GroupContent { .. } => "LocalGroup",
+        }
+    }
+}
+
 /// Kind of a write to an entity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum EntityWrite {
@@ -133,6 +158,9 @@ pub enum EntityWrite {
     /// Joints were despawned.
     #[error("a despawned joint")]
     DespawnedJoint,
+    /// The name of a rig was written.
+    #[error("a write to the name of a rig")]
+    RigName,
     /// The label of a joint was written.
     #[error("a write to a label")]
     Label,
@@ -172,4 +200,28 @@ pub enum EntityWrite {
     /// The content of a local group was written.
     #[error("a write to a local group")]
     LocalGroup,
+}
+
+impl EntityWrite {
+    /// Name of the component that was written; `Entity` where an entity was spawned or despawned.
+    pub fn component(self) -> &'static str {
+        match self {
+            Self::SpawnedJoint
+            | Self::DespawnedJoint
+            | Self::SpawnedTag
+            | Self::DespawnedTag
+            | Self::SpawnedLocalGroup
+            | Self::DespawnedLocalGroup => "Entity",
+            Self::RigName => "Name",
+            Self::Label => "NodeLabel",
+            Self::Kind => "Null",
+            Self::Group => "InGroup",
+            Self::Rest => "RestTransform",
+            Self::Parent => "ChildOf",
+            Self::Tag => "CommandTag",
+            Self::TagJoint => "TagOf",
+            Self::TagOrder => "Tags",
+            Self::LocalGroup => "LocalGroup",
+        }
+    }
 }

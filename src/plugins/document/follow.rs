@@ -2,17 +2,20 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use bevy::prelude::*;
+use bevy::{ecs::entity::EntityHashMap, prelude::*};
 
 use super::{
     ShowRest,
-    entities::{EntityIndex, EntityPart, GroupEntities, JointEntities, MirroredJoint, MirroredTag, TagEntities},
+    entities::{
+        EntityIndex, EntityPart, GroupEntities, JointEntities, MirroredJoint, MirroredTag, TagEntities, misplaced,
+    },
 };
 use crate::{
     plugins::{
         runtime::RigRuntime,
         schema::{
-            CommandTag, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeOf, Null, Tag, TagOf,
+            CommandTag, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, LocalGroups, NodeLabel, NodeOf,
+            Null, Tag, TagOf,
         },
     },
     rig::{NodeKind, PoseOffset, RestTransform, Rig, TagKind, Uid},
@@ -39,13 +42,20 @@ pub(in crate::plugins) fn follow_rigs(
 ) {
     for (rig_entity, rig, mut joints, mut groups, show_rest, is_running, name, uid) in &mut rigs {
         let rig: &Rig = &rig;
-        if name.is_none_or(|name| name.as_str() != rig.about().name) {
-            commands.entity(rig_entity).try_insert(Name::new(rig.about().name.clone()));
-        }
-        if uid != Some(&rig.uid()) {
-            commands.entity(rig_entity).try_insert(rig.uid());
-        }
         let known = joints.bypass_change_detection();
+        // A name or uid that other code gave to the rig, and that this plugin has not written, waits for its adoption.
+        if known.rig_name.as_ref() != Some(&rig.about().name) {
+            if known.rig_name.is_some() || name.is_none() {
+                commands.entity(rig_entity).try_insert(Name::new(rig.about().name.clone()));
+            }
+            known.rig_name = Some(rig.about().name.clone());
+        }
+        if known.rig_uid != Some(rig.uid()) {
+            if known.rig_uid.is_some() || uid.is_none() {
+                commands.entity(rig_entity).try_insert(rig.uid());
+            }
+            known.rig_uid = Some(rig.uid());
+        }
         let is_posed = !show_rest.is_some_and(|show_rest| show_rest.0);
         if known.follow(rig) {
             follow_pose(known, rig, is_posed, is_running, &mut places);
@@ -230,6 +240,21 @@ fn follow_groups(
                 index.insert(entity, rig_entity, group.uid, EntityPart::Group);
                 known.groups.insert(group.uid, (entity, group.clone()));
             }
+        }
+    }
+}
+
+/// Puts the local groups of rigs into the order of the document, where the document or other code changed the order.
+pub(in crate::plugins) fn order_groups(
+    mut commands: Commands,
+    rigs: Query<(Entity, &Rig, &GroupEntities, &LocalGroups), Or<(Changed<Rig>, Changed<LocalGroups>)>>,
+) {
+    for (rig_entity, rig, known, groups) in &rigs {
+        let ranks: EntityHashMap<usize> =
+            (rig.groups().iter().enumerate()).filter_map(|(rank, group)| Some((known.get(group.uid)?, rank))).collect();
+        for group in misplaced(groups.iter(), &ranks) {
+            // Removing and inserting each group in turn puts it behind the ones before it.
+            commands.entity(group).try_remove::<GroupOf>().try_insert(GroupOf(rig_entity));
         }
     }
 }

@@ -33,17 +33,20 @@ const LIST: &str = "gestures";
 const PARTS: &str = "parts/";
 
 /// Gestures to carry out on the rig of this entity, and the answers so far.
-#[derive(Component, Default)]
+#[derive(Component, Reflect, Default)]
+#[reflect(Component, Default, from_reflect = false)]
 pub struct GestureScript {
+    #[reflect(ignore)]
     waiting: VecDeque<Gesture>,
     /// Answers, one for each finished gesture, in order.
     pub answers: Vec<GestureAnswer>,
+    #[reflect(ignore)]
     state: UserState,
     pending: bool,
 }
 
 /// Answer to a gesture.
-#[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
+#[derive(Reflect, Debug, Clone, PartialEq, Default, serde::Serialize)]
 pub struct GestureAnswer {
     /// Number of the gesture in the list, from one.
     pub number: usize,

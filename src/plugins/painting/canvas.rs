@@ -18,7 +18,9 @@ use crate::{
 pub struct CanvasUse(pub Option<Entity>);
 
 /// Mesh prepared for brushes; on the entity with the [`RigMesh`].
-#[derive(Component, Clone)]
+#[derive(Component, Reflect, Clone)]
+#[reflect(opaque)]
+#[reflect(Component, Clone)]
 pub struct PaintCanvas {
     /// The prepared mesh.
     pub canvas: Arc<Canvas>,

@@ -11,7 +11,9 @@ use crate::{
 
 /// Rig and build of an entity that has no document of its own; all instances of a template share them. Meshes of such an entity
 /// have their weights as [`InstanceSkin`].
-#[derive(Component, Debug, Clone)]
+#[derive(Component, Reflect, Debug, Clone)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone)]
 pub struct InstanceBody {
     /// The rig.
     pub rig: Arc<Rig>,
@@ -20,7 +22,9 @@ pub struct InstanceBody {
 }
 
 /// Weights of a mesh over the joints of an [`InstanceBody`], shared by equal meshes.
-#[derive(Component, Debug, Clone)]
+#[derive(Component, Reflect, Debug, Clone)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone)]
 pub struct InstanceSkin(pub Arc<SkinData>);
 
 /// Hash of the joints that weights of a mesh follow from.

@@ -58,7 +58,9 @@ impl ParentReason {
 /// The joints that strokes left selected on this rig, and that no person has picked since.
 ///
 /// Added to a rig's entity with its first chain.
-#[derive(Component, Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Component, Reflect, Debug, Clone, PartialEq, Eq, Default)]
+#[reflect(opaque)]
+#[reflect(Component, Debug, Clone, PartialEq, Default)]
 pub struct StrokeTips(pub(super) BTreeSet<Uid>);
 
 impl StrokeTips {

@@ -147,6 +147,18 @@ fn values(stage: &Stage, registry: &TypeRegistry) -> Values {
     values
 }
 
+/// State of the rig itself, with more in it than its reflected value shows.
+const STATES: [&str; 8] = [
+    "::RigHistory",
+    "::RigRuntime",
+    "::Processor",
+    "::RigSurface",
+    "::JointEntities",
+    "::TagEntities",
+    "::GroupEntities",
+    "::BuiltEntities",
+];
+
 /// Components that an edit wrote although their values are the same as before, and how many it wrote in all. Markers
 /// without a value, such as those of Bevy's propagation of transforms, do not count.
 fn unchanged_writes(stage: &mut Stage, edit: impl FnOnce(&mut Stage)) -> (Vec<String>, usize) {
@@ -168,7 +180,9 @@ fn unchanged_writes(stage: &mut Stage, edit: impl FnOnce(&mut Stage)) -> (Vec<St
         let is_root = *entity == stage.rig && name.ends_with("GlobalTransform");
         let is_of_bevy = !is_root
             && ["::Transform", "GlobalTransform", "Name", "ChildOf", "Children"].iter().any(|end| name.ends_with(*end));
+        let is_state = *entity == stage.rig && STATES.iter().any(|state| name.ends_with(state));
         let is_same = match (before.get(&key), after.get(&key)) {
+            _ if is_state => false,
             (Some(before), Some(after)) => {
                 before.reflect_partial_eq(&**after).unwrap_or_else(|| format!("{before:?}") == format!("{after:?}"))
             }

@@ -12,8 +12,8 @@ use rigsmith::{
         runtime::RigRuntime,
         schema::{
             CommandTag, Constrains, ConstraintKind, ConstraintTargets, Control, CreatedBy, CreatedRole, FeatureTag,
-            GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeLabel, NodeLayer, NodeOf, Null, ParkedNode, Tag, TagOf,
-            Tags,
+            GroupOf, InFeature, InGroup, Joint, LocalGroup, LocalGroups, NodeConstraints, NodeLabel, NodeLayer, NodeOf,
+            Null, ParkedNode, Tag, TagOf, Tags,
         },
     },
     prelude::*,
@@ -31,6 +31,12 @@ use crate::random::Random;
 #[track_caller]
 fn check(stage: &mut Stage, what: &str) {
     let rig = stage.document().clone();
+    assert_eq!(
+        stage.get::<Name>(stage.rig).map(Name::as_str),
+        Some(rig.about().name.as_str()),
+        "{what}: the rig's name"
+    );
+    assert_eq!(stage.get::<Uid>(stage.rig), Some(&rig.uid()), "{what}: the rig's uid");
     // Commands may put joints below other nodes.
     let built = stage.get::<BuildResult>(stage.rig).map(|built| built.0.clone()).unwrap_or_default();
     let parents: BTreeMap<Uid, Option<Uid>> =
@@ -113,6 +119,11 @@ fn check(stage: &mut Stage, what: &str) {
         assert_eq!((&told.name, told.color, told.enabled), (&group.name, group.color, group.enabled), "{what}");
         assert_eq!(stage.get::<Name>(entity).map(Name::as_str), Some(group.name.as_str()), "{what}");
     }
+    let order: Vec<Entity> =
+        stage.get::<LocalGroups>(stage.rig).map_or_else(Vec::new, |groups| groups.iter().collect());
+    let known = stage.get::<GroupEntities>(stage.rig).unwrap();
+    let wanted: Vec<Entity> = rig.groups().iter().filter_map(|group| known.get(group.uid)).collect();
+    assert_eq!(order, wanted, "{what}: the order of groups");
     let world = stage.app.world_mut();
     let groups = world.query::<&LocalGroup>().iter(world).count();
     let tags = world.query::<&TagOf>().iter(world).count();
@@ -149,6 +160,7 @@ fn check_built(stage: &Stage, built: &BuiltRig, what: &str) {
         assert_eq!(by, Some(origin.command), "{what}: the command of {}", node.name);
         assert!(stage.get::<ParkedNode>(entity).is_none(), "{what}: {} is parked", node.name);
     }
+    let mut orders: BTreeMap<Entity, Vec<Entity>> = BTreeMap::new();
     for constraint in &built.constraints {
         let entity = stage.get::<BuiltEntities>(stage.rig).unwrap().constraint(constraint.uid);
         let entity = entity.unwrap_or_else(|| panic!("{what}: constraint {} has no entity", constraint.uid));
@@ -162,6 +174,13 @@ fn check_built(stage: &Stage, built: &BuiltRig, what: &str) {
         let is_of_rig = |of: &Constrains| stage.get::<NodeOf>(of.0) == Some(&NodeOf(stage.rig));
         let drives = !constraint.constraint.drives().is_empty();
         assert_eq!(stage.get::<Constrains>(entity).is_some_and(is_of_rig), drives, "{what}: {}", constraint.uid);
+        if let Some(Constrains(node)) = stage.get::<Constrains>(entity) {
+            orders.entry(*node).or_default().push(entity);
+        }
+    }
+    for (node, wanted) in orders {
+        let order: Vec<Entity> = stage.get::<NodeConstraints>(node).unwrap().iter().collect();
+        assert_eq!(order, wanted, "{what}: the order of the constraints on a node");
     }
 }
 
@@ -456,6 +475,12 @@ fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
         }
         (36, Some(entity), ..) => {
             world.entity_mut(entity).insert(Name::new(format!("m{number}")));
+        }
+        (37, ..) if number.is_multiple_of(3) => {
+            world.entity_mut(rig_entity).insert(Name::new(format!("m{number}")));
+        }
+        (37, ..) if number % 3 == 1 => {
+            world.entity_mut(rig_entity).remove::<(Name, Uid)>();
         }
         (37, _, _, Some(group)) => {
             world.entity_mut(group).insert(Name::new(format!("m{number}")));

@@ -7,7 +7,7 @@ use rigsmith::{
         document::{ChangeError, EntityWriteError, GroupEntities, TagEntities},
         schema::{
             Attributes, CommandTag, Constrains, ConstraintTargets, CreatedBy, FeatureTag, GroupOf, InFeature, InGroup,
-            Joint, LocalGroup, NodeLabel, Tag, TagOf, Tags,
+            Joint, LocalGroup, LocalGroups, NodeConstraints, NodeLabel, Tag, TagOf, Tags,
         },
     },
     prelude::*,
@@ -161,6 +161,81 @@ fn tags_are_reordered_beside_one_that_is_despawned() {
     assert_eq!(text(&stage), before);
     assert_eq!(stage.get::<Tags>(joint).unwrap().len(), 4);
     assert_eq!(comments(&stage), ["0", "1", "2", "3"]);
+}
+
+/// Names of the local groups, in the order of the relation; fails unless the document has the same order.
+#[track_caller]
+fn group_order(stage: &Stage) -> Vec<String> {
+    let groups = stage.get::<LocalGroups>(stage.rig).unwrap();
+    let names: Vec<String> = groups.iter().map(|group| stage.get::<LocalGroup>(group).unwrap().name.clone()).collect();
+    let wanted: Vec<&str> = stage.document().groups().iter().map(|group| group.name.as_str()).collect();
+    assert_eq!(names, wanted);
+    names
+}
+
+/// A group that comes back stands where it stood, in the relation as in the document, and so does one that is put back.
+#[test]
+fn groups_stand_in_the_order_of_the_document() {
+    let mut stage = chain();
+    for name in ["a", "b", "c"] {
+        let group = LocalGroup { name: name.into(), color: [1.0, 0.0, 0.0], enabled: true };
+        stage.app.world_mut().spawn((group, GroupOf(stage.rig)));
+        stage.app.update();
+    }
+    let first = |stage: &Stage| stage.get::<LocalGroups>(stage.rig).unwrap().iter().next().unwrap();
+    let group = first(&stage);
+    stage.app.world_mut().entity_mut(group).despawn();
+    stage.app.update();
+    assert_eq!(group_order(&stage), ["b", "c"]);
+    stage.change(Change::Undo);
+    assert_eq!(group_order(&stage), ["a", "b", "c"]);
+    // A group cannot leave its rig.
+    let group = first(&stage);
+    stage.app.world_mut().entity_mut(group).remove::<GroupOf>();
+    stage.app.update();
+    assert_eq!(group_order(&stage), ["a", "b", "c"]);
+    // The order of the relation alone is no edit.
+    let before = text(&stage);
+    let rig = stage.rig;
+    stage.app.world_mut().entity_mut(rig).insert_related::<GroupOf>(2, &[group]);
+    stage.app.update();
+    assert_eq!(group_order(&stage), ["a", "b", "c"]);
+    assert_eq!(text(&stage), before);
+}
+
+/// Constraints on a node are listed in the order in which they run, when the tags that make them change places and when
+/// one of them is put back.
+#[test]
+fn constraints_on_a_node_follow_the_order_of_their_tags() {
+    let mut rig = chain().document().clone();
+    let tag = |uid: u64, params: &str| {
+        let kind = TagKind::Command { module: "orient".into(), params: params.into(), feature: None };
+        Box::new(TagData { uid: Uid(uid), enabled: true, comment: String::new(), kind })
+    };
+    let tags = [tag(70, "(targets: \"@joint j1\")"), tag(71, "(targets: \"@joint j1\", weight: 0.5)")];
+    for (index, tag) in tags.iter().enumerate() {
+        rig.apply(&RigEdit::AddTag { joint: Uid(2), tag: tag.clone(), index }).unwrap();
+    }
+    let mut stage = Stage::built(rig);
+    let order = |stage: &Stage| -> Vec<Uid> {
+        let joint = stage.node(Uid(2)).unwrap();
+        let constraints = stage.get::<NodeConstraints>(joint).unwrap();
+        constraints
+            .iter()
+            .map(|constraint| *stage.get::<Uid>(stage.get::<CreatedBy>(constraint).unwrap().0).unwrap())
+            .collect()
+    };
+    assert_eq!(order(&stage), [Uid(70), Uid(71)]);
+    let again = RigEdit::AddTag { joint: Uid(2), tag: tags[0].clone(), index: 1 };
+    stage.edit(vec![RigEdit::RemoveTag(Uid(2), Uid(70)), again]);
+    assert_eq!(order(&stage), [Uid(71), Uid(70)]);
+    stage.change(Change::Undo);
+    assert_eq!(order(&stage), [Uid(70), Uid(71)]);
+    let joint = stage.node(Uid(2)).unwrap();
+    let first = stage.get::<NodeConstraints>(joint).unwrap().iter().next().unwrap();
+    stage.app.world_mut().entity_mut(first).remove::<Constrains>();
+    stage.app.update();
+    assert_eq!(order(&stage), [Uid(70), Uid(71)]);
 }
 
 #[test]

@@ -17,6 +17,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 continue;
             };
             let (group, asked) = group;
+            self.trial.look_at_entity(entity);
             let uid = self.trial.free_uid(asked);
             let data = GroupData { uid, name: group.name, color: group.color, enabled: group.enabled };
             let added = RigEdit::AddLocalGroup(data.clone(), usize::MAX);
@@ -32,6 +33,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         for &(entity, uid) in &writes.groups {
             let Some((_, data)) = self.groups.groups.get(&uid).cloned() else { continue };
             let Ok(view) = self.views.get(entity) else { continue };
+            self.trial.look_at(uid);
             self.hold_uid(entity, uid, view.uid.copied());
             if view.group_of != Some(&GroupOf(self.trial.rig_entity)) {
                 self.commands.entity(entity).try_insert(GroupOf(self.trial.rig_entity));

@@ -43,6 +43,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let rig_entity = self.trial.rig_entity;
         let Ok(view) = self.views.get(entity) else { return };
         let Some(above) = view.child_of.map(ChildOf::parent) else { return };
+        self.trial.look_at_entity(entity);
         let parent = if above == rig_entity { None } else { self.uid_of(above, EntityPart::Joint) };
         if parent.is_none() && above != rig_entity {
             self.commands.entity(entity).try_remove::<ChildOf>();
@@ -84,6 +85,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             if self.rig().joint(uid).is_none() {
                 continue;
             }
+            self.trial.look_at(uid);
             self.hold_uid(entity, uid, view.uid.copied());
             if !view.joint {
                 self.commands.entity(entity).try_insert(Joint);
@@ -194,23 +196,32 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
 
     /// Reverts writes of other code to a created node, which follows its command only.
     fn node_written(&mut self, entity: Entity, uid: Uid) {
-        let Some(mirrored) = self.built.as_ref().and_then(|built| built.nodes.get(&uid)).cloned() else { return };
+        let Some(built) = &self.built else { return };
+        if built.constraints.get(&uid).is_some_and(|mirrored| mirrored.entity == entity) {
+            let told = self.views.get(entity).ok().and_then(|view| view.uid.copied());
+            self.trial.look_at(uid);
+            return self.hold_uid(entity, uid, told);
+        }
+        let Some(mirrored) = built.nodes.get(&uid).cloned() else { return };
         let (Some(node), Ok(view)) =
             (mirrored.node.as_ref().filter(|_| mirrored.entity == entity), self.views.get(entity))
         else {
             return;
         };
+        self.trial.look_at(uid);
         self.hold_uid(entity, uid, view.uid.copied());
         if mirrored.is_parked {
             return;
         }
         let group = node.group.and_then(|group| self.groups.get(group));
-        let is_as_built = view.name.is_some_and(|name| *name.as_str() == *node.name)
-            && view.label.map(|label| label.0.as_str()) == node.label.as_deref()
-            && view.in_group.map(|group| group.0) == group
-            && view.rest.copied() == Some(node.base.into())
-            && view.child_of.map(ChildOf::parent) == mirrored.parent;
-        if !is_as_built {
+        let written = [
+            ("Name", view.name.is_none_or(|name| *name.as_str() != *node.name)),
+            ("NodeLabel", view.label.map(|label| label.0.as_str()) != node.label.as_deref()),
+            ("InGroup", view.in_group.map(|group| group.0) != group),
+            ("RestTransform", view.rest.copied() != Some(node.base.into())),
+            ("ChildOf", view.child_of.map(ChildOf::parent) != mirrored.parent),
+        ];
+        if written.iter().any(|(_, is_other)| *is_other) {
             write_label(self.commands, entity, node.label.as_deref());
             self.commands
                 .entity(entity)
@@ -219,7 +230,9 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             if let Some(parent) = mirrored.parent {
                 self.commands.entity(entity).try_insert(ChildOf(parent));
             }
-            self.trial.refuse(EntityWriteError::CreatedContent { name: node.name.to_string() });
+            for (component, _) in written.into_iter().filter(|(_, is_other)| *is_other) {
+                self.trial.refuse(EntityWriteError::CreatedContent { name: node.name.to_string(), component });
+            }
         }
     }
 }

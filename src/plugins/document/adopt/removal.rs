@@ -23,6 +23,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let mut deleted = Vec::new();
         for (entity, indexed) in &writes.dead {
             self.index.remove(*entity);
+            self.trial.look_at(indexed.uid);
             match indexed.part {
                 EntityPart::Joint if along.contains(&indexed.uid) => self.forget_joint(indexed.uid),
                 EntityPart::Joint => deleted.push(indexed.uid),
@@ -47,10 +48,12 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 self.forget_joint(*joint);
             }
             let delete = Operation::Delete { joints: deleted, keep_children: false };
+            self.trial.look_at_entity(self.trial.rig_entity);
             self.trial.operate(EntityWrite::DespawnedJoint, &delete);
         }
         for (_, indexed) in &writes.dead {
             let uid = indexed.uid;
+            self.trial.look_at(uid);
             match indexed.part {
                 EntityPart::Tag => {
                     let bearer = self.rig().find_tag(uid).map(|(joint, _)| joint.data.uid);

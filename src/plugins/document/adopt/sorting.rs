@@ -18,12 +18,15 @@ use crate::{
 pub(super) struct RigWrites {
     pub joints: Vec<(Entity, Uid)>,
     pub spawned_joints: Vec<Entity>,
+    /// Created nodes and constraints.
     pub nodes: Vec<(Entity, Uid)>,
     pub tags: Vec<(Entity, Uid)>,
     pub spawned_tags: Vec<Entity>,
     pub groups: Vec<(Entity, Uid)>,
     pub spawned_groups: Vec<Entity>,
     pub dead: Vec<(Entity, IndexedEntity)>,
+    /// True if the entity of the rig itself was written.
+    pub is_rig_written: bool,
 }
 
 /// Largest depth of a hierarchy; a longer chain of parents is a cycle.
@@ -51,6 +54,9 @@ pub(super) fn sort_by_rig(
         }
         None
     };
+    for rig in touched.rigs.iter().filter(|entity| is_rig(**entity)) {
+        rigs.entry(*rig).or_default().is_rig_written = true;
+    }
     for entity in &touched.uids {
         let Some(indexed) = index.get(*entity) else { continue };
         let writes = rigs.entry(indexed.rig).or_default();
@@ -67,7 +73,7 @@ pub(super) fn sort_by_rig(
             Some(IndexedEntity { rig, uid, part: EntityPart::Joint }) => {
                 rigs.entry(rig).or_default().joints.push((*entity, uid))
             }
-            Some(IndexedEntity { rig, uid, part: EntityPart::Node }) => {
+            Some(IndexedEntity { rig, uid, part: EntityPart::Node | EntityPart::Constraint }) => {
                 rigs.entry(rig).or_default().nodes.push((*entity, uid))
             }
             Some(_) => {}

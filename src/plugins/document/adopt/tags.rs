@@ -55,6 +55,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
     fn tag_spawned(&mut self, entity: Entity) {
         let Ok(view) = self.views.get(entity) else { return };
         let Some(bearer) = view.tag_of.map(|of| of.0) else { return };
+        self.trial.look_at_entity(entity);
         let Some(joint) = self.uid_of(bearer, EntityPart::Joint) else {
             return self.tag_refused(entity, Some(EntityWriteError::TagBearer));
         };
@@ -96,6 +97,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let Ok(view) = self.views.get(entity) else { return };
         let Some((bearer, _)) = self.rig().find_tag(uid) else { return };
         let joint = bearer.data.uid;
+        self.trial.look_at(uid);
         self.hold_uid(entity, uid, view.uid.copied());
         let told = self.told_tag(entity, uid);
         if told.as_ref() != Some(&mirrored.data) {
@@ -179,6 +181,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             if !is_same_set || told == known || told == mirrored.tags {
                 continue;
             }
+            self.trial.look_at(uid);
             let mut edits = Vec::new();
             let mut now = known;
             for (at, tag) in told.iter().enumerate() {
