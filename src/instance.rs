@@ -66,6 +66,7 @@ pub use self::{
     bodies::InstanceSkins,
     builds::BuiltTemplate,
     clips::{ClipsBound, InstanceAnimations, InstanceClips, RigAnimation, RigAnimationError, RigAnimationLoader},
+    file_nodes::JointsHeld,
     folders::{FolderError, FolderFault, FolderRead, GesturesRead, WatchedFolder, WatchedFolderPlugin, WatchedFolders},
     model_files::{ModelFault, ModelFile, ModelFileError, ModelFilesPlugin},
     skins::{BoundTo, SkinBound},

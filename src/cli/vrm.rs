@@ -92,7 +92,7 @@ impl<'a> AvatarDraft<'a> {
     ) -> Result<(), Failure> {
         let recipe = |(preset, shapes)| ExpressionRecipe { preset, shapes };
         let recipes: Vec<ExpressionRecipe> =
-            vrm_mixes(&expressions::of_site(report)?).into_iter().map(recipe).collect();
+            vrm_mixes(&*expressions::of_site(report)?).into_iter().map(recipe).collect();
         let made = make_avatar(model, &self.source(), meta, &recipes)?;
         report.notes(&made.notes);
         let (vrm, springs) = (&made.avatar.vrm, &made.avatar.springs);
