@@ -93,7 +93,10 @@ fn tell(one: &ListedTemplate, newest: &NewestVersions, report: &mut Report) -> V
     };
     let mut value = value(file, header);
     let newer = newest.get(&VersionedTemplate::of(header));
-    let newer = newer.filter(|(version, _)| compare(&header.version, version) == Ordering::Less);
+    // Those that come with the program are of one version.
+    let newer = newer.filter(|(version, at)| {
+        (place.path().is_some() || at.path().is_some()) && compare(&header.version, version) == Ordering::Less
+    });
     let newer = newer.map(|(version, at)| {
         value["newer"] = json!({ "version": version, "file": at.to_string() });
         format!("; {version} is in {at}")

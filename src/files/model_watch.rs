@@ -71,7 +71,7 @@ impl ModelWatch {
         }
     }
 
-    /// The same watch of files that have to stand still for another time.
+    /// Watch of the same files that have to stand still for another time.
     pub fn settling(self, settle: Duration) -> Self {
         Self { settle, ..self }
     }

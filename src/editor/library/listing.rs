@@ -81,7 +81,9 @@ impl LibraryListing {
         let newest = newest_versions(self.templates().map(Arc::as_ref).filter(is_version));
         let (version, place) = newest.get(&template)?;
         let header = listed.header.as_ref().ok()?;
-        (**place != listed.place && crate::rig::version::compare(&header.version, version).is_lt())
+        // Those that come with the program are of one version.
+        let is_alone = listed.place.path().is_none() && place.path().is_none();
+        (!is_alone && **place != listed.place && crate::rig::version::compare(&header.version, version).is_lt())
             .then_some((*version, *place))
     }
 }

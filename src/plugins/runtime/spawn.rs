@@ -53,6 +53,10 @@ pub fn furnish_instance(world: &mut World, rig: Entity) {
                     let mut entity = world.entity_mut(entity);
                     number_node(&mut entity, slot);
                     describe_node(&mut entity, node, mode);
+                    // A joint that was not exposed before.
+                    if node.is_posable() && !entity.contains::<ControlPose>() {
+                        entity.insert(ControlPose::default());
+                    }
                     continue;
                 }
                 if !is_joint && !node.is_posable() {

@@ -19,9 +19,9 @@ pub struct RigNameIndex<'a> {
 /// Commands by their names.
 #[derive(Default)]
 struct CommandNames {
-    /// By module, and by module and label of the joint.
+    /// Commands by module, and by module and label of the joint.
     by_joint: HashMap<String, Vec<Uid>>,
-    /// By module and the name that the command gives, with the label of the joint between and without.
+    /// Commands by module and the name that the command gives, with the label of the joint between and without.
     by_given: HashMap<String, Vec<Uid>>,
 }
 

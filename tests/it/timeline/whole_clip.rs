@@ -1,4 +1,4 @@
-//! What is done to whole clips and tracks: baking, reducing, retiming, masks of layers, and switches over a range.
+//! Operations on whole clips and tracks: baking, reducing, retiming, masks of layers, and switches over a range.
 
 use rigsmith::{
     plugins::commands::{BuildRequest, BuildResult, BuildStep},

@@ -254,7 +254,9 @@ pub fn obstacle(world: &World, action: TimelineAction) -> Option<&'static str> {
     match action {
         TimelineAction::NextKey | TimelineAction::PreviousKey => (!has_keys()).then_some("the clip has no keys"),
         TimelineAction::BakeClip | TimelineAction::ReduceClip => (!has_keys()).then_some("the clip has no keys"),
-        TimelineAction::SwitchKinematics | TimelineAction::SwitchSpace => switches::request(world, &open, action).err(),
+        TimelineAction::SwitchKinematics | TimelineAction::SwitchSpace => {
+            switches::request(world, &open, action).err().map(switches::NoSwitch::text)
+        }
         TimelineAction::Play | TimelineAction::Longer | TimelineAction::Shorter => {
             (open.clip.duration() <= 0.0).then_some("the clip has no length")
         }

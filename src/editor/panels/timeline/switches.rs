@@ -40,20 +40,39 @@ pub(in crate::editor::panels) fn requested(
     }
 }
 
+/// Reason why there is no switch to set, in a few words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum NoSwitch {
+    NotBuilt,
+    NoClip,
+    NothingSelected,
+    NoSpaces,
+    NoKinematics,
+}
+
+impl NoSwitch {
+    /// The reason, for lists of actions.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::NotBuilt => "the rig is not built",
+            Self::NoClip => "no clip is open",
+            Self::NothingSelected => "nothing is selected",
+            Self::NoSpaces => "no control that has spaces is selected",
+            Self::NoKinematics => "no control of a limb with IK and FK is selected",
+        }
+    }
+}
+
 /// Request of an action, for the first selected node that a switch concerns; or the reason why there is none, in a few words.
-pub(super) fn request(
-    world: &World,
-    open: &OpenClip,
-    action: TimelineAction,
-) -> Result<SwitchOverRequest, &'static str> {
+pub(super) fn request(world: &World, open: &OpenClip, action: TimelineAction) -> Result<SwitchOverRequest, NoSwitch> {
     let built = world.get::<BuildResult>(open.entity).map(|built| &built.0);
     let (Some(built), Some(runtime)) = (built, world.get::<RigRuntime>(open.entity)) else {
-        return Err("the rig is not built");
+        return Err(NoSwitch::NotBuilt);
     };
-    let timeline = world.get_resource::<Timeline>().ok_or("no clip is open")?;
+    let timeline = world.get_resource::<Timeline>().ok_or(NoSwitch::NoClip)?;
     let selected = world.get::<Selection>(open.entity).map_or(&[] as &[Uid], |selection| &selection.0);
     if selected.is_empty() {
-        return Err("nothing is selected");
+        return Err(NoSwitch::NothingSelected);
     }
     let is_wanted = |switch: &&SwitchData| match switch.matching {
         Matching::IkFk { .. } => action == TimelineAction::SwitchKinematics,
@@ -63,8 +82,8 @@ pub(super) fn request(
     let of_node = |node: &Uid| switches().find(|switch| concerns(built, switch, *node));
     let Some(switch) = selected.iter().find_map(of_node) else {
         return Err(match action {
-            TimelineAction::SwitchSpace => "no control that has spaces is selected",
-            _ => "no control of a limb with IK and FK is selected",
+            TimelineAction::SwitchSpace => NoSwitch::NoSpaces,
+            _ => NoSwitch::NoKinematics,
         });
     };
     let target = TrackTarget { node: switch.control, property: Property::Attribute(switch.attribute.to_string()) };
