@@ -83,7 +83,7 @@ fn command(uid: u64, module: &str, params: &str) -> Box<TagData> {
 /// A layer that hides controls, and one that hides a joint, are deleted, disabled, undone.
 #[test]
 fn what_a_layer_hid_is_seen_when_the_layer_is_gone() {
-    for nodes in ["@any type:control", "@joint j3"] {
+    for nodes in ["@any type:control", "@joint j3#0000000000000003"] {
         let mut rig = limited_rig();
         let params = format!("(nodes: \"{nodes}\", name: \"hidden\", visible: false)");
         let layer = command(78, "layer", &params);
@@ -112,8 +112,8 @@ fn a_joint_of_a_group_that_is_off_keeps_nothing_of_its_build() {
     let mut rig = limited_rig();
     let group = GroupData { uid: Uid(50), name: "end".into(), color: [1.0, 0.0, 0.0], enabled: true };
     let tags = [
-        command(78, "layer", "(nodes: \"@joint j3\", name: \"hidden\", visible: false)"),
-        command(79, "attribute", "(node: \"@joint j3\", name: \"bend\", default: 0.25)"),
+        command(78, "layer", "(nodes: \"@joint j3#0000000000000003\", name: \"hidden\", visible: false)"),
+        command(79, "attribute", "(node: \"@joint j3#0000000000000003\", name: \"bend\", default: 0.25)"),
     ];
     let mut edits = vec![RigEdit::AddLocalGroup(group.clone(), 0), RigEdit::SetGroup(Uid(3), Some(group.uid))];
     edits.extend(tags.into_iter().map(|tag| RigEdit::AddTag { joint: Uid(1), tag, index: 0 }));

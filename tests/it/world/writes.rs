@@ -212,7 +212,10 @@ fn constraints_on_a_node_follow_the_order_of_their_tags() {
         let kind = TagKind::Command { module: "orient".into(), params: params.into(), feature: None };
         Box::new(TagData { uid: Uid(uid), enabled: true, comment: String::new(), kind })
     };
-    let tags = [tag(70, "(targets: \"@joint j1\")"), tag(71, "(targets: \"@joint j1\", weight: 0.5)")];
+    let tags = [
+        tag(70, "(targets: \"@joint j1#0000000000000001\")"),
+        tag(71, "(targets: \"@joint j1#0000000000000001\", weight: 0.5)"),
+    ];
     for (index, tag) in tags.iter().enumerate() {
         rig.apply(&RigEdit::AddTag { joint: Uid(2), tag: tag.clone(), index }).unwrap();
     }
