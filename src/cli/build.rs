@@ -233,23 +233,23 @@ pub(super) fn character_of(
     let Some(mesh) = mesh else { return posed_skeleton(bench, export) };
     let model = limits::load_model(mesh)?;
     report.notes(model.notes.iter().cloned());
-    character_with(bench, MeshSource::Model(model), weights, export, report)
+    character_with(bench, MeshSource::Model(Box::new(model)), weights, export, report)
 }
 
 /// Mesh for a rig.
 pub(super) enum MeshSource {
     /// A file's mesh, which is bound to what is built.
-    Model(Model),
+    Model(Box<Model>),
     /// A mesh of a project, which keeps its weights if it has some.
-    Open(RigMesh),
+    Open(Box<RigMesh>),
 }
 
 impl MeshSource {
     /// Puts the mesh on a workbench, whose rig is built, and binds it where it has no weights.
     pub fn open(self, bench: &mut Workbench, weights: &WeightArgs, report: &mut Report) -> Result<(), Failure> {
         match self {
-            Self::Model(model) => bench.open(model, true)?,
-            Self::Open(mesh) => bench.attach(mesh),
+            Self::Model(model) => bench.open(*model, true)?,
+            Self::Open(mesh) => bench.attach(*mesh),
         }
         if bench.weights().is_some() {
             return Ok(());

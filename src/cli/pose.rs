@@ -241,7 +241,9 @@ fn write(
         return Ok(());
     }
     let (model, settings) = match own_mesh {
-        Some(mesh) => build::character_with(bench, MeshSource::Open(mesh), &args.weights, &args.export, report)?,
+        Some(mesh) => {
+            build::character_with(bench, MeshSource::Open(Box::new(mesh)), &args.weights, &args.export, report)?
+        }
         None => build::character_of(bench, args.mesh.as_deref(), &args.weights, &args.export, report)?,
     };
     report.notes(store_model(&RealDisk, output, &model, &settings)?);
@@ -257,11 +259,11 @@ fn picture(
     report: &mut Report,
 ) -> Result<(), Failure> {
     let mesh = match (own_mesh, &args.mesh) {
-        (Some(mesh), _) => Some(MeshSource::Open(mesh)),
+        (Some(mesh), _) => Some(MeshSource::Open(Box::new(mesh))),
         (None, Some(path)) => {
             let model = limits::load_model(path)?;
             report.notes(model.notes.iter().cloned());
-            Some(MeshSource::Model(model))
+            Some(MeshSource::Model(Box::new(model)))
         }
         (None, None) => None,
     };

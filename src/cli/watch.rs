@@ -298,7 +298,12 @@ impl Watch<'_> {
                     // Binding a mesh may change commands, and the rig here stays as its file has it.
                     let mut bench = limits::workbench(bench.rig().clone());
                     bench.build(BuildStep::All);
-                    let own = bound_mesh(&mut bench, MeshSource::Model(model), &args.weights, &mut Report::default())?;
+                    let own = bound_mesh(
+                        &mut bench,
+                        MeshSource::Model(Box::new(model)),
+                        &args.weights,
+                        &mut Report::default(),
+                    )?;
                     none.insert(BoundMesh { bench, own })
                 }
             };

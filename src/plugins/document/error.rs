@@ -135,7 +135,7 @@ impl EntityWriteError {
             Self::Refused { write, .. } => write.component(),
             Self::Uid { .. } => "Uid",
             Self::CreatedNode | Self::CreatedConstraint { .. } => "Entity",
-            Self::BuiltContent { component, .. } | Self::CreatedContent { component, .. } => *component,
+            Self::BuiltContent { component, .. } | Self::CreatedContent { component, .. } => component,
             Self::DrivenAttribute { .. } => "Attributes",
             Self::JointParent | Self::ForeignParent(_) => "ChildOf",
             Self::JointMarker(_) => "Joint",

@@ -182,11 +182,11 @@ pub(in crate::rig) fn tokens(text: &str) -> impl Iterator<Item = Token<'_>> {
         loop {
             let mut start = at;
             let first = *bytes.get(at)?;
-            if first >= 0x80 || first.is_ascii_whitespace() || first == 0x0B {
-                if let Some(blank) = text[at..].chars().next().filter(|c| is_blank(*c)) {
-                    at += blank.len_utf8();
-                    continue;
-                }
+            if (first >= 0x80 || first.is_ascii_whitespace() || first == 0x0B)
+                && let Some(blank) = text[at..].chars().next().filter(|c| is_blank(*c))
+            {
+                at += blank.len_utf8();
+                continue;
             }
             match first {
                 b'/' if bytes.get(at + 1) == Some(&b'/') => {
