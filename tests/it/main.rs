@@ -184,6 +184,7 @@ mod surface;
 mod surface_refresh;
 mod tags;
 mod template;
+#[cfg(feature = "cli")]
 mod template_copies;
 mod template_text;
 mod three_strokes;
