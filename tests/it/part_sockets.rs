@@ -342,6 +342,11 @@ fn a_header_counts_what_parts_bring_as_the_template_has_it() {
     }
     for (name, text) in BUNDLED_PARTS {
         let written = read_header(text.as_bytes()).unwrap();
+        // A hand's header would be as long as that of four others: what it needs follows from the file.
+        if written.needs.is_none() {
+            assert_eq!(*name, "parts/hand.rig.ron");
+            continue;
+        }
         let mut counted = written.clone();
         let none = BTreeMap::new();
         counted.complete_from(&PartFiles::given(&none).complete(Path::new(name), text.as_bytes()).unwrap().rig);

@@ -103,7 +103,7 @@ fn refusals(bench: &mut Workbench) -> Vec<String> {
 
 /// Bounds of what is not told, in units of the rig and degrees.
 const HELD: [f32; 2] = [1e-4, 0.05];
-/// Bounds where a nearly straight arm goes to inverse kinematics: its elbow turns by much where its goal moves by little.
+/// Bounds of an arm that goes to inverse kinematics under a layer of half weight; what is beyond [`HELD`] is told.
 const NEARLY: [f32; 2] = [5e-4, 0.1];
 
 /// Deform joints of a clip, frame by frame.

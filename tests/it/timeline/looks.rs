@@ -26,7 +26,7 @@ fn the_bar_stays_on_one_line() {
         }
     }
     // What a narrow bar leaves out is in its menu.
-    desk.resize(600.0, 600.0);
+    desk.resize(600.0, 300.0);
     assert!(desk.look("Add marker").is_none());
     desk.click("Menu of the clip");
     desk.frames(2);

@@ -199,6 +199,8 @@ impl Bar {
             entry(ui, world, TimelineAction::NewLayer, requests);
             entry(ui, world, TimelineAction::KeyAll, requests);
             ui.separator();
+            RARER.into_iter().for_each(|action| entry(ui, world, action, requests));
+            ui.separator();
             entry(ui, world, TimelineAction::BakeClip, requests);
             entry(ui, world, TimelineAction::ReduceClip, requests);
             entry(ui, world, TimelineAction::Longer, requests);
@@ -209,8 +211,6 @@ impl Bar {
                 requests.send(ActionRequest(Action::Timeline(TimelineAction::Stretch)));
                 ui.close();
             }
-            ui.separator();
-            RARER.into_iter().for_each(|action| entry(ui, world, action, requests));
         });
         menu.response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, "Menu of the clip"));
         menu.response.on_hover_text("Make, rename, copy, delete and import clips");
