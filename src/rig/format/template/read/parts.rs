@@ -388,6 +388,9 @@ impl Template {
         mirror: MirrorParams,
     ) -> (Self, Vec<SourceError>) {
         let mut of_parts: Vec<PartSocket> = Vec::new();
+        let groups = self.take_groups();
+        let hung = std::mem::take(&mut self.hung);
+        let mut waiting = hung.clone();
         let (mut faults, mut is_one_missing, mut brings) = (Vec::new(), false, 0);
         let places = InstancePlaces { fields: fields(source) };
         for instance in std::mem::take(&mut self.parts) {
@@ -418,6 +421,8 @@ impl Template {
                         SourceError::at(source, at, message(&E::from(error)))
                     }));
                     self.instances.push(instance);
+                    // The next parts may hang on them.
+                    self.hang_joints(&mut waiting);
                 }
                 Err((message, is_of_host)) => {
                     if !(is_of_host && is_one_missing) {
@@ -427,6 +432,8 @@ impl Template {
                 }
             }
         }
+        self.give_groups(groups);
+        faults.extend(self.settle_hung(&hung, &waiting, source, is_one_missing));
         place_sockets(&self.rig, &mut self.sockets, source, &mut faults);
         self.rig.about.sockets = self.sockets.iter().filter_map(PartSocket::header).collect();
         self.sockets.extend(of_parts);
