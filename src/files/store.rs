@@ -300,7 +300,7 @@ pub fn store_rig_over(
     let TemplateText { text, note } = template_text(rig.borrow(), source, path, &reader);
     drop((rig, found, moved));
     save_template(disk, path, &text)?;
-    Ok(note.into_iter().chain(is_unread.then_some(SOURCE_UNREAD)).map(str::to_owned).collect())
+    Ok(note.into_iter().chain(is_unread.then(|| SOURCE_UNREAD.to_owned())).collect())
 }
 
 /// Saves a document over its template as [`store_rig_over`] does, and keeps the sockets and options of the file that neither the
@@ -334,8 +334,7 @@ fn template_of(disk: &dyn Disk, path: &Path, rig: Uid) -> Result<Option<String>,
         Err(_) => return Ok(None),
     };
     let is_same = template::read_header(&bytes).is_ok_and(|header| header.uid == rig);
-    let text = String::from_utf8(bytes).ok().filter(|_| is_same);
-    Ok(text.map(|text| text.strip_prefix('\u{FEFF}').map(str::to_owned).unwrap_or(text)))
+    Ok(String::from_utf8(bytes).ok().filter(|_| is_same))
 }
 
 /// True if a file is the template of a rig, or cannot be read to tell.

@@ -1,12 +1,16 @@
 //! Texts of templates that say what a rig is, as changes of the text that it was read from.
 
-use std::{collections::HashSet, path::Path};
+use std::{
+    collections::{BTreeSet, HashSet},
+    path::Path,
+};
 
 use super::PartFiles;
 use crate::rig::{
     Rig, TagData, TagKind, Uid,
+    nearest::listed,
     part::{DroppedPart, PartChange, PartInstance, without_dropped},
-    template::{self, PartRigs, Template, write_template},
+    template::{self, FileMarks, PartRigs, Template, write_template},
 };
 
 /// Makes a reader of parts.
@@ -16,7 +20,7 @@ pub(crate) type PartReader<'r, 'd> = &'r dyn Fn() -> PartFiles<'d>;
 pub(crate) struct TemplateText {
     pub text: String,
     /// Loss of what the former text has, a sentence.
-    pub note: Option<&'static str>,
+    pub note: Option<String>,
 }
 
 /// Parts that were dropped onto joints and are not in the template yet.
@@ -41,6 +45,14 @@ pub(crate) fn template_text(
     target: &Path,
     reader: PartReader,
 ) -> TemplateText {
+    let Some((at, text)) = source else { return plain_text(rig, None, target, reader) };
+    let (marks, text) = FileMarks::of(text);
+    let written = plain_text(rig, Some((at, &text)), target, reader);
+    TemplateText { text: marks.put_on(written.text), ..written }
+}
+
+/// [`template_text`] of a text without marks.
+fn plain_text(rig: &Rig, source: Option<(&Path, &str)>, target: &Path, reader: PartReader) -> TemplateText {
     let (at, text) = source.map_or((target, None), |(at, text)| (at, Some(text)));
     let template = text.and_then(|text| template::read_template(text.as_bytes()).ok());
     let FreshParts { parts, are_some_lost } = dropped(rig, at, text.zip(template.as_ref()), reader);
@@ -50,9 +62,9 @@ pub(crate) fn template_text(
     let changed = changed(rig, at, text, &parts, reader).filter(|changed| is_right(&changed.text));
     let written = changed.unwrap_or_else(|| {
         let lost = if has_parts { PARTS_LOST } else { COMMENTS_LOST };
-        TemplateText { text: write_template(rig), note: (has_parts || text.is_some()).then_some(lost) }
+        TemplateText { text: write_template(rig), note: (has_parts || text.is_some()).then(|| lost.to_owned()) }
     });
-    if are_some_lost { TemplateText { note: Some(PARTS_LOST), ..written } } else { written }
+    if are_some_lost { TemplateText { note: Some(PARTS_LOST.to_owned()), ..written } } else { written }
 }
 
 /// True if a text at that path says what the rig is.
@@ -115,7 +127,7 @@ fn changed(
     let base = source.and_then(|text| over(&own, at, text, reader));
     let base = base.unwrap_or_else(|| TemplateText {
         text: write_template(&own),
-        note: source.is_some().then_some(COMMENTS_LOST),
+        note: source.is_some().then(|| COMMENTS_LOST.to_owned()),
     });
     let instances: Vec<PartInstance> = dropped.iter().map(|(instance, _)| instance.clone()).collect();
     let text = template::with_instances(&base.text, &own, rig, &instances)?;
@@ -132,8 +144,8 @@ fn over(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<Template
     Some(TemplateText { text: template::write_template_over(rig, text)?, note: None })
 }
 
-/// The text of a template with parts, changed so that it says what the rig is; `None` if something of the parts is different
-/// in it. Parts of which nothing is left are taken out.
+/// The text of a template with parts, changed so that it says what the rig is; `None` if it cannot be. Parts of which nothing is
+/// left are taken out, and those of which something is different that no change says are written out.
 fn over_parts(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<TemplateText> {
     if says(reader, at, text, rig) {
         return Some(TemplateText { text: text.to_owned(), note: None });
@@ -150,26 +162,124 @@ fn over_parts(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<Te
         && let Some(changed) = over(rig, at, &rest, reader)
     {
         let are_lost = gone.iter().any(|number| has_remains(&read, &changed.text, &parts[*number]));
-        return Some(TemplateText { note: if are_lost { Some(PARTS_LOST) } else { changed.note }, ..changed });
+        return Some(TemplateText {
+            note: if are_lost { Some(PARTS_LOST.to_owned()) } else { changed.note },
+            ..changed
+        });
     }
-    let own = read.rig.clone();
-    let mut without_changes = read.clone();
-    for part in &mut without_changes.parts {
-        // Other parts may go onto joints by the labels that changes give.
-        for change in &mut part.changes {
-            *change = PartChange { joint: change.joint.clone(), label: change.label.clone(), ..PartChange::default() };
+    let before = ReadText::put_together(at, text, read, parts, reader)?;
+    let mut written_out = BTreeSet::new();
+    loop {
+        let said = match before.changed(rig, text, &written_out, at, reader) {
+            Ok(text) => {
+                let titles: Vec<&str> = written_out.iter().map(|number| before.parts[*number].0.title()).collect();
+                return Some(TemplateText { text, note: (!titles.is_empty()).then(|| written_out_note(&titles)) });
+            }
+            Err(said) => said,
+        };
+        // What cannot be said of a part is said without the part.
+        let known = written_out.len();
+        let said = said.as_ref().unwrap_or(&before.whole);
+        written_out.extend(template::unsaid_parts(said, rig, &before.own, &before.parts));
+        if written_out.len() == known {
+            return None;
         }
-        part.changes.retain(|change| change.label.is_some());
     }
-    let mut files = reader();
-    let before = files.put_together(at, text, read).ok()?.rig;
-    let plain = files.put_together(at, text, without_changes).ok()?.rig;
-    let rigs = PartRigs { own: &own, before: &before, plain: &plain, parts: &parts };
-    // Names are what people write; uids say it where a name means something else. The order of a text stays if it can.
-    let ways = [(true, false), (false, false), (true, true), (false, true)].into_iter();
-    let mut texts = ways.filter_map(|(names, in_order)| template::write_parts_over(rig, &rigs, text, names, in_order));
-    let text = texts.find(|text| says(reader, at, text, rig))?;
-    Some(TemplateText { text, note: None })
+}
+
+/// Note about parts of a template that are parts no more.
+fn written_out_note(titles: &[&str]) -> String {
+    let (parts, were) = if titles.len() == 1 { ("part", "was") } else { ("parts", "were") };
+    format!(
+        "the {parts} {} {were} written out: no change of a part says what the rig is now; the others are parts as before",
+        listed(titles, "and")
+    )
+}
+
+/// A text of a template with parts, as it was read.
+struct ReadText {
+    /// What the template has itself.
+    own: Rig,
+    /// The template with its parts.
+    whole: Rig,
+    /// The template with its parts, without the changes of these, other labels excepted.
+    plain: Rig,
+    /// Every instance with its part, as it is fitted.
+    parts: Vec<(PartInstance, Rig)>,
+}
+
+impl ReadText {
+    fn of(at: &Path, text: &str, reader: PartReader) -> Option<Self> {
+        let read = template::read_template(text.as_bytes()).ok()?;
+        let parts = reader().fitted(at, &read).ok()?;
+        Self::put_together(at, text, read, parts, reader)
+    }
+
+    fn put_together(
+        at: &Path,
+        text: &str,
+        read: Template,
+        parts: Vec<(PartInstance, Rig)>,
+        reader: PartReader,
+    ) -> Option<Self> {
+        let own = read.rig.clone();
+        let mut without_changes = read.clone();
+        for part in &mut without_changes.parts {
+            // Other parts may go onto joints by the labels that changes give.
+            for change in &mut part.changes {
+                let (joint, label) = (change.joint.clone(), change.label.clone());
+                *change = PartChange { joint, label, ..PartChange::default() };
+            }
+            part.changes.retain(|change| change.label.is_some());
+        }
+        let mut files = reader();
+        let whole = files.put_together(at, text, read).ok()?.rig;
+        let plain = files.put_together(at, text, without_changes).ok()?.rig;
+        Some(Self { own, whole, plain, parts })
+    }
+
+    fn says(&self, rig: &Rig) -> bool {
+        template::says_the_same(&self.whole, rig, &self.own)
+    }
+
+    /// The text, changed so that it says what the rig is, without the parts that have these numbers. Otherwise the rig that a changed
+    /// text says, if one could be read.
+    fn changed(
+        &self,
+        rig: &Rig,
+        text: &str,
+        written_out: &BTreeSet<usize>,
+        at: &Path,
+        reader: PartReader,
+    ) -> Result<String, Option<Rig>> {
+        let mut said = None;
+        // The order of a text stays if it can.
+        for in_order in [false, true] {
+            // What parts bring follows from what the template has itself. Only what is different then is a change of a part.
+            let own = template::write_own_over(rig, &self.rigs(), text, written_out, in_order);
+            let own = own.and_then(|text| Some((Self::of(at, &text, reader)?, text)));
+            let Some((read, own)) = own else { continue };
+            if read.says(rig) {
+                return Ok(own);
+            }
+            // Names are what people write; uids say it where a name means something else.
+            for with_names in [true, false] {
+                let changed = template::write_changes_over(rig, &read.rigs(), &own, with_names);
+                let Some(changed) = changed else { continue };
+                let Some(read) = Self::of(at, &changed, reader) else { continue };
+                if read.says(rig) {
+                    return Ok(changed);
+                }
+                said = said.or(Some(read.whole));
+            }
+            said = said.or(Some(read.whole));
+        }
+        Err(said)
+    }
+
+    fn rigs(&self) -> PartRigs<'_> {
+        PartRigs { own: &self.own, before: &self.whole, plain: &self.plain, parts: &self.parts }
+    }
 }
 
 /// True if a text from which a part was taken out has, as its own, tags that may be those of the part from a time when its

@@ -26,6 +26,8 @@ use crate::{
     },
 };
 
+const BYTE_ORDER_MARK: &str = "\u{FEFF}";
+
 /// A template as an asset, `.rig.ron`.
 #[derive(Asset, TypePath, Debug, Clone)]
 pub struct RigTemplate {
@@ -35,6 +37,8 @@ pub struct RigTemplate {
     origins: Arc<BTreeMap<Uid, PartOrigin>>,
     /// The text that the rig was read from; empty for a rig that was made by code.
     text: Arc<str>,
+    /// True if the file begins with a byte order mark, which the text does not have.
+    has_mark: bool,
     /// True if the rig is what the text says.
     is_of_text: bool,
     parts: Arc<TemplateParts>,
@@ -64,6 +68,7 @@ impl RigTemplate {
             sockets: Arc::from([]),
             origins: Arc::default(),
             text: Arc::from(""),
+            has_mark: false,
             is_of_text: false,
             parts: Arc::new(parts),
         }
@@ -86,8 +91,9 @@ impl RigTemplate {
         let (found, modules) = (files.found.clone(), files.modules().clone());
         let parts = Arc::new(TemplateParts { path: path.to_owned(), found, modules });
         let text = Arc::from(text_of(content)?);
+        let has_mark = content.starts_with(BYTE_ORDER_MARK.as_bytes());
         let (rig, sockets, origins) = (Arc::new(rig), sockets.into(), Arc::new(origins));
-        Ok(Self { rig, sockets, origins, text, is_of_text: true, parts })
+        Ok(Self { rig, sockets, origins, text, has_mark, is_of_text: true, parts })
     }
 
     /// The rig.
@@ -119,14 +125,15 @@ impl RigTemplate {
     }
 
     /// The text that a save writes: that of the file where it was read from one, changed where the rig differs from it. What
-    /// is different about parts becomes changes of their instances; where these cannot say it, the parts are written out.
+    /// is different about parts becomes changes of their instances; a part of which these cannot say it is written out.
     pub fn saved(&self) -> String {
+        let mark = if self.has_mark { BYTE_ORDER_MARK } else { "" };
         if self.is_of_text {
-            return self.text.to_string();
+            return format!("{mark}{}", self.text);
         }
         let path = self.parts.path.as_path();
         let source = (!self.text.is_empty()).then(|| (path, &*self.text));
-        template_text(&self.rig, source, path, &|| self.parts.reader()).text
+        format!("{mark}{}", template_text(&self.rig, source, path, &|| self.parts.reader()).text)
     }
 
     /// True if both are the same in memory.

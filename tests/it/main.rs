@@ -27,6 +27,8 @@ mod cli_outputs;
 #[cfg(feature = "cli")]
 mod cli_pose;
 #[cfg(feature = "cli")]
+mod cli_saved_parts;
+#[cfg(feature = "cli")]
 mod cli_site;
 #[cfg(all(feature = "cli", target_os = "linux"))]
 mod cli_streams;
@@ -167,6 +169,7 @@ mod retarget;
 mod rig_limits;
 mod rig_text;
 mod runtime;
+mod saved_text;
 mod schema;
 mod sided_values;
 mod site;

@@ -16,11 +16,13 @@
 //!   `ik.space`, and of several features of a name the one on the same joint is meant.
 //! - `control(shape: "ring")` stands for `Command(module: "control", params: (shape: "ring"))`. The fields `uid`,
 //!   `enabled`, `comment` and `feature` belong to the tag, all others to the module.
+//! - `parent` may name a joint that a part brings, too, where the file itself has none of that name.
 //! - `rotation` takes three angles in degrees, about X, Y and Z, besides a quaternion.
 //! - Whatever has a default can be left out: the translation, the colour of a group, the number of joints.
 
 mod comment_placement;
 mod file;
+mod file_marks;
 mod header;
 mod moved_text;
 mod read;
@@ -33,12 +35,15 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
+pub(crate) use file_marks::FileMarks;
 pub(crate) use moved_text::{with_changes_on_lines, with_part_files, with_rig_uid};
 pub(in crate::rig) use read::read_text;
 pub use read::{read_header, read_template, survey_template, text_of};
 pub use shorthand::{Explicit, explicit};
 pub use text_patch::write_template_over;
-pub(crate) use text_patch::{PartRigs, says_the_same, with_instances, without_instances, write_parts_over};
+pub(crate) use text_patch::{
+    PartRigs, says_the_same, unsaid_parts, with_instances, without_instances, write_changes_over, write_own_over,
+};
 pub use tidy::{UidStyle, format_template};
 pub use write::write_template;
 pub(in crate::rig) use write::{option_text, quoted, socket_text, vector, write_without_poses};
@@ -168,6 +173,8 @@ pub struct Template {
     pub options: Vec<PartOption>,
     /// Parts that have not been put into the rig yet: see [`Template::with_parts`].
     pub parts: Vec<PartInstance>,
+    /// Joints of the rig that hang on what its parts bring; empty once these are in the rig.
+    pub hung: Vec<HungJoint>,
     /// Parts that have been put into the rig.
     pub instances: Vec<PartInstance>,
     /// Instances of the commands that come of parts.
@@ -185,6 +192,15 @@ impl Template {
         self.notes.extend(self.unbound.drain(..).map(|(_, told)| told));
         self
     }
+}
+
+/// Joint of a template whose parent is not in its file, but comes with a part.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HungJoint {
+    /// The joint, which is a root until the parts are in the rig.
+    pub joint: Uid,
+    /// The parent as the file names it: by its label or its uid.
+    pub parent: String,
 }
 
 /// Origin of a command that a part brought.

@@ -32,6 +32,11 @@ impl Lacking {
         }
     }
 
+    /// Returns `true` for a label that one of the parts may have brought.
+    pub fn may_have(&self, label: &str) -> bool {
+        self.is_unknown || self.labels.contains(label)
+    }
+
     /// Returns `true` for the fault of a part that lacks what another one should have brought.
     pub fn explains(&self, error: &PartError) -> bool {
         let is_of_part = |name: &str| {
@@ -39,7 +44,7 @@ impl Lacking {
         };
         match error {
             PartError::UnknownHostJoint { label, .. } | PartError::Socket(SocketError::NoJoint { label, .. }) => {
-                self.is_unknown || self.labels.contains(label)
+                self.may_have(label)
             }
             PartError::Socket(SocketError::Unknown { name, .. }) => is_of_part(name),
             _ => false,

@@ -1,5 +1,6 @@
 //! Reader of templates: strict, with the place of each error.
 
+mod hung;
 mod inputs;
 mod parts;
 mod survey;
@@ -12,7 +13,7 @@ use std::{
 use bevy::math::{Quat, Vec3};
 
 use super::{
-    FORMAT, FeatureSummary, MAX_BYTES, Template, TemplateHeader,
+    FORMAT, FeatureSummary, HungJoint, MAX_BYTES, Template, TemplateHeader,
     comment_placement::take_placement,
     file::{FaceFile, JointFile, TagFile, TemplateFile, known_names},
     header::complete,
@@ -76,6 +77,11 @@ fn in_text(explicit: &Explicit, mut template: Template) -> Template {
     for offset in parts.chain(template.sockets.iter_mut().map(|socket| &mut socket.offset)) {
         *offset = explicit.in_source(*offset);
     }
+    for hung in &mut template.hung {
+        if let Some(name) = hung.parent.parse::<Uid>().ok().and_then(|uid| explicit.parent_name(uid)) {
+            hung.parent = name.to_owned();
+        }
+    }
     template
 }
 
@@ -132,7 +138,9 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
     if let Some(claimed) = file.joint_count.filter(|claimed| *claimed != count && instances.is_empty()) {
         notes.push(format!("the header says {claimed} joints, the file has {count}; saving corrects it"));
     }
-    add_joints(&mut rig, format, file.joints, places, &mut seen, faults);
+    let mut hung = Vec::new();
+    let may_hang = places.has_parts().then_some(&mut hung);
+    add_joints(&mut rig, format, file.joints, places, &mut seen, may_hang, faults);
     let chains = parts::chains(&rig, file.chains, &mut notes);
     let mut sockets = parts::sockets(places, file.sockets, faults);
     let options = parts::options(places, file.options, faults);
@@ -159,6 +167,7 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
         sockets,
         options,
         parts: instances,
+        hung,
         instances: Vec::new(),
         origins: BTreeMap::new(),
         unbound,
@@ -197,12 +206,14 @@ fn sorted(mut features: Vec<FeatureSummary>) -> Vec<FeatureSummary> {
     features
 }
 
+/// Adds the joints of a file. Those whose parents the file does not have go to `hung`, if parts may bring these.
 fn add_joints(
     rig: &mut Rig,
     format: u32,
     joints: Vec<JointFile>,
     places: &Places,
     seen: &mut HashSet<Uid>,
+    mut hung: Option<&mut Vec<HungJoint>>,
     faults: &mut Vec<SourceError>,
 ) {
     // Boxed, so that each is freed as soon as its joint is in the rig.
@@ -218,12 +229,15 @@ fn add_joints(
             continue;
         }
         for (what, other) in [("parent", &mut joint.parent), ("mirror", &mut joint.mirror)] {
-            if let Some(other) = other.take_if(|other| !known.contains(other))
-                && !places.is_left_out(other)
-            {
-                faults.push(places.error(uid, 0, what, format!(
+            let Some(other) = other.take_if(|other| !known.contains(other)) else { continue };
+            if places.is_left_out(other) {
+                continue;
+            }
+            match hung.as_deref_mut().filter(|_| what == "parent") {
+                Some(hung) => hung.push(HungJoint { joint: uid, parent: other.to_string() }),
+                None => faults.push(places.error(uid, 0, what, format!(
                     "joint {uid} names the {what} {other}, which is not in the file; correct it or leave the field out"
-                )));
+                ))),
             }
         }
         if let Some(group) = joint.group.take_if(|group| rig.group(*group).is_none())
@@ -372,6 +386,15 @@ impl Places<'_> {
             field.name == "uid" && self.text[field.value..field.end].trim_start_matches([' ', '"']).starts_with(&digits)
         };
         !self.left_out.is_empty() && self.fields.iter().filter(declares).any(|field| self.is_inside_left_out(field))
+    }
+
+    /// True if the template uses parts.
+    fn has_parts(&self) -> bool {
+        let is_of_part = |field: &Field| {
+            let list = field.parent.map(|parent| &self.fields[parent]);
+            field.depth == 3 && list.is_some_and(|list| list.depth == 1 && list.name == "parts")
+        };
+        self.fields.iter().any(is_of_part)
     }
 
     /// True for a field in an element that is not read.

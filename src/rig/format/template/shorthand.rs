@@ -8,7 +8,11 @@
 
 mod declarations;
 
-use std::{borrow::Cow, collections::HashMap, ops::Range};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, HashMap},
+    ops::Range,
+};
 
 use crate::rig::{
     Uid, UidError, degrees,
@@ -24,7 +28,7 @@ use crate::rig::{
 pub(in crate::rig::format) use declarations::{Declaration, Declarations, TagForm};
 
 /// The first format with shorthand.
-const FIRST_FORMAT: u32 = 2;
+pub(super) const FIRST_FORMAT: u32 = 2;
 
 /// Fields of a tag in the short form; all others are parameters of its module.
 pub(in crate::rig::format) const TAG_FIELDS: [&str; 4] = ["uid", "enabled", "comment", "feature"];
@@ -38,6 +42,8 @@ pub struct Explicit<'a> {
     pieces: Vec<Piece>,
     /// Names that nothing has, and declarations that nothing identifies.
     pub faults: Vec<SourceError>,
+    /// Names of parents that the file does not have and its parts may bring, by the uids that stand for them in the text.
+    parents: BTreeMap<Uid, String>,
 }
 
 /// Piece of an explicit text: copied from the source, or written in place of some of it.
@@ -62,6 +68,11 @@ impl<'a> Explicit<'a> {
         piece.source + if piece.is_copy { offset - piece.start } else { 0 }
     }
 
+    /// Name of the parent for which a uid stands in the text; `None` for a uid that the source has itself.
+    pub(super) fn parent_name(&self, uid: Uid) -> Option<&str> {
+        self.parents.get(&uid).map(String::as_str)
+    }
+
     /// An error in the text as one in the source.
     pub fn fault(&self, error: SourceError) -> SourceError {
         match self.pieces.is_empty() {
@@ -73,13 +84,14 @@ impl<'a> Explicit<'a> {
 
 /// The text of a template without shorthand. A text of format 1, and one whose brackets do not match, is itself.
 pub fn explicit(source: &str) -> Explicit<'_> {
-    let unchanged = Explicit { source, text: Cow::Borrowed(source), pieces: Vec::new(), faults: Vec::new() };
+    let (text, parents) = (Cow::Borrowed(source), BTreeMap::new());
+    let unchanged = Explicit { source, text, pieces: Vec::new(), faults: Vec::new(), parents };
     let Some(declared) = Declarations::find(source).filter(|declared| declared.format() >= FIRST_FORMAT) else {
         return unchanged;
     };
     let mut writer = Writer::new(&declared);
     writer.declarations();
-    let Writer { mut changes, mut faults, .. } = writer;
+    let Writer { mut changes, mut faults, parents, .. } = writer;
     faults.extend(declared.faults);
     faults.sort_by_key(|fault| fault.offset);
     if changes.is_empty() {
@@ -97,7 +109,7 @@ pub fn explicit(source: &str) -> Explicit<'_> {
     }
     pieces.push(Piece { start: text.len(), source: at, is_copy: true });
     text.push_str(&source[at..]);
-    Explicit { source, text: Cow::Owned(text), pieces, faults }
+    Explicit { source, text: Cow::Owned(text), pieces, faults, parents }
 }
 
 /// Text in place of a range of the source.
@@ -193,11 +205,13 @@ struct Writer<'d, 'a> {
     called: NameIndex<'d, 'a>,
     changes: Vec<Change>,
     faults: Vec<SourceError>,
+    parents: BTreeMap<Uid, String>,
 }
 
 impl<'d, 'a> Writer<'d, 'a> {
     fn new(declared: &'d Declarations<'a>) -> Self {
-        Self { declared, called: NameIndex::new(declared), changes: Vec::new(), faults: Vec::new() }
+        let (called, parents) = (NameIndex::new(declared), BTreeMap::new());
+        Self { declared, called, changes: Vec::new(), faults: Vec::new(), parents }
     }
 
     fn tree(&self) -> &'d Tree<'a> {
@@ -277,9 +291,21 @@ impl<'d, 'a> Writer<'d, 'a> {
         let Some(name) = self.tree().string(node, field).filter(|name| name.parse::<Uid>().is_err()) else { return };
         let said = match self.called.find(&name, kind) {
             Ok(uid) => format!("\"{uid}\""),
+            Err(NameError::Unknown { .. }) if field == "parent" && self.has_parts() => {
+                let uid = Uid::derived(["parent in a part", name.as_str()]);
+                self.parents.insert(uid, name);
+                format!("\"{uid}\"")
+            }
             Err(error) => self.fault(item, error.to_string()),
         };
         self.replace(item.value, said);
+    }
+
+    /// True if the template uses parts.
+    fn has_parts(&self) -> bool {
+        let tree = self.tree();
+        let has_fields = |item: &Item| tree.node(item.value).items.iter().any(|item| item.key.is_some());
+        tree.elements(tree.root(), "parts").iter().any(has_fields)
     }
 
     /// Value of a field that names a feature.

@@ -1,25 +1,20 @@
 //! Saving over a text: only what changed is written, so that comments, blank lines, the order and the style of what a
 //! person wrote stay, and one changed value is one changed line.
 
+mod fresh;
 mod labels;
 mod lists;
 mod order;
 mod parts;
 pub(super) mod patch;
 
-use std::{
-    collections::{HashMap, HashSet},
-    rc::Rc,
-};
-
 use bevy::math::{Quat, Vec3};
 
 use super::{
+    file_marks::FileMarks,
     read::read_text,
     shorthand::{Declaration, Declarations, TAG_FIELDS, TagForm},
-    write::{
-        face_text, feature_list, feature_summaries, feature_uids, joint_text, needed_format, needs_text, tag_text,
-    },
+    write::{face_text, feature_list, feature_summaries, needed_format, needs_text},
     write_template,
 };
 use crate::rig::{
@@ -30,14 +25,20 @@ use crate::rig::{
     },
     reference::{RigNameIndex, bind_names, given_name, refresh_names, without_uids},
 };
+use fresh::{NamesInUse, is_short, settled};
 use labels::header_labels;
 use order::reordered;
-pub(crate) use parts::{PartRigs, with_instances, without_instances, write_parts_over};
+pub(crate) use parts::{PartRigs, unsaid_parts, with_instances, without_instances, write_changes_over, write_own_over};
 use patch::Patch;
 
 /// The text of a rig's template, as changes of a text of the same rig. `None` if `source` is no template of this rig, or
 /// cannot be changed so that it says the same: [`write_template`] then writes it anew, without its comments.
 pub fn write_template_over(rig: &Rig, source: &str) -> Option<String> {
+    let (marks, source) = FileMarks::of(source);
+    written_over(rig, &source).map(|text| marks.put_on(text))
+}
+
+fn written_over(rig: &Rig, source: &str) -> Option<String> {
     let before = read_text(source, 1).ok()?.rig;
     if before.uid() != rig.uid() {
         return None;
@@ -55,18 +56,23 @@ pub fn write_template_over(rig: &Rig, source: &str) -> Option<String> {
     is_right(&text).then_some(text)
 }
 
-/// True if the templates of two rigs say the same. Groups and inputs that are not in `own`, which is what a template has
-/// besides its parts, may stand anywhere: those of parts come last where it is read.
+/// True if the templates of two rigs say the same. What is not in `own`, which is what a template has besides its parts, may
+/// stand anywhere among groups, inputs and brothers: where the template is read, its own comes first.
 pub(crate) fn says_the_same(a: &Rig, b: &Rig, own: &Rig) -> bool {
-    // Those of the template come first, in their order, then those of parts by their uids.
+    said_with_parts(a, own).is_some_and(|said_a| said_with_parts(b, own) == Some(said_a))
+}
+
+/// A rig as its template says it, where what is in `own` comes first, in its order, then what parts bring, by its uids.
+fn said_with_parts(rig: &Rig, own: &Rig) -> Option<Rig> {
     let place = |uid: Uid| (!own.is_taken(uid)).then_some(uid);
-    let said = |rig: &Rig| {
-        let mut read = comparable(read_text(&write_template(rig), 1).ok()?.rig);
-        read.groups.sort_by_key(|group| place(group.uid));
-        read.inputs.sort_by_key(|input| place(input.uid));
-        Some(read)
-    };
-    said(a).is_some_and(|said_a| said(b) == Some(said_a))
+    let mut read = comparable(read_text(&write_template(rig), 1).ok()?.rig);
+    read.groups.sort_by_key(|group| place(group.uid));
+    read.inputs.sort_by_key(|input| place(input.uid));
+    let brothers = read.joints.values_mut().map(|joint| &mut joint.children);
+    for list in brothers.chain([&mut read.roots]) {
+        list.sort_by_key(|joint| place(*joint));
+    }
+    Some(read)
 }
 
 /// A rig whose header does not depend on the order of sockets and options, and whose parameters do not depend on blanks,
@@ -111,52 +117,6 @@ fn canonical(params: &str) -> String {
     out
 }
 
-/// Text of a joint that is new in a text; with names, it refers by label where that is the joint's alone.
-fn new_joint(rig: &Rig, joint: &RigJoint, names: &NamesInUse, with_names: bool) -> String {
-    let mut text = joint_text(rig, joint, &names.features);
-    if !with_names {
-        return text;
-    }
-    for (field, uid) in [("parent", joint.parent), ("mirror", joint.data.mirror)] {
-        let called = uid.and_then(|uid| Some((uid, rig.joint(uid)?.data.label.as_deref()?)));
-        if let Some((uid, label)) = called.filter(|(_, label)| names.is_unique("joint", label)) {
-            text = text.replacen(&format!("{field}: \"{uid}\""), &format!("{field}: {}", quoted(label)), 1);
-        }
-    }
-    if let Some(group) =
-        joint.data.group.and_then(|group| rig.group(group)).filter(|g| names.is_unique("group", &g.name))
-    {
-        text = text.replacen(&format!("group: \"{}\"", group.uid), &format!("group: {}", quoted(&group.name)), 1);
-    }
-    without_uids(&text, rig, |_| true).into_owned()
-}
-
-/// Numbers of joints and groups with each name, and the features of a rig.
-struct NamesInUse {
-    joints: HashMap<String, usize>,
-    groups: HashMap<String, usize>,
-    features: HashSet<Uid>,
-}
-
-impl NamesInUse {
-    fn of(rig: &Rig) -> Self {
-        let (mut joints, mut groups) = (HashMap::new(), HashMap::new());
-        for label in rig.walk().filter_map(|joint| joint.data.label.clone()) {
-            *joints.entry(label).or_default() += 1;
-        }
-        for group in rig.groups() {
-            *groups.entry(group.name.clone()).or_default() += 1;
-        }
-        Self { joints, groups, features: feature_uids(rig) }
-    }
-
-    /// Returns `true` if one thing alone has that name: a group for the field `group`, else a joint.
-    fn is_unique(&self, field: &str, name: &str) -> bool {
-        let names = if field == "group" { &self.groups } else { &self.joints };
-        names.get(name) == Some(&1)
-    }
-}
-
 struct Rewriter<'d, 'a> {
     rig: &'d Rig,
     before: &'d Rig,
@@ -165,7 +125,9 @@ struct Rewriter<'d, 'a> {
     declared: &'d Declarations<'a>,
     /// True in a text that leaves uids out: it gets names.
     with_names: bool,
-    names: Rc<NamesInUse>,
+    /// True in a text with tags of the short form.
+    is_short: bool,
+    names: NamesInUse,
     index: RigNameIndex<'d>,
     patch: Patch<'d, 'a>,
 }
@@ -179,7 +141,8 @@ impl<'d, 'a> Rewriter<'d, 'a> {
             whole: [before, rig],
             declared,
             with_names,
-            names: Rc::new(NamesInUse::of(rig)),
+            is_short: is_short(declared, with_names),
+            names: NamesInUse::of(rig),
             index: RigNameIndex::new(rig),
             patch: Patch::new(&declared.tree),
         }
@@ -196,7 +159,9 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         self.inputs();
         self.joints();
         self.poses();
-        self.patch.text()
+        let (has_fresh, declared, with_names) = (self.has_fresh(), self.declared, self.with_names);
+        let text = self.patch.text();
+        if has_fresh { settled(text, declared, with_names) } else { text }
     }
 
     fn header(&mut self) {
@@ -250,9 +215,10 @@ impl<'d, 'a> Rewriter<'d, 'a> {
     }
 
     fn joints(&mut self) {
-        let (rig, declared, with_names, names) = (self.rig, self.declared, self.with_names, self.names.clone());
+        let (rig, before, declared, tree) = (self.rig, self.before, self.declared, self.tree());
+        let both = |one: &Declaration| Some((before.joint(one.uid)?, rig.joint(one.uid)?));
         for (declared, tags) in declared.joints.iter().zip(&declared.tags) {
-            let (Some(old), Some(new)) = (self.before.joint(declared.uid), rig.joint(declared.uid)) else { continue };
+            let Some((old, new)) = both(declared) else { continue };
             self.joint(declared, old, new);
             for tag in tags {
                 let old = old.data.tags.iter().find(|old| old.uid == tag.uid);
@@ -261,20 +227,24 @@ impl<'d, 'a> Rewriter<'d, 'a> {
                     self.tag(tag, old, new);
                 }
             }
+        }
+        let mut patch = std::mem::replace(&mut self.patch, Patch::new(tree));
+        for (declared, tags) in declared.joints.iter().zip(&declared.tags) {
+            let Some((_, new)) = both(declared) else { continue };
             let wanted: Vec<Uid> = new.data.tags.iter().map(|tag| tag.uid).collect();
-            let text =
-                |uid: Uid| rig.find_tag(uid).map(|(_, tag)| tag_text(rig, tag, &names.features)).unwrap_or_default();
-            self.patch.list(declared.node, "tags", tags, &wanted, None, text);
+            let text = |uid: Uid| rig.find_tag(uid).map(|(_, tag)| self.new_tag(tag)).unwrap_or_default();
+            patch.list(declared.node, "tags", tags, &wanted, None, text);
         }
         let wanted: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
-        let text = |uid: Uid| rig.joint(uid).map(|joint| new_joint(rig, joint, &names, with_names)).unwrap_or_default();
+        let text = |uid: Uid| rig.joint(uid).map(|joint| self.new_joint(joint)).unwrap_or_default();
         // A joint comes behind its elder brother, or else behind its parent.
         let behind = |uid: Uid| {
             let joint = rig.joint(uid)?;
             let place = rig.children(joint.parent).iter().position(|child| *child == uid)?;
             place.checked_sub(1).map(|elder| rig.children(joint.parent)[elder]).or(joint.parent)
         };
-        self.patch.list(self.tree().root(), "joints", &declared.joints, &wanted, Some(&behind), text);
+        patch.list(tree.root(), "joints", &declared.joints, &wanted, Some(&behind), text);
+        self.patch = patch;
     }
 
     fn joint(&mut self, declared: &Declaration, old: &RigJoint, new: &RigJoint) {
@@ -287,8 +257,16 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         let label = |rig: &Rig, uid: Uid| rig.joint(uid).and_then(|joint| joint.data.label.clone());
         let group = |rig: &Rig, uid: Uid| rig.group(uid).map(|group| group.name.clone());
         let is_there = |uid: &Uid| self.rig.joint(*uid).is_some();
-        let (parent, mirror, in_group) = (new.parent, is.mirror.filter(is_there), is.group);
-        self.refer(node, "parent", old.parent, parent, &label);
+        let (mirror, in_group) = (is.mirror.filter(is_there), is.group);
+        let (was_below, is_below) = (self.parent_of(0, old), self.parent_of(1, new));
+        match is_below.filter(|_| new.parent.is_none()) {
+            Some(parent) => self.hang(node, was_below, parent),
+            None if was_below.is_some() || is_below.is_some() => {
+                self.refer(node, "parent", was_below, is_below, &label);
+            }
+            // A parent that no part has brought yet.
+            None => {}
+        }
         self.refer(node, "mirror", was.mirror, mirror, &label);
         self.refer(node, "group", was.group, in_group, &group);
         if was.kind != is.kind {
@@ -393,7 +371,10 @@ impl<'d, 'a> Rewriter<'d, 'a> {
                 self.set_text(node, "switch", was_switch, switch);
                 self.set_text(node, "choice", was_choice, choice);
             }
-            _ => self.patch.replace(node, &tag_text(self.rig, new, &self.names.features)),
+            _ => {
+                let text = self.new_tag(new);
+                self.patch.replace(node, &text);
+            }
         }
     }
 

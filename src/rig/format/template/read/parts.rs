@@ -390,6 +390,9 @@ impl Template {
         mirror: MirrorParams,
     ) -> (Self, Vec<SourceError>) {
         let mut of_parts: Vec<PartSocket> = Vec::new();
+        let groups = self.take_groups();
+        let hung = std::mem::take(&mut self.hung);
+        let mut waiting = hung.clone();
         let (mut faults, mut lacking, mut brings) = (Vec::new(), Lacking::default(), 0);
         let places = InstancePlaces { fields: fields(source) };
         for instance in std::mem::take(&mut self.parts) {
@@ -424,6 +427,8 @@ impl Template {
                     self.notes.extend(put.notes);
                     of_parts.extend(brought);
                     self.origins.extend(instance.origins(&part, &fitted, &changes));
+                    // The next parts may hang on them.
+                    self.hang_joints(&mut waiting);
                     put.faults
                 }
                 Err(reason) => {
@@ -442,6 +447,8 @@ impl Template {
                 self.instances.push(instance);
             }
         }
+        self.give_groups(groups);
+        faults.extend(self.settle_hung(&hung, &waiting, source, &lacking));
         place_sockets(&self.rig, &mut self.sockets, source, &mut faults);
         self.rig.about.sockets = self.sockets.iter().filter_map(PartSocket::header).collect();
         self.sockets.extend(of_parts);

@@ -35,7 +35,7 @@ pub(super) fn reordered(rig: &Rig, text: &str) -> Option<String> {
     Some(with_changes(&text, lists.into_iter().flatten().collect()))
 }
 
-fn with_changes(text: &str, mut changes: Vec<(Range<usize>, String)>) -> String {
+pub(super) fn with_changes(text: &str, mut changes: Vec<(Range<usize>, String)>) -> String {
     changes.sort_by_key(|(range, _)| range.start);
     let mut out = String::with_capacity(text.len());
     let mut at = 0;

@@ -2,22 +2,32 @@
 
 mod change;
 mod instance;
+mod own;
+mod unsaid;
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
-use super::{Rewriter, labels::header_labels, order::reordered, patch::Patch, tag_text};
+use super::{labels::header_labels, patch::Patch};
 use crate::rig::{
-    Rig, RigJoint, TagData, Uid,
+    Rig, TagData, Uid,
     format::{
         layout::value_on_one_line,
-        template::{quoted, shorthand::Declarations, write::feature_uids},
+        template::{
+            quoted,
+            shorthand::{Declaration, Declarations},
+            write::{feature_uids, tag_text},
+        },
         tree::{NodeId, Tree},
     },
     part::{PartInstance, switch_name},
     reference::RigNameIndex,
 };
-use change::{FieldChange, JointDiff, TagDiff, Words, short_tag};
+pub(super) use change::short_tag;
+use change::{FieldChange, JointDiff, TagDiff, Words};
 pub(crate) use instance::{with_instances, without_instances};
+pub(crate) use own::write_own_over;
+use own::{added_tags, instance_labels};
+pub(crate) use unsaid::unsaid_parts;
 
 /// Rigs of a template with parts, from which its text is changed.
 pub(crate) struct PartRigs<'a> {
@@ -31,42 +41,13 @@ pub(crate) struct PartRigs<'a> {
     pub parts: &'a [(PartInstance, Rig)],
 }
 
-/// The text of a template with parts, as changes of a text of the same rig: of what the template has itself, and of the
-/// `changes` of its part instances. The result may say something else than `rig` where no change says what is different of a
-/// part: read it to see. With `with_names`, references in the changes are names without uids; with `in_order`, what the
-/// template has itself is put into the rig's order.
-pub(crate) fn write_parts_over(
-    rig: &Rig,
-    rigs: &PartRigs,
-    source: &str,
-    with_names: bool,
-    in_order: bool,
-) -> Option<String> {
-    let added = added_tags(rig, rigs);
-    let of_parts: HashSet<Uid> = added.values().flatten().map(|(_, tag)| *tag).collect();
-    let set_by_changes = joints_set_by_changes(rigs);
-    let is_own = |uid: Uid| (rigs.own.is_taken(uid) || !rigs.before.is_taken(uid)) && !of_parts.contains(&uid);
-    let stripped = |rig: &Rig| {
-        let data = |joint: &RigJoint| {
-            let mut data = joint.data.clone();
-            data.tags.retain(|tag| is_own(tag.uid));
-            if let Some(own) = rigs.own.joint(data.uid).filter(|_| set_by_changes.contains(&data.uid)) {
-                (data.rest, data.label, data.locked) = (own.data.rest, own.data.label.clone(), own.data.locked);
-            }
-            (data.uid, (data, joint.parent))
-        };
-        let joints = rig.walk().filter(|joint| is_own(joint.data.uid)).map(data).collect();
-        let mut out = rig.clone();
-        out.groups.retain(|group| is_own(group.uid));
-        out.inputs.retain(|input| is_own(input.uid));
-        out.set_joints(joints, |parent| rig.children(parent).to_vec());
-        out
-    };
-    let (own, own_before) = (stripped(rig), stripped(rigs.before));
+/// The text of a template with parts, as changes of the `changes` of its part instances in a text that says already what the
+/// template has itself. The result may say something else than `rig` where no change says what is different of a part: read it
+/// to see. With `with_names`, references in the changes are names without uids.
+pub(crate) fn write_changes_over(rig: &Rig, rigs: &PartRigs, source: &str, with_names: bool) -> Option<String> {
+    let added = added_tags(rig, rigs, &BTreeSet::new());
     let declared = Declarations::find(source)?;
-    let text = Rewriter { whole: [rigs.before, rig], ..Rewriter::new(&own, &own_before, &declared) }.text();
-    let text = if in_order { reordered(&own, &text)? } else { text };
-    let tree = Tree::parse(&text)?;
+    let tree = &declared.tree;
     let elements = tree.elements(tree.root(), "parts");
     if elements.len() != rigs.parts.len() {
         return None;
@@ -76,62 +57,18 @@ pub(crate) fn write_parts_over(
         rigs,
         words: Words { names: RigNameIndex::new(rig), with_names },
         features: feature_uids(rig),
-        patch: Patch::new(&tree),
-        tree: &tree,
+        patch: Patch::new(tree),
+        tree,
     };
-    header_labels(&mut writer.patch, &tree, rigs.before, rig);
+    header_labels(&mut writer.patch, tree, rigs.before, rig);
+    for joint in &declared.joints {
+        writer.parent(joint);
+    }
     let none = Vec::new();
     for (number, item) in elements.iter().enumerate() {
         writer.instance(item.value, number, added.get(&number).unwrap_or(&none));
     }
     Some(writer.patch.text())
-}
-
-/// Tags that are in no text yet and stand behind those of a part on their joint, or on a joint of a part: by the number of the
-/// instance, with the joint of each.
-fn added_tags(rig: &Rig, rigs: &PartRigs) -> HashMap<usize, Vec<(Uid, Uid)>> {
-    let mut instance_of: HashMap<Uid, usize> = HashMap::new();
-    for (number, (instance, part)) in rigs.parts.iter().enumerate() {
-        for (place, joint) in part.walk().enumerate() {
-            if place >= instance.onto.len() {
-                instance_of.insert(instance.uid_of(joint.data.uid), number);
-            }
-            instance_of.extend(joint.data.tags.iter().map(|tag| (instance.uid_of(tag.uid), number)));
-        }
-        instance_of.extend(instance.changes.iter().flat_map(|change| &change.tags).map(|tag| (tag.uid, number)));
-    }
-    let mut added: HashMap<usize, Vec<(Uid, Uid)>> = HashMap::new();
-    for joint in rig.walk() {
-        let mut last = instance_of.get(&joint.data.uid).copied();
-        for tag in &joint.data.tags {
-            match (instance_of.get(&tag.uid), last) {
-                (Some(number), _) => last = Some(*number),
-                (None, Some(number)) if !rigs.before.is_taken(tag.uid) => {
-                    added.entry(number).or_default().push((joint.data.uid, tag.uid));
-                }
-                _ => {}
-            }
-        }
-    }
-    added
-}
-
-/// Joints of the template itself whose place, label or lock a change of an instance sets.
-fn joints_set_by_changes(rigs: &PartRigs) -> HashSet<Uid> {
-    let mut set = HashSet::new();
-    for (instance, part) in rigs.parts {
-        for change in &instance.changes {
-            let is_set = change.translation.is_some()
-                || change.rotation.is_some()
-                || change.scale.is_some()
-                || change.label.is_some()
-                || change.locked.is_some();
-            let place = change.joint.as_ref().and_then(|label| instance.find_joint(part, label).ok());
-            let onto = place.filter(|_| is_set).and_then(|place| instance.onto.get(place));
-            set.extend(onto.and_then(|label| rigs.own.find_label(label)));
-        }
-    }
-    set
 }
 
 /// A thing of a part that an instance changes.
@@ -173,7 +110,7 @@ impl Overrides<'_, '_> {
     /// Writes what is different of an instance, whose element in the text is `node`.
     fn instance(&mut self, node: NodeId, number: usize, added: &[(Uid, Uid)]) {
         let (instance, part) = &self.rigs.parts[number];
-        self.labels(node, instance);
+        instance_labels(&mut self.patch, self.tree, node, instance, [self.rigs.before, self.rig]);
         let entries = self.entries(node, instance, part);
         let mut changes = Entries { node, ..Entries::default() };
         let (mut off, mut on) = (Vec::new(), Vec::new());
@@ -217,25 +154,16 @@ impl Overrides<'_, '_> {
         self.patch.exchange(node, "changes", &changes.gone, &changes.fresh);
     }
 
-    /// Writes other labels of the joints that a part goes onto and hangs on.
-    fn labels(&mut self, node: NodeId, instance: &PartInstance) {
-        let renamed = |label: &str| {
-            let joint = self.rig.joint(self.rigs.before.find_label(label)?)?;
-            joint.data.label.clone().filter(|now| now != label)
-        };
-        if let Some(now) = instance.parent.as_deref().and_then(renamed) {
-            self.patch.set(node, "parent", &quoted(&now));
-        }
-        let onto: Vec<Option<String>> = instance.onto.iter().map(|label| renamed(label)).collect();
-        // The uid of a part without a name follows from the labels.
-        let follows = instance.name.is_empty() && self.tree.field(node, "uid").is_none();
-        if follows && onto.iter().any(Option::is_some) {
-            self.patch.put_first(node, &format!("uid: \"{}\"", instance.uid));
-        }
-        for (item, now) in self.tree.elements(node, "onto").iter().zip(onto) {
-            if let Some(now) = now {
-                self.patch.replace(item.value, &quoted(&now));
-            }
+    /// Writes another label of the joint of a part on which a joint of the template itself hangs.
+    fn parent(&mut self, joint: &Declaration) {
+        let Some(parent) = self.rig.joint(joint.uid).and_then(|joint| joint.parent) else { return };
+        let written = self.tree.string(joint.node, "parent").filter(|written| written.parse::<Uid>().is_err());
+        let Some(written) = written.filter(|_| self.rigs.own.joint(parent).is_none()) else { return };
+        let label = self.rig.joint(parent).and_then(|parent| parent.data.label.as_deref());
+        if label != Some(written.as_str()) {
+            let bearers = self.rig.walk().filter(|other| other.data.label.as_deref() == label).count();
+            let text = label.filter(|_| bearers == 1).map_or_else(|| format!("\"{parent}\""), quoted);
+            self.patch.set(joint.node, "parent", &text);
         }
     }
 

@@ -15,6 +15,21 @@ use crate::rig::{
     },
 };
 
+/// Fields of a template's header, in the order in which they are written. What lists headers reads the beginning of a file alone.
+const HEADER: [&str; 11] = [
+    "format",
+    "uid",
+    "name",
+    "version",
+    "kind",
+    "author",
+    "description",
+    "preview",
+    "joint_count",
+    "features",
+    "needs",
+];
+
 /// Changes of a text, collected in any order.
 pub(in crate::rig::format::template) struct Patch<'d, 'a> {
     tree: &'d Tree<'a>,
@@ -254,15 +269,18 @@ impl<'d, 'a> Patch<'d, 'a> {
         }
     }
 
-    /// Adds a field to a struct: before its tags, which may be long, else at its end.
+    /// Adds a field to a struct: one of a header in its place there, others before the tags, which may be long, else at the end.
     fn add(&mut self, node: NodeId, field: &str, value: &str) {
         let items = &self.tree.node(node).items;
-        let last = items.iter().rposition(|item| item.key != Some("tags"));
-        self.insert(
-            node,
-            if field == "tags" { items.len().checked_sub(1) } else { last },
-            &format!("{field}: {value}"),
-        );
+        let in_header = (node == self.tree.root()).then(|| HEADER.iter().position(|known| *known == field)).flatten();
+        let behind = match in_header {
+            Some(number) => {
+                HEADER[..number].iter().rev().find_map(|before| items.iter().position(|item| item.key == Some(*before)))
+            }
+            None if field == "tags" => items.len().checked_sub(1),
+            None => items.iter().rposition(|item| item.key != Some("tags")),
+        };
+        self.insert(node, behind, &format!("{field}: {value}"));
     }
 
     /// Inserts an item behind another one, or before the first.
@@ -275,7 +293,7 @@ impl<'d, 'a> Patch<'d, 'a> {
         let tree = self.tree;
         let (items, inside) = (&tree.node(node).items, tree.node(node).inside);
         if tree.node(node).bracket.is_none() {
-            let texts: Vec<&str> = changes.added.iter().map(|added| added.text.as_str()).collect();
+            let texts: Vec<String> = changes.added.iter().map(|added| item_on_one_line(&added.text)).collect();
             let end = tree.node(node).range.end;
             return self.changes.push((end..end, format!("({})", texts.join(", "))));
         }
@@ -306,7 +324,7 @@ impl<'d, 'a> Patch<'d, 'a> {
             false => format!("\n{blanks}{}", laid_out_item(&item.text, blanks.len())),
         };
         for (behind, added) in added {
-            let texts = || added.iter().map(|item| item.text.as_str());
+            let texts = || added.iter().map(|item| item_on_one_line(&item.text));
             let Some(item) = behind.map(|behind| &items[behind]) else {
                 let text = match items.first() {
                     Some(first) if self.is_alone(first) => {
@@ -391,12 +409,22 @@ impl<'d, 'a> Patch<'d, 'a> {
 
 /// An item in the layout of a line of its own.
 fn laid_out_item(text: &str, indent: usize) -> String {
-    let name = text.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(text.len());
-    match text[name..].strip_prefix(": ") {
-        Some(value) => {
-            let key = &text[..name];
-            format!("{key}: {}", value_laid_out(value, indent, indent + key.chars().count() + 2))
-        }
-        None => value_laid_out(text, indent, indent),
+    let (key, value) = key_and_value(text);
+    format!("{key}{}", value_laid_out(value, indent, indent + key.chars().count()))
+}
+
+/// An item on one line, as far as no comment is in it.
+fn item_on_one_line(text: &str) -> String {
+    if !text.contains('\n') {
+        return text.to_owned();
     }
+    let (key, value) = key_and_value(text);
+    format!("{key}{}", value_on_one_line(value))
+}
+
+/// Name of a field with the colon and the blank behind it, and the value; an empty name for an element.
+fn key_and_value(text: &str) -> (&str, &str) {
+    let name = text.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(text.len());
+    let start = if text[name..].starts_with(": ") { name + 2 } else { 0 };
+    text.split_at(start)
 }

@@ -5,13 +5,13 @@ use std::collections::HashSet;
 use bevy::math::{Quat, Vec3};
 
 use crate::rig::{
-    JointData, Rig, TagData, TagKind, Uid, degrees,
+    JointData, TagData, TagKind, Uid, degrees,
     format::{
         layout::value_on_one_line,
         template::{quoted, shorthand::TAG_FIELDS, text_patch::canonical, vector},
         tree::{Item, Tree},
     },
-    reference::{RigNameIndex, bind_names, refresh_names, without_uids},
+    reference::{Names, RigNameIndex, bind_names, refresh_names, without_uids},
 };
 
 /// A field of a change that is written, or taken out where it has no value.
@@ -49,7 +49,7 @@ impl Words<'_> {
 }
 
 /// A tag on one line, in the short form; `None` for one that does not fit into it.
-pub(super) fn short_tag(rig: &Rig, tag: &TagData, features: &HashSet<Uid>) -> Option<String> {
+pub(in super::super) fn short_tag(names: &dyn Names, tag: &TagData, features: &HashSet<Uid>) -> Option<String> {
     let mut fields = vec![format!("uid: \"{}\"", tag.uid)];
     if !tag.enabled {
         fields.push("enabled: false".to_owned());
@@ -59,13 +59,18 @@ pub(super) fn short_tag(rig: &Rig, tag: &TagData, features: &HashSet<Uid>) -> Op
     }
     let name = match &tag.kind {
         TagKind::Command { module, params, feature } => {
-            let params = refresh_names(params, rig);
+            let params = value_on_one_line(&refresh_names(params, names));
             let tree = Tree::parse(&params)?;
             let node = tree.node(tree.root());
             let fits = |item: &Item| item.key.is_some_and(|key| !TAG_FIELDS.contains(&key));
             let is_name = module.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
                 && module.starts_with(|c: char| c.is_ascii_lowercase());
-            if node.bracket != Some('(') || !node.items.iter().all(fits) || !is_name || params.contains(['\n', '/']) {
+            if node.bracket != Some('(')
+                || !node.items.iter().all(fits)
+                || !is_name
+                || params.contains('\n')
+                || params.contains("/*")
+            {
                 return None;
             }
             let feature = feature.filter(|feature| features.contains(feature));

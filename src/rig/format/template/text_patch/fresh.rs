@@ -1,0 +1,190 @@
+//! Joints and tags that come into a text: in the form and the layout that it has.
+
+use std::{
+    collections::{HashMap, HashSet},
+    ops::Range,
+};
+
+use super::{
+    super::{
+        shorthand::{Declaration, Declarations, FIRST_FORMAT, TagForm},
+        write::{feature_uids, joint_text, tag_text},
+    },
+    Rewriter,
+    order::with_changes,
+    parts::short_tag,
+    patch::Patch,
+};
+use crate::rig::{
+    Rig, RigJoint, TagData, Uid,
+    format::{
+        layout::value_laid_out,
+        template::quoted,
+        tree::{NodeId, Tree},
+    },
+    reference::without_uids,
+};
+
+/// Numbers of joints and groups with each name, and the features of a rig.
+pub(super) struct NamesInUse {
+    joints: HashMap<String, usize>,
+    groups: HashMap<String, usize>,
+    pub features: HashSet<Uid>,
+}
+
+impl NamesInUse {
+    pub fn of(rig: &Rig) -> Self {
+        let (mut joints, mut groups) = (HashMap::new(), HashMap::new());
+        for label in rig.walk().filter_map(|joint| joint.data.label.clone()) {
+            *joints.entry(label).or_default() += 1;
+        }
+        for group in rig.groups() {
+            *groups.entry(group.name.clone()).or_default() += 1;
+        }
+        Self { joints, groups, features: feature_uids(rig) }
+    }
+
+    /// Returns `true` if one thing alone has that name: a group for the field `group`, else a joint.
+    pub fn is_unique(&self, field: &str, name: &str) -> bool {
+        let names = if field == "group" { &self.groups } else { &self.joints };
+        names.get(name) == Some(&1)
+    }
+}
+
+/// Returns `true` for a text whose tags have the short form, or would have it if there were any.
+pub(super) fn is_short(declared: &Declarations, with_names: bool) -> bool {
+    let forms = || declared.tags.iter().flatten().filter_map(|tag| TagForm::of(&declared.tree, tag.node));
+    let has_short = forms().any(|form| matches!(form, TagForm::Short(_)));
+    let has_long = forms().any(|form| matches!(form, TagForm::Command));
+    declared.format() >= FIRST_FORMAT && (has_short || with_names && !has_long)
+}
+
+impl<'d> Rewriter<'d, '_> {
+    /// Returns `true` if a joint or a tag comes into the text.
+    pub(super) fn has_fresh(&self) -> bool {
+        let is_known = |uid: Uid| self.before.is_taken(uid);
+        self.rig.walk().any(|joint| !is_known(joint.data.uid) || joint.data.tags.iter().any(|tag| !is_known(tag.uid)))
+    }
+
+    /// Text of a tag.
+    pub(super) fn new_tag(&self, tag: &TagData) -> String {
+        let features = &self.names.features;
+        match self.is_short.then(|| short_tag(&self.index, tag, features)).flatten() {
+            Some(text) => self.styled(&text),
+            None => tag_text(self.rig, tag, features),
+        }
+    }
+
+    /// Text of a joint. With names, it refers by label where that is the joint's alone.
+    pub(super) fn new_joint(&self, joint: &RigJoint) -> String {
+        let parent = self.parent_of(1, joint);
+        let mut without_tags = RigJoint { parent, ..joint.clone() };
+        let tags = if self.is_short { std::mem::take(&mut without_tags.data.tags) } else { Vec::new() };
+        let mut text = joint_text(self.rig, &without_tags, &self.names.features);
+        if let Some(open) = text.strip_suffix(')').filter(|_| !tags.is_empty()) {
+            let tags: Vec<String> = tags.iter().map(|tag| self.new_tag(tag)).collect();
+            text = format!("{open}tags: [{}])", tags.join(", "));
+        }
+        if !self.with_names {
+            return text;
+        }
+        for (field, uid) in [("parent", parent), ("mirror", joint.data.mirror)] {
+            if let Some((uid, label)) = uid.and_then(|uid| Some((uid, self.label_of(uid)?))) {
+                text = text.replacen(&format!("{field}: \"{uid}\""), &format!("{field}: {}", quoted(label)), 1);
+            }
+        }
+        let group = joint.data.group.and_then(|group| self.rig.group(group));
+        if let Some(group) = group.filter(|group| self.names.is_unique("group", &group.name)) {
+            text = text.replacen(&format!("group: \"{}\"", group.uid), &format!("group: {}", quoted(&group.name)), 1);
+        }
+        without_uids(&text, &self.index, |_| true).into_owned()
+    }
+
+    /// Parent of a joint of the text in the rig before (0) or now (1), with what parts bring.
+    pub(super) fn parent_of(&self, which: usize, joint: &RigJoint) -> Option<Uid> {
+        joint.parent.or_else(|| self.whole[which].joint(joint.data.uid)?.parent)
+    }
+
+    /// Writes the parent of a joint that hangs on what a part brings.
+    pub(super) fn hang(&mut self, node: NodeId, old: Option<Uid>, new: Uid) {
+        let is_own = |label: &String| self.names.joints.contains_key(label);
+        let written = self.tree().string(node, "parent");
+        let is_kept = written.is_some_and(|written| written.parse::<Uid>().is_ok() || !is_own(&written));
+        if old == Some(new) && is_kept {
+            return;
+        }
+        let label = self.label_of(new).filter(|_| self.with_names);
+        let text = label.map_or_else(|| format!("\"{new}\""), quoted);
+        self.patch.set(node, "parent", &text);
+    }
+
+    /// Label by which the text can refer to a joint, which no other joint has. A joint that a part brings has the label from
+    /// before: changes of the part come into the text later.
+    fn label_of(&self, uid: Uid) -> Option<&'d str> {
+        if let Some(joint) = self.rig.joint(uid) {
+            return joint.data.label.as_deref().filter(|label| self.names.is_unique("joint", label));
+        }
+        let before = self.whole[0];
+        let label = before.joint(uid)?.data.label.as_deref()?;
+        let bearers = before.walk().filter(|joint| joint.data.label.as_deref() == Some(label)).count();
+        (bearers == 1 && !self.names.joints.contains_key(label)).then_some(label)
+    }
+}
+
+/// A text with what came into it as if it had been formatted: without uids that follow from names, if it leaves such uids out,
+/// and with the layout of joints that have got tags and had their layout before.
+pub(super) fn settled(mut text: String, before: &Declarations, leaves_out: bool) -> String {
+    let known: HashSet<Uid> = before.all().map(|one| one.uid).collect();
+    if let Some(shorter) = leaves_out.then(|| without_derived(&text, &known)).flatten() {
+        text = shorter;
+    }
+    laid_out_joints(&text, before, &known).unwrap_or(text)
+}
+
+/// The text without the uids of what came that follow from names; `None` if there are none, or the text would declare something
+/// else.
+fn without_derived(text: &str, known: &HashSet<Uid>) -> Option<String> {
+    let declared = Declarations::find(text)?;
+    let follows = |one: &&Declaration| one.is_written && one.derived == Some(one.uid) && !known.contains(&one.uid);
+    let found: Vec<NodeId> = declared.all().filter(follows).map(|one| one.node).collect();
+    if found.is_empty() {
+        return None;
+    }
+    let mut patch = Patch::new(&declared.tree);
+    found.into_iter().for_each(|node| patch.set_or_remove(node, "uid", None));
+    let out = patch.text();
+    let is_same = {
+        let after = Declarations::find(&out)?;
+        let uids = |declared: &Declarations| declared.all().map(|one| one.uid).collect::<Vec<Uid>>();
+        after.faults.len() == declared.faults.len() && uids(&after) == uids(&declared)
+    };
+    is_same.then_some(out)
+}
+
+/// The text with joints in their layout that have something that came, unless they had another layout before.
+fn laid_out_joints(text: &str, before: &Declarations, known: &HashSet<Uid>) -> Option<String> {
+    let declared = Declarations::find(text)?;
+    let was: HashMap<Uid, &Declaration> = before.joints.iter().map(|joint| (joint.uid, joint)).collect();
+    let mut changes: Vec<(Range<usize>, String)> = Vec::new();
+    for (joint, tags) in declared.joints.iter().zip(&declared.tags) {
+        let has_fresh = std::iter::once(joint).chain(tags).any(|one| !known.contains(&one.uid));
+        let had_layout = |old: &&Declaration| {
+            in_layout(&before.tree, old.node).is_some_and(|text| text == before.tree.written(old.node))
+        };
+        if has_fresh
+            && was.get(&joint.uid).is_none_or(had_layout)
+            && let Some(text) = in_layout(&declared.tree, joint.node)
+        {
+            changes.push((declared.tree.node(joint.node).range.clone(), text));
+        }
+    }
+    Some(with_changes(text, changes))
+}
+
+/// A value in its layout; `None` for one that does not begin its line behind blanks.
+fn in_layout(tree: &Tree, node: NodeId) -> Option<String> {
+    let start = tree.node(node).range.start;
+    let line = tree.text[..start].rfind('\n').map_or(0, |at| at + 1);
+    let is_indented = tree.text[line..start].bytes().all(|byte| byte == b' ');
+    is_indented.then(|| value_laid_out(tree.written(node), start - line, start - line))
+}
