@@ -6,7 +6,7 @@ use bevy::math::Vec3;
 use serde::Serialize;
 
 use super::{
-    humanoid::{HumanBone, HumanJoints, SkeletonJoint, by_names, by_shape},
+    humanoid::{HumanBone, HumanJoints, SkeletonJoint, by_names_and, by_shape, named_bones},
     motion::Motion,
 };
 use crate::rig::{NodeKind, Rig, SourceError, Uid, nearest::did_you_mean, parse_ron, utf8};
@@ -89,30 +89,34 @@ pub fn write_joint_map(pairs: &[(String, String)]) -> String {
 }
 
 impl JointMap {
-    /// Map of a motion to a rig. Pairs that are given win over what names and shape say.
+    /// Map of a motion to a rig. Pairs that are given win over what names and shape say, and complete names that say too little.
     ///
     /// # Errors
     /// A given name is unknown, or nothing can be mapped.
     pub fn new(motion: &Motion, rig: &Rig, given: &[(String, String)]) -> Result<Self, JointMapError> {
         let (sources, targets) = (motion_joints(motion), rig_joints(rig));
-        let ((mut source, mut found_by), (target, _)) = (found(&sources), found(&targets));
+        let mut places = Vec::with_capacity(given.len());
+        for (from, to) in given {
+            let from = find(&sources, from).map_err(|(name, nearest)| JointMapError::NoSource { name, nearest })?;
+            let to = find(&targets, to).map_err(|(name, nearest)| JointMapError::NoTarget { name, nearest })?;
+            places.push((from, to));
+        }
+        let target = target_bones(&sources, &targets, &places);
         let mut pairs = Vec::new();
+        let mut replaced: BTreeMap<HumanBone, BTreeSet<usize>> = BTreeMap::new();
+        for (from, to) in places {
+            match target.iter().find(|(_, joints)| joints.contains(&to)) {
+                Some((bone, _)) => replaced.entry(*bone).or_default().extend([from]),
+                None => pairs.push((from, to)),
+            }
+        }
+        let known = replaced.iter().filter_map(|(bone, joints)| Some((*bone, *joints.first()?))).collect();
+        let (mut source, mut found_by) = found(&sources, &known);
         if !given.is_empty() {
             found_by = FoundBy::Map;
-            let bone_of =
-                |joint: usize| target.iter().find(|(_, joints)| joints.contains(&joint)).map(|(bone, _)| *bone);
-            let mut replaced: BTreeMap<HumanBone, BTreeSet<usize>> = BTreeMap::new();
-            for (from, to) in given {
-                let from = find(&sources, from).map_err(|(name, nearest)| JointMapError::NoSource { name, nearest })?;
-                let to = find(&targets, to).map_err(|(name, nearest)| JointMapError::NoTarget { name, nearest })?;
-                match bone_of(to) {
-                    Some(bone) => replaced.entry(bone).or_default().extend([from]),
-                    None => pairs.push((from, to)),
-                }
-            }
-            for (bone, joints) in replaced {
-                source.insert(bone, joints.into_iter().collect());
-            }
+        }
+        for (bone, joints) in replaced {
+            source.insert(bone, joints.into_iter().collect());
         }
         // Joints of the same name that are no bones of a human turn alike.
         let taken: BTreeSet<usize> = target.values().flatten().copied().collect();
@@ -140,7 +144,7 @@ impl JointMap {
     /// There are no pairs.
     pub fn of_pairs(motion: &Motion, rig: &Rig, given: &[(usize, usize)]) -> Result<Self, JointMapError> {
         let (sources, targets) = (motion.joints.len(), rig_joints(rig));
-        let (mut target, _) = found(&targets);
+        let (mut target, _) = found(&targets, &BTreeMap::new());
         let mut source = HumanJoints::new();
         let mut pairs = Vec::new();
         for &(from, to) in given.iter().filter(|(from, to)| *from < sources && *to < targets.len()) {
@@ -213,10 +217,22 @@ impl JointMap {
     }
 }
 
-/// Bones of a skeleton, by names or else by shape.
-fn found(joints: &[SkeletonJoint]) -> (HumanJoints, FoundBy) {
-    let named = by_names(joints);
+/// Bones of a skeleton, by names and by what is known of bones that have none, or else by shape.
+fn found(joints: &[SkeletonJoint], known: &BTreeMap<HumanBone, usize>) -> (HumanJoints, FoundBy) {
+    let named = by_names_and(joints, known);
     if named.is_empty() { (shaped(joints), FoundBy::Shape) } else { (named, FoundBy::Names) }
+}
+
+/// Bones of a rig. Where neither its names nor its shape say anything, the pairs of a map do, by the names of the motion.
+fn target_bones(sources: &[SkeletonJoint], targets: &[SkeletonJoint], pairs: &[(usize, usize)]) -> HumanJoints {
+    let (target, _) = found(targets, &BTreeMap::new());
+    if !target.is_empty() || pairs.is_empty() {
+        return target;
+    }
+    let bones: BTreeMap<usize, HumanBone> =
+        named_bones(sources).into_iter().map(|(bone, joint)| (joint, bone)).collect();
+    let known = pairs.iter().filter_map(|(from, to)| Some((*bones.get(from)?, *to))).collect();
+    found(targets, &known).0
 }
 
 /// Joint of that name, or the name and the end of a sentence about it.
@@ -243,6 +259,7 @@ pub fn motion_joints(motion: &Motion) -> Vec<SkeletonJoint> {
         name: joint.name.clone(),
         parent: joint.parent,
         position: rest.translation,
+        has_end: !joint.ends.is_empty(),
     };
     motion.joints.iter().zip(motion.rest_globals()).map(joint).collect()
 }
@@ -255,6 +272,7 @@ pub fn rig_joints(rig: &Rig) -> Vec<SkeletonJoint> {
         name: joint.data.label.clone().unwrap_or_default(),
         parent: joint.parent.and_then(|parent| index.get(&parent).copied()),
         position: *position,
+        has_end: false,
     };
     rig.walk().zip(&places).map(joint).collect()
 }
