@@ -6,13 +6,16 @@ use bevy::math::Vec3;
 use serde::Serialize;
 
 use super::{
-    humanoid::{HumanBone, HumanJoints, SkeletonJoint, by_names_and, by_shape, named_bones},
+    humanoid::{HumanBone, HumanJoints, SkeletonJoint, by_names_and, by_shape, is_above, named_bones},
     motion::Motion,
 };
 use crate::rig::{NodeKind, Rig, SourceError, Uid, nearest::did_you_mean, parse_ron, utf8};
 
 /// Largest map file in bytes.
 pub const MAX_BYTES: usize = 4 << 20;
+
+/// Most joints one below the other that only carry a skeleton, such as those above the hips.
+const MOST_ROOTS: usize = 4;
 
 /// Way in which a skeleton's bones were found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -65,6 +68,14 @@ pub enum JointMapError {
         "no joint of the motion is mapped to the rig: neither are names alike nor is it a human; give a map with --map: [(\"joint of the motion\", \"joint of the rig\"), ...]"
     )]
     Nothing,
+    /// Only joints that carry everything are mapped.
+    #[error(
+        "of the motion only \"{name}\" is mapped to the rig, which carries all other joints: neither are their names alike nor is it a human; give a map with --map: [(\"joint of the motion\", \"joint of the rig\"), ...]"
+    )]
+    OnlyRoot {
+        /// Joint of the motion.
+        name: String,
+    },
 }
 
 /// Pairs of names: joint of the motion, joint of the rig.
@@ -129,8 +140,10 @@ impl JointMap {
             }
         }
         if !is_human {
-            if pairs.is_empty() {
-                return Err(JointMapError::Nothing);
+            let Some((first, _)) = pairs.first() else { return Err(JointMapError::Nothing) };
+            let is_root = |(from, to): &(usize, usize)| carries_all(&sources, *from) || carries_all(&targets, *to);
+            if given.is_empty() && pairs.len() <= MOST_ROOTS && pairs.iter().all(is_root) {
+                return Err(JointMapError::OnlyRoot { name: sources[*first].name.clone() });
             }
             let found_by = if given.is_empty() { FoundBy::Labels } else { found_by };
             return Ok(Self { source: HumanJoints::new(), target: HumanJoints::new(), pairs, found_by });
@@ -233,6 +246,12 @@ fn target_bones(sources: &[SkeletonJoint], targets: &[SkeletonJoint], pairs: &[(
         named_bones(sources).into_iter().map(|(bone, joint)| (joint, bone)).collect();
     let known = pairs.iter().filter_map(|(from, to)| Some((*bones.get(from)?, *to))).collect();
     found(targets, &known).0
+}
+
+/// True if a joint has nearly all joints of a skeleton of several ones below it.
+fn carries_all(joints: &[SkeletonJoint], at: usize) -> bool {
+    let below = (0..joints.len()).filter(|joint| is_above(joints, at, *joint)).count();
+    joints.len() > 1 && 4 * (below + 1) >= 3 * joints.len()
 }
 
 /// Joint of that name, or the name and the end of a sentence about it.
