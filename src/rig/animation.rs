@@ -8,6 +8,7 @@
 mod check;
 pub mod clip_extras;
 pub mod file_clip;
+pub mod four_legs;
 pub mod humanoid;
 pub mod joint_map;
 pub mod motion;

@@ -2,10 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use bevy::math::Vec3;
+use bevy::math::{Quat, Vec3};
 use serde::Serialize;
 
 use super::{
+    four_legs::FourLegs,
     humanoid::{HumanBone, HumanJoints, SkeletonJoint, by_names_and, by_shape, is_above, named_bones},
     motion::Motion,
 };
@@ -42,6 +43,9 @@ pub struct JointMap {
     pub pairs: Vec<(usize, usize)>,
     /// Way in which the motion's bones were found.
     pub found_by: FoundBy,
+    /// Rotations of the motion's and of the rig's skeleton from axes in which left is X, up is Y and forward is Z, for animals;
+    /// those of humans follow from their bones.
+    pub axes: Option<[Quat; 2]>,
 }
 
 /// Reason why no map can be made.
@@ -112,6 +116,9 @@ impl JointMap {
             let to = find(&targets, to).map_err(|(name, nearest)| JointMapError::NoTarget { name, nearest })?;
             places.push((from, to));
         }
+        if let Some(animals) = animals(&sources, &targets) {
+            return Ok(Self::of_animals([&sources, &targets], &animals, &places));
+        }
         let target = target_bones(&sources, &targets, &places);
         let mut pairs = Vec::new();
         let mut replaced: BTreeMap<HumanBone, BTreeSet<usize>> = BTreeMap::new();
@@ -141,14 +148,33 @@ impl JointMap {
         }
         if !is_human {
             let Some((first, _)) = pairs.first() else { return Err(JointMapError::Nothing) };
-            let is_root = |(from, to): &(usize, usize)| carries_all(&sources, *from) || carries_all(&targets, *to);
-            if given.is_empty() && pairs.len() <= MOST_ROOTS && pairs.iter().all(is_root) {
+            if given.is_empty() && are_roots(&sources, &targets, &pairs) {
                 return Err(JointMapError::OnlyRoot { name: sources[*first].name.clone() });
             }
             let found_by = if given.is_empty() { FoundBy::Labels } else { found_by };
-            return Ok(Self { source: HumanJoints::new(), target: HumanJoints::new(), pairs, found_by });
+            return Ok(Self { source: HumanJoints::new(), target: HumanJoints::new(), pairs, found_by, axes: None });
         }
-        Ok(Self { source, target, pairs, found_by })
+        Ok(Self { source, target, pairs, found_by, axes: None })
+    }
+
+    /// Map of two animals: hips to hips, and other joints by their chains, but for those of pairs that are given.
+    fn of_animals(
+        [sources, targets]: [&[SkeletonJoint]; 2],
+        [from, to]: &[FourLegs; 2],
+        given: &[(usize, usize)],
+    ) -> Self {
+        let is_given = |target: usize| given.iter().any(|(_, known)| *known == target);
+        let hips = given.iter().rev().find(|(_, known)| *known == to.hips).map_or(from.hips, |(source, _)| *source);
+        let mut pairs: Vec<(usize, usize)> = given.iter().copied().filter(|(_, target)| *target != to.hips).collect();
+        let guessed = from.pairs(sources, to, targets);
+        pairs.extend(guessed.into_iter().filter(|(_, target)| !is_given(*target)));
+        Self {
+            source: HumanJoints::from([(HumanBone::Hips, vec![hips])]),
+            target: HumanJoints::from([(HumanBone::Hips, vec![to.hips])]),
+            pairs,
+            found_by: if given.is_empty() { FoundBy::Shape } else { FoundBy::Map },
+            axes: Some([from.axes, to.axes]),
+        }
     }
 
     /// Map of these pairs alone: a joint of the motion, and one of the rig as an index in the order of [`Rig::walk`].
@@ -156,11 +182,16 @@ impl JointMap {
     /// # Errors
     /// There are no pairs.
     pub fn of_pairs(motion: &Motion, rig: &Rig, given: &[(usize, usize)]) -> Result<Self, JointMapError> {
-        let (sources, targets) = (motion.joints.len(), rig_joints(rig));
+        let (sources, targets) = (motion_joints(motion), rig_joints(rig));
         let (mut target, _) = found(&targets, &BTreeMap::new());
+        let mut axes = None;
+        if let Some([from, to]) = animals(&sources, &targets) {
+            target = HumanJoints::from([(HumanBone::Hips, vec![to.hips])]);
+            axes = Some([from.axes, to.axes]);
+        }
         let mut source = HumanJoints::new();
         let mut pairs = Vec::new();
-        for &(from, to) in given.iter().filter(|(from, to)| *from < sources && *to < targets.len()) {
+        for &(from, to) in given.iter().filter(|(from, to)| *from < sources.len() && *to < targets.len()) {
             match target.iter().find(|(_, joints)| joints.contains(&to)) {
                 Some((bone, _)) => source.entry(*bone).or_default().push(from),
                 None => pairs.push((from, to)),
@@ -174,7 +205,7 @@ impl JointMap {
         if source.is_empty() && pairs.is_empty() {
             return Err(JointMapError::Nothing);
         }
-        Ok(Self { source, target, pairs, found_by: FoundBy::Map })
+        Ok(Self { source, target, pairs, found_by: FoundBy::Map, axes })
     }
 
     /// Pairs of the map: joint of the motion, joint of the rig. Of several joints of a bone, those at the same share of its
@@ -252,6 +283,24 @@ fn target_bones(sources: &[SkeletonJoint], targets: &[SkeletonJoint], pairs: &[(
 fn carries_all(joints: &[SkeletonJoint], at: usize) -> bool {
     let below = (0..joints.len()).filter(|joint| is_above(joints, at, *joint)).count();
     joints.len() > 1 && 4 * (below + 1) >= 3 * joints.len()
+}
+
+/// True if all pairs are of joints that carry a whole skeleton.
+fn are_roots(sources: &[SkeletonJoint], targets: &[SkeletonJoint], pairs: &[(usize, usize)]) -> bool {
+    let is_root = |(from, to): &(usize, usize)| carries_all(sources, *from) || carries_all(targets, *to);
+    pairs.len() <= MOST_ROOTS && pairs.iter().all(is_root)
+}
+
+/// Skeletons of two animals whose joints have other names; `None` for a motion of a human.
+fn animals(sources: &[SkeletonJoint], targets: &[SkeletonJoint]) -> Option<[FourLegs; 2]> {
+    let animals = [FourLegs::find(sources)?, FourLegs::find(targets)?];
+    let places: BTreeMap<&str, usize> =
+        sources.iter().enumerate().rev().map(|(at, joint)| (joint.name.as_str(), at)).collect();
+    let named = targets.iter().enumerate().filter(|(_, joint)| !joint.name.is_empty());
+    let alike: Vec<(usize, usize)> =
+        named.filter_map(|(to, joint)| Some((*places.get(joint.name.as_str())?, to))).collect();
+    let is_human = !found(sources, &BTreeMap::new()).0.is_empty();
+    (!is_human && are_roots(sources, targets, &alike)).then_some(animals)
 }
 
 /// Joint of that name, or the name and the end of a sentence about it.

@@ -9,14 +9,14 @@ use rigsmith::{
     processor::Builder,
     rig::{
         RigEdit,
-        animation::{NodeNames, orphaned_keys},
+        animation::{NodeNames, file_clip::motion_of, motion::Motion, orphaned_keys},
         project::{Project, ProjectRig, read_project, write_project},
     },
 };
 use serde_json::Value;
 
 use super::{WALKER, json, played};
-use crate::{bench::shipped, cli_build::rigsmith};
+use crate::{bench::shipped, cli_build::rigsmith, prerequisites::test_data};
 
 /// A folder with a motion, and with its clip on the biped's controls.
 fn folder() -> tempfile::TempDir {
@@ -171,4 +171,64 @@ fn a_motion_of_which_only_a_root_is_mapped_is_refused() {
     refused(folder.path(), &args, 1, &["`arm.bvh`", "only \"root\"", "--map"]);
     let answer = json(folder.path(), &[&["animate"], &args[..], &["--map", "map.ron"]].concat());
     assert!(answer["keys_after"].as_u64().unwrap() >= 3, "{answer}");
+}
+
+/// Foxes with joints of other names, other proportions and other numbers of joints in spine, neck, tail and legs.
+#[test]
+fn an_animal_moves_another_one_by_the_chains_of_its_skeleton() {
+    let Some(data) = test_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let [fox, other] =
+        ["gltf_skinned/Fox.glb", "creatures/fox-fox.glb"].map(|path| data.join(path).display().to_string());
+    let run =
+        |rig: &str, args: &[&str]| json(folder.path(), &[&["animate", rig, &fox, "--clip", "Walk"], args].concat());
+    let source = |answer: &Value, to: &str| -> String {
+        let mapped = answer["motions"][0]["mapped"].as_array().unwrap();
+        let pair = mapped.iter().find(|pair| pair["to"][0] == to).unwrap_or_else(|| panic!("{to}: {answer}"));
+        pair["from"][0].as_str().unwrap().to_owned()
+    };
+    let answer = run(&other, &["--map-out", "map.ron", "-o", "walk.anim.ron"]);
+    assert_eq!(answer["motions"][0]["found_by"], "shape", "{answer}");
+    for (to, from) in [
+        ("Hips", "b_Hip"),
+        ("Spine_1", "b_Spine01"),
+        ("Nose", "b_Head"),
+        ("Tail_End", "b_Tail"),
+        ("Front_Leg_Upper_L", "b_Left"),
+        ("Front_Leg_Foot_R", "b_RightHand"),
+        ("Back_Leg_Lower_L", "b_Left"),
+        ("Back_Leg_Foot_R", "b_RightFoot"),
+    ] {
+        let source = source(&answer, to);
+        assert!(source.starts_with(from), "{to} moves as {source}");
+    }
+    assert!(answer["clips"][0]["tracks"].as_u64().unwrap() > 20, "{answer}");
+    run(&other, &["--map", "map.ron", "-o", "again.anim.ron"]);
+    let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    assert!(read("walk.anim.ron") == read("again.anim.ron"), "the written map gives another clip");
+
+    // Legs swing as those of the other fox do, about the axis across the body.
+    run(&other, &["-o", "walk.glb"]);
+    let [was, is] = [Path::new(&fox), &folder.path().join("walk.glb")].map(|path| load_model(&RealDisk, path).unwrap());
+    let was_clip = was.clips.iter().find(|clip| clip.name == "Walk").unwrap();
+    let (was_motion, is_motion) = (motion_of(&was, was_clip), motion_of(&is, &is.clips[0]));
+    let turn = |motion: &Motion, name: &str, time: f32| {
+        let joint = motion.find(name).unwrap();
+        let at = |time: f32| motion.globals_at(time)[joint].rotation;
+        at(time) * at(0.0).inverse()
+    };
+    for time in [0.2, 0.4, 0.6] {
+        let turns = [turn(&was_motion, "b_LeftUpperArm_09", time), {
+            let to = "Front_Leg_Shoulder_L";
+            assert!(source(&answer, to).starts_with("b_LeftUpperArm"), "{answer}");
+            turn(&is_motion, to, time)
+        }];
+        assert!(turns[0].angle_between(turns[1]) < 0.05, "{turns:?}");
+    }
+
+    // Onto the controls of the quadruped, too.
+    let answer = run("quadruped", &["-o", "quadruped.anim.ron"]);
+    assert_eq!(answer["motions"][0]["onto"], "controls", "{answer}");
+    assert!(source(&answer, "upper_arm_l").starts_with("b_Left"), "{answer}");
+    assert!(answer["clips"][0]["tracks"].as_u64().unwrap() > 15, "{answer}");
 }
