@@ -118,15 +118,15 @@ impl FourLegs {
         Some(Self { hips, chains, axes, heights })
     }
 
-    /// Pairs of joints of two animals that turn alike, but for the hips: in legs those of the same height, in other chains those
-    /// at the same share of the length.
+    /// Pairs of joints of two animals that turn alike, but for the hips: in legs those whose bones have their middles at the same
+    /// height, in other chains those at the same share of the length.
     pub fn pairs(&self, joints: &[SkeletonJoint], other: &Self, others: &[SkeletonJoint]) -> Vec<(usize, usize)> {
         let mut pairs = Vec::new();
         for (chain, to) in &other.chains {
             let Some(from) = self.chains.get(chain) else { continue };
             let is_leg = matches!(chain, AnimalChain::Front(_) | AnimalChain::Hind(_));
             let places = |animal: &Self, joints: &[SkeletonJoint], chain: &[usize]| -> Vec<f32> {
-                if is_leg { chain.iter().map(|joint| animal.heights[*joint]).collect() } else { shares(joints, chain) }
+                if is_leg { animal.middles(chain) } else { shares(joints, chain) }
             };
             let (own, wanted) = (places(self, joints, from), places(other, others, to));
             for (joint, wanted) in to.iter().zip(wanted) {
@@ -137,6 +137,12 @@ impl FourLegs {
             }
         }
         pairs
+    }
+
+    /// Heights of the middles of the bones of a chain; the last joint has its own.
+    fn middles(&self, chain: &[usize]) -> Vec<f32> {
+        let height = |place: usize| self.heights[chain[place.min(chain.len() - 1)]];
+        (0..chain.len()).map(|place| 0.5 * (height(place) + height(place + 1))).collect()
     }
 }
 

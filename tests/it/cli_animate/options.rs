@@ -194,9 +194,9 @@ fn an_animal_moves_another_one_by_the_chains_of_its_skeleton() {
         ("Spine_1", "b_Spine01"),
         ("Nose", "b_Head"),
         ("Tail_End", "b_Tail"),
-        ("Front_Leg_Upper_L", "b_Left"),
+        ("Front_Leg_Upper_L", "b_LeftUpperArm"),
         ("Front_Leg_Foot_R", "b_RightHand"),
-        ("Back_Leg_Lower_L", "b_Left"),
+        ("Back_Leg_Lower_L", "b_LeftLeg02"),
         ("Back_Leg_Foot_R", "b_RightFoot"),
     ] {
         let source = source(&answer, to);
