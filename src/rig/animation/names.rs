@@ -87,7 +87,7 @@ pub struct OrphanedKeys {
 }
 
 /// Keys of nodes that are neither joints of the document nor built, by clip, layer and node. Other nodes are offered by the names
-/// that the clip brought with it, and else by those of earlier builds in `known`.
+/// of earlier builds in `known`, and else by those that the clip brought with it.
 pub fn orphaned_keys(rig: &Rig, built: Option<&BuiltRig>, known: &NodeNames) -> Vec<OrphanedKeys> {
     let there = NodeNames::of(rig, built);
     rig.clips().iter().flat_map(|clip| of_clip(clip, &there, known)).collect()
@@ -102,7 +102,7 @@ fn of_clip(clip: &RigClip, there: &NodeNames, known: &NodeNames) -> Vec<Orphaned
             *count = (count.0 + 1, count.1 + track.keys.len());
         }
         for (node, (tracks, keys)) in counts.iter().filter(|(node, _)| !there.0.contains_key(node)) {
-            let name = clip.names.0.get(node).or_else(|| known.0.get(node)).cloned().unwrap_or_default();
+            let name = known.0.get(node).or_else(|| clip.names.0.get(node)).cloned().unwrap_or_default();
             let offer = there.find(&name).filter(|offer| !counts.contains_key(offer));
             let (clip, layer) = (clip.uid, layer.uid);
             found.push(OrphanedKeys { clip, layer, node: *node, name, tracks: *tracks, keys: *keys, offer });
