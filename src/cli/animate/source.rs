@@ -301,6 +301,12 @@ impl Taking<'_> {
         let done = spinning("retargeting", || retarget(bench.rig(), built, motion, &map, &settings))?;
         let RetargetedMotion { clip, keys, stances, touches, unmoved, notes } = done;
         report.notes(notes);
+        if keys[1] == 0 {
+            let name = &clip.name;
+            report
+                .notes
+                .push(format!("the clip \"{name}\" moves nothing: no joint that is mapped moves in the motion"));
+        }
         if !unmoved.is_empty() {
             report
                 .notes
