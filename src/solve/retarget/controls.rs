@@ -221,7 +221,7 @@ impl Moves {
         let program = state.program();
         let mut tried = state.clone();
         let near = 2e-3 * body.target.height;
-        let turn = PoseOffset::from_rotation(Quat::from_xyzw(0.12, 0.14, 0.1, 1.0).normalize());
+        let turn = Quat::from_xyzw(0.12, 0.14, 0.1, 1.0).normalize();
         let way = Vec3::splat(near);
         let joints: Vec<usize> = body.target.joints.iter().filter_map(|joint| program.node(joint.uid)).collect();
         let nodes = program.nodes().iter().enumerate();
@@ -230,10 +230,17 @@ impl Moves {
         let list = posable.map(|(slot, node)| {
             tried.set_offset_at(slot, PoseOffset { translation: way, ..PoseOffset::IDENTITY });
             let is_movable = tried.offset_at(slot).translation.distance(way) < 0.1 * near;
-            tried.set_offset_at(slot, turn);
-            tried.evaluate(0.0);
-            let is_turned = |joint: &usize| angle_between(tried.global_at(*joint), state.global_at(*joint)) > 0.1;
-            let turned = joints.iter().copied().filter(is_turned).collect();
+            let mut turned: Vec<usize> = Vec::new();
+            // A hinge at its end turns one way alone.
+            for rotation in [turn, turn.inverse()] {
+                if turned.is_empty() {
+                    tried.set_offset_at(slot, PoseOffset::from_rotation(rotation));
+                    tried.evaluate(0.0);
+                    let is_turned =
+                        |joint: &usize| angle_between(tried.global_at(*joint), state.global_at(*joint)) > 0.1;
+                    turned.extend(joints.iter().copied().filter(is_turned));
+                }
+            }
             tried.set_offset_at(slot, PoseOffset::IDENTITY);
             tried.evaluate(0.0);
             Mover { slot, joints: turned, is_control: node.kind == NodeType::Control, is_movable }
