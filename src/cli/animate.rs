@@ -1,5 +1,6 @@
 //! `rigsmith animate`: a clip, or the motion of another skeleton, on a rig.
 
+mod choice;
 mod source;
 #[cfg(feature = "render")]
 mod strip;
@@ -25,7 +26,7 @@ use crate::{
     plugins::commands::BuildStep,
     rig::{
         BuiltRig, Rig, RigEdit, Uid,
-        animation::{RigClip, joint_map::JointMapError},
+        animation::RigClip,
         bake::baked,
         operations::KeyTolerance,
         skeleton_preset::{SkeletonPreset, apply_preset},
@@ -129,12 +130,6 @@ impl From<RetargetError> for Failure {
     }
 }
 
-impl From<JointMapError> for Failure {
-    fn from(error: JointMapError) -> Self {
-        Self::Input(Box::new(error))
-    }
-}
-
 pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     let is_picture = args.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
     #[cfg(feature = "render")]
@@ -152,18 +147,19 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
         None if !has_commands => MotionTarget::Joints,
         Some(OntoArg::Controls) | None => MotionTarget::Controls,
     };
+    let mut whole = None;
     if is_motion && onto == MotionTarget::Joints && has_commands {
         report
             .notes
             .push("--onto joints: the commands of the rig are left out, so that joints can have keys".to_owned());
-        rig = without_commands(&rig)?;
+        let bare = without_commands(&rig)?;
+        if args.clips.iter().any(|clip| FileKind::of(clip) == Some(FileKind::Animation)) {
+            whole = Some(running(rig)?);
+        }
+        rig = bare;
     }
-    let mut bench = limits::workbench(rig);
-    if let Some(error) = bench.build(BuildStep::All).error {
-        return Err(Failure::Input(Box::new(error)));
-    }
-    bench.runtime()?;
-    let mut clips = source::clips(args, onto, &mut bench, &mut report)?;
+    let mut bench = running(rig)?;
+    let mut clips = source::clips(args, onto, &mut bench, whole.as_ref(), &mut report)?;
     switch::throw(&args.switches, &mut bench, &mut clips, &mut report)?;
     describe(&clips, &mut report);
     if is_picture {
@@ -188,6 +184,16 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     report.line(format!("wrote {}", args.output.display()));
     report.set("output", args.output.display().to_string());
     Ok(report)
+}
+
+/// Workbench with a rig that is built and runs.
+fn running(rig: Rig) -> Result<Workbench, Failure> {
+    let mut bench = limits::workbench(rig);
+    if let Some(error) = bench.build(BuildStep::All).error {
+        return Err(Failure::Input(Box::new(error)));
+    }
+    bench.runtime()?;
+    Ok(bench)
 }
 
 /// True if a file has the motion of a skeleton of its own.
@@ -217,6 +223,14 @@ fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
     let motions = args.clips.iter().filter(|clip| is_motion(clip)).count();
     if motions == 0 && (args.map.is_some() || args.map_out.is_some() || args.onto.is_some()) {
         let text = "--map, --map-out and --onto are for a .bvh, .glb, .gltf or .vrm; a clip of a rig knows its nodes";
+        return Err(Failure::Usage(text.to_owned()));
+    }
+    if motions == 0 && (args.in_place || args.free_feet || args.free_hands) {
+        let text = "--in-place, --free-feet and --free-hands are for a .bvh, .glb, .gltf or .vrm; a clip of a rig moves as its keys say";
+        return Err(Failure::Usage(text.to_owned()));
+    }
+    if motions == 0 && args.tolerance.is_some() && !is_character {
+        let text = "--tolerance is for motion of another skeleton and for a .glb, .gltf or .vrm; the keys of a clip of a rig stay as they are in a .anim.ron or .png";
         return Err(Failure::Usage(text.to_owned()));
     }
     if motions > 1 && args.map_out.is_some() {
@@ -314,13 +328,10 @@ fn exported(
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let program = bench.runtime()?.state().program();
     let nodes = baked_nodes(bench.rig(), built, model);
-    let globals = model.rest_globals();
-    let places = || globals.iter().map(|at| at.translation);
-    let extent = places().reduce(Vec3A::max).zip(places().reduce(Vec3A::min));
-    // The tolerance is for humans in metres; animals are longer than high, and skeletons may hang below the ground.
-    let size = extent.map_or(0.0, |(most, least)| (most - least).max_element());
-    let tolerance = KeyTolerance::default().scaled(args.tolerance.map_or(1.0, |most| most / 0.05)).for_height(size);
+    let tolerance = tolerance(args, size_of(model.rest_globals().iter().map(|at| at.translation)));
     let mut baked = Vec::new();
+    let mut facts = Vec::new();
+    let mut sums = [0, 0];
     for clip in clips {
         let rate = args.fps.unwrap_or(clip.frame_rate);
         let done = bake_clip(program, clip, &nodes, rate, &tolerance)
@@ -332,11 +343,44 @@ fn exported(
             counted(done.channels.len(), "channel", "channels"),
             counted(keys, "key", "keys")
         ));
+        // Without the reduction, each channel had a key at each frame.
+        let frames = (clip.duration() * rate + 1e-3).floor() as usize + 1;
+        sums = [sums[0] + frames * done.channels.len(), sums[1] + keys];
+        facts.push(json!({
+            "name": done.name,
+            "channels": done.channels.len(),
+            "keys_before": frames * done.channels.len(),
+            "keys_after": keys,
+            "reduction": reduction(frames * done.channels.len(), keys),
+        }));
         baked.push(done);
+    }
+    report.set("animations", facts);
+    // What retargeting has told is about the clips on the rig.
+    if !report.json.contains_key("motions") {
+        report.set("keys_before", sums[0]);
+        report.set("keys_after", sums[1]);
+        report.set("reduction", reduction(sums[0], sums[1]));
     }
     let channels: usize = baked.iter().map(|clip| clip.channels.len()).sum();
     report.set("channels", channels);
     Ok(baked)
+}
+
+/// Ratio of numbers of keys before and after a reduction.
+fn reduction(before: usize, after: usize) -> f32 {
+    before as f32 / after.max(1) as f32
+}
+
+/// Longest edge of the box around some places. Animals are longer than high, and skeletons may hang below the ground.
+fn size_of(places: impl Iterator<Item = Vec3A> + Clone) -> f32 {
+    let extent = places.clone().reduce(Vec3A::max).zip(places.reduce(Vec3A::min));
+    extent.map_or(0.0, |(most, least)| (most - least).max_element())
+}
+
+/// Tolerance of baking for a figure of a size; the usual one is for humans in metres.
+fn tolerance(args: &AnimateArgs, size: f32) -> KeyTolerance {
+    KeyTolerance::default().scaled(args.tolerance.map_or(1.0, |most| most / 0.05)).for_height(size)
 }
 
 /// Gives the model the names and axes of another program.

@@ -8,6 +8,7 @@
 mod check;
 pub mod clip_extras;
 pub mod file_clip;
+pub mod four_legs;
 pub mod humanoid;
 pub mod joint_map;
 pub mod motion;
@@ -54,6 +55,9 @@ pub struct RigClip {
     pub markers: Vec<Marker>,
     /// Layers from the bottom to the top; the first one is the base.
     pub layers: Vec<ClipLayer>,
+    /// Names of animated nodes that the rig did not have when the clip came to it, by which other nodes are offered.
+    #[serde(default, skip_serializing_if = "NodeNames::is_empty")]
+    pub names: NodeNames,
 }
 
 /// Named moment of a clip.
@@ -227,6 +231,7 @@ impl RigClip {
             looped: false,
             markers: Vec::new(),
             layers: vec![base],
+            names: NodeNames::default(),
         }
     }
 
@@ -250,8 +255,8 @@ impl RigClip {
     pub(in crate::rig) fn set_about(&mut self, about: &ClipAbout) -> ClipAbout {
         let before = self.about();
         let ClipAbout { name, frame_rate, range, looped, markers } = about.clone();
-        *self =
-            Self { name, frame_rate, range, looped, markers, uid: self.uid, layers: std::mem::take(&mut self.layers) };
+        let (layers, names) = (std::mem::take(&mut self.layers), std::mem::take(&mut self.names));
+        *self = Self { name, frame_rate, range, looped, markers, uid: self.uid, layers, names };
         before
     }
 

@@ -204,6 +204,7 @@ pub fn apply_preset(model: &mut Model, preset: SkeletonPreset) -> Option<usize> 
             name: node.name.clone(),
             parent: node.parent,
             position: at.translation.into(),
+            has_end: false,
         })
         .collect();
     let named = by_names(&joints);
@@ -362,7 +363,8 @@ mod tests {
 
     #[test]
     fn chains_without_length_have_a_direction() {
-        let joint = |parent: Option<usize>, position: Vec3| SkeletonJoint { name: String::new(), parent, position };
+        let joint =
+            |parent: Option<usize>, position: Vec3| SkeletonJoint { parent, position, ..SkeletonJoint::default() };
         let joints = [joint(None, Vec3::Y), joint(Some(0), Vec3::Y), joint(Some(1), Vec3::new(2.0, 1.0, 0.0))];
         for (chain, wanted) in [
             (vec![0, 1, 2], Vec3::X),

@@ -377,7 +377,7 @@ fn bones_are_found_by_the_names_of_many_programs() {
         let mut joints: Vec<SkeletonJoint> = parents
             .iter()
             .zip(names)
-            .map(|(parent, name)| SkeletonJoint { name: name.into(), parent: *parent, position: Vec3::ZERO })
+            .map(|(parent, name)| SkeletonJoint { name: name.into(), parent: *parent, ..SkeletonJoint::default() })
             .collect();
         let right = |name: &str| {
             let pairs =
@@ -390,9 +390,9 @@ fn bones_are_found_by_the_names_of_many_programs() {
         for at in 3..11 {
             let parent = parents[at].unwrap();
             let parent = if parent < 3 { parent } else { parent + 9 };
-            joints.push(SkeletonJoint { name: right(names[at]), parent: Some(parent), position: Vec3::ZERO });
+            joints.push(SkeletonJoint { name: right(names[at]), parent: Some(parent), ..SkeletonJoint::default() });
         }
-        joints.push(SkeletonJoint { name: names[12].into(), parent: Some(15), position: Vec3::ZERO });
+        joints.push(SkeletonJoint { name: names[12].into(), parent: Some(15), ..SkeletonJoint::default() });
         let found = by_names(&joints);
         for (at, bone) in bones.iter().enumerate() {
             let expected = if at == 12 { joints.len() - 1 } else { at };

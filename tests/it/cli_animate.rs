@@ -1,5 +1,7 @@
 //! `rigsmith animate`: clips and motion capture onto rigs, with the real binary, real files and exit codes.
 
+mod options;
+
 use std::{fs, path::Path};
 
 use rigsmith::{

@@ -98,6 +98,7 @@ fn clip(version: u32) -> RigClip {
         looped: false,
         markers: Vec::new(),
         layers: Vec::new(),
+        ..RigClip::new(Uid(0xC11), Uid(0), "")
     }
 }
 

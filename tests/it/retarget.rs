@@ -3,6 +3,8 @@
 mod bodies;
 mod hands;
 mod joints;
+mod keyed_nodes;
+mod maps;
 mod reduction;
 
 use std::{path::Path, sync::Arc};
@@ -312,6 +314,9 @@ fn a_map_is_guessed_written_read_and_wins() {
             let bone = HumanBone::Limb(side, bone);
             assert_eq!(shaped.source[&bone].last(), map.source[&bone].last(), "{bone}");
         }
+    }
+    for bone in [HumanBone::Neck, HumanBone::Head] {
+        assert_eq!(shaped.source.get(&bone), map.source.get(&bone), "{bone}");
     }
 }
 

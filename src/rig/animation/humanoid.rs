@@ -161,6 +161,8 @@ pub struct SkeletonJoint {
     pub parent: Option<usize>,
     /// Position at rest.
     pub position: Vec3,
+    /// True if a bone is known to begin at the joint though no joint may follow: the end sites of a BVH tell.
+    pub has_end: bool,
 }
 
 /// Joints of a skeleton by the bone that they stand for, each list from the body outwards. The first joint of a bone has its
@@ -190,7 +192,17 @@ pub fn head_bones(joints: &[SkeletonJoint], head: usize) -> BTreeMap<HeadBone, u
 
 /// Joints that stand for bones, by their names. Empty if the names say nothing: a human needs hips and two legs.
 pub fn by_names(joints: &[SkeletonJoint]) -> HumanJoints {
-    complete(joints, &named_bones(joints))
+    by_names_and(joints, &BTreeMap::new())
+}
+
+/// Joints that stand for bones, by their names and by what is known of bones that have no such names. Empty if both together
+/// say nothing.
+pub fn by_names_and(joints: &[SkeletonJoint], known: &BTreeMap<HumanBone, usize>) -> HumanJoints {
+    let mut named = named_bones(joints);
+    for (bone, joint) in known {
+        named.entry(*bone).or_insert(*joint);
+    }
+    complete(joints, &named)
 }
 
 /// Joints that are named as bones, whether they make up a human or not. Of spines, only those that go on to the head have
@@ -206,12 +218,36 @@ pub fn named_bones(joints: &[SkeletonJoint]) -> BTreeMap<HumanBone, usize> {
             named.insert(bone, at);
         }
     }
+    name_arms(joints, &mut named);
     if !named.contains_key(&HumanBone::Head)
         && let Some(head) = end_of_spine(joints, &named)
     {
         named.insert(HumanBone::Head, head);
     }
     named
+}
+
+/// Names the joints of arms that are called shoulder and wrist: a shoulder that carries the elbow is an upper arm if no other
+/// joint is called so, and a wrist that carries the hand is where the hand begins.
+fn name_arms(joints: &[SkeletonJoint], named: &mut BTreeMap<HumanBone, usize>) {
+    for (at, joint) in joints.iter().enumerate() {
+        let Some((side, word)) = names::arm_word_of(&joint.name) else { continue };
+        let [collar, upper, lower, hand] = [LimbBone::Shoulder, LimbBone::UpperArm, LimbBone::LowerArm, LimbBone::Hand]
+            .map(|bone| HumanBone::Limb(side, bone));
+        let carries = |bone: HumanBone| named.get(&bone).is_some_and(|child| joints[*child].parent == Some(at));
+        match word {
+            names::ArmWord::Shoulder if carries(lower) && !named.contains_key(&upper) => {
+                if named.get(&collar) == Some(&at) {
+                    named.remove(&collar);
+                }
+                named.insert(upper, at);
+            }
+            names::ArmWord::Wrist if carries(hand) => {
+                named.insert(hand, at);
+            }
+            names::ArmWord::Shoulder | names::ArmWord::Wrist => {}
+        }
+    }
 }
 
 /// Last joint of a numbered spine that goes on above the arms: the head.

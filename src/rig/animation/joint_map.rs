@@ -2,17 +2,21 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use bevy::math::Vec3;
+use bevy::math::{Quat, Vec3};
 use serde::Serialize;
 
 use super::{
-    humanoid::{HumanBone, HumanJoints, SkeletonJoint, by_names, by_shape},
+    four_legs::FourLegs,
+    humanoid::{HumanBone, HumanJoints, SkeletonJoint, by_names_and, by_shape, is_above, named_bones},
     motion::Motion,
 };
 use crate::rig::{NodeKind, Rig, SourceError, Uid, nearest::did_you_mean, parse_ron, utf8};
 
 /// Largest map file in bytes.
 pub const MAX_BYTES: usize = 4 << 20;
+
+/// Most joints one below the other that only carry a skeleton, such as those above the hips.
+const MOST_ROOTS: usize = 4;
 
 /// Way in which a skeleton's bones were found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -39,6 +43,9 @@ pub struct JointMap {
     pub pairs: Vec<(usize, usize)>,
     /// Way in which the motion's bones were found.
     pub found_by: FoundBy,
+    /// Rotations of the motion's and of the rig's skeleton from axes in which left is X, up is Y and forward is Z, for animals;
+    /// those of humans follow from their bones.
+    pub axes: Option<[Quat; 2]>,
 }
 
 /// Reason why no map can be made.
@@ -65,6 +72,14 @@ pub enum JointMapError {
         "no joint of the motion is mapped to the rig: neither are names alike nor is it a human; give a map with --map: [(\"joint of the motion\", \"joint of the rig\"), ...]"
     )]
     Nothing,
+    /// Only joints that carry everything are mapped.
+    #[error(
+        "of the motion only \"{name}\" is mapped to the rig, which carries all other joints: neither are their names alike nor is it a human; give a map with --map: [(\"joint of the motion\", \"joint of the rig\"), ...]"
+    )]
+    OnlyRoot {
+        /// Joint of the motion.
+        name: String,
+    },
 }
 
 /// Pairs of names: joint of the motion, joint of the rig.
@@ -89,30 +104,37 @@ pub fn write_joint_map(pairs: &[(String, String)]) -> String {
 }
 
 impl JointMap {
-    /// Map of a motion to a rig. Pairs that are given win over what names and shape say.
+    /// Map of a motion to a rig. Pairs that are given win over what names and shape say, and complete names that say too little.
     ///
     /// # Errors
     /// A given name is unknown, or nothing can be mapped.
     pub fn new(motion: &Motion, rig: &Rig, given: &[(String, String)]) -> Result<Self, JointMapError> {
         let (sources, targets) = (motion_joints(motion), rig_joints(rig));
-        let ((mut source, mut found_by), (target, _)) = (found(&sources), found(&targets));
+        let mut places = Vec::with_capacity(given.len());
+        for (from, to) in given {
+            let from = find(&sources, from).map_err(|(name, nearest)| JointMapError::NoSource { name, nearest })?;
+            let to = find(&targets, to).map_err(|(name, nearest)| JointMapError::NoTarget { name, nearest })?;
+            places.push((from, to));
+        }
+        if let Some(animals) = animals(&sources, &targets) {
+            return Ok(Self::of_animals([&sources, &targets], &animals, &places));
+        }
+        let target = target_bones(&sources, &targets, &places);
         let mut pairs = Vec::new();
+        let mut replaced: BTreeMap<HumanBone, BTreeSet<usize>> = BTreeMap::new();
+        for (from, to) in places {
+            match target.iter().find(|(_, joints)| joints.contains(&to)) {
+                Some((bone, _)) => replaced.entry(*bone).or_default().extend([from]),
+                None => pairs.push((from, to)),
+            }
+        }
+        let known = replaced.iter().filter_map(|(bone, joints)| Some((*bone, *joints.first()?))).collect();
+        let (mut source, mut found_by) = found(&sources, &known);
         if !given.is_empty() {
             found_by = FoundBy::Map;
-            let bone_of =
-                |joint: usize| target.iter().find(|(_, joints)| joints.contains(&joint)).map(|(bone, _)| *bone);
-            let mut replaced: BTreeMap<HumanBone, BTreeSet<usize>> = BTreeMap::new();
-            for (from, to) in given {
-                let from = find(&sources, from).map_err(|(name, nearest)| JointMapError::NoSource { name, nearest })?;
-                let to = find(&targets, to).map_err(|(name, nearest)| JointMapError::NoTarget { name, nearest })?;
-                match bone_of(to) {
-                    Some(bone) => replaced.entry(bone).or_default().extend([from]),
-                    None => pairs.push((from, to)),
-                }
-            }
-            for (bone, joints) in replaced {
-                source.insert(bone, joints.into_iter().collect());
-            }
+        }
+        for (bone, joints) in replaced {
+            source.insert(bone, joints.into_iter().collect());
         }
         // Joints of the same name that are no bones of a human turn alike.
         let taken: BTreeSet<usize> = target.values().flatten().copied().collect();
@@ -125,13 +147,34 @@ impl JointMap {
             }
         }
         if !is_human {
-            if pairs.is_empty() {
-                return Err(JointMapError::Nothing);
+            let Some((first, _)) = pairs.first() else { return Err(JointMapError::Nothing) };
+            if given.is_empty() && are_roots(&sources, &targets, &pairs) {
+                return Err(JointMapError::OnlyRoot { name: sources[*first].name.clone() });
             }
             let found_by = if given.is_empty() { FoundBy::Labels } else { found_by };
-            return Ok(Self { source: HumanJoints::new(), target: HumanJoints::new(), pairs, found_by });
+            return Ok(Self { source: HumanJoints::new(), target: HumanJoints::new(), pairs, found_by, axes: None });
         }
-        Ok(Self { source, target, pairs, found_by })
+        Ok(Self { source, target, pairs, found_by, axes: None })
+    }
+
+    /// Map of two animals: hips to hips, and other joints by their chains, but for those of pairs that are given.
+    fn of_animals(
+        [sources, targets]: [&[SkeletonJoint]; 2],
+        [from, to]: &[FourLegs; 2],
+        given: &[(usize, usize)],
+    ) -> Self {
+        let is_given = |target: usize| given.iter().any(|(_, known)| *known == target);
+        let hips = given.iter().rev().find(|(_, known)| *known == to.hips).map_or(from.hips, |(source, _)| *source);
+        let mut pairs: Vec<(usize, usize)> = given.iter().copied().filter(|(_, target)| *target != to.hips).collect();
+        let guessed = from.pairs(sources, to, targets);
+        pairs.extend(guessed.into_iter().filter(|(_, target)| !is_given(*target)));
+        Self {
+            source: HumanJoints::from([(HumanBone::Hips, vec![hips])]),
+            target: HumanJoints::from([(HumanBone::Hips, vec![to.hips])]),
+            pairs,
+            found_by: if given.is_empty() { FoundBy::Shape } else { FoundBy::Map },
+            axes: Some([from.axes, to.axes]),
+        }
     }
 
     /// Map of these pairs alone: a joint of the motion, and one of the rig as an index in the order of [`Rig::walk`].
@@ -139,11 +182,16 @@ impl JointMap {
     /// # Errors
     /// There are no pairs.
     pub fn of_pairs(motion: &Motion, rig: &Rig, given: &[(usize, usize)]) -> Result<Self, JointMapError> {
-        let (sources, targets) = (motion.joints.len(), rig_joints(rig));
-        let (mut target, _) = found(&targets);
+        let (sources, targets) = (motion_joints(motion), rig_joints(rig));
+        let (mut target, _) = found(&targets, &BTreeMap::new());
+        let mut axes = None;
+        if let Some([from, to]) = animals(&sources, &targets) {
+            target = HumanJoints::from([(HumanBone::Hips, vec![to.hips])]);
+            axes = Some([from.axes, to.axes]);
+        }
         let mut source = HumanJoints::new();
         let mut pairs = Vec::new();
-        for &(from, to) in given.iter().filter(|(from, to)| *from < sources && *to < targets.len()) {
+        for &(from, to) in given.iter().filter(|(from, to)| *from < sources.len() && *to < targets.len()) {
             match target.iter().find(|(_, joints)| joints.contains(&to)) {
                 Some((bone, _)) => source.entry(*bone).or_default().push(from),
                 None => pairs.push((from, to)),
@@ -157,7 +205,7 @@ impl JointMap {
         if source.is_empty() && pairs.is_empty() {
             return Err(JointMapError::Nothing);
         }
-        Ok(Self { source, target, pairs, found_by: FoundBy::Map })
+        Ok(Self { source, target, pairs, found_by: FoundBy::Map, axes })
     }
 
     /// Pairs of the map: joint of the motion, joint of the rig. Of several joints of a bone, those at the same share of its
@@ -213,10 +261,46 @@ impl JointMap {
     }
 }
 
-/// Bones of a skeleton, by names or else by shape.
-fn found(joints: &[SkeletonJoint]) -> (HumanJoints, FoundBy) {
-    let named = by_names(joints);
+/// Bones of a skeleton, by names and by what is known of bones that have none, or else by shape.
+fn found(joints: &[SkeletonJoint], known: &BTreeMap<HumanBone, usize>) -> (HumanJoints, FoundBy) {
+    let named = by_names_and(joints, known);
     if named.is_empty() { (shaped(joints), FoundBy::Shape) } else { (named, FoundBy::Names) }
+}
+
+/// Bones of a rig. Where neither its names nor its shape say anything, the pairs of a map do, by the names of the motion.
+fn target_bones(sources: &[SkeletonJoint], targets: &[SkeletonJoint], pairs: &[(usize, usize)]) -> HumanJoints {
+    let (target, _) = found(targets, &BTreeMap::new());
+    if !target.is_empty() || pairs.is_empty() {
+        return target;
+    }
+    let bones: BTreeMap<usize, HumanBone> =
+        named_bones(sources).into_iter().map(|(bone, joint)| (joint, bone)).collect();
+    let known = pairs.iter().filter_map(|(from, to)| Some((*bones.get(from)?, *to))).collect();
+    found(targets, &known).0
+}
+
+/// True if a joint has nearly all joints of a skeleton of several ones below it.
+fn carries_all(joints: &[SkeletonJoint], at: usize) -> bool {
+    let below = (0..joints.len()).filter(|joint| is_above(joints, at, *joint)).count();
+    joints.len() > 1 && 4 * (below + 1) >= 3 * joints.len()
+}
+
+/// True if all pairs are of joints that carry a whole skeleton.
+fn are_roots(sources: &[SkeletonJoint], targets: &[SkeletonJoint], pairs: &[(usize, usize)]) -> bool {
+    let is_root = |(from, to): &(usize, usize)| carries_all(sources, *from) || carries_all(targets, *to);
+    pairs.len() <= MOST_ROOTS && pairs.iter().all(is_root)
+}
+
+/// Skeletons of two animals whose joints have other names; `None` for a motion of a human.
+fn animals(sources: &[SkeletonJoint], targets: &[SkeletonJoint]) -> Option<[FourLegs; 2]> {
+    let animals = [FourLegs::find(sources)?, FourLegs::find(targets)?];
+    let places: BTreeMap<&str, usize> =
+        sources.iter().enumerate().rev().map(|(at, joint)| (joint.name.as_str(), at)).collect();
+    let named = targets.iter().enumerate().filter(|(_, joint)| !joint.name.is_empty());
+    let alike: Vec<(usize, usize)> =
+        named.filter_map(|(to, joint)| Some((*places.get(joint.name.as_str())?, to))).collect();
+    let is_human = !found(sources, &BTreeMap::new()).0.is_empty();
+    (!is_human && are_roots(sources, targets, &alike)).then_some(animals)
 }
 
 /// Joint of that name, or the name and the end of a sentence about it.
@@ -243,6 +327,7 @@ pub fn motion_joints(motion: &Motion) -> Vec<SkeletonJoint> {
         name: joint.name.clone(),
         parent: joint.parent,
         position: rest.translation,
+        has_end: !joint.ends.is_empty(),
     };
     motion.joints.iter().zip(motion.rest_globals()).map(joint).collect()
 }
@@ -255,6 +340,7 @@ pub fn rig_joints(rig: &Rig) -> Vec<SkeletonJoint> {
         name: joint.data.label.clone().unwrap_or_default(),
         parent: joint.parent.and_then(|parent| index.get(&parent).copied()),
         position: *position,
+        has_end: false,
     };
     rig.walk().zip(&places).map(joint).collect()
 }

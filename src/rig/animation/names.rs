@@ -2,20 +2,25 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 use super::RigClip;
 use crate::rig::{BuiltRig, Rig, Uid};
 
 /// Names by which a node can be found again when it has another uid.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 pub struct KnownNode {
     /// The label; empty without one.
+    #[serde(default)]
     pub label: String,
     /// The purpose that a command gave to the node; empty for joints of the document.
+    #[serde(default)]
     pub role: String,
 }
 
 /// Names of nodes by their uids.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(transparent)]
 pub struct NodeNames(pub BTreeMap<Uid, KnownNode>);
 
 impl NodeNames {
@@ -32,6 +37,11 @@ impl NodeNames {
             names.insert(joint.data.uid, KnownNode { label, role: String::new() });
         }
         Self(names)
+    }
+
+    /// True without any names.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 
     /// Takes in other names; nodes that are in both get the other ones.
@@ -76,8 +86,8 @@ pub struct OrphanedKeys {
     pub offer: Option<Uid>,
 }
 
-/// Keys of nodes that are neither joints of the document nor built, by clip, layer and node. `known` holds names of nodes of
-/// earlier builds or of a file, by which other nodes are offered.
+/// Keys of nodes that are neither joints of the document nor built, by clip, layer and node. Other nodes are offered by the names
+/// of earlier builds in `known`, and else by those that the clip brought with it.
 pub fn orphaned_keys(rig: &Rig, built: Option<&BuiltRig>, known: &NodeNames) -> Vec<OrphanedKeys> {
     let there = NodeNames::of(rig, built);
     rig.clips().iter().flat_map(|clip| of_clip(clip, &there, known)).collect()
@@ -92,7 +102,7 @@ fn of_clip(clip: &RigClip, there: &NodeNames, known: &NodeNames) -> Vec<Orphaned
             *count = (count.0 + 1, count.1 + track.keys.len());
         }
         for (node, (tracks, keys)) in counts.iter().filter(|(node, _)| !there.0.contains_key(node)) {
-            let name = known.0.get(node).cloned().unwrap_or_default();
+            let name = known.0.get(node).or_else(|| clip.names.0.get(node)).cloned().unwrap_or_default();
             let offer = there.find(&name).filter(|offer| !counts.contains_key(offer));
             let (clip, layer) = (clip.uid, layer.uid);
             found.push(OrphanedKeys { clip, layer, node: *node, name, tracks: *tracks, keys: *keys, offer });

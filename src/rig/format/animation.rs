@@ -145,5 +145,18 @@ impl ReadAnimation {
     }
 }
 
+impl BoundClips {
+    /// Labels of the nodes that the rig does not have, sorted, each once; the uid where the file has no label.
+    pub fn missing_labels(&self) -> Vec<String> {
+        let label = |node: &Uid| {
+            let known = self.clips.iter().find_map(|clip| clip.names.0.get(node));
+            let label = known.map(|name| name.label.clone()).filter(|label| !label.is_empty());
+            label.unwrap_or_else(|| node.to_string())
+        };
+        let labels: std::collections::BTreeSet<String> = self.missing.iter().map(label).collect();
+        labels.into_iter().collect()
+    }
+}
+
 /// Node of a syntax tree.
 type Place<'a> = (&'a Tree<'a>, usize);

@@ -47,6 +47,7 @@ pub fn human_nodes(model: &Model) -> Result<HumanNodes, AvatarError> {
         name: node.name.clone(),
         parent: node.parent,
         position: at.translation.into(),
+        has_end: false,
     };
     let joints: Vec<SkeletonJoint> = model.nodes.iter().zip(&globals).map(joint).collect();
     let named = by_names(&joints);

@@ -109,6 +109,13 @@ impl<'a> Body<'a> {
         };
         body.find_ground();
         let rest = |joint: usize| turn * source.joints[joint].rest.translation;
+        // Hips of animals, whose paws are not looked at, are as high as at rest.
+        if let (Some(_), Some(from), Some(to)) =
+            (map.axes, source.first(HumanBone::Hips), target.first(HumanBone::Hips))
+        {
+            let off = scale * rest(from) - target.joints[to].rest.translation;
+            body.source_ankle = body.ankle_height() + off.dot(up);
+        }
         for side in BodySide::BOTH {
             for kind in [LimbKind::Arm, LimbKind::Leg] {
                 let limb = Limb::new(&body, side, kind, &rest);

@@ -1,7 +1,9 @@
 //! A motion on controls: offsets of controls that put the joints where they are wanted.
 //!
 //! A limb with a switch gets the poses of its forward and of its inverse controls, so that the switch can be thrown at any
-//! frame. Any other joint is turned by the control that stands where it stands; the hips are moved by the one that carries all.
+//! frame; one of which the motion moves a part alone is switched to its forward controls. Any other joint is turned by the
+//! control that stands where it stands, or by a null where there is no such control. The hips are moved by the control at their
+//! place that carries the body and leaves standing feet where they are.
 
 use std::sync::Arc;
 
@@ -11,7 +13,10 @@ use rayon::prelude::*;
 use super::{RetargetError, body::Body, limbs::LimbKind, tracks::KeyedTracks};
 use crate::{
     mesh::model::Trs,
-    rig::{BuiltRig, Matching, NodeType, PoseOffset, SwitchData, animation::humanoid::HumanBone},
+    rig::{
+        BuiltRig, Matching, NodeType, PoseOffset, SwitchData,
+        animation::humanoid::{BodySide, HumanBone, LimbBone},
+    },
     solve::{
         matching::{angle_between, hold_limb, offset_towards},
         program::{RigProgram, RigState},
@@ -66,9 +71,11 @@ pub(super) fn keyed(
 ) -> Result<(KeyedTracks, Vec<String>), RetargetError> {
     let mut state = RigState::new(program.clone());
     let limbs = limbs(built, body, hands);
-    for (switch, _, value) in &limbs {
+    let parts = limbs_in_part(built, body, &limbs);
+    let values = || limbs.iter().map(|(switch, _, value)| (*switch, *value)).chain(parts.iter().map(|of| (*of, 0.0)));
+    for (switch, value) in values() {
         // A switch that the program lacks is told when the limb is posed.
-        let _ = state.set_attribute(switch.control, &switch.attribute, *value);
+        let _ = state.set_attribute(switch.control, &switch.attribute, value);
     }
     state.evaluate(0.0);
     let (steps, unmoved) = steps(&state, body, &limbs);
@@ -109,8 +116,7 @@ pub(super) fn keyed(
         let (node, name) = (program.nodes()[attribute.node].uid, attribute.name.to_string());
         keyed.numbers.push((node, name, frames.iter().map(|frame| frame.dials[place]).collect()));
     }
-    keyed.values =
-        limbs.iter().map(|(switch, _, value)| (switch.control, switch.attribute.to_string(), *value)).collect();
+    keyed.values = values().map(|(switch, value)| (switch.control, switch.attribute.to_string(), value)).collect();
     Ok((keyed, unmoved))
 }
 
@@ -137,13 +143,29 @@ fn limbs<'a>(built: &'a BuiltRig, body: &Body, hands: [bool; 2]) -> Vec<(&'a Swi
     built.switches.iter().filter_map(limb).collect()
 }
 
+/// Switches of limbs of which the motion moves some joints, but not all: as with a hind leg, which has a joint more than a
+/// human's. Their forward controls take the motion joint by joint.
+fn limbs_in_part<'a>(
+    built: &'a BuiltRig,
+    body: &Body,
+    limbs: &[(&'a SwitchData, Vec<usize>, f32)],
+) -> Vec<&'a SwitchData> {
+    let is_in_part = |switch: &SwitchData| {
+        let Matching::IkFk { joints, .. } = &switch.matching else { return false };
+        let of_whole = |known: &SwitchData| known.control == switch.control && known.attribute == switch.attribute;
+        let mut moved = body.target.joints.iter().enumerate().filter(|(at, _)| body.is_moved(*at));
+        moved.any(|(_, joint)| joints.contains(&joint.uid)) && !limbs.iter().any(|(known, ..)| of_whole(known))
+    };
+    built.switches.iter().map(|switch| &**switch).filter(|switch| is_in_part(switch)).collect()
+}
+
 /// Steps for all joints that the motion moves, and labels of joints that nothing moves.
 fn steps<'a>(
     state: &RigState,
     body: &Body,
     limbs: &[(&'a SwitchData, Vec<usize>, f32)],
 ) -> (Vec<Step<'a>>, Vec<String>) {
-    let (program, moves) = (state.program(), Moves::find(state, body));
+    let (program, moves) = (state.program(), Moves::find(state, body, limbs));
     let (mut steps, mut unmoved) = (Vec::new(), Vec::new());
     let hips = body.target.first(HumanBone::Hips);
     let spine = body.target.bones.get(&HumanBone::Spine).map_or(&[][..], |spine| &spine[..]);
@@ -156,8 +178,9 @@ fn steps<'a>(
         }
         let above = std::iter::successors(joint.parent, |at| body.target.joints[*at].parent);
         let above: Vec<usize> = above.filter_map(|at| program.node(body.target.joints[at].uid)).collect();
+        let is_hips = hips == Some(at);
         let Some((joint_slot, control)) =
-            program.node(joint.uid).and_then(|slot| Some((slot, moves.best(state, slot, &above)?)))
+            program.node(joint.uid).and_then(|slot| Some((slot, moves.best(state, slot, &above, is_hips)?)))
         else {
             match program.node(joint.uid).and_then(|slot| Dial::find(state, body, at, slot)) {
                 Some(dial) => steps.push(Step::Dial(dial)),
@@ -168,51 +191,81 @@ fn steps<'a>(
         let carried = relative(state.global_at(joint_slot), state.global_at(control));
         // A curve lays the joints within a spine; only its end is where its control is.
         let corrects = !spine.contains(&at) || spine.last() == Some(&at);
-        steps.push(Step::Joint(Handle { joint: at, joint_slot, control, carried, moves: hips == Some(at), corrects }));
+        steps.push(Step::Joint(Handle { joint: at, joint_slot, control, carried, moves: is_hips, corrects }));
     }
     (steps, unmoved)
 }
 
 /// Joints that each posable node turns.
 struct Moves {
-    /// Slot of the node, slots of the joints.
-    list: Vec<(usize, Vec<usize>)>,
+    list: Vec<Mover>,
+    /// Slots of feet that are held by their goals.
+    standing: Vec<usize>,
     /// Distance within which a control stands where a joint stands.
     near: f32,
 }
 
+/// Node that turns joints.
+struct Mover {
+    slot: usize,
+    /// Slots of the joints.
+    joints: Vec<usize>,
+    is_control: bool,
+    /// True if the node can be moved in all directions.
+    is_movable: bool,
+}
+
 impl Moves {
     /// Turns every node a little and looks which joints turn.
-    fn find(state: &RigState, body: &Body) -> Self {
+    fn find(state: &RigState, body: &Body, limbs: &[(&SwitchData, Vec<usize>, f32)]) -> Self {
         let program = state.program();
         let mut tried = state.clone();
-        let turn = PoseOffset::from_rotation(Quat::from_xyzw(0.12, 0.14, 0.1, 1.0).normalize());
+        let near = 2e-3 * body.target.height;
+        let turn = Quat::from_xyzw(0.12, 0.14, 0.1, 1.0).normalize();
+        let way = Vec3::splat(near);
         let joints: Vec<usize> = body.target.joints.iter().filter_map(|joint| program.node(joint.uid)).collect();
         let nodes = program.nodes().iter().enumerate();
         let posable =
             nodes.filter(|(_, node)| node.is_posable() && (node.kind == NodeType::Control || !node.is_driven));
-        let list = posable.map(|(slot, _)| {
-            tried.set_offset_at(slot, turn);
-            tried.evaluate(0.0);
-            let is_turned = |joint: &usize| angle_between(tried.global_at(*joint), state.global_at(*joint)) > 0.1;
-            let turned = joints.iter().copied().filter(is_turned).collect();
+        let list = posable.map(|(slot, node)| {
+            tried.set_offset_at(slot, PoseOffset { translation: way, ..PoseOffset::IDENTITY });
+            let is_movable = tried.offset_at(slot).translation.distance(way) < 0.1 * near;
+            let mut turned: Vec<usize> = Vec::new();
+            // A hinge at its end turns one way alone.
+            for rotation in [turn, turn.inverse()] {
+                if turned.is_empty() {
+                    tried.set_offset_at(slot, PoseOffset::from_rotation(rotation));
+                    tried.evaluate(0.0);
+                    let is_turned =
+                        |joint: &usize| angle_between(tried.global_at(*joint), state.global_at(*joint)) > 0.1;
+                    turned.extend(joints.iter().copied().filter(is_turned));
+                }
+            }
             tried.set_offset_at(slot, PoseOffset::IDENTITY);
             tried.evaluate(0.0);
-            (slot, turned)
+            Mover { slot, joints: turned, is_control: node.kind == NodeType::Control, is_movable }
         });
-        Self { list: list.collect(), near: 2e-3 * body.target.height }
+        let feet = BodySide::BOTH.into_iter().filter_map(|side| body.target.limb(side, LimbBone::Foot));
+        let is_held = |foot: &usize| limbs.iter().any(|(_, joints, value)| *value > 0.0 && joints.contains(foot));
+        let standing = feet.filter(is_held).filter_map(|foot| program.node(body.target.joints[foot].uid)).collect();
+        Self { list: list.collect(), standing, near }
     }
 
     /// Node that turns a joint: of those at its place the one that carries most, else the one that carries least and turns no
-    /// joint above it.
-    fn best(&self, state: &RigState, joint: usize, above: &[usize]) -> Option<usize> {
+    /// joint above it; a control rather than a null that stands there just for it. The hips are also moved; by a control that
+    /// carries standing feet, such as that of the whole character, only if there is no other one.
+    fn best(&self, state: &RigState, joint: usize, above: &[usize], is_hips: bool) -> Option<usize> {
         let place = state.global_at(joint).translation;
-        let turning = || self.list.iter().filter(|(_, joints)| joints.contains(&joint));
-        let is_there = |slot: usize| state.global_at(slot).translation.distance(place) <= self.near;
-        let there = turning().filter(|(slot, _)| is_there(*slot));
-        let most = there.min_by_key(|(slot, joints)| (std::cmp::Reverse(joints.len()), *slot));
-        let below = || turning().filter(|(_, joints)| !joints.iter().any(|other| above.contains(other)));
-        most.or_else(|| below().min_by_key(|(slot, joints)| (joints.len(), *slot))).map(|(slot, _)| *slot)
+        let turning = || self.list.iter().filter(|mover| mover.joints.contains(&joint));
+        let is_there = |mover: &&Mover| state.global_at(mover.slot).translation.distance(place) <= self.near;
+        let is_fit = |mover: &Mover| mover.is_control && (!is_hips || mover.is_movable);
+        let carries_feet = |mover: &Mover| is_hips && self.standing.iter().any(|foot| mover.joints.contains(foot));
+        let most = turning().filter(is_there).min_by_key(|mover| {
+            (!is_fit(mover), carries_feet(mover), std::cmp::Reverse(mover.joints.len()), mover.slot)
+        });
+        let below = || turning().filter(|mover| !mover.joints.iter().any(|other| above.contains(other)));
+        let least = || below().min_by_key(|mover| (!is_fit(mover), mover.joints.len(), mover.slot));
+        most.or_else(least).map(|mover| mover.slot)
     }
 }
 

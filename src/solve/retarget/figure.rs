@@ -56,7 +56,8 @@ impl Figure {
                 rest: Trs { translation, rotation: rotation.normalize(), scale },
             }
         };
-        Self::new(rig.walk().zip(&globals).map(joint).collect(), map.target.clone())
+        let axes = map.axes.map(|[_, target]| target);
+        Self::new(rig.walk().zip(&globals).map(joint).collect(), map.target.clone(), axes)
     }
 
     /// Skeleton of a motion; `None` if it has no size.
@@ -68,13 +69,14 @@ impl Figure {
             local: joint.rest,
             rest,
         };
-        Self::new(motion.joints.iter().zip(motion.rest_globals()).map(joint).collect(), map.source.clone())
+        let axes = map.axes.map(|[source, _]| source);
+        Self::new(motion.joints.iter().zip(motion.rest_globals()).map(joint).collect(), map.source.clone(), axes)
     }
 
-    fn new(joints: Vec<FigureJoint>, bones: HumanJoints) -> Option<Self> {
+    fn new(joints: Vec<FigureJoint>, bones: HumanJoints, axes: Option<Quat>) -> Option<Self> {
         let mut figure = Self { joints, bones, axes: Quat::IDENTITY, height: 0.0, leg: 0.0 };
         let place = |joint: usize| figure.joints[joint].rest.translation;
-        figure.axes = human_axes(&figure.bones, &place).unwrap_or_default();
+        figure.axes = axes.or_else(|| human_axes(&figure.bones, &place)).unwrap_or_default();
         let up = figure.axes * Vec3::Y;
         let heights = || figure.joints.iter().map(|joint| joint.rest.translation.dot(up));
         let (low, high) = (heights().fold(f32::MAX, f32::min), heights().fold(f32::MIN, f32::max));

@@ -282,8 +282,10 @@ fn read(
             let bound = file.onto(rig, Some(&Builder::build(rig, modules)?));
             imported.notes.extend(file.notes);
             if !bound.missing.is_empty() {
-                let count = bound.missing.len();
-                imported.notes.push(format!("the rig does not have {count} of its nodes; their keys are set aside"));
+                let (count, labels) = (bound.missing.len(), bound.missing_labels().join(", "));
+                imported
+                    .notes
+                    .push(format!("the rig does not have {count} of its nodes; their keys are set aside: {labels}"));
             }
             imported.clips = bound.clips;
         }

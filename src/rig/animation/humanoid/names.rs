@@ -1,7 +1,7 @@
 //! Names that skeletons give to the bones of a human.
 //!
 //! Known are the names of Mixamo (`mixamorig:LeftUpLeg`), Unreal (`thigh_l`), VRM (`J_Bip_L_UpperLeg`, `leftUpperLeg`), CMU
-//! (`LeftUpLeg`, `LHipJoint`), MakeHuman (`upperleg01.L`, `UpLeg_L`), Rigify (`DEF-thigh.L`), Biped (`Bip01 L Thigh`) and the
+//! (`LeftUpLeg`, `LHipJoint`; `LeftHip`, `LeftKnee`; `lfemur`, `ltibia`), MakeHuman (`upperleg01.L`, `UpLeg_L`), Rigify (`DEF-thigh.L`), Biped (`Bip01 L Thigh`) and the
 //! templates of this crate (`thigh_l`).
 
 use super::{BodySide, Finger, HeadBone, HumanBone, LimbBone};
@@ -9,6 +9,9 @@ use super::{BodySide, Finger, HeadBone, HumanBone, LimbBone};
 /// Beginnings of names that say which tool made the skeleton.
 const PREFIXES: [&[&str]; 8] =
     [&["j", "bip"], &["mixamorig"], &["def"], &["org"], &["bip", "1"], &["bip", "01"], &["bip", "001"], &["bip"]];
+
+/// Words that the names of CMU's ASF files glue to the letter of their side: `lfemur`.
+const GLUED: [&str; 9] = ["clavicle", "humerus", "radius", "wrist", "hand", "femur", "tibia", "foot", "toes"];
 
 /// Words of a name without namespace and without the tool's prefix.
 fn own_words(name: &str) -> Vec<String> {
@@ -38,7 +41,7 @@ pub(super) fn bone_of(name: &str) -> Option<(HumanBone, usize)> {
         return None;
     }
     let words = own_words(name);
-    let (words, side) = without_side(&words);
+    let (words, side) = unglued(without_side(&words));
     let (number, stem) = numbered(&words);
     let side_of = |bone: LimbBone, rank: usize| Some((HumanBone::Limb(side?, bone), rank));
     if let Some((finger, number)) = finger(&words) {
@@ -66,18 +69,41 @@ pub(super) fn bone_of(name: &str) -> Option<(HumanBone, usize)> {
         ("clavicle" | "collar" | "collarbone", _) => side_of(LimbBone::Shoulder, 0),
         ("shoulder", _) => side_of(LimbBone::Shoulder, 1),
         ("forearm" | "lowerarm" | "loarm" | "lowarm" | "larm", _) => side_of(LimbBone::LowerArm, 0),
-        ("elbow", _) => side_of(LimbBone::LowerArm, 1),
+        ("humerus", _) => side_of(LimbBone::UpperArm, 2),
+        ("elbow" | "radius", _) => side_of(LimbBone::LowerArm, 1),
         ("hand", _) => side_of(LimbBone::Hand, 0),
         ("wrist", _) => side_of(LimbBone::Hand, 1),
         ("thigh" | "upleg" | "upperleg" | "uleg", _) => side_of(LimbBone::UpperLeg, 0),
         ("shin" | "calf" | "shank" | "lowerleg" | "loleg" | "lowleg" | "lleg", _) => side_of(LimbBone::LowerLeg, 0),
         ("leg", _) => side_of(LimbBone::LowerLeg, 1),
-        ("knee", _) => side_of(LimbBone::LowerLeg, 2),
+        ("hip" | "femur", _) => side_of(LimbBone::UpperLeg, 1),
+        ("knee" | "tibia", _) => side_of(LimbBone::LowerLeg, 2),
         ("foot", _) => side_of(LimbBone::Foot, 0),
         ("ankle", _) => side_of(LimbBone::Foot, 1),
         ("toebase" | "toes" | "toe" | "ball", _) => side_of(LimbBone::Toes, 0),
         _ => None,
     }
+}
+
+/// Joint of an arm whose bone depends on the other names of the skeleton.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ArmWord {
+    /// A collarbone, or the upper arm.
+    Shoulder,
+    /// A hand, or its joint before another one that is called hand.
+    Wrist,
+}
+
+/// Side and word of such a joint.
+pub(super) fn arm_word_of(name: &str) -> Option<(BodySide, ArmWord)> {
+    let words = own_words(name);
+    let (words, side) = unglued(without_side(&words));
+    let word = match words[..] {
+        ["shoulder"] => ArmWord::Shoulder,
+        ["wrist"] => ArmWord::Wrist,
+        _ => return None,
+    };
+    Some((side?, word))
 }
 
 /// Bone of the head that a name means.
@@ -109,6 +135,19 @@ fn without_side(words: &[String]) -> (Vec<&str>, Option<BodySide>) {
         side = Some(of);
         false
     });
+    (words, side)
+}
+
+/// A word and its side, where a letter before it says which.
+fn unglued((words, side): (Vec<&str>, Option<BodySide>)) -> (Vec<&str>, Option<BodySide>) {
+    if let ([word], None) = (&words[..], side) {
+        let of = [("l", BodySide::Left), ("r", BodySide::Right)]
+            .into_iter()
+            .find_map(|(letter, side)| Some((word.strip_prefix(letter).filter(|rest| GLUED.contains(rest))?, side)));
+        if let Some((rest, side)) = of {
+            return (vec![rest], Some(side));
+        }
+    }
     (words, side)
 }
 

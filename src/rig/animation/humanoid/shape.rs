@@ -4,7 +4,12 @@ use std::collections::BTreeMap;
 
 use bevy::math::Vec3;
 
-use super::{BodySide, HumanBone, HumanJoints, LimbBone, SkeletonJoint, ancestors, complete, is_above, path};
+use super::{
+    BodySide, HumanBone, HumanJoints, LimbBone, SkeletonJoint, ancestors, common_ancestor, complete, is_above, path,
+};
+
+/// Length of a bone above which it is a head rather than a neck, as a share of the height from a foot to the last joint.
+const HEAD: f32 = 0.085;
 
 /// Joints that stand for bones, by the chains of the skeleton at rest: two that go down are legs, two that branch off above
 /// them to the sides are arms, the one that goes up is spine and head. Empty if the skeleton has another shape.
@@ -53,12 +58,24 @@ pub fn by_shape(joints: &[SkeletonJoint], up: Vec3, forward: Vec3) -> HumanJoint
             named.insert(HumanBone::Limb(side, bone), *joint);
         }
     }
-    // The last joint of the trunk that carries something is the head.
-    let trunk = path(joints, top, Some(hips));
-    if let Some(head) = trunk.iter().rev().nth(usize::from(trunk.len() > 3)).copied() {
-        named.insert(HumanBone::Head, head);
-    }
+    named.insert(HumanBone::Head, head_of(joints, &named, top, height(top) - height(left_foot)));
     complete(joints, &named)
+}
+
+/// Joint of the head: the last one of the trunk, or the one before if the last one is the end of the head. `tall` is the height
+/// of the last joint above a foot.
+fn head_of(joints: &[SkeletonJoint], named: &BTreeMap<HumanBone, usize>, top: usize, tall: f32) -> usize {
+    let [left, right] = BodySide::BOTH.map(|side| named.get(&HumanBone::Limb(side, LimbBone::UpperArm)).copied());
+    let chest = left.zip(right).and_then(|(left, right)| common_ancestor(joints, left, right));
+    // The joint before the last one is a neck or the head only above where the arms branch off.
+    let before = joints[top].parent.filter(|before| chest.is_some_and(|chest| is_above(joints, chest, *before)));
+    match before {
+        Some(before) if !joints[top].has_end => {
+            let last = joints[top].position.distance(joints[before].position);
+            if last > HEAD * tall { before } else { top }
+        }
+        _ => top,
+    }
 }
 
 /// Place in a chain at which its two last long bones begin: arm and forearm, thigh and shin. What follows them is a hand or a

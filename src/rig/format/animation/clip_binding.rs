@@ -3,7 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{BoundClips, ReadAnimation};
-use crate::rig::{Uid, animation::NodeNames};
+use crate::rig::{
+    Uid,
+    animation::{NodeNames, RigClip},
+};
 
 /// The clips with uids of the nodes of a rig.
 pub(super) fn bind_clips(read: &ReadAnimation, there: &NodeNames) -> BoundClips {
@@ -21,6 +24,15 @@ pub(super) fn bind_clips(read: &ReadAnimation, there: &NodeNames) -> BoundClips 
             None => missing.push(node),
         }
     }
-    let clips = read.clips.iter().map(|clip| clip.with_nodes(|node| map.get(&node).copied().unwrap_or(node)));
-    BoundClips { clips: clips.collect(), by_label: map.into_iter().collect(), missing }
+    let bound = |clip: &RigClip| {
+        let mut clip = clip.with_nodes(|node| map.get(&node).copied().unwrap_or(node));
+        let masked = clip.layers.iter().flat_map(|layer| &layer.mask);
+        let nodes: BTreeSet<Uid> = clip.nodes().into_iter().chain(masked.copied()).collect();
+        let named = missing.iter().filter(|node| nodes.contains(*node));
+        let names = named.filter_map(|node| Some((*node, read.names.0.get(node)?.clone())));
+        clip.names = NodeNames(names.collect());
+        clip
+    };
+    let clips = read.clips.iter().map(bound).collect();
+    BoundClips { clips, by_label: map.into_iter().collect(), missing }
 }

@@ -192,7 +192,16 @@ fn clip(
     let place = ClipPlace { clip: number, ..ClipPlace::default() };
     let ClipFile { uid, name, frame_rate, range, looped, markers, layers } = file;
     let range = [range.0, range.1];
-    let mut clip = RigClip { uid, name, frame_rate, range, looped, markers, layers: Vec::with_capacity(layers.len()) };
+    let mut clip = RigClip {
+        uid,
+        name,
+        frame_rate,
+        range,
+        looped,
+        markers,
+        layers: Vec::with_capacity(layers.len()),
+        names: NodeNames::default(),
+    };
     if !seen.insert(uid) {
         return Err((ClipPlace { field: "uid", ..place }, twice(uid)));
     }

@@ -23,7 +23,7 @@ pub(super) fn write_file(
     writeln!(out, "    ],\n)")
 }
 
-/// Writes clips as elements of a list.
+/// Writes clips as elements of a list. Nodes without a name in `names` have those that the clips have for them.
 pub(in crate::rig::format) fn write_clips(
     out: &mut String,
     clips: &[RigClip],
@@ -31,7 +31,7 @@ pub(in crate::rig::format) fn write_clips(
     indent: &str,
 ) -> fmt::Result {
     for clip in clips {
-        let RigClip { uid, name, frame_rate, range: [start, end], looped, markers, layers } = clip;
+        let RigClip { uid, name, frame_rate, range: [start, end], looped, markers, layers, names: own } = clip;
         writeln!(out, "{indent}(\n{indent}    uid: \"{uid}\",\n{indent}    name: {},", quoted(name))?;
         writeln!(out, "{indent}    frame_rate: {frame_rate:?},\n{indent}    range: ({start:?}, {end:?}),")?;
         if *looped {
@@ -46,14 +46,14 @@ pub(in crate::rig::format) fn write_clips(
         }
         writeln!(out, "{indent}    layers: [")?;
         for layer in layers {
-            write_layer(out, layer, names, &format!("{indent}        "))?;
+            write_layer(out, layer, [names, own], &format!("{indent}        "))?;
         }
         writeln!(out, "{indent}    ],\n{indent}),")?;
     }
     Ok(())
 }
 
-fn write_layer(out: &mut String, layer: &ClipLayer, names: &NodeNames, indent: &str) -> fmt::Result {
+fn write_layer(out: &mut String, layer: &ClipLayer, names: [&NodeNames; 2], indent: &str) -> fmt::Result {
     let ClipLayer { uid, name, mode, weight, mask, muted, tracks } = layer;
     writeln!(out, "{indent}(\n{indent}    uid: \"{uid}\",\n{indent}    name: {},", quoted(name))?;
     if *mode == LayerMode::Additive {
@@ -88,9 +88,9 @@ fn write_layer(out: &mut String, layer: &ClipLayer, names: &NodeNames, indent: &
     writeln!(out, "{indent}    ],\n{indent}),")
 }
 
-fn write_node(out: &mut String, node: Uid, names: &NodeNames) -> fmt::Result {
+fn write_node(out: &mut String, node: Uid, names: [&NodeNames; 2]) -> fmt::Result {
     write!(out, "node: \"{node}\"")?;
-    let Some(name) = names.0.get(&node) else { return Ok(()) };
+    let Some(name) = names.iter().find_map(|names| names.0.get(&node)) else { return Ok(()) };
     if !name.label.is_empty() {
         write!(out, ", label: {}", quoted(&name.label))?;
     }

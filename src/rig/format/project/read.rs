@@ -2,7 +2,7 @@
 
 use std::{
     borrow::Cow,
-    collections::{HashMap, HashSet},
+    collections::{BTreeSet, HashMap, HashSet},
 };
 
 use bevy::math::Vec3;
@@ -14,6 +14,7 @@ use super::{
 };
 use crate::rig::{
     AttributeValues, EditError, Rig, RigEdit, SelectionSet, SourceError, StoredPose, Uid,
+    animation::NodeNames,
     format::animation::{ClipFile, clip_fields, clip_offset, clips_in},
     format::poses::{OffsetFile, PoseFile, ValueFile},
     format::scan::{self, Field},
@@ -244,8 +245,14 @@ fn read_stored_poses(
 
 fn read_clips(places: &Places, number: usize, rig: &mut Rig, files: Vec<ClipFile>) -> Result<(), SourceError> {
     let path = [("rigs", number)];
-    let (clips, _) = clips_in(files, places.text, &path)?;
-    for (number, clip) in clips.into_iter().enumerate() {
+    let (clips, mut names) = clips_in(files, places.text, &path)?;
+    // Joints of the document have their labels.
+    names.0.retain(|node, _| rig.joint(*node).is_none());
+    for (number, mut clip) in clips.into_iter().enumerate() {
+        let masked = clip.layers.iter().flat_map(|layer| layer.mask.iter().copied());
+        let nodes: BTreeSet<Uid> = clip.nodes().into_iter().chain(masked).collect();
+        let own = names.0.iter().filter(|(node, _)| nodes.contains(*node));
+        clip.names = NodeNames(own.map(|(node, name)| (*node, name.clone())).collect());
         rig.apply(&RigEdit::AddClip(Box::new(clip), usize::MAX)).map_err(|error| {
             let offset = clip_offset(places.text, &path, number).unwrap_or_default();
             SourceError::at(places.text, offset, error.to_string())
