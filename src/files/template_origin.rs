@@ -117,7 +117,7 @@ pub fn store_rig_from(
         None => (text, Some(PARTS_AWAY)),
     };
     save_template(disk, path, &text)?;
-    Ok(note.into_iter().chain(away).map(str::to_owned).collect())
+    Ok(note.into_iter().chain(away.map(str::to_owned)).collect())
 }
 
 /// True if a file is a template that has parts.
