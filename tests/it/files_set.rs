@@ -271,6 +271,38 @@ fn a_copy_of_the_main_file_keeps_its_companions() {
 }
 
 #[test]
+fn companions_that_other_files_name_stay() {
+    // Deep in a large mesh, in a rig, in a project of the folder above, and in a model of one below.
+    let deep = format!("{}\nusemtl wood\n", "# 0.125\n".repeat(1 << 18));
+    let users: [(&str, &str); 4] =
+        [("large.obj", deep.as_str()), ("fox.rig.ron", ""), ("../all.rigsmith.ron", ""), ("parts/hat.gltf", "")];
+    for kind in Kind::ALL {
+        for (user, before) in users {
+            let above = tempfile::tempdir().unwrap();
+            let folder = above.path().join("models");
+            fs::create_dir_all(folder.join("parts")).unwrap();
+            fs::write(folder.join("mesh.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+            let listed = || -> BTreeSet<String> {
+                let entries = fs::read_dir(&folder).unwrap();
+                entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+            };
+            let others = listed();
+            kind.save(&RealDisk, &folder, 2).unwrap();
+            let mut companions: BTreeSet<String> = listed().difference(&others).cloned().collect();
+            companions.remove(kind.main(&folder).file_name().unwrap().to_str().unwrap());
+            assert!(!companions.is_empty());
+            let named: String = companions.iter().map(|name| format!("{before}uses models/{name}\n")).collect();
+            fs::write(folder.join(user), named).unwrap();
+            for version in [4, 6] {
+                kind.save(&RealDisk, &folder, version).unwrap();
+                assert!(companions.is_subset(&listed()), "{kind:?}, {user}: {companions:?} of {:?}", listed());
+            }
+            fs::remove_file(folder.join(user)).unwrap();
+        }
+    }
+}
+
+#[test]
 fn models_share_a_texture_until_the_last_one_drops_it() {
     let folder = furnished();
     for (kind, version) in [(Kind::Gltf, 2), (Kind::Obj, 3), (Kind::Gltf, 4)] {

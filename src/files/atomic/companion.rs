@@ -6,8 +6,9 @@
 
 use std::{
     collections::BTreeSet,
+    ffi::OsStr,
     io::{self, ErrorKind, Read},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use super::temp::is_temp_name;
@@ -18,14 +19,18 @@ use crate::{
 
 /// Digits of a hash in a name.
 const DIGITS: usize = 16;
+/// Bytes that no mark has, with its number of a copy.
+const MARK: usize = DIGITS + 12;
 /// Largest number of bytes of a plain name that are kept in a companion's name.
 const MAX_STEM: usize = 100;
 /// Largest number of names in a folder that are searched; in a larger folder, unused companions stay.
 const MAX_NAMES: usize = 20_000;
-/// Largest amount of text, in bytes, that is searched for references; beyond it, unused companions stay.
-const MAX_TEXT: u64 = 256 << 20;
-/// Bytes at the beginning of a file that hold its references where the rest is geometry.
+/// Largest number of bytes that are searched for references; beyond it, unused companions stay.
+const MAX_TEXT: u64 = 512 << 20;
+/// Bytes at the beginning of a mesh in which this program writes its references.
 const HEAD: u64 = 1 << 20;
+/// Bytes that are searched at a time.
+const BLOCK: usize = 1 << 16;
 
 /// Name of a companion with the plain name `plain` and this content; `copy` counts the names that other files already
 /// have.
@@ -73,9 +78,28 @@ fn parse(text: &str) -> Option<Mark> {
 }
 
 /// The marks of companions that a text refers to.
-fn marks_in(text: &[u8]) -> BTreeSet<Mark> {
-    let between_dots = text.split(|byte| *byte == b'.').filter(|part| (DIGITS..DIGITS + 12).contains(&part.len()));
-    between_dots.filter_map(|part| parse(std::str::from_utf8(part).ok()?)).collect()
+fn marks_in(text: &[u8]) -> impl Iterator<Item = Mark> {
+    let between_dots = text.split(|byte| *byte == b'.').filter(|part| (DIGITS..MARK).contains(&part.len()));
+    between_dots.filter_map(|part| parse(std::str::from_utf8(part).ok()?))
+}
+
+/// The marks of companions to which the first `limit` bytes of a file refer, read in blocks.
+fn marks_of(disk: &dyn Disk, path: &Path, limit: u64) -> io::Result<BTreeSet<Mark>> {
+    let mut reader = disk.open(path)?.take(limit);
+    let (mut marks, mut text) = (BTreeSet::new(), Vec::with_capacity(BLOCK + MARK));
+    loop {
+        let count = reader.by_ref().take(BLOCK as u64).read_to_end(&mut text)?;
+        if count == 0 {
+            marks.extend(marks_in(&text));
+            return Ok(marks);
+        }
+        // What follows the last dot may go on in the next block, unless it is longer than any mark already.
+        if let Some(dot) = text.iter().rposition(|byte| *byte == b'.') {
+            marks.extend(marks_in(&text[..dot]));
+            text.drain(..=dot);
+        }
+        text.truncate(MARK);
+    }
 }
 
 /// Tells whether a regular file at `path` has this content; `None` if nothing is there.
@@ -105,21 +129,23 @@ pub(super) fn holds(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> io::Result<Op
 
 /// Companions in `folder` that the main file `main` refers to, itself or through a material library.
 pub(super) fn referred(disk: &dyn Disk, folder: &Path, main: &Path) -> io::Result<Vec<String>> {
-    let mut marks = marks_in(&read(disk, main, reach(main).min(MAX_TEXT))?);
+    let reach = if is_mesh(main) { HEAD } else { MAX_TEXT };
+    let mut marks = marks_of(disk, main, reach)?;
     if marks.is_empty() {
         return Ok(Vec::new());
     }
     let names = companions(disk, folder)?;
     for (name, mark) in &names {
         if is_library(name) && marks.contains(mark) {
-            marks.extend(marks_in(&read(disk, &folder.join(name), MAX_TEXT)?));
+            marks.extend(marks_of(disk, &folder.join(name), MAX_TEXT)?);
         }
     }
     Ok(names.into_iter().filter(|(_, mark)| marks.contains(mark)).map(|(name, _)| name).collect())
 }
 
-/// Removes those of the companions `names` in `folder` that no other file there refers to. A file whose content does
-/// not fit the hash in its name was written by another program and stays.
+/// Removes those of the companions `names` in `folder` that no other file refers to: none in the folder, and no model,
+/// rig or project in the folders right below it or in the one above. A file whose content does not fit the hash in its
+/// name was written by another program and stays. All stay where there is more to search than the limits allow.
 ///
 /// # Errors
 /// When something could not be read or removed: it may be tried again. Nothing is removed before all has been read.
@@ -128,33 +154,25 @@ pub(super) fn remove_unmentioned(disk: &dyn Disk, folder: &Path, names: &[String
     if names.is_empty() {
         return Ok(());
     }
-    let listed = disk.list(folder, MAX_NAMES)?;
-    if listed.len() == MAX_NAMES {
+    let mut search = Search { disk, mentioned: BTreeSet::new(), names_left: MAX_NAMES, bytes_left: MAX_TEXT };
+    let is_removed = |name: &OsStr| names.iter().any(|(known, _)| name == *known);
+    let Some(below) = search.folder(folder, |name| may_refer(Path::new(name)) && !is_removed(name))? else {
         return Ok(());
-    }
-    let mut mentioned = BTreeSet::new();
-    let mut left = MAX_TEXT;
-    for name in &listed {
-        let path = folder.join(name);
-        let reach = reach(&path);
-        if reach == 0 || is_temp_name(name) || names.iter().any(|(known, _)| name == known) {
-            continue;
+    };
+    let above = disk.canonical(folder)?.parent().map(Path::to_path_buf);
+    for other in below.into_iter().chain(above) {
+        match search.folder(&other, |name| is_naming(Path::new(name))) {
+            Ok(Some(_)) => {}
+            Ok(None) => return Ok(()),
+            // Nobody works in a folder that may not be listed, or that is gone.
+            Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::PermissionDenied) => {}
+            Err(error) => return Err(error),
         }
-        let entry = match disk.entry(&path, true) {
-            // The entry is a link to nowhere, or was removed in the meantime.
-            Err(error) if error.kind() == ErrorKind::NotFound => continue,
-            entry => entry?,
-        };
-        if entry.kind != EntryKind::File {
-            continue;
-        }
-        let Some(rest) = left.checked_sub(entry.len.min(reach)) else { return Ok(()) };
-        left = rest;
-        mentioned.extend(marks_in(&read(disk, &path, reach)?));
     }
+    let mut mentioned = search.mentioned;
     for (name, mark) in names.iter().filter(|(name, _)| is_library(name)) {
         if mentioned.contains(mark) {
-            mentioned.extend(marks_in(&read(disk, &folder.join(name), MAX_TEXT)?));
+            mentioned.extend(marks_of(disk, &folder.join(name), MAX_TEXT)?);
         }
     }
     for (name, mark) in names.into_iter().filter(|(_, mark)| !mentioned.contains(mark)) {
@@ -170,6 +188,49 @@ pub(super) fn remove_unmentioned(disk: &dyn Disk, folder: &Path, names: &[String
     Ok(())
 }
 
+/// A search for marks through the files of folders.
+struct Search<'d> {
+    disk: &'d dyn Disk,
+    mentioned: BTreeSet<Mark>,
+    names_left: usize,
+    bytes_left: u64,
+}
+
+impl Search<'_> {
+    /// Searches the files of a folder whose names are `wanted`, and returns the folders among them; `None` if there is more
+    /// to search than the limits allow.
+    fn folder(&mut self, folder: &Path, wanted: impl Fn(&OsStr) -> bool) -> io::Result<Option<Vec<PathBuf>>> {
+        let listed = self.disk.list(folder, self.names_left)?;
+        self.names_left -= listed.len();
+        if self.names_left == 0 {
+            return Ok(None);
+        }
+        let mut below = Vec::new();
+        for name in listed.iter().filter(|name| wanted(name) && !is_temp_name(name)) {
+            let path = folder.join(name);
+            let entry = match self.disk.entry(&path, true) {
+                // The entry is a link to nowhere, or was removed in the meantime.
+                Err(error) if error.kind() == ErrorKind::NotFound => continue,
+                entry => entry?,
+            };
+            match entry.kind {
+                EntryKind::Folder => below.push(path),
+                EntryKind::File => {
+                    let Some(left) = self.bytes_left.checked_sub(entry.len) else { return Ok(None) };
+                    self.bytes_left = left;
+                    // A file that grows meanwhile is read as far as it was counted.
+                    match marks_of(self.disk, &path, entry.len) {
+                        Err(error) if error.kind() == ErrorKind::NotFound => {}
+                        marks => self.mentioned.extend(marks?),
+                    }
+                }
+                _ => {}
+            }
+        }
+        Ok(Some(below))
+    }
+}
+
 /// The companions in a folder with their marks, by their names alone.
 fn companions(disk: &dyn Disk, folder: &Path) -> io::Result<Vec<(String, Mark)>> {
     let names = disk.list(folder, MAX_NAMES)?;
@@ -180,14 +241,26 @@ fn is_library(name: &str) -> bool {
     name.ends_with(".mtl")
 }
 
-/// Bytes at the beginning of a file in which it refers to others, by its ending.
-fn reach(path: &Path) -> u64 {
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    match ending.as_str() {
-        "bin" | "skin" | "journal" | "png" | "jpg" | "jpeg" | "webp" | "ktx2" | "dds" | "avif" | "f32" => 0,
-        "obj" | "glb" => HEAD,
-        _ => u64::MAX,
-    }
+fn ending(path: &Path) -> String {
+    path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
+
+/// True for meshes, which are geometry for the most part.
+fn is_mesh(path: &Path) -> bool {
+    matches!(ending(path).as_str(), "obj" | "glb" | "vrm")
+}
+
+/// True for files that may refer to others: all but those that hold nothing but pixels or numbers.
+fn may_refer(path: &Path) -> bool {
+    let ending = ending(path);
+    !matches!(ending.as_str(), "bin" | "skin" | "png" | "jpg" | "jpeg" | "webp" | "ktx2" | "dds" | "avif" | "f32")
+}
+
+/// True for files that refer to others as a rule: models, rigs, projects and scenes.
+fn is_naming(path: &Path) -> bool {
+    let ending = ending(path);
+    let others = matches!(ending.as_str(), "blend" | "dae" | "fbx" | "usd" | "usda" | "json");
+    others || is_mesh(path) || matches!(ending.as_str(), "gltf" | "mtl" | "ron" | "rig")
 }
 
 fn read(disk: &dyn Disk, path: &Path, limit: u64) -> io::Result<Vec<u8>> {
@@ -228,6 +301,9 @@ mod tests {
         }
         let text =
             br#"{"uri":"my%20wood.00000000000000ab.png"},{"uri":"x.00000000000000ac-2.bin"} 1.5.0123456789abcdef"#;
-        assert_eq!(marks_in(text), BTreeSet::from([(0xAB, 0), (0xAC, 2), (0x0123_4567_89AB_CDEF, 0)]));
+        assert_eq!(
+            marks_in(text).collect::<BTreeSet<_>>(),
+            BTreeSet::from([(0xAB, 0), (0xAC, 2), (0x0123_4567_89AB_CDEF, 0)])
+        );
     }
 }
