@@ -18,8 +18,8 @@ use super::{
 };
 use crate::{
     files::{
-        FileKind, LoadError, PartFiles, RealDisk, load_animation, load_gestures, load_model, load_motion, load_project,
-        load_skin, read_capped,
+        FileKind, LoadError, PartFiles, ProjectNote, RealDisk, load_animation, load_gestures, load_model, load_motion,
+        load_project, load_skin, read_capped,
     },
     mesh::{
         adjacency::{edges, islands, weld},
@@ -127,7 +127,9 @@ fn check(path: &Path) -> Result<Findings, Failure> {
         Some(FileKind::Project) => load_project(&RealDisk, path).map(|project| {
             found.remarks = project.notes.iter().map(ToString::to_string).collect();
             found.remarks.extend(project.rigs.iter().flat_map(remarks_on_rig));
-            found.error = limits::check_project(path, &project).err().map(|error| error.to_string());
+            let outside = project.notes.iter().find(|note| matches!(note, ProjectNote::MeshOutside(_)));
+            let outside = outside.map(ToString::to_string);
+            found.error = outside.or(limits::check_project(path, &project).err().map(|error| error.to_string()));
         }),
         Some(FileKind::Skin) => load_skin(&RealDisk, path).map(drop),
         Some(FileKind::Animation) => load_animation(&RealDisk, path).map(|read| found.remarks = read.notes),

@@ -5,7 +5,7 @@ use std::{fmt::Write as _, path::Path, str::FromStr, sync::OnceLock};
 use super::{ArgumentError, Failure, SEED};
 pub(super) use crate::plugins::limits::{Limit, LimitError, RigLimits};
 use crate::{
-    files::{self, LoadedProject, MeshState, RealDisk},
+    files::{self, LoadError, LoadedProject, MeshState, RealDisk},
     headless::Workbench,
     mesh::model::Model,
     modules,
@@ -109,6 +109,15 @@ pub(super) fn load_project(path: &Path) -> Result<LoadedProject, Failure> {
     let project = files::load_project(&RealDisk, path)?;
     check_project(path, &project)?;
     Ok(project)
+}
+
+/// Refuses a project with a mesh outside of its folder, for commands that show or write its meshes.
+pub(super) fn refuse_outside(project: &LoadedProject) -> Result<(), Failure> {
+    let refused = project.meshes.iter().find_map(|mesh| match &mesh.shape {
+        MeshState::Missing { error, .. } if matches!(**error, LoadError::Outside { .. }) => Some(error.clone()),
+        _ => None,
+    });
+    refused.map_or(Ok(()), |error| Err(Failure::Input(Box::new(error))))
 }
 
 /// The modules, with the limits of builds.

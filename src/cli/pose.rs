@@ -176,6 +176,9 @@ fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Option<RigMesh>), 
     let mut own_mesh = None;
     let mut rig = if FileKind::of(&args.rig) == Some(FileKind::Project) {
         let mut project = limits::load_project(&args.rig)?;
+        if args.mesh.is_none() {
+            limits::refuse_outside(&project)?;
+        }
         report.notes(project.notes);
         if project.rigs.is_empty() {
             return Err(Failure::Input(format!("`{}` has no rig to pose", args.rig.display()).into()));

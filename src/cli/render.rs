@@ -278,6 +278,7 @@ fn read(args: &RenderArgs, report: &mut Report) -> Result<Scene, Failure> {
         }
         Some(FileKind::Project) => {
             let mut project = spinning("reading", || limits::load_project(path))?;
+            limits::refuse_outside(&project)?;
             report.notes(project.notes);
             let empty = || Failure::Input(format!("`{}` has no rig to draw", path.display()).into());
             let rig = (!project.rigs.is_empty()).then(|| project.rigs.swap_remove(0)).ok_or_else(empty)?;

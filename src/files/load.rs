@@ -150,6 +150,17 @@ pub enum LoadError {
         /// Error of the reader.
         source: SkinFileError,
     },
+    /// A project names a mesh outside of its folder.
+    #[error(
+        "`{}` is outside of `{}`, the folder of the project that names it, and is not opened; copy it into that folder, or \
+         give a command the mesh with --mesh", path.display(), folder.display()
+    )]
+    Outside {
+        /// The file, as the project names it.
+        path: PathBuf,
+        /// The project's folder.
+        folder: PathBuf,
+    },
     /// The reader panicked.
     #[error("`{}`: the file broke the reader; it is damaged in a way that is not foreseen; export it again", path.display())]
     Broken {
@@ -170,6 +181,7 @@ impl LoadError {
             | Self::Source { path, .. }
             | Self::Bvh { path, .. }
             | Self::Skin { path, .. }
+            | Self::Outside { path, .. }
             | Self::Broken { path } => Some(path),
         }
     }

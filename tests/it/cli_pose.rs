@@ -598,6 +598,21 @@ fn the_mesh_of_a_project_is_posed_with_its_own_weights() {
     let answer = rigsmith(folder.path(), &args);
     assert!(answer.code == 0 && answer.err.contains("stands in"), "{}", answer.err);
     assert_eq!(load_model(&RealDisk, &path("other.glb")).unwrap().points.len(), 5);
+    // Outside of the project's folder, its mesh is refused, and a person's own is taken.
+    fs::create_dir(path("inner")).unwrap();
+    let text = fs::read_to_string(path("square.rigsmith.ron")).unwrap();
+    fs::write(path("inner/away.rigsmith.ron"), text.replace("\"square.obj\"", "\"../square.obj\"")).unwrap();
+    for command in ["pose", "check"] {
+        let mut args = vec![command, "inner/away.rigsmith.ron"];
+        args.extend(["-o", "away.glb"].iter().filter(|_| command == "pose"));
+        let answer = rigsmith(folder.path(), &args);
+        let told = format!("{}{}", answer.out, answer.err);
+        assert!(answer.code == 1 && told.contains("is outside of") && told.contains("--mesh"), "{command}: {told}");
+        assert!(!path("away.glb").exists());
+    }
+    let args = ["pose", "inner/away.rigsmith.ron", "--mesh", "square.obj", "-o", "away.glb"];
+    let answer = rigsmith(folder.path(), &args);
+    assert!(answer.code == 0 && path("away.glb").exists(), "{}", answer.err);
     // Without a file to write, a mesh would be for nothing.
     let answer = rigsmith(folder.path(), &["pose", "square.rigsmith.ron", "--mesh", "other.obj"]);
     assert!(answer.code == 2 && answer.err.contains("-o"), "{}", answer.err);

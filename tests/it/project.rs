@@ -241,20 +241,19 @@ fn a_broken_view_is_no_reason_to_refuse_a_project() {
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
-/// A folder with a mesh beside the folder of the project.
+/// A folder with a project's folder, in which its mesh has one of its own.
 struct Folder(tempfile::TempDir);
 
 impl Folder {
     fn new() -> Self {
         let folder = Self(tempfile::tempdir().unwrap());
-        fs::create_dir_all(folder.0.path().join("work")).unwrap();
-        fs::create_dir_all(folder.0.path().join("meshes")).unwrap();
+        fs::create_dir_all(folder.0.path().join("work/meshes")).unwrap();
         fs::write(folder.mesh(), CUBE).unwrap();
         folder
     }
 
     fn mesh(&self) -> std::path::PathBuf {
-        self.0.path().join("meshes/cube.obj")
+        self.0.path().join("work/meshes/cube.obj")
     }
 
     fn project(&self) -> std::path::PathBuf {
@@ -349,13 +348,14 @@ fn what_is_saved_is_opened_and_saving_that_changes_nothing() {
         let mut names: Vec<String> = fs::read_dir(folder.0.path().join("work"))
             .unwrap()
             .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .filter(|name| name != "meshes")
             .collect();
         names.sort();
         names
     };
     assert_eq!(names.len(), 2);
     assert!(names[0].starts_with("hero.") && names[0].ends_with(".skin") && names[1] == "hero.rigsmith.ron");
-    assert!(folder.text().contains("path: \"../meshes/cube.obj\""), "{}", folder.text());
+    assert!(folder.text().contains("path: \"meshes/cube.obj\""), "{}", folder.text());
     let text = folder.text();
     let loaded = folder.load();
     assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
@@ -367,9 +367,7 @@ fn what_is_saved_is_opened_and_saving_that_changes_nothing() {
 
     // The whole folder moved elsewhere.
     let moved = tempfile::tempdir().unwrap();
-    for name in ["work", "meshes"] {
-        fs::rename(folder.0.path().join(name), moved.path().join(name)).unwrap();
-    }
+    fs::rename(folder.0.path().join("work"), moved.path().join("work")).unwrap();
     let loaded = load_project(&RealDisk, &moved.path().join("work/hero.rigsmith.ron")).unwrap();
     assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
     assert_eq!(loaded.rigs, project.rigs);
@@ -407,7 +405,7 @@ fn a_missing_mesh_loses_nothing() {
     folder.save(&project);
     let text = folder.text();
     let skin = fs::read(folder.skin()).unwrap();
-    let away = folder.0.path().join("meshes/elsewhere.obj");
+    let away = folder.0.path().join("work/meshes/elsewhere.obj");
     fs::rename(folder.mesh(), &away).unwrap();
     let loaded = folder.load();
     assert_eq!(loaded.rigs, project.rigs, "weights and poses included");
@@ -457,15 +455,8 @@ fn broken_weights_are_told_and_the_rest_opens() {
         assert!(loaded.notes[0].to_string().contains("below the project"), "{:?}", loaded.notes);
         assert!(loaded.rigs[0].skins().next().is_none());
     }
-    // A mesh far away is told and opened.
-    let _ = fs::remove_file(&skin);
-    folder.save(&project);
-    let far = folder.0.path().join("meshes/cube.obj").display().to_string();
-    fs::write(folder.project(), folder.text().replace("../meshes/cube.obj", &far)).unwrap();
-    let loaded = folder.load();
-    assert!(loaded.notes.len() == 1 && loaded.notes[0].to_string().contains("is far from"), "{:?}", loaded.notes);
     // Weights of another save: still those of this mesh.
-    fs::remove_file(&skin).unwrap();
+    let _ = fs::remove_file(&skin);
     folder.save(&project);
     let hash = text.split(".skin\", hash: \"").nth(1).unwrap()[..16].to_owned();
     fs::write(folder.project(), text.replace(&format!("hash: \"{hash}\""), "hash: \"0000000000000000\"")).unwrap();
@@ -513,6 +504,66 @@ fn weights_of_a_mesh_that_is_not_open_are_told() {
     assert_eq!(folder.load().meshes.len(), 0);
 }
 
+/// What a project names outside of its folder is refused and told, and comes back from a copy in the folder.
+#[test]
+fn meshes_outside_of_the_folder_are_refused() {
+    let folder = Folder::new();
+    let project = cube(&folder.mesh());
+    folder.save(&project);
+    let text = folder.text();
+    let away = folder.0.path().join("cube.obj");
+    fs::rename(folder.mesh(), &away).unwrap();
+    let mut named = vec![away.display().to_string(), "../cube.obj".to_owned(), "meshes/../../cube.obj".to_owned()];
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(&away, folder.mesh().with_file_name("link.obj")).unwrap();
+        named.push("meshes/link.obj".to_owned());
+    }
+    for name in named {
+        fs::write(folder.project(), text.replace("meshes/cube.obj", &name)).unwrap();
+        let loaded = folder.load();
+        assert_eq!(loaded.rigs, project.rigs, "{name}: weights and poses are kept");
+        let [ProjectNote::MeshOutside(error)] = &loaded.notes[..] else { panic!("{name}: {:?}", loaded.notes) };
+        assert!(matches!(**error, LoadError::Outside { .. }) && error.to_string().contains("copy it"), "{error}");
+        assert!(matches!(loaded.meshes[0].shape, MeshState::Missing { .. }), "{name}");
+        assert!(loaded.notes[0].is_serious());
+        // Saved again, the project names it as before, and says what will come of it.
+        let told = folder.save(&to_save(loaded));
+        assert!(told.len() == 1 && told[0].contains("outside"), "{name}: {told:?}");
+    }
+    fs::write(folder.project(), text.replace("meshes/cube.obj", "../cube.obj")).unwrap();
+    fs::copy(&away, folder.project().with_file_name("cube.obj")).unwrap();
+    let loaded = folder.load();
+    assert!(matches!(&loaded.notes[..], [ProjectNote::FileBeside { .. }]), "{:?}", loaded.notes);
+    assert!(matches!(loaded.meshes[0].shape, MeshState::Open { changed: false, .. }));
+    folder.save(&to_save(loaded));
+    assert!(folder.load().notes.is_empty() && folder.text().contains("path: \"cube.obj\""), "{}", folder.text());
+}
+
+/// A template outside of the project's folder is not followed, and the version that the rig took over is kept.
+#[test]
+fn templates_outside_of_the_folder_are_not_followed() {
+    let folder = Folder::new();
+    let mut project = cube(&folder.mesh());
+    let file = folder.0.path().join("t.rig.ron");
+    fs::write(&file, "(format: 1)").unwrap();
+    let base = Arc::new(read_project(FOLLOWS.as_bytes()).unwrap().project.templates[0].base.clone());
+    project.templates = vec![ProjectTemplate { rig: project.rigs[0].uid(), path: file.clone(), base }];
+    let told = folder.save(&project);
+    assert!(told.len() == 1 && told[0].contains("RIGSMITH_TEMPLATES"), "{told:?}");
+    let loaded = folder.load();
+    assert!(matches!(&loaded.notes[..], [ProjectNote::TemplateOutside(_)]), "{:?}", loaded.notes);
+    let inside = folder.project().with_file_name("t.rig.ron");
+    assert_eq!(loaded.templates[0].path, inside);
+    assert_eq!(loaded.templates[0].base, project.templates[0].base);
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(&file, &inside).unwrap();
+        let loaded = folder.load();
+        assert!(loaded.templates.is_empty() && loaded.notes.len() == 1, "{:?}", loaded.notes);
+    }
+}
+
 #[test]
 fn a_character_with_a_skeleton_of_its_own_goes_through_a_project() {
     let folder = Folder::new();
@@ -526,7 +577,7 @@ fn a_character_with_a_skeleton_of_its_own_goes_through_a_project() {
         nodes: &[],
         skin: posed.rigs[0].skin(Uid(0x50)).map(|skin| &**skin),
     };
-    let path = folder.0.path().join("meshes/cube.glb");
+    let path = folder.0.path().join("work/meshes/cube.glb");
     store_model(&RealDisk, &path, &character(&parts), &GltfWriteSettings::default()).unwrap();
 
     let model = load_model(&RealDisk, &path).unwrap();
@@ -591,8 +642,7 @@ fn the_template_that_a_rig_follows_is_kept_with_its_version() {
     let followed = ProjectTemplate { rig: project.rigs[0].uid(), path: file, base: Arc::new(template.base.clone()) };
     project.templates = vec![followed.clone()];
     folder.save(&project);
-    let path = folder.0.path().join("work/../meshes/t.rig.ron");
-    assert_eq!(folder.load().templates, [ProjectTemplate { path, ..followed }]);
+    assert_eq!(folder.load().templates, [followed]);
 }
 
 /// Weights of some points, with a joint that joins the list, are saved with the others; taking them back gives the first file.

@@ -17,9 +17,23 @@ pub enum ProjectNote {
     /// A mesh cannot be loaded.
     #[error("a mesh of the project is not there: {0}; put it back and open the project again, its weights are kept")]
     MeshMissing(Arc<LoadError>),
-    /// A mesh lies neither below the project's folder nor in one beside it.
-    #[error("the mesh `{0}` is far from the project's folder; put it below if the project came from elsewhere")]
-    MeshOutside(String),
+    /// A mesh lies outside of the project's folder, and is not opened.
+    #[error("a mesh of the project was refused: {0}; its weights are kept")]
+    MeshOutside(Arc<LoadError>),
+    /// A template lies outside of the project's folder, and is not followed.
+    #[error(
+        "the template `{0}` is outside of the project's folder and is not followed; copy it into that folder, or name its \
+         folder as one of templates (RIGSMITH_TEMPLATES), and open the project again"
+    )]
+    TemplateOutside(String),
+    /// A file outside of the project's folder is not opened, but one of its name in the folder is.
+    #[error("the project names `{named}`, which is outside of its folder; `{}` is used instead", path.display())]
+    FileBeside {
+        /// The file as the project names it.
+        named: String,
+        /// The file that is used.
+        path: PathBuf,
+    },
     /// A mesh differs from the one with which the project was saved.
     #[error("the mesh `{}` has changed since the project was saved", .0.display())]
     MeshChanged(PathBuf),
@@ -67,6 +81,6 @@ pub enum ProjectNote {
 impl ProjectNote {
     /// True if a mesh or weights are missing, or may not be those that were saved.
     pub fn is_serious(&self) -> bool {
-        !matches!(self, Self::File(_) | Self::MeshChanged(_))
+        !matches!(self, Self::File(_) | Self::MeshChanged(_) | Self::FileBeside { .. })
     }
 }

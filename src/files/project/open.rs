@@ -1,15 +1,19 @@
 //! Loader of projects.
 
-use std::{path::Path, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use super::{
     LoadedMesh, LoadedProject, MeshShape, MeshState, ProjectNote, ProjectTemplate,
-    path::{below, leads_away, located},
+    path::{Place, below, is_of_site, place},
 };
 use crate::{
     algo::transfer::{TransferMesh, TransferSettings, transfer_weights},
     files::{
         Disk, LoadError,
+        atomic::folder_of,
         load::{load_hashed_skin, load_project_file},
         load_model,
     },
@@ -26,18 +30,21 @@ use crate::{
 /// A mesh or weights that are missing, changed or damaged are no error: the rest opens, and the notes describe each of
 /// them and its remedy. Weights of a mesh that has changed are transferred to it.
 ///
+/// Files outside of the project's folder are refused like missing ones ([`LoadError::Outside`]), whether the project names
+/// them by an absolute path, by `..` or by a link; a file of the same name in the folder stands in. Templates may be in the
+/// folders of the site, too ([`SearchPaths`](crate::files::SearchPaths)).
+///
 /// # Errors
 /// [`LoadError`] for errors in the project file itself.
 pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadError> {
     let read = load_project_file(disk, path)?;
     let Project { name, meshes: references, rigs: entries, templates, view, journal } = read.project;
-    let templates = templates.into_iter().map(|template| ProjectTemplate {
-        rig: template.rig,
-        path: located(path, &template.path),
-        base: Arc::new(template.base),
+    let mut notes: Vec<ProjectNote> = read.notes.into_iter().map(ProjectNote::File).collect();
+    let templates = templates.into_iter().filter_map(|template| {
+        let file = template_file(disk, path, &template.path, &mut notes)?;
+        Some(ProjectTemplate { rig: template.rig, path: file, base: Arc::new(template.base) })
     });
     let templates = templates.collect();
-    let mut notes: Vec<ProjectNote> = read.notes.into_iter().map(ProjectNote::File).collect();
     let (mut rigs, skins): (Vec<Rig>, Vec<Vec<SkinReference>>) =
         entries.into_iter().map(|entry| (entry.rig, entry.skins)).unzip();
     let mut meshes = Vec::with_capacity(references.len());
@@ -55,6 +62,23 @@ pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadE
         meshes.push(mesh);
     }
     Ok(LoadedProject { name, rigs, meshes, templates, view, journal, notes })
+}
+
+/// File of a template; `None`, with a note, if it is not to be followed.
+fn template_file(disk: &dyn Disk, project: &Path, text: &str, notes: &mut Vec<ProjectNote>) -> Option<PathBuf> {
+    match place(disk, project, text) {
+        Place::Inside(path) => Some(path),
+        Place::Outside(path) if is_of_site(disk, &path) => Some(path),
+        Place::Beside(path) => {
+            notes.push(ProjectNote::FileBeside { named: text.to_owned(), path: path.clone() });
+            Some(path)
+        }
+        Place::Outside(_) => {
+            notes.push(ProjectNote::TemplateOutside(text.to_owned()));
+            // The version that the rig took over stays with the name that the template has once it is there.
+            below(disk, project, Path::new(text).file_name()?.to_str()?)
+        }
+    }
 }
 
 /// Weights of a mesh from their file; `None`, with a note, if it cannot be read.
@@ -86,18 +110,32 @@ fn open_mesh(
     notes: &mut Vec<ProjectNote>,
 ) -> (LoadedMesh, Option<SkinData>) {
     let MeshReference { uid, rig: rig_uid, path, hash, mut nodes } = reference;
-    if leads_away(&path) {
-        notes.push(ProjectNote::MeshOutside(path.clone()));
-    }
-    let path = located(project, &path);
+    let (path, read) = match place(disk, project, &path) {
+        Place::Inside(path) => {
+            let read = load_model(disk, &path);
+            (path, read)
+        }
+        Place::Beside(beside) => {
+            notes.push(ProjectNote::FileBeside { named: path, path: beside.clone() });
+            let read = load_model(disk, &beside);
+            (beside, read)
+        }
+        Place::Outside(outside) => {
+            let refused = LoadError::Outside { path: outside.clone(), folder: folder_of(project).to_path_buf() };
+            (outside, Err(refused))
+        }
+    };
     let data = |file: &SkinFile, weights: Weights, at_rest: bool| {
         let joints = file.joints().iter().map(|joint| Uid(joint.uid)).collect();
         SkinData { joints, weights, at_rest, subjects: SkinJoint::subjects(file.joints()) }
     };
-    let (state, bound) = match load_model(disk, &path) {
+    let (state, bound) = match read {
         Err(error) => {
             let error = Arc::new(error);
-            notes.push(ProjectNote::MeshMissing(error.clone()));
+            notes.push(match *error {
+                LoadError::Outside { .. } => ProjectNote::MeshOutside(error.clone()),
+                _ => ProjectNote::MeshMissing(error.clone()),
+            });
             let bound = skin.as_ref().map(|(file, at_rest)| data(file, file.weights().clone(), *at_rest));
             let shape = MeshShape::Missing { hash, skin: skin.map(|(file, _)| Arc::new(file)) };
             (MeshState::Missing { error, shape }, bound)

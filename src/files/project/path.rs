@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use crate::files::{Disk, atomic::folder_of};
+use crate::files::{Disk, EntryKind, SearchPaths, atomic::folder_of};
 
 /// Text by which a project refers to a file: relative to the project's folder, with `/` between names, so that both can
 /// be moved together; absolute if they have no folder in common.
@@ -51,11 +51,35 @@ pub(super) fn below(disk: &dyn Disk, project: &Path, text: &str) -> Option<PathB
     }
 }
 
-/// True for references that lead further than to folders beside the project's: absolute ones, and those that go up more
-/// than once. A project from elsewhere may name any file of the machine by them.
-pub(super) fn leads_away(text: &str) -> bool {
-    let path = Path::new(text);
-    path.is_absolute() || path.components().filter(|part| *part == Component::ParentDir).count() > 1
+/// Place of a file that a project refers to. A project from elsewhere may name any file of the machine, so only files below
+/// its folder are opened.
+pub(super) enum Place {
+    /// Below the project's folder.
+    Inside(PathBuf),
+    /// Outside of the folder, with a file of that name in it, which stands in.
+    Beside(PathBuf),
+    /// Outside of the folder.
+    Outside(PathBuf),
+}
+
+/// Place of the file to which the reference `text` of a project leads.
+pub(super) fn place(disk: &dyn Disk, project: &Path, text: &str) -> Place {
+    if let Some(path) = below(disk, project, text) {
+        return Place::Inside(path);
+    }
+    let is_file = |path: &PathBuf| disk.entry(path, true).is_ok_and(|entry| entry.kind == EntryKind::File);
+    let name = Path::new(text).file_name().and_then(|name| name.to_str());
+    match name.and_then(|name| below(disk, project, name)).filter(is_file) {
+        Some(path) => Place::Beside(path),
+        None => Place::Outside(located(project, text)),
+    }
+}
+
+/// True for a file in one of the folders of templates that the person or the site has named.
+pub(super) fn is_of_site(disk: &dyn Disk, path: &Path) -> bool {
+    let Ok(target) = disk.canonical(path) else { return false };
+    let site = SearchPaths::of_site().unwrap_or_default();
+    site.folders.iter().any(|folder| disk.canonical(folder).is_ok_and(|folder| target.starts_with(folder)))
 }
 
 /// An absolute path without `.` and `..`.

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use super::{MeshShape, MeshToSave, ProjectToSave, path::reference};
+use super::{
+    MeshShape, MeshToSave, ProjectToSave,
+    path::{Place, is_of_site, place, reference},
+};
 use crate::{
     files::{Disk, FileSet, StoreError, save_set, stem, verify},
     rig::{
@@ -68,18 +71,30 @@ pub fn project_files(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> R
     }
     let mut meshes = Vec::with_capacity(project.meshes.len());
     for mesh in &project.meshes {
+        let named = reference(disk, path, &mesh.path, &mut notes);
+        if !matches!(place(disk, path, &named), Place::Inside(_)) {
+            notes.push(format!(
+                "the mesh `{named}` is outside of the project's folder and does not open with the project; copy it into \
+                 that folder"
+            ));
+        }
         meshes.push(MeshReference {
             uid: mesh.uid,
             rig: mesh.rig,
-            path: reference(disk, path, &mesh.path, &mut notes),
+            path: named,
             hash: mesh.shape.hash(),
             nodes: mesh.nodes.to_vec(),
         });
     }
-    let templates = project.templates.iter().map(|template| TemplateReference {
-        rig: template.rig,
-        path: reference(disk, path, &template.path, &mut notes),
-        base: (*template.base).clone(),
+    let templates = project.templates.iter().map(|template| {
+        let named = reference(disk, path, &template.path, &mut notes);
+        if !matches!(place(disk, path, &named), Place::Inside(_)) && !is_of_site(disk, &template.path) {
+            notes.push(format!(
+                "the template `{named}` is outside of the project's folder and is not followed when the project is opened; \
+                 copy it into that folder, or name its folder as one of templates (RIGSMITH_TEMPLATES)"
+            ));
+        }
+        TemplateReference { rig: template.rig, path: named, base: (*template.base).clone() }
     });
     let templates = templates.collect();
     let (name, view, journal) = (project.name.clone(), project.view.clone(), project.journal.clone());
