@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Disk, ModelFolder, PartFiles, ReadError, open, parts::named_template, read_capped};
+use super::{
+    Disk, ModelFolder, PartFiles, ReadError, UriError, open, parts::named_template, read::read_plausible, read_capped,
+};
 use crate::{
     mesh::{
         gltf::{self, ExternalError, ExternalFile, GltfError, read_gltf},
         model::Model,
-        obj::{self, ObjError, ObjSettings},
+        obj::{self, ObjError, ObjSettings, SidecarFile},
     },
     rig::{
         SourceError,
@@ -17,7 +19,7 @@ use crate::{
         },
         format::{
             animation::{self, ReadAnimation, read_animation},
-            bvh::{BvhError, read_bvh},
+            bvh::{self, BvhError, read_bvh},
         },
         project::{self, ReadProject, read_project},
         skin::{SkinFile, SkinFileError, content_hash},
@@ -215,14 +217,21 @@ fn load_obj(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
     let folder = ModelFolder::of(disk, path)?;
     let mut sidecar = |uri: &str| {
         let limit = if uri.to_ascii_lowercase().ends_with(".mtl") { MAX_MTL_BYTES } else { gltf::MAX_IMAGE_BYTES };
-        folder.read(uri, limit).ok()
+        match folder.read(uri, limit) {
+            Ok(bytes) => Some(SidecarFile::Bytes(bytes)),
+            Err(error @ UriError::Outside { .. }) => Some(SidecarFile::Refused(error.to_string())),
+            Err(UriError::Read { source, .. }) if !matches!(source, ReadError::Missing { .. }) => {
+                Some(SidecarFile::Refused(source.to_string()))
+            }
+            Err(_) => None,
+        }
     };
     obj::read_model(file, &stem(path), &ObjSettings::default(), &mut sidecar)
         .map_err(|source| LoadError::Obj { path: path.into(), source })
 }
 
 fn load_gltf(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
-    let bytes = read_capped(disk, path, MAX_GLTF_BYTES)?;
+    let bytes = read_plausible(disk, path, MAX_GLTF_BYTES, gltf::may_begin_with)?;
     let folder = ModelFolder::of(disk, path)?;
     let mut external =
         |file: ExternalFile| folder.read(file.path, file.limit.min(MAX_GLTF_BYTES)).map_err(ExternalError::new);
@@ -253,7 +262,7 @@ pub fn load_animation(disk: &dyn Disk, path: &Path) -> Result<ReadAnimation, Loa
 
 /// Reads the motion of a BVH file.
 pub fn load_motion(disk: &dyn Disk, path: &Path) -> Result<Motion, LoadError> {
-    let bytes = read_capped(disk, path, MAX_BVH_BYTES)?;
+    let bytes = read_plausible(disk, path, MAX_BVH_BYTES, bvh::may_begin_with)?;
     read_bvh(&bytes, &stem(path)).map_err(|source| LoadError::Bvh { path: path.into(), source })
 }
 
@@ -282,7 +291,7 @@ pub fn load_skin(disk: &dyn Disk, path: &Path) -> Result<SkinFile, LoadError> {
 
 /// Reads weights and the hash of their file.
 pub(super) fn load_hashed_skin(disk: &dyn Disk, path: &Path) -> Result<(SkinFile, u64), LoadError> {
-    let bytes = read_capped(disk, path, MAX_GLTF_BYTES)?;
+    let bytes = read_plausible(disk, path, MAX_GLTF_BYTES, SkinFile::may_begin_with)?;
     let file = SkinFile::read(&bytes).map_err(|source| LoadError::Skin { path: path.into(), source })?;
     Ok((file, content_hash(&bytes)))
 }

@@ -15,6 +15,8 @@ use super::{
 
 /// Largest number of bytes that are reserved before a single byte has been read, whatever length the file claims.
 const FIRST_RESERVE: u64 = 16 << 20;
+/// Bytes that tell what kind of file it is.
+const BEGINNING: u64 = 4096;
 /// Largest number of names in a folder that are searched for a hint.
 const MAX_NAMES: usize = 4096;
 const MAX_HINTS: usize = 3;
@@ -139,14 +141,34 @@ pub fn open(disk: &dyn Disk, path: &Path) -> Result<OpenFile, ReadError> {
 /// # Errors
 /// See [`ReadError`].
 pub fn read_capped(disk: &dyn Disk, path: &Path, limit: u64) -> Result<Vec<u8>, ReadError> {
+    read_plausible(disk, path, limit, |_| true)
+}
+
+/// Reads a file as [`read_capped`] does if its first bytes may be those of the wanted kind; otherwise these bytes alone,
+/// which the reader of that kind refuses like the whole file. Gigabytes of anything else are not read.
+///
+/// # Errors
+/// See [`ReadError`].
+pub(super) fn read_plausible(
+    disk: &dyn Disk,
+    path: &Path,
+    limit: u64,
+    may_begin_with: impl Fn(&[u8]) -> bool,
+) -> Result<Vec<u8>, ReadError> {
     let too_large = || ReadError::TooLarge { path: path.to_path_buf(), limit };
     let entry = regular(disk, path)?;
     if entry.len > limit {
         return Err(too_large());
     }
     let reader = disk.open(path).map_err(|error| ReadError::new(disk, path, error))?;
+    let mut reader = reader.take(limit.saturating_add(1));
     let mut bytes = Vec::with_capacity(usize::try_from(entry.len.min(FIRST_RESERVE)).unwrap_or(0));
-    reader.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(|error| ReadError::new(disk, path, error))?;
+    let failed = |error| ReadError::new(disk, path, error);
+    reader.by_ref().take(BEGINNING).read_to_end(&mut bytes).map_err(failed)?;
+    if !may_begin_with(&bytes) && !bytes.is_empty() {
+        return Ok(bytes);
+    }
+    reader.read_to_end(&mut bytes).map_err(failed)?;
     match bytes.len() as u64 {
         0 => Err(ReadError::Empty { path: path.to_path_buf() }),
         read if read > limit => Err(too_large()),

@@ -14,7 +14,7 @@ use crate::{
     mesh::{
         gltf::{ExternalError, ExternalFile, read_avatar, read_gltf},
         model::Model,
-        obj::{self, ObjSettings},
+        obj::{self, ObjSettings, SidecarFile},
         vrm::Avatar,
     },
     rig::{
@@ -33,7 +33,7 @@ pub(super) fn model(set: &FileSet, model: &Model) -> Result<(), StoreError> {
     let is_obj = FileKind::of(path) == Some(FileKind::Obj);
     let read = || {
         if is_obj {
-            let mut sidecar = |name: &str| set.companion(name).map(<[u8]>::to_vec);
+            let mut sidecar = |name: &str| set.companion(name).map(|bytes| SidecarFile::Bytes(bytes.to_vec()));
             obj::read_model(set.bytes(), &stem(path), &ObjSettings::default(), &mut sidecar)
                 .map_err(|source| LoadError::Obj { path: path.into(), source })
         } else {

@@ -37,6 +37,13 @@ use budget::{Budget, Notes};
 /// Largest number of bytes of all images of one file together.
 pub const MAX_IMAGE_BYTES: u64 = 256 << 20;
 
+/// True for bytes that may be the first of a glTF or GLB file.
+pub fn may_begin_with(bytes: &[u8]) -> bool {
+    let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    let first = text.iter().find(|byte| !byte.is_ascii_whitespace());
+    bytes.starts_with(b"glTF") || first.is_none_or(|byte| matches!(byte, b'{' | b'['))
+}
+
 /// Largest number of bytes of memory for reading a file of `input` bytes (with its external buffers): 64 MiB and 16
 /// times the file.
 pub fn memory_limit(input: u64) -> u64 {

@@ -34,7 +34,7 @@ use crate::mesh::model::Model;
 
 pub use self::{
     error::{LineProblem, ObjError},
-    materials::Sidecar,
+    materials::{Sidecar, SidecarFile},
     mtl::{ObjMaterial, ObjTexture, read_mtl},
     names::ObjNames,
     paths::{library_names, safe_relative_path},

@@ -17,7 +17,7 @@ use rigsmith::{
     mesh::{
         gltf::GltfWriteSettings,
         model::{Model, Weights},
-        obj::{ObjSettings, read_model},
+        obj::{ObjSettings, SidecarFile, read_model},
     },
     rig::{JointData, Rig, RigEdit, SkinData, Uid},
 };
@@ -44,7 +44,8 @@ fn texture(version: u32) -> Vec<u8> {
 pub fn triangle(version: u32) -> Model {
     let obj = format!("mtllib a.mtl\nv {version} 0 0\nv 1 5 0\nv 0 1 9\nvt 0 0\nusemtl wood\nf 1/1 2/1 3/1\n");
     let mtl = format!("newmtl wood\nKd 0.5 0.5 0.{version}\nmap_Kd wood.png\n");
-    let mut sidecar = |name: &str| Some(if name == "a.mtl" { mtl.clone().into() } else { texture(version) });
+    let mut sidecar =
+        |name: &str| Some(SidecarFile::Bytes(if name == "a.mtl" { mtl.clone().into() } else { texture(version) }));
     read_model(obj.as_bytes(), "scene", &ObjSettings::default(), &mut sidecar).unwrap()
 }
 

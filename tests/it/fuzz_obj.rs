@@ -4,7 +4,7 @@ use std::{cell::Cell, fs, path::PathBuf};
 
 use rigsmith::mesh::{
     model::Model,
-    obj::{ObjArrays, ObjError, ObjSettings, read_mtl, read_obj, to_model, write_obj},
+    obj::{ObjArrays, ObjError, ObjSettings, SidecarFile, read_mtl, read_obj, to_model, write_obj},
 };
 
 use crate::{mutate::run_fuzz, prerequisites::test_data};
@@ -59,7 +59,10 @@ fn check(bytes: &[u8]) -> bool {
         Err(error) => panic!("{error}"),
         Ok(()) => {
             assert!(whole.is_consistent());
-            let model = to_model(&whole, "fuzz", &mut |path| path.ends_with(".mtl").then(|| bytes.to_vec())).unwrap();
+            let model = to_model(&whole, "fuzz", &mut |path| {
+                path.ends_with(".mtl").then(|| SidecarFile::Bytes(bytes.to_vec()))
+            })
+            .unwrap();
             check_model(&whole, &model);
             check_written(&model);
         }

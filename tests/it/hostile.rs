@@ -282,6 +282,26 @@ fn files_and_builds_stay_within_their_memory() {
     }
 }
 
+/// Gigabytes that are no file of their kind are refused by their beginning, and what is too large is told as that.
+#[test]
+fn gigabytes_of_nothing_are_not_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let long = |name: &str, size: u64| fs::File::create(folder.path().join(name)).unwrap().set_len(size).unwrap();
+    for name in ["zeros.glb", "zeros.gltf", "zeros.vrm", "zeros.skin", "zeros.bvh"] {
+        long(name, 3 << 30);
+        let (ended, answer) = json_answer(folder.path(), &["check", name]);
+        assert_eq!(ended.code, Some(1), "{answer}");
+        assert!(ended.memory <= memory_allowance(0), "{name}: {} KiB", ended.memory >> 10);
+        fs::remove_file(folder.path().join(name)).unwrap();
+    }
+    long("large.mtl", 65 << 20);
+    fs::write(folder.path().join("a.obj"), "mtllib large.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n").unwrap();
+    let (ended, answer) = json_answer(folder.path(), &["info", "a.obj"]);
+    assert_eq!(ended.code, Some(0), "{answer}");
+    let notes = answer["notes"].to_string();
+    assert!(notes.contains("large.mtl") && notes.contains("too large") && !notes.contains("not found"), "{notes}");
+}
+
 /// A million frames of motion capture are read, and are too many for a clip.
 #[test]
 fn a_million_frames_of_motion_stay_within_their_memory() {

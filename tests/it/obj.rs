@@ -7,7 +7,9 @@ use std::{
 
 use rigsmith::mesh::{
     model::Model,
-    obj::{LineProblem, NONE, ObjArrays, ObjError, ObjSettings, read_model, read_obj, to_model, write_obj},
+    obj::{
+        LineProblem, NONE, ObjArrays, ObjError, ObjSettings, SidecarFile, read_model, read_obj, to_model, write_obj,
+    },
 };
 
 fn arrays(text: &str) -> Result<ObjArrays, ObjError> {
@@ -22,7 +24,7 @@ fn model(text: &str) -> Model {
 
 pub fn model_with(text: &str, files: &[(&str, &[u8])]) -> Model {
     let files: HashMap<&str, &[u8]> = files.iter().copied().collect();
-    let mut sidecar = |path: &str| files.get(path).map(|bytes| bytes.to_vec());
+    let mut sidecar = |path: &str| files.get(path).map(|bytes| SidecarFile::Bytes(bytes.to_vec()));
     read_model(text.as_bytes(), "test", &ObjSettings::default(), &mut sidecar).unwrap()
 }
 
@@ -432,7 +434,7 @@ fn check_round_trip(name: &str, model: &Model) {
         plain.to_owned()
     };
     let written = write_obj(model, "test", &mut companion);
-    let mut sidecar = |path: &str| files.get(path).cloned();
+    let mut sidecar = |path: &str| files.get(path).cloned().map(SidecarFile::Bytes);
     let again = read_model(&written[..], &model.name, &ObjSettings::default(), &mut sidecar).unwrap();
     assert_eq!(again.points, model.points, "{name}");
     assert_eq!(again.parts.len(), model.parts.len(), "{name}");

@@ -1,6 +1,6 @@
 //! Materials, textures and vertex looks of OBJ files.
 
-use rigsmith::mesh::obj::{ObjSettings, library_names, read_model, read_mtl, safe_relative_path};
+use rigsmith::mesh::obj::{ObjSettings, SidecarFile, library_names, read_model, read_mtl, safe_relative_path};
 
 use crate::obj::{PNG, TRIANGLE, model_with};
 
@@ -44,8 +44,8 @@ fn missing_files_are_notes() {
     let mut sidecar = |path: &str| {
         asked.push(path.to_owned());
         match path {
-            "a.mtl" => Some(mtl.into()),
-            "picture.tga" => Some(vec![0; 18]),
+            "a.mtl" => Some(SidecarFile::Bytes(mtl.into())),
+            "picture.tga" => Some(SidecarFile::Bytes(vec![0; 18])),
             _ => None,
         }
     };
@@ -56,6 +56,24 @@ fn missing_files_are_notes() {
     }
     assert!(asked.iter().all(|path| !path.contains("..") && !path.starts_with('/')), "{asked:?}");
     assert!(asked.contains(&"no such.mtl".to_owned()) && asked.contains(&"secret.png".to_owned()), "{asked:?}");
+}
+
+#[test]
+fn files_that_are_there_and_refused_are_not_told_as_missing() {
+    let obj = format!("mtllib large.mtl\nmtllib a.mtl\n{TRIANGLE}usemtl m\nf 1 2 3\n");
+    let mut sidecar = |path: &str| {
+        Some(match path {
+            "a.mtl" => SidecarFile::Bytes("newmtl m\nmap_Kd wood.png\n".into()),
+            "large.mtl" => SidecarFile::Bytes(vec![b'\n'; (64 << 20) + 1]),
+            _ => SidecarFile::Refused("it may not be read".to_owned()),
+        })
+    };
+    let model = read_model(obj.as_bytes(), "test", &ObjSettings::default(), &mut sidecar).unwrap();
+    assert!(model.material_set.images.is_empty());
+    for wanted in ["`large.mtl` was left out: it is larger than", "`wood.png` was left out: it may not be read"] {
+        assert!(model.notes.iter().any(|note| note.contains(wanted)), "{wanted}: {:?}", model.notes);
+    }
+    assert!(model.notes.iter().all(|note| !note.contains("not found")), "{:?}", model.notes);
 }
 
 #[test]

@@ -7,14 +7,14 @@ use std::{
 
 use rigsmith::mesh::{
     model::Model,
-    obj::{ObjError, ObjSettings, read_model, write_obj},
+    obj::{ObjError, ObjSettings, SidecarFile, read_model, write_obj},
 };
 
 use crate::prerequisites::test_data;
 
 fn read(path: &Path) -> Result<Model, ObjError> {
     let folder = path.parent().unwrap();
-    let mut sidecar = |relative: &str| fs::read(folder.join(relative)).ok();
+    let mut sidecar = |relative: &str| fs::read(folder.join(relative)).ok().map(SidecarFile::Bytes);
     let name = path.file_stem().unwrap().to_string_lossy();
     read_model(fs::File::open(path).unwrap(), &name, &ObjSettings::default(), &mut sidecar)
 }
@@ -84,7 +84,7 @@ fn check_model(name: &str, model: &Model) {
         plain.to_owned()
     };
     let written = write_obj(model, "again", &mut companion);
-    let mut sidecar = |path: &str| library.clone().filter(|_| path == "again.mtl");
+    let mut sidecar = |path: &str| library.clone().filter(|_| path == "again.mtl").map(SidecarFile::Bytes);
     let again = read_model(&written[..], name, &ObjSettings::default(), &mut sidecar).unwrap();
     assert_eq!(again.points, model.points, "{name}");
     assert!(again.parts == model.parts, "{name} changed on writing");

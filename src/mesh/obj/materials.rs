@@ -11,8 +11,17 @@ use super::{
 };
 use crate::mesh::model::{Image, MaterialSet};
 
-/// Fetches a file by its safe path below the model's folder.
-pub type Sidecar<'a> = dyn FnMut(&str) -> Option<Vec<u8>> + 'a;
+/// Fetches a file by its safe path below the model's folder; `None` if there is none.
+pub type Sidecar<'a> = dyn FnMut(&str) -> Option<SidecarFile> + 'a;
+
+/// File that a model refers to, and that is there.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SidecarFile {
+    /// Content of the file.
+    Bytes(Vec<u8>),
+    /// Reason for not reading the file, in words.
+    Refused(String),
+}
 
 /// Largest size of all images of one model together, in bytes.
 const MOST_IMAGE_BYTES: usize = 256 << 20;
@@ -71,28 +80,59 @@ fn load_libraries(
     for statement in &arrays.material_libraries {
         let names = library_names(statement);
         let mut load = |name: &str, sidecar: &mut Sidecar| {
+            let mut refused = None;
             for place in candidates("", name) {
-                let Some(bytes) = sidecar(&place).filter(|bytes| bytes.len() <= MOST_LIBRARY_BYTES) else { continue };
+                let bytes = match sidecar(&place) {
+                    None => continue,
+                    Some(SidecarFile::Bytes(bytes)) if bytes.len() <= MOST_LIBRARY_BYTES => bytes,
+                    Some(SidecarFile::Bytes(_)) => {
+                        refused.get_or_insert_with(|| "it is larger than 64 MiB".to_owned());
+                        continue;
+                    }
+                    Some(SidecarFile::Refused(reason)) => {
+                        refused.get_or_insert(reason);
+                        continue;
+                    }
+                };
                 for material in read_mtl(&bytes) {
                     let name = material.name.clone();
                     materials.entry(name).or_insert_with(|| (material, folder_of(&place).to_owned()));
                 }
-                return true;
+                return Library::Read;
             }
-            false
+            refused.map_or(Library::Missing, Library::Refused)
         };
-        if load(&names[0], sidecar) {
+        let whole = load(&names[0], sidecar);
+        if matches!(whole, Library::Read) {
             continue;
         }
-        let several = if names.len() > 1 { &names[1..] } else { &names[..] };
-        for name in several {
-            // A single name equals the whole statement, which was just tried.
-            if (names.len() == 1 || !load(name, sidecar)) && notes.len() < MOST_NOTES {
-                notes.push(format!("the material library `{name}` was not found"));
+        // A single name equals the whole statement, which was just tried.
+        let mut tried = Vec::new();
+        for name in &names[1..] {
+            tried.push((name, load(name, sidecar)));
+        }
+        if tried.is_empty() {
+            tried.push((&names[0], whole));
+        }
+        for (name, library) in tried {
+            let note = match library {
+                Library::Read => continue,
+                Library::Missing => format!("the material library `{name}` was not found"),
+                Library::Refused(reason) => format!("the material library `{name}` was left out: {reason}"),
+            };
+            if notes.len() < MOST_NOTES {
+                notes.push(note);
             }
         }
     }
     materials
+}
+
+/// Outcome of looking for a library.
+enum Library {
+    Read,
+    Missing,
+    Refused(String),
 }
 
 struct Builder<'a, 'b, 'c> {
@@ -212,15 +252,24 @@ impl Builder<'_, '_, '_> {
         if let Some(known) = places.iter().find_map(|place| self.images.get(place)) {
             return *known;
         }
+        let mut refused = None;
         for place in &places {
-            let Some(bytes) = (self.sidecar)(place) else { continue };
+            let bytes = match (self.sidecar)(place) {
+                None => continue,
+                Some(SidecarFile::Bytes(bytes)) => bytes,
+                Some(SidecarFile::Refused(reason)) => {
+                    refused.get_or_insert(reason);
+                    continue;
+                }
+            };
             let image = self.keep_image(place, bytes);
             self.images.insert(place.clone(), image);
             return image;
         }
-        self.note(match safe_relative_path(&map.path) {
-            Some(_) => format!("the texture `{}` was not found", map.path),
-            None => format!("the texture `{}` lies outside the model's folder and was not opened", map.path),
+        self.note(match (refused, safe_relative_path(&map.path)) {
+            (Some(reason), _) => format!("the texture `{}` was left out: {reason}", map.path),
+            (None, Some(_)) => format!("the texture `{}` was not found", map.path),
+            (None, None) => format!("the texture `{}` lies outside the model's folder and was not opened", map.path),
         });
         self.images.extend(places.into_iter().map(|place| (place, None)));
         None

@@ -75,6 +75,13 @@ pub fn read_bvh(bytes: &[u8], name: &str) -> Result<Motion, BvhError> {
     Ok(motion)
 }
 
+/// True for bytes that may be the first of a BVH file: white space and its first word, or the beginning of it.
+pub fn may_begin_with(bytes: &[u8]) -> bool {
+    let mut cursor = Cursor { rest: bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes), line: 1 };
+    let word = cursor.word();
+    b"HIERARCHY".get(..word.len()).is_some_and(|wanted| wanted.eq_ignore_ascii_case(word))
+}
+
 /// Text that is not read yet.
 struct Cursor<'a> {
     rest: &'a [u8],

@@ -155,6 +155,11 @@ impl SkinFile {
         Ok(Self { mesh_hash: mesh_hash(points, triangles), joints, weights: canonical(weights), mesh })
     }
 
+    /// True for bytes that may be the first of a skin file.
+    pub fn may_begin_with(bytes: &[u8]) -> bool {
+        bytes.starts_with(&MAGIC)
+    }
+
     /// Reads a file. Memory stays within a small multiple of the file's length whatever its counts say.
     ///
     /// # Errors
