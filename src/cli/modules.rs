@@ -1,7 +1,7 @@
 //! `rigsmith modules`: description of the command modules.
 
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::{Report, explanation::Explanation};
 use crate::{modules, rig::nearest::did_you_mean};
@@ -33,10 +33,6 @@ pub(super) fn run(args: &ModulesArgs) -> Report {
         report.notes.push(fault);
         report.at_fault = true;
     }
-    if report.at_fault {
-        report.set("modules", list);
-    } else {
-        report.list = Some(Value::Array(list));
-    }
+    report.set("modules", list);
     report
 }

@@ -37,8 +37,6 @@ pub(super) struct Report {
     pub notes: Vec<String>,
     /// Result for programs.
     pub json: Map<String, Value>,
-    /// Result for programs that is not an object.
-    pub list: Option<Value>,
     /// Marks a result that reports a fault of the input.
     pub at_fault: bool,
     /// Fault of the input, for programs.
@@ -155,10 +153,6 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool, subject: &str)
                 for note in &report.notes {
                     is_told &= complain(&format!("note: {note}"));
                 }
-            }
-            if let (true, Some(list)) = (json, &report.list) {
-                let is_written = print_json(list);
-                return ExitCode::from(if is_written { code } else { code.max(1) });
             }
             let mut answer = Map::from_iter([("ok".to_owned(), Value::from(!report.at_fault))]);
             answer.extend(report.json);

@@ -536,8 +536,9 @@ fn modules_are_listed_with_parameters_and_defaults() {
     let folder = tempfile::tempdir().unwrap();
     let answer = rigsmith(folder.path(), &["modules", "--json"]);
     assert_eq!(answer.code, 0, "{}", answer.err);
-    let list = answer.json();
-    let list = list.as_array().expect("an array");
+    let told = answer.json();
+    assert_eq!(told["ok"], true);
+    let list = told["modules"].as_array().expect("an array");
     let names: Vec<&str> = list.iter().map(|module| module["name"].as_str().unwrap()).collect();
     assert!(names.is_sorted() && names.len() >= 19, "{names:?}");
     for name in ["control", "null", "attribute", "ik_handle", "ik_fk_switch", "spline_ik", "reverse_foot", "spring"] {
@@ -566,7 +567,10 @@ fn modules_are_listed_with_parameters_and_defaults() {
     assert_eq!(some.code, 0);
     assert!(some.out.starts_with("null: ") && some.out.contains("\nspring: "), "{}", some.out);
     assert!(some.out.contains("frequency = 2.0"), "{}", some.out);
-    assert_eq!(rigsmith(folder.path(), &["--json", "modules", "spring"]).json().as_array().unwrap().len(), 1);
+    assert_eq!(
+        rigsmith(folder.path(), &["--json", "modules", "spring"]).json()["modules"].as_array().unwrap().len(),
+        1
+    );
     let unknown = rigsmith(folder.path(), &["--json", "modules", "sprign"]);
     assert!(crate::cli::explained(&unknown.json()).contains("did you mean \"spring\"?"), "{}", unknown.out);
     let wrong = rigsmith(folder.path(), &["modules", "sprign"]);
