@@ -1,6 +1,6 @@
 //! Limits of commands and of the window: `--limit NAME=NUMBER` sets each of [`RigLimits`].
 
-use std::{fmt::Write as _, path::Path, str::FromStr, sync::OnceLock};
+use std::{borrow::Cow, fmt::Write as _, path::Path, str::FromStr, sync::OnceLock};
 
 use super::{ArgumentError, Failure, SEED};
 pub(super) use crate::plugins::limits::{Limit, LimitError, RigLimits};
@@ -13,6 +13,9 @@ use crate::{
     processor::Modules,
     rig::{Rig, template::Template},
 };
+
+/// Most characters of a line of a report, unless more are set for messages.
+const MOST_LINE: usize = 10_000;
 
 /// Values of the limits; set once, before the command runs.
 static CHOSEN: OnceLock<RigLimits> = OnceLock::new();
@@ -64,6 +67,16 @@ pub(super) fn listing() -> String {
 /// A text within the limit of messages: its beginning and its end, which says what to do.
 pub(super) fn message(text: &str) -> String {
     chosen().shortened(text)
+}
+
+/// A line of a report within a limit that leaves room for the lists of a line: its beginning and its end.
+pub(super) fn line(text: &str) -> Cow<'_, str> {
+    if text.len() <= MOST_LINE {
+        return Cow::Borrowed(text);
+    }
+    let limits = chosen();
+    let most = limits.get(Limit::Message).max(MOST_LINE as u64);
+    Cow::Owned(limits.with(Limit::Message, most).shortened(text))
 }
 
 /// Refuses a mesh with more than is taken.
@@ -179,9 +192,12 @@ mod tests {
     fn long_messages_keep_their_beginning_and_end() {
         let text = format!("a fault {}; do this", "é".repeat(5000));
         let cut = message(&text);
-        // The limit and the three characters of the gap.
-        assert_eq!(cut.chars().count(), 1503);
         assert!(cut.starts_with("a fault") && cut.ends_with("; do this"), "{cut}");
+        let gap = " … 3517 characters left out … ";
+        assert!(cut.contains(gap), "{cut}");
+        assert_eq!(cut.chars().count(), 1500 + gap.chars().count());
+        let name = "x".repeat(1 << 20);
+        assert!(line(&name).len() < 2 * MOST_LINE && line("short") == "short");
         let accents = "é".repeat(1500);
         assert_eq!(message(&accents), accents);
         assert_eq!(message("short"), "short");

@@ -151,7 +151,7 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool, subject: &str)
             if !json {
                 is_told &= print(report.lines.iter().map(String::as_str));
                 for note in &report.notes {
-                    is_told &= complain(&format!("note: {note}"));
+                    is_told &= complain(&one_line(&format!("note: {note}")));
                 }
             }
             let mut answer = Map::from_iter([("ok".to_owned(), Value::from(!report.at_fault))]);
@@ -166,7 +166,10 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool, subject: &str)
         }
         Err(Failure::Usage(message)) => {
             if !json {
-                is_told = complain(&format!("error: {message}\n\nFor more information, try 'rigsmith --help'."));
+                is_told = complain(&format!(
+                    "error: {}\n\nFor more information, try 'rigsmith --help'.",
+                    one_line(&limits::message(&message))
+                ));
             }
             (2, failed(&of_usage(&message)))
         }
@@ -181,10 +184,10 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool, subject: &str)
     ExitCode::from(if is_told { code } else { code.max(1) })
 }
 
-/// Prints lines; `false` if standard output is closed or full.
+/// Prints lines, each within [`limits::line`]; `false` if standard output is closed or full.
 pub(super) fn print<'a>(lines: impl IntoIterator<Item = &'a str>) -> bool {
     let mut out = std::io::stdout().lock();
-    lines.into_iter().all(|line| writeln!(out, "{}", printable(line)).is_ok()) && out.flush().is_ok()
+    lines.into_iter().all(|line| writeln!(out, "{}", one_line(&limits::line(line))).is_ok()) && out.flush().is_ok()
 }
 
 /// Prints a value as one line of JSON; `false` if standard output is closed or full.
@@ -236,6 +239,14 @@ fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
+/// A [`printable`] text on one line: line breaks in names would make lines that look like those of a report.
+fn one_line(text: &str) -> Cow<'_, str> {
+    match printable(text) {
+        shown if shown.contains('\n') => Cow::Owned(shown.replace('\n', "\\n")),
+        shown => shown,
+    }
+}
+
 fn failed(error: &Explanation) -> Map<String, Value> {
     Map::from_iter([("ok".to_owned(), Value::from(false)), ("error".to_owned(), error.json())])
 }
@@ -248,10 +259,19 @@ fn of_usage(message: &str) -> Explanation {
     Explanation::at("command line".to_owned(), &fault)
 }
 
-/// True for characters that a terminal obeys instead of showing them.
+/// True for characters that a terminal obeys instead of showing them, and for those that nobody sees. Joiners (200C, 200D)
+/// belong to the spelling of some languages.
 fn is_obeyed(c: char) -> bool {
-    (c.is_control() && !matches!(c, '\n' | '\t'))
-        || matches!(c, '\u{200e}' | '\u{200f}' | '\u{61c}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    let is_mark = matches!(
+        c,
+        '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}'
+            | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}'
+    );
+    is_mark || (c.is_control() && !matches!(c, '\n' | '\t'))
+}
+
+fn is_plain_line(text: &str) -> bool {
+    !text.contains('\n') && !has_obeyed(text)
 }
 
 fn has_obeyed(text: &str) -> bool {
@@ -265,13 +285,14 @@ fn show(error: &(dyn std::error::Error + 'static)) -> bool {
     if let Some(LoadError::Source { path, text, source }) = error.downcast_ref::<LoadError>() {
         let offset = source.offset.min(text.len());
         let is_plain = |text: &str| text.lines().all(|line| line.len() <= LONG && !has_obeyed(line));
-        if !is_plain(lines_around(text, offset)) || has_obeyed(&error.to_string()) {
-            let message = limits::message(&format!("error: {error}"));
-            return complain(&piece_of_line(path, text, offset, &message, &limits::message(&source.message)));
+        let (message, what) = (limits::message(&error.to_string()), limits::message(&source.message));
+        if !is_plain(lines_around(text, offset)) || !is_plain_line(&message) || !is_plain_line(&what) {
+            let message = format!("error: {message}");
+            return complain(&piece_of_line(path, text, offset, &message, &what));
         }
         let report = miette::Report::new(InSource {
-            message: error.to_string(),
-            what: source.message.clone(),
+            message,
+            what,
             code: NamedSource::new(path.display().to_string(), text.clone()),
             place: SourceSpan::from(offset),
         });
@@ -279,7 +300,7 @@ fn show(error: &(dyn std::error::Error + 'static)) -> bool {
         writeln!(std::io::stderr().lock(), "{report:?}").is_ok()
     } else {
         // The text of an error contains those of its causes.
-        complain(&limits::message(&format!("error: {error}")))
+        complain(&one_line(&limits::message(&format!("error: {error}"))))
     }
 }
 
@@ -310,7 +331,9 @@ fn piece_of_line(path: &Path, text: &str, offset: usize, message: &str, what: &s
     let right = if to < end { "…" } else { "" };
     let [piece, before] = [&text[from..to], &text[from..offset]].map(printable);
     let pad = " ".repeat(before.chars().count() + left.chars().count());
-    let path = path.display();
+    let [message, what] = [message, what].map(one_line);
+    let path = path.display().to_string();
+    let path = one_line(&path);
     format!("{message}\n  --> {path}:{line}:{column}\n  | {left}{piece}{right}\n  | {pad}^ {what}")
 }
 
@@ -324,6 +347,8 @@ mod tests {
     fn terminals_obey_nothing_in_names() {
         assert_eq!(printable("arm\u{1b}[31m\u{202e}_l\n"), "arm\\u{1b}[31m\\u{202e}_l\n");
         assert!(matches!(printable("Kopf_ä"), Cow::Borrowed("Kopf_ä")));
+        assert_eq!(one_line("arm\u{2028}\u{200b}\n{\"ok\": true}"), "arm\\u{2028}\\u{200b}\\n{\"ok\": true}");
+        assert!(matches!(one_line("Kopf_ä\tb"), Cow::Borrowed("Kopf_ä\tb")));
     }
 
     #[test]

@@ -176,7 +176,8 @@ impl RigLimits {
         Duration::from_secs(self.get(Limit::Seconds))
     }
 
-    /// Text within the limit of messages: its beginning and its end, which says what to do.
+    /// Text within the limit of messages: its beginning and its end, which says what to do, and between them the number of
+    /// characters that were left out.
     pub fn shortened(&self, text: &str) -> String {
         let most = self.most(Limit::Message);
         let count = text.chars().count();
@@ -186,7 +187,7 @@ impl RigLimits {
         // Byte at which a character begins.
         let start = |number: usize| text.char_indices().nth(number).map_or(text.len(), |(at, _)| at);
         let (head, tail) = (start(most - most / 4), start(count - most / 4));
-        format!("{} … {}", &text[..head], &text[tail..])
+        format!("{} … {} characters left out … {}", &text[..head], count - most, &text[tail..])
     }
 
     /// Refuses a model with more than is taken.

@@ -208,6 +208,36 @@ fn texts_that_no_terminal_should_obey_are_escaped() {
     }
 }
 
+/// Names make no lines of their own, hide nothing, and do not fill the terminal.
+#[test]
+fn names_stay_on_their_line_and_within_bounds() {
+    let folder = tempfile::tempdir().unwrap();
+    let evil = "\\n\\u{2028}\\u{2029}\\u{200b}\\u{feff}a.rig.ron: ok";
+    let long = "x".repeat(1 << 20);
+    let joints: String =
+        [evil, &long].map(|label| format!("(label: \"{label}\"), (label: \"{label}\", oops: 1), ")).concat();
+    fs::write(folder.path().join("a.rig.ron"), format!("(format: 2, name: \"{evil}\", joints: [{joints}])")).unwrap();
+    let joints: String = [evil, &long].map(|label| format!("(label: \"{label}\"), ")).concat();
+    let whole = format!("(format: 2, name: \"{evil}\", joints: [{joints}])");
+    fs::write(folder.path().join("b.rig.ron"), whole).unwrap();
+    fs::write(folder.path().join("c.obj"), format!("mtllib {long}\nv 0 0 0\nv 1 0 0\nv 0 1 0\no {long}\nf 1 2 3\n"))
+        .unwrap();
+    for file in ["a.rig.ron", "b.rig.ron", "c.obj"] {
+        for command in ["info", "check", "build"].into_iter().filter(|command| *command != "build" || file != "c.obj") {
+            let (ended, _) = json_answer(folder.path(), &[command, file]);
+            let said = run(folder.path(), &[command, file]);
+            assert_eq!(said.code, ended.code, "{command} {file}");
+            for text in [&said.out, &said.err] {
+                assert!(text.len() < 100_000, "{command} {file}: {} bytes", text.len());
+                let hidden = ['\u{2028}', '\u{2029}', '\u{200b}', '\u{feff}'];
+                assert!(!text.contains(hidden), "{command} {file}: {text:.2000}");
+                let forged = text.lines().any(|line| line.trim_start().starts_with("a.rig.ron: ok"));
+                assert!(!forged, "{command} {file}: {text:.2000}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_minified_file_with_a_typo_shows_a_piece_of_its_line() {
     let folder = tempfile::tempdir().unwrap();
