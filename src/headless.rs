@@ -32,7 +32,7 @@ use crate::{
         },
         fit::{FitAnswer, FitFailure, FitJob, FitParts, FitReport, FitRequest, FitTemplates},
         gesture::{Gesture, GestureAnswer, GestureScript},
-        limits::{Limit, RigLimits},
+        limits::{Deadline, Limit, OutOfTime, RigLimits},
         mesh_reload::ReloadError,
         skinning::{BindAnswer, BindRequest, MeshPart, PartBinding, SkinningError, SkinningJob, SkinningReport},
         surface::{RigMesh, SkinOf},
@@ -59,8 +59,8 @@ pub struct Workbench {
     app: App,
     rig: Entity,
     mesh: Option<Entity>,
-    /// End of the time that work may take, and that time.
-    deadline: Option<(Instant, Duration)>,
+    /// End of the time that work may take.
+    deadline: Option<Deadline>,
 }
 
 /// Error of the workbench.
@@ -85,13 +85,8 @@ pub enum WorkbenchError {
     #[error(transparent)]
     Reload(#[from] ReloadError),
     /// Work took longer than it may.
-    #[error("{work} took longer than {seconds} s and was given up; simplify the input, or raise the limit `seconds`")]
-    OutOfTime {
-        /// The work, as a subject.
-        work: &'static str,
-        /// Time that it may take.
-        seconds: u64,
-    },
+    #[error(transparent)]
+    OutOfTime(#[from] OutOfTime),
     /// The workbench has no mesh.
     #[error("no mesh is open; open one first")]
     NoMesh,
@@ -141,8 +136,7 @@ impl Workbench {
         if modules.0.limits != build {
             Arc::make_mut(&mut modules.0).limits = build;
         }
-        let now = Instant::now();
-        self.deadline = now.checked_add(time).map(|end| (end, time));
+        self.deadline = Some(Deadline::after(time));
         let mut limits = self.app.world_mut().resource_mut::<RigLimits>();
         for (limit, value) in [
             (Limit::Nodes, build.made as u64),
@@ -162,12 +156,7 @@ impl Workbench {
     }
 
     fn check_time(&self, work: &'static str) -> Result<(), WorkbenchError> {
-        match self.deadline {
-            Some((end, time)) if Instant::now() >= end => {
-                Err(WorkbenchError::OutOfTime { work, seconds: time.as_secs() })
-            }
-            _ => Ok(()),
-        }
+        Ok(self.deadline.map_or(Ok(()), |deadline| deadline.check(work))?)
     }
 
     /// Opens a mesh below the rig. Its own skeleton and weights are imported, unless `mesh_only`.

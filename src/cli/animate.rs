@@ -192,6 +192,7 @@ fn running(rig: Rig) -> Result<Workbench, Failure> {
     if let Some(error) = bench.build(BuildStep::All).error {
         return Err(Failure::Input(Box::new(error)));
     }
+    limits::check_time("building the rig")?;
     bench.runtime()?;
     Ok(bench)
 }
@@ -333,6 +334,7 @@ fn exported(
     let mut facts = Vec::new();
     let mut sums = [0, 0];
     for clip in clips {
+        limits::check_time("baking the clips")?;
         let rate = args.fps.unwrap_or(clip.frame_rate);
         let done = bake_clip(program, clip, &nodes, rate, &tolerance)
             .map_err(|error| Failure::Input(format!("clip \"{}\": {error}", clip.name).into()))?;

@@ -101,6 +101,7 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
     if report.at_fault {
         return Ok(());
     }
+    limits::check_time("building the rig")?;
     // Compiled even if no file is written: a built rig that cannot run, such as one with a cycle of parents, is no rig.
     RigProgram::compile(&built, &CompileOptions::default()).map_err(PoseError::CannotRun)?;
     let Some(output) = &args.output else { return Ok(()) };

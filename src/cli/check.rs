@@ -66,6 +66,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let mut list = Vec::new();
     for path in &args.files {
+        limits::check_time("checking the files")?;
         let found = check(path)?.cut();
         match &found.error {
             Some(error) => report.line(format!("{}: error: {error}", path.display())),

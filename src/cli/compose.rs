@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use super::{
-    Failure, InPlaceArgs, Report, SEED,
+    Failure, InPlaceArgs, Report, SEED, limits,
     report::counted,
     update::{load, load_part},
 };
@@ -119,8 +119,10 @@ pub(super) fn merge(args: &MergeArgs) -> Result<Report, Failure> {
     for (other, parent) in others.iter().zip(parents) {
         let parent = parent.map(|label| joint(&rig, label)).transpose()?;
         let operation = Operation::Merge { other: Arc::new(other.clone()), parent };
+        limits::check_time("merging the rigs")?;
         run(&mut rig, &operation, &mut uids, &mut report)?;
     }
+    limits::check_time("merging the rigs")?;
     write(&args.output, &rig, &[&args.rigs[0]], &mut report)?;
     let joints = counted(rig.len(), "joint", "joints");
     report.line(format!("{joints} of {}", counted(rigs.len(), "rig", "rigs")));

@@ -3,7 +3,7 @@
 use std::{borrow::Cow, fmt::Write as _, path::Path, str::FromStr, sync::OnceLock};
 
 use super::{ArgumentError, Failure, SEED};
-pub(super) use crate::plugins::limits::{Limit, LimitError, RigLimits};
+pub(super) use crate::plugins::limits::{Deadline, Limit, LimitError, RigLimits};
 use crate::{
     files::{self, LoadError, LoadedProject, MeshState, RealDisk},
     headless::Workbench,
@@ -19,6 +19,9 @@ const MOST_LINE: usize = 10_000;
 
 /// Values of the limits; set once, before the command runs.
 static CHOSEN: OnceLock<RigLimits> = OnceLock::new();
+
+/// End of the time of this command.
+static DEADLINE: OnceLock<Deadline> = OnceLock::new();
 
 /// Value of `--limit`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +45,13 @@ impl FromStr for LimitSetting {
 pub(super) fn choose(settings: &[LimitSetting]) {
     let limits = settings.iter().fold(RigLimits::default(), |limits, set| limits.with(set.limit, set.value));
     // Set once: a process runs one command.
+    let _ = DEADLINE.set(limits.deadline());
     let _ = CHOSEN.set(limits);
+}
+
+/// Gives the command up where its time is over; `work` is the subject of a sentence.
+pub(super) fn check_time(work: &'static str) -> Result<(), Failure> {
+    DEADLINE.get().map_or(Ok(()), |deadline| deadline.check(work)).map_err(|late| Failure::Input(Box::new(late)))
 }
 
 /// The limits of this process.
@@ -137,6 +146,7 @@ pub(super) fn refuse_outside(project: &LoadedProject) -> Result<(), Failure> {
 pub(super) fn modules() -> Modules {
     let mut modules = modules::all();
     modules.limits = chosen().build();
+    modules.deadline = DEADLINE.get().copied();
     modules
 }
 

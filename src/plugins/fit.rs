@@ -254,7 +254,7 @@ fn start(
             from,
             landing: Landing::asked(history),
             held: None,
-            deadline: Deadline::new(&limits),
+            deadline: limits.deadline(),
         });
     }
 }
@@ -269,7 +269,7 @@ fn land(
     for (entity, mut job, of) in &mut jobs {
         let job = &mut *job;
         let was_held = job.held.is_some();
-        let finished = match job.deadline.passed() {
+        let finished = match job.deadline.check("fitting the template").err() {
             _ if was_held && job.control.is_cancelled() => Some(Err(FitError::Cancelled.into())),
             _ if was_held => job.held.take().map(Ok),
             Some(late) => Some(Err(late.into())),

@@ -12,12 +12,11 @@
 //! app.insert_resource(RigLimits::default().with(Limit::Nodes, 2_000).with(Limit::Seconds, 30));
 //! ```
 
-use std::{
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{sync::Arc, time::Duration};
 
 use bevy::prelude::*;
+
+pub use crate::processor::{Deadline, OutOfTime};
 
 use super::{commands::RigModules, gesture::Gesture, surface::RigMesh};
 use crate::{
@@ -68,7 +67,7 @@ const LIMITS: [(Limit, &str, u64, &str); 13] = [
     (Limit::Influences, "influences", 1_000_000_000, "influences of a mesh, of all its points"),
     (Limit::Gestures, "gestures", 1_000_000, "gestures of a list"),
     (Limit::StrokePoints, "stroke_points", 1_000_000, "points of one stroke"),
-    (Limit::Seconds, "seconds", 3_600, "seconds for gestures, binding, a fit and a face, together"),
+    (Limit::Seconds, "seconds", 3_600, "seconds of work of one command, or of one background job"),
     (Limit::Listed, "listed", 200, "joints and problems that are listed for people"),
     (Limit::Notes, "notes", 200, "notes of one command"),
     (Limit::Message, "message", 1_500, "characters of one note or error"),
@@ -132,14 +131,6 @@ pub struct LimitError {
     pub limit: u64,
 }
 
-/// Error of a background job that took too long.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("it took longer than {seconds} s and was given up; simplify the mesh, or raise the limit `seconds`")]
-pub struct OutOfTime {
-    /// Time that the job was given.
-    pub seconds: u64,
-}
-
 impl RigLimits {
     /// Copy of the limits with another value of one.
     pub fn with(mut self, limit: Limit, value: u64) -> Self {
@@ -174,6 +165,11 @@ impl RigLimits {
     /// Time that work may take.
     pub fn time(&self) -> Duration {
         Duration::from_secs(self.get(Limit::Seconds))
+    }
+
+    /// Deadline of work that begins now.
+    pub fn deadline(&self) -> Deadline {
+        Deadline::after(self.time())
     }
 
     /// Text within the limit of messages: its beginning and its end, which says what to do, and between them the number of
@@ -255,25 +251,6 @@ impl RigLimits {
         let meaning = of.meaning();
         let what = meaning.split(" of ").next().unwrap_or(meaning);
         Err(LimitError { file: file.to_owned(), holder: holder.to_owned(), what, name: of.name(), count, limit })
-    }
-}
-
-/// End of the time that a background job may take.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Deadline {
-    end: Option<Instant>,
-    seconds: u64,
-}
-
-impl Deadline {
-    /// Deadline of a job that begins now.
-    pub fn new(limits: &RigLimits) -> Self {
-        Self { end: Instant::now().checked_add(limits.time()), seconds: limits.get(Limit::Seconds) }
-    }
-
-    /// The error of a job whose time is over.
-    pub fn passed(&self) -> Option<OutOfTime> {
-        self.end.is_some_and(|end| Instant::now() >= end).then_some(OutOfTime { seconds: self.seconds })
     }
 }
 

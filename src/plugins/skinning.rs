@@ -368,7 +368,7 @@ fn start_skinning(
             input.claim(&request.claims);
             input.compute(&mesh, &request.settings, &|part| reporter.report(part))
         });
-        let deadline = Deadline::new(&limits);
+        let deadline = limits.deadline();
         commands.entity(entity).insert(SkinningJob {
             control,
             task,
@@ -393,7 +393,7 @@ fn land_skinning(
     for (entity, mut job, mesh, of) in &mut jobs {
         let job = &mut *job;
         let was_held = job.held.is_some();
-        let late = job.deadline.passed().filter(|_| !was_held);
+        let late = job.deadline.check("binding the mesh").err().filter(|_| !was_held);
         let finished = match late {
             Some(late) => Some(Err(late.into())),
             None if was_held && job.control.is_cancelled() => Some(Err(WeightError::Cancelled.into())),

@@ -1,6 +1,6 @@
 //! Errors of a build: the tag at fault, the problem, and the remedy.
 
-use super::exclusion::Exclusion;
+use super::{deadline::OutOfTime, exclusion::Exclusion};
 use crate::rig::{SourceError, Uid, reference::NodeRefs};
 
 /// Reason why a module could not do its work.
@@ -104,6 +104,9 @@ pub enum BuildProblem {
     /// The module says no.
     #[error(transparent)]
     Module(#[from] ModuleError),
+    /// The time of the build was over before the command began.
+    #[error(transparent)]
+    OutOfTime(#[from] OutOfTime),
 }
 
 /// A command that failed. What stood before it stands; nothing after it ran.

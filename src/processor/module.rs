@@ -6,7 +6,7 @@ use bevy::reflect::{Reflect, TypeInfo, Typed};
 use glam::Quat;
 use serde::{Serialize, de::DeserializeOwned};
 
-use super::{BuildProblem, BuildScope, ModuleError, form::read_module_form, mirror};
+use super::{BuildProblem, BuildScope, Deadline, ModuleError, form::read_module_form, mirror};
 use crate::rig::{SourceError, nearest::did_you_mean, parse_ron, ron_text};
 
 /// Module of commands: its fields are the parameters of the tag, [`RigModule::construct`] is the work.
@@ -177,6 +177,8 @@ pub struct Modules {
     by_name: BTreeMap<&'static str, ModuleInfo>,
     /// Limits of what the commands of one rig may make.
     pub limits: BuildLimits,
+    /// End of the time for builds; no command begins after it.
+    pub deadline: Option<Deadline>,
 }
 
 /// Limits of what the commands of one rig may make, so that a few tags that name everything, and what they made

@@ -33,6 +33,9 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
     for _ in 0..MOST {
         builder.sync(&running);
         let Some(error) = builder.run_all().error else { break };
+        if matches!(error.problem, BuildProblem::OutOfTime(_)) {
+            return vec![error];
+        }
         if running.find_tag(error.command).is_none() {
             break;
         }

@@ -1,7 +1,12 @@
 //! Limits of commands: `--limit` sets them, and errors say which one and what went over it.
 
-use std::fs;
+use std::{fs, sync::Arc};
 
+use rigsmith::{
+    plugins::limits::{Limit, RigLimits},
+    processor::{BuildProblem, Builder, review},
+    rig::template::read_template,
+};
 use serde_json::Value;
 
 use crate::{cli::explained, cli_outputs::rigsmith};
@@ -73,6 +78,43 @@ fn each_limit_can_be_set_and_is_named_by_its_error() {
             }
         }
     }
+}
+
+#[test]
+fn commands_are_given_up_when_their_time_is_over() {
+    let folder = folder();
+    let walker = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/retarget/walker.bvh");
+    let commands: [(&[&str], &str); 4] = [
+        (&["check", "tags.rig.ron"], "checking the files"),
+        (&["build", "tags.rig.ron", "-o", "out.glb"], "building the rig"),
+        (&["animate", "tags.rig.ron", walker, "-o", "out.anim.ron"], "building the rig"),
+        (&["merge", "tags.rig.ron", "tags.rig.ron", "-o", "out.rig.ron"], "merging the rigs"),
+    ];
+    for (args, work) in commands {
+        let (code, said) = rigsmith(folder.path(), &[args, &["--limit", "seconds=0", "--json"]].concat());
+        let answer: Value = serde_json::from_str(&said).unwrap_or_else(|error| panic!("{error}: {said}"));
+        let told = explained(&answer);
+        assert_eq!(code, 1, "{args:?}: {told}");
+        assert!(told.contains(&format!("{work} took longer than 0 s")), "{args:?}: {told}");
+        assert!(told.contains("raise the limit `seconds`"), "{args:?}: {told}");
+        for written in ["out.glb", "out.anim.ron", "out.rig.ron"] {
+            assert!(!folder.path().join(written).exists(), "{args:?}");
+        }
+    }
+}
+
+/// A rig stays as it was built so far, and its command says why it goes no further.
+#[test]
+fn builds_begin_no_command_after_their_time() {
+    let text = "(format: 2, name: \"n\", joints: [(label: \"j\", tags: [Command(module: \"null\")])])";
+    let rig = read_template(text.as_bytes()).unwrap().rig;
+    let mut modules = rigsmith::modules::all();
+    modules.deadline = Some(RigLimits::default().with(Limit::Seconds, 0).deadline());
+    let error = Builder::build(&rig, &Arc::new(modules.clone())).unwrap_err();
+    assert!(matches!(error.problem, BuildProblem::OutOfTime(_)), "{error}");
+    assert_eq!(review(&rig, &Arc::new(modules.clone())), [error]);
+    modules.deadline = Some(RigLimits::default().deadline());
+    assert!(Builder::build(&rig, &Arc::new(modules)).is_ok());
 }
 
 #[test]

@@ -97,14 +97,15 @@ fn jobs_refuse_meshes_above_the_limits() {
 fn jobs_are_given_up_when_their_time_is_over() {
     let mut bench = Bench::new(RigLimits::default().with(Limit::Seconds, 0));
     let mesh = bench.mesh;
-    let late = OutOfTime { seconds: 0 };
-    assert!(late.to_string().contains("raise the limit `seconds`"), "{late}");
+    let late = |work| OutOfTime { work, seconds: 0 };
+    let text = late("binding the mesh").to_string();
+    assert!(text.starts_with("binding the mesh took") && text.contains("raise the limit `seconds`"), "{text}");
     let bound = bench.ask::<_, BindAnswer>(BindRequest::new(mesh));
-    assert_eq!(bound.result.unwrap_err(), SkinningError::OutOfTime(late));
+    assert_eq!(bound.result.unwrap_err(), SkinningError::OutOfTime(late("binding the mesh")));
     let fitted = bench.ask::<_, FitAnswer>(FitRequest::new(mesh));
-    assert_eq!(fitted.result.unwrap_err(), FitFailure::OutOfTime(late));
+    assert_eq!(fitted.result.unwrap_err(), FitFailure::OutOfTime(late("fitting the template")));
     let placed = bench.ask::<_, FacePlaced>(FaceRequest { mesh, settings: Default::default(), fit: None });
-    assert_eq!(placed.result.unwrap_err(), PlaceFaceError::OutOfTime(late));
+    assert_eq!(placed.result.unwrap_err(), PlaceFaceError::OutOfTime(late("placing the face")));
     // The jobs are gone, and the rig is as it was.
     bench.app.update();
     assert!(bench.app.world().get::<SkinningJob>(mesh).is_none() && bench.app.world().get::<FitJob>(mesh).is_none());

@@ -53,6 +53,7 @@ pub(super) fn clips(
         set_aside: Vec::new(),
     };
     for path in &args.clips {
+        limits::check_time("reading the motion")?;
         match FileKind::of(path) {
             Some(kind) if kind.is_gltf() => {
                 let model = spinning("reading the animations", || limits::load_model(path))?;

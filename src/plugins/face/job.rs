@@ -159,7 +159,7 @@ pub(super) fn start(
         let progress = Arc::new(Progress::default());
         let told = progress.clone();
         let task = AsyncComputeTaskPool::get().spawn(async move { work.run(&told) });
-        let deadline = Deadline::new(&limits);
+        let deadline = limits.deadline();
         let shapes = fit.clone();
         commands.entity(*entity).insert(FaceJob { progress, shapes, task, basis, landing, held: None, deadline });
     }
@@ -255,7 +255,7 @@ pub(super) fn land(
 ) {
     for (entity, mut job, mesh, of) in &mut jobs {
         let job = &mut *job;
-        let finished = match (job.held.take(), job.deadline.passed()) {
+        let finished = match (job.held.take(), job.deadline.check("placing the face").err()) {
             (Some(_), _) if job.progress.cancelled.load(Ordering::Relaxed) => Some(Err(FaceError::Cancelled.into())),
             (Some(held), _) => Some(Ok(held)),
             (None, Some(late)) => Some(Err(late.into())),

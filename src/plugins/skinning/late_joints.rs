@@ -14,7 +14,7 @@ use crate::{
         history::RigHistory,
         job_control::JobControl,
         landing::{BindStart, Landing},
-        limits::{Deadline, RigLimits},
+        limits::RigLimits,
         surface::{RigMesh, SkinOf},
     },
     rig::{
@@ -71,7 +71,7 @@ pub(super) fn late_job(
         let input = SkinningInput::new(&rig, Some(&built), modules.as_deref(), &mesh, &[]);
         Ok(input.late_shares(&mesh, &skin))
     });
-    let (control, deadline) = (JobControl::default(), Deadline::new(limits));
+    let (control, deadline) = (JobControl::default(), limits.deadline());
     Some(SkinningJob { control, task, start, landing, held: None, is_asked: false, deadline })
 }
 
