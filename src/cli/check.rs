@@ -27,8 +27,9 @@ use crate::{
     },
     processor::{BuildError, BuildProblem, Builder, ModuleError, Modules, SourceText, review},
     rig::{
-        Rig, SourceError, TagData, TagKind, Uid,
+        JointData, Rig, RigJoint, SourceError, TagData, TagKind, Uid,
         feature::{FeatureKinds, undecided_choices},
+        proportion,
         template::{self, PartOrigin, Template},
     },
     solve::program::{CompileOptions, RigProgram},
@@ -119,6 +120,7 @@ fn check(path: &Path) -> Result<Findings, Failure> {
                 Ok(rig) => {
                     found.remarks = told.notes;
                     found.remarks.extend(remarks_on_rig(&rig));
+                    found.error = faults_of_places(&rig).into_iter().next().map(|(_, fault)| fault);
                 }
                 Err(Failure::Input(error)) => found.error = Some(error.to_string()),
                 Err(usage) => return Err(usage),
@@ -130,7 +132,9 @@ fn check(path: &Path) -> Result<Findings, Failure> {
             found.remarks.extend(project.rigs.iter().flat_map(remarks_on_rig));
             let outside = project.notes.iter().find(|note| matches!(note, ProjectNote::MeshOutside(_)));
             let outside = outside.map(ToString::to_string);
-            found.error = outside.or(limits::check_project(path, &project).err().map(|error| error.to_string()));
+            let beyond = limits::check_project(path, &project).err().map(|error| error.to_string());
+            let nowhere = project.rigs.iter().flat_map(faults_of_places).next().map(|(_, fault)| fault);
+            found.error = outside.or(beyond).or(nowhere);
         }),
         Some(FileKind::Skin) => load_skin(&RealDisk, path).map(drop),
         Some(FileKind::Animation) => load_animation(&RealDisk, path).map(|read| found.remarks = read.notes),
@@ -206,7 +210,15 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
             places.locate_declared(tag, "choice", message)
         })
         .collect();
+    let nowhere = faults_of_places(&rig);
+    let nowhere_count = nowhere.len();
+    let lost: Vec<SourceError> = nowhere
+        .into_iter()
+        .take(limits::most(Limit::Listed))
+        .map(|(joint, fault)| places.locate_declared(joint, "translation", fault))
+        .collect();
     let told = [
+        (nowhere_count, "joint is at no finite place", "joints are at no finite place"),
         (undecided_count, "choice is not decided", "choices are not decided"),
         (faults.len(), "fault of the structure", "faults of the structure"),
         (unknown_kinds, "kind of feature is not registered", "kinds of features are not registered"),
@@ -219,11 +231,13 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     // Of a command that is told, its references are among what is told, unless nobody knows its module.
     found.remarks.extend(unbound.into_iter().filter(|(tag, _)| !readable.contains(tag)).map(|(_, told)| told));
     found.remarks.extend(remarks_on_rig(&rig));
-    let unlisted = problems - commands.len() + unknown_kinds - kinds.len() + undecided_count - choices.len();
+    let unlisted = problems - commands.len() + unknown_kinds - kinds.len() + undecided_count - choices.len()
+        + nowhere_count
+        - lost.len();
     if unlisted > 0 {
         found.remarks.push(format!("{} not listed", counted(unlisted, "more problem is", "more problems are")));
     }
-    found.problems = faults.into_iter().chain(kinds).chain(choices).chain(commands).collect();
+    found.problems = faults.into_iter().chain(kinds).chain(choices).chain(lost).chain(commands).collect();
     found.problems.sort_by_key(|problem| problem.offset);
     Ok(())
 }
@@ -319,6 +333,29 @@ fn remarks_on_model(model: &Model) -> Vec<String> {
     remarks
 }
 
+/// Joints whose place in the rig is no finite number, though their own numbers are: the first of each chain.
+fn faults_of_places(rig: &Rig) -> Vec<(Uid, String)> {
+    let globals = rig.rest_globals();
+    let lost: HashSet<Uid> =
+        globals.iter().filter(|(_, global)| !global.is_finite()).map(|(joint, _)| *joint).collect();
+    let is_first = |parent: Option<Uid>| parent.is_none_or(|parent| !lost.contains(&parent));
+    rig.walk()
+        .filter(|joint| lost.contains(&joint.data.uid) && is_first(joint.parent))
+        .map(|joint| {
+            let fault = format!(
+                "joint {} is at no finite place: its numbers and those of the joints above it add up to more than a number \
+                 can hold; write smaller ones",
+                name_of(&joint.data)
+            );
+            (joint.data.uid, fault)
+        })
+        .collect()
+}
+
+fn name_of(joint: &JointData) -> String {
+    joint.label.clone().unwrap_or_else(|| joint.uid.to_string())
+}
+
 fn remarks_on_rig(rig: &Rig) -> Vec<String> {
     let mut remarks = Vec::new();
     let mut labels: Vec<&str> = rig.walk().filter_map(|joint| joint.data.label.as_deref()).collect();
@@ -336,6 +373,15 @@ fn remarks_on_rig(rig: &Rig) -> Vec<String> {
         rig.walk().filter(|joint| joint.parent.is_some() && joint.data.rest.translation.length() == 0.0).count();
     if short > 0 {
         remarks.push(counted(short, "joint lies exactly on its parent", "joints lie exactly on their parent"));
+    }
+    let is_flat = |joint: &&RigJoint| joint.data.rest.scale.abs().min_element() < 1.0 / proportion::MOST;
+    let flat: Vec<String> = rig.walk().filter(is_flat).map(|joint| name_of(&joint.data)).collect();
+    if !flat.is_empty() {
+        let count = counted(flat.len(), "joint has a scale of nothing", "joints have a scale of nothing");
+        remarks.push(format!(
+            "{count}, which flattens all that hangs below and cannot be undone: {}; write other factors",
+            flat.join(", ")
+        ));
     }
     remarks
 }

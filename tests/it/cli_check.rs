@@ -236,3 +236,30 @@ fn faults_of_a_parts_file_have_their_own_place() {
 )"#;
     tells_what_it_says(folder.path(), "host.rig.ron", text);
 }
+
+/// A rig whose numbers add up to no number, and one that is flattened, are told before they are built.
+#[test]
+fn places_that_are_no_numbers_and_flat_scales_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = r#"(
+    format: 2,
+    name: "far",
+    joints: [
+        (label: "a", translation: (3e38, 0, 0)),
+        (
+            label: "b",
+            parent: "a",
+            translation: (3e38, 0, 0), // joint b is at no finite place
+        ),
+        (label: "c", parent: "b", translation: (0, 1, 0)),
+    ],
+)"#;
+    tells_what_it_says(folder.path(), "far.rig.ron", text);
+    let built = rigsmith(folder.path(), &["build", "far.rig.ron", "-o", "far.glb"]);
+    assert!(built.code == 1 && !folder.path().join("far.glb").exists(), "{}", built.err);
+    let flat = "(format: 2, name: \"flat\", joints: [(label: \"a\", scale: (0, 1, 1)), (label: \"b\", translation: (1, 0, 0))])";
+    fs::write(folder.path().join("flat.rig.ron"), flat).unwrap();
+    let answer = rigsmith(folder.path(), &["check", "flat.rig.ron", "--json"]).json();
+    let remarks = answer["files"][0]["remarks"].to_string();
+    assert!(remarks.contains("1 joint has a scale of nothing") && remarks.contains(": a;"), "{remarks}");
+}
