@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use bevy::{math::Vec3, prelude::*};
 use rigsmith::{
-    algo::fit_template::FitError,
+    algo::fit_template::{FitError, MeshAnalysis},
     files::{RealDisk, bundled_characters, bundled_part, load_model},
     headless::{Workbench, WorkbenchError},
     mesh::model::Model,
@@ -311,4 +311,15 @@ fn a_given_template_is_taken() {
     if let Ok(report) = result {
         assert_eq!(report.template, "hand");
     }
+}
+
+/// A block, which is solid all through, is looked at in about as many cells as a body.
+#[test]
+fn blocks_take_as_few_cells_as_bodies() {
+    let cells = |model: &Model| {
+        MeshAnalysis::new(&model.points, &model.point_triangles(), None, &|_| true).map(|analysis| analysis.cells())
+    };
+    let body = cells(&bundled_body()).unwrap();
+    let block = cells(&crate::gestures::boxes(&[[[0.0; 3], [1.0; 3]]])).unwrap();
+    assert!(block < 2 * body, "{block} cells of a block, {body} of a body");
 }

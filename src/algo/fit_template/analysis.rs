@@ -1,5 +1,7 @@
 //! Analysis: what depends on the mesh alone.
 
+use std::ops::RangeInclusive;
+
 use glam::Vec3;
 
 use super::{
@@ -19,6 +21,11 @@ use crate::mesh::{surface::Surface, voxels::Voxels};
 const NODES: f32 = 90_000.0;
 /// Cells along the longest side for the first look.
 const COARSE: usize = 64;
+/// Cells along the longest side between which limbs are seen and time is well spent.
+const FINE: RangeInclusive<usize> = 96..=240;
+/// Solid cells with the fewest along a side from which on a mesh is a block: it has no limbs to be seen, and would take ten
+/// times as long as a body.
+const BLOCK: usize = 250_000;
 /// Extent of a mesh along its thinnest axis below which it is flat, as a share of the longest.
 const FLAT: f32 = 0.004;
 
@@ -73,7 +80,7 @@ impl MeshAnalysis {
         let voxels = |resolution: usize| Voxels::new(&mesh.points, &mesh.triangles, resolution, None);
         let coarse = voxels(COARSE).map_err(|_| FitError::NoSurface)?;
         let fine = COARSE as f32 * bevy::math::ops::cbrt(NODES / coarse.len().max(1) as f32);
-        let voxels = voxels((fine as usize).clamp(96, 240)).map_err(|_| FitError::NoSurface)?;
+        let voxels = voxels(resolution(coarse.len(), fine as usize)).map_err(|_| FitError::NoSurface)?;
         step(0.4)?;
         let (surface, (graph, target)) = rayon::join(
             || Surface::build(&mesh.points, &mesh.triangles),
@@ -93,6 +100,11 @@ impl MeshAnalysis {
         }
         let seam = seam.map(|place| mesh.space.to_unit(place));
         Ok(Self { mesh, voxels, surface, target, graph, trees, mirror, seam })
+    }
+
+    /// Number of the solid cells in which the mesh is analysed.
+    pub fn cells(&self) -> usize {
+        self.voxels.len()
     }
 
     /// Ends of the mesh's branches in its space, longest first: limbs, and what hangs on them.
@@ -150,4 +162,12 @@ impl MeshAnalysis {
         let (low, high) = used.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), d| (l.min(d), h.max(d)));
         ((high - low) as f64 / self.mesh.space.scale) as f32
     }
+}
+
+/// Cells along the longest side for a mesh of which the first look has so many solid cells; `wished` are those that give a
+/// body its number of cells.
+fn resolution(solid: usize, wished: usize) -> usize {
+    let (least, coarse) = (*FINE.start(), COARSE);
+    let of_least = solid.saturating_mul(least * least * least) / (coarse * coarse * coarse);
+    if of_least > BLOCK { wished.min(least) } else { wished.clamp(least, *FINE.end()) }
 }
