@@ -178,7 +178,7 @@ impl Drop for Temp<'_> {
 }
 
 /// Removes files that processes left in `folder` when they died in the middle of a save: their temporary files, and
-/// companions that no file of the folder refers to. Returns how many temporary files there were.
+/// companions that no file refers to. Returns how many temporary files there were.
 ///
 /// Files of living processes stay. Where files cannot be locked, temporary files count as left behind after an hour.
 ///
