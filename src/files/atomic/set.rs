@@ -88,8 +88,9 @@ impl FileSet {
 /// Companions are put in place first, unless they are there already; a file is never replaced by one. Then the main
 /// file is renamed, as [`save_atomic`](super::save_atomic) does. Then the companions that only the former main file
 /// referred to are removed: those whose names hold the hash of their content and that no other file mentions, in the
-/// folder and in those right above and below it, so that a copy of the main file under another name keeps its own. Costs what `save_atomic` costs for each file that
-/// is not there yet.
+/// folder and in those right above and below it, so that a copy of the main file under another name keeps its own.
+/// Costs what `save_atomic` costs for each file that is not there yet, and a search of these folders where a companion
+/// is no more referred to.
 ///
 /// # Errors
 /// See [`SaveError`]; the only one after which the set is in place is [`SaveError::Unconfirmed`].
