@@ -245,6 +245,27 @@ fn changes_are_unsaved_until_saved_and_clean_again_after_undo() {
 }
 
 #[test]
+fn a_mesh_outside_of_a_projects_folder_is_refused() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    window.place(1.0);
+    let text = std::fs::read_to_string(window.save_as("guy.rigsmith.ron")).expect("the project was saved");
+    assert!(text.contains("\"biped.obj\""), "the mesh lies beside the project");
+    let inner = folder.path().join("inner");
+    std::fs::create_dir(&inner).expect("made");
+    let project = inner.join("guy.rigsmith.ron");
+    std::fs::write(&project, text.replace("\"biped.obj\"", "\"../biped.obj\"")).expect("written");
+    let mut other = Window::new(folder.path());
+    other.open_file(&project);
+    assert!(other.mesh().is_none() && other.rig() == window.rig(), "{:?}", other.notices);
+    assert!(other.said(Severity::Warning, "is outside of"), "{:?}", other.notices);
+    // A copy beside the project is taken.
+    std::fs::copy(folder.path().join("biped.obj"), inner.join("biped.obj")).expect("copied");
+    other.open_file(&project);
+    assert!(other.mesh().is_some(), "{:?}", other.notices);
+}
+
+#[test]
 fn what_was_saved_opens_the_same() {
     let folder = folder();
     let mut window = Window::bundled(folder.path());
