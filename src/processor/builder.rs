@@ -460,6 +460,7 @@ impl Builder {
         }
         let mut values = Vec::with_capacity(trace.writes.len());
         for (node, aspect) in &trace.writes {
+            self.world.anchors.note_written(*node, *aspect);
             let writes = self.world.cell_mut(*node, *aspect).writes_mut();
             if let Some(at) = writes.iter().position(|(writer, _)| *writer == number) {
                 values.push((*node, *aspect, writes.swap_remove(at).1));
