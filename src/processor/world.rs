@@ -196,7 +196,7 @@ pub(super) struct World {
     counted: Option<usize>,
     /// Number of commands and nodes in [`Slot::global_readers`] of all nodes.
     pub global_reads: usize,
-    /// Number of nodes that were visited to find readers of transforms.
+    /// Number of nodes that were visited to find readers of transforms, and circles.
     pub visited: u64,
     /// Number of values that commands have read and written.
     pub work: u64,

@@ -168,6 +168,24 @@ fn visited(count: usize) -> u64 {
     visited
 }
 
+/// Nodes that are visited to find circles of constraints, where each joint of a chain follows a control that stands on the
+/// joint above.
+fn searched(count: usize) -> u64 {
+    let rig = chain(count, |_| vec!["Command(module: \"control\", params: (at: \"@this\"))".to_owned()]);
+    let mut builder = Builder::new(Arc::new(rigsmith::modules::all()));
+    builder.sync(&rig);
+    assert_eq!(builder.run_all().error, None);
+    builder.visited()
+}
+
+#[test]
+fn circles_on_chains_of_controls_are_searched_once() {
+    let visits: Vec<u64> = [150, 300, 600].into_iter().map(searched).collect();
+    for pair in visits.windows(2) {
+        assert!(pair[0] > 0 && pair[1] as f64 <= GROWTH * pair[0] as f64, "{visits:?}");
+    }
+}
+
 #[test]
 fn moves_of_whole_chains_are_followed_once() {
     let visits: Vec<u64> = [150, 300, 600].into_iter().map(visited).collect();
