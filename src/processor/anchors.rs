@@ -79,8 +79,8 @@ impl World {
         for (lowest, global) in &way.ends {
             let stretch = &way.nodes[*lowest..*lowest + STRETCH];
             let written = stretch.iter().try_fold(from, |from, link| Some(from.max(self.written_from(*link)?)));
-            // What has been written twice is another at earlier places.
-            let Some(written) = written else { break };
+            // What is written twice, or later, is another at other places.
+            let Some(written) = written.filter(|written| *written <= place) else { break };
             from = written;
             self.anchors.known.insert(stretch[0], Anchor { global: *global, from });
             self.anchors.on_way.extend(stretch.iter().copied());
