@@ -35,24 +35,35 @@ impl Builder {
     /// Refuses constraints that a command wrote and that close a circle; `place` is that after the command.
     pub(super) fn check_loops(&mut self, writes: &[(NodeId, Aspect)], place: u32) -> Result<(), ModuleError> {
         let mut settled = std::mem::take(&mut self.settled.places);
-        let is_settled = |(node, aspect): &(NodeId, Aspect)| match aspect {
-            Aspect::Parent => settled.contains(&Dependency::Node(self.world.uid(*node))),
-            Aspect::Constraint => match self.world.read_at(*node, Aspect::Constraint, place) {
-                Some(Value::Constraint(_, data)) => data.drives().iter().any(|driven| settled.contains(driven)),
+        for (node, aspect) in writes {
+            // A settled place with another parent or another driver depends on more than was looked at.
+            let is_settled = match aspect {
+                Aspect::Parent => settled.contains(&Dependency::Node(self.world.uid(*node))),
+                Aspect::Constraint => self.drives_any(*node, place, &settled),
                 _ => false,
-            },
-            _ => false,
-        };
-        if writes.iter().any(is_settled) {
-            settled.clear();
+            };
+            if is_settled {
+                settled.clear();
+            }
         }
         for (constraint, _) in writes.iter().filter(|(_, aspect)| *aspect == Aspect::Constraint) {
+            // An earlier constraint of the command may have looked at what this one drives.
+            if self.drives_any(*constraint, place, &settled) {
+                settled.clear();
+            }
             let seen = self.check_loop(*constraint, place, &settled)?;
             self.world.visited += seen.len() as u64;
             settled.extend(seen);
         }
         self.settled.places = settled;
         Ok(())
+    }
+
+    fn drives_any(&self, constraint: NodeId, place: u32, among: &HashSet<Dependency>) -> bool {
+        match self.world.read_at(constraint, Aspect::Constraint, place) {
+            Some(Value::Constraint(_, data)) => data.drives().iter().any(|driven| among.contains(driven)),
+            _ => false,
+        }
     }
 
     /// The first command before `target` that closes a circle which was not there when it ran.
