@@ -30,6 +30,10 @@ fn null(at: &str) -> String {
     format!("Command(module: \"null\", params: (at: \"{at}\"))")
 }
 
+fn control() -> String {
+    "Command(module: \"control\", params: (at: \"@this\"))".to_owned()
+}
+
 /// Joints in a chain; `tags` are those of the joint with a number.
 fn chain(count: usize, tags: impl Fn(usize) -> Vec<String>) -> Rig {
     let parent = |number: usize| number.checked_sub(1).map(|above| format!("j{above}"));
@@ -87,6 +91,7 @@ fn builds_of_the_worst_shapes_grow_with_their_size() {
     // The way up to the rig is walked as far as a joint whose transform is known, at most some hundred.
     let many = [600, 1200, 2400];
     check("chain", many, |count| chain(count, |_| vec![null("@this")]));
+    check("chain of controls", many, |count| chain(count, |_| vec![control()]));
     check("chain under one reference", many, |count| {
         chain(count, |at| if at == 0 { vec![null("@any")] } else { vec![] })
     });
@@ -171,7 +176,7 @@ fn visited(count: usize) -> u64 {
 /// Nodes that are visited to find circles of constraints, where each joint of a chain follows a control that stands on the
 /// joint above.
 fn searched(count: usize) -> u64 {
-    let rig = chain(count, |_| vec!["Command(module: \"control\", params: (at: \"@this\"))".to_owned()]);
+    let rig = chain(count, |_| vec![control()]);
     let mut builder = Builder::new(Arc::new(rigsmith::modules::all()));
     builder.sync(&rig);
     assert_eq!(builder.run_all().error, None);
