@@ -9,6 +9,7 @@
 //! Modules see the world through a [`BuildScope`] only. Nothing here knows an `App`.
 
 mod amount;
+mod anchors;
 mod authoring;
 mod axis;
 mod builder;

@@ -1,6 +1,6 @@
 //! Binding of a mesh for every command that skins: joints and parts by name, and what the weights report tells.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use serde_json::{Value, json};
 
@@ -46,40 +46,55 @@ pub(super) fn bind(
 }
 
 /// Labels of the joints that can hold skin, and the names of those without a label.
-pub(super) struct JointNames(Vec<(Uid, String)>);
+pub(super) struct JointNames {
+    list: Vec<(Uid, String)>,
+    /// Place in the list of each joint, and of the first joint with each name.
+    joints: HashMap<Uid, usize>,
+    names: HashMap<String, usize>,
+}
 
 impl JointNames {
     /// Names of the joints of a workbench's rig.
     pub fn new(bench: &Workbench) -> Self {
         let (rig, built) = (bench.rig(), bench.built());
+        let mut made: HashMap<Uid, &str> = HashMap::new();
+        for node in built.into_iter().flat_map(|built| built.nodes.iter()) {
+            let name: &str = node.label.as_ref().unwrap_or(&node.name);
+            made.entry(node.uid).or_insert(name);
+        }
         let name = |uid: Uid| {
             let label = rig.joint(uid).and_then(|joint| joint.data.label.clone());
-            let node = || built?.nodes.iter().find(|node| node.uid == uid);
-            let created = || node().map(|node| node.label.as_ref().unwrap_or(&node.name).to_string());
+            let created = || made.get(&uid).map(|name| (*name).to_owned());
             label.or_else(created).unwrap_or_else(|| uid.to_string())
         };
-        Self(DeformSkeleton::new(rig, built).joints().iter().map(|joint| (joint.uid, name(joint.uid))).collect())
+        let skeleton = DeformSkeleton::new(rig, built);
+        let list: Vec<(Uid, String)> = skeleton.joints().iter().map(|joint| (joint.uid, name(joint.uid))).collect();
+        let (mut joints, mut names) = (HashMap::new(), HashMap::new());
+        for (at, (uid, name)) in list.iter().enumerate() {
+            joints.entry(*uid).or_insert(at);
+            names.entry(name.clone()).or_insert(at);
+        }
+        Self { list, joints, names }
     }
 
     /// Joint with a name; `option` names the option in the error.
     pub fn find(&self, option: &str, name: &str) -> Result<Uid, Failure> {
-        let found = self.0.iter().find(|(_, known)| known == name).map(|(uid, _)| *uid);
+        let found = self.names.get(name).map(|at| self.list[*at].0);
         found.ok_or_else(|| {
-            let nearest = did_you_mean(name, self.0.iter().map(|(_, name)| name));
+            let nearest = did_you_mean(name, self.list.iter().map(|(_, name)| name));
             Failure::Input(format!("{option}: the rig has no joint with the label {name:?}{nearest}").into())
         })
     }
 
     /// Joints of lists of labels with commas between them.
     fn claims(&self, lists: &[String]) -> Result<Vec<Uid>, Failure> {
-        let is_name = |text: &str| self.0.iter().any(|(_, name)| name == text);
+        let is_name = |text: &str| self.names.contains_key(text);
         let labels = lists.iter().flat_map(|list| separated(list, is_name));
         labels.map(|label| self.find("--claim", label)).collect()
     }
 
     fn of(&self, uid: Uid) -> String {
-        let found = self.0.iter().find(|(known, _)| *known == uid);
-        found.map_or_else(|| uid.to_string(), |(_, name)| name.clone())
+        self.joints.get(&uid).map_or_else(|| uid.to_string(), |at| self.list[*at].1.clone())
     }
 }
 
@@ -183,6 +198,7 @@ fn rigid_lines(names: &JointNames, parts: &[RigidPart]) -> Vec<String> {
 
 /// Lines about idle joints for people, one for each reason; joints that were to claim skin have a line of their own.
 fn idle_lines(names: &JointNames, idle: &[IdleJoint], claims: &[Uid]) -> Vec<String> {
+    let claims: HashSet<Uid> = claims.iter().copied().collect();
     let of = |reason: &str| -> Vec<&IdleJoint> {
         let is_one = |idle: &&IdleJoint| reason_word(idle.reason).0 == reason && !claims.contains(&idle.joint);
         idle.iter().filter(is_one).collect()
@@ -204,9 +220,11 @@ fn idle_lines(names: &JointNames, idle: &[IdleJoint], claims: &[Uid]) -> Vec<Str
 /// distances from the mesh if they lie outside of it.
 fn named_once(names: &JointNames, joints: &[&IdleJoint]) -> Vec<String> {
     let mut by_name: Vec<(String, Vec<&IdleJoint>)> = Vec::new();
+    let mut places: HashMap<String, usize> = HashMap::new();
     for &joint in joints {
         let name = names.of(joint.joint);
-        match by_name.iter_mut().find(|(known, _)| *known == name) {
+        let at = *places.entry(name.clone()).or_insert(by_name.len());
+        match by_name.get_mut(at) {
             Some((_, group)) => group.push(joint),
             None => by_name.push((name, vec![joint])),
         }

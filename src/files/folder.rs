@@ -4,8 +4,11 @@
 //! the model's own folder, with every link resolved, is ever opened.
 
 use std::{
+    collections::HashMap,
+    ffi::OsString,
     io::ErrorKind,
     path::{Path, PathBuf},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
 use thiserror::Error;
@@ -13,11 +16,15 @@ use thiserror::Error;
 use super::{
     atomic::folder_of,
     disk::{Disk, EntryKind},
-    read::{OpenFile, ReadError, open, read_capped},
+    read::{OpenFile, ReadError, UNLIKE, is_missing, nearest_names, no_folder, open, read_capped},
 };
 
 /// Largest number of names that are searched for one that differs only in case.
 const MAX_NAMES: usize = 10_000;
+/// Number of names that are kept of the folders that were listed.
+const MAX_KEPT: usize = 10 * MAX_NAMES;
+/// Number of missing files for which names like theirs are searched.
+const MAX_HINTED: usize = 32;
 /// Longest reference in bytes; longer ones exceed every file system and are refused unread.
 const MAX_LENGTH: usize = 4096;
 /// Number of characters of a reference that a message shows.
@@ -67,10 +74,43 @@ pub enum UriError {
 }
 
 /// Resolves the references of one model to files below the model's folder.
+///
+/// Folders are listed once, so that the answers are those of one moment; use another value for another reading.
 pub struct ModelFolder<'d> {
     disk: &'d dyn Disk,
     /// Canonical path of the folder, so that prefixes can be compared.
     root: PathBuf,
+    search: Mutex<Search>,
+}
+
+/// Searches for names so far.
+#[derive(Default)]
+struct Search {
+    folders: HashMap<PathBuf, Arc<Names>>,
+    /// Number of names in those folders.
+    kept: usize,
+    /// Number of missing files for which names like theirs were searched.
+    hinted: usize,
+}
+
+/// Names in a folder.
+struct Names {
+    sorted: Vec<OsString>,
+    /// The first in byte order of the names that differ only in case, by the name in lower case.
+    by_lower: HashMap<String, OsString>,
+}
+
+impl Names {
+    fn list(disk: &dyn Disk, folder: &Path) -> Self {
+        let sorted = disk.list(folder, MAX_NAMES).unwrap_or_default();
+        let mut by_lower = HashMap::with_capacity(sorted.len());
+        for name in &sorted {
+            if let Some(text) = name.to_str() {
+                by_lower.entry(text.to_lowercase()).or_insert_with(|| name.clone());
+            }
+        }
+        Self { sorted, by_lower }
+    }
 }
 
 impl<'d> ModelFolder<'d> {
@@ -88,7 +128,7 @@ impl<'d> ModelFolder<'d> {
     /// When it does not exist or cannot be reached.
     pub fn at(disk: &'d dyn Disk, folder: &Path) -> Result<Self, ReadError> {
         let root = disk.canonical(folder).map_err(|error| ReadError::new(disk, folder, error))?;
-        Ok(Self { disk, root })
+        Ok(Self { disk, root, search: Mutex::default() })
     }
 
     /// Returns the folder, absolute and with links resolved.
@@ -192,10 +232,29 @@ impl<'d> ModelFolder<'d> {
 
     /// Name in `folder` that differs from `name` only in case.
     fn other_case(&self, folder: &Path, name: &str) -> Option<PathBuf> {
-        let wanted = name.to_lowercase();
-        let names = self.disk.list(folder, MAX_NAMES).ok()?;
-        let found = names.iter().find(|found| found.to_str().is_some_and(|found| found.to_lowercase() == wanted))?;
+        let names = self.names(folder);
+        let found = names.by_lower.get(&name.to_lowercase())?;
         self.disk.canonical(&folder.join(found)).ok()
+    }
+
+    /// Names in a folder, listed where they were not listed yet.
+    fn names(&self, folder: &Path) -> Arc<Names> {
+        if let Some(names) = self.search().folders.get(folder) {
+            return names.clone();
+        }
+        let names = Arc::new(Names::list(self.disk, folder));
+        let mut search = self.search();
+        if search.kept + names.sorted.len() > MAX_KEPT {
+            search.folders.clear();
+            search.kept = 0;
+        }
+        search.kept += names.sorted.len() + 1;
+        search.folders.insert(folder.to_path_buf(), names.clone());
+        names
+    }
+
+    fn search(&self) -> MutexGuard<'_, Search> {
+        self.search.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn outside(&self, uri: &str) -> UriError {
@@ -205,12 +264,29 @@ impl<'d> ModelFolder<'d> {
     fn missing(&self, uri: &str, folder: &Path, rest: &[String]) -> UriError {
         let mut path = folder.to_path_buf();
         path.extend(rest);
-        // A second attempt to open the file gives an error that lists similar names.
-        let source = match open(self.disk, &path) {
-            Err(error) => error,
-            Ok(_) => ReadError::Missing { path, hint: "try again".to_owned() },
+        // A second attempt to reach the file tells why it fails.
+        let source = match self.disk.entry(&path, true) {
+            Err(error) if is_missing(&error) => ReadError::Missing { hint: self.hint(&path), path },
+            _ => match open(self.disk, &path) {
+                Err(error) => error,
+                Ok(_) => ReadError::Missing { path, hint: "try again".to_owned() },
+            },
         };
         UriError::Read { uri: shown(uri), source }
+    }
+
+    /// Remedy for a missing file.
+    fn hint(&self, path: &Path) -> String {
+        if let Some(hint) = no_folder(self.disk, path) {
+            return hint;
+        }
+        let hinted = {
+            let mut search = self.search();
+            search.hinted += 1;
+            search.hinted
+        };
+        // Each search compares the name with all others; a model may name files without end.
+        if hinted > MAX_HINTED { UNLIKE.to_owned() } else { nearest_names(path, &self.names(folder_of(path)).sorted) }
     }
 
     /// True if `uri` refers to an existing regular file below the folder.

@@ -1,6 +1,7 @@
 //! Reading files with a size limit, and with errors that say what to do.
 
 use std::{
+    ffi::OsString,
     io::{self, ErrorKind, Read},
     path::{Path, PathBuf},
 };
@@ -20,6 +21,8 @@ const BEGINNING: u64 = 4096;
 /// Largest number of names in a folder that are searched for a hint.
 const MAX_NAMES: usize = 4096;
 const MAX_HINTS: usize = 3;
+/// Remedy for a missing file with a name unlike all others.
+pub(super) const UNLIKE: &str = "check the path";
 
 /// Reason for not reading a file.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -188,17 +191,26 @@ fn regular(disk: &dyn Disk, path: &Path) -> Result<Entry, ReadError> {
 
 /// Remedy for a missing file: names the first missing folder, or the names most like the given one.
 fn hint(disk: &dyn Disk, path: &Path) -> String {
+    let list = || disk.list(folder_of(path), MAX_NAMES).unwrap_or_default();
+    no_folder(disk, path).unwrap_or_else(|| nearest_names(path, &list()))
+}
+
+/// Remedy for a missing file whose folder is missing as well, or is none.
+pub(super) fn no_folder(disk: &dyn Disk, path: &Path) -> Option<String> {
     let folder = folder_of(path);
     match disk.entry(folder, true) {
-        Ok(entry) if entry.kind == EntryKind::Folder => {}
-        Ok(_) => return format!("`{}` is a file, not a folder", folder.display()),
-        Err(_) => return format!("there is no folder `{}` either; check the path", folder.display()),
+        Ok(entry) if entry.kind == EntryKind::Folder => None,
+        Ok(_) => Some(format!("`{}` is a file, not a folder", folder.display())),
+        Err(_) => Some(format!("there is no folder `{}` either; check the path", folder.display())),
     }
+}
+
+/// Remedy for a missing file: the most alike of the first names in its folder.
+pub(super) fn nearest_names(path: &Path, names: &[OsString]) -> String {
     let wanted = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
-    let mut near: Vec<(usize, String)> = disk
-        .list(folder, MAX_NAMES)
-        .unwrap_or_default()
-        .into_iter()
+    let mut near: Vec<(usize, String)> = names
+        .iter()
+        .take(MAX_NAMES)
         .filter(|name| !is_temp_name(name))
         .filter_map(|name| {
             let name = name.to_string_lossy().into_owned();
@@ -209,7 +221,7 @@ fn hint(disk: &dyn Disk, path: &Path) -> String {
     near.sort();
     near.truncate(MAX_HINTS);
     match near.as_slice() {
-        [] => "check the path".to_owned(),
+        [] => UNLIKE.to_owned(),
         names => {
             let names: Vec<String> = names.iter().map(|(_, name)| format!("`{name}`")).collect();
             format!("did you mean {}?", names.join(" or "))

@@ -45,6 +45,10 @@ impl BuildScope<'_> {
 
     /// The nearest node above `node` that is in the list, as its place in it.
     pub fn upper_in(&mut self, node: NodeId, list: &[NodeId]) -> Option<usize> {
+        // Whatever stands above, it is not in the list.
+        if list.is_empty() {
+            return None;
+        }
         let mut at = self.parent(node);
         while let Some(node) = at {
             if let Some(place) = list.iter().position(|listed| *listed == node) {

@@ -16,6 +16,7 @@ use std::{
 
 pub use dependencies::CommandDependency;
 pub use find::FindError;
+use loops::SettledPlaces;
 pub use status::{CommandState, CommandStatus};
 
 use super::{
@@ -82,6 +83,7 @@ pub struct Builder {
     breakpoints: HashSet<Uid>,
     /// First place from which something that can close a circle of constraints has changed.
     graph_changed: Option<u32>,
+    settled: SettledPlaces,
     /// First place from which references may find other nodes than before.
     structure_changed: Option<u32>,
     /// Nodes that have moved, or have another parent, and whose readers in the rig's space are not marked yet.
@@ -109,6 +111,7 @@ impl Builder {
             failed: None,
             breakpoints: HashSet::new(),
             graph_changed: None,
+            settled: SettledPlaces::default(),
             structure_changed: None,
             moved: Vec::new(),
             run: 0,
@@ -360,6 +363,7 @@ impl Builder {
     }
 
     fn execute(&mut self, number: u32) -> Result<(), BuildProblem> {
+        self.settled.begin(self.run, self.world.places[number as usize]);
         let old = std::mem::take(&mut self.commands[number as usize].trace);
         let before = self.take_back(number, &old);
         let mut trace = Trace::default();
@@ -436,11 +440,7 @@ impl Builder {
             return Err(error_references::as_written(problem, params, &self.world, asker.place));
         }
         self.world.check_work()?;
-        let made = trace.writes.iter().filter(|(_, aspect)| *aspect == Aspect::Constraint);
-        let made: Vec<NodeId> = made.map(|(node, _)| *node).collect();
-        for constraint in made {
-            self.check_loop(constraint, asker.place + 1)?;
-        }
+        self.check_loops(&trace.writes, asker.place + 1)?;
         Ok(())
     }
 
@@ -463,6 +463,7 @@ impl Builder {
         }
         let mut values = Vec::with_capacity(trace.writes.len());
         for (node, aspect) in &trace.writes {
+            self.world.anchors.note_written(*node, *aspect);
             let writes = self.world.cell_mut(*node, *aspect).writes_mut();
             if let Some(at) = writes.iter().position(|(writer, _)| *writer == number) {
                 values.push((*node, *aspect, writes.swap_remove(at).1));

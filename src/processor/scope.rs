@@ -163,11 +163,10 @@ impl BuildScope<'_> {
     /// The transform of a node in the rig's space.
     pub fn global(&mut self, node: NodeId) -> Trs {
         let place = self.asker.place + 1;
-        let is_changed = |node: NodeId| self.is_own(node, Aspect::Base) || self.is_own(node, Aspect::Parent);
-        if std::iter::successors(Some(node), |node| self.world.parent(*node, place)).any(is_changed) {
+        if self.world.is_moved_by(self.command, node, place) {
             return self.global_of_own(node);
         }
-        let (global, count) = self.world.global(node, place);
+        let (global, count) = self.world.global_kept(node, place);
         self.world.work += count;
         if self.trace.globals.insert(node, global).is_none() {
             let readers = &mut self.world.slots[node.0 as usize].global_readers;
@@ -408,6 +407,7 @@ impl BuildScope<'_> {
         let command = self.command;
         self.world.work += 1;
         self.world.note_parent(node, &value);
+        self.world.anchors.note_written(node, aspect);
         let writes = self.world.cell_mut(node, aspect).writes_mut();
         match writes.iter_mut().find(|(writer, _)| *writer == command) {
             Some((_, old)) => *old = value,

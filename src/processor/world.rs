@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy::platform::collections::{HashMap, HashSet};
 
-use super::{ModuleError, exclusion::Exclusions, module::BuildLimits};
+use super::{ModuleError, anchors::Anchors, exclusion::Exclusions, module::BuildLimits};
 use crate::{
     mesh::model::Trs,
     rig::{Attribute, Constraint, ControlData, LayerData, NodeType, Origin, RigInput, SwitchData, Uid},
@@ -186,6 +186,8 @@ pub(super) struct World {
     pub inputs: Vec<NodeId>,
     /// Exclusions of the document and of commands.
     pub off: Exclusions,
+    /// Transforms in the rig's space that are kept; told of all that is written.
+    pub anchors: Anchors,
     /// Limits on the nodes and constraints that commands make.
     pub limits: BuildLimits,
     /// Number of slots of nodes and constraints that commands make.
@@ -194,7 +196,7 @@ pub(super) struct World {
     counted: Option<usize>,
     /// Number of commands and nodes in [`Slot::global_readers`] of all nodes.
     pub global_reads: usize,
-    /// Number of nodes that were visited to find readers of transforms.
+    /// Number of nodes that were visited to find readers of transforms, and circles.
     pub visited: u64,
     /// Number of values that commands have read and written.
     pub work: u64,
@@ -363,17 +365,6 @@ impl World {
             Some(Value::Base(base)) => **base,
             _ => Trs::IDENTITY,
         }
-    }
-
-    /// Transform of a node in the rig's space, and the number of nodes on the way up to the rig.
-    pub fn global(&self, node: NodeId, place: u32) -> (Trs, u64) {
-        let (mut global, mut at, mut count) = (self.base(node, place), node, 1);
-        while let Some(parent) = self.parent(at, place) {
-            global = self.base(parent, place) * global;
-            at = parent;
-            count += 1;
-        }
-        (global, count)
     }
 
     /// Commands that read the transform, in the rig's space, of one of the nodes or of one that may stand below them.

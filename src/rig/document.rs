@@ -226,6 +226,11 @@ impl Rig {
         self.walk().find(|joint| joint.data.label.as_deref() == Some(label)).map(|joint| joint.data.uid)
     }
 
+    /// Labels of the joints, in no order.
+    pub(super) fn labels(&self) -> impl Iterator<Item = &str> {
+        self.joints.values().filter_map(|joint| joint.data.label.as_deref())
+    }
+
     /// Transform of a joint from its own space to the rig's, at rest. Identity for an unknown joint.
     pub fn rest_global(&self, uid: Uid) -> Affine3 {
         let Some(joint) = self.joints.get(&uid) else { return Affine3::IDENTITY };

@@ -263,3 +263,25 @@ fn places_that_are_no_numbers_and_flat_scales_are_told() {
     let remarks = answer["files"][0]["remarks"].to_string();
     assert!(remarks.contains("1 joint has a scale of nothing") && remarks.contains(": a;"), "{remarks}");
 }
+
+/// Each of many joints with one label is told at its own place.
+#[test]
+fn joints_with_one_label_are_told_each() {
+    const COUNT: usize = 10_000;
+    let folder = tempfile::tempdir().unwrap();
+    // Two joints on a line, and letters of several bytes before the second.
+    let pair = "  (label: \"é\", translation: (0, 0.1, 0)), (label: \"é\")";
+    let text = format!("(format: 2, name: \"n\", joints: [\n{}\n])", vec![pair; COUNT / 2].join(",\n"));
+    fs::write(folder.path().join("alike.rig.ron"), text).unwrap();
+    let answer = rigsmith(folder.path(), &["check", "alike.rig.ron", "--json"]);
+    assert_eq!(answer.code, 1, "{}{}", answer.out, answer.err);
+    let file = answer.json()["files"][0].clone();
+    let problems = file["problems"].as_array().unwrap();
+    assert_eq!(problems.len(), COUNT - 1);
+    let second = pair.chars().count() - "(label: \"é\")".chars().count();
+    for (number, problem) in problems.iter().enumerate().map(|(number, problem)| (number + 1, problem)) {
+        let column = if number % 2 == 0 { 4 } else { second + 2 };
+        let place = (problem["line"].as_u64().unwrap() as usize, problem["column"].as_u64().unwrap() as usize);
+        assert_eq!(place, (2 + number / 2, column), "{problem}");
+    }
+}

@@ -188,3 +188,26 @@ fn links_out_of_a_model_folder_are_refused() {
     }
     assert_eq!(folder.read("textures/inside.png", 100).unwrap(), b"a");
 }
+
+#[test]
+fn folders_of_missing_files_are_listed_once() {
+    let outer = fresh();
+    let at = |name: &str| outer.path().join(name);
+    fs::write(at("m.gltf"), b"{}").unwrap();
+    for number in 0..20 {
+        fs::write(at(&format!("texture_{number}.png")), b"skin").unwrap();
+    }
+    let lists = |missing: usize| {
+        let disk = FaultyDisk::new(RealDisk, None);
+        let folder = ModelFolder::of(&disk, &at("m.gltf")).unwrap();
+        let told = |number: usize| folder.read(&format!("textur_{number}.png"), 10).unwrap_err().to_string();
+        let hinted = (0..missing).filter(|number| told(*number).contains("did you mean `texture_")).count();
+        assert_eq!(folder.read("TEXTURE_7.png", 10).unwrap(), b"skin");
+        (disk.log().iter().filter(|name| **name == "list").count(), hinted)
+    };
+    assert_eq!(lists(1), (1, 1));
+    assert_eq!(lists(20), (1, 20));
+    let (listed, hinted) = lists(400);
+    assert_eq!(listed, 1);
+    assert!((20..100).contains(&hinted), "{hinted} of 400 missing files are compared with all names");
+}

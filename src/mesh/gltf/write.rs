@@ -8,11 +8,12 @@ mod meshes;
 mod skeleton;
 mod vrm;
 
+use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Map, Value};
 
 use super::{GltfError, uri::percent_encode};
 use crate::mesh::{CompanionSink, model::Model, vrm::Avatar};
-use buffer::Bin;
+use buffer::{Accessor, Bin, View};
 use skeleton::Skeleton;
 
 /// Settings of [`write_glb`] and [`write_gltf`].
@@ -49,8 +50,7 @@ impl Default for GltfWriteSettings {
 /// [`GltfError::Model`] if the model's indices or lists do not fit together or a number is not finite,
 /// [`GltfError::Unweighted`] if `bind_unweighted` is off. Costs time and memory linear in the model.
 pub fn write_glb(model: &Model, settings: &GltfWriteSettings) -> Result<Vec<u8>, GltfError> {
-    let (json, bin) = document(model, settings, None, None)?;
-    glb(&json, &bin)
+    glb(document(model, settings, None, None)?)
 }
 
 /// Writes an avatar in VRM 1.0: a GLB file as [`write_glb`] writes it, with the extensions of the avatar.
@@ -59,13 +59,42 @@ pub fn write_glb(model: &Model, settings: &GltfWriteSettings) -> Result<Vec<u8>,
 /// As [`write_glb`], and [`GltfError::Model`] if the avatar refers to a node that is not in the model or is not written
 /// ([`GltfWriteSettings::all_joints`] writes all), or to a morph target that is not there.
 pub fn write_vrm(model: &Model, avatar: &Avatar, settings: &GltfWriteSettings) -> Result<Vec<u8>, GltfError> {
-    let (json, bin) = document(model, settings, Some(avatar), None)?;
-    glb(&json, &bin)
+    glb(document(model, settings, Some(avatar), None)?)
+}
+
+/// A document and its buffer. The lists of accessors and views are the longest, and no trees of JSON.
+struct Document {
+    root: Map<String, Value>,
+    accessors: Vec<Accessor>,
+    views: Vec<View>,
+    /// The one buffer, as it is declared.
+    buffer: Option<Value>,
+    bytes: Vec<u8>,
+}
+
+impl Serialize for Document {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        for (key, value) in &self.root {
+            map.serialize_entry(key, value)?;
+        }
+        if !self.accessors.is_empty() {
+            map.serialize_entry("accessors", &self.accessors)?;
+        }
+        if !self.views.is_empty() {
+            map.serialize_entry("bufferViews", &self.views)?;
+        }
+        if let Some(buffer) = &self.buffer {
+            map.serialize_entry("buffers", &[buffer])?;
+        }
+        map.end()
+    }
 }
 
 /// File of a document and its buffer.
-fn glb(json: &Map<String, Value>, bin: &[u8]) -> Result<Vec<u8>, GltfError> {
-    let mut json = to_bytes(json, false)?;
+fn glb(document: Document) -> Result<Vec<u8>, GltfError> {
+    let mut json = to_bytes(&document, false)?;
+    let bin = document.bytes;
     json.resize(json.len().next_multiple_of(4), b' ');
     let bin_chunk = if bin.is_empty() { 0 } else { 8 + bin.len() };
     let length = 12 + 8 + json.len() + bin_chunk;
@@ -82,7 +111,7 @@ fn glb(json: &Map<String, Value>, bin: &[u8]) -> Result<Vec<u8>, GltfError> {
     if !bin.is_empty() {
         glb.extend_from_slice(&word(bin.len())?);
         glb.extend_from_slice(b"BIN\0");
-        glb.extend_from_slice(bin);
+        glb.extend_from_slice(&bin);
     }
     Ok(glb)
 }
@@ -97,11 +126,11 @@ pub fn write_gltf(
     stem: &str,
     companion: &mut CompanionSink,
 ) -> Result<Vec<u8>, GltfError> {
-    to_bytes(&document(model, settings, None, Some((stem, companion)))?.0, true)
+    to_bytes(&document(model, settings, None, Some((stem, companion)))?, true)
 }
 
-fn to_bytes(root: &Map<String, Value>, pretty: bool) -> Result<Vec<u8>, GltfError> {
-    let bytes = if pretty { serde_json::to_vec_pretty(root) } else { serde_json::to_vec(root) };
+fn to_bytes(document: &Document, pretty: bool) -> Result<Vec<u8>, GltfError> {
+    let bytes = if pretty { serde_json::to_vec_pretty(document) } else { serde_json::to_vec(document) };
     bytes.map_err(|error| GltfError::model(error.to_string()))
 }
 
@@ -111,7 +140,7 @@ fn document(
     settings: &GltfWriteSettings,
     avatar: Option<&Avatar>,
     mut outside: Option<(&str, &mut CompanionSink)>,
-) -> Result<(Map<String, Value>, Vec<u8>), GltfError> {
+) -> Result<Document, GltfError> {
     check::check(model)?;
     let mut bin = Bin::default();
     let skeleton = Skeleton::new(model, settings)?;
@@ -160,8 +189,7 @@ fn document(
     insert_list(&mut root, "textures", written.textures);
     insert_list(&mut root, "images", written.images);
     insert_list(&mut root, "samplers", written.samplers);
-    insert_list(&mut root, "accessors", accessors);
-    insert_list(&mut root, "bufferViews", views);
+    let mut declared = None;
     if !bytes.is_empty() {
         let mut buffer = Map::new();
         buffer.insert("byteLength".to_owned(), bytes.len().into());
@@ -169,9 +197,9 @@ fn document(
             let name = companion(&format!("{stem}.bin"), std::mem::take(&mut bytes));
             buffer.insert("uri".to_owned(), percent_encode(&name).into());
         }
-        root.insert("buffers".to_owned(), vec![Value::from(buffer)].into());
+        declared = Some(Value::from(buffer));
     }
-    Ok((root, bytes))
+    Ok(Document { root, accessors, views, buffer: declared, bytes })
 }
 
 /// Inserts a list unless it is empty, which glTF forbids.

@@ -1,6 +1,9 @@
 //! Edits that give a rig a face: joints, pairs, tags, weights; and the removal of the bones that it replaces.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{BTreeMap, HashSet},
+    sync::Arc,
+};
 
 use glam::{Affine3A, Quat, Vec3};
 
@@ -228,7 +231,7 @@ fn limits(bone: &FaceBone) -> ([(f32, f32); 3], [(f32, f32); 3]) {
 fn skin(rig: &Rig, new: &NewFace, known: &FaceRig, neck: Option<Uid>, head: Uid, joints: &[Uid]) -> SkinData {
     let NewFace { analysis, face, mesh, .. } = *new;
     let old = rig.skin(mesh).filter(|skin| skin.weights.len() == analysis.mesh_points);
-    let face_joints: Vec<Uid> = known.bones.iter().map(|bone| bone.uid).chain(joints.iter().copied()).collect();
+    let face_joints: HashSet<Uid> = known.bones.iter().map(|bone| bone.uid).chain(joints.iter().copied()).collect();
     let is_own = |uid: &Uid| Some(*uid) == neck || *uid == head || face_joints.contains(uid);
     let subjects = old.map(|skin| skin.subjects.clone()).unwrap_or_default();
     // Joints that commands created are not in the document, whether they are built or not.

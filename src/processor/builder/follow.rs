@@ -189,6 +189,7 @@ impl Builder {
         let cell = self.world.cell_mut(node, aspect);
         if !same(cell.document.as_ref(), value.as_ref()) {
             cell.document = value;
+            self.world.anchors.note_written(node, aspect);
             self.changed(node, aspect, None, aspect == Aspect::Parent);
         }
     }
@@ -250,6 +251,7 @@ impl Builder {
         }
         // With other places, everything may read something else, and everything has to be looked at.
         self.built.forget();
+        self.world.anchors.forget();
         let had_any = !self.list.is_empty();
         let reached = self.list.get(self.cursor as usize).copied();
         for number in std::mem::replace(&mut self.list, list) {

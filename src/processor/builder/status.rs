@@ -69,8 +69,8 @@ impl Builder {
         self.world.slots.len() + self.commands.len()
     }
 
-    /// Number of nodes that were visited since the builder was made to find the commands that read where something is:
-    /// a measure of work that is the same on every machine.
+    /// Number of nodes that were visited since the builder was made to find the commands that read where something is,
+    /// and circles of constraints: a measure of work that is the same on every machine.
     pub fn visited(&self) -> u64 {
         self.world.visited
     }

@@ -63,6 +63,39 @@ impl SourceError {
     }
 }
 
+/// Place in a text that goes on from error to error: many errors in the order of the text take one pass over it.
+pub(crate) struct TextPlace<'a> {
+    text: &'a str,
+    offset: usize,
+    line: usize,
+    column: usize,
+}
+
+impl<'a> TextPlace<'a> {
+    /// The start of a text.
+    pub fn start(text: &'a str) -> Self {
+        Self { text, offset: 0, line: 1, column: 1 }
+    }
+
+    /// An error at a byte offset, as [`SourceError::at`].
+    pub fn error(&mut self, offset: usize, message: impl Into<String>) -> SourceError {
+        let offset = (0..=offset.min(self.text.len())).rev().find(|at| self.text.is_char_boundary(*at)).unwrap_or(0);
+        if offset < self.offset {
+            *self = Self::start(self.text);
+        }
+        let passed = &self.text[self.offset..offset];
+        match passed.rfind('\n') {
+            Some(end) => {
+                self.line += passed.matches('\n').count();
+                self.column = passed[end + 1..].chars().count() + 1;
+            }
+            None => self.column += passed.chars().count(),
+        }
+        self.offset = offset;
+        SourceError { line: self.line, column: self.column, offset, message: message.into() }
+    }
+}
+
 /// Options for reading all RON files of Rigsmith: `Some(...)` need not be written.
 pub(crate) fn ron_options() -> Options {
     Options::default().with_default_extension(Extensions::IMPLICIT_SOME)

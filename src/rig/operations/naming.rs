@@ -1,6 +1,6 @@
 //! Names of drawn joints: by chain, side and place, such as `spine_1` and `arm_l_2`.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use bevy::math::Vec3;
 
@@ -62,8 +62,7 @@ impl ChainName {
             let number = place.base().strip_prefix(base).filter(|_| is_here)?;
             if number.is_empty() { Some(1) } else { number.parse().ok() }
         };
-        let labels = rig.walk().filter_map(|joint| joint.data.label.as_deref());
-        let taken: BTreeSet<u32> = labels.filter_map(Place::of).filter_map(number_of).collect();
+        let taken: BTreeSet<u32> = rig.labels().filter_map(Place::of).filter_map(number_of).collect();
         let number = (1..).find(|number| !taken.contains(number)).unwrap_or(1);
         Self { base: if number == 1 { base.to_owned() } else { format!("{base}{number}") }, first: 1 }
     }
@@ -82,10 +81,10 @@ impl ChainName {
         };
         let first = self.first + place as u32;
         let own = name(first);
-        if is_free(&own, &|name| rig.find_label(name).is_some()) {
+        if is_free(&own, &|name| rig.labels().any(|label| label == name)) {
             return own;
         }
-        let labels: BTreeSet<&str> = rig.walk().filter_map(|joint| joint.data.label.as_deref()).collect();
+        let labels: BTreeSet<&str> = rig.labels().collect();
         (first + 1..).map(name).find(|name| is_free(name, &|name| labels.contains(name))).unwrap_or(own)
     }
 }
@@ -165,7 +164,7 @@ fn base(
 
 /// The joints from a joint up to its root, and those that continue them: a spine.
 struct Trunk {
-    joints: BTreeMap<Uid, usize>,
+    joints: Vec<Uid>,
     start: Vec3,
     end: Vec3,
 }
@@ -186,12 +185,12 @@ impl Trunk {
         }
         let place = |joint: Option<&Uid>| joint.map_or(Vec3::ZERO, |joint| rig.position(*joint));
         let (start, end) = (place(chain.first()), place(chain.last()));
-        Self { joints: chain.iter().enumerate().map(|(number, joint)| (*joint, number)).collect(), start, end }
+        Self { joints: chain, start, end }
     }
 
     /// True for the joints of the lower half.
     fn is_lower(&self, joint: Uid) -> bool {
-        self.joints.get(&joint).is_some_and(|number| 2 * number < self.joints.len().max(1))
+        self.joints.iter().position(|one| *one == joint).is_some_and(|number| 2 * number < self.joints.len())
     }
 
     /// Place of a point along the trunk, from 0 at its start to 1 at its end; `None` for a trunk of one joint.

@@ -6,6 +6,7 @@
 //! patch. With fixed weights the matrix is the same for all expressions and factorised once; as the field is a sum over
 //! units, the movements for each unit are solved once, too, when it is first used, and an expression is their sum.
 
+mod factor;
 mod moving_skin;
 mod pose_problem;
 mod samples;
@@ -17,6 +18,7 @@ use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use self::{
+    factor::{Factor, SparseMatrix},
     moving_skin::MovingSkin,
     samples::{Mark, Sample},
     targets::UnitTargets,
@@ -61,8 +63,8 @@ pub struct FittedFace {
     /// The lines of mouth and eyes; `None` for degenerate landmarks, with which nothing moves.
     opening_lines: Option<OpeningLines>,
     samples: Vec<Sample>,
-    /// The Cholesky factor.
-    factor: Vec<f64>,
+    /// Factor of the normal equations.
+    factor: Factor,
     /// Targets of the units at the samples, kept for other weights.
     targets: Option<UnitTargets>,
     /// Movements of the skin bones for each unit on the left and the right side at full strength, without the jaw.
@@ -91,7 +93,7 @@ impl FittedFace {
     /// All in head space. `triangles` are checked for flips (an empty list: no check). `mask` marks points of the
     /// face's skin (an empty list: all points that bones move); `weights` as [`apply`](super::apply) takes them.
     /// Inconsistent input (too few weights, joints without a bone, triangles without points) is skipped. Cost: points
-    /// times influences squared, and bones cubed.
+    /// times influences squared, and bones times the square of how many lie side by side.
     pub fn new(
         points: &[Vec3],
         triangles: &[[u32; 3]],
@@ -108,7 +110,7 @@ impl FittedFace {
             skin: (0..bones.len()).filter(|&bone| bones[bone].kind == FaceBoneKind::Skin).collect(),
             opening_lines: OpeningLines::new(landmarks),
             samples: Vec::new(),
-            factor: Vec::new(),
+            factor: Factor::default(),
             targets: None,
             unit_movements: unsolved(units),
             jaw: JawMovements::default(),
@@ -169,7 +171,7 @@ impl FittedFace {
     /// Sums the normal equations and factorises them.
     fn factorise(&mut self) {
         let size = self.skin.len();
-        let mut matrix = vec![0.0; size * size];
+        let mut matrix = SparseMatrix::zero(size);
         let mut patch = vec![0.0; size];
         for sample in &self.samples {
             for &(a, weight) in &sample.influences {
@@ -177,21 +179,12 @@ impl FittedFace {
                     patch[a as usize] += sample.counts * weight;
                 }
                 for &(b, other) in &sample.influences {
-                    matrix[a as usize * size + b as usize] += sample.counts * weight * other;
+                    matrix.add(a, b, sample.counts * weight * other);
                 }
             }
         }
         let floor = 1e-6 / size.max(1) as f64;
-        let common = matrix.clone();
-        for a in 0..size {
-            matrix[a * size + a] += HOLD * patch[a] + floor;
-            for b in (0..size).filter(|&b| b != a) {
-                matrix[a * size + a] += STIFF * common[a * size + b];
-                matrix[a * size + b] -= STIFF * common[a * size + b];
-            }
-        }
-        cholesky(&mut matrix, size);
-        self.factor = matrix;
+        self.factor = matrix.stiffened(STIFF, |bone| HOLD * patch[bone] + floor).factorise();
     }
 
     /// Movements of the skin bones whose skin follows a displacement best.
@@ -209,7 +202,7 @@ impl FittedFace {
                 right[unknown as usize] += counts * weight * target;
             }
         }
-        substitute(&self.factor, &mut right);
+        self.factor.solve(&mut right);
         right
     }
 
@@ -297,40 +290,4 @@ fn mirrored_pairs(bones: &[FaceBone], landmarks: &Landmarks) -> Vec<[usize; 2]> 
     let partners: Vec<Option<usize>> = (0..bones.len()).map(partner).collect();
     let mutual = |bone: usize| partners[bone].filter(|other| *other > bone && partners[*other] == Some(bone));
     (0..bones.len()).filter_map(|bone| Some([bone, mutual(bone)?])).collect()
-}
-
-/// Factorises a symmetric positive matrix in place, L in the lower triangle. A pivot lost to rounding becomes 1.
-fn cholesky(matrix: &mut [f64], size: usize) {
-    for row in 0..size {
-        for column in 0..=row {
-            let mut sum = matrix[row * size + column];
-            for k in 0..column {
-                sum -= matrix[row * size + k] * matrix[column * size + k];
-            }
-            matrix[row * size + column] = if row == column {
-                if sum > 0.0 { sum.sqrt() } else { 1.0 }
-            } else {
-                sum / matrix[column * size + column]
-            };
-        }
-    }
-}
-
-/// Solves for a right-hand side of vectors, in place.
-fn substitute(factor: &[f64], right: &mut [DVec3]) {
-    let size = right.len();
-    for row in 0..size {
-        let mut sum = right[row];
-        for k in 0..row {
-            sum -= right[k] * factor[row * size + k];
-        }
-        right[row] = sum / factor[row * size + row];
-    }
-    for row in (0..size).rev() {
-        let mut sum = right[row];
-        for k in row + 1..size {
-            sum -= right[k] * factor[k * size + row];
-        }
-        right[row] = sum / factor[row * size + row];
-    }
 }

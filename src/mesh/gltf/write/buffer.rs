@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::Vec3;
-use serde_json::{Map, Value, json};
-
-use super::floats;
+use serde::Serialize;
 
 /// Content of a view, as the GPU uses it.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -15,12 +13,62 @@ pub(super) enum Target {
     Other,
 }
 
+/// View of the buffer. A file may have hundreds of thousands, which take little memory so.
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct View {
+    buffer: u32,
+    byte_offset: usize,
+    byte_length: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    target: Option<u32>,
+}
+
+/// Accessor, with its fields in the order of the file.
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Accessor {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    buffer_view: Option<usize>,
+    component_type: u32,
+    count: usize,
+    #[serde(rename = "type")]
+    kind: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sparse: Option<Box<Sparse>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    min: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    max: Option<Vec<f64>>,
+}
+
+/// Elements of a sparse accessor that are not zero.
+#[derive(Serialize)]
+struct Sparse {
+    count: usize,
+    indices: SparseIndices,
+    values: SparseValues,
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct SparseIndices {
+    buffer_view: usize,
+    component_type: u32,
+}
+
+#[derive(Serialize)]
+#[serde(rename_all = "camelCase")]
+struct SparseValues {
+    buffer_view: usize,
+}
+
 /// The buffer being written, with its views and accessors.
 #[derive(Default)]
 pub(super) struct Bin {
     bytes: Vec<u8>,
-    views: Vec<Value>,
-    accessors: Vec<Value>,
+    views: Vec<View>,
+    accessors: Vec<Accessor>,
     /// Accessors of key times already written: channels of a clip mostly share them.
     times: BTreeMap<Vec<u8>, usize>,
 }
@@ -29,27 +77,23 @@ impl Bin {
     /// Appends bytes as a view; returns its index.
     pub(super) fn view(&mut self, bytes: &[u8], target: Target) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let mut view = Map::new();
-        view.insert("buffer".to_owned(), 0.into());
-        view.insert("byteOffset".to_owned(), self.bytes.len().into());
-        view.insert("byteLength".to_owned(), bytes.len().into());
-        match target {
-            Target::Vertices => drop(view.insert("target".to_owned(), 34962.into())),
-            Target::Indices => drop(view.insert("target".to_owned(), 34963.into())),
-            Target::Other => {}
-        }
+        let target = match target {
+            Target::Vertices => Some(34962),
+            Target::Indices => Some(34963),
+            Target::Other => None,
+        };
+        self.views.push(View { buffer: 0, byte_offset: self.bytes.len(), byte_length: bytes.len(), target });
         self.bytes.extend_from_slice(bytes);
-        self.views.push(view.into());
         self.views.len() - 1
     }
 
-    fn accessor(&mut self, bytes: &[u8], target: Target, component: u32, kind: &str, count: usize) -> usize {
-        let mut accessor = Map::new();
-        accessor.insert("bufferView".to_owned(), self.view(bytes, target).into());
-        accessor.insert("componentType".to_owned(), component.into());
-        accessor.insert("count".to_owned(), count.into());
-        accessor.insert("type".to_owned(), kind.into());
-        self.accessors.push(accessor.into());
+    fn accessor(&mut self, bytes: &[u8], target: Target, component: u32, kind: &'static str, count: usize) -> usize {
+        let buffer_view = Some(self.view(bytes, target));
+        self.push(Accessor { buffer_view, component_type: component, count, kind, sparse: None, min: None, max: None })
+    }
+
+    fn push(&mut self, accessor: Accessor) -> usize {
+        self.accessors.push(accessor);
         self.accessors.len() - 1
     }
 
@@ -92,17 +136,20 @@ impl Bin {
         let values: Vec<[f32; 3]> = moved.iter().map(|at| offsets[*at].to_array()).collect();
         let values = little_endian(values.as_flattened(), f32::to_le_bytes);
         let (places, values) = (self.view(&places, Target::Other), self.view(&values, Target::Other));
-        self.accessors.push(json!({
-            "componentType": 5126,
-            "count": offsets.len(),
-            "type": "VEC3",
-            "sparse": {
-                "count": moved.len(),
-                "indices": { "bufferView": places, "componentType": if wide { 5125 } else { 5123 } },
-                "values": { "bufferView": values },
-            },
-        }));
-        let index = self.accessors.len() - 1;
+        let sparse = Sparse {
+            count: moved.len(),
+            indices: SparseIndices { buffer_view: places, component_type: if wide { 5125 } else { 5123 } },
+            values: SparseValues { buffer_view: values },
+        };
+        let index = self.push(Accessor {
+            buffer_view: None,
+            component_type: 5126,
+            count: offsets.len(),
+            kind: "VEC3",
+            sparse: Some(Box::new(sparse)),
+            min: None,
+            max: None,
+        });
         let low = offsets.iter().fold(Vec3::INFINITY, |low, offset| low.min(*offset));
         let high = offsets.iter().fold(Vec3::NEG_INFINITY, |high, offset| high.max(*offset));
         self.bounds(index, &low.to_array(), &high.to_array());
@@ -144,14 +191,14 @@ impl Bin {
     }
 
     fn bounds(&mut self, accessor: usize, low: &[f32], high: &[f32]) {
-        if let Some(Value::Object(map)) = self.accessors.get_mut(accessor) {
-            map.insert("min".to_owned(), floats(low));
-            map.insert("max".to_owned(), floats(high));
+        let floats = |ends: &[f32]| Some(ends.iter().map(|end| f64::from(*end)).collect());
+        if let Some(accessor) = self.accessors.get_mut(accessor) {
+            (accessor.min, accessor.max) = (floats(low), floats(high));
         }
     }
 
     /// Finishes the buffer: accessors, views and bytes.
-    pub(super) fn finish(mut self) -> (Vec<Value>, Vec<Value>, Vec<u8>) {
+    pub(super) fn finish(mut self) -> (Vec<Accessor>, Vec<View>, Vec<u8>) {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         (self.accessors, self.views, self.bytes)
     }

@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use crate::rig::{
     Uid,
     format::{
-        source::SourceError,
+        source::{SourceError, TextPlace},
         tree::{Item, NodeId, Tree},
     },
 };
@@ -46,7 +46,14 @@ impl<'a> Declarations<'a> {
         if tree.node(root).bracket != Some('(') {
             return None;
         }
-        let mut finder = Finder { tree: &tree, taken: written_uids(&tree), named: HashSet::new(), faults: Vec::new() };
+        let mut finder = Finder {
+            tree: &tree,
+            taken: written_uids(&tree),
+            named: HashSet::new(),
+            next: HashMap::new(),
+            faults: Vec::new(),
+            place: TextPlace::start(text),
+        };
         let rig = finder.named(root, "rig", "name");
         let groups = finder.list(root, "groups", "group", "name");
         let inputs = finder.list(root, "inputs", "input", "name");
@@ -108,7 +115,11 @@ struct Finder<'t, 'a> {
     taken: HashSet<Uid>,
     /// Uids that follow from names so far.
     named: HashSet<Uid>,
+    /// The first number that is not tried yet, by names: those before it are taken.
+    next: HashMap<String, u32>,
     faults: Vec<SourceError>,
+    /// Place of the last fault.
+    place: TextPlace<'t>,
 }
 
 impl Finder<'_, '_> {
@@ -133,7 +144,7 @@ impl Finder<'_, '_> {
                 ),
                 None => format!("this {kind} has neither a {field} nor a uid; give it one of them"),
             };
-            self.faults.push(SourceError::at(self.tree.text, at, message));
+            self.faults.push(self.place.error(at, message));
         }
         // The name may have been another's, who kept the uid.
         let uid = match derived.filter(|uid| self.taken.insert(*uid)) {
@@ -170,13 +181,13 @@ impl Finder<'_, '_> {
 
     /// A derived uid that nothing else has.
     fn free(&mut self, names: [&str; 3]) -> Uid {
-        let mut number = 0;
+        let next = self.next.entry(names.join("\0")).or_default();
         loop {
-            let uid = Uid::derived(names.into_iter().chain(["again", &u32::to_string(&number)]));
+            let uid = Uid::derived(names.into_iter().chain(["again", &u32::to_string(next)]));
+            *next += 1;
             if self.taken.insert(uid) {
                 return uid;
             }
-            number += 1;
         }
     }
 }
