@@ -43,7 +43,7 @@ pub fn state(program: &Arc<RigProgram>, clip: Option<&RigClip>, time: f32) -> Ri
 /// Largest distance and angle of joints, over all keys and frames, that are not listed; with the clip as it was, and kept.
 fn check(what: &str, before: &Rig, after: &Rig, most_frames: usize) -> Rig {
     let mut kept = after.clone();
-    let notes: Vec<ClipNote> = keep_clips(before, &mut kept, &Arc::new(modules::all())).unwrap();
+    let notes: Vec<ClipNote> = keep_clips(before, &mut kept, &Arc::new(modules::all())).unwrap().notes;
     let listed: HashSet<Uid> = notes.iter().map(|note| note.deviation.joint).collect();
     let frames = notes.iter().map(|note| note.frames).max().unwrap_or_default();
     println!("{what}: {} joints are listed, one of them at {frames} frames", listed.len());
