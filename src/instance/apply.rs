@@ -109,7 +109,7 @@ pub(super) fn update_instances(world: &mut World) {
         let is_other = running.is_none_or(|running| !Arc::ptr_eq(&running.0, built));
         let mut updated = None;
         if let (Some(running), Some(RigClips(clips)), true) = (running, clips, is_other) {
-            updated = jobs.updated(&running.0, built, clips, origin);
+            updated = jobs.updated(&running.0, built, clips, origin, *mode);
             if updated.is_none() {
                 is_waited_for = true;
                 continue;

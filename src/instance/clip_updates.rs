@@ -12,6 +12,7 @@ use bevy::{
 
 use super::BuiltTemplate;
 use crate::{
+    plugins::runtime::InstanceMode,
     processor::{ClipReport, KeptClips, RigVersion, clips_between},
     rig::animation::RigClip,
 };
@@ -43,6 +44,7 @@ struct ClipJob {
     clips: Arc<[RigClip]>,
     from: Arc<BuiltTemplate>,
     to: Arc<BuiltTemplate>,
+    mode: InstanceMode,
     state: JobState,
     /// True if an instance waits for it.
     is_wanted: bool,
@@ -61,16 +63,19 @@ impl ClipJobs {
         to: &Arc<BuiltTemplate>,
         clips: &Arc<[RigClip]>,
         origin: Option<&ClipOrigin>,
+        mode: InstanceMode,
     ) -> Option<UpdatedClips> {
         if to.way.as_ref().is_some_and(|way| way.holds_poses(running, to)) {
             return Some(UpdatedClips { clips: clips.clone(), origin: None, report: Arc::default() });
         }
         let origin = origin.filter(|origin| Arc::ptr_eq(&origin.shown, clips));
         let (made, from) = origin.map_or((clips, running), |origin| (&origin.clips, &origin.built));
-        let is_it =
-            |job: &ClipJob| Arc::ptr_eq(&job.clips, made) && Arc::ptr_eq(&job.from, from) && Arc::ptr_eq(&job.to, to);
+        let is_it = |job: &ClipJob| {
+            let is_between = Arc::ptr_eq(&job.from, from) && Arc::ptr_eq(&job.to, to);
+            is_between && Arc::ptr_eq(&job.clips, made) && job.mode == mode
+        };
         let number = self.0.iter().position(is_it).unwrap_or_else(|| {
-            self.0.push(ClipJob::start(made, from, to));
+            self.0.push(ClipJob::start(made, from, to, mode));
             self.0.len() - 1
         });
         let job = &mut self.0[number];
@@ -93,17 +98,22 @@ impl ClipJobs {
 }
 
 impl ClipJob {
-    fn start(clips: &Arc<[RigClip]>, from: &Arc<BuiltTemplate>, to: &Arc<BuiltTemplate>) -> Self {
-        let (clips, from, to) = (clips.clone(), from.clone(), to.clone());
+    fn start(clips: &Arc<[RigClip]>, from: &Arc<BuiltTemplate>, to: &Arc<BuiltTemplate>, mode: InstanceMode) -> Self {
         let work = (clips.clone(), from.clone(), to.clone());
         let task = AsyncComputeTaskPool::get().spawn(async move {
             let (clips, from, to) = work;
-            clips_between(&clips, version(&from), version(&to))
+            clips_between(&clips, version(&from, mode), version(&to, mode))
         });
-        Self { clips, from, to, state: JobState::Running(task), is_wanted: true }
+        let (clips, from, to) = (clips.clone(), from.clone(), to.clone());
+        Self { clips, from, to, mode, state: JobState::Running(task), is_wanted: true }
     }
 }
 
-fn version(template: &BuiltTemplate) -> RigVersion<'_> {
-    RigVersion { rig: &template.rig, built: &template.built, program: &template.whole }
+/// A version of a template, with the nodes that an instance in that mode can pose.
+fn version(template: &BuiltTemplate, mode: InstanceMode) -> RigVersion<'_> {
+    let program = match mode {
+        InstanceMode::Hierarchy => &template.whole,
+        InstanceMode::Direct => &template.lean,
+    };
+    RigVersion { rig: &template.rig, built: &template.built, program }
 }

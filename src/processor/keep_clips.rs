@@ -94,14 +94,14 @@ impl ClipReport {
     }
 }
 
-/// Version of a rig, with what its commands build and a program with all of its nodes.
+/// Version of a rig, with what its commands build and a program of that.
 #[derive(Debug, Clone, Copy)]
 pub struct RigVersion<'a> {
     /// The document.
     pub rig: &'a Rig,
     /// Nodes and constraints.
     pub built: &'a BuiltRig,
-    /// Program with all nodes.
+    /// Program with all nodes, or with controls exposed: nodes that it cannot pose get no keys.
     pub program: &'a Arc<RigProgram>,
 }
 
