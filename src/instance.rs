@@ -13,7 +13,8 @@
 //! a joint; [`JointsHeld`] tells the others.
 //!
 //! Clips of a `.anim.ron` go onto an instance with [`InstanceClips`]; a [`ClipPlayer`](crate::plugins::animation::ClipPlayer)
-//! plays them where [`ClipPlugin`](crate::plugins::animation::ClipPlugin) is added, or Bevy's own player.
+//! plays them where [`ClipPlugin`](crate::plugins::animation::ClipPlugin) is added, or Bevy's own player. When a saved template
+//! changes what their keys mean, they are re-expressed, so that the joints move as before; [`RigUpdated`] tells what is not kept.
 //!
 //! An instance is as its template says. A rig that people edit has a document of its own: [`RigSource`].
 //!
@@ -36,6 +37,7 @@ mod apply;
 mod asset;
 mod bodies;
 mod builds;
+mod clip_updates;
 mod clips;
 mod exchange;
 mod file_nodes;
@@ -83,7 +85,7 @@ use crate::{
         commands::{BuildResult, RigModules},
         runtime::{ControlPose, InstanceMode, NodeOf, RigRuntime, RuntimePlugin},
     },
-    processor::PoseNote,
+    processor::{ClipReport, PoseNote},
     rig::{PoseOffset, RestTransform, SourceError, Uid, update::Change},
     solve::program::{ExposedNode, ProgramError},
 };
@@ -134,6 +136,7 @@ impl Plugin for RigInstancePlugin {
             .register_asset_loader(RigTemplateLoader)
             .init_asset::<RigAnimation>()
             .register_asset_loader(RigAnimationLoader)
+            .init_resource::<clip_updates::ClipJobs>()
             .insert_resource(RigTemplates {
                 builds: Builds::start(self.look, self.patience),
                 is_live: self.live,
@@ -233,6 +236,8 @@ pub struct RigUpdated {
     pub ran: Arc<[Uid]>,
     /// Joints that could not be held where they stood, although the change moved only what a pose means.
     pub poses: Arc<[PoseNote]>,
+    /// Motion that the clips could not keep, and keys whose nodes are gone: compared with the clips as they were made.
+    pub clips: Arc<ClipReport>,
 }
 
 /// The template of an instance was not taken over; the instance goes on as it was.

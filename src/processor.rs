@@ -49,7 +49,7 @@ pub use exclusion::{Exclusion, SkipReason};
 pub use fit::{Fitting, fitted_rig};
 pub use follow::{FollowParams, TargetParams};
 pub use ik::{Ik, IkSolver, JointAngles};
-pub use keep_clips::{ClipNote, keep_clips};
+pub use keep_clips::{ClipNote, ClipReport, KeptClips, KeysSetAside, RigVersion, clips_between, keep_clips};
 pub use keep_poses::{PoseNote, keep_poses};
 pub use list::{BuildRange, ListEntry};
 pub use mirror::{mirrored_angles, mirrored_direction, mirrored_limits, mirrored_line, opposite};

@@ -76,6 +76,9 @@ pub(super) struct AnimateArgs {
     /// Leave a figure that walks on the spot where it is
     #[arg(long)]
     in_place: bool,
+    /// Put the travel over the ground onto the control that carries the whole rig, for the root motion of a game
+    #[arg(long)]
+    root_motion: bool,
     /// Let standing feet move as they do in the file
     #[arg(long)]
     free_feet: bool,
@@ -226,8 +229,8 @@ fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
         let text = "--map, --map-out and --onto are for a .bvh, .glb, .gltf or .vrm; a clip of a rig knows its nodes";
         return Err(Failure::Usage(text.to_owned()));
     }
-    if motions == 0 && (args.in_place || args.free_feet || args.free_hands) {
-        let text = "--in-place, --free-feet and --free-hands are for a .bvh, .glb, .gltf or .vrm; a clip of a rig moves as its keys say";
+    if motions == 0 && (args.in_place || args.free_feet || args.free_hands || args.root_motion) {
+        let text = "--in-place, --root-motion, --free-feet and --free-hands are for a .bvh, .glb, .gltf or .vrm; a clip of a rig moves as its keys say";
         return Err(Failure::Usage(text.to_owned()));
     }
     if motions == 0 && args.tolerance.is_some() && !is_character {

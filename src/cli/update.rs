@@ -1,5 +1,7 @@
 //! `rigsmith diff` and `rigsmith update`: what differs between versions of a template, and how a rig gets the new one.
 
+mod clips;
+
 use std::{
     path::{Path, PathBuf},
     sync::Arc,
@@ -45,6 +47,10 @@ pub(super) struct UpdateArgs {
     /// Keep the version that is taken over as `OUT.base`, for the next update
     #[arg(long)]
     keep_base: bool,
+    /// Clips of the rig, `.anim.ron`, several times if need be: they are re-expressed, so that the joints move as before, and
+    /// written under their names beside OUT
+    #[arg(long, value_name = "FILE")]
+    clips: Vec<PathBuf>,
     /// Say what would change, and write nothing
     #[arg(long)]
     dry_run: bool,
@@ -77,6 +83,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     let inputs: Vec<&Path> =
         [Some(&args.rig), Some(&args.from), args.base.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
     args.in_place.check(&inputs, args.output.as_deref(), &[])?;
+    let clip_files = clips::outputs(args, &inputs)?;
     let mut report = Report::default();
     let (now, file) = (load(&args.rig, &mut report)?, load(&args.from, &mut report)?);
     let beside = companion(&args.rig);
@@ -106,6 +113,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
         report.line(format!("moves    {note}"));
     }
     report.set("poses", serde_json::to_value(&poses).unwrap_or(Value::Null));
+    let clips = clips::updated(args, (&now, &updated.rig), &clip_files, &mut report)?;
     let conflicts = updated.conflicts();
     report.set("conflicts", conflicts);
     if conflicts > 0 && args.take.is_none() {
@@ -119,6 +127,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     if let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) {
         report.notes(store_rig_over(&RealDisk, output, &updated.rig, &[&args.rig])?);
         report.line(format!("wrote {}", output.display()));
+        clips::store(&clips, &mut report)?;
         if args.keep_base || is_beside {
             let base = companion(output);
             save_atomic(&RealDisk, &base, write_template(&file).as_bytes()).map_err(StoreError::from)?;

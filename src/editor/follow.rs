@@ -174,6 +174,16 @@ fn tell_update(updated: On<RigUpdated>, documents: Query<&OpenDocument>, mut not
         let text = "Some joints do not stand as before in poses; the log lists them";
         notices.write(Notice::warning(text));
     }
+    for line in updated.clips.lines() {
+        notices.write(Notice::warning(line).quiet());
+    }
+    if !updated.clips.notes.is_empty() {
+        notices.write(Notice::warning("Some joints do not move as before in clips; the log lists them"));
+    }
+    if !updated.clips.set_aside.is_empty() {
+        let text = "Keys of nodes that are gone are set aside until the nodes are back; the log lists them";
+        notices.write(Notice::warning(text));
+    }
 }
 
 fn tell_failure(failed: On<RigFailed>, documents: Query<&OpenDocument>, mut notices: MessageWriter<Notice>) {

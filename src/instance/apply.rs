@@ -8,10 +8,12 @@ use rayon::prelude::*;
 use super::{
     BuiltTemplate, ExposedNodes, RigBuilt, RigFailed, RigInstance, RigTemplate, RigTemplates, RigUpdated,
     RunningTemplate, TemplateError, Users,
+    clip_updates::{ClipJobs, ClipOrigin, UpdatedClips},
     exchange::{Exchange, described_otherwise},
 };
 use crate::{
     plugins::{
+        animation::RigClips,
         runtime::{ControlPose, InstanceMode, RigNodes, RigRuntime, furnish_instance, spawn_instance},
         schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer},
     },
@@ -71,6 +73,8 @@ struct DueInstance {
     is_fresh: bool,
     /// True if its template is another version than the one it runs.
     is_other: bool,
+    /// Its clips for that version.
+    clips: Option<UpdatedClips>,
 }
 
 /// An instance that goes on with another program.
@@ -83,7 +87,7 @@ struct Step<'a> {
     kept: Option<KeptPose>,
 }
 
-/// Gives every instance the program of its template: all of them in this frame.
+/// Gives every instance the program of its template: all of them in this frame, but those whose clips are being re-expressed.
 pub(super) fn update_instances(world: &mut World) {
     let mut query = world.query::<(
         Entity,
@@ -92,23 +96,41 @@ pub(super) fn update_instances(world: &mut World) {
         Option<&ExposedNodes>,
         Option<&RunningTemplate>,
         Option<&RigRuntime>,
+        Option<&RigClips>,
+        Option<&ClipOrigin>,
     )>();
     let (mut due, mut failed) = (Vec::new(), Vec::new());
+    let mut jobs = std::mem::take(&mut *world.resource_mut::<ClipJobs>());
+    let mut is_waited_for = false;
     let templates = world.resource::<RigTemplates>();
-    for (entity, instance, mode, exposed, running, runtime) in query.iter(world) {
+    for (entity, instance, mode, exposed, running, runtime, clips, origin) in query.iter(world) {
         let Some(built) = templates.built.get(&instance.0.id()) else { continue };
         let is_fresh = runtime.is_none_or(|runtime| runtime.mode() != *mode);
         let is_other = running.is_none_or(|running| !Arc::ptr_eq(&running.0, built));
+        let mut updated = None;
+        if let (Some(running), Some(RigClips(clips)), true) = (running, clips, is_other) {
+            updated = jobs.updated(&running.0, built, clips, origin, *mode);
+            if updated.is_none() {
+                is_waited_for = true;
+                continue;
+            }
+        }
         let program = program(built, *mode, exposed).unwrap_or_else(|source| {
             failed.push((entity, TemplateError::CannotRun { file: None, source }));
             built.lean.clone()
         });
         let runs_other = runtime.is_none_or(|runtime| !Arc::ptr_eq(runtime.state().program(), &program));
         if is_fresh || is_other || runs_other {
-            due.push(DueInstance { entity, built: built.clone(), program, mode: *mode, is_fresh, is_other });
+            let (built, mode) = (built.clone(), *mode);
+            due.push(DueInstance { entity, built, program, mode, is_fresh, is_other, clips: updated });
         }
     }
-    world.resource_mut::<RigTemplates>().is_fresh = false;
+    jobs.tidy();
+    world.insert_resource(jobs);
+    world.resource_mut::<RigTemplates>().is_fresh = is_waited_for;
+    for due in &due {
+        give_updated_clips(world, due);
+    }
     let (fresh, going): (Vec<DueInstance>, Vec<DueInstance>) = due.into_iter().partition(|due| due.is_fresh);
     for DueInstance { entity, built, program, mode, .. } in &fresh {
         world.entity_mut(*entity).despawn_related::<RigNodes>();
@@ -132,13 +154,26 @@ pub(super) fn update_instances(world: &mut World) {
     for DueInstance { entity, .. } in fresh {
         world.trigger(RigBuilt { entity });
     }
-    for DueInstance { entity, built, .. } in going.into_iter().filter(|due| due.is_other) {
+    for DueInstance { entity, built, clips, .. } in going.into_iter().filter(|due| due.is_other) {
         let deviations = kept.remove(&entity).map(|kept| kept.deviations).unwrap_or_default();
         let poses = deviations.into_iter().map(|deviation| PoseNote { pose: None, deviation }).collect();
-        world.trigger(RigUpdated { entity, changes: built.changes.clone(), ran: built.ran.clone(), poses });
+        let clips = clips.map(|clips| clips.report).unwrap_or_default();
+        world.trigger(RigUpdated { entity, changes: built.changes.clone(), ran: built.ran.clone(), poses, clips });
     }
     for (entity, error) in failed {
         world.trigger(RigFailed { entity, error });
+    }
+}
+
+/// Gives an instance its clips for the version of its template that it goes on with.
+fn give_updated_clips(world: &mut World, due: &DueInstance) {
+    let Some(UpdatedClips { clips, origin, .. }) = &due.clips else { return };
+    let Ok(mut entity) = world.get_entity_mut(due.entity) else { return };
+    if entity.get::<RigClips>().is_none_or(|own| !Arc::ptr_eq(&own.0, clips)) {
+        entity.insert(RigClips(clips.clone()));
+    }
+    if let Some(origin) = origin {
+        entity.insert(origin.clone());
     }
 }
 

@@ -1,14 +1,14 @@
 //! Clips of files on instances.
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use bevy::{
-    asset::{Asset, AssetLoader, LoadContext, io::Reader},
+    asset::{Asset, AssetId, AssetLoader, LoadContext, io::Reader},
     prelude::*,
     reflect::TypePath,
 };
 
-use super::{BuiltTemplate, RunningTemplate};
+use super::{BuiltTemplate, RigInstance, RigTemplate, RunningTemplate, clip_updates::ClipOrigin};
 use crate::{
     plugins::{
         animation::{ClipTargets, RigClips, animation_clip},
@@ -16,7 +16,7 @@ use crate::{
     },
     rig::{
         BuiltRig, Rig, SourceError, Uid,
-        animation::RigClip,
+        animation::{NodeNames, RigClip},
         format::animation::{BoundClips, ReadAnimation, read_animation},
     },
     solve::program::RigProgram,
@@ -83,8 +83,9 @@ impl AssetLoader for RigAnimationLoader {
 }
 
 /// Clips of a file on an instance: once both are there, its [`RigClips`] are those of the file, with the instance's own nodes,
-/// and [`ClipsBound`] tells it; after a change of the file or the template again. An instance with [`ClipTargets`] gets
-/// [`InstanceAnimations`], too. Taken off, it leaves the clips as they are.
+/// and [`ClipsBound`] tells it; after a change of the file or the template again. A changed template does not change the motion: the
+/// clips are re-expressed for it, and those of the file are for the version with which they came. An instance with
+/// [`ClipTargets`] gets [`InstanceAnimations`], too. Taken off, it leaves the clips as they are.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Eq)]
 #[reflect(Component)]
 pub struct InstanceClips(pub Handle<RigAnimation>);
@@ -108,31 +109,96 @@ pub struct ClipsBound {
 #[derive(Component)]
 pub(super) struct ClipSource {
     file: Arc<ReadAnimation>,
+    id: AssetId<RigTemplate>,
     template: Arc<BuiltTemplate>,
     program: Arc<RigProgram>,
     has_animations: bool,
 }
 
+/// Clips on the nodes of a version of a template, which instances share.
+pub(super) struct Binding {
+    /// Clips that went through an earlier version; `None` for those of the file.
+    earlier: Option<Weak<[RigClip]>>,
+    file: Weak<ReadAnimation>,
+    template: Weak<BuiltTemplate>,
+    clips: Weak<[RigClip]>,
+    missing: Vec<Uid>,
+}
+
+impl Binding {
+    fn is_of(
+        &self,
+        file: &Arc<ReadAnimation>,
+        template: &Arc<BuiltTemplate>,
+        earlier: Option<&Arc<[RigClip]>>,
+    ) -> bool {
+        let is_same = match (&self.earlier, earlier) {
+            (Some(known), Some(earlier)) => std::ptr::addr_eq(known.as_ptr(), Arc::as_ptr(earlier)),
+            (None, None) => true,
+            _ => false,
+        };
+        is_same && self.file.as_ptr() == Arc::as_ptr(file) && self.template.as_ptr() == Arc::as_ptr(template)
+    }
+}
+
+/// The clips of a file on a version of a template. Those that an instance has from it already, for an earlier version, go on:
+/// nodes that came back under another uid get the keys that wait for them.
+fn bound(
+    file: &Arc<ReadAnimation>,
+    template: &Arc<BuiltTemplate>,
+    earlier: Option<(&ClipSource, &Arc<[RigClip]>)>,
+    known: &mut Vec<Binding>,
+) -> (Arc<[RigClip]>, Vec<Uid>) {
+    let own = earlier.map(|(_, clips)| clips);
+    let found = known.iter().find(|known| known.is_of(file, template, own));
+    if let Some((clips, missing)) = found.and_then(|known| Some((known.clips.upgrade()?, known.missing.clone()))) {
+        return (clips, missing);
+    }
+    let bound = match earlier {
+        None => file.onto(&template.rig, Some(&template.built)),
+        Some((source, clips)) => {
+            let mut names = file.names.clone();
+            names.extend(&NodeNames::of(&source.template.rig, Some(&source.template.built)));
+            let read = ReadAnimation { clips: clips.to_vec(), names, ..ReadAnimation::default() };
+            read.onto(&template.rig, Some(&template.built))
+        }
+    };
+    let clips = match own.filter(|own| own[..] == bound.clips[..]) {
+        Some(own) => own.clone(),
+        None => bound.clips.into(),
+    };
+    known.push(Binding {
+        earlier: own.map(Arc::downgrade),
+        file: Arc::downgrade(file),
+        template: Arc::downgrade(template),
+        clips: Arc::downgrade(&clips),
+        missing: bound.missing.clone(),
+    });
+    (clips, bound.missing)
+}
+
 /// Gives instances the clips of their files.
 pub(super) fn give_clips(
-    instances: Query<(
+    mut instances: Query<(
         Entity,
-        &InstanceClips,
-        &RunningTemplate,
-        &RigRuntime,
+        (&InstanceClips, &RigInstance, &RunningTemplate, &RigRuntime),
         Has<ClipTargets>,
         Option<&ClipSource>,
+        Option<&RigClips>,
+        Option<&mut ClipOrigin>,
         Option<&InstanceAnimations>,
     )>,
     files: Res<Assets<RigAnimation>>,
     mut animations: Option<ResMut<Assets<AnimationClip>>>,
+    mut bindings: Local<Vec<Binding>>,
     mut commands: Commands,
 ) {
-    for (entity, clips, template, runtime, is_target, source, known) in &instances {
-        let Some(file) = files.get(&clips.0) else { continue };
-        let (template, program) = (template.get(), runtime.state().program());
+    bindings.retain(|known| known.clips.strong_count() > 0);
+    for (entity, (clips, instance, template, runtime), is_target, source, own, origin, known) in &mut instances {
+        let Some(RigAnimation(file)) = files.get(&clips.0) else { continue };
+        let (id, template, program) = (instance.0.id(), template.get(), runtime.state().program());
         let is_same = source.is_some_and(|source| {
-            Arc::ptr_eq(&source.file, &file.0)
+            Arc::ptr_eq(&source.file, file)
                 && Arc::ptr_eq(&source.template, template)
                 && Arc::ptr_eq(&source.program, program)
                 && source.has_animations == is_target
@@ -140,10 +206,12 @@ pub(super) fn give_clips(
         if is_same {
             continue;
         }
-        let bound = file.onto(&template.rig, Some(&template.built));
+        let is_going_on = |source: &&ClipSource| Arc::ptr_eq(&source.file, file) && source.id == id;
+        let earlier = source.filter(is_going_on).zip(own.map(|own| &own.0));
+        let (bound, missing) = bound(file, template, earlier, &mut bindings);
         if let Some(animations) = animations.as_mut().filter(|_| is_target) {
-            let mut handles = Vec::with_capacity(bound.clips.len());
-            for (number, clip) in bound.clips.iter().enumerate() {
+            let mut handles = Vec::with_capacity(bound.len());
+            for (number, clip) in bound.iter().enumerate() {
                 let made = animation_clip(clip, program, runtime.mode());
                 match known.and_then(|known| known.0.get(number)) {
                     Some(handle) => {
@@ -156,13 +224,25 @@ pub(super) fn give_clips(
             }
             commands.entity(entity).try_insert(InstanceAnimations(handles));
         }
+        let is_other = own.is_none_or(|own| !Arc::ptr_eq(&own.0, &bound));
+        if let (Some(mut origin), Some(own)) = (origin, own)
+            && earlier.is_some()
+            && is_other
+            && Arc::ptr_eq(&origin.shown, &own.0)
+        {
+            origin.shown = bound.clone();
+        }
+        if is_other {
+            commands.entity(entity).try_insert(RigClips(bound));
+        }
         let source = ClipSource {
-            file: file.0.clone(),
+            file: file.clone(),
+            id,
             template: template.clone(),
             program: program.clone(),
             has_animations: is_target,
         };
-        commands.entity(entity).try_insert((RigClips(bound.clips.into()), source));
-        commands.trigger(ClipsBound { entity, missing: bound.missing });
+        commands.entity(entity).try_insert(source);
+        commands.trigger(ClipsBound { entity, missing });
     }
 }

@@ -87,6 +87,13 @@ impl NextVersion {
         (self.from.as_ptr() == Arc::as_ptr(from)).then_some(&self.described)
     }
 
+    /// True if it is known that every pose of the version before means the same in this one.
+    pub fn holds_poses(&self, from: &BuiltTemplate, to: &BuiltTemplate) -> bool {
+        [(&from.whole, &to.whole), (&from.lean, &to.lean)].into_iter().any(|(from, to)| {
+            Arc::ptr_eq(from, to) || self.exchange(from, to).is_some_and(|exchange| exchange.keeper.is_none())
+        })
+    }
+
     /// The exchange of two programs, if it is known.
     pub fn exchange(&self, from: &Arc<RigProgram>, to: &Arc<RigProgram>) -> Option<&Arc<Exchange>> {
         self.exchanges.iter().find(|known| known.is_between(from, to))

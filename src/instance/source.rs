@@ -12,7 +12,7 @@ use crate::{
         skinning::BindRequest,
         surface::{RigMesh, RigMeshes},
     },
-    processor::{PoseNote, keep_clips, keep_poses},
+    processor::{ClipReport, PoseNote, keep_clips, keep_poses},
     rig::{
         Rig,
         operations::Operation,
@@ -53,11 +53,18 @@ pub struct RigSource {
     pending: Option<Arc<BuiltTemplate>>,
     /// An update that was made in this frame.
     trial: Option<Arc<BuiltTemplate>>,
-    /// Joints that poses could not hold in the update that was requested.
-    notes: Arc<[PoseNote]>,
+    /// Poses and motion that could not be kept in the update that was requested.
+    notes: UpdateNotes,
     /// True if the build had failed before the update.
     had_failed: bool,
     steps: Vec<AcceptedUpdate>,
+}
+
+/// Poses and motion that an update cannot keep.
+#[derive(Debug, Clone, Default)]
+struct UpdateNotes {
+    poses: Arc<[PoseNote]>,
+    clips: Arc<ClipReport>,
 }
 
 /// Step of an update, with the bases before and after it.
@@ -80,7 +87,7 @@ impl RigSource {
             seen: None,
             pending: None,
             trial: None,
-            notes: Arc::default(),
+            notes: UpdateNotes::default(),
             had_failed: false,
             steps: Vec::new(),
         }
@@ -146,6 +153,8 @@ pub struct UpdateOffer {
     pub changes: Arc<[Difference]>,
     /// Joints that would not stand as before in a pose, although nothing but the meaning of the pose changes.
     pub poses: Arc<[PoseNote]>,
+    /// Motion that the clips could not keep, and keys that would be set aside with their nodes.
+    pub clips: Arc<ClipReport>,
     /// Version that the rig comes from and that of the template, if they say different ones.
     pub version: Option<VersionChange>,
     built: Arc<BuiltTemplate>,
@@ -215,8 +224,9 @@ pub(super) fn try_updates(
                 commands.trigger(RigFailed { entity, error: TemplateError::Load(error.to_string()) });
             }
             None => {
-                let (changes, ran, poses) = (built.changes.clone(), built.ran.clone(), source.notes.clone());
-                commands.trigger(RigUpdated { entity, changes, ran, poses });
+                let (changes, ran) = (built.changes.clone(), built.ran.clone());
+                let UpdateNotes { poses, clips } = source.notes.clone();
+                commands.trigger(RigUpdated { entity, changes, ran, poses, clips });
             }
         }
     }
@@ -248,17 +258,18 @@ pub(super) fn compare_templates(
             source.base = Some(built.rig.clone());
             continue;
         }
-        let (updated, poses) = updated(source.base.as_deref(), rig, &built.rig, &Take::Mine.into(), &modules);
+        let (updated, notes) = updated(source.base.as_deref(), rig, &built.rig, &Take::Mine.into(), &modules);
         if updated.changes.is_empty() {
             source.base = Some(built.rig.clone());
         } else if source.is_live && updated.conflicts() == 0 {
             source.had_failed = had_failed;
-            source.notes = poses;
+            source.notes = notes;
             take_over(entity, rig, updated, built, &mut source, &mut edits, &mut commands);
         } else {
             let from = source.base.as_deref().unwrap_or(rig);
             let version = VersionChange::between(from.about(), built.rig.about());
-            let offer = UpdateOffer { changes: updated.changes.into(), poses, version, built: built.clone() };
+            let (UpdateNotes { poses, clips }, built) = (notes, built.clone());
+            let offer = UpdateOffer { changes: updated.changes.into(), poses, clips, version, built };
             commands.entity(entity).try_insert(offer);
         }
     }
@@ -278,32 +289,31 @@ pub(super) fn accept_offers(
             continue;
         };
         source.had_failed = had_failed;
-        let (updated, poses) = updated(source.base.as_deref(), rig, &offer.built.rig, choices, &modules);
-        source.notes = poses;
+        let (updated, notes) = updated(source.base.as_deref(), rig, &offer.built.rig, choices, &modules);
+        source.notes = notes;
         commands.entity(*entity).try_remove::<UpdateOffer>();
         take_over(*entity, rig, updated, &offer.built, &mut source, &mut edits, &mut commands);
     }
 }
 
-/// An update whose poses mean the same, and what they could not hold.
+/// An update whose poses and clips mean the same, and what they could not keep.
 fn updated(
     base: Option<&Rig>,
     rig: &Rig,
     file: &Rig,
     choices: &Choices,
     modules: &RigModules,
-) -> (Update, Arc<[PoseNote]>) {
+) -> (Update, UpdateNotes) {
     let mut updated = update_with(base, rig, file, choices);
-    let notes = keep_poses(rig, &mut updated.rig, &modules.0).unwrap_or_else(|error| {
+    let poses = keep_poses(rig, &mut updated.rig, &modules.0).unwrap_or_else(|error| {
         warn!("poses were not re-expressed: {error}");
         Vec::new()
     });
-    // Clips are told in the log; the list of poses is for the panel of the update.
-    match keep_clips(rig, &mut updated.rig, &modules.0) {
-        Ok(notes) => notes.iter().for_each(|note| warn!("{note}")),
-        Err(error) => warn!("clips were not re-expressed: {error}"),
-    }
-    (updated, notes.into())
+    let clips = keep_clips(rig, &mut updated.rig, &modules.0).unwrap_or_else(|error| {
+        warn!("clips were not re-expressed: {error}");
+        ClipReport::default()
+    });
+    (updated, UpdateNotes { poses: poses.into(), clips: clips.into() })
 }
 
 /// Requests the edits of an update.

@@ -96,8 +96,9 @@ pub struct MarkerReached {
 /// start of the clip, and the game multiplies the rig's `Transform` by `delta` after each frame.
 ///
 /// Motion of another skeleton that was put onto joints (`MotionTarget::Joints`, `rigsmith animate --onto joints`) has all of its
-/// travel on the hips, which are the node to give. Motion on controls suits only where one control carries all others and has all
-/// of the travel; goals that have keys of their own in the rig's space would stay behind. Bevy's own animation of
+/// travel on the hips, which are the node to give. Motion on controls suits where one control carries all others and has all of the
+/// travel, as with `RetargetSettings::root_motion` and `rigsmith animate --root-motion`; goals that have keys of their own in the
+/// rig's space would stay behind otherwise. Bevy's own animation of
 /// [`animation_clip`] hands no motion over: there the node moves, or a mask leaves it out and the game moves the rig itself, by
 /// the way of the node in [`RigClip::value`](crate::rig::animation::RigClip::value).
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]

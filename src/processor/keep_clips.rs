@@ -1,17 +1,23 @@
-//! Clips of a document that mean the same after an update of it.
+//! Clips that mean the same after an update of their rig.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::Arc,
 };
 
-use super::{Modules, keep_poses::program};
+use super::{Modules, keep_poses::built_program};
 use crate::{
     rig::{
-        EditError, PoseOffset, Rig, RigEdit, Uid,
-        animation::{Ease, Key, LayerMode, Property, RigClip, SampledPose, Track, TrackTarget},
+        BuiltRig, EditError, PoseOffset, Rig, RigEdit, Uid,
+        animation::{
+            Ease, Key, LayerMode, NodeNames, OrphanedKeys, Property, RigClip, SampledPose, Track, TrackTarget,
+            keys_set_aside,
+        },
     },
-    solve::keep_pose::{Deviation, PoseKeeper},
+    solve::{
+        keep_pose::{Deviation, PoseKeeper},
+        program::RigProgram,
+    },
 };
 
 /// Rounds in which frames between keys get keys where the joints would leave their paths.
@@ -47,35 +53,112 @@ impl std::fmt::Display for ClipNote {
     }
 }
 
-/// Re-expresses the clips of `after` that are those of `before`, so that the joints move as they did: at every key, and at the
-/// frames between keys, which get keys where they are needed. Returns what could not be held.
+/// Keys that wait in a clip for a node which an update took away.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct KeysSetAside {
+    /// Name of the clip.
+    pub clip_name: String,
+    /// The node, the number of its keys, and the node that may take them.
+    #[serde(flatten)]
+    pub keys: OrphanedKeys,
+}
+
+impl std::fmt::Display for KeysSetAside {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let OrphanedKeys { node, name, keys, .. } = &self.keys;
+        let label = if name.label.is_empty() { node.to_string() } else { name.label.clone() };
+        let (of, are) = if *keys == 1 { ("key", "is") } else { ("keys", "are") };
+        write!(f, "clip \"{}\": {keys} {of} of {label} {are} set aside until the node is back", self.clip_name)
+    }
+}
+
+/// Motion that clips could not keep through an update of their rig.
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
+pub struct ClipReport {
+    /// Joints that do not move as before.
+    pub notes: Vec<ClipNote>,
+    /// Keys of nodes that are gone. They stay in their clips.
+    pub set_aside: Vec<KeysSetAside>,
+}
+
+impl ClipReport {
+    /// True if all joints move as before and all nodes with keys are there.
+    pub fn is_empty(&self) -> bool {
+        self.notes.is_empty() && self.set_aside.is_empty()
+    }
+
+    /// Sentences about joints, and then about keys.
+    pub fn lines(&self) -> Vec<String> {
+        let joints = self.notes.iter().map(ToString::to_string);
+        joints.chain(self.set_aside.iter().map(ToString::to_string)).collect()
+    }
+}
+
+/// Version of a rig, with what its commands build and a program of that.
+#[derive(Debug, Clone, Copy)]
+pub struct RigVersion<'a> {
+    /// The document.
+    pub rig: &'a Rig,
+    /// Nodes and constraints.
+    pub built: &'a BuiltRig,
+    /// Program with all nodes, or with controls exposed: nodes that it cannot pose get no keys.
+    pub program: &'a Arc<RigProgram>,
+}
+
+/// Clips that went through an update of their rig.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct KeptClips {
+    /// The clips, in the order in which they were given.
+    pub clips: Vec<RigClip>,
+    /// Motion that they could not keep.
+    pub report: ClipReport,
+}
+
+/// Re-expresses clips of one version of a rig for another one, so that the joints move as they did: at every key, and at the
+/// frames between keys, which get keys where they are needed. Keys of nodes that are gone stay in the clips and are listed.
 ///
-/// Clips stay as they are where nothing moved what they mean, or where one of the two rigs cannot be built. Builds both rigs
-/// if there are clips; a clip whose poses mean something else takes some milliseconds for each key and frame.
+/// Clips stay as they are where nothing moved what they mean; others take some milliseconds for each key and frame.
+pub fn clips_between(clips: &[RigClip], from: RigVersion<'_>, to: RigVersion<'_>) -> KeptClips {
+    let keeper = PoseKeeper::between(from.program, to.program);
+    let (was, is) = (NodeNames::of(from.rig, Some(from.built)), NodeNames::of(to.rig, Some(to.built)));
+    let mut done = KeptClips::default();
+    for clip in clips {
+        let is_moved = !keeper.is_idle() && clip.key_count() > 0;
+        let next = if is_moved { kept(clip, &keeper, &mut done.report.notes) } else { clip.clone() };
+        let gone = keys_set_aside(&next, &was, &is);
+        let named = gone.into_iter().map(|keys| KeysSetAside { clip_name: clip.name.clone(), keys });
+        done.report.set_aside.extend(named);
+        done.clips.push(next);
+    }
+    done
+}
+
+/// Re-expresses the clips of `after` that are those of `before`: see [`clips_between`]. Returns what they could not keep.
+///
+/// Clips stay as they are where one of the two rigs cannot be built. Builds both rigs if there are clips.
 ///
 /// # Errors
 /// If a clip is refused, which a valid rig's is not.
-pub fn keep_clips(before: &Rig, after: &mut Rig, modules: &Arc<Modules>) -> Result<Vec<ClipNote>, EditError> {
+pub fn keep_clips(before: &Rig, after: &mut Rig, modules: &Arc<Modules>) -> Result<ClipReport, EditError> {
     let is_kept = |clip: &&RigClip| before.clip(clip.uid) == Some(clip) && clip.key_count() > 0;
     let clips: Vec<RigClip> = after.clips().iter().filter(is_kept).cloned().collect();
     if clips.is_empty() {
-        return Ok(Vec::new());
+        return Ok(ClipReport::default());
     }
-    let (Some(from), Some(to)) = (program(before, modules), program(after, modules)) else { return Ok(Vec::new()) };
-    let keeper = PoseKeeper::between(&from, &to);
-    let mut notes = Vec::new();
-    if keeper.is_idle() {
-        return Ok(notes);
-    }
-    for clip in clips {
-        let kept = kept(&clip, &keeper, &mut notes);
+    let (Some(from), Some(to)) = (built_program(before, modules), built_program(after, modules)) else {
+        return Ok(ClipReport::default());
+    };
+    let from = RigVersion { rig: before, built: &from.0, program: &from.1 };
+    let KeptClips { clips: kept, report } =
+        clips_between(&clips, from, RigVersion { rig: after, built: &to.0, program: &to.1 });
+    for (clip, kept) in clips.into_iter().zip(kept) {
         if kept != clip {
             let index = after.clips().iter().position(|own| own.uid == clip.uid).unwrap_or(usize::MAX);
             after.apply(&RigEdit::RemoveClip(clip.uid))?;
             after.apply(&RigEdit::AddClip(Box::new(kept), index))?;
         }
     }
-    Ok(notes)
+    Ok(report)
 }
 
 type Offsets = BTreeMap<Uid, PoseOffset>;

@@ -98,7 +98,13 @@ fn is_part(pose: &Offsets, of: &Offsets) -> bool {
     pose.iter().all(|(node, offset)| of.get(node) == Some(offset))
 }
 
-pub(super) fn program(rig: &Rig, modules: &Arc<Modules>) -> Option<Arc<RigProgram>> {
-    let built: BuiltRig = Builder::build(rig, modules).ok()?;
-    RigProgram::compile(&built, &CompileOptions::default()).ok().map(Arc::new)
+fn program(rig: &Rig, modules: &Arc<Modules>) -> Option<Arc<RigProgram>> {
+    built_program(rig, modules).map(|(_, program)| program)
+}
+
+/// A rig as its commands build it, and the program with all of its nodes.
+pub(super) fn built_program(rig: &Rig, modules: &Arc<Modules>) -> Option<(BuiltRig, Arc<RigProgram>)> {
+    let built = Builder::build(rig, modules).ok()?;
+    let program = RigProgram::compile(&built, &CompileOptions::default()).ok()?;
+    Some((built, Arc::new(program)))
 }

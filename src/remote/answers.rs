@@ -170,8 +170,8 @@ fn update_answer(
     accepted: &mut MessageWriter<AcceptUpdate>,
 ) -> Option<Answer> {
     let AwaitedEvent::Update { rig, template, before, is_known, take, changes } = awaited else { return None };
-    let told = |changes: &[Change], ran: Value, poses: Vec<String>| {
-        Some(Ok(json!({"changes": changes, "ran": ran, "poses": poses})))
+    let told = |changes: &[Change], ran: Value, poses: Vec<String>, clips: Vec<String>| {
+        Some(Ok(json!({"changes": changes, "ran": ran, "poses": poses, "clips": clips})))
     };
     for sign in signs.iter().filter(|sign| sign.rig() == *rig) {
         match sign {
@@ -179,7 +179,7 @@ fn update_answer(
             Sign::Updated(updated) => {
                 let poses = updated.poses.iter().map(ToString::to_string).collect();
                 let changes = changes.as_ref().unwrap_or(&updated.changes);
-                return told(changes, json!(*updated.ran), poses);
+                return told(changes, json!(*updated.ran), poses, updated.clips.lines());
             }
             Sign::Built(_) => {}
         }
@@ -197,7 +197,7 @@ fn update_answer(
             None
         }
         Some(_) => None,
-        None if source.is_settled() => told(changes.as_deref().unwrap_or_default(), json!([]), Vec::new()),
+        None if source.is_settled() => told(changes.as_deref().unwrap_or_default(), json!([]), Vec::new(), Vec::new()),
         None => None,
     }
 }

@@ -126,6 +126,7 @@ impl Verb {
                 "changes": list("kind, uid, joint, tag, field, from, to, conflict"),
                 "ran": list("tags of the commands that ran"),
                 "poses": list("joints that do not stand as before, a sentence each"),
+                "clips": list("joints that do not move as before, and keys that are set aside, a sentence each"),
             })),
         }
     }

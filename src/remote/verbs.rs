@@ -375,13 +375,13 @@ fn renew(world: &mut World, params: UpdateParams) -> Result<StartedCall, CallErr
     let file = read.map_err(|source| TemplateError::Source { file: Some(path), source })?;
     if params.dry_run {
         let updated = update(source.base().map(|base| &**base), &rig, file.rig(), take);
-        return Ok(StartedCall::Answered(json!({"changes": updated.changes, "ran": [], "poses": []})));
+        return Ok(StartedCall::Answered(json!({"changes": updated.changes, "ran": [], "poses": [], "clips": []})));
     }
     let template = source.template.clone();
     let before = world.resource::<RigTemplates>().built(&template).cloned();
     let is_known = before.as_ref().is_some_and(|before| before.is_of(file.rig()));
     if is_known && world.get::<UpdateOffer>(entity).is_none() {
-        return Ok(StartedCall::Answered(json!({"changes": [], "ran": [], "poses": []})));
+        return Ok(StartedCall::Answered(json!({"changes": [], "ran": [], "poses": [], "clips": []})));
     }
     if !is_known {
         let offered = template.clone();

@@ -34,7 +34,7 @@ use super::{
     reduction::CurveKind,
 };
 use crate::rig::{
-    BuiltRig, Rig,
+    BuiltRig, Rig, Uid,
     animation::{RigClip, joint_map::JointMap, motion::Motion},
     operations::KeyTolerance,
 };
@@ -60,6 +60,9 @@ pub struct RetargetSettings {
     pub onto: MotionTarget,
     /// True to let a figure travel that walks on the spot.
     pub travel: bool,
+    /// True to put the travel over the ground onto the control that carries the whole figure, so that a game can take it over as
+    /// root motion. Without effect on joints, where the hips have it.
+    pub root_motion: bool,
     /// True to hold standing feet in their places.
     pub lock_feet: bool,
     /// True to hold hands where they touch something.
@@ -79,6 +82,7 @@ impl Default for RetargetSettings {
             looped: false,
             onto: MotionTarget::Controls,
             travel: true,
+            root_motion: false,
             lock_feet: true,
             lock_hands: true,
             tolerance: KeyTolerance::captured(),
@@ -101,6 +105,8 @@ pub struct RetargetedMotion {
     pub touches: Vec<Touch>,
     /// Labels of mapped joints that no control moves.
     pub unmoved: Vec<String>,
+    /// Control that has the travel over the ground, if that was wanted and there is one.
+    pub root: Option<Uid>,
     /// Remarks, a sentence each.
     pub notes: Vec<String>,
 }
@@ -169,13 +175,18 @@ pub fn retarget(
     clip.markers.clone_from(&motion.markers);
     let program = std::sync::Arc::new(RigProgram::compile(built, &CompileOptions::default())?);
     let (keyed, unmoved) = match settings.onto {
-        MotionTarget::Controls => controls::keyed(built, &program, &body, &poses, touches.hands())?,
+        MotionTarget::Controls => {
+            controls::keyed(built, &program, &body, &poses, touches.hands(), settings.root_motion)?
+        }
         MotionTarget::Joints => (joints::keyed(&body, &poses), Vec::new()),
     };
+    if settings.root_motion && settings.onto == MotionTarget::Controls && keyed.root.is_none() {
+        notes.push("no control carries the whole figure; the travel stays where it is without root motion".to_owned());
+    }
     let tolerance = settings.tolerance.for_height(target.height);
     let keys = tracks::fill(&mut clip, &keyed, &times, &program, &tolerance, settings.curves);
     let (stances, touches) = (contacts.stances(&body, &times), touches.list(&times));
-    Ok(RetargetedMotion { clip, keys, stances, touches, unmoved, notes })
+    Ok(RetargetedMotion { clip, keys, stances, touches, unmoved, root: keyed.root, notes })
 }
 
 /// Frame rate of a motion, divided until it is at most 60.

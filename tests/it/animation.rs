@@ -1,8 +1,9 @@
 //! Clips: edits with exact inverses, what animators do with keys, files, playback, and motion that survives changes.
 
 mod app;
+mod captured;
 mod files;
-mod keep;
+pub mod keep;
 mod keys;
 mod random;
 mod sampler;

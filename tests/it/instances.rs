@@ -2,6 +2,7 @@
 
 mod clips;
 mod file_clips;
+mod kept_clips;
 mod meshes;
 mod reloads;
 mod work;

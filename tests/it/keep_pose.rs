@@ -222,18 +222,88 @@ impl CharacterUids {
     }
 }
 
+/// Renames a joint and a control, moves a joint to a group of its own, and makes a control larger.
+pub fn rename_and_regroup(rig: &mut Rig) {
+    let (arm, hand) = (rig.find_label("forearm_l").unwrap(), rig.find_label("hand_l").unwrap());
+    let known = CharacterUids::of(rig);
+    apply(rig, RigEdit::SetLabel(arm, Some("lower_arm_l".into())));
+    set_params(rig, known.arm_fk, |params| params.replace("arm_fk_l", "forward_l"));
+    let group = GroupData { uid: Uid(4711), name: "other".into(), ..rig.groups()[0].clone() };
+    apply(rig, RigEdit::AddLocalGroup(group, usize::MAX));
+    apply(rig, RigEdit::SetGroup(hand, Some(Uid(4711))));
+    set_params(rig, known.hand_ik, |params| params.replace("relative_size: 0.5", "relative_size: 0.7"));
+}
+
+/// Hangs the control of the spine on that of the hips.
+pub fn hang_spine_on_hips(rig: &mut Rig) {
+    let known = CharacterUids::of(rig);
+    set_params(rig, known.spine_fk, |params| params.replace(&known.torso.to_string(), &known.hips.to_string()));
+}
+
+/// Hangs a clavicle on another joint of the spine.
+pub fn hang_clavicle_lower(rig: &mut Rig) {
+    let [clavicle, spine] = ["clavicle_l", "spine_1"].map(|label| rig.find_label(label).unwrap());
+    reparent(rig, clavicle, spine);
+}
+
+/// Turns the axes of joints in spine, limbs and head by half a turn.
+pub fn flip_axes(rig: &mut Rig) {
+    for label in ["spine_1", "forearm_l", "hand_r", "index_02_l", "head", "shin_l"] {
+        flip(rig, label, Quat::from_euler(EulerRot::XYZ, 0.0, std::f32::consts::PI, 0.0));
+    }
+}
+
+/// Gives the spine, which the torso moved with the hips, a control of its own.
+pub fn split_torso(rig: &mut Rig) {
+    let spine = rig.find_label("spine").unwrap();
+    let known = CharacterUids::of(rig);
+    let root = format!("@command control/hips#{} role:control", known.root);
+    let kind = TagKind::Command {
+        module: "control".into(),
+        params: format!("(parent: \"{root}\", follow: false, creation: (name: \"upper_body\"))"),
+        feature: None,
+    };
+    let upper = TagData { uid: Uid(0x1234), enabled: true, comment: String::new(), kind };
+    apply(rig, RigEdit::AddTag { joint: spine, tag: Box::new(upper), index: 0 });
+    set_params(rig, known.spine_fk, |params| params.replace(&known.torso.to_string(), "0000000000001234"));
+}
+
+/// Inserts a joint with a control between neck and head.
+pub fn insert_neck_joint(rig: &mut Rig) {
+    let [neck, head] = ["neck", "head"].map(|label| rig.find_label(label).unwrap());
+    let mut middle = JointData { uid: Uid(0x77), label: Some("neck_1".into()), ..JointData::default() };
+    middle.rest.translation = rig.joint(head).unwrap().data.rest.translation / 2.0;
+    let control = TagData {
+        uid: Uid(0x78),
+        enabled: true,
+        comment: String::new(),
+        kind: TagKind::Command { module: "control".into(), params: "()".into(), feature: None },
+    };
+    middle.tags.push(control);
+    apply(rig, RigEdit::AddJoint { joint: Box::new(middle), parent: Some(neck), index: usize::MAX });
+    reparent(rig, head, Uid(0x77));
+}
+
+/// The biped before its left elbow got a pole.
+pub fn without_pole() -> Rig {
+    let mut rig = biped();
+    let known = CharacterUids::of(&rig);
+    for tag in [known.pole_spaces, known.pole, known.elbow] {
+        remove_tag(&mut rig, tag);
+    }
+    set_params(&mut rig, known.arm_switch, |params| {
+        let start = params.find("pole: ").unwrap();
+        let end = start + params[start..].find("\",").unwrap() + 2;
+        format!("{}{}", &params[..start], &params[end..])
+    });
+    rig
+}
+
 #[test]
 fn names_groups_and_values_leave_poses_alone() {
     let before = posed(biped());
     let mut after = before.clone();
-    let (arm, hand) = (after.find_label("forearm_l").unwrap(), after.find_label("hand_l").unwrap());
-    apply(&mut after, RigEdit::SetLabel(arm, Some("lower_arm_l".into())));
-    let known = CharacterUids::of(&before);
-    set_params(&mut after, known.arm_fk, |params| params.replace("arm_fk_l", "forward_l"));
-    let group = GroupData { uid: Uid(4711), name: "other".into(), ..after.groups()[0].clone() };
-    apply(&mut after, RigEdit::AddLocalGroup(group, usize::MAX));
-    apply(&mut after, RigEdit::SetGroup(hand, Some(Uid(4711))));
-    set_params(&mut after, known.hand_ik, |params| params.replace("relative_size: 0.5", "relative_size: 0.7"));
+    rename_and_regroup(&mut after);
     let mut kept = after.clone();
     assert!(keep_poses(&before, &mut kept, &Arc::new(modules::all())).unwrap().is_empty());
     assert_eq!(kept, after);
@@ -245,12 +315,10 @@ fn names_groups_and_values_leave_poses_alone() {
 fn controls_below_another_parent_hold_the_joints() {
     let before = posed(biped());
     let mut after = before.clone();
-    let known = CharacterUids::of(&before);
-    set_params(&mut after, known.spine_fk, |params| params.replace(&known.torso.to_string(), &known.hips.to_string()));
+    hang_spine_on_hips(&mut after);
     check("a spine below the hips", &before, &after).is_held(0);
     let mut after = before.clone();
-    let [clavicle, spine] = ["clavicle_l", "spine_1"].map(|label| after.find_label(label).unwrap());
-    reparent(&mut after, clavicle, spine);
+    hang_clavicle_lower(&mut after);
     check("a clavicle below another joint", &before, &after).is_held(0);
 }
 
@@ -258,9 +326,7 @@ fn controls_below_another_parent_hold_the_joints() {
 fn flipped_axes_hold_the_joints() {
     let before = posed(biped());
     let mut after = before.clone();
-    for label in ["spine_1", "forearm_l", "hand_r", "index_02_l", "head", "shin_l"] {
-        flip(&mut after, label, Quat::from_euler(EulerRot::XYZ, 0.0, std::f32::consts::PI, 0.0));
-    }
+    flip_axes(&mut after);
     check("flipped axes", &before, &after).is_held(6);
     let mut after = before.clone();
     flip(&mut after, "clavicle_r", Quat::from_euler(EulerRot::XYZ, 0.4, -1.2, 0.8));
@@ -272,18 +338,7 @@ fn flipped_axes_hold_the_joints() {
 fn a_control_that_is_split_holds_the_joints() {
     let before = posed(biped());
     let mut after = before.clone();
-    let spine = after.find_label("spine").unwrap();
-    // The torso moved hips and spine; now the spine has a control of its own.
-    let known = CharacterUids::of(&before);
-    let root = format!("@command control/hips#{} role:control", known.root);
-    let kind = TagKind::Command {
-        module: "control".into(),
-        params: format!("(parent: \"{root}\", follow: false, creation: (name: \"upper_body\"))"),
-        feature: None,
-    };
-    let upper = TagData { uid: Uid(0x1234), enabled: true, comment: String::new(), kind };
-    apply(&mut after, RigEdit::AddTag { joint: spine, tag: Box::new(upper), index: 0 });
-    set_params(&mut after, known.spine_fk, |params| params.replace(&known.torso.to_string(), "0000000000001234"));
+    split_torso(&mut after);
     check("a control in two", &before, &after).is_held(2);
 }
 
@@ -291,37 +346,14 @@ fn a_control_that_is_split_holds_the_joints() {
 fn an_inserted_joint_holds_the_others() {
     let before = posed(biped());
     let mut after = before.clone();
-    let [neck, head] = ["neck", "head"].map(|label| after.find_label(label).unwrap());
-    let middle = JointData { uid: Uid(0x77), label: Some("neck_1".into()), ..JointData::default() };
-    let half = after.joint(head).unwrap().data.rest.translation / 2.0;
-    let control = TagData {
-        uid: Uid(0x78),
-        enabled: true,
-        comment: String::new(),
-        kind: TagKind::Command { module: "control".into(), params: "()".into(), feature: None },
-    };
-    let mut middle = middle;
-    middle.rest.translation = half;
-    middle.tags.push(control);
-    apply(&mut after, RigEdit::AddJoint { joint: Box::new(middle), parent: Some(neck), index: usize::MAX });
-    reparent(&mut after, head, Uid(0x77));
+    insert_neck_joint(&mut after);
     let found = check("a joint in the neck", &before, &after);
     assert_eq!(found.off, 0);
 }
 
 #[test]
 fn an_added_pole_holds_the_limb() {
-    let mut before = biped();
-    let known = CharacterUids::of(&before);
-    for tag in [known.pole_spaces, known.pole, known.elbow] {
-        remove_tag(&mut before, tag);
-    }
-    set_params(&mut before, known.arm_switch, |params| {
-        let start = params.find("pole: ").unwrap();
-        let end = start + params[start..].find("\",").unwrap() + 2;
-        format!("{}{}", &params[..start], &params[end..])
-    });
-    let before = posed(before);
+    let before = posed(without_pole());
     let mut after = biped();
     for pose in before.stored_poses() {
         apply(&mut after, RigEdit::AddStoredPose(Box::new(pose.clone()), usize::MAX));

@@ -34,6 +34,8 @@ mod cli_site;
 mod cli_streams;
 #[cfg(feature = "cli")]
 mod cli_templates;
+#[cfg(feature = "cli")]
+mod cli_update_clips;
 mod clip_files;
 mod commands;
 mod control_sizes;

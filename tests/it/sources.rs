@@ -23,7 +23,13 @@ use rigsmith::{
         surface::{RigMesh, SkinOf},
     },
     prelude::*,
-    rig::{AttributeValues, PoseOffset, RigJoint, template::write_template, update::Take},
+    rig::{
+        AttributeValues, PoseOffset, RigJoint,
+        animation::{Key, Property, RigClip, TrackTarget},
+        operations::{ClipOperation, KeyOperation},
+        template::write_template,
+        update::Take,
+    },
     test_app::strict_app,
 };
 
@@ -414,6 +420,28 @@ impl Studio {
     }
 }
 
+/// The clip of the long life, and its layer.
+const CLIP: Uid = Uid(0xC11B_0001);
+const LAYER: Uid = Uid(0xC11B_0002);
+
+/// Checks that a reload has left all keys of the clip: those of nodes that are gone, too. Where nothing changed what they mean and all
+/// of their nodes are there, they are as they were.
+fn check_keys(studio: &Studio, before: Option<&RigClip>, is_same: bool, step: usize) {
+    let (Some(before), Some(after)) = (before, studio.rig().clip(CLIP)) else {
+        assert!(before.is_none(), "step {step}: the clip is gone");
+        return;
+    };
+    for (target, track) in &before.layers[0].tracks {
+        let now = after.layers[0].tracks.get(target).unwrap_or_else(|| panic!("step {step}: {target:?} has no keys"));
+        for key in &track.keys {
+            assert!(now.keys.iter().any(|now| now.time == key.time), "step {step}: {target:?} at {} s", key.time);
+        }
+    }
+    if is_same && before.nodes().into_iter().all(|node| studio.is_built(node)) {
+        assert_eq!(after, before, "step {step}");
+    }
+}
+
 /// Joints that an update could not hold.
 #[derive(Resource, Default)]
 struct ListedJoints(HashSet<Uid>);
@@ -441,9 +469,15 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
         listed.0 = updated.poses.iter().map(|note| note.deviation.joint).collect();
     });
     let first = write_template(studio.rig());
+    let mut keys = 0;
     let (mut done, mut is_mixed, mut reloads, mut offers, mut held) = (0usize, false, 0, 0, 0);
     let (mut version, mut parts) = (0, 0);
     for step in 0..steps {
+        // An undo may have taken it away.
+        if studio.rig().clip(CLIP).is_none() {
+            let clip = RigClip { range: [0.0, 1.0], ..RigClip::new(CLIP, LAYER, "sway") };
+            studio.edit(RigEdit::AddClip(Box::new(clip), 0));
+        }
         let controls: Vec<Uid> = {
             let built = &studio.app.world().get::<BuildResult>(studio.rig).unwrap().0;
             built.nodes.iter().filter(|node| node.control.is_some()).map(|node| node.uid).collect()
@@ -453,6 +487,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
         let joint = labels[dice.below(labels.len() as u64) as usize];
         let share = dice.below(1000) as f32 / 1000.0;
         let before = studio.posed_state();
+        let clip_before = studio.rig().clip(CLIP).cloned();
         let edit = match dice.below(10) {
             0..=2 => {
                 let turned = PoseOffset::from_rotation(Quat::from_rotation_z(share - 0.5));
@@ -460,7 +495,14 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
             }
             3 => Some(Operation::Edits(vec![RigEdit::SetAttributeValue(control, "amount".into(), Some(share))])),
             4 => Some(Operation::Edits(vec![RigEdit::SetLabel(joint, Some(format!("mine_{step}")))])),
-            5 => Some(Operation::Edits(vec![RigEdit::SetLocked(joint, share > 0.5)])),
+            5 if share < 0.3 => Some(Operation::Edits(vec![RigEdit::SetLocked(joint, share > 0.15)])),
+            5 => {
+                let target = TrackTarget { node: control, property: Property::Rotation };
+                let key = Key::rotation((step % 5) as f32 * 0.25, Quat::from_rotation_z(share - 0.5));
+                let change = KeyOperation::Set(vec![(target, vec![key])]);
+                keys += 1;
+                Some(Operation::Clips(ClipOperation::Keys { clip: CLIP, layer: LAYER, change }))
+            }
             6 => {
                 let change = if share < 0.7 && done > 0 { Change::Undo } else { Change::Redo };
                 studio.request(change);
@@ -508,6 +550,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                 for (node, values) in before.values.iter().filter(|(node, _)| studio.is_built(**node)) {
                     assert_eq!(after.values.get(node), Some(values), "step {step}");
                 }
+                check_keys(&studio, clip_before.as_ref(), !means_other && !is_mixed, step);
                 let listed = &studio.app.world().resource::<ListedJoints>().0;
                 if !means_other && !is_mixed {
                     for (node, offset) in before.pose.iter().filter(|(node, _)| studio.is_built(**node)) {
@@ -535,10 +578,13 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
         }
     }
     assert!(reloads > steps / 10 && parts > steps / 40, "{reloads} reloads, {parts} of them of the part");
-    println!("{steps} steps, {reloads} reloads, {parts} of the part, {offers} offered, {held} joints held");
-    assert!(held > steps / 10, "{held}");
+    println!(
+        "{steps} steps, {reloads} reloads, {parts} of the part, {offers} offered, {held} joints held, {keys} keys"
+    );
+    assert!(held > steps / 10 && keys > steps / 40, "{held} {keys}");
     for _ in 0..steps * 2 {
         studio.request(Change::Undo);
     }
     assert_eq!(write_template(studio.rig()), first);
+    assert!(studio.rig().clips().is_empty());
 }

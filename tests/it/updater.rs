@@ -3,6 +3,7 @@
 use std::{
     fs,
     path::PathBuf,
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -21,11 +22,14 @@ use rigsmith::{
     files::SearchPaths,
     headless::headless_app,
     instance::{RigSource, UpdateOffer},
+    modules,
     plugins::document::Change,
     prelude::*,
+    processor::Builder,
     rig::{
         PoseOffset, RestTransform, RigEdit, Uid,
-        operations::ClipOperation,
+        animation::{Key, Property, TrackTarget},
+        operations::{ClipOperation, KeyOperation},
         template::{read_template, write_template},
         update::{Choices, Take, update_with},
     },
@@ -268,6 +272,36 @@ fn each_conflict_has_a_choice_of_its_own_and_keys_and_poses_stay() {
     let mut choices = Choices::from(Take::Mine);
     choices.others.insert((studio.joint("b"), Some("translation".to_owned())));
     assert_eq!(write_template(&update_with(Some(&base), &before, &file, &choices).rig), studio.text());
+}
+
+#[test]
+fn keys_of_a_control_that_is_gone_are_told_before_and_after() {
+    let mut studio = Studio::new();
+    let built = Builder::build(studio.desk.rig(), &Arc::new(modules::all())).unwrap();
+    let control = built.nodes.iter().find(|node| node.control.is_some()).unwrap().uid;
+    let create = ClipOperation::Create { name: "wave".to_owned(), frame_rate: 24.0, range: [0.0, 1.0] };
+    studio.desk.edit(Operation::Clips(create));
+    let (clip, layer) = {
+        let clip = &studio.desk.rig().clips()[0];
+        (clip.uid, clip.layers[0].uid)
+    };
+    let target = TrackTarget { node: control, property: Property::Rotation };
+    let keys = vec![Key::rotation(0.0, Quat::IDENTITY), Key::rotation(1.0, Quat::from_rotation_z(1.0))];
+    let change = KeyOperation::Set(vec![(target.clone(), keys.clone())]);
+    studio.desk.edit(Operation::Clips(ClipOperation::Keys { clip, layer, change }));
+    studio.save(&CHAIN.replace(", tags: [control(size: 0.5)]", ""));
+    let offer = studio.desk.app.world().get::<UpdateOffer>(studio.desk.rig).unwrap().clips.clone();
+    let [aside] = &offer.set_aside[..] else { panic!("{offer:?}") };
+    assert_eq!((aside.keys.node, aside.keys.keys), (control, 2));
+    let line = aside.to_string();
+    assert!(studio.desk.says(&line), "{line} is not among {:?}", studio.desk.seen);
+    studio.desk.click("Take over");
+    studio.desk.until("the update", |desk| desk.rig().walk().all(|joint| joint.data.tags.is_empty()));
+    studio.settle();
+    let told = studio.desk.told();
+    assert!(told.contains(&line), "{told:?}");
+    assert!(told.iter().any(|told| told.contains("set aside") && told.contains("the log lists them")), "{told:?}");
+    assert_eq!(studio.desk.rig().clip(clip).unwrap().layers[0].tracks[&target].keys, keys);
 }
 
 #[test]

@@ -169,6 +169,7 @@ impl Taking<'_> {
             (args.in_place, "--in-place"),
             (args.free_feet, "--free-feet"),
             (args.free_hands, "--free-hands"),
+            (args.root_motion, "--root-motion"),
             (args.tolerance.is_some() && !is_character && !is_baked, "--tolerance"),
         ];
         let unused: Vec<&str> = options.iter().filter(|(is_given, _)| *is_given).map(|(_, name)| *name).collect();
@@ -292,6 +293,7 @@ impl Taking<'_> {
             looped: args.looped,
             onto,
             travel: !args.in_place,
+            root_motion: args.root_motion,
             lock_feet: !args.free_feet,
             lock_hands: !args.free_hands,
             tolerance: KeyTolerance::captured().scaled(args.tolerance.map_or(1.0, |most| most / 0.5)),
@@ -300,8 +302,13 @@ impl Taking<'_> {
         };
         let built = bench.built().ok_or(PoseError::NotBuilt)?;
         let done = spinning("retargeting", || retarget(bench.rig(), built, motion, &map, &settings))?;
-        let RetargetedMotion { clip, keys, stances, touches, unmoved, notes } = done;
+        let RetargetedMotion { clip, keys, stances, touches, unmoved, root, notes } = done;
         report.notes(notes);
+        if let Some(root) = root {
+            let name = built.node(root).map_or_else(|| root.to_string(), |node| node.name.to_string());
+            report.line(format!("the travel is on {name}, for root motion"));
+            entry.insert("root".to_owned(), json!({"node": root, "name": name}));
+        }
         if keys[1] == 0 {
             let name = &clip.name;
             report

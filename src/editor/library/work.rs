@@ -267,7 +267,7 @@ impl Snapshot {
         let mut updated = update(Some(&base), now, &template.rig, Take::Theirs);
         let mut notes = template.notes;
         notes.extend(keep_poses(now, &mut updated.rig, &self.modules)?.iter().map(ToString::to_string));
-        notes.extend(keep_clips(now, &mut updated.rig, &self.modules)?.iter().map(ToString::to_string));
+        notes.extend(keep_clips(now, &mut updated.rig, &self.modules)?.lines());
         let mut edits = edits_between(now, &updated.rig)?;
         edits.extend(pose_edits(now, &updated.rig));
         edits.extend(clip_edits(now, &updated.rig)?);

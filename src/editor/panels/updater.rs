@@ -27,6 +27,8 @@ pub struct UpdaterPanel {
     choices: Option<Choices>,
     /// Changes in the order of the list: conflicts first.
     order: Vec<usize>,
+    /// Poses and motion that the update cannot keep.
+    notes: Vec<String>,
 }
 
 impl EditorPanel for UpdaterPanel {
@@ -104,6 +106,7 @@ impl UpdaterPanel {
         let (conflicts, others): (Vec<usize>, Vec<usize>) =
             (0..offer.changes.len()).partition(|number| offer.changes[*number].conflict);
         self.order = conflicts.into_iter().chain(others).collect();
+        self.notes = offer.poses.iter().map(ToString::to_string).chain(offer.clips.lines()).collect();
     }
 
     fn buttons(&mut self, ui: &mut Ui, offer: &UpdateOffer, requests: &mut Requests) {
@@ -134,10 +137,10 @@ impl UpdaterPanel {
     fn rows(&mut self, ui: &mut Ui, offer: &UpdateOffer) {
         let Some(choices) = &mut self.choices else { return };
         let line = list::row_height(ui);
-        let notes = offer.poses.len();
+        let notes = &self.notes;
         let rows = List {
             id: "changes",
-            count: self.order.len() + notes,
+            count: self.order.len() + notes.len(),
             height: 2.0 * line + 6.0,
             reveal: None,
             follow: false,
@@ -149,8 +152,8 @@ impl UpdaterPanel {
                 let lower = Rect::from_min_size(upper.left_bottom(), vec2(rect.width(), line));
                 let (strong, quiet) = (ui.visuals().strong_text_color(), style::quiet(ui.visuals()));
                 let Some(change) = self.order.get(number).and_then(|place| offer.changes.get(*place)) else {
-                    let note = offer.poses.get(number - self.order.len()).map(ToString::to_string).unwrap_or_default();
-                    told(ui, upper, &note, style::obstacle(ui.visuals()));
+                    let note = notes.get(number - self.order.len()).map(String::as_str).unwrap_or_default();
+                    told(ui, upper, note, style::obstacle(ui.visuals()));
                     continue;
                 };
                 let subject = subject(change);

@@ -67,7 +67,7 @@ impl NodeNames {
 
 /// Keys of a node that is neither a joint nor built at present. They stay in the clip and take effect when the node is
 /// back.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct OrphanedKeys {
     /// The clip.
     pub clip: Uid,
@@ -91,6 +91,13 @@ pub struct OrphanedKeys {
 pub fn orphaned_keys(rig: &Rig, built: Option<&BuiltRig>, known: &NodeNames) -> Vec<OrphanedKeys> {
     let there = NodeNames::of(rig, built);
     rig.clips().iter().flat_map(|clip| of_clip(clip, &there, known)).collect()
+}
+
+/// Keys of a clip whose nodes one version of a rig has and the next one does not, by layer and node.
+pub fn keys_set_aside(clip: &RigClip, before: &NodeNames, after: &NodeNames) -> Vec<OrphanedKeys> {
+    let mut found = of_clip(clip, after, before);
+    found.retain(|keys| before.0.contains_key(&keys.node));
+    found
 }
 
 fn of_clip(clip: &RigClip, there: &NodeNames, known: &NodeNames) -> Vec<OrphanedKeys> {

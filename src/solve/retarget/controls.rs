@@ -30,6 +30,8 @@ const BLOCK: usize = 32;
 
 /// Part of posing a rig, in the order in which parts depend on one another.
 enum Step<'a> {
+    /// The travel of the whole figure.
+    Travel(Travel),
     /// A joint, as an index of the figure and a slot, and the slot of the control that turns it.
     Joint(Handle),
     /// A joint that an attribute turns.
@@ -48,6 +50,17 @@ struct Dial {
     rate: f32,
 }
 
+/// Control that carries the whole figure over the ground.
+struct Travel {
+    control: usize,
+    /// Transform of the control at rest.
+    rest: Trs,
+    /// The hips as an index of the figure, and their place at rest.
+    hips: usize,
+    hips_rest: Vec3,
+    up: Vec3,
+}
+
 struct Handle {
     joint: usize,
     joint_slot: usize,
@@ -61,13 +74,14 @@ struct Handle {
 }
 
 /// Offsets of the controls that the motion moves, and labels of joints that no control moves. `hands` tells which hands, left
-/// and right, are held anywhere.
+/// and right, are held anywhere; with `has_root_motion` the control that carries the whole figure gets its travel.
 pub(super) fn keyed(
     built: &BuiltRig,
     program: &Arc<RigProgram>,
     body: &Body,
     poses: &[Vec<Trs>],
     hands: [bool; 2],
+    has_root_motion: bool,
 ) -> Result<(KeyedTracks, Vec<String>), RetargetError> {
     let mut state = RigState::new(program.clone());
     let limbs = limbs(built, body, hands);
@@ -78,7 +92,13 @@ pub(super) fn keyed(
         let _ = state.set_attribute(switch.control, &switch.attribute, value);
     }
     state.evaluate(0.0);
-    let (steps, unmoved) = steps(&state, body, &limbs);
+    let moves = Moves::find(&state, body, &limbs);
+    let (mut steps, unmoved) = steps(&state, body, &limbs, &moves);
+    let travel = if has_root_motion { Travel::find(&state, body, &moves) } else { None };
+    let root = travel.as_ref().map(|travel| program.nodes()[travel.control].uid);
+    if let Some(travel) = travel {
+        steps.insert(0, Step::Travel(travel));
+    }
     let blocks: Vec<&[Vec<Trs>]> = poses.chunks(BLOCK).collect();
     let dials: Vec<usize> =
         steps.iter().filter_map(|step| if let Step::Dial(dial) = step { Some(dial.attribute) } else { None }).collect();
@@ -105,7 +125,7 @@ pub(super) fn keyed(
     for block in posed {
         frames.extend(block?);
     }
-    let mut keyed = KeyedTracks::default();
+    let mut keyed = KeyedTracks { root, ..KeyedTracks::default() };
     for (slot, node) in program.nodes().iter().enumerate() {
         if frames.iter().any(|frame| frame.offsets[slot] != PoseOffset::IDENTITY) {
             keyed.nodes.push((node.uid, frames.iter().map(|frame| frame.offsets[slot]).collect()));
@@ -164,8 +184,9 @@ fn steps<'a>(
     state: &RigState,
     body: &Body,
     limbs: &[(&'a SwitchData, Vec<usize>, f32)],
+    moves: &Moves,
 ) -> (Vec<Step<'a>>, Vec<String>) {
-    let (program, moves) = (state.program(), Moves::find(state, body, limbs));
+    let program = state.program();
     let (mut steps, mut unmoved) = (Vec::new(), Vec::new());
     let hips = body.target.first(HumanBone::Hips);
     let spine = body.target.bones.get(&HumanBone::Spine).map_or(&[][..], |spine| &spine[..]);
@@ -273,6 +294,7 @@ impl Moves {
 fn strike(built: &BuiltRig, mut state: RigState, steps: &[Step], pose: &[Trs]) -> Result<RigState, RetargetError> {
     for step in steps {
         match step {
+            Step::Travel(travel) => travel.place(&mut state, &pose[travel.hips]),
             Step::Joint(handle) => handle.place(&mut state, &pose[handle.joint]),
             Step::Dial(dial) => dial.turn(&mut state, &pose[dial.joint]),
             Step::Limb(switch, joints, value) => {
@@ -282,6 +304,36 @@ fn strike(built: &BuiltRig, mut state: RigState, steps: &[Step], pose: &[Trs]) -
         }
     }
     Ok(state)
+}
+
+impl Travel {
+    /// Topmost control that carries all joints which the motion moves, and can be moved; `None` without one, or without hips.
+    fn find(state: &RigState, body: &Body, moves: &Moves) -> Option<Self> {
+        let program = state.program();
+        let hips = body.target.first(HumanBone::Hips)?;
+        let joints = body.target.joints.iter().enumerate().filter(|(at, _)| body.is_moved(*at));
+        let moved: Vec<usize> = joints.filter_map(|(_, joint)| program.node(joint.uid)).collect();
+        let carries_all = |mover: &&Mover| {
+            mover.is_control && mover.is_movable && moved.iter().all(|joint| mover.joints.contains(joint))
+        };
+        let depth = |slot: usize| std::iter::successors(Some(slot), |slot| program.nodes()[*slot].parent).count();
+        let carriers = moves.list.iter().filter(carries_all);
+        let control = carriers.map(|mover| mover.slot).min_by_key(|slot| (depth(*slot), *slot))?;
+        let hips_rest = body.target.joints[hips].rest.translation;
+        Some(Self { control, rest: *state.global_at(control), hips, hips_rest, up: body.up })
+    }
+
+    /// Moves the control over the ground as far as the hips are from their place at rest.
+    fn place(&self, state: &mut RigState, hips: &Trs) {
+        let way = hips.translation - self.hips_rest;
+        let level = way - self.up * way.dot(self.up);
+        let wanted = Trs { translation: self.rest.translation + level, ..self.rest };
+        state.evaluate(0.0);
+        let offset = state.offset_at(self.control);
+        let next = offset_towards(state.global_at(self.control), &offset, &wanted);
+        state.set_offset_at(self.control, PoseOffset { translation: next.translation, ..offset });
+        state.evaluate(0.0);
+    }
 }
 
 impl Dial {

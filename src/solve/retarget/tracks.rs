@@ -22,6 +22,8 @@ pub(super) struct KeyedTracks {
     pub values: Vec<(Uid, String, f32)>,
     /// Attributes frame by frame.
     pub numbers: Vec<(Uid, String, Vec<f32>)>,
+    /// Control that has the travel, if one was to get it.
+    pub root: Option<Uid>,
 }
 
 /// Clip without tracks. Its uids follow from its name and the rig.

@@ -449,6 +449,58 @@ fn root_motion_of_an_imported_clip_goes_to_the_game() {
     assert!(off < 2e-3 && walked.rotation.angle_between(wanted.rotation) < 5e-3, "{walked:?} {wanted:?}");
 }
 
+/// Motion of another skeleton onto controls has its travel on the control that carries the rig, if that is wanted.
+#[test]
+fn root_motion_on_controls_goes_to_the_game() {
+    let mut rig = biped();
+    let motion = read_bvh(include_bytes!("../retarget/walker.bvh"), "walker").unwrap();
+    let (built, program) = (super::built(&rig), program(&rig));
+    let map = JointMap::new(&motion, &rig, &[]).unwrap();
+    let of = |root_motion: bool| {
+        let settings = RetargetSettings { root_motion, ..RetargetSettings::default() };
+        retarget(&rig, &built, &motion, &map, &settings).unwrap()
+    };
+    let (plain, done) = (of(false), of(true));
+    assert_eq!(plain.root, None);
+    let (clip, root) = (done.clip, done.root.unwrap());
+    assert_eq!(&*built.node(root).unwrap().name, "root");
+    let moved = target(root, Property::Translation);
+    assert!(clip.layers[0].tracks.contains_key(&moved) && !plain.clip.layers[0].tracks.contains_key(&moved));
+    // The joints move as they do without.
+    for frame in 0..=18 {
+        let time = clip.range[1] * frame as f32 / 18.0;
+        let (with, without) = (state(&program, Some(&clip), time), state(&program, Some(&plain.clip), time));
+        for joint in rig.walk().map(|joint| joint.data.uid) {
+            let off = with.global(joint).unwrap().translation.distance(without.global(joint).unwrap().translation);
+            assert!(off < 3e-3, "{joint} at {time} s is off by {off}");
+        }
+    }
+    let hips = rig.find_label("hips").unwrap();
+    let at = |time: f32| state(&program, Some(&clip), time).global(hips).unwrap().translation;
+    let (start, end) = (at(clip.range[0]), at(clip.range[1]));
+    assert!((end - start).with_y(0.0).length() > 0.02, "{start} {end}");
+    apply(&mut rig, RigEdit::AddClip(Box::new(clip.clone()), 0));
+
+    let mut app = app();
+    let entity = with_document(&mut app, rig);
+    let hips_stand = |app: &App| {
+        let joint = app.world().get::<JointEntities>(entity).unwrap().get(hips).unwrap();
+        app.world().get::<GlobalTransform>(joint).unwrap().translation()
+    };
+    app.world_mut()
+        .entity_mut(entity)
+        .insert((ClipPlayer { looped: false, ..ClipPlayer::new(&clip) }, RootMotion::of(root)));
+    let mut walked = Transform::IDENTITY;
+    for _ in 0..15 {
+        app.update();
+        walked = walked.mul_transform(app.world().get::<RootMotion>(entity).unwrap().delta);
+        let off = (hips_stand(&app) - start).with_y(0.0).length();
+        assert!(off < 2e-3, "the hips stand over the place where they begin: {off}");
+    }
+    let off = walked.transform_point(hips_stand(&app)).distance(end);
+    assert!(off < 3e-3, "where the game puts the rig, the hips are where the clip has them: {off}");
+}
+
 #[test]
 fn a_pose_sets_keys_while_auto_key_is_on() {
     let rig = animated();

@@ -1,6 +1,9 @@
 //! Motion that survives changes of the rig.
 
-use std::{collections::HashSet, sync::Arc};
+use std::{
+    collections::{BTreeMap, HashSet},
+    sync::Arc,
+};
 
 use bevy::math::{EulerRot, Quat};
 use rigsmith::{
@@ -20,7 +23,7 @@ use super::{BASE, CLIP, Random, animated, apply, biped, controls, program, targe
 use crate::keep_pose::flip;
 
 /// Metres and degrees.
-const NEAR: (f32, f32) = (1e-4, 0.05);
+pub const NEAR: (f32, f32) = (1e-4, 0.05);
 
 /// An instance where a clip puts it, by the program alone.
 pub fn state(program: &Arc<RigProgram>, clip: Option<&RigClip>, time: f32) -> RigState {
@@ -40,42 +43,51 @@ pub fn state(program: &Arc<RigProgram>, clip: Option<&RigClip>, time: f32) -> Ri
     state
 }
 
-/// Largest distance and angle of joints, over all keys and frames, that are not listed; with the clip as it was, and kept.
+/// Largest distance and angle by which a clip on a rig moves joints otherwise than another one on an earlier version of the rig,
+/// over some times, for each joint of both.
+pub fn joints_off(
+    (from, was): (&Arc<RigProgram>, &RigClip),
+    (to, is): (&Arc<RigProgram>, &RigClip),
+    times: &[f32],
+) -> BTreeMap<Uid, (f32, f32)> {
+    let (rest_before, rest_after) = (state(from, None, 0.0), state(to, None, 0.0));
+    let mut most: BTreeMap<Uid, (f32, f32)> = BTreeMap::new();
+    for time in times {
+        let (was, is) = (state(from, Some(was), *time), state(to, Some(is), *time));
+        for (slot, node) in to.nodes().iter().enumerate().filter(|(_, node)| node.kind == NodeType::Joint) {
+            let Some(known) = from.node(node.uid) else { continue };
+            let turned = relative(rest_before.global_at(known), rest_after.global_at(slot));
+            let (now, wanted) = (is.global_at(slot), multiply(was.global_at(known), &turned));
+            let distance = now.translation.distance(wanted.translation);
+            let chord = (now.rotation.conjugate() * wanted.rotation).xyz().length().min(1.0);
+            let angle = (chord.asin() * 2.0).to_degrees();
+            let own = most.entry(node.uid).or_default();
+            *own = (own.0.max(distance), own.1.max(angle));
+        }
+    }
+    most
+}
+
+/// Checks, over all keys and frames, that joints which are not listed move as before, and that they would not with the clip as
+/// it was.
 fn check(what: &str, before: &Rig, after: &Rig, most_frames: usize) -> Rig {
     let mut kept = after.clone();
-    let notes: Vec<ClipNote> = keep_clips(before, &mut kept, &Arc::new(modules::all())).unwrap();
+    let notes: Vec<ClipNote> = keep_clips(before, &mut kept, &Arc::new(modules::all())).unwrap().notes;
     let listed: HashSet<Uid> = notes.iter().map(|note| note.deviation.joint).collect();
     let frames = notes.iter().map(|note| note.frames).max().unwrap_or_default();
     println!("{what}: {} joints are listed, one of them at {frames} frames", listed.len());
     assert!(frames <= most_frames, "{what}: a joint is listed at {frames} frames, {:?}", notes.first());
     let (from, to) = (program(before), program(after));
-    let (rest_before, rest_after) = (state(&from, None, 0.0), state(&to, None, 0.0));
     let clip = before.clip(CLIP).unwrap();
-    let frames = (0..=60).map(|frame| frame as f32 / clip.frame_rate).chain(clip.key_times());
-    let mut plain = (0.0f32, 0.0f32);
-    for time in frames {
-        let was = state(&from, Some(clip), time);
-        for rig in [&kept, after] {
-            let is = state(&to, rig.clip(CLIP), time);
-            for (slot, node) in to.nodes().iter().enumerate().filter(|(_, node)| node.kind == NodeType::Joint) {
-                let Some(known) = from.node(node.uid) else { continue };
-                let turned = relative(rest_before.global_at(known), rest_after.global_at(slot));
-                let (now, wanted) = (is.global_at(slot), multiply(was.global_at(known), &turned));
-                let distance = now.translation.distance(wanted.translation);
-                let chord = (now.rotation.conjugate() * wanted.rotation).xyz().length().min(1.0);
-                let angle = (chord.asin() * 2.0).to_degrees();
-                if !std::ptr::eq(rig, &kept) {
-                    plain = (plain.0.max(distance), plain.1.max(angle));
-                } else if !listed.contains(&node.uid) {
-                    assert!(
-                        distance <= NEAR.0 && angle <= NEAR.1,
-                        "{what}, {time} s: {:?} is off by {distance} m and {angle}°",
-                        node.label
-                    );
-                }
-            }
-        }
+    let times: Vec<f32> = (0..=60).map(|frame| frame as f32 / clip.frame_rate).chain(clip.key_times()).collect();
+    for (joint, (distance, angle)) in joints_off((&from, clip), (&to, kept.clip(CLIP).unwrap()), &times) {
+        assert!(
+            listed.contains(&joint) || (distance <= NEAR.0 && angle <= NEAR.1),
+            "{what}: {joint} is off by {distance} m and {angle}°"
+        );
     }
+    let plain = joints_off((&from, clip), (&to, after.clip(CLIP).unwrap()), &times);
+    let plain = plain.into_values().fold((0.0f32, 0.0f32), |most, own| (most.0.max(own.0), most.1.max(own.1)));
     assert!(plain.0 > NEAR.0 || plain.1 > NEAR.1, "{what}: the change moves nothing");
     kept
 }
@@ -93,10 +105,10 @@ fn names_and_groups_leave_clips_alone() {
 }
 
 /// Joints whose axes are flipped.
-const FLIPPED: [&str; 4] = ["spine_1", "forearm_l", "hand_r", "head"];
+pub const FLIPPED: [&str; 4] = ["spine_1", "forearm_l", "hand_r", "head"];
 
 /// The biped with a gentle motion of a few controls, and of all that stand on joints which are flipped.
-fn gentle() -> Rig {
+pub fn gentle() -> Rig {
     let mut rig = biped();
     let program = program(&rig);
     let nodes = controls(&program);
@@ -116,13 +128,18 @@ fn gentle() -> Rig {
     rig
 }
 
+/// Turns the axes of those joints by half a turn.
+pub fn flip_all(rig: &mut Rig) {
+    for label in FLIPPED {
+        flip(rig, label, Quat::from_euler(EulerRot::XYZ, 0.0, std::f32::consts::PI, 0.0));
+    }
+}
+
 #[test]
 fn flipped_axes_hold_the_motion() {
     let before = gentle();
     let mut after = before.clone();
-    for label in FLIPPED {
-        flip(&mut after, label, Quat::from_euler(EulerRot::XYZ, 0.0, std::f32::consts::PI, 0.0));
-    }
+    flip_all(&mut after);
     let kept = check("flipped axes", &before, &after, 6);
     assert_ne!(kept.clips(), after.clips());
 }

@@ -56,12 +56,25 @@ fn deed(rig: &Rig, random: &mut Random) -> Operation {
             edits(off.take(1).collect())
         }
         6 if random.chance(6) && joints.len() > 20 => Operation::Delete { joints: vec![one], keep_children: true },
-        // An update to a version with another place of a joint.
+        // An update to a version with another place of a joint, another name, or a command of a part that says something else.
         _ => {
             let mut file = rig.clone();
             let mut rest = rig.joint(one).map(|joint| joint.data.rest).unwrap_or_default();
-            rest.translation += Vec3::splat(share(random) * 0.01);
-            file.apply(&RigEdit::SetRest(one, rest)).unwrap();
+            let tag = rig.joint(one).and_then(|joint| joint.data.tags.first().cloned());
+            match (random.below(3), tag) {
+                (0, _) => {
+                    let label = Some(format!("version {}", random.below(1000)));
+                    file.apply(&RigEdit::SetLabel(one, label)).unwrap();
+                }
+                (1, Some(mut tag)) => {
+                    tag.comment = format!("version {}", random.below(1000));
+                    file.apply(&RigEdit::SetTag(one, Box::new(tag))).unwrap();
+                }
+                _ => {
+                    rest.translation += Vec3::splat(share(random) * 0.01);
+                    file.apply(&RigEdit::SetRest(one, rest)).unwrap();
+                }
+            }
             for clip in rig.clips() {
                 file.apply(&RigEdit::RemoveClip(clip.uid)).unwrap();
             }

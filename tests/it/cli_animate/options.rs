@@ -39,7 +39,8 @@ fn notes(answer: &Value) -> String {
 #[test]
 fn options_of_motion_are_refused_or_told_on_clips_of_a_rig() {
     let folder = folder();
-    for option in [&["--in-place"][..], &["--free-feet"], &["--free-hands"], &["--tolerance", "5"]] {
+    for option in [&["--in-place"][..], &["--root-motion"], &["--free-feet"], &["--free-hands"], &["--tolerance", "5"]]
+    {
         refused(folder.path(), &[&["biped", "walk.anim.ron", "-o", "b.anim.ron"], option].concat(), 2, &[option[0]]);
     }
     assert!(!folder.path().join("b.anim.ron").exists());
@@ -47,6 +48,8 @@ fn options_of_motion_are_refused_or_told_on_clips_of_a_rig() {
     let args = ["animate", "biped", "walk.anim.ron", "walker.bvh", "--in-place", "-o", "both.anim.ron"];
     let told = notes(&json(folder.path(), &args));
     assert!(told.contains("`walk.anim.ron`") && told.contains("without effect on it: --in-place"), "{told}");
+    let told = json(folder.path(), &["animate", "biped", "walker.bvh", "--root-motion", "-o", "root.anim.ron"]);
+    assert_eq!(told["root"]["name"], "root", "{told}");
     // A frame rate works.
     json(folder.path(), &["animate", "biped", "walk.anim.ron", "--fps", "60", "-o", "fast.anim.ron"]);
     let fast = &load_animation(&RealDisk, &folder.path().join("fast.anim.ron")).unwrap().clips[0];

@@ -163,6 +163,33 @@ fn a_file_of_clips_becomes_animations_of_bevy() {
 }
 
 #[test]
+fn clips_of_a_file_go_through_versions_of_the_template() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut game, clips, instance) = rising(folder.path(), InstanceMode::Hierarchy);
+    game.app.world_mut().entity_mut(instance).insert((InstanceClips(clips), ClipTargets));
+    bound(&mut game, 1);
+    let own = |game: &Game| game.app.world().get::<RigClips>(instance).unwrap().0.clone();
+    let first = own(&game);
+    let animations = game.app.world().get::<InstanceAnimations>(instance).unwrap().clone();
+    let control = first[0].nodes().into_iter().find(|node| *node != GONE).unwrap();
+    game.offer(instance, TWO.replace(", tags: [control(creation: (name: \"ctl_a\"))]", "").as_bytes());
+    bound(&mut game, 2);
+    let mut missing = told(&game).bound[1].clone();
+    missing.sort_unstable_by_key(|node| *node != GONE);
+    assert_eq!(missing, [GONE, control]);
+    // The joint, which nothing drives any more, has the motion; the keys of the control wait.
+    let now = own(&game);
+    let tracks = |node: Uid| now[0].layers[0].tracks.keys().filter(|target| target.node == node).count();
+    let joint = read_template(TWO.as_bytes()).unwrap().rig.find_label("a").unwrap();
+    assert!(tracks(control) > 0 && tracks(joint) > 0, "{:?}", now[0].nodes());
+    game.offer(instance, TWO.as_bytes());
+    bound(&mut game, 3);
+    assert_eq!(told(&game).bound[2], [GONE]);
+    assert_eq!(own(&game), first);
+    assert_eq!(*game.app.world().get::<InstanceAnimations>(instance).unwrap(), animations, "handles stay");
+}
+
+#[test]
 fn a_file_without_clips_that_can_be_read_is_an_error() {
     let error = RigAnimation::read(b"(format: 1, rig: ").unwrap_err();
     assert!(!error.to_string().is_empty());
