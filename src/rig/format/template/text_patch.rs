@@ -28,7 +28,10 @@ use crate::rig::{
 use fresh::{NamesInUse, is_short, settled};
 use labels::header_labels;
 use order::reordered;
-pub(crate) use parts::{PartRigs, unsaid_parts, with_instances, without_instances, write_changes_over, write_own_over};
+pub(crate) use parts::{
+    PartRigs, unsaid_parts, with_instance_fields, with_instances, with_instances_of, without_instances,
+    write_changes_over, write_own_over,
+};
 use patch::Patch;
 
 /// The text of a rig's template, as changes of a text of the same rig. `None` if `source` is no template of this rig, or
