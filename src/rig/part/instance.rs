@@ -128,7 +128,7 @@ pub struct PartInstance {
 pub type MirrorParams<'a> = &'a dyn Fn(&str, &str) -> Option<String>;
 
 /// Module whose name is that of an attribute, not of a node.
-const ATTRIBUTE: &str = "attribute";
+pub(super) const ATTRIBUTE: &str = "attribute";
 
 /// Notes and faults of a part that was put into a rig.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -315,9 +315,12 @@ impl PartInstance {
         if let ([only], true) = (part.chains.as_slice(), counts.is_empty())
             && !self.onto.is_empty()
             && !self.adds
+            && !only.is_fan
         {
             counts.push((only, only.count_on(&part.rig, self.onto.len())));
         }
+        // The copy of a branch has as many joints as the branch.
+        counts.sort_by_key(|(chain, _)| chain.is_fan);
         let mut rig = part.rig.clone();
         for (chain, count) in counts {
             rig = chain.resized(&rig, count)?;
