@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use super::{cli_outputs::rigsmith, part_instances::load};
 
-const PART: &str = r#"(
+pub(super) const PART: &str = r#"(
     format: 2,
     name: "finger",
     kind: "part",
