@@ -99,7 +99,7 @@ pub struct PartInstance {
     pub onto: Vec<String>,
     /// True to bring its own joints beyond those of `onto`, too.
     pub adds: bool,
-    /// Number of joints of the part's chains, by the name of the chain; an empty name for its only one.
+    /// Number of joints of the part's chains, or of its branches, by their name; an empty name for the only ones.
     pub counts: Vec<(String, usize)>,
     /// Label of the joint that its own joints hang on.
     pub parent: Option<String>,
