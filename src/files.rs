@@ -38,6 +38,7 @@ mod site;
 mod store;
 mod template_origin;
 mod template_text;
+mod template_update;
 mod verify;
 mod watch;
 
@@ -75,4 +76,5 @@ pub use store::{
 };
 pub use template_origin::{TemplateOrigin, has_parts, store_rig_from};
 pub(crate) use template_text::template_text;
+pub use template_update::{TemplateUpdate, TemplateVersion, base_text, update_template};
 pub use watch::{FileWatch, LOOK, TemplateWatch};

@@ -5,7 +5,7 @@ use std::{borrow::Cow, fmt::Write as _, path::Path, str::FromStr, sync::OnceLock
 use super::{ArgumentError, Failure, SEED};
 pub(super) use crate::plugins::limits::{Deadline, Limit, LimitError, RigLimits};
 use crate::{
-    files::{self, LoadError, LoadedProject, MeshState, RealDisk},
+    files::{self, LoadError, LoadedProject, MeshState, RealDisk, TemplateVersion},
     headless::Workbench,
     mesh::model::Model,
     modules,
@@ -124,6 +124,13 @@ pub(super) fn load_template(path: &Path) -> Result<Template, Failure> {
     let template = files::load_template(&RealDisk, path)?;
     check_rig(path, &template.rig)?;
     Ok(template)
+}
+
+/// Reads a version of a template.
+pub(super) fn load_version(path: &Path) -> Result<TemplateVersion, Failure> {
+    let version = TemplateVersion::read(&RealDisk, path)?;
+    check_rig(path, version.rig())?;
+    Ok(version)
 }
 
 /// Reads a project with its meshes.

@@ -12,13 +12,12 @@ use serde_json::{Value, json};
 
 use super::{Failure, InPlaceArgs, Report, explanation::Explanation, limits, report::counted};
 use crate::{
-    files::{Disk, FileKind, RealDisk, StoreError, save_atomic, store_rig_over},
+    files::{Disk, FileKind, RealDisk, StoreError, TemplateVersion, base_text, save_atomic, update_template},
     processor::keep_poses,
     rig::{
         Rig,
         part::Part,
-        template::write_template,
-        update::{Change, Take, diff, update},
+        update::{Change, Take, diff},
         version::VersionChange,
     },
 };
@@ -85,12 +84,12 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     args.in_place.check(&inputs, args.output.as_deref(), &[])?;
     let clip_files = clips::outputs(args, &inputs)?;
     let mut report = Report::default();
-    let (now, file) = (load(&args.rig, &mut report)?, load(&args.from, &mut report)?);
+    let (now, file) = (version(&args.rig, &mut report)?, version(&args.from, &mut report)?);
     let beside = companion(&args.rig);
     let is_beside = args.base.is_none() && RealDisk.entry(&beside, true).is_ok();
     let base = match &args.base {
-        Some(base) => Some(load(base, &mut report)?),
-        None if is_beside => Some(limits::load_template(&beside)?.rig),
+        Some(base) => Some(version(base, &mut report)?),
+        None if is_beside => Some(limits::load_version(&beside)?),
         None => None,
     };
     report.set(
@@ -101,13 +100,15 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
         Some(TakeArg::Theirs) => Take::Theirs,
         Some(TakeArg::Mine) | None => Take::Mine,
     };
-    let mut updated = update(base.as_ref(), &now, &file, take);
-    if let Some(version) = VersionChange::between(base.as_ref().unwrap_or(&now).about(), file.about()) {
+    let mut update = update_template(&RealDisk, base.as_ref(), &now, &file, &take.into());
+    let updated = &mut update.update;
+    let was = base.as_ref().unwrap_or(&now).rig();
+    if let Some(version) = VersionChange::between(was.about(), file.rig().about()) {
         report.line(format!("version  {version}"));
         report.set("version", json!({"from": version.from, "to": version.to}));
     }
     tell(&mut report, &updated.changes);
-    let poses = keep_poses(&now, &mut updated.rig, &Arc::new(limits::modules()))
+    let poses = keep_poses(now.rig(), &mut updated.rig, &Arc::new(limits::modules()))
         .map_err(|error| Failure::Input(Box::new(error)))?;
     for note in &poses {
         report.line(format!("moves    {note}"));
@@ -125,12 +126,12 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
         return Ok(report);
     }
     if let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) {
-        report.notes(store_rig_over(&RealDisk, output, &updated.rig, &[&args.rig])?);
+        report.notes(update.store(&RealDisk, output)?);
         report.line(format!("wrote {}", output.display()));
         clips::store(&clips, &mut report)?;
         if args.keep_base || is_beside {
             let base = companion(output);
-            save_atomic(&RealDisk, &base, write_template(&file).as_bytes()).map_err(StoreError::from)?;
+            save_atomic(&RealDisk, &base, base_text(&RealDisk, &file, output).as_bytes()).map_err(StoreError::from)?;
             report.line(format!("wrote {}", base.display()));
         }
     }
@@ -148,12 +149,25 @@ pub(super) fn load(path: &Path, report: &mut Report) -> Result<Rig, Failure> {
     Ok(load_part(path, report)?.rig)
 }
 
-/// The template of a file, with what it says for its use as a part.
-pub(super) fn load_part(path: &Path, report: &mut Report) -> Result<Part, Failure> {
+/// The version of a template that a file has.
+fn version(path: &Path, report: &mut Report) -> Result<TemplateVersion, Failure> {
+    check_kind(path)?;
+    let version = limits::load_version(path)?;
+    report.notes(version.notes().to_vec());
+    Ok(version)
+}
+
+fn check_kind(path: &Path) -> Result<(), Failure> {
     // A name without an ending is that of a template in the folders of the site.
     if path.extension().is_some() && FileKind::of(path) != Some(FileKind::Template) {
         return Err(Failure::Usage(format!("`{}` is no template; give a .rig.ron", path.display())));
     }
+    Ok(())
+}
+
+/// The template of a file, with what it says for its use as a part.
+pub(super) fn load_part(path: &Path, report: &mut Report) -> Result<Part, Failure> {
+    check_kind(path)?;
     let mut template = limits::load_template(path)?;
     report.notes(std::mem::take(&mut template.notes));
     Ok(template.into())

@@ -62,9 +62,17 @@ fn plain_text(rig: &Rig, source: Option<(&Path, &str)>, target: &Path, reader: P
     let changed = changed(rig, at, text, &parts, reader).filter(|changed| is_right(&changed.text));
     let written = changed.unwrap_or_else(|| {
         let lost = if has_parts { PARTS_LOST } else { COMMENTS_LOST };
-        TemplateText { text: write_template(rig), note: (has_parts || text.is_some()).then(|| lost.to_owned()) }
+        TemplateText { text: written_anew(rig, text), note: (has_parts || text.is_some()).then(|| lost.to_owned()) }
     });
     if are_some_lost { TemplateText { note: Some(PARTS_LOST.to_owned()), ..written } } else { written }
+}
+
+/// The text of a rig's template that takes nothing but its form from the former text: one that people write is like that.
+fn written_anew(rig: &Rig, former: Option<&str>) -> String {
+    let header = former.and_then(|text| template::read_header(text.as_bytes()).ok());
+    let is_of_people = header.is_some_and(|header| header.format >= template::FORMAT);
+    let short = if is_of_people { template::write_short_template(rig) } else { None };
+    short.unwrap_or_else(|| write_template(rig))
 }
 
 /// True if a text at that path says what the rig is.
@@ -126,7 +134,7 @@ fn changed(
     let own = without_dropped(rig, dropped, file.as_ref().map(|file| &file.rig), has_partners).ok()?;
     let base = source.and_then(|text| over(&own, at, text, reader));
     let base = base.unwrap_or_else(|| TemplateText {
-        text: write_template(&own),
+        text: written_anew(&own, source),
         note: source.is_some().then(|| COMMENTS_LOST.to_owned()),
     });
     let instances: Vec<PartInstance> = dropped.iter().map(|(instance, _)| instance.clone()).collect();

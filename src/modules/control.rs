@@ -140,6 +140,8 @@ parameters! {
         pub channels: Channels = Channels::default(),
         /// Lowest and highest values of these; rotation in degrees.
         pub limits: Limits = Limits::default(),
+        /// Nodes among them whose controls the limits are for; all of them without any.
+        pub limited: NodeRefs = NodeRefs::NONE,
         /// Nodes among them whose controls turn about one axis only, such as elbows and knees.
         pub hinges: NodeRefs = NodeRefs::NONE,
         /// The axis of hinges (bend: about which the bones are bent as built; x: X of the node), and the least and the
@@ -170,11 +172,8 @@ impl RigModule for ControlModule {
         self.check(scope)?;
         let nodes = scope.resolve_some("at", &self.at)?;
         let parent = scope.resolve_parent("parent", &self.parent)?;
-        let hinges = scope.resolve("hinges", &self.hinges)?;
-        if let Some(outside) = hinges.iter().find(|hinge| !nodes.contains(hinge)) {
-            let problem = format!("{} gets no control here; name nodes of \"at\"", scope.name(*outside));
-            return Err(ModuleError::reference("hinges", &self.hinges, problem));
-        }
+        let hinges = among(scope, &nodes, "hinges", &self.hinges)?;
+        let limited = among(scope, &nodes, "limited", &self.limited)?;
         let mut controls: Vec<MadeControl> = Vec::with_capacity(nodes.len());
         for (index, node) in nodes.iter().copied().enumerate() {
             let upper = if self.hierarchy { scope.upper_in(node, &nodes[..index]) } else { None };
@@ -187,7 +186,9 @@ impl RigModule for ControlModule {
             let parent_control =
                 upper.filter(|upper| scope.parent(node) == Some(nodes[*upper])).map(|upper| controls[upper].carrier);
             let hinge = if hinges.contains(&node) { Some(self.hinge(scope, node, &nodes)) } else { None };
-            controls.push(self.make(scope, node, index, above, parent_control, hinge)?);
+            let is_limited = self.limited == NodeRefs::NONE || limited.contains(&node);
+            let limits = if is_limited { self.limits } else { Limits::default() };
+            controls.push(self.make(scope, node, index, above, parent_control, (limits, hinge))?);
         }
         Ok(())
     }
@@ -211,6 +212,21 @@ impl RigModule for ControlModule {
             };
         }
     }
+}
+
+/// Nodes that a parameter names among those that get a control.
+fn among(
+    scope: &mut BuildScope<'_>,
+    nodes: &[NodeId],
+    parameter: &str,
+    named: &NodeRefs,
+) -> Result<Vec<NodeId>, ModuleError> {
+    let found = scope.resolve(parameter, named)?;
+    if let Some(outside) = found.iter().find(|node| !nodes.contains(node)) {
+        let problem = format!("{} gets no control here; name nodes of \"at\"", scope.name(*outside));
+        return Err(ModuleError::reference(parameter, named, problem));
+    }
+    Ok(found)
 }
 
 impl ControlModule {
@@ -272,8 +288,7 @@ impl ControlModule {
     }
 
     /// Limits of the control of a hinge: the range of the bend, from how it is bent as built.
-    fn hinge_limits(&self, hinge: &Hinge) -> Limits {
-        let mut limits = self.limits;
+    fn hinge_limits(&self, mut limits: Limits, hinge: &Hinge) -> Limits {
         if let Some((bent, sense)) = hinge.bent {
             let low = self.hinge.min.map(|low| (low - bent).min(0.0));
             let high = self.hinge.max.map(|high| (high - bent).max(0.0));
@@ -290,7 +305,7 @@ impl ControlModule {
         index: usize,
         above: Option<NodeId>,
         upper: Option<NodeId>,
-        hinge: Option<Hinge>,
+        (limits, hinge): (Limits, Option<Hinge>),
     ) -> Result<MadeControl, ModuleError> {
         let own = scope.global(node);
         let place = match (self.axes, &hinge) {
@@ -302,7 +317,7 @@ impl ControlModule {
             Some(_) => Channels { rotate: [true, false, false], ..self.channels },
             None => self.channels,
         };
-        let limits = hinge.as_ref().map_or(self.limits, |hinge| self.hinge_limits(hinge));
+        let limits = hinge.as_ref().map_or(limits, |hinge| self.hinge_limits(limits, hinge));
         let creation = scope.creation_for(&self.creation, node, index);
         let control = if self.offset_group {
             let name = creation.name.as_ref().map(|name| format!("{name}_offset"));

@@ -149,7 +149,8 @@ pub struct ControlData {
     pub size: f32,
     /// Transform of the shape relative to the control.
     pub offset: Trs,
-    /// True if the shape may be drawn larger than its size, so that it does not lie in the flesh of a mesh.
+    /// True if the shape may be drawn larger than its size, so that it does not touch the flesh of a mesh; false for one that has
+    /// its size unless most of it would lie in the flesh.
     pub fits: bool,
     /// Channels that people move and set keys on.
     pub channels: Channels,

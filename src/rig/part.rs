@@ -4,6 +4,7 @@
 //! of other joints refer to it or to its commands; the joints behind the last one needed are extras. Besides, a part is
 //! connected through its sockets.
 
+mod branches;
 mod change;
 mod dropped_part;
 mod error;

@@ -13,6 +13,7 @@ mod copies;
 mod edits;
 mod fields;
 mod order;
+mod parts;
 mod rename_detection;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -29,6 +30,7 @@ use order::merged_order;
 pub use change::{Change, ChangeKind};
 pub use choices::{Choices, Take};
 pub use edits::{clip_edits, edits_between, pose_edits};
+pub use parts::{MergedParts, RefittedTemplate, TemplateWithParts, merge_parts};
 
 /// An update.
 #[derive(Debug, Clone, PartialEq)]

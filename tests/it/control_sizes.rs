@@ -5,18 +5,24 @@ use std::{path::Path, sync::Arc, time::Duration};
 use bevy::math::Vec3;
 use rigsmith::{
     algo::control_size::{OUTSIDE, clear_factor, is_inside, outside_share},
-    files::{RealDisk, load_model},
+    files::{RealDisk, load_model, load_template},
     headless::Workbench,
     mesh::surface::Surface,
     modules,
     plugins::{
         commands::{BuildResult, BuildStep, BuiltEntities},
-        controls::{outline::lines_of, size::MeasuredShapes, size::ShapeFactor},
+        controls::{
+            outline::lines_of,
+            size::{MeasuredShapes, ShapeFactor, shape_factors},
+        },
         surface::RigMeshes,
     },
     processor::Builder,
-    rig::BuiltRig,
+    rig::{BuiltRig, Rig, Uid},
 };
+
+use super::cli_outputs::rigsmith;
+use crate::prerequisites::test_data;
 
 /// A box about the origin, twice as long as half of it is wide.
 fn flesh(half: f32) -> Surface {
@@ -69,6 +75,12 @@ fn shares(bench: &mut Workbench, surface: &Surface) -> Vec<(String, f32, f32)> {
     let world = bench.app_mut().world();
     let built: Arc<BuiltRig> = world.get::<BuildResult>(rig).unwrap().0.clone();
     let entities = world.get::<BuiltEntities>(rig).unwrap();
+    shares_of(&built, surface, &|uid| {
+        entities.get(uid).and_then(|entity| world.get::<ShapeFactor>(entity)).map_or(1.0, |factor| factor.0)
+    })
+}
+
+fn shares_of(built: &BuiltRig, surface: &Surface, factor: &dyn Fn(Uid) -> f32) -> Vec<(String, f32, f32)> {
     let mut found = Vec::new();
     for (at, node) in built.nodes.iter().enumerate() {
         let Some(control) = &node.control else { continue };
@@ -78,7 +90,7 @@ fn shares(bench: &mut Workbench, surface: &Surface) -> Vec<(String, f32, f32)> {
             place = built.nodes[parent].base.affine() * place;
             above = built.nodes[parent].parent;
         }
-        let factor = entities.get(node.uid).and_then(|entity| world.get::<ShapeFactor>(entity)).map_or(1.0, |f| f.0);
+        let factor = factor(node.uid);
         let about = (place * control.offset.affine()).translation.into();
         let share = outside_share(surface, &lines_of(control, place), about, factor);
         found.push((node.name.to_string(), share, factor));
@@ -112,4 +124,94 @@ fn no_control_of_the_bundled_biped_lies_in_its_flesh() {
     let built = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
     let rig = bench.rig_entity();
     assert_eq!(*bench.app_mut().world().get::<BuildResult>(rig).unwrap().0, built);
+}
+
+/// Controls of a rig as they are drawn on a mesh.
+fn drawn(rig: &Rig, surface: &Surface) -> Vec<(String, f32, f32)> {
+    let built = Builder::build(rig, &Arc::new(modules::all())).unwrap();
+    let factors = shape_factors(&built, surface);
+    shares_of(&built, surface, &|uid| {
+        factors.iter().find(|(known, _)| *known == uid).map_or(1.0, |(_, factor)| *factor)
+    })
+}
+
+/// Flesh about the bones of a rig: a closed tube for each, as thick as a part of its length.
+fn tubes(rig: &Rig, thickness: f32) -> Surface {
+    const SIDES: usize = 12;
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    for joint in rig.walk() {
+        let Some(parent) = joint.parent else { continue };
+        let ends = [rig.position(parent), rig.position(joint.data.uid)];
+        let along = ends[1] - ends[0];
+        let Some(axis) = along.try_normalize() else { continue };
+        let (x, y) = axis.any_orthonormal_pair();
+        let (start, radius) = (points.len() as u32, thickness * along.length());
+        for end in ends {
+            points.extend((0..SIDES).map(|side| {
+                let angle = side as f32 / SIDES as f32 * std::f32::consts::TAU;
+                end + (x * angle.cos() + y * angle.sin()) * radius
+            }));
+        }
+        let sides = SIDES as u32;
+        for side in 0..sides {
+            let (here, next) = (start + side, start + (side + 1) % sides);
+            triangles.extend([[here, next, next + sides], [here, next + sides, here + sides]]);
+        }
+        for side in 1..sides - 1 {
+            triangles.push([start, start + side + 1, start + side]);
+            triangles.push([start + sides, start + sides + side, start + sides + side + 1]);
+        }
+    }
+    Surface::build(&points, &triangles)
+}
+
+#[test]
+fn no_control_of_animals_lies_in_the_flesh_about_their_bones() {
+    for name in ["quadruped", "bird"] {
+        let rig = crate::bench::shipped(name);
+        let surface = tubes(&rig, 0.3);
+        let middle =
+            rig.walk().find_map(|joint| Some((rig.position(joint.parent?), rig.position(joint.data.uid)))).unwrap();
+        assert!(is_inside(&surface, middle.0.midpoint(middle.1)), "{name}: the bones are in flesh");
+        let drawn = drawn(&rig, &surface);
+        assert!(drawn.len() > 40, "{name}: {}", drawn.len());
+        for (control, share, factor) in drawn {
+            assert!(share >= 0.5, "{name}: {control}: {share} of its shape is outside, enlarged by {factor}");
+            assert!((1.0..=4.0).contains(&factor), "{name}: {control}: {factor}");
+        }
+    }
+}
+
+#[test]
+fn no_control_of_fitted_animals_lies_in_their_flesh() {
+    let Some(data) = test_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for (mesh, template) in [("fox-fox", "quadruped"), ("fox-dog", "quadruped"), ("bird-eagle", "bird")] {
+        let mesh = data.join(format!("creatures/{mesh}.glb"));
+        let fit = ["fit", mesh.to_str().unwrap(), "--template", template, "-o", "fitted.rig.ron"];
+        let (code, said) = rigsmith(folder.path(), &fit);
+        assert_eq!(code, 0, "{said}");
+        let rig = load_template(&RealDisk, &folder.path().join("fitted.rig.ron")).unwrap().rig;
+        let model = load_model(&RealDisk, &mesh).unwrap();
+        let surface = Surface::build(&model.points, &model.point_triangles());
+        let drawn = drawn(&rig, &surface);
+        for (control, share, factor) in &drawn {
+            assert!(*share >= 0.25, "{}: {control}: {share} outside, enlarged by {factor}", mesh.display());
+        }
+        let seen = drawn.iter().filter(|(_, share, _)| *share >= 0.5).count();
+        assert!(seen * 10 >= drawn.len() * 9, "{}: {seen} of {}", mesh.display(), drawn.len());
+        std::fs::remove_file(folder.path().join("fitted.rig.ron")).unwrap();
+    }
+}
+
+#[test]
+fn a_written_size_stays_unless_it_lies_in_the_flesh() {
+    let surface = flesh(1.0);
+    for (size, grows) in [(0.5, true), (1.3, false), (1.6, false)] {
+        let text = format!("(format: 2, name: \"one\", joints: [(label: \"one\", tags: [control(size: {size:?})])])");
+        let rig = rigsmith::rig::template::read_template(text.as_bytes()).unwrap().rig;
+        let drawn = drawn(&rig, &surface);
+        let (_, share, factor) = &drawn[0];
+        assert!(*share >= 0.5 && (*factor > 1.0) == grows, "{size}: {share} outside, enlarged by {factor}");
+    }
 }

@@ -26,7 +26,7 @@ use rigsmith::{
     test_app::strict_app,
 };
 
-use super::bench::HANG;
+use super::{bench::HANG, part_fields::PART};
 
 const CHAIN: &str = r#"(
     format: 2,
@@ -50,9 +50,15 @@ struct Window {
 
 impl Window {
     fn new() -> Self {
+        Self::of(CHAIN)
+    }
+
+    /// A window with that template open, beside which is the part of the tests of parts.
+    fn of(template: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder for the test");
         let file = folder.path().join("chain.rig.ron");
-        fs::write(&file, CHAIN).expect("the template is written");
+        fs::write(&file, template).expect("the template is written");
+        fs::write(folder.path().join("finger.rig.ron"), PART).expect("the part is written");
         let mut app = headless_app(7);
         app.insert_resource(StateFolder(Some(folder.path().join("state"))))
             .add_plugins((FilesPlugin, FollowPlugin))
@@ -226,6 +232,32 @@ fn a_save_of_the_window_itself_is_no_news() {
     window.send(OfferAnswer::Take(Take::Mine));
     window.until("the update", |window| window.height("c") == 0.6);
     assert_eq!(window.height("b"), 0.9);
+}
+
+#[test]
+fn fields_of_parts_that_the_file_changed_are_there_after_the_next_save() {
+    let part =
+        "(part: \"finger.rig.ron\", name: \"index\", parent: \"palm\", translation: (0, 0.1, 0), prefix: \"a_\")";
+    let mut window = Window::of(&format!(
+        "(\n    format: 2,\n    name: \"hand\",\n    joints: [(label: \"palm\", tags: [control()])],\n    parts: [\n        {part},\n    ],\n)\n"
+    ));
+    window.raise("a_bone_1", 0.7);
+    window.save("prefix: \"a_\"", "prefix: \"b_\", count: 5");
+    window.until("the offer", |window| window.offer().is_some());
+    let conflicts = window.offer().into_iter().flat_map(|offer| offer.changes.iter()).filter(|c| c.conflict).count();
+    assert_eq!(conflicts, 0);
+    window.send(OfferAnswer::Take(Take::Mine));
+    window.until("the update", |window| window.data().find_label("b_bone_5").is_some());
+    assert_eq!((window.height("b_bone_1"), window.data().len()), (0.7, 6));
+    let path = window.file.clone();
+    window.send(ActionRequest(Action::Export));
+    window.send(DialogAnswer(Answer::Path(path)));
+    window.send(DialogAnswer(Answer::Save));
+    window
+        .until("the saved template", |window| fs::read_to_string(&window.file).is_ok_and(|text| text.contains("0.7")));
+    let text = fs::read_to_string(&window.file).expect("the template is there");
+    assert!(text.contains("prefix: \"b_\", count: 5") && text.contains("(joint: \"bone_1\""), "{text}");
+    assert!(!text.contains("a_") && !text.contains("Command(") && text.lines().count() == 8, "{text}");
 }
 
 #[test]

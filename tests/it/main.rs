@@ -147,6 +147,7 @@ mod obj_torture;
 mod packed_clips;
 #[cfg(feature = "editor")]
 mod panels;
+mod part_fields;
 mod part_instances;
 mod part_overrides;
 mod part_sizes;

@@ -226,6 +226,15 @@ fn a_save_leaves_parts_to_their_files() {
     let notes = store_rig_over(&RealDisk, &out, &rig, &[&path]).unwrap();
     assert!(notes.len() == 1 && notes[0].contains("\"finger 1\" was written out"), "{notes:?}");
     assert_eq!(saved_text::joints(&load(&out)), saved_text::joints(&rig));
+    // Without the part's file all is the template's own, in the form that people write.
+    let rig = load(&path);
+    fs::remove_file(folder.path().join("finger.rig.ron")).unwrap();
+    let notes = store_rig_over(&RealDisk, &out, &rig, &[&path]).unwrap();
+    assert!(notes.len() == 1 && notes[0].contains("written out"), "{notes:?}");
+    let text = fs::read_to_string(&out).unwrap();
+    assert!(text.contains("format: 2") && text.contains("control(") && text.contains("parent: \"palm\""), "{text}");
+    assert!(!text.contains("Command(") && !text.contains("version: \"\"") && !text.contains("joint_count"), "{text}");
+    assert_eq!(saved_text::joints(&load(&out)), saved_text::joints(&rig));
 }
 
 /// What instances told.

@@ -261,6 +261,24 @@ fn chains_that_do_not_fit_are_told_and_left_out() {
         let template = read(chains);
         assert!(template.notes.len() == 1 && template.notes[0].contains(told), "{chains}: {:?}", template.notes);
     }
+    // Branches are side by side.
+    let branches = |list: &str| {
+        let text = format!(
+            "(format: 2, name: \"part\", chains: [(name: \"x\", joints: [\"a\", \"b\"])], branches: [{list}], joints: [(label: \"a\"), \
+             (label: \"b\", parent: \"a\"), (label: \"c\", parent: \"a\")])"
+        );
+        read_template(text.as_bytes()).unwrap()
+    };
+    let template = branches("(name: \"y\", joints: [\"b\", \"c\"])");
+    assert!(template.notes.is_empty() && template.chains.len() == 2 && template.chains[1].is_fan);
+    for (list, told) in [
+        ("(name: \"y\", joints: [\"a\", \"b\"])", "hang on one joint"),
+        ("(name: \"y\", joints: [\"b\", \"b\"])", "hang on one joint"),
+        ("(name: \"x\", joints: [\"b\", \"c\"])", "has its name"),
+    ] {
+        let template = branches(list);
+        assert!(template.notes.len() == 1 && template.notes[0].contains(told), "{list}: {:?}", template.notes);
+    }
     // A use that asks for what the part does not have is told with its place.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.rig.ron");
@@ -308,4 +326,72 @@ fn parts_that_come_with_the_program_are_found_anywhere() {
     // A broken file is told, not passed over.
     fs::write(folder.path().join("parts/single_control.rig.ron"), &own[..20]).unwrap();
     assert!(load().unwrap_err().to_string().contains("single_control.rig.ron"));
+}
+
+/// A hand with counts of its chains, on the other side where `is_right`.
+fn hand(folder: &Path, counts: &[(&str, usize)], is_right: bool) -> Result<Rig, String> {
+    let counts: Vec<String> =
+        counts.iter().map(|(chain, count)| format!("(chain: \"{chain}\", count: {count})")).collect();
+    let counts = counts.join(", ");
+    let text = format!(
+        "(format: 2, name: \"arm\", parts: [(part: \"parts/hand.rig.ron\", name: \"hand\", mirror: {is_right}, counts: [{counts}])])"
+    );
+    let path = folder.join("arm.rig.ron");
+    fs::write(&path, text).unwrap();
+    load_template(&RealDisk, &path).map(|template| template.rig).map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_hand_has_as_many_fingers_of_as_many_joints_as_its_use_says() {
+    const FINGERS: [&str; 5] = ["thumb", "index", "middle", "ring", "pinky"];
+    let folder = tempfile::tempdir().unwrap();
+    let usual = hand(folder.path(), &[], false).unwrap();
+    let known = labels(&usual);
+    for fingers in 1..=6 {
+        for joints in 2..=6 {
+            let mut counts: Vec<(&str, usize)> = vec![("fingers", fingers)];
+            counts.extend(FINGERS.map(|finger| (finger, joints)));
+            let rig = hand(folder.path(), &counts, false).unwrap();
+            let found = labels(&rig);
+            assert_eq!(found.len(), 1 + fingers * joints, "{found:?}");
+            // What stays keeps its identity and its place.
+            for finger in FINGERS.iter().take(fingers) {
+                let root = format!("{finger}_01_l");
+                assert_eq!(found[&root], known[&root]);
+                assert!(rig.position(found[&root]).distance(usual.position(known[&root])) < 1e-5, "{root}");
+                let (end, was) = (format!("{finger}_0{joints}_l"), format!("{finger}_03_l"));
+                assert_eq!(found[&end], known[&was], "{end} is the end");
+            }
+            assert_eq!(found.contains_key("pinky2_01_l"), fingers == 6);
+            // A control for each joint, one for the finger, one for its tip, and one for all.
+            assert_eq!(controls(&rig, 1e-4), 1 + fingers * (joints + 2), "{fingers} fingers of {joints} joints");
+            // All of them curl.
+            let built = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
+            let program = RigProgram::compile(&built, &CompileOptions::default()).unwrap();
+            let mut state = RigState::new(Arc::new(program));
+            let named = |name: &str| {
+                let node = built.nodes.iter().find(|node| &*node.name == name && node.control.is_some());
+                node.unwrap_or_else(|| panic!("no control {name}")).uid
+            };
+            state.set_attribute(named("fingers_l"), "curl", 1.0).unwrap();
+            state.evaluate(0.0);
+            // The base of a thumb does not curl: the second joint of two turns where it is.
+            let is_end = |label: &&String| label.contains(&format!("_0{joints}_"));
+            for label in found.keys().filter(is_end).filter(|label| joints > 2 || !label.starts_with("thumb")) {
+                let (rest, now) = (rig.position(found[label]), state.global(found[label]).unwrap().translation);
+                assert!(rest.distance(now) > 0.004, "{label} of {fingers} fingers of {joints} joints stands");
+            }
+        }
+    }
+    // The right hand has the same on its side.
+    let right = hand(folder.path(), &[("fingers", 6), ("thumb", 2)], true).unwrap();
+    let left = hand(folder.path(), &[("fingers", 6), ("thumb", 2)], false).unwrap();
+    for joint in left.walk() {
+        let label = mirrored_label(joint.data.label.as_deref().unwrap()).unwrap();
+        let other = right.find_label(&label).unwrap_or_else(|| panic!("no joint {label}"));
+        let (place, mirrored) = (left.position(joint.data.uid), right.position(other));
+        assert!((place * glam::Vec3::new(-1.0, 1.0, 1.0)).distance(mirrored) < 1e-5, "{label}");
+    }
+    let error = hand(folder.path(), &[("fingers", 7)], false).unwrap_err();
+    assert!(error.contains("takes 1 to 6"), "{error}");
 }

@@ -101,6 +101,7 @@ fn joints_for(rig: &Rig, chosen: &[Uid], stroke: &[Uid], part: &Part) -> Vec<Uid
     }
     let end = part.rig.walk().last().map(|joint| joint.data.uid);
     if let ([chain], Some(end), Some(last)) = (part.chains.as_slice(), end, joints.last())
+        && !chain.is_fan
         && chain.joints.contains(&end)
     {
         let most = (part.rig.len() - chain.joints.len()).saturating_add(chain.max);

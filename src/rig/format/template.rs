@@ -42,7 +42,8 @@ pub use read::{read_header, read_template, survey_template, text_of};
 pub use shorthand::{Explicit, explicit};
 pub use text_patch::write_template_over;
 pub(crate) use text_patch::{
-    PartRigs, says_the_same, unsaid_parts, with_instances, without_instances, write_changes_over, write_own_over,
+    PartRigs, says_the_same, unsaid_parts, with_instance_fields, with_instances, with_instances_of, without_instances,
+    write_changes_over, write_own_over, write_short_template,
 };
 pub use tidy::{UidStyle, format_template};
 pub use write::write_template;

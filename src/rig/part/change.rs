@@ -16,7 +16,7 @@ use crate::rig::{
 /// A difference of an instance from its part: of a joint or of a tag.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PartChange {
-    /// Label of a joint of the part.
+    /// Label of a joint of the part, or its uid there.
     pub joint: Option<String>,
     /// A tag of the part: `module/name`, `module/label of its joint`, or its uid; where several are called so, with the
     /// number of one behind it, as in `point/hand_l#2`.
@@ -112,14 +112,17 @@ impl PartInstance {
         Ok(())
     }
 
-    /// Number of the joint of the fitted part that is called so.
+    /// Number of the joint of the fitted part that is called so, by its label or its uid there.
     ///
     /// # Errors
     /// A label that no joint has.
     pub(in crate::rig) fn find_joint(&self, part: &Rig, label: &str) -> Result<usize, PartError> {
+        let uid = label.parse::<Uid>().ok();
         let is_called = |joint: &RigJoint| {
             let known = joint.data.label.as_deref();
-            known == Some(label) || known.and_then(|known| known.strip_prefix(self.prefix.as_str())) == Some(label)
+            known == Some(label)
+                || known.and_then(|known| known.strip_prefix(self.prefix.as_str())) == Some(label)
+                || uid == Some(joint.data.uid)
         };
         part.walk().position(is_called).ok_or_else(|| {
             let known: Vec<&str> = part.walk().filter_map(|joint| joint.data.label.as_deref()).collect();

@@ -99,7 +99,7 @@ pub struct PartInstance {
     pub onto: Vec<String>,
     /// True to bring its own joints beyond those of `onto`, too.
     pub adds: bool,
-    /// Number of joints of the part's chains, by the name of the chain; an empty name for its only one.
+    /// Number of joints of the part's chains, or of its branches, by their name; an empty name for the only ones.
     pub counts: Vec<(String, usize)>,
     /// Label of the joint that its own joints hang on.
     pub parent: Option<String>,
@@ -128,7 +128,7 @@ pub struct PartInstance {
 pub type MirrorParams<'a> = &'a dyn Fn(&str, &str) -> Option<String>;
 
 /// Module whose name is that of an attribute, not of a node.
-const ATTRIBUTE: &str = "attribute";
+pub(super) const ATTRIBUTE: &str = "attribute";
 
 /// Notes and faults of a part that was put into a rig.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -315,9 +315,12 @@ impl PartInstance {
         if let ([only], true) = (part.chains.as_slice(), counts.is_empty())
             && !self.onto.is_empty()
             && !self.adds
+            && !only.is_fan
         {
             counts.push((only, only.count_on(&part.rig, self.onto.len())));
         }
+        // The copy of a branch has as many joints as the branch.
+        counts.sort_by_key(|(chain, _)| chain.is_fan);
         let mut rig = part.rig.clone();
         for (chain, count) in counts {
             rig = chain.resized(&rig, count)?;

@@ -8,16 +8,18 @@ use super::{Part, PartError, PartNeeds, name_of};
 use crate::rig::{
     EditError, JointData, NodeRef, NodeRefs, RestTransform, Rig, RigEdit, TagKind, Uid,
     operations::{OperationError, TagError},
-    reference::{Source, map_unions},
+    reference::{Pick, PickAt, Source, map_unions},
 };
 
 /// Largest number of joints of a chain of a part.
 pub(in crate::rig) const MOST_JOINTS: usize = 200;
 
-/// Two or more joints of a part, each the child of the one before, of which an instance may have another number.
+/// Two or more joints of a part, each the child of the one before, of which an instance may have another number; or branches
+/// side by side, such as fingers.
 ///
 /// The first joints and the last one keep their identities, places of the others are taken along the line of the part's own.
-/// References to several joints of the chain name those in between, too.
+/// References to several joints of the chain name those in between, too, and picks of a command's nodes up to the last joint
+/// go on up to the last joint.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartChain {
     /// Name for people.
@@ -28,6 +30,8 @@ pub struct PartChain {
     pub min: usize,
     /// Largest number of joints.
     pub max: usize,
+    /// True for branches: the joints are the first of each, and all hang on one joint.
+    pub is_fan: bool,
 }
 
 impl Part {
@@ -37,7 +41,7 @@ impl Part {
     /// # Errors
     /// Fewer joints than the part needs with its shortest chain; a chain that is none of the part.
     pub fn sized_for(&self, count: usize) -> Result<Rig, PartError> {
-        let [chain] = self.chains.as_slice() else { return Ok(self.rig.clone()) };
+        let [chain @ PartChain { is_fan: false, .. }] = self.chains.as_slice() else { return Ok(self.rig.clone()) };
         let least = chain.resized(&self.rig, chain.min)?;
         let of_chain = least.walk().enumerate().filter(|(_, joint)| chain.joints.contains(&joint.data.uid));
         let end = of_chain.map(|(place, _)| place + 1).max().unwrap_or_default();
@@ -63,7 +67,7 @@ impl PartChain {
     /// # Errors
     /// A chain that does not take so many joints, or is none of `part`.
     pub fn resized(&self, part: &Rig, count: usize) -> Result<Rig, PartError> {
-        let Self { name, joints, min, max } = self;
+        let Self { name, joints, min, max, is_fan } = self;
         if !(*min..=*max).contains(&count) {
             return Err(PartError::ChainLength { chain: name.clone(), min: *min, max: *max, count });
         }
@@ -71,9 +75,12 @@ impl PartChain {
         if count == joints.len() {
             return Ok(out);
         }
+        let chain_edit = |source| PartError::ChainEdit { chain: name.clone(), source };
+        if *is_fan {
+            return self.branched(part, count).map_err(chain_edit);
+        }
         let places = self.places(part, count)?;
-        let kept =
-            self.change(&mut out, count).map_err(|source| PartError::ChainEdit { chain: name.clone(), source })?;
+        let kept = self.change(&mut out, count).map_err(chain_edit)?;
         let mut above = kept.first().and_then(|first| part.joint(*first)?.parent).map_or(Affine3::IDENTITY, |parent| {
             part.rest_globals().into_iter().find(|(uid, _)| *uid == parent).map_or(Affine3::IDENTITY, |(_, at)| at)
         });
@@ -128,6 +135,7 @@ impl PartChain {
     fn change(&self, rig: &mut Rig, count: usize) -> Result<Vec<Uid>, EditError> {
         let joints = &self.joints;
         let last = joints.len() - 1;
+        self.pick(rig, count);
         if count <= last {
             let (kept, gone) = (&joints[..count.max(2) - 1], &joints[count.max(2) - 1..last]);
             let mut chain = kept.to_vec();
@@ -174,6 +182,28 @@ impl PartChain {
         Ok(chain)
     }
 
+    /// Makes picks by number of the nodes of a command on the chain which go up to the last joint go up to the last of `count`.
+    fn pick(&self, rig: &mut Rig, count: usize) {
+        let on_chain = self.joints.iter().filter_map(|joint| rig.joint(*joint)).flat_map(|joint| &joint.data.tags);
+        let commands: Vec<Uid> = on_chain.map(|tag| tag.uid).collect();
+        let most = self.joints.len();
+        refer(rig, &mut |union| {
+            for reference in &mut union.0 {
+                let is_of_chain = matches!(reference.source, Source::Command(tag) if commands.contains(&tag));
+                if let Pick::List(places) = &mut reference.pick
+                    && let Some(PickAt::Number(first)) = places.first().copied()
+                    && is_of_chain
+                    && places.len() > 1
+                    && places.iter().zip(first..).all(|(place, number)| *place == PickAt::Number(number))
+                    && first as usize + places.len() == most
+                {
+                    let first = first.min(count as u32 - 1);
+                    *places = (first..count as u32).map(PickAt::Number).collect();
+                }
+            }
+        });
+    }
+
     /// Numbers the joints of a chain whose labels have numbers.
     fn number(&self, rig: &mut Rig, chain: &[Uid]) -> Result<(), EditError> {
         let label = |rig: &Rig, joint: Uid| rig.joint(joint).and_then(|joint| joint.data.label.clone());
@@ -209,7 +239,7 @@ fn parted(label: &str) -> Option<(&str, usize, &str)> {
 }
 
 /// Changes the unions of references of all commands.
-fn refer(rig: &mut Rig, change: &mut dyn FnMut(&mut NodeRefs)) {
+pub(super) fn refer(rig: &mut Rig, change: &mut dyn FnMut(&mut NodeRefs)) {
     for joint in rig.joints.values_mut() {
         for tag in &mut joint.data.tags {
             if let TagKind::Command { params, .. } = &mut tag.kind {
@@ -220,7 +250,7 @@ fn refer(rig: &mut Rig, change: &mut dyn FnMut(&mut NodeRefs)) {
 }
 
 /// A union without joints that are gone; what named only them names the one before.
-fn without(union: &mut NodeRefs, gone: &[Uid], above: Uid) {
+pub(super) fn without(union: &mut NodeRefs, gone: &[Uid], above: Uid) {
     let is_gone = |reference: &NodeRef| matches!(reference.source, Source::Joint(joint) if gone.contains(&joint));
     if union.0.iter().all(is_gone) && !union.0.is_empty() {
         union.0.truncate(1);
@@ -231,7 +261,7 @@ fn without(union: &mut NodeRefs, gone: &[Uid], above: Uid) {
 }
 
 /// A union with the joints that were added behind `before`, where it names that among others of the chain.
-fn with(union: &mut NodeRefs, chain: &[Uid], before: Uid, added: &[Uid]) {
+pub(super) fn with(union: &mut NodeRefs, chain: &[Uid], before: Uid, added: &[Uid]) {
     let joint_of = |reference: &NodeRef| match reference.source {
         Source::Joint(joint) if chain.contains(&joint) => Some(joint),
         _ => None,

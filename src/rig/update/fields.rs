@@ -25,7 +25,11 @@ pub(super) struct Field<'a, T> {
     pub is_own: bool,
 }
 
-fn field<'a, T>(name: &str, text: impl Fn(&T) -> Option<String> + 'a, take: impl Fn(&mut T, &T) + 'a) -> Field<'a, T> {
+pub(super) fn field<'a, T>(
+    name: &str,
+    text: impl Fn(&T) -> Option<String> + 'a,
+    take: impl Fn(&mut T, &T) + 'a,
+) -> Field<'a, T> {
     let (name, is_close) = (name.to_owned(), Box::new(|_: &T, _: &T| false));
     Field { name, text: Box::new(text), take: Box::new(take), is_close, is_own: true }
 }

@@ -21,6 +21,124 @@ const HINGES: [(&str, &str, f32, f32); 9] = [
     ("biped", "pinky_r_3", -15.0, 120.0),
 ];
 
+/// Controls that turn without an end by intent, without side and number.
+const TURN_FREELY: [&[&str]; 4] = [
+    // What carries the rig, or a large part of it.
+    &["root", "main", "body", "torso", "hips", "chest", "spine", "spine_fk", "scapula", "shoulder", "hand", "forearm"],
+    // Goals: what they carry turns as far as its limb lets it.
+    &[
+        "hand_ik",
+        "foot_ik",
+        "leg_goal",
+        "front_goal",
+        "wing_tip",
+        "chest_ik",
+        "head_ik",
+        "chain_ik",
+        "limb_start",
+        "limb_end",
+        "hock",
+        "thumb_tip",
+        "index_tip",
+        "middle_tip",
+        "ring_tip",
+        "pinky_tip",
+    ],
+    // Ball joints, whose ends depend on where the limb is.
+    &[
+        "arm_fk", "leg_fk", "front_fk", "foot_fk", "head", "neck", "neck_fk", "thumb", "index", "middle", "ring",
+        "pinky", "paw", "fingers",
+    ],
+    // Chains of no anatomy, and what is soft.
+    &["chain", "control", "tail", "tail_fan", "tail_fk", "tail_bend", "tongue_fk", "tongue_bend", "ear"],
+];
+
+/// Name of a control without the side, the number and the ending of those that are called like their joints.
+fn stem(name: &str) -> &str {
+    let mut stem = name;
+    loop {
+        let ends = ["_control", "_l", "_r"].into_iter().find_map(|end| stem.strip_suffix(end));
+        let numbered = stem.rsplit_once('_').filter(|(_, end)| end.bytes().all(|byte| byte.is_ascii_digit()));
+        match ends.or(numbered.map(|(start, _)| start)) {
+            Some(shorter) => stem = shorter,
+            None => return stem,
+        }
+    }
+}
+
+#[test]
+fn every_control_has_ends_or_locks_to_its_turns_or_is_free_by_intent() {
+    let mut free = 0;
+    for (template, _) in files() {
+        let puppet = Puppet::of(&template);
+        let made = puppet
+            .built
+            .nodes
+            .iter()
+            .filter(|node| node.origin.as_ref().is_some_and(|origin| *origin.role == *"control"));
+        for node in made {
+            let Some(control) = node.control.as_deref() else { continue };
+            let is_open = |axis: usize| {
+                let (low, high) = control.limits.rotate[axis];
+                control.channels.rotate[axis] && (low.is_none() || high.is_none())
+            };
+            if (0..3).any(is_open) {
+                let stem = stem(&node.name);
+                assert!(
+                    TURN_FREELY.iter().any(|names| names.contains(&stem)),
+                    "{template}: {} turns without end",
+                    node.name
+                );
+                free += 1;
+            }
+        }
+    }
+    assert!(free > 40, "{free}");
+}
+
+#[test]
+fn eyes_lids_lips_wings_and_toes_turn_as_far_as_they_do() {
+    // Template, control, whether it stays in its place.
+    let ended = [
+        ("parts/eye", "eye_l", true),
+        ("quadruped", "eye_r", true),
+        ("parts/lips", "lip_upper", false),
+        ("parts/lips", "lip_corner_r", false),
+        ("parts/wing", "wing_fk_l_2", true),
+        ("bird", "wing_fk_r", true),
+        ("bird", "quill_6_r", true),
+        ("bird", "toe_middle_l_control", true),
+        ("quadruped", "toes_r_control", true),
+        ("parts/leg", "leg_fk_l_4", false),
+        ("biped", "leg_fk_r_4", false),
+    ];
+    for (template, name, stays) in ended {
+        let puppet = Puppet::of(template);
+        let (_, control) = controls(&puppet).into_iter().find(|(known, _)| known == name).unwrap();
+        for (low, high) in control.limits.rotate {
+            let (low, high) = (low.unwrap(), high.unwrap());
+            assert!((-150.0..0.0).contains(&low) && (0.0..=150.0).contains(&high), "{template}: {name}: {low} {high}");
+        }
+        assert_eq!(control.channels.translate, [!stays; 3], "{template}: {name}");
+    }
+    // The limits are for the toes alone.
+    for joint in ["leg_fk_l", "leg_fk_l_3"] {
+        let (_, control) = controls(&Puppet::of("parts/leg")).into_iter().find(|(known, _)| known == joint).unwrap();
+        assert_eq!(control.limits.rotate, [(None, None); 3], "{joint}");
+    }
+    // Toes go up to their end and no further, on both sides.
+    for name in ["leg_fk_l_4", "leg_fk_r_4"] {
+        let mut puppet = Puppet::of("biped");
+        let slot = puppet.state.program().node(puppet.control(name)).unwrap();
+        puppet.turn(name, Quat::from_rotation_x(2.0));
+        let taken = puppet.state.offset_at(slot).rotation;
+        assert!((2.0 * taken.x.atan2(taken.w).to_degrees() - 80.0).abs() < 0.5, "{name}: {taken}");
+    }
+    // Lips stay near the mouth.
+    let (_, lip) = controls(&Puppet::of("parts/lips")).into_iter().find(|(known, _)| known == "lip_lower").unwrap();
+    assert!(lip.limits.translate.iter().all(|(low, high)| low.is_some() && high.is_some()));
+}
+
 fn controls(puppet: &Puppet) -> Vec<(String, ControlData)> {
     let controls = puppet.built.nodes.iter().filter(|node| node.kind == NodeType::Control);
     controls.map(|node| (node.name.to_string(), node.control.as_deref().unwrap().clone())).collect()

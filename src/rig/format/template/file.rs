@@ -40,6 +40,8 @@ pub(super) struct TemplateFile {
     #[serde(default)]
     pub(super) chains: Vec<ChainFile>,
     #[serde(default)]
+    pub(super) branches: Vec<ChainFile>,
+    #[serde(default)]
     pub(super) sockets: Vec<SocketFile>,
     #[serde(default)]
     pub(super) options: Vec<OptionFile>,
@@ -315,6 +317,7 @@ pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&
             "features",
             "needs",
             "chains",
+            "branches",
             "sockets",
             "options",
             "groups",
@@ -346,7 +349,7 @@ pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&
         (3, Some("sockets")) => Some(&["name", "joint", "translation", "rotation"]),
         (3, Some("options")) => Some(&["name", "default", "description", "form", "sets"]),
         (5, Some("sets")) if above == Some("options") => Some(&["tag", "param"]),
-        (3, Some("chains")) => Some(&["name", "joints", "min", "max"]),
+        (3, Some("chains" | "branches")) => Some(&["name", "joints", "min", "max"]),
         (5, Some("counts")) if above == Some("parts") => Some(&["chain", "count"]),
         (5, Some("changes")) if above == Some("parts") => Some(&PART_CHANGE_FIELDS),
         (3, Some("poses")) => Some(&["uid", "name", "offsets", "values"]),

@@ -94,7 +94,8 @@ pub fn read_header(bytes: &[u8]) -> Result<TemplateHeader, SourceError> {
     };
     let fields = scan::fields(text);
     let is_list = |field: &&Field| {
-        field.depth == 1 && matches!(field.name, "chains" | "groups" | "inputs" | "joints" | "parts" | "poses")
+        field.depth == 1
+            && matches!(field.name, "chains" | "branches" | "groups" | "inputs" | "joints" | "parts" | "poses")
     };
     let mut passed_over = TEMPLATE.unknown(&fields);
     passed_over.extend(fields.iter().filter(is_list));
@@ -141,7 +142,7 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
     let mut hung = Vec::new();
     let may_hang = places.has_parts().then_some(&mut hung);
     add_joints(&mut rig, format, file.joints, places, &mut seen, may_hang, faults);
-    let chains = parts::chains(&rig, file.chains, &mut notes);
+    let chains = parts::chains(&rig, file.chains, file.branches, &mut notes);
     let mut sockets = parts::sockets(places, file.sockets, faults);
     let options = parts::options(places, file.options, faults);
     rig.about.options.clone_from(&options);

@@ -11,6 +11,7 @@ pub(super) mod patch;
 use bevy::math::{Quat, Vec3};
 
 use super::{
+    FORMAT,
     file_marks::FileMarks,
     read::read_text,
     shorthand::{Declaration, Declarations, TAG_FIELDS, TagForm},
@@ -28,7 +29,10 @@ use crate::rig::{
 use fresh::{NamesInUse, is_short, settled};
 use labels::header_labels;
 use order::reordered;
-pub(crate) use parts::{PartRigs, unsaid_parts, with_instances, without_instances, write_changes_over, write_own_over};
+pub(crate) use parts::{
+    PartRigs, unsaid_parts, with_instance_fields, with_instances, with_instances_of, without_instances,
+    write_changes_over, write_own_over,
+};
 use patch::Patch;
 
 /// The text of a rig's template, as changes of a text of the same rig. `None` if `source` is no template of this rig, or
@@ -43,12 +47,28 @@ fn written_over(rig: &Rig, source: &str) -> Option<String> {
     if before.uid() != rig.uid() {
         return None;
     }
-    let wanted = comparable(read_text(&write_template(rig), 1).ok()?.rig);
-    let is_right = |text: &str| read_text(text, 1).is_ok_and(|read| comparable(read.rig) == wanted);
     let declared = Declarations::find(source)?;
     let mut rewriter = Rewriter::new(rig, &before, &declared);
     header_labels(&mut rewriter.patch, &declared.tree, &before, rig);
-    let text = rewriter.text();
+    said(rig, rewriter.text())
+}
+
+/// The text of a rig's template as people write it: tags of the short form, names where they are enough, and no uid that follows
+/// from names. `None` for a rig that such a text cannot say.
+pub(crate) fn write_short_template(rig: &Rig) -> Option<String> {
+    let (uid, name) = (rig.uid(), quoted(&rig.about().name));
+    let source = format!("(\n    format: {FORMAT},\n    uid: \"{uid}\",\n    name: {name},\n)\n");
+    let before = read_text(&source, 1).ok()?.rig;
+    let declared = Declarations::find(&source)?;
+    let mut rewriter = Rewriter { with_names: true, is_short: true, ..Rewriter::new(rig, &before, &declared) };
+    header_labels(&mut rewriter.patch, &declared.tree, &before, rig);
+    said(rig, rewriter.text())
+}
+
+/// The text, or the text in the rig's order, if that says what the rig is.
+fn said(rig: &Rig, text: String) -> Option<String> {
+    let wanted = comparable(read_text(&write_template(rig), 1).ok()?.rig);
+    let is_right = |text: &str| read_text(text, 1).is_ok_and(|read| comparable(read.rig) == wanted);
     if is_right(&text) {
         return Some(text);
     }
@@ -141,7 +161,7 @@ impl<'d, 'a> Rewriter<'d, 'a> {
             whole: [before, rig],
             declared,
             with_names,
-            is_short: is_short(declared, with_names),
+            is_short: is_short(declared),
             names: NamesInUse::of(rig),
             index: RigNameIndex::new(rig),
             patch: Patch::new(&declared.tree),

@@ -30,26 +30,39 @@ use crate::rig::{
     },
 };
 
-/// Chains of a part. One that does not fit the joints is told and left out.
-pub(super) fn chains(rig: &Rig, files: Vec<ChainFile>, notes: &mut Vec<String>) -> Vec<PartChain> {
-    let mut known: Vec<PartChain> = Vec::with_capacity(files.len());
-    for ChainFile { name, joints: labels, min, max } in files {
+/// Chains and branches of a part. One that does not fit the joints is told and left out.
+pub(super) fn chains(
+    rig: &Rig,
+    chains: Vec<ChainFile>,
+    branches: Vec<ChainFile>,
+    notes: &mut Vec<String>,
+) -> Vec<PartChain> {
+    let mut known: Vec<PartChain> = Vec::with_capacity(chains.len() + branches.len());
+    let files = chains.into_iter().map(|file| (file, false)).chain(branches.into_iter().map(|file| (file, true)));
+    for (ChainFile { name, joints: labels, min, max }, is_fan) in files {
         let joints: Vec<Uid> = labels.iter().filter_map(|label| rig.find_label(label)).collect();
         let (min, max) = (min.unwrap_or(1), max.unwrap_or(MOST_JOINTS));
         let parent = |joint: Uid| rig.joint(joint).and_then(|joint| joint.parent);
+        let is_taken = |chain: &PartChain| {
+            let shares = chain.joints.iter().any(|of| joints.contains(of));
+            chain.name == name || (shares && chain.is_fan == is_fan)
+        };
         let fault = if joints.len() != labels.len() || joints.len() < 2 {
             "it needs two joints or more, all of them in the file".to_owned()
-        } else if joints.windows(2).any(|pair| parent(pair[1]) != Some(pair[0])) {
+        } else if !is_fan && joints.windows(2).any(|pair| parent(pair[1]) != Some(pair[0])) {
             "each of its joints must be the parent of the next".to_owned()
+        } else if is_fan && joints.windows(2).any(|pair| parent(pair[0]) != parent(pair[1]) || pair[0] == pair[1]) {
+            "all of its joints must hang on one joint".to_owned()
         } else if !(1..=joints.len()).contains(&min) || !(joints.len()..=MOST_JOINTS).contains(&max) {
             format!("`min` is 1 to {0}, and `max` {0} to {MOST_JOINTS}, for its {0} joints", joints.len())
-        } else if known.iter().any(|chain| chain.name == name || chain.joints.iter().any(|of| joints.contains(of))) {
+        } else if known.iter().any(is_taken) {
             "another has its name or one of its joints".to_owned()
         } else {
-            known.push(PartChain { name, joints, min, max });
+            known.push(PartChain { name, joints, min, max, is_fan });
             continue;
         };
-        notes.push(format!("chain \"{name}\" has the number of joints in the file, always: {fault}"));
+        let kind = if is_fan { "branches" } else { "chain" };
+        notes.push(format!("{kind} \"{name}\" has the number of joints in the file, always: {fault}"));
     }
     known
 }

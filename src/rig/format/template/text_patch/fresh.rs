@@ -52,11 +52,11 @@ impl NamesInUse {
 }
 
 /// Returns `true` for a text whose tags have the short form, or would have it if there were any.
-pub(super) fn is_short(declared: &Declarations, with_names: bool) -> bool {
+pub(super) fn is_short(declared: &Declarations) -> bool {
     let forms = || declared.tags.iter().flatten().filter_map(|tag| TagForm::of(&declared.tree, tag.node));
     let has_short = forms().any(|form| matches!(form, TagForm::Short(_)));
     let has_long = forms().any(|form| matches!(form, TagForm::Command));
-    declared.format() >= FIRST_FORMAT && (has_short || with_names && !has_long)
+    declared.format() >= FIRST_FORMAT && (has_short || !has_long)
 }
 
 impl<'d> Rewriter<'d, '_> {

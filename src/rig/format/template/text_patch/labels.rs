@@ -12,7 +12,7 @@ use crate::rig::{
 /// Fields before which sockets and options are put: what lists headers reads the beginning of a file alone.
 const BEHIND_HEADER: [&str; 5] = ["groups", "inputs", "joints", "parts", "poses"];
 
-/// Writes sockets and options that are others now, and the labels of joints that sockets and chains name. A socket whose joint is
+/// Writes sockets and options that are others now, and the labels of joints that sockets, chains and branches name. A socket whose joint is
 /// gone goes.
 pub(super) fn header_labels(patch: &mut Patch, tree: &Tree, before: &Rig, rig: &Rig) {
     sockets(patch, tree, before, rig);
@@ -21,7 +21,8 @@ pub(super) fn header_labels(patch: &mut Patch, tree: &Tree, before: &Rig, rig: &
         let now = rig.joint(before.find_label(label)?)?.data.label.clone()?;
         (now != label).then(|| quoted(&now))
     };
-    for chain in tree.elements(tree.root(), "chains") {
+    let lists = ["chains", "branches"].map(|list| tree.elements(tree.root(), list));
+    for chain in lists.into_iter().flatten() {
         for item in tree.elements(chain.value, "joints") {
             let label: Option<String> = ron::from_str(tree.written(item.value)).ok();
             if let Some(now) = label.as_deref().and_then(renamed) {

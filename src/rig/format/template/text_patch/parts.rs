@@ -1,6 +1,7 @@
 //! Changes of what parts bring, as local changes of the part instances in a template's text.
 
 mod change;
+mod fields;
 mod instance;
 mod own;
 mod unsaid;
@@ -24,6 +25,7 @@ use crate::rig::{
 };
 pub(super) use change::short_tag;
 use change::{FieldChange, JointDiff, TagDiff, Words};
+pub(crate) use fields::{with_instance_fields, with_instances_of};
 pub(crate) use instance::{with_instances, without_instances};
 pub(crate) use own::write_own_over;
 use own::{added_tags, instance_labels};

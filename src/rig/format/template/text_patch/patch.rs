@@ -284,7 +284,7 @@ impl<'d, 'a> Patch<'d, 'a> {
     }
 
     /// Inserts an item behind another one, or before the first.
-    fn insert(&mut self, node: NodeId, behind: Option<usize>, text: &str) {
+    pub fn insert(&mut self, node: NodeId, behind: Option<usize>, text: &str) {
         self.items.entry(node).or_default().added.push(AddedItem { behind, text: text.to_owned(), is_line: false });
     }
 

@@ -1,0 +1,190 @@
+//! Updates of templates with parts: what a new version changes of a part instance is changed of the instance, not of what comes
+//! of it.
+
+use std::path::{Path, PathBuf};
+
+use super::{
+    Disk, LoadError, PartFiles, StoreError,
+    load::{in_source, template_file},
+    store::{save_template, store_rig_over},
+    template_origin::moved_text,
+    template_text::{TemplateText, template_text},
+};
+use crate::rig::{
+    Rig, Uid,
+    part::PartInstance,
+    template::{FileMarks, read_template, text_of, with_instance_fields, with_instances_of, write_template},
+    update::{
+        Change, ChangeKind, Choices, MergedParts, RefittedTemplate, TemplateWithParts, Update, diff, merge_parts,
+        update_with,
+    },
+};
+
+/// A version of a template: its file, and the rig with its parts.
+#[derive(Debug, Clone)]
+pub struct TemplateVersion {
+    path: PathBuf,
+    text: String,
+    content: TemplateWithParts,
+    notes: Vec<String>,
+}
+
+impl TemplateVersion {
+    /// The template of a file, which is found as [`load_template`](super::load_template) finds it.
+    ///
+    /// # Errors
+    /// Those of [`load_template`](super::load_template).
+    pub fn read(disk: &dyn Disk, path: &Path) -> Result<Self, LoadError> {
+        let (path, bytes) = template_file(disk, path)?;
+        let fault = |source| in_source(&path, &bytes, source);
+        let text = text_of(&bytes).map_err(fault)?;
+        let template = read_template(&bytes).map_err(fault)?;
+        let mut files = PartFiles::new(disk);
+        let whole = files.put_together(&path, text, template.clone()).map_err(fault)?;
+        let fitted = files.fitted(&path, &template).unwrap_or_default();
+        // The marks of the file are kept.
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        let content = TemplateWithParts { template, rig: whole.rig, fitted };
+        Ok(Self { path, text, content, notes: whole.notes })
+    }
+
+    /// The rig with its parts.
+    pub fn rig(&self) -> &Rig {
+        &self.content.rig
+    }
+
+    /// Notes of the reader, a sentence each.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn parts(&self) -> &[PartInstance] {
+        &self.content.template.parts
+    }
+
+    /// The version with the fields of `merged` instances, and its rig then. `None` where its parts do not fit so.
+    fn refitted(&self, disk: &dyn Disk, merged: &MergedParts) -> Option<(RefittedTemplate, Rig)> {
+        if self.content.fitted.len() != self.parts().len() {
+            return None;
+        }
+        let mut files = PartFiles::new(disk);
+        let mut fit = |instance: &PartInstance| files.fitted_part(&self.path, instance).ok();
+        let refitted = self.content.with_fields(&merged.instances, &mut fit)?;
+        let (_, text) = FileMarks::of(&self.text);
+        let whole = files.put_together(&self.path, &text, refitted.template.clone()).ok()?;
+        Some((refitted, whole.rig))
+    }
+}
+
+/// An update of a template.
+#[derive(Debug, Clone)]
+pub struct TemplateUpdate {
+    /// The rig after the update, and the changes: those of fields of part instances first.
+    pub update: Update,
+    /// The template that is updated.
+    path: PathBuf,
+    /// Texts of the template with the parts as they are after the update, best first.
+    texts: Vec<String>,
+}
+
+/// The update of a template to the content of `file`: see [`update_with`]. Fields of part instances, such as `prefix`, `count`
+/// and `socket`, are compared by themselves, and the rigs as they are with the fields that come of that. Without a base whatever
+/// differs is a conflict.
+pub fn update_template(
+    disk: &dyn Disk,
+    base: Option<&TemplateVersion>,
+    now: &TemplateVersion,
+    file: &TemplateVersion,
+    choices: &Choices,
+) -> TemplateUpdate {
+    let path = now.path.clone();
+    let merged = merge_parts(base.map(|base| &base.content), &now.content, &file.content, choices);
+    let refitted = if merged.differs { with_merged_fields(disk, base, now, file, &merged, choices) } else { None };
+    let plain = || (update_with(base.map(TemplateVersion::rig), now.rig(), file.rig(), choices), None);
+    let (update, text) = refitted.unwrap_or_else(plain);
+    let (marks, plain) = FileMarks::of(&now.text);
+    let of_fields = text.as_deref().unwrap_or(&plain);
+    let fresh = fresh_parts(base, now, file);
+    let (_, of_file) = FileMarks::of(&file.text);
+    let whole = (!fresh.is_empty())
+        .then(|| with_instances_of(of_fields, now.parts(), (&*of_file, file.parts()), &fresh))
+        .flatten();
+    // A part that cannot be had from here comes as joints and tags.
+    let is_right = |text: &String| PartFiles::new(disk).complete(&now.path, text.as_bytes()).is_ok();
+    let texts = whole.into_iter().chain(text).filter(is_right).map(|text| marks.put_on(text)).collect();
+    TemplateUpdate { update, path, texts }
+}
+
+/// Part instances of the file that neither the base nor the template has now.
+fn fresh_parts(base: Option<&TemplateVersion>, now: &TemplateVersion, file: &TemplateVersion) -> Vec<Uid> {
+    let is_known = |uid: Uid| {
+        let mut versions = base.into_iter().chain([now]);
+        versions.any(|version| version.parts().iter().any(|part| part.uid == uid))
+    };
+    file.parts().iter().map(|part| part.uid).filter(|uid| !is_known(*uid)).collect()
+}
+
+/// The update of the versions with the fields of instances that were merged, and the text with these fields. `None` where a
+/// version does not take them.
+fn with_merged_fields(
+    disk: &dyn Disk,
+    base: Option<&TemplateVersion>,
+    now: &TemplateVersion,
+    file: &TemplateVersion,
+    merged: &MergedParts,
+    choices: &Choices,
+) -> Option<(Update, Option<String>)> {
+    let was = match base {
+        Some(base) => Some(base.refitted(disk, merged)?.1),
+        None => None,
+    };
+    let (refitted, rig) = now.refitted(disk, merged)?;
+    let (_, theirs) = file.refitted(disk, merged)?;
+    let mut update = update_with(was.as_ref(), &rig, &theirs, choices);
+    // What comes and goes with other fields is told with them.
+    let comes_or_goes = |change: &Change| matches!(change.kind, ChangeKind::Added | ChangeKind::Removed);
+    let brought = diff(now.rig(), &rig).into_iter().filter(comes_or_goes);
+    let changes = merged.changes.iter().cloned().chain(refitted.lost).chain(brought).chain(update.changes);
+    update.changes = changes.collect();
+    let parts: Vec<(PartInstance, Rig)> = refitted.template.parts.into_iter().zip(refitted.fitted).collect();
+    let (_, text) = FileMarks::of(&now.text);
+    let text = with_instance_fields(&text, [now.content.fitted.as_slice(), parts.as_slice()], [now.rig(), &rig]);
+    Some((update, text))
+}
+
+impl TemplateUpdate {
+    /// Saves the updated rig as changes of the template's text: parts stay parts. Returns notes, a sentence each.
+    ///
+    /// # Errors
+    /// [`StoreError`]; the former file is unchanged.
+    pub fn store(&self, disk: &dyn Disk, path: &Path) -> Result<Vec<String>, StoreError> {
+        let reader = || PartFiles::new(disk);
+        let mut first: Option<TemplateText> = None;
+        for text in &self.texts {
+            let is_elsewhere = self.path.parent() != path.parent();
+            let moved = if is_elsewhere { moved_text(text, &self.path, path, &reader) } else { None };
+            let source = moved.as_deref().map_or((self.path.as_path(), text.as_str()), |text| (path, text));
+            let written = template_text(&self.update.rig, Some(source), path, &reader);
+            if written.note.is_none() {
+                first = Some(written);
+                break;
+            }
+            first.get_or_insert(written);
+        }
+        let Some(TemplateText { text, note }) = first else {
+            return store_rig_over(disk, path, &self.update.rig, &[&self.path]);
+        };
+        save_template(disk, path, &text)?;
+        Ok(note.into_iter().collect())
+    }
+}
+
+/// The text that a version is kept as for the next update of the rig in a file: with its parts if that has them all, too.
+pub fn base_text(disk: &dyn Disk, version: &TemplateVersion, rig: &Path) -> String {
+    let saved = TemplateVersion::read(disk, rig);
+    let has = |uid: Uid| saved.as_ref().is_ok_and(|saved| saved.parts().iter().any(|part| part.uid == uid));
+    let has_parts = !version.parts().is_empty() && version.parts().iter().all(|part| has(part.uid));
+    let (_, text) = FileMarks::of(&version.text);
+    let moved = if has_parts { moved_text(&text, &version.path, rig, &|| PartFiles::new(disk)) } else { None };
+    moved.unwrap_or_else(|| write_template(version.rig()))
+}
