@@ -37,6 +37,7 @@ use rigsmith::{
         stage::RigStage,
     },
     prelude::*,
+    rig::{TagKind, operations::TagOperation},
 };
 
 use crate::gestures::boxes;
@@ -779,7 +780,10 @@ fn the_controls_panel_poses_resets_and_switches() {
     assert_eq!(place, all);
     desk.click("Take back the last command");
     desk.frames(2);
-    assert!(desk.says(&format!("{} of {all} commands", all - 1)));
+    let counts = desk.app.world().get::<rigsmith::plugins::commands::Processor>(entity).unwrap().builder().counts();
+    let off = if counts.off == 0 { String::new() } else { format!(", {} off", counts.off) };
+    assert!(counts.built < counts.all || counts.off > 0, "{counts:?}");
+    assert!(desk.says(&format!("{} of {} commands{off}", counts.built, counts.all)), "{:?}", desk.seen);
 }
 
 #[test]
@@ -805,4 +809,29 @@ fn the_stage_of_a_rig_is_chosen_in_the_process_panel() {
         let joints = desk.rig().len();
         assert_eq!(joints, if wanted == RigStage::Deleted { 0 } else { count });
     }
+}
+
+#[test]
+fn commands_that_are_off_are_counted_apart() {
+    let mut desk = Desk::new(ProcessPanel::default());
+    let joints = desk.chain(&["a", "b", "c"]);
+    let kind = TagKind::Command { module: "null".into(), params: "()".into(), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: joints.clone(), kind, index: None }));
+    desk.edit(Operation::Group { joints: vec![joints[1], joints[2]], name: "tail".into(), color: None });
+    let group = desk.rig().joint(joints[1]).unwrap().data.group.unwrap();
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::All });
+    desk.frames(3);
+    assert!(desk.says("3 of 3"), "{:?}", desk.seen);
+    desk.edit(Operation::Tags(TagOperation::EnableGroup(group, false)));
+    desk.frames(2);
+    assert!(desk.says("1 of 1") && desk.says("2 off"), "{:?}", desk.seen);
+    // What is off is no command to wait for, either.
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::RollBack });
+    desk.frames(2);
+    assert!(desk.says("0 of 1") && desk.says("2 off"), "{:?}", desk.seen);
+    let next = rigsmith::editor::next_step::next_step(desk.app.world());
+    assert!(next.as_ref().is_some_and(|next| next.starts_with("Built 0 of 1 command, 2 off")), "{next:?}");
+    desk.edit(Operation::Tags(TagOperation::EnableGroup(group, true)));
+    desk.frames(2);
+    assert!(!desk.says("2 off") && desk.says("0 of 3"), "{:?}", desk.seen);
 }

@@ -534,7 +534,7 @@ fn bones_and_meshes_are_hidden_by_switches() {
     let points = desk.app.world().get::<RigMesh>(mesh).unwrap().rest.points.len();
     let skin = RigEdit::SetSkin(Uid(97), Some(Arc::new(held_by(joints[0], points))));
     desk.edit(Operation::Edits(vec![skin]));
-    assert!(desk.says("1 of 2 joints move points of a mesh."), "{:?}", desk.seen);
+    assert!(desk.says("1 of 2 joints moves points of a mesh."), "{:?}", desk.seen);
     assert_eq!(desk.steps().0, steps.0 + 1, "showing and hiding is no step");
 }
 

@@ -20,6 +20,7 @@ use crate::{
         bones::{FaceBoneKind, Region},
     },
     editor::{
+        counted::counted,
         notice::Notice,
         panel::{EditorPanel, Requests},
     },
@@ -118,7 +119,7 @@ fn summary(report: &FaceReport) -> String {
     };
     let fitted =
         report.fit_error.map_or(String::new(), |error| format!("; the shapes are met to {error:.4} on average"));
-    format!("{skin} facial bones in {sum:.0} ms{kept}{fitted}.")
+    format!("{} in {sum:.0} ms{kept}{fitted}.", counted(skin, "facial bone", "facial bones"))
 }
 
 /// The panel.

@@ -53,6 +53,7 @@ use super::{
 use crate::{
     editor::{
         actions::ActionRequest,
+        counted::counted,
         notice::Notice,
         panel::{EditorPanel, Requests},
     },
@@ -226,10 +227,7 @@ impl GraphPanel {
                 button(ui, world, GraphAction::OpenFrames, "Open all", requests);
                 button(ui, world, GraphAction::FoldFrames, "Fold all", requests);
             }
-            let count = match graph.nodes.len() {
-                1 => "1 command".to_owned(),
-                count => format!("{count} commands"),
-            };
+            let count = counted(graph.nodes.len(), "command", "commands");
             let selected = view.selected.len();
             let text = if selected == 0 { count } else { format!("{count}, {selected} selected") };
             ui.add(egui::Label::new(egui::RichText::new(text).weak()).truncate());

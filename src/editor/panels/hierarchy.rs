@@ -19,6 +19,7 @@ use super::{
 };
 use crate::{
     editor::{
+        counted::counted,
         library::{DraggedTemplate, goes_onto_both},
         notice::Notice,
         panel::{EditorPanel, Requests},
@@ -123,7 +124,7 @@ impl HierarchyPanel {
         }
         if !self.filter.trim().is_empty() {
             let found = self.tree.rows.iter().filter(|row| row.matches).count();
-            ui.weak(format!("{found} of {} joints", shown.rig.len()));
+            ui.weak(format!("{found} of {}", counted(shown.rig.len(), "joint", "joints")));
         }
     }
 

@@ -8,17 +8,18 @@ use bevy_egui::egui::{self, Color32, Label, Rect, RichText, ScrollArea, Sense, U
 use super::list::{self, List};
 use crate::{
     editor::{
+        counted::counted,
         notice::{Notice, Severity},
         panel::{EditorPanel, Requests},
     },
     plugins::{
         controls::SwitchedOver,
-        document::{ChangeError, EditRefusal},
+        document::{ChangeError, EditRefusal, EditReport},
         limits::RigLimits,
     },
 };
 
-/// Plugin that stores notices, and makes notices of refused edits.
+/// Plugin that stores notices, and makes notices of refused edits and of what operations note.
 pub struct LogPlugin;
 
 impl Plugin for LogPlugin {
@@ -27,9 +28,10 @@ impl Plugin for LogPlugin {
             .add_message::<Notice>()
             .add_message::<ClearLog>()
             .add_message::<EditRefusal>()
+            .add_message::<EditReport>()
             .add_message::<SwitchedOver>()
             .add_message::<RequestRedraw>()
-            .add_systems(Last, (tell_refusals, tell_switches, keep_notices).chain().in_set(LogSystems));
+            .add_systems(Last, (tell_notes, tell_refusals, tell_switches, keep_notices).chain().in_set(LogSystems));
     }
 }
 
@@ -99,6 +101,13 @@ impl LogEntry {
     }
 }
 
+/// Tells what an operation noted, once it is carried out.
+fn tell_notes(mut edited: MessageReader<EditReport>, mut notices: MessageWriter<Notice>) {
+    for note in edited.read().flat_map(|report| &report.notes) {
+        notices.write(Notice::warning(sentence(note)));
+    }
+}
+
 fn tell_refusals(mut refused: MessageReader<EditRefusal>, mut notices: MessageWriter<Notice>) {
     for refused in refused.read() {
         let text = sentence(&refused.reason.to_string());
@@ -114,7 +123,10 @@ fn tell_refusals(mut refused: MessageReader<EditRefusal>, mut notices: MessageWr
 fn tell_switches(mut switched: MessageReader<SwitchedOver>, mut notices: MessageWriter<Notice>) {
     for SwitchedOver { frames, keys, notes, .. } in switched.read() {
         notices.write(match notes.first() {
-            None => Notice::done(format!("Switched over {frames} frames with {keys} keys; all joints move as before.")),
+            None => {
+                let (frames, keys) = (counted(*frames, "frame", "frames"), counted(*keys, "key", "keys"));
+                Notice::done(format!("Switched over {frames} with {keys}; all joints move as before."))
+            }
             Some(first) => {
                 let more = match notes.len() {
                     1 => String::new(),

@@ -167,7 +167,14 @@ impl ProcessPanel {
                     }
                 });
             }
-            ui.label(format!("{done} of {total}"));
+            let counts = builder.counts();
+            ui.label(format!("{} of {}", counts.built, counts.all))
+                .on_hover_text("Commands that are in effect, of those that a build carries out");
+            if counts.off > 0 {
+                ui.weak(format!("{} off", counts.off)).on_hover_text(
+                    "Commands that the build passes over: their tag, feature or group is off, or what they refer to",
+                );
+            }
             if !self.ran.is_empty() {
                 let ran = format!("{} ran", self.ran.len());
                 ui.label(RichText::new(ran).color(style::accent(ui.visuals())))

@@ -21,6 +21,7 @@ use crate::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
+        counted::counted,
         notice::{Notice, Severity},
         panel::{EditorPanel, Requests},
     },
@@ -174,9 +175,13 @@ fn unweighted(report: &WeightReport) -> usize {
 /// "100 % of 13380 points have weights", or the number of points without any.
 fn covered(points: usize, without: usize) -> String {
     if without == 0 {
-        format!("100 % of {points} points have weights")
+        match points {
+            1 => "100 % of 1 point has weights".to_owned(),
+            _ => format!("100 % of {} have weights", counted(points, "point", "points")),
+        }
     } else {
-        format!("{without} of {points} points have no weights")
+        let have = if without == 1 { "has" } else { "have" };
+        format!("{without} of {} {have} no weights", counted(points, "point", "points"))
     }
 }
 
@@ -297,7 +302,7 @@ impl SkinningPanel {
         ui.strong(mesh_name(mesh));
         let points = mesh.rest.points.len();
         let Some(skin) = shown.rig.skin(mesh.uid) else {
-            ui.weak(format!("Not skinned ({points} points)"));
+            ui.weak(format!("Not skinned ({})", counted(points, "point", "points")));
             self.failure(ui, world, entity);
             return;
         };

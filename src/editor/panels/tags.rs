@@ -23,6 +23,7 @@ use super::{
 };
 use crate::{
     editor::{
+        counted::counted,
         notice::Notice,
         panel::{EditorPanel, Requests},
     },
@@ -106,7 +107,7 @@ impl TagsPanel {
             let joints = &self.stack.joints;
             let name = match joints[..] {
                 [joint] => shown.name(joint).into_owned(),
-                _ => format!("{} joints", joints.len()),
+                _ => counted(joints.len(), "joint", "joints"),
             };
             ui.strong(name);
             let to = joints.clone();
@@ -156,7 +157,7 @@ impl TagsPanel {
         match clipboard {
             Ok(clipboard) => {
                 let count: usize = clipboard.joints.iter().map(|joint| joint.tags.len()).sum();
-                requests.send(Notice::done(format!("Copied {count} tags.")).quiet());
+                requests.send(Notice::done(format!("Copied {}.", counted(count, "tag", "tags"))).quiet());
                 self.clipboard = Some(Arc::new(clipboard));
             }
             Err(error) => requests.send(Notice::error(format!("Nothing was copied: {error}."))),

@@ -8,6 +8,7 @@ use bevy_egui::egui::{
 use super::{DraggedJoints, HierarchyPanel, Tree, menu, obstacle, reparent, rows::Row, select, tops};
 use crate::{
     editor::{
+        counted::counted,
         library::{DraggedTemplate, LibraryAct, LibraryRequest, dropping},
         panel::Requests,
         panels::{
@@ -234,7 +235,7 @@ fn carried(ui: &Ui, joints: &[Uid], shown: &DisplayedRig, refused: Option<&str>)
     let text = match (refused, joints) {
         (Some(refused), _) => refused.to_owned(),
         (None, [one]) => shown.name(*one).into_owned(),
-        (None, more) => format!("{} joints", more.len()),
+        (None, more) => counted(more.len(), "joint", "joints"),
     };
     beside_pointer(ui, text);
 }
