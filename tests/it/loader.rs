@@ -497,6 +497,24 @@ fn a_part_goes_onto_the_stroke_that_was_just_drawn() {
 }
 
 #[test]
+fn a_part_over_other_commands_is_told_once_it_is_there() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let [hips, arm, elbow] = ["hips", "arm_l", "elbow_l"].map(|label| studio.joint(label));
+    let onto = |studio: &mut Studio, joints: Vec<Uid>| {
+        let place = studio.limb();
+        studio.act(place, LibraryAct::Part { joints, options: Vec::new() });
+    };
+    // Joints that do not follow each other are refused.
+    onto(&mut studio, vec![hips, elbow]);
+    assert!(studio.desk.rig().dropped_parts().is_empty(), "{:?}", studio.desk.told());
+    assert!(!studio.told("was added to joints"), "{:?}", studio.desk.told());
+    onto(&mut studio, vec![hips, arm]);
+    assert_eq!(studio.desk.rig().dropped_parts().len(), 1, "{:?}", studio.desk.told());
+    let own = "Limb was added to joints that have 1 command of their own, which stays";
+    assert!(studio.told(own), "{:?}", studio.desk.told());
+}
+
+#[test]
 fn options_of_a_part_are_set_in_its_card() {
     let mut studio = Studio::new(LoaderPanel::default());
     let arm = studio.joint("arm_l");

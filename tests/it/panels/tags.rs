@@ -2,7 +2,10 @@
 
 use std::{
     fs,
-    sync::atomic::{AtomicUsize, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
 };
 
 use bevy::prelude::*;
@@ -16,7 +19,7 @@ use rigsmith::{
     processor::{BuildScope, ModuleError, RigModule},
     rig::{
         RigEdit, TagData, TagKind, Uid,
-        operations::{Operation, TagOperation},
+        operations::{Operation, PasteTo, PasteWhat, TagClipboard, TagOperation},
         template::read_template,
     },
 };
@@ -53,6 +56,33 @@ fn tags_are_listed_with_what_became_of_them() {
     desk.click("control");
     desk.frames(3);
     assert!(is_on(&desk) && !desk.says("passed over"));
+}
+
+#[test]
+fn what_an_operation_notes_is_told_once_it_is_done() {
+    let mut desk = Desk::new(TagsPanel::default());
+    let [a, b, c] = desk.chain(&["a", "b", "c"])[..] else { panic!() };
+    let kind = TagKind::Command { module: "null".into(), params: "()".into(), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: vec![a, b], kind, index: None }));
+    let tags: Vec<Uid> = desk.rig().walk().flat_map(|joint| &joint.data.tags).map(|tag| tag.uid).collect();
+    let clipboard = Arc::new(TagClipboard::copy_tags(desk.rig(), &tags).unwrap());
+    let paste = |to: PasteTo| {
+        let clipboard = Arc::clone(&clipboard);
+        Operation::Tags(TagOperation::Paste { clipboard, what: PasteWhat::Both, to })
+    };
+    let is_told = |desk: &Desk| desk.told().iter().filter(|told| told.contains("left over")).count();
+    // A refused one notes nothing.
+    let steps = desk.steps();
+    desk.edit(paste(PasteTo::Joints(vec![Uid(404)])));
+    assert_eq!((desk.steps(), is_told(&desk)), (steps, 0), "{:?}", desk.told());
+    desk.edit(paste(PasteTo::Joints(vec![c])));
+    let told = "1 copied joint is left over: the selection has only 1.";
+    assert!(desk.told().iter().any(|known| known == told), "{:?}", desk.told());
+    // Undo tells nothing again.
+    let rig = desk.rig;
+    desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+    desk.frames(2);
+    assert_eq!((desk.steps().1, is_told(&desk)), (steps.1, 1), "{:?}", desk.told());
 }
 
 #[test]
