@@ -5,6 +5,7 @@ mod face;
 mod features;
 mod posing;
 mod tags;
+mod walk;
 mod weights;
 
 use std::collections::HashSet;
