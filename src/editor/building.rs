@@ -99,10 +99,10 @@ fn report_failures(
 ) {
     let Some(active) = active else { return };
     if let Ok(failure) = failures.get(active.0) {
-        notices.write(Notice::error(format!("The build stopped: {}", failure.0)));
+        notices.write(Notice::error(format!("The build stopped: {}", failure.0)).at("Process"));
     }
     if let Ok(failure) = run_failures.get(active.0) {
-        notices.write(Notice::error(format!("The built rig cannot run: {}", failure.0)));
+        notices.write(Notice::error(format!("The built rig cannot run: {}", failure.0)).at("Process"));
     }
     let Some(done) = done.read().filter(|done| done.rig == active.0).last() else { return };
     let Ok(processor) = processors.get(active.0) else { return };

@@ -119,10 +119,8 @@ fn answer(
 /// Tells that the file of the open rig has changed; the Updater lists how.
 fn tell_offer(offers: Query<&UpdateOffer, Added<UpdateOffer>>, active: Option<Res<ActiveRig>>, mut commands: Commands) {
     let Some(offer) = active.and_then(|active| offers.get(active.0).ok()) else { return };
-    commands.write_message(Notice::info(format!(
-        "The template's file has changed: {}. The Updater lists them",
-        counts(offer)
-    )));
+    let text = format!("The template's file has changed: {}. The Updater lists them", counts(offer));
+    commands.write_message(Notice::info(text).at("Updater"));
 }
 
 /// Number of changes and conflicts of an offer, in words.

@@ -15,6 +15,7 @@ use bevy_egui::egui::{self, Key, Modifiers, Pos2};
 use rigsmith::{
     editor::{
         actions::{Action, ActionRequest},
+        dock::ShowPanel,
         mode::Mode,
         notice::{Notice, Severity},
         panel::EditorPanel,
@@ -74,6 +75,21 @@ fn the_filter_keeps_matches_and_what_is_above_them() {
     desk.click("Clear filter");
     desk.frames(2);
     assert!(desk.look("tail").is_some());
+}
+
+#[test]
+fn the_filter_finds_joints_by_what_is_built_on_them() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let joints = desk.chain(&["hips", "spine", "head"]);
+    let kind = TagKind::Command { module: "space_switch".into(), params: "()".into(), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: vec![joints[1]], kind, index: None }));
+    let cases: &[(&str, &[&str])] =
+        &[("Space", &["hips", "spine"]), ("space spine", &["hips", "spine"]), ("space head", &[])];
+    for (filter, expected) in cases {
+        let found = rows(desk.rig(), &HashSet::new(), filter);
+        let labels: Vec<&str> = found.iter().map(|row| desk.label(row.joint)).collect();
+        assert_eq!(labels, *expected, "{filter}");
+    }
 }
 
 #[test]
@@ -540,6 +556,25 @@ fn toasts_are_few_and_errors_stay_longest() {
     desk.frames(3);
     assert_eq!(shown(&desk), 0, "even an error goes, and is in the log");
     assert!(desk.told().iter().any(|told| told.starts_with("It cannot be")));
+}
+
+#[test]
+fn a_toast_leads_to_the_panel_that_it_is_about() {
+    let size = egui::vec2(1280.0, 720.0);
+    let mut desk = Desk::with(Sheet::Overlay(Box::new(Toasts::default())), size);
+    for (notice, name, panel) in [
+        (Notice::error("The build stopped.").at("Process"), "Show in Process", "Process"),
+        (Notice::warning("Something else."), "Show in the log", "Log"),
+    ] {
+        desk.app.world_mut().write_message(notice);
+        desk.frames(4);
+        desk.time += 1.0;
+        let at = desk.find(name).rect.left_center() + egui::vec2(3.0, 0.0);
+        desk.press(at);
+        desk.release(at);
+        let shown: Vec<ShowPanel> = desk.app.world_mut().resource_mut::<Messages<ShowPanel>>().drain().collect();
+        assert_eq!(shown, [ShowPanel(panel)], "{name}");
+    }
 }
 
 #[test]

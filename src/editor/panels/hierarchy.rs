@@ -108,7 +108,7 @@ impl HierarchyPanel {
     /// Draws the filter and the fold buttons.
     fn bar(&mut self, ui: &mut Ui, shown: &DisplayedRig) {
         let mut fold: Option<bool> = None;
-        let tip = "Joints whose label or group contains all of these words";
+        let tip = "Joints whose label, group or tags contain all of these words";
         list::search_bar(ui, "Filter", tip, &mut self.filter, |ui| {
             if list::symbol_button(ui, "⏵", "Fold all") {
                 fold = Some(true);

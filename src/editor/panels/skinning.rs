@@ -91,7 +91,7 @@ fn skin(
     if let Some(progress) = meshes.iter().find_map(|mesh| jobs.get(*mesh).ok()).map(SkinningJob::progress) {
         let percent = (progress * 100.0) as u32;
         let text = format!("Skinning is running ({percent} %). Wait for it, or cancel it in the Skinning panel.");
-        commands.write_message(Notice::info(text));
+        commands.write_message(Notice::info(text).at(TITLE));
         return;
     }
     if let Some(obstacle) = obstacle(rig, meshes.len()) {
@@ -104,6 +104,9 @@ fn skin(
         commands.write_message(BindRequest { mesh, settings: settings.0.clone(), parts, claims });
     }
 }
+
+/// Name of the panel.
+const TITLE: &str = "Skinning";
 
 /// Reason why there is nothing to skin, if so.
 fn obstacle(rig: &Rig, meshes: usize) -> Option<&'static str> {
@@ -140,10 +143,10 @@ fn tell_results(
         notices.write(match result {
             Ok(SkinningReport { weights: report, .. }) => {
                 let told = format!("{name} is skinned: {}.", covered(report.points, unweighted(report)));
-                if unweighted(report) == 0 { Notice::done(told) } else { Notice::warning(told) }
+                if unweighted(report) == 0 { Notice::done(told) } else { Notice::warning(told).at(TITLE) }
             }
             Err(error) if is_cancelled(error) => Notice::info("Skinning was cancelled. The weights are as they were."),
-            Err(error) => Notice::error(format!("{name} was not skinned: {error}.")),
+            Err(error) => Notice::error(format!("{name} was not skinned: {error}.")).at(TITLE),
         });
         results.0.retain(|(known, _)| known != mesh && meshes.contains(*known));
         results.0.push((*mesh, result.clone()));
@@ -195,7 +198,7 @@ pub struct SkinningPanel {
 
 impl EditorPanel for SkinningPanel {
     fn title(&self) -> &'static str {
-        "Skinning"
+        TITLE
     }
 
     fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {

@@ -64,7 +64,7 @@ fn tell_answers(
             Err(error @ WeightChangeError::Discarded) => {
                 Notice::info(format!("The weights of {name} were not {what}: {error}."))
             }
-            Err(error) => Notice::warning(format!("The weights of {name} were not {what}: {error}.")),
+            Err(error) => Notice::warning(format!("The weights of {name} were not {what}: {error}.")).at("Weights"),
         });
     }
 }

@@ -9,11 +9,15 @@ use std::{
 };
 
 use bevy::prelude::*;
+use bevy_egui::egui;
 use rigsmith::{
-    editor::panels::{properties::PropertiesPanel, tags::TagsPanel},
+    editor::{
+        panel::{EditorPanel, Requests},
+        panels::{process::ProcessPanel, properties::PropertiesPanel, tags::TagsPanel},
+    },
     files::{RealDisk, load_template, store_rig_over},
     plugins::{
-        commands::{BuildRequest, BuildStep, RegisterRigModule},
+        commands::{BuildRequest, BuildStep, Processor, RegisterRigModule},
         document::{Change, EditRequest},
     },
     processor::{BuildScope, ModuleError, RigModule},
@@ -25,7 +29,65 @@ use rigsmith::{
 };
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::desk::Desk;
+use super::desk::{Desk, Sheet};
+
+/// The Process and the Tags panel, side by side.
+#[derive(Default)]
+struct Both(ProcessPanel, TagsPanel);
+
+impl EditorPanel for Both {
+    fn title(&self) -> &'static str {
+        "Both"
+    }
+
+    fn show(&mut self, ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
+        let Self(process, tags) = self;
+        ui.columns_const(|[left, right]| {
+            process.show(left, world, requests);
+            tags.show(right, world, requests);
+        });
+    }
+}
+
+#[test]
+fn a_failed_command_leads_to_its_card_and_commands_to_what_they_made() {
+    let mut desk = Desk::with(Sheet::Panel(Box::new(Both::default())), egui::vec2(900.0, 900.0));
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    let add = |desk: &mut Desk, joint: Uid, module: &str, params: &str| {
+        let kind = TagKind::Command { module: module.into(), params: params.into(), feature: None };
+        desk.edit(Operation::Tags(TagOperation::Add { joints: vec![joint], kind, index: None }));
+    };
+    add(&mut desk, a, "control", "()");
+    add(&mut desk, b, "null", "(oops: 1)");
+    desk.select(&[]);
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::All });
+    desk.frames(3);
+    let wrong = desk.rig().joint(b).unwrap().data.tags[0].uid;
+    let status = desk.app.world().get::<Processor>(desk.rig).unwrap().builder().status(wrong).unwrap();
+    let reason = status.error.expect("it fails").to_string();
+    assert!(!desk.says(&reason), "{:?}", desk.seen);
+    let row = |desk: &Desk, name: &str| {
+        let found = desk.seen.iter().find(|seen| seen.label.starts_with(name));
+        found.unwrap_or_else(|| panic!("{name} is not among {:?}", desk.seen)).label.clone()
+    };
+    let failed = row(&desk, "b null failed");
+    desk.click(&failed);
+    // Away from the row, over which the reason is, too.
+    desk.move_to(egui::pos2(890.0, 890.0));
+    desk.frames(4);
+    assert_eq!(desk.selected(), [b]);
+    assert!(desk.says(&reason), "the card is open: {:?}", desk.seen);
+    // What runs is only selected, and leads to what it made.
+    let built = row(&desk, "a control built");
+    desk.click(&built);
+    desk.frames(2);
+    assert_eq!(desk.selected(), [a]);
+    desk.secondary_click(&built);
+    desk.click("Select what it made");
+    desk.frames(2);
+    let control = desk.selected().to_vec();
+    assert!(!control.is_empty() && !control.contains(&a), "{control:?}");
+}
 
 #[test]
 fn tags_are_listed_with_what_became_of_them() {

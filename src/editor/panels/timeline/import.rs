@@ -399,7 +399,7 @@ pub(super) fn land(mut import: ResMut<ClipImport>, mut commands: Commands) {
         Ok(ReadMotion::Clips(imported)) => put(world, rig, name, landing, imported),
         Ok(ReadMotion::Draft(draft)) => {
             let text = format!("{name}: check in the Timeline which joints its motion goes to, then import it.");
-            world.write_message(Notice::info(text));
+            world.write_message(Notice::info(text).at("Timeline"));
             world.write_message(ShowPanel("Timeline"));
             world.resource_mut::<ClipImport>().draft = Some(draft);
         }
