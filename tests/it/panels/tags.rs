@@ -13,7 +13,7 @@ use bevy_egui::egui;
 use rigsmith::{
     editor::{
         panel::{EditorPanel, Requests},
-        panels::{process::ProcessPanel, properties::PropertiesPanel, tags::TagsPanel},
+        panels::{hierarchy::HierarchyPanel, process::ProcessPanel, properties::PropertiesPanel, tags::TagsPanel},
     },
     files::{RealDisk, load_template, store_rig_over},
     plugins::{
@@ -31,9 +31,14 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::desk::{Desk, Sheet};
 
-/// The Process and the Tags panel, side by side.
-#[derive(Default)]
-struct Both(ProcessPanel, TagsPanel);
+/// Two panels, side by side.
+struct Both(Box<dyn EditorPanel>, Box<dyn EditorPanel>);
+
+impl Both {
+    fn sheet(left: impl EditorPanel, right: impl EditorPanel) -> Sheet {
+        Sheet::Panel(Box::new(Self(Box::new(left), Box::new(right))))
+    }
+}
 
 impl EditorPanel for Both {
     fn title(&self) -> &'static str {
@@ -41,17 +46,18 @@ impl EditorPanel for Both {
     }
 
     fn show(&mut self, ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
-        let Self(process, tags) = self;
+        let Self(first, second) = self;
         ui.columns_const(|[left, right]| {
-            process.show(left, world, requests);
-            tags.show(right, world, requests);
+            first.show(left, world, requests);
+            second.show(right, world, requests);
         });
     }
 }
 
 #[test]
 fn a_failed_command_leads_to_its_card_and_commands_to_what_they_made() {
-    let mut desk = Desk::with(Sheet::Panel(Box::new(Both::default())), egui::vec2(900.0, 900.0));
+    let sheet = Both::sheet(ProcessPanel::default(), TagsPanel::default());
+    let mut desk = Desk::with(sheet, egui::vec2(900.0, 900.0));
     let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
     let add = |desk: &mut Desk, joint: Uid, module: &str, params: &str| {
         let kind = TagKind::Command { module: module.into(), params: params.into(), feature: None };
@@ -118,6 +124,32 @@ fn tags_are_listed_with_what_became_of_them() {
     desk.click("control");
     desk.frames(3);
     assert!(is_on(&desk) && !desk.says("passed over"));
+}
+
+#[test]
+fn a_module_is_dragged_onto_a_joint() {
+    let sheet = Both::sheet(HierarchyPanel::default(), TagsPanel::default());
+    let mut desk = Desk::with(sheet, egui::vec2(900.0, 900.0));
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    desk.select(&[a]);
+    let (before, steps) = (desk.rig().clone(), desk.steps().1);
+    desk.click("+ Add");
+    desk.frames(3);
+    desk.type_text("null");
+    desk.frames(3);
+    let (from, to) = (desk.find("null").rect.center(), desk.find("b").rect.center());
+    desk.drag(from, to);
+    desk.frames(3);
+    let modules = |desk: &Desk, joint: Uid| {
+        let tags = desk.rig().joint(joint).unwrap().data.tags.iter();
+        tags.map(|tag| matches!(&tag.kind, TagKind::Command { module, .. } if module == "null")).collect::<Vec<_>>()
+    };
+    assert_eq!((modules(&desk, a), modules(&desk, b)), (vec![], vec![true]), "{:?}", desk.told());
+    assert_eq!(desk.steps().1, steps + 1);
+    let rig = desk.rig;
+    desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+    desk.frames(2);
+    assert_eq!(*desk.rig(), before);
 }
 
 #[test]
