@@ -93,6 +93,40 @@ fn the_filter_finds_joints_by_what_is_built_on_them() {
 }
 
 #[test]
+fn built_nodes_are_listed_and_lead_to_their_commands() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    let kind = TagKind::Command { module: "control".into(), params: "()".into(), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: vec![b], kind, index: None }));
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::All });
+    desk.frames(3);
+    let steps = desk.steps();
+    desk.secondary_click("a");
+    desk.click("Show all built nodes");
+    desk.frames(2);
+    assert!(desk.look("a, joint").is_some() && desk.look("b, joint").is_some(), "{:?}", desk.seen);
+    let control = desk.seen.iter().find(|seen| seen.label.ends_with(", control")).expect("the control").label.clone();
+    desk.click(&control);
+    desk.frames(2);
+    let [node] = desk.selected() else { panic!("{:?}", desk.selected()) };
+    assert!(![a, b].contains(node) && desk.find(&control).on == Some(true));
+    desk.secondary_click(&control);
+    desk.click("Show the command that made it");
+    desk.frames(2);
+    assert_eq!(desk.selected(), [b]);
+    // With words it is a list.
+    desk.click("Filter");
+    desk.type_text("control");
+    desk.frames(2);
+    assert!(desk.look("a, joint").is_none() && desk.look(&control).is_some(), "{:?}", desk.seen);
+    desk.click("Clear filter");
+    desk.click("Joints");
+    desk.frames(2);
+    assert!(desk.look("a").is_some() && desk.look(&control).is_none(), "{:?}", desk.seen);
+    assert_eq!(desk.steps(), steps, "looking is no step");
+}
+
+#[test]
 fn joints_are_renamed_in_place() {
     let mut desk = Desk::new(HierarchyPanel::default());
     let joints = desk.chain(&["a", "b", "c"]);

@@ -1,8 +1,9 @@
-//! Hierarchy panel: the tree of joints.
+//! Hierarchy panel: the tree of joints, or of all nodes that are built.
 //!
 //! The panel shows the rig's own selection and changes it with pick requests, so the viewport and the tree never
 //! differ.
 
+mod built;
 mod keys;
 mod menu;
 mod row;
@@ -30,6 +31,7 @@ use crate::{
     },
     rig::{Rig, Uid, operations::Operation},
 };
+use built::BuiltTree;
 use rows::{Row, rows};
 
 /// The panel.
@@ -53,6 +55,9 @@ pub struct HierarchyPanel {
     under: Option<Uid>,
     /// True if a part is dragged that goes onto both sides.
     is_for_both: bool,
+    built: BuiltTree,
+    /// True if all nodes of the built rig are listed, not its joints alone.
+    shows_built: bool,
 }
 
 /// The listed rows with the state they were made from.
@@ -87,6 +92,9 @@ impl EditorPanel for HierarchyPanel {
             self.rename = None;
             return list::nothing(ui, "No joints yet: place them with clicks or draw them with strokes.");
         }
+        if self.shows_built {
+            return self.built_nodes(ui, world, &shown, requests);
+        }
         self.bar(ui, &shown);
         self.reveal_active(&shown);
         self.refresh(&shown);
@@ -105,6 +113,21 @@ impl EditorPanel for HierarchyPanel {
 }
 
 impl HierarchyPanel {
+    /// Draws the nodes of the built rig in place of the joints.
+    fn built_nodes(&mut self, ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut Requests) {
+        self.rename = None;
+        if self.pointed.take().is_some() {
+            requests.send(HoverJoint { rig: shown.entity, joint: None });
+        }
+        let tip = "Nodes whose name, kind or module contains all of these words";
+        let mut is_back = false;
+        list::search_bar(ui, "Filter", tip, &mut self.filter, |ui| {
+            is_back = ui.button("Joints").on_hover_text("Back to the joints").clicked();
+        });
+        self.shows_built = !is_back;
+        self.built.show(ui, world, shown, &self.filter, requests);
+    }
+
     /// Draws the filter and the fold buttons.
     fn bar(&mut self, ui: &mut Ui, shown: &DisplayedRig) {
         let mut fold: Option<bool> = None;
