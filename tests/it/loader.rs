@@ -328,6 +328,8 @@ fn a_template_is_loaded_with_poses_and_keys_kept_and_taken_back_whole() {
     assert!(studio.desk.says("2.0.0 · 5 joints"), "{:?}", studio.desk.seen);
     studio.click("Load");
     assert_eq!((studio.height("hips"), studio.desk.steps().1), (1.5, steps + 1), "{:?}", studio.desk.told());
+    let loaded = studio.desk.told().iter().filter(|told| told.starts_with("Loaded ")).count();
+    assert_eq!(loaded, 1, "told once, when it is done: {:?}", studio.desk.told());
     let after = studio.desk.rig().clone();
     let turned = |rig: &rigsmith::rig::Rig| rig.clip(clip).unwrap().sample(0.5).offsets[&arm].rotation;
     assert_eq!(after.clip(clip).unwrap().key_count(), before.clip(clip).unwrap().key_count(), "keys stay");
