@@ -561,6 +561,18 @@ fn everything_is_told_and_the_log_is_capped() {
     desk.click("Clear");
     desk.frames(2);
     assert!(desk.told().is_empty());
+    // An entry leads to the panel that it is about.
+    desk.click("Clear search");
+    desk.app.world_mut().write_message(Notice::error("It stopped.").at("Process"));
+    desk.frames(3);
+    desk.click("It stopped.");
+    desk.frames(2);
+    desk.time += 1.0;
+    let at = desk.find("Show in Process").rect.center();
+    desk.press(at);
+    desk.release(at);
+    let shown: Vec<ShowPanel> = desk.app.world_mut().resource_mut::<Messages<ShowPanel>>().drain().collect();
+    assert_eq!(shown, [ShowPanel("Process")]);
 }
 
 #[test]

@@ -9,6 +9,7 @@ use super::list::{self, List};
 use crate::{
     editor::{
         counted::counted,
+        dock::ShowPanel,
         notice::{Notice, Severity},
         panel::{EditorPanel, Requests},
     },
@@ -211,6 +212,11 @@ impl EditorPanel for LogPanel {
             ui.separator();
             ScrollArea::vertical().id_salt("whole text").auto_shrink(false).show(ui, |ui| {
                 ui.add(Label::new(RichText::new(entry.line())).wrap().selectable(true));
+                if let Some(panel) = entry.notice.panel
+                    && ui.button(format!("Show in {panel}")).clicked()
+                {
+                    requests.send(ShowPanel(panel));
+                }
             });
         }
     }
@@ -237,7 +243,8 @@ impl LogPanel {
 
     fn bar(&mut self, ui: &mut Ui, book: &LogBook, requests: &mut Requests) {
         let (mut copy, mut clear) = (false, false);
-        list::search_bar(ui, "Search", "Entries that contain all of these words", &mut self.search, |ui| {
+        let tip = "Entries with all of these words; error, warning, done and info stand for the kinds";
+        list::search_bar(ui, "Search", tip, &mut self.search, |ui| {
             clear = ui.button("Clear").on_hover_text("Forget all entries").clicked();
             copy = ui.button("Copy").on_hover_text("Copy what is listed").clicked();
         });
