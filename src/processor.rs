@@ -41,7 +41,7 @@ mod world;
 pub use amount::Amount;
 pub use authoring::{check_finite, check_limits};
 pub use axis::Axis;
-pub use builder::{Builder, CommandDependency, CommandState, CommandStatus, FindError, RunReport};
+pub use builder::{Builder, CommandCounts, CommandDependency, CommandState, CommandStatus, FindError, RunReport};
 pub use creation::Creation;
 pub use deadline::{Deadline, OutOfTime};
 pub use error::{BuildError, BuildProblem, ModuleError};

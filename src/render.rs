@@ -10,6 +10,7 @@ use std::{
 use bevy::{
     app::PluginGroupBuilder,
     camera::RenderTarget,
+    ecs::system::SystemState,
     log::LogPlugin,
     prelude::*,
     render::{
@@ -28,12 +29,13 @@ use crate::{
     plugins::{
         RigPlugins,
         commands::{BuildRequest, BuildStep},
-        controls::size::MeasuredShapes,
+        controls::{outline::ControlNodes, size::MeasuredShapes},
         display::{DisplayJob, DisplayPlugin, MeshDisplay, ViewportLights},
         document::EditRequest,
         document::Selection,
         drawing::{BACKGROUND, DrawingPlugin, RigDrawing},
         runtime::RigRuntime,
+        schema::RigNodes,
         surface::{RigMesh, RigSurface, SkinOf},
         task_pools,
         viewport::{FIELD_OF_VIEW, RigViewport, framing},
@@ -66,7 +68,8 @@ pub struct PictureSettings {
     /// State in which the built rig is shown, its springs on their way, if it is one of the same program; in its pose at
     /// rest if `None`.
     pub state: Option<RigState>,
-    /// Least and greatest corner of the box that fills the picture, in the rig's space; the whole character if `None`.
+    /// Least and greatest corner of the box that fills the picture, in the rig's space; the whole character, with the controls that
+    /// are drawn, if `None`.
     pub bounds: Option<[Vec3; 2]>,
 }
 
@@ -291,9 +294,19 @@ pub fn bevy_plugins() -> PluginGroupBuilder {
 #[derive(Resource, Default)]
 struct CapturedPicture(Option<Image>);
 
-/// Points the camera so that the whole character is visible.
+/// Least and greatest corner of the outlines of a rig's visible controls, in the rig's space; `None` without any.
+fn control_bounds(world: &mut World, rig: Entity) -> Option<[Vec3; 2]> {
+    let mut state: SystemState<(Query<(&GlobalTransform, Option<&RigNodes>)>, ControlNodes)> = SystemState::new(world);
+    let (rigs, controls) = state.get(world).ok()?;
+    let (place, nodes) = rigs.get(rig).ok()?;
+    let outlines = controls.visible(nodes, place.affine().inverse());
+    let points = outlines.iter().flat_map(|outline| &outline.lines).flatten().copied();
+    points.map(|point| [point; 2]).reduce(|[low, high], [least, most]| [low.min(least), high.max(most)])
+}
+
+/// Points the camera so that the whole character is visible, with the controls that are drawn.
 fn aim(world: &mut World, rig: Entity, camera: Entity, settings: &PictureSettings) {
-    let bounds = match (settings.bounds, world.get::<RigSurface>(rig), world.get::<Rig>(rig)) {
+    let mut bounds = match (settings.bounds, world.get::<RigSurface>(rig), world.get::<Rig>(rig)) {
         (Some(bounds), ..) => bounds,
         (None, Some(surface), _) => surface.bounds(),
         (None, None, Some(rig)) if !rig.is_empty() => {
@@ -307,6 +320,13 @@ fn aim(world: &mut World, rig: Entity, camera: Entity, settings: &PictureSetting
         }
         _ => [Vec3::new(-0.5, 0.0, -0.5), Vec3::new(0.5, 1.0, 0.5)],
     };
+    let are_drawn = settings.build && settings.drawing.rig && settings.drawing.controls;
+    if settings.bounds.is_none()
+        && are_drawn
+        && let Some([low, high]) = control_bounds(world, rig)
+    {
+        bounds = [bounds[0].min(low), bounds[1].max(high)];
+    }
     let [right, up, towards] = settings.view.axes();
     let aspect = settings.size.x as f32 / settings.size.y as f32;
     let (focus, distance) = framing(bounds, [right, up, towards], aspect);

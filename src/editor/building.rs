@@ -5,6 +5,7 @@ use bevy::prelude::*;
 use super::{
     ActiveRig,
     actions::{Action, ActionRequest},
+    counted::built_commands,
     mode::Mode,
     notice::Notice,
 };
@@ -98,14 +99,14 @@ fn report_failures(
 ) {
     let Some(active) = active else { return };
     if let Ok(failure) = failures.get(active.0) {
-        notices.write(Notice::error(format!("The build stopped: {}", failure.0)));
+        notices.write(Notice::error(format!("The build stopped: {}", failure.0)).at("Process"));
     }
     if let Ok(failure) = run_failures.get(active.0) {
-        notices.write(Notice::error(format!("The built rig cannot run: {}", failure.0)));
+        notices.write(Notice::error(format!("The built rig cannot run: {}", failure.0)).at("Process"));
     }
     let Some(done) = done.read().filter(|done| done.rig == active.0).last() else { return };
-    let total = processors.get(active.0).map_or(done.report.cursor, |processor| processor.builder().len());
-    if place.replace(done.report.cursor) != Some(done.report.cursor) && total > 0 {
-        notices.write(Notice::done(format!("{} of {total} commands are carried out.", done.report.cursor)).quiet());
+    let Ok(processor) = processors.get(active.0) else { return };
+    if place.replace(done.report.cursor) != Some(done.report.cursor) && !processor.builder().is_empty() {
+        notices.write(Notice::done(format!("Built {}.", built_commands(processor.builder()))).quiet());
     }
 }

@@ -6,6 +6,7 @@ use bevy::{prelude::*, winit::WinitSettings};
 
 use super::{
     ActiveRig,
+    counted::counted,
     files::{OpenDocument, attend},
     notice::Notice,
 };
@@ -118,23 +119,17 @@ fn answer(
 /// Tells that the file of the open rig has changed; the Updater lists how.
 fn tell_offer(offers: Query<&UpdateOffer, Added<UpdateOffer>>, active: Option<Res<ActiveRig>>, mut commands: Commands) {
     let Some(offer) = active.and_then(|active| offers.get(active.0).ok()) else { return };
-    commands.write_message(Notice::info(format!(
-        "The template's file has changed: {}. The Updater lists them",
-        counts(offer)
-    )));
+    let text = format!("The template's file has changed: {}. The Updater lists them", counts(offer));
+    commands.write_message(Notice::info(text).at("Updater"));
 }
 
 /// Number of changes and conflicts of an offer, in words.
 pub(super) fn counts(offer: &UpdateOffer) -> String {
     let conflicts = offer.changes.iter().filter(|change| change.conflict).count();
-    let changes = match offer.changes.len() {
-        1 => "1 change".to_owned(),
-        count => format!("{count} changes"),
-    };
+    let changes = counted(offer.changes.len(), "change", "changes");
     match conflicts {
         0 => changes,
-        1 => format!("{changes}, 1 conflict"),
-        count => format!("{changes}, {count} conflicts"),
+        count => format!("{changes}, {}", counted(count, "conflict", "conflicts")),
     }
 }
 
@@ -162,10 +157,7 @@ fn wake(
 
 fn tell_update(updated: On<RigUpdated>, documents: Query<&OpenDocument>, mut notices: MessageWriter<Notice>) {
     let Ok(document) = documents.get(updated.entity) else { return };
-    let count = match updated.changes.len() {
-        1 => "1 change".to_owned(),
-        count => format!("{count} changes"),
-    };
+    let count = counted(updated.changes.len(), "change", "changes");
     notices.write(Notice::done(format!("{}: {count} taken over from the file; Ctrl+Z takes it back", document.name)));
     for note in updated.poses.iter() {
         notices.write(Notice::warning(note.to_string()).quiet());

@@ -6,7 +6,7 @@ use bevy_egui::egui;
 use super::{
     actions::{Action, ActionRequest},
     files::attend,
-    keys::KeyBindings,
+    keys::{ChosenKey, KeyBindings},
     palette::obstacle,
     panel::{EditorOverlay, PanelApp, Requests},
     settings::SettingsFile,
@@ -171,6 +171,8 @@ pub fn rows(world: &World, words: &str) -> Vec<HelpRow> {
 struct HelpPage {
     words: String,
     was_shown: bool,
+    /// True if an action waited for its key in the last frame.
+    was_waiting: bool,
 }
 
 impl EditorOverlay for HelpPage {
@@ -184,6 +186,9 @@ impl EditorOverlay for HelpPage {
         if opened {
             self.words.clear();
         }
+        let waiting = world.get_resource::<ChosenKey>().and_then(|chosen| chosen.0);
+        // Escape in place of a key keeps the page.
+        let is_for_key = std::mem::replace(&mut self.was_waiting, waiting.is_some()) || waiting.is_some();
         let mut is_open = true;
         let room = ctx.content_rect().size() - egui::vec2(48.0, 140.0);
         egui::Window::new("Help")
@@ -197,14 +202,15 @@ impl EditorOverlay for HelpPage {
                 self.head(ui, opened, requests);
                 egui::ScrollArea::vertical().max_height(room.y.max(120.0)).auto_shrink([false, true]).show(ui, |ui| {
                     self.pointer(ui);
-                    actions(ui, &rows(world, &self.words));
+                    actions(ui, &rows(world, &self.words), waiting, requests);
                 });
                 let file = world.get_resource::<SettingsFile>().and_then(SettingsFile::path);
                 let place = file.map_or_else(|| "the settings file".to_owned(), |file| file.display().to_string());
                 ui.weak(format!("Keys are bound in {place}."));
             });
-        if !is_open || ctx.input(|input| input.key_pressed(egui::Key::Escape)) {
+        if !is_open || !is_for_key && ctx.input(|input| input.key_pressed(egui::Key::Escape)) {
             requests.set(HelpShown(false));
+            requests.set(ChosenKey(None));
         }
     }
 }
@@ -253,8 +259,8 @@ impl HelpPage {
     }
 }
 
-/// Draws actions, a row each.
-fn actions(ui: &mut egui::Ui, list: &[HelpRow]) {
+/// Draws actions, a row each: a click on one lets it wait for another key.
+fn actions(ui: &mut egui::Ui, list: &[HelpRow], waiting: Option<Action>, requests: &mut Requests) {
     if list.is_empty() {
         ui.weak("No action is called so.");
         return;
@@ -264,8 +270,14 @@ fn actions(ui: &mut egui::Ui, list: &[HelpRow]) {
         for row in list {
             let is_free = row.obstacle.is_none();
             let color = if is_free { ui.visuals().text_color() } else { style::quiet(ui.visuals()) };
-            ui.colored_label(color, &row.text);
-            ui.colored_label(style::accent(ui.visuals()), &row.keys);
+            let text = egui::RichText::new(&row.text).color(color);
+            let label = ui.add(egui::Label::new(text).sense(egui::Sense::click()));
+            label.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, &row.text));
+            if label.on_hover_text("Click, then press the key that it is to have").clicked() {
+                requests.set(ChosenKey(Some(row.action)));
+            }
+            let keys = if waiting == Some(row.action) { "press a key" } else { row.keys.as_str() };
+            ui.colored_label(style::accent(ui.visuals()), keys);
             ui.weak(row.obstacle.unwrap_or_default());
             ui.end_row();
         }

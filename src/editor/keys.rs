@@ -14,7 +14,9 @@ use serde::{Deserialize, Serialize};
 use super::{
     actions::{Action, ActionRequest},
     files::dialog::Dialog,
+    help::describe,
     mode::Mode,
+    notice::Notice,
     panels::{
         graph::{GraphView, over_graph},
         timeline::{Timeline, TimelineAction, over_timeline},
@@ -29,8 +31,11 @@ pub struct KeysPlugin;
 impl Plugin for KeysPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<KeyBindings>()
+            .init_resource::<ChosenKey>()
             .add_message::<ActionRequest>()
-            .add_systems(PreUpdate, press_keys.after(bevy::input::InputSystems));
+            .add_message::<KeyBound>()
+            .add_message::<Notice>()
+            .add_systems(PreUpdate, (press_keys, bind).chain().after(bevy::input::InputSystems));
     }
 }
 
@@ -92,6 +97,19 @@ impl std::fmt::Display for Chord {
 #[derive(Resource, Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct KeyBindings(pub Vec<(Chord, Action)>);
+
+/// Action that waits for its key: the next one that is pressed, unless that is Escape.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ChosenKey(pub Option<Action>);
+
+/// Key that was pressed for an action, which gets it in place of its keys.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct KeyBound {
+    /// The key.
+    pub chord: Chord,
+    /// The action.
+    pub action: Action,
+}
 
 /// Key that was bound to two actions.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -221,6 +239,14 @@ impl KeyBindings {
         self.0.iter().filter(move |(_, known)| *known == action).map(|(chord, _)| chord)
     }
 
+    /// Binds a key to an action in place of the action's keys; returns the action that had the key before.
+    pub fn bind(&mut self, chord: Chord, action: Action) -> Option<Action> {
+        let before = self.action(&chord).filter(|other| *other != action);
+        self.0.retain(|(known, other)| *known != chord && *other != action);
+        self.0.push((chord, action));
+        before
+    }
+
     /// Removes the bindings of keys that are bound to another action before; returns them.
     pub fn refuse_doubles(&mut self) -> Vec<DoubleBinding> {
         let mut refused = Vec::new();
@@ -267,8 +293,9 @@ fn press_keys(
     mut held: Local<ModifierKeys>,
     bindings: Res<KeyBindings>,
     (dialog, timeline, graph): (Option<Res<Dialog>>, Option<Res<Timeline>>, Option<Res<GraphView>>),
+    mut chosen: ResMut<ChosenKey>,
     mut contexts: Query<&mut EguiContext, With<PrimaryEguiContext>>,
-    mut actions: MessageWriter<ActionRequest>,
+    (mut actions, mut bound): (MessageWriter<ActionRequest>, MessageWriter<KeyBound>),
 ) {
     if lost.read().any(|focus| !focus.focused) {
         *held = ModifierKeys::default();
@@ -286,6 +313,13 @@ fn press_keys(
         }
         let Some(key) = key_name(input) else { continue };
         let chord = Chord { key, control: held.control, shift: held.shift, alt: held.alt };
+        if let Some(action) = chosen.0 {
+            chosen.0 = None;
+            if chord.key != "Escape" {
+                bound.write(KeyBound { chord, action });
+            }
+            continue;
+        }
         match bindings.action(&chord) {
             // Text fields do not use these chords.
             Some(action) if !typing || matches!(action, Action::Save | Action::SaveAs | Action::Help) => {
@@ -294,5 +328,19 @@ fn press_keys(
             }
             _ => {}
         }
+    }
+}
+
+/// Binds keys that were pressed for actions, and tells of actions that lost theirs.
+fn bind(mut bound: MessageReader<KeyBound>, mut bindings: ResMut<KeyBindings>, mut notices: MessageWriter<Notice>) {
+    for KeyBound { chord, action } in bound.read() {
+        let name = describe(*action);
+        notices.write(match bindings.bind(chord.clone(), *action) {
+            None => Notice::done(format!("{chord} is the key of \"{name}\".")),
+            Some(other) => {
+                let other = describe(other);
+                Notice::warning(format!("{chord} is the key of \"{name}\", and no more that of \"{other}\"."))
+            }
+        });
     }
 }

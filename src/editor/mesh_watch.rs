@@ -6,6 +6,7 @@
 use bevy::prelude::*;
 
 use super::{
+    counted::counted,
     files::{MeshSource, attend},
     notice::Notice,
 };
@@ -55,7 +56,10 @@ fn tell(
         let notice = match result {
             Ok(report) => {
                 let [before, now] = report.points;
-                let points = if before == now { String::new() } else { format!("{now} points instead of {before}; ") };
+                let points = match counted(now, "point", "points") {
+                    _ if before == now => String::new(),
+                    now => format!("{now} instead of {before}; "),
+                };
                 let weights = if report.weights.is_some() { "; its weights were transferred" } else { "" };
                 let moved = report.moved;
                 Notice::done(format!("{name} was read again: {points}points moved by {moved:.4} at most{weights}."))

@@ -5,6 +5,7 @@ use bevy::prelude::*;
 use super::{
     ActiveRig,
     actions::Action,
+    counted::{built_commands, counted},
     keys::KeyBindings,
     mode::Mode,
     panels::{
@@ -42,10 +43,7 @@ pub fn next_step(world: &World) -> Option<String> {
     {
         return Some(next);
     }
-    let joints = match rig.len() {
-        1 => "1 joint".to_owned(),
-        count => format!("{count} joints"),
-    };
+    let joints = counted(rig.len(), "joint", "joints");
     let built = world.get::<BuildResult>(entity).map(|built| &*built.0);
     let is_skinned = has_weights(rig, built, meshes.iter().filter_map(|mesh| world.get::<RigMesh>(*mesh)));
     let has_commands =
@@ -63,14 +61,16 @@ pub fn next_step(world: &World) -> Option<String> {
         (no_mesh, false) => {
             let builder = world.get::<Processor>(entity).map(Processor::builder);
             if let Some(builder) = builder.filter(|builder| has_commands && builder.cursor() < builder.len()) {
-                let (done, all) = (builder.cursor(), builder.len());
-                return Some(format!("{done} of {all} commands are carried out: {} builds all.", key(Action::Build)));
+                return Some(format!("Built {}: {} builds all.", built_commands(builder), key(Action::Build)));
             }
             match rig.clips() {
                 _ if !no_mesh && !is_skinned => {}
                 [] => {}
                 [only] => return Some(format!("The rig has a clip, \"{}\": choose it in the Timeline.", only.name)),
-                several => return Some(format!("The rig has {} clips: choose one in the Timeline.", several.len())),
+                several => {
+                    let clips = counted(several.len(), "clip", "clips");
+                    return Some(format!("The rig has {clips}: choose one in the Timeline."));
+                }
             }
             match (no_mesh, is_skinned, has_commands) {
                 (false, false, _) => format!("{joints}, no weights yet: {} skins.", key(Action::Skin)),

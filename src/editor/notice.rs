@@ -24,27 +24,34 @@ pub struct Notice {
     pub text: String,
     /// Keeps the notice out of the toasts if `true`.
     pub quiet: bool,
+    /// Panel that shows what the notice is about; the log without one.
+    pub panel: Option<&'static str>,
 }
 
 impl Notice {
     /// A notice about an event.
     pub fn info(text: impl Into<String>) -> Self {
-        Self { severity: Severity::Info, text: text.into(), quiet: false }
+        Self { severity: Severity::Info, text: text.into(), quiet: false, panel: None }
     }
 
     /// A notice about a success.
     pub fn done(text: impl Into<String>) -> Self {
-        Self { severity: Severity::Done, text: text.into(), quiet: false }
+        Self { severity: Severity::Done, text: text.into(), quiet: false, panel: None }
     }
 
     /// A warning.
     pub fn warning(text: impl Into<String>) -> Self {
-        Self { severity: Severity::Warning, text: text.into(), quiet: false }
+        Self { severity: Severity::Warning, text: text.into(), quiet: false, panel: None }
     }
 
     /// A notice about a failure.
     pub fn error(text: impl Into<String>) -> Self {
-        Self { severity: Severity::Error, text: text.into(), quiet: false }
+        Self { severity: Severity::Error, text: text.into(), quiet: false, panel: None }
+    }
+
+    /// Names the panel that a click on the notice's toast brings forward.
+    pub fn at(self, panel: &'static str) -> Self {
+        Self { panel: Some(panel), ..self }
     }
 
     /// Restricts the notice to the log.

@@ -6,6 +6,7 @@ use bevy_egui::egui::{Color32, Painter, Rect, Stroke, pos2};
 use super::{
     actions::{Action, ActionRequest},
     camera::ViewportSight,
+    counted::counted,
     files::attend,
     panel::{PanelApp, ViewportPainter},
     panels::{
@@ -65,8 +66,7 @@ impl OnionStep {
     /// The name in the Display panel.
     pub fn name(self) -> String {
         match self {
-            Self::Frames(1) => "1 frame".to_owned(),
-            Self::Frames(count) => format!("{count} frames"),
+            Self::Frames(count) => counted(count as usize, "frame", "frames"),
             Self::Keys => "Keys".to_owned(),
         }
     }

@@ -10,6 +10,7 @@ use bevy::{
 
 use super::{
     ActiveRig,
+    counted::counted,
     files::{
         FollowUp, LoadJob, after_asking,
         dialog::{Answer, Dialog, Question},
@@ -124,7 +125,7 @@ pub fn describe(pending: &PendingJournal) -> String {
             project_beside(&pending.path).map_or_else(|| "unknown work".to_owned(), |project| stem(&project))
         }
     };
-    let edits = if pending.changes == 1 { "1 edit".to_owned() } else { format!("{} edits", pending.changes) };
+    let edits = counted(pending.changes, "edit", "edits");
     match &pending.condition {
         Condition::Unreadable(error) => format!("{on}: {error}"),
         Condition::Damaged(_) => format!("{on}: {edits}, {}", pending.condition),
@@ -182,9 +183,10 @@ fn tell_losses(recovered: &RecoveredJournal, restored: &RestoredRig, basis: Basi
     if let Some(reason) = &restored.replayed.refused {
         let total = recovered.changes().len();
         opened.warnings.push(format!(
-            "the weights and joints of the last {} of {total} changes could not be made again: {reason}; their journal \
+            "the weights and joints of the last {} of {} could not be made again: {reason}; their journal \
              is kept",
-            total - restored.replayed.applied
+            total - restored.replayed.applied,
+            counted(total, "change", "changes")
         ));
     }
     if !recovered.is_damaged() {
@@ -192,8 +194,10 @@ fn tell_losses(recovered: &RecoveredJournal, restored: &RestoredRig, basis: Basi
     }
     let (made, records) = (restored.replayed.applied, recovered.records());
     let edits = recovered.changes().len();
-    let mut summary =
-        format!("the journal was damaged: {records} could be read, {made} of their {edits} edits were made");
+    let mut summary = format!(
+        "the journal was damaged: {records} could be read, {made} of their {} were made",
+        counted(edits, "edit", "edits")
+    );
     if records.lost > 0 || !restored.skipped.is_empty() {
         summary.push_str("; look over the rig, the log lists what is missing");
     }
@@ -218,7 +222,7 @@ fn tell_losses(recovered: &RecoveredJournal, restored: &RestoredRig, basis: Basi
     opened.notes.extend(lines.by_ref().take(MAX_TOLD));
     match lines.count() {
         0 => {}
-        more => opened.notes.push(format!("and {more} more places")),
+        more => opened.notes.push(format!("and {more} more {}", if more == 1 { "place" } else { "places" })),
     }
 }
 

@@ -5,6 +5,7 @@ use bevy_egui::egui;
 
 use super::{
     ActiveRig,
+    counted::counted,
     files::LoadJob,
     follow,
     library::LibraryJobs,
@@ -106,9 +107,9 @@ fn counts(world: &World) -> String {
     if selected > 0 {
         parts.push(format!("{selected} selected"));
     }
-    parts.push(format!("{joints} joints"));
+    parts.push(counted(joints, "joint", "joints"));
     if let Some(triangles) = meshes {
-        parts.push(format!("{triangles} triangles"));
+        parts.push(counted(triangles, "triangle", "triangles"));
     }
     parts.join("  ·  ")
 }

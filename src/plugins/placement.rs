@@ -2,13 +2,16 @@
 //!
 //! The joint goes to the midpoint of the closest and the furthest hit of a ray through the posed mesh, becomes a child
 //! of the selected joint or a root, and is selected. If the ray misses the mesh, nothing happens, and [`PlaceAnswer`]
-//! reports it. While the surface is behind the pose, requests wait for it.
+//! reports it. While the surface is behind the pose, requests wait for it; steps that are undone meanwhile are not lost to
+//! a request that waited, which is refused then.
 
 use bevy::prelude::*;
 
 use super::{
     RigSystems, configure_sets,
     document::{EditRequest, Selection},
+    history::RigHistory,
+    landing::Landing,
     surface::{Answer, RigMeshes, RigSurface, answer},
 };
 use crate::{
@@ -45,8 +48,20 @@ pub struct PlaceRequest {
 pub struct PlaceAnswer {
     /// The rig.
     pub rig: Entity,
-    /// Hits of the ray, and the position of the joint.
+    /// Hits of the ray, and the position of the joint; [`Placement::Nothing`] for a refused request.
     pub placement: Placement,
+    /// True if the request waited for the surface.
+    pub waited: bool,
+    /// Reason why a request that waited was refused; `None` for all others.
+    pub refusal: Option<PlaceRefusal>,
+}
+
+/// Reason why a request that waited for the surface is refused; a sentence without its full stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum PlaceRefusal {
+    /// Steps were undone while the request waited, and its step would discard them.
+    #[error("steps were undone while the click waited for the mesh, and a joint would lose them; click again")]
+    Undone,
 }
 
 /// Joint that a [`PlaceRequest`] adds.
@@ -76,22 +91,45 @@ pub fn joint_at(
     PlacedJoint { placement, parent, rest }
 }
 
+/// Request that waits for the surface.
+pub(super) struct WaitingPlace {
+    request: PlaceRequest,
+    /// State of the surface that it waits for.
+    since: Option<u64>,
+    landing: Landing,
+    waited: bool,
+}
+
 pub(super) fn place(
     mut requests: MessageReader<PlaceRequest>,
-    mut waiting: Local<Vec<(PlaceRequest, Option<u64>)>>,
-    rigs: Query<(&Rig, &Selection, Option<&RigSurface>, Has<RigMeshes>)>,
+    mut waiting: Local<Vec<WaitingPlace>>,
+    rigs: Query<(&Rig, &Selection, &RigHistory, Option<&RigSurface>, Has<RigMeshes>)>,
     mut edits: MessageWriter<EditRequest>,
     mut placed: MessageWriter<PlaceAnswer>,
 ) {
-    waiting.extend(requests.read().map(|request| (request.clone(), None)));
-    waiting.retain_mut(|(PlaceRequest { rig, ray, settings }, since)| {
-        let Ok((document, selection, surface, has_mesh)) = rigs.get(*rig) else { return false };
-        let Answer::Now(surface) = answer(since, has_mesh, surface) else { return true };
+    let arrived = requests.read().filter_map(|request| {
+        let (_, _, history, ..) = rigs.get(request.rig).ok()?;
+        let landing = Landing::asked(history);
+        Some(WaitingPlace { request: request.clone(), since: None, landing, waited: false })
+    });
+    waiting.extend(arrived);
+    waiting.retain_mut(|WaitingPlace { request: PlaceRequest { rig, ray, settings }, since, landing, waited }| {
+        let Ok((document, selection, history, surface, has_mesh)) = rigs.get(*rig) else { return false };
+        let (rig, is_late) = (*rig, *waited);
+        let mut tell = |placement, refusal| placed.write(PlaceAnswer { rig, placement, waited: is_late, refusal });
+        if landing.would_discard(history) {
+            tell(Placement::Nothing, Some(PlaceRefusal::Undone));
+            return false;
+        }
+        let Answer::Now(surface) = answer(since, has_mesh, surface) else {
+            *waited = true;
+            return true;
+        };
         let PlacedJoint { placement, parent, rest } = joint_at(document, selection, surface, ray, *settings);
         if let Some(position) = rest {
-            edits.write(EditRequest::operation(*rig, Operation::Place { position, parent }));
+            edits.write(EditRequest::operation(rig, Operation::Place { position, parent }));
         }
-        placed.write(PlaceAnswer { rig: *rig, placement });
+        tell(placement, None);
         false
     });
 }

@@ -17,7 +17,7 @@ use std::{
 pub use dependencies::CommandDependency;
 pub use find::FindError;
 use loops::SettledPlaces;
-pub use status::{CommandState, CommandStatus};
+pub use status::{CommandCounts, CommandState, CommandStatus};
 
 use super::{
     BuildError, BuildProblem, BuildRange, BuildScope, DynModule, ListEntry, ModuleError, Modules, error_references,

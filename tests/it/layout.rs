@@ -475,3 +475,55 @@ fn the_architecture_names_paths_that_exist() {
     assert!(count > 100, "the paths were not found");
     assert!(wrong.is_empty(), "write whole paths, from the root of the repository:\n{}", wrong.join("\n"));
 }
+
+/// Nouns that texts of the window count.
+const COUNTED: [&str; 21] = [
+    "joints",
+    "commands",
+    "keys",
+    "points",
+    "nodes",
+    "tracks",
+    "frames",
+    "changes",
+    "conflicts",
+    "edits",
+    "clips",
+    "tags",
+    "bones",
+    "faces",
+    "triangles",
+    "motions",
+    "layers",
+    "ghosts",
+    "places",
+    "units",
+    "influences",
+];
+
+/// Places of a line at which a number of any size stands before a noun in the plural.
+fn plurals(line: &str) -> Vec<&'static str> {
+    let noun = |(at, _): (usize, &str)| {
+        let rest = &line[at + 2..];
+        let word = rest.split(|letter: char| !letter.is_alphabetic()).next().unwrap_or_default();
+        let is_verb = rest[word.len()..].starts_with(" the ");
+        COUNTED.into_iter().find(|noun| *noun == word && !is_verb)
+    };
+    line.match_indices("} ").filter_map(noun).collect()
+}
+
+#[test]
+fn numbers_of_the_window_have_words_that_fit() {
+    assert_eq!(plurals("format!(\"{count} joints, {} keys of {a}\")"), ["joints", "keys"]);
+    assert_eq!(plurals("format!(\"{key} keys the selected ones, {} joint\")"), [""; 0]);
+    let mut wrong = Vec::new();
+    for (path, text) in sources("editor") {
+        for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//")) {
+            let found = plurals(line);
+            if !found.is_empty() {
+                wrong.push(format!("{}:{}: {found:?}, where `counted` belongs", path.display(), number + 1));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}

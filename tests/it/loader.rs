@@ -328,6 +328,8 @@ fn a_template_is_loaded_with_poses_and_keys_kept_and_taken_back_whole() {
     assert!(studio.desk.says("2.0.0 · 5 joints"), "{:?}", studio.desk.seen);
     studio.click("Load");
     assert_eq!((studio.height("hips"), studio.desk.steps().1), (1.5, steps + 1), "{:?}", studio.desk.told());
+    let loaded = studio.desk.told().iter().filter(|told| told.starts_with("Loaded ")).count();
+    assert_eq!(loaded, 1, "told once, when it is done: {:?}", studio.desk.told());
     let after = studio.desk.rig().clone();
     let turned = |rig: &rigsmith::rig::Rig| rig.clip(clip).unwrap().sample(0.5).offsets[&arm].rotation;
     assert_eq!(after.clip(clip).unwrap().key_count(), before.clip(clip).unwrap().key_count(), "keys stay");
@@ -494,6 +496,24 @@ fn a_part_goes_onto_the_stroke_that_was_just_drawn() {
     studio.act(TemplatePlace::Bundled("parts/arm.rig.ron"), LibraryAct::Part { joints: end, options: Vec::new() });
     assert_eq!(studio.text(), text);
     assert!(studio.told("needs"), "{:?}", studio.desk.told());
+}
+
+#[test]
+fn a_part_over_other_commands_is_told_once_it_is_there() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let [hips, arm, elbow] = ["hips", "arm_l", "elbow_l"].map(|label| studio.joint(label));
+    let onto = |studio: &mut Studio, joints: Vec<Uid>| {
+        let place = studio.limb();
+        studio.act(place, LibraryAct::Part { joints, options: Vec::new() });
+    };
+    // Joints that do not follow each other are refused.
+    onto(&mut studio, vec![hips, elbow]);
+    assert!(studio.desk.rig().dropped_parts().is_empty(), "{:?}", studio.desk.told());
+    assert!(!studio.told("was added to joints"), "{:?}", studio.desk.told());
+    onto(&mut studio, vec![hips, arm]);
+    assert_eq!(studio.desk.rig().dropped_parts().len(), 1, "{:?}", studio.desk.told());
+    let own = "Limb was added to joints that have 1 command of their own, which stays";
+    assert!(studio.told(own), "{:?}", studio.desk.told());
 }
 
 #[test]

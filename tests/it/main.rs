@@ -125,6 +125,8 @@ mod instances;
 mod journal;
 mod journal_kill;
 mod keep_pose;
+#[cfg(feature = "editor")]
+mod key_bindings;
 mod kmeans;
 mod layout;
 mod leg_strokes;

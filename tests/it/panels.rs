@@ -5,6 +5,7 @@ mod face;
 mod features;
 mod posing;
 mod tags;
+mod walk;
 mod weights;
 
 use std::collections::HashSet;
@@ -14,6 +15,7 @@ use bevy_egui::egui::{self, Key, Modifiers, Pos2};
 use rigsmith::{
     editor::{
         actions::{Action, ActionRequest},
+        dock::ShowPanel,
         mode::Mode,
         notice::{Notice, Severity},
         panel::EditorPanel,
@@ -37,6 +39,7 @@ use rigsmith::{
         stage::RigStage,
     },
     prelude::*,
+    rig::{TagKind, operations::TagOperation},
 };
 
 use crate::gestures::boxes;
@@ -72,6 +75,55 @@ fn the_filter_keeps_matches_and_what_is_above_them() {
     desk.click("Clear filter");
     desk.frames(2);
     assert!(desk.look("tail").is_some());
+}
+
+#[test]
+fn the_filter_finds_joints_by_what_is_built_on_them() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let joints = desk.chain(&["hips", "spine", "head"]);
+    let kind = TagKind::Command { module: "space_switch".into(), params: "()".into(), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: vec![joints[1]], kind, index: None }));
+    let cases: &[(&str, &[&str])] =
+        &[("Space", &["hips", "spine"]), ("space spine", &["hips", "spine"]), ("space head", &[])];
+    for (filter, expected) in cases {
+        let found = rows(desk.rig(), &HashSet::new(), filter);
+        let labels: Vec<&str> = found.iter().map(|row| desk.label(row.joint)).collect();
+        assert_eq!(labels, *expected, "{filter}");
+    }
+}
+
+#[test]
+fn built_nodes_are_listed_and_lead_to_their_commands() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    let kind = TagKind::Command { module: "control".into(), params: "()".into(), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: vec![b], kind, index: None }));
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::All });
+    desk.frames(3);
+    let steps = desk.steps();
+    desk.secondary_click("a");
+    desk.click("Show all built nodes");
+    desk.frames(2);
+    assert!(desk.look("a, joint").is_some() && desk.look("b, joint").is_some(), "{:?}", desk.seen);
+    let control = desk.seen.iter().find(|seen| seen.label.ends_with(", control")).expect("the control").label.clone();
+    desk.click(&control);
+    desk.frames(2);
+    let [node] = desk.selected() else { panic!("{:?}", desk.selected()) };
+    assert!(![a, b].contains(node) && desk.find(&control).on == Some(true));
+    desk.secondary_click(&control);
+    desk.click("Show the command that made it");
+    desk.frames(2);
+    assert_eq!(desk.selected(), [b]);
+    // With words it is a list.
+    desk.click("Filter");
+    desk.type_text("control");
+    desk.frames(2);
+    assert!(desk.look("a, joint").is_none() && desk.look(&control).is_some(), "{:?}", desk.seen);
+    desk.click("Clear filter");
+    desk.click("Joints");
+    desk.frames(2);
+    assert!(desk.look("a").is_some() && desk.look(&control).is_none(), "{:?}", desk.seen);
+    assert_eq!(desk.steps(), steps, "looking is no step");
 }
 
 #[test]
@@ -509,6 +561,18 @@ fn everything_is_told_and_the_log_is_capped() {
     desk.click("Clear");
     desk.frames(2);
     assert!(desk.told().is_empty());
+    // An entry leads to the panel that it is about.
+    desk.click("Clear search");
+    desk.app.world_mut().write_message(Notice::error("It stopped.").at("Process"));
+    desk.frames(3);
+    desk.click("It stopped.");
+    desk.frames(2);
+    desk.time += 1.0;
+    let at = desk.find("Show in Process").rect.center();
+    desk.press(at);
+    desk.release(at);
+    let shown: Vec<ShowPanel> = desk.app.world_mut().resource_mut::<Messages<ShowPanel>>().drain().collect();
+    assert_eq!(shown, [ShowPanel("Process")]);
 }
 
 #[test]
@@ -538,6 +602,25 @@ fn toasts_are_few_and_errors_stay_longest() {
     desk.frames(3);
     assert_eq!(shown(&desk), 0, "even an error goes, and is in the log");
     assert!(desk.told().iter().any(|told| told.starts_with("It cannot be")));
+}
+
+#[test]
+fn a_toast_leads_to_the_panel_that_it_is_about() {
+    let size = egui::vec2(1280.0, 720.0);
+    let mut desk = Desk::with(Sheet::Overlay(Box::new(Toasts::default())), size);
+    for (notice, name, panel) in [
+        (Notice::error("The build stopped.").at("Process"), "Show in Process", "Process"),
+        (Notice::warning("Something else."), "Show in the log", "Log"),
+    ] {
+        desk.app.world_mut().write_message(notice);
+        desk.frames(4);
+        desk.time += 1.0;
+        let at = desk.find(name).rect.left_center() + egui::vec2(3.0, 0.0);
+        desk.press(at);
+        desk.release(at);
+        let shown: Vec<ShowPanel> = desk.app.world_mut().resource_mut::<Messages<ShowPanel>>().drain().collect();
+        assert_eq!(shown, [ShowPanel(panel)], "{name}");
+    }
 }
 
 #[test]
@@ -779,7 +862,10 @@ fn the_controls_panel_poses_resets_and_switches() {
     assert_eq!(place, all);
     desk.click("Take back the last command");
     desk.frames(2);
-    assert!(desk.says(&format!("{} of {all} commands", all - 1)));
+    let counts = desk.app.world().get::<rigsmith::plugins::commands::Processor>(entity).unwrap().builder().counts();
+    let off = if counts.off == 0 { String::new() } else { format!(", {} off", counts.off) };
+    assert!(counts.built < counts.all || counts.off > 0, "{counts:?}");
+    assert!(desk.says(&format!("{} of {} commands{off}", counts.built, counts.all)), "{:?}", desk.seen);
 }
 
 #[test]
@@ -805,4 +891,29 @@ fn the_stage_of_a_rig_is_chosen_in_the_process_panel() {
         let joints = desk.rig().len();
         assert_eq!(joints, if wanted == RigStage::Deleted { 0 } else { count });
     }
+}
+
+#[test]
+fn commands_that_are_off_are_counted_apart() {
+    let mut desk = Desk::new(ProcessPanel::default());
+    let joints = desk.chain(&["a", "b", "c"]);
+    let kind = TagKind::Command { module: "null".into(), params: "()".into(), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: joints.clone(), kind, index: None }));
+    desk.edit(Operation::Group { joints: vec![joints[1], joints[2]], name: "tail".into(), color: None });
+    let group = desk.rig().joint(joints[1]).unwrap().data.group.unwrap();
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::All });
+    desk.frames(3);
+    assert!(desk.says("3 of 3"), "{:?}", desk.seen);
+    desk.edit(Operation::Tags(TagOperation::EnableGroup(group, false)));
+    desk.frames(2);
+    assert!(desk.says("1 of 1") && desk.says("2 off"), "{:?}", desk.seen);
+    // What is off is no command to wait for, either.
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::RollBack });
+    desk.frames(2);
+    assert!(desk.says("0 of 1") && desk.says("2 off"), "{:?}", desk.seen);
+    let next = rigsmith::editor::next_step::next_step(desk.app.world());
+    assert!(next.as_ref().is_some_and(|next| next.starts_with("Built 0 of 1 command, 2 off")), "{next:?}");
+    desk.edit(Operation::Tags(TagOperation::EnableGroup(group, true)));
+    desk.frames(2);
+    assert!(!desk.says("2 off") && desk.says("0 of 3"), "{:?}", desk.seen);
 }

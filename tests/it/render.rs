@@ -18,7 +18,7 @@ use rigsmith::{
         surface::RigMesh,
     },
     render::{PictureSettings, adapter, png, take_picture},
-    rig::{PoseOffset, Rig, operations::Operation},
+    rig::{PoseOffset, Rig, operations::Operation, template::read_template},
 };
 
 use crate::prerequisites::skip;
@@ -150,6 +150,38 @@ fn impossible_sizes_are_refused() {
         let error = take_picture(Rig::default(), Vec::new(), &settings).unwrap_err().to_string();
         assert!(error.contains("choose"), "{error}");
     }
+}
+
+/// A control that is much larger than the joints is in the picture as a whole.
+#[test]
+fn controls_are_framed_on_a_gpu() {
+    if !can_draw() {
+        return;
+    }
+    let _turn = TURN.lock();
+    let text = r#"(format: 2, name: "wide", joints: [
+        (label: "a", tags: [control(size: 6.0)]),
+        (label: "b", parent: "a", translation: (0, 1, 0)),
+    ])"#;
+    let rig = read_template(text.as_bytes()).unwrap().rig;
+    let drawing = RigDrawing { grid: false, ..RigDrawing::default() };
+    let settings = PictureSettings {
+        size: UVec2::new(240, 180),
+        view: View::Orbit(30.0, 35.0),
+        drawing,
+        build: true,
+        ..PictureSettings::default()
+    };
+    let bytes = png(take_picture(rig, Vec::new(), &settings).unwrap()).unwrap();
+    let picture = image::load_from_memory(&bytes).unwrap().to_rgb8();
+    let ground = *picture.get_pixel(0, 0);
+    let is_drawn = |pixel: &image::Rgb<u8>| pixel.0.iter().zip(ground.0).any(|(a, b)| a.abs_diff(b) > 24);
+    let places: Vec<(u32, u32)> =
+        picture.enumerate_pixels().filter(|(.., pixel)| is_drawn(pixel)).map(|(x, y, _)| (x, y)).collect();
+    let across = [places.iter().map(|(x, _)| *x).min().unwrap(), places.iter().map(|(x, _)| *x).max().unwrap()];
+    let tall = [places.iter().map(|(_, y)| *y).min().unwrap(), places.iter().map(|(_, y)| *y).max().unwrap()];
+    assert!(across[0] > 2 && across[1] < 237 && tall[0] > 2 && tall[1] < 177, "{across:?} {tall:?}");
+    assert!(across[1] - across[0] > 80, "the control fills the picture: {across:?}");
 }
 
 /// Without a display nothing asks for one, on whichever way to a graphics card.

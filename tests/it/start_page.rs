@@ -20,7 +20,7 @@ use rigsmith::{
             title,
         },
         help::{self, HelpPlugin, HelpShown},
-        keys::{Chord, KeyBindings},
+        keys::{Chord, ChosenKey, KeyBindings},
         mode::Mode,
         next_step::next_step,
         notice::Notice,
@@ -420,6 +420,16 @@ fn the_help_finds_actions_and_says_why_not() {
     page.desk.key(egui::Key::Escape);
     page.settle();
     assert!(!page.world().resource::<HelpShown>().0);
+    // A click lets an action wait for another key.
+    page.send(ActionRequest(Action::Help));
+    page.desk.type_text("select mode");
+    page.settle();
+    page.click("Select mode");
+    assert!(page.desk.says("press a key"), "{:?}", page.desk.seen);
+    let waiting = page.world().resource::<ChosenKey>().0;
+    assert_eq!(waiting, Some(Action::Mode(Mode::Select)));
+    page.desk.app.insert_resource(ChosenKey(None));
+    page.send(ActionRequest(Action::Help));
     page.send(ActionRequest(Action::Help));
     page.desk.type_text("mesh is open");
     page.settle();
@@ -534,7 +544,7 @@ fn bones_and_meshes_are_hidden_by_switches() {
     let points = desk.app.world().get::<RigMesh>(mesh).unwrap().rest.points.len();
     let skin = RigEdit::SetSkin(Uid(97), Some(Arc::new(held_by(joints[0], points))));
     desk.edit(Operation::Edits(vec![skin]));
-    assert!(desk.says("1 of 2 joints move points of a mesh."), "{:?}", desk.seen);
+    assert!(desk.says("1 of 2 joints moves points of a mesh."), "{:?}", desk.seen);
     assert_eq!(desk.steps().0, steps.0 + 1, "showing and hiding is no step");
 }
 

@@ -8,9 +8,9 @@ use std::{
 
 use bevy::{math::Affine3A, prelude::*};
 use rigsmith::{
-    algo::{stroke::stroke_chain, view::ViewPlane},
+    algo::{placement::Placement, stroke::stroke_chain, view::ViewPlane},
     mesh::{
-        model::Weights,
+        model::{Model, Weights},
         obj::{ObjSettings, read_model},
         ray::Ray,
         skinning::skin_points,
@@ -18,6 +18,7 @@ use rigsmith::{
     },
     plugins::{
         document::{HoveredNode, JointEntities},
+        placement::PlaceRefusal,
         stroke::StrokeFailure,
     },
     prelude::*,
@@ -281,19 +282,46 @@ fn hovering_shows_what_a_click_picks() {
     assert_eq!(hovered(&bench), Some(placed));
 }
 
-#[test]
-fn requests_wait_for_the_surface_and_hovering_does_not() {
+/// Far too many boxes for a surface in the frame that asks for it.
+fn many_boxes() -> Model {
     let grid: Vec<[[f32; 3]; 2]> = (0..20_000)
         .map(|i| {
             let low = [(i % 30) as f32 * 0.03, (i / 30 % 30) as f32 * 0.03, (i / 900) as f32 * 0.03];
             [low, low.map(|c| c + 0.029)]
         })
         .collect();
+    boxes(&grid)
+}
+
+#[test]
+fn a_click_that_waits_for_the_surface_does_not_cut_off_steps_that_were_undone_meanwhile() {
+    let mut bench = RigBench::of(Rig::new(Uid(1), "rig"));
+    let rig = bench.rig;
+    bench.app.world_mut().spawn((RigMesh::new(MESH, many_boxes(), Vec::new()), SkinOf(rig)));
+    let ray = ViewPlane::orthographic(View::Front, [Vec3::ZERO, Vec3::ONE]).ray(Vec2::new(0.11, 0.14));
+    let request = PlaceRequest { rig, ray, settings: PlaceSettings::default() };
+    bench.app.world_mut().write_message(request.clone());
+    undo_meanwhile(&mut bench.app, rig, new_clip("wave"));
+    bench.wait("the answer", |bench| !bench.app.world().resource::<Messages<PlaceAnswer>>().is_empty());
+    let answer = bench.messages::<PlaceAnswer>().remove(0);
+    assert_eq!((answer.refusal, answer.placement), (Some(PlaceRefusal::Undone), Placement::Nothing));
+    assert!(answer.waited && bench.rig().is_empty(), "{answer:?}");
+    bench.change(Change::Redo);
+    assert_eq!(bench.rig().clips().len(), 1);
+    // Asked for anew, it is placed.
+    bench.app.world_mut().write_message(request);
+    bench.wait("the joint", |bench| !bench.rig().is_empty());
+    let answer = bench.messages::<PlaceAnswer>().remove(0);
+    assert!(answer.refusal.is_none() && answer.placement != Placement::Nothing, "{answer:?}");
+}
+
+#[test]
+fn requests_wait_for_the_surface_and_hovering_does_not() {
     let mut bench = RigBench::of(Rig::new(Uid(1), "rig"));
     let rig = bench.rig;
     bench.edit(Operation::Place { position: Vec3::new(0.1, 0.1, 0.5), parent: None });
     let root = bench.rig().roots()[0];
-    bench.app.world_mut().spawn((RigMesh::new(MESH, boxes(&grid), Vec::new()), SkinOf(rig)));
+    bench.app.world_mut().spawn((RigMesh::new(MESH, many_boxes(), Vec::new()), SkinOf(rig)));
     let plane = ViewPlane::orthographic(View::Front, [Vec3::ZERO, Vec3::ONE]);
     let point = Vec2::new(0.11, 0.14);
     let ray = plane.ray(point);

@@ -353,10 +353,10 @@ fn one_joint_is_pasted_onto_each_and_several_in_order() {
 
     let two = copy(&desk.rig, TagScope::Joints(vec![HAND_L, ARM_L]), false);
     let notes = desk.paste(&two, PasteWhat::Both, PasteTo::Joints(vec![HAND_R]));
-    assert!(notes[0].contains("1 copied joints are left over"), "{notes:?}");
+    assert!(notes[0].contains("1 copied joint is left over"), "{notes:?}");
     assert_eq!(desk.tags(HAND_R).len(), 2);
     let notes = desk.paste(&two, PasteWhat::Both, PasteTo::Joints(vec![HAND_R, ARM_R, HIPS]));
-    assert!(notes[0].contains("1 selected joints are left over"), "{notes:?}");
+    assert!(notes[0].contains("1 selected joint is left over"), "{notes:?}");
 
     let group = copy(&desk.rig, TagScope::Group(RIGHT), false);
     assert_eq!(group.joints.iter().map(|joint| joint.uid).collect::<Vec<_>>(), [ARM_R, HAND_R]);
@@ -414,7 +414,7 @@ fn the_other_side_gets_mirrored_references_and_names() {
     let mirrored = left_only
         .map_params(|module, params| (module == "ik_handle").then(|| params.replace("side: 1.0", "side: -1.0")));
     let notes = desk.paste(&mirrored, PasteWhat::Both, PasteTo::Mirror);
-    assert!(notes[0].contains("1 copied joints have no joint on the other side"), "{notes:?}");
+    assert!(notes[0].contains("1 copied joint has no joint on the other side"), "{notes:?}");
     let [_, _, ik, handle] = desk.tags(ARM_R)[..] else { panic!("{:?}", desk.tags(ARM_R)) };
     let grip = desk.tags(HAND_R)[0];
     let expected = format!(
@@ -502,7 +502,7 @@ fn a_part_is_dropped_onto_a_chain_until_either_list_ends() {
         add(&mut desk.rig, JointData { uid: Uid(bare), ..Default::default() }, Some(parent));
     }
     let notes = desk.run(drop_on(&[Uid(0x50), Uid(0x51), Uid(0x52), Uid(0x53)])).notes;
-    assert_eq!(notes, ["1 selected joints are left over: the part has only 3"]);
+    assert_eq!(notes, ["1 selected joint is left over: the part has only 3"]);
     let [ik, handle] = desk.tags(Uid(0x50))[..] else { panic!() };
     let control = desk.tags(Uid(0x51))[0];
     let group = desk.rig.joint(Uid(0x51)).unwrap().data.group.unwrap();
@@ -541,7 +541,7 @@ fn a_part_is_dropped_onto_a_chain_until_either_list_ends() {
     // A joint that is left out is found by its label, if the rig has it; the last joint's own tags are extras.
     desk.rig.apply(&RigEdit::SetLabel(HIPS, Some("end".into()))).unwrap();
     let notes = desk.run(drop_on(&[ARM_L, HAND_L])).notes;
-    assert!(notes.iter().any(|note| note.contains("1 joints of the part are left over")), "{notes:?}");
+    assert!(notes.iter().any(|note| note.contains("1 joint of the part is left over")), "{notes:?}");
     let control = *desk.tags(HAND_L).last().unwrap();
     assert!(desk.params(control).contains("@joint end#0000000000000001"), "{}", desk.params(control));
 
@@ -683,7 +683,7 @@ fn notes_reach_those_who_asked_and_kinds_are_a_resource() {
     app.world_mut().write_message(EditRequest::operation(rig, paste));
     app.update();
     let edited: Vec<EditReport> = app.world_mut().resource_mut::<Messages<EditReport>>().drain().collect();
-    assert!(edited[0].name == "Paste tags" && edited[0].notes[0].contains("1 copied joints"), "{edited:?}");
+    assert!(edited[0].name == "Paste tags" && edited[0].notes[0].contains("1 copied joint "), "{edited:?}");
     let names: Vec<_> = app.world().resource::<FeatureKinds>().iter().map(|kind| kind.name.clone()).collect();
     assert!(names.contains(&"wing".to_owned()) && names.contains(&"ik".to_owned()), "{names:?}");
 }

@@ -17,6 +17,7 @@ use super::{
 };
 use crate::{
     editor::{
+        counted::counted,
         panel::{EditorOverlay, Requests},
         panels::timeline::import::MOTION_FILES,
         recovery, style,
@@ -354,11 +355,11 @@ fn when(time: Option<SystemTime>) -> String {
     let Some(seconds) = time.and_then(|time| time.elapsed().ok()).map(|age| age.as_secs()) else {
         return "at an unknown time".to_owned();
     };
-    let counted = |number: u64, unit: &str| format!("{number} {unit}{} ago", if number == 1 { "" } else { "s" });
+    let ago = |number: u64, one: &str, many: &str| format!("{} ago", counted(number as usize, one, many));
     match seconds {
         0..60 => "just now".to_owned(),
-        60..3600 => counted(seconds / 60, "minute"),
-        3600..86_400 => counted(seconds / 3600, "hour"),
-        _ => counted(seconds / 86_400, "day"),
+        60..3600 => ago(seconds / 60, "minute", "minutes"),
+        3600..86_400 => ago(seconds / 3600, "hour", "hours"),
+        _ => ago(seconds / 86_400, "day", "days"),
     }
 }

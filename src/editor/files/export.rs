@@ -20,6 +20,7 @@ use super::{
 };
 use crate::{
     algo::face::expression::{ExpressionSet, vrm_mixes},
+    editor::counted::counted,
     files::{
         FileKind, LoadError, RealDisk, StoreError, TemplateOrigin, is_template_of, load_animation, load_model,
         load_rig_text, load_skin, load_template, stem, store_animation, store_avatar, store_document_over, store_model,
@@ -239,10 +240,6 @@ impl ExportSource<'_> {
 
 /// Content of a written file as Rigsmith's own reader finds it, in a sentence.
 fn check(path: &Path) -> Result<String, LoadError> {
-    let counted = |count: usize, one: &str, more: &str| match count {
-        1 => format!("1 {one}"),
-        count => format!("{count} {more}"),
-    };
     let parts = match FileKind::of(path) {
         Some(FileKind::Glb | FileKind::Gltf | FileKind::Obj | FileKind::Vrm) => {
             let model = load_model(&RealDisk, path)?;

@@ -20,8 +20,8 @@ use super::{
 };
 use crate::{
     editor::{
-        ActiveRig, camera::FrameWhenReady, notice::Notice, recovery::Recovery, render_errors::watched,
-        settings::EditorSettings,
+        ActiveRig, camera::FrameWhenReady, counted::counted, notice::Notice, recovery::Recovery,
+        render_errors::watched, settings::EditorSettings,
     },
     files::{
         Disk, FileKind, LoadedMesh, MeshState, MeshToSave, ProjectNote, RealDisk,
@@ -426,8 +426,8 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
         world.write_message(Notice::info(note).quiet());
     }
     if more > 0 {
-        let are = if more == 1 { "note is" } else { "notes are" };
-        let text = format!("{more} more {are} left out; --limit notes=N tells more");
+        let are = counted(more, "more note is", "more notes are");
+        let text = format!("{are} left out; --limit notes=N tells more");
         world.write_message(Notice::info(text).quiet());
     }
     if let Some(pending) = pending {

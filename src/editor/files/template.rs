@@ -11,7 +11,7 @@ use super::{
     open::LoadedDocument,
 };
 use crate::{
-    editor::notice::Notice,
+    editor::{counted::counted, notice::Notice},
     files::journal::Origin,
     plugins::document::EditRequest,
     rig::{PoseOffset, Rig, RigEdit, operations::Operation, step::edits_from_empty},
@@ -90,11 +90,11 @@ pub(super) fn put(world: &mut World, fit: &Fit, scale: f32) {
     let edits = replacing(rig, &fit.rig, scale);
     world.write_message(EditRequest::operation(entity, Operation::Edits(edits)));
     world.write_message(DocumentLanded { origin: Origin::Empty });
-    let joints = fit.rig.len();
+    let joints = counted(fit.rig.len(), "joint", "joints");
     let replaced =
         if had > 0 { format!(" instead of the {had} that were there; undo brings them back") } else { String::new() };
     let sized = if scale == 1.0 { String::new() } else { format!(", scaled by {scale:.3}") };
-    world.write_message(Notice::done(format!("Put {} onto the mesh: {joints} joints{sized}{replaced}", fit.name)));
+    world.write_message(Notice::done(format!("Put {} onto the mesh: {joints}{sized}{replaced}", fit.name)));
 }
 
 /// Edits that put a template, scaled by `scale`, in place of a rig. Weights of the template are left out.

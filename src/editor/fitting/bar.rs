@@ -10,6 +10,7 @@ use crate::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
+        counted::counted,
         library::ChosenTemplate,
         panel::{Requests, ViewportPainter},
         tools::region::{ChosenFaces, RegionSkeleton, RegionTool},
@@ -76,8 +77,7 @@ fn corrections(ui: &mut egui::Ui, rig: Entity, fitted: &FittedRig, world: &World
     let doubtful = fitted.report.doubts().count();
     let doubt = match doubtful {
         0 => "no doubt".to_owned(),
-        1 => "1 doubtful joint".to_owned(),
-        more => format!("{more} doubtful joints"),
+        more => counted(more, "doubtful joint", "doubtful joints"),
     };
     if doubtful > 0 {
         egui::ScrollArea::vertical().max_height(LIST_HEIGHT).show(ui, |ui| {
@@ -91,7 +91,8 @@ fn corrections(ui: &mut egui::Ui, rig: Entity, fitted: &FittedRig, world: &World
     }
     markers(ui, rig, world, requests);
     ui.horizontal(|ui| {
-        ui.label(format!("{}: {} joints, {doubt}", fitted.report.template, fitted.report.joints.len()));
+        let joints = counted(fitted.report.joints.len(), "joint", "joints");
+        ui.label(format!("{}: {joints}, {doubt}", fitted.report.template));
         if doubtful > 0 && ui.button("Next").on_hover_text("The next doubtful joint (N)").clicked() {
             requests.send(ActionRequest(Action::NextDoubt));
         }
@@ -151,7 +152,7 @@ fn region(ui: &mut egui::Ui, faces: &ChosenFaces, world: &World, requests: &mut 
     let (rig, mesh) = (world.get::<Rig>(faces.rig), world.get::<RigMesh>(faces.mesh));
     let mut next = faces.clone();
     ui.horizontal(|ui| {
-        ui.label(format!("Fit a part: {} faces", faces.triangles.len()));
+        ui.label(format!("Fit a part: {}", counted(faces.triangles.len(), "face", "faces")));
         ui.weak("Click a piece, drag a box; Shift adds, Ctrl takes away");
     });
     ui.horizontal(|ui| {

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 
 use super::work::LOAD;
 use crate::{
-    editor::files::OpenDocument,
+    editor::{files::OpenDocument, notice::Notice},
     instance::RigSource,
     plugins::{
         document::{Change, EditRefusal, EditReport, EditRequest},
@@ -38,6 +38,8 @@ pub(super) struct PendingLoad {
     pub base: Arc<Rig>,
     /// Mesh that the skeleton goes into.
     pub mesh: Option<Entity>,
+    /// What is told once the step is made.
+    pub told: String,
 }
 
 /// Template that a document follows.
@@ -90,6 +92,7 @@ fn cross(world: &mut World, rig: Entity, commit: &Commit) {
         loads.steps.retain(|known| known.rig == rig);
         loads.steps.push(Crossing { rig, step: step.clone(), before: now, after: after.clone() });
         set(world, rig, after);
+        world.write_message(Notice::done(pending.told));
         if let Some(mesh) = pending.mesh {
             world.write_message(FitRequest::new(mesh));
         }
@@ -115,6 +118,7 @@ fn settle(world: &mut World, rig: Entity) {
     let mut loads = world.resource_mut::<LoadSteps>();
     let Some(pending) = loads.pending.take_if(|pending| pending.rig == rig) else { return };
     set(world, rig, FollowState { template: pending.template, base: Some(pending.base), source: None });
+    world.write_message(Notice::done(pending.told));
     if let Some(mesh) = pending.mesh {
         world.write_message(FitRequest::new(mesh));
     }

@@ -15,6 +15,7 @@ use super::{
 use crate::{
     editor::{
         ActiveRig,
+        counted::counted,
         files::{ExportRequest, OpenDocument, loading::settled},
         notice::Notice,
     },
@@ -249,7 +250,7 @@ pub(super) fn go_on(mut save: ResMut<TemplateSave>, histories: Query<&RigHistory
             commands.write_message(ExportRequest(path));
         }
         Ok(SaveProgress::Joints(count, notes)) => {
-            let joints = if count == 1 { "1 joint".to_owned() } else { format!("{count} joints") };
+            let joints = counted(count, "joint", "joints");
             commands.write_message(Notice::done(format!("Wrote {name}: {joints}")));
             for note in notes {
                 commands.write_message(Notice::warning(note));

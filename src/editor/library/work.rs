@@ -17,6 +17,7 @@ use super::{
 use crate::{
     editor::{
         ActiveRig,
+        counted::counted,
         files::{
             OpenDocument,
             loading::{replacing, settled},
@@ -34,7 +35,7 @@ use crate::{
     },
     processor::{Modules, keep_clips, keep_poses},
     rig::{
-        EditError, Rig, RigEdit, TagKind, Uid,
+        EditError, Rig, RigEdit, Uid,
         operations::{Operation, TagOperation},
         part::{Part, PartError},
         template::Template,
@@ -335,9 +336,6 @@ fn put(world: &mut World, rig: Entity, request: LibraryRequest, mut landing: Lan
     }
     let (edits, base, notes) = match ready {
         Ready::Operation(operation, note) => {
-            if let Some(warning) = doubled(world, rig, &name, &operation) {
-                world.write_message(warning);
-            }
             world.write_message(EditRequest::operation(rig, *operation));
             if let Some(note) = note {
                 world.write_message(Notice::info(note));
@@ -356,29 +354,10 @@ fn put(world: &mut World, rig: Entity, request: LibraryRequest, mut landing: Lan
         world.write_message(Notice::info(note).quiet());
     }
     let template = request.place.path().map(std::path::Path::to_path_buf);
-    let joints = base.len();
-    world.resource_mut::<LoadSteps>().pending = Some(PendingLoad { rig, template, base, mesh });
+    let joints = counted(base.len(), "joint", "joints");
+    let told = format!("Loaded {name}: {joints}; Ctrl+Z takes it back");
+    world.resource_mut::<LoadSteps>().pending = Some(PendingLoad { rig, template, base, mesh, told });
     world.write_message(EditRequest::operation(rig, Operation::Named { name: LOAD, edits }));
-    world.write_message(Notice::done(format!("Loaded {name}: {joints} joints; Ctrl+Z takes it back")));
-}
-
-/// Warning about a part that goes onto joints with commands of their own, which stay.
-fn doubled(world: &World, rig: Entity, name: &str, operation: &Operation) -> Option<Notice> {
-    let joints: Vec<Uid> = match operation {
-        Operation::Tags(TagOperation::AddPart { joints, .. }) => joints.clone(),
-        Operation::Tags(TagOperation::AddPair { sides, .. }) => {
-            sides.iter().flat_map(|side| side.joints.iter().copied()).collect()
-        }
-        _ => return None,
-    };
-    let rig = world.get::<Rig>(rig)?;
-    let tags = joints.iter().filter_map(|joint| rig.joint(*joint)).flat_map(|joint| &joint.data.tags);
-    let count = tags.filter(|tag| matches!(tag.kind, TagKind::Command { .. })).count();
-    (count > 0).then(|| {
-        Notice::warning(format!(
-            "{name} was added to joints that have {count} commands of their own, which stay. Ctrl+Z takes it back"
-        ))
-    })
 }
 
 /// The mesh with the most points, which is the body: eyes and clothes lie in it or on it.

@@ -11,7 +11,10 @@ use super::{
     list,
 };
 use crate::{
-    editor::panel::{EditorPanel, Requests},
+    editor::{
+        counted::built_commands,
+        panel::{EditorPanel, Requests},
+    },
     plugins::{
         commands::{BuildFailure, BuildRequest, BuildResult, BuildStep, Processor, RunFailure},
         controls::SwitchRequest,
@@ -68,7 +71,7 @@ fn build_state(ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut 
     };
     let (place, total) = (processor.builder().cursor(), processor.builder().len());
     ui.horizontal_wrapped(|ui| {
-        ui.label(format!("{place} of {total} commands"));
+        ui.label(built_commands(processor.builder()));
         let buttons = [
             ("Build", "Carry out all commands", BuildStep::All, place < total),
             ("◀", "Take back the last command", BuildStep::Back, place > 0),

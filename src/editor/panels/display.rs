@@ -9,6 +9,7 @@ use super::displayed_rig::{DisplayedRig, Stamp};
 use crate::{
     editor::{
         actions::{Action, ActionRequest},
+        counted::counted,
         help::describe,
         keys::KeyBindings,
         onion::{ONION_COUNTS, OnionSkin, OnionStep},
@@ -96,10 +97,11 @@ impl DisplayPanel {
             self.deforming = deforming_joints(&shown.rig);
             self.made_from = Some(shown.stamp());
         }
-        let joints = shown.rig.len();
+        let joints = counted(shown.rig.len(), "joint", "joints");
         let text = match self.deforming.iter().filter(|joint| shown.rig.joint(**joint).is_some()).count() {
             0 => "No joint moves a point yet: skin the mesh first.".to_owned(),
-            count => format!("{count} of {joints} joints move points of a mesh."),
+            1 => format!("1 of {joints} moves points of a mesh."),
+            count => format!("{count} of {joints} move points of a mesh."),
         };
         ui.weak(text);
     }
@@ -147,7 +149,7 @@ fn onion(ui: &mut Ui, world: &World, requests: &mut Requests) {
         ui.weak("Before and after");
         for count in ONION_COUNTS {
             let response = ui.selectable_label(skin.count == count, count.to_string());
-            let said = format!("{count} ghosts before and after");
+            let said = format!("{} before and after", counted(count, "ghost", "ghosts"));
             response.widget_info(|| WidgetInfo::selected(WidgetType::Button, true, skin.count == count, &said));
             if response.clicked() {
                 next.count = count;

@@ -20,6 +20,7 @@ use crate::{
         bones::{FaceBoneKind, Region},
     },
     editor::{
+        counted::counted,
         notice::Notice,
         panel::{EditorPanel, Requests},
     },
@@ -84,11 +85,11 @@ fn tell_results(
                 if report.is_part {
                     let text = "The mesh is more than a head: the face was placed in its head part. \
                                 Tick \"Whole mesh\" in the Face panel to take all of it for a head.";
-                    commands.write_message(Notice::info(text));
+                    commands.write_message(Notice::info(text).at("Face"));
                 }
                 if !report.certain {
                     let text = "Which way the head looks is a weak guess. Choose up and forward in the Face panel.";
-                    commands.write_message(Notice::warning(text));
+                    commands.write_message(Notice::warning(text).at("Face"));
                 }
                 results.0.retain(|(known, _)| known != mesh && meshes.contains(*known));
                 results.0.push((*mesh, report.clone()));
@@ -97,7 +98,7 @@ fn tell_results(
                 commands.write_message(Notice::info("Placing the face was cancelled. The rig is as it was."));
             }
             Err(error) => {
-                commands.write_message(Notice::error(format!("No face was placed: {error}.")));
+                commands.write_message(Notice::error(format!("No face was placed: {error}.")).at("Face"));
             }
         }
     }
@@ -118,7 +119,7 @@ fn summary(report: &FaceReport) -> String {
     };
     let fitted =
         report.fit_error.map_or(String::new(), |error| format!("; the shapes are met to {error:.4} on average"));
-    format!("{skin} facial bones in {sum:.0} ms{kept}{fitted}.")
+    format!("{} in {sum:.0} ms{kept}{fitted}.", counted(skin, "facial bone", "facial bones"))
 }
 
 /// The panel.

@@ -26,7 +26,7 @@ mod words;
 use std::{collections::BTreeMap, sync::Arc};
 
 use bevy::{ecs::change_detection::Tick, prelude::*};
-use bevy_egui::egui::{self, Id, Popup, Rect, Response, SetOpenCommand, Ui, emath::TSTransform};
+use bevy_egui::egui::{self, Id, Popup, Pos2, Rect, Response, SetOpenCommand, Ui, emath::TSTransform};
 use egui_snarl::{NodeId, Snarl};
 
 pub use self::{
@@ -53,6 +53,7 @@ use super::{
 use crate::{
     editor::{
         actions::ActionRequest,
+        counted::counted,
         notice::Notice,
         panel::{EditorPanel, Requests},
     },
@@ -226,10 +227,7 @@ impl GraphPanel {
                 button(ui, world, GraphAction::OpenFrames, "Open all", requests);
                 button(ui, world, GraphAction::FoldFrames, "Fold all", requests);
             }
-            let count = match graph.nodes.len() {
-                1 => "1 command".to_owned(),
-                count => format!("{count} commands"),
-            };
+            let count = counted(graph.nodes.len(), "command", "commands");
             let selected = view.selected.len();
             let text = if selected == 0 { count } else { format!("{count}, {selected} selected") };
             ui.add(egui::Label::new(egui::RichText::new(text).weak()).truncate());
@@ -268,10 +266,10 @@ impl GraphPanel {
         let fitted = fitting.min_elem().clamp(SCALES[0], 1.0);
         let (mut scale, mut centre) = (fitted, space.center());
         if is_other && fitted < FIRST_SCALE {
-            // The first look at a large graph is one at its beginning, or at what is selected, where names can be read.
-            let selected = self.graph.nodes.iter().position(|node| view.selected.contains(&node.tag));
-            let start = space.min + area.size() / (2.0 * FIRST_SCALE);
-            (scale, centre) = (FIRST_SCALE, selected.map_or(start, |number| spots.shown(number).center()));
+            (scale, centre) = first_look(spots, view, area).unwrap_or_else(|| {
+                let start = space.min + area.size() / (2.0 * FIRST_SCALE);
+                (FIRST_SCALE, start)
+            });
         }
         let from = area.center() - scale * centre.to_vec2();
         Some(TSTransform::new(from.to_vec2(), scale))
@@ -291,8 +289,8 @@ impl GraphPanel {
         if is_dropped(ui) {
             self.gesture = None;
         }
-        let (rest, boxes) = (self.rects(view, egui::Vec2::ZERO), self.boxes());
-        let want = self.wanted(shown.entity, view, (rest.as_slice(), boxes.as_slice()), area);
+        let (rest, rest_boxes) = (self.rects(view, egui::Vec2::ZERO), self.boxes(view, egui::Vec2::ZERO));
+        let want = self.wanted(shown.entity, view, (rest.as_slice(), rest_boxes.as_slice()), area);
         let transform = want.unwrap_or(self.transform);
         let inverse = transform.inverse();
         let at = ui.input(|input| input.pointer.latest_pos()).map(|at| inverse * at);
@@ -300,7 +298,7 @@ impl GraphPanel {
         let hand = Hand {
             graph: &self.graph,
             rects: &rest,
-            boxes: &boxes,
+            boxes: &rest_boxes,
             selected: &view.selected,
             at,
             pressed: None,
@@ -308,13 +306,13 @@ impl GraphPanel {
             scale: transform.scaling,
         };
         let by = match &self.gesture {
-            Some(Gesture::Nodes(_, from)) => hand.shift(*from),
+            Some(Gesture::Nodes(_, from) | Gesture::Folded(_, from)) => hand.shift(*from),
             _ => egui::Vec2::ZERO,
         };
         let is_free = self.gesture.is_none() && ui.rect_contains_pointer(area);
         let hovered = if is_free { hand.wire_at() } else { None };
-        let rects = self.rects(view, by);
-        let hand = Hand { rects: &rects, ..hand };
+        let (rects, boxes) = (self.rects(view, by), self.boxes(view, by));
+        let hand = Hand { rects: &rects, boxes: &boxes, ..hand };
         let ink = self.gesture.as_ref().and_then(|gesture| hand.ink(gesture));
         let id = Id::new("command graph");
         let mut canvas = Canvas {
@@ -379,6 +377,43 @@ impl GraphPanel {
         let Some(target) = self.menu else { return };
         Popup::context_menu(&ground).open_memory(opened).show(|ui| menu.show(ui, target, requests));
     }
+}
+
+/// Scale and centre of the first look at a large graph with selected commands, at which names can be read: all of them with
+/// what they read and what reads them, or all of them, or else where most of them are together. `None` without any.
+fn first_look(spots: Spots, view: &GraphView, area: Rect) -> Option<(f32, Pos2)> {
+    let graph = spots.graph;
+    let is_selected = |number: usize| view.selected.contains(&graph.nodes[number].tag);
+    let selected: Vec<Rect> =
+        (0..graph.nodes.len()).filter(|number| is_selected(*number)).map(|number| spots.shown(number)).collect();
+    let first = selected.first()?.center();
+    let alone = selected.iter().copied().fold(Rect::NOTHING, Rect::union);
+    let around = graph.wires.iter().filter(|wire| is_selected(wire.from) || is_selected(wire.to));
+    let around =
+        around.flat_map(|wire| [wire.from, wire.to]).map(|number| spots.shown(number)).fold(alone, Rect::union);
+    for space in [around, alone] {
+        let space = space.expand(30.0);
+        let scale = (area.size() / space.size()).min_elem();
+        if scale >= FIRST_SCALE {
+            return Some((scale.min(1.0), space.center()));
+        }
+    }
+    // Those of folded frames share a box, and are no crowd.
+    let open: Vec<Rect> = (0..graph.nodes.len())
+        .filter(|number| is_selected(*number))
+        .map(|number| spots.rects[number])
+        .filter(|rect| rect.is_finite())
+        .collect();
+    let seen = |centre: Pos2| Rect::from_center_size(centre, area.size() / FIRST_SCALE);
+    let together = |centre: Pos2| open.iter().filter(|rect| seen(centre).contains_rect(**rect)).count();
+    let mut best = (0, first);
+    for centre in open.iter().map(Rect::center) {
+        let count = together(centre);
+        if count > best.0 {
+            best = (count, centre);
+        }
+    }
+    Some((FIRST_SCALE, best.1))
 }
 
 /// Module of the library that is let go over the graph.

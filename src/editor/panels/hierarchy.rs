@@ -1,8 +1,9 @@
-//! Hierarchy panel: the tree of joints.
+//! Hierarchy panel: the tree of joints, or of all nodes that are built.
 //!
 //! The panel shows the rig's own selection and changes it with pick requests, so the viewport and the tree never
 //! differ.
 
+mod built;
 mod keys;
 mod menu;
 mod row;
@@ -19,6 +20,7 @@ use super::{
 };
 use crate::{
     editor::{
+        counted::counted,
         library::{DraggedTemplate, goes_onto_both},
         notice::Notice,
         panel::{EditorPanel, Requests},
@@ -29,6 +31,7 @@ use crate::{
     },
     rig::{Rig, Uid, operations::Operation},
 };
+use built::BuiltTree;
 use rows::{Row, rows};
 
 /// The panel.
@@ -52,6 +55,9 @@ pub struct HierarchyPanel {
     under: Option<Uid>,
     /// True if a part is dragged that goes onto both sides.
     is_for_both: bool,
+    built: BuiltTree,
+    /// True if all nodes of the built rig are listed, not its joints alone.
+    shows_built: bool,
 }
 
 /// The listed rows with the state they were made from.
@@ -86,6 +92,9 @@ impl EditorPanel for HierarchyPanel {
             self.rename = None;
             return list::nothing(ui, "No joints yet: place them with clicks or draw them with strokes.");
         }
+        if self.shows_built {
+            return self.built_nodes(ui, world, &shown, requests);
+        }
         self.bar(ui, &shown);
         self.reveal_active(&shown);
         self.refresh(&shown);
@@ -104,10 +113,25 @@ impl EditorPanel for HierarchyPanel {
 }
 
 impl HierarchyPanel {
+    /// Draws the nodes of the built rig in place of the joints.
+    fn built_nodes(&mut self, ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut Requests) {
+        self.rename = None;
+        if self.pointed.take().is_some() {
+            requests.send(HoverJoint { rig: shown.entity, joint: None });
+        }
+        let tip = "Nodes whose name, kind or module contains all of these words";
+        let mut is_back = false;
+        list::search_bar(ui, "Filter", tip, &mut self.filter, |ui| {
+            is_back = ui.button("Joints").on_hover_text("Back to the joints").clicked();
+        });
+        self.shows_built = !is_back;
+        self.built.show(ui, world, shown, &self.filter, requests);
+    }
+
     /// Draws the filter and the fold buttons.
     fn bar(&mut self, ui: &mut Ui, shown: &DisplayedRig) {
         let mut fold: Option<bool> = None;
-        let tip = "Joints whose label or group contains all of these words";
+        let tip = "Joints whose label, group or tags contain all of these words";
         list::search_bar(ui, "Filter", tip, &mut self.filter, |ui| {
             if list::symbol_button(ui, "⏵", "Fold all") {
                 fold = Some(true);
@@ -123,7 +147,7 @@ impl HierarchyPanel {
         }
         if !self.filter.trim().is_empty() {
             let found = self.tree.rows.iter().filter(|row| row.matches).count();
-            ui.weak(format!("{found} of {} joints", shown.rig.len()));
+            ui.weak(format!("{found} of {}", counted(shown.rig.len(), "joint", "joints")));
         }
     }
 

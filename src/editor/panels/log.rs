@@ -8,17 +8,19 @@ use bevy_egui::egui::{self, Color32, Label, Rect, RichText, ScrollArea, Sense, U
 use super::list::{self, List};
 use crate::{
     editor::{
+        counted::counted,
+        dock::ShowPanel,
         notice::{Notice, Severity},
         panel::{EditorPanel, Requests},
     },
     plugins::{
         controls::SwitchedOver,
-        document::{ChangeError, EditRefusal},
+        document::{ChangeError, EditRefusal, EditReport},
         limits::RigLimits,
     },
 };
 
-/// Plugin that stores notices, and makes notices of refused edits.
+/// Plugin that stores notices, and makes notices of refused edits and of what operations note.
 pub struct LogPlugin;
 
 impl Plugin for LogPlugin {
@@ -27,9 +29,10 @@ impl Plugin for LogPlugin {
             .add_message::<Notice>()
             .add_message::<ClearLog>()
             .add_message::<EditRefusal>()
+            .add_message::<EditReport>()
             .add_message::<SwitchedOver>()
             .add_message::<RequestRedraw>()
-            .add_systems(Last, (tell_refusals, tell_switches, keep_notices).chain().in_set(LogSystems));
+            .add_systems(Last, (tell_notes, tell_refusals, tell_switches, keep_notices).chain().in_set(LogSystems));
     }
 }
 
@@ -99,6 +102,13 @@ impl LogEntry {
     }
 }
 
+/// Tells what an operation noted, once it is carried out.
+fn tell_notes(mut edited: MessageReader<EditReport>, mut notices: MessageWriter<Notice>) {
+    for note in edited.read().flat_map(|report| &report.notes) {
+        notices.write(Notice::warning(sentence(note)));
+    }
+}
+
 fn tell_refusals(mut refused: MessageReader<EditRefusal>, mut notices: MessageWriter<Notice>) {
     for refused in refused.read() {
         let text = sentence(&refused.reason.to_string());
@@ -114,7 +124,10 @@ fn tell_refusals(mut refused: MessageReader<EditRefusal>, mut notices: MessageWr
 fn tell_switches(mut switched: MessageReader<SwitchedOver>, mut notices: MessageWriter<Notice>) {
     for SwitchedOver { frames, keys, notes, .. } in switched.read() {
         notices.write(match notes.first() {
-            None => Notice::done(format!("Switched over {frames} frames with {keys} keys; all joints move as before.")),
+            None => {
+                let (frames, keys) = (counted(*frames, "frame", "frames"), counted(*keys, "key", "keys"));
+                Notice::done(format!("Switched over {frames} with {keys}; all joints move as before."))
+            }
             Some(first) => {
                 let more = match notes.len() {
                     1 => String::new(),
@@ -199,6 +212,11 @@ impl EditorPanel for LogPanel {
             ui.separator();
             ScrollArea::vertical().id_salt("whole text").auto_shrink(false).show(ui, |ui| {
                 ui.add(Label::new(RichText::new(entry.line())).wrap().selectable(true));
+                if let Some(panel) = entry.notice.panel
+                    && ui.button(format!("Show in {panel}")).clicked()
+                {
+                    requests.send(ShowPanel(panel));
+                }
             });
         }
     }
@@ -225,7 +243,8 @@ impl LogPanel {
 
     fn bar(&mut self, ui: &mut Ui, book: &LogBook, requests: &mut Requests) {
         let (mut copy, mut clear) = (false, false);
-        list::search_bar(ui, "Search", "Entries that contain all of these words", &mut self.search, |ui| {
+        let tip = "Entries with all of these words; error, warning, done and info stand for the kinds";
+        list::search_bar(ui, "Search", tip, &mut self.search, |ui| {
             clear = ui.button("Clear").on_hover_text("Forget all entries").clicked();
             copy = ui.button("Copy").on_hover_text("Copy what is listed").clicked();
         });

@@ -6,8 +6,10 @@ use bevy_egui::egui::{self, Area, Button, Frame, Id, Key, Order, Pos2, Rect, Ui}
 
 use super::{
     controls::values_of,
+    displayed_rig::DisplayedRig,
     poses::PosedRig,
     selection_sets::{free_name, recall},
+    tags::show_tag,
     timeline::{OpenClip, Timeline, TimelineAction, obstacle, range, requested},
 };
 use crate::{
@@ -129,6 +131,13 @@ fn entries(ui: &mut Ui, world: &World, open: &OpenMenu, requests: &mut Requests)
     }
     if entry(ui, TimelineAction::Key.name(), obstacle(world, TimelineAction::Key)) {
         requests.send(ActionRequest(Action::Timeline(TimelineAction::Key)));
+    }
+    let command = built.and_then(|built| built.node(node)?.origin.as_ref()).map(|origin| origin.command);
+    if let Some(command) = command
+        && entry(ui, "Show the command that made it", None)
+        && let Some(shown) = DisplayedRig::of(world)
+    {
+        show_tag(world, &shown, command, requests);
     }
     ui.separator();
     let sets: Vec<_> = document.selection_sets().iter().filter(|set| set.nodes.contains(&node)).collect();

@@ -25,6 +25,7 @@ use crate::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
+        counted::counted,
         notice::Notice,
         panel::{EditorPanel, Requests},
         style,
@@ -136,7 +137,7 @@ fn current(ui: &mut Ui, posed: &PosedRig, shown: &DisplayedRig) -> Option<Operat
     let text = match count {
         0 => "At rest".to_owned(),
         1 => "1 joint is posed".to_owned(),
-        more => format!("{more} joints are posed"),
+        more => format!("{} are posed", counted(more, "joint", "joints")),
     };
     ui.weak(text);
     let is_posed = |node: &Uid| posed.shown.offsets.contains_key(node) || posed.shown.values.contains_key(node);

@@ -10,19 +10,21 @@ use bevy_egui::egui::{
 use super::{
     displayed_rig::{DisplayedRig, Stamp},
     list::{self, List},
+    tags::show_tag,
 };
 use crate::{
     editor::{
+        notice::Notice,
         panel::{EditorPanel, Requests},
         style,
     },
     plugins::{
-        commands::{BuildRequest, BuildStep, Processor},
+        commands::{BuildRequest, BuildResult, BuildStep, Processor},
         picking::{Pick, PickRequest},
         stage::{RigStage, StageRequest},
     },
     processor::{BuildRange, Builder, CommandState, CommandStatus, ListEntry},
-    rig::{TagKind, Uid},
+    rig::{BuiltNode, TagKind, Uid},
 };
 
 /// The panel.
@@ -95,7 +97,7 @@ impl EditorPanel for ProcessPanel {
             }
         });
         if let Some((at, click)) = clicked {
-            self.carry_out(at, click, &shown, requests);
+            self.carry_out(at, click, world, &shown, requests);
         }
     }
 }
@@ -103,6 +105,8 @@ impl EditorPanel for ProcessPanel {
 /// Request of a click on a row.
 enum Click {
     Select,
+    Values,
+    Made,
     RunTo,
     Breakpoint,
 }
@@ -167,7 +171,14 @@ impl ProcessPanel {
                     }
                 });
             }
-            ui.label(format!("{done} of {total}"));
+            let counts = builder.counts();
+            ui.label(format!("{} of {}", counts.built, counts.all))
+                .on_hover_text("Commands that are in effect, of those that a build carries out");
+            if counts.off > 0 {
+                ui.weak(format!("{} off", counts.off)).on_hover_text(
+                    "Commands that the build passes over: their tag, feature or group is off, or what they refer to",
+                );
+            }
             if !self.ran.is_empty() {
                 let ran = format!("{} ran", self.ran.len());
                 ui.label(RichText::new(ran).color(style::accent(ui.visuals())))
@@ -246,7 +257,12 @@ impl ProcessPanel {
         let mut click = response.clicked().then_some(Click::Select);
         response.context_menu(|ui| {
             let label = if row.is_breakpoint { "Remove breakpoint" } else { "Stop before it" };
-            for (name, asked) in [("Run to here", Click::RunTo), (label, Click::Breakpoint)] {
+            for (name, asked) in [
+                ("Run to here", Click::RunTo),
+                (label, Click::Breakpoint),
+                ("Show its values", Click::Values),
+                ("Select what it made", Click::Made),
+            ] {
                 if ui.button(name).clicked() {
                     click = Some(asked);
                     ui.close();
@@ -262,18 +278,33 @@ impl ProcessPanel {
         click
     }
 
-    fn carry_out(&self, number: usize, click: Click, shown: &DisplayedRig, requests: &mut Requests) {
+    fn carry_out(&self, number: usize, click: Click, world: &World, shown: &DisplayedRig, requests: &mut Requests) {
         let row = &self.rows[number];
         let ask = |step| BuildRequest { rig: shown.entity, step };
+        let pick = |nodes| PickRequest { rig: shown.entity, what: Pick::Joints(nodes), add: false };
+        let has_failed = row.status.as_ref().is_some_and(|status| status.state == CommandState::Failed);
         match click {
-            Click::Select => {
-                let what = Pick::Joints(vec![row.entry.joint]);
-                requests.send(PickRequest { rig: shown.entity, what, add: false });
-            }
+            // What failed is mended where its values are.
+            Click::Select if has_failed => show_tag(world, shown, row.entry.command, requests),
+            Click::Select => requests.send(pick(vec![row.entry.joint])),
+            Click::Values => show_tag(world, shown, row.entry.command, requests),
+            Click::Made => match made_by(world, shown, row.entry.command) {
+                nodes if nodes.is_empty() => {
+                    requests.send(Notice::info(format!("{} of {} made no node.", row.name, row.joint)));
+                }
+                nodes => requests.send(pick(nodes)),
+            },
             Click::RunTo => requests.send(ask(BuildStep::To(number + 1))),
             Click::Breakpoint => requests.send(ask(BuildStep::Breakpoint(row.entry.command, !row.is_breakpoint))),
         }
     }
+}
+
+/// Nodes that a command made.
+fn made_by(world: &World, shown: &DisplayedRig, command: Uid) -> Vec<Uid> {
+    let Some(built) = world.get::<BuildResult>(shown.entity) else { return Vec::new() };
+    let is_own = |node: &&BuiltNode| node.origin.as_ref().is_some_and(|origin| origin.command == command);
+    built.0.nodes.iter().filter(is_own).map(|node| node.uid).collect()
 }
 
 /// Stage of the rig, and the choice of another.

@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     editor::{
+        counted::counted,
         mode::Mode,
         panel::{EditorPanel, Requests},
         settings::EditorSettings,
@@ -62,7 +63,7 @@ impl EditorPanel for PropertiesPanel {
         }
         ScrollArea::vertical().id_salt("properties").auto_shrink(false).show(ui, |ui| {
             if self.values.joints.len() > 1 {
-                ui.strong(format!("{} joints", self.values.joints.len()));
+                ui.strong(counted(self.values.joints.len(), "joint", "joints"));
             }
             self.label_field(ui, &shown, requests);
             self.group_field(ui, &shown, requests);
@@ -278,7 +279,10 @@ fn lengths(lengths: &[f32]) -> String {
     match lengths {
         [] => "no child".to_owned(),
         [_] => short(f64::from(most), 4),
-        more => format!("{} to {} ({} bones)", short(f64::from(least), 3), short(f64::from(most), 3), more.len()),
+        more => {
+            let bones = counted(more.len(), "bone", "bones");
+            format!("{} to {} ({bones})", short(f64::from(least), 3), short(f64::from(most), 3))
+        }
     }
 }
 

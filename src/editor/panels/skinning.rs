@@ -21,6 +21,7 @@ use crate::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
+        counted::counted,
         notice::{Notice, Severity},
         panel::{EditorPanel, Requests},
     },
@@ -90,7 +91,7 @@ fn skin(
     if let Some(progress) = meshes.iter().find_map(|mesh| jobs.get(*mesh).ok()).map(SkinningJob::progress) {
         let percent = (progress * 100.0) as u32;
         let text = format!("Skinning is running ({percent} %). Wait for it, or cancel it in the Skinning panel.");
-        commands.write_message(Notice::info(text));
+        commands.write_message(Notice::info(text).at(TITLE));
         return;
     }
     if let Some(obstacle) = obstacle(rig, meshes.len()) {
@@ -103,6 +104,9 @@ fn skin(
         commands.write_message(BindRequest { mesh, settings: settings.0.clone(), parts, claims });
     }
 }
+
+/// Name of the panel.
+const TITLE: &str = "Skinning";
 
 /// Reason why there is nothing to skin, if so.
 fn obstacle(rig: &Rig, meshes: usize) -> Option<&'static str> {
@@ -139,10 +143,10 @@ fn tell_results(
         notices.write(match result {
             Ok(SkinningReport { weights: report, .. }) => {
                 let told = format!("{name} is skinned: {}.", covered(report.points, unweighted(report)));
-                if unweighted(report) == 0 { Notice::done(told) } else { Notice::warning(told) }
+                if unweighted(report) == 0 { Notice::done(told) } else { Notice::warning(told).at(TITLE) }
             }
             Err(error) if is_cancelled(error) => Notice::info("Skinning was cancelled. The weights are as they were."),
-            Err(error) => Notice::error(format!("{name} was not skinned: {error}.")),
+            Err(error) => Notice::error(format!("{name} was not skinned: {error}.")).at(TITLE),
         });
         results.0.retain(|(known, _)| known != mesh && meshes.contains(*known));
         results.0.push((*mesh, result.clone()));
@@ -174,9 +178,13 @@ fn unweighted(report: &WeightReport) -> usize {
 /// "100 % of 13380 points have weights", or the number of points without any.
 fn covered(points: usize, without: usize) -> String {
     if without == 0 {
-        format!("100 % of {points} points have weights")
+        match points {
+            1 => "100 % of 1 point has weights".to_owned(),
+            _ => format!("100 % of {} have weights", counted(points, "point", "points")),
+        }
     } else {
-        format!("{without} of {points} points have no weights")
+        let have = if without == 1 { "has" } else { "have" };
+        format!("{without} of {} {have} no weights", counted(points, "point", "points"))
     }
 }
 
@@ -190,7 +198,7 @@ pub struct SkinningPanel {
 
 impl EditorPanel for SkinningPanel {
     fn title(&self) -> &'static str {
-        "Skinning"
+        TITLE
     }
 
     fn show(&mut self, ui: &mut Ui, world: &World, requests: &mut Requests) {
@@ -297,7 +305,7 @@ impl SkinningPanel {
         ui.strong(mesh_name(mesh));
         let points = mesh.rest.points.len();
         let Some(skin) = shown.rig.skin(mesh.uid) else {
-            ui.weak(format!("Not skinned ({points} points)"));
+            ui.weak(format!("Not skinned ({})", counted(points, "point", "points")));
             self.failure(ui, world, entity);
             return;
         };

@@ -23,14 +23,17 @@ use super::{
 };
 use crate::{
     editor::{
+        counted::counted,
+        dock::ShowPanel,
         notice::Notice,
         panel::{EditorPanel, Requests},
     },
     plugins::{
         commands::{CommandReport, Processor, RigModules, TagEntities},
         document::{Change, EditRequest},
+        picking::{Pick, PickRequest},
     },
-    processor::Modules,
+    processor::{CommandState, Modules},
     rig::{
         TagKind, Uid,
         operations::{Operation, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation},
@@ -38,6 +41,24 @@ use crate::{
 };
 use stack::{Entry, Stack};
 use values::{ValueEdit, Values};
+
+/// Request to open the card of a tag, with the number of requests before it.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ShownTag {
+    /// Number of the request.
+    pub number: u64,
+    /// The tag.
+    pub tag: Uid,
+}
+
+/// Selects the joint of a tag and opens the tag's card in this panel, which comes forward.
+pub(super) fn show_tag(world: &World, shown: &DisplayedRig, tag: Uid, requests: &mut Requests) {
+    let Some((joint, _)) = shown.rig.find_tag(tag) else { return };
+    let number = world.get_resource::<ShownTag>().map_or(0, |known| known.number) + 1;
+    requests.send(PickRequest { rig: shown.entity, what: Pick::Joints(vec![joint.data.uid]), add: false });
+    requests.set(ShownTag { number, tag });
+    requests.send(ShowPanel("Tags"));
+}
 
 /// The panel.
 #[derive(Default)]
@@ -49,6 +70,10 @@ pub struct TagsPanel {
     words: String,
     clipboard: Option<Arc<TagClipboard>>,
     parts: parts::PartMenu,
+    /// Number of the last [`ShownTag`] that was answered.
+    answered: u64,
+    /// Card that is scrolled into view.
+    reveal: Option<Uid>,
 }
 
 /// Request of a card.
@@ -77,6 +102,7 @@ impl EditorPanel for TagsPanel {
         self.header(ui, world, &modules.0, &shown, requests);
         ui.separator();
         let entries = std::mem::take(&mut self.stack.entries);
+        self.answer(world, &entries);
         ScrollArea::vertical().id_salt("tags").auto_shrink(false).show(ui, |ui| {
             if entries.is_empty() {
                 ui.weak("Nothing is built here. Add a control, an IK handle, a spring …");
@@ -99,6 +125,19 @@ fn send(operation: TagOperation, shown: &DisplayedRig, requests: &mut Requests) 
 }
 
 impl TagsPanel {
+    /// Opens the card of a tag that was asked for, once its joint is selected.
+    fn answer(&mut self, world: &World, entries: &[Entry]) {
+        let Some(asked) = world.get_resource::<ShownTag>().filter(|asked| asked.number != self.answered) else {
+            return;
+        };
+        let has_tag = |entry: &&Entry| entry.tags.iter().any(|(_, tag)| *tag == asked.tag);
+        if let Some(entry) = entries.iter().find(has_tag) {
+            self.answered = asked.number;
+            self.open.insert(entry.first.uid);
+            self.reveal = Some(entry.first.uid);
+        }
+    }
+
     fn header(&mut self, ui: &mut Ui, world: &World, modules: &Modules, shown: &DisplayedRig, requests: &mut Requests) {
         ui.horizontal_wrapped(|ui| {
             // Buttons go on in the next row, not letter by letter.
@@ -106,7 +145,7 @@ impl TagsPanel {
             let joints = &self.stack.joints;
             let name = match joints[..] {
                 [joint] => shown.name(joint).into_owned(),
-                _ => format!("{} joints", joints.len()),
+                _ => counted(joints.len(), "joint", "joints"),
             };
             ui.strong(name);
             let to = joints.clone();
@@ -156,7 +195,7 @@ impl TagsPanel {
         match clipboard {
             Ok(clipboard) => {
                 let count: usize = clipboard.joints.iter().map(|joint| joint.tags.len()).sum();
-                requests.send(Notice::done(format!("Copied {count} tags.")).quiet());
+                requests.send(Notice::done(format!("Copied {}.", counted(count, "tag", "tags"))).quiet());
                 self.clipboard = Some(Arc::new(clipboard));
             }
             Err(error) => requests.send(Notice::error(format!("Nothing was copied: {error}."))),
@@ -264,6 +303,9 @@ impl TagsPanel {
             match modules.get(name) {
                 Some(module) => {
                     ui.weak(module.doc);
+                    if let Some(reason) = failure(world, shown, entry) {
+                        ui.colored_label(ui.visuals().error_fg_color, reason);
+                    }
                     let edit = self.values.show(ui, shown, builder, module, entry);
                     request = request.take().or(edit.map(CardRequest::Value));
                 }
@@ -273,6 +315,9 @@ impl TagsPanel {
                 }
             }
         });
+        if self.reveal.take_if(|revealed| *revealed == tag).is_some() {
+            card.response.scroll_to_me(Some(egui::Align::Center));
+        }
         // A card that was dragged here goes before this one.
         if let Some(dragged) = card.response.dnd_release_payload::<usize>() {
             request = request.or(moved(entries, *dragged, number));
@@ -302,6 +347,13 @@ fn enabled(ui: &mut Ui, shown: &DisplayedRig, entry: &Entry) -> Option<CardReque
     let field = Checkbox::new(&mut value, RichText::new(several).strong()).indeterminate(mixed);
     let clicked = ui.add(field).on_hover_text(about).clicked();
     clicked.then_some(CardRequest::Operation(TagOperation::Enable(tags, mixed || value)))
+}
+
+/// Reason why a command of an entry failed, if one did.
+fn failure(world: &World, shown: &DisplayedRig, entry: &Entry) -> Option<String> {
+    let entities = world.get::<TagEntities>(shown.entity)?;
+    let mut reports = entry.tags.iter().filter_map(|(_, tag)| world.get::<CommandReport>(entities.get(*tag)?));
+    reports.find(|report| report.0.state == CommandState::Failed).and_then(|report| reason(&report.0))
 }
 
 /// Draws the state of the commands in the build: the worst state of all.

@@ -155,11 +155,13 @@ impl EditorOverlay for Toasts {
                 .fade_in(false)
                 .show(ctx, |ui| draw(ui, toast, width));
             ctx.move_to_top(shown.response.layer_id);
-            shown.response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, "Show in the log"));
+            let panel = toast.notice.panel;
+            let said = panel.map_or_else(|| "Show in the log".to_owned(), |panel| format!("Show in {panel}"));
+            shown.response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, &said));
             if shown.inner {
                 closed = Some(toast.id);
             } else if shown.response.clicked() {
-                requests.send(ShowPanel("Log"));
+                requests.send(ShowPanel(panel.unwrap_or("Log")));
             }
             let rect: Rect = shown.response.rect;
             // A toast under the pointer stays.

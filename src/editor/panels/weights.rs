@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     editor::{
+        counted::counted,
         notice::Notice,
         panel::{EditorPanel, Requests},
         tools::paint::brush::BrushPlugin,
@@ -56,11 +57,14 @@ fn tell_answers(
         };
         notices.write(match result {
             Ok(0) => Notice::info(format!("The weights of {name} are {what} already; nothing changed.")),
-            Ok(count) => Notice::done(format!("The weights of {name} are {what}: {count} points changed.")),
+            Ok(count) => {
+                let points = counted(*count, "point", "points");
+                Notice::done(format!("The weights of {name} are {what}: {points} changed."))
+            }
             Err(error @ WeightChangeError::Discarded) => {
                 Notice::info(format!("The weights of {name} were not {what}: {error}."))
             }
-            Err(error) => Notice::warning(format!("The weights of {name} were not {what}: {error}.")),
+            Err(error) => Notice::warning(format!("The weights of {name} were not {what}: {error}.")).at("Weights"),
         });
     }
 }

@@ -16,12 +16,13 @@ use crate::{
         mode::Mode,
         notice::{Notice, StatusLine},
         panel::{PanelApp, ViewportPainter},
+        panels::log::LogSystems,
         pointer::{PointerAct, ViewportArea},
     },
     mesh::ray::Ray,
     plugins::{
         picking::{HoverRequest, Pick, PickRequest},
-        placement::{PlaceRequest, PlacedJoint, joint_at},
+        placement::{PlaceAnswer, PlaceRequest, PlacedJoint, joint_at},
         viewport::Sight,
     },
     rig::{Uid, operations::settle},
@@ -34,7 +35,9 @@ impl Plugin for PlacePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<PlaceTool>()
             .add_systems(Update, place.in_set(ToolSystems::Tools).after(select::select))
+            .add_message::<PlaceAnswer>()
             .add_systems(PostUpdate, show.in_set(ToolSystems::Show).after(select::say))
+            .add_systems(Last, tell_late.before(LogSystems))
             .add_painter(DepthPainter);
     }
 }
@@ -241,6 +244,19 @@ pub(super) fn place(
         if tool.hovers != hovering {
             tool.hovers = hovering;
         }
+    }
+}
+
+/// Tells what became of clicks that waited for the mesh.
+fn tell_late(mut answers: MessageReader<PlaceAnswer>, mut notices: MessageWriter<Notice>) {
+    for PlaceAnswer { placement, refusal, .. } in answers.read().filter(|answer| answer.waited) {
+        notices.write(match (refusal, placement) {
+            (Some(why), _) => Notice::info(format!("No joint was placed: {why}.")),
+            (None, Placement::Nothing) => {
+                Notice::info("No joint was placed: the click waited for the mesh, and is beside it.")
+            }
+            (None, _) => Notice::done("Placed the joint of the click that waited for the mesh.").quiet(),
+        });
     }
 }
 

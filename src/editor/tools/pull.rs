@@ -16,6 +16,7 @@ use crate::{
     editor::{
         actions::{Action, ActionRequest},
         building::use_controls,
+        counted::counted,
         mode::Mode,
         notice::{Notice, StatusLine},
         pointer::{PointerAct, ViewportPointer},
@@ -314,9 +315,8 @@ impl Drag {
             Way::Joints(joints, _) => joints.len(),
             Way::Itself(_) => return format!("Moving {}", self.name),
         };
-        match (&self.way, count) {
-            (Way::Controls(_), 1) => format!("Pulling {}: 1 control", self.name),
-            (Way::Controls(_), more) => format!("Pulling {}: {more} controls", self.name),
+        match &self.way {
+            Way::Controls(_) => format!("Pulling {}: {}", self.name, counted(count, "control", "controls")),
             _ => format!("Pulling {}: {}", self.name, joints(count)),
         }
     }

@@ -7,7 +7,7 @@ use bevy::{
 };
 
 use crate::{
-    editor::{ActiveRig, camera::ViewportSight},
+    editor::{ActiveRig, camera::ViewportSight, counted::counted},
     plugins::{
         animation::ClipPlayer,
         commands::BuildResult,
@@ -210,5 +210,5 @@ pub fn joint_name(rig: &Rig, joint: Uid) -> String {
 
 /// `1 joint`, `2 joints`.
 pub fn joints(count: usize) -> String {
-    if count == 1 { "1 joint".to_owned() } else { format!("{count} joints") }
+    counted(count, "joint", "joints")
 }

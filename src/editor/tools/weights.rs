@@ -8,7 +8,7 @@ use super::{
     scene::{EditedRig, Scene},
 };
 use crate::{
-    editor::{mode::Mode, notice::StatusLine},
+    editor::{counted::counted, mode::Mode, notice::StatusLine},
     plugins::display::{MeshDisplay, WeightColors},
     rig::Uid,
 };
@@ -83,7 +83,7 @@ fn describe(rig: &EditedRig) -> (String, Option<String>) {
     let name = rig.name(joint);
     let hint = match moved {
         0 => format!("{name} moves no point of {of}."),
-        _ => format!("{name} moves {moved} of {of} points."),
+        _ => format!("{name} moves {moved} of {}.", counted(of, "point", "points")),
     };
     (format!("{hint} Click another joint to see what it moves."), None)
 }

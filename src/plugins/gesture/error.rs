@@ -1,6 +1,8 @@
 //! Reasons why gestures have no effect.
 
-use crate::plugins::{document::ChangeError, fit::FitFailure, limits::LimitError, stroke::StrokeFailure};
+use crate::plugins::{
+    document::ChangeError, fit::FitFailure, limits::LimitError, placement::PlaceRefusal, stroke::StrokeFailure,
+};
 
 /// Reason why a gesture had no effect; a sentence for people without its full stop.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -11,6 +13,9 @@ pub(super) enum GestureError {
     /// A click met no mesh.
     #[error("the ray meets nothing there: no joint was placed")]
     NothingThere,
+    /// A click waited for the mesh, and was refused.
+    #[error(transparent)]
+    Place(#[from] PlaceRefusal),
     /// The gesture needs a selected joint.
     #[error("no joint is selected; select one first")]
     NoSelection,

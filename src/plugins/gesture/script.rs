@@ -196,11 +196,13 @@ impl Answers<'_, '_> {
             }
             script.pending = false;
         }
-        for PlaceAnswer { rig: entity, placement } in self.placed.read() {
+        for PlaceAnswer { rig: entity, placement, refusal, .. } in self.placed.read() {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             script.note_added(rig);
             match placement {
-                Placement::Nothing => script.fail(&GestureError::NothingThere),
+                Placement::Nothing => {
+                    script.fail(&refusal.map_or(GestureError::NothingThere, GestureError::from));
+                }
                 Placement::Single { position } => {
                     script.say(format!("placed a joint on the surface at {}", point(*position)));
                 }

@@ -35,7 +35,34 @@ pub struct CommandStatus {
     pub skipped: Option<SkipReason>,
 }
 
+/// Numbers of the commands of a list, by whether a build carries them out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CommandCounts {
+    /// Number of commands in effect.
+    pub built: usize,
+    /// Number of commands that a build carries out.
+    pub all: usize,
+    /// Number of commands that a build passes over, because something is off.
+    pub off: usize,
+}
+
 impl Builder {
+    /// Numbers of commands in effect, of all that a build carries out, and of those that it passes over. A reference to
+    /// something that is off is known from the first run on.
+    pub fn counts(&self) -> CommandCounts {
+        let cursor = self.cursor();
+        let mut counts = CommandCounts::default();
+        for (place, number) in self.list.iter().enumerate() {
+            if !self.commands[*number as usize].active || self.world.off.commands.contains_key(number) {
+                counts.off += 1;
+            } else {
+                counts.all += 1;
+                counts.built += usize::from(place < cursor);
+            }
+        }
+        counts
+    }
+
     /// State, time and problem of a command; `None` if it is not in the list.
     pub fn status(&self, tag: Uid) -> Option<CommandStatus> {
         let number = self.world.creator_of(tag)?;

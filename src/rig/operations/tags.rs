@@ -305,9 +305,11 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
         TagOperation::Paste { clipboard, what, to } => paste::paste(draft, clipboard, *what, to),
         TagOperation::Drop { part, joints, bindings } => part::drop_sized(draft, part, joints, bindings),
         TagOperation::AddPart { part, fitted, joints, mirror } => {
+            part::note_own_commands(draft, part, joints.iter());
             part::drop_instance(draft, part, fitted, joints, *mirror)
         }
         TagOperation::AddPair { part, sides } => {
+            part::note_own_commands(draft, part, sides.iter().flat_map(|side| &side.joints));
             sides.iter().try_for_each(|side| part::drop_instance(draft, part, &side.fitted, &side.joints, side.mirror))
         }
         TagOperation::SetFeature(key, on) => apply(draft, feature::set_feature(draft.rig(), key, *on)?),

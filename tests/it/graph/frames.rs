@@ -203,6 +203,62 @@ fn the_first_look_is_at_a_selection_that_is_folded() {
 }
 
 #[test]
+fn many_selected_joints_open_what_can_be_read_and_the_first_look_is_at_them() {
+    let mut biped = Biped::unseen();
+    biped.desk.app.world_mut().write_message(BuildRequest { rig: biped.desk.rig, step: BuildStep::All });
+    let rig = biped.desk.rig();
+    let labels = ["upper_arm_l", "thumb_01_l", "index_01_l", "foot_l", "thigh_l"];
+    let joints: Vec<Uid> = labels.iter().map(|label| rig.find_label(label).unwrap()).collect();
+    let request = PickRequest { rig: biped.desk.rig, what: Pick::Joints(joints), add: false };
+    biped.desk.app.world_mut().write_message(request);
+    (0..3).for_each(|_| biped.desk.app.update());
+    biped.desk.frames(3);
+    let selected = view(&biped.desk).selected.clone();
+    assert!((2..=FEW).contains(&selected.len()), "{}", selected.len());
+    let chart = biped.chart();
+    let opened: usize = chart.frames.iter().filter(|frame| frame.is_open).map(|frame| frame.commands.len()).sum();
+    assert!((1..=FEW).contains(&opened), "{opened}");
+    // Names can be read, those of selected commands among them.
+    let is_selected = |seen: &&ShownWidget| seen.on == Some(true) && seen.rect.width() > 100.0;
+    assert!(biped.desk.seen.iter().any(|seen| is_selected(&seen)), "{:?}", biped.desk.seen);
+    // One joint alone opens all of its frames.
+    let foot = biped.desk.rig().find_label("foot_l").unwrap();
+    biped.desk.select(&[foot]);
+    biped.desk.frames(2);
+    let of_foot = view(&biped.desk).selected.clone();
+    let is_open = |frame: &ChartFrame| frame.is_open == frame.commands.iter().any(|tag| of_foot.contains(tag));
+    assert!(biped.chart().frames.iter().all(is_open), "{:?}", biped.open_frames());
+}
+
+#[test]
+fn a_folded_frame_is_dragged_and_stays_where_it_is_put() {
+    let mut biped = Biped::new();
+    let (before, steps, chart) = (bytes(&biped.desk), biped.desk.steps(), biped.chart());
+    let arm = chart.frames.iter().find(|frame| frame.title == "arm_l · ik").unwrap().clone();
+    let seen = biped.seen(&arm).rect;
+    let scale = seen.width() / arm.rect.width();
+    // Above all others.
+    let by = egui::vec2(0.0, chart.space().top() - arm.rect.bottom() - 2.0 * GRID);
+    biped.desk.drag(seen.center(), seen.center() + scale * by);
+    biped.desk.frames(2);
+    assert_eq!(view(&biped.desk).moved.keys().copied().collect::<Vec<_>>(), [arm.uid]);
+    let now = biped.frame(arm.uid);
+    assert!(!now.is_open && (now.rect.min - arm.rect.min - by).length() < 0.1, "{now:?} {by:?}");
+    assert!(view(&biped.desk).selected.is_empty(), "nothing is selected by the way");
+    // A click opens it as before; folded again, it is where it was put.
+    act(&mut biped.desk, GraphAction::ShowAll);
+    let at = biped.seen(&now).rect.center();
+    biped.click(at);
+    assert_eq!(biped.open_frames(), BTreeSet::from([arm.uid]));
+    biped.desk.app.world_mut().write_message(GraphRequest::Fold(arm.uid, false));
+    biped.desk.frames(3);
+    assert_eq!(biped.frame(arm.uid).rect, now.rect);
+    act(&mut biped.desk, GraphAction::LayOut);
+    assert_eq!(biped.chart(), chart);
+    assert_eq!((bytes(&biped.desk), biped.desk.steps()), (before, steps), "no document notices");
+}
+
+#[test]
 fn selected_commands_of_folded_frames_are_not_moved() {
     let mut biped = Biped::new();
     act(&mut biped.desk, GraphAction::SelectAll);

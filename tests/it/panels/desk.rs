@@ -52,6 +52,8 @@ pub struct ShownWidget {
     pub rect: Rect,
     pub on: Option<bool>,
     pub enabled: bool,
+    /// True if it can have the keyboard and be clicked.
+    pub clickable: bool,
 }
 
 impl Desk {
@@ -358,5 +360,6 @@ fn shown_widget(node: &accesskit::Node) -> Option<ShownWidget> {
         rect,
         on: node.toggled().map(|toggled| toggled == accesskit::Toggled::True),
         enabled: !node.is_disabled(),
+        clickable: node.supports_action(accesskit::Action::Click) && node.supports_action(accesskit::Action::Focus),
     })
 }

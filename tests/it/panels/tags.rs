@@ -2,27 +2,98 @@
 
 use std::{
     fs,
-    sync::atomic::{AtomicUsize, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
 };
 
 use bevy::prelude::*;
+use bevy_egui::egui;
 use rigsmith::{
-    editor::panels::{properties::PropertiesPanel, tags::TagsPanel},
+    editor::{
+        panel::{EditorPanel, Requests},
+        panels::{hierarchy::HierarchyPanel, process::ProcessPanel, properties::PropertiesPanel, tags::TagsPanel},
+    },
     files::{RealDisk, load_template, store_rig_over},
     plugins::{
-        commands::{BuildRequest, BuildStep, RegisterRigModule},
+        commands::{BuildRequest, BuildStep, Processor, RegisterRigModule},
         document::{Change, EditRequest},
     },
     processor::{BuildScope, ModuleError, RigModule},
     rig::{
         RigEdit, TagData, TagKind, Uid,
-        operations::{Operation, TagOperation},
+        operations::{Operation, PasteTo, PasteWhat, TagClipboard, TagOperation},
         template::read_template,
     },
 };
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::desk::Desk;
+use super::desk::{Desk, Sheet};
+
+/// Two panels, side by side.
+struct Both(Box<dyn EditorPanel>, Box<dyn EditorPanel>);
+
+impl Both {
+    fn sheet(left: impl EditorPanel, right: impl EditorPanel) -> Sheet {
+        Sheet::Panel(Box::new(Self(Box::new(left), Box::new(right))))
+    }
+}
+
+impl EditorPanel for Both {
+    fn title(&self) -> &'static str {
+        "Both"
+    }
+
+    fn show(&mut self, ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
+        let Self(first, second) = self;
+        ui.columns_const(|[left, right]| {
+            first.show(left, world, requests);
+            second.show(right, world, requests);
+        });
+    }
+}
+
+#[test]
+fn a_failed_command_leads_to_its_card_and_commands_to_what_they_made() {
+    let sheet = Both::sheet(ProcessPanel::default(), TagsPanel::default());
+    let mut desk = Desk::with(sheet, egui::vec2(900.0, 900.0));
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    let add = |desk: &mut Desk, joint: Uid, module: &str, params: &str| {
+        let kind = TagKind::Command { module: module.into(), params: params.into(), feature: None };
+        desk.edit(Operation::Tags(TagOperation::Add { joints: vec![joint], kind, index: None }));
+    };
+    add(&mut desk, a, "control", "()");
+    add(&mut desk, b, "null", "(oops: 1)");
+    desk.select(&[]);
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::All });
+    desk.frames(3);
+    let wrong = desk.rig().joint(b).unwrap().data.tags[0].uid;
+    let status = desk.app.world().get::<Processor>(desk.rig).unwrap().builder().status(wrong).unwrap();
+    let reason = status.error.expect("it fails").to_string();
+    assert!(!desk.says(&reason), "{:?}", desk.seen);
+    let row = |desk: &Desk, name: &str| {
+        let found = desk.seen.iter().find(|seen| seen.label.starts_with(name));
+        found.unwrap_or_else(|| panic!("{name} is not among {:?}", desk.seen)).label.clone()
+    };
+    let failed = row(&desk, "b null failed");
+    desk.click(&failed);
+    // Away from the row, over which the reason is, too.
+    desk.move_to(egui::pos2(890.0, 890.0));
+    desk.frames(4);
+    assert_eq!(desk.selected(), [b]);
+    assert!(desk.says(&reason), "the card is open: {:?}", desk.seen);
+    // What runs is only selected, and leads to what it made.
+    let built = row(&desk, "a control built");
+    desk.click(&built);
+    desk.frames(2);
+    assert_eq!(desk.selected(), [a]);
+    desk.secondary_click(&built);
+    desk.click("Select what it made");
+    desk.frames(2);
+    let control = desk.selected().to_vec();
+    assert!(!control.is_empty() && !control.contains(&a), "{control:?}");
+}
 
 #[test]
 fn tags_are_listed_with_what_became_of_them() {
@@ -53,6 +124,59 @@ fn tags_are_listed_with_what_became_of_them() {
     desk.click("control");
     desk.frames(3);
     assert!(is_on(&desk) && !desk.says("passed over"));
+}
+
+#[test]
+fn a_module_is_dragged_onto_a_joint() {
+    let sheet = Both::sheet(HierarchyPanel::default(), TagsPanel::default());
+    let mut desk = Desk::with(sheet, egui::vec2(900.0, 900.0));
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    desk.select(&[a]);
+    let (before, steps) = (desk.rig().clone(), desk.steps().1);
+    desk.click("+ Add");
+    desk.frames(3);
+    desk.type_text("null");
+    desk.frames(3);
+    let (from, to) = (desk.find("null").rect.center(), desk.find("b").rect.center());
+    desk.drag(from, to);
+    desk.frames(3);
+    let modules = |desk: &Desk, joint: Uid| {
+        let tags = desk.rig().joint(joint).unwrap().data.tags.iter();
+        tags.map(|tag| matches!(&tag.kind, TagKind::Command { module, .. } if module == "null")).collect::<Vec<_>>()
+    };
+    assert_eq!((modules(&desk, a), modules(&desk, b)), (vec![], vec![true]), "{:?}", desk.told());
+    assert_eq!(desk.steps().1, steps + 1);
+    let rig = desk.rig;
+    desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+    desk.frames(2);
+    assert_eq!(*desk.rig(), before);
+}
+
+#[test]
+fn what_an_operation_notes_is_told_once_it_is_done() {
+    let mut desk = Desk::new(TagsPanel::default());
+    let [a, b, c] = desk.chain(&["a", "b", "c"])[..] else { panic!() };
+    let kind = TagKind::Command { module: "null".into(), params: "()".into(), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: vec![a, b], kind, index: None }));
+    let tags: Vec<Uid> = desk.rig().walk().flat_map(|joint| &joint.data.tags).map(|tag| tag.uid).collect();
+    let clipboard = Arc::new(TagClipboard::copy_tags(desk.rig(), &tags).unwrap());
+    let paste = |to: PasteTo| {
+        let clipboard = Arc::clone(&clipboard);
+        Operation::Tags(TagOperation::Paste { clipboard, what: PasteWhat::Both, to })
+    };
+    let is_told = |desk: &Desk| desk.told().iter().filter(|told| told.contains("left over")).count();
+    // A refused one notes nothing.
+    let steps = desk.steps();
+    desk.edit(paste(PasteTo::Joints(vec![Uid(404)])));
+    assert_eq!((desk.steps(), is_told(&desk)), (steps, 0), "{:?}", desk.told());
+    desk.edit(paste(PasteTo::Joints(vec![c])));
+    let told = "1 copied joint is left over: the selection has only 1.";
+    assert!(desk.told().iter().any(|known| known == told), "{:?}", desk.told());
+    // Undo tells nothing again.
+    let rig = desk.rig;
+    desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+    desk.frames(2);
+    assert_eq!((desk.steps().1, is_told(&desk)), (steps.1, 1), "{:?}", desk.told());
 }
 
 #[test]

@@ -156,7 +156,7 @@ fn keys_of_nodes_that_are_gone_are_set_aside_under_their_names() {
     assert!(desk.look("arm_r").is_none());
     desk.click("Set aside (1)");
     desk.frames(2);
-    assert!(desk.says("arm_r") && desk.says("4 keys of 1 tracks"), "{:?}", desk.seen);
+    assert!(desk.says("arm_r") && desk.says("4 keys of 1 track"), "{:?}", desk.seen);
     // They come back with the node, or go to another one of that name.
     undo(&mut desk);
     assert!(desk.look("Set aside (1)").is_none() && desk.look("arm_r").is_some());

@@ -79,11 +79,21 @@ impl GraphPanel {
             .collect()
     }
 
-    /// Rectangles of folded frames.
-    pub(super) fn boxes(&self) -> Vec<Option<Rect>> {
-        let folded =
-            |place: &Option<[f32; 2]>| place.map(|[x, y]| Rect::from_min_size(Pos2::new(x, y), vec2(BOX[0], BOX[1])));
-        self.folded.iter().map(folded).collect()
+    /// Rectangles of folded frames: where the layout or a person put them, and where a drag has them.
+    pub(super) fn boxes(&self, view: &GraphView, by: Vec2) -> Vec<Option<Rect>> {
+        let dragged = match &self.gesture {
+            Some(Gesture::Folded(frame, _)) => Some(*frame),
+            _ => None,
+        };
+        let frames = self.graph.frames.iter().zip(&self.folded);
+        frames
+            .map(|(frame, place)| {
+                let laid = (*place)?;
+                let [x, y] = view.moved.get(&frame.uid).copied().unwrap_or(laid);
+                let folded = Rect::from_min_size(Pos2::new(x, y), vec2(BOX[0], BOX[1]));
+                Some(if dragged == Some(frame.uid) { folded.translate(by) } else { folded })
+            })
+            .collect()
     }
 }
 

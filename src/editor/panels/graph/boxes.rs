@@ -12,7 +12,7 @@ use super::{
     wires::{Spots, box_pins},
 };
 use crate::{
-    editor::{panels::process, style},
+    editor::{counted::counted, panels::process, style},
     processor::{CommandState, CommandStatus},
 };
 
@@ -56,9 +56,8 @@ impl Tally {
 
     /// The counts in words.
     pub fn words(&self) -> String {
-        let commands = if self.commands == 1 { "command" } else { "commands" };
         let failed = if self.failed == 0 { String::new() } else { format!(", {} failed", self.failed) };
-        format!("{} {commands}, {} built{failed}", self.commands, self.built)
+        format!("{}, {} built{failed}", counted(self.commands, "command", "commands"), self.built)
     }
 }
 

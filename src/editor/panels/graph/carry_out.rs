@@ -1,7 +1,10 @@
 //! Actions and requests of the graph, carried out: edits and picks are sent on, everything else changes what the window
 //! shows.
 
-use std::collections::BTreeSet;
+use std::{
+    cmp::Reverse,
+    collections::{BTreeMap, BTreeSet},
+};
 
 use bevy::prelude::*;
 
@@ -64,13 +67,36 @@ fn select(world: &mut World, tags: BTreeSet<Uid>) {
     world.write_message(PickRequest { rig, what, add: false });
 }
 
-/// Frames of selected commands, unless there are too many.
+/// Frames of selected commands that are opened: none if too many are selected; of several joints those with most of the
+/// selected commands, as long as few commands come into view.
 fn frames_of(rig: &Rig, tags: &BTreeSet<Uid>) -> BTreeSet<Uid> {
-    if tags.len() > FEW {
+    if tags.is_empty() || tags.len() > FEW {
         return BTreeSet::new();
     }
-    let found = tags.iter().filter_map(|tag| rig.find_tag(*tag));
-    found.filter_map(|(joint, tag)| frame_of(rig, &joint.data, tag)).collect()
+    // Numbers of selected commands and of all commands of each frame.
+    let mut found: BTreeMap<Uid, (usize, usize)> = BTreeMap::new();
+    for joint in rig.walk() {
+        for tag in &joint.data.tags {
+            let Some(frame) = frame_of(rig, &joint.data, tag) else { continue };
+            let (selected, all) = found.entry(frame).or_default();
+            *selected += usize::from(tags.contains(&tag.uid));
+            *all += 1;
+        }
+    }
+    found.retain(|_, (selected, _)| *selected > 0);
+    if joints_of(rig, tags).len() < 2 || found.len() < 2 {
+        return found.into_keys().collect();
+    }
+    let mut frames: Vec<(Uid, usize, usize)> =
+        found.into_iter().map(|(frame, (selected, all))| (frame, selected, all)).collect();
+    frames.sort_by_key(|(frame, selected, all)| (Reverse(*selected), *all, *frame));
+    let mut room = FEW;
+    frames.retain(|(_, _, all)| {
+        let fits = *all <= room;
+        room -= if fits { *all } else { 0 };
+        fits
+    });
+    frames.into_iter().map(|(frame, ..)| frame).collect()
 }
 
 /// Opens the frames of selected commands, those that were folded by hand, too.

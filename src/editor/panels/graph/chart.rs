@@ -46,7 +46,7 @@ impl GraphChart {
 impl GraphPanel {
     /// Chart of the graph as it was drawn last.
     pub fn chart(&self, view: &GraphView) -> GraphChart {
-        let (rects, boxes) = (self.rects(view, Vec2::ZERO), self.boxes());
+        let (rects, boxes) = (self.rects(view, Vec2::ZERO), self.boxes(view, Vec2::ZERO));
         let graph = &self.graph;
         let spots = Spots { graph, rects: &rects, boxes: &boxes };
         let shown = graph.nodes.iter().zip(&rects).filter(|(_, rect)| rect.is_finite());

@@ -1,4 +1,4 @@
-//! Gestures on the graph: nodes that are dragged, boxes that select, wires that are pulled from a pin.
+//! Gestures on the graph: nodes and folded frames that are dragged, boxes that select, wires that are pulled from a pin.
 
 use std::collections::BTreeSet;
 
@@ -22,6 +22,8 @@ const REACH: f32 = 9.0;
 pub(super) enum Gesture {
     /// Nodes that are moved, from a point of the graph.
     Nodes(BTreeSet<Uid>, Pos2),
+    /// Folded frame that is moved, from a point of the graph.
+    Folded(Uid, Pos2),
     /// Box, from a point of the graph.
     Box(Pos2),
     /// Wire from the output of a command.
@@ -78,6 +80,12 @@ impl Hand<'_> {
         found.next().map(|(number, opens)| (self.graph.frames[number].uid, opens))
     }
 
+    /// The folded frame at a point.
+    fn folded_at(&self, at: Pos2) -> Option<Uid> {
+        let is_there = |folded: &Option<Rect>| folded.is_some_and(|folded| folded.contains(at));
+        self.boxes.iter().position(is_there).map(|number| self.graph.frames[number].uid)
+    }
+
     /// The topmost node at a point.
     pub fn node_at(&self, at: Pos2) -> Option<usize> {
         self.rects.iter().rposition(|rect| rect.contains(at))
@@ -117,7 +125,7 @@ impl Hand<'_> {
     pub fn ink(&self, gesture: &Gesture) -> Option<Ink> {
         let at = self.at?;
         match gesture {
-            Gesture::Nodes(..) => None,
+            Gesture::Nodes(..) | Gesture::Folded(..) => None,
             Gesture::Box(from) => Some(Ink::Box(Rect::from_two_pos(*from, at))),
             Gesture::From(tag) => Some(Ink::Wire([output_pin(self.rects[self.number(*tag)?]), at])),
             Gesture::To(tag, input) => {
@@ -153,7 +161,11 @@ impl Hand<'_> {
                 let tags = if is_selected { self.selected.clone() } else { BTreeSet::from([tag(number)]) };
                 Gesture::Nodes(tags, from)
             }
-            None => Gesture::Box(from),
+            // With a key held the frame is selected, as everything else is.
+            None => match self.folded_at(from).filter(|_| self.held.is_none()) {
+                Some(frame) => Gesture::Folded(frame, from),
+                None => Gesture::Box(from),
+            },
         })
     }
 
@@ -220,6 +232,14 @@ impl Hand<'_> {
                     rect.is_finite().then_some((*tag, [rect.min.x, rect.min.y]))
                 };
                 Some(Outcome::Move(tags.iter().filter_map(place).collect()))
+            }
+            Gesture::Folded(frame, from) => {
+                if self.shift(from) == Vec2::ZERO {
+                    return None;
+                }
+                let number = self.graph.frames.iter().position(|known| known.uid == frame)?;
+                let folded = (*self.boxes.get(number)?)?;
+                Some(Outcome::Move(vec![(frame, [folded.min.x, folded.min.y])]))
             }
             Gesture::Box(from) => {
                 let space = Rect::from_two_pos(from, self.at?);

@@ -14,7 +14,7 @@ pub struct GraphView {
     pub rig: Option<Entity>,
     /// Selected command tags.
     pub selected: BTreeSet<Uid>,
-    /// Places of nodes that were moved by hand, on the grid.
+    /// Places of nodes and folded frames that were moved by hand, on the grid.
     pub moved: BTreeMap<Uid, [f32; 2]>,
     /// Frames that a person opened or folded: `true` for open ones.
     pub folds: BTreeMap<Uid, bool>,
@@ -54,7 +54,7 @@ pub enum GraphLook {
 pub enum GraphRequest {
     /// Selects command tags in place of the selected ones, and the joints that carry them.
     Select(BTreeSet<Uid>),
-    /// Puts nodes to places.
+    /// Puts nodes and folded frames to places.
     Move(Vec<(Uid, [f32; 2])>),
     /// Opens a frame, or folds it.
     Fold(Uid, bool),

@@ -55,6 +55,9 @@ pub(super) fn show(panel: &mut HierarchyPanel, response: &Response, shown: &Disp
             all.push(active);
             select(all, shown, requests);
         }
+        if entry(ui, "Show all built nodes", "") {
+            panel.shows_built = true;
+        }
     });
 }
 

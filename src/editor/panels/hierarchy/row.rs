@@ -8,15 +8,21 @@ use bevy_egui::egui::{
 use super::{DraggedJoints, HierarchyPanel, Tree, menu, obstacle, reparent, rows::Row, select, tops};
 use crate::{
     editor::{
+        counted::counted,
         library::{DraggedTemplate, LibraryAct, LibraryRequest, dropping},
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
             fields::{self, Renaming},
             groups, list,
+            tags::library::DraggedModule,
         },
     },
-    rig::{NodeKind, Uid},
+    plugins::document::EditRequest,
+    rig::{
+        NodeKind, TagKind, Uid,
+        operations::{Operation, TagOperation},
+    },
 };
 
 /// Draws a row and handles its input.
@@ -184,6 +190,10 @@ fn drag(
     shown: &DisplayedRig,
     requests: &mut Requests,
 ) {
+    if DragAndDrop::has_payload_of_type::<DraggedModule>(ui.ctx()) {
+        drop_module(ui, response, rect, joint, shown, requests);
+        return;
+    }
     if DragAndDrop::has_payload_of_type::<DraggedTemplate>(ui.ctx()) {
         drop_template(ui, response, rect, (joint, panel.is_for_both), shown, requests);
         return;
@@ -229,12 +239,26 @@ fn drop_template(
     }
 }
 
+/// Marks the row under a module of the library, and attaches a command to the joint when it is let go.
+fn drop_module(ui: &Ui, response: &Response, rect: Rect, joint: Uid, shown: &DisplayedRig, requests: &mut Requests) {
+    if let Some(dragged) = response.dnd_hover_payload::<DraggedModule>() {
+        let color = ui.visuals().selection.stroke.color;
+        ui.painter().rect_stroke(rect.shrink(0.5), 3.0, Stroke::new(1.5, color), StrokeKind::Inside);
+        beside_pointer(ui, format!("{} on {}", dragged.0, shown.name(joint)));
+    }
+    if let Some(dragged) = response.dnd_release_payload::<DraggedModule>() {
+        let kind = TagKind::Command { module: dragged.0.to_owned(), feature: None, params: "()".to_owned() };
+        let operation = Operation::Tags(TagOperation::Add { joints: vec![joint], kind, index: None });
+        requests.send(EditRequest::operation(shown.entity, operation));
+    }
+}
+
 /// Paints the dragged joints, or the reason why they cannot be dropped here, beside the pointer.
 fn carried(ui: &Ui, joints: &[Uid], shown: &DisplayedRig, refused: Option<&str>) {
     let text = match (refused, joints) {
         (Some(refused), _) => refused.to_owned(),
         (None, [one]) => shown.name(*one).into_owned(),
-        (None, more) => format!("{} joints", more.len()),
+        (None, more) => counted(more.len(), "joint", "joints"),
     };
     beside_pointer(ui, text);
 }

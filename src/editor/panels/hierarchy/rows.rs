@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use crate::rig::{Rig, RigJoint, Uid};
+use crate::rig::{Rig, RigJoint, TagKind, Uid};
 
 /// A joint in the tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub struct Row {
 }
 
 /// The listed joints, top to bottom: all but those below a folded one, or, with a filter, those that match it and their
-/// ancestors. All words of the filter must be in the label or the group's name, in any case.
+/// ancestors. All words of the filter must be in the label, the group's name or a module of the joint's tags, in any case.
 pub fn rows(rig: &Rig, folded: &HashSet<Uid>, filter: &str) -> Vec<Row> {
     let words: Vec<String> = filter.split_whitespace().map(str::to_lowercase).collect();
     if words.is_empty() { unfolded(rig, folded) } else { matching(rig, &words) }
@@ -45,7 +45,18 @@ fn matching(rig: &Rig, words: &[String]) -> Vec<Row> {
     let hit = |joint: &RigJoint| {
         let name = super::super::joint_name(&joint.data).to_lowercase();
         let group = joint.data.group.and_then(|uid| groups.iter().find(|(group, _)| *group == uid));
-        words.iter().all(|word| name.contains(word) || group.is_some_and(|(_, name)| name.contains(word)))
+        let modules = || {
+            joint.data.tags.iter().filter_map(|tag| match &tag.kind {
+                TagKind::Command { module, .. } => Some(module.to_lowercase()),
+                TagKind::Feature { .. } => None,
+            })
+        };
+        let is_in = |word: &String| {
+            name.contains(word)
+                || group.is_some_and(|(_, name)| name.contains(word))
+                || modules().any(|module| module.contains(word))
+        };
+        words.iter().all(is_in)
     };
     // Parents come first, so their numbers are known; in reverse order, children mark their parents as listed.
     let mut numbers = std::collections::HashMap::with_capacity(rig.len());

@@ -9,6 +9,7 @@ use bevy_egui::egui::{
 
 use crate::{
     editor::{
+        counted::counted,
         library::{LibraryAct, LibraryAction, LibraryListing, LibraryRequest, PartSides, obstacle, partners},
         panel::Requests,
         panels::displayed_rig::DisplayedRig,
@@ -202,10 +203,7 @@ pub(in crate::editor::panels) fn both_sides(ui: &mut Ui, world: &World, shown: &
 /// Draws what a header says.
 pub(in crate::editor::panels) fn about(ui: &mut Ui, listed: &ListedTemplate, header: &TemplateHeader) {
     ui.strong(listed.name());
-    let joints = match header.joint_count {
-        1 => "1 joint".to_owned(),
-        count => format!("{count} joints"),
-    };
+    let joints = counted(header.joint_count, "joint", "joints");
     let facts = [header.kind.as_str(), header.version.as_str(), header.author.as_str(), joints.as_str()];
     let facts: Vec<&str> = facts.into_iter().filter(|fact| !fact.is_empty()).collect();
     ui.add(Label::new(RichText::new(facts.join(" · ")).small()).wrap());

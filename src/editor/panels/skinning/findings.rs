@@ -9,6 +9,7 @@ use super::{SkinningParts, SkinningResults};
 use crate::{
     algo::weights::IdleReason,
     editor::{
+        counted::counted,
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
@@ -52,7 +53,7 @@ fn rigid_parts(
     requests: &mut Requests,
 ) {
     let rigid = report.rigid_parts.iter().map(|rigid| {
-        let note = format!("{} points with {}", rigid.points, shown.name(rigid.joint));
+        let note = format!("{} with {}", counted(rigid.points, "point", "points"), shown.name(rigid.joint));
         (rigid.part, rigid.name.as_str(), note)
     });
     let bending = report.bending_parts.iter().map(|(part, name)| (*part, name.as_str(), "bends".to_owned()));

@@ -3,7 +3,11 @@
 use bevy_egui::egui::{Label, RichText, Ui};
 
 use super::values::Subject;
-use crate::{editor::panels::list, processor::FindError, rig::Uid};
+use crate::{
+    editor::{counted::counted, panels::list},
+    processor::FindError,
+    rig::Uid,
+};
 
 /// The most names that are listed.
 const NAMED: usize = 3;
@@ -23,7 +27,7 @@ pub(super) fn about(ui: &mut Ui, subject: &Subject, label: &str, text: Option<&s
                 let names: Vec<String> = nodes.iter().map(|node| name(subject, *node)).collect();
                 let more = if names.len() > NAMED { ", …" } else { "" };
                 let count = names.len();
-                let nodes = if count == 1 { "1 node".to_owned() } else { format!("{count} nodes") };
+                let nodes = counted(count, "node", "nodes");
                 let listed = names.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
                 let said = if count == 0 { nodes } else { format!("{nodes}: {listed}{more}") };
                 (said, ui.visuals().weak_text_color(), names.join(", "))

@@ -16,6 +16,7 @@ use super::carry_out::open;
 use crate::{
     editor::{
         ActiveRig,
+        counted::counted,
         dock::ShowPanel,
         files::dialog::{Dialog, Question},
         notice::Notice,
@@ -364,9 +365,10 @@ impl ImportedMotion {
         let unmapped = map.unmapped_source(motion).len();
         self.notes.extend(done.notes);
         self.notes.push(format!(
-            "\"{}\": {} bones were found; {unmapped} joints of the motion move nothing",
+            "\"{}\": {} found; {} of the motion without effect",
             done.clip.name,
-            map.bones().count() + map.pairs.len(),
+            counted(map.bones().count() + map.pairs.len(), "bone", "bones"),
+            counted(unmapped, "joint", "joints"),
         ));
         if !done.unmoved.is_empty() {
             self.notes.push(format!("no control turns {}", done.unmoved.join(", ")));
@@ -397,7 +399,7 @@ pub(super) fn land(mut import: ResMut<ClipImport>, mut commands: Commands) {
         Ok(ReadMotion::Clips(imported)) => put(world, rig, name, landing, imported),
         Ok(ReadMotion::Draft(draft)) => {
             let text = format!("{name}: check in the Timeline which joints its motion goes to, then import it.");
-            world.write_message(Notice::info(text));
+            world.write_message(Notice::info(text).at("Timeline"));
             world.write_message(ShowPanel("Timeline"));
             world.resource_mut::<ClipImport>().draft = Some(draft);
         }
@@ -445,7 +447,7 @@ fn add(world: &mut World, entity: Entity, name: &str, imported: ImportedMotion) 
     open(world, rig.clips().get(before));
     let step = if count == 1 { "Import clip" } else { "Import clips" };
     world.write_message(EditRequest::operation(entity, Operation::Named { name: step, edits }));
-    let clips = if count == 1 { "1 clip".to_owned() } else { format!("{count} clips") };
+    let clips = counted(count, "clip", "clips");
     world.write_message(Notice::done(format!("Imported {clips} from {name}")));
     for note in imported.notes {
         world.write_message(Notice::info(note).quiet());

@@ -7,6 +7,7 @@ use bevy_egui::egui::{
 use super::import::{MapDraft, MapRequest};
 use crate::{
     editor::{
+        counted::counted,
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
@@ -42,8 +43,15 @@ pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy:
             Some(FoundBy::Map) => "of a map",
             None => "nothing could be guessed",
         };
-        let motions = if draft.motions() == 1 { String::new() } else { format!("{} motions, ", draft.motions()) };
-        ui.weak(format!("{}: {motions}{mapped} of {all} joints move a joint of the rig ({found}).", draft.name));
+        let motions = match draft.motions() {
+            1 => String::new(),
+            count => format!("{}, ", counted(count, "motion", "motions")),
+        };
+        ui.weak(format!(
+            "{}: {motions}{mapped} of {} move a joint of the rig ({found}).",
+            draft.name,
+            counted(all, "joint", "joints")
+        ));
     });
     if is_cancelled && !is_busy {
         requests.send(MapRequest::Cancel);

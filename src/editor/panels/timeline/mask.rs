@@ -3,7 +3,10 @@
 use bevy_egui::egui::{Button, Ui, WidgetInfo, WidgetType};
 
 use super::row::RowContext;
-use crate::rig::{Uid, animation::ClipLayer};
+use crate::{
+    editor::counted::counted,
+    rig::{Uid, animation::ClipLayer},
+};
 
 /// Most names that a tooltip lists.
 const MOST: usize = 24;
@@ -15,8 +18,7 @@ pub(super) fn button(ui: &mut Ui, said: &str, layer: &ClipLayer, context: &RowCo
     let is_masked = !layer.mask.is_empty();
     let text = match layer.mask.len() {
         0 => "all".to_owned(),
-        1 => "1 node".to_owned(),
-        count => format!("{count} nodes"),
+        count => counted(count, "node", "nodes"),
     };
     let enabled = is_masked || !selected.is_empty();
     let response = ui.add_enabled(enabled, Button::selectable(is_masked, text.as_str()));

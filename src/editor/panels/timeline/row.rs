@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     editor::{
+        counted::counted,
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
@@ -286,8 +287,8 @@ fn layer(
             requests.send(EditRequest::operation(open.entity, set(&|about| about.mask.clone_from(&mask))));
         }
         let keys: usize = layer.tracks.values().map(|track| track.keys.len()).sum();
-        let text = RichText::new(format!("{} tracks, {keys} keys", layer.tracks.len()))
-            .color(KeyColors::of(ui.visuals()).quiet);
+        let (tracks, keys) = (counted(layer.tracks.len(), "track", "tracks"), counted(keys, "key", "keys"));
+        let text = RichText::new(format!("{tracks}, {keys}")).color(KeyColors::of(ui.visuals()).quiet);
         ui.add(Label::new(text).truncate());
     });
 }
@@ -326,7 +327,7 @@ fn orphan(ui: &mut Ui, rect: Rect, split: f32, orphan: &OrphanedKeys, context: &
                 ask(KeyOperation::Adopt { from: orphan.node, to });
             }
         }
-        let text = format!("{} keys of {} tracks", orphan.keys, orphan.tracks);
+        let text = format!("{} of {}", counted(orphan.keys, "key", "keys"), counted(orphan.tracks, "track", "tracks"));
         ui.add(Label::new(RichText::new(text).color(KeyColors::of(ui.visuals()).quiet)).truncate());
     });
 }

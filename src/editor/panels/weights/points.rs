@@ -9,6 +9,7 @@ use super::in_area;
 use crate::{
     editor::{
         actions::{Action, ActionRequest},
+        counted::counted,
         notice::Notice,
         panel::Requests,
         panels::{
@@ -119,7 +120,7 @@ impl PointTable {
         self.refresh(world, shown, mesh, skin, listed);
         let count = self.points.len();
         ui.horizontal(|ui| {
-            ui.strong(if count == 1 { "1 point".to_owned() } else { format!("{count} points") });
+            ui.strong(counted(count, "point", "points"));
             if ui.button("Select no points").clicked() {
                 requests.send(ActionRequest(Action::Brush(BrushAction::NoPoints)));
             }

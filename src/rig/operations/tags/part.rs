@@ -151,8 +151,9 @@ pub(super) fn drop_instance(
     }
     let others = pairs.iter().filter(|(joint, other)| !joints.contains(joint) && !joints.contains(other)).count();
     if others > 0 {
+        let are = if others == 1 { "other pair of joints are" } else { "other pairs of joints are" };
         draft.note(format!(
-            "{others} other pairs of joints are partners now, too: in a file with parts joints are whose labels differ by \
+            "{others} {are} partners now, too: in a file with parts joints are whose labels differ by \
              their side alone"
         ));
     }
@@ -173,14 +174,30 @@ fn free_label(rig: &Rig, label: &str) -> String {
     names.find(|name| rig.find_label(name).is_none()).unwrap_or_default()
 }
 
+/// Notes that a part goes onto joints with commands of their own.
+pub(super) fn note_own_commands<'a>(draft: &mut Draft, file: &str, joints: impl Iterator<Item = &'a Uid>) {
+    let rig = draft.rig();
+    let tags = joints.filter_map(|joint| rig.joint(*joint)).flat_map(|joint| &joint.data.tags);
+    let count = tags.filter(|tag| matches!(tag.kind, TagKind::Command { .. })).count();
+    let own = match count {
+        0 => return,
+        1 => "1 command of their own, which stays".to_owned(),
+        more => format!("{more} commands of their own, which stay"),
+    };
+    let name = file.rsplit(['/', '\\']).next().unwrap_or(file).trim_end_matches(".rig.ron");
+    draft.note(format!("{name} was added to joints that have {own}; undo takes it back"));
+}
+
 /// Notes which joints were too few or too many for a part that was dropped onto them.
 fn note_left_over(draft: &mut Draft, part: &Rig, joints: &[Uid]) {
     let left = part.len().saturating_sub(joints.len());
     if left > 0 {
-        draft.note(format!("{left} joints of the part are left over: only {} are selected", joints.len()));
+        let are = if left == 1 { "joint of the part is" } else { "joints of the part are" };
+        draft.note(format!("{left} {are} left over: the selection has only {}", joints.len()));
     } else if joints.len() > part.len() {
         let left = joints.len() - part.len();
-        draft.note(format!("{left} selected joints are left over: the part has only {}", part.len()));
+        let are = if left == 1 { "selected joint is" } else { "selected joints are" };
+        draft.note(format!("{left} {are} left over: the part has only {}", part.len()));
     }
 }
 

@@ -106,9 +106,11 @@ fn pairs_in_order<'a>(
     }
     let (copied, count) = (clipboard.joints.len(), targets.len());
     if copied > count {
-        draft.note(format!("{} copied joints are left over: only {count} are selected", copied - count));
+        let are = if copied - count == 1 { "copied joint is" } else { "copied joints are" };
+        draft.note(format!("{} {are} left over: the selection has only {count}", copied - count));
     } else if count > copied {
-        draft.note(format!("{} selected joints are left over: only {copied} were copied", count - copied));
+        let are = if count - copied == 1 { "selected joint is" } else { "selected joints are" };
+        draft.note(format!("{} {are} left over: the copy has only {copied}", count - copied));
     }
     Ok(clipboard.joints.iter().zip(targets).collect())
 }
@@ -125,7 +127,8 @@ fn mirrored_pairs<'a>(draft: &mut Draft, clipboard: &'a TagClipboard) -> Result<
     }
     let without = clipboard.joints.len() - pairs.len();
     if without > 0 {
-        draft.note(format!("{without} copied joints have no joint on the other side; their tags were not pasted"));
+        let have = if without == 1 { "copied joint has" } else { "copied joints have" };
+        draft.note(format!("{without} {have} no joint on the other side: tags of it were not pasted"));
     }
     Ok(pairs)
 }
@@ -200,7 +203,8 @@ fn paste_values(draft: &mut Draft, pairs: &[Pair], mut remap: Remap, mirrored: b
         left += joint.tags.iter().filter(|tag| !remap.uids.contains_key(&tag.uid)).count();
     }
     if left > 0 {
-        draft.note(format!("{left} copied tags found no tag of their module or kind to give their values to"));
+        let tags = if left == 1 { "copied tag" } else { "copied tags" };
+        draft.note(format!("{left} {tags} found no tag of the same module or kind to give values to"));
     }
     for tag in pairs.iter().flat_map(|(joint, _)| &joint.tags) {
         let Some(uid) = remap.get(tag.uid) else { continue };
