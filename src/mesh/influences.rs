@@ -17,3 +17,22 @@ pub fn keep_strongest(influences: &mut Vec<(u32, f32)>, most: usize, least: f32)
         *weight = (f64::from(*weight) / total) as f32;
     }
 }
+
+/// Keeps the strongest influences of a point as [`keep_strongest`] does, and takes the weight of the first one that goes from
+/// each that stays.
+///
+/// Weights that change evenly along a surface go on doing so: where two influences change places in the order, both are
+/// zero. Mirror images in the plane of symmetry, which are equally strong, stay or go together.
+pub fn keep_strongest_evenly(influences: &mut Vec<(u32, f32)>, most: usize, least: f32) {
+    keep_strongest(influences, usize::MAX, 0.0);
+    if let Some((_, next)) = influences.get(most.max(1)).copied() {
+        influences.truncate(most.max(1));
+        let strongest = influences[0];
+        influences.iter_mut().for_each(|(_, weight)| *weight -= next);
+        influences.retain(|(_, weight)| *weight > 0.0);
+        if influences.is_empty() {
+            influences.push(strongest);
+        }
+    }
+    keep_strongest(influences, most, least);
+}

@@ -100,7 +100,7 @@ impl Head {
 
     fn weigh(&self, bones: &[FaceBone]) -> Weights {
         let (p, t) = (&self.points, &self.triangles);
-        face_weights(p, t, &self.shells, &self.groups, &self.landmarks, bones, &|_| true).unwrap()
+        face_weights(p, t, &self.shells, &self.groups, &self.landmarks, bones, 8, &|_| true).unwrap()
     }
 
     fn nearest(&self, to: Vec3) -> usize {

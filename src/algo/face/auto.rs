@@ -44,8 +44,7 @@ pub struct AutoSettings {
     pub whole: bool,
     /// Number of groups at which the depths are cut before front groups are joined; found from the mesh if `None`.
     pub groups: Option<usize>,
-    /// Largest number of joints that move a point after a fit to shapes, 1 to 8; 4, which every program reads, unless
-    /// more are exported.
+    /// Largest number of joints that move a point, 1 to 8; 4, which every program reads, unless more are exported.
     pub influences: usize,
 }
 
@@ -308,6 +307,7 @@ impl FaceAnalysis {
             groups,
             landmarks,
             &placed.bones,
+            settings.influences,
             &within(progress, FaceStep::Weights),
         )
         .map_err(|error| cancelled(progress, FaceError::Weights(error)))?;
@@ -320,7 +320,8 @@ impl FaceAnalysis {
         };
         begin(progress, FaceStep::Expressions)?;
         let mask = &groups.mask;
-        face.folds = repair_folds(expressions, points, triangles, mask, &mut face.weights, &face.bones, landmarks);
+        let (most, bones) = (settings.influences, &face.bones);
+        face.folds = repair_folds(expressions, points, triangles, mask, &mut face.weights, bones, landmarks, most);
         Ok(face)
     }
 

@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     algo::weights::laplacian::Graph,
-    mesh::{adjacency::weld, influences::keep_strongest, model::Weights},
+    mesh::{adjacency::weld, influences::keep_strongest_evenly, model::Weights},
 };
 
 pub(crate) use symmetry::Mirror;
@@ -31,8 +31,6 @@ pub const HEAD: u32 = 1;
 /// Joint of the first facial bone.
 pub const FIRST: u32 = 2;
 
-/// Largest number of influences of a point.
-const INFLUENCES: usize = 8;
 /// Weights below this are dropped.
 const PRUNE: f32 = 0.002;
 
@@ -89,9 +87,10 @@ pub(crate) struct Face<'a> {
 /// Weights of all points of a head.
 ///
 /// `points` are in head space; `shells`, `groups`, `landmarks` and `bones` belong to them. Joints of the result: 0 is
-/// the neck, 1 the head, 2 + i is `bones[i]`. Every point has one to eight influences, strongest first, that sum to
+/// the neck, 1 the head, 2 + i is `bones[i]`. Every point has one to `most` influences, strongest first, that sum to
 /// one; points at equal places have equal weights, and so, mirrored, have points of a symmetric head that are each
-/// other's mirror images. The same input gives the same bits with any number of threads.
+/// other's mirror images. Where more bones reach a point, all of its weights lose that of the strongest one too many, so that
+/// they go on changing evenly along the skin. The same input gives the same bits with any number of threads.
 /// `progress` is called with a share from 0 to 1 and returns whether to go on.
 ///
 /// # Errors
@@ -104,6 +103,7 @@ pub fn face_weights(
     groups: &HeadGroups,
     landmarks: &Landmarks,
     bones: &[FaceBone],
+    most: usize,
     progress: &(dyn Fn(f32) -> bool + Sync),
 ) -> Result<Weights, FaceWeightsError> {
     if let Some(point) = points.iter().position(|p| !p.is_finite()) {
@@ -160,7 +160,7 @@ pub fn face_weights(
     let sides = sides::Sides::new(&face);
     let mut rows = skin::rows(&face, &sides, progress)?;
     interior::rows(&face, &sides, &shell, &kinds, &mut rows);
-    rows.iter_mut().for_each(finish);
+    rows.iter_mut().for_each(|row| finish(row, most));
     if !progress(1.0) {
         return Err(FaceWeightsError::Cancelled);
     }
@@ -169,7 +169,7 @@ pub fn face_weights(
         weights.push(rows[v as usize].iter().copied());
     }
     if let Some(mirror) = Mirror::new(points, bones, landmarks) {
-        mirror.apply(&mut weights);
+        mirror.apply(&mut weights, most);
     }
     Ok(weights)
 }
@@ -178,8 +178,8 @@ pub fn face_weights(
 pub(crate) type Row = Vec<(u32, f32)>;
 
 /// Keeps the strongest influences of a vertex; one without any belongs to the head.
-fn finish(row: &mut Row) {
-    keep_strongest(row, INFLUENCES, PRUNE);
+fn finish(row: &mut Row, most: usize) {
+    keep_strongest_evenly(row, most, PRUNE);
     if row.is_empty() {
         row.push((HEAD, 1.0));
     }

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use glam::Vec3;
+
 use super::{
     FitError, MeshAnalysis, TemplateJoint,
     assign::{self, Hypothesis},
@@ -40,9 +42,14 @@ const REST: f32 = 2.0;
 /// Penalty of a template without sides, whose chains fit much.
 const ANY_SHAPE: f32 = 0.2;
 
-/// A penalty that can be compared between templates with and without sides.
-fn comparable(best: &Hypothesis, free: bool) -> f32 {
-    best.posed_cost() + (REST - assign::POSED) * best.rest + if free { ANY_SHAPE } else { 0.0 }
+/// Penalty of an up direction that is not the file's second axis, which most formats have for it.
+const LYING: f32 = 0.08;
+
+/// A penalty that can be compared between templates with and without sides; `up` is the file's second axis.
+fn comparable(best: &Hypothesis, free: bool, up: Vec3) -> f32 {
+    let lying = (1.0 - up.dot(best.alignment.rotation * Vec3::Y)).clamp(0.0, 1.0);
+    let shape = if free { ANY_SHAPE } else { 0.0 };
+    best.posed_cost() + (REST - assign::POSED) * best.rest + LYING * lying + shape
 }
 
 /// Ranks templates for a mesh, best first. Templates that cannot be fitted at all are left out.
@@ -53,6 +60,7 @@ pub fn choose_template(
     analysis: &MeshAnalysis,
     templates: &[(&str, &[TemplateJoint])],
 ) -> Result<Vec<TemplateChoice>, FitError> {
+    let up = analysis.mesh.space.direction_to_unit(Vec3::Y);
     let mut choices = Vec::new();
     let mut problem = FitError::NoChain;
     for (index, (_, joints)) in templates.iter().enumerate() {
@@ -77,7 +85,7 @@ pub fn choose_template(
         let shown = best.leaves.iter().filter(|l| l.is_some()).count();
         choices.push(TemplateChoice {
             index,
-            cost: comparable(best, template.limbs.iter().all(|l| l.kind == LimbKind::Free)),
+            cost: comparable(best, template.limbs.iter().all(|l| l.kind == LimbKind::Free), up),
             limbs: kinds.into_iter().map(of_kind).collect(),
             unused: analysis.trees[best.tree].branches.leaves.len() - shown,
         });

@@ -164,7 +164,8 @@ fn further(from: Quat, to: Quat, factor: f32) -> Quat {
     let turn = from.inverse() * to;
     let turn = if turn.w < 0.0 { -turn } else { turn };
     let Some(axis) = turn.xyz().try_normalize() else { return to };
-    let half = bevy::math::ops::acos(turn.w.min(1.0)) * factor;
+    // The vector part has the digits of small angles, which the cosine has not.
+    let half = bevy::math::ops::atan2(turn.xyz().length(), turn.w) * factor;
     let turned = axis * bevy::math::ops::sin(half);
     (from * Quat::from_xyzw(turned.x, turned.y, turned.z, bevy::math::ops::cos(half))).normalize()
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::{ExpressionSet, FittedFace, Mix, bone_fit::SLIVER, text::Expression};
 use crate::{
     algo::face::{bones::FaceBone, landmarks::Landmarks, weights::Mirror},
-    mesh::{adjacency::weld, influences::keep_strongest, model::Weights},
+    mesh::{adjacency::weld, influences::keep_strongest_evenly, model::Weights},
 };
 
 /// Number of passes; each solves the bones' movements anew.
@@ -21,8 +21,6 @@ const ROUNDS: usize = 40;
 const WIDEN: usize = 1;
 /// Share of its own weights that a place keeps in a round.
 const OWN: f32 = 0.25;
-/// Largest number of influences of a point.
-const INFLUENCES: usize = 8;
 
 type Influences = Vec<(u32, f32)>;
 
@@ -30,7 +28,7 @@ type Influences = Vec<(u32, f32)>;
 ///
 /// All in head space; `mask` and `weights` as [`FittedFace::new`] takes them. Points at the same place keep the same
 /// weights. Bones move otherwise with other weights, so that each pass poses anew, and the weights with the fewest folds
-/// are kept. Returns the folds that are left, summed over the six, after [`FittedFace::pose`] has repaired the poses.
+/// are kept, of which no point has more than `most`. Returns the folds that are left, summed over the six, after [`FittedFace::pose`] has repaired the poses.
 /// Cost: a few poses of every expression.
 pub fn repair_folds(
     set: &ExpressionSet,
@@ -40,6 +38,7 @@ pub fn repair_folds(
     weights: &mut Weights,
     bones: &[FaceBone],
     landmarks: &Landmarks,
+    most: usize,
 ) -> usize {
     if weights.len() != points.len() || triangles.iter().flatten().any(|&corner| corner as usize >= points.len()) {
         return 0;
@@ -77,6 +76,7 @@ pub fn repair_folds(
             points,
             triangles,
             weights,
+            most,
             poses: &poses,
             own: vec![Vec::new(); surface.first.len()],
             posed: vec![Vec::new(); surface.first.len()],
@@ -84,7 +84,7 @@ pub fn repair_folds(
         averaged.smooth(folded);
         *weights = averaged.weights();
         if let Some(mirror) = &mirror {
-            mirror.apply(weights);
+            mirror.apply(weights, most);
         }
     }
     let Some((left, best)) = best else { return 0 };
@@ -148,6 +148,8 @@ struct AveragedWeights<'a> {
     points: &'a [Vec3],
     triangles: &'a [[u32; 3]],
     weights: &'a Weights,
+    /// Largest number of influences of a point.
+    most: usize,
     /// Matrices of the joints in each pose.
     poses: &'a [Vec<Affine3A>],
     /// Averaged weights of each place; empty where they are as they were.
@@ -216,7 +218,7 @@ impl AveragedWeights<'_> {
         let near = |other: u32| 1.0 / self.at(other).distance_squared(self.at(place)).max(f32::MIN_POSITIVE);
         let next = self.next_to(place);
         let all: f32 = next.iter().map(|other| near(*other)).sum();
-        let mut sum: Influences = Vec::with_capacity(4 * INFLUENCES);
+        let mut sum: Influences = Vec::with_capacity(4 * self.most);
         let mut add = |place: u32, share: f32| {
             let mut add_one = |(joint, weight): (u32, f32)| match sum.binary_search_by_key(&joint, |entry| entry.0) {
                 Ok(known) => sum[known].1 += weight * share,
@@ -234,7 +236,7 @@ impl AveragedWeights<'_> {
             add(place, 1.0);
         }
         sum.retain(|(_, weight)| *weight > 1e-4);
-        keep_strongest(&mut sum, INFLUENCES, 0.0);
+        keep_strongest_evenly(&mut sum, self.most, 0.0);
         sum
     }
 

@@ -6,10 +6,10 @@
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 
-use super::{FIRST, INFLUENCES, PRUNE};
+use super::{FIRST, PRUNE};
 use crate::{
     algo::face::{bones::FaceBone, landmarks::Landmarks},
-    mesh::{influences::keep_strongest, model::Weights},
+    mesh::{influences::keep_strongest_evenly, model::Weights},
 };
 
 /// Largest distance between a point and the mirror image of its partner, as a share of the distance of the eyes.
@@ -119,8 +119,9 @@ impl Mirror {
         Some(Self { points: mutual, joints })
     }
 
-    /// Gives each point the mean of its own weights and its partner's mirrored ones, where all joints have an image.
-    pub fn apply(&self, weights: &mut Weights) {
+    /// Gives each point the mean of its own weights and its partner's mirrored ones, `most` of them, where all joints have an
+    /// image.
+    pub fn apply(&self, weights: &mut Weights, most: usize) {
         let mut both = Weights::default();
         let mut list: Vec<(u32, f32)> = Vec::new();
         for (point, partner) in self.points.iter().enumerate().take(weights.len()) {
@@ -139,7 +140,7 @@ impl Mirror {
                     None => list.push((joint, 0.5 * weight)),
                 }
             }
-            keep_strongest(&mut list, INFLUENCES, PRUNE);
+            keep_strongest_evenly(&mut list, most, PRUNE);
             both.push(list.iter().copied());
         }
         *weights = both;
