@@ -24,13 +24,13 @@ use rigsmith::{
     },
 };
 
-use super::{NEAR, Stage, shipped};
+use super::{NEAR, RigBench, shipped};
 use crate::random::Random;
 
 /// Fails unless the entities say what the document says, all of it and nothing else.
 #[track_caller]
-fn check(stage: &mut Stage, what: &str) {
-    let rig = stage.document().clone();
+fn check(stage: &mut RigBench, what: &str) {
+    let rig = stage.rig().clone();
     assert_eq!(
         stage.get::<Name>(stage.rig).map(Name::as_str),
         Some(rig.about().name.as_str()),
@@ -140,7 +140,7 @@ fn check(stage: &mut Stage, what: &str) {
 }
 
 /// Fails unless created nodes and constraints are told as they are built, whatever somebody else did to them.
-fn check_built(stage: &Stage, built: &BuiltRig, what: &str) {
+fn check_built(stage: &RigBench, built: &BuiltRig, what: &str) {
     for node in &built.nodes {
         let entity = stage.node(node.uid).unwrap_or_else(|| panic!("{what}: {} has no entity", node.name));
         let pose = stage.get::<Transform>(entity).unwrap_or_else(|| panic!("{what}: {} has no place", node.name));
@@ -245,9 +245,9 @@ fn put_on(entity: &mut EntityWorldMut, number: usize, other: Entity) {
 }
 
 /// One random deed: its name, and whether the app has taken it up.
-fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
+fn step(stage: &mut RigBench, random: &mut Random) -> (String, bool) {
     let (other_rig, other_joint, other_group) = stage.neighbour();
-    let rig = stage.document().clone();
+    let rig = stage.rig().clone();
     let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
     let tags: Vec<Uid> = rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| tag.uid)).collect();
     let groups: Vec<Uid> = rig.groups().iter().map(|group| group.uid).collect();
@@ -360,7 +360,7 @@ fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
         }
         (22, ..) => {
             if let Some(joint) = joint {
-                stage.edit(vec![RigEdit::SetLabel(joint, Some(format!("e{number}")))]);
+                stage.apply(RigEdit::SetLabel(joint, Some(format!("e{number}"))));
             }
         }
         (23, ..) => {
@@ -442,7 +442,7 @@ fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
             let features = combined_features(&rig);
             if !features.is_empty() {
                 let feature = random.pick(&features);
-                stage.edit(set_feature(&rig, &feature.key, random.chance(2)).unwrap_or_default());
+                stage.apply_all(set_feature(&rig, &feature.key, random.chance(2)).unwrap_or_default());
             }
         }
         (32, ..) => {
@@ -520,7 +520,7 @@ fn step(stage: &mut Stage, random: &mut Random) -> (String, bool) {
     (format!("deed {what} ({number}) on joint {joint:?}, tag {tag:?}, group {group:?}"), is_seen)
 }
 
-impl Stage {
+impl RigBench {
     /// Another rig of the same world, spawned when it is first asked for, with its first joint and its group.
     fn neighbour(&mut self) -> (Entity, Entity, Entity) {
         let name = Name::new("neighbour");
@@ -567,10 +567,10 @@ fn world_and_document_stay_equal_through_random_deeds() {
     for (number, (start, is_built, rounds)) in starts.into_iter().enumerate() {
         let rig = templates.iter().find(|(name, _)| name == start).unwrap().1.clone();
         let mut random = Random(7 + number as u64);
-        let mut stage = if is_built { Stage::built(rig) } else { Stage::new(rig) };
-        let first = write_template(stage.document());
+        let mut stage = if is_built { RigBench::of_built(rig) } else { RigBench::started(rig) };
+        let first = write_template(stage.rig());
         let (other, _, _) = stage.neighbour();
-        let of_other = |stage: &Stage| write_template(stage.get::<Rig>(other).unwrap());
+        let of_other = |stage: &RigBench| write_template(stage.get::<Rig>(other).unwrap());
         let beside = of_other(&stage);
         let mut deeds: Vec<String> = Vec::new();
         for round in 0..rounds {
@@ -590,6 +590,6 @@ fn world_and_document_stay_equal_through_random_deeds() {
             stage.change(Change::Undo);
             check(&mut stage, &what);
         }
-        assert_eq!(write_template(stage.document()), first, "rig {number} is back at its first bytes");
+        assert_eq!(write_template(stage.rig()), first, "rig {number} is back at its first bytes");
     }
 }
