@@ -4,11 +4,11 @@ use bevy::prelude::*;
 use rigsmith::{
     algo::placement::Placement,
     editor::{
-        actions::{Action, ActionRequest},
+        actions::Action,
         camera::ViewportSight,
         mode::Mode,
-        notice::{Notice, StatusLine},
-        pointer::{ModifierKeys, PointerAct, ViewportPointer, WheelUse},
+        notice::StatusLine,
+        pointer::{ModifierKeys, PointerAct, WheelUse},
         tools::{
             place::PlaceTool,
             select::SelectTool,
@@ -28,14 +28,9 @@ use rigsmith::{
 };
 
 use crate::{
-    bench::wait,
-    viewport_app::{CONTROL, DROPPED, PLAIN, SHIFT, front, open_body, tools_app},
+    bench::RigBench,
+    viewport_app::{CONTROL, DROPPED, PLAIN, SHIFT, front},
 };
-
-struct Bench {
-    app: App,
-    rig: Entity,
-}
 
 const CLICKED: PointerAct = PointerAct::Released { dragged: false, count: 1 };
 
@@ -48,23 +43,18 @@ fn left() -> Sight {
     Sight::new(&camera.into(), &projection, &viewport, Vec2::splat(800.0), &GlobalTransform::IDENTITY).unwrap()
 }
 
-impl Bench {
+impl RigBench {
     /// The bundled character without joints, seen from the front.
-    fn new(mode: Mode) -> Self {
-        let mut bench = Self::empty(mode);
-        open_body(&mut bench.app, bench.rig);
+    fn with_body(mode: Mode) -> Self {
+        let mut bench = Self::in_mode(mode);
+        bench.open_body();
         bench
     }
 
-    fn empty(mode: Mode) -> Self {
-        let (mut app, rig) = tools_app();
-        app.insert_resource(mode);
-        app.update();
-        Self { app, rig }
-    }
-
-    fn wait(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
-        wait(self, what, |bench| bench.app.update(), done);
+    fn in_mode(mode: Mode) -> Self {
+        let mut bench = Self::with_tools();
+        bench.mode(mode);
+        bench
     }
 
     fn look(&mut self, sight: Sight) {
@@ -73,24 +63,6 @@ impl Bench {
 
     fn sight(&self) -> Sight {
         self.app.world().resource::<ViewportSight>().0.unwrap()
-    }
-
-    fn mode(&mut self, mode: Mode) {
-        self.app.insert_resource(mode);
-        self.app.update();
-    }
-
-    fn act(&mut self, action: Action) {
-        self.app.world_mut().write_message(ActionRequest(action));
-        self.app.update();
-    }
-
-    /// One frame in which the pointer does all this.
-    fn point(&mut self, held: ModifierKeys, acts: &[(Vec2, PointerAct)]) {
-        for (at, act) in acts {
-            self.app.world_mut().write_message(ViewportPointer { at: *at, act: *act, held });
-        }
-        self.app.update();
     }
 
     fn hover(&mut self, at: Vec2) {
@@ -135,33 +107,16 @@ impl Bench {
         self.app.world().resource::<Ghosts>()
     }
 
-    fn status(&self) -> &StatusLine {
-        self.app.world().resource::<StatusLine>()
-    }
-
-    fn rig(&self) -> &Rig {
-        self.app.world().get::<Rig>(self.rig).unwrap()
-    }
-
     fn places(&self) -> Vec<Vec3> {
         self.rig().rest_globals().iter().map(|(_, joint)| joint.translation).collect()
     }
 
-    fn selected(&self) -> Vec<Uid> {
-        self.app.world().get::<Selection>(self.rig).unwrap().0.clone()
-    }
-
     fn hovered(&self) -> Option<Uid> {
-        self.app.world().get::<HoveredNode>(self.rig).unwrap().0
-    }
-
-    fn notices(&mut self) -> Vec<Notice> {
-        self.app.world_mut().resource_mut::<Messages<Notice>>().drain().collect()
+        self.get::<HoveredNode>(self.rig).unwrap().0
     }
 
     fn operate(&mut self, operation: Operation) {
-        self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
-        self.app.update();
+        self.edit(operation);
         self.app.update();
     }
 
@@ -202,7 +157,7 @@ fn the_ghost_is_where_the_joint_goes() {
         (left(), [0.0, 0.5, 0.0], -4.0, 2, true),
     ];
     for (sight, place, wheel, tabs, symmetry) in table {
-        let mut bench = Bench::new(Mode::Place);
+        let mut bench = RigBench::with_body(Mode::Place);
         bench.look(*sight);
         if *symmetry {
             bench.act(Action::Symmetry);
@@ -231,7 +186,7 @@ fn the_ghost_is_where_the_joint_goes() {
 
 #[test]
 fn tab_goes_through_the_volumes() {
-    let mut bench = Bench::new(Mode::Place);
+    let mut bench = RigBench::with_body(Mode::Place);
     bench.look(left());
     let at = left().project(Vec3::new(0.0, 0.5, 0.0)).unwrap();
     bench.hover(at);
@@ -250,7 +205,7 @@ fn tab_goes_through_the_volumes() {
     assert!(seen[0].1.abs() < 0.03, "midway: between the legs");
     assert_eq!((seen[1].1, seen[2].1), (0.06, -0.06), "the near leg is the left one");
     // One volume: Tab changes nothing.
-    let mut bench = Bench::new(Mode::Place);
+    let mut bench = RigBench::with_body(Mode::Place);
     bench.hover(front().project(Vec3::new(0.0, 1.2, 0.0)).unwrap());
     bench.act(Action::NextVolume);
     assert_eq!(bench.place_tool().settings.volume, None);
@@ -258,13 +213,13 @@ fn tab_goes_through_the_volumes() {
 
 #[test]
 fn wheel_and_drag_change_the_depth() {
-    let mut bench = Bench::new(Mode::Place);
+    let mut bench = RigBench::with_body(Mode::Place);
     let at = front().project(Vec3::new(0.0, 1.2, 0.0)).unwrap();
     bench.hover(Vec2::new(5.0, 5.0));
     assert_eq!(*bench.app.world().resource::<WheelUse>(), WheelUse::Zoom, "beside the mesh the wheel zooms");
     bench.hover(at);
     assert_eq!(*bench.app.world().resource::<WheelUse>(), WheelUse::Tool);
-    let depth = |bench: &Bench| bench.place_tool().ghost.unwrap().position.z;
+    let depth = |bench: &RigBench| bench.place_tool().ghost.unwrap().position.z;
     let middle = depth(&bench);
     bench.point(PLAIN, &[(at, PointerAct::Wheel(4.0))]);
     assert!(depth(&bench) < middle - 0.01, "up is deeper");
@@ -291,7 +246,7 @@ fn wheel_and_drag_change_the_depth() {
 
 #[test]
 fn on_a_posed_rig_joints_stand_where_the_ghost_was() {
-    let (mut bench, joints) = Bench::new(Mode::Place).with_joints();
+    let (mut bench, joints) = RigBench::with_body(Mode::Place).with_joints();
     let turn = PoseOffset::from_rotation(Quat::from_rotation_z(0.4));
     bench.operate(Operation::Pose(vec![(joints[1], turn)]));
     for symmetry in [false, true] {
@@ -318,10 +273,10 @@ fn on_a_posed_rig_joints_stand_where_the_ghost_was() {
 
 #[test]
 fn placing_says_why_it_cannot() {
-    let mut bench = Bench::empty(Mode::Place);
+    let mut bench = RigBench::in_mode(Mode::Place);
     bench.hover(Vec2::splat(400.0));
     assert!(bench.status().obstacle.as_ref().unwrap().contains("no mesh"), "{:?}", bench.status());
-    let mut bench = Bench::new(Mode::Place);
+    let mut bench = RigBench::with_body(Mode::Place);
     bench.hover(Vec2::splat(5.0));
     assert!(bench.status().obstacle.as_ref().unwrap().contains("beside the mesh"), "{:?}", bench.status());
     bench.notices();
@@ -345,14 +300,14 @@ const ARM: [[f32; 3]; 3] = [[0.17, 1.4, 0.0], [0.37, 1.2, 0.0], [0.53, 1.02, 0.0
 #[test]
 fn what_is_previewed_is_what_is_taken() {
     for symmetry in [false, true] {
-        let mut bench = Bench::new(Mode::Stroke);
+        let mut bench = RigBench::with_body(Mode::Stroke);
         if symmetry {
             bench.act(Action::Symmetry);
         }
         bench.preview(&ARM);
         assert!(bench.rig().is_empty(), "a preview changes nothing");
         assert_eq!(*bench.app.world().resource::<WheelUse>(), WheelUse::Tool);
-        let count = |bench: &Bench| bench.ghosts().joints.iter().filter(|joint| !joint.mirrored).count();
+        let count = |bench: &RigBench| bench.ghosts().joints.iter().filter(|joint| !joint.mirrored).count();
         let before = count(&bench);
         let at = Vec2::splat(400.0);
         bench.point(PLAIN, &[(at, PointerAct::Wheel(1.0)), (at, PointerAct::Wheel(2.0))]);
@@ -370,7 +325,7 @@ fn what_is_previewed_is_what_is_taken() {
         assert_eq!(taken.len(), if symmetry { 10 } else { 5 });
 
         // The same stroke, asked for without a window.
-        let mut other = Bench::new(Mode::Select);
+        let mut other = RigBench::with_body(Mode::Select);
         if symmetry {
             other.act(Action::Symmetry);
         }
@@ -388,7 +343,7 @@ fn what_is_previewed_is_what_is_taken() {
 
 #[test]
 fn a_preview_is_dropped_or_kept_never_lost() {
-    let table: &[(&str, fn(&mut Bench), usize)] = &[
+    let table: &[(&str, fn(&mut RigBench), usize)] = &[
         ("Escape", |bench| bench.act(Action::Cancel), 0),
         ("undo", |bench| bench.act(Action::Undo), 0),
         ("Enter", |bench| bench.act(Action::Accept), 1),
@@ -398,7 +353,7 @@ fn a_preview_is_dropped_or_kept_never_lost() {
         ("a click", |bench| bench.click(PLAIN, Vec2::splat(5.0)), 0),
     ];
     for (what, make, chains) in table {
-        let mut bench = Bench::new(Mode::Stroke);
+        let mut bench = RigBench::with_body(Mode::Stroke);
         bench.preview(&ARM);
         make(&mut bench);
         bench.app.update();
@@ -412,7 +367,7 @@ fn a_preview_is_dropped_or_kept_never_lost() {
         }
     }
     // Escape while the button is down.
-    let mut bench = Bench::new(Mode::Stroke);
+    let mut bench = RigBench::with_body(Mode::Stroke);
     bench.point(PLAIN, &[(Vec2::splat(300.0), PointerAct::Pressed), (Vec2::splat(350.0), PointerAct::Dragged)]);
     assert_eq!(bench.ghosts().stroke.len(), 2, "the line follows at once");
     bench.act(Action::Cancel);
@@ -428,7 +383,7 @@ fn a_preview_is_dropped_or_kept_never_lost() {
 
 #[test]
 fn ticks_insert_and_scribbles_delete_at_once() {
-    let (mut bench, joints) = Bench::new(Mode::Stroke).with_joints();
+    let (mut bench, joints) = RigBench::with_body(Mode::Stroke).with_joints();
     let elbow = (bench.pixel(joints[4]) + bench.pixel(joints[5])) * 0.5;
     let across = (bench.pixel(joints[5]) - bench.pixel(joints[4])).normalize().perp() * 20.0;
     bench.point(PLAIN, &[(elbow - across, PointerAct::Pressed), (elbow + across, PointerAct::Dragged)]);
@@ -459,7 +414,7 @@ fn ticks_insert_and_scribbles_delete_at_once() {
 
 #[test]
 fn hovering_tells_what_a_click_picks() {
-    let (mut bench, joints) = Bench::new(Mode::Select).with_joints();
+    let (mut bench, joints) = RigBench::with_body(Mode::Select).with_joints();
     let mut met = 0;
     for y in 0..10 {
         for x in 0..10 {
@@ -504,7 +459,7 @@ fn hovering_tells_what_a_click_picks() {
 
 #[test]
 fn drags_select_boxes() {
-    let (mut bench, joints) = Bench::new(Mode::Select).with_joints();
+    let (mut bench, joints) = RigBench::with_body(Mode::Select).with_joints();
     let [a, b] = [bench.pixel(joints[3]) + Vec2::new(-5.0, -5.0), bench.pixel(joints[5]) + 5.0];
     bench.point(PLAIN, &[(a, PointerAct::Pressed), (b, PointerAct::Dragged)]);
     assert_eq!(bench.app.world().resource::<SelectTool>().band, Some([a, b]));
@@ -524,7 +479,7 @@ fn drags_select_boxes() {
 
 #[test]
 fn actions_work_on_the_selection() {
-    let (mut bench, joints) = Bench::new(Mode::Select).with_joints();
+    let (mut bench, joints) = RigBench::with_body(Mode::Select).with_joints();
     bench.notices();
     bench.act(Action::Delete);
     assert!(bench.notices()[0].text.contains("No joint is selected"));
@@ -544,7 +499,7 @@ fn actions_work_on_the_selection() {
 
 #[test]
 fn the_weights_mode_shows_and_restores() {
-    let (mut bench, joints) = Bench::new(Mode::Select).with_joints();
+    let (mut bench, joints) = RigBench::with_body(Mode::Select).with_joints();
     bench.app.world_mut().resource_mut::<MeshDisplay>().weights = WeightColors::AllJoints;
     bench.mode(Mode::Weights);
     assert!(bench.status().obstacle.as_ref().unwrap().contains("no weights yet"));
@@ -567,11 +522,11 @@ fn the_weights_mode_shows_and_restores() {
 #[test]
 fn idle_tools_change_nothing_and_hovering_does_no_more_than_it_must() {
     for mode in [Mode::Select, Mode::Place, Mode::Stroke, Mode::Weights] {
-        let (mut bench, _) = Bench::new(mode).with_joints();
+        let (mut bench, _) = RigBench::with_body(mode).with_joints();
         let at = front().project(Vec3::new(0.0, 1.2, 0.0)).unwrap();
         bench.hover(at);
         bench.app.update();
-        let ticks = |bench: &Bench| {
+        let ticks = |bench: &RigBench| {
             let world = bench.app.world();
             let changed = |id: Option<bevy::ecs::change_detection::ComponentTicks>| id.map(|ticks| ticks.changed);
             [
