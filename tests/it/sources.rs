@@ -5,7 +5,6 @@ use std::{
     fs,
     path::{Path, PathBuf},
     sync::Arc,
-    time::Instant,
 };
 
 use bevy::{ecs::system::RunSystemOnce, prelude::*};
@@ -28,7 +27,7 @@ use rigsmith::{
 };
 
 use super::{
-    bench::HANG,
+    bench::{RigBench, wait_with},
     template_text::{CHAIN, Dice},
 };
 
@@ -40,8 +39,7 @@ struct InstanceReport {
 }
 
 struct Studio {
-    app: App,
-    rig: Entity,
+    base: RigBench,
     file: PathBuf,
     _folder: tempfile::TempDir,
 }
@@ -67,59 +65,40 @@ impl Studio {
         let path = file.clone();
         let template = app.world_mut().run_system_once(move |files: TemplateFiles| files.open(path.clone())).unwrap();
         let source = if is_live { RigSource::live(template) } else { RigSource::new(template) };
-        let rig = app.world_mut().spawn(source).id();
-        let mut studio = Self { app, rig, file, _folder: folder };
+        let mut studio = Self { base: RigBench::with(app, source), file, _folder: folder };
         studio.until("the rig", |world, rig| world.get::<BuildResult>(rig).is_some());
-        studio.app.update();
+        studio.base.app.update();
         assert_eq!(studio.instance_report().built, 1);
         studio
     }
 
     /// The template, and what was built of it last.
     fn built(&self) -> (Handle<RigTemplate>, Arc<BuiltTemplate>) {
-        let template = self.app.world().get::<RigSource>(self.rig).unwrap().template.clone();
-        let built = self.app.world().resource::<RigTemplates>().built(&template).unwrap().clone();
+        let template = self.base.get::<RigSource>(self.base.rig).unwrap().template.clone();
+        let built = self.base.app.world().resource::<RigTemplates>().built(&template).unwrap().clone();
         (template, built)
     }
 
     fn instance_report(&self) -> &InstanceReport {
-        self.app.world().resource::<InstanceReport>()
-    }
-
-    fn rig(&self) -> &Rig {
-        self.app.world().get::<Rig>(self.rig).unwrap()
+        self.base.app.world().resource::<InstanceReport>()
     }
 
     fn until(&mut self, what: &str, is_so: impl Fn(&World, Entity) -> bool) {
-        let start = Instant::now();
-        while !is_so(self.app.world(), self.rig) {
-            assert!(start.elapsed() < HANG, "{what} does not come: {:?}", self.instance_report());
-            self.app.update();
-            std::thread::sleep(std::time::Duration::from_millis(1));
-        }
+        let done = |studio: &Self| is_so(studio.base.app.world(), studio.base.rig);
+        let report = |studio: &Self| format!("{:?}", studio.instance_report());
+        wait_with(self, what, |studio| studio.base.app.update(), done, report);
     }
 
     fn save(&self, text: &str) {
         save_whole(&self.file, text);
     }
 
-    fn edit(&mut self, edit: RigEdit) {
-        let request = EditRequest::operation(self.rig, Operation::Edits(vec![edit]));
-        self.app.world_mut().write_message(request);
-        self.app.update();
-    }
-
-    fn request(&mut self, change: Change) {
-        self.app.world_mut().write_message(EditRequest { rig: self.rig, change });
-        self.app.update();
-    }
-
     fn joint(&self, label: &str) -> Uid {
-        self.rig().find_label(label).unwrap()
+        self.base.rig().find_label(label).unwrap()
     }
 
     fn height(&self, label: &str) -> f32 {
-        self.rig().joint(self.joint(label)).unwrap().data.rest.translation.y
+        self.base.rig().joint(self.joint(label)).unwrap().data.rest.translation.y
     }
 }
 
@@ -127,45 +106,45 @@ impl Studio {
 fn a_live_rig_takes_over_what_the_file_changed_and_keeps_what_is_its_own() {
     let mut studio = Studio::new(true);
     let (tip, middle) = (studio.joint("tail_3"), studio.joint("tail_2"));
-    studio.edit(RigEdit::SetLocked(middle, true));
+    studio.base.apply(RigEdit::SetLocked(middle, true));
     let posed = PoseOffset { translation: Vec3::X * 0.1, ..PoseOffset::IDENTITY };
-    let built = studio.app.world().get::<BuildResult>(studio.rig).unwrap().0.clone();
+    let built = studio.base.get::<BuildResult>(studio.base.rig).unwrap().0.clone();
     let on_root = |node: &&rigsmith::rig::BuiltNode| node.control.is_some() && node.name.contains("tail_1");
     let control = built.nodes.iter().find(on_root).unwrap().uid;
-    studio.request(Change::Do(Operation::Pose(vec![(control, posed)])));
-    let entity = studio.app.world().get::<JointEntities>(studio.rig).unwrap().get(tip).unwrap();
+    studio.base.change(Change::Do(Operation::Pose(vec![(control, posed)])));
+    let entity = studio.base.get::<JointEntities>(studio.base.rig).unwrap().get(tip).unwrap();
     studio.save(&CHAIN.replace("(0, 1, 0)", "(0, 1.5, 0)"));
     studio.until("the update", |world, _| world.resource::<InstanceReport>().updated == 1);
     assert_eq!(studio.height("tail_1"), 1.5);
-    assert!(studio.rig().joint(middle).unwrap().data.locked && studio.rig().offset(control) == Some(&posed));
-    assert_eq!(studio.app.world().get::<JointEntities>(studio.rig).unwrap().get(tip), Some(entity));
-    studio.app.update();
-    let place = studio.app.world().get::<GlobalTransform>(entity).unwrap().translation();
+    assert!(studio.base.rig().joint(middle).unwrap().data.locked && studio.base.rig().offset(control) == Some(&posed));
+    assert_eq!(studio.base.get::<JointEntities>(studio.base.rig).unwrap().get(tip), Some(entity));
+    studio.base.app.update();
+    let place = studio.base.get::<GlobalTransform>(entity).unwrap().translation();
     assert!((place - Vec3::new(0.1, 2.1, 0.0)).length() < 1e-5, "{place}");
 
     // Undone, the base is the one before, and nothing is taken over until the file changes again.
-    let after = studio.app.world().get::<RigSource>(studio.rig).unwrap().base().unwrap().clone();
-    studio.request(Change::Undo);
+    let after = studio.base.get::<RigSource>(studio.base.rig).unwrap().base().unwrap().clone();
+    studio.base.change(Change::Undo);
     assert_eq!(studio.height("tail_1"), 1.0);
-    let before = studio.app.world().get::<RigSource>(studio.rig).unwrap().base().unwrap().clone();
+    let before = studio.base.get::<RigSource>(studio.base.rig).unwrap().base().unwrap().clone();
     assert!(before != after);
     for _ in 0..80 {
-        studio.app.update();
+        studio.base.app.update();
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     assert_eq!((studio.height("tail_1"), studio.instance_report().updated), (1.0, 1));
-    studio.request(Change::Redo);
-    assert_eq!(studio.app.world().get::<RigSource>(studio.rig).unwrap().base(), Some(&after));
-    studio.request(Change::Undo);
+    studio.base.change(Change::Redo);
+    assert_eq!(studio.base.get::<RigSource>(studio.base.rig).unwrap().base(), Some(&after));
+    studio.base.change(Change::Undo);
     studio.save(&CHAIN.replace("(0, 1, 0)", "(0, 1.25, 0)"));
     studio.until("the next", |world, _| world.resource::<InstanceReport>().updated == 2);
     assert_eq!(studio.height("tail_1"), 1.25);
     // Undo to the start.
     for _ in 0..4 {
-        studio.request(Change::Undo);
+        studio.base.change(Change::Undo);
     }
     let first = rigsmith::rig::template::read_template(CHAIN.as_bytes()).unwrap().rig;
-    assert_eq!(studio.rig(), &first);
+    assert_eq!(studio.base.rig(), &first);
 }
 
 #[test]
@@ -173,12 +152,12 @@ fn a_conflict_is_offered_and_decided_by_a_choice() {
     for (take, height) in [(Take::Mine, 2.0), (Take::Theirs, 1.5)] {
         let mut studio = Studio::new(true);
         let root = studio.joint("tail_1");
-        let mut rest = studio.rig().joint(root).unwrap().data.rest;
+        let mut rest = studio.base.rig().joint(root).unwrap().data.rest;
         rest.translation.y = 2.0;
-        studio.edit(RigEdit::SetRest(root, rest));
+        studio.base.apply(RigEdit::SetRest(root, rest));
         studio.save(&CHAIN.replace("(0, 1, 0)", "(0, 1.5, 0)").replace("relative_size: 0.5", "relative_size: 0.75"));
         studio.until("the offer", |world, rig| world.get::<UpdateOffer>(rig).is_some());
-        let offer = studio.app.world().get::<UpdateOffer>(studio.rig).unwrap().changes.clone();
+        let offer = studio.base.get::<UpdateOffer>(studio.base.rig).unwrap().changes.clone();
         let of: Vec<(Option<&str>, bool)> =
             offer.iter().map(|change| (change.field.as_deref(), change.conflict)).collect();
         assert_eq!(of, [(Some("translation"), true), (Some("params.relative_size"), false)]);
@@ -187,12 +166,12 @@ fn a_conflict_is_offered_and_decided_by_a_choice() {
             [Some("(0.0, 2.0, 0.0)"), Some("(0.0, 1.5, 0.0)")]
         );
         assert_eq!(studio.height("tail_1"), 2.0, "nothing happens by itself");
-        studio.app.world_mut().write_message(AcceptUpdate { rig: studio.rig, choices: take.into() });
+        studio.base.app.world_mut().write_message(AcceptUpdate { rig: studio.base.rig, choices: take.into() });
         studio.until("the update", |world, _| world.resource::<InstanceReport>().updated == 1);
         assert_eq!(studio.height("tail_1"), height);
-        let tip = studio.rig().joint(studio.joint("tail_3")).unwrap().clone();
+        let tip = studio.base.rig().joint(studio.joint("tail_3")).unwrap().clone();
         assert!(format!("{:?}", tip.data.tags).contains("0.75"));
-        assert!(studio.app.world().get::<UpdateOffer>(studio.rig).is_none());
+        assert!(studio.base.get::<UpdateOffer>(studio.base.rig).is_none());
     }
 }
 
@@ -206,19 +185,19 @@ fn an_update_that_is_not_live_waits_and_one_that_cannot_be_built_is_taken_back()
     // The file alone builds; with what was changed here it does not.
     let mut studio = Studio::new(true);
     let first = studio.joint("tail_1");
-    let tag = studio.rig().joint(first).unwrap().data.tags[0].uid;
-    studio.edit(RigEdit::RemoveTag(first, tag));
-    assert!(studio.app.world().get::<BuildFailure>(studio.rig).is_none());
-    let before = studio.rig().clone();
+    let tag = studio.base.rig().joint(first).unwrap().data.tags[0].uid;
+    studio.base.apply(RigEdit::RemoveTag(first, tag));
+    assert!(studio.base.get::<BuildFailure>(studio.base.rig).is_none());
+    let before = studio.base.rig().clone();
     studio.save(&CHAIN.replace(
         "parent: \"tail_1\", translation: (0, 0.3, 0), tags: [control]",
         "parent: \"tail_1\", translation: (0, 0.3, 0), tags: [control, orient(targets: \"@command control/tail_1\")]",
     ));
     studio.until("the failure", |world, _| !world.resource::<InstanceReport>().failed.is_empty());
-    studio.app.update();
-    studio.app.update();
-    assert_eq!((studio.rig(), studio.instance_report().updated), (&before, 0));
-    assert!(studio.app.world().get::<BuildFailure>(studio.rig).is_none(), "it is built as before");
+    studio.base.app.update();
+    studio.base.app.update();
+    assert_eq!((studio.base.rig(), studio.instance_report().updated), (&before, 0));
+    assert!(studio.base.get::<BuildFailure>(studio.base.rig).is_none(), "it is built as before");
     studio.save(&CHAIN.replace("(0, 1, 0)", "(0, 1.5, 0)"));
     studio.until("the next good save", |world, _| world.resource::<InstanceReport>().updated == 1);
     assert_eq!(studio.height("tail_1"), 1.5);
@@ -245,19 +224,19 @@ fn a_mesh_of_a_rig_from_a_template_is_bound() {
     fs::write(&path, text).unwrap();
     let model: Model = rigsmith::files::load_model(&rigsmith::files::RealDisk, &path).unwrap();
     let uid = Uid(4242);
-    studio.app.world_mut().spawn((RigMesh::new(uid, model, Vec::new()), SkinOf(studio.rig)));
+    studio.base.app.world_mut().spawn((RigMesh::new(uid, model, Vec::new()), SkinOf(studio.base.rig)));
     studio.until("the weights", |world, rig| world.get::<Rig>(rig).is_some_and(|rig| rig.skin(uid).is_some()));
-    let weights = studio.rig().skin(uid).unwrap().clone();
+    let weights = studio.base.rig().skin(uid).unwrap().clone();
     studio.save(&CHAIN.replace("relative_size: 0.5", "relative_size: 0.75"));
     studio.until("the update", |world, _| world.resource::<InstanceReport>().updated == 1);
-    assert_eq!(studio.rig().skin(uid), Some(&weights), "weights stay");
+    assert_eq!(studio.base.rig().skin(uid), Some(&weights), "weights stay");
 }
 
 #[test]
 fn another_name_in_the_file_is_the_same_joint_for_ever() {
     let mut studio = Studio::new(true);
     let tip = studio.joint("tail_3");
-    let entity = studio.app.world().get::<JointEntities>(studio.rig).unwrap().get(tip).unwrap();
+    let entity = studio.base.get::<JointEntities>(studio.base.rig).unwrap().get(tip).unwrap();
     let renamed = CHAIN.replace("tail_3", "tip");
     studio.save(&renamed);
     studio.until("the other name", |world, _| world.resource::<InstanceReport>().updated == 1);
@@ -266,8 +245,8 @@ fn another_name_in_the_file_is_the_same_joint_for_ever() {
     studio.save(&renamed.replace("relative_size: 0.5", "relative_size: 0.75").replace("(0, 1, 0)", "(0, 1.5, 0)"));
     studio.until("the next save", |world, _| world.resource::<InstanceReport>().updated == 2);
     assert_eq!((studio.joint("tip"), studio.height("tail_1")), (tip, 1.5));
-    assert!(format!("{:?}", studio.rig().joint(tip).unwrap().data.tags).contains("0.75"));
-    assert_eq!(studio.app.world().get::<JointEntities>(studio.rig).unwrap().get(tip), Some(entity));
+    assert!(format!("{:?}", studio.base.rig().joint(tip).unwrap().data.tags).contains("0.75"));
+    assert_eq!(studio.base.get::<JointEntities>(studio.base.rig).unwrap().get(tip), Some(entity));
     studio.save(&renamed.replace("tip", "end"));
     studio.until("a third name", |world, _| world.resource::<InstanceReport>().updated == 3);
     assert_eq!(studio.joint("end"), tip);
@@ -276,16 +255,18 @@ fn another_name_in_the_file_is_the_same_joint_for_ever() {
 #[test]
 fn a_live_update_that_moves_what_a_pose_means_holds_the_joints() {
     let mut studio = Studio::new(true);
-    let built = studio.app.world().get::<BuildResult>(studio.rig).unwrap().0.clone();
+    let built = studio.base.get::<BuildResult>(studio.base.rig).unwrap().0.clone();
     let control =
         |name: &str| built.nodes.iter().find(|node| node.control.is_some() && node.name.contains(name)).unwrap().uid;
     let turn = |angle: f32| PoseOffset::from_rotation(Quat::from_rotation_z(angle));
-    studio.request(Change::Do(Operation::Pose(vec![(control("tail_1"), turn(0.4)), (control("tail_2"), turn(0.3))])));
+    studio
+        .base
+        .change(Change::Do(Operation::Pose(vec![(control("tail_1"), turn(0.4)), (control("tail_2"), turn(0.3))])));
     let place = |studio: &mut Studio| {
-        studio.app.update();
+        studio.base.app.update();
         let tip = studio.joint("tail_3");
-        let entity = studio.app.world().get::<JointEntities>(studio.rig).unwrap().get(tip).unwrap();
-        studio.app.world().get::<GlobalTransform>(entity).unwrap().translation()
+        let entity = studio.base.get::<JointEntities>(studio.base.rig).unwrap().get(tip).unwrap();
+        studio.base.get::<GlobalTransform>(entity).unwrap().translation()
     };
     let before = place(&mut studio);
     // The second joint's axes are turned by a quarter; what hangs on it stays where it is.
@@ -303,7 +284,7 @@ fn a_live_update_that_moves_what_a_pose_means_holds_the_joints() {
     studio.until("the update", |world, _| world.resource::<InstanceReport>().updated == 1);
     let after = place(&mut studio);
     assert!((after - before).length() < 1e-5, "{before} {after}");
-    studio.request(Change::Undo);
+    studio.base.change(Change::Undo);
     assert!((place(&mut studio) - before).length() < 1e-5);
 }
 
@@ -399,8 +380,8 @@ struct PosedState {
 
 impl Studio {
     fn posed_state(&self) -> PosedState {
-        let runtime = self.app.world().get::<RigRuntime>(self.rig).unwrap();
-        let rig = self.rig();
+        let runtime = self.base.get::<RigRuntime>(self.base.rig).unwrap();
+        let rig = self.base.rig();
         let joint = |joint: &RigJoint| {
             let uid = joint.data.uid;
             Some((uid, runtime.state().global(uid)?.translation, rig.position(uid)))
@@ -410,7 +391,7 @@ impl Studio {
     }
 
     fn is_built(&self, node: Uid) -> bool {
-        self.app.world().get::<BuildResult>(self.rig).unwrap().0.node(node).is_some()
+        self.base.get::<BuildResult>(self.base.rig).unwrap().0.node(node).is_some()
     }
 }
 
@@ -436,20 +417,20 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
         joints.push(Some(FileJoint { name: format!("joint_{number}"), above, place, turn: 0.0, size: 1.0 }));
     }
     let mut studio = Studio::of(true, &template_of_joints(&joints));
-    studio.app.init_resource::<ListedJoints>();
-    studio.app.add_observer(|updated: On<RigUpdated>, mut listed: ResMut<ListedJoints>| {
+    studio.base.app.init_resource::<ListedJoints>();
+    studio.base.app.add_observer(|updated: On<RigUpdated>, mut listed: ResMut<ListedJoints>| {
         listed.0 = updated.poses.iter().map(|note| note.deviation.joint).collect();
     });
-    let first = write_template(studio.rig());
+    let first = write_template(studio.base.rig());
     let (mut done, mut is_mixed, mut reloads, mut offers, mut held) = (0usize, false, 0, 0, 0);
     let (mut version, mut parts) = (0, 0);
     for step in 0..steps {
         let controls: Vec<Uid> = {
-            let built = &studio.app.world().get::<BuildResult>(studio.rig).unwrap().0;
+            let built = &studio.base.get::<BuildResult>(studio.base.rig).unwrap().0;
             built.nodes.iter().filter(|node| node.control.is_some()).map(|node| node.uid).collect()
         };
         let control = controls[dice.below(controls.len() as u64) as usize];
-        let labels: Vec<Uid> = studio.rig().walk().map(|joint| joint.data.uid).collect();
+        let labels: Vec<Uid> = studio.base.rig().walk().map(|joint| joint.data.uid).collect();
         let joint = labels[dice.below(labels.len() as u64) as usize];
         let share = dice.below(1000) as f32 / 1000.0;
         let before = studio.posed_state();
@@ -463,7 +444,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
             5 => Some(Operation::Edits(vec![RigEdit::SetLocked(joint, share > 0.5)])),
             6 => {
                 let change = if share < 0.7 && done > 0 { Change::Undo } else { Change::Redo };
-                studio.request(change);
+                studio.base.change(change);
                 is_mixed = true;
                 None
             }
@@ -472,7 +453,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                 let was = template_of_joints(&joints);
                 let is_part = dice.below(4) == 0;
                 let mut means_other = false;
-                studio.app.world_mut().resource_mut::<ListedJoints>().0.clear();
+                studio.base.app.world_mut().resource_mut::<ListedJoints>().0.clear();
                 if is_part {
                     let next =
                         (1..).map(|more| version + more).find(|next| written_part(*next) != written_part(version));
@@ -491,14 +472,18 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                         || world.resource::<InstanceReport>().failed.len() > 3
                 });
                 for _ in 0..4 {
-                    studio.app.update();
+                    studio.base.app.update();
                 }
-                if studio.app.world().get::<UpdateOffer>(studio.rig).is_some() {
+                if studio.base.get::<UpdateOffer>(studio.base.rig).is_some() {
                     offers += 1;
                     let take = if share < 0.5 { Take::Mine } else { Take::Theirs };
-                    studio.app.world_mut().write_message(AcceptUpdate { rig: studio.rig, choices: take.into() });
+                    studio
+                        .base
+                        .app
+                        .world_mut()
+                        .write_message(AcceptUpdate { rig: studio.base.rig, choices: take.into() });
                     for _ in 0..4 {
-                        studio.app.update();
+                        studio.base.app.update();
                     }
                     is_mixed = true;
                 }
@@ -508,7 +493,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                 for (node, values) in before.values.iter().filter(|(node, _)| studio.is_built(**node)) {
                     assert_eq!(after.values.get(node), Some(values), "step {step}");
                 }
-                let listed = &studio.app.world().resource::<ListedJoints>().0;
+                let listed = &studio.base.app.world().resource::<ListedJoints>().0;
                 if !means_other && !is_mixed {
                     for (node, offset) in before.pose.iter().filter(|(node, _)| studio.is_built(**node)) {
                         assert_eq!(after.pose.get(node), Some(offset), "step {step}");
@@ -531,14 +516,14 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
         };
         done += 1;
         if let Some(operation) = edit {
-            studio.request(Change::Do(operation));
+            studio.base.change(Change::Do(operation));
         }
     }
     assert!(reloads > steps / 10 && parts > steps / 40, "{reloads} reloads, {parts} of them of the part");
     println!("{steps} steps, {reloads} reloads, {parts} of the part, {offers} offered, {held} joints held");
     assert!(held > steps / 10, "{held}");
     for _ in 0..steps * 2 {
-        studio.request(Change::Undo);
+        studio.base.change(Change::Undo);
     }
-    assert_eq!(write_template(studio.rig()), first);
+    assert_eq!(write_template(studio.base.rig()), first);
 }
