@@ -31,7 +31,7 @@ use rigsmith::{
 };
 
 use super::{
-    bench::HANG,
+    bench::{AppBench, HANG, wait_with},
     mutate::Mutator,
     template_text::{CHAIN, Dice},
 };
@@ -45,17 +45,14 @@ struct InstanceReport {
     failed: Vec<String>,
 }
 
-struct Game {
-    app: App,
-}
-
-impl Game {
-    fn new(plugin: RigInstancePlugin, assets: &Path) -> Self {
-        Self::with(plugin, assets, |_| {})
+impl AppBench {
+    /// A game without window and renderer, with instances.
+    fn game(plugin: RigInstancePlugin, assets: &Path) -> Self {
+        Self::game_with(plugin, assets, |_| {})
     }
 
     /// A game with more than instances.
-    fn with(plugin: RigInstancePlugin, assets: &Path, more: impl FnOnce(&mut App)) -> Self {
+    fn game_with(plugin: RigInstancePlugin, assets: &Path, more: impl FnOnce(&mut App)) -> Self {
         let mut app = App::new();
         let files = AssetPlugin { file_path: assets.display().to_string(), ..default() };
         app.add_plugins((MinimalPlugins, files, TransformPlugin, plugin)).init_resource::<InstanceReport>();
@@ -70,15 +67,15 @@ impl Game {
             });
         app.finish();
         app.cleanup();
-        Self { app }
+        Self::bare(app)
     }
 
-    fn live() -> Self {
-        Self::new(RigInstancePlugin::live(), Path::new("assets"))
+    fn live_game() -> Self {
+        Self::game(RigInstancePlugin::live(), Path::new("assets"))
     }
 
-    fn still() -> Self {
-        Self::new(RigInstancePlugin::default(), Path::new("assets"))
+    fn still_game() -> Self {
+        Self::game(RigInstancePlugin::default(), Path::new("assets"))
     }
 
     fn instance_report(&self) -> &InstanceReport {
@@ -87,12 +84,9 @@ impl Game {
 
     /// Updates until something is so.
     fn until(&mut self, what: &str, is_so: impl Fn(&InstanceReport) -> bool) {
-        let start = Instant::now();
-        while !is_so(self.instance_report()) {
-            assert!(start.elapsed() < HANG, "{what} does not come: {:?}", self.instance_report());
-            self.app.update();
-            sleep(Duration::from_millis(1));
-        }
+        let done = |game: &Self| is_so(game.instance_report());
+        let report = |game: &Self| format!("{:?}", game.instance_report());
+        wait_with(self, what, |game| game.app.update(), done, report);
     }
 
     /// Updates for a while.
@@ -166,11 +160,11 @@ fn saved(folder: &Path, text: &str) -> PathBuf {
 fn an_instance_is_built_posed_and_taken_away() {
     for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
         let folder = tempfile::tempdir().unwrap();
-        let mut game = Game::still();
+        let mut game = AppBench::still_game();
         let instance = game.open(&saved(folder.path(), TWO), mode);
         let (control, end) = (game.node(instance, "ctl_a"), game.node(instance, "a_end"));
         game.app.update();
-        let place = |game: &Game| game.app.world().get::<GlobalTransform>(end).unwrap().translation();
+        let place = |game: &AppBench| game.app.world().get::<GlobalTransform>(end).unwrap().translation();
         assert!(place(&game).distance(Vec3::new(0.0, 1.5, 0.0)) < 1e-6, "{mode:?} {:?}", place(&game));
         let turned = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
         let world = game.app.world_mut();
@@ -202,7 +196,7 @@ fn the_rest_of_a_joint_is_the_built_one_in_an_instance() {
     assert_eq!(rest(world, joint), Vec3::new(0.0, 0.5, 0.0));
     for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
         let folder = tempfile::tempdir().unwrap();
-        let mut game = Game::still();
+        let mut game = AppBench::still_game();
         let instance = game.open(&saved(folder.path(), &text), mode);
         let joint = game.node(instance, "a_end");
         let built = rest(game.app.world(), joint);
@@ -215,7 +209,7 @@ fn a_saved_file_reaches_its_instances_and_leaves_the_rest_to_the_bit() {
     for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
         let folder = tempfile::tempdir().unwrap();
         let path = saved(folder.path(), TWO);
-        let mut game = Game::live();
+        let mut game = AppBench::live_game();
         let instance = game.open(&path, mode);
         let (control, other) = (game.node(instance, "ctl_b_end"), game.node(instance, "b_end"));
         let turned = Quat::from_rotation_x(0.3);
@@ -258,7 +252,7 @@ fn a_saved_file_reaches_its_instances_and_leaves_the_rest_to_the_bit() {
 fn nodes_come_and_go_and_what_others_hung_on_them_stays() {
     for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
         let folder = tempfile::tempdir().unwrap();
-        let mut game = Game::still();
+        let mut game = AppBench::still_game();
         let instance = game.open(&saved(folder.path(), TWO), mode);
         let (end, gone) = (game.node(instance, "b_end"), game.node(instance, "ctl_a"));
         let sword = game.app.world_mut().spawn((Transform::default(), ChildOf(gone))).id();
@@ -373,7 +367,7 @@ fn a_file_is_taken_over_once_however_it_is_saved() {
     ];
     let folder = tempfile::tempdir().unwrap();
     let path = saved(folder.path(), TWO);
-    let mut game = Game::live();
+    let mut game = AppBench::live_game();
     let instance = game.open(&path, InstanceMode::Hierarchy);
     let (control, end) = (game.node(instance, "ctl_b"), game.node(instance, "a_end"));
     game.app.world_mut().get_mut::<Transform>(control).unwrap().translation.x += 0.25;
@@ -418,7 +412,7 @@ fn a_file_is_taken_over_once_however_it_is_saved() {
 #[test]
 fn a_thousand_broken_saves_change_nothing_and_are_told() {
     let folder = tempfile::tempdir().unwrap();
-    let mut game = Game::still();
+    let mut game = AppBench::still_game();
     let instance = game.open(&saved(folder.path(), CHAIN), InstanceMode::Direct);
     game.app.update();
     let before = game.places(instance);
@@ -459,7 +453,7 @@ fn a_thousand_broken_saves_change_nothing_and_are_told() {
 fn the_asset_server_loads_templates_and_a_failed_first_load_is_tried_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = saved(folder.path(), "(format: 2, name: ");
-    let mut game = Game::new(RigInstancePlugin::live(), folder.path());
+    let mut game = AppBench::game(RigInstancePlugin::live(), folder.path());
     let handle = game.app.world().resource::<AssetServer>().load::<RigTemplate>("t.rig.ron");
     let instance = game.app.world_mut().spawn(RigInstance(handle)).id();
     game.until("the failure", |told| !told.failed.is_empty());
@@ -515,7 +509,7 @@ struct Bindings(Vec<(Entity, Vec<String>)>);
 fn skinned_meshes_of_loaded_files_follow_an_instance() {
     let folder = tempfile::tempdir().unwrap();
     for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
-        let mut game = Game::still();
+        let mut game = AppBench::still_game();
         game.app.init_resource::<Bindings>();
         game.app.add_observer(|bound: On<SkinBound>, mut bindings: ResMut<Bindings>| {
             bindings.0.push((bound.instance, bound.unknown.clone()));
@@ -537,11 +531,11 @@ fn skinned_meshes_of_loaded_files_follow_an_instance() {
 fn joints_are_handed_over_and_taken_back() {
     let folder = tempfile::tempdir().unwrap();
     for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
-        let mut game = Game::still();
+        let mut game = AppBench::still_game();
         let instance = game.open(&saved(folder.path(), TWO), mode);
         let joints = ["a", "b", "b_end"].map(|name| game.node(instance, name));
         game.go_on(Duration::from_millis(5));
-        let places = |game: &Game| joints.map(|joint| *game.app.world().get::<GlobalTransform>(joint).unwrap());
+        let places = |game: &AppBench| joints.map(|joint| *game.app.world().get::<GlobalTransform>(joint).unwrap());
         let before = places(&game);
         let to = Isometry3d::new(Vec3::new(1.0, 2.0, 3.0), Quat::from_rotation_z(0.5));
         game.app.world_mut().entity_mut(joints[1]).insert(OutsideTransform(to));
@@ -580,11 +574,11 @@ fn the_asset_server_loads_parts_too() {
     let text = "(format: 2, name: \"doll\", joints: [(label: \"hip\")], parts: [(part: \"limbs/limb.rig.ron\", parent: \
                 \"hip\"), (part: \"parts/jaw.rig.ron\", parent: \"hip\")])";
     saved(folder.path(), text);
-    let mut game = Game::new(RigInstancePlugin::live(), folder.path());
+    let mut game = AppBench::game(RigInstancePlugin::live(), folder.path());
     let handle = game.app.world().resource::<AssetServer>().load::<RigTemplate>("t.rig.ron");
     let instance = game.app.world_mut().spawn((RigInstance(handle), InstanceMode::Hierarchy)).id();
     game.until("the character", |told| told.built == 1);
-    let height = |game: &mut Game| {
+    let height = |game: &mut AppBench| {
         let knee = game.node(instance, "knee");
         game.app.world().get::<GlobalTransform>(knee).unwrap().translation().y
     };
