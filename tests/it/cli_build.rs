@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use crate::exports::exports;
 
-/// What the binary said.
+/// Answer of the binary.
 pub struct Answer {
     pub code: i32,
     pub out: String,

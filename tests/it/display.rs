@@ -580,7 +580,7 @@ fn wrong_numbers_draw_nothing_and_break_nothing() {
     assert_eq!(triangles(&bench.meshes(DisplayPiece::Surface)), 8 - 2);
 }
 
-/// What a frame hands to the renderer.
+/// Data that a frame hands to the renderer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct RenderUpload {
     mesh_bytes: usize,

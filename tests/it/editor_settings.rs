@@ -181,7 +181,7 @@ fn a_save_that_fails_is_told_once_and_made_up_for() {
     assert_eq!(fs::read(&path).unwrap(), content);
 }
 
-/// What is changed before the file is looked at for the first time is kept as what is changed later.
+/// Changes before the first look at the file are kept like later ones.
 #[test]
 fn changes_of_the_first_second_are_kept() {
     let folder = tempfile::tempdir().unwrap();

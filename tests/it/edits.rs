@@ -14,7 +14,7 @@ use rigsmith::{
     },
 };
 
-/// What a random step is made of: kind, two joints, a place.
+/// Material of a random step: kind, two joints, a place.
 pub type Step = (u8, u16, u16, [i8; 3]);
 
 pub fn steps(most: usize) -> impl Strategy<Value = Vec<Step>> {

@@ -36,7 +36,7 @@ use super::{
     template_text::{CHAIN, Dice},
 };
 
-/// What instances told.
+/// Reports of instances.
 #[derive(Resource, Default, Debug)]
 struct InstanceReport {
     built: usize,

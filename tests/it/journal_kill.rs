@@ -41,9 +41,9 @@ use crate::{
 const FOLDER: &str = "RIGSMITH_TEST_JOURNAL_FOLDER";
 const SEED: &str = "RIGSMITH_TEST_JOURNAL_SEED";
 const KILLS: &str = "RIGSMITH_KILLS";
-/// What may be lost at most.
+/// Time whose changes may be lost at most.
 const BLINK: Duration = Duration::from_millis(250);
-/// How many kills go on at the same time.
+/// Number of kills that go on at the same time.
 const TOGETHER: usize = 4;
 
 /// A rig that is edited at random; the same seed gives the same edits.
@@ -163,7 +163,7 @@ fn child_that_edits_until_killed() {
     }
 }
 
-/// What one kill came to.
+/// Outcome of one kill.
 #[derive(Debug, Default, Clone, Copy)]
 struct Outcome {
     changes: u64,

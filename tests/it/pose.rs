@@ -29,7 +29,7 @@ fn two_arms() -> (Bench, Uid, Vec<Uid>, Vec<Uid>) {
     (bench, hips, left, right)
 }
 
-/// What the pose does to a point of the mesh that is at rest and moves with the joint.
+/// Movement that the pose gives a point of the mesh that is at rest and moves with the joint.
 fn moves(rig: &Rig, joint: Uid) -> Affine3 {
     rig.posed_global(joint) * rig.rest_global(joint).inverse()
 }

@@ -287,7 +287,7 @@ fn open_shape(model: &Model) -> MeshShape {
     MeshShape::Open { rest: Arc::new(model.at_rest()), triangles: model.point_triangles().into() }
 }
 
-/// What the editor would save after opening.
+/// Project that the editor would save after opening.
 fn to_save(loaded: LoadedProject) -> ProjectToSave {
     let meshes = loaded.meshes.into_iter().map(|mesh| MeshToSave {
         uid: mesh.uid,
@@ -595,7 +595,8 @@ fn the_template_that_a_rig_follows_is_kept_with_its_version() {
     assert_eq!(folder.load().templates, [ProjectTemplate { path, ..followed }]);
 }
 
-/// Weights of some points, with a joint that joins the list, are saved with the others; taking them back gives the first file.
+/// Weights of some points, with a joint that joins the list, are saved with the others; taking them back gives the first
+/// file.
 #[test]
 fn painted_weights_are_saved_with_the_project() {
     let folder = Folder::new();

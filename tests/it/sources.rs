@@ -369,7 +369,7 @@ fn rewrite(joints: &mut Vec<Option<FileJoint>>, dice: &mut Dice, number: usize) 
     kind == 3 || kind == 4
 }
 
-/// What must stay through an update: poses and values of nodes, and where the joints stand.
+/// State that must stay through an update: poses and values of nodes, and places of the joints.
 #[derive(Debug, PartialEq)]
 struct PosedState {
     pose: std::collections::BTreeMap<Uid, PoseOffset>,

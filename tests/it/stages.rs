@@ -72,7 +72,7 @@ impl RigBench {
         self.rig().walk().map(place).collect()
     }
 
-    /// What a stage shows: the commands in effect, whether edits rebuild, and whether the rest pose is shown.
+    /// View of a stage: the commands in effect, whether edits rebuild, and whether the rest pose is shown.
     fn stage_view(&self) -> (usize, bool, bool) {
         let processor = self.get::<Processor>(self.rig).unwrap();
         let rest = self.get::<ShowRest>(self.rig).unwrap().0;

@@ -42,7 +42,7 @@ pub struct Body {
     path: PathBuf,
     joints: Vec<(String, Vec3)>,
     bones: Vec<(Limb, Vec3, Vec3)>,
-    /// Whether left and right stand alike.
+    /// True if left and right stand alike.
     symmetric: bool,
 }
 
@@ -187,13 +187,13 @@ enum Camera {
     Perspective,
 }
 
-/// What is drawn and how.
+/// Drawing of one try: its view, its strokes and its settings.
 #[derive(Debug, Clone, Copy)]
 struct Sketch {
     camera: Camera,
     /// 0 between the shoulders, 1 the neck, 2 the head.
     spine_to: usize,
-    /// Whether the arm ends in the hand, not at the wrist.
+    /// True if the arm ends in the hand, not at the wrist.
     to_hand: bool,
     /// Joints of spine, arm and leg, or the default threshold.
     joints: Option<[usize; 3]>,
@@ -302,7 +302,7 @@ impl Bench {
         odd.count() >= 2
     }
 
-    /// What is wrong with the biped that was drawn.
+    /// Faults of the biped that was drawn.
     fn faults(&self, body: &Body, sketch: Sketch, [spine, arm, leg]: &[Vec<Uid>; 3]) -> Vec<String> {
         let rig = self.bench.rig();
         let mut faults = Vec::new();

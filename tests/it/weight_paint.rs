@@ -678,7 +678,7 @@ fn computed_weights_that_wait_can_be_dropped() {
     assert_eq!(*bench.rig(), before);
 }
 
-/// What was undone before a person asked goes with the result, as with any other edit.
+/// Steps that were undone before a person asked go with the result, as with any other edit.
 #[test]
 fn weights_that_are_asked_for_after_an_undo_do_not_wait_for_it() {
     let (mut bench, [one, other], joints) = app();

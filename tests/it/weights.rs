@@ -64,7 +64,7 @@ fn weight(weights: &Weights, point: usize, joint: u32) -> f32 {
     weights.of(point).find(|e| e.0 == joint).map_or(0.0, |e| e.1)
 }
 
-/// What every result must be.
+/// Demands on every result.
 fn check_sound(weights: &Weights, points: usize, joints: &[WeightJoint], most: usize) {
     assert_eq!(weights.len(), points);
     let any = joints.iter().any(|j| j.deforms);

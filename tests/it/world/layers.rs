@@ -123,7 +123,7 @@ mod drawn_layers {
         ink.tints.clone()
     }
 
-    /// What a click on the outline of the control selects.
+    /// Nodes that a click on the outline of the control selects.
     fn click(stage: &mut RigBench, control: Uid) -> Vec<Uid> {
         let entity = stage.node(control).unwrap();
         let place = stage.get::<GlobalTransform>(entity).unwrap().affine();

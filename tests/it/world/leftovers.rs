@@ -78,7 +78,7 @@ fn despawned_joints_take_the_pose_of_their_controls_along() {
     assert_eq!(bytes(stage.rig()), before);
 }
 
-/// What is switched off may be switched on again, so its pose stays.
+/// Features that are off may be switched on again, so their poses stay.
 #[test]
 fn what_is_switched_off_keeps_its_pose() {
     let (mut stage, controls) = posed();

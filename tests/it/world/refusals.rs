@@ -223,7 +223,7 @@ fn a_result_of_somebody_else_is_put_back() {
     }
 }
 
-/// What other code writes to the visibility of a node is put back in the same frame; entities that are no nodes are left
+/// Visibility of a node that other code writes is put back in the same frame; entities that are no nodes are left
 /// alone.
 #[test]
 fn a_visibility_of_somebody_else_is_put_back() {

@@ -36,7 +36,7 @@ fn shown(stage: &mut RigBench) -> Shown {
         .collect()
 }
 
-/// What nodes show; fails unless it is the same in an app that opens the document as it is now.
+/// State of visibility of the nodes; fails unless it is the same in an app that opens the document as it is now.
 #[track_caller]
 fn as_opened(stage: &mut RigBench, what: &str) -> Shown {
     let mut opened = RigBench::of_built(stage.rig().clone());
