@@ -1,4 +1,4 @@
-//! A window without a window: the app that opens and saves documents, and the notices that it gives.
+//! A window without a window: the app that opens and saves documents, and its notices.
 
 use std::path::PathBuf;
 
@@ -13,7 +13,7 @@ use rigsmith::{
     test_app::strict_app,
 };
 
-use crate::bench::AppBench;
+use crate::bench::{AppBench, wait_with};
 
 impl AppBench {
     /// An app with these plugins of the window, whose journals lie in a folder.
@@ -51,5 +51,31 @@ impl Notices {
     /// True if there was one of this severity with this in its text.
     pub fn include(&self, severity: Severity, part: &str) -> bool {
         self.list.iter().any(|notice| notice.severity == severity && notice.text.contains(part))
+    }
+}
+
+/// An app that opens and saves documents, and its notices.
+pub struct WindowBench {
+    pub base: AppBench,
+    pub notices: Notices,
+}
+
+impl WindowBench {
+    pub fn with_files<M>(state: PathBuf, plugins: impl Plugins<M>) -> Self {
+        Self { base: AppBench::with_files(state, plugins), notices: Notices::default() }
+    }
+
+    pub fn world(&self) -> &World {
+        self.base.app.world()
+    }
+
+    pub fn frame(&mut self) {
+        self.base.app.update();
+        self.notices.read(&self.base.app);
+    }
+
+    #[track_caller]
+    pub fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
+        wait_with(self, what, Self::frame, done, |window| window.notices.list.clone());
     }
 }
