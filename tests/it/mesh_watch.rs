@@ -3,7 +3,6 @@
 use std::{fs, time::Duration};
 
 use bevy::prelude::*;
-
 use rigsmith::{
     editor::{
         ActiveRig,
