@@ -1,5 +1,9 @@
 //! Files in the window, without the window: opening, saving, asking, recovering.
 
+mod crashes;
+mod exporting;
+mod failures;
+
 use std::{
     path::{Path, PathBuf},
     time::{Duration, Instant},
@@ -249,110 +253,6 @@ fn what_was_saved_opens_the_same() {
 }
 
 #[test]
-fn a_crash_loses_nothing() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    window.place(1.0);
-    window.place(0.5);
-    window.change(Change::Undo);
-    let (rig, points) = (window.rig(), window.mesh().map(|mesh| mesh.rest.points.clone()));
-    let journal = window.journal();
-    assert!(journal.starts_with(folder.path().join("state")));
-    drop(window);
-
-    let mut window = Window::bundled(folder.path());
-    let Some(Question::Recover(list)) = window.question() else { panic!("nothing is offered") };
-    let pending = list.iter().find(|pending| pending.path == journal).expect("our work is offered");
-    assert_eq!(pending.changes, 3);
-    window.answer(Answer::Recover(journal.clone()));
-    assert_eq!(window.rig(), rig, "{:?}", window.notices.list);
-    assert_eq!(window.mesh().map(|mesh| mesh.rest.points.clone()), points);
-    assert!(window.is_unsaved(), "recovered work is in no file");
-    window.change(Change::Redo);
-    assert_eq!(window.rig().len(), rig.len() + 1, "what was undone can be done again");
-    window.change(Change::Undo);
-    window.change(Change::Undo);
-    assert_eq!(window.rig().len(), rig.len() - 1);
-    // A second crash.
-    drop(window);
-    let mut window = Window::bundled(folder.path());
-    let offered = match window.question() {
-        Some(Question::Recover(list)) => list.iter().find(|p| p.path.starts_with(folder.path())).cloned(),
-        _ => None,
-    };
-    let offered = offered.expect("the work that went on is offered");
-    window.answer(Answer::Forget(offered.path.clone()));
-    assert!(!offered.path.exists());
-}
-
-#[test]
-fn a_damaged_journal_is_offered_recovered_and_kept() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    for height in [1.0, 0.5, 0.25] {
-        window.place(height);
-    }
-    let journal = window.journal();
-    drop(window);
-    let mut bytes = std::fs::read(&journal).expect("the journal of the crash");
-    // In the text of the last step but one.
-    let middle = bytes.windows(5).enumerate().filter(|(_, word)| word == b"after").map(|(at, _)| at).nth(1).unwrap();
-    bytes[middle] ^= 1;
-    std::fs::write(&journal, &bytes).unwrap();
-    let unreadable = folder.path().join("state/rigsmith-00000000000000aa.journal");
-    std::fs::write(&unreadable, b"RIGJRNL\0 and nothing that makes sense").unwrap();
-
-    let mut window = Window::bundled(folder.path());
-    let Some(Question::Recover(list)) = window.question() else { panic!("nothing is offered") };
-    let of = |path: &Path| list.iter().find(|pending| pending.path == path).expect("it is offered");
-    let (damaged, hopeless) = (of(&journal), of(&unreadable));
-    assert!(can_recover(damaged) && !can_recover(hopeless));
-    let text = describe(damaged);
-    assert!(text.starts_with("the bundled character: 2 edits, damaged: "), "{text}");
-    assert!(text.ends_with(" records can be recovered"), "{text}");
-    assert!(describe(hopeless).contains("none of its records can be read"), "{}", describe(hopeless));
-    window.answer(Answer::Recover(journal.clone()));
-    assert_eq!(window.rig().walk().filter(|joint| joint.data.rest.translation.y == 0.5).count(), 0);
-    assert!(window.rig().walk().any(|joint| joint.data.rest.translation.y == 0.25), "what came after the damage");
-    assert!(window.notices.include(Severity::Warning, "the journal was damaged"), "{:?}", window.notices.list);
-    assert!(window.notices.include(Severity::Warning, "is kept as"), "{:?}", window.notices.list);
-    assert!(window.notices.include(Severity::Info, "a step is lost after 1 edit"), "{:?}", window.notices.list);
-    let mut kept = journal.clone().into_os_string();
-    kept.push(".damaged");
-    assert_eq!(std::fs::read(&kept).unwrap(), bytes);
-    // Nobody is asked about the other one again before the next start, and it stays until somebody says so.
-    window.answer(Answer::Cancel);
-    assert!(unreadable.exists());
-    drop(window);
-    let mut window = Window::bundled(folder.path());
-    window.answer(Answer::Forget(unreadable.clone()));
-    assert!(!unreadable.exists() && PathBuf::from(kept).exists());
-}
-
-#[test]
-fn a_crash_after_saving_recovers_what_came_later() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    window.place(1.0);
-    let path = window.save_as("guy.rigsmith.ron");
-    window.place(0.5);
-    let rig = window.rig();
-    drop(window);
-    let mut window = Window::new(folder.path());
-    window.open_file(&path);
-    let Some(Question::Recover(list)) = window.question() else {
-        panic!("nothing is offered beside the project: {:?}", window.notices.list)
-    };
-    let ours: Vec<_> = list.iter().filter(|pending| pending.path.starts_with(folder.path())).cloned().collect();
-    assert_eq!(ours.iter().map(|pending| pending.changes).collect::<Vec<_>>(), [1]);
-    window.answer(Answer::Recover(ours[0].path.clone()));
-    assert_eq!(window.rig(), rig);
-    assert_eq!(title(window.world()), "guy* - Rigsmith");
-    window.act(Action::Save);
-    assert!(!window.is_unsaved() && window.question().is_none(), "it knows where it was saved");
-}
-
-#[test]
 fn quitting_asks_about_unsaved_changes_and_leaves_no_journal() {
     let folder = folder();
     let mut window = Window::bundled(folder.path());
@@ -434,42 +334,6 @@ fn what_dead_saves_left_is_cleared_at_the_start() {
 }
 
 #[test]
-fn files_that_are_nothing_lose_nothing() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    window.place(1.0);
-    let rig = window.rig();
-    let cases: &[(&str, &[u8], &str)] = &[
-        ("notes.txt", b"hello", ".obj, .gltf, .glb or .vrm"),
-        ("weights.skin", b"hello", "only weights"),
-        ("strokes.ron", b"[]", "neither template nor project"),
-    ];
-    for (name, bytes, said) in cases {
-        let path_buf = folder.path().join(name);
-        std::fs::write(&path_buf, bytes).expect("written");
-        let entity = window.base.open_rig();
-        window.send(FileDragAndDrop::DroppedFile { window: entity, path_buf });
-        assert!(window.notices.include(Severity::Error, said), "{name}: {:?}", window.notices.list);
-        assert_eq!(window.rig(), rig, "{name}");
-        assert!(window.question().is_none(), "{name}: nothing to ask about");
-    }
-    // By their names these could be something: what they hold is told after asking.
-    window.change(Change::Undo);
-    for (name, bytes) in
-        [("a.glb", &b"hello"[..]), ("b.rigsmith.ron", b"hello"), ("c.rig.ron", b"hello"), ("d.obj", b"")]
-    {
-        let path = folder.path().join(name);
-        std::fs::write(&path, bytes).expect("written");
-        window.notices.list.clear();
-        window.open_file(&path);
-        assert!(window.notices.include(Severity::Error, name), "{name}: {:?}", window.notices.list);
-        assert!(window.mesh().is_some(), "{name}: the character is still open");
-    }
-    window.open_file(&folder.path().join("gone.obj"));
-    assert!(window.notices.include(Severity::Error, "gone.obj"));
-}
-
-#[test]
 fn a_template_is_put_onto_the_mesh() {
     let folder = folder();
     let mut window = Window::bundled(folder.path());
@@ -510,60 +374,6 @@ fn a_template_is_put_onto_the_mesh() {
     assert!(window.mesh().is_some());
 }
 
-#[test]
-fn clips_of_the_document_are_exported_as_they_are_edited() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    window.place(1.0);
-    window.export("none.anim.ron");
-    assert!(window.notices.include(Severity::Error, "no clips to export"));
-    let joint = window.rig().roots()[0];
-    let mut clip = RigClip { range: [0.5, 1.5], ..RigClip::new(Uid(77), Uid(78), "turn") };
-    let keys = [0.5, 1.0, 1.5].map(|time| Key::rotation(time, Quat::from_rotation_z(time))).to_vec();
-    let target = TrackTarget { node: joint, property: Property::Rotation };
-    clip.layers[0].tracks.insert(target, std::sync::Arc::new(Track { keys }));
-    window.change(Change::Do(Operation::Edits(vec![RigEdit::AddClip(Box::new(clip.clone()), 0)])));
-    let bytes = std::fs::read(window.export("turn.glb")).expect("a file");
-    let file = gltf::Gltf::from_slice(&bytes).expect("a model");
-    let animations: Vec<_> = file.animations().collect();
-    assert_eq!((animations.len(), animations[0].name()), (1, Some("turn")));
-    let channel = animations[0].channels().next().expect("a channel");
-    let blob = file.blob.clone().expect("a buffer");
-    let reader = channel.reader(|_| Some(&blob[..]));
-    let times: Vec<f32> = reader.read_inputs().expect("times").collect();
-    assert_eq!((times[0], times[times.len() - 1]), (0.0, 1.0), "a clip begins at zero");
-    // The clips alone come back as they were, and a file with animations opens with them.
-    let read = load_animation(&RealDisk, &window.export("turn.anim.ron")).expect("clips");
-    assert_eq!(read.clips, [clip]);
-    window.open_file(&folder.path().join("turn.glb"));
-    window.answer(Answer::Discard);
-    let clips = window.rig().clips().to_vec();
-    assert_eq!((clips.len(), clips[0].name.as_str()), (1, "turn"), "{:?}", window.notices.list);
-    assert!(clips[0].key_count() >= 2 && !has_unsaved_changes(window.world()));
-}
-
-#[test]
-fn exports_can_be_read_back() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    window.place(1.0);
-    let file = std::fs::read(window.export("out.glb")).expect("a file");
-    let file = gltf::Gltf::from_slice(&file).expect("glTF");
-    let bare = file.nodes().filter(|node| node.mesh().is_none()).count();
-    assert_eq!(bare, 1, "the joint is written though nothing is skinned");
-    let template = load_template(&RealDisk, &window.export("out.rig.ron")).expect("a template");
-    assert_eq!(template.rig.len(), 1);
-    window.export("out.rig");
-    window.export("out.obj");
-    assert!(["out.rig", "out.obj"].iter().all(|name| folder.path().join(name).exists()));
-    window.export("out.skin");
-    assert!(window.notices.include(Severity::Error, "skin the mesh first"));
-    window.export("out.glb");
-    assert!(matches!(window.question(), Some(Question::Replace { .. })), "it is there already");
-    window.answer(Answer::Save);
-    assert!(window.is_unsaved(), "an export is no save");
-}
-
 /// A character of Rigsmith in a document's rig, as a fit puts it there, keeps its parts in the first file and in the next ones.
 #[test]
 fn what_a_fit_made_keeps_its_parts_in_its_first_file() {
@@ -587,47 +397,6 @@ fn what_a_fit_made_keeps_its_parts_in_its_first_file() {
         assert_eq!((read.rig.uid(), diff(&read.rig, &window.rig())), (window.rig().uid(), Vec::new()));
         assert_eq!(read.rig.joint(thigh).expect("a thigh").data.rest.translation.y, height);
     }
-}
-
-#[test]
-fn a_failed_save_keeps_everything() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    window.place(1.0);
-    window.save_as("missing/guy.rigsmith.ron");
-    assert!(window.notices.include(Severity::Error, "There is no folder"));
-    window.answer(Answer::Cancel);
-    let path = window.save_as("guy.rigsmith.ron");
-    window.place(0.5);
-    // A folder where the file was: nothing can take its place.
-    std::fs::remove_file(&path).expect("removed");
-    std::fs::create_dir_all(path.join("in the way")).expect("made");
-    window.act(Action::Save);
-    assert!(window.notices.include(Severity::Error, "Could not write guy.rigsmith.ron"), "{:?}", window.notices.list);
-    assert!(window.is_unsaved());
-    assert!(window.journal().exists());
-}
-
-#[test]
-fn an_unwritable_folder_for_journals_is_told_and_work_goes_on() {
-    let folder = folder();
-    let file = folder.path().join("file");
-    std::fs::write(&file, "in the way").expect("written");
-    let mut window = Window::with_state(folder.path(), file.join("state"));
-    window.open(OpenRequest::Bundled);
-    window.place(1.0);
-    let journal = window.journal();
-    assert!(journal.starts_with(std::env::temp_dir()), "{}", journal.display());
-    window.settle();
-    let told = |window: &Window| window.notices.list.iter().filter(|n| n.text.contains("RIGSMITH_STATE")).count();
-    assert_eq!(told(&window), 1, "{:?}", window.notices.list);
-    let path = window.save_as("guy.rigsmith.ron");
-    assert!(path.exists() && !window.is_unsaved());
-    assert_eq!(told(&window), 1, "told once");
-    let steps = window.world().get::<RigHistory>(window.base.open_rig()).map(|history| history.steps().1);
-    assert_eq!(steps, Some(1));
-    window.act(Action::Quit);
-    assert!(!journal.exists());
 }
 
 /// Waits until the journal of a window is at a path.
@@ -667,53 +436,4 @@ fn the_second_window_on_a_project_is_told() {
     wait_for_journal(&third, &journal_beside(&project));
     third.settle();
     assert!(!told(&third), "{:?}", third.notices.list);
-}
-
-#[test]
-fn presets_give_exports_the_names_of_other_programs_and_the_result_is_read_back() {
-    let folder = folder();
-    let mut window = Window::new(folder.path());
-    window.open(OpenRequest::Template("biped".into()));
-    let cases = [
-        (SkeletonPreset::Plain, "hand_l"),
-        (SkeletonPreset::Mixamo, "mixamorig:LeftHand"),
-        (SkeletonPreset::Unreal, "hand_l"),
-        (SkeletonPreset::Unity, "LeftHand"),
-        (SkeletonPreset::Vrm, "leftHand"),
-    ];
-    for (number, (preset, hand)) in cases.into_iter().enumerate() {
-        window.base.app.insert_resource(ExportOptions { preset, author: String::new() });
-        let path = window.export(&format!("{number}.glb"));
-        let model = load_model(&RealDisk, &path).expect("a model");
-        assert!(model.nodes.iter().any(|node| node.name == hand), "{preset:?}");
-        let counts = format!("Exported {number}.glb; read back: {} joints", model.nodes.len());
-        assert!(window.notices.include(Severity::Done, &counts), "{counts}: {:?}", window.notices.list);
-    }
-    window.export("rig.rig.ron");
-    assert!(window.notices.include(Severity::Done, "Exported rig.rig.ron; read back:"), "{:?}", window.notices.list);
-}
-
-#[test]
-fn avatars_are_exported_with_an_author() {
-    let folder = folder();
-    let mut window = Window::new(folder.path());
-    window.open(OpenRequest::Template("biped".into()));
-    let mut about = window.rig().about().clone();
-    about.author.clear();
-    window.change(Change::Do(Operation::Edits(vec![RigEdit::SetAbout(Box::new(about))])));
-    let before = window.rig();
-    let path = window.export("nobody.vrm");
-    assert!(
-        window.notices.include(Severity::Error, "requires an author") && !path.exists(),
-        "{:?}",
-        window.notices.list
-    );
-    window.base.app.insert_resource(ExportOptions { author: "Ann".into(), ..default() });
-    let path = window.export("ann.vrm");
-    assert!(window.notices.include(Severity::Done, "Exported ann.vrm; read back:"), "{:?}", window.notices.list);
-    let bytes = std::fs::read(&path).expect("an avatar");
-    let avatar = rigsmith::mesh::gltf::read_avatar(&bytes, "ann.vrm").expect("VRM").expect("an avatar");
-    assert_eq!(avatar.vrm.meta.authors, ["Ann"]);
-    assert!(avatar.vrm.humanoid.human_bones.contains_key("leftHand"));
-    assert_eq!(window.rig(), before, "an export changes nothing");
 }
