@@ -1,6 +1,6 @@
 //! Rays, closest points, volumes and skinning, through the public API.
 
-mod volumes;
+mod nearest;
 
 use glam::{Affine3A, Quat, Vec3};
 use rigsmith::mesh::adjacency::{Edge, edges, islands, weld};

@@ -74,7 +74,7 @@ impl RigBench {
     }
 
     /// The node with that label.
-    pub fn labelled(&self, label: &str) -> Entity {
+    pub fn labelled_node(&self, label: &str) -> Entity {
         let built = self.built();
         self.node(built.find_label(label).unwrap_or_else(|| panic!("no {label}")).uid).unwrap()
     }

@@ -342,7 +342,7 @@ fn nothing_that_happens_to_entities_panics_or_leaves_a_stale_handle() {
         assert!(stage.off() <= NEAR);
     }
     // What the build wrote stays as it was built.
-    let control = stage.labelled("hand_l");
+    let control = stage.labelled_node("hand_l");
     let label = stage.get::<NodeLabel>(control).cloned();
     let node =
         nodes.iter().map(|(uid, _)| stage.node(*uid).unwrap()).find(|entity| stage.get::<NodeLabel>(*entity).is_some());
