@@ -1,6 +1,6 @@
 //! Start page, tour, help and settings of the window, without the window: pages are drawn as the dock draws them, and clicked.
 
-mod help;
+mod guidance;
 
 use std::{
     fs,
