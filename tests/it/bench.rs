@@ -147,6 +147,13 @@ impl RigBench {
         Self::with(test_app(), rig)
     }
 
+    /// A rig after its first frame.
+    pub fn started(rig: Rig) -> Self {
+        let mut bench = Self::of(rig);
+        bench.app.update();
+        bench
+    }
+
     pub fn with(mut app: App, bundle: impl Bundle) -> Self {
         let rig = app.world_mut().spawn(bundle).id();
         Self { app, rig }

@@ -50,13 +50,6 @@ pub fn shipped() -> Vec<(String, Rig)> {
 }
 
 impl RigBench {
-    /// A rig after its first frame.
-    pub fn started(rig: Rig) -> Self {
-        let mut bench = Self::of(rig);
-        bench.app.update();
-        bench
-    }
-
     /// A rig of which every command is in effect.
     pub fn of_built(rig: Rig) -> Self {
         let mut bench = Self::started(rig);
