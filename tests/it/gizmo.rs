@@ -128,8 +128,7 @@ impl Bench {
     }
 
     fn pointer(&mut self, at: Vec2, act: PointerAct, held: ModifierKeys) {
-        self.base.app.world_mut().write_message(ViewportPointer { at, act, held });
-        self.base.app.update();
+        self.base.send(ViewportPointer { at, act, held });
     }
 
     /// A press, two moves; the button stays down.
@@ -336,8 +335,7 @@ fn escape_and_other_edits_take_a_drag_back_to_the_bit() {
         bench.base.edit(Operation::Lock(vec![root], true));
         bench.pointer(from, PointerAct::Dragged, ModifierKeys::default());
         bench.release(from + 50.0);
-        bench.base.app.world_mut().write_message(EditRequest { rig: bench.base.rig, change: Change::Undo });
-        bench.base.app.update();
+        bench.base.change(Change::Undo);
         assert_eq!(*bench.base.rig(), before, "{mode:?}: the other edit had the preview in it");
     }
 }

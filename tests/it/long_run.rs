@@ -19,7 +19,7 @@ use rigsmith::{
     modules,
     plugins::{
         animation::ClipPlayer,
-        commands::{BuildRequest, BuildResult, BuildStep, BuiltEntities, Processor},
+        commands::{BuildResult, BuildStep, BuiltEntities, Processor},
         document::{Change, Selection},
         history::{MOST_STEPS, MOST_WEIGHT_BYTES, RigHistory},
         schema::{ConstraintKind, ParkedNode},
@@ -202,8 +202,7 @@ impl LongRun {
             25..=27 => {
                 let step = [BuildStep::RollBack, BuildStep::Back, BuildStep::Restart, BuildStep::To(2)];
                 for step in [step[number % 4].clone(), BuildStep::All] {
-                    self.base.app.world_mut().write_message(BuildRequest { rig, step });
-                    self.base.app.update();
+                    self.base.step(step);
                 }
             }
             28 | 29 => {

@@ -101,8 +101,7 @@ fn jobs_are_given_up_when_their_time_is_over() {
 fn builds_obey_the_limits_of_the_app() {
     let mut bench = Bench::new(RigLimits::default().with(Limit::Nodes, 1));
     let build = |bench: &mut Bench| {
-        bench.base.app.world_mut().write_message(BuildRequest { rig: bench.base.rig, step: BuildStep::All });
-        bench.base.app.update();
+        bench.base.step(BuildStep::All);
         bench.base.app.update();
         let failure = bench.base.get::<BuildFailure>(bench.base.rig).map(|failure| failure.0.to_string());
         let made = bench.base.get::<BuildResult>(bench.base.rig).map(|built| built.0.nodes.len());

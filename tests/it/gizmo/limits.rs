@@ -66,8 +66,7 @@ fn gizmos_keep_controls_within_their_channels_and_limits() {
                 reached[1] |= (held.rotation.angle_between(Quat::IDENTITY).to_degrees() - 10.0).abs() < 1e-2;
                 assert!(bench.base.steps() <= steps + 1, "{what}: a drag is one step");
                 if bench.base.steps() > steps {
-                    bench.base.app.world_mut().write_message(EditRequest { rig: bench.base.rig, change: Change::Undo });
-                    bench.base.app.update();
+                    bench.base.change(Change::Undo);
                 }
                 assert!(offset(&bench, control).is_rest(1e-6), "{what}: undone");
                 bench.base.app.update();

@@ -123,8 +123,7 @@ fn a_click_takes_a_control_and_the_gizmo_moves_what_it_drives() {
             assert!(global(&bench, elbow).distance(before) > 1e-3, "the elbow follows");
         }
         assert_eq!(bench.base.steps(), steps + 1);
-        bench.base.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-        bench.base.app.update();
+        bench.base.change(Change::Undo);
         assert!(global(&bench, wrist).distance(hand) < 1e-5);
 
         // Drawing a skeleton, nobody takes a control by mistake.

@@ -87,8 +87,7 @@ fn a_joint_goes_with_the_pointer_in_one_step() {
                     |rig: &Rig| rig.posed_global(above).translation.distance(rig.posed_global(below).translation);
                 assert!((length(&rig) - length(&before)).abs() < 1e-4, "bones keep their lengths");
             }
-            bench.base.app.world_mut().write_message(EditRequest { rig: bench.base.rig, change: Change::Undo });
-            bench.base.app.update();
+            bench.base.change(Change::Undo);
             assert_eq!(*bench.base.rig(), before);
 
             // Escape takes it back to the bit, and the drag does not go on.
@@ -179,8 +178,7 @@ fn a_built_rig_is_pulled_by_its_controls() {
         );
         let is_goal = |node: &Uid| matches!(&switch.matching, Matching::IkFk { goal, .. } if goal == node);
         assert_eq!(posed.iter().any(is_goal), value == 1.0, "{posed:?}");
-        bench.base.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-        bench.base.app.update();
+        bench.base.change(Change::Undo);
         bench.base.app.update();
         assert_eq!(*bench.base.rig(), before);
         assert!(pixel(&bench, hand).distance(from) < 0.5);

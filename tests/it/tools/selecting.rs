@@ -78,8 +78,7 @@ fn actions_work_on_the_selection() {
     bench.click(PLAIN, bench.pixel(joints[3]));
     bench.act(Action::MirrorSelected);
     assert_eq!(bench.rig().len(), joints.len() + 3);
-    bench.app.world_mut().write_message(EditRequest { rig: bench.rig, change: Change::Undo });
-    bench.app.update();
+    bench.change(Change::Undo);
     bench.act(Action::DeleteHierarchy);
     assert_eq!(bench.rig().len(), 3);
     bench.act(Action::Symmetry);

@@ -19,8 +19,7 @@ fn what_is_previewed_is_what_is_taken() {
         let at = Vec2::splat(400.0);
         bench.point(PLAIN, &[(at, PointerAct::Wheel(1.0)), (at, PointerAct::Wheel(2.0))]);
         assert_eq!(count(&bench), before + 3);
-        bench.app.world_mut().write_message(StrokeTune::Choice(ChainChoice::Joints(5)));
-        bench.app.update();
+        bench.send(StrokeTune::Choice(ChainChoice::Joints(5)));
         assert_eq!(count(&bench), 5);
         assert!(bench.status().hint.starts_with("5 joints"), "{:?}", bench.status());
         let mut shown: Vec<Vec3> = bench.ghosts().joints.iter().map(|joint| joint.position).collect();
