@@ -239,22 +239,13 @@ impl Workbench {
         let mut request = BindRequest::new(mesh);
         ask(&mut request);
         self.app.world_mut().write_message(request);
-        let pause = Pause::new();
-        loop {
-            self.app.update();
-            let bound = self.app.world_mut().resource_mut::<Messages<BindAnswer>>().drain().last();
-            if let Some(bound) = bound {
-                // The edit that binds the weights is applied in the next frame.
-                self.app.update();
-                let report = bound.result?;
-                return self.refused().map_or(Ok(report), Err);
-            }
-            if let Some(job) = self.app.world().get::<SkinningJob>(mesh) {
+        let bound: BindAnswer = self.await_answer("binding the mesh", |world| {
+            if let Some(job) = world.get::<SkinningJob>(mesh) {
                 progress(job.progress());
             }
-            self.check_time("binding the mesh")?;
-            pause.rest();
-        }
+        })?;
+        let report = bound.result?;
+        self.refused().map_or(Ok(report), Err)
     }
 
     /// Offers templates that fits may choose.
@@ -281,22 +272,13 @@ impl Workbench {
         let mut request = FitRequest::new(mesh);
         ask(&mut request);
         self.app.world_mut().write_message(request);
-        let pause = Pause::new();
-        loop {
-            self.app.update();
-            let fitted = self.app.world_mut().resource_mut::<Messages<FitAnswer>>().drain().last();
-            if let Some(fitted) = fitted {
-                // The edit that moves the joints is applied in the same frame or in the next one.
-                self.app.update();
-                let report = fitted.result?;
-                return self.refused().map_or(Ok(report), Err);
-            }
-            if let Some(job) = self.app.world().get::<FitJob>(mesh) {
+        let fitted: FitAnswer = self.await_answer("fitting the template", |world| {
+            if let Some(job) = world.get::<FitJob>(mesh) {
                 progress(job.progress());
             }
-            self.check_time("fitting the template")?;
-            pause.rest();
-        }
+        })?;
+        let report = fitted.result?;
+        self.refused().map_or(Ok(report), Err)
     }
 
     /// Places a face in the mesh, or moves the face's bones to fit shapes. `progress` is called with the current step
@@ -310,28 +292,20 @@ impl Workbench {
         let mesh = self.mesh.ok_or(WorkbenchError::NoMesh)?;
         self.forget_refusals();
         self.app.world_mut().write_message(FaceRequest { mesh, settings, fit });
-        let pause = Pause::new();
-        loop {
-            self.app.update();
-            let placed = self.app.world_mut().resource_mut::<Messages<FacePlaced>>().drain().last();
-            if let Some(placed) = placed {
-                // The edit that makes the face is applied in the next frame.
-                self.app.update();
-                let report = placed.result?;
-                while self.app.world().get::<FacePreparation>(mesh).is_some() {
-                    pause.rest();
-                    self.app.update();
-                }
-                return self.refused().map_or(Ok(report), Err);
-            }
-            if let Some(job) = self.app.world().get::<FaceJob>(mesh)
+        let placed: FacePlaced = self.await_answer("placing the face", |world| {
+            if let Some(job) = world.get::<FaceJob>(mesh)
                 && let Some(step) = job.step()
             {
                 progress(step, job.progress());
             }
-            self.check_time("placing the face")?;
+        })?;
+        let report = placed.result?;
+        let pause = Pause::new();
+        while self.app.world().get::<FacePreparation>(mesh).is_some() {
             pause.rest();
+            self.app.update();
         }
+        self.refused().map_or(Ok(report), Err)
     }
 
     /// Shows expressions and units by name, each with a strength from 0 to 1.5, in place of the current ones.
@@ -380,6 +354,28 @@ impl Workbench {
             });
         }
         self.operate(Operation::Named { name: "Store poses", edits })
+    }
+
+    /// Runs frames until the answer to a request comes, and one more for the edit that it makes. `look` is called between
+    /// them.
+    fn await_answer<A: Message>(
+        &mut self,
+        work: &'static str,
+        mut look: impl FnMut(&World),
+    ) -> Result<A, WorkbenchError> {
+        let pause = Pause::new();
+        loop {
+            self.app.update();
+            let answer = self.app.world_mut().resource_mut::<Messages<A>>().drain().last();
+            if let Some(answer) = answer {
+                // The edit is applied in this frame or in the next one.
+                self.app.update();
+                return Ok(answer);
+            }
+            look(self.app.world());
+            self.check_time(work)?;
+            pause.rest();
+        }
     }
 
     /// Drops refusals of earlier edits, which gestures have answered already, so that none is taken for the next

@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use bevy::prelude::*;
-
-use super::{Pause, Workbench, WorkbenchError};
+use super::{Workbench, WorkbenchError};
 use crate::{
     mesh::model::Model,
     plugins::mesh_reload::{ReloadAnswer, ReloadReport, ReloadRequest},
@@ -20,18 +18,8 @@ impl Workbench {
         self.check_time("exchanging the mesh")?;
         self.forget_refusals();
         self.app.world_mut().write_message(ReloadRequest { mesh, model: Arc::new(model) });
-        let pause = Pause::new();
-        loop {
-            self.app.update();
-            let answer = self.app.world_mut().resource_mut::<Messages<ReloadAnswer>>().drain().last();
-            if let Some(answer) = answer {
-                // The step that exchanges the mesh is made in this frame or in the next one.
-                self.app.update();
-                let report = answer.result?;
-                return self.refused().map_or(Ok(report), Err);
-            }
-            self.check_time("exchanging the mesh")?;
-            pause.rest();
-        }
+        let answer: ReloadAnswer = self.await_answer("exchanging the mesh", |_| {})?;
+        let report = answer.result?;
+        self.refused().map_or(Ok(report), Err)
     }
 }

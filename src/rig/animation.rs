@@ -28,7 +28,7 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub(in crate::rig) use self::check::{check_about, check_clip, check_keys, check_layer, check_tracks};
-pub(in crate::rig) use self::sample::slerp;
+pub(in crate::rig) use self::sample::{cubic_slope, slerp};
 pub use self::{
     check::{ClipFault, KeyFault},
     names::{KnownNode, NodeNames, OrphanedKeys, keys_set_aside, orphaned_keys},

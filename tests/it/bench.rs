@@ -1,13 +1,21 @@
-//! One rig in an app: what tests of plugins edit, wait for and look at.
+//! An app, mostly with one rig: what tests of plugins edit, wait for and look at.
 
-use std::time::{Duration, Instant};
+use std::{
+    fmt::Debug,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use bevy::prelude::*;
 use rigsmith::{
     files::{RealDisk, load_template},
-    plugins::document::JointEntities,
+    plugins::{
+        commands::{BuildRequest, BuildResult, BuildStep},
+        document::JointEntities,
+        history::RigHistory,
+    },
     prelude::*,
-    rig::operations::ClipOperation,
+    rig::{BuiltRig, operations::ClipOperation},
     test_app::test_app,
 };
 
@@ -23,9 +31,21 @@ pub fn shipped(name: &str) -> Rig {
 /// Runs frames until something holds, and gives background work some time between them.
 #[track_caller]
 pub fn wait<B>(bench: &mut B, what: &str, frame: impl Fn(&mut B), done: impl Fn(&B) -> bool) {
+    wait_with(bench, what, frame, done, |_| ());
+}
+
+/// Runs frames as [`wait`] does; the message of a wait without end has a state in it.
+#[track_caller]
+pub fn wait_with<B, S: Debug>(
+    bench: &mut B,
+    what: &str,
+    frame: impl Fn(&mut B),
+    done: impl Fn(&B) -> bool,
+    state: impl Fn(&B) -> S,
+) {
     let started = Instant::now();
     while !done(bench) {
-        assert!(started.elapsed() < HANG, "{what} does not come");
+        assert!(started.elapsed() < HANG, "{what} does not come: {:?}", state(bench));
         std::thread::sleep(Duration::from_millis(1));
         frame(bench);
     }
@@ -50,10 +70,70 @@ pub fn undo_meanwhile(app: &mut App, rig: Entity, step: Operation) {
     app.update();
 }
 
-/// An app with one rig.
-pub struct RigBench {
+/// An app, with one rig (`R` is its entity) or with none of the bench's own (`R` is `()`).
+///
+/// Tests of one subject add what only they do: as methods where the rig is all they have, else in a struct around the bench.
+pub struct Bench<R> {
     pub app: App,
-    pub rig: Entity,
+    pub rig: R,
+}
+
+/// An app with one rig.
+pub type RigBench = Bench<Entity>;
+
+/// An app without a rig, or one that opens rigs itself.
+pub type AppBench = Bench<()>;
+
+impl<R> Bench<R> {
+    pub fn get<C: Component>(&self, entity: Entity) -> Option<&C> {
+        self.app.world().get(entity)
+    }
+
+    pub fn messages<M: Message>(&mut self) -> Vec<M> {
+        self.app.world_mut().resource_mut::<Messages<M>>().drain().collect()
+    }
+
+    /// Writes a message and runs a frame.
+    pub fn send<M: Message>(&mut self, message: M) {
+        self.app.world_mut().write_message(message);
+        self.app.update();
+    }
+
+    pub fn frames(&mut self, count: usize) {
+        (0..count).for_each(|_| self.app.update());
+    }
+
+    #[track_caller]
+    pub fn wait(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
+        wait(self, what, |bench| bench.app.update(), done);
+    }
+
+    /// Runs frames until a message comes; the last one of its frame.
+    #[track_caller]
+    pub fn next_message<M: Message>(&mut self) -> M {
+        let started = Instant::now();
+        loop {
+            self.app.update();
+            if let Some(message) = self.messages::<M>().pop() {
+                return message;
+            }
+            assert!(started.elapsed() < HANG, "{} does not come", std::any::type_name::<M>());
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Sends a request and waits for its answer.
+    #[track_caller]
+    pub fn ask<Q: Message, A: Message>(&mut self, request: Q) -> A {
+        self.app.world_mut().write_message(request);
+        self.next_message()
+    }
+}
+
+impl AppBench {
+    pub fn bare(app: App) -> Self {
+        Self { app, rig: () }
+    }
 }
 
 impl RigBench {
@@ -67,6 +147,13 @@ impl RigBench {
         Self::with(test_app(), rig)
     }
 
+    /// A rig after its first frame.
+    pub fn started(rig: Rig) -> Self {
+        let mut bench = Self::of(rig);
+        bench.app.update();
+        bench
+    }
+
     pub fn with(mut app: App, bundle: impl Bundle) -> Self {
         let rig = app.world_mut().spawn(bundle).id();
         Self { app, rig }
@@ -76,18 +163,43 @@ impl RigBench {
         self.app.world().get(self.rig).unwrap()
     }
 
-    /// Writes a message and runs a frame.
-    pub fn send<M: Message>(&mut self, message: M) {
-        self.app.world_mut().write_message(message);
-        self.app.update();
-    }
-
     pub fn edit(&mut self, operation: Operation) {
         self.change(Change::Do(operation));
     }
 
     pub fn change(&mut self, change: Change) {
         self.send(EditRequest { rig: self.rig, change });
+    }
+
+    /// One edit as a step.
+    pub fn apply(&mut self, edit: RigEdit) {
+        self.apply_all(vec![edit]);
+    }
+
+    /// Edits as one step.
+    pub fn apply_all(&mut self, edits: Vec<RigEdit>) {
+        self.edit(Operation::Edits(edits));
+    }
+
+    pub fn step(&mut self, step: BuildStep) {
+        self.send(BuildRequest { rig: self.rig, step });
+    }
+
+    /// Result of the last build.
+    #[track_caller]
+    pub fn built(&self) -> Arc<BuiltRig> {
+        self.get::<BuildResult>(self.rig).expect("the rig is built").0.clone()
+    }
+
+    /// Names of the steps of the history, and the number of those in effect.
+    pub fn history(&self) -> (Vec<String>, usize) {
+        let (names, done) = self.get::<RigHistory>(self.rig).unwrap().steps();
+        (names.into_iter().map(str::to_owned).collect(), done)
+    }
+
+    /// Number of the steps in effect.
+    pub fn steps(&self) -> usize {
+        self.get::<RigHistory>(self.rig).unwrap().steps().1
     }
 
     /// Adds a chain of joints; the uids of all joints.
@@ -107,20 +219,7 @@ impl RigBench {
         self.find(joint).unwrap_or_else(|| panic!("{joint} has no entity"))
     }
 
-    pub fn get<C: Component>(&self, entity: Entity) -> Option<&C> {
-        self.app.world().get(entity)
-    }
-
-    pub fn messages<M: Message>(&mut self) -> Vec<M> {
-        self.app.world_mut().resource_mut::<Messages<M>>().drain().collect()
-    }
-
     pub fn surface(&self) -> Option<&RigSurface> {
         self.get(self.rig)
-    }
-
-    #[track_caller]
-    pub fn wait(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
-        wait(self, what, |bench| bench.app.update(), done);
     }
 }

@@ -43,7 +43,7 @@ fn commands_that_double_what_there_is_end_at_the_limit() {
     }
 }
 
-/// What was refused for the limit is built when earlier commands make less, and the build is the one from nothing.
+/// Commands that were refused for the limit are built when earlier commands make less, and the build is the one from nothing.
 #[test]
 fn a_refused_command_is_tried_again() {
     let mut rig = doubling(12);

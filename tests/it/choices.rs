@@ -20,7 +20,7 @@ fn run(rig: &mut Rig, operation: TagOperation) -> Result<(), String> {
     done.map(drop).map_err(|error| error.to_string())
 }
 
-/// Which of ccd, fabrik and soft are on, and the state of their feature.
+/// Switches of ccd, fabrik and soft, and the state of their feature.
 fn state(rig: &Rig) -> ([bool; 3], FeatureState) {
     let on = [0x30, 0x31, 0x32].map(|uid| rig.find_tag(Uid(uid)).unwrap().1.enabled);
     (on, combined_features(rig)[0].state)

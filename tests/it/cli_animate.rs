@@ -414,7 +414,7 @@ fn switches_are_thrown_over_clips() {
     assert!(!path("x.anim.ron").exists());
 }
 
-/// What is above the joints, such as a hat, is in the strip; and the strip says that it shows one clip of several.
+/// Parts of the mesh above the joints, such as a hat, are in the strip; and the strip says that it shows one clip of several.
 #[cfg(feature = "render")]
 #[test]
 fn a_strip_shows_the_whole_mesh() {

@@ -97,7 +97,7 @@ fn one_wrong_name_in_a_change_is_told_alone() {
     tells_what_it_says(folder.path(), "biped.rig.ron", &text.join("\n"));
 }
 
-/// What cannot be read is left out, and the rest is built.
+/// Parts that cannot be read are left out, and the rest is built.
 #[test]
 fn faults_of_the_structure_hide_no_others() {
     let folder = tempfile::tempdir().unwrap();
@@ -191,7 +191,7 @@ fn wrong_names_of_instances_are_told_all_at_once() {
     tells_what_it_says(folder.path(), "host.rig.ron", text);
 }
 
-/// What a part lacks because another one could not be put into the rig is no fault of its own.
+/// Nodes that a part lacks because another one could not be put into the rig are no fault of its own.
 #[test]
 fn what_a_part_at_fault_would_bring_is_not_missed() {
     let folder = tempfile::tempdir().unwrap();

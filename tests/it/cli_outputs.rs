@@ -7,9 +7,11 @@ use std::{
 };
 
 use rigsmith::{
-    files::{RealDisk, load_model, store_model},
+    files::{RealDisk, load_model, load_template, store_model},
     mesh::{gltf::GltfWriteSettings, model::Image},
+    rig::Rig,
 };
+use serde_json::Value;
 
 pub(super) fn rigsmith(folder: &Path, args: &[&str]) -> (i32, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_rigsmith")).current_dir(folder).args(args).output().unwrap();
@@ -17,6 +19,19 @@ pub(super) fn rigsmith(folder: &Path, args: &[&str]) -> (i32, String) {
     let said = text(&output.stdout) + &text(&output.stderr);
     assert!(!said.contains("panicked"), "{args:?} panicked: {said}");
     (output.status.code().unwrap(), said)
+}
+
+/// The rig of a template in a folder.
+pub(super) fn rig(folder: &Path, name: &str) -> Rig {
+    load_template(&RealDisk, &folder.join(name)).unwrap().rig
+}
+
+/// Runs the command with `--json`; its code, and the first value that it prints.
+pub(super) fn json(folder: &Path, args: &[&str]) -> (i32, Value) {
+    let (code, said) = rigsmith(folder, &[args, &["--json"]].concat());
+    let start = said.find('{').unwrap_or_else(|| panic!("{args:?}: {said}"));
+    let mut values = serde_json::Deserializer::from_str(&said[start..]).into_iter::<Value>();
+    (code, values.next().unwrap().unwrap_or_else(|error| panic!("{args:?}: {error}: {said}")))
 }
 
 const BOX: &str = "o box\nv -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n\

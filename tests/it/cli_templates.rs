@@ -13,7 +13,7 @@ use std::{
 };
 
 use rigsmith::{
-    files::{RealDisk, load_model, load_template},
+    files::{RealDisk, load_model},
     mesh::model::Model,
     modules,
     processor::{Builder, review},
@@ -21,18 +21,10 @@ use rigsmith::{
 };
 use serde_json::Value;
 
-use super::{bench::HANG, cli_outputs::rigsmith};
-
-fn rig(folder: &Path, name: &str) -> Rig {
-    load_template(&RealDisk, &folder.join(name)).unwrap().rig
-}
-
-fn json(folder: &Path, args: &[&str]) -> (i32, Value) {
-    let (code, said) = rigsmith(folder, &[args, &["--json"]].concat());
-    let start = said.find('{').unwrap_or_else(|| panic!("{args:?}: {said}"));
-    let mut values = serde_json::Deserializer::from_str(&said[start..]).into_iter::<Value>();
-    (code, values.next().unwrap().unwrap_or_else(|error| panic!("{args:?}: {error}: {said}")))
-}
+use super::{
+    bench::HANG,
+    cli_outputs::{json, rig, rigsmith},
+};
 
 fn builds(rig: &Rig) {
     let modules = Arc::new(modules::all());

@@ -29,7 +29,10 @@ use rigsmith::{
     rig::operations::MirrorPlane,
 };
 
-use crate::prerequisites::skip;
+use crate::{
+    bench::{RigBench, shipped},
+    prerequisites::skip,
+};
 
 /// Size of the pictures: small, unless somebody wants to look at them.
 fn size() -> UVec2 {
@@ -42,8 +45,7 @@ fn size() -> UVec2 {
 struct LastPicture(Option<Image>);
 
 struct Studio {
-    app: App,
-    rig: Entity,
+    base: RigBench,
     camera: Entity,
     target: Handle<Image>,
     folder: Option<PathBuf>,
@@ -57,7 +59,7 @@ impl Studio {
         app.finish();
         app.cleanup();
         let world = app.world_mut();
-        let rig = world.spawn(crate::bench::shipped("biped")).id();
+        let rig = world.spawn(shipped("biped")).id();
         let target = Image::new_target_texture(size().x, size().y, TextureFormat::Rgba8UnormSrgb, None);
         let target = world.resource_mut::<Assets<Image>>().add(target);
         let camera = (
@@ -76,7 +78,8 @@ impl Studio {
             StandardMaterial { base_color: Color::srgb(0.62, 0.6, 0.58), perceptual_roughness: 0.9, ..default() };
         let clay = world.resource_mut::<Assets<StandardMaterial>>().add(clay);
         world.spawn((Mesh3d(mesh), MeshMaterial3d(clay)));
-        Self { app, rig, camera, target, folder: std::env::var_os("RIGSMITH_PICTURES").map(PathBuf::from) }
+        let base = RigBench { app, rig };
+        Self { base, camera, target, folder: std::env::var_os("RIGSMITH_PICTURES").map(PathBuf::from) }
     }
 
     /// Looks at `target` from `eye`; `height` makes the view orthographic and that high.
@@ -94,15 +97,15 @@ impl Studio {
             }
         };
         let place = Transform::from_translation(eye).looking_at(target, up);
-        self.app.world_mut().entity_mut(self.camera).insert((place, projection, RigViewport { focus }));
+        self.base.app.world_mut().entity_mut(self.camera).insert((place, projection, RigViewport { focus }));
     }
 
     /// Renders, and keeps the picture if that was asked for.
     fn take(&mut self, name: &str) -> Image {
         for _ in 0..3 {
-            self.app.update();
+            self.base.app.update();
         }
-        let world = self.app.world_mut();
+        let world = self.base.app.world_mut();
         world.resource_mut::<LastPicture>().0 = None;
         world.spawn(Screenshot::image(self.target.clone())).observe(
             |shot: On<ScreenshotCaptured>, mut taken: ResMut<LastPicture>| {
@@ -110,8 +113,8 @@ impl Studio {
             },
         );
         let image = (0..200).find_map(|_| {
-            self.app.update();
-            self.app.world_mut().resource_mut::<LastPicture>().0.take()
+            self.base.app.update();
+            self.base.app.world_mut().resource_mut::<LastPicture>().0.take()
         });
         let image = image.unwrap_or_else(|| panic!("no picture of {name} came back"));
         if let Some(folder) = &self.folder {
@@ -122,19 +125,19 @@ impl Studio {
     }
 
     fn set(&mut self, change: impl FnOnce(&mut RigDrawing)) {
-        change(&mut self.app.world_mut().resource_mut::<RigDrawing>());
+        change(&mut self.base.app.world_mut().resource_mut::<RigDrawing>());
     }
 
     fn uid(&self, label: &str) -> Uid {
-        self.app.world().get::<Rig>(self.rig).unwrap().find_label(label).unwrap_or_else(|| panic!("no {label}"))
+        self.base.rig().find_label(label).unwrap_or_else(|| panic!("no {label}"))
     }
 
     fn position(&self, label: &str) -> Vec3 {
-        self.app.world().get::<Rig>(self.rig).unwrap().position(self.uid(label))
+        self.base.rig().position(self.uid(label))
     }
 
     fn sight(&self) -> Sight {
-        let world = self.app.world();
+        let world = self.base.app.world();
         let camera = world.entity(self.camera);
         let (eye, projection) = (camera.get::<GlobalTransform>().unwrap(), camera.get::<Projection>().unwrap());
         Sight::new(eye, projection, camera.get().unwrap(), size().as_vec2(), &GlobalTransform::IDENTITY).unwrap()
@@ -196,7 +199,7 @@ fn a_rig_is_seen_over_the_mesh_from_every_angle_on_a_gpu() {
         studio.set(|settings| settings.rig = true);
         let rigged = studio.take(name);
         let sight = studio.sight();
-        let rig = studio.app.world().get::<Rig>(studio.rig).unwrap();
+        let rig = studio.base.rig();
         let places: Vec<Vec2> =
             rig.rest_globals().iter().filter_map(|(_, global)| sight.project(global.translation)).collect();
         assert!(places.len() > 40);
@@ -211,9 +214,9 @@ fn states_ghosts_and_labels_are_seen_on_a_gpu() {
     let (hips, chest, arm) = (studio.uid("hips"), studio.uid("chest"), studio.uid("head"));
     studio.look(Vec3::new(0.9, 1.3, 1.9), Vec3::new(0.1, 1.15, 0.0), None);
     let plain = studio.take("near_plain");
-    let rig = studio.rig;
-    studio.app.world_mut().get_mut::<Selection>(rig).unwrap().0 = vec![hips, chest];
-    studio.app.world_mut().get_mut::<HoveredNode>(rig).unwrap().0 = Some(arm);
+    let rig = studio.base.rig;
+    studio.base.app.world_mut().get_mut::<Selection>(rig).unwrap().0 = vec![hips, chest];
+    studio.base.app.world_mut().get_mut::<HoveredNode>(rig).unwrap().0 = Some(arm);
     let states = studio.take("near_states");
     for (label, what) in [("hips", "selected"), ("chest", "active"), ("head", "hovered")] {
         let place = studio.sight().project(studio.position(label)).unwrap();
@@ -253,17 +256,16 @@ fn states_ghosts_and_labels_are_seen_on_a_gpu() {
         joints,
         stroke: (0..20).map(wave).collect(),
     };
-    studio.app.world_mut().insert_resource(ghosts);
-    studio.app.world_mut().get_mut::<Symmetry>(rig).unwrap().0 = Some(MirrorPlane::sagittal(1.8));
+    studio.base.app.world_mut().insert_resource(ghosts);
+    studio.base.app.world_mut().get_mut::<Symmetry>(rig).unwrap().0 = Some(MirrorPlane::sagittal(1.8));
     studio.look(Vec3::new(1.3, 1.4, 1.9), Vec3::new(0.1, 1.2, 0.0), None);
     let ghosts = studio.take("near_ghosts");
     let place = studio.sight().project(to).unwrap();
-    studio.app.world_mut().insert_resource(Ghosts::default());
+    studio.base.app.world_mut().insert_resource(Ghosts::default());
     let gone = studio.take("near_ghosts_gone");
     assert_ne!(at(&ghosts, place), at(&gone, place));
-    let hand = studio.app.world().get::<Rig>(rig).unwrap().walk().map(|joint| joint.data.uid).collect::<Vec<_>>();
-    let positions: Vec<Vec3> =
-        hand.iter().map(|uid| studio.app.world().get::<Rig>(rig).unwrap().position(*uid)).collect();
+    let hand = studio.base.rig().walk().map(|joint| joint.data.uid).collect::<Vec<_>>();
+    let positions: Vec<Vec3> = hand.iter().map(|uid| studio.base.rig().position(*uid)).collect();
     let far = positions.into_iter().max_by(|a, b| a.x.total_cmp(&b.x)).unwrap();
     studio.look(far + Vec3::new(0.25, 0.25, 0.45), far - Vec3::X * 0.06, None);
     let [hand, far] = [("hand", None), ("far", Some(Vec3::new(6.0, 5.0, 9.0)))].map(|(name, eye)| {

@@ -1,21 +1,24 @@
 //! Files in the window, without the window: opening, saving, asking, recovering.
 
+mod crashes;
+mod exporting;
+mod failures;
+
 use std::{
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
-use bevy::{ecs::message::MessageCursor, prelude::*, window::FileDragAndDrop};
+use bevy::{prelude::*, window::FileDragAndDrop};
 use rigsmith::{
     editor::{
-        ActiveRig,
         actions::{Action, ActionRequest},
         files::{
-            ExportOptions, FilesPlugin, LoadJob, OpenDocument, OpenRequest, SaveJob, StateFolder,
+            ExportOptions, FilesPlugin, OpenDocument, OpenRequest, StateFolder,
             dialog::{Answer, Dialog, DialogAnswer, Purpose, Question},
             has_unsaved_changes, title,
         },
-        notice::{Notice, Severity},
+        notice::Severity,
         recovery::{Recovery, can_recover, describe},
         settings::EditorSettings,
     },
@@ -37,16 +40,17 @@ use rigsmith::{
         skeleton_preset::SkeletonPreset,
         update::{diff, edits_between},
     },
-    test_app::strict_app,
 };
 
-use crate::bench::HANG;
+use crate::{
+    bench::{AppBench, HANG},
+    window_app::Notices,
+};
 
 struct Window {
-    app: App,
+    base: AppBench,
     folder: PathBuf,
-    cursor: MessageCursor<Notice>,
-    notices: Vec<Notice>,
+    notices: Notices,
 }
 
 impl Window {
@@ -56,10 +60,8 @@ impl Window {
     }
 
     fn with_state(folder: &Path, state: PathBuf) -> Self {
-        let mut app = headless_app(7);
-        app.insert_resource(StateFolder(Some(state))).add_plugins(FilesPlugin).add_message::<bevy::app::AppExit>();
-        let app = strict_app(app);
-        let mut window = Self { app, folder: folder.to_owned(), cursor: MessageCursor::default(), notices: Vec::new() };
+        let base = AppBench::with_files(state, FilesPlugin);
+        let mut window = Self { base, folder: folder.to_owned(), notices: Notices::default() };
         window.settle();
         window
     }
@@ -71,20 +73,19 @@ impl Window {
     }
 
     fn world(&self) -> &World {
-        self.app.world()
+        self.base.app.world()
     }
 
     fn update(&mut self) {
-        self.app.update();
-        let messages = self.app.world().resource::<Messages<Notice>>();
-        self.notices.extend(self.cursor.read(messages).cloned());
+        self.base.app.update();
+        self.notices.read(&self.base.app);
         // Work that other tests left in the system's folder for temporary files is none of ours.
         let foreign = match self.question() {
             Some(Question::Recover(list)) => list.iter().all(|pending| !pending.path.starts_with(&self.folder)),
             _ => false,
         };
         if foreign {
-            self.app.world_mut().write_message(DialogAnswer(Answer::Cancel));
+            self.base.app.world_mut().write_message(DialogAnswer(Answer::Cancel));
         }
     }
 
@@ -94,10 +95,7 @@ impl Window {
         for _ in 0..3 {
             self.update();
         }
-        while self.world().resource::<LoadJob>().what().is_some()
-            || self.world().resource::<SaveJob>().what().is_some()
-            || self.world().resource::<Recovery>().is_looking()
-        {
+        while self.base.has_file_jobs() || self.world().resource::<Recovery>().is_looking() {
             assert!(start.elapsed() < HANG, "something never ends");
             std::thread::sleep(Duration::from_millis(2));
             self.update();
@@ -108,7 +106,7 @@ impl Window {
     }
 
     fn send<M: Message>(&mut self, message: M) {
-        self.app.world_mut().write_message(message);
+        self.base.app.world_mut().write_message(message);
         self.settle();
     }
 
@@ -132,16 +130,12 @@ impl Window {
         self.world().resource::<Dialog>().question()
     }
 
-    fn rig_entity(&self) -> Entity {
-        self.world().resource::<ActiveRig>().0
-    }
-
     fn rig(&self) -> Rig {
-        self.world().get::<Rig>(self.rig_entity()).expect("a rig is open").clone()
+        self.world().get::<Rig>(self.base.open_rig()).expect("a rig is open").clone()
     }
 
     fn change(&mut self, change: Change) {
-        let rig = self.rig_entity();
+        let rig = self.base.open_rig();
         self.send(EditRequest { rig, change });
     }
 
@@ -168,16 +162,12 @@ impl Window {
     }
 
     fn mesh(&self) -> Option<&RigMesh> {
-        let entity = self.world().get::<RigMeshes>(self.rig_entity())?.iter().next()?;
+        let entity = self.world().get::<RigMeshes>(self.base.open_rig())?.iter().next()?;
         self.world().get::<RigMesh>(entity)
     }
 
-    fn said(&self, severity: Severity, part: &str) -> bool {
-        self.notices.iter().any(|notice| notice.severity == severity && notice.text.contains(part))
-    }
-
     fn journal(&self) -> PathBuf {
-        let document = self.world().get::<OpenDocument>(self.rig_entity()).expect("a document is open");
+        let document = self.world().get::<OpenDocument>(self.base.open_rig()).expect("a document is open");
         let start = Instant::now();
         loop {
             if let Some(path) = document.journal().path() {
@@ -203,16 +193,16 @@ fn files_above_a_limit_are_refused_with_a_toast() {
     std::fs::write(at("box.obj"), format!("{corners}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")).unwrap();
     let mut window = Window::new(folder.path());
     let limits = RigLimits::default().with(Limit::Joints, 2).with(Limit::Triangles, 3);
-    window.app.insert_resource(limits);
+    window.base.app.insert_resource(limits);
     window.open(OpenRequest::Empty);
     let before = window.rig();
     for (file, told) in [("three.rig", "the rig has 3 joints"), ("box.obj", "the mesh has 4 triangles")] {
         window.open_file(&at(file));
-        assert!(window.said(Severity::Error, told), "{file}: {:?}", window.notices);
-        assert!(window.said(Severity::Error, "--limit "), "{file}: {:?}", window.notices);
+        assert!(window.notices.include(Severity::Error, told), "{file}: {:?}", window.notices.list);
+        assert!(window.notices.include(Severity::Error, "--limit "), "{file}: {:?}", window.notices.list);
         assert_eq!(window.rig(), before, "{file}");
     }
-    window.app.insert_resource(RigLimits::default());
+    window.base.app.insert_resource(RigLimits::default());
     window.open_file(&at("three.rig"));
     assert_eq!(window.rig().len(), 3);
 }
@@ -229,7 +219,7 @@ fn changes_are_unsaved_until_saved_and_clean_again_after_undo() {
     window.change(Change::Redo);
     assert!(window.is_unsaved());
     let path = window.save_as("guy");
-    assert_eq!(title(window.world()), "guy - Rigsmith", "{:?}", window.notices);
+    assert_eq!(title(window.world()), "guy - Rigsmith", "{:?}", window.notices.list);
     assert!(!path.exists(), "the ending is added");
     let path = folder.path().join("guy.rigsmith.ron");
     assert!(path.exists() && folder.path().join("biped.obj").exists());
@@ -284,110 +274,6 @@ fn what_was_saved_opens_the_same() {
 }
 
 #[test]
-fn a_crash_loses_nothing() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    window.place(1.0);
-    window.place(0.5);
-    window.change(Change::Undo);
-    let (rig, points) = (window.rig(), window.mesh().map(|mesh| mesh.rest.points.clone()));
-    let journal = window.journal();
-    assert!(journal.starts_with(folder.path().join("state")));
-    drop(window);
-
-    let mut window = Window::bundled(folder.path());
-    let Some(Question::Recover(list)) = window.question() else { panic!("nothing is offered") };
-    let pending = list.iter().find(|pending| pending.path == journal).expect("our work is offered");
-    assert_eq!(pending.changes, 3);
-    window.answer(Answer::Recover(journal.clone()));
-    assert_eq!(window.rig(), rig, "{:?}", window.notices);
-    assert_eq!(window.mesh().map(|mesh| mesh.rest.points.clone()), points);
-    assert!(window.is_unsaved(), "recovered work is in no file");
-    window.change(Change::Redo);
-    assert_eq!(window.rig().len(), rig.len() + 1, "what was undone can be done again");
-    window.change(Change::Undo);
-    window.change(Change::Undo);
-    assert_eq!(window.rig().len(), rig.len() - 1);
-    // A second crash.
-    drop(window);
-    let mut window = Window::bundled(folder.path());
-    let offered = match window.question() {
-        Some(Question::Recover(list)) => list.iter().find(|p| p.path.starts_with(folder.path())).cloned(),
-        _ => None,
-    };
-    let offered = offered.expect("the work that went on is offered");
-    window.answer(Answer::Forget(offered.path.clone()));
-    assert!(!offered.path.exists());
-}
-
-#[test]
-fn a_damaged_journal_is_offered_recovered_and_kept() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    for height in [1.0, 0.5, 0.25] {
-        window.place(height);
-    }
-    let journal = window.journal();
-    drop(window);
-    let mut bytes = std::fs::read(&journal).expect("the journal of the crash");
-    // In the text of the last step but one.
-    let middle = bytes.windows(5).enumerate().filter(|(_, word)| word == b"after").map(|(at, _)| at).nth(1).unwrap();
-    bytes[middle] ^= 1;
-    std::fs::write(&journal, &bytes).unwrap();
-    let unreadable = folder.path().join("state/rigsmith-00000000000000aa.journal");
-    std::fs::write(&unreadable, b"RIGJRNL\0 and nothing that makes sense").unwrap();
-
-    let mut window = Window::bundled(folder.path());
-    let Some(Question::Recover(list)) = window.question() else { panic!("nothing is offered") };
-    let of = |path: &Path| list.iter().find(|pending| pending.path == path).expect("it is offered");
-    let (damaged, hopeless) = (of(&journal), of(&unreadable));
-    assert!(can_recover(damaged) && !can_recover(hopeless));
-    let text = describe(damaged);
-    assert!(text.starts_with("the bundled character: 2 edits, damaged: "), "{text}");
-    assert!(text.ends_with(" records can be recovered"), "{text}");
-    assert!(describe(hopeless).contains("none of its records can be read"), "{}", describe(hopeless));
-    window.answer(Answer::Recover(journal.clone()));
-    assert_eq!(window.rig().walk().filter(|joint| joint.data.rest.translation.y == 0.5).count(), 0);
-    assert!(window.rig().walk().any(|joint| joint.data.rest.translation.y == 0.25), "what came after the damage");
-    assert!(window.said(Severity::Warning, "the journal was damaged"), "{:?}", window.notices);
-    assert!(window.said(Severity::Warning, "is kept as"), "{:?}", window.notices);
-    assert!(window.said(Severity::Info, "a step is lost after 1 edit"), "{:?}", window.notices);
-    let mut kept = journal.clone().into_os_string();
-    kept.push(".damaged");
-    assert_eq!(std::fs::read(&kept).unwrap(), bytes);
-    // Nobody is asked about the other one again before the next start, and it stays until somebody says so.
-    window.answer(Answer::Cancel);
-    assert!(unreadable.exists());
-    drop(window);
-    let mut window = Window::bundled(folder.path());
-    window.answer(Answer::Forget(unreadable.clone()));
-    assert!(!unreadable.exists() && PathBuf::from(kept).exists());
-}
-
-#[test]
-fn a_crash_after_saving_recovers_what_came_later() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    window.place(1.0);
-    let path = window.save_as("guy.rigsmith.ron");
-    window.place(0.5);
-    let rig = window.rig();
-    drop(window);
-    let mut window = Window::new(folder.path());
-    window.open_file(&path);
-    let Some(Question::Recover(list)) = window.question() else {
-        panic!("nothing is offered beside the project: {:?}", window.notices)
-    };
-    let ours: Vec<_> = list.iter().filter(|pending| pending.path.starts_with(folder.path())).cloned().collect();
-    assert_eq!(ours.iter().map(|pending| pending.changes).collect::<Vec<_>>(), [1]);
-    window.answer(Answer::Recover(ours[0].path.clone()));
-    assert_eq!(window.rig(), rig);
-    assert_eq!(title(window.world()), "guy* - Rigsmith");
-    window.act(Action::Save);
-    assert!(!window.is_unsaved() && window.question().is_none(), "it knows where it was saved");
-}
-
-#[test]
 fn quitting_asks_about_unsaved_changes_and_leaves_no_journal() {
     let folder = folder();
     let mut window = Window::bundled(folder.path());
@@ -396,19 +282,19 @@ fn quitting_asks_about_unsaved_changes_and_leaves_no_journal() {
     window.place(1.0);
     window.act(Action::Quit);
     assert!(matches!(window.question(), Some(Question::Unsaved { .. })));
-    assert!(window.app.should_exit().is_none());
+    assert!(window.base.app.should_exit().is_none());
     window.answer(Answer::Cancel);
-    assert!(window.question().is_none() && window.app.should_exit().is_none() && journal.exists());
-    window.app.world_mut().write_message(ActionRequest(Action::Quit));
+    assert!(window.question().is_none() && window.base.app.should_exit().is_none() && journal.exists());
+    window.base.app.world_mut().write_message(ActionRequest(Action::Quit));
     window.update();
-    window.app.world_mut().write_message(DialogAnswer(Answer::Save));
+    window.base.app.world_mut().write_message(DialogAnswer(Answer::Save));
     window.update();
     assert!(matches!(window.question(), Some(Question::Path { purpose: Purpose::Save, .. })));
     let path = folder.path().join("guy.rigsmith.ron");
-    window.app.world_mut().write_message(DialogAnswer(Answer::Path(path.clone())));
+    window.base.app.world_mut().write_message(DialogAnswer(Answer::Path(path.clone())));
     let start = Instant::now();
-    while window.app.should_exit().is_none() {
-        assert!(start.elapsed() < HANG, "it never quits: {:?}", window.notices);
+    while window.base.app.should_exit().is_none() {
+        assert!(start.elapsed() < HANG, "it never quits: {:?}", window.notices.list);
         window.update();
     }
     assert!(path.exists() && !journal.exists());
@@ -434,8 +320,8 @@ fn opening_something_else_asks_first() {
     window.answer(Answer::Discard);
     assert!(window.rig().is_empty() && !window.is_unsaved());
     // The last one wins.
-    window.app.world_mut().write_message(OpenRequest::Bundled);
-    window.app.world_mut().write_message(OpenRequest::Empty);
+    window.base.app.world_mut().write_message(OpenRequest::Bundled);
+    window.base.app.world_mut().write_message(OpenRequest::Empty);
     window.settle();
     assert!(window.mesh().is_none());
 }
@@ -469,42 +355,6 @@ fn what_dead_saves_left_is_cleared_at_the_start() {
 }
 
 #[test]
-fn files_that_are_nothing_lose_nothing() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    window.place(1.0);
-    let rig = window.rig();
-    let cases: &[(&str, &[u8], &str)] = &[
-        ("notes.txt", b"hello", ".obj, .gltf, .glb or .vrm"),
-        ("weights.skin", b"hello", "only weights"),
-        ("strokes.ron", b"[]", "neither template nor project"),
-    ];
-    for (name, bytes, said) in cases {
-        let path_buf = folder.path().join(name);
-        std::fs::write(&path_buf, bytes).expect("written");
-        let entity = window.rig_entity();
-        window.send(FileDragAndDrop::DroppedFile { window: entity, path_buf });
-        assert!(window.said(Severity::Error, said), "{name}: {:?}", window.notices);
-        assert_eq!(window.rig(), rig, "{name}");
-        assert!(window.question().is_none(), "{name}: nothing to ask about");
-    }
-    // By their names these could be something: what they hold is told after asking.
-    window.change(Change::Undo);
-    for (name, bytes) in
-        [("a.glb", &b"hello"[..]), ("b.rigsmith.ron", b"hello"), ("c.rig.ron", b"hello"), ("d.obj", b"")]
-    {
-        let path = folder.path().join(name);
-        std::fs::write(&path, bytes).expect("written");
-        window.notices.clear();
-        window.open_file(&path);
-        assert!(window.said(Severity::Error, name), "{name}: {:?}", window.notices);
-        assert!(window.mesh().is_some(), "{name}: the character is still open");
-    }
-    window.open_file(&folder.path().join("gone.obj"));
-    assert!(window.said(Severity::Error, "gone.obj"));
-}
-
-#[test]
 fn a_template_is_put_onto_the_mesh() {
     let folder = folder();
     let mut window = Window::bundled(folder.path());
@@ -532,7 +382,7 @@ fn a_template_is_put_onto_the_mesh() {
     let giant = folder.path().join("giant.rig.ron");
     window.open_file(&giant);
     assert!(matches!(window.question(), Some(Question::Fit(_))));
-    assert!(window.said(Severity::Warning, "another size"));
+    assert!(window.notices.include(Severity::Warning, "another size"));
     window.answer(Answer::Cancel);
     assert_eq!(window.rig().len(), 1);
     window.open_file(&giant);
@@ -543,60 +393,6 @@ fn a_template_is_put_onto_the_mesh() {
     window.answer(Answer::AsItIs);
     assert!((height(&window) / mesh / 100.0 - 1.0).abs() < 1e-4);
     assert!(window.mesh().is_some());
-}
-
-#[test]
-fn clips_of_the_document_are_exported_as_they_are_edited() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    window.place(1.0);
-    window.export("none.anim.ron");
-    assert!(window.said(Severity::Error, "no clips to export"));
-    let joint = window.rig().roots()[0];
-    let mut clip = RigClip { range: [0.5, 1.5], ..RigClip::new(Uid(77), Uid(78), "turn") };
-    let keys = [0.5, 1.0, 1.5].map(|time| Key::rotation(time, Quat::from_rotation_z(time))).to_vec();
-    let target = TrackTarget { node: joint, property: Property::Rotation };
-    clip.layers[0].tracks.insert(target, std::sync::Arc::new(Track { keys }));
-    window.change(Change::Do(Operation::Edits(vec![RigEdit::AddClip(Box::new(clip.clone()), 0)])));
-    let bytes = std::fs::read(window.export("turn.glb")).expect("a file");
-    let file = gltf::Gltf::from_slice(&bytes).expect("a model");
-    let animations: Vec<_> = file.animations().collect();
-    assert_eq!((animations.len(), animations[0].name()), (1, Some("turn")));
-    let channel = animations[0].channels().next().expect("a channel");
-    let blob = file.blob.clone().expect("a buffer");
-    let reader = channel.reader(|_| Some(&blob[..]));
-    let times: Vec<f32> = reader.read_inputs().expect("times").collect();
-    assert_eq!((times[0], times[times.len() - 1]), (0.0, 1.0), "a clip begins at zero");
-    // The clips alone come back as they were, and a file with animations opens with them.
-    let read = load_animation(&RealDisk, &window.export("turn.anim.ron")).expect("clips");
-    assert_eq!(read.clips, [clip]);
-    window.open_file(&folder.path().join("turn.glb"));
-    window.answer(Answer::Discard);
-    let clips = window.rig().clips().to_vec();
-    assert_eq!((clips.len(), clips[0].name.as_str()), (1, "turn"), "{:?}", window.notices);
-    assert!(clips[0].key_count() >= 2 && !has_unsaved_changes(window.world()));
-}
-
-#[test]
-fn exports_can_be_read_back() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    window.place(1.0);
-    let file = std::fs::read(window.export("out.glb")).expect("a file");
-    let file = gltf::Gltf::from_slice(&file).expect("glTF");
-    let bare = file.nodes().filter(|node| node.mesh().is_none()).count();
-    assert_eq!(bare, 1, "the joint is written though nothing is skinned");
-    let template = load_template(&RealDisk, &window.export("out.rig.ron")).expect("a template");
-    assert_eq!(template.rig.len(), 1);
-    window.export("out.rig");
-    window.export("out.obj");
-    assert!(["out.rig", "out.obj"].iter().all(|name| folder.path().join(name).exists()));
-    window.export("out.skin");
-    assert!(window.said(Severity::Error, "skin the mesh first"));
-    window.export("out.glb");
-    assert!(matches!(window.question(), Some(Question::Replace { .. })), "it is there already");
-    window.answer(Answer::Save);
-    assert!(window.is_unsaved(), "an export is no save");
 }
 
 /// A character of Rigsmith in a document's rig, as a fit puts it there, keeps its parts in the first file and in the next ones.
@@ -618,51 +414,10 @@ fn what_a_fit_made_keeps_its_parts_in_its_first_file() {
         }
         let read = load_template(&RealDisk, &path).expect("a template");
         let parts: Vec<&str> = read.instances.iter().map(|instance| instance.part.as_str()).collect();
-        assert_eq!((parts.len(), parts[0]), (8, "parts/spine.rig.ron"), "{:?}", window.notices);
+        assert_eq!((parts.len(), parts[0]), (8, "parts/spine.rig.ron"), "{:?}", window.notices.list);
         assert_eq!((read.rig.uid(), diff(&read.rig, &window.rig())), (window.rig().uid(), Vec::new()));
         assert_eq!(read.rig.joint(thigh).expect("a thigh").data.rest.translation.y, height);
     }
-}
-
-#[test]
-fn a_failed_save_keeps_everything() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    window.place(1.0);
-    window.save_as("missing/guy.rigsmith.ron");
-    assert!(window.said(Severity::Error, "There is no folder"));
-    window.answer(Answer::Cancel);
-    let path = window.save_as("guy.rigsmith.ron");
-    window.place(0.5);
-    // A folder where the file was: nothing can take its place.
-    std::fs::remove_file(&path).expect("removed");
-    std::fs::create_dir_all(path.join("in the way")).expect("made");
-    window.act(Action::Save);
-    assert!(window.said(Severity::Error, "Could not write guy.rigsmith.ron"), "{:?}", window.notices);
-    assert!(window.is_unsaved());
-    assert!(window.journal().exists());
-}
-
-#[test]
-fn an_unwritable_folder_for_journals_is_told_and_work_goes_on() {
-    let folder = folder();
-    let file = folder.path().join("file");
-    std::fs::write(&file, "in the way").expect("written");
-    let mut window = Window::with_state(folder.path(), file.join("state"));
-    window.open(OpenRequest::Bundled);
-    window.place(1.0);
-    let journal = window.journal();
-    assert!(journal.starts_with(std::env::temp_dir()), "{}", journal.display());
-    window.settle();
-    let told = |window: &Window| window.notices.iter().filter(|n| n.text.contains("RIGSMITH_STATE")).count();
-    assert_eq!(told(&window), 1, "{:?}", window.notices);
-    let path = window.save_as("guy.rigsmith.ron");
-    assert!(path.exists() && !window.is_unsaved());
-    assert_eq!(told(&window), 1, "told once");
-    let steps = window.world().get::<RigHistory>(window.rig_entity()).map(|history| history.steps().1);
-    assert_eq!(steps, Some(1));
-    window.act(Action::Quit);
-    assert!(!journal.exists());
 }
 
 /// Waits until the journal of a window is at a path.
@@ -676,7 +431,7 @@ fn wait_for_journal(window: &Window, path: &Path) {
 
 #[test]
 fn the_second_window_on_a_project_is_told() {
-    let told = |window: &Window| window.said(Severity::Warning, "open in another window");
+    let told = |window: &Window| window.notices.include(Severity::Warning, "open in another window");
     let folder = folder();
     let mut first = Window::bundled(folder.path());
     first.place(1.0);
@@ -684,13 +439,13 @@ fn the_second_window_on_a_project_is_told() {
     first.place(1.1);
     wait_for_journal(&first, &journal_beside(&project));
     first.settle();
-    assert!(!told(&first), "{:?}", first.notices);
+    assert!(!told(&first), "{:?}", first.notices.list);
     let mut second = Window::new(folder.path());
     second.open_file(&project);
     assert_ne!(second.journal(), journal_beside(&project));
     second.settle();
-    assert!(told(&second), "{:?}", second.notices);
-    assert!(!told(&first), "{:?}", first.notices);
+    assert!(told(&second), "{:?}", second.notices.list);
+    assert!(!told(&first), "{:?}", first.notices.list);
     // The first window's journal is its own: both can be recovered.
     assert!(journal_beside(&project).exists() && second.journal().exists());
     second.act(Action::Quit);
@@ -701,50 +456,5 @@ fn the_second_window_on_a_project_is_told() {
     third.open_file(&project);
     wait_for_journal(&third, &journal_beside(&project));
     third.settle();
-    assert!(!told(&third), "{:?}", third.notices);
-}
-
-#[test]
-fn presets_give_exports_the_names_of_other_programs_and_the_result_is_read_back() {
-    let folder = folder();
-    let mut window = Window::new(folder.path());
-    window.open(OpenRequest::Template("biped".into()));
-    let cases = [
-        (SkeletonPreset::Plain, "hand_l"),
-        (SkeletonPreset::Mixamo, "mixamorig:LeftHand"),
-        (SkeletonPreset::Unreal, "hand_l"),
-        (SkeletonPreset::Unity, "LeftHand"),
-        (SkeletonPreset::Vrm, "leftHand"),
-    ];
-    for (number, (preset, hand)) in cases.into_iter().enumerate() {
-        window.app.insert_resource(ExportOptions { preset, author: String::new() });
-        let path = window.export(&format!("{number}.glb"));
-        let model = load_model(&RealDisk, &path).expect("a model");
-        assert!(model.nodes.iter().any(|node| node.name == hand), "{preset:?}");
-        let counts = format!("Exported {number}.glb; read back: {} joints", model.nodes.len());
-        assert!(window.said(Severity::Done, &counts), "{counts}: {:?}", window.notices);
-    }
-    window.export("rig.rig.ron");
-    assert!(window.said(Severity::Done, "Exported rig.rig.ron; read back:"), "{:?}", window.notices);
-}
-
-#[test]
-fn avatars_are_exported_with_an_author() {
-    let folder = folder();
-    let mut window = Window::new(folder.path());
-    window.open(OpenRequest::Template("biped".into()));
-    let mut about = window.rig().about().clone();
-    about.author.clear();
-    window.change(Change::Do(Operation::Edits(vec![RigEdit::SetAbout(Box::new(about))])));
-    let before = window.rig();
-    let path = window.export("nobody.vrm");
-    assert!(window.said(Severity::Error, "requires an author") && !path.exists(), "{:?}", window.notices);
-    window.app.insert_resource(ExportOptions { author: "Ann".into(), ..default() });
-    let path = window.export("ann.vrm");
-    assert!(window.said(Severity::Done, "Exported ann.vrm; read back:"), "{:?}", window.notices);
-    let bytes = std::fs::read(&path).expect("an avatar");
-    let avatar = rigsmith::mesh::gltf::read_avatar(&bytes, "ann.vrm").expect("VRM").expect("an avatar");
-    assert_eq!(avatar.vrm.meta.authors, ["Ann"]);
-    assert!(avatar.vrm.humanoid.human_bones.contains_key("leftHand"));
-    assert_eq!(window.rig(), before, "an export changes nothing");
+    assert!(!told(&third), "{:?}", third.notices.list);
 }

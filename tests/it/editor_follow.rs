@@ -6,27 +6,29 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bevy::{ecs::message::MessageCursor, prelude::*};
+use bevy::prelude::*;
 use rigsmith::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
         files::{
-            FilesPlugin, LoadJob, OpenRequest, SaveJob, StateFolder,
+            FilesPlugin, OpenRequest,
             dialog::{Answer, DialogAnswer},
         },
         follow::{FollowPlugin, OfferAnswer},
-        notice::{Notice, Severity},
+        notice::Severity,
     },
-    headless::headless_app,
     instance::{RigSource, UpdateOffer},
     plugins::document::{Change, EditRequest},
     prelude::*,
     rig::{RestTransform, RigEdit, operations::Operation, update::Take},
-    test_app::strict_app,
 };
 
-use super::{bench::HANG, part_fields::PART};
+use super::{
+    bench::{AppBench, wait_with},
+    part_fields::PART,
+    window_app::Notices,
+};
 
 const CHAIN: &str = r#"(
     format: 2,
@@ -41,10 +43,9 @@ const CHAIN: &str = r#"(
 
 /// A window without the window, with the chain's template open.
 struct Window {
-    app: App,
+    base: AppBench,
     file: PathBuf,
-    cursor: MessageCursor<Notice>,
-    notices: Vec<Notice>,
+    notices: Notices,
     _folder: tempfile::TempDir,
 }
 
@@ -59,33 +60,29 @@ impl Window {
         let file = folder.path().join("chain.rig.ron");
         fs::write(&file, template).expect("the template is written");
         fs::write(folder.path().join("finger.rig.ron"), PART).expect("the part is written");
-        let mut app = headless_app(7);
-        app.insert_resource(StateFolder(Some(folder.path().join("state"))))
-            .add_plugins((FilesPlugin, FollowPlugin))
-            .add_message::<AppExit>();
-        let app = strict_app(app);
-        let mut window = Self { app, file, cursor: MessageCursor::default(), notices: Vec::new(), _folder: folder };
+        let base = AppBench::with_files(folder.path().join("state"), (FilesPlugin, FollowPlugin));
+        let mut window = Self { base, file, notices: Notices::default(), _folder: folder };
         let path = window.file.clone();
-        window.app.world_mut().write_message(OpenRequest::File(path));
+        window.base.app.world_mut().write_message(OpenRequest::File(path));
         window.until("the followed document", |window| window.source().is_some_and(|source| source.base().is_some()));
         window.settle();
         window
     }
 
     fn rig(&self) -> Entity {
-        self.app.world().resource::<ActiveRig>().0
+        self.base.open_rig()
     }
 
     fn source(&self) -> Option<&RigSource> {
-        self.app.world().get::<RigSource>(self.app.world().get_resource::<ActiveRig>()?.0)
+        self.base.get::<RigSource>(self.base.app.world().get_resource::<ActiveRig>()?.0)
     }
 
     fn offer(&self) -> Option<&UpdateOffer> {
-        self.app.world().get::<UpdateOffer>(self.rig())
+        self.base.get::<UpdateOffer>(self.rig())
     }
 
     fn data(&self) -> &Rig {
-        self.app.world().get::<Rig>(self.rig()).expect("a rig is open")
+        self.base.get::<Rig>(self.rig()).expect("a rig is open")
     }
 
     /// Height of the joint with this label above its parent.
@@ -98,28 +95,20 @@ impl Window {
     }
 
     fn frame(&mut self) {
-        self.app.update();
-        let messages = self.app.world().resource::<Messages<Notice>>();
-        self.notices.extend(self.cursor.read(messages).cloned());
-        std::thread::sleep(Duration::from_millis(1));
+        self.base.app.update();
+        self.notices.read(&self.base.app);
     }
 
     fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
-        let start = Instant::now();
-        while !is_so(self) {
-            assert!(start.elapsed() < HANG, "{what} does not come: {:?}", self.notices);
-            self.frame();
-        }
+        wait_with(self, what, Self::frame, is_so, |window| window.notices.list.clone());
     }
 
     /// Runs frames until nothing is loaded or saved, and the file was looked at several times.
     fn settle(&mut self) {
-        self.until("the end of work", |window| {
-            let world = window.app.world();
-            world.resource::<LoadJob>().what().is_none() && world.resource::<SaveJob>().what().is_none()
-        });
+        self.until("the end of work", |window| !window.base.has_file_jobs());
         let start = Instant::now();
         while start.elapsed() < Duration::from_millis(1200) {
+            std::thread::sleep(Duration::from_millis(1));
             self.frame();
         }
     }
@@ -131,7 +120,7 @@ impl Window {
     }
 
     fn send<M: Message>(&mut self, message: M) {
-        self.app.world_mut().write_message(message);
+        self.base.app.world_mut().write_message(message);
         self.frame();
         self.frame();
     }
@@ -140,10 +129,6 @@ impl Window {
         let (rig, joint) = (self.rig(), self.joint(label));
         let edit = RigEdit::SetRest(joint, RestTransform::from_translation(Vec3::Y * height));
         self.send(EditRequest::operation(rig, Operation::Edits(vec![edit])));
-    }
-
-    fn has_notice(&self, severity: Severity, part: &str) -> bool {
-        self.notices.iter().any(|notice| notice.severity == severity && notice.text.contains(part))
     }
 }
 
@@ -161,9 +146,9 @@ fn a_changed_template_is_offered_and_taken_over_as_one_step() {
     window.until("the update", |window| window.height("b") == 0.5);
     window.settle();
     assert!(
-        window.offer().is_none() && window.has_notice(Severity::Done, "1 change taken over"),
+        window.offer().is_none() && window.notices.include(Severity::Done, "1 change taken over"),
         "{:?}",
-        window.notices
+        window.notices.list
     );
     // Undone, it stays undone until the file changes again; then both changes are offered.
     let rig = window.rig();
@@ -264,7 +249,7 @@ fn fields_of_parts_that_the_file_changed_are_there_after_the_next_save() {
 fn a_broken_save_changes_nothing_and_is_told() {
     let mut window = Window::new();
     fs::write(&window.file, "(format: 2, name: \"chain\", joints: [(").expect("the template is written");
-    window.until("the notice", |window| window.has_notice(Severity::Error, "not taken over"));
+    window.until("the notice", |window| window.notices.include(Severity::Error, "not taken over"));
     assert!(window.offer().is_none() && window.height("b") == 0.3);
     fs::write(&window.file, CHAIN.replace("0.3", "0.35")).expect("the template is written");
     window.until("the offer", |window| window.offer().is_some());

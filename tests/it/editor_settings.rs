@@ -19,13 +19,13 @@ use rigsmith::{
 };
 
 use crate::{
-    bench::HANG,
+    bench::{AppBench, HANG},
     files_faults::{is_passing, plans},
 };
 
 /// A window's settings without the window. Every update is two seconds long.
 struct Settings {
-    app: App,
+    base: AppBench,
     told: Vec<String>,
 }
 
@@ -45,21 +45,20 @@ impl Settings {
             .init_resource::<KeyBindings>()
             .add_message::<ActionRequest>()
             .add_message::<AppExit>();
-        Self { app, told: Vec::new() }
+        Self { base: AppBench::bare(app), told: Vec::new() }
     }
 
     fn update(&mut self) {
-        self.app.update();
-        let mut notices = self.app.world_mut().resource_mut::<Messages<Notice>>();
-        self.told.extend(notices.drain().map(|notice| notice.text));
+        self.base.app.update();
+        self.told.extend(self.base.messages::<Notice>().into_iter().map(|notice| notice.text));
     }
 
     fn remember(&mut self, name: &str) {
-        self.app.world_mut().resource_mut::<EditorSettings>().remember(name.into());
+        self.base.app.world_mut().resource_mut::<EditorSettings>().remember(name.into());
     }
 
     fn close(mut self) {
-        self.app.world_mut().write_message(AppExit::Success);
+        self.base.app.world_mut().write_message(AppExit::Success);
         self.update();
     }
 }
@@ -68,7 +67,7 @@ impl Settings {
 fn recent(path: &Path) -> Vec<String> {
     let settings = Settings::open(Arc::new(RealDisk), path);
     assert_eq!(settings.told, Vec::<String>::new());
-    let recent = &settings.app.world().resource::<EditorSettings>().recent;
+    let recent = &settings.base.app.world().resource::<EditorSettings>().recent;
     recent.iter().map(|path| path.display().to_string()).collect()
 }
 
@@ -182,7 +181,7 @@ fn a_save_that_fails_is_told_once_and_made_up_for() {
     assert_eq!(fs::read(&path).unwrap(), content);
 }
 
-/// What is changed before the file is looked at for the first time is kept as what is changed later.
+/// Changes before the first look at the file are kept like later ones.
 #[test]
 fn changes_of_the_first_second_are_kept() {
     let folder = tempfile::tempdir().unwrap();
@@ -197,6 +196,6 @@ fn changes_of_the_first_second_are_kept() {
     }
     settings.close();
     let again = Settings::open(Arc::new(RealDisk), &path);
-    let recent = again.app.world().resource::<EditorSettings>().recent.clone();
+    let recent = again.base.app.world().resource::<EditorSettings>().recent.clone();
     assert_eq!(recent, [PathBuf::from("early.obj")]);
 }

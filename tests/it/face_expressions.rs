@@ -131,7 +131,7 @@ impl Head {
         self.triangles.iter().filter(|corners| corners.iter().all(|corner| self.mask[*corner as usize])).count()
     }
 
-    /// What an expression must reach, in eye distances (lids: in their opening), as (what, reached, least).
+    /// Goals of an expression, in eye distances (lids: in their opening), as (what, reached, least).
     fn reached(&self, name: &str, moved: &[Vec3]) -> Vec<(String, f32, f32)> {
         let scale = 1.0 / self.landmarks.eye_distance();
         let at = |points: &[Vec3], mark: usize| points[self.marks[mark]];

@@ -58,7 +58,7 @@ fn run(points: &[Vec3], triangles: &[[u32; 3]], shapes: &[Vec<Vec3>], settings: 
     found
 }
 
-/// What every result must be.
+/// Demands on every result.
 fn check_sound(found: &Fit, points: &[Vec3], shapes: &[Vec<Vec3>], settings: &FitSettings) {
     check_weights(&found.weights, points.len(), settings);
     assert_eq!((found.positions.len(), found.moves.len()), (settings.bones, shapes.len()));

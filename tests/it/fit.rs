@@ -248,7 +248,7 @@ fn own_joints_are_moved() {
     assert!((root.y - 1.0).abs() < 0.02 * report.fit.height, "the root stands at {root}");
 }
 
-/// What cannot be fitted is refused with a reason, and changes nothing.
+/// Meshes that cannot be fitted are refused with a reason, and nothing changes.
 #[test]
 fn meshes_without_a_figure_are_refused() {
     let triangle = crate::gestures::boxes(&[[[0.0; 3], [1.0, 1.0, 1.0]]]);

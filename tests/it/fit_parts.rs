@@ -82,7 +82,7 @@ fn shoulder(rig: &Rig) -> String {
     control.unwrap()
 }
 
-/// What an update would change: the fields, and whether one of them is a conflict.
+/// Fields that an update would change, and true if one of them is a conflict.
 fn update(folder: &Path, rig: &str, from: &str) -> (Vec<String>, bool) {
     let answer = rigsmith(folder, &["--json", "update", rig, "--from", from, "--dry-run"]);
     assert_eq!(answer.code, 0, "{}", answer.err);
@@ -206,7 +206,8 @@ fn a_fit_in_a_sketch_keeps_parts() {
     assert_eq!(update(folder.path(), "sketched.rig.ron", "own/biped.rig.ron"), (Vec::new(), false));
 }
 
-/// A skeleton that was built has no commands, and so no parts that bring some: the command says so. Parts of joints alone stay.
+/// A skeleton that was built has no commands, and so no parts that bring some: the command says so. Parts of joints alone
+/// stay.
 #[test]
 fn built_skeletons_keep_the_parts_that_they_can_have() {
     let folder = workplace();

@@ -12,7 +12,7 @@ use rigsmith::{
     rig::animation::file_clip::motion_of,
 };
 
-/// What a mutator should try inside JSON.
+/// Words that a mutator should try inside JSON.
 const WORDS: &str = r#""bufferView":0 "byteOffset":4 "byteStride":4 "byteStride":255 "byteLength":0 "count":0 "count":1 "count":4294967295
 "componentType":5120 "componentType":5121 "componentType":5122 "componentType":5123 "componentType":5125 "componentType":5126
 "normalized":true "type":"SCALAR" "type":"VEC2" "type":"VEC3" "type":"VEC4" "type":"MAT4" "sparse":{ "mode":5 "mode":6 "mode":0

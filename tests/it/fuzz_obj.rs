@@ -91,7 +91,7 @@ fn check_model(arrays: &ObjArrays, model: &Model) {
     assert_eq!(triangles, arrays.corners.len() - 2 * arrays.face_count());
 }
 
-/// What is written reads as the same geometry.
+/// Files that are written read as the same geometry.
 fn check_written(model: &Model) {
     let written = write_obj(model, "fuzz", &mut |plain, _| plain.to_owned());
     let mut arrays = ObjArrays::default();

@@ -58,7 +58,7 @@ fn pose_commands() {
     run_seeded("pose_command", 40, whole::pose::check);
 }
 
-/// What generators make is mostly valid: inputs that are refused at once would test readers alone.
+/// Inputs that generators make are mostly valid: those that are refused at once would test readers alone.
 #[test]
 fn most_of_what_is_made_is_valid() {
     use crate::{

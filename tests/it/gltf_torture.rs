@@ -55,7 +55,7 @@ fn read(path: &Path) -> Result<Model, String> {
     }
 }
 
-/// What was read can be written and read again.
+/// Models that were read can be written and read again.
 fn check_model(path: &Path, model: &Model) {
     let settings =
         GltfWriteSettings { max_influences: 8, all_joints: true, bind_unweighted: true, ..Default::default() };

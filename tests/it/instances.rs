@@ -5,6 +5,7 @@ mod file_clips;
 mod kept_clips;
 mod meshes;
 mod reloads;
+mod saves;
 mod work;
 
 use std::{
@@ -32,12 +33,12 @@ use rigsmith::{
 };
 
 use super::{
-    bench::HANG,
+    bench::{AppBench, HANG, wait_with},
     mutate::Mutator,
     template_text::{CHAIN, Dice},
 };
 
-/// What instances told.
+/// Reports of instances.
 #[derive(Resource, Default, Debug)]
 struct InstanceReport {
     built: usize,
@@ -46,17 +47,14 @@ struct InstanceReport {
     failed: Vec<String>,
 }
 
-struct Game {
-    app: App,
-}
-
-impl Game {
-    fn new(plugin: RigInstancePlugin, assets: &Path) -> Self {
-        Self::with(plugin, assets, |_| {})
+impl AppBench {
+    /// A game without window and renderer, with instances.
+    fn game(plugin: RigInstancePlugin, assets: &Path) -> Self {
+        Self::game_with(plugin, assets, |_| {})
     }
 
     /// A game with more than instances.
-    fn with(plugin: RigInstancePlugin, assets: &Path, more: impl FnOnce(&mut App)) -> Self {
+    fn game_with(plugin: RigInstancePlugin, assets: &Path, more: impl FnOnce(&mut App)) -> Self {
         let mut app = App::new();
         let files = AssetPlugin { file_path: assets.display().to_string(), ..default() };
         app.add_plugins((MinimalPlugins, files, TransformPlugin, plugin)).init_resource::<InstanceReport>();
@@ -71,15 +69,15 @@ impl Game {
             });
         app.finish();
         app.cleanup();
-        Self { app }
+        Self::bare(app)
     }
 
-    fn live() -> Self {
-        Self::new(RigInstancePlugin::live(), Path::new("assets"))
+    fn live_game() -> Self {
+        Self::game(RigInstancePlugin::live(), Path::new("assets"))
     }
 
-    fn still() -> Self {
-        Self::new(RigInstancePlugin::default(), Path::new("assets"))
+    fn still_game() -> Self {
+        Self::game(RigInstancePlugin::default(), Path::new("assets"))
     }
 
     fn instance_report(&self) -> &InstanceReport {
@@ -88,12 +86,9 @@ impl Game {
 
     /// Updates until something is so.
     fn until(&mut self, what: &str, is_so: impl Fn(&InstanceReport) -> bool) {
-        let start = Instant::now();
-        while !is_so(self.instance_report()) {
-            assert!(start.elapsed() < HANG, "{what} does not come: {:?}", self.instance_report());
-            self.app.update();
-            sleep(Duration::from_millis(1));
-        }
+        let done = |game: &Self| is_so(game.instance_report());
+        let report = |game: &Self| format!("{:?}", game.instance_report());
+        wait_with(self, what, |game| game.app.update(), done, report);
     }
 
     /// Updates for a while.
@@ -167,11 +162,11 @@ fn saved(folder: &Path, text: &str) -> PathBuf {
 fn an_instance_is_built_posed_and_taken_away() {
     for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
         let folder = tempfile::tempdir().unwrap();
-        let mut game = Game::still();
+        let mut game = AppBench::still_game();
         let instance = game.open(&saved(folder.path(), TWO), mode);
         let (control, end) = (game.node(instance, "ctl_a"), game.node(instance, "a_end"));
         game.app.update();
-        let place = |game: &Game| game.app.world().get::<GlobalTransform>(end).unwrap().translation();
+        let place = |game: &AppBench| game.app.world().get::<GlobalTransform>(end).unwrap().translation();
         assert!(place(&game).distance(Vec3::new(0.0, 1.5, 0.0)) < 1e-6, "{mode:?} {:?}", place(&game));
         let turned = Quat::from_rotation_z(std::f32::consts::FRAC_PI_2);
         let world = game.app.world_mut();
@@ -203,7 +198,7 @@ fn the_rest_of_a_joint_is_the_built_one_in_an_instance() {
     assert_eq!(rest(world, joint), Vec3::new(0.0, 0.5, 0.0));
     for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
         let folder = tempfile::tempdir().unwrap();
-        let mut game = Game::still();
+        let mut game = AppBench::still_game();
         let instance = game.open(&saved(folder.path(), &text), mode);
         let joint = game.node(instance, "a_end");
         let built = rest(game.app.world(), joint);
@@ -216,7 +211,7 @@ fn a_saved_file_reaches_its_instances_and_leaves_the_rest_to_the_bit() {
     for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
         let folder = tempfile::tempdir().unwrap();
         let path = saved(folder.path(), TWO);
-        let mut game = Game::live();
+        let mut game = AppBench::live_game();
         let instance = game.open(&path, mode);
         let (control, other) = (game.node(instance, "ctl_b_end"), game.node(instance, "b_end"));
         let turned = Quat::from_rotation_x(0.3);
@@ -259,7 +254,7 @@ fn a_saved_file_reaches_its_instances_and_leaves_the_rest_to_the_bit() {
 fn nodes_come_and_go_and_what_others_hung_on_them_stays() {
     for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
         let folder = tempfile::tempdir().unwrap();
-        let mut game = Game::still();
+        let mut game = AppBench::still_game();
         let instance = game.open(&saved(folder.path(), TWO), mode);
         let (end, gone) = (game.node(instance, "b_end"), game.node(instance, "ctl_a"));
         let sword = game.app.world_mut().spawn((Transform::default(), ChildOf(gone))).id();
@@ -288,179 +283,11 @@ fn nodes_come_and_go_and_what_others_hung_on_them_stays() {
     }
 }
 
-/// True once the app has told that the file is broken.
-static BROKEN_SEEN: AtomicBool = AtomicBool::new(false);
-
-/// Longest time of a save whose writer ran without long interruptions.
-const UNDISTURBED: Duration = Duration::from_millis(250);
-
-/// Writes in pieces, with a pause after each.
-fn slowly(path: &Path, text: &str, pause: u64) {
-    use std::io::Write as _;
-    let mut file = fs::File::create(path).unwrap();
-    for piece in text.as_bytes().chunks(text.len() / 4 + 1) {
-        sleep(Duration::from_millis(pause));
-        file.write_all(piece).unwrap();
-        file.flush().unwrap();
-    }
-}
-
-#[test]
-fn a_file_is_taken_over_once_however_it_is_saved() {
-    let patterns: [(&str, fn(&Path, &str)); 12] = [
-        ("in place", |path, text| fs::write(path, text).unwrap()),
-        ("emptied, and filled after a pause", |path, text| {
-            fs::write(path, "").unwrap();
-            sleep(Duration::from_millis(120));
-            fs::write(path, text).unwrap();
-        }),
-        ("slowly", |path, text| slowly(path, text, 40)),
-        ("beside and renamed", |path, text| {
-            fs::write(path.with_extension("tmp"), text).unwrap();
-            fs::rename(path.with_extension("tmp"), path).unwrap();
-        }),
-        ("renamed from an old file", |path, text| {
-            let beside = path.with_extension("old");
-            fs::write(&beside, text).unwrap();
-            let old = fs::File::options().write(true).open(&beside).unwrap();
-            old.set_modified(std::time::SystemTime::now() - Duration::from_secs(86_400)).unwrap();
-            sleep(Duration::from_millis(50));
-            fs::rename(beside, path).unwrap();
-        }),
-        ("moved away and written anew, as vim does", |path, text| {
-            let backup = path.with_file_name("t.rig.ron~");
-            fs::rename(path, &backup).unwrap();
-            sleep(Duration::from_millis(15));
-            fs::write(path, text).unwrap();
-            fs::remove_file(backup).unwrap();
-        }),
-        ("with a lock and a backup, as emacs does", |path, text| {
-            let (lock, backup) = (path.with_file_name(".#t.rig.ron"), path.with_file_name("t.rig.ron~"));
-            fs::write(&lock, "").unwrap();
-            fs::copy(path, backup).unwrap();
-            fs::write(path, text).unwrap();
-            fs::remove_file(lock).unwrap();
-        }),
-        ("with a backup that is another template", |path, text| {
-            fs::write(path.with_file_name("t.rig.ron~"), "(format: 2)").unwrap();
-            fs::write(path, text).unwrap();
-        }),
-        ("twenty times in a row", |path, text| {
-            for number in 0..20 {
-                fs::write(path, if number % 2 == 0 { "(format: 2, na" } else { &text[..text.len() - 3] }).unwrap();
-                sleep(Duration::from_millis(3));
-            }
-            fs::write(path, text).unwrap();
-        }),
-        ("deleted and made again", |path, text| {
-            fs::remove_file(path).unwrap();
-            sleep(Duration::from_millis(60));
-            fs::write(path, text).unwrap();
-        }),
-        ("copied over a network", |path, text| {
-            // The time of the file is that of the source, and so it may stand still.
-            let time = fs::metadata(path).unwrap().modified().unwrap();
-            slowly(path, text, 20);
-            fs::File::options().write(true).open(path).unwrap().set_modified(time).unwrap();
-        }),
-        ("broken, then good", |path, text| {
-            BROKEN_SEEN.store(false, Ordering::Release);
-            fs::write(path, &text[..text.len() / 2]).unwrap();
-            while !BROKEN_SEEN.load(Ordering::Acquire) {
-                sleep(Duration::from_millis(1));
-            }
-            fs::write(path, text).unwrap();
-        }),
-    ];
-    let folder = tempfile::tempdir().unwrap();
-    let path = saved(folder.path(), TWO);
-    let mut game = Game::live();
-    let instance = game.open(&path, InstanceMode::Hierarchy);
-    let (control, end) = (game.node(instance, "ctl_b"), game.node(instance, "a_end"));
-    game.app.world_mut().get_mut::<Transform>(control).unwrap().translation.x += 0.25;
-    let mut failed = 0;
-    for (number, (name, save)) in patterns.iter().enumerate() {
-        let height = 1.0 + number as f32 * 0.25;
-        let text = TWO.replace("(0, 1, 0)", &format!("(0, {height:?}, 0)"));
-        let text = if number == 0 { text.replace("two", "three") } else { text };
-        let (path, text, save) = (path.clone(), text, *save);
-        let is_broken = *name == "broken, then good";
-        let writer = std::thread::spawn(move || {
-            let start = Instant::now();
-            save(&path, &text);
-            start.elapsed()
-        });
-        if is_broken {
-            game.until(name, |told| !told.failed.is_empty());
-            BROKEN_SEEN.store(true, Ordering::Release);
-        }
-        game.until(name, |told| told.updated.len() == number + 1);
-        let took = writer.join().unwrap();
-        // Nothing comes after it.
-        game.go_on(Duration::from_millis(60));
-        assert_eq!(game.instance_report().updated.len(), number + 1, "{name}");
-        // A writer that the machine stopped in the middle of a file leaves a broken file, which is told.
-        if is_broken {
-            assert_eq!(game.instance_report().failed.len(), failed + 1, "{name}: {:?}", game.instance_report().failed);
-        } else if took < UNDISTURBED {
-            assert_eq!(game.instance_report().failed.len(), failed, "{name}: {:?}", game.instance_report().failed);
-        }
-        failed = game.instance_report().failed.len();
-        let world = game.app.world();
-        let place = world.get::<GlobalTransform>(end).unwrap().translation();
-        assert!((place.y - height - 0.5).abs() < 1e-5, "{name}: {place}");
-        let posed = world.get::<GlobalTransform>(control).unwrap().translation();
-        assert!((posed.x - 1.25).abs() < 1e-5, "{name}: the pose stays, {posed}");
-    }
-    let told = game.instance_report().failed.last().unwrap();
-    assert!(told.contains("t.rig.ron") && told.contains("line "), "{told}");
-}
-
-#[test]
-fn a_thousand_broken_saves_change_nothing_and_are_told() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut game = Game::still();
-    let instance = game.open(&saved(folder.path(), CHAIN), InstanceMode::Direct);
-    game.app.update();
-    let before = game.places(instance);
-    let mut mutator = Mutator::new(7, &[b"joints", b"(", b"]"], 1 << 16);
-    let dice = &mut Dice(UidSource::seeded(8));
-    let broken = (0..).map(|number: u32| match number % 4 {
-        // Cut short, mutated, a command that fails, another uid twice.
-        0 => CHAIN.as_bytes()[..dice.below(CHAIN.len() as u64 - 3) as usize].to_vec(),
-        1 => mutator.mutate(CHAIN.as_bytes(), TWO.as_bytes()),
-        2 => CHAIN.replace("shape: \"cube\"", &format!("shape: \"no such shape {number}\"")).into_bytes(),
-        _ => CHAIN.replace("parent: \"tail_1\"", &format!("parent: \"tail_{number}\"")).into_bytes(),
-    });
-    let mut count = 0;
-    for content in broken {
-        // A mutation may be a good file after all.
-        if read_template(&content).is_ok() && !content.windows(7).any(|text| text == b"no such") {
-            continue;
-        }
-        game.offer(instance, &content);
-        count += 1;
-        game.until("the report", |told| told.failed.len() == count);
-        if count == 1000 {
-            break;
-        }
-    }
-    assert_eq!(game.instance_report().failed.len(), 1000);
-    assert!(game.instance_report().updated.is_empty());
-    assert!(game.instance_report().failed.iter().all(|told| told.contains("line ")), "each has a place");
-    assert_eq!(game.places(instance), before);
-    game.offer(instance, CHAIN.replace("(0, 1, 0)", "(0, 2, 0)").as_bytes());
-    game.until("the next good save", |told| told.updated.len() == 1);
-    assert_eq!(game.instance_report().failed.len(), 1000);
-    game.app.update();
-    assert_ne!(game.places(instance), before);
-}
-
 #[test]
 fn the_asset_server_loads_templates_and_a_failed_first_load_is_tried_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = saved(folder.path(), "(format: 2, name: ");
-    let mut game = Game::new(RigInstancePlugin::live(), folder.path());
+    let mut game = AppBench::game(RigInstancePlugin::live(), folder.path());
     let handle = game.app.world().resource::<AssetServer>().load::<RigTemplate>("t.rig.ron");
     let instance = game.app.world_mut().spawn(RigInstance(handle)).id();
     game.until("the failure", |told| !told.failed.is_empty());
@@ -516,7 +343,7 @@ struct Bindings(Vec<(Entity, Vec<String>)>);
 fn skinned_meshes_of_loaded_files_follow_an_instance() {
     let folder = tempfile::tempdir().unwrap();
     for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
-        let mut game = Game::still();
+        let mut game = AppBench::still_game();
         game.app.init_resource::<Bindings>();
         game.app.add_observer(|bound: On<SkinBound>, mut bindings: ResMut<Bindings>| {
             bindings.0.push((bound.instance, bound.unknown.clone()));
@@ -538,11 +365,11 @@ fn skinned_meshes_of_loaded_files_follow_an_instance() {
 fn joints_are_handed_over_and_taken_back() {
     let folder = tempfile::tempdir().unwrap();
     for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
-        let mut game = Game::still();
+        let mut game = AppBench::still_game();
         let instance = game.open(&saved(folder.path(), TWO), mode);
         let joints = ["a", "b", "b_end"].map(|name| game.node(instance, name));
         game.go_on(Duration::from_millis(5));
-        let places = |game: &Game| joints.map(|joint| *game.app.world().get::<GlobalTransform>(joint).unwrap());
+        let places = |game: &AppBench| joints.map(|joint| *game.app.world().get::<GlobalTransform>(joint).unwrap());
         let before = places(&game);
         let to = Isometry3d::new(Vec3::new(1.0, 2.0, 3.0), Quat::from_rotation_z(0.5));
         game.app.world_mut().entity_mut(joints[1]).insert(OutsideTransform(to));
@@ -581,11 +408,11 @@ fn the_asset_server_loads_parts_too() {
     let text = "(format: 2, name: \"doll\", joints: [(label: \"hip\")], parts: [(part: \"limbs/limb.rig.ron\", parent: \
                 \"hip\"), (part: \"parts/jaw.rig.ron\", parent: \"hip\")])";
     saved(folder.path(), text);
-    let mut game = Game::new(RigInstancePlugin::live(), folder.path());
+    let mut game = AppBench::game(RigInstancePlugin::live(), folder.path());
     let handle = game.app.world().resource::<AssetServer>().load::<RigTemplate>("t.rig.ron");
     let instance = game.app.world_mut().spawn((RigInstance(handle), InstanceMode::Hierarchy)).id();
     game.until("the character", |told| told.built == 1);
-    let height = |game: &mut Game| {
+    let height = |game: &mut AppBench| {
         let knee = game.node(instance, "knee");
         game.app.world().get::<GlobalTransform>(knee).unwrap().translation().y
     };

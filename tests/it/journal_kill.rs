@@ -24,8 +24,8 @@ use rigsmith::{
     },
     headless::headless_app,
     mesh::model::Weights,
-    plugins::{history::RigHistory, journal::RigJournal},
-    prelude::{Change, EditRequest, Operation},
+    plugins::journal::RigJournal,
+    prelude::{Change, Operation},
     rig::{
         PoseOffset, Rig, RigEdit, SkinData, Uid,
         step::{Commit, SinkError, StepSink},
@@ -33,20 +33,22 @@ use rigsmith::{
     },
 };
 
-use crate::{bench::HANG, random::Random};
+use crate::{
+    bench::{HANG, RigBench},
+    random::Random,
+};
 
 const FOLDER: &str = "RIGSMITH_TEST_JOURNAL_FOLDER";
 const SEED: &str = "RIGSMITH_TEST_JOURNAL_SEED";
 const KILLS: &str = "RIGSMITH_KILLS";
-/// What may be lost at most.
+/// Time whose changes may be lost at most.
 const BLINK: Duration = Duration::from_millis(250);
-/// How many kills go on at the same time.
+/// Number of kills that go on at the same time.
 const TOGETHER: usize = 4;
 
 /// A rig that is edited at random; the same seed gives the same edits.
 struct EditSession {
-    app: App,
-    rig: Entity,
+    base: RigBench,
     random: Random,
     saves: bool,
 }
@@ -56,19 +58,14 @@ impl EditSession {
         let mut app = headless_app(seed);
         app.finish();
         app.cleanup();
-        let rig = app.world_mut().spawn(Rig::new(Uid(seed), "victim")).id();
-        Self { app, rig, random: Random(seed), saves: seed.is_multiple_of(2) }
-    }
-
-    fn rig(&self) -> &Rig {
-        self.app.world().get::<Rig>(self.rig).unwrap()
+        let base = RigBench::with(app, Rig::new(Uid(seed), "victim"));
+        Self { base, random: Random(seed), saves: seed.is_multiple_of(2) }
     }
 
     /// One change; true if the project should be saved before it.
     fn step(&mut self) -> bool {
         let random = &mut self.random;
-        let rig = self.app.world().get::<Rig>(self.rig).unwrap();
-        let head = self.app.world().get::<RigHistory>(self.rig).unwrap().steps().1;
+        let (rig, head) = (self.base.rig(), self.base.steps());
         let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
         let pick = |random: &mut Random| joints.get(random.below(joints.len().max(1))).copied();
         let mut place = || Vec3::from(std::array::from_fn(|_| random.below(1000) as f32 / 77.0));
@@ -99,8 +96,7 @@ impl EditSession {
             }
             _ => Change::Do(Operation::Place { position, parent }),
         };
-        self.app.world_mut().write_message(EditRequest { rig: self.rig, change });
-        self.app.update();
+        self.base.change(change);
         self.saves && self.random.chance(40)
     }
 }
@@ -137,10 +133,10 @@ fn child_that_edits_until_killed() {
     let mut editing = EditSession::new(seed);
     let project = folder.join("victim.rigsmith.ron");
     let places = JournalPlaces { project: None, state: Some(folder.clone()) };
-    let rig = Some(editing.rig().clone());
+    let rig = Some(editing.base.rig().clone());
     let journal = Journal::start(Arc::new(RealDisk), JournalStart { places: places.clone(), rig, ..default() });
-    let rig = editing.rig;
-    editing.app.world_mut().entity_mut(rig).insert(RigJournal::new(journal.clone()));
+    let rig = editing.base.rig;
+    editing.base.app.world_mut().entity_mut(rig).insert(RigJournal::new(journal.clone()));
     let mut pause = Random(seed ^ 0xFACE);
     let started = Instant::now();
     let mut saving: Option<std::thread::JoinHandle<()>> = None;
@@ -152,7 +148,7 @@ fn child_that_edits_until_killed() {
         std::io::stdout().flush().unwrap();
         // As an editor would, beside editing; one save at a time.
         if save && saving.as_ref().is_none_or(|thread| thread.is_finished()) {
-            let text = write_template(editing.rig());
+            let text = write_template(editing.base.rig());
             let mark =
                 SaveMark { path: project.clone(), hash: file_hash(text.as_bytes()), position: journal.position() };
             let (journal, places) =
@@ -167,7 +163,7 @@ fn child_that_edits_until_killed() {
     }
 }
 
-/// What one kill came to.
+/// Outcome of one kill.
 #[derive(Debug, Default, Clone, Copy)]
 struct Outcome {
     changes: u64,
@@ -246,13 +242,13 @@ fn kill_once(round: u64, folder: &Path) -> Outcome {
     let last = lines.last().map_or(0, |line| line.0);
     let mut again = EditSession::new(round);
     let counter = Counter::default();
-    let entity = again.rig;
-    again.app.world_mut().entity_mut(entity).insert(RigJournal::new(counter.clone()));
-    let mut held = (again.rig() == &rig).then_some(0);
+    let entity = again.base.rig;
+    again.base.app.world_mut().entity_mut(entity).insert(RigJournal::new(counter.clone()));
+    let mut held = (again.base.rig() == &rig).then_some(0);
     // One change may have been written that could not be told any more; undo may come back to a former state.
     while counter.0.load(Ordering::Relaxed) <= last {
         again.step();
-        if again.rig() == &rig {
+        if again.base.rig() == &rig {
             held = Some(counter.0.load(Ordering::Relaxed));
         }
     }

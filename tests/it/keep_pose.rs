@@ -127,7 +127,7 @@ fn check(what: &str, before: &Rig, after: &Rig) -> PoseDeviation {
     PoseDeviation { plain, off: off.len() }
 }
 
-/// What a change does to the poses: largest distance and angle where they are left as they are, and the number of poses
+/// Effect of a change on the poses: largest distance and angle where they are left as they are, and the number of poses
 /// that cannot be held.
 struct PoseDeviation {
     plain: (f32, f32),
@@ -190,7 +190,7 @@ fn command(rig: &Rig, joint: &str, module: &str, says: &str) -> Uid {
     first
 }
 
-/// Those of the left arm and the trunk.
+/// Uids of commands and joints of the left arm and the trunk.
 struct CharacterUids {
     hand_ik: Uid,
     elbow: Uid,

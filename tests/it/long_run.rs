@@ -8,7 +8,7 @@ use std::{
     collections::{BTreeMap, HashSet},
     fs,
     sync::Arc,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use bevy::{ecs::system::RunSystemOnce, prelude::*, time::TimeUpdateStrategy};
@@ -19,8 +19,8 @@ use rigsmith::{
     modules,
     plugins::{
         animation::ClipPlayer,
-        commands::{BuildRequest, BuildResult, BuildStep, BuiltEntities, Processor},
-        document::{Change, EditRequest, Selection},
+        commands::{BuildResult, BuildStep, BuiltEntities, Processor},
+        document::{Change, Selection},
         history::{MOST_STEPS, MOST_WEIGHT_BYTES, RigHistory},
         schema::{ConstraintKind, ParkedNode},
         surface::{RigMesh, SkinOf},
@@ -36,7 +36,7 @@ use rigsmith::{
 };
 
 use crate::{
-    bench::HANG,
+    bench::RigBench,
     random::Random,
     whole::{edits::bytes, skin::cube},
 };
@@ -68,8 +68,7 @@ fn template(version: usize) -> String {
 struct Failures(Vec<String>);
 
 struct LongRun {
-    app: App,
-    rig: Entity,
+    base: RigBench,
     /// Entities that were there before the rig.
     before: HashSet<Entity>,
     version: usize,
@@ -110,41 +109,23 @@ impl LongRun {
         app.update();
         let before = app.world().iter_entities().map(|entity| entity.id()).collect();
         let handle = app.world_mut().run_system_once(move |files: TemplateFiles| files.open(file.clone())).unwrap();
-        let rig = app.world_mut().spawn(RigSource::live(handle)).id();
-        let mut run = Self { app, rig, before, version: 0, next: 0, _folder: folder };
+        let base = RigBench::with(app, RigSource::live(handle));
+        let mut run = Self { base, before, version: 0, next: 0, _folder: folder };
         run.until("the rig", |world, rig| world.get::<BuildResult>(rig).is_some());
         let mesh = RigMesh::new(MESH, cube(), Vec::new());
-        run.app.world_mut().spawn((mesh, SkinOf(run.rig)));
+        run.base.app.world_mut().spawn((mesh, SkinOf(run.base.rig)));
         let clip = RigClip { range: [0.0, 2.0], looped: true, ..RigClip::new(CLIP, LAYER, "wave") };
         run.edit(vec![RigEdit::AddClip(Box::new(clip), 0)]);
-        run.frames(4);
+        run.base.frames(4);
         run
     }
 
     fn until(&mut self, what: &str, is_so: impl Fn(&World, Entity) -> bool) {
-        let start = Instant::now();
-        while !is_so(self.app.world(), self.rig) {
-            assert!(start.elapsed() < HANG, "{what} does not come");
-            self.app.update();
-            std::thread::sleep(Duration::from_micros(200));
-        }
-    }
-
-    fn frames(&mut self, count: usize) {
-        (0..count).for_each(|_| self.app.update());
-    }
-
-    fn document(&self) -> &Rig {
-        self.app.world().get::<Rig>(self.rig).unwrap()
-    }
-
-    fn change(&mut self, change: Change) {
-        self.app.world_mut().write_message(EditRequest { rig: self.rig, change });
-        self.app.update();
+        self.base.wait(what, |bench| is_so(bench.app.world(), bench.rig));
     }
 
     fn edit(&mut self, edits: Vec<RigEdit>) {
-        self.change(Change::Do(Operation::Named { name: "deed", edits }));
+        self.base.change(Change::Do(Operation::Named { name: "deed", edits }));
     }
 
     fn uid(&mut self) -> Uid {
@@ -155,13 +136,13 @@ impl LongRun {
     /// Joints of the template first, then those that were added.
     fn joints(&self) -> (Vec<Uid>, Vec<Uid>) {
         let is_added = |joint: &Uid| joint.0 >> 32 == 0xADD0;
-        self.document().walk().map(|joint| joint.data.uid).partition(|joint| !is_added(joint))
+        self.base.rig().walk().map(|joint| joint.data.uid).partition(|joint| !is_added(joint))
     }
 
     /// Controls of the template's own joints. Offsets of nodes that are gone stay in a document, so that those come back posed.
     fn controls(&self) -> Vec<Uid> {
         let (own, _) = self.joints();
-        let built = &self.app.world().get::<BuildResult>(self.rig).unwrap().0;
+        let built = &self.base.get::<BuildResult>(self.base.rig).unwrap().0;
         let is_own = |origin: &rigsmith::rig::Origin| own.contains(&origin.subject);
         let controls = built.nodes.iter().filter(|node| node.control.is_some());
         controls.filter(|node| node.origin.as_deref().is_some_and(is_own)).map(|node| node.uid).collect()
@@ -171,22 +152,23 @@ impl LongRun {
         let (own, added) = self.joints();
         let all: Vec<Uid> = own.iter().chain(&added).copied().collect();
         let (joint, number) = (random.pick(&all), random.below(1000));
-        let rig = self.rig;
+        let rig = self.base.rig;
         match random.below(40) {
             0..=6 => {
                 if let Some(control) = random.of(&self.controls()) {
                     let offset = PoseOffset { rotation: random.rotation(), ..PoseOffset::IDENTITY };
-                    self.change(Change::Do(Operation::Pose(vec![(control, offset)])));
+                    self.base.change(Change::Do(Operation::Pose(vec![(control, offset)])));
                 }
             }
             7 | 8 => {
-                let built = self.app.world().get::<BuiltEntities>(rig).unwrap();
+                let built = self.base.get::<BuiltEntities>(rig).unwrap();
                 let entity = random.of(&self.controls()).and_then(|control| built.get(control));
-                if let Some(mut transform) = entity.and_then(|entity| self.app.world_mut().get_mut::<Transform>(entity))
+                if let Some(mut transform) =
+                    entity.and_then(|entity| self.base.app.world_mut().get_mut::<Transform>(entity))
                 {
                     transform.translation += 0.01 * random.point();
                 }
-                self.app.update();
+                self.base.app.update();
             }
             9 | 10 => self.edit(vec![RigEdit::SetLabel(joint, Some(format!("l{number}")))]),
             11..=13 if all.len() < JOINTS => {
@@ -197,18 +179,18 @@ impl LongRun {
             }
             14 | 15 => {
                 if let Some(gone) = random.of(&added) {
-                    self.change(Change::Do(Operation::Delete { joints: vec![gone], keep_children: true }));
+                    self.base.change(Change::Do(Operation::Delete { joints: vec![gone], keep_children: true }));
                 }
             }
-            16..=19 => self.change(Change::Undo),
-            20 | 21 => self.change(Change::Redo),
+            16..=19 => self.base.change(Change::Undo),
+            20 | 21 => self.base.change(Change::Redo),
             22 => {
                 let kind = TagKind::Command { module: "null".into(), params: "()".into(), feature: None };
                 let tag = TagData { uid: self.uid(), enabled: true, comment: String::new(), kind };
                 self.edit(vec![RigEdit::AddTag { joint, tag: Box::new(tag), index: 0 }]);
             }
             23 | 24 => {
-                let tags = self.document().walk().flat_map(|joint| {
+                let tags = self.base.rig().walk().flat_map(|joint| {
                     let uid = joint.data.uid;
                     joint.data.tags.iter().map(move |tag| (uid, tag.uid))
                 });
@@ -220,23 +202,22 @@ impl LongRun {
             25..=27 => {
                 let step = [BuildStep::RollBack, BuildStep::Back, BuildStep::Restart, BuildStep::To(2)];
                 for step in [step[number % 4].clone(), BuildStep::All] {
-                    self.app.world_mut().write_message(BuildRequest { rig, step });
-                    self.app.update();
+                    self.base.step(step);
                 }
             }
             28 | 29 => {
-                let player = self.document().clip(CLIP).map(ClipPlayer::new);
-                let mut entity = self.app.world_mut().entity_mut(rig);
+                let player = self.base.rig().clip(CLIP).map(ClipPlayer::new);
+                let mut entity = self.base.app.world_mut().entity_mut(rig);
                 match player.filter(|_| number.is_multiple_of(2)) {
                     Some(player) => entity.insert(player),
                     None => entity.remove::<ClipPlayer>(),
                 };
-                self.frames(2);
+                self.base.frames(2);
             }
             30 | 31 => {
                 let target = TrackTarget { node: random.pick(&own), property: Property::Rotation };
                 let key = Key::rotation((number % 16) as f32 / 8.0, random.rotation());
-                let clip = self.document().clip(CLIP);
+                let clip = self.base.rig().clip(CLIP);
                 let track = clip.and_then(|clip| clip.layers[0].tracks.get(&target).cloned());
                 let removed: Vec<f32> = track
                     .iter()
@@ -257,7 +238,7 @@ impl LongRun {
                 self.edit(vec![RigEdit::SetSkin(MESH, Some(Arc::new(skin)))]);
             }
             34 => {
-                let groups: Vec<Uid> = self.document().groups().iter().map(|group| group.uid).collect();
+                let groups: Vec<Uid> = self.base.rig().groups().iter().map(|group| group.uid).collect();
                 let edits = match groups.len() < 4 {
                     true => {
                         let group = GroupData { uid: self.uid(), name: "g".into(), color: [0.5; 3], enabled: true };
@@ -265,7 +246,7 @@ impl LongRun {
                     }
                     false => {
                         let group = groups[0];
-                        let of_it = self.document().walk().filter(|joint| joint.data.group == Some(group));
+                        let of_it = self.base.rig().walk().filter(|joint| joint.data.group == Some(group));
                         let out = of_it.map(|joint| RigEdit::SetGroup(joint.data.uid, None));
                         out.chain([RigEdit::RemoveLocalGroup(group)]).collect()
                     }
@@ -273,11 +254,11 @@ impl LongRun {
                 self.edit(edits);
             }
             35 => {
-                self.app.world_mut().get_mut::<Selection>(rig).unwrap().0 = vec![joint];
-                self.app.update();
+                self.base.app.world_mut().get_mut::<Selection>(rig).unwrap().0 = vec![joint];
+                self.base.app.update();
             }
             36 if number < 200 => self.reload(),
-            _ => self.app.update(),
+            _ => self.base.app.update(),
         }
     }
 
@@ -285,10 +266,11 @@ impl LongRun {
     fn reload(&mut self) {
         self.version += 1;
         let content = template(self.version).into_bytes();
-        let template = self.app.world().get::<RigSource>(self.rig).unwrap().template.clone();
-        let before = self.app.world().resource::<RigTemplates>().built(&template).cloned();
+        let template = self.base.get::<RigSource>(self.base.rig).unwrap().template.clone();
+        let before = self.base.app.world().resource::<RigTemplates>().built(&template).cloned();
         let offered = template.clone();
-        self.app
+        self.base
+            .app
             .world_mut()
             .run_system_once(move |files: TemplateFiles| files.offer(&offered, content.clone()))
             .unwrap();
@@ -297,18 +279,18 @@ impl LongRun {
             !world.resource::<Failures>().0.is_empty()
                 || now.zip(before.as_ref()).is_some_and(|(now, before)| !Arc::ptr_eq(now, before))
         });
-        self.frames(4);
-        if self.app.world().get::<UpdateOffer>(self.rig).is_some() {
-            self.app.world_mut().write_message(AcceptUpdate { rig: self.rig, choices: Take::Theirs.into() });
-            self.frames(4);
+        self.base.frames(4);
+        if self.base.get::<UpdateOffer>(self.base.rig).is_some() {
+            self.base.app.world_mut().write_message(AcceptUpdate { rig: self.base.rig, choices: Take::Theirs.into() });
+            self.base.frames(4);
         }
-        assert_eq!(self.app.world().resource::<Failures>().0, Vec::<String>::new());
+        assert_eq!(self.base.app.world().resource::<Failures>().0, Vec::<String>::new());
     }
 
     /// Fails unless every entity is a part of the rig, the rig itself or its mesh, or was there before.
     fn counts(&mut self) -> Counts {
-        self.frames(3);
-        let world = self.app.world();
+        self.base.frames(3);
+        let world = self.base.app.world();
         let mut strangers: BTreeMap<String, usize> = BTreeMap::new();
         let (mut entities, mut parked, mut constraints) = (0, 0, 0);
         for entity in world.iter_entities().filter(|entity| !self.before.contains(&entity.id())) {
@@ -318,16 +300,16 @@ impl LongRun {
             if entity.contains::<Uid>() || entity.contains::<ConstraintKind>() || entity.contains::<RigMesh>() {
                 continue;
             }
-            if entity.id() != self.rig {
+            if entity.id() != self.base.rig {
                 let names = entity.archetype().components().iter();
                 let names = names.filter_map(|id| Some(world.components().get_name(*id)?.to_string()));
                 *strangers.entry(names.collect::<Vec<_>>().join(", ")).or_default() += 1;
             }
         }
         assert!(strangers.is_empty(), "entities that are no part of the rig: {strangers:?}");
-        let rig = self.document();
+        let rig = self.base.rig();
         let tags: usize = rig.walk().map(|joint| joint.data.tags.len()).sum();
-        let built = &world.get::<BuildResult>(self.rig).unwrap().0;
+        let built = &world.get::<BuildResult>(self.base.rig).unwrap().0;
         let made = built.nodes.iter().filter(|node| node.origin.is_some()).count();
         assert_eq!(constraints, built.constraints.len(), "constraints without a build");
         let known = 2 + rig.len() + tags + rig.groups().len() + made + constraints + parked;
@@ -337,8 +319,8 @@ impl LongRun {
             parked,
             archetypes: world.archetypes().len(),
             document: bytes(rig).len(),
-            steps: world.get::<RigHistory>(self.rig).unwrap().steps().0.len(),
-            kept: world.get::<Processor>(self.rig).unwrap().builder().kept(),
+            steps: world.get::<RigHistory>(self.base.rig).unwrap().steps().0.len(),
+            kept: world.get::<Processor>(self.base.rig).unwrap().builder().kept(),
             memory: anonymous_memory(),
         }
     }
@@ -377,20 +359,20 @@ fn thousands_of_deeds_leave_nothing_behind() {
         let most = early.memory + early.memory / 10;
         assert!(last.memory <= most, "memory grows by more than a tenth: {counted:?}");
     }
-    let bare = Builder::build(run.document(), &Arc::new(modules::all()));
-    assert_eq!(bare.ok().as_ref(), run.app.world().get::<BuildResult>(run.rig).map(|built| &*built.0));
+    let bare = Builder::build(run.base.rig(), &Arc::new(modules::all()));
+    assert_eq!(bare.ok().as_ref(), run.base.get::<BuildResult>(run.base.rig).map(|built| &*built.0));
 
     // Undone as far as it goes, and closed, it leaves the entities that were there before.
-    let steps = run.app.world().get::<RigHistory>(run.rig).unwrap().steps().1;
+    let steps = run.base.steps();
     for _ in 0..steps {
-        run.change(Change::Undo);
+        run.base.change(Change::Undo);
     }
-    assert_eq!(run.app.world().get::<RigHistory>(run.rig).unwrap().steps().1, 0);
+    assert_eq!(run.base.steps(), 0);
     run.counts();
-    let rig = run.rig;
-    run.app.world_mut().entity_mut(rig).despawn();
-    run.frames(4);
-    let world = run.app.world();
+    let rig = run.base.rig;
+    run.base.app.world_mut().entity_mut(rig).despawn();
+    run.base.frames(4);
+    let world = run.base.app.world();
     let left: Vec<Entity> =
         world.iter_entities().map(|entity| entity.id()).filter(|id| !run.before.contains(id)).collect();
     let names = |entity: &Entity| {

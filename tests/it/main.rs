@@ -220,4 +220,6 @@ mod weights_bodies;
 mod whole;
 #[cfg(all(feature = "editor", feature = "cli"))]
 mod window;
+#[cfg(feature = "editor")]
+mod window_app;
 mod world;

@@ -6,16 +6,14 @@ use bevy::prelude::*;
 use rigsmith::{
     editor::{
         ActiveRig,
-        files::{FilesPlugin, LoadJob, OpenRequest, StateFolder},
+        files::{FilesPlugin, OpenRequest},
         mesh_watch::MeshWatchPlugin,
-        notice::{Notice, Severity},
+        notice::Severity,
     },
-    headless::headless_app,
     plugins::surface::{RigMesh, RigMeshes},
-    test_app::strict_app,
 };
 
-use super::bench::HANG;
+use super::window_app::WindowBench;
 
 fn cube(half: f32) -> String {
     let mut text = String::new();
@@ -34,46 +32,31 @@ fn a_saved_mesh_is_read_again_and_a_broken_one_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("cube.obj");
     fs::write(&file, cube(0.5)).unwrap();
-    let mut app = headless_app(7);
-    app.insert_resource(StateFolder(Some(folder.path().join("state"))))
-        .add_plugins((FilesPlugin, MeshWatchPlugin))
-        .add_message::<AppExit>();
-    let mut app = strict_app(app);
-    app.world_mut().write_message(OpenRequest::File(file.clone()));
-    let mut notices: Vec<Notice> = Vec::new();
-    let mut cursor = bevy::ecs::message::MessageCursor::<Notice>::default();
-    let mut until = |app: &mut App, what: &str, is_so: &dyn Fn(&World, &[Notice]) -> bool| {
-        let start = std::time::Instant::now();
-        loop {
-            app.update();
-            notices.extend(cursor.read(app.world().resource::<Messages<Notice>>()).cloned());
-            if is_so(app.world(), &notices) {
-                return;
-            }
-            assert!(start.elapsed() < HANG, "{what} does not come: {notices:?}");
-            std::thread::sleep(Duration::from_millis(5));
-        }
-    };
-    let half = |world: &World| {
+    let state = folder.path().join("state");
+    let mut window = WindowBench::with_files(state, (FilesPlugin, MeshWatchPlugin));
+    window.base.app.world_mut().write_message(OpenRequest::File(file.clone()));
+    let half = |window: &WindowBench| {
+        let world = window.world();
         let rig = world.get_resource::<ActiveRig>()?.0;
         let mesh = world.get::<RigMeshes>(rig)?.iter().next()?;
         let points = &world.get::<RigMesh>(mesh)?.rest.points;
         points.iter().map(|point| point.x).reduce(f32::max)
     };
-    until(&mut app, "the mesh", &|world, _| half(world) == Some(0.5) && world.resource::<LoadJob>().what().is_none());
+    window.until("the mesh", |window| half(window) == Some(0.5) && !window.base.has_file_jobs());
     // The file is looked at before it changes.
     let looks = std::time::Instant::now();
     while looks.elapsed() < Duration::from_millis(700) {
-        app.update();
+        window.frame();
         std::thread::sleep(Duration::from_millis(5));
     }
     fs::write(&file, cube(0.75)).unwrap();
-    until(&mut app, "the next version", &|world, notices| {
-        half(world) == Some(0.75) && notices.iter().any(|notice| notice.text.contains("was read again"))
+    window.until("the next version", |window| {
+        let is_told = window.notices.list.iter().any(|notice| notice.text.contains("was read again"));
+        half(window) == Some(0.75) && is_told
     });
     fs::write(&file, "v 1 2\nf 1 2 3 4 5 6 7 8 9\n").unwrap();
-    until(&mut app, "the error", &|_, notices| notices.iter().any(|notice| notice.severity == Severity::Error));
-    assert_eq!(half(app.world()), Some(0.75), "a broken file changes nothing");
+    window.until("the error", |window| window.notices.include(Severity::Error, ""));
+    assert_eq!(half(&window), Some(0.75), "a broken file changes nothing");
     fs::write(&file, cube(0.6)).unwrap();
-    until(&mut app, "the version after the broken one", &|world, _| half(world) == Some(0.6));
+    window.until("the version after the broken one", |window| half(window) == Some(0.6));
 }

@@ -22,7 +22,7 @@ use rigsmith::{
     rig::{Rig, Uid},
 };
 
-use crate::bench::HANG;
+use crate::bench::{AppBench, wait_with};
 
 /// A square column around [`ARM`], that wide, with so many rings of points.
 fn column(width: f32, rings: u32) -> String {
@@ -212,7 +212,7 @@ fn a_file_that_the_model_names_is_followed() {
 
 /// A game without window and renderer, whose meshes follow their files.
 struct Game {
-    app: App,
+    base: AppBench,
     folder: tempfile::TempDir,
     answers: MessageCursor<ReloadAnswer>,
     reports: Vec<ReloadReport>,
@@ -231,7 +231,7 @@ impl Game {
         app.finish();
         app.cleanup();
         let (answers, faults) = (MessageCursor::default(), MessageCursor::default());
-        Self { app, folder, answers, reports: Vec::new(), faults, told: Vec::new() }
+        Self { base: AppBench::bare(app), folder, answers, reports: Vec::new(), faults, told: Vec::new() }
     }
 
     fn path(&self) -> PathBuf {
@@ -239,7 +239,7 @@ impl Game {
     }
 
     fn template(&mut self) -> Handle<RigTemplate> {
-        self.app.world_mut().resource_mut::<Assets<RigTemplate>>().add(RigTemplate::read(ARM).unwrap())
+        self.base.app.world_mut().resource_mut::<Assets<RigTemplate>>().add(RigTemplate::read(ARM).unwrap())
     }
 
     fn mesh(&self) -> RigMesh {
@@ -247,27 +247,23 @@ impl Game {
     }
 
     fn update(&mut self) {
-        self.app.update();
-        let world = self.app.world();
+        self.base.app.update();
+        let world = self.base.app.world();
         let answers = self.answers.read(world.resource::<Messages<ReloadAnswer>>());
         self.reports.extend(answers.map(|answer| answer.result.clone().unwrap()));
         let faults = self.faults.read(world.resource::<Messages<ModelFault>>());
         self.told.extend(faults.map(|fault| fault.error.to_string()));
-        std::thread::sleep(Duration::from_millis(1));
     }
 
     fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
-        let start = Instant::now();
-        while !is_so(self) {
-            assert!(start.elapsed() < HANG, "{what} does not come: {:?}", self.told);
-            self.update();
-        }
+        wait_with(self, what, Self::update, is_so, |game| game.told.clone());
     }
 
     /// Updates until the files have been looked at a few times.
     fn settle(&mut self) {
         let start = Instant::now();
         while start.elapsed() < Duration::from_millis(200) {
+            std::thread::sleep(Duration::from_millis(1));
             self.update();
         }
     }
@@ -290,12 +286,12 @@ fn meshes_of_instances_follow_their_file_with_one_transfer_for_all() {
     let mut game = Game::new(app);
     let (template, mesh, file) = (game.template(), game.mesh(), ModelFile(game.path()));
     let meshes = [0, 1].map(|_| {
-        let world = game.app.world_mut();
+        let world = game.base.app.world_mut();
         let instance = world.spawn(RigInstance(template.clone())).id();
         world.spawn((mesh.clone(), SkinOf(instance), file.clone())).id()
     });
-    let skin = |game: &Game, mesh: Entity| game.app.world().get::<InstanceSkin>(mesh).map(|skin| skin.0.clone());
-    let points = |game: &Game, mesh: Entity| game.app.world().get::<RigMesh>(mesh).unwrap().rest.points.len();
+    let skin = |game: &Game, mesh: Entity| game.base.get::<InstanceSkin>(mesh).map(|skin| skin.0.clone());
+    let points = |game: &Game, mesh: Entity| game.base.get::<RigMesh>(mesh).unwrap().rest.points.len();
     game.until("the weights", |game| meshes.iter().all(|mesh| skin(game, *mesh).is_some()));
     game.settle();
     game.save(&column(0.2, 7));
@@ -303,7 +299,11 @@ fn meshes_of_instances_follow_their_file_with_one_transfer_for_all() {
     let skins = meshes.map(|mesh| skin(&game, mesh).unwrap());
     assert!(skins[0].weights.len() == 28 && Arc::ptr_eq(&skins[0], &skins[1]), "the weights come with the points");
     game.settle();
-    assert_eq!(game.app.world().resource::<InstanceSkins>().computed(), 1, "weights are transferred, not computed");
+    assert_eq!(
+        game.base.app.world().resource::<InstanceSkins>().computed(),
+        1,
+        "weights are transferred, not computed"
+    );
     assert!(Arc::ptr_eq(&skin(&game, meshes[0]).unwrap(), &skins[0]));
     assert_eq!(game.reports.iter().map(|report| report.points).collect::<Vec<_>>(), [[16, 28]; 2]);
     assert!(game.reports.iter().all(|report| report.moved > 0.09 && report.weights.is_some()), "{:?}", game.reports);
@@ -314,7 +314,7 @@ fn meshes_of_instances_follow_their_file_with_one_transfer_for_all() {
     game.save(&column(0.1, 5));
     game.until("the good version", |game| meshes.iter().all(|mesh| points(game, *mesh) == 20));
     // One that follows nothing any more stays as it is.
-    game.app.world_mut().entity_mut(meshes[0]).remove::<ModelFile>();
+    game.base.app.world_mut().entity_mut(meshes[0]).remove::<ModelFile>();
     game.save(&column(0.1, 6));
     game.until("the last version", |game| points(game, meshes[1]) == 24);
     assert_eq!(points(&game, meshes[0]), 20);
@@ -324,18 +324,18 @@ fn meshes_of_instances_follow_their_file_with_one_transfer_for_all() {
 fn a_mesh_of_a_document_follows_its_file_as_a_step_that_can_be_undone() {
     let mut game = Game::new(rigsmith::headless::headless_app(5));
     let (template, mesh, file) = (game.template(), game.mesh(), ModelFile(game.path()));
-    let world = game.app.world_mut();
+    let world = game.base.app.world_mut();
     let rig = world.spawn(RigSource::new(template)).id();
     let mesh = world.spawn((mesh, SkinOf(rig), file)).id();
-    let weights = |game: &Game| Some(game.app.world().get::<Rig>(rig)?.skin(Uid(7))?.weights.len());
-    let points = |game: &Game| game.app.world().get::<RigMesh>(mesh).unwrap().rest.points.len();
+    let weights = |game: &Game| Some(game.base.get::<Rig>(rig)?.skin(Uid(7))?.weights.len());
+    let points = |game: &Game| game.base.get::<RigMesh>(mesh).unwrap().rest.points.len();
     game.until("the weights", |game| weights(game) == Some(16));
     game.settle();
     game.save(&column(0.2, 7));
     game.until("the next version", |game| points(game) == 28);
     assert_eq!(weights(&game), Some(28));
     game.until("the report", |game| game.reports.len() == 1);
-    game.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+    game.base.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
     game.until("the version before", |game| points(game) == 16);
     assert_eq!(weights(&game), Some(16));
     game.settle();

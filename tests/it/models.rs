@@ -65,7 +65,7 @@ fn joints(name: &str) -> Vec<(i64, DVec3, String)> {
         .collect()
 }
 
-/// Whether a ray from `p` in an odd direction leaves through an odd number of triangles.
+/// True if a ray from `p` in an odd direction leaves through an odd number of triangles.
 fn inside(mesh: &Mesh, faces: &[Vec<usize>], p: DVec3) -> bool {
     let direction = dvec3(0.2631, 0.1147, 0.9579);
     let mut crossings = 0;

@@ -177,8 +177,8 @@ fn what_does_not_fit_is_told_with_its_place() {
     }
 }
 
-/// A dozen files, each of which uses the next eight times: neither what they would bring nor what keeps them from it is worked
-/// out for each use.
+/// A dozen files, each of which uses the next eight times: neither what they would bring nor what keeps them from it is
+/// worked out for each use.
 #[test]
 fn parts_of_parts_fill_neither_the_memory_nor_the_day() {
     let level = |next: &str| {
@@ -237,7 +237,7 @@ fn a_save_leaves_parts_to_their_files() {
     assert_eq!(saved_text::joints(&load(&out)), saved_text::joints(&rig));
 }
 
-/// What instances told.
+/// Reports of instances.
 #[derive(Resource, Default, Debug)]
 struct InstanceReport {
     built: usize,

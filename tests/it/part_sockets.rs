@@ -191,7 +191,7 @@ fn a_renamed_joint_keeps_its_socket_and_a_deleted_one_takes_it_along() {
     assert_eq!(load_template(&RealDisk, &path).unwrap().sockets, Vec::new());
 }
 
-/// What instances told.
+/// Reports of instances.
 #[derive(Resource, Default)]
 struct InstanceReport {
     built: usize,

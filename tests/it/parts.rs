@@ -153,7 +153,8 @@ impl Puppet {
         self.built.nodes.iter().filter(|node| node.origin.is_some()).count()
     }
 
-    /// How far the document's joints are from where they rest: as a share of the rig's height, and in degrees.
+    /// Largest distance of the document's joints from where they rest, as a share of the rig's height, their largest turn
+    /// in degrees, and the joint's name.
     fn off_rest(&self) -> (f32, f32, String) {
         let places: Vec<Vec3> = self.rig.walk().map(|joint| self.rig.position(joint.data.uid)).collect();
         let (low, high) =
@@ -175,7 +176,7 @@ impl Puppet {
     }
 }
 
-/// What a person would write: no uid, the layout of `rigsmith format`, and as many lines as one can read.
+/// Files as a person would write them: no uid, the layout of `rigsmith format`, and as many lines as one can read.
 #[test]
 fn files_are_written_by_people() {
     for (name, path) in files() {

@@ -107,7 +107,7 @@ impl Stage {
         self.global(self.joint(label)).translation
     }
 
-    /// How far the furthest joint is from where it rests, and by how many degrees the most turned one is turned.
+    /// Distance of the furthest joint from where it rests, and the turn of the most turned one in degrees.
     fn off_rest(&self) -> (f32, f32) {
         let off = self.rig.rest_globals().into_iter().filter_map(|(joint, rest)| {
             let (_, rotation, translation) = rest.to_scale_rotation_translation();

@@ -29,7 +29,7 @@ fn two_arms() -> (Bench, Uid, Vec<Uid>, Vec<Uid>) {
     (bench, hips, left, right)
 }
 
-/// What the pose does to a point of the mesh that is at rest and moves with the joint.
+/// Movement that the pose gives a point of the mesh that is at rest and moves with the joint.
 fn moves(rig: &Rig, joint: Uid) -> Affine3 {
     rig.posed_global(joint) * rig.rest_global(joint).inverse()
 }
@@ -290,13 +290,6 @@ fn a_deleted_joint_takes_its_part_of_the_pose_along_and_brings_it_back() {
 }
 
 impl RigBench {
-    /// A rig whose entities are there.
-    fn in_app(rig: Rig) -> Self {
-        let mut bench = Self::of(rig);
-        bench.app.update();
-        bench
-    }
-
     fn transform(&self, joint: Uid) -> Transform {
         *self.get::<Transform>(self.joint(joint)).unwrap()
     }
@@ -313,7 +306,7 @@ impl RigBench {
 fn entities_stand_as_the_document_poses_them() {
     let (mut bench, hips, left, right) = two_arms();
     bench.run(Operation::Pose(vec![(left[0], turn(0.0, 0.0, 1.0))]));
-    let mut app = RigBench::in_app(bench.rig.clone());
+    let mut app = RigBench::started(bench.rig.clone());
     app.assert_as_documented();
     assert_ne!(app.transform(right[0]).rotation, app.rig().joint(right[0]).unwrap().data.rest.rotation);
 
@@ -340,7 +333,7 @@ fn entities_stand_as_the_document_poses_them() {
 #[test]
 fn who_else_writes_a_pose_keeps_it_until_the_document_poses_that_joint() {
     let (bench, hips, left, _) = two_arms();
-    let mut app = RigBench::in_app(bench.rig.clone());
+    let mut app = RigBench::started(bench.rig.clone());
     app.edit(Operation::Pose(vec![(hips, turn(0.3, 0.0, 0.0))]));
     let animated = turn(0.0, 0.7, 0.0);
     for joint in [hips, left[1]] {

@@ -26,12 +26,15 @@ use rigsmith::{
 };
 use serde_json::{Value, json};
 
-use super::{bench::HANG, template_text::CHAIN};
+use super::{
+    bench::{AppBench, HANG},
+    template_text::CHAIN,
+};
 
 const TOKEN: &str = "a-token-for-tests-only";
 
 struct Remote {
-    app: App,
+    base: AppBench,
     address: SocketAddr,
     folder: tempfile::TempDir,
 }
@@ -54,7 +57,7 @@ impl Remote {
         assert!(address.ip().is_loopback());
         let mut app = headless_app(1);
         app.add_plugins((RigInstancePlugin::default(), remote));
-        Self { app: strict_app(app), address, folder }
+        Self { base: AppBench::bare(strict_app(app)), address, folder }
     }
 
     fn file(&self, name: &str) -> std::path::PathBuf {
@@ -71,7 +74,7 @@ impl Remote {
             told.send(send(stream)).unwrap();
         });
         let answer = loop {
-            self.app.update();
+            self.base.app.update();
             match answer.recv_timeout(Duration::from_millis(1)) {
                 Ok(answer) => break answer,
                 Err(mpsc::RecvTimeoutError::Timeout) => {}
@@ -163,7 +166,7 @@ fn every_verb_drives_a_running_app() {
     let tip = told["joints"][2]["joint"]["uid"].clone();
     let edited = remote.call("rig.edit", json!({"rig": rig, "edits": [{"SetLabel": [tip, "tip"]}]}));
     assert_eq!((&edited["changed"], &edited["step"]), (&json!(true), &json!("Remote edit")));
-    assert!(remote.app.world().get::<Rig>(entity(&rig)).unwrap().find_label("tip").is_some());
+    assert!(remote.base.get::<Rig>(entity(&rig)).unwrap().find_label("tip").is_some());
     remote.call("rig.edit", json!({"rig": rig, "history": "undo"}));
     assert_eq!(remote.text(&rig), before);
     remote.call("rig.edit", json!({"rig": rig, "history": "redo"}));
@@ -175,7 +178,7 @@ fn every_verb_drives_a_running_app() {
     assert_eq!(remote.call("rig.step", json!({"rig": rig, "to": "back"}))["cursor"], json!(commands - 1));
     assert_eq!(remote.call("rig.step", json!({"rig": rig, "to": "forward"}))["cursor"], json!(commands));
     assert_eq!(remote.call("rig.step", json!({"rig": rig, "to": 1}))["cursor"], json!(1));
-    let nodes = |remote: &Remote| remote.app.world().get::<BuildResult>(entity(&rig)).unwrap().0.nodes.len();
+    let nodes = |remote: &Remote| remote.base.get::<BuildResult>(entity(&rig)).unwrap().0.nodes.len();
     let few = nodes(&remote);
     assert_eq!(remote.call("rig.step", json!({"rig": rig, "to": "run"}))["cursor"], json!(commands));
     assert!(nodes(&remote) > few);
@@ -186,8 +189,8 @@ fn every_verb_drives_a_running_app() {
     let copy = fs::read_to_string(remote.file("copy.rig.ron")).unwrap();
     assert!(copy.contains("// half as big"), "{copy}");
     let saved_rig = write_template(&read_template(copy.as_bytes()).unwrap().rig);
-    assert_eq!(saved_rig, write_template(remote.app.world().get::<Rig>(entity(&rig)).unwrap()));
-    let base = |remote: &Remote| remote.app.world().get::<RigSource>(entity(&rig)).unwrap().base().unwrap().clone();
+    assert_eq!(saved_rig, write_template(remote.base.get::<Rig>(entity(&rig)).unwrap()));
+    let base = |remote: &Remote| remote.base.get::<RigSource>(entity(&rig)).unwrap().base().unwrap().clone();
     assert!(base(&remote).find_label("tip").is_none());
     remote.call("rig.template.save", json!({"rig": rig}));
     assert_eq!(fs::read_to_string(remote.file("t.rig.ron")).unwrap(), copy);
@@ -205,7 +208,7 @@ fn every_verb_drives_a_running_app() {
     let updated = remote.call("rig.template.update", json!({"rig": rig}));
     assert_eq!(updated["changes"], offer["changes"]);
     assert_eq!(updated["changes"][0]["field"], json!("translation"));
-    let document = remote.app.world().get::<Rig>(entity(&rig)).unwrap();
+    let document = remote.base.get::<Rig>(entity(&rig)).unwrap();
     let root = document.joint(document.find_label("tail_1").unwrap()).unwrap();
     assert_eq!(root.data.rest.translation.y, 1.5);
     assert!(document.joint(serde_json::from_value(middle).unwrap()).unwrap().data.locked);
@@ -226,7 +229,7 @@ fn a_conflict_is_decided_by_the_call() {
         let updated = remote.call("rig.template.update", json!({"rig": rig, "take": take}));
         assert_eq!(updated["changes"].as_array().unwrap().len(), 2);
         assert_eq!(updated["changes"][0]["conflict"], json!(true));
-        let document = remote.app.world().get::<Rig>(entity(&rig)).unwrap();
+        let document = remote.base.get::<Rig>(entity(&rig)).unwrap();
         assert_eq!(document.joint(document.find_label("tail_1").unwrap()).unwrap().data.rest.translation.y, height);
         assert!(write_template(document).contains("0.75"));
     }
@@ -397,7 +400,7 @@ fn templates_that_cannot_be_read_leave_nothing_behind() {
     let (code, message) = remote.refusal("rig.template.load", json!({"path": "broken.rig.ron"}));
     assert!(code == -32003 && message.contains("broken.rig.ron"), "{message}");
     assert_eq!(remote.refusal("rig.template.load", json!({"path": "none.rig.ron"})).0, -32002);
-    remote.app.update();
+    remote.base.app.update();
     assert_eq!(remote.call("rig.list", json!({})), json!([]));
     let rig = remote.load();
     let before = remote.text(&rig);
@@ -415,7 +418,7 @@ fn listening_ends_with_the_app_and_waiting_calls_wake_it() {
     let mut remote = Remote::new();
     let woken = Arc::new(AtomicUsize::new(0));
     let counted = woken.clone();
-    remote.app.world().resource::<RemoteServer>().set_wake(move || {
+    remote.base.app.world().resource::<RemoteServer>().set_wake(move || {
         counted.fetch_add(1, Ordering::SeqCst);
     });
     remote.call("rig.list", json!({}));

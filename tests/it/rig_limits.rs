@@ -1,6 +1,6 @@
 //! Limits of an app with rigs: a resource that builds, background jobs and gesture lists obey.
 
-use std::{path::Path, time::Instant};
+use std::path::Path;
 
 use bevy::prelude::*;
 use rigsmith::{
@@ -20,7 +20,7 @@ use rigsmith::{
     test_app::test_app,
 };
 
-use crate::bench::HANG;
+use crate::bench::RigBench;
 
 const RIG: &str = r#"(format: 2, name: "n", joints: [
     (label: "root", tags: [null(), null()]),
@@ -29,8 +29,7 @@ const RIG: &str = r#"(format: 2, name: "n", joints: [
 
 /// An app with limits, a rig, and the bundled biped as its mesh.
 struct Bench {
-    app: App,
-    rig: Entity,
+    base: RigBench,
     mesh: Entity,
 }
 
@@ -42,24 +41,10 @@ impl Bench {
     fn new(limits: RigLimits) -> Self {
         let mut app = test_app();
         app.insert_resource(limits);
-        let rig = app.world_mut().spawn(read_template(RIG.as_bytes()).unwrap().rig).id();
-        let mesh = app.world_mut().spawn((RigMesh::new(Uid(9), biped(), Vec::new()), SkinOf(rig))).id();
-        app.update();
-        Self { app, rig, mesh }
-    }
-
-    /// Sends a request and waits for the answer.
-    fn ask<Q: Message, A: Message + Clone>(&mut self, request: Q) -> A {
-        self.app.world_mut().write_message(request);
-        let start = Instant::now();
-        loop {
-            self.app.update();
-            if let Some(answer) = self.app.world_mut().resource_mut::<Messages<A>>().drain().last() {
-                return answer;
-            }
-            assert!(start.elapsed() < HANG, "no answer");
-            std::thread::sleep(std::time::Duration::from_millis(2));
-        }
+        let mut base = RigBench::with(app, read_template(RIG.as_bytes()).unwrap().rig);
+        let mesh = base.app.world_mut().spawn((RigMesh::new(Uid(9), biped(), Vec::new()), SkinOf(base.rig))).id();
+        base.app.update();
+        Self { base, mesh }
     }
 }
 
@@ -74,22 +59,22 @@ fn jobs_refuse_meshes_above_the_limits() {
     for (limit, name) in [(Limit::Points, "points"), (Limit::Triangles, "triangles")] {
         let mut bench = Bench::new(RigLimits::default().with(limit, 10));
         let mesh = bench.mesh;
-        match bench.ask::<_, BindAnswer>(BindRequest::new(mesh)).result {
+        match bench.base.ask::<_, BindAnswer>(BindRequest::new(mesh)).result {
             Err(SkinningError::Limit(error)) => check_limit(&error, name),
             other => panic!("{other:?}"),
         }
-        match bench.ask::<_, FitAnswer>(FitRequest::new(mesh)).result {
+        match bench.base.ask::<_, FitAnswer>(FitRequest::new(mesh)).result {
             Err(FitFailure::Limit(error)) => check_limit(&error, name),
             other => panic!("{other:?}"),
         }
         let request = FaceRequest { mesh, settings: Default::default(), fit: None };
-        match bench.ask::<_, FacePlaced>(request).result {
+        match bench.base.ask::<_, FacePlaced>(request).result {
             Err(PlaceFaceError::Limit(error)) => check_limit(&error, name),
             other => panic!("{other:?}"),
         }
         // With the limits that hold otherwise the same mesh is bound.
-        bench.app.insert_resource(RigLimits::default());
-        assert!(bench.ask::<_, BindAnswer>(BindRequest::new(mesh)).result.is_ok());
+        bench.base.app.insert_resource(RigLimits::default());
+        assert!(bench.base.ask::<_, BindAnswer>(BindRequest::new(mesh)).result.is_ok());
     }
 }
 
@@ -100,16 +85,16 @@ fn jobs_are_given_up_when_their_time_is_over() {
     let late = |work| OutOfTime { work, seconds: 0 };
     let text = late("binding the mesh").to_string();
     assert!(text.starts_with("binding the mesh took") && text.contains("raise the limit `seconds`"), "{text}");
-    let bound = bench.ask::<_, BindAnswer>(BindRequest::new(mesh));
+    let bound = bench.base.ask::<_, BindAnswer>(BindRequest::new(mesh));
     assert_eq!(bound.result.unwrap_err(), SkinningError::OutOfTime(late("binding the mesh")));
-    let fitted = bench.ask::<_, FitAnswer>(FitRequest::new(mesh));
+    let fitted = bench.base.ask::<_, FitAnswer>(FitRequest::new(mesh));
     assert_eq!(fitted.result.unwrap_err(), FitFailure::OutOfTime(late("fitting the template")));
-    let placed = bench.ask::<_, FacePlaced>(FaceRequest { mesh, settings: Default::default(), fit: None });
+    let placed = bench.base.ask::<_, FacePlaced>(FaceRequest { mesh, settings: Default::default(), fit: None });
     assert_eq!(placed.result.unwrap_err(), PlaceFaceError::OutOfTime(late("placing the face")));
     // The jobs are gone, and the rig is as it was.
-    bench.app.update();
-    assert!(bench.app.world().get::<SkinningJob>(mesh).is_none() && bench.app.world().get::<FitJob>(mesh).is_none());
-    let rig = bench.app.world().get::<Rig>(bench.rig).unwrap();
+    bench.base.app.update();
+    assert!(bench.base.get::<SkinningJob>(mesh).is_none() && bench.base.get::<FitJob>(mesh).is_none());
+    let rig = bench.base.rig();
     assert!(rig.skins().next().is_none() && rig.len() == 2);
 }
 
@@ -117,19 +102,18 @@ fn jobs_are_given_up_when_their_time_is_over() {
 fn builds_obey_the_limits_of_the_app() {
     let mut bench = Bench::new(RigLimits::default().with(Limit::Nodes, 1));
     let build = |bench: &mut Bench| {
-        bench.app.world_mut().write_message(BuildRequest { rig: bench.rig, step: BuildStep::All });
-        bench.app.update();
-        bench.app.update();
-        let failure = bench.app.world().get::<BuildFailure>(bench.rig).map(|failure| failure.0.to_string());
-        let made = bench.app.world().get::<BuildResult>(bench.rig).map(|built| built.0.nodes.len());
+        bench.base.step(BuildStep::All);
+        bench.base.app.update();
+        let failure = bench.base.get::<BuildFailure>(bench.base.rig).map(|failure| failure.0.to_string());
+        let made = bench.base.get::<BuildResult>(bench.base.rig).map(|built| built.0.nodes.len());
         (failure, made)
     };
     let (failure, _) = build(&mut bench);
     assert!(failure.as_ref().is_some_and(|failure| failure.contains("nodes")), "{failure:?}");
     // Limits that are set anew hold from the next start of a build.
-    bench.app.insert_resource(RigLimits::default());
-    bench.app.update();
-    bench.app.world_mut().write_message(BuildRequest { rig: bench.rig, step: BuildStep::Restart });
+    bench.base.app.insert_resource(RigLimits::default());
+    bench.base.app.update();
+    bench.base.app.world_mut().write_message(BuildRequest { rig: bench.base.rig, step: BuildStep::Restart });
     let (failure, made) = build(&mut bench);
     assert_eq!(failure, None);
     assert!(made.is_some_and(|made| made >= 4), "{made:?}");
@@ -141,13 +125,9 @@ fn lists_of_gestures_obey_the_limits() {
     let mut bench = Bench::new(limits);
     let long = Gesture::Stroke { points: vec![(0.0, 0.2), (0.0, 0.3), (0.0, 0.5)], threshold: None, joints: None };
     let gestures = [long, Gesture::SelectAll, Gesture::Deselect, Gesture::SelectAll];
-    bench.app.world_mut().entity_mut(bench.rig).insert(GestureScript::new(gestures));
-    let start = Instant::now();
-    while !bench.app.world().get::<GestureScript>(bench.rig).unwrap().is_done() {
-        bench.app.update();
-        assert!(start.elapsed() < HANG, "the list never ends");
-    }
-    let answers = &bench.app.world().get::<GestureScript>(bench.rig).unwrap().answers;
+    bench.base.app.world_mut().entity_mut(bench.base.rig).insert(GestureScript::new(gestures));
+    bench.base.wait("the end of the list", |bench| bench.get::<GestureScript>(bench.rig).unwrap().is_done());
+    let answers = &bench.base.get::<GestureScript>(bench.base.rig).unwrap().answers;
     let told: Vec<(bool, &str)> = answers.iter().map(|answer| (answer.done, answer.message.as_str())).collect();
     assert_eq!(told.len(), 3, "{told:?}");
     assert!(!told[0].0 && told[0].1.contains("has 3 points") && told[0].1.contains("stroke_points"), "{told:?}");

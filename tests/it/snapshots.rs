@@ -81,7 +81,7 @@ fn check(name: &str) {
     assert!(wrong.is_empty(), "{} problems:\n{}", wrong.len(), wrong.join("\n"));
 }
 
-/// How pictures are made.
+/// Advice on how a picture is made.
 const HOW: &str = "UPDATE_SNAPSHOTS=1 cargo test --test it snapshots makes it; look at it before you keep it";
 
 fn take(booth: &mut Booth, case: &Case) -> Shot {
@@ -142,8 +142,8 @@ fn the_table_has_every_stored_picture() {
     assert!(bytes <= MOST_BYTES, "the pictures have {bytes} bytes, of which {MOST_BYTES} may be");
 }
 
-/// What the comparison and the queries are there for is found: another letter, a field without a name, two buttons of one
-/// name, a line that is too long. What nobody sees is none.
+/// Faults that the comparison and the queries are there for are found: another letter, a field without a name, two buttons
+/// of one name, a line that is too long. What nobody sees is none.
 #[test]
 fn differences_and_problems_are_found() {
     let mut canvas = Canvas::new();

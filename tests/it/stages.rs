@@ -6,32 +6,23 @@ use bevy::prelude::*;
 use rigsmith::{
     mesh::model::Weights,
     plugins::{
-        commands::{BuildResult, Processor},
-        document::{Change, JointEntities, ShowRest},
-        history::RigHistory,
+        commands::Processor,
+        document::{Change, ShowRest},
         stage::{DELETE, RESTORE, RigStage, StageRequest},
     },
     prelude::*,
     rig::{PoseOffset, SkinData, StoredPose, template::read_template, template::write_template},
-    test_app::test_app,
 };
 
-use super::template_text::CHAIN;
+use super::{bench::RigBench, template_text::CHAIN};
 
-struct Stages {
-    app: App,
-    rig: Entity,
-}
-
-impl Stages {
-    /// A rig with poses of a joint and of a control, a stored pose, an attribute value and weights; not built yet.
-    fn new() -> Self {
+impl RigBench {
+    /// A rig with poses of a joint and of a control, a stored pose, an attribute value and weights.
+    fn with_everything() -> Self {
         let rig = read_template(CHAIN.as_bytes()).unwrap().rig;
         let [root, tip] = ["tail_1", "tail_3"].map(|label| rig.find_label(label).unwrap());
-        let mut app = test_app();
-        let entity = app.world_mut().spawn(rig).id();
-        let mut stages = Self { app, rig: entity };
-        stages.request(RigStage::Built);
+        let mut stages = Self::of(rig);
+        stages.enter_stage(RigStage::Built);
         let built = stages.built();
         // Nodes stand in the order of the hierarchy: the first control is not that of the first joint.
         let is_of_root = |node: &rigsmith::rig::BuiltNode| {
@@ -44,10 +35,10 @@ impl Stages {
         let skin = SkinData { joints: vec![tip], weights, at_rest: true, subjects: BTreeMap::new() };
         let offsets = BTreeMap::from([(control, turned), (tip, moved)]);
         let stored = StoredPose { uid: Uid(7), name: "bent".into(), offsets, ..StoredPose::default() };
-        let before = stages.places();
-        stages.operate(Operation::Pose(vec![(control, turned), (tip, moved)]));
-        assert!(!is_near(&stages.places(), &before), "the control moves joints");
-        stages.operate(Operation::Edits(vec![
+        let before = stages.joint_places();
+        stages.edit_or_fail(Operation::Pose(vec![(control, turned), (tip, moved)]));
+        assert!(!is_near(&stages.joint_places(), &before), "the control moves joints");
+        stages.edit_or_fail(Operation::Edits(vec![
             RigEdit::SetAttributeValue(control, "share".into(), Some(0.25)),
             RigEdit::AddStoredPose(Box::new(stored), 0),
             RigEdit::SetSkin(Uid(9), Some(Arc::new(skin))),
@@ -55,57 +46,36 @@ impl Stages {
         stages
     }
 
-    fn operate(&mut self, operation: Operation) {
-        self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
-        self.app.update();
-        let refused = self.app.world_mut().resource_mut::<Messages<EditRefusal>>().drain().next();
+    /// Fails if the operation is refused.
+    fn edit_or_fail(&mut self, operation: Operation) {
+        self.edit(operation);
+        let refused = self.messages::<EditRefusal>().into_iter().next();
         assert!(refused.is_none(), "{refused:?}");
     }
 
-    fn change(&mut self, change: Change) {
-        self.app.world_mut().write_message(EditRequest { rig: self.rig, change });
-        self.app.update();
-    }
-
-    fn request(&mut self, stage: RigStage) {
-        self.app.world_mut().write_message(StageRequest { rig: self.rig, stage });
-        self.app.update();
+    fn enter_stage(&mut self, stage: RigStage) {
+        self.send(StageRequest { rig: self.rig, stage });
         self.app.update();
         assert_eq!(self.stage(), Some(stage));
     }
 
     fn stage(&self) -> Option<RigStage> {
-        self.app.world().get::<RigStage>(self.rig).copied()
-    }
-
-    fn rig(&self) -> &Rig {
-        self.app.world().get::<Rig>(self.rig).unwrap()
-    }
-
-    fn built(&self) -> Arc<rigsmith::rig::BuiltRig> {
-        self.app.world().get::<BuildResult>(self.rig).unwrap().0.clone()
-    }
-
-    fn steps(&self) -> (Vec<String>, usize) {
-        let (names, done) = self.app.world().get::<RigHistory>(self.rig).unwrap().steps();
-        (names.into_iter().map(str::to_owned).collect(), done)
+        self.get::<RigStage>(self.rig).copied()
     }
 
     /// Places of the joints in the world.
-    fn places(&self) -> Vec<(Uid, Vec3)> {
-        let entities = self.app.world().get::<JointEntities>(self.rig).unwrap();
+    fn joint_places(&self) -> Vec<(Uid, Vec3)> {
         let place = |joint: &rigsmith::rig::RigJoint| {
-            let entity = entities.get(joint.data.uid).unwrap();
-            let at = self.app.world().get::<GlobalTransform>(entity).unwrap().translation();
+            let at = self.get::<GlobalTransform>(self.joint(joint.data.uid)).unwrap().translation();
             (joint.data.uid, at)
         };
         self.rig().walk().map(place).collect()
     }
 
-    /// What a stage shows: the commands in effect, whether edits rebuild, and whether the rest pose is shown.
+    /// View of a stage: the commands in effect, whether edits rebuild, and whether the rest pose is shown.
     fn stage_view(&self) -> (usize, bool, bool) {
-        let processor = self.app.world().get::<Processor>(self.rig).unwrap();
-        let rest = self.app.world().get::<ShowRest>(self.rig).unwrap().0;
+        let processor = self.get::<Processor>(self.rig).unwrap();
+        let rest = self.get::<ShowRest>(self.rig).unwrap().0;
         (processor.builder().cursor(), processor.follows(), rest)
     }
 }
@@ -117,7 +87,7 @@ fn is_near(a: &[(Uid, Vec3)], b: &[(Uid, Vec3)]) -> bool {
 
 #[test]
 fn every_stage_leads_to_every_other_and_nothing_is_lost() {
-    let mut stages = Stages::new();
+    let mut stages = RigBench::with_everything();
     let (document, bytes) = (stages.rig().clone(), write_template(stages.rig()));
     let commands = stages.stage_view().0;
     assert!(commands > 0);
@@ -129,7 +99,7 @@ fn every_stage_leads_to_every_other_and_nothing_is_lost() {
                 if stages.stage() == Some(stage) {
                     continue;
                 }
-                stages.request(stage);
+                stages.enter_stage(stage);
                 if stage == RigStage::Deleted {
                     assert!(stages.rig().is_empty() && stages.rig().groups().is_empty());
                     assert_eq!(stages.rig().stored_poses(), document.stored_poses());
@@ -143,7 +113,7 @@ fn every_stage_leads_to_every_other_and_nothing_is_lost() {
                     stage => (0, false, stage == RigStage::Edit),
                 };
                 assert_eq!(stages.stage_view(), expected, "{from:?} to {to:?}");
-                let now = stages.places();
+                let now = stages.joint_places();
                 let before = places.entry(stage.name()).or_insert_with(|| now.clone());
                 assert!(is_near(before, &now), "{from:?} to {to:?}: {stage:?} was {before:?} and is {now:?}");
             }
@@ -157,39 +127,39 @@ fn every_stage_leads_to_every_other_and_nothing_is_lost() {
 
 #[test]
 fn edits_at_a_stage_stay_and_run_only_where_commands_are_in_effect() {
-    let mut stages = Stages::new();
+    let mut stages = RigBench::with_everything();
     let tip = stages.rig().find_label("tail_3").unwrap();
     let nodes = stages.built().nodes.len();
-    stages.request(RigStage::Edit);
+    stages.enter_stage(RigStage::Edit);
     assert_eq!(stages.built().nodes.len(), stages.rig().len());
     let mut rest = stages.rig().joint(tip).unwrap().data.rest;
     rest.translation.y = 0.5;
-    stages.operate(Operation::Edits(vec![RigEdit::SetRest(tip, rest)]));
+    stages.edit_or_fail(Operation::Edits(vec![RigEdit::SetRest(tip, rest)]));
     assert_eq!(stages.stage_view(), (0, false, true));
-    stages.request(RigStage::Built);
+    stages.enter_stage(RigStage::Built);
     assert_eq!(stages.built().nodes.len(), nodes);
     assert_eq!(stages.rig().joint(tip).unwrap().data.rest.translation.y, 0.5);
 }
 
 #[test]
 fn deleting_is_one_step_and_comes_back_by_undo_or_by_another_stage() {
-    let mut stages = Stages::new();
+    let mut stages = RigBench::with_everything();
     let document = stages.rig().clone();
-    let steps = stages.steps().1;
-    stages.request(RigStage::Deleted);
-    assert_eq!((stages.steps().1, stages.steps().0.last().map(String::as_str)), (steps + 1, Some(DELETE)));
+    let steps = stages.steps();
+    stages.enter_stage(RigStage::Deleted);
+    assert_eq!((stages.steps(), stages.history().0.last().map(String::as_str)), (steps + 1, Some(DELETE)));
     // Asked for again, nothing happens.
-    stages.request(RigStage::Deleted);
-    assert_eq!(stages.steps().1, steps + 1);
+    stages.enter_stage(RigStage::Deleted);
+    assert_eq!(stages.steps(), steps + 1);
     stages.change(Change::Undo);
     assert_eq!((stages.stage(), stages.rig() == &document), (Some(RigStage::Built), true));
     stages.change(Change::Redo);
     assert_eq!((stages.stage(), stages.rig().len()), (Some(RigStage::Deleted), 0));
 
     // Something was done since: it stays, and the rig comes back with it.
-    stages.operate(Operation::Place { position: Vec3::Y, parent: None });
-    stages.request(RigStage::Skeleton);
-    assert_eq!(stages.steps().0.last().map(String::as_str), Some(RESTORE));
+    stages.edit_or_fail(Operation::Place { position: Vec3::Y, parent: None });
+    stages.enter_stage(RigStage::Skeleton);
+    assert_eq!(stages.history().0.last().map(String::as_str), Some(RESTORE));
     assert_eq!(stages.rig().len(), document.len() + 1);
     for joint in document.walk() {
         assert_eq!(stages.rig().joint(joint.data.uid), Some(joint));
@@ -202,6 +172,6 @@ fn deleting_is_one_step_and_comes_back_by_undo_or_by_another_stage() {
     stages.change(Change::Undo);
     assert_eq!(stages.rig(), &document);
     assert_ne!(stages.stage(), Some(RigStage::Deleted));
-    stages.request(RigStage::Built);
+    stages.enter_stage(RigStage::Built);
     assert_eq!(stages.rig(), &document);
 }

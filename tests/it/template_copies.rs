@@ -2,13 +2,13 @@
 
 use std::{fs, path::Path};
 
-use rigsmith::{
-    files::{RealDisk, load_template},
-    rig::{Rig, TagKind, update::Take},
-};
+use rigsmith::rig::{Rig, TagKind, update::Take};
 use serde_json::Value;
 
-use super::{cli_outputs::rigsmith, template_text::read};
+use super::{
+    cli_outputs::{json, rig, rigsmith},
+    template_text::read,
+};
 
 const TAIL: &str = r#"(
     format: 2,
@@ -45,17 +45,6 @@ fn written(folder: &Path, files: &[(&str, &str)]) {
     for (name, text) in files {
         fs::write(folder.join(name), text).unwrap();
     }
-}
-
-fn rig(folder: &Path, name: &str) -> Rig {
-    load_template(&RealDisk, &folder.join(name)).unwrap().rig
-}
-
-fn json(folder: &Path, args: &[&str]) -> (i32, Value) {
-    let (code, said) = rigsmith(folder, &[args, &["--json"]].concat());
-    let start = said.find('{').unwrap_or_else(|| panic!("{args:?}: {said}"));
-    let mut values = serde_json::Deserializer::from_str(&said[start..]).into_iter::<Value>();
-    (code, values.next().unwrap().unwrap_or_else(|error| panic!("{args:?}: {error}: {said}")))
 }
 
 fn labels(rig: &Rig) -> Vec<&str> {

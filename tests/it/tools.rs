@@ -1,14 +1,17 @@
 //! The editor's tools without a window: what the pointer does becomes what the screen had promised.
 
+mod selecting;
+mod strokes;
+
 use bevy::prelude::*;
 use rigsmith::{
     algo::placement::Placement,
     editor::{
-        actions::{Action, ActionRequest},
+        actions::Action,
         camera::ViewportSight,
         mode::Mode,
-        notice::{Notice, StatusLine},
-        pointer::{ModifierKeys, PointerAct, ViewportPointer, WheelUse},
+        notice::StatusLine,
+        pointer::{ModifierKeys, PointerAct, WheelUse},
         tools::{
             place::PlaceTool,
             select::SelectTool,
@@ -28,14 +31,9 @@ use rigsmith::{
 };
 
 use crate::{
-    bench::wait,
-    viewport_app::{CONTROL, DROPPED, PLAIN, SHIFT, front, open_body, tools_app},
+    bench::RigBench,
+    viewport_app::{CONTROL, DROPPED, PLAIN, SHIFT, front},
 };
-
-struct Bench {
-    app: App,
-    rig: Entity,
-}
 
 const CLICKED: PointerAct = PointerAct::Released { dragged: false, count: 1 };
 
@@ -48,23 +46,18 @@ fn left() -> Sight {
     Sight::new(&camera.into(), &projection, &viewport, Vec2::splat(800.0), &GlobalTransform::IDENTITY).unwrap()
 }
 
-impl Bench {
+impl RigBench {
     /// The bundled character without joints, seen from the front.
-    fn new(mode: Mode) -> Self {
-        let mut bench = Self::empty(mode);
-        open_body(&mut bench.app, bench.rig);
+    fn with_body(mode: Mode) -> Self {
+        let mut bench = Self::in_mode(mode);
+        bench.open_body();
         bench
     }
 
-    fn empty(mode: Mode) -> Self {
-        let (mut app, rig) = tools_app();
-        app.insert_resource(mode);
-        app.update();
-        Self { app, rig }
-    }
-
-    fn wait(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
-        wait(self, what, |bench| bench.app.update(), done);
+    fn in_mode(mode: Mode) -> Self {
+        let mut bench = Self::with_tools();
+        bench.mode(mode);
+        bench
     }
 
     fn look(&mut self, sight: Sight) {
@@ -73,24 +66,6 @@ impl Bench {
 
     fn sight(&self) -> Sight {
         self.app.world().resource::<ViewportSight>().0.unwrap()
-    }
-
-    fn mode(&mut self, mode: Mode) {
-        self.app.insert_resource(mode);
-        self.app.update();
-    }
-
-    fn act(&mut self, action: Action) {
-        self.app.world_mut().write_message(ActionRequest(action));
-        self.app.update();
-    }
-
-    /// One frame in which the pointer does all this.
-    fn point(&mut self, held: ModifierKeys, acts: &[(Vec2, PointerAct)]) {
-        for (at, act) in acts {
-            self.app.world_mut().write_message(ViewportPointer { at: *at, act: *act, held });
-        }
-        self.app.update();
     }
 
     fn hover(&mut self, at: Vec2) {
@@ -135,33 +110,16 @@ impl Bench {
         self.app.world().resource::<Ghosts>()
     }
 
-    fn status(&self) -> &StatusLine {
-        self.app.world().resource::<StatusLine>()
-    }
-
-    fn rig(&self) -> &Rig {
-        self.app.world().get::<Rig>(self.rig).unwrap()
-    }
-
     fn places(&self) -> Vec<Vec3> {
         self.rig().rest_globals().iter().map(|(_, joint)| joint.translation).collect()
     }
 
-    fn selected(&self) -> Vec<Uid> {
-        self.app.world().get::<Selection>(self.rig).unwrap().0.clone()
-    }
-
     fn hovered(&self) -> Option<Uid> {
-        self.app.world().get::<HoveredNode>(self.rig).unwrap().0
-    }
-
-    fn notices(&mut self) -> Vec<Notice> {
-        self.app.world_mut().resource_mut::<Messages<Notice>>().drain().collect()
+        self.get::<HoveredNode>(self.rig).unwrap().0
     }
 
     fn operate(&mut self, operation: Operation) {
-        self.app.world_mut().write_message(EditRequest::operation(self.rig, operation));
-        self.app.update();
+        self.edit(operation);
         self.app.update();
     }
 
@@ -202,7 +160,7 @@ fn the_ghost_is_where_the_joint_goes() {
         (left(), [0.0, 0.5, 0.0], -4.0, 2, true),
     ];
     for (sight, place, wheel, tabs, symmetry) in table {
-        let mut bench = Bench::new(Mode::Place);
+        let mut bench = RigBench::with_body(Mode::Place);
         bench.look(*sight);
         if *symmetry {
             bench.act(Action::Symmetry);
@@ -231,7 +189,7 @@ fn the_ghost_is_where_the_joint_goes() {
 
 #[test]
 fn tab_goes_through_the_volumes() {
-    let mut bench = Bench::new(Mode::Place);
+    let mut bench = RigBench::with_body(Mode::Place);
     bench.look(left());
     let at = left().project(Vec3::new(0.0, 0.5, 0.0)).unwrap();
     bench.hover(at);
@@ -250,7 +208,7 @@ fn tab_goes_through_the_volumes() {
     assert!(seen[0].1.abs() < 0.03, "midway: between the legs");
     assert_eq!((seen[1].1, seen[2].1), (0.06, -0.06), "the near leg is the left one");
     // One volume: Tab changes nothing.
-    let mut bench = Bench::new(Mode::Place);
+    let mut bench = RigBench::with_body(Mode::Place);
     bench.hover(front().project(Vec3::new(0.0, 1.2, 0.0)).unwrap());
     bench.act(Action::NextVolume);
     assert_eq!(bench.place_tool().settings.volume, None);
@@ -258,13 +216,13 @@ fn tab_goes_through_the_volumes() {
 
 #[test]
 fn wheel_and_drag_change_the_depth() {
-    let mut bench = Bench::new(Mode::Place);
+    let mut bench = RigBench::with_body(Mode::Place);
     let at = front().project(Vec3::new(0.0, 1.2, 0.0)).unwrap();
     bench.hover(Vec2::new(5.0, 5.0));
     assert_eq!(*bench.app.world().resource::<WheelUse>(), WheelUse::Zoom, "beside the mesh the wheel zooms");
     bench.hover(at);
     assert_eq!(*bench.app.world().resource::<WheelUse>(), WheelUse::Tool);
-    let depth = |bench: &Bench| bench.place_tool().ghost.unwrap().position.z;
+    let depth = |bench: &RigBench| bench.place_tool().ghost.unwrap().position.z;
     let middle = depth(&bench);
     bench.point(PLAIN, &[(at, PointerAct::Wheel(4.0))]);
     assert!(depth(&bench) < middle - 0.01, "up is deeper");
@@ -291,7 +249,7 @@ fn wheel_and_drag_change_the_depth() {
 
 #[test]
 fn on_a_posed_rig_joints_stand_where_the_ghost_was() {
-    let (mut bench, joints) = Bench::new(Mode::Place).with_joints();
+    let (mut bench, joints) = RigBench::with_body(Mode::Place).with_joints();
     let turn = PoseOffset::from_rotation(Quat::from_rotation_z(0.4));
     bench.operate(Operation::Pose(vec![(joints[1], turn)]));
     for symmetry in [false, true] {
@@ -318,10 +276,10 @@ fn on_a_posed_rig_joints_stand_where_the_ghost_was() {
 
 #[test]
 fn placing_says_why_it_cannot() {
-    let mut bench = Bench::empty(Mode::Place);
+    let mut bench = RigBench::in_mode(Mode::Place);
     bench.hover(Vec2::splat(400.0));
     assert!(bench.status().obstacle.as_ref().unwrap().contains("no mesh"), "{:?}", bench.status());
-    let mut bench = Bench::new(Mode::Place);
+    let mut bench = RigBench::with_body(Mode::Place);
     bench.hover(Vec2::splat(5.0));
     assert!(bench.status().obstacle.as_ref().unwrap().contains("beside the mesh"), "{:?}", bench.status());
     bench.notices();
@@ -340,211 +298,9 @@ fn placing_says_why_it_cannot() {
     assert!(bench.ghosts().joints.is_empty(), "no ghost where a click selects");
 }
 
-const ARM: [[f32; 3]; 3] = [[0.17, 1.4, 0.0], [0.37, 1.2, 0.0], [0.53, 1.02, 0.0]];
-
-#[test]
-fn what_is_previewed_is_what_is_taken() {
-    for symmetry in [false, true] {
-        let mut bench = Bench::new(Mode::Stroke);
-        if symmetry {
-            bench.act(Action::Symmetry);
-        }
-        bench.preview(&ARM);
-        assert!(bench.rig().is_empty(), "a preview changes nothing");
-        assert_eq!(*bench.app.world().resource::<WheelUse>(), WheelUse::Tool);
-        let count = |bench: &Bench| bench.ghosts().joints.iter().filter(|joint| !joint.mirrored).count();
-        let before = count(&bench);
-        let at = Vec2::splat(400.0);
-        bench.point(PLAIN, &[(at, PointerAct::Wheel(1.0)), (at, PointerAct::Wheel(2.0))]);
-        assert_eq!(count(&bench), before + 3);
-        bench.app.world_mut().write_message(StrokeTune::Choice(ChainChoice::Joints(5)));
-        bench.app.update();
-        assert_eq!(count(&bench), 5);
-        assert!(bench.status().hint.starts_with("5 joints"), "{:?}", bench.status());
-        let mut shown: Vec<Vec3> = bench.ghosts().joints.iter().map(|joint| joint.position).collect();
-        let StrokeState::Preview(preview) = &bench.app.world().resource::<StrokeTool>().state else { panic!() };
-        let request = StrokeRequest { chain: None, parent: StrokeParent::Natural, ..preview.request.clone() };
-        bench.act(Action::Accept);
-        assert!(!bench.is_previewing() && bench.ghosts().is_empty());
-        let mut taken = bench.places();
-        assert_eq!(taken.len(), if symmetry { 10 } else { 5 });
-
-        // The same stroke, asked for without a window.
-        let mut other = Bench::new(Mode::Select);
-        if symmetry {
-            other.act(Action::Symmetry);
-        }
-        other.app.world_mut().write_message(StrokeRequest { rig: other.rig, ..request });
-        other.wait("the chain", |bench| !bench.rig().is_empty());
-        assert_eq!(other.places(), taken, "to the bit");
-        let order = |a: &Vec3, b: &Vec3| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y));
-        shown.sort_by(order);
-        taken.sort_by(order);
-        for (shown, taken) in shown.iter().zip(&taken) {
-            assert!(shown.distance(*taken) <= EXACT, "{shown} was shown, {taken} was taken");
-        }
-    }
-}
-
-#[test]
-fn a_preview_is_dropped_or_kept_never_lost() {
-    let table: &[(&str, fn(&mut Bench), usize)] = &[
-        ("Escape", |bench| bench.act(Action::Cancel), 0),
-        ("undo", |bench| bench.act(Action::Undo), 0),
-        ("Enter", |bench| bench.act(Action::Accept), 1),
-        ("another mode", |bench| bench.mode(Mode::Select), 1),
-        ("saving", |bench| bench.act(Action::Save), 1),
-        ("another stroke", |bench| bench.stroke(&[[0.11, 0.85, 0.0], [0.11, 0.5, 0.0], [0.12, 0.1, 0.0]]), 1),
-        ("a click", |bench| bench.click(PLAIN, Vec2::splat(5.0)), 0),
-    ];
-    for (what, make, chains) in table {
-        let mut bench = Bench::new(Mode::Stroke);
-        bench.preview(&ARM);
-        make(&mut bench);
-        bench.app.update();
-        assert_eq!(bench.rig().roots().len(), *chains, "{what}");
-        assert_eq!(bench.is_previewing(), ["another stroke", "a click"].contains(what), "{what}");
-        if *what == "Escape" {
-            assert!(bench.ghosts().is_empty(), "nothing is left to see");
-            let mut steps =
-                bench.app.world().get::<rigsmith::plugins::history::RigHistory>(bench.rig).unwrap().steps().0;
-            assert_eq!(steps.pop(), None, "nothing is left to undo");
-        }
-    }
-    // Escape while the button is down.
-    let mut bench = Bench::new(Mode::Stroke);
-    bench.point(PLAIN, &[(Vec2::splat(300.0), PointerAct::Pressed), (Vec2::splat(350.0), PointerAct::Dragged)]);
-    assert_eq!(bench.ghosts().stroke.len(), 2, "the line follows at once");
-    bench.act(Action::Cancel);
-    bench.point(PLAIN, &[(Vec2::splat(400.0), PointerAct::Dragged), (Vec2::splat(400.0), DROPPED)]);
-    assert!(!bench.is_previewing() && bench.ghosts().is_empty());
-    // Beside the mesh there is no chain, and a word about it.
-    bench.notices();
-    let corner = [Vec2::splat(5.0), Vec2::new(5.0, 60.0)];
-    bench.point(PLAIN, &[(corner[0], PointerAct::Pressed), (corner[1], PointerAct::Dragged), (corner[1], DROPPED)]);
-    bench.wait("the refusal", |bench| !bench.is_previewing());
-    assert!(bench.notices().iter().any(|notice| notice.text.contains("does not cross the mesh")));
-}
-
-#[test]
-fn ticks_insert_and_scribbles_delete_at_once() {
-    let (mut bench, joints) = Bench::new(Mode::Stroke).with_joints();
-    let elbow = (bench.pixel(joints[4]) + bench.pixel(joints[5])) * 0.5;
-    let across = (bench.pixel(joints[5]) - bench.pixel(joints[4])).normalize().perp() * 20.0;
-    bench.point(PLAIN, &[(elbow - across, PointerAct::Pressed), (elbow + across, PointerAct::Dragged)]);
-    assert!(bench.status().hint.contains("put a joint into"), "{:?}", bench.status());
-    bench.point(PLAIN, &[(elbow + across, DROPPED)]);
-    bench.wait("the joint", |bench| bench.rig().len() == joints.len() + 1);
-    assert!(!bench.is_previewing());
-
-    let hand = bench.pixel(joints[5]);
-    let mut moves = vec![(hand + Vec2::new(-20.0, -20.0), PointerAct::Pressed)];
-    for swing in 0..7 {
-        let x = if swing % 2 == 0 { 20.0 } else { -20.0 };
-        moves.push((hand + Vec2::new(x, -18.0 + 6.0 * swing as f32), PointerAct::Dragged));
-    }
-    bench.point(PLAIN, &moves);
-    assert!(bench.status().hint.contains("delete 1 joint"), "{:?}", bench.status());
-    bench.point(PLAIN, &[(moves[moves.len() - 1].0, DROPPED)]);
-    bench.wait("the deletion", |bench| bench.rig().joint(joints[5]).is_none());
-    assert_eq!(bench.rig().len(), joints.len());
-
-    // From a joint on: the pointer says so, and a click selects it.
-    bench.hover(bench.pixel(joints[0]));
-    assert_eq!(bench.hovered(), Some(joints[0]));
-    assert!(bench.status().hint.contains("continue from"), "{:?}", bench.status());
-    bench.click(PLAIN, bench.pixel(joints[0]));
-    assert_eq!(bench.selected(), [joints[0]]);
-}
-
-#[test]
-fn hovering_tells_what_a_click_picks() {
-    let (mut bench, joints) = Bench::new(Mode::Select).with_joints();
-    let mut met = 0;
-    for y in 0..10 {
-        for x in 0..10 {
-            let at = Vec2::new(x as f32, y as f32) * 80.0 + 40.0;
-            bench.hover(at);
-            let promised = bench.hovered();
-            bench.click(PLAIN, at);
-            assert_eq!(bench.selected(), promised.into_iter().collect::<Vec<_>>(), "at {at}");
-            met += usize::from(promised.is_some());
-        }
-    }
-    assert!(met > 10 && met < 100, "some over the mesh, some beside: {met}");
-
-    bench.click(PLAIN, bench.pixel(joints[5]));
-    bench.click(SHIFT, bench.pixel(joints[0]));
-    assert_eq!(bench.selected(), [joints[5], joints[0]]);
-    bench.hover(bench.pixel(joints[5]));
-    bench.click(CONTROL, bench.pixel(joints[5]));
-    assert_eq!(bench.selected(), [joints[0]], "Control takes away");
-    bench.click(CONTROL, bench.pixel(joints[5]));
-    assert_eq!(bench.selected(), [joints[0], joints[5]], "and adds");
-    bench.click(SHIFT, Vec2::splat(5.0));
-    assert_eq!(bench.selected().len(), 2, "Shift beside everything loses nothing");
-    bench.click(PLAIN, Vec2::splat(5.0));
-    assert!(bench.selected().is_empty());
-
-    let shoulder = bench.pixel(joints[3]);
-    bench.click(PLAIN, shoulder);
-    bench.point(
-        PLAIN,
-        &[(shoulder, PointerAct::Pressed), (shoulder, PointerAct::Released { dragged: false, count: 2 })],
-    );
-    let mut below = bench.selected();
-    assert_eq!(below.last(), Some(&joints[3]), "it stays the active one");
-    below.sort();
-    let mut wanted = joints[3..].to_vec();
-    wanted.sort();
-    assert_eq!(below, wanted);
-    bench.point(PLAIN, &[(shoulder, PointerAct::Left)]);
-    assert_eq!(bench.hovered(), None);
-}
-
-#[test]
-fn drags_select_boxes() {
-    let (mut bench, joints) = Bench::new(Mode::Select).with_joints();
-    let [a, b] = [bench.pixel(joints[3]) + Vec2::new(-5.0, -5.0), bench.pixel(joints[5]) + 5.0];
-    bench.point(PLAIN, &[(a, PointerAct::Pressed), (b, PointerAct::Dragged)]);
-    assert_eq!(bench.app.world().resource::<SelectTool>().band, Some([a, b]));
-    // The drag stays with its tool, whatever becomes of the mode.
-    bench.mode(Mode::Place);
-    bench.point(PLAIN, &[(b, DROPPED)]);
-    assert_eq!(bench.selected(), joints[3..]);
-    assert_eq!((bench.rig().len(), bench.app.world().resource::<SelectTool>().band), (joints.len(), None));
-    bench.mode(Mode::Select);
-    let spine = [bench.pixel(joints[2]) - 5.0, bench.pixel(joints[0]) + 5.0];
-    let drag = [(spine[0], PointerAct::Pressed), (spine[1], PointerAct::Dragged), (spine[1], DROPPED)];
-    bench.point(SHIFT, &drag);
-    assert_eq!(bench.selected().len(), joints.len());
-    bench.point(CONTROL, &drag);
-    assert_eq!(bench.selected(), joints[3..]);
-}
-
-#[test]
-fn actions_work_on_the_selection() {
-    let (mut bench, joints) = Bench::new(Mode::Select).with_joints();
-    bench.notices();
-    bench.act(Action::Delete);
-    assert!(bench.notices()[0].text.contains("No joint is selected"));
-    bench.act(Action::SelectAll);
-    assert_eq!(bench.selected().len(), joints.len());
-    bench.click(PLAIN, bench.pixel(joints[3]));
-    bench.act(Action::MirrorSelected);
-    assert_eq!(bench.rig().len(), joints.len() + 3);
-    bench.app.world_mut().write_message(EditRequest { rig: bench.rig, change: Change::Undo });
-    bench.app.update();
-    bench.act(Action::DeleteHierarchy);
-    assert_eq!(bench.rig().len(), 3);
-    bench.act(Action::Symmetry);
-    bench.act(Action::Symmetry);
-    assert_eq!(bench.app.world().get::<Symmetry>(bench.rig), Some(&Symmetry(None)));
-}
-
 #[test]
 fn the_weights_mode_shows_and_restores() {
-    let (mut bench, joints) = Bench::new(Mode::Select).with_joints();
+    let (mut bench, joints) = RigBench::with_body(Mode::Select).with_joints();
     bench.app.world_mut().resource_mut::<MeshDisplay>().weights = WeightColors::AllJoints;
     bench.mode(Mode::Weights);
     assert!(bench.status().obstacle.as_ref().unwrap().contains("no weights yet"));
@@ -567,11 +323,11 @@ fn the_weights_mode_shows_and_restores() {
 #[test]
 fn idle_tools_change_nothing_and_hovering_does_no_more_than_it_must() {
     for mode in [Mode::Select, Mode::Place, Mode::Stroke, Mode::Weights] {
-        let (mut bench, _) = Bench::new(mode).with_joints();
+        let (mut bench, _) = RigBench::with_body(mode).with_joints();
         let at = front().project(Vec3::new(0.0, 1.2, 0.0)).unwrap();
         bench.hover(at);
         bench.app.update();
-        let ticks = |bench: &Bench| {
+        let ticks = |bench: &RigBench| {
             let world = bench.app.world();
             let changed = |id: Option<bevy::ecs::change_detection::ComponentTicks>| id.map(|ticks| ticks.changed);
             [

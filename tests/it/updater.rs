@@ -141,7 +141,7 @@ impl Studio {
         seen
     }
 
-    /// What `rigsmith update` makes of a rig.
+    /// Rig that `rigsmith update` makes of this one.
     #[cfg(feature = "cli")]
     fn of_command(&self, now: &str, take: &str) -> String {
         let folder = self.folder.path();

@@ -4,8 +4,11 @@ use bevy::prelude::*;
 use rigsmith::{
     editor::{
         ActiveRig,
+        actions::{Action, ActionRequest},
         camera::ViewportSight,
-        pointer::{ModifierKeys, PointerAct},
+        mode::Mode,
+        notice::{Notice, StatusLine},
+        pointer::{ModifierKeys, PointerAct, ViewportPointer},
         tools::ToolsPlugin,
     },
     files::{RealDisk, load_model},
@@ -15,9 +18,9 @@ use rigsmith::{
     test_app::strict_app,
 };
 
-use crate::bench::wait;
+use crate::bench::RigBench;
 
-/// The mesh of [`open_body`].
+/// The mesh of [`RigBench::open_body`].
 pub const MESH: Uid = Uid(99);
 
 pub const PLAIN: ModifierKeys = ModifierKeys { shift: false, control: false, alt: false };
@@ -33,22 +36,56 @@ pub fn front() -> Sight {
     Sight::new(&camera.into(), &projection, &viewport, Vec2::splat(800.0), &GlobalTransform::IDENTITY).unwrap()
 }
 
-/// An app with the tools, in which an empty rig is open.
-pub fn tools_app() -> (App, Entity) {
-    let mut app = headless_app(1);
-    app.add_plugins(ToolsPlugin);
-    let mut app = strict_app(app);
-    let rig = app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
-    app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(front())));
-    (app, rig)
-}
+impl RigBench {
+    /// An empty rig that is open in an app with the tools, seen from its front.
+    pub fn with_tools() -> Self {
+        let mut app = headless_app(1);
+        app.add_plugins(ToolsPlugin);
+        let mut bench = Self::with(strict_app(app), Rig::new(Uid(1), "rig"));
+        bench.app.insert_resource(ActiveRig(bench.rig)).insert_resource(ViewportSight(Some(front())));
+        bench
+    }
 
-/// Gives a rig the bundled character's mesh, and waits until it can be pointed at.
-pub fn open_body(app: &mut App, rig: Entity) -> Entity {
-    let model = load_model(&RealDisk, "assets/models/biped.obj".as_ref()).unwrap();
-    let mesh = app.world_mut().spawn((RigMesh::new(MESH, model, Vec::new()), SkinOf(rig))).id();
-    wait(app, "the surface", App::update, |app| {
-        app.world().get::<RigSurface>(rig).is_some_and(|surface| surface.ready().is_some())
-    });
-    mesh
+    /// Gives the rig the bundled character's mesh, and waits until it can be pointed at.
+    pub fn open_body(&mut self) -> Entity {
+        let model = load_model(&RealDisk, "assets/models/biped.obj".as_ref()).unwrap();
+        let mesh = self.app.world_mut().spawn((RigMesh::new(MESH, model, Vec::new()), SkinOf(self.rig))).id();
+        self.wait("the surface", |bench| bench.surface().is_some_and(|surface| surface.ready().is_some()));
+        mesh
+    }
+
+    pub fn mode(&mut self, mode: Mode) {
+        self.app.insert_resource(mode);
+        self.app.update();
+    }
+
+    pub fn act(&mut self, action: Action) {
+        self.send(ActionRequest(action));
+    }
+
+    /// One frame in which the pointer does all this.
+    pub fn point(&mut self, held: ModifierKeys, acts: &[(Vec2, PointerAct)]) {
+        for (at, act) in acts {
+            self.app.world_mut().write_message(ViewportPointer { at: *at, act: *act, held });
+        }
+        self.app.update();
+    }
+
+    pub fn selected(&self) -> Vec<Uid> {
+        self.get::<Selection>(self.rig).unwrap().0.clone()
+    }
+
+    /// Selects joints and created nodes.
+    pub fn select(&mut self, nodes: &[Uid]) {
+        self.app.world_mut().get_mut::<Selection>(self.rig).unwrap().0 = nodes.to_vec();
+        self.app.update();
+    }
+
+    pub fn status(&self) -> &StatusLine {
+        self.app.world().resource()
+    }
+
+    pub fn notices(&mut self) -> Vec<Notice> {
+        self.messages()
+    }
 }

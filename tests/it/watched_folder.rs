@@ -1,10 +1,6 @@
 //! A watched folder: forms, expressions and gestures that are saved there are in use at once.
 
-use std::{
-    fs,
-    path::Path,
-    time::{Duration, Instant},
-};
+use std::{fs, path::Path, time::Duration};
 
 use bevy::{ecs::message::MessageCursor, prelude::*};
 use rigsmith::{
@@ -13,10 +9,10 @@ use rigsmith::{
     plugins::{commands::RigModules, face::FaceExpressions},
 };
 
-use super::bench::HANG;
+use super::bench::{AppBench, wait_with};
 
 struct WatchedFolder {
-    app: App,
+    base: AppBench,
     folder: tempfile::TempDir,
     cursors: (MessageCursor<FolderRead>, MessageCursor<FolderFault>, MessageCursor<GesturesRead>),
     read: Vec<String>,
@@ -35,7 +31,7 @@ impl WatchedFolder {
         app.finish();
         app.cleanup();
         let cursors = Default::default();
-        Self { app, folder, cursors, read: Vec::new(), faults: Vec::new(), gestures: Vec::new() }
+        Self { base: AppBench::bare(app), folder, cursors, read: Vec::new(), faults: Vec::new(), gestures: Vec::new() }
     }
 
     fn save(&self, name: &str, text: &str) {
@@ -44,24 +40,23 @@ impl WatchedFolder {
         fs::write(path, text).unwrap();
     }
 
+    fn frame(&mut self) {
+        self.base.app.update();
+        let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
+        let world = self.base.app.world();
+        self.read.extend(self.cursors.0.read(world.resource()).map(|read| name(&read.file)));
+        self.faults.extend(
+            self.cursors.1.read(world.resource()).map(|fault| format!("{}: {}", name(&fault.file), fault.error)),
+        );
+        self.gestures.extend(self.cursors.2.read(world.resource()).map(|read| read.gestures.len()));
+    }
+
     fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
-        let start = Instant::now();
-        while !is_so(self) {
-            assert!(start.elapsed() < HANG, "{what} does not come: {:?} {:?}", self.read, self.faults);
-            self.app.update();
-            let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
-            let world = self.app.world();
-            self.read.extend(self.cursors.0.read(world.resource()).map(|read| name(&read.file)));
-            self.faults.extend(
-                self.cursors.1.read(world.resource()).map(|fault| format!("{}: {}", name(&fault.file), fault.error)),
-            );
-            self.gestures.extend(self.cursors.2.read(world.resource()).map(|read| read.gestures.len()));
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        wait_with(self, what, Self::frame, is_so, |watched| (watched.read.clone(), watched.faults.clone()));
     }
 
     fn has(&self, expression: &str) -> bool {
-        self.app.world().resource::<FaceExpressions>().0.get(expression).is_some()
+        self.base.app.world().resource::<FaceExpressions>().0.get(expression).is_some()
     }
 }
 
@@ -97,7 +92,7 @@ fn expressions_of_a_folder_come_change_and_go() {
 fn a_form_of_a_folder_is_that_of_its_module() {
     let mut watched = WatchedFolder::new();
     let form = |watched: &WatchedFolder| {
-        watched.app.world().resource::<RigModules>().0.get("control").unwrap().form.as_deref().unwrap().to_owned()
+        watched.base.app.world().resource::<RigModules>().0.get("control").unwrap().form.as_deref().unwrap().to_owned()
     };
     let text = asset("modules/control.ui.ron").replace("title: \"Control\"", "title: \"Handle\"");
     watched.save("control.ui.ron", &text);
@@ -141,9 +136,9 @@ fn folders_come_and_go_and_the_first_of_them_counts() {
     watched.save("smile.expr.ron", &named("narrow"));
     watched.until("the first folder", |watched| watched.has("narrow"));
     let folders = |watched: &mut WatchedFolder, change: &dyn Fn(&mut WatchedFolders)| {
-        change(&mut watched.app.world_mut().resource_mut::<WatchedFolders>());
+        change(&mut watched.base.app.world_mut().resource_mut::<WatchedFolders>());
     };
-    let first = watched.app.world().resource::<WatchedFolders>().0[0].clone();
+    let first = watched.base.app.world().resource::<WatchedFolders>().0[0].clone();
     let second = rigsmith::instance::WatchedFolder { path: other.path().to_owned(), depth: 0 };
     folders(&mut watched, &|folders| folders.0.push(second.clone()));
     watched.until("the file of the second", |watched| watched.read.len() == 2);

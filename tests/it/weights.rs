@@ -1,5 +1,8 @@
 //! Automatic skin weights: what holds of every result, and what bodies, damage, locks and bad input give.
 
+mod inputs;
+mod pieces;
+
 use std::ops::Range;
 
 use glam::Vec3;
@@ -37,19 +40,6 @@ fn tube() -> (Vec<Vec3>, Vec<[u32; 3]>) {
     (points, triangles)
 }
 
-/// Adds a box to a mesh and returns its points.
-fn add_box(points: &mut Vec<Vec3>, triangles: &mut Vec<[u32; 3]>, low: Vec3, high: Vec3) -> Range<usize> {
-    let first = points.len() as u32;
-    points.extend((0..8).map(|corner| {
-        let pick = |axis: usize| if corner >> axis & 1 == 1 { high[axis] } else { low[axis] };
-        Vec3::new(pick(0), pick(1), pick(2))
-    }));
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let split = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
-    triangles.extend(quads.into_iter().flat_map(split).map(|t| t.map(|corner| first + corner)));
-    first as usize..points.len()
-}
-
 /// Two bones that meet in the middle of the tube.
 fn tube_joints() -> Vec<WeightJoint> {
     vec![joint([0.1, 0.0, 0.0], None), joint([2.0, 0.0, 0.0], Some(0)), joint([3.8, 0.0, 0.0], Some(1))]
@@ -64,7 +54,7 @@ fn weight(weights: &Weights, point: usize, joint: u32) -> f32 {
     weights.of(point).find(|e| e.0 == joint).map_or(0.0, |e| e.1)
 }
 
-/// What every result must be.
+/// Demands on every result.
 fn check_sound(weights: &Weights, points: usize, joints: &[WeightJoint], most: usize) {
     assert_eq!(weights.len(), points);
     let any = joints.iter().any(|j| j.deforms);
@@ -306,17 +296,6 @@ fn one_joint_takes_all() {
 }
 
 #[test]
-fn rigid_parts_hang_on_their_joint() {
-    let (points, triangles) = tube();
-    let (weights, report) =
-        skin_weights(&points, &triangles, &tube_joints(), &[(0..40, 2)], None, &WeightSettings::default(), &|_| true)
-            .unwrap();
-    assert!((0..40).all(|p| weights.of(p).eq([(2, 1.0)])));
-    assert_eq!(report.given, 40);
-    assert!(weight(&weights, 60, 0) > 0.5);
-}
-
-#[test]
 fn locked_joints_keep_their_weights() {
     let (points, triangles) = tube();
     let joints = tube_joints();
@@ -343,119 +322,6 @@ fn locked_joints_keep_their_weights() {
     let (weights, _) =
         skin_weights(&points, &triangles, &joints, &[], Some(locks), &WeightSettings::default(), &|_| true).unwrap();
     assert!((0..points.len()).all(|p| (weight(&weights, p, 0) - weight(&present, p, 0)).abs() < 1e-5));
-}
-
-#[test]
-fn bad_input_is_named() {
-    let (points, triangles) = tube();
-    let joints = tube_joints();
-    let settings = WeightSettings::default();
-    let bind = |points: &[Vec3], triangles: &[[u32; 3]], joints: &[WeightJoint]| {
-        skin_weights(points, triangles, joints, &[], None, &settings, &|_| true).map(|_| ())
-    };
-    let mut broken = points.clone();
-    broken[7].y = f32::NAN;
-    assert_eq!(bind(&broken, &triangles, &joints), Err(WeightError::Point { point: 7 }));
-    broken[7].y = f32::INFINITY;
-    assert_eq!(bind(&broken, &triangles, &joints), Err(WeightError::Point { point: 7 }));
-    assert_eq!(bind(&points, &triangles, &[]), Err(WeightError::NoJoints));
-    assert_eq!(bind(&points, &[[0, 1, 999]], &joints), Err(WeightError::Triangle { triangle: 0 }));
-    assert_eq!(
-        bind(&points, &triangles, &[joint([0.0; 3], None), joint([f32::NAN; 3], Some(0))]),
-        Err(WeightError::Joint { joint: 1 })
-    );
-    for parents in [[Some(1), Some(0)], [None, Some(1)], [None, Some(5)]] {
-        let joints = parents.map(|parent| joint([0.0; 3], parent));
-        assert!(matches!(bind(&points, &triangles, &joints), Err(WeightError::Parent { .. })), "{parents:?}");
-    }
-    let twist = |joint: usize, end| WeightJoint { twist: Some(TwistBone { joint, end }), ..joints[2] };
-    for broken in [twist(9, Vec3::X), twist(2, Vec3::X), twist(0, Vec3::NAN)] {
-        assert_eq!(bind(&points, &triangles, &[joints[0], joints[1], broken]), Err(WeightError::Twist { joint: 2 }));
-    }
-    let rigid = skin_weights(&points, &triangles, &joints, &[(0..9999, 0)], None, &settings, &|_| true);
-    assert_eq!(rigid.map(|_| ()), Err(WeightError::Rigid { part: 0 }));
-    let locks = Locks { weights: &Weights::default(), joints: &[true] };
-    let locked = skin_weights(&points, &triangles, &joints, &[], Some(locks), &settings, &|_| true);
-    assert_eq!(locked.map(|_| ()), Err(WeightError::Locks { points: 0, joints: 1 }));
-    let cancelled = skin_weights(&points, &triangles, &joints, &[], None, &settings, &|share| share < 0.5);
-    assert_eq!(cancelled.map(|_| ()), Err(WeightError::Cancelled));
-}
-
-#[test]
-fn odd_input_gives_weights() {
-    let (points, triangles) = tube();
-    let joints = tube_joints();
-    let all_at_one_point = vec![Vec3::ONE; 30];
-    let fan: Vec<[u32; 3]> = (1..40).map(|i| [0, i, i + 1]).collect();
-    let many_here: Vec<WeightJoint> = (0..100_000).map(|i| joint([1.0, 0.0, 0.0], (i > 0).then_some(0))).collect();
-    let chain_here: Vec<WeightJoint> = (0..100_000usize).map(|i| joint([1.0, 0.0, 0.0], i.checked_sub(1))).collect();
-    let many_apart: Vec<WeightJoint> = (0..5000)
-        .map(|i| joint([i as f32 * 8e-4, 0.1, (i % 7) as f32 * 0.01], (i > 0).then(|| i as usize - 1)))
-        .collect();
-    for (name, points, triangles, joints) in [
-        ("no points", &[][..], &[][..], &joints[..]),
-        ("no triangles", &points[..], &[][..], &joints[..]),
-        ("one place", &all_at_one_point[..], &[[0, 1, 2]][..], &joints[..]),
-        ("a fin on one edge", &points[..], &fan[..], &joints[..]),
-        ("siblings at one place", &points[..], &triangles[..], &many_here[..]),
-        ("a chain at one place", &points[..], &triangles[..], &chain_here[..]),
-        ("many joints", &points[..], &triangles[..], &many_apart[..]),
-    ] {
-        let (weights, _) = bind(points, triangles, joints);
-        check_sound(&weights, points.len(), joints, 8);
-        println!("{name} is sound");
-    }
-    let far: Vec<WeightJoint> = joints.iter().map(|&j| WeightJoint { head: j.head + Vec3::splat(1e30), ..j }).collect();
-    check_sound(&bind(&points, &triangles, &far).0, points.len(), &far, 8);
-}
-
-#[test]
-fn many_triangles_at_one_place_fit_the_stack_of_a_thread() {
-    let fan: Vec<Vec3> =
-        (0..25_002).map(|i| if i == 0 { Vec3::ZERO } else { Vec3::new(1.0, i as f32 * 4e-5, 0.0) }).collect();
-    let blades: Vec<[u32; 3]> = (1..25_001).map(|i| [0, i, i + 1]).collect();
-    let joints = [joint([0.0, 0.0, 0.0], None), joint([0.5, 0.2, 0.0], Some(0)), joint([1.0, 0.5, 0.0], Some(1))];
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).stack_size(1 << 20).build().unwrap();
-    pool.install(|| {
-        let (weights, _) = bind(&fan, &blades, &joints);
-        check_sound(&weights, fan.len(), &joints, 8);
-        let (weights, _) = bind(&[Vec3::ZERO, Vec3::X, Vec3::Y], &[[0, 1, 2]; 22_000], &joints);
-        check_sound(&weights, 3, &joints, 8);
-    });
-}
-
-#[test]
-fn dense_meshes_are_bound_like_sparse_ones() {
-    // 50,000 points, more than are bound one by one.
-    let (around, along) = (100usize, 500usize);
-    let mut points = Vec::new();
-    let mut triangles = Vec::new();
-    for ring in 0..along {
-        for side in 0..around {
-            // A square section, walked at even steps.
-            let t = side as f32 / around as f32 * 4.0;
-            let (edge, at) = (t as usize, t.fract() * 0.6 - 0.3);
-            let [y, z] = [[at, -0.3], [0.3, at], [-at, 0.3], [-0.3, -at]][edge];
-            points.push(Vec3::new(ring as f32 / (along - 1) as f32 * 4.0, y, z));
-        }
-    }
-    for ring in 0..along - 1 {
-        for side in 0..around {
-            let (a, b) = ((ring * around + side) as u32, (ring * around + (side + 1) % around) as u32);
-            let up = around as u32;
-            triangles.extend([[a, b, b + up], [a, b + up, a + up]]);
-        }
-    }
-    let joints = tube_joints();
-    let (weights, report) = bind(&points, &triangles, &joints);
-    check_sound(&weights, points.len(), &joints, 8);
-    assert_eq!(report.by_surface, points.len());
-    let line: Vec<f32> = (0..along).map(|ring| weight(&weights, ring * around + around / 8, 0)).collect();
-    assert!(line[0] > 0.98 && line[along - 1] < 0.02 && (0.35..0.65).contains(&line[along / 2]), "{}", line[along / 2]);
-    assert!(line.windows(2).all(|w| (w[0] - w[1]).abs() < 0.04), "the blend has steps");
-    let settings = WeightSettings { method: Method::Voxel, voxel_resolution: 64, ..WeightSettings::default() };
-    let (weights, _) = skin_weights(&points, &triangles, &joints, &[], None, &settings, &|_| true).unwrap();
-    check_sound(&weights, points.len(), &joints, 8);
 }
 
 #[test]
@@ -551,102 +417,4 @@ fn half_joints_hold_what_both_sides_share() {
         }
         assert!(most > 0.9 * peak, "the half joint holds most in the middle of the bend: {most}");
     }
-}
-
-/// A helmet, the head inside of it and a cape over the shoulders, each a piece of its own.
-#[test]
-fn parts_belong_to_the_bones_inside_of_them() {
-    let (mut points, mut triangles) = tube();
-    let (body, soft) = (points.len(), triangles.clone());
-    // A box around the end of the tube, wide enough for the last bone, and a small one that floats beside the first.
-    let helmet = add_box(&mut points, &mut triangles, Vec3::new(3.2, -0.8, -0.8), Vec3::new(4.4, 0.8, 0.8));
-    let mut joints = tube_joints();
-    joints[2].head.x = 3.3;
-    joints.push(joint([4.2, 0.0, 0.0], Some(2)));
-    let (weights, report) = bind(&points, &triangles, &joints);
-    for point in helmet.clone() {
-        assert!(
-            weight(&weights, point, 2) + weight(&weights, point, 3) > 0.99,
-            "{:?}",
-            weights.of(point).collect::<Vec<_>>()
-        );
-    }
-    let first: Vec<(u32, f32)> = weights.of(helmet.start).collect();
-    assert!(helmet.clone().all(|point| weights.of(point).eq(first.iter().copied())) == (report.stiff > 0));
-    // A pouch on the first bone moves as one, unless a person says that it bends.
-    let pouch = add_box(&mut points, &mut triangles, Vec3::new(0.4, 1.2, -0.2), Vec3::new(0.6, 1.4, 0.2));
-    let stiff = bind(&points, &triangles, &joints).1.stiff - report.stiff;
-    assert_eq!(stiff, pouch.len());
-    let bending = std::iter::once(pouch.start as u32..pouch.start as u32 + 1).collect();
-    let settings = WeightSettings { bending, ..WeightSettings::default() };
-    let bent = skin_weights(&points, &triangles, &joints, &[], None, &settings, &|_| true).unwrap().1;
-    assert_eq!(bent.stiff, report.stiff);
-    // The tube is bound as without the helmet.
-    let alone = bind(&points[..body], &soft, &joints).0;
-    for point in 0..body {
-        for joint in 0..2 {
-            assert!((weight(&weights, point, joint) - weight(&alone, point, joint)).abs() < 0.1, "point {point}");
-        }
-    }
-}
-
-/// A pouch that floats beside the second bone is told with its joint, and a joint that hangs far outside with its distance.
-#[test]
-fn stiff_pieces_and_idle_joints_are_told() {
-    let (mut points, mut triangles) = tube();
-    let pouch = add_box(&mut points, &mut triangles, Vec3::new(2.8, 0.5, -0.1), Vec3::new(3.1, 0.7, 0.1));
-    let mut joints = tube_joints();
-    joints[2].deforms = false;
-    joints.push(joint([2.0, 9.0, 0.0], Some(0)));
-    let (weights, report) = bind(&points, &triangles, &joints);
-    let first = pouch.start as u32;
-    assert_eq!(report.stiff_pieces, [StiffPiece { first, points: 8, joint: 1, share: 1.0 }]);
-    assert_eq!(report.stiff, 8);
-    assert!(pouch.clone().all(|point| weights.of(point).eq([(1, 1.0)])));
-    let [ends, far] = report.idle_joints[..] else { panic!("{:?}", report.idle_joints) };
-    assert_eq!(ends, IdleJoint { joint: 2, reason: IdleReason::NotDeforming });
-    assert!(matches!(far.reason, IdleReason::Outside { distance } if (distance - 8.338).abs() < 0.01), "{far:?}");
-    assert_eq!(far.joint, 3);
-    // A piece that bends is told no more, and a joint that is locked has another reason.
-    let settings = WeightSettings { bending: std::iter::once(first..first + 1).collect(), ..WeightSettings::default() };
-    let bent = skin_weights(&points, &triangles, &joints, &[], None, &settings, &|_| true).unwrap().1;
-    assert_eq!((bent.stiff, bent.stiff_pieces.len()), (0, 0));
-    let mut present = Weights::default();
-    (0..points.len()).for_each(|_| present.push([(0, 1.0)]));
-    let locks = Locks { weights: &present, joints: &[false, false, false, true] };
-    let locked =
-        skin_weights(&points, &triangles, &joints, &[], Some(locks), &WeightSettings::default(), &|_| true).unwrap().1;
-    assert_eq!(locked.idle_joints[1], IdleJoint { joint: 3, reason: IdleReason::Locked });
-}
-
-/// A joint beside a thing that floats above the tube holds the thing if it claims skin, and only then.
-#[test]
-fn claims_let_idle_joints_hold_what_is_nearest_to_them() {
-    let (mut points, mut triangles) = tube();
-    let body = points.len();
-    let thing = add_box(&mut points, &mut triangles, Vec3::new(1.6, 2.2, -0.4), Vec3::new(2.4, 2.8, 0.4));
-    let mut joints = tube_joints();
-    joints.push(joint([2.0, 3.4, 0.0], Some(0)));
-    let with = |claims: Vec<usize>, joints: &[WeightJoint]| {
-        let settings = WeightSettings { claims, ..WeightSettings::default() };
-        skin_weights(&points, &triangles, joints, &[], None, &settings, &|_| true)
-    };
-    let (weights, report) = with(Vec::new(), &joints).unwrap();
-    assert!(thing.clone().all(|point| weight(&weights, point, 3) == 0.0));
-    let [far] = report.idle_joints[..] else { panic!("{:?}", report.idle_joints) };
-    assert!(matches!(far.reason, IdleReason::Outside { distance } if (distance - 0.6).abs() < 0.01), "{far:?}");
-    let (claimed, report) = with(vec![3], &joints).unwrap();
-    check_sound(&claimed, points.len(), &joints, 8);
-    assert!(thing.clone().all(|point| weight(&claimed, point, 3) > 0.99));
-    assert!(report.idle_joints.is_empty(), "{:?}", report.idle_joints);
-    for point in 0..body {
-        assert!((weight(&weights, point, 0) - weight(&claimed, point, 0)).abs() < 0.02, "point {point} of the tube");
-    }
-    // A joint that does not deform holds skin, too; one that is far from all of it stays idle.
-    joints[2].deforms = false;
-    joints[3].head.y = 50.0;
-    let (claimed, report) = with(vec![2, 3], &joints).unwrap();
-    assert!((0..body).any(|point| weight(&claimed, point, 2) > 0.1));
-    assert_eq!(report.idle_joints.iter().map(|idle| idle.joint).collect::<Vec<_>>(), [3]);
-    assert_eq!(with(vec![9], &joints).unwrap_err(), WeightError::Claim { joint: 9, joints: 4 });
 }

@@ -120,7 +120,7 @@ impl<'a> Hands<'a> {
         }
     }
 
-    /// What the window shows once it is as expected; `None` if it is not within a time.
+    /// Report of the window once it is as expected; `None` if it is not within a time.
     fn within(&self, time: Duration, expected: impl Fn(&WindowReport) -> bool) -> Option<WindowReport> {
         let start = Instant::now();
         while start.elapsed() < time {
@@ -263,7 +263,7 @@ fn there(tool: &str) -> bool {
     Command::new(tool).arg("-version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok()
 }
 
-/// What is missing to drive a window.
+/// Prerequisite that is missing to drive a window.
 fn missing_prerequisite() -> Option<&'static str> {
     if cfg!(not(target_os = "linux")) {
         Some("windows are driven on Linux only")

@@ -22,15 +22,15 @@ use bevy::{
 use rigsmith::{
     files::{RealDisk, load_template},
     plugins::{
-        commands::{BuildRequest, BuildResult, BuildStep, BuiltEntities},
-        document::JointEntities,
+        commands::{BuildStep, BuiltEntities},
         runtime::RigRuntime,
     },
     prelude::*,
     rig::{BuiltNode, NodeType},
     solve::program::{CompileOptions, RigProgram, RigState},
-    test_app::test_app,
 };
+
+use crate::bench::RigBench;
 
 /// Every template and part that comes with the program, by its file's name.
 pub fn shipped() -> Vec<(String, Rig)> {
@@ -49,42 +49,12 @@ pub fn shipped() -> Vec<(String, Rig)> {
     files.into_iter().map(read).collect()
 }
 
-/// An app with one rig.
-pub struct Stage {
-    pub app: App,
-    pub rig: Entity,
-}
-
-impl Stage {
-    pub fn new(rig: Rig) -> Self {
-        let mut app = test_app();
-        let rig = app.world_mut().spawn(rig).id();
-        app.update();
-        Self { app, rig }
-    }
-
-    pub fn built(rig: Rig) -> Self {
-        let mut stage = Self::new(rig);
-        stage.step(BuildStep::All);
-        stage
-    }
-
-    pub fn step(&mut self, step: BuildStep) {
-        self.app.world_mut().write_message(BuildRequest { rig: self.rig, step });
-        self.app.update();
-    }
-
-    pub fn edit(&mut self, edits: Vec<RigEdit>) {
-        self.change(Change::Do(Operation::Edits(edits)));
-    }
-
-    pub fn change(&mut self, change: Change) {
-        self.app.world_mut().write_message(EditRequest { rig: self.rig, change });
-        self.app.update();
-    }
-
-    pub fn document(&self) -> &Rig {
-        self.app.world().get::<Rig>(self.rig).unwrap()
+impl RigBench {
+    /// A rig of which every command is in effect.
+    pub fn of_built(rig: Rig) -> Self {
+        let mut bench = Self::started(rig);
+        bench.step(BuildStep::All);
+        bench
     }
 
     pub fn runtime(&self) -> &RigRuntime {
@@ -93,26 +63,21 @@ impl Stage {
 
     /// The entity of a joint or created node.
     pub fn node(&self, uid: Uid) -> Option<Entity> {
-        let joint = self.app.world().get::<JointEntities>(self.rig)?.get(uid);
-        joint.or_else(|| self.app.world().get::<BuiltEntities>(self.rig)?.get(uid))
+        self.find(uid).or_else(|| self.get::<BuiltEntities>(self.rig)?.get(uid))
     }
 
     /// The node with that label.
-    pub fn labelled(&self, label: &str) -> Entity {
-        let built = &self.app.world().get::<BuildResult>(self.rig).unwrap().0;
+    pub fn labelled_node(&self, label: &str) -> Entity {
+        let built = self.built();
         self.node(built.find_label(label).unwrap_or_else(|| panic!("no {label}")).uid).unwrap()
     }
 
     /// The control with that name.
     pub fn control(&self, name: &str) -> Entity {
-        let built = &self.app.world().get::<BuildResult>(self.rig).unwrap().0;
+        let built = self.built();
         let is_meant = |node: &&BuiltNode| node.kind == NodeType::Control && *node.name == *name;
         let found = built.nodes.iter().find(is_meant).unwrap_or_else(|| panic!("no control {name}"));
         self.node(found.uid).unwrap()
-    }
-
-    pub fn get<C: Component>(&self, entity: Entity) -> Option<&C> {
-        self.app.world().get::<C>(entity)
     }
 
     /// Height of the authored skeleton at rest: its extent along Y, or along its longest axis where it lies flat (less
@@ -125,7 +90,7 @@ impl Stage {
             let longest = extent.max_element();
             if extent.y >= 0.1 * longest { extent.y } else { longest }
         };
-        let joints = self.document().rest_globals().into_iter().map(|(_, rest)| rest.translation);
+        let joints = self.rig().rest_globals().into_iter().map(|(_, rest)| rest.translation);
         let height = extent(&joints.collect::<Vec<Vec3>>());
         if height > 1e-3 {
             return height;
@@ -138,7 +103,7 @@ impl Stage {
     /// the rig's space, over all nodes: of places as a share of the rig's height, of axes as a share of their length.
     pub fn off(&self) -> f32 {
         let world = self.app.world();
-        let built = &world.get::<BuildResult>(self.rig).expect("the rig is built").0;
+        let built = self.built();
         let state = self.runtime().state();
         assert_eq!(state.program().nodes().len(), built.nodes.len(), "the program is that of the build");
         let exact = |affine: Affine3A| DAffine3 {
@@ -170,13 +135,13 @@ impl Stage {
     /// Largest distance, as a share of the rig's height, between the running program and one compiled from nothing and
     /// posed as the document says.
     pub fn off_from_document(&self) -> f32 {
-        let built = &self.app.world().get::<BuildResult>(self.rig).unwrap().0;
-        let program = RigProgram::compile(built, &CompileOptions::default()).unwrap();
+        let built = self.built();
+        let program = RigProgram::compile(&built, &CompileOptions::default()).unwrap();
         let mut state = RigState::new(Arc::new(program));
-        for (node, offset) in self.document().pose() {
+        for (node, offset) in self.rig().pose() {
             let _ = state.set_offset(*node, *offset);
         }
-        for (node, values) in self.document().attribute_values() {
+        for (node, values) in self.rig().attribute_values() {
             for (name, value) in values {
                 let _ = state.set_attribute(*node, name, *value);
             }

@@ -116,11 +116,9 @@ pub(super) fn keep_built(
         let Guard { written, name, .. } = guard;
         let reasons =
             written.into_iter().map(|component| EntityWriteError::BuiltContent { name: name.clone(), component });
-        for reason in told.look(Bearer::Part(rig, uid), reasons.collect()) {
-            warn!("{reason}");
-            refused.write(EditRefusal { rig, reason: reason.into() });
-            has_told = true;
-        }
+        has_told |= told.tell(Bearer::Part(rig, uid), rig, reasons.collect(), |refusal| {
+            refused.write(refusal);
+        });
     }
     if has_told {
         told.retain(|bearer| matches!(bearer, Bearer::Part(rig, _) if rigs.contains(rig)));
@@ -156,11 +154,9 @@ pub(super) fn keep_results(
             let (name, component) = (rig.about().name.clone(), BuildResult::short_type_path());
             reasons.push(EntityWriteError::BuiltContent { name, component });
         }
-        for reason in told.look(Bearer::Entity(entity), reasons) {
-            warn!("{reason}");
-            refused.write(EditRefusal { rig: entity, reason: reason.into() });
-            has_told = true;
-        }
+        has_told |= told.tell(Bearer::Entity(entity), entity, reasons, |refusal| {
+            refused.write(refusal);
+        });
     }
     if has_told {
         told.retain(|bearer| matches!(bearer, Bearer::Entity(rig) if rigs.contains(rig)));
@@ -192,10 +188,9 @@ pub(super) fn keep_places(
         let name = name.map_or_else(|| uid.to_string(), Name::to_string);
         let reason = EntityWriteError::BuiltContent { name, component: Transform::short_type_path() };
         bare_nodes.insert(Bearer::Part(rig, uid));
-        for reason in told.look(Bearer::Part(rig, uid), vec![reason]) {
-            warn!("{reason}");
-            refused.write(EditRefusal { rig, reason: reason.into() });
-        }
+        told.tell(Bearer::Part(rig, uid), rig, vec![reason], |refusal| {
+            refused.write(refusal);
+        });
     }
     told.look_at_others(&bare_nodes);
 }
@@ -226,10 +221,10 @@ pub(super) fn keep_attributes(
         commands.entity(entity).try_insert(Attributes(values.collect()));
         let (name, component) = (node.name.to_string(), Attributes::short_type_path());
         bare_nodes.insert(Bearer::Part(rig, uid));
-        for reason in told.look(Bearer::Part(rig, uid), vec![EntityWriteError::BuiltContent { name, component }]) {
-            warn!("{reason}");
-            refused.write(EditRefusal { rig, reason: reason.into() });
-        }
+        let reason = EntityWriteError::BuiltContent { name, component };
+        told.tell(Bearer::Part(rig, uid), rig, vec![reason], |refusal| {
+            refused.write(refusal);
+        });
     }
     told.look_at_others(&bare_nodes);
 }

@@ -15,7 +15,7 @@ use bevy::{
 use super::{NodeVisible, VISIBLE};
 use crate::plugins::{
     document::{
-        EditRefusal, EntityWriteError,
+        EntityWriteError,
         refusals::{Bearer, ToldRefusals},
     },
     schema::{Attributes, Control, NodeLayer, NodeOf},
@@ -102,11 +102,9 @@ pub(super) fn show_nodes(
             let name = node.name.map_or_else(|| entity.to_string(), Name::to_string);
             reasons.push(EntityWriteError::BuiltContent { name, component: NodeVisible::short_type_path() });
         }
-        for reason in state.told.look(Bearer::Entity(entity), reasons) {
-            warn!("{reason}");
-            commands.write_message(EditRefusal { rig, reason: reason.into() });
-            has_told = true;
-        }
+        has_told |= state.told.tell(Bearer::Entity(entity), rig, reasons, |refusal| {
+            commands.write_message(refusal);
+        });
     }
     if has_told {
         state.told.retain(|bearer| matches!(bearer, Bearer::Entity(node) if nodes.contains(node)));

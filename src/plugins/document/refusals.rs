@@ -7,7 +7,7 @@ use std::collections::{BTreeSet, HashMap};
 
 use bevy::prelude::*;
 
-use super::error::EntityWriteError;
+use super::{EditRefusal, error::EntityWriteError};
 use crate::rig::Uid;
 
 /// Bearer of components that other code wrote.
@@ -44,6 +44,23 @@ impl ToldRefusals {
             self.0.remove(&bearer);
         }
         fresh
+    }
+
+    /// Takes all refusals of one look at a bearer, and sends and logs the ones to tell. Returns `true` if there is one.
+    pub fn tell(
+        &mut self,
+        bearer: Bearer,
+        rig: Entity,
+        refused: Vec<EntityWriteError>,
+        mut send: impl FnMut(EditRefusal),
+    ) -> bool {
+        let fresh = self.look(bearer, refused);
+        let has_told = !fresh.is_empty();
+        for reason in fresh {
+            warn!("{reason}");
+            send(EditRefusal { rig, reason: reason.into() });
+        }
+        has_told
     }
 
     /// Takes a look at all bearers but these, nothing of which is refused.

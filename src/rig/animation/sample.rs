@@ -44,10 +44,7 @@ pub(super) fn between(from: &Key, to: &Key, property: &Property, time: f32) -> [
         }
         Ease::Linear => std::array::from_fn(|axis| from.value[axis] + (to.value[axis] - from.value[axis]) * share),
         Ease::Cubic { leave, .. } => {
-            let arrive = match to.ease {
-                Ease::Cubic { arrive, .. } => arrive,
-                Ease::Stepped | Ease::Linear => [0.0; 4],
-            };
+            let arrive = arrival(to);
             let (square, cube) = (share * share, share * share * share);
             let value = std::array::from_fn(|axis| {
                 (2.0 * cube - 3.0 * square + 1.0) * from.value[axis]
@@ -58,6 +55,26 @@ pub(super) fn between(from: &Key, to: &Key, property: &Property, time: f32) -> [
             if *property == Property::Rotation { normalized(value) } else { value }
         }
     }
+}
+
+/// Tangent with which a cubic curve comes to a key.
+pub(super) fn arrival(key: &Key) -> [f32; 4] {
+    match key.ease {
+        Ease::Cubic { arrive, .. } => arrive,
+        Ease::Stepped | Ease::Linear => [0.0; 4],
+    }
+}
+
+/// Change a second of the cubic curve between two neighbouring keys; zero where it is not cubic.
+pub(in crate::rig) fn cubic_slope(from: &Key, to: &Key, time: f32) -> [f32; 4] {
+    let Ease::Cubic { leave, .. } = from.ease else { return [0.0; 4] };
+    let (arrive, span) = (arrival(to), to.time - from.time);
+    let share = (time - from.time) / span;
+    std::array::from_fn(|axis| {
+        6.0 * share * (1.0 - share) * (to.value[axis] - from.value[axis]) / span
+            + (3.0 * share * share - 4.0 * share + 1.0) * leave[axis]
+            + (3.0 * share * share - 2.0 * share) * arrive[axis]
+    })
 }
 
 /// Rotation between two, on the shorter way.

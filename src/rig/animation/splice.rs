@@ -1,6 +1,9 @@
 //! Keys put into a span of a track, while the curve before and behind the span stays.
 
-use super::{Ease, Key, Property, Track};
+use super::{
+    Ease, Key, Property, Track,
+    sample::{arrival, between, cubic_slope},
+};
 use glam::Quat;
 
 /// Span of time in which a track gets other keys.
@@ -104,20 +107,12 @@ fn resumed(former: &[Key], property: &Property, time: f32) -> Option<Key> {
 
 /// Value between two keys, and its change a second where the curve is cubic.
 fn point(from: &Key, to: &Key, property: &Property, time: f32) -> ([f32; 4], [f32; 4]) {
-    let value = super::sample::between(from, to, property, time);
+    let value = between(from, to, property, time);
     let Ease::Cubic { leave, .. } = from.ease else { return (value, [0.0; 4]) };
-    let arrive = match to.ease {
-        Ease::Cubic { arrive, .. } => arrive,
-        Ease::Stepped | Ease::Linear => [0.0; 4],
-    };
-    let span = to.time - from.time;
-    let share = (time - from.time) / span;
-    let slope = std::array::from_fn(|axis| {
-        6.0 * share * (1.0 - share) * (to.value[axis] - from.value[axis]) / span
-            + (3.0 * share * share - 4.0 * share + 1.0) * leave[axis]
-            + (3.0 * share * share - 2.0 * share) * arrive[axis]
-    });
+    let slope = cubic_slope(from, to, time);
     if *property == Property::Rotation {
+        let (arrive, span) = (arrival(to), to.time - from.time);
+        let share = (time - from.time) / span;
         // The curve is normalised, and so is its tangent: what points along the value changes nothing.
         let plain: [f32; 4] = std::array::from_fn(|axis| {
             (2.0 * share - 3.0) * share * share * (from.value[axis] - to.value[axis])

@@ -15,19 +15,19 @@ fn bench(sight: Sight) -> (Bench, Uid) {
     app.world_mut().write_message(rigsmith::plugins::commands::BuildRequest { rig, step: BuildStep::All });
     app.update();
     app.update();
-    let mut bench = Bench { app, rig, sink: Sink::default() };
-    let built = bench.app.world().get::<BuildResult>(rig).unwrap().0.clone();
+    let mut bench = Bench { base: RigBench { app, rig }, sink: Sink::default() };
+    let built = bench.base.get::<BuildResult>(rig).unwrap().0.clone();
     let control = built.nodes.iter().find(|node| node.control.is_some()).expect("a control").uid;
     bench.mode(Mode::Pose);
-    bench.select(&[control]);
-    bench.app.update();
+    bench.base.select(&[control]);
+    bench.base.app.update();
     (bench, control)
 }
 
 /// Offset of the control's entity from rest.
 fn offset(bench: &Bench, control: Uid) -> PoseOffset {
-    let world = bench.app.world();
-    let runtime = world.get::<RigRuntime>(bench.rig).unwrap();
+    let world = bench.base.app.world();
+    let runtime = world.get::<RigRuntime>(bench.base.rig).unwrap();
     let entity = runtime.entity(runtime.state().program().node(control).unwrap()).unwrap();
     PoseOffset::between(world.get::<RestTransform>(entity).unwrap(), world.get::<Transform>(entity).unwrap())
 }
@@ -55,22 +55,21 @@ fn gizmos_keep_controls_within_their_channels_and_limits() {
             for by in [Vec2::new(40.0, -160.0), Vec2::new(-150.0, 90.0)] {
                 let what = format!("{handle:?} by {by}");
                 let from = bench.grip(handle);
-                let steps = bench.steps();
+                let steps = bench.base.steps();
                 bench.drag(from, by, ModifierKeys::default());
                 is_within(offset(&bench, control), &format!("{what}, while it is dragged"));
                 bench.release(from + by);
-                bench.app.update();
+                bench.base.app.update();
                 let held = offset(&bench, control);
                 is_within(held, &what);
                 reached[0] |= (held.translation.y.abs() - 0.1).abs() < 1e-5;
                 reached[1] |= (held.rotation.angle_between(Quat::IDENTITY).to_degrees() - 10.0).abs() < 1e-2;
-                assert!(bench.steps() <= steps + 1, "{what}: a drag is one step");
-                if bench.steps() > steps {
-                    bench.app.world_mut().write_message(EditRequest { rig: bench.rig, change: Change::Undo });
-                    bench.app.update();
+                assert!(bench.base.steps() <= steps + 1, "{what}: a drag is one step");
+                if bench.base.steps() > steps {
+                    bench.base.change(Change::Undo);
                 }
                 assert!(offset(&bench, control).is_rest(1e-6), "{what}: undone");
-                bench.app.update();
+                bench.base.app.update();
             }
         }
         assert_eq!(reached, [true; 2], "drags reach the limits of the free channels");

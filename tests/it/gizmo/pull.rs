@@ -9,11 +9,11 @@ use rigsmith::{
 use super::*;
 
 fn pulled(bench: &Bench) -> Option<Uid> {
-    bench.app.world().resource::<PullTool>().pulled()
+    bench.base.app.world().resource::<PullTool>().pulled()
 }
 
 fn banded(bench: &Bench) -> bool {
-    bench.app.world().resource::<SelectTool>().band.is_some()
+    bench.base.app.world().resource::<SelectTool>().band.is_some()
 }
 
 /// A way on the screen from one place to another, turned and shortened.
@@ -66,18 +66,19 @@ fn a_joint_goes_with_the_pointer_in_one_step() {
             let mut bench = Bench::new(sight, place);
             let [root, middle, tip] = chain(&mut bench);
             bench.mode(Mode::Pose);
-            let (before, steps) = (bench.rig().clone(), bench.steps());
-            let pixel = |bench: &Bench, joint: Uid| sight.project(bench.rig().posed_global(joint).translation).unwrap();
+            let (before, steps) = (bench.base.rig().clone(), bench.base.steps());
+            let pixel =
+                |bench: &Bench, joint: Uid| sight.project(bench.base.rig().posed_global(joint).translation).unwrap();
             let (from, to) = (pixel(&bench, tip), pixel(&bench, root));
             let by = way(from, to, 0.4, 0.3);
             bench.drag(from, by, ModifierKeys::default());
             assert_eq!((pulled(&bench), banded(&bench)), (Some(tip), false));
             assert!(pixel(&bench, tip).distance(from + by) < 1.0, "{} is not {}", pixel(&bench, tip), from + by);
-            assert_eq!(bench.steps(), steps, "a preview is no step");
+            assert_eq!(bench.base.steps(), steps, "a preview is no step");
             bench.release(from + by);
-            let rig = bench.rig().clone();
+            let rig = bench.base.rig().clone();
             assert!(pixel(&bench, tip).distance(from + by) < 1.0);
-            assert_eq!((bench.steps(), bench.journaled()), (steps + 1, steps + 1));
+            assert_eq!((bench.base.steps(), bench.journaled()), (steps + 1, steps + 1));
             for joint in [root, middle, tip] {
                 assert_eq!(rig.rest_global(joint), before.rest_global(joint), "the rest pose stays");
             }
@@ -86,17 +87,16 @@ fn a_joint_goes_with_the_pointer_in_one_step() {
                     |rig: &Rig| rig.posed_global(above).translation.distance(rig.posed_global(below).translation);
                 assert!((length(&rig) - length(&before)).abs() < 1e-4, "bones keep their lengths");
             }
-            bench.app.world_mut().write_message(EditRequest { rig: bench.rig, change: Change::Undo });
-            bench.app.update();
-            assert_eq!(*bench.rig(), before);
+            bench.base.change(Change::Undo);
+            assert_eq!(*bench.base.rig(), before);
 
             // Escape takes it back to the bit, and the drag does not go on.
             bench.drag(from, by, ModifierKeys::default());
-            assert_ne!(*bench.rig(), before);
-            bench.action(Action::Cancel);
+            assert_ne!(*bench.base.rig(), before);
+            bench.base.act(Action::Cancel);
             bench.pointer(from + by, PointerAct::Dragged, ModifierKeys::default());
             bench.release(from + by);
-            assert_eq!((bench.rig(), bench.steps()), (&before, steps));
+            assert_eq!((bench.base.rig(), bench.base.steps()), (&before, steps));
         }
     }
 }
@@ -106,22 +106,22 @@ fn a_root_moves_a_click_selects_and_a_drag_beside_joints_is_a_box() {
     let [sight, _] = sights(Transform::IDENTITY);
     let mut bench = Bench::new(sight, Transform::IDENTITY);
     let [root, _, tip] = chain(&mut bench);
-    bench.select(&[]);
+    bench.base.select(&[]);
     bench.mode(Mode::Pose);
-    let pixel = |bench: &Bench, joint: Uid| sight.project(bench.rig().posed_global(joint).translation).unwrap();
-    let (steps, from) = (bench.steps(), pixel(&bench, root));
+    let pixel = |bench: &Bench, joint: Uid| sight.project(bench.base.rig().posed_global(joint).translation).unwrap();
+    let (steps, from) = (bench.base.steps(), pixel(&bench, root));
     let by = Vec2::new(60.0, 35.0);
     bench.drag(from, by, ModifierKeys::default());
     bench.release(from + by);
     assert!(pixel(&bench, root).distance(from + by) < 1.0);
-    assert_eq!(bench.steps(), steps + 1);
+    assert_eq!(bench.base.steps(), steps + 1);
 
     let at = pixel(&bench, tip);
     bench.pointer(at, PointerAct::Pressed, ModifierKeys::default());
     bench.pointer(at, PointerAct::Released { dragged: false, count: 1 }, ModifierKeys::default());
-    bench.app.update();
-    assert_eq!(bench.app.world().get::<Selection>(bench.rig).unwrap().0, [tip]);
-    assert_eq!(bench.steps(), steps + 1, "a click poses nothing");
+    bench.base.app.update();
+    assert_eq!(bench.base.get::<Selection>(bench.base.rig).unwrap().0, [tip]);
+    assert_eq!(bench.base.steps(), steps + 1, "a click poses nothing");
 
     bench.drag(Vec2::new(15.0, 15.0), Vec2::new(30.0, 20.0), ModifierKeys::default());
     assert_eq!((pulled(&bench), banded(&bench)), (None, true));
@@ -143,8 +143,8 @@ fn a_built_rig_is_pulled_by_its_controls() {
     app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(sight)));
     app.update();
     app.update();
-    let mut bench = Bench { app, rig, sink: Sink::default() };
-    let built = bench.app.world().get::<BuildResult>(rig).expect("a built rig").0.clone();
+    let mut bench = Bench { base: RigBench { app, rig }, sink: Sink::default() };
+    let built = bench.base.get::<BuildResult>(rig).expect("a built rig").0.clone();
     let [hand, shoulder] = ["hand_l", "upper_arm_l"].map(|label| built.find_label(label).expect("a joint").uid);
     let switch = built.switches.iter().find(|switch| match &switch.matching {
         Matching::IkFk { joints, .. } => joints.contains(&hand),
@@ -154,34 +154,33 @@ fn a_built_rig_is_pulled_by_its_controls() {
     bench.mode(Mode::Pose);
     for value in [1.0, 0.0] {
         let (control, attribute) = (switch.control, switch.attribute.to_string());
-        bench.app.world_mut().write_message(SwitchRequest { rig, control, attribute, value });
+        bench.base.app.world_mut().write_message(SwitchRequest { rig, control, attribute, value });
         for _ in 0..3 {
-            bench.app.update();
+            bench.base.app.update();
         }
-        let state = |bench: &Bench| bench.app.world().get::<RigRuntime>(rig).unwrap().state().clone();
+        let state = |bench: &Bench| bench.base.get::<RigRuntime>(rig).unwrap().state().clone();
         assert_eq!(state(&bench).attribute(switch.control, &switch.attribute), Some(value));
         let pixel = |bench: &Bench, node: Uid| sight.project(state(bench).global(node).unwrap().translation).unwrap();
-        let (before, steps, from) = (bench.rig().clone(), bench.steps(), pixel(&bench, hand));
+        let (before, steps, from) = (bench.base.rig().clone(), bench.base.steps(), pixel(&bench, hand));
         let to = pixel(&bench, shoulder);
         let by = way(from, to, 0.8, 40.0 / from.distance(to));
         bench.drag(from, by, ModifierKeys::default());
         assert_eq!(pulled(&bench), Some(hand), "switch at {value}");
         bench.release(from + by);
-        bench.app.update();
+        bench.base.app.update();
         let off = pixel(&bench, hand).distance(from + by);
         assert!(off < 5.0, "switch at {value}: the hand is {off} pixels off");
-        assert_eq!(bench.steps(), steps + 1);
-        let posed = bench.rig().pose().iter().filter(|(node, offset)| before.offset(**node) != Some(*offset));
+        assert_eq!(bench.base.steps(), steps + 1);
+        let posed = bench.base.rig().pose().iter().filter(|(node, offset)| before.offset(**node) != Some(*offset));
         let posed: Vec<Uid> = posed.map(|(node, _)| *node).collect();
         assert!(
             !posed.is_empty() && posed.iter().all(|node| built.node(*node).is_some_and(|node| node.control.is_some()))
         );
         let is_goal = |node: &Uid| matches!(&switch.matching, Matching::IkFk { goal, .. } if goal == node);
         assert_eq!(posed.iter().any(is_goal), value == 1.0, "{posed:?}");
-        bench.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-        bench.app.update();
-        bench.app.update();
-        assert_eq!(*bench.rig(), before);
+        bench.base.change(Change::Undo);
+        bench.base.app.update();
+        assert_eq!(*bench.base.rig(), before);
         assert!(pixel(&bench, hand).distance(from) < 0.5);
     }
 }

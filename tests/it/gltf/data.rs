@@ -148,7 +148,7 @@ fn characters_pose_the_same() {
 /// Points and weights of skinned meshes, bind matrices, and key times.
 type OtherView = (Vec<Vec3>, Vec<[f32; 4]>, Vec<[[f32; 4]; 4]>, Vec<f32>);
 
-/// What the crate `gltf` reads from a file that is known to be good.
+/// Content that the crate `gltf` reads from a file that is known to be good.
 fn view_of_other_reader(glb: &[u8]) -> OtherView {
     let file = ::gltf::Gltf::from_slice(glb).unwrap();
     let bytes = |_: ::gltf::Buffer| file.blob.as_deref();

@@ -21,7 +21,7 @@ use rigsmith::{
     },
 };
 
-use super::{Game, TWO, saved};
+use super::{AppBench, TWO, saved};
 
 /// A node that no rig has.
 const GONE: Uid = Uid(0xDEAD);
@@ -49,8 +49,8 @@ fn file(way: f32) -> String {
     write_named(Uid(0xF1), "two", &NodeNames(names), &[clip.with_nodes(other)])
 }
 
-fn game(folder: &Path) -> Game {
-    let mut game = Game::with(RigInstancePlugin::default(), folder, |app| {
+fn game(folder: &Path) -> AppBench {
+    let mut game = AppBench::game_with(RigInstancePlugin::default(), folder, |app| {
         app.add_plugins((AnimationPlugin, ClipPlugin))
             .init_resource::<ClipTold>()
             .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(100)))
@@ -63,12 +63,12 @@ fn game(folder: &Path) -> Game {
     game
 }
 
-fn told(game: &Game) -> &ClipTold {
+fn told(game: &AppBench) -> &ClipTold {
     game.app.world().resource::<ClipTold>()
 }
 
 /// Updates until clips were bound so many times.
-fn bound(game: &mut Game, count: usize) {
+fn bound(game: &mut AppBench, count: usize) {
     let start = std::time::Instant::now();
     while told(game).bound.len() < count {
         assert!(start.elapsed() < super::HANG, "the clips do not come");
@@ -78,7 +78,7 @@ fn bound(game: &mut Game, count: usize) {
 }
 
 /// A game with an instance, and the file of a clip in which its control rises.
-fn rising(folder: &Path, mode: InstanceMode) -> (Game, Handle<RigAnimation>, Entity) {
+fn rising(folder: &Path, mode: InstanceMode) -> (AppBench, Handle<RigAnimation>, Entity) {
     let path = saved(folder, TWO);
     fs::write(folder.join("rise.anim.ron"), file(1.0)).unwrap();
     let mut game = game(folder);
@@ -104,7 +104,7 @@ fn a_file_of_clips_plays_on_an_instance() {
         let player = *game.app.world().get::<ClipPlayer>(instance).unwrap();
         assert!((player.time - 0.4).abs() < 1e-3, "{}", player.time);
         let end = game.node(instance, "a_end");
-        let height = |game: &Game| game.app.world().get::<GlobalTransform>(end).unwrap().translation().y;
+        let height = |game: &AppBench| game.app.world().get::<GlobalTransform>(end).unwrap().translation().y;
         assert!((height(&game) - 1.9).abs() < 1e-3, "{mode:?}: {}", height(&game));
         let names: Vec<&str> = told(&game).markers.iter().map(|(_, name)| name.as_str()).collect();
         assert_eq!(names, ["low", "high", "low"], "{mode:?}");
@@ -140,7 +140,7 @@ fn a_file_of_clips_becomes_animations_of_bevy() {
         let names: Vec<&str> = told(&game).markers.iter().map(|(_, name)| name.as_str()).collect();
         assert!(names.len() >= 4 && names.starts_with(&["low", "high", "low", "high"]), "{mode:?}: {names:?}");
         assert!(told(&game).markers.iter().all(|(entity, _)| *entity == instance));
-        let halt = |game: &mut Game| {
+        let halt = |game: &mut AppBench| {
             let mut player = game.app.world_mut().get_mut::<AnimationPlayer>(instance).unwrap();
             player.animation_mut(index).unwrap().pause().seek_to(0.5);
             for _ in 0..4 {

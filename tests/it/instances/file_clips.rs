@@ -12,7 +12,7 @@ use rigsmith::{
 
 use std::{collections::BTreeSet, path::Path, time::Duration};
 
-use super::{Game, TWO, saved};
+use super::{AppBench, TWO, saved};
 
 /// Nodes of a file: names, parents and places, as those of [`TWO`].
 const NODES: [(&str, Option<usize>, Vec3); 4] = [
@@ -26,8 +26,8 @@ const NODES: [(&str, Option<usize>, Vec3); 4] = [
 #[derive(Resource, Default)]
 struct Held(Vec<String>);
 
-fn game() -> Game {
-    let mut game = Game::with(RigInstancePlugin::default(), Path::new("assets"), |app| {
+fn game() -> AppBench {
+    let mut game = AppBench::game_with(RigInstancePlugin::default(), Path::new("assets"), |app| {
         app.add_plugins(AnimationPlugin).init_asset::<SkinnedMeshInverseBindposes>().init_resource::<Held>();
     });
     game.app.add_observer(|told: On<JointsHeld>, mut held: ResMut<Held>| held.0.extend(told.joints.clone()));
@@ -44,7 +44,7 @@ struct Loaded {
 
 impl Loaded {
     /// The file below an instance, with inverse bind poses that were loaded before, or its own.
-    fn below(game: &mut Game, instance: Entity, bindposes: Option<Handle<SkinnedMeshInverseBindposes>>) -> Self {
+    fn below(game: &mut AppBench, instance: Entity, bindposes: Option<Handle<SkinnedMeshInverseBindposes>>) -> Self {
         let world = game.app.world_mut();
         let scene = world.spawn((Transform::default(), ChildOf(instance))).id();
         let (mut nodes, mut places) = (Vec::new(), Vec::new());
@@ -63,7 +63,7 @@ impl Loaded {
     }
 
     /// A clip of the file that moves all nodes upwards, played.
-    fn play(&self, game: &mut Game) {
+    fn play(&self, game: &mut AppBench) {
         let world = game.app.world_mut();
         let mut clip = AnimationClip::default();
         let player = self.scene;

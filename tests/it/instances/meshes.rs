@@ -27,7 +27,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Bindings, Game, HANG, TWO, saved};
+use super::{AppBench, Bindings, HANG, TWO, saved};
 use crate::prerequisites::test_data;
 
 /// A tube around both chains of [`TWO`], as a mesh of an instance.
@@ -58,7 +58,7 @@ fn tube() -> RigMesh {
 fn meshes_of_instances_are_bound_once_for_all() {
     let folder = tempfile::tempdir().unwrap();
     let path = saved(folder.path(), TWO);
-    let mut game = Game::live();
+    let mut game = AppBench::live_game();
     game.app.init_resource::<Bindings>();
     game.app.add_observer(|bound: On<SkinBound>, mut bindings: ResMut<Bindings>| {
         bindings.0.push((bound.instance, bound.unknown.clone()));
@@ -68,8 +68,8 @@ fn meshes_of_instances_are_bound_once_for_all() {
     let second = game.spawn(template, InstanceMode::Hierarchy);
     let mesh = tube();
     let meshes = [first, second].map(|instance| game.app.world_mut().spawn((mesh.clone(), SkinOf(instance))).id());
-    let skin = |game: &Game, mesh: Entity| game.app.world().get::<InstanceSkin>(mesh).map(|skin| skin.0.clone());
-    let bound = |game: &mut Game| {
+    let skin = |game: &AppBench, mesh: Entity| game.app.world().get::<InstanceSkin>(mesh).map(|skin| skin.0.clone());
+    let bound = |game: &mut AppBench| {
         let start = Instant::now();
         while meshes.iter().any(|mesh| skin(game, *mesh).is_none()) {
             assert!(start.elapsed() < HANG, "no weights come");
@@ -132,7 +132,7 @@ fn a_loaded_character_with_an_animation_of_its_own_is_moved_by_an_instance() {
     let folder = tempfile::tempdir().unwrap();
     let path = saved(folder.path(), &write_template(&rig));
     for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
-        let mut game = Game::with(RigInstancePlugin::default(), Path::new("assets"), |app| {
+        let mut game = AppBench::game_with(RigInstancePlugin::default(), Path::new("assets"), |app| {
             app.add_plugins(AnimationPlugin);
         });
         game.app.init_resource::<Bindings>();

@@ -16,7 +16,7 @@ use rigsmith::{
     rig::{PoseOffset, RigEdit, Uid, UidSource, template::read_template},
 };
 
-use super::{Game, HANG, TWO, saved};
+use super::{AppBench, HANG, TWO, saved};
 use crate::{
     mutate::Mutator,
     template_text::{CHAIN, Dice},
@@ -27,7 +27,7 @@ fn a_thousand_broken_files_on_the_disk_change_nothing_and_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let path = saved(folder.path(), CHAIN);
     let quick = RigInstancePlugin { look: Duration::from_millis(1), patience: Duration::from_millis(2), live: true };
-    let mut game = Game::new(quick, Path::new("assets"));
+    let mut game = AppBench::game(quick, Path::new("assets"));
     let instance = game.open(&path, InstanceMode::Direct);
     game.app.update();
     let before = game.places(instance);
@@ -78,7 +78,7 @@ fn no_frame_of_a_reload_shows_the_rest_pose_or_moves_an_untouched_limb() {
     for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
         let folder = tempfile::tempdir().unwrap();
         let path = biped(folder.path());
-        let mut game = Game::live();
+        let mut game = AppBench::live_game();
         let instance = game.open(&path, mode);
         game.app.update();
         let rest = game.places(instance);
@@ -155,7 +155,7 @@ fn no_frame_of_a_reload_shows_the_rest_pose_or_moves_an_untouched_limb() {
 fn a_thousand_instances_go_on_in_one_frame() {
     let folder = tempfile::tempdir().unwrap();
     let text = fs::read_to_string(biped(folder.path())).unwrap();
-    let mut game = Game::still();
+    let mut game = AppBench::still_game();
     let handle =
         game.app.world_mut().resource_mut::<Assets<RigTemplate>>().add(RigTemplate::read(text.as_bytes()).unwrap());
     let spawned = (0..1000).map(|number| (RigInstance(handle.clone()), Transform::from_xyz(number as f32, 0.0, 0.0)));
@@ -165,7 +165,7 @@ fn a_thousand_instances_go_on_in_one_frame() {
     // The limbs stand where their parts say in the rig's space; the chest goes with the hips.
     let chests: Vec<Entity> = [0, 499, 999].iter().map(|at| game.node(crowd[*at], "chest")).collect();
     game.app.update();
-    let place = |game: &Game, at: usize| game.app.world().get::<GlobalTransform>(chests[at]).unwrap().translation();
+    let place = |game: &AppBench, at: usize| game.app.world().get::<GlobalTransform>(chests[at]).unwrap().translation();
     let before = [place(&game, 0), place(&game, 1), place(&game, 2)];
     assert!((before[2] - before[0]).distance(Vec3::X * 999.0) < 1e-3);
     game.offer(crowd[0], text.replace("translation: (0, 0.955, -0.006)", "translation: (0, 1.055, -0.006)").as_bytes());

@@ -13,7 +13,7 @@ use rigsmith::{
     solve::program::{ExposedNode, RigProgram},
 };
 
-use super::{Game, TWO, saved};
+use super::{AppBench, TWO, saved};
 
 const CROWD: usize = 12;
 
@@ -25,7 +25,7 @@ fn count<C: Component>(nodes: Query<(), (Changed<C>, With<NodeOf>)>, mut written
     *written.0.entry(type_name::<C>()).or_default() += nodes.iter().count();
 }
 
-impl Game {
+impl AppBench {
     /// A game that counts what is written, with the bundled biped as a file beside the part of its hands.
     fn counting(folder: &Path) -> (Self, String) {
         let templates = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/templates");
@@ -33,7 +33,7 @@ impl Game {
         fs::copy(templates.join("parts/hand.rig.ron"), folder.join("parts/hand.rig.ron")).unwrap();
         let text = fs::read_to_string(templates.join("biped.rig.ron")).unwrap();
         saved(folder, &text);
-        let mut game = Self::still();
+        let mut game = Self::still_game();
         game.app.init_resource::<Written>().add_systems(
             Last,
             (
@@ -90,7 +90,7 @@ impl Game {
 fn a_size_of_a_control_writes_that_control_alone() {
     for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
         let folder = tempfile::tempdir().unwrap();
-        let (mut game, text) = Game::counting(folder.path());
+        let (mut game, text) = AppBench::counting(folder.path());
         let crowd = game.crowd(folder.path(), mode);
         let (before, program) = (game.template(crowd[0]).clone(), game.program(crowd[0]).clone());
         let written = game.written_by(crowd[0], &text.replacen("size: 0.573", "size: 0.6", 1));
@@ -107,7 +107,7 @@ fn a_size_of_a_control_writes_that_control_alone() {
 fn a_program_is_compiled_once_for_all_instances_and_poses_stay_unread() {
     for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
         let folder = tempfile::tempdir().unwrap();
-        let (mut game, text) = Game::counting(folder.path());
+        let (mut game, text) = AppBench::counting(folder.path());
         let crowd = game.crowd(folder.path(), mode);
         let before = game.program(crowd[0]).clone();
         let places: Vec<_> = crowd.iter().map(|instance| game.places(*instance)).collect();
@@ -135,7 +135,7 @@ fn a_program_is_compiled_once_for_all_instances_and_poses_stay_unread() {
 #[test]
 fn programs_of_exposed_nodes_stay_where_a_change_does_not_reach_them() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut game, text) = Game::counting(folder.path());
+    let (mut game, text) = AppBench::counting(folder.path());
     let crowd = game.crowd(folder.path(), InstanceMode::Direct);
     let nodes = &game.template(crowd[0]).get().built.nodes;
     let hand = nodes.iter().find(|node| &*node.name == "hand_ik_l").unwrap().uid;
@@ -167,7 +167,7 @@ fn limits_that_are_loosened_free_the_pose_that_was_set() {
                 format!("control(limits: (translate: ({range}, {range}, {range})), creation: (name: \"ctl_a\"))");
             TWO.replace("control(creation: (name: \"ctl_a\"))", &limits)
         };
-        let mut game = Game::still();
+        let mut game = AppBench::still_game();
         let instance = game.open(&saved(folder.path(), &limited(0.1)), mode);
         let (control, end) = (game.node(instance, "ctl_a"), game.node(instance, "a_end"));
         game.app.update();
@@ -177,7 +177,7 @@ fn limits_that_are_loosened_free_the_pose_that_was_set() {
             InstanceMode::Hierarchy => world.get_mut::<Transform>(control).unwrap().translation.y += 0.5,
         }
         game.app.update();
-        let height = |game: &Game| game.app.world().get::<GlobalTransform>(end).unwrap().translation().y;
+        let height = |game: &AppBench| game.app.world().get::<GlobalTransform>(end).unwrap().translation().y;
         assert!((height(&game) - 1.6).abs() < 1e-5, "{mode:?}: {}", height(&game));
         for (number, most) in [0.3, 0.2, 1.0].into_iter().enumerate() {
             game.offer(instance, limited(most).as_bytes());

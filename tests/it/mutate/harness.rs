@@ -15,7 +15,7 @@ use crate::random::Random;
 const HANG: Duration = Duration::from_secs(60);
 /// Inputs grow by splicing and repeating, up to this many bytes or four times the largest seed.
 const MAX_LEN: usize = 64 << 10;
-/// How many mutants are kept as further seeds.
+/// Number of mutants that are kept as further seeds.
 const POOL: usize = 256;
 /// Mutants that a test tries, on every machine the same ones.
 const MUTANTS: u64 = 4000;
@@ -63,8 +63,8 @@ pub fn findings(name: &str) -> PathBuf {
 /// Replays what was found before, then calls `check` with mutants of `seeds`: a set number of them, or as many as fit into
 /// `RIGSMITH_FUZZ_SECONDS`.
 ///
-/// `check` panics where something is wrong: a reader that must not panic, or a promise about what was read. Such an input, and
-/// one that takes longer than a minute, is written to `tests/fuzz_findings/NAME/`, and the test fails naming it.
+/// `check` panics where something is wrong: a reader that must not panic, or a promise about what was read. Such an input,
+/// and one that takes longer than a minute, is written to `tests/fuzz_findings/NAME/`, and the test fails naming it.
 pub fn run_fuzz(name: &str, seeds: &[Vec<u8>], dictionary: &[&[u8]], check: impl Fn(&[u8])) {
     assert!(TARGETS.contains(&name), "{name} is not among the targets");
     run_fuzz_for(Budget::of(MUTANTS), name, seeds, dictionary, check);

@@ -14,7 +14,7 @@ use rigsmith::{
     test_app::strict_app,
 };
 
-/// What is being looked at.
+/// Sheet that lies on a desk.
 pub enum Sheet {
     Panel(Box<dyn EditorPanel>),
     Overlay(Box<dyn EditorOverlay>),
@@ -34,7 +34,7 @@ pub struct Desk {
     /// Everything in the last frame: what it says, its value, and where it is.
     pub seen: Vec<ShownWidget>,
     held: Modifiers,
-    /// How many shapes the last frame was drawn with.
+    /// Number of shapes that the last frame was drawn with.
     pub shapes: usize,
     /// Nothing that the panel asks for is done.
     pub deaf: bool,
@@ -314,14 +314,14 @@ impl Desk {
         self.rig().joint(joint).unwrap().parent
     }
 
-    /// How many steps the history has, and how many are in effect.
+    /// Number of steps of the history, and of those in effect.
     pub fn steps(&self) -> (usize, usize) {
         let (steps, done) = self.app.world().get::<RigHistory>(self.rig).unwrap().steps();
         (steps.len(), done)
     }
 
-    /// Does something that is one step or none: without one, what is saved is as before; with one, after its undo. Returns true
-    /// if it was a step.
+    /// Does something that is one step or none: without one, what is saved is as before; with one, after its undo. Returns
+    /// true if it was a step.
     #[track_caller]
     pub fn is_one_step(&mut self, what: &str, saved: impl Fn(&Self) -> String, act: impl FnOnce(&mut Self)) -> bool {
         let (before, (steps, done)) = (saved(self), self.steps());

@@ -216,7 +216,7 @@ fn a_part_that_is_added_stays_a_part() {
     assert!(!save(&desk).contains("parts"));
 }
 
-/// How often parameters of [`Counted`] were read.
+/// Number of times that parameters of [`Counted`] were read.
 static READS: AtomicUsize = AtomicUsize::new(0);
 
 /// A module that counts how often its parameters are read.

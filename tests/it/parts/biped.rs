@@ -14,7 +14,7 @@ fn it_is_as_large_as_it_shall_be() {
     assert!(puppet.built.switches.len() >= 12, "{} switches", puppet.built.switches.len());
 }
 
-/// What is on the left is on the right, with references to the right.
+/// Joints and commands on the left are on the right, too, with references to the right.
 #[test]
 fn its_sides_are_mirror_images() {
     let rig = template("biped");

@@ -122,7 +122,7 @@ fn twists(puppet: &Puppet) -> Vec<Quat> {
     made.iter().map(|node| puppet.at(node.uid).rotation).collect()
 }
 
-/// How far each twist joint has turned since, in radians.
+/// Turn of each twist joint since then, in radians.
 fn turns(puppet: &Puppet, rest: &[Quat]) -> Vec<f32> {
     twists(puppet).iter().zip(rest).map(|(now, rest)| now.angle_between(*rest)).collect()
 }

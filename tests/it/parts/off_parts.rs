@@ -99,7 +99,7 @@ fn built(builder: &mut Builder, what: &str) -> (BuiltRig, RigState) {
     (built, state)
 }
 
-/// How far joints may be from where they would be, in units of the templates (about meters).
+/// Largest distance of joints from where they would be, in units of the templates (about meters).
 const STILL: f32 = 1e-5;
 
 /// Document joints, by uid, that a control moves, of those that it leaves finite.

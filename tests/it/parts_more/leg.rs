@@ -8,7 +8,7 @@ fn places(stage: &Stage) -> [Vec3; 4] {
     JOINTS.map(|label| stage.place(label))
 }
 
-/// How far a joint is before the line between its neighbours; below zero behind it.
+/// Distance of a joint before the line between its neighbours; below zero behind it.
 fn before_line(upper: Vec3, joint: Vec3, lower: Vec3) -> f32 {
     let along = (lower - upper).normalize();
     let aside = (joint - upper) - along * (joint - upper).dot(along);

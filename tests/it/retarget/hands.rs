@@ -22,15 +22,15 @@ use super::{PlayedRig, RetargetSettings, motion, shipped, test_data};
 const RATE: f32 = 30.0;
 const FRAMES: usize = 121;
 
-/// What a figure does at a time: where its hips are, and how its spine is turned.
+/// Pose of a figure at a time: the place of its hips, and the turn of its spine.
 type Moment = (Vec3, Quat);
 
 fn at(translation: Vec3, rotation: Quat) -> Trs {
     Trs { translation, rotation, scale: Vec3::ONE }
 }
 
-/// A figure with arms of these lengths, at rest with its arms out, that moves as `moment` says and reaches with its wrists for the
-/// places that `reach` gives for a side (1 for the left, -1 for the right), from the hips and the shoulder.
+/// A figure with arms of these lengths, at rest with its arms out, that moves as `moment` says and reaches with its wrists
+/// for the places that `reach` gives for a side (1 for the left, -1 for the right), from the hips and the shoulder.
 fn reaching(arm: [f32; 2], moment: impl Fn(f32) -> Moment, reach: impl Fn(f32, f32, &Trs, Vec3) -> Vec3) -> Motion {
     let mut joints: Vec<MotionJoint> = Vec::new();
     let mut add = |name: String, parent: Option<usize>, place: Vec3, is_turned: bool, end: Option<Vec3>| {

@@ -15,7 +15,7 @@ use rigsmith::{
 /// Makes built rigs from nodes given by label and place.
 #[derive(Default)]
 pub struct RigBuilder {
-    /// What was made so far.
+    /// Nodes and constraints made so far.
     pub rig: BuiltRig,
     globals: Vec<Trs>,
     by_label: HashMap<String, usize>,

@@ -69,7 +69,7 @@ fn steps(bench: &mut Workbench) -> usize {
     bench.app_mut().world().get::<RigHistory>(rig).unwrap().steps().1
 }
 
-/// What each joint of the weights holds in all.
+/// Sum of the weights of each joint.
 fn held(skin: &SkinData) -> BTreeMap<Uid, f32> {
     let mut held = BTreeMap::new();
     for (joint, weight) in skin.weights.joints.iter().zip(&skin.weights.values) {

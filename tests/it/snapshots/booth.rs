@@ -49,7 +49,7 @@ use super::{
 };
 use crate::bench::{HANG, wait};
 
-/// What a picture is taken of.
+/// Subject of a picture.
 pub enum Subject {
     /// A panel in a tab.
     Panel(Box<dyn EditorPanel>),
@@ -70,7 +70,7 @@ pub struct Frame {
     pub look: Look,
 }
 
-/// What is done before a picture is taken.
+/// Step before a picture is taken.
 #[derive(Clone, Copy)]
 pub enum Step {
     /// Clicks the first widget whose name begins so.

@@ -71,7 +71,7 @@ pub fn texts(shapes: &[ClippedShape]) -> Vec<Text> {
     found
 }
 
-/// What is asked of a picture.
+/// Questions about a picture.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Asked {
     /// Everything that can be clicked has a name, which says which one is meant in its row.

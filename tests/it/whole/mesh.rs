@@ -72,7 +72,8 @@ fn saved(model: &Model, name: &str, is_whole: bool) -> Option<(MemoryDisk, Model
     }
 }
 
-/// What was written as GLB gives the same bytes when it is written again, and the same model as with a buffer beside it.
+/// Models that were written as GLB give the same bytes when they are written again, and the same model as with a buffer
+/// beside it.
 fn as_gltf(model: &Model, is_whole: bool) {
     // A model that is read has the name of its file, and the scene that is written has the name of the model.
     let model = &Model { name: "a".to_owned(), ..model.clone() };
@@ -92,8 +93,8 @@ fn as_gltf(model: &Model, is_whole: bool) {
     assert!(!has_temporaries, "{:?}", beside.names());
 }
 
-/// What was written as OBJ has the points and faces of the model at rest, and a model that was read from OBJ gives the same
-/// bytes each time.
+/// Models that were written as OBJ have the points and faces of the model at rest, and a model that was read from OBJ gives
+/// the same bytes each time.
 fn as_obj(model: &Model) {
     let Some((_, first)) = saved(model, "a.obj", false) else { return };
     assert_eq!(first.points.len(), model.points.len());

@@ -203,7 +203,7 @@ pub fn run(built: &BuiltRig, is_ordinary: bool) {
     }
 }
 
-/// What can be saved can be read, and says as much; what cannot be saved is an error, and leaves no file.
+/// Rigs that can be saved can be read, and say as much; one that cannot be saved is an error, and leaves no file.
 pub fn saved(rig: &Rig, built: Option<&BuiltRig>) {
     let disk = MemoryDisk::default();
     store_rig(&disk, &at("r.rig.ron"), rig).unwrap_or_else(|error| panic!("{error}\n{}", write_template(rig)));

@@ -18,12 +18,12 @@ use rigsmith::{
     rig::{NodeType, TagData, TagKind},
 };
 
-use super::{Stage, shipped};
+use super::{RigBench, shipped};
 
 /// The built biped, some frames later.
-fn biped() -> Stage {
+fn biped() -> RigBench {
     let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
-    let mut stage = Stage::built(rig);
+    let mut stage = RigBench::of_built(rig);
     (0..3).for_each(|_| stage.app.update());
     stage
 }
@@ -41,7 +41,7 @@ fn of_rigs(world: &World) -> Vec<EntityRef<'_>> {
 }
 
 /// Components of the rigs' entities that were written after a tick, with their names.
-fn writes_since(stage: &Stage, tick: Tick) -> Vec<(Entity, ComponentId, String)> {
+fn writes_since(stage: &RigBench, tick: Tick) -> Vec<(Entity, ComponentId, String)> {
     let world = stage.app.world();
     let now = world.read_change_tick();
     let mut found = Vec::new();
@@ -58,7 +58,7 @@ fn writes_since(stage: &Stage, tick: Tick) -> Vec<(Entity, ComponentId, String)>
 }
 
 /// The same for the parts of the rigs, without the rigs' own entities.
-fn parts_written_since(stage: &Stage, tick: Tick) -> Vec<(Entity, String)> {
+fn parts_written_since(stage: &RigBench, tick: Tick) -> Vec<(Entity, String)> {
     let written = writes_since(stage, tick).into_iter().filter(|(entity, ..)| *entity != stage.rig);
     written.map(|(entity, _, name)| (entity, name)).collect()
 }
@@ -94,7 +94,7 @@ fn an_edit_of_one_tag_touches_only_what_changed() {
         origin.is_some_and(|origin| origin.command == uid)
     };
     let tick = stage.app.world().read_change_tick();
-    stage.edit(vec![RigEdit::SetTag(joint, Box::new(tag))]);
+    stage.apply(RigEdit::SetTag(joint, Box::new(tag)));
     let written = parts_written_since(&stage, tick);
     let controls = written.iter().filter(|(_, name)| name.ends_with("schema::Control")).count();
     assert!(controls > 0, "the control's shape is written: {written:?}");
@@ -119,8 +119,8 @@ fn an_edit_of_one_tag_touches_only_what_changed() {
 }
 
 /// The first command that fits, with its joint.
-fn command(stage: &Stage, is_meant: impl Fn(&str, &str) -> bool) -> (Uid, TagData) {
-    let rig = stage.document();
+fn command(stage: &RigBench, is_meant: impl Fn(&str, &str) -> bool) -> (Uid, TagData) {
+    let rig = stage.rig();
     let tags = rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag.clone())));
     let fits = |(_, tag): &(Uid, TagData)| match &tag.kind {
         TagKind::Command { module, params, .. } => is_meant(module, params),
@@ -132,7 +132,7 @@ fn command(stage: &Stage, is_meant: impl Fn(&str, &str) -> bool) -> (Uid, TagDat
 /// Values of all reflected components of a rig's entities.
 type Values = BTreeMap<(Entity, ComponentId), Box<dyn PartialReflect>>;
 
-fn values(stage: &Stage, registry: &TypeRegistry) -> Values {
+fn values(stage: &RigBench, registry: &TypeRegistry) -> Values {
     let world = stage.app.world();
     let mut values = Values::new();
     for entity in of_rigs(world) {
@@ -161,7 +161,7 @@ const STATES: [&str; 8] = [
 
 /// Components that an edit wrote although their values are the same as before, and how many it wrote in all. Markers
 /// without a value, such as those of Bevy's propagation of transforms, do not count.
-fn unchanged_writes(stage: &mut Stage, edit: impl FnOnce(&mut Stage)) -> (Vec<String>, usize) {
+fn unchanged_writes(stage: &mut RigBench, edit: impl FnOnce(&mut RigBench)) -> (Vec<String>, usize) {
     let registry = stage.app.world().resource::<AppTypeRegistry>().clone();
     let before = values(stage, &registry.read());
     let reports: BTreeMap<Entity, CommandReport> = of_rigs(stage.app.world())
@@ -221,7 +221,7 @@ fn no_value_that_stays_the_same_is_written() {
     ];
     let mut edited = 0;
     for (module, part, by) in table {
-        let found = stage.document().walk().any(|joint| {
+        let found = stage.rig().walk().any(|joint| {
             joint.data.tags.iter().any(|tag| match &tag.kind {
                 TagKind::Command { module: m, params, .. } => text(module, part)(m, params),
                 TagKind::Feature { .. } => false,
@@ -237,7 +237,7 @@ fn no_value_that_stays_the_same_is_written() {
         }
         let what = format!("{module}: {by}");
         let (same, count) =
-            unchanged_writes(&mut stage, |stage| stage.edit(vec![RigEdit::SetTag(joint, Box::new(tag))]));
+            unchanged_writes(&mut stage, |stage| stage.apply_all(vec![RigEdit::SetTag(joint, Box::new(tag))]));
         assert!(count > 0, "{what}: the edit is seen");
         assert_eq!(same, Vec::<String>::new(), "{what}");
         let (same, count) = unchanged_writes(&mut stage, |stage| stage.change(Change::Undo));

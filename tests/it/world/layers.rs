@@ -7,13 +7,13 @@ use rigsmith::{
     rig::{Matching, NodeType},
 };
 
-use super::{Stage, shipped};
+use super::{RigBench, shipped};
 
 /// Controls whose kinematics has no effect are neither seen nor picked; a blend of both shows both.
 #[test]
 fn controls_without_effect_are_hidden() {
     let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
-    let mut stage = Stage::built(rig);
+    let mut stage = RigBench::of_built(rig);
     let built = stage.get::<BuildResult>(stage.rig).unwrap().0.clone();
     let limbs = built.switches.iter().filter_map(|switch| match &switch.matching {
         Matching::IkFk { fk, goal, .. } if *goal != switch.control => {
@@ -23,7 +23,7 @@ fn controls_without_effect_are_hidden() {
     });
     let limbs: Vec<_> = limbs.collect();
     assert!(limbs.len() >= 4, "arms and legs");
-    let visible = |stage: &Stage, node: Uid| stage.get::<NodeVisible>(stage.node(node).unwrap()).unwrap().0;
+    let visible = |stage: &RigBench, node: Uid| stage.get::<NodeVisible>(stage.node(node).unwrap()).unwrap().0;
     // The control that carries a goal: a foot's goal hangs below its control.
     let index = built.index();
     let carrier = |goal: Uid| {
@@ -36,7 +36,7 @@ fn controls_without_effect_are_hidden() {
     for (control, attribute, fk, goal) in limbs {
         for (value, forward, inverse) in [(0.0, true, false), (0.4, true, true), (1.0, false, true)] {
             let edit = RigEdit::SetAttributeValue(control, attribute.clone(), Some(value));
-            stage.edit(vec![edit]);
+            stage.apply_all(vec![edit]);
             assert_eq!(visible(&stage, carrier(goal)), inverse, "the goal at {value}");
             for node in fk.iter().filter(|node| **node != control) {
                 assert_eq!(visible(&stage, *node), forward, "a forward control at {value}");
@@ -75,14 +75,14 @@ mod drawn_layers {
     const OTHER: [f32; 3] = [0.9, 0.1, 0.8];
 
     /// A rig with one control of a colour of its own, at the joint `j2`.
-    fn stage() -> (Stage, Uid) {
+    fn stage() -> (RigBench, Uid) {
         let mut rig = limited_rig();
         let mut tag = rig.find_tag(Uid(77)).unwrap().1.clone();
         let params = format!("(size: 0.3, color: Some({}))", tuple(OWN));
         tag.kind = TagKind::Command { module: "control".into(), params, feature: None };
         rig.apply(&RigEdit::SetTag(Uid(2), Box::new(tag))).unwrap();
         rig.apply(&RigEdit::AddTag { joint: Uid(2), tag: Box::new(layer("()")), index: 1 }).unwrap();
-        let stage = Stage::built(rig);
+        let stage = RigBench::of_built(rig);
         let built = &stage.get::<BuildResult>(stage.rig).unwrap().0;
         let control = built.nodes.iter().find(|node| node.kind == NodeType::Control).unwrap().uid;
         (stage, control)
@@ -109,7 +109,7 @@ mod drawn_layers {
     }
 
     /// Outlines of the visible controls, as the drawing and the picking get them.
-    fn outlines(stage: &mut Stage) -> Vec<ControlOutline> {
+    fn outlines(stage: &mut RigBench) -> Vec<ControlOutline> {
         let rig = stage.rig;
         let visible = move |controls: ControlNodes, nodes: Query<&RigNodes>| {
             controls.visible(nodes.get(rig).ok(), bevy::math::Affine3A::IDENTITY)
@@ -117,14 +117,14 @@ mod drawn_layers {
         stage.app.world_mut().run_system_once(visible).unwrap()
     }
 
-    fn tints(stage: &mut Stage) -> Vec<Tint> {
+    fn tints(stage: &mut RigBench) -> Vec<Tint> {
         let (controls, mut ink) = (outlines(stage), Ink::default());
         draw_controls(&controls, &Selection::default(), &HoveredNode::default(), &sight(), &Theme::default(), &mut ink);
         ink.tints.clone()
     }
 
-    /// What a click on the outline of the control selects.
-    fn click(stage: &mut Stage, control: Uid) -> Vec<Uid> {
+    /// Nodes that a click on the outline of the control selects.
+    fn click(stage: &mut RigBench, control: Uid) -> Vec<Uid> {
         let entity = stage.node(control).unwrap();
         let place = stage.get::<GlobalTransform>(entity).unwrap().affine();
         let lines = lines_of(&stage.get::<Control>(entity).unwrap().0, place);
@@ -155,7 +155,7 @@ mod drawn_layers {
             ("(visible: false, display: template)", None, false),
         ];
         for (params, color, is_picked) in table {
-            stage.edit(vec![RigEdit::SetTag(Uid(2), Box::new(layer(params)))]);
+            stage.apply(RigEdit::SetTag(Uid(2), Box::new(layer(params))));
             let entity = stage.node(control).unwrap();
             assert_eq!(stage.get::<NodeVisible>(entity), Some(&NodeVisible(color.is_some())), "{params}");
             let tints = tints(&mut stage);
@@ -196,11 +196,11 @@ mod drawn_layers {
             let tag = TagData { uid: Uid(uid), enabled: true, comment: String::new(), kind };
             RigEdit::AddTag { joint: Uid(2), tag: Box::new(tag), index }
         });
-        stage.edit(tags.collect());
+        stage.apply_all(tags.collect());
         assert!(!tints(&mut stage).is_empty());
         assert_eq!(click(&mut stage, control), [control]);
-        let show = |stage: &mut Stage, value: f32| {
-            stage.edit(vec![RigEdit::SetAttributeValue(control, "shown".into(), Some(value))]);
+        let show = |stage: &mut RigBench, value: f32| {
+            stage.apply(RigEdit::SetAttributeValue(control, "shown".into(), Some(value)));
         };
         show(&mut stage, 0.0);
         assert!(tints(&mut stage).is_empty());

@@ -16,10 +16,10 @@ fn bytes(rig: &Rig) -> String {
 }
 
 /// A built rig with a pose and attribute values of joints and controls, and the uids of both controls.
-fn posed() -> (Stage, [Uid; 2]) {
+fn posed() -> (RigBench, [Uid; 2]) {
     let rig = read_template(RIG.as_bytes()).unwrap().rig;
     let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
-    let mut stage = Stage::built(rig);
+    let mut stage = RigBench::of_built(rig);
     let built = stage.app.world().get::<BuildResult>(stage.rig).unwrap().0.clone();
     let control = |joint: usize| {
         let made = built.nodes.iter().find(|node| {
@@ -34,13 +34,13 @@ fn posed() -> (Stage, [Uid; 2]) {
         edits.push(RigEdit::SetOffset(*node, offset(0.1 + number as f32)));
         edits.push(RigEdit::SetAttributeValue(*node, "stretch".to_owned(), Some(number as f32)));
     }
-    stage.edit(edits);
+    stage.apply_all(edits);
     (stage, controls)
 }
 
 /// Fails unless nothing but the root and its control has a pose and values.
-fn check_only_root(stage: &Stage, [root, arm]: [Uid; 2]) {
-    let rig = stage.document();
+fn check_only_root(stage: &RigBench, [root, arm]: [Uid; 2]) {
+    let rig = stage.rig();
     let posed: Vec<Uid> = rig.pose().keys().copied().collect();
     let valued: Vec<Uid> = rig.attribute_values().keys().copied().collect();
     assert_eq!(posed, valued);
@@ -51,43 +51,43 @@ fn check_only_root(stage: &Stage, [root, arm]: [Uid; 2]) {
 #[test]
 fn deleted_joints_take_the_pose_of_their_controls_along() {
     let (mut stage, controls) = posed();
-    let before = bytes(stage.document());
-    let arm = stage.document().children(Some(stage.document().roots()[0]))[0];
+    let before = bytes(stage.rig());
+    let arm = stage.rig().children(Some(stage.rig().roots()[0]))[0];
     stage.change(Change::Do(Operation::Delete { joints: vec![arm], keep_children: false }));
     check_only_root(&stage, controls);
-    let after = bytes(stage.document());
+    let after = bytes(stage.rig());
     for _ in 0..2 {
         stage.change(Change::Undo);
-        assert_eq!(bytes(stage.document()), before);
+        assert_eq!(bytes(stage.rig()), before);
         stage.change(Change::Redo);
-        assert_eq!(bytes(stage.document()), after);
+        assert_eq!(bytes(stage.rig()), after);
     }
 }
 
 #[test]
 fn despawned_joints_take_the_pose_of_their_controls_along() {
     let (mut stage, controls) = posed();
-    let before = bytes(stage.document());
-    let arm = stage.document().children(Some(stage.document().roots()[0]))[0];
+    let before = bytes(stage.rig());
+    let arm = stage.rig().children(Some(stage.rig().roots()[0]))[0];
     let entity = stage.node(arm).unwrap();
     stage.app.world_mut().entity_mut(entity).despawn();
     stage.app.update();
-    assert_eq!(stage.document().joint(arm), None);
+    assert_eq!(stage.rig().joint(arm), None);
     check_only_root(&stage, controls);
     stage.change(Change::Undo);
-    assert_eq!(bytes(stage.document()), before);
+    assert_eq!(bytes(stage.rig()), before);
 }
 
-/// What is switched off may be switched on again, so its pose stays.
+/// Features that are off may be switched on again, so their poses stay.
 #[test]
 fn what_is_switched_off_keeps_its_pose() {
     let (mut stage, controls) = posed();
-    let arm = stage.document().children(Some(stage.document().roots()[0]))[0];
-    let tag = stage.document().joint(arm).unwrap().data.tags[0].clone();
-    stage.edit(vec![RigEdit::SetTag(arm, Box::new(TagData { enabled: false, ..tag }))]);
-    let hand = stage.document().children(Some(arm))[0];
+    let arm = stage.rig().children(Some(stage.rig().roots()[0]))[0];
+    let tag = stage.rig().joint(arm).unwrap().data.tags[0].clone();
+    stage.apply(RigEdit::SetTag(arm, Box::new(TagData { enabled: false, ..tag })));
+    let hand = stage.rig().children(Some(arm))[0];
     stage.change(Change::Do(Operation::Delete { joints: vec![hand], keep_children: false }));
-    assert!(stage.document().offset(controls[1]).is_some());
-    assert!(stage.document().attribute_values().contains_key(&controls[1]));
-    assert!(!stage.document().attribute_values().contains_key(&hand));
+    assert!(stage.rig().offset(controls[1]).is_some());
+    assert!(stage.rig().attribute_values().contains_key(&controls[1]));
+    assert!(!stage.rig().attribute_values().contains_key(&hand));
 }

@@ -10,7 +10,7 @@ use rigsmith::{
     rig::{JointData, NodeType, PoseOffset, RestTransform, TagData, TagKind},
 };
 
-use super::{NEAR, Stage};
+use super::{NEAR, RigBench};
 
 /// A chain of three joints whose middle one has a control: it may only move along Y by up to a tenth, and turn about Z by
 /// up to ten degrees.
@@ -37,13 +37,13 @@ pub fn limited_rig() -> Rig {
 }
 
 /// The built rig, and its only control.
-fn limited() -> (Stage, Uid) {
-    let stage = Stage::built(limited_rig());
+fn limited() -> (RigBench, Uid) {
+    let stage = RigBench::of_built(limited_rig());
     let control = only_control(&stage);
     (stage, control)
 }
 
-fn only_control(stage: &Stage) -> Uid {
+fn only_control(stage: &RigBench) -> Uid {
     let built = &stage.get::<BuildResult>(stage.rig).unwrap().0;
     let control = built.nodes.iter().find(|node| node.kind == NodeType::Control);
     control.unwrap_or_else(|| panic!("no control in {:?}", built.nodes)).uid
@@ -56,13 +56,13 @@ const FAR: PoseOffset = PoseOffset {
     scale: Vec3::splat(3.0),
 };
 
-fn rest(stage: &Stage, control: Uid) -> RestTransform {
+fn rest(stage: &RigBench, control: Uid) -> RestTransform {
     *stage.get::<RestTransform>(stage.node(control).unwrap()).unwrap()
 }
 
 /// Fails unless the control is held at its limits, and what hangs on it, too.
 #[track_caller]
-fn is_held(stage: &Stage, control: Uid, who: &str) {
+fn is_held(stage: &RigBench, control: Uid, who: &str) {
     let entity = stage.node(control).unwrap();
     let offset = PoseOffset::between(&rest(stage, control), stage.get::<Transform>(entity).unwrap());
     assert!(offset.translation.distance(Vec3::new(0.0, 0.1, 0.0)) < 1e-6, "{who}: {offset:?}");
@@ -96,11 +96,11 @@ fn channels_and_limits_hold_for_whoever_writes() {
     // Limits that come later hold a pose that is there already.
     let (mut stage, control) = limited();
     let loose = {
-        let mut tag = stage.document().find_tag(Uid(77)).unwrap().1.clone();
+        let mut tag = stage.rig().find_tag(Uid(77)).unwrap().1.clone();
         tag.kind = TagKind::Command { module: "control".into(), params: "()".into(), feature: None };
         tag
     };
-    stage.edit(vec![RigEdit::SetTag(Uid(2), Box::new(loose))]);
+    stage.apply(RigEdit::SetTag(Uid(2), Box::new(loose)));
     let entity = stage.node(control).unwrap();
     *stage.app.world_mut().get_mut::<Transform>(entity).unwrap() = posed;
     stage.app.update();
@@ -117,7 +117,7 @@ fn channels_and_limits_hold_for_animations() {
     app.cleanup();
     let rig = app.world_mut().spawn(limited_rig()).id();
     app.update();
-    let mut stage = Stage { app, rig };
+    let mut stage = RigBench { app, rig };
     stage.step(BuildStep::All);
     let control = only_control(&stage);
     let entity = stage.node(control).unwrap();

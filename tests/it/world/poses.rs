@@ -13,13 +13,13 @@ use rigsmith::{
     },
 };
 
-use super::{NEAR, Stage, shipped};
+use super::{NEAR, RigBench, shipped};
 use crate::random::Random;
 
 #[test]
 fn entities_stand_as_the_program_says_at_every_step() {
     for (name, rig) in shipped() {
-        let mut stage = Stage::new(rig);
+        let mut stage = RigBench::started(rig);
         stage.step(BuildStep::RollBack);
         let mut steps = 0;
         loop {
@@ -49,7 +49,7 @@ fn entities_stand_as_the_program_says_at_every_step() {
 fn a_rig_that_is_spawned_and_built_stands_as_it_was_drawn() {
     let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
     let rests: Vec<(Uid, Vec3)> = rig.rest_globals().into_iter().map(|(uid, rest)| (uid, rest.translation)).collect();
-    let mut stage = Stage::built(rig);
+    let mut stage = RigBench::of_built(rig);
     for _ in 0..4 {
         stage.app.update();
     }
@@ -62,7 +62,7 @@ fn a_rig_that_is_spawned_and_built_stands_as_it_was_drawn() {
 
 /// One random move of a rig: of its controls, attributes and place, of its document and its history, of what is switched
 /// off, and of the build.
-fn random_move(stage: &mut Stage, random: &mut Random) -> &'static str {
+fn random_move(stage: &mut RigBench, random: &mut Random) -> &'static str {
     let built = stage.get::<BuildResult>(stage.rig).unwrap().0.clone();
     let controls: Vec<Uid> =
         built.nodes.iter().filter(|node| node.kind == NodeType::Control).map(|node| node.uid).collect();
@@ -109,25 +109,25 @@ fn random_move(stage: &mut Stage, random: &mut Random) -> &'static str {
             stage.app.update();
             "place"
         }
-        (11, _) if !stage.document().groups().is_empty() => {
-            let mut group = random.pick(stage.document().groups());
+        (11, _) if !stage.rig().groups().is_empty() => {
+            let mut group = random.pick(stage.rig().groups());
             group.enabled = !group.enabled;
-            stage.edit(vec![RigEdit::SetLocalGroup(group)]);
+            stage.apply(RigEdit::SetLocalGroup(group));
             "group"
         }
         (12, _) => {
-            let features = combined_features(stage.document());
+            let features = combined_features(stage.rig());
             if features.is_empty() {
                 return "nothing";
             }
             let feature = random.pick(&features);
             let on = random.chance(2);
             let edits = match random.of(&feature.switches.iter().map(|switch| &*switch.name).collect::<Vec<&str>>()) {
-                Some(switch) if random.chance(2) => set_switch(stage.document(), &feature.key, switch, on),
-                _ => set_feature(stage.document(), &feature.key, on),
+                Some(switch) if random.chance(2) => set_switch(stage.rig(), &feature.key, switch, on),
+                _ => set_feature(stage.rig(), &feature.key, on),
             };
             // A choice has no switch that is off.
-            stage.edit(edits.unwrap_or_default());
+            stage.apply_all(edits.unwrap_or_default());
             "feature"
         }
         (13, _) => {
@@ -154,7 +154,7 @@ fn random_moves_keep_entities_and_program_together() {
     let mut worst = (0.0_f32, String::new());
     for (number, (name, rig)) in shipped().into_iter().enumerate() {
         let mut random = Random(number as u64 + 1);
-        let mut stage = Stage::built(rig);
+        let mut stage = RigBench::of_built(rig);
         for round in 0..rounds {
             let what = random_move(&mut stage, &mut random);
             let off = stage.off();
@@ -167,12 +167,12 @@ fn random_moves_keep_entities_and_program_together() {
     println!("largest difference: {worst:?}");
 }
 
-fn biped() -> Stage {
+fn biped() -> RigBench {
     let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
-    Stage::built(rig)
+    RigBench::of_built(rig)
 }
 
-fn place(stage: &Stage, entity: Entity) -> Vec3 {
+fn place(stage: &RigBench, entity: Entity) -> Vec3 {
     stage.get::<GlobalTransform>(entity).unwrap().translation()
 }
 
@@ -191,7 +191,7 @@ fn writing_the_transform_of_a_control_drives_the_rig_in_the_same_frame() {
 }
 
 /// The left wrist and the control whose movement moves it most.
-fn hand_and_control(stage: &Stage) -> (Entity, Entity) {
+fn hand_and_control(stage: &RigBench) -> (Entity, Entity) {
     let built = &stage.app.world().get::<BuildResult>(stage.rig).unwrap().0;
     let labels: Vec<&str> = built.nodes.iter().filter_map(|node| node.label.as_deref()).collect();
     assert!(labels.contains(&"hand_l"), "{labels:?}");
@@ -223,7 +223,7 @@ fn an_animation_drives_controls_in_the_same_frame() {
     app.cleanup();
     let rig = app.world_mut().spawn(rig).id();
     app.update();
-    let mut stage = Stage { app, rig };
+    let mut stage = RigBench { app, rig };
     stage.step(BuildStep::All);
     let (hand, control) = hand_and_control(&stage);
     let before = place(&stage, hand);
@@ -261,17 +261,17 @@ fn posing_in_the_document_and_undoing_it_reaches_the_entity_of_the_control() {
     let posed = *stage.get::<Transform>(control).unwrap();
     assert!(posed.translation.distance(before.translation) > 0.05);
     // A rebuild keeps the pose, also where it replaces the program.
-    let tag = stage.document().walk().flat_map(|joint| joint.data.tags.clone()).next().unwrap();
-    let joint = stage.document().find_tag(tag.uid).unwrap().0.data.uid;
+    let tag = stage.rig().walk().flat_map(|joint| joint.data.tags.clone()).next().unwrap();
+    let joint = stage.rig().find_tag(tag.uid).unwrap().0.data.uid;
     let mut other = tag.clone();
     other.comment = "a remark".into();
-    stage.edit(vec![RigEdit::SetTag(joint, Box::new(other))]);
+    stage.apply(RigEdit::SetTag(joint, Box::new(other)));
     assert_eq!(*stage.get::<Transform>(control).unwrap(), posed);
     let moved = rigsmith::rig::RestTransform { translation: Vec3::new(0.0, 0.02, 0.0), ..default() };
-    let root = stage.document().roots()[0];
-    let rest = stage.document().joint(root).unwrap().data.rest;
+    let root = stage.rig().roots()[0];
+    let rest = stage.rig().joint(root).unwrap().data.rest;
     let rest = rigsmith::rig::RestTransform { translation: rest.translation + moved.translation, ..rest };
-    stage.edit(vec![RigEdit::SetRest(root, rest)]);
+    stage.apply(RigEdit::SetRest(root, rest));
     assert!(stage.off() <= NEAR && stage.off_from_document() <= NEAR);
     stage.change(Change::Undo);
     stage.change(Change::Undo);

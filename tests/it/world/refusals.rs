@@ -15,14 +15,14 @@ use rigsmith::{
     rig::{BuiltRig, RestTransform},
 };
 
-use super::{NEAR, Stage, shipped};
+use super::{NEAR, RigBench, shipped};
 
 fn template(name: &str) -> Rig {
     shipped().into_iter().find(|(template, _)| template == name).unwrap().1
 }
 
 /// Components of the writes that were refused since the last call.
-fn refused(stage: &mut Stage) -> Vec<&'static str> {
+fn refused(stage: &mut RigBench) -> Vec<&'static str> {
     let mut messages = stage.app.world_mut().resource_mut::<Messages<EditRefusal>>();
     let components = messages.drain().map(|refusal| match refusal.reason {
         ChangeError::Entity(error) => error.component(),
@@ -36,13 +36,13 @@ type Write = fn(&mut EntityWorldMut, Entity, usize);
 /// Writes in every frame, and in every third one, are told once.
 #[test]
 fn a_write_that_is_repeated_is_told_once() {
-    let mut stage = Stage::built(template("arm"));
+    let mut stage = RigBench::of_built(template("arm"));
     let stranger = stage.app.world_mut().spawn(Transform::default()).id();
     let built = stage.get::<BuildResult>(stage.rig).unwrap().0.clone();
     let control = stage.control("arm_fk_l");
-    let joint = stage.node(stage.document().roots()[0]).unwrap();
+    let joint = stage.node(stage.rig().roots()[0]).unwrap();
     let constraint = stage.get::<BuiltEntities>(stage.rig).unwrap().constraint(built.constraints[0].uid).unwrap();
-    let group = stage.document().groups()[0].uid;
+    let group = stage.rig().groups()[0].uid;
     let group = stage.get::<GroupEntities>(stage.rig).unwrap().get(group).unwrap();
     let rig = stage.rig;
     let valued = built.nodes.iter().find(|node| !node.attributes.is_empty()).unwrap();
@@ -129,7 +129,7 @@ fn a_write_that_is_repeated_is_told_once() {
 /// A created node that is despawned in every frame comes back each time, and is told once.
 #[test]
 fn a_node_that_is_despawned_again_is_told_once() {
-    let mut stage = Stage::built(template("arm"));
+    let mut stage = RigBench::of_built(template("arm"));
     refused(&mut stage);
     let built = stage.get::<BuildResult>(stage.rig).unwrap().0.clone();
     let is_leaf = |at: usize| built.nodes.iter().all(|node| node.parent != Some(at));
@@ -149,7 +149,7 @@ fn a_node_that_is_despawned_again_is_told_once() {
 /// A value that equals the right one, and a write that is accepted, let the next refusal be told.
 #[test]
 fn a_refusal_is_told_again_after_a_right_value() {
-    let mut stage = Stage::built(template("arm"));
+    let mut stage = RigBench::of_built(template("arm"));
     (0..2).for_each(|_| stage.app.update());
     refused(&mut stage);
     let control = stage.control("arm_fk_l");
@@ -168,7 +168,7 @@ fn a_refusal_is_told_again_after_a_right_value() {
     }
 
     let stranger = stage.app.world_mut().spawn_empty().id();
-    let joint = stage.node(stage.document().roots()[0]).unwrap();
+    let joint = stage.node(stage.rig().roots()[0]).unwrap();
     let rig = stage.rig;
     let group = LocalGroup { name: "other".into(), color: [1.0, 0.0, 0.0], enabled: true };
     let group = stage.app.world_mut().spawn((group, GroupOf(rig))).id();
@@ -192,7 +192,7 @@ fn a_refusal_is_told_again_after_a_right_value() {
 /// A result that did not come from the build is put back in the same frame, before anything follows it.
 #[test]
 fn a_result_of_somebody_else_is_put_back() {
-    let mut stage = Stage::new(template("arm"));
+    let mut stage = RigBench::started(template("arm"));
     let rig = stage.rig;
     let foreign = || BuildResult(Arc::new(BuiltRig::default()));
     stage.app.world_mut().entity_mut(rig).insert(foreign());
@@ -223,15 +223,15 @@ fn a_result_of_somebody_else_is_put_back() {
     }
 }
 
-/// What other code writes to the visibility of a node is put back in the same frame; entities that are no nodes are left
+/// Visibility of a node that other code writes is put back in the same frame; entities that are no nodes are left
 /// alone.
 #[test]
 fn a_visibility_of_somebody_else_is_put_back() {
-    let mut stage = Stage::built(template("arm"));
+    let mut stage = RigBench::of_built(template("arm"));
     stage.app.update();
     refused(&mut stage);
     let control = stage.control("arm_fk_l");
-    let joint = stage.node(stage.document().roots()[0]).unwrap();
+    let joint = stage.node(stage.rig().roots()[0]).unwrap();
     let before = stage.get::<NodeVisible>(control).copied().unwrap();
     stage.app.world_mut().entity_mut(control).insert(NodeVisible(!before.0));
     stage.app.world_mut().entity_mut(joint).insert(NodeVisible(false));

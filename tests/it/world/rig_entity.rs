@@ -2,40 +2,36 @@
 
 use bevy::prelude::*;
 use rigsmith::{
-    plugins::{
-        document::{ChangeError, EntityWriteError},
-        history::RigHistory,
-    },
+    plugins::document::{ChangeError, EntityWriteError},
     prelude::*,
     rig::RigAbout,
     test_app::test_app,
 };
 
-use super::Stage;
+use super::RigBench;
 
 fn rig() -> Rig {
     Rig::new(Uid(1000), "rig")
 }
 
 /// Names of the entity and of the document, and the number of steps in effect.
-fn names(stage: &Stage) -> (String, String, usize) {
+fn names(stage: &RigBench) -> (String, String, usize) {
     let name = stage.get::<Name>(stage.rig).unwrap().as_str().to_owned();
-    let steps = stage.get::<RigHistory>(stage.rig).unwrap().steps().1;
-    (name, stage.document().about().name.clone(), steps)
+    (name, stage.rig().about().name.clone(), stage.steps())
 }
 
 fn both(name: &str, steps: usize) -> (String, String, usize) {
     (name.to_owned(), name.to_owned(), steps)
 }
 
-fn refusals(stage: &mut Stage) -> Vec<ChangeError> {
+fn refusals(stage: &mut RigBench) -> Vec<ChangeError> {
     let mut messages = stage.app.world_mut().resource_mut::<Messages<EditRefusal>>();
     messages.drain().map(|refusal| refusal.reason).collect()
 }
 
 #[test]
 fn writing_the_name_of_a_rig_renames_it() {
-    let mut stage = Stage::new(rig());
+    let mut stage = RigBench::started(rig());
     assert_eq!(names(&stage), both("rig", 0));
     let entity = stage.rig;
     stage.app.world_mut().entity_mut(entity).insert(Name::new("Hero"));
@@ -51,9 +47,9 @@ fn writing_the_name_of_a_rig_renames_it() {
     assert_eq!(names(&stage), both("rig", 0));
     stage.change(Change::Redo);
     assert_eq!(names(&stage), both("Hero", 1));
-    stage.edit(vec![RigEdit::SetAbout(Box::new(RigAbout {
+    stage.apply_all(vec![RigEdit::SetAbout(Box::new(RigAbout {
         name: "Villain".into(),
-        ..stage.document().about().clone()
+        ..stage.rig().about().clone()
     }))]);
     assert_eq!(names(&stage), both("Villain", 2), "the entity follows the document");
     // A rig has a name.
@@ -78,7 +74,7 @@ fn a_name_that_is_given_with_a_rig_wins() {
         }
         app.world_mut().entity_mut(entity).insert(rig());
         app.update();
-        let mut stage = Stage { app, rig: entity };
+        let mut stage = RigBench { app, rig: entity };
         assert_eq!(names(&stage), both("Hero", 1), "{is_early}");
         stage.change(Change::Undo);
         assert_eq!(names(&stage), both("rig", 0), "{is_early}");
@@ -87,7 +83,7 @@ fn a_name_that_is_given_with_a_rig_wins() {
 
 #[test]
 fn the_uid_of_a_rig_is_put_back_and_told() {
-    let check = |stage: &mut Stage, what: &str| {
+    let check = |stage: &mut RigBench, what: &str| {
         stage.app.update();
         assert_eq!(stage.get::<Uid>(stage.rig), Some(&Uid(1000)), "{what}");
         let told = refusals(stage);
@@ -102,7 +98,7 @@ fn the_uid_of_a_rig_is_put_back_and_told() {
     };
     let mut app = test_app();
     let entity = app.world_mut().spawn((rig(), Uid(5))).id();
-    let mut stage = Stage { app, rig: entity };
+    let mut stage = RigBench { app, rig: entity };
     check(&mut stage, "spawned with another one");
     // An equal one is no write that somebody has to hear of.
     stage.app.world_mut().entity_mut(entity).insert(Uid(1000));

@@ -10,23 +10,23 @@ use rigsmith::{
     test_app::test_app,
 };
 
-use super::{Stage, shipped};
+use super::{RigBench, shipped};
 
 /// The part `spring_chain`, built and at rest, in an app with frames of a sixtieth of a second.
-fn chain() -> Stage {
+fn chain() -> RigBench {
     let (_, rig) = shipped().into_iter().find(|(name, _)| name == "spring_chain").unwrap();
     let mut app = test_app();
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_nanos(16_666_667)));
     let rig = app.world_mut().spawn(rig).id();
     app.update();
-    let mut stage = Stage { app, rig };
+    let mut stage = RigBench { app, rig };
     stage.step(BuildStep::All);
     stage
 }
 
 /// Turns the first control of the chain.
-fn swing(stage: &mut Stage) {
-    let root = stage.document().roots()[0];
+fn swing(stage: &mut RigBench) {
+    let root = stage.rig().roots()[0];
     let built = &stage.get::<BuildResult>(stage.rig).unwrap().0;
     let is_first = |node: &&BuiltNode| {
         node.kind == NodeType::Control && node.origin.as_ref().is_some_and(|origin| origin.subject == root)
@@ -36,8 +36,8 @@ fn swing(stage: &mut Stage) {
     (0..6).for_each(|_| stage.app.update());
 }
 
-fn places(stage: &Stage) -> Vec<Vec3> {
-    let joints = stage.document().walk().map(|joint| stage.node(joint.data.uid).unwrap());
+fn places(stage: &RigBench) -> Vec<Vec3> {
+    let joints = stage.rig().walk().map(|joint| stage.node(joint.data.uid).unwrap());
     joints.map(|joint| stage.get::<GlobalTransform>(joint).unwrap().translation()).collect()
 }
 
@@ -68,7 +68,7 @@ fn edits(rig: &Rig) -> Vec<(&'static str, RigEdit)> {
 
 #[test]
 fn springs_go_on_through_a_rebuild() {
-    let rig = chain().document().clone();
+    let rig = chain().rig().clone();
     for (what, edit) in edits(&rig) {
         let (mut plain, mut edited) = (chain(), chain());
         let still = places(&plain);
@@ -76,7 +76,7 @@ fn springs_go_on_through_a_rebuild() {
             swing(stage);
         }
         assert!(largest(&places(&plain), &still) > 0.02, "the chain moves");
-        edited.edit(vec![edit]);
+        edited.apply(edit);
         plain.app.update();
         let mut moved: f32 = 0.0;
         for frame in 0..30 {

@@ -16,13 +16,13 @@ use rigsmith::{
     },
 };
 
-use super::{Stage, limits::limited_rig, shipped};
+use super::{RigBench, limits::limited_rig, shipped};
 
 /// Visibility, layer and names of attributes of each node that has any of them.
 type Shown = BTreeMap<Uid, NodeShown>;
 type NodeShown = (Option<bool>, Option<LayerData>, Vec<String>);
 
-fn shown(stage: &mut Stage) -> Shown {
+fn shown(stage: &mut RigBench) -> Shown {
     let world = stage.app.world_mut();
     let mut nodes = world
         .query_filtered::<(&Uid, Option<&NodeVisible>, Option<&NodeLayer>, Option<&Attributes>), Allow<Disabled>>();
@@ -36,10 +36,10 @@ fn shown(stage: &mut Stage) -> Shown {
         .collect()
 }
 
-/// What nodes show; fails unless it is the same in an app that opens the document as it is now.
+/// State of visibility of the nodes; fails unless it is the same in an app that opens the document as it is now.
 #[track_caller]
-fn as_opened(stage: &mut Stage, what: &str) -> Shown {
-    let mut opened = Stage::built(stage.document().clone());
+fn as_opened(stage: &mut RigBench, what: &str) -> Shown {
+    let mut opened = RigBench::of_built(stage.rig().clone());
     opened.app.update();
     let now = shown(stage);
     assert_eq!(now, shown(&mut opened), "{what}");
@@ -51,18 +51,18 @@ fn as_opened(stage: &mut Stage, what: &str) -> Shown {
 fn a_feature_that_goes_off_leaves_what_opening_without_it_shows() {
     for name in ["arm", "biped"] {
         let (_, rig) = shipped().into_iter().find(|(template, _)| template == name).unwrap();
-        let mut stage = Stage::built(rig);
+        let mut stage = RigBench::of_built(rig);
         let first = as_opened(&mut stage, name);
         let mut revealed = 0;
-        for feature in combined_features(stage.document()) {
+        for feature in combined_features(stage.rig()) {
             if name == "biped" && feature.key.kind != "ik" {
                 continue;
             }
-            let edits = set_feature(stage.document(), &feature.key, false).unwrap();
+            let edits = set_feature(stage.rig(), &feature.key, false).unwrap();
             if edits.is_empty() {
                 continue;
             }
-            stage.edit(edits);
+            stage.apply_all(edits);
             let now = as_opened(&mut stage, &format!("{name} without {:?}", feature.key));
             let is_revealed = |(uid, node): (&Uid, &NodeShown)| {
                 node.0 == Some(true) && first.get(uid).is_some_and(|before| before.0 == Some(false))
@@ -88,7 +88,7 @@ fn what_a_layer_hid_is_seen_when_the_layer_is_gone() {
         let params = format!("(nodes: \"{nodes}\", name: \"hidden\", visible: false)");
         let layer = command(78, "layer", &params);
         rig.apply(&RigEdit::AddTag { joint: Uid(2), tag: layer.clone(), index: 1 }).unwrap();
-        let mut stage = Stage::built(rig);
+        let mut stage = RigBench::of_built(rig);
         let hidden = as_opened(&mut stage, nodes);
         assert!(hidden.values().any(|node| node.0 == Some(false)), "{nodes}: {hidden:?}");
         let gone = [
@@ -97,7 +97,7 @@ fn what_a_layer_hid_is_seen_when_the_layer_is_gone() {
             RigEdit::SetTag(Uid(2), command(78, "layer", &params.replace("false", "true"))),
         ];
         for edit in gone {
-            stage.edit(vec![edit.clone()]);
+            stage.apply_all(vec![edit.clone()]);
             let now = as_opened(&mut stage, &format!("{nodes}: {edit:?}"));
             assert!(now.values().all(|node| node.0 != Some(false)), "{nodes}: {edit:?}: {now:?}");
             stage.change(Change::Undo);
@@ -120,19 +120,19 @@ fn a_joint_of_a_group_that_is_off_keeps_nothing_of_its_build() {
     for edit in edits {
         rig.apply(&edit).unwrap();
     }
-    let mut stage = Stage::built(rig);
+    let mut stage = RigBench::of_built(rig);
     let first = as_opened(&mut stage, "all on");
     assert_eq!(first[&Uid(3)].2, ["bend"]);
     assert!(first[&Uid(3)].1.is_some());
-    let switch = |stage: &mut Stage, enabled: bool| {
-        stage.edit(vec![RigEdit::SetLocalGroup(GroupData { enabled, ..group.clone() })]);
+    let switch = |stage: &mut RigBench, enabled: bool| {
+        stage.apply(RigEdit::SetLocalGroup(GroupData { enabled, ..group.clone() }));
     };
     switch(&mut stage, false);
     assert!(!as_opened(&mut stage, "off").contains_key(&Uid(3)));
     switch(&mut stage, true);
     assert_eq!(as_opened(&mut stage, "on again"), first);
     switch(&mut stage, false);
-    stage.edit(vec![RigEdit::RemoveTag(Uid(1), Uid(78)), RigEdit::RemoveTag(Uid(1), Uid(79))]);
+    stage.apply_all(vec![RigEdit::RemoveTag(Uid(1), Uid(78)), RigEdit::RemoveTag(Uid(1), Uid(79))]);
     switch(&mut stage, true);
     assert!(!as_opened(&mut stage, "on without the tags").contains_key(&Uid(3)));
     for _ in 0..5 {

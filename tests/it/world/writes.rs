@@ -14,10 +14,10 @@ use rigsmith::{
     rig::{PoseOffset, RestTransform, TagData, TagKind, template::write_template},
 };
 
-use super::{NEAR, Stage, shipped};
+use super::{NEAR, RigBench, shipped};
 
-fn chain() -> Stage {
-    let mut stage = Stage::new(Rig::new(Uid(1000), "rig"));
+fn chain() -> RigBench {
+    let mut stage = RigBench::started(Rig::new(Uid(1000), "rig"));
     for number in 1..=3 {
         let joint = rigsmith::rig::JointData {
             uid: Uid(number),
@@ -26,23 +26,19 @@ fn chain() -> Stage {
             ..default()
         };
         let parent = (number > 1).then(|| Uid(number - 1));
-        stage.edit(vec![RigEdit::AddJoint { joint: Box::new(joint), parent, index: 0 }]);
+        stage.apply_all(vec![RigEdit::AddJoint { joint: Box::new(joint), parent, index: 0 }]);
     }
     stage
 }
 
-fn steps(stage: &Stage) -> usize {
-    stage.get::<rigsmith::plugins::history::RigHistory>(stage.rig).unwrap().steps().1
-}
-
-fn text(stage: &Stage) -> String {
-    write_template(stage.document())
+fn text(stage: &RigBench) -> String {
+    write_template(stage.rig())
 }
 
 #[test]
 fn writing_a_component_is_one_undoable_edit_and_an_equal_value_is_none() {
     let mut stage = chain();
-    let before = (text(&stage), steps(&stage));
+    let before = (text(&stage), stage.steps());
     let joint = stage.node(Uid(2)).unwrap();
     let group = stage
         .app
@@ -55,12 +51,12 @@ fn writing_a_component_is_one_undoable_edit_and_an_equal_value_is_none() {
         InGroup(group),
     ));
     stage.app.update();
-    let data = &stage.document().joint(Uid(2)).unwrap().data;
+    let data = &stage.rig().joint(Uid(2)).unwrap().data;
     assert_eq!((data.label.as_deref(), data.rest.translation.y), (Some("elbow"), 2.0));
-    assert_eq!(stage.document().group(data.group.unwrap()).unwrap().name, "arm");
+    assert_eq!(stage.rig().group(data.group.unwrap()).unwrap().name, "arm");
     assert_eq!(stage.get::<Name>(joint).unwrap().as_str(), "elbow");
     assert_eq!(stage.get::<GlobalTransform>(joint).unwrap().translation().y, 3.0, "the pose follows the rest pose");
-    assert_eq!(steps(&stage), before.1 + 1, "writes of one frame are one step");
+    assert_eq!(stage.steps(), before.1 + 1, "writes of one frame are one step");
     assert_eq!(stage.get::<GroupEntities>(stage.rig).unwrap().get(data.group.unwrap()), Some(group), "the same entity");
 
     // Equal values, and what the mirror wrote itself.
@@ -68,12 +64,12 @@ fn writing_a_component_is_one_undoable_edit_and_an_equal_value_is_none() {
     for _ in 0..3 {
         stage.app.update();
     }
-    assert_eq!(steps(&stage), before.1 + 1);
+    assert_eq!(stage.steps(), before.1 + 1);
 
     // Colour and name of the group, then everything back.
     stage.app.world_mut().get_mut::<LocalGroup>(group).unwrap().color = [0.0, 1.0, 0.0];
     stage.app.update();
-    assert_eq!(stage.document().groups()[0].color, [0.0, 1.0, 0.0]);
+    assert_eq!(stage.rig().groups()[0].color, [0.0, 1.0, 0.0]);
     stage.change(Change::Undo);
     assert_eq!(stage.get::<LocalGroup>(group).unwrap().color, [1.0, 0.0, 0.0], "undo reaches the entity");
     stage.change(Change::Undo);
@@ -88,7 +84,7 @@ fn writing_a_component_is_one_undoable_edit_and_an_equal_value_is_none() {
 /// defaults is told nothing.
 #[test]
 fn a_driven_attribute_is_put_back_and_told_once() {
-    let mut rig = chain().document().clone();
+    let mut rig = chain().rig().clone();
     let commands = [
         ("attribute", "(name: \"in\", default: 0.25)"),
         ("attribute", "(name: \"out\")"),
@@ -101,14 +97,14 @@ fn a_driven_attribute_is_put_back_and_told_once() {
     for (index, command) in commands.into_iter().enumerate() {
         rig.apply(&RigEdit::AddTag { joint: Uid(2), tag: tag(70 + index as u64, command), index }).unwrap();
     }
-    let mut stage = Stage::built(rig);
+    let mut stage = RigBench::of_built(rig);
     let joint = stage.node(Uid(2)).unwrap();
-    let out = |stage: &Stage| stage.get::<Attributes>(joint).unwrap().0["out"];
-    let write = |stage: &mut Stage, name: &str, value: f32| {
+    let out = |stage: &RigBench| stage.get::<Attributes>(joint).unwrap().0["out"];
+    let write = |stage: &mut RigBench, name: &str, value: f32| {
         stage.app.world_mut().get_mut::<Attributes>(joint).unwrap().0.insert(name.into(), value);
         stage.app.update();
     };
-    let refused = |stage: &mut Stage| -> Vec<EditRefusal> {
+    let refused = |stage: &mut RigBench| -> Vec<EditRefusal> {
         stage.app.world_mut().resource_mut::<Messages<EditRefusal>>().drain().collect()
     };
     assert!((out(&stage) - 0.25).abs() < 1e-6, "{}", out(&stage));
@@ -128,7 +124,7 @@ fn a_driven_attribute_is_put_back_and_told_once() {
     // Another value of the same node drives.
     write(&mut stage, "in", 1.0);
     assert!((out(&stage) - 1.0).abs() < 1e-6, "{}", out(&stage));
-    stage.edit(vec![RigEdit::SetTag(Uid(2), tag(71, ("attribute", "(name: \"out\", default: 0.5)")))]);
+    stage.apply(RigEdit::SetTag(Uid(2), tag(71, ("attribute", "(name: \"out\", default: 0.5)"))));
     (0..3).for_each(|_| stage.app.update());
     assert!(refused(&mut stage).is_empty());
 }
@@ -151,8 +147,8 @@ fn tags_are_reordered_beside_one_that_is_despawned() {
     world.entity_mut(joint).insert_related::<TagOf>(0, &[tags[3]]);
     world.entity_mut(tags[1]).despawn();
     stage.app.update();
-    let comments = |stage: &Stage| -> Vec<String> {
-        stage.document().joint(Uid(2)).unwrap().data.tags.iter().map(|tag| tag.comment.clone()).collect()
+    let comments = |stage: &RigBench| -> Vec<String> {
+        stage.rig().joint(Uid(2)).unwrap().data.tags.iter().map(|tag| tag.comment.clone()).collect()
     };
     assert_eq!(comments(&stage), ["3", "0", "2"]);
     let told: Vec<Entity> = stage.get::<Tags>(joint).unwrap().iter().collect();
@@ -165,10 +161,10 @@ fn tags_are_reordered_beside_one_that_is_despawned() {
 
 /// Names of the local groups, in the order of the relation; fails unless the document has the same order.
 #[track_caller]
-fn group_order(stage: &Stage) -> Vec<String> {
+fn group_order(stage: &RigBench) -> Vec<String> {
     let groups = stage.get::<LocalGroups>(stage.rig).unwrap();
     let names: Vec<String> = groups.iter().map(|group| stage.get::<LocalGroup>(group).unwrap().name.clone()).collect();
-    let wanted: Vec<&str> = stage.document().groups().iter().map(|group| group.name.as_str()).collect();
+    let wanted: Vec<&str> = stage.rig().groups().iter().map(|group| group.name.as_str()).collect();
     assert_eq!(names, wanted);
     names
 }
@@ -182,7 +178,7 @@ fn groups_stand_in_the_order_of_the_document() {
         stage.app.world_mut().spawn((group, GroupOf(stage.rig)));
         stage.app.update();
     }
-    let first = |stage: &Stage| stage.get::<LocalGroups>(stage.rig).unwrap().iter().next().unwrap();
+    let first = |stage: &RigBench| stage.get::<LocalGroups>(stage.rig).unwrap().iter().next().unwrap();
     let group = first(&stage);
     stage.app.world_mut().entity_mut(group).despawn();
     stage.app.update();
@@ -207,7 +203,7 @@ fn groups_stand_in_the_order_of_the_document() {
 /// one of them is put back.
 #[test]
 fn constraints_on_a_node_follow_the_order_of_their_tags() {
-    let mut rig = chain().document().clone();
+    let mut rig = chain().rig().clone();
     let tag = |uid: u64, params: &str| {
         let kind = TagKind::Command { module: "orient".into(), params: params.into(), feature: None };
         Box::new(TagData { uid: Uid(uid), enabled: true, comment: String::new(), kind })
@@ -219,8 +215,8 @@ fn constraints_on_a_node_follow_the_order_of_their_tags() {
     for (index, tag) in tags.iter().enumerate() {
         rig.apply(&RigEdit::AddTag { joint: Uid(2), tag: tag.clone(), index }).unwrap();
     }
-    let mut stage = Stage::built(rig);
-    let order = |stage: &Stage| -> Vec<Uid> {
+    let mut stage = RigBench::of_built(rig);
+    let order = |stage: &RigBench| -> Vec<Uid> {
         let joint = stage.node(Uid(2)).unwrap();
         let constraints = stage.get::<NodeConstraints>(joint).unwrap();
         constraints
@@ -230,7 +226,7 @@ fn constraints_on_a_node_follow_the_order_of_their_tags() {
     };
     assert_eq!(order(&stage), [Uid(70), Uid(71)]);
     let again = RigEdit::AddTag { joint: Uid(2), tag: tags[0].clone(), index: 1 };
-    stage.edit(vec![RigEdit::RemoveTag(Uid(2), Uid(70)), again]);
+    stage.apply_all(vec![RigEdit::RemoveTag(Uid(2), Uid(70)), again]);
     assert_eq!(order(&stage), [Uid(71), Uid(70)]);
     stage.change(Change::Undo);
     assert_eq!(order(&stage), [Uid(70), Uid(71)]);
@@ -257,20 +253,20 @@ fn spawning_and_despawning_adds_and_deletes() {
         world.spawn((command, Tag { enabled: false, comment: "later".into() }, InFeature(feature), TagOf(upper))).id();
     stage.app.update();
     let uid = *stage.get::<Uid>(upper).unwrap();
-    let data = &stage.document().joint(uid).unwrap().data;
+    let data = &stage.rig().joint(uid).unwrap().data;
     assert_eq!((data.label.as_deref(), data.rest.translation.y), (Some("new"), 0.5));
     assert_eq!(data.tags.len(), 2);
     let TagKind::Command { feature: of, .. } = &data.tags[1].kind else { panic!("{data:?}") };
     assert_eq!((*of, data.tags[1].enabled), (Some(data.tags[0].uid), false));
     assert_eq!(stage.get::<TagEntities>(stage.rig).unwrap().get(data.tags[1].uid), Some(command));
-    assert_eq!(stage.document().joint(*stage.get::<Uid>(lower).unwrap()).unwrap().parent, Some(uid));
-    assert_eq!(stage.document().len(), 5);
+    assert_eq!(stage.rig().joint(*stage.get::<Uid>(lower).unwrap()).unwrap().parent, Some(uid));
+    assert_eq!(stage.rig().len(), 5);
 
     // Tag order, and another joint for a tag.
     stage.app.world_mut().entity_mut(upper).insert_related::<TagOf>(0, &[command]);
     stage.app.update();
-    let order = |stage: &Stage| -> Vec<Uid> {
-        stage.document().joint(uid).unwrap().data.tags.iter().map(|tag| tag.uid).collect()
+    let order = |stage: &RigBench| -> Vec<Uid> {
+        stage.rig().joint(uid).unwrap().data.tags.iter().map(|tag| tag.uid).collect()
     };
     assert_eq!(order(&stage)[0], *stage.get::<Uid>(command).unwrap());
     stage.app.world_mut().entity_mut(command).insert(TagOf(lower));
@@ -282,7 +278,7 @@ fn spawning_and_despawning_adds_and_deletes() {
     let with_new = text(&stage);
     stage.app.world_mut().entity_mut(upper).despawn();
     stage.app.update();
-    assert_eq!(stage.document().len(), 3);
+    assert_eq!(stage.rig().len(), 3);
     stage.change(Change::Undo);
     assert_eq!(text(&stage), with_new);
     assert!(stage.node(uid).is_some_and(|entity| entity != upper), "deleted entities come back as others");
@@ -298,10 +294,10 @@ fn reparenting_an_entity_reparents_the_joint() {
     let (one, three) = (stage.node(Uid(1)).unwrap(), stage.node(Uid(3)).unwrap());
     stage.app.world_mut().entity_mut(three).insert(ChildOf(one));
     stage.app.update();
-    assert_eq!(stage.document().joint(Uid(3)).unwrap().parent, Some(Uid(1)));
+    assert_eq!(stage.rig().joint(Uid(3)).unwrap().parent, Some(Uid(1)));
     stage.app.world_mut().entity_mut(three).remove::<ChildOf>();
     stage.app.update();
-    assert_eq!(stage.document().joint(Uid(3)).unwrap().parent, None);
+    assert_eq!(stage.rig().joint(Uid(3)).unwrap().parent, None);
     assert_eq!(stage.get::<ChildOf>(three).unwrap().parent(), stage.rig, "below the rig, as a root is");
     stage.change(Change::Undo);
     assert_eq!(stage.get::<ChildOf>(three).unwrap().parent(), one);
@@ -322,31 +318,31 @@ fn reparenting_an_entity_reparents_the_joint() {
 #[test]
 fn nothing_that_happens_to_entities_panics_or_leaves_a_stale_handle() {
     let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
-    let mut stage = Stage::built(rig);
-    let tag = stage.document().walk().flat_map(|joint| joint.data.tags.iter()).next().unwrap().uid;
+    let mut stage = RigBench::of_built(rig);
+    let tag = stage.rig().walk().flat_map(|joint| joint.data.tags.iter()).next().unwrap().uid;
     let tag_entity = stage.get::<TagEntities>(stage.rig).unwrap().get(tag).unwrap();
     stage.app.world_mut().entity_mut(tag_entity).despawn();
-    stage.edit(vec![RigEdit::SetLabel(stage.document().roots()[0], Some("top".into()))]);
-    assert!(stage.document().find_tag(tag).is_none());
+    stage.apply_all(vec![RigEdit::SetLabel(stage.rig().roots()[0], Some("top".into()))]);
+    assert!(stage.rig().find_tag(tag).is_none());
     assert!(stage.off() <= NEAR);
     stage.change(Change::Undo);
     stage.change(Change::Undo);
 
     // A created node is no edit: told, and back in the next frame, with the joints that went along.
     let nodes: Vec<(Uid, Entity)> = stage.get::<BuiltEntities>(stage.rig).unwrap().iter().collect();
-    let joints = stage.document().len();
+    let joints = stage.rig().len();
     for (uid, _) in nodes.iter().step_by(37) {
         let entity = stage.node(*uid).unwrap();
         stage.app.world_mut().entity_mut(entity).despawn();
         stage.app.world_mut().resource_mut::<Messages<EditRefusal>>().clear();
         stage.app.update();
         assert!(!stage.app.world().resource::<Messages<EditRefusal>>().is_empty(), "it is told");
-        assert_eq!(stage.document().len(), joints, "and no joint is deleted");
+        assert_eq!(stage.rig().len(), joints, "and no joint is deleted");
         assert!(stage.node(*uid).is_some_and(|again| again != entity));
         assert!(stage.off() <= NEAR);
     }
     // What the build wrote stays as it was built.
-    let control = stage.labelled("hand_l");
+    let control = stage.labelled_node("hand_l");
     let label = stage.get::<NodeLabel>(control).cloned();
     let node =
         nodes.iter().map(|(uid, _)| stage.node(*uid).unwrap()).find(|entity| stage.get::<NodeLabel>(*entity).is_some());
@@ -367,10 +363,10 @@ fn nothing_that_happens_to_entities_panics_or_leaves_a_stale_handle() {
 #[test]
 fn constraints_are_entities_that_name_their_nodes() {
     let (_, rig) = shipped().into_iter().find(|(name, _)| name == "biped").unwrap();
-    let mut stage = Stage::built(rig);
+    let mut stage = RigBench::of_built(rig);
     let built = stage.get::<BuildResult>(stage.rig).unwrap().0.clone();
     assert!(built.constraints.len() > 50);
-    let known = |stage: &Stage, uid: Uid| stage.get::<BuiltEntities>(stage.rig).unwrap().constraint(uid);
+    let known = |stage: &RigBench, uid: Uid| stage.get::<BuiltEntities>(stage.rig).unwrap().constraint(uid);
     for constraint in &built.constraints {
         let entity = known(&stage, constraint.uid).expect("a constraint has an entity");
         let by = stage.get::<CreatedBy>(entity).unwrap().0;
@@ -396,7 +392,7 @@ fn a_pose_that_ends_a_preview_brings_the_build_back() {
     let preview = Operation::Edits(vec![RigEdit::SetRest(Uid(2), rest)]);
     stage.change(Change::Preview(preview));
     stage.app.update();
-    let base = |stage: &Stage| stage.get::<BuildResult>(stage.rig).unwrap().0.node(Uid(2)).unwrap().base.translation;
+    let base = |stage: &RigBench| stage.get::<BuildResult>(stage.rig).unwrap().0.node(Uid(2)).unwrap().base.translation;
     assert_eq!(base(&stage), Vec3::new(0.0, 3.0, 0.0));
     let offset = PoseOffset::from_rotation(Quat::from_rotation_x(0.3));
     stage.change(Change::Do(Operation::Pose(vec![(Uid(1), offset)])));
@@ -409,7 +405,7 @@ fn a_pose_that_ends_a_preview_brings_the_build_back() {
 #[test]
 fn a_transform_that_is_taken_off_comes_back_in_place() {
     let (_, rig) = shipped().into_iter().find(|(name, _)| name == "arm").unwrap();
-    let mut stage = Stage::built(rig);
+    let mut stage = RigBench::of_built(rig);
     let (_, control) = stage.get::<BuiltEntities>(stage.rig).unwrap().iter().next().unwrap();
     stage.app.world_mut().get_mut::<Transform>(control).unwrap().translation += 0.05 * Vec3::Y;
     stage.app.update();

@@ -3,7 +3,7 @@
 use super::{KeyTimes, OperationError, find, keys::Changes, keys::selected};
 use crate::rig::{
     Uid,
-    animation::{ClipAbout, ClipLayer, Ease, Key, Marker, Property, Track, TrackTarget},
+    animation::{ClipAbout, ClipLayer, Ease, Key, Marker, Property, Track, TrackTarget, cubic_slope},
     operations::Draft,
 };
 
@@ -144,18 +144,8 @@ fn split(track: &Track, property: &Property, time: f32) -> Option<Key> {
     let value = track.sample(property, time)?;
     let ease = match from.ease {
         Ease::Cubic { .. } if *property == Property::Rotation => return None,
-        Ease::Cubic { leave, .. } => {
-            let arrive = match to.ease {
-                Ease::Cubic { arrive, .. } => arrive,
-                Ease::Stepped | Ease::Linear => [0.0; 4],
-            };
-            let span = to.time - from.time;
-            let share = (time - from.time) / span;
-            let tangent = std::array::from_fn(|axis| {
-                6.0 * share * (1.0 - share) * (to.value[axis] - from.value[axis]) / span
-                    + (3.0 * share * share - 4.0 * share + 1.0) * leave[axis]
-                    + (3.0 * share * share - 2.0 * share) * arrive[axis]
-            });
+        Ease::Cubic { .. } => {
+            let tangent = cubic_slope(from, to, time);
             Ease::Cubic { arrive: tangent, leave: tangent }
         }
         ease => ease,

@@ -1,0 +1,106 @@
+//! Exports of the window, and what they read back.
+
+use super::*;
+
+#[test]
+fn clips_of_the_document_are_exported_as_they_are_edited() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    window.place(1.0);
+    window.export("none.anim.ron");
+    assert!(window.notices.include(Severity::Error, "no clips to export"));
+    let joint = window.rig().roots()[0];
+    let mut clip = RigClip { range: [0.5, 1.5], ..RigClip::new(Uid(77), Uid(78), "turn") };
+    let keys = [0.5, 1.0, 1.5].map(|time| Key::rotation(time, Quat::from_rotation_z(time))).to_vec();
+    let target = TrackTarget { node: joint, property: Property::Rotation };
+    clip.layers[0].tracks.insert(target, std::sync::Arc::new(Track { keys }));
+    window.change(Change::Do(Operation::Edits(vec![RigEdit::AddClip(Box::new(clip.clone()), 0)])));
+    let bytes = std::fs::read(window.export("turn.glb")).expect("a file");
+    let file = gltf::Gltf::from_slice(&bytes).expect("a model");
+    let animations: Vec<_> = file.animations().collect();
+    assert_eq!((animations.len(), animations[0].name()), (1, Some("turn")));
+    let channel = animations[0].channels().next().expect("a channel");
+    let blob = file.blob.clone().expect("a buffer");
+    let reader = channel.reader(|_| Some(&blob[..]));
+    let times: Vec<f32> = reader.read_inputs().expect("times").collect();
+    assert_eq!((times[0], times[times.len() - 1]), (0.0, 1.0), "a clip begins at zero");
+    // The clips alone come back as they were, and a file with animations opens with them.
+    let read = load_animation(&RealDisk, &window.export("turn.anim.ron")).expect("clips");
+    assert_eq!(read.clips, [clip]);
+    window.open_file(&folder.path().join("turn.glb"));
+    window.answer(Answer::Discard);
+    let clips = window.rig().clips().to_vec();
+    assert_eq!((clips.len(), clips[0].name.as_str()), (1, "turn"), "{:?}", window.notices.list);
+    assert!(clips[0].key_count() >= 2 && !has_unsaved_changes(window.world()));
+}
+
+#[test]
+fn exports_can_be_read_back() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    window.place(1.0);
+    let file = std::fs::read(window.export("out.glb")).expect("a file");
+    let file = gltf::Gltf::from_slice(&file).expect("glTF");
+    let bare = file.nodes().filter(|node| node.mesh().is_none()).count();
+    assert_eq!(bare, 1, "the joint is written though nothing is skinned");
+    let template = load_template(&RealDisk, &window.export("out.rig.ron")).expect("a template");
+    assert_eq!(template.rig.len(), 1);
+    window.export("out.rig");
+    window.export("out.obj");
+    assert!(["out.rig", "out.obj"].iter().all(|name| folder.path().join(name).exists()));
+    window.export("out.skin");
+    assert!(window.notices.include(Severity::Error, "skin the mesh first"));
+    window.export("out.glb");
+    assert!(matches!(window.question(), Some(Question::Replace { .. })), "it is there already");
+    window.answer(Answer::Save);
+    assert!(window.is_unsaved(), "an export is no save");
+}
+
+#[test]
+fn presets_give_exports_the_names_of_other_programs_and_the_result_is_read_back() {
+    let folder = folder();
+    let mut window = Window::new(folder.path());
+    window.open(OpenRequest::Template("biped".into()));
+    let cases = [
+        (SkeletonPreset::Plain, "hand_l"),
+        (SkeletonPreset::Mixamo, "mixamorig:LeftHand"),
+        (SkeletonPreset::Unreal, "hand_l"),
+        (SkeletonPreset::Unity, "LeftHand"),
+        (SkeletonPreset::Vrm, "leftHand"),
+    ];
+    for (number, (preset, hand)) in cases.into_iter().enumerate() {
+        window.base.app.insert_resource(ExportOptions { preset, author: String::new() });
+        let path = window.export(&format!("{number}.glb"));
+        let model = load_model(&RealDisk, &path).expect("a model");
+        assert!(model.nodes.iter().any(|node| node.name == hand), "{preset:?}");
+        let counts = format!("Exported {number}.glb; read back: {} joints", model.nodes.len());
+        assert!(window.notices.include(Severity::Done, &counts), "{counts}: {:?}", window.notices.list);
+    }
+    window.export("rig.rig.ron");
+    assert!(window.notices.include(Severity::Done, "Exported rig.rig.ron; read back:"), "{:?}", window.notices.list);
+}
+
+#[test]
+fn avatars_are_exported_with_an_author() {
+    let folder = folder();
+    let mut window = Window::new(folder.path());
+    window.open(OpenRequest::Template("biped".into()));
+    let mut about = window.rig().about().clone();
+    about.author.clear();
+    window.change(Change::Do(Operation::Edits(vec![RigEdit::SetAbout(Box::new(about))])));
+    let before = window.rig();
+    let path = window.export("nobody.vrm");
+    assert!(
+        window.notices.include(Severity::Error, "requires an author") && !path.exists(),
+        "{:?}",
+        window.notices.list
+    );
+    window.base.app.insert_resource(ExportOptions { author: "Ann".into(), ..default() });
+    let path = window.export("ann.vrm");
+    assert!(window.notices.include(Severity::Done, "Exported ann.vrm; read back:"), "{:?}", window.notices.list);
+    let bytes = std::fs::read(&path).expect("an avatar");
+    let avatar = rigsmith::mesh::gltf::read_avatar(&bytes, "ann.vrm").expect("VRM").expect("an avatar");
+    assert_eq!(avatar.vrm.meta.authors, ["Ann"]);
+    assert!(avatar.vrm.humanoid.human_bones.contains_key("leftHand"));
+    assert_eq!(window.rig(), before, "an export changes nothing");
+}

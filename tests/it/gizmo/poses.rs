@@ -1,0 +1,133 @@
+//! Gizmos that pose joints and controls, and the rest pose while it is edited.
+
+use super::*;
+
+#[test]
+fn poses_leave_the_rest_pose_alone_and_follow_the_pointer() {
+    for sight in sights(somewhere()) {
+        let mut bench = Bench::new(sight, somewhere());
+        let [root, middle, tip] = chain(&mut bench);
+        bench.base.select(&[middle]);
+        bench.mode(Mode::Pose);
+        assert!(bench.shapes().iter().all(|shape| !matches!(shape.handle, Handle::MoveAxis(_))));
+        let before = bench.base.rig().clone();
+        let from = bench.grip(Handle::ViewRing);
+        let centre = sight.project(before.position(middle)).unwrap();
+        let turned = centre + Vec2::from_angle(0.5).rotate(from - centre);
+        bench.drag(from, turned - from, ModifierKeys::default());
+        bench.release(turned);
+        let rig = bench.base.rig();
+        for joint in [root, middle, tip] {
+            assert_eq!(rig.rest_global(joint), before.rest_global(joint));
+        }
+        let (old, new) = (before.position(tip), rig.posed_global(tip).translation);
+        let axis = sight.towards(before.position(middle));
+        let arm = old - before.position(middle);
+        let wanted = before.position(middle) + Quat::from_axis_angle(axis, -0.5) * arm;
+        assert!(new.distance(wanted) < 1e-2, "{new} is not {wanted}");
+
+        // A root can be moved as well, by its arrows or its middle.
+        bench.base.select(&[root]);
+        bench.mode(Mode::Pose);
+        let from = bench.grip(Handle::MoveView);
+        let start = sight.project(bench.base.rig().posed_global(root).translation).unwrap();
+        bench.drag(from, Vec2::new(40.0, 25.0), ModifierKeys::default());
+        bench.release(from + Vec2::new(40.0, 25.0));
+        let now = sight.project(bench.base.rig().posed_global(root).translation).unwrap();
+        assert!(now.distance(start + Vec2::new(40.0, 25.0)) < 1.0);
+        assert_eq!(bench.base.rig().rest_global(root), before.rest_global(root));
+    }
+}
+
+#[test]
+fn rest_is_shown_while_it_is_edited() {
+    let [sight, _] = sights(Transform::IDENTITY);
+    let mut bench = Bench::new(sight, Transform::IDENTITY);
+    let [_, middle, _] = chain(&mut bench);
+    bench.base.edit(Operation::Pose(vec![(middle, PoseOffset::from_rotation(Quat::from_rotation_z(0.8)))]));
+    let shown = |bench: &Bench| {
+        let entity = bench.base.get::<JointEntities>(bench.base.rig).unwrap().get(middle).unwrap();
+        *bench.base.get::<Transform>(entity).unwrap()
+    };
+    let (posed, pose) = (bench.base.rig().posed_local(middle), bench.base.rig().pose().clone());
+    assert_eq!(shown(&bench), posed);
+    bench.base.select(&[middle]);
+    bench.mode(Mode::Move);
+    assert_eq!(bench.base.get::<ShowRest>(bench.base.rig), Some(&ShowRest(true)));
+    assert_eq!(shown(&bench), bench.base.rig().joint(middle).unwrap().data.rest.into());
+    assert_eq!(*bench.base.rig().pose(), pose);
+    bench.mode(Mode::Pose);
+    assert_eq!(shown(&bench), posed);
+}
+
+/// The bundled biped in the window: its commands are carried out when it is opened, a click in Pose mode takes the control
+/// of the hand, and the arrow of the gizmo moves control, hand and elbow as one step.
+#[test]
+fn a_click_takes_a_control_and_the_gizmo_moves_what_it_drives() {
+    let rig = crate::bench::shipped("biped");
+    for sight in sights(Transform::IDENTITY) {
+        let mut app = headless_app(1);
+        app.add_plugins((ToolsPlugin, BuildingPlugin));
+        let mut app = strict_app(app);
+        let rig = app.world_mut().spawn(rig.clone()).id();
+        app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(sight)));
+        app.update();
+        app.update();
+        let mut bench = Bench { base: RigBench { app, rig }, sink: Sink::default() };
+        let world = bench.base.app.world();
+        let built = world.get::<BuildResult>(rig).expect("a rig with commands is built when it is opened").0.clone();
+        assert!(world.get::<BuildFailure>(rig).is_none());
+        let wrist = built.find_label("hand_l").unwrap().uid;
+        let global = |bench: &Bench, node: Uid| {
+            bench.base.get::<RigRuntime>(bench.base.rig).unwrap().state().global(node).unwrap().translation
+        };
+        let at_wrist = global(&bench, wrist);
+        let goal = built.switches.iter().find_map(|switch| match &switch.matching {
+            Matching::IkFk { goal, .. } if global(&bench, *goal).distance(at_wrist) < 0.05 => Some(*goal),
+            _ => None,
+        });
+        let goal = goal.expect("the hand has a control of inverse kinematics");
+
+        bench.mode(Mode::Pose);
+        // Any place of the outline that no other control covers.
+        let control = built.node(goal).unwrap().control.clone().unwrap();
+        let place = bench.base.get::<RigRuntime>(rig).unwrap().state().global(goal).unwrap();
+        let lines = lines_of(&control, place.affine());
+        let mut picked = false;
+        for point in lines.iter().flatten() {
+            let at = sight.project(*point).unwrap();
+            for act in [PointerAct::Moved, PointerAct::Pressed, PointerAct::Released { dragged: false, count: 1 }] {
+                bench.pointer(at, act, ModifierKeys::default());
+            }
+            bench.base.app.update();
+            if bench.base.get::<Selection>(rig).unwrap().0 == [goal] {
+                picked = true;
+                break;
+            }
+        }
+        assert!(picked, "no click on its outline takes the control");
+        bench.base.app.update();
+
+        let (steps, hand, elbow) = (bench.base.steps(), at_wrist, built.find_label("lower_arm_l").map(|node| node.uid));
+        let elbow = elbow.map(|elbow| (elbow, global(&bench, elbow)));
+        let from = bench.grip(Handle::MoveAxis(1));
+        bench.drag(from, Vec2::new(-20.0, -30.0), ModifierKeys::default());
+        let during = global(&bench, wrist);
+        bench.release(from + Vec2::new(-20.0, -30.0));
+        bench.base.app.update();
+        let moved = global(&bench, wrist);
+        assert!(moved.distance(hand) > 0.02, "the hand stays at {moved}");
+        assert!(moved.distance(during) < 1e-5, "the release keeps what was shown");
+        assert!(moved.distance(global(&bench, goal)) < 1e-3, "the hand is where its control is");
+        if let Some((elbow, before)) = elbow {
+            assert!(global(&bench, elbow).distance(before) > 1e-3, "the elbow follows");
+        }
+        assert_eq!(bench.base.steps(), steps + 1);
+        bench.base.change(Change::Undo);
+        assert!(global(&bench, wrist).distance(hand) < 1e-5);
+
+        // Drawing a skeleton, nobody takes a control by mistake.
+        bench.mode(Mode::Move);
+        assert!(!bench.base.app.world().resource::<ControlsInUse>().0);
+    }
+}

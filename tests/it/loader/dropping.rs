@@ -1,0 +1,155 @@
+//! Parts that are dropped onto joints and strokes, and their options.
+
+use super::*;
+
+#[test]
+fn a_part_of_a_search_path_is_dropped_onto_a_joint() {
+    let mut studio = Studio::new(Both::default());
+    studio.settle();
+    let before = studio.desk.rig().clone();
+    let steps = studio.desk.steps().1;
+    let [from, to] = ["Part limb", "arm_l"].map(|label| studio.desk.find(label).rect.center());
+    studio.desk.drag(from, to);
+    studio.settle();
+    assert_eq!(studio.desk.steps().1, steps + 1, "{:?}", studio.desk.told());
+    let [part] = studio.desk.rig().dropped_parts() else { panic!("{:?}", studio.desk.rig().dropped_parts()) };
+    let expected = vec![studio.joint("arm_l"), studio.joint("elbow_l")];
+    assert_eq!((part.part.as_str(), &part.joints, part.mirror), ("limbs/limb.rig.ron", &expected, false));
+    studio.change(Change::Undo);
+    assert_eq!(*studio.desk.rig(), before);
+    // On the other side it is the mirror image.
+    let to = studio.desk.find("arm_r").rect.center();
+    studio.desk.drag(from, to);
+    studio.settle();
+    assert!(studio.desk.rig().dropped_parts()[0].mirror);
+    studio.change(Change::Undo);
+    // Whatever is no part is merged below the joint.
+    let from = studio.desk.find("Template tall man").rect.center();
+    studio.desk.drag(from, to);
+    studio.settle();
+    assert_eq!(studio.desk.rig().len(), 10, "{:?}", studio.desk.told());
+    let hips = studio.joint("tall_man_hips");
+    assert_eq!(studio.desk.parent(hips), Some(studio.joint("arm_r")));
+    // Let go beside the joints it does nothing.
+    let steps = studio.desk.steps().1;
+    studio.desk.drag(from, to + egui::vec2(0.0, 600.0));
+    studio.settle();
+    assert_eq!(studio.desk.steps().1, steps);
+}
+
+#[test]
+fn a_part_is_dropped_onto_a_joint_in_the_viewport() {
+    let mut studio = Studio::with(Sheet::Window);
+    let plane = ViewPlane::orthographic(View::Front, [Vec3::splat(-3.0), Vec3::splat(3.0)]);
+    let sight = Sight { plane, pixel: 0.01, size: Vec2::new(620.0, 1400.0) };
+    studio.desk.app.insert_resource(ViewportSight(Some(sight)));
+    studio.desk.frames(2);
+    let at = sight.project(studio.desk.rig().position(studio.joint("arm_r"))).unwrap();
+    let (from, joint) = (egui::pos2(20.0, 1300.0), egui::pos2(at.x, at.y));
+    let drop = |studio: &mut Studio, to: egui::Pos2| {
+        studio.desk.press(from);
+        let dragged = DraggedTemplate { place: studio.limb(), name: "limb".to_owned() };
+        egui::DragAndDrop::set_payload(&studio.desk.ctx, dragged);
+        studio.desk.move_to(to);
+        studio.desk.release(to);
+        studio.settle();
+    };
+    drop(&mut studio, joint + egui::vec2(0.0, 500.0));
+    assert!(
+        studio.desk.rig().dropped_parts().is_empty() && studio.told("there is no joint"),
+        "{:?}",
+        studio.desk.told()
+    );
+    drop(&mut studio, joint + egui::vec2(6.0, 4.0));
+    let [part] = studio.desk.rig().dropped_parts() else { panic!("{:?}", studio.desk.told()) };
+    assert_eq!((part.joints[0], part.mirror), (studio.joint("arm_r"), true));
+}
+
+#[test]
+fn a_part_goes_onto_the_stroke_that_was_just_drawn() {
+    let mut studio = Studio::new(TagsPanel::default());
+    let hips = studio.joint("hips");
+    let positions = vec![Vec3::new(0.5, 1.0, 0.0), Vec3::new(0.8, 1.0, 0.0)];
+    studio.desk.edit(Operation::Chain { positions, parent: Some(hips) });
+    let end = studio.desk.selected().to_vec();
+    assert_eq!(end.len(), 1, "a stroke selects its end");
+    let steps = studio.desk.steps().1;
+    studio.click("Part");
+    studio.desk.until("the parts", |desk| desk.look("Part limb").is_some());
+    assert!(studio.desk.look("Part arm").is_some() && studio.desk.look("Template man").is_none(), "parts alone");
+    studio.click("Part limb");
+    assert_eq!(studio.desk.steps().1, steps + 1, "{:?}", studio.desk.told());
+    let part = &studio.desk.rig().dropped_parts()[0];
+    assert_eq!(part.joints, [studio.desk.parent(end[0]).unwrap(), end[0]]);
+    // What takes more joints than there are is refused with the reason, and changes nothing.
+    let text = studio.text();
+    studio.act(TemplatePlace::Bundled("parts/arm.rig.ron"), LibraryAct::Part { joints: end, options: Vec::new() });
+    assert_eq!(studio.text(), text);
+    assert!(studio.told("needs"), "{:?}", studio.desk.told());
+}
+
+#[test]
+fn a_part_over_other_commands_is_told_once_it_is_there() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let [hips, arm, elbow] = ["hips", "arm_l", "elbow_l"].map(|label| studio.joint(label));
+    let onto = |studio: &mut Studio, joints: Vec<Uid>| {
+        let place = studio.limb();
+        studio.act(place, LibraryAct::Part { joints, options: Vec::new() });
+    };
+    // Joints that do not follow each other are refused.
+    onto(&mut studio, vec![hips, elbow]);
+    assert!(studio.desk.rig().dropped_parts().is_empty(), "{:?}", studio.desk.told());
+    assert!(!studio.told("was added to joints"), "{:?}", studio.desk.told());
+    onto(&mut studio, vec![hips, arm]);
+    assert_eq!(studio.desk.rig().dropped_parts().len(), 1, "{:?}", studio.desk.told());
+    let own = "Limb was added to joints that have 1 command of their own, which stays";
+    assert!(studio.told(own), "{:?}", studio.desk.told());
+}
+
+#[test]
+fn options_of_a_part_are_set_in_its_card() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let arm = studio.joint("arm_l");
+    studio.desk.select(&[arm]);
+    studio.settle();
+    studio.click("Part limb");
+    for told in ["Sockets: end on lower_l", "An upper and a lower bone.", "Features: fk"] {
+        assert!(studio.desk.says(told), "{told} is not among {:?}", studio.desk.seen);
+    }
+    assert!(studio.desk.look("Option size").is_some());
+    studio.desk.click("Option size");
+    studio.desk.hold(egui::Modifiers::COMMAND);
+    studio.desk.key(egui::Key::A);
+    studio.desk.hold(egui::Modifiers::NONE);
+    studio.desk.type_text("0.75");
+    studio.desk.frames(2);
+    studio.click("Add part");
+    let on_arm = studio.desk.rig().joint(arm).unwrap().data.tags.clone();
+    let params = on_arm.iter().find_map(|tag| match &tag.kind {
+        TagKind::Command { params, .. } => Some(params.clone()),
+        TagKind::Feature { .. } => None,
+    });
+    assert!(params.as_ref().is_some_and(|params| params.contains("0.75")), "{params:?} {:?}", studio.desk.told());
+    // A value that the option does not take is refused.
+    let text = studio.text();
+    let elbow = studio.joint("elbow_r");
+    let options = vec![("weight".to_owned(), "1".to_owned())];
+    studio.act(studio.limb(), LibraryAct::Part { joints: vec![elbow], options });
+    assert!(studio.text() == text && studio.told("has no option \"weight\""), "{:?}", studio.desk.told());
+}
+
+/// The name by which a template calls a part of a folder.
+#[test]
+fn parts_are_called_relative_to_the_document_or_the_site() {
+    let site = SearchPaths { folders: vec![PathBuf::from("/site")] };
+    let cases = [
+        ("/home/parts/arm.rig.ron", "parts/arm.rig.ron"),
+        ("/site/limbs/arm.rig.ron", "limbs/arm.rig.ron"),
+        ("/elsewhere/arm.rig.ron", "/elsewhere/arm.rig.ron"),
+    ];
+    for (file, name) in cases {
+        let place = TemplatePlace::File(PathBuf::from(file));
+        assert_eq!(place.part_name(Some(Path::new("/home")), &site), name);
+    }
+    assert_eq!(TemplatePlace::Bundled("parts/arm.rig.ron").part_name(None, &site), "parts/arm.rig.ron");
+}

@@ -1,0 +1,201 @@
+//! The hierarchy of joints: filter, names, drags, clicks and the menu of a row.
+
+use super::*;
+
+#[test]
+fn the_filter_keeps_matches_and_what_is_above_them() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let joints = desk.chain(&["hips", "spine", "Arm_L", "hand_L"]);
+    desk.chain(&["tail"]);
+    desk.edit(Operation::Group { joints: vec![joints[1]], name: "Trunk".into(), color: None });
+    let cases: &[(&str, &[&str])] = &[
+        ("", &["hips", "spine", "Arm_L", "hand_L", "tail"]),
+        ("arm", &["hips", "spine", "Arm_L"]),
+        ("trunk", &["hips", "spine"]),
+        ("_l hand", &["hips", "spine", "Arm_L", "hand_L"]),
+        ("TAIL", &["tail"]),
+        ("nothing", &[]),
+    ];
+    for (filter, expected) in cases {
+        let found = rows(desk.rig(), &HashSet::new(), filter);
+        let labels: Vec<&str> = found.iter().map(|row| desk.label(row.joint)).collect();
+        assert_eq!(labels, *expected, "{filter}");
+    }
+    let folded = rows(desk.rig(), &[joints[1]].into(), "");
+    assert_eq!(folded.iter().map(|row| desk.label(row.joint)).collect::<Vec<_>>(), ["hips", "spine", "tail"]);
+
+    // The same, typed.
+    desk.click("Filter");
+    desk.type_text("arm");
+    desk.frames(2);
+    assert!(desk.look("Arm_L").is_some() && desk.look("hips").is_some() && desk.look("tail").is_none());
+    desk.click("Clear filter");
+    desk.frames(2);
+    assert!(desk.look("tail").is_some());
+}
+
+#[test]
+fn the_filter_finds_joints_by_what_is_built_on_them() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let joints = desk.chain(&["hips", "spine", "head"]);
+    let kind = TagKind::Command { module: "space_switch".into(), params: "()".into(), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: vec![joints[1]], kind, index: None }));
+    let cases: &[(&str, &[&str])] =
+        &[("Space", &["hips", "spine"]), ("space spine", &["hips", "spine"]), ("space head", &[])];
+    for (filter, expected) in cases {
+        let found = rows(desk.rig(), &HashSet::new(), filter);
+        let labels: Vec<&str> = found.iter().map(|row| desk.label(row.joint)).collect();
+        assert_eq!(labels, *expected, "{filter}");
+    }
+}
+
+#[test]
+fn built_nodes_are_listed_and_lead_to_their_commands() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    let kind = TagKind::Command { module: "control".into(), params: "()".into(), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: vec![b], kind, index: None }));
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::All });
+    desk.frames(3);
+    let steps = desk.steps();
+    desk.secondary_click("a");
+    desk.click("Show all built nodes");
+    desk.frames(2);
+    assert!(desk.look("a, joint").is_some() && desk.look("b, joint").is_some(), "{:?}", desk.seen);
+    let control = desk.seen.iter().find(|seen| seen.label.ends_with(", control")).expect("the control").label.clone();
+    desk.click(&control);
+    desk.frames(2);
+    let [node] = desk.selected() else { panic!("{:?}", desk.selected()) };
+    assert!(![a, b].contains(node) && desk.find(&control).on == Some(true));
+    desk.secondary_click(&control);
+    desk.click("Show the command that made it");
+    desk.frames(2);
+    assert_eq!(desk.selected(), [b]);
+    // With words it is a list.
+    desk.click("Filter");
+    desk.type_text("control");
+    desk.frames(2);
+    assert!(desk.look("a, joint").is_none() && desk.look(&control).is_some(), "{:?}", desk.seen);
+    desk.click("Clear filter");
+    desk.click("Joints");
+    desk.frames(2);
+    assert!(desk.look("a").is_some() && desk.look(&control).is_none(), "{:?}", desk.seen);
+    assert_eq!(desk.steps(), steps, "looking is no step");
+}
+
+#[test]
+fn joints_are_renamed_in_place() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let joints = desk.chain(&["a", "b", "c"]);
+    let before = desk.steps().0;
+    desk.double_click("b");
+    assert_eq!(desk.selected(), [joints[1]]);
+    desk.type_text("elbow");
+    desk.key(Key::Enter);
+    assert_eq!((desk.label(joints[1]), desk.steps().0), ("elbow", before + 1), "typing replaces the selected text");
+
+    desk.click("a");
+    desk.key(Key::F2);
+    desk.type_text("dropped");
+    desk.key(Key::Escape);
+    assert_eq!((desk.label(joints[0]), desk.steps().0), ("a", before + 1), "Escape drops it");
+
+    desk.key(Key::F2);
+    desk.type_text("kept");
+    desk.click("c");
+    assert_eq!((desk.label(joints[0]), desk.steps().0), ("kept", before + 2), "a click elsewhere takes it");
+
+    desk.key(Key::F2);
+    desk.key(Key::Enter);
+    assert_eq!(desk.steps().0, before + 2, "the same name is no step");
+}
+
+#[test]
+fn drags_reparent_and_refuse_cycles() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let [hips, spine, head] = desk.chain(&["hips", "spine", "head"])[..] else { panic!() };
+    let [tail, tip] = desk.chain(&["tail", "tip"])[..] else { panic!() };
+    let before = desk.steps().0;
+    let at = |desk: &Desk, label: &str| desk.find(label).rect.center();
+
+    let place = desk.rig().position(tail);
+    desk.drag(at(&desk, "tail"), at(&desk, "hips"));
+    assert_eq!((desk.parent(tail), desk.parent(tip), desk.steps().0), (Some(hips), Some(tail), before + 1));
+    assert!(desk.rig().position(tail).distance(place) < 1e-5, "it stays where it is");
+
+    desk.drag(at(&desk, "hips"), at(&desk, "head"));
+    assert_eq!((desk.parent(hips), desk.steps().0), (None, before + 1));
+    assert!(desk.told().last().is_some_and(|told| told.contains("hips cannot hang below head")), "{:?}", desk.told());
+
+    desk.drag(at(&desk, "spine"), at(&desk, "spine") + egui::vec2(30.0, 1.0));
+    assert_eq!(desk.steps().0, before + 1, "let go where it was");
+
+    let below = desk.find("tip").rect.center() + egui::vec2(0.0, 300.0);
+    desk.drag(at(&desk, "head"), below);
+    assert_eq!((desk.parent(head), desk.steps().0), (None, before + 2), "the empty space makes roots");
+
+    // What is selected goes along; what hangs below it anyway does not.
+    desk.select(&[tip, tail, spine]);
+    desk.drag(at(&desk, "tail"), at(&desk, "head"));
+    assert_eq!([tip, tail, spine].map(|joint| desk.parent(joint)), [Some(tail), Some(head), Some(head)]);
+    assert_eq!(desk.steps().0, before + 3);
+}
+
+#[test]
+fn clicks_select_one_a_range_or_one_more() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let joints = desk.chain(&["a", "b", "c", "d"]);
+    desk.click("b");
+    assert_eq!(desk.selected(), [joints[1]]);
+    desk.hold(Modifiers::SHIFT);
+    desk.click("d");
+    assert_eq!(desk.selected(), [joints[1], joints[2], joints[3]], "the clicked one is active");
+    desk.click("a");
+    assert_eq!(desk.selected(), [joints[1], joints[0]], "a range begins where the last click was");
+    desk.hold(Modifiers::COMMAND);
+    desk.click("c");
+    assert_eq!(desk.selected(), [joints[1], joints[0], joints[2]]);
+    desk.click("a");
+    assert_eq!(desk.selected(), [joints[1], joints[2]]);
+    desk.hold(Modifiers::NONE);
+    let steps = desk.steps();
+    desk.key(Key::ArrowUp);
+    assert_eq!(desk.selected(), [joints[1]], "the row above the active one");
+    assert_eq!(desk.steps(), steps, "selecting is no step");
+
+    // Both ways: what is selected elsewhere is unfolded and shown.
+    desk.click("Fold all");
+    desk.frames(2);
+    assert!(desk.look("d").is_none());
+    desk.select(&[joints[3]]);
+    assert_eq!(desk.find("d").on, Some(true));
+
+    // And the row under the pointer is the hovered joint.
+    desk.move_to(desk.find("c").rect.center());
+    desk.frames(2);
+    assert_eq!(desk.app.world().get::<HoveredNode>(desk.rig), Some(&HoveredNode(Some(joints[2]))));
+    desk.move_to(Pos2::new(150.0, 590.0));
+    desk.frames(2);
+    assert_eq!(desk.app.world().get::<HoveredNode>(desk.rig), Some(&HoveredNode(None)));
+}
+
+#[test]
+fn the_menu_of_a_row_is_about_the_selection() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let joints = desk.chain(&["a", "b", "c"]);
+    let choose = |desk: &mut Desk, row: &str, entry: &str| {
+        desk.secondary_click(row);
+        desk.click(entry);
+        desk.frames(2);
+    };
+    choose(&mut desk, "b", "Lock weights");
+    assert_eq!(desk.selected(), [joints[1]]);
+    assert!(desk.rig().joint(joints[1]).unwrap().data.locked);
+    choose(&mut desk, "a", "Select hierarchy");
+    assert_eq!(desk.selected(), [joints[1], joints[2], joints[0]]);
+    desk.select(&[joints[1]]);
+    choose(&mut desk, "b", "Delete");
+    assert_eq!((desk.rig().len(), desk.parent(joints[2])), (2, Some(joints[0])));
+    choose(&mut desk, "a", "Delete hierarchy");
+    assert!(desk.rig().is_empty());
+}

@@ -1,0 +1,120 @@
+//! The panel of weights: why it cannot run, and the choices of parts and idle joints.
+
+use super::*;
+
+#[test]
+fn skinning_says_why_not_runs_once_and_can_be_cancelled() {
+    let mut desk = Desk::new(SkinningPanel::default());
+    assert!(!desk.find("Skin").enabled);
+    desk.app.world_mut().write_message(ActionRequest(Action::Skin));
+    desk.frames(2);
+    assert!(desk.told().last().is_some_and(|told| told.contains("no mesh")), "{:?}", desk.told());
+    // Two hundred thousand points are not done within a few frames.
+    let grid: Vec<[[f32; 3]; 2]> = (0..25_000)
+        .map(|i| {
+            let (x, y, z) = ((i % 30) as f32, (i / 30 % 30) as f32, (i / 900) as f32);
+            [[x * 0.03, y * 0.03, z * 0.03], [x * 0.03 + 0.029, y * 0.03 + 0.029, z * 0.03 + 0.029]]
+        })
+        .collect();
+    let mesh = RigMesh::new(Uid(99), boxes(&grid), Vec::new());
+    let mesh = desk.app.world_mut().spawn((mesh, SkinOf(desk.rig))).id();
+    desk.frames(2);
+    assert!(!desk.find("Skin").enabled, "there are no joints");
+    desk.chain(&["a", "b"]);
+    desk.frames(2);
+    desk.click("Skin");
+    desk.frames(2);
+    assert!(desk.app.world().get::<SkinningJob>(mesh).is_some(), "it runs");
+    desk.app.world_mut().write_message(ActionRequest(Action::Skin));
+    desk.frames(2);
+    assert!(desk.told().last().is_some_and(|told| told.contains("running")), "{:?}", desk.told());
+    assert!(desk.app.world().get::<SkinningJob>(mesh).is_some(), "nothing is lost");
+    desk.click("Cancel");
+    wait(&mut desk, mesh);
+    assert!(desk.rig().skin(Uid(99)).is_none());
+    assert!(desk.told().last().is_some_and(|told| told.contains("cancelled")), "{:?}", desk.told());
+
+    desk.app.world_mut().entity_mut(mesh).despawn();
+    let small = RigMesh::new(Uid(98), boxes(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]), Vec::new());
+    let small = desk.app.world_mut().spawn((small, SkinOf(desk.rig))).id();
+    desk.frames(2);
+    desk.click("Skin");
+    wait(&mut desk, small);
+    assert!(desk.rig().skin(Uid(98)).is_some());
+    assert!(desk.told().last().is_some_and(|told| told.contains("100 %")), "{:?}", desk.told());
+}
+
+#[test]
+fn parts_tell_what_holds_them_and_keep_to_choices() {
+    let mut desk = Desk::new(SkinningPanel::default());
+    desk.resize(320.0, 900.0);
+    let boxes = boxes(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]], [[-0.1, 1.05, -0.1], [0.1, 1.2, 0.1]]]);
+    let mesh = RigMesh::new(Uid(97), boxes, Vec::new());
+    let mesh = desk.app.world_mut().spawn((mesh, SkinOf(desk.rig))).id();
+    let joints = desk.chain(&["low", "high"]);
+    desk.frames(2);
+    desk.click("Skin");
+    wait(&mut desk, mesh);
+    desk.click("Parts (2)");
+    desk.frames(30);
+    let says =
+        |desk: &Desk, text: &str| desk.seen.iter().any(|seen| seen.value.contains(text) || seen.label.contains(text));
+    assert!(says(&desk, "Automatic: moves with low"), "{:?}", desk.seen);
+    // The joint of a choice holds the object after the next computation.
+    desk.select(&joints[1..]);
+    let key = (Uid(97), MeshPart::Object(0));
+    desk.app.world_mut().resource_mut::<SkinningParts>().0.insert(key, PartBinding::Rigid(joints[1]));
+    desk.frames(2);
+    assert!(says(&desk, "Moves with high"), "{:?}", desk.seen);
+    desk.click("Skin");
+    wait(&mut desk, mesh);
+    let mesh = desk.app.world().get::<RigMesh>(mesh).unwrap();
+    assert_eq!(held_objects(mesh, desk.rig().skin(Uid(97)).unwrap())[0], Some(joints[1]));
+}
+
+/// A box clicked free bends after the next computation and can be made rigid again; a joint far above the boxes is idle until
+/// it claims skin.
+#[test]
+fn rigid_parts_and_idle_joints_have_a_choice_each() {
+    let mut desk = Desk::new(SkinningPanel::default());
+    desk.resize(360.0, 1400.0);
+    let boxes = boxes(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]], [[-0.1, 1.05, -0.1], [0.1, 1.2, 0.1]]]);
+    let mesh = RigMesh::new(Uid(97), boxes, Vec::new());
+    let mesh = desk.app.world_mut().spawn((mesh, SkinOf(desk.rig))).id();
+    let joints = desk.chain(&["low", "high", "far"]);
+    desk.frames(2);
+    desk.click("Skin");
+    wait(&mut desk, mesh);
+    open(&mut desk, "Rigid parts (");
+    let rigid = {
+        let report = desk.app.world().resource::<SkinningResults>().get(mesh).unwrap().as_ref().unwrap();
+        assert!(report.idle_joints.iter().any(|idle| idle.joint == joints[2]), "{report:?}");
+        report.rigid_parts.clone()
+    };
+    assert_eq!(desk.find("rigid").on, Some(true));
+    desk.click("rigid");
+    desk.frames(2);
+    let chosen = desk.app.world().resource::<SkinningParts>().0.clone();
+    let [(key, PartBinding::Bends)] = chosen.into_iter().collect::<Vec<_>>()[..] else { panic!("{:?}", desk.seen) };
+    let first = rigid.into_iter().find(|rigid| (Uid(97), rigid.part) == key).unwrap();
+    desk.click("Skin");
+    wait(&mut desk, mesh);
+    let bends = |desk: &Desk| {
+        let report = desk.app.world().resource::<SkinningResults>().get(mesh).unwrap().as_ref().unwrap();
+        let is_rigid = report.rigid_parts.iter().any(|rigid| rigid.part == first.part);
+        !is_rigid && report.bending_parts.iter().any(|(part, name)| *part == first.part && *name == first.name)
+    };
+    assert!(bends(&desk));
+    assert_eq!(desk.find("rigid").on, Some(false), "the row stays");
+    desk.click("rigid");
+    desk.frames(2);
+    assert!(desk.app.world().resource::<SkinningParts>().0.is_empty());
+    open(&mut desk, "Rigid parts (");
+    open(&mut desk, "Idle joints (");
+    desk.click("claims skin");
+    desk.frames(2);
+    assert_eq!(desk.app.world().resource::<SkinningClaims>().0.len(), 1);
+    desk.click("claims skin");
+    desk.frames(2);
+    assert!(desk.app.world().resource::<SkinningClaims>().0.is_empty());
+}

@@ -1,0 +1,151 @@
+//! Help over the window: the tour, the search, toasts, looks and keys.
+
+use super::*;
+
+#[test]
+fn the_tour_advances_when_its_steps_are_done() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    page.click("Take the tour");
+    let tour = |page: &Page| page.world().resource::<Tour>().clone();
+    assert!(tour(&page).is_on() && page.mesh().as_deref() == Some("biped"));
+    assert!(page.desk.says("1 of 3: Put a skeleton in"), "{:?}", page.desk.seen);
+    let bytes = write_template(page.desk.rig());
+
+    change(&mut page, Change::Do(Operation::Chain { positions: vec![Vec3::Y, Vec3::Y * 1.5], parent: None }));
+    assert!(page.desk.says("2 of 3: Skin it"), "{:?}", page.desk.seen);
+    let (uid, points) = {
+        let mesh = page.world().get::<RigMesh>(page.mesh_entity()).unwrap();
+        (mesh.uid, mesh.rest.points.len())
+    };
+    let joint = page.desk.rig().walk().next().unwrap().data.uid;
+    let skin = RigEdit::SetSkin(uid, Some(Arc::new(held_by(joint, points))));
+    change(&mut page, Change::Do(Operation::Edits(vec![skin])));
+    assert!(page.desk.says("3 of 3: Pose it"), "{:?}", page.desk.seen);
+
+    let bent = Operation::Pose(vec![(joint, PoseOffset::from_rotation(Quat::from_rotation_z(0.5)))]);
+    change(&mut page, Change::Preview(bent));
+    assert_eq!(tour(&page).present(), Some(TourStep::Pose), "a drag that may yet be dropped is no pose");
+    change(&mut page, Change::Commit);
+    assert!(page.desk.says("From a mesh to a pose"), "{:?}", page.desk.seen);
+
+    // What is undone is to be done again, and the rig is as it was, byte by byte.
+    for step in [TourStep::Pose, TourStep::Weights, TourStep::Joints] {
+        change(&mut page, Change::Undo);
+        assert_eq!(tour(&page).present(), Some(step));
+    }
+    assert_eq!(write_template(page.desk.rig()), bytes);
+    page.click("Skip");
+    assert!(page.desk.says("2 of 3: Skin it"));
+    assert!(page.desk.says("Not yet: there are no joints."), "{:?}", page.desk.seen);
+    page.click("End the tour");
+    assert!(!tour(&page).is_on());
+
+    // Another document ends it.
+    page.send(ActionRequest(Action::StartPage));
+    page.click("Take the tour");
+    assert!(tour(&page).is_on());
+    page.send(OpenRequest::Empty);
+    assert!(!tour(&page).is_on());
+}
+
+#[test]
+fn the_help_finds_actions_and_says_why_not() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    page.send(ActionRequest(Action::Cancel));
+    let rows = help::rows(page.world(), "");
+    assert_eq!(rows.iter().map(|row| row.action).collect::<Vec<_>>(), Action::all());
+    let found = help::rows(page.world(), "ctrl+b the rig");
+    let [build] = &found[..] else { panic!("by its key and its name: {found:?}") };
+    assert_eq!((build.action, build.keys.as_str()), (Action::Build, "Ctrl+B"));
+    assert!(build.obstacle.is_some_and(|why| why.contains("no joint has commands")));
+    let redo = help::rows(page.world(), "redo");
+    assert_eq!(redo[0].keys, "Ctrl+Shift+Z, Ctrl+Y", "all of its keys");
+    let missing: Vec<Action> = rows.into_iter().filter(|row| row.text.is_empty()).map(|row| row.action).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+
+    page.send(ActionRequest(Action::Help));
+    assert!(page.world().resource::<HelpShown>().0 && page.desk.says("Select mode"));
+    // The search has the keyboard at once.
+    page.desk.type_text("half-tr");
+    page.settle();
+    assert!(page.desk.says("No action is called so."), "{:?}", page.desk.seen);
+    page.desk.key(egui::Key::Escape);
+    page.settle();
+    assert!(!page.world().resource::<HelpShown>().0);
+    // A click lets an action wait for another key.
+    page.send(ActionRequest(Action::Help));
+    page.desk.type_text("select mode");
+    page.settle();
+    page.click("Select mode");
+    assert!(page.desk.says("press a key"), "{:?}", page.desk.seen);
+    let waiting = page.world().resource::<ChosenKey>().0;
+    assert_eq!(waiting, Some(Action::Mode(Mode::Select)));
+    page.desk.app.insert_resource(ChosenKey(None));
+    page.send(ActionRequest(Action::Help));
+    page.send(ActionRequest(Action::Help));
+    page.desk.type_text("mesh is open");
+    page.settle();
+    assert!(page.desk.says("Meshes") && !page.desk.says("Select mode"), "{:?}", page.desk.seen);
+}
+
+#[test]
+fn toasts_keep_clear_of_windows() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    page.send(ActionRequest(Action::Cancel));
+    page.send(ActionRequest(Action::Help));
+    let toasts = |page: &Page| {
+        let crosses = page.desk.seen.iter().filter(|seen| seen.label == "Close");
+        crosses.map(|cross| cross.rect).collect::<Vec<_>>()
+    };
+    for number in 0..3 {
+        page.desk.app.world_mut().write_message(Notice::error(format!("something went wrong, number {number}")));
+    }
+    page.desk.frames(4);
+    let help = page.desk.ctx.memory(|memory| memory.area_rect(help::page_id())).expect("the help is shown");
+    for toast in toasts(&page) {
+        assert!(!help.intersects(toast), "{toast:?} covers {help:?}");
+    }
+    page.send(ActionRequest(Action::Help));
+    page.desk.frames(4);
+    let low: Vec<f32> = toasts(&page).iter().map(|toast| toast.bottom()).collect();
+    assert!(low.len() >= 3 && low.iter().any(|bottom| *bottom > 640.0), "{low:?}");
+}
+
+#[test]
+fn looks_are_kept_and_keys_that_are_bound_twice_are_told() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    for action in [Action::UiLarger, Action::UiLarger, Action::Theme, Action::Contrast] {
+        page.send(ActionRequest(action));
+    }
+    let settings = page.settings().clone();
+    assert_eq!((settings.ui_scale, settings.theme, settings.high_contrast), (1.25, WindowTheme::Light, true));
+    for _ in 0..20 {
+        page.send(ActionRequest(Action::UiLarger));
+    }
+    assert_eq!(page.settings().ui_scale, 2.5, "there is a largest size");
+    page.send(ActionRequest(Action::UiUsual));
+    page.send(ActionRequest(Action::UiSmaller));
+    page.quit();
+    let again = Page::open(folder.path(), None);
+    let settings = again.settings();
+    assert_eq!((settings.ui_scale, settings.theme, settings.high_contrast), (0.9, WindowTheme::Light, true));
+    again.quit();
+
+    let file = folder.path().join("config/settings.ron");
+    let keys = r#"(settings: (ui_scale: 99.0), keys: Some([("Ctrl+B", Build), ("Ctrl+B", Skin), ("F1", Help)]))"#;
+    fs::write(&file, keys).expect("written");
+    let page = Page::open(folder.path(), None);
+    assert_eq!(page.settings().ui_scale, 2.5, "no size in which nothing can be read");
+    let keys = page.world().resource::<KeyBindings>();
+    let chord = Chord::try_from("Ctrl+B".to_owned()).unwrap();
+    assert_eq!((keys.action(&chord), keys.0.len()), (Some(Action::Build), 2));
+    let told: Vec<String> =
+        page.world().resource::<LogBook>().entries().map(|entry| entry.notice.text.clone()).collect();
+    let refused = r#"Ctrl+B is bound to "Build the rig" and not to "Skin" as well"#;
+    assert!(told.iter().any(|told| told.contains(refused)), "{told:?}");
+    assert!(KeyBindings::default().clone().refuse_doubles().is_empty(), "no default key is bound twice");
+}

@@ -1,0 +1,125 @@
+//! Weights of the pieces of a mesh: rigid and stiff ones, and idle joints.
+
+use super::*;
+
+/// Adds a box to a mesh and returns its points.
+fn add_box(points: &mut Vec<Vec3>, triangles: &mut Vec<[u32; 3]>, low: Vec3, high: Vec3) -> Range<usize> {
+    let first = points.len() as u32;
+    points.extend((0..8).map(|corner| {
+        let pick = |axis: usize| if corner >> axis & 1 == 1 { high[axis] } else { low[axis] };
+        Vec3::new(pick(0), pick(1), pick(2))
+    }));
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let split = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+    triangles.extend(quads.into_iter().flat_map(split).map(|t| t.map(|corner| first + corner)));
+    first as usize..points.len()
+}
+
+#[test]
+fn rigid_parts_hang_on_their_joint() {
+    let (points, triangles) = tube();
+    let (weights, report) =
+        skin_weights(&points, &triangles, &tube_joints(), &[(0..40, 2)], None, &WeightSettings::default(), &|_| true)
+            .unwrap();
+    assert!((0..40).all(|p| weights.of(p).eq([(2, 1.0)])));
+    assert_eq!(report.given, 40);
+    assert!(weight(&weights, 60, 0) > 0.5);
+}
+
+/// A helmet, the head inside of it and a cape over the shoulders, each a piece of its own.
+#[test]
+fn parts_belong_to_the_bones_inside_of_them() {
+    let (mut points, mut triangles) = tube();
+    let (body, soft) = (points.len(), triangles.clone());
+    // A box around the end of the tube, wide enough for the last bone, and a small one that floats beside the first.
+    let helmet = add_box(&mut points, &mut triangles, Vec3::new(3.2, -0.8, -0.8), Vec3::new(4.4, 0.8, 0.8));
+    let mut joints = tube_joints();
+    joints[2].head.x = 3.3;
+    joints.push(joint([4.2, 0.0, 0.0], Some(2)));
+    let (weights, report) = bind(&points, &triangles, &joints);
+    for point in helmet.clone() {
+        assert!(
+            weight(&weights, point, 2) + weight(&weights, point, 3) > 0.99,
+            "{:?}",
+            weights.of(point).collect::<Vec<_>>()
+        );
+    }
+    let first: Vec<(u32, f32)> = weights.of(helmet.start).collect();
+    assert!(helmet.clone().all(|point| weights.of(point).eq(first.iter().copied())) == (report.stiff > 0));
+    // A pouch on the first bone moves as one, unless a person says that it bends.
+    let pouch = add_box(&mut points, &mut triangles, Vec3::new(0.4, 1.2, -0.2), Vec3::new(0.6, 1.4, 0.2));
+    let stiff = bind(&points, &triangles, &joints).1.stiff - report.stiff;
+    assert_eq!(stiff, pouch.len());
+    let bending = std::iter::once(pouch.start as u32..pouch.start as u32 + 1).collect();
+    let settings = WeightSettings { bending, ..WeightSettings::default() };
+    let bent = skin_weights(&points, &triangles, &joints, &[], None, &settings, &|_| true).unwrap().1;
+    assert_eq!(bent.stiff, report.stiff);
+    // The tube is bound as without the helmet.
+    let alone = bind(&points[..body], &soft, &joints).0;
+    for point in 0..body {
+        for joint in 0..2 {
+            assert!((weight(&weights, point, joint) - weight(&alone, point, joint)).abs() < 0.1, "point {point}");
+        }
+    }
+}
+
+/// A pouch that floats beside the second bone is told with its joint, and a joint that hangs far outside with its distance.
+#[test]
+fn stiff_pieces_and_idle_joints_are_told() {
+    let (mut points, mut triangles) = tube();
+    let pouch = add_box(&mut points, &mut triangles, Vec3::new(2.8, 0.5, -0.1), Vec3::new(3.1, 0.7, 0.1));
+    let mut joints = tube_joints();
+    joints[2].deforms = false;
+    joints.push(joint([2.0, 9.0, 0.0], Some(0)));
+    let (weights, report) = bind(&points, &triangles, &joints);
+    let first = pouch.start as u32;
+    assert_eq!(report.stiff_pieces, [StiffPiece { first, points: 8, joint: 1, share: 1.0 }]);
+    assert_eq!(report.stiff, 8);
+    assert!(pouch.clone().all(|point| weights.of(point).eq([(1, 1.0)])));
+    let [ends, far] = report.idle_joints[..] else { panic!("{:?}", report.idle_joints) };
+    assert_eq!(ends, IdleJoint { joint: 2, reason: IdleReason::NotDeforming });
+    assert!(matches!(far.reason, IdleReason::Outside { distance } if (distance - 8.338).abs() < 0.01), "{far:?}");
+    assert_eq!(far.joint, 3);
+    // A piece that bends is told no more, and a joint that is locked has another reason.
+    let settings = WeightSettings { bending: std::iter::once(first..first + 1).collect(), ..WeightSettings::default() };
+    let bent = skin_weights(&points, &triangles, &joints, &[], None, &settings, &|_| true).unwrap().1;
+    assert_eq!((bent.stiff, bent.stiff_pieces.len()), (0, 0));
+    let mut present = Weights::default();
+    (0..points.len()).for_each(|_| present.push([(0, 1.0)]));
+    let locks = Locks { weights: &present, joints: &[false, false, false, true] };
+    let locked =
+        skin_weights(&points, &triangles, &joints, &[], Some(locks), &WeightSettings::default(), &|_| true).unwrap().1;
+    assert_eq!(locked.idle_joints[1], IdleJoint { joint: 3, reason: IdleReason::Locked });
+}
+
+/// A joint beside a thing that floats above the tube holds the thing if it claims skin, and only then.
+#[test]
+fn claims_let_idle_joints_hold_what_is_nearest_to_them() {
+    let (mut points, mut triangles) = tube();
+    let body = points.len();
+    let thing = add_box(&mut points, &mut triangles, Vec3::new(1.6, 2.2, -0.4), Vec3::new(2.4, 2.8, 0.4));
+    let mut joints = tube_joints();
+    joints.push(joint([2.0, 3.4, 0.0], Some(0)));
+    let with = |claims: Vec<usize>, joints: &[WeightJoint]| {
+        let settings = WeightSettings { claims, ..WeightSettings::default() };
+        skin_weights(&points, &triangles, joints, &[], None, &settings, &|_| true)
+    };
+    let (weights, report) = with(Vec::new(), &joints).unwrap();
+    assert!(thing.clone().all(|point| weight(&weights, point, 3) == 0.0));
+    let [far] = report.idle_joints[..] else { panic!("{:?}", report.idle_joints) };
+    assert!(matches!(far.reason, IdleReason::Outside { distance } if (distance - 0.6).abs() < 0.01), "{far:?}");
+    let (claimed, report) = with(vec![3], &joints).unwrap();
+    check_sound(&claimed, points.len(), &joints, 8);
+    assert!(thing.clone().all(|point| weight(&claimed, point, 3) > 0.99));
+    assert!(report.idle_joints.is_empty(), "{:?}", report.idle_joints);
+    for point in 0..body {
+        assert!((weight(&weights, point, 0) - weight(&claimed, point, 0)).abs() < 0.02, "point {point} of the tube");
+    }
+    // A joint that does not deform holds skin, too; one that is far from all of it stays idle.
+    joints[2].deforms = false;
+    joints[3].head.y = 50.0;
+    let (claimed, report) = with(vec![2, 3], &joints).unwrap();
+    assert!((0..body).any(|point| weight(&claimed, point, 2) > 0.1));
+    assert_eq!(report.idle_joints.iter().map(|idle| idle.joint).collect::<Vec<_>>(), [3]);
+    assert_eq!(with(vec![9], &joints).unwrap_err(), WeightError::Claim { joint: 9, joints: 4 });
+}

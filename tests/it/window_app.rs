@@ -1,0 +1,81 @@
+//! A window without a window: the app that opens and saves documents, and its notices.
+
+use std::path::PathBuf;
+
+use bevy::{app::Plugins, ecs::message::MessageCursor, prelude::*};
+use rigsmith::{
+    editor::{
+        ActiveRig,
+        files::{LoadJob, SaveJob, StateFolder},
+        notice::{Notice, Severity},
+    },
+    headless::headless_app,
+    test_app::strict_app,
+};
+
+use crate::bench::{AppBench, wait_with};
+
+impl AppBench {
+    /// An app with these plugins of the window, whose journals lie in a folder.
+    pub fn with_files<M>(state: PathBuf, plugins: impl Plugins<M>) -> Self {
+        let mut app = headless_app(7);
+        app.insert_resource(StateFolder(Some(state))).add_plugins(plugins).add_message::<AppExit>();
+        Self::bare(strict_app(app))
+    }
+
+    /// The entity of the open rig.
+    pub fn open_rig(&self) -> Entity {
+        self.app.world().resource::<ActiveRig>().0
+    }
+
+    /// True while a file is being read or written.
+    pub fn has_file_jobs(&self) -> bool {
+        let world = self.app.world();
+        world.resource::<LoadJob>().what().is_some() || world.resource::<SaveJob>().what().is_some()
+    }
+}
+
+/// Notices of an app since its start.
+#[derive(Default)]
+pub struct Notices {
+    cursor: MessageCursor<Notice>,
+    pub list: Vec<Notice>,
+}
+
+impl Notices {
+    /// Takes over those of the last frame.
+    pub fn read(&mut self, app: &App) {
+        self.list.extend(self.cursor.read(app.world().resource::<Messages<Notice>>()).cloned());
+    }
+
+    /// True if there was one of this severity with this in its text.
+    pub fn include(&self, severity: Severity, part: &str) -> bool {
+        self.list.iter().any(|notice| notice.severity == severity && notice.text.contains(part))
+    }
+}
+
+/// An app that opens and saves documents, and its notices.
+pub struct WindowBench {
+    pub base: AppBench,
+    pub notices: Notices,
+}
+
+impl WindowBench {
+    pub fn with_files<M>(state: PathBuf, plugins: impl Plugins<M>) -> Self {
+        Self { base: AppBench::with_files(state, plugins), notices: Notices::default() }
+    }
+
+    pub fn world(&self) -> &World {
+        self.base.app.world()
+    }
+
+    pub fn frame(&mut self) {
+        self.base.app.update();
+        self.notices.read(&self.base.app);
+    }
+
+    #[track_caller]
+    pub fn until(&mut self, what: &str, done: impl Fn(&Self) -> bool) {
+        wait_with(self, what, Self::frame, done, |window| window.notices.list.clone());
+    }
+}
