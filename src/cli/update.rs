@@ -114,7 +114,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
         report.line(format!("moves    {note}"));
     }
     report.set("poses", serde_json::to_value(&poses).unwrap_or(Value::Null));
-    let clips = clips::updated(args, (&now, &updated.rig), &clip_files, &mut report)?;
+    let clips = clips::updated(args, (now.rig(), &updated.rig), &clip_files, &mut report)?;
     let conflicts = updated.conflicts();
     report.set("conflicts", conflicts);
     if conflicts > 0 && args.take.is_none() {

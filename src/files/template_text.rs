@@ -206,7 +206,7 @@ fn written_out_note(titles: &[&str]) -> String {
 
 /// A text of a template with parts, as it was read.
 struct ReadText {
-    /// What the template has itself.
+    /// Joints and tags that the template has itself.
     own: Rig,
     /// The template with its parts.
     whole: Rig,

@@ -247,12 +247,12 @@ fn a_mesh_outside_of_a_projects_folder_is_refused() {
     std::fs::write(&project, text.replace("\"biped.obj\"", "\"../biped.obj\"")).expect("written");
     let mut other = Window::new(folder.path());
     other.open_file(&project);
-    assert!(other.mesh().is_none() && other.rig() == window.rig(), "{:?}", other.notices);
-    assert!(other.said(Severity::Warning, "is outside of"), "{:?}", other.notices);
+    assert!(other.mesh().is_none() && other.rig() == window.rig(), "{:?}", other.notices.list);
+    assert!(other.notices.include(Severity::Warning, "is outside of"), "{:?}", other.notices.list);
     // A copy beside the project is taken.
     std::fs::copy(folder.path().join("biped.obj"), inner.join("biped.obj")).expect("copied");
     other.open_file(&project);
-    assert!(other.mesh().is_some(), "{:?}", other.notices);
+    assert!(other.mesh().is_some(), "{:?}", other.notices.list);
 }
 
 #[test]

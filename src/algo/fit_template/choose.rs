@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::{
     FitError, MeshAnalysis, TemplateJoint,
     assign::{self, Hypothesis},
-    limbs::{LimbKind, limbs},
+    limbs::{LimbKind, TemplateLimbs, limbs},
 };
 
 /// Penalty of a template for a mesh, with the limbs that it is made of.
@@ -43,12 +43,16 @@ const REST: f32 = 2.0;
 const ANY_SHAPE: f32 = 0.2;
 
 /// Penalty of an up direction that is not the file's second axis, which most formats have for it.
-const LYING: f32 = 0.08;
+const LYING: f32 = 0.12;
+/// Penalty of a template with wings: figures that hold their arms out are far more frequent than birds.
+const WINGED: f32 = 0.1;
 
 /// A penalty that can be compared between templates with and without sides; `up` is the file's second axis.
-fn comparable(best: &Hypothesis, free: bool, up: Vec3) -> f32 {
+fn comparable(best: &Hypothesis, template: &TemplateLimbs, up: Vec3) -> f32 {
     let lying = (1.0 - up.dot(best.alignment.rotation * Vec3::Y)).clamp(0.0, 1.0);
-    let shape = if free { ANY_SHAPE } else { 0.0 };
+    let is_free = template.limbs.iter().all(|limb| limb.kind == LimbKind::Free);
+    let is_winged = template.limbs.iter().any(|limb| limb.kind == LimbKind::Wing);
+    let shape = if is_free { ANY_SHAPE } else { 0.0 } + if is_winged { WINGED } else { 0.0 };
     best.posed_cost() + (REST - assign::POSED) * best.rest + LYING * lying + shape
 }
 
@@ -85,7 +89,7 @@ pub fn choose_template(
         let shown = best.leaves.iter().filter(|l| l.is_some()).count();
         choices.push(TemplateChoice {
             index,
-            cost: comparable(best, template.limbs.iter().all(|l| l.kind == LimbKind::Free), up),
+            cost: comparable(best, &template, up),
             limbs: kinds.into_iter().map(of_kind).collect(),
             unused: analysis.trees[best.tree].branches.leaves.len() - shown,
         });

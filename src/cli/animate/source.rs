@@ -52,6 +52,7 @@ pub(super) fn clips(
         told: Vec::new(),
         set_aside: Vec::new(),
     };
+    let mut failed = None;
     for path in &args.clips {
         limits::check_time("reading the motion")?;
         match FileKind::of(path) {
@@ -61,15 +62,21 @@ pub(super) fn clips(
             }
             Some(FileKind::Bvh) => {
                 let motion = spinning("reading the motion", || load_motion(&RealDisk, path))?;
-                if taking.choice.takes(&motion.name) {
-                    taking.add_motion(path, &motion, bench, report)?;
+                if taking.choice.takes(&motion.name)
+                    && let Err(error) = taking.add_motion(path, &motion, bench, report)
+                {
+                    failed = failed.or(Some(error));
                 }
             }
             _ => taking.add_clips(path, bench, whole, report)?,
         }
     }
-    taking.choice.check()?;
+    // A misspelt name in the map is why a motion has no joint of the rig.
     taking.maps.check(args, report)?;
+    if let Some(error) = failed {
+        return Err(error);
+    }
+    taking.choice.check()?;
     // A single motion is told without a list, too.
     if let [only] = &taking.told[..] {
         report.json.extend(only.clone());

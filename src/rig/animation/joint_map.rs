@@ -72,7 +72,7 @@ pub enum JointMapError {
         "no joint of the motion is mapped to the rig: neither are names alike nor is it a human; give a map with --map: [(\"joint of the motion\", \"joint of the rig\"), ...]"
     )]
     Nothing,
-    /// Only joints that carry everything are mapped.
+    /// Joints that carry everything are mapped alone.
     #[error(
         "of the motion only \"{name}\" is mapped to the rig, which carries all other joints: neither are their names alike nor is it a human; give a map with --map: [(\"joint of the motion\", \"joint of the rig\"), ...]"
     )]

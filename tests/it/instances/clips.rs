@@ -168,7 +168,7 @@ fn clips_of_a_file_go_through_versions_of_the_template() {
     let (mut game, clips, instance) = rising(folder.path(), InstanceMode::Hierarchy);
     game.app.world_mut().entity_mut(instance).insert((InstanceClips(clips), ClipTargets));
     bound(&mut game, 1);
-    let own = |game: &Game| game.app.world().get::<RigClips>(instance).unwrap().0.clone();
+    let own = |game: &AppBench| game.app.world().get::<RigClips>(instance).unwrap().0.clone();
     let first = own(&game);
     let animations = game.app.world().get::<InstanceAnimations>(instance).unwrap().clone();
     let control = first[0].nodes().into_iter().find(|node| *node != GONE).unwrap();

@@ -23,15 +23,15 @@ use rigsmith::{
     },
 };
 
-use super::{Game, HANG, TWO, saved};
+use super::{AppBench, HANG, TWO, saved};
 use crate::animation::keep::{NEAR, flip_all, gentle, joints_off};
 
 /// What updates told of clips.
 #[derive(Resource, Default)]
 struct ToldClips(Vec<Arc<ClipReport>>);
 
-fn game(folder: &Path) -> Game {
-    Game::with(RigInstancePlugin::default(), folder, |app| {
+fn game(folder: &Path) -> AppBench {
+    AppBench::game_with(RigInstancePlugin::default(), folder, |app| {
         app.add_plugins(ClipPlugin)
             .init_resource::<ToldClips>()
             .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(10)))
@@ -39,7 +39,7 @@ fn game(folder: &Path) -> Game {
     })
 }
 
-fn told(game: &Game) -> &[Arc<ClipReport>] {
+fn told(game: &AppBench) -> &[Arc<ClipReport>] {
     &game.app.world().resource::<ToldClips>().0
 }
 
@@ -51,19 +51,19 @@ fn character() -> (Rig, RigClip) {
     (rig, clip)
 }
 
-fn clips(game: &Game, instance: Entity) -> Arc<[RigClip]> {
+fn clips(game: &AppBench, instance: Entity) -> Arc<[RigClip]> {
     game.app.world().get::<RigClips>(instance).unwrap().0.clone()
 }
 
 /// Places of the joints of a rig in the world.
-fn joints(game: &Game, instance: Entity, rig: &Rig) -> BTreeMap<Uid, Vec3> {
+fn joints(game: &AppBench, instance: Entity, rig: &Rig) -> BTreeMap<Uid, Vec3> {
     let places = game.places(instance);
     let joints = places.iter().filter(|(uid, _)| rig.joint(**uid).is_some());
     joints.map(|(uid, (place, _))| (*uid, place.translation())).collect()
 }
 
 /// Shows the clip at a second.
-fn show(game: &mut Game, instance: Entity, time: f32) {
+fn show(game: &mut AppBench, instance: Entity, time: f32) {
     game.app.world_mut().get_mut::<ClipPlayer>(instance).unwrap().time = time;
     game.app.update();
 }
@@ -171,7 +171,7 @@ fn keys_of_a_node_that_is_gone_wait_and_the_joints_move_on() {
         let [aside] = &report.set_aside[..] else { panic!("{:?}", report.set_aside) };
         assert_eq!((aside.keys.node, aside.keys.keys, aside.clip_name.as_str()), (control, 2, "turn"));
         assert!(report.lines().last().is_some_and(|line| line.contains("2 keys")), "{:?}", report.lines());
-        let check = |game: &mut Game, listed: &[Uid]| {
+        let check = |game: &mut AppBench, listed: &[Uid]| {
             show(game, instance, 0.0);
             show(game, instance, 0.5);
             for (joint, place) in joints(game, instance, &rig).iter().filter(|(joint, _)| !listed.contains(joint)) {

@@ -14,11 +14,12 @@ use crate::{
 };
 
 /// Number of passes; each solves the bones' movements anew.
-const PASSES: usize = 2;
+const PASSES: usize = 5;
 /// Rounds of averaging in a pass.
-const ROUNDS: usize = 40;
-/// Round from which neighbours of the corners are averaged, too.
-const WIDEN: usize = 1;
+const ROUNDS: usize = 120;
+/// Rounds after which places one edge further from the corners are averaged, too; the first do so after one round. On a dense
+/// mesh a fold is many edges wide.
+const WIDEN: usize = 10;
 /// Share of its own weights that a place keeps in a round.
 const OWN: f32 = 0.25;
 
@@ -28,8 +29,8 @@ type Influences = Vec<(u32, f32)>;
 ///
 /// All in head space; `mask` and `weights` as [`FittedFace::new`] takes them. Points at the same place keep the same
 /// weights. Bones move otherwise with other weights, so that each pass poses anew, and the weights with the fewest folds
-/// are kept, of which no point has more than `most`. Returns the folds that are left, summed over the six, after [`FittedFace::pose`] has repaired the poses.
-/// Cost: a few poses of every expression.
+/// are kept, of which no point has more than `most`. Returns the folds that are left, summed over the six, after
+/// [`FittedFace::pose`] has repaired the poses. Cost: a few poses of every expression.
 pub fn repair_folds(
     set: &ExpressionSet,
     points: &[Vec3],
@@ -164,7 +165,8 @@ impl AveragedWeights<'_> {
         for round in 0..ROUNDS {
             let mut places: Vec<u32> = folded.iter().flat_map(|&triangle| self.places(triangle)).collect();
             sort(&mut places);
-            if round >= WIDEN {
+            let rings = if round > 0 { 1 + round / WIDEN } else { 0 };
+            for _ in 0..rings {
                 let next: Vec<u32> = places.iter().flat_map(|&place| self.next_to(place)).collect();
                 places.extend(next);
                 sort(&mut places);

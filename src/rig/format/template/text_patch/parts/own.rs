@@ -1,4 +1,4 @@
-//! What a template with parts has itself, in its text.
+//! Joints and tags that a template with parts has itself, in its text.
 
 use std::{
     borrow::Cow,
@@ -106,12 +106,12 @@ impl<'r> OwnThings<'r> {
         Some(staged)
     }
 
-    /// What the template has itself now.
+    /// Joints and tags that the template has itself now.
     fn now(&self, rig: &Rig) -> Rig {
         self.stripped(rig, &self.set_by_kept, &|uid| self.is_own(uid))
     }
 
-    /// What the template had itself before.
+    /// Joints and tags that the template had itself before.
     fn before(&self) -> Rig {
         self.stripped(self.rigs.before, &self.set_by_any, &|uid| self.rigs.own.is_taken(uid))
     }
