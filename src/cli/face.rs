@@ -153,13 +153,19 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     let mut shapes = Vec::new();
     if args.arkit {
         shapes = spinning("baking blend shapes", || bench.arkit_shapes(args.export.settings().max_influences))?;
+        tell_kept_morphs(&bench, &shapes, &mut report);
         bench.store_poses(shapes.iter().map(|shape| (shape.name.clone(), shape.pose.clone())).collect())?;
         report.line(format!("{} blend shapes of ARKit", shapes.len()));
         report.set("arkit", shapes.iter().map(|shape| shape.name.as_str()).collect::<Vec<_>>());
     }
     report.set("joints", bench.rig().len());
     match output_kind {
-        OutputKind::Rig => report.notes(store_rig(&RealDisk, &args.output, bench.rig())?),
+        OutputKind::Rig => {
+            if !args.expression.is_empty() {
+                store_expression(args, &mut bench, &mut report)?;
+            }
+            report.notes(store_rig(&RealDisk, &args.output, bench.rig())?);
+        }
         OutputKind::Character => {
             let mut model = bench.character();
             add_morphs(&mut model, &shapes);
@@ -184,6 +190,10 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
                 let error =
                     spinning("reading back", || fit_error::fit_error(&args.output, &model, rest, shapes, &head))?;
                 report_written_error(&mut report, error);
+            } else if fitted.is_some() && !is_plain {
+                let note = "the error of the fit is not measured in a file with other poses; write one without --arkit, \
+                    --expression and .vrm";
+                report.notes.push(note.to_owned());
             }
         }
         OutputKind::Picture => picture(args, &bench, &mut report)?,
@@ -226,6 +236,29 @@ fn express(args: &FaceArgs, bench: &mut Workbench, report: &mut Report) -> Resul
     bench.express(strengths.clone())?;
     report.set("expressions", json!(strengths));
     Ok(())
+}
+
+/// Stores the expression as a pose of the rig: a template has no pose of the moment.
+fn store_expression(args: &FaceArgs, bench: &mut Workbench, report: &mut Report) -> Result<(), Failure> {
+    let names: Vec<&str> = args.expression.iter().map(|(name, _)| name.as_str()).collect();
+    let name = names.join(", ");
+    let pose = bench.rig().pose().clone();
+    report.notes.push(format!("the expression is the stored pose \"{name}\" of the rig"));
+    Ok(bench.store_poses(vec![(name, pose)])?)
+}
+
+/// Reports morph targets of the mesh that have the names of shapes.
+fn tell_kept_morphs(bench: &Workbench, shapes: &[FaceShape], report: &mut Report) {
+    let Some(mesh) = bench.mesh() else { return };
+    let is_kept = |shape: &&FaceShape| mesh.file.objects.iter().any(|object| object.morph_names.contains(&shape.name));
+    let kept = shapes.iter().filter(is_kept).count();
+    if kept > 0 {
+        let targets = counted(kept, "morph target", "morph targets");
+        report.notes.push(format!(
+            "{targets} of the mesh with names of ARKit stay as they are, and the clips of these names show other shapes; \
+             give the mesh without them"
+        ));
+    }
 }
 
 /// Adds shapes as morph targets to the objects that they move. Targets that an object has already stay as they are.

@@ -2,6 +2,7 @@
 
 mod bends;
 mod body;
+mod carriers;
 mod late_joints;
 mod parts;
 mod report;
@@ -21,6 +22,7 @@ pub use self::{
 };
 use self::{
     bends::{TriedBend, push_edits, tried_bends},
+    carriers::joints_at_nodes,
     parts::{object_points, runs_by_value},
 };
 use super::{
@@ -204,7 +206,7 @@ pub struct SkinningInput {
 
 impl SkinningInput {
     /// Collects the input for a mesh from a rig and its build. Objects that hang on a joint in their file are rigid,
-    /// too; joints that commands created are locked with the node that they were made for.
+    /// too, as are those of a mesh without its skeleton that hang on a node which the rig has a joint for; joints that commands created are locked with the node that they were made for.
     ///
     /// `modules` tells which commands take lengths that follow from the mesh; without it none does.
     pub fn new(
@@ -243,7 +245,7 @@ impl SkinningInput {
             bending_parts: Vec::new(),
             bends,
         };
-        input.choose(mesh, &skeleton, &bindings(mesh, parts));
+        input.choose(mesh, &skeleton, &bindings(rig, mesh, parts));
         input
     }
 
@@ -309,9 +311,11 @@ impl SkinningInput {
 
 /// Bindings of parts in the order in which they count: objects that hang on a joint in their file, unless a person decided
 /// about them, objects that a person decided about, and pieces.
-fn bindings(mesh: &RigMesh, parts: &[(MeshPart, PartBinding)]) -> Vec<(MeshPart, PartBinding)> {
+fn bindings(rig: &Rig, mesh: &RigMesh, parts: &[(MeshPart, PartBinding)]) -> Vec<(MeshPart, PartBinding)> {
+    let alike = if mesh.nodes.is_empty() { joints_at_nodes(rig, &mesh.file) } else { BTreeMap::new() };
     let carried = mesh.rest.objects.iter().enumerate().filter_map(|(object, data)| {
-        let joint = mesh.nodes.get(data.node?)?;
+        let node = data.node?;
+        let joint = mesh.nodes.get(node).or_else(|| alike.get(&node))?;
         Some((MeshPart::Object(object), PartBinding::Rigid(*joint)))
     });
     let carried = carried.filter(|(object, _)| parts.iter().all(|(other, _)| other != object));

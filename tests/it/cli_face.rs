@@ -37,6 +37,9 @@ fn a_head_becomes_a_character_and_a_rig() {
     assert_eq!(rigsmith(folder.path(), &happy).code, 0);
     let template = load_template(&RealDisk, Path::new(&rig)).unwrap();
     assert!(template.rig.find_label("head").is_some());
+    // A template holds no pose of the moment: the expression is one of its stored poses.
+    let stored = template.rig.stored_poses();
+    assert!(stored.len() == 1 && stored[0].name == "happiness" && stored[0].offsets.len() > 4, "{stored:?}");
     let first = fs::read(&rig).unwrap();
     assert_eq!(rigsmith(folder.path(), &happy).code, 0);
     assert_eq!(fs::read(&rig).unwrap(), first, "the same command writes the same bytes");
@@ -78,6 +81,21 @@ fn an_expression_poses_the_character() {
     let differ = still.nodes.iter().zip(&moved.nodes).filter(|(a, b)| a.rest != b.rest).count();
     assert!(differ > 4, "{differ} nodes are posed");
     assert_eq!(still.points, moved.points, "the mesh itself stays");
+}
+
+/// Shapes of the mesh stay as they are where shapes of these names are baked, which is told.
+#[test]
+fn shapes_that_the_mesh_has_already_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = head();
+    let first = rigsmith(folder.path(), &["face", &head, "--bones", "12", "--arkit", "-o", "first.glb", "--json"]);
+    assert_eq!(first.code, 0, "{}", first.err);
+    assert!(!first.json()["notes"].to_string().contains("stay as they are"), "{}", first.out);
+    let args = ["face", "first.glb", "--bones", "8", "--arkit", "-o", "second.glb", "--json"];
+    let second = rigsmith(folder.path(), &args).json();
+    let baked = second["arkit"].as_array().unwrap().len();
+    let told = second["notes"].to_string();
+    assert!(told.contains(&format!("{baked} morph targets of the mesh with names of ARKit stay")), "{told}");
 }
 
 #[test]

@@ -1,8 +1,12 @@
 //! Automatic weights on bodies and characters with weights painted by hand: how near they are, and how they bend.
 
+#[cfg(feature = "cli")]
+use std::collections::BTreeSet;
 use std::{collections::BTreeMap, path::Path};
 
 use glam::{Quat, Vec3};
+#[cfg(feature = "cli")]
+use rigsmith::files::{RealDisk, load_model};
 use rigsmith::{
     algo::weights::{IdleReason, WeightJoint, WeightReport, WeightSettings, skin_weights},
     mesh::{
@@ -276,6 +280,37 @@ fn characters_of_many_parts_are_bound_part_by_part() {
     let reasons = all.report.idle_joints.iter().map(|idle| idle.reason);
     let far = reasons.filter(|reason| matches!(reason, IdleReason::Outside { distance } if *distance > 0.1)).count();
     assert!(far >= 2, "{:?}", all.report.idle_joints);
+}
+
+/// Objects that hang on a joint in their file follow it alone, where the command opens the mesh without its skeleton, too.
+#[cfg(feature = "cli")]
+#[test]
+fn what_hangs_on_a_joint_in_its_file_is_bound_to_it_by_the_command() {
+    let Some(data) = test_data() else { return };
+    let mage = data.join("characters/Mage.glb");
+    let path = mage.display().to_string();
+    let folder = tempfile::tempdir().unwrap();
+    let answer = crate::cli_build::rigsmith(folder.path(), &["skin", &path, &path, "-o", "mage.glb"]);
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    let [before, after] = [mage, folder.path().join("mage.glb")].map(|path| load_model(&RealDisk, &path).unwrap());
+    let carried = before.objects.iter().filter(|object| object.node.is_some());
+    let mut count = 0;
+    for object in carried {
+        let carrier = &before.nodes[object.node.unwrap()].name;
+        let at = after.objects.iter().position(|other| other.name == object.name).unwrap();
+        let points = after.parts.iter().filter(|part| part.object == at).flat_map(|part| &part.vertices);
+        let holders: BTreeSet<&str> = match (after.objects[at].node, &after.weights) {
+            (Some(node), _) => [after.nodes[node].name.as_str()].into(),
+            (None, Some(weights)) => {
+                let influences = points.flat_map(|point| weights.of(*point as usize));
+                influences.map(|(node, _)| after.nodes[node as usize].name.as_str()).collect()
+            }
+            (None, None) => BTreeSet::new(),
+        };
+        assert_eq!(holders, [carrier.as_str()].into(), "{}", object.name);
+        count += 1;
+    }
+    assert!(count >= 2, "{count} objects hang on joints");
 }
 
 /// Errors against the weights of the files, as measured.

@@ -133,7 +133,9 @@ pub enum FaceBonesError {
     #[error("no facial bones were asked for; ask for one at least")]
     NoBones,
     /// A mask with fewer vertices than bones.
-    #[error("{bones} facial bones do not fit on a facial mask of {vertices} vertices; ask for fewer")]
+    #[error(
+        "{bones} facial bones do not fit on a facial mask of {vertices} vertices; give a mesh whose face has more, or ask for fewer bones"
+    )]
     TooManyBones {
         /// Number of bones requested.
         bones: usize,
