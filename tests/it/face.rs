@@ -402,12 +402,13 @@ fn real_heads_and_creatures_get_faces() {
 
 #[test]
 fn faces_of_real_heads_hardly_fold() {
-    // The folds of the six expressions together, a tenth above what was measured.
+    // The folds of the six expressions together, a tenth or one above what was measured.
     let heads = [
-        ("ict_neutral", [35, 61, 37, 73]),
-        ("ict_identity_1", [2, 35, 23, 36]),
-        ("ict_identity_2", [40, 137, 113, 140]),
-        ("lee_perry_smith", [39, 66, 85, 90]),
+        ("ict_neutral", [1, 1, 1, 1]),
+        ("ict_identity_1", [1, 2, 1, 1]),
+        ("ict_identity_2", [1, 5, 6, 3]),
+        ("ict_identity_3", [1, 1, 19, 19]),
+        ("lee_perry_smith", [1, 11, 1, 3]),
     ];
     for (head, folds) in heads {
         let file = format!("heads/{head}.obj");
