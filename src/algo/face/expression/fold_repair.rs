@@ -20,6 +20,8 @@ const ROUNDS: usize = 120;
 /// Rounds after which places one edge further from the corners are averaged, too; the first do so after one round. On a dense
 /// mesh a fold is many edges wide.
 const WIDEN: usize = 10;
+/// Rounds without fewer folds after which a pass ends.
+const PATIENCE: usize = 60;
 /// Share of its own weights that a place keeps in a round.
 const OWN: f32 = 0.25;
 
@@ -162,15 +164,10 @@ struct AveragedWeights<'a> {
 impl AveragedWeights<'_> {
     /// Averages until no triangle is folded or all rounds are over.
     fn smooth(&mut self, mut folded: Vec<u32>) {
+        let (mut least, mut waited) = (usize::MAX, 0);
         for round in 0..ROUNDS {
-            let mut places: Vec<u32> = folded.iter().flat_map(|&triangle| self.places(triangle)).collect();
-            sort(&mut places);
             let rings = if round > 0 { 1 + round / WIDEN } else { 0 };
-            for _ in 0..rings {
-                let next: Vec<u32> = places.iter().flat_map(|&place| self.next_to(place)).collect();
-                places.extend(next);
-                sort(&mut places);
-            }
+            let places = self.around(&folded, rings);
             let averaged = |&place: &u32| {
                 let influences = self.average(place);
                 let posed = self.posed_with(place, || influences.iter().copied());
@@ -194,10 +191,34 @@ impl AveragedWeights<'_> {
                 self.posed[place as usize] = posed;
             }
             folded = near.into_par_iter().filter(|&triangle| self.is_folded(triangle)).collect();
-            if folded.is_empty() {
+            waited = if folded.len() < least { 0 } else { waited + 1 };
+            least = least.min(folded.len());
+            if folded.is_empty() || waited == PATIENCE {
                 return;
             }
         }
+    }
+
+    /// Corners of triangles and the places up to so many edges from them, in rising order.
+    fn around(&self, triangles: &[u32], rings: usize) -> Vec<u32> {
+        let mut places: Vec<u32> = triangles.iter().flat_map(|&triangle| self.places(triangle)).collect();
+        sort(&mut places);
+        let mut is_in = vec![false; self.surface.first.len()];
+        places.iter().for_each(|&place| is_in[place as usize] = true);
+        let mut from = 0;
+        for _ in 0..rings {
+            let to = places.len();
+            for at in from..to {
+                for other in self.next_to(places[at]) {
+                    if !std::mem::replace(&mut is_in[other as usize], true) {
+                        places.push(other);
+                    }
+                }
+            }
+            from = to;
+        }
+        places.sort_unstable();
+        places
     }
 
     /// The weights of all points.
