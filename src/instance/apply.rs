@@ -73,7 +73,7 @@ struct DueInstance {
     is_fresh: bool,
     /// True if its template is another version than the one it runs.
     is_other: bool,
-    /// Its clips for that version.
+    /// Clips of the instance for that version.
     clips: Option<UpdatedClips>,
 }
 

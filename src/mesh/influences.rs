@@ -18,20 +18,17 @@ pub fn keep_strongest(influences: &mut Vec<(u32, f32)>, most: usize, least: f32)
     }
 }
 
-/// Keeps the strongest influences of a point as [`keep_strongest`] does, and takes the weight of the first one that goes from
-/// each that stays.
-///
-/// Weights that change evenly along a surface go on doing so: where two influences change places in the order, both are
-/// zero. Mirror images in the plane of symmetry, which are equally strong, stay or go together.
-pub fn keep_strongest_evenly(influences: &mut Vec<(u32, f32)>, most: usize, least: f32) {
+/// Share of a weight up to which another counts as equally strong.
+const ALIKE: f32 = 1e-5;
+
+/// Keeps the strongest influences of a point as [`keep_strongest`] does, but of equally strong ones all or none, as long as one
+/// stays: mirror images in a plane of symmetry stay or go together.
+pub fn keep_strongest_alike(influences: &mut Vec<(u32, f32)>, most: usize, least: f32) {
     keep_strongest(influences, usize::MAX, 0.0);
     if let Some((_, next)) = influences.get(most.max(1)).copied() {
         influences.truncate(most.max(1));
-        let strongest = influences[0];
-        influences.iter_mut().for_each(|(_, weight)| *weight -= next);
-        influences.retain(|(_, weight)| *weight > 0.0);
-        if influences.is_empty() {
-            influences.push(strongest);
+        while influences.len() > 1 && influences.last().is_some_and(|(_, last)| *last <= next * (1.0 + ALIKE)) {
+            influences.pop();
         }
     }
     keep_strongest(influences, most, least);

@@ -24,7 +24,7 @@ const BASE: &str = r#"(
     sockets: [(name: "side", joint: "palm", translation: (1, 0, 0))],
     joints: [
         (label: "palm", translation: (0.5, 1, 0), tags: [control()]),
-        (label: "ring", parent: "palm", translation: (0, 1, 0), tags: [parent(targets: "@command control/a_base role:control")]),
+        (label: "ring", parent: "palm", translation: (0, 1, 0), tags: [parent(targets: "@joint a_bone_1")]),
     ],
     parts: [
         // The finger.
@@ -39,7 +39,7 @@ const BASE: &str = r#"(
 )
 "#;
 
-/// What a person changed of the finger.
+/// Changes that a person made of the finger.
 const CHANGES: &str = r#"            changes: [(tag: "control/base", params: (relative_size: 0.9))],
 "#;
 

@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     algo::weights::laplacian::Graph,
-    mesh::{adjacency::weld, influences::keep_strongest_evenly, model::Weights},
+    mesh::{adjacency::weld, influences::keep_strongest_alike, model::Weights},
 };
 
 pub(crate) use symmetry::Mirror;
@@ -89,8 +89,7 @@ pub(crate) struct Face<'a> {
 /// `points` are in head space; `shells`, `groups`, `landmarks` and `bones` belong to them. Joints of the result: 0 is
 /// the neck, 1 the head, 2 + i is `bones[i]`. Every point has one to `most` influences, strongest first, that sum to
 /// one; points at equal places have equal weights, and so, mirrored, have points of a symmetric head that are each
-/// other's mirror images. Where more bones reach a point, all of its weights lose that of the strongest one too many, so that
-/// they go on changing evenly along the skin. The same input gives the same bits with any number of threads.
+/// other's mirror images. The same input gives the same bits with any number of threads.
 /// `progress` is called with a share from 0 to 1 and returns whether to go on.
 ///
 /// # Errors
@@ -179,7 +178,7 @@ pub(crate) type Row = Vec<(u32, f32)>;
 
 /// Keeps the strongest influences of a vertex; one without any belongs to the head.
 fn finish(row: &mut Row, most: usize) {
-    keep_strongest_evenly(row, most, PRUNE);
+    keep_strongest_alike(row, most, PRUNE);
     if row.is_empty() {
         row.push((HEAD, 1.0));
     }

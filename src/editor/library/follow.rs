@@ -38,7 +38,7 @@ pub(super) struct PendingLoad {
     pub base: Arc<Rig>,
     /// Mesh that the skeleton goes into.
     pub mesh: Option<Entity>,
-    /// What is told once the step is made.
+    /// Notice that is told once the step is made.
     pub told: String,
 }
 

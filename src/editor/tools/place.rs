@@ -16,7 +16,6 @@ use crate::{
         mode::Mode,
         notice::{Notice, StatusLine},
         panel::{PanelApp, ViewportPainter},
-        panels::log::LogSystems,
         pointer::{PointerAct, ViewportArea},
     },
     mesh::ray::Ray,
@@ -34,10 +33,9 @@ pub struct PlacePlugin;
 impl Plugin for PlacePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<PlaceTool>()
-            .add_systems(Update, place.in_set(ToolSystems::Tools).after(select::select))
+            .add_systems(Update, (tell_late, place).chain().in_set(ToolSystems::Tools).after(select::select))
             .add_message::<PlaceAnswer>()
             .add_systems(PostUpdate, show.in_set(ToolSystems::Show).after(select::say))
-            .add_systems(Last, tell_late.before(LogSystems))
             .add_painter(DepthPainter);
     }
 }

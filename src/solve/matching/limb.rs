@@ -24,6 +24,15 @@ pub(super) struct Limb<'a> {
 /// times as far as its end.
 const NEAR: f32 = 1e-6;
 
+/// Tolerance of the middle joint's position, as a share of the limb's length.
+const NEAR_MIDDLE: f32 = 2e-5;
+
+/// Share of its length that a limb reaches at least for a goal ahead of its end to be tried.
+const STRAIGHT: f32 = 0.999;
+
+/// Ways by which the goal of an almost straight limb is moved ahead, as shares of the limb's length.
+const AHEAD: [f32; 9] = [-1e-6, -5e-7, -2.5e-7, 1.25e-7, 2.5e-7, 5e-7, 1e-6, 4e-6, 1.6e-5];
+
 /// Rounds in which the controls above a limb and its own are brought to agree.
 const ROUNDS: usize = 2;
 
@@ -127,6 +136,10 @@ impl Limb<'_> {
             attempt.place_carried(pole, &Trs { translation: place, ..now })?;
         }
 
+        if wanted.len() == 3 && !solver.is_soft {
+            self.hold_straight(attempt, wanted, length)?;
+        }
+
         // A soft limb lags behind its goal: the goal is moved ahead until the end is at its wanted place.
         let off = |attempt: &mut Attempt<'_>, ahead: f32| -> Result<f32, MatchError> {
             let line = direction(end.translation - root.translation).unwrap_or(Vec3::X);
@@ -155,6 +168,30 @@ impl Limb<'_> {
         }
         off(attempt, high)?;
         Ok(())
+    }
+
+    /// Moves the goal of an almost straight limb ahead until the middle joint is where it should be: rounding that puts the goal
+    /// a little nearer bends such a limb by thousands of times as much.
+    fn hold_straight(&self, attempt: &mut Attempt<'_>, wanted: &[Trs], length: f32) -> Result<(), MatchError> {
+        let (root, mid, end) = (wanted[0].translation, self.joints[1], wanted[2].translation);
+        let Some(line) = direction(end - root) else { return Ok(()) };
+        let near = NEAR_MIDDLE * length;
+        let first = attempt.global(mid)?.translation.distance(wanted[1].translation);
+        if first <= near || root.distance(end) < STRAIGHT * length {
+            return Ok(());
+        }
+        let start = attempt.global(self.goal)?;
+        let mut best = (first, 0.0);
+        for share in AHEAD {
+            let ahead = share * length;
+            attempt.place_carried(self.goal, &Trs { translation: end + line * ahead, ..start })?;
+            let off = attempt.global(mid)?.translation.distance(wanted[1].translation);
+            best = if off < best.0 { (off, ahead) } else { best };
+            if off <= near {
+                return Ok(());
+            }
+        }
+        attempt.place_carried(self.goal, &Trs { translation: end + line * best.1, ..start })
     }
 
     /// Position of the pole that holds the middle joint, at the pole's built distance from it.

@@ -26,7 +26,7 @@ use rigsmith::{
 use super::{AppBench, HANG, TWO, saved};
 use crate::animation::keep::{NEAR, flip_all, gentle, joints_off};
 
-/// What updates told of clips.
+/// Reports of updates about clips.
 #[derive(Resource, Default)]
 struct ToldClips(Vec<Arc<ClipReport>>);
 

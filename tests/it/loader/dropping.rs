@@ -96,8 +96,8 @@ fn a_part_over_other_commands_is_told_once_it_is_there() {
         let place = studio.limb();
         studio.act(place, LibraryAct::Part { joints, options: Vec::new() });
     };
-    // Joints that do not follow each other are refused.
-    onto(&mut studio, vec![hips, elbow]);
+    // One joint is too few, which is refused.
+    onto(&mut studio, vec![elbow]);
     assert!(studio.desk.rig().dropped_parts().is_empty(), "{:?}", studio.desk.told());
     assert!(!studio.told("was added to joints"), "{:?}", studio.desk.told());
     onto(&mut studio, vec![hips, arm]);

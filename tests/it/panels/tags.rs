@@ -127,32 +127,6 @@ fn tags_are_listed_with_what_became_of_them() {
 }
 
 #[test]
-fn a_module_is_dragged_onto_a_joint() {
-    let sheet = Both::sheet(HierarchyPanel::default(), TagsPanel::default());
-    let mut desk = Desk::with(sheet, egui::vec2(900.0, 900.0));
-    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
-    desk.select(&[a]);
-    let (before, steps) = (desk.rig().clone(), desk.steps().1);
-    desk.click("+ Add");
-    desk.frames(3);
-    desk.type_text("null");
-    desk.frames(3);
-    let (from, to) = (desk.find("null").rect.center(), desk.find("b").rect.center());
-    desk.drag(from, to);
-    desk.frames(3);
-    let modules = |desk: &Desk, joint: Uid| {
-        let tags = desk.rig().joint(joint).unwrap().data.tags.iter();
-        tags.map(|tag| matches!(&tag.kind, TagKind::Command { module, .. } if module == "null")).collect::<Vec<_>>()
-    };
-    assert_eq!((modules(&desk, a), modules(&desk, b)), (vec![], vec![true]), "{:?}", desk.told());
-    assert_eq!(desk.steps().1, steps + 1);
-    let rig = desk.rig;
-    desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-    desk.frames(2);
-    assert_eq!(*desk.rig(), before);
-}
-
-#[test]
 fn what_an_operation_notes_is_told_once_it_is_done() {
     let mut desk = Desk::new(TagsPanel::default());
     let [a, b, c] = desk.chain(&["a", "b", "c"])[..] else { panic!() };

@@ -184,7 +184,7 @@ fn weights_of_a_mesh_that_is_not_open_are_told() {
     assert_eq!(folder.load().meshes.len(), 0);
 }
 
-/// What a project names outside of its folder is refused and told, and comes back from a copy in the folder.
+/// Files that a project names outside of its folder are refused and told, and come back from a copy in the folder.
 #[test]
 fn meshes_outside_of_the_folder_are_refused() {
     let folder = Folder::new();

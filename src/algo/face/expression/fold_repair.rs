@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::{ExpressionSet, FittedFace, Mix, bone_fit::SLIVER, text::Expression};
 use crate::{
     algo::face::{bones::FaceBone, landmarks::Landmarks, weights::Mirror},
-    mesh::{adjacency::weld, influences::keep_strongest_evenly, model::Weights},
+    mesh::{adjacency::weld, influences::keep_strongest_alike, model::Weights},
 };
 
 /// Number of passes; each solves the bones' movements anew.
@@ -259,7 +259,7 @@ impl AveragedWeights<'_> {
             add(place, 1.0);
         }
         sum.retain(|(_, weight)| *weight > 1e-4);
-        keep_strongest_evenly(&mut sum, self.most, 0.0);
+        keep_strongest_alike(&mut sum, self.most, 0.0);
         sum
     }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::{FIRST, PRUNE};
 use crate::{
     algo::face::{bones::FaceBone, landmarks::Landmarks},
-    mesh::{influences::keep_strongest_evenly, model::Weights},
+    mesh::{influences::keep_strongest_alike, model::Weights},
 };
 
 /// Largest distance between a point and the mirror image of its partner, as a share of the distance of the eyes.
@@ -140,7 +140,7 @@ impl Mirror {
                     None => list.push((joint, 0.5 * weight)),
                 }
             }
-            keep_strongest_evenly(&mut list, most, PRUNE);
+            keep_strongest_alike(&mut list, most, PRUNE);
             both.push(list.iter().copied());
         }
         *weights = both;
