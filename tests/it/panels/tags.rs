@@ -13,7 +13,7 @@ use bevy_egui::egui;
 use rigsmith::{
     editor::{
         panel::{EditorPanel, Requests},
-        panels::{hierarchy::HierarchyPanel, process::ProcessPanel, properties::PropertiesPanel, tags::TagsPanel},
+        panels::{process::ProcessPanel, properties::PropertiesPanel, tags::TagsPanel},
     },
     files::{RealDisk, load_template, store_rig_over},
     plugins::{

@@ -360,7 +360,7 @@ fn all_actions_are_taken_back_by_undo() {
             continue;
         }
         walk.ready();
-        walk.check(&format!("{action:?}"), false, |desk| {
+        walk.check(&format!("{action:?}"), 1, |desk| {
             desk.app.world_mut().write_message(ActionRequest(action));
             desk.frames(4);
         });
