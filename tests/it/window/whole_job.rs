@@ -129,7 +129,7 @@ fn an_unseen_body_becomes_an_animated_character_by_hand_on_a_display_and_gpu() {
 
     // Somebody else saves the template.
     let text = fs::read_to_string(&template).unwrap();
-    let next = text.replacen("relative_size: 0.6", "relative_size: 0.7", 1);
+    let next = text.replacen("relative_size: 2.2", "relative_size: 2.4", 1);
     assert_ne!(next, text, "the template has a size to change");
     let beside = folder.join("hero.rig.ron.part");
     fs::write(&beside, next).unwrap();
