@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     plugins::{
-        animation::RigClips,
+        animation::{PlayedClip, RigClips},
         runtime::{ControlPose, InstanceMode, RigNodes, RigRuntime, furnish_instance, spawn_instance},
         schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer},
     },
@@ -85,6 +85,8 @@ struct Step<'a> {
     exchange: usize,
     /// The pose of the instance where its offsets have to change, so that its joints stand as before.
     kept: Option<KeptPose>,
+    /// Nodes that have an offset for that and had none before.
+    held: Vec<Uid>,
 }
 
 /// Gives every instance the program of its template: all of them in this frame, but those whose clips are being re-expressed.
@@ -138,7 +140,7 @@ pub(super) fn update_instances(world: &mut World) {
         describe(world, *entity, &built.built.nodes);
         world.entity_mut(*entity).insert(RunningTemplate(built.clone()));
     }
-    let (changed_nodes, mut kept) = exchange(world, &going);
+    let (changed_nodes, mut kept, held) = exchange(world, &going);
     for ChangedNodes { entity, built, described } in &changed_nodes {
         match described {
             Some(nodes) => describe(world, *entity, nodes.iter().map(|node| &built.built.nodes[*node])),
@@ -150,6 +152,13 @@ pub(super) fn update_instances(world: &mut World) {
     }
     for (entity, kept) in &kept {
         pose_controls(world, *entity, kept);
+    }
+    // What was shown of a clip is held in this frame; the next one shows the clip of this version.
+    for DueInstance { entity, .. } in going.iter().filter(|due| due.clips.is_some()) {
+        let nodes = held.get(entity).cloned().unwrap_or_default();
+        if let Some(mut played) = world.get_mut::<PlayedClip>(*entity).filter(|_| !nodes.is_empty()) {
+            played.unpose(nodes);
+        }
     }
     for DueInstance { entity, .. } in fresh {
         world.trigger(RigBuilt { entity });
@@ -206,8 +215,11 @@ struct ChangedDescriptions {
 }
 
 /// Lets instances go on with the programs of their templates. Returns instances whose nodes are others now or described
-/// otherwise, and the poses of instances whose offsets are others now.
-fn exchange(world: &mut World, going: &[DueInstance]) -> (Vec<ChangedNodes>, EntityHashMap<KeptPose>) {
+/// otherwise, the poses of instances whose offsets are others now, and the nodes that have an offset only since.
+fn exchange(
+    world: &mut World,
+    going: &[DueInstance],
+) -> (Vec<ChangedNodes>, EntityHashMap<KeptPose>, EntityHashMap<Vec<Uid>>) {
     let wanted: EntityHashMap<&DueInstance> = going.iter().map(|due| (due.entity, due)).collect();
     let mut query = world.query::<(Entity, &mut RigRuntime, &mut RunningTemplate)>();
     let mut exchanges: Vec<Arc<Exchange>> = Vec::new();
@@ -246,14 +258,16 @@ fn exchange(world: &mut World, going: &[DueInstance]) -> (Vec<ChangedNodes>, Ent
                 described: Some(described).filter(|_| !is_other),
             });
         }
-        steps.push(Step { entity, runtime, program: to, exchange: number, kept: None });
+        steps.push(Step { entity, runtime, program: to, exchange: number, kept: None, held: Vec::new() });
     }
-    steps.par_iter_mut().for_each(|Step { runtime, program, exchange, kept, .. }| {
+    steps.par_iter_mut().for_each(|Step { runtime, program, exchange, kept, held, .. }| {
         let Exchange { carry, keeper, .. } = &*exchanges[*exchange];
         if let Some(keeper) = keeper {
             let (offsets, values) = pose_of(runtime.state());
             *kept = Some(keeper.keep(&offsets, &values))
                 .filter(|kept| kept.offsets != offsets || !kept.deviations.is_empty());
+            let nodes = kept.iter().flat_map(|kept| kept.offsets.keys()).copied();
+            *held = nodes.filter(|node| !offsets.contains_key(node)).collect();
         }
         // Where nodes and entities stay as they are, the run marks the instances of which something is another.
         let changed = if carry.is_aligned() { runtime.bypass_change_detection() } else { &mut **runtime };
@@ -264,8 +278,13 @@ fn exchange(world: &mut World, going: &[DueInstance]) -> (Vec<ChangedNodes>, Ent
             runtime.state_mut().set_offset_at(slot, offset);
         }
     });
-    let kept = steps.into_iter().filter_map(|step| Some((step.entity, step.kept?))).collect();
-    (others, kept)
+    let mut held: EntityHashMap<Vec<Uid>> = EntityHashMap::default();
+    let mut kept: EntityHashMap<KeptPose> = EntityHashMap::default();
+    for Step { entity, kept: pose, held: nodes, .. } in steps {
+        held.insert(entity, nodes);
+        kept.extend(pose.map(|pose| (entity, pose)));
+    }
+    (others, kept, held)
 }
 
 /// Offsets and attribute values of an instance.

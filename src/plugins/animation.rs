@@ -14,7 +14,7 @@ use std::{borrow::Cow, sync::Arc};
 use bevy::{app::AnimationSystems, prelude::*};
 
 pub use graph::{AttributeProperty, ClipTargets, animation_clip, target_id};
-use play::PlayedClip;
+pub(crate) use play::PlayedClip;
 
 use super::{RigSystems, configure_sets};
 use crate::rig::{RigEdit, Uid, animation::RigClip, operations::Operation};

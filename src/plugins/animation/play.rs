@@ -34,6 +34,8 @@ pub struct PlayedClip {
     revision: Option<Revision>,
     /// Properties that a clip has moved and moves no longer: they go back to the pose of the document.
     pub(super) released: BTreeSet<TrackTarget>,
+    /// Nodes whose offsets hold what a clip moved in another version of the rig: they go back to none.
+    pub(super) unposed: Vec<Uid>,
 }
 
 /// Nodes of a halted clip that the next frame writes.
@@ -133,6 +135,12 @@ pub(super) fn compile(
 }
 
 impl PlayedClip {
+    /// Takes offsets from nodes that were posed to hold what a clip shows, before the clip, which moves others now, is shown again.
+    pub(crate) fn unpose(&mut self, nodes: Vec<Uid>) {
+        self.unposed = nodes;
+        self.due = PendingWrite::All;
+    }
+
     /// Ends the playback; what the clip has moved goes back to the pose of the document.
     pub(super) fn end(&mut self) {
         let Some(compiled) = self.compiled.take() else { return };

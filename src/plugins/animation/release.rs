@@ -14,7 +14,7 @@ use crate::{
         runtime::{ControlPose, RigRuntime},
         schema::Attributes,
     },
-    rig::{Rig, Uid, animation::Property},
+    rig::{PoseOffset, Rig, Uid, animation::Property},
 };
 
 /// Ends the playback of rigs.
@@ -45,10 +45,15 @@ pub(super) fn release(
     mut attributes: Query<&mut Attributes>,
 ) {
     for (mut played, mut runtime, rig, joints, rest) in &mut rigs {
-        if played.released.is_empty() || rest.is_some_and(|rest| rest.0) {
+        if played.released.is_empty() && played.unposed.is_empty() || rest.is_some_and(|rest| rest.0) {
             continue;
         }
-        let released = std::mem::take(&mut played.bypass_change_detection().released);
+        let played = played.bypass_change_detection();
+        for node in std::mem::take(&mut played.unposed) {
+            let Some(place) = NodePlace::of(node, runtime.as_deref(), rig, joints) else { continue };
+            pose(&place, node, PoseOffset::IDENTITY, (&mut poses, &mut transforms), &mut runtime);
+        }
+        let released = std::mem::take(&mut played.released);
         let Some(rig) = rig else { continue };
         let mut nodes: BTreeMap<Uid, Vec<Property>> = BTreeMap::new();
         for target in released {
@@ -79,27 +84,38 @@ pub(super) fn release(
                     }
                 }
             }
-            if !place.is_posable {
-                continue;
+            pose(&place, node, offset, (&mut poses, &mut transforms), &mut runtime);
+        }
+    }
+}
+
+/// Gives a node an offset, if it can be posed.
+fn pose(
+    place: &NodePlace,
+    node: Uid,
+    offset: PoseOffset,
+    (poses, transforms): (&mut Query<&mut ControlPose>, &mut Query<&mut Transform>),
+    runtime: &mut Option<Mut<RigRuntime>>,
+) {
+    if !place.is_posable {
+        return;
+    }
+    if place.is_direct
+        && let Ok(mut pose) = poses.get_mut(place.entity)
+    {
+        pose.set_if_neq(offset.into());
+    }
+    // The program of a running rig writes the transforms of its nodes; a clip that moves the node goes on from here.
+    match runtime {
+        Some(runtime) => {
+            let state = runtime.bypass_change_detection().state_mut();
+            if let Some(slot) = state.program().node(node) {
+                state.set_offset_at(slot, offset);
             }
-            if place.is_direct
-                && let Ok(mut pose) = poses.get_mut(place.entity)
-            {
-                pose.set_if_neq(offset.into());
-            }
-            // The program of a running rig writes the transforms of its nodes; a clip that moves the node goes on from here.
-            match &mut runtime {
-                Some(runtime) => {
-                    let state = runtime.bypass_change_detection().state_mut();
-                    if let Some(slot) = state.program().node(node) {
-                        state.set_offset_at(slot, offset);
-                    }
-                }
-                None => {
-                    if let Ok(mut transform) = transforms.get_mut(place.entity) {
-                        transform.set_if_neq(offset.on(&place.base));
-                    }
-                }
+        }
+        None => {
+            if let Ok(mut transform) = transforms.get_mut(place.entity) {
+                transform.set_if_neq(offset.on(&place.base));
             }
         }
     }
