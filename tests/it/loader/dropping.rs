@@ -97,7 +97,8 @@ fn a_part_over_other_commands_is_told_once_it_is_there() {
         studio.act(place, LibraryAct::Part { joints, options: Vec::new() });
     };
     // One joint is too few, which is refused.
-    onto(&mut studio, vec![elbow]);
+    let one = LibraryAct::Part { joints: vec![elbow], options: Vec::new() };
+    studio.act(TemplatePlace::Bundled("parts/arm.rig.ron"), one);
     assert!(studio.desk.rig().dropped_parts().is_empty(), "{:?}", studio.desk.told());
     assert!(!studio.told("was added to joints"), "{:?}", studio.desk.told());
     onto(&mut studio, vec![hips, arm]);
