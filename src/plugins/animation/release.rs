@@ -50,7 +50,9 @@ pub(super) fn release(
         }
         let played = played.bypass_change_detection();
         for node in std::mem::take(&mut played.unposed) {
-            let Some(place) = NodePlace::of(node, runtime.as_deref(), rig, joints) else { continue };
+            // A joint that cannot be posed may hold what was shown, too.
+            let Some(mut place) = NodePlace::of(node, runtime.as_deref(), rig, joints) else { continue };
+            place.is_posable = true;
             pose(&place, node, PoseOffset::IDENTITY, (&mut poses, &mut transforms), &mut runtime);
         }
         let released = std::mem::take(&mut played.released);

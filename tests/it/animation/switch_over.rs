@@ -145,6 +145,7 @@ fn check(bench: &mut Workbench, switch: &SwitchData, value: f32, range: [f32; 2]
         bench.app_mut().world_mut().resource_mut::<Messages<SwitchedOver>>().drain().collect();
     assert_eq!(told.len(), 1, "{what}");
     let bounds = if value > 0.5 && what.contains("inverse") { NEARLY } else { HELD };
+    println!("{what}: {:?}", told[0].notes);
     // What is not held as it should be is told.
     let mut deviations = told[0].notes.iter().map(|note| &note.deviation);
     assert!(deviations.all(|off| off.distance <= bounds[0] && off.angle <= bounds[1]), "{what}: {:?}", told[0].notes);
