@@ -154,10 +154,10 @@ pub(super) fn update_instances(world: &mut World) {
         pose_controls(world, *entity, kept);
     }
     // What was shown of a clip is held in this frame; the next one shows the clip of this version.
-    for DueInstance { entity, .. } in going.iter().filter(|due| due.clips.is_some()) {
-        let nodes = held.get(entity).cloned().unwrap_or_default();
-        if let Some(mut played) = world.get_mut::<PlayedClip>(*entity).filter(|_| !nodes.is_empty()) {
-            played.unpose(nodes);
+    let is_re_expressed = |due: &&DueInstance| due.clips.as_ref().is_some_and(|clips| clips.origin.is_some());
+    for DueInstance { entity, .. } in going.iter().filter(is_re_expressed) {
+        if let Some(mut played) = world.get_mut::<PlayedClip>(*entity) {
+            played.unpose(held.get(entity).map_or(&[], Vec::as_slice));
         }
     }
     for DueInstance { entity, .. } in fresh {

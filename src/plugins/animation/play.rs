@@ -34,8 +34,8 @@ pub struct PlayedClip {
     revision: Option<Revision>,
     /// Properties that a clip has moved and moves no longer: they go back to the pose of the document.
     pub(super) released: BTreeSet<TrackTarget>,
-    /// Nodes whose offsets hold what a clip moved in another version of the rig: they go back to none.
-    pub(super) unposed: Vec<Uid>,
+    /// Properties that hold what a clip moved in another version of a rig without a document: they go back to rest.
+    pub(super) unposed: Vec<TrackTarget>,
 }
 
 /// Nodes of a halted clip that the next frame writes.
@@ -135,9 +135,17 @@ pub(super) fn compile(
 }
 
 impl PlayedClip {
-    /// Takes offsets from nodes that were posed to hold what a clip shows, before the clip, which moves others now, is shown again.
-    pub(crate) fn unpose(&mut self, nodes: Vec<Uid>) {
-        self.unposed = nodes;
+    /// Takes back what the clip has moved, and offsets of nodes that hold what it shows, before the clip, which moves others now,
+    /// is shown again.
+    pub(crate) fn unpose(&mut self, nodes: &[Uid]) {
+        let all = [Property::Translation, Property::Rotation, Property::Scale];
+        let of_node = |node: &Uid| all.clone().map(|property| TrackTarget { node: *node, property });
+        self.unposed = nodes.iter().flat_map(of_node).collect();
+        if let Some(compiled) = &self.compiled {
+            let written = compiled.sampler.targets().iter().zip(&compiled.written);
+            let posed = written.filter(|(target, value)| value.is_some() && all.contains(&target.property));
+            self.unposed.extend(posed.map(|(target, _)| target.clone()));
+        }
         self.due = PendingWrite::All;
     }
 

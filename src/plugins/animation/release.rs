@@ -14,7 +14,10 @@ use crate::{
         runtime::{ControlPose, RigRuntime},
         schema::Attributes,
     },
-    rig::{PoseOffset, Rig, Uid, animation::Property},
+    rig::{
+        PoseOffset, Rig, Uid,
+        animation::{Property, TrackTarget},
+    },
 };
 
 /// Ends the playback of rigs.
@@ -49,11 +52,18 @@ pub(super) fn release(
             continue;
         }
         let played = played.bypass_change_detection();
-        for node in std::mem::take(&mut played.unposed) {
+        for TrackTarget { node, property } in std::mem::take(&mut played.unposed) {
             // A joint that cannot be posed may hold what was shown, too.
             let Some(mut place) = NodePlace::of(node, runtime.as_deref(), rig, joints) else { continue };
             place.is_posable = true;
-            pose(&place, node, PoseOffset::IDENTITY, (&mut poses, &mut transforms), &mut runtime);
+            let (mut offset, rest) = (place.offset, PoseOffset::IDENTITY);
+            match property {
+                Property::Translation => offset.translation = rest.translation,
+                Property::Rotation => offset.rotation = rest.rotation,
+                Property::Scale => offset.scale = rest.scale,
+                Property::Attribute(_) => continue,
+            }
+            pose(&place, node, offset, (&mut poses, &mut transforms), &mut runtime);
         }
         let released = std::mem::take(&mut played.released);
         let Some(rig) = rig else { continue };
