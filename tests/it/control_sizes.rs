@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc, time::Duration};
 use bevy::math::Vec3;
 use rigsmith::{
     algo::control_size::{OUTSIDE, clear_factor, is_inside, outside_share},
-    files::{RealDisk, load_model, load_template},
+    files::{RealDisk, load_model},
     headless::Workbench,
     mesh::surface::Surface,
     modules,
@@ -20,9 +20,6 @@ use rigsmith::{
     processor::Builder,
     rig::{BuiltRig, Rig, Uid},
 };
-
-use super::cli_outputs::rigsmith;
-use crate::prerequisites::test_data;
 
 /// A box about the origin, twice as long as half of it is wide.
 fn flesh(half: f32) -> Surface {
@@ -183,8 +180,11 @@ fn no_control_of_animals_lies_in_the_flesh_about_their_bones() {
     }
 }
 
+#[cfg(feature = "cli")]
 #[test]
 fn no_control_of_fitted_animals_lies_in_their_flesh() {
+    use crate::{cli_outputs::rigsmith, prerequisites::test_data};
+
     let Some(data) = test_data() else { return };
     let folder = tempfile::tempdir().unwrap();
     for (mesh, template) in [("fox-fox", "quadruped"), ("fox-dog", "quadruped"), ("bird-eagle", "bird")] {
@@ -192,7 +192,7 @@ fn no_control_of_fitted_animals_lies_in_their_flesh() {
         let fit = ["fit", mesh.to_str().unwrap(), "--template", template, "-o", "fitted.rig.ron"];
         let (code, said) = rigsmith(folder.path(), &fit);
         assert_eq!(code, 0, "{said}");
-        let rig = load_template(&RealDisk, &folder.path().join("fitted.rig.ron")).unwrap().rig;
+        let rig = rigsmith::files::load_template(&RealDisk, &folder.path().join("fitted.rig.ron")).unwrap().rig;
         let model = load_model(&RealDisk, &mesh).unwrap();
         let surface = Surface::build(&model.points, &model.point_triangles());
         let drawn = drawn(&rig, &surface);

@@ -56,7 +56,7 @@ mod dual_quaternion;
 mod edit_text;
 #[cfg(feature = "editor")]
 mod editor_files;
-#[cfg(feature = "editor")]
+#[cfg(all(feature = "cli", feature = "editor"))]
 mod editor_follow;
 #[cfg(feature = "editor")]
 mod editor_settings;
@@ -149,6 +149,7 @@ mod obj_torture;
 mod packed_clips;
 #[cfg(feature = "editor")]
 mod panels;
+#[cfg(feature = "cli")]
 mod part_fields;
 mod part_instances;
 mod part_overrides;
