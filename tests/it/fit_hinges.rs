@@ -157,6 +157,20 @@ fn figures_of_other_builds_bend_as_bodies_do() {
     }
 }
 
+/// A dog that is as wide as a lying figure is still one that stands on four legs.
+#[test]
+fn a_wide_dog_gets_the_template_of_an_animal() {
+    let Some(data) = test_data() else { return };
+    let mut model = load_model(&RealDisk, &data.join("creatures/fox-dog.glb")).unwrap().at_rest();
+    model.weights = None;
+    model.points.iter_mut().for_each(|point| *point *= Vec3::new(1.25, 1.0, 1.25));
+    let mut bench = Workbench::new(7, "dog");
+    bench.open(model, true).unwrap();
+    bench.offer_templates(FitTemplates(Arc::new(bundled_characters)));
+    let report = bench.fit(|request: &mut FitRequest| request.template = FitTemplate::Choose, &mut |_| ()).unwrap();
+    assert_eq!(report.template, "quadruped", "{}", report.choice);
+}
+
 #[test]
 fn fitted_animals_bend_as_animals_do() {
     let Some(data) = test_data() else { return };
