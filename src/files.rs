@@ -60,8 +60,8 @@ pub use load::{
 };
 pub use model_watch::{ModelWatch, SETTLE};
 pub use parts::{
-    BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartFileError, PartFiles, bundled_characters, bundled_part,
-    bundled_parts,
+    BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartCache, PartFileError, PartFiles, bundled_characters,
+    bundled_part, bundled_parts,
 };
 pub use project::{
     LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote,

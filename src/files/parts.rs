@@ -172,6 +172,23 @@ pub enum PartFileError {
     Again(Arc<PartFileError>),
 }
 
+/// Parts that were read from files, with the contents that these had: for one who reads the same templates again and again.
+/// Parts that have others in them are not among them.
+#[derive(Debug, Default)]
+pub struct PartCache(BTreeMap<PathBuf, (Vec<u8>, Arc<Part>)>);
+
+impl PartCache {
+    fn part(&self, path: &Path, content: &[u8]) -> Option<&Arc<Part>> {
+        self.0.get(path).filter(|(known, _)| known == content).map(|(_, part)| part)
+    }
+
+    /// Forgets the parts of all other files.
+    pub fn keep<'f>(&mut self, files: impl IntoIterator<Item = &'f PathBuf>) {
+        let mut known = std::mem::take(&mut self.0);
+        self.0 = files.into_iter().filter_map(|file| known.remove_entry(file)).collect();
+    }
+}
+
 /// Reader of templates with their parts. A part is looked for beside its template, then in the folders of the site
 /// ([`SearchPaths`]), then among those that come with Rigsmith. The reader notes the files that it has asked for.
 pub struct PartFiles<'a> {
@@ -185,6 +202,8 @@ pub struct PartFiles<'a> {
     pub found: BTreeMap<PathBuf, FoundPart>,
     site: Option<SearchPaths>,
     known: BTreeMap<PathBuf, Arc<Part>>,
+    /// Parts of readers before this one.
+    pub cache: PartCache,
     /// Errors of parts that cannot be had, by the places beside their templates: a part that many others use is read once,
     /// and refused once.
     refused: BTreeMap<PathBuf, Arc<PartFileError>>,
@@ -227,6 +246,7 @@ impl<'a> PartFiles<'a> {
             asked: BTreeMap::new(),
             site: None,
             known: BTreeMap::new(),
+            cache: PartCache::default(),
             refused: BTreeMap::new(),
             open: Vec::new(),
         }
@@ -235,6 +255,11 @@ impl<'a> PartFiles<'a> {
     /// The reader with other folders than those of the site.
     pub fn with_site(self, site: SearchPaths) -> Self {
         Self { site: Some(site), ..self }
+    }
+
+    /// The reader with the parts that others have read.
+    pub fn with_cache(self, cache: PartCache) -> Self {
+        Self { cache, ..self }
     }
 
     /// Reads a template with its parts, whose files are relative to the folder of `path`, the template's own file.
@@ -343,6 +368,10 @@ impl<'a> PartFiles<'a> {
             Some((path, content)) => {
                 let part = FoundPart { path: path.clone(), content: content.clone() };
                 self.found.insert(first.to_owned(), part);
+                if let Some(part) = self.cache.part(&path, &content).cloned() {
+                    self.known.insert(first.to_owned(), part.clone());
+                    return Ok(part);
+                }
                 (path, content)
             }
             None => match (bundled_alone(name), bundled(name)) {
@@ -366,7 +395,11 @@ impl<'a> PartFiles<'a> {
         };
         let (file, text) = (path.display().to_string(), text_of(&bytes).unwrap_or_default().to_owned());
         let source = PartSource { file, text, origins: template.origins.clone() };
+        let is_alone = template.parts.is_empty() && template.instances.is_empty();
         let part = Arc::new(Part { source: Some(Arc::new(source)), ..Part::from(template) });
+        if is_alone {
+            self.cache.0.insert(path, (bytes, part.clone()));
+        }
         self.known.insert(first.to_owned(), part.clone());
         Ok(part)
     }

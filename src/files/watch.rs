@@ -44,6 +44,11 @@ impl FileWatch {
         &self.path
     }
 
+    /// True if a content has been seen once, and is given out if the next look sees it again.
+    pub fn is_pending(&self) -> bool {
+        self.next.is_some()
+    }
+
     /// Takes note of a content that is no news, such as one that this program saves.
     pub fn know(&mut self, content: Vec<u8>) {
         self.known = Some(content);
@@ -108,6 +113,11 @@ impl TemplateWatch {
     /// Number of files that are watched.
     pub fn count(&self) -> usize {
         1 + self.parts.len()
+    }
+
+    /// True if the next look may give out a content, see [`FileWatch::is_pending`].
+    pub fn is_pending(&self) -> bool {
+        self.own.is_pending() || self.parts.iter().any(FileWatch::is_pending)
     }
 
     /// Reads the template's own file at once, as it is.

@@ -15,7 +15,7 @@ use bevy::{asset::AssetId, log::error};
 
 use super::{RigTemplate, TemplateError, exchange::NextVersion};
 use crate::{
-    files::{PartFiles, RealDisk, TemplateWatch},
+    files::{PartCache, PartFiles, RealDisk, TemplateWatch},
     processor::{BuildError, Builder, Modules, SourceText},
     rig::{
         BuiltRig, Rig, Uid,
@@ -158,6 +158,8 @@ struct TemplateBuild {
     good: Option<Arc<BuiltTemplate>>,
     file: Option<PathBuf>,
     watch: Option<TemplateWatch>,
+    /// Parts that the file has used.
+    parts: PartCache,
     /// Uids of things that got another name since they were built first, by those of their names now.
     identities: HashMap<Uid, Uid>,
     /// Reason for which the file's content was not taken over, and since when it has been so.
@@ -170,12 +172,13 @@ const PAUSE_FOR_EACH: Duration = Duration::from_micros(100);
 impl BuildThread {
     fn run(&mut self, work: &Receiver<Work>) {
         loop {
-            let watches: usize =
-                self.templates.values().filter_map(|kept| kept.watch.as_ref()).map(TemplateWatch::count).sum();
+            let watched = || self.templates.values().filter_map(|kept| kept.watch.as_ref());
+            let watches: usize = watched().map(TemplateWatch::count).sum();
             let next = if watches == 0 {
                 work.recv().map_err(|_| RecvTimeoutError::Disconnected)
             } else {
-                work.recv_timeout(self.look.max(PAUSE_FOR_EACH * watches as u32))
+                let look = if watched().any(TemplateWatch::is_pending) { self.look / 2 } else { self.look };
+                work.recv_timeout(look.max(PAUSE_FOR_EACH * watches as u32))
             };
             match next {
                 Ok(work) => self.carry_out(work),
@@ -233,6 +236,7 @@ impl BuildThread {
             good: None,
             file: None,
             watch: None,
+            parts: PartCache::default(),
             identities: HashMap::new(),
             fault: None,
         })
@@ -267,11 +271,16 @@ impl TemplateBuild {
 
     /// Reads and builds a content of the file. An error leaves everything as it is; it is told by the caller.
     fn content(&mut self, id: Id, content: &[u8]) -> Result<Outcome, TemplateError> {
-        let mut files = PartFiles::with_modules(&RealDisk, (*self.modules).clone());
+        let parts = std::mem::take(&mut self.parts);
+        let mut files = PartFiles::with_modules(&RealDisk, (*self.modules).clone()).with_cache(parts);
         let read = match &self.file {
             Some(file) => RigTemplate::read_with_parts(content, file, &mut files),
             None => RigTemplate::read(content),
         };
+        self.parts = std::mem::take(&mut files.cache);
+        if read.is_ok() {
+            self.parts.keep(files.asked.keys());
+        }
         if let Some(watch) = &mut self.watch {
             watch.follow(files.asked, read.is_ok());
         }

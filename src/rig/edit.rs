@@ -471,7 +471,11 @@ fn checked(tag: &TagData) -> Result<TagData, EditError> {
         let raw: Box<RawValue> = options
             .from_str(&format!("{params}\n"))
             .map_err(|error| EditError::BadParams(tag.uid, error.code.to_string()))?;
-        *params = raw.trim().get_ron().to_owned();
+        // Trimming parses once more, for the sake of comments.
+        *params = match params.is_ascii() && !params.contains('/') {
+            true => params.trim_matches([' ', '\t', '\n', '\r', '\u{b}', '\u{c}']).to_owned(),
+            false => raw.trim().get_ron().to_owned(),
+        };
     }
     Ok(tag)
 }

@@ -323,9 +323,14 @@ impl Merge<'_> {
             let (was, is, theirs) = (base.and_then(of), of(now), of(file));
             let Some(name) = is.as_ref().or(theirs.as_ref()).or(was.as_ref()).map(tag_title) else { continue };
             let named = ChangeSubject { uid, joint: Some(title), tag: Some(&name), prefix: "" };
-            let keys = [&was, &is, &theirs].map(Option::as_ref);
-            let fields = tag_fields(&keys, now, file);
-            let fate = self.fate(&fields, (was.as_ref(), is.as_ref(), theirs.as_ref()), &named);
+            let fate = match is {
+                // Most tags of most updates: their parameters need not be read.
+                Some(tag) if theirs.as_ref() == Some(&tag) => Fate::Kept(tag),
+                _ => {
+                    let fields = tag_fields(&[&was, &is, &theirs].map(Option::as_ref), now, file);
+                    self.fate(&fields, (was.as_ref(), is.as_ref(), theirs.as_ref()), &named)
+                }
+            };
             if let Fate::Kept(tag) | Fate::Added(tag) = fate
                 && self.placed.insert(uid)
             {
