@@ -23,6 +23,7 @@ fn the_shapes_of_arkit_are_those_of_the_bones() {
     let answer = rigsmith(folder.path(), &["face", &head, "--arkit", "-o", &glb, "--json"]);
     assert_eq!(answer.code, 0, "{}", answer.err);
     assert_eq!(answer.json()["arkit"].as_array().unwrap().len(), 51);
+    assert_eq!(answer.json()["arkit_left_out"], serde_json::json!(["tongueOut"]));
     let model = load_model(&RealDisk, Path::new(&glb)).unwrap();
     let names = &model.objects[model.parts[0].object].morph_names;
     assert_eq!(names.len(), 51);

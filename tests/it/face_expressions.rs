@@ -236,7 +236,7 @@ fn every_bundled_file_parses_and_comes_back() {
     assert_eq!(&set, ExpressionSet::bundled());
     assert_eq!(set.six().count(), 6);
     assert_eq!(set.expressions().len(), 26);
-    assert_eq!(set.unit_set().arkit_shapes().count(), 51);
+    assert_eq!(set.unit_set().arkit_shapes().count(), 52);
     for (file, text) in files {
         if file.ends_with(".units.ron") {
             let units = Unit::parse_list(text, file).unwrap();

@@ -11,6 +11,7 @@ use super::{
 use crate::{
     algo::face::{
         auto::FaceAnalysis,
+        bones::FaceBoneKind,
         expression::{BonePose, ExpressionSet, Mix, Sides, apply},
     },
     mesh::{influences::keep_strongest, model::Weights},
@@ -35,7 +36,8 @@ pub struct FaceShape {
     pub pose: BTreeMap<Uid, PoseOffset>,
 }
 
-/// The blend shapes of ARKit for which the set has units, in the order of the units, as linear skinning by the facial
+/// The blend shapes of ARKit for which the set has units, in the order of the units, without those of the tongue on a face that
+/// has none, as linear skinning by the facial
 /// bones with the strongest `influences` of each point gives them.
 ///
 /// # Errors
@@ -63,7 +65,10 @@ pub fn arkit_shapes(
     };
     let open = units.arkit(OPEN);
     let still = STILL * analysis.landmarks.eye_distance();
-    let shapes = units.arkit_shapes().map(|(name, unit, side)| {
+    let has_tongue = bones.iter().any(|bone| bone.kind == FaceBoneKind::Tongue);
+    let is_of_tongue = |unit: usize| units.units().get(unit).is_some_and(|unit| unit.is_of_tongue());
+    let known = units.arkit_shapes().filter(|(_, unit, _)| has_tongue || !is_of_tongue(*unit));
+    let shapes = known.map(|(name, unit, side)| {
         let mut own = poses(&[(unit, side)]);
         if let Some(open) = open.filter(|_| name == CLOSE) {
             for ((own, both), open) in own.iter_mut().zip(poses(&[(unit, side), open])).zip(poses(&[open])) {
@@ -78,7 +83,8 @@ pub fn arkit_shapes(
                 *slot = analysis.to_mesh() * offset;
             }
         }
-        let pose = face.bones.iter().zip(&own).filter_map(|(bone, pose)| {
+        let posed = face.joint_poses(analysis, &own);
+        let pose = face.bones.iter().zip(&posed).filter_map(|(bone, pose)| {
             let offset = Frame::of(rig, bone.uid, analysis).offset(pose);
             (!offset.is_rest(1e-7)).then_some((bone.uid, offset))
         });

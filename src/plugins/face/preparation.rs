@@ -13,6 +13,7 @@ use bevy::{
 
 use super::{
     ExpressError, ExpressRequest, ExpressionAnswer, Face, FaceExpressions,
+    job::analysed,
     placed_bones::FaceRig,
     pose::{analysed_weights, facial_bones},
 };
@@ -82,7 +83,7 @@ impl FacePreparation {
                 Some(face) => face,
                 None => {
                     let settings = AutoSettings::default();
-                    let analysis = FaceAnalysis::new(&rest.points, &triangles, &settings, &|_, _| true)?;
+                    let analysis = analysed(&rest, &triangles, &settings, &|_, _| true)?;
                     Face { analysis: analysis.into(), settings, rest }
                 }
             };

@@ -29,7 +29,8 @@ impl PoseProblems {
 impl FittedFace {
     /// Repairs a pose as far as it may; alike on both sides if `is_alike`. Returns the triangles that stay folded.
     pub(super) fn repair(&self, poses: &mut [BonePose], is_alike: bool) -> Vec<u32> {
-        let furthest = poses.iter().map(|pose| pose.translation.length()).fold(0.0, f32::max);
+        let of_skin = self.bones.iter().zip(&*poses).filter(|(bone, _)| bone.kind == FaceBoneKind::Skin);
+        let furthest = of_skin.map(|(_, pose)| pose.translation.length()).fold(0.0, f32::max);
         let solved: Vec<Vec3> = poses.iter().map(|pose| pose.translation).collect();
         let mut apart = vec![0.0; poses.len()];
         if self.moving.triangles.is_empty() && self.moving.apart.is_empty() {
