@@ -28,7 +28,7 @@ use crate::{
         document::{ChangeError, EditRefusal, EditRequest},
         face::{
             ExpressError, ExpressRequest, ExpressionAnswer, Face, FaceExpressions, FaceJob, FacePlaced,
-            FacePreparation, FaceReport, FaceRequest, FaceShape, PlaceFaceError, arkit_shapes,
+            FacePreparation, FaceReport, FaceRequest, FaceShape, PlaceFaceError, arkit_shapes, unit_shapes,
         },
         fit::{FitAnswer, FitFailure, FitJob, FitParts, FitReport, FitRequest, FitTemplates},
         gesture::{Gesture, GestureAnswer, GestureScript},
@@ -339,6 +339,17 @@ impl Workbench {
         let face = self.placed_face().ok_or(ExpressError::NoBones)?;
         let set = &self.app.world().resource::<FaceExpressions>().0;
         Ok(arkit_shapes(self.rig(), mesh, &face.analysis, set, influences)?)
+    }
+
+    /// Shapes of units without a name in ARKit, baked from the placed face with the strongest `influences` of each point.
+    ///
+    /// # Errors
+    /// No face was placed; see [`unit_shapes`].
+    pub fn unit_shapes(&self, influences: usize) -> Result<Vec<FaceShape>, WorkbenchError> {
+        let mesh = self.mesh().ok_or(WorkbenchError::NoMesh)?;
+        let face = self.placed_face().ok_or(ExpressError::NoBones)?;
+        let set = &self.app.world().resource::<FaceExpressions>().0;
+        Ok(unit_shapes(self.rig(), mesh, &face.analysis, set, influences)?)
     }
 
     /// Stores poses by name, as one step; poses of the same names are replaced.

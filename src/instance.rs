@@ -16,6 +16,9 @@
 //! plays them where [`ClipPlugin`](crate::plugins::animation::ClipPlugin) is added, or Bevy's own player. When a saved template
 //! changes what their keys mean, they are re-expressed, so that the joints move as before; [`RigUpdated`] tells what is not kept.
 //!
+//! A face shows the strengths that a game writes to [`Expressions`](crate::plugins::face::Expressions) on its instance, by the poses
+//! that its template stores; [`ExpressFailed`] tells names that it cannot show.
+//!
 //! An instance is as its template says. A rig that people edit has a document of its own: [`RigSource`].
 //!
 //! ```
@@ -40,6 +43,7 @@ mod builds;
 mod clip_updates;
 mod clips;
 mod exchange;
+mod faces;
 mod file_nodes;
 mod folders;
 mod model_files;
@@ -68,6 +72,7 @@ pub use self::{
     bodies::InstanceSkins,
     builds::BuiltTemplate,
     clips::{ClipsBound, InstanceAnimations, InstanceClips, RigAnimation, RigAnimationError, RigAnimationLoader},
+    faces::ExpressFailed,
     file_nodes::JointsHeld,
     folders::{FolderError, FolderFault, FolderRead, GesturesRead, WatchedFolder, WatchedFolderPlugin, WatchedFolders},
     model_files::{ModelFault, ModelFile, ModelFileError, ModelFilesPlugin},
@@ -175,6 +180,10 @@ impl Plugin for RigInstancePlugin {
             (skins::bind_skins.run_if(skins::is_due), file_nodes::fit_skins.run_if(file_nodes::fit_is_due))
                 .chain()
                 .after(apply::update_instances),
+        )
+        .add_systems(
+            UpdateInstances,
+            faces::express.after(clips::give_clips).after(bodies::bind_bodies).after(file_nodes::fit_skins),
         )
         .add_systems(
             PostUpdate,

@@ -66,7 +66,7 @@ pub(super) struct FaceArgs {
     #[arg(long, value_name = "SHAPES")]
     fit: Option<PathBuf>,
     /// Add the blend shapes of ARKit, baked from the bones: 52, or 51 on a face without a tongue of its own. As morph
-    /// targets and clips of one frame in .glb or .gltf, as stored poses in .rig.ron
+    /// targets and clips of one frame in .glb or .gltf, as stored poses in .rig.ron, with those of all other units
     #[arg(long)]
     arkit: bool,
     /// Output file: .glb or .gltf for the character, .vrm for an avatar in VRM 1.0 (of a body with its skeleton), .rig.ron for
@@ -155,7 +155,13 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     if args.arkit {
         shapes = spinning("baking blend shapes", || bench.arkit_shapes(args.export.settings().max_influences))?;
         tell_kept_morphs(&bench, &shapes, &mut report);
-        bench.store_poses(shapes.iter().map(|shape| (shape.name.clone(), shape.pose.clone())).collect())?;
+        let mut poses: Vec<_> = shapes.iter().map(|shape| (shape.name.clone(), shape.pose.clone())).collect();
+        if output_kind == OutputKind::Rig {
+            // Expressions of instances are made of all units.
+            let others = bench.unit_shapes(args.export.settings().max_influences)?;
+            poses.extend(others.into_iter().map(|shape| (shape.name, shape.pose)));
+        }
+        bench.store_poses(poses)?;
         let is_baked = |name: &str| shapes.iter().any(|shape| shape.name == name);
         let names = set.unit_set().arkit_shapes().map(|(name, ..)| name);
         let left_out: Vec<&str> = names.filter(|name| !is_baked(name)).collect();
