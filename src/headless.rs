@@ -28,7 +28,8 @@ use crate::{
         document::{ChangeError, EditRefusal, EditRequest},
         face::{
             ExpressError, ExpressRequest, ExpressionAnswer, Face, FaceExpressions, FaceJob, FacePlaced,
-            FacePreparation, FaceReport, FaceRequest, FaceShape, PlaceFaceError, arkit_shapes, unit_shapes,
+            FacePreparation, FaceReport, FaceRequest, FaceShape, PlaceFaceError, arkit_shapes, mended_shares,
+            unit_shapes,
         },
         fit::{FitAnswer, FitFailure, FitJob, FitParts, FitReport, FitRequest, FitTemplates},
         gesture::{Gesture, GestureAnswer, GestureScript},
@@ -323,6 +324,11 @@ impl Workbench {
             }
             pause.rest();
         }
+    }
+
+    /// Largest share of each unit's movement that mending of folds takes, by the unit's name; see [`mended_shares`].
+    pub fn mended_shares(&self) -> BTreeMap<String, f32> {
+        self.mesh.map(|mesh| mended_shares(self.app.world(), mesh)).unwrap_or_default()
     }
 
     /// Analysis of the mesh's face, if there is one.

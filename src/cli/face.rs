@@ -148,6 +148,7 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     let placed = bench.face(settings, shapes, &mut |_: FaceStep, part| progress.at(part))?;
     drop(progress);
     describe(&mut report, &placed);
+    tell_mended(&mut report, &spinning("measuring units", || bench.mended_shares()));
     if !args.expression.is_empty() {
         express(args, &mut bench, &mut report)?;
     }
@@ -260,6 +261,19 @@ fn store_expression(args: &FaceArgs, bench: &mut Workbench, report: &mut Report)
     let pose = bench.rig().pose().clone();
     report.notes.push(format!("the expression is the stored pose \"{name}\" of the rig"));
     Ok(bench.store_poses(vec![(name, pose)])?)
+}
+
+/// Reports what mending of folds takes of each unit.
+fn tell_mended(report: &mut Report, shares: &BTreeMap<String, f32>) {
+    let percent = |share: f32| (f64::from(share) * 1000.0).round() / 10.0;
+    let percent: BTreeMap<&str, f64> = shares.iter().map(|(unit, share)| (unit.as_str(), percent(*share))).collect();
+    let named: Vec<String> =
+        percent.iter().filter(|(_, taken)| **taken > 0.0).map(|(unit, taken)| format!("{unit} {taken} %")).collect();
+    report.line(match named.as_slice() {
+        [] => "mending of folds takes nothing of any unit".to_owned(),
+        named => format!("mending of folds takes of {}", named.join(", ")),
+    });
+    report.set("mended_percent", json!(percent));
 }
 
 /// Reports morph targets of the mesh that have the names of shapes.

@@ -30,7 +30,7 @@ pub use error::{ExpressError, PlaceFaceError};
 pub use job::FaceJob;
 pub use placed_bones::{FaceRig, PlacedBone};
 pub use pose::{expressed_points, mixed};
-pub use preparation::FacePreparation;
+pub use preparation::{FacePreparation, mended_shares};
 
 /// Plugin of automatic faces.
 pub struct FacePlugin;

@@ -57,9 +57,9 @@ pub fn repair_folds(
             face = face.with_weights(points, triangles, mask, weights);
         }
         let posed = |expression: &&Expression| {
-            let (poses, folded) = face.pose_and_folds(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
+            let (poses, repair) = face.pose_and_repair(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
             let moved = poses.into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
-            ([Affine3A::IDENTITY; 2].into_iter().chain(moved).collect(), folded)
+            ([Affine3A::IDENTITY; 2].into_iter().chain(moved).collect(), repair.folded)
         };
         let (poses, all): (Vec<Vec<Affine3A>>, Vec<Vec<u32>>) = six.par_iter().map(posed).unzip();
         let sum = all.iter().map(Vec::len).sum();
