@@ -207,9 +207,9 @@ impl Plugin for RigInstancePlugin {
 #[require(InstanceMode, Transform)]
 pub struct RigInstance(pub Handle<RigTemplate>);
 
-/// Nodes that an instance in [`InstanceMode::Direct`] has as entities besides its joints and sockets. Without this component it
-/// has all controls; instances with the same nodes share a program. A node that the template does not have is told
-/// ([`RigFailed`]), and the instance has all controls then.
+/// Nodes that an instance in [`InstanceMode::Direct`] has as entities besides its joints and sockets, and poses besides the joints
+/// that stored poses move. Without this component it has all controls; instances with the same nodes share a program. A node that
+/// the template does not have is told ([`RigFailed`]), and the instance has all controls then.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Eq, Default)]
 #[reflect(Component)]
 pub struct ExposedNodes(pub Vec<ExposedNode>);
