@@ -28,7 +28,8 @@ use crate::{
         document::{ChangeError, EditRefusal, EditRequest},
         face::{
             ExpressError, ExpressRequest, ExpressionAnswer, Face, FaceExpressions, FaceJob, FacePlaced,
-            FacePreparation, FaceReport, FaceRequest, FaceShape, PlaceFaceError, arkit_shapes,
+            FacePreparation, FaceReport, FaceRequest, FaceShape, PlaceFaceError, arkit_shapes, mended_shares,
+            unit_shapes,
         },
         fit::{FitAnswer, FitFailure, FitJob, FitParts, FitReport, FitRequest, FitTemplates},
         gesture::{Gesture, GestureAnswer, GestureScript},
@@ -325,6 +326,11 @@ impl Workbench {
         }
     }
 
+    /// Largest share of each unit's movement that mending of folds takes, by the unit's name; see [`mended_shares`].
+    pub fn mended_shares(&self) -> BTreeMap<String, f32> {
+        self.mesh.map(|mesh| mended_shares(self.app.world(), mesh)).unwrap_or_default()
+    }
+
     /// Analysis of the mesh's face, if there is one.
     pub fn placed_face(&self) -> Option<&Face> {
         self.app.world().get::<Face>(self.mesh?)
@@ -339,6 +345,17 @@ impl Workbench {
         let face = self.placed_face().ok_or(ExpressError::NoBones)?;
         let set = &self.app.world().resource::<FaceExpressions>().0;
         Ok(arkit_shapes(self.rig(), mesh, &face.analysis, set, influences)?)
+    }
+
+    /// Shapes of units without a name in ARKit, baked from the placed face with the strongest `influences` of each point.
+    ///
+    /// # Errors
+    /// No face was placed; see [`unit_shapes`].
+    pub fn unit_shapes(&self, influences: usize) -> Result<Vec<FaceShape>, WorkbenchError> {
+        let mesh = self.mesh().ok_or(WorkbenchError::NoMesh)?;
+        let face = self.placed_face().ok_or(ExpressError::NoBones)?;
+        let set = &self.app.world().resource::<FaceExpressions>().0;
+        Ok(unit_shapes(self.rig(), mesh, &face.analysis, set, influences)?)
     }
 
     /// Stores poses by name, as one step; poses of the same names are replaced.

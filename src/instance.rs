@@ -16,6 +16,9 @@
 //! plays them where [`ClipPlugin`](crate::plugins::animation::ClipPlugin) is added, or Bevy's own player. When a saved template
 //! changes what their keys mean, they are re-expressed, so that the joints move as before; [`RigUpdated`] tells what is not kept.
 //!
+//! A face shows the strengths that a game writes to [`Expressions`](crate::plugins::face::Expressions) on its instance, by the poses
+//! that its template stores; [`ExpressFailed`] tells names that it cannot show.
+//!
 //! An instance is as its template says. A rig that people edit has a document of its own: [`RigSource`].
 //!
 //! ```
@@ -40,6 +43,7 @@ mod builds;
 mod clip_updates;
 mod clips;
 mod exchange;
+mod faces;
 mod file_nodes;
 mod folders;
 mod model_files;
@@ -68,6 +72,7 @@ pub use self::{
     bodies::InstanceSkins,
     builds::BuiltTemplate,
     clips::{ClipsBound, InstanceAnimations, InstanceClips, RigAnimation, RigAnimationError, RigAnimationLoader},
+    faces::ExpressFailed,
     file_nodes::JointsHeld,
     folders::{FolderError, FolderFault, FolderRead, GesturesRead, WatchedFolder, WatchedFolderPlugin, WatchedFolders},
     model_files::{ModelFault, ModelFile, ModelFileError, ModelFilesPlugin},
@@ -177,6 +182,10 @@ impl Plugin for RigInstancePlugin {
                 .after(apply::update_instances),
         )
         .add_systems(
+            UpdateInstances,
+            faces::express.after(clips::give_clips).after(bodies::bind_bodies).after(file_nodes::fit_skins),
+        )
+        .add_systems(
             PostUpdate,
             (
                 file_nodes::note_rests.before(AnimationSystems),
@@ -198,9 +207,9 @@ impl Plugin for RigInstancePlugin {
 #[require(InstanceMode, Transform)]
 pub struct RigInstance(pub Handle<RigTemplate>);
 
-/// Nodes that an instance in [`InstanceMode::Direct`] has as entities besides its joints and sockets. Without this component it
-/// has all controls; instances with the same nodes share a program. A node that the template does not have is told
-/// ([`RigFailed`]), and the instance has all controls then.
+/// Nodes that an instance in [`InstanceMode::Direct`] has as entities besides its joints and sockets, and poses besides the joints
+/// that stored poses move. Without this component it has all controls; instances with the same nodes share a program. A node that
+/// the template does not have is told ([`RigFailed`]), and the instance has all controls then.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Eq, Default)]
 #[reflect(Component)]
 pub struct ExposedNodes(pub Vec<ExposedNode>);

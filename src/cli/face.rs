@@ -65,8 +65,8 @@ pub(super) struct FaceArgs {
     /// shape is kept as a stored pose
     #[arg(long, value_name = "SHAPES")]
     fit: Option<PathBuf>,
-    /// Add the 51 blend shapes of ARKit that a face without a tongue has, baked from the bones: as morph targets and
-    /// clips of one frame in .glb or .gltf, as stored poses in .rig.ron
+    /// Add the blend shapes of ARKit, baked from the bones: 52, or 51 on a face without a tongue of its own. As morph
+    /// targets and clips of one frame in .glb or .gltf, as stored poses in .rig.ron, with those of all other units
     #[arg(long)]
     arkit: bool,
     /// Output file: .glb or .gltf for the character, .vrm for an avatar in VRM 1.0 (of a body with its skeleton), .rig.ron for
@@ -129,7 +129,8 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     let shapes = args.fit.as_ref().map(|path| spinning("reading shapes", || load_shapes(&RealDisk, path, &model)));
     let shapes = shapes.transpose()?.map(Arc::new);
     let mut bench = limits::empty_workbench(&stem(&args.mesh));
-    bench.app_mut().insert_resource(FaceExpressions(expressions::of_site(&mut report)?));
+    let set = expressions::of_site(&mut report)?;
+    bench.app_mut().insert_resource(FaceExpressions(set.clone()));
     bench.open(model, false)?;
     let settings = AutoSettings {
         bones: args.bones,
@@ -147,6 +148,7 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     let placed = bench.face(settings, shapes, &mut |_: FaceStep, part| progress.at(part))?;
     drop(progress);
     describe(&mut report, &placed);
+    tell_mended(&mut report, &spinning("measuring units", || bench.mended_shares()));
     if !args.expression.is_empty() {
         express(args, &mut bench, &mut report)?;
     }
@@ -154,8 +156,22 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     if args.arkit {
         shapes = spinning("baking blend shapes", || bench.arkit_shapes(args.export.settings().max_influences))?;
         tell_kept_morphs(&bench, &shapes, &mut report);
-        bench.store_poses(shapes.iter().map(|shape| (shape.name.clone(), shape.pose.clone())).collect())?;
-        report.line(format!("{} blend shapes of ARKit", shapes.len()));
+        let mut poses: Vec<_> = shapes.iter().map(|shape| (shape.name.clone(), shape.pose.clone())).collect();
+        if output_kind == OutputKind::Rig {
+            // Expressions of instances are made of all units.
+            let others = bench.unit_shapes(args.export.settings().max_influences)?;
+            poses.extend(others.into_iter().map(|shape| (shape.name, shape.pose)));
+        }
+        bench.store_poses(poses)?;
+        let is_baked = |name: &str| shapes.iter().any(|shape| shape.name == name);
+        let names = set.unit_set().arkit_shapes().map(|(name, ..)| name);
+        let left_out: Vec<&str> = names.filter(|name| !is_baked(name)).collect();
+        let missing = match left_out.as_slice() {
+            [] => String::new(),
+            names => format!(", without {}: no tongue of its own was found in the mouth", names.join(", ")),
+        };
+        report.line(format!("{} blend shapes of ARKit{missing}", shapes.len()));
+        report.set("arkit_left_out", left_out);
         report.set("arkit", shapes.iter().map(|shape| shape.name.as_str()).collect::<Vec<_>>());
     }
     report.set("joints", bench.rig().len());
@@ -245,6 +261,19 @@ fn store_expression(args: &FaceArgs, bench: &mut Workbench, report: &mut Report)
     let pose = bench.rig().pose().clone();
     report.notes.push(format!("the expression is the stored pose \"{name}\" of the rig"));
     Ok(bench.store_poses(vec![(name, pose)])?)
+}
+
+/// Reports what mending of folds takes of each unit.
+fn tell_mended(report: &mut Report, shares: &BTreeMap<String, f32>) {
+    let percent = |share: f32| (f64::from(share) * 1000.0).round() / 10.0;
+    let percent: BTreeMap<&str, f64> = shares.iter().map(|(unit, share)| (unit.as_str(), percent(*share))).collect();
+    let named: Vec<String> =
+        percent.iter().filter(|(_, taken)| **taken > 0.0).map(|(unit, taken)| format!("{unit} {taken} %")).collect();
+    report.line(match named.as_slice() {
+        [] => "mending of folds takes nothing of any unit".to_owned(),
+        named => format!("mending of folds takes of {}", named.join(", ")),
+    });
+    report.set("mended_percent", json!(percent));
 }
 
 /// Reports morph targets of the mesh that have the names of shapes.

@@ -1,7 +1,7 @@
 //! The thread that builds templates and watches their files.
 
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::{BTreeMap, BTreeSet, HashMap},
     path::PathBuf,
     sync::{
         Arc, Mutex, PoisonError,
@@ -18,7 +18,7 @@ use crate::{
     files::{PartCache, PartFiles, RealDisk, TemplateWatch},
     processor::{BuildError, Builder, Modules, SourceText},
     rig::{
-        BuiltRig, Rig, Uid,
+        BuiltRig, NodeType, Rig, Uid,
         part::PartSocket,
         template,
         update::{Change, Take, update, with_identities},
@@ -77,12 +77,15 @@ impl BuiltTemplate {
     }
 
     fn options(&self, exposed: Vec<ExposedNode>) -> CompileOptions {
-        lean_options(exposed, &self.sockets, &self.built)
+        lean_options(exposed, &self.rig, &self.sockets, &self.built)
     }
 }
 
-/// Options of a program with joints, sockets and those nodes.
-fn lean_options(mut exposed: Vec<ExposedNode>, sockets: &[PartSocket], built: &BuiltRig) -> CompileOptions {
+/// Options of a program with joints, sockets and those nodes. Joints that stored poses move, as those of a face, can be posed.
+fn lean_options(mut exposed: Vec<ExposedNode>, rig: &Rig, sockets: &[PartSocket], built: &BuiltRig) -> CompileOptions {
+    let moved: BTreeSet<Uid> = rig.stored_poses().iter().flat_map(|pose| pose.offsets.keys().copied()).collect();
+    let posed = built.nodes.iter().filter(|node| node.kind == NodeType::Joint && moved.contains(&node.uid));
+    exposed.extend(posed.map(|node| ExposedNode::Uid(node.uid)));
     let joints = sockets.iter().filter_map(|socket| socket.joint);
     let there = joints.filter(|joint| built.nodes.iter().any(|node| node.uid == *joint));
     exposed.extend(there.map(ExposedNode::Uid));
@@ -338,8 +341,9 @@ impl TemplateBuild {
         let file_sockets = template.sockets().clone();
         let sockets: Arc<[PartSocket]> = file_sockets.iter().map(|socket| self.named_first(socket, &rig)).collect();
         let mut program = |options: &CompileOptions| self.programs.get(&built, options);
-        let programs: Result<_, ProgramError> = program(&CompileOptions::default())
-            .and_then(|whole| Ok((whole, program(&lean_options(vec![ExposedNode::Controls], &sockets, &built))?)));
+        let programs: Result<_, ProgramError> = program(&CompileOptions::default()).and_then(|whole| {
+            Ok((whole, program(&lean_options(vec![ExposedNode::Controls], &rig, &sockets, &built))?))
+        });
         let (whole, lean) = programs.map_err(|source| TemplateError::CannotRun { file: self.file.clone(), source })?;
         let (source, changes, ran) = (source.clone(), changes.into(), report.executed.into());
         // What instances expose is compiled here, and not in the frame that takes the template over.
@@ -347,7 +351,7 @@ impl TemplateBuild {
         let (mut some, mut pairs) = (Vec::new(), Vec::new());
         for (exposed, program) in before.into_iter().flatten() {
             self.programs.adopt(&program);
-            let options = lean_options(exposed.clone(), &sockets, &built);
+            let options = lean_options(exposed.clone(), &rig, &sockets, &built);
             // A node that is gone is told by the instance that wants it.
             let Ok(now) = self.programs.get(&built, &options) else { continue };
             some.push((exposed, now.clone()));

@@ -25,12 +25,12 @@ use crate::{
     mesh::{model::Model, shapes::Shapes},
 };
 
-pub use arkit::{FaceShape, arkit_shapes};
+pub use arkit::{FaceShape, arkit_shapes, pose_names, unit_shapes};
 pub use error::{ExpressError, PlaceFaceError};
 pub use job::FaceJob;
 pub use placed_bones::{FaceRig, PlacedBone};
 pub use pose::{expressed_points, mixed};
-pub use preparation::FacePreparation;
+pub use preparation::{FacePreparation, mended_shares};
 
 /// Plugin of automatic faces.
 pub struct FacePlugin;
@@ -178,6 +178,8 @@ pub struct ExpressionAnswer {
 /// A game sets expressions by writing it: the face moves in the same frame, as an [`ExpressRequest`] would move it, and
 /// the answer is an [`ExpressionAnswer`] message. While the face is still prepared ([`FacePreparation`]), both wait for it. A
 /// value equal to what is shown is no edit.
+///
+/// On a [`RigInstance`](crate::instance::RigInstance) it poses the instance's facial joints by the stored poses of its template.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
 #[reflect(Component, Debug, Clone, PartialEq, Default)]
 pub struct Expressions(pub BTreeMap<String, f32>);

@@ -114,6 +114,8 @@ pub enum FaceBonePart {
     Jaw,
     /// The bone of an eye.
     Eye,
+    /// The bone of the tongue, below that of the jaw.
+    Tongue,
 }
 
 /// Record of the placement of a facial bone. Whatever differs from it was changed by a person later.

@@ -6,7 +6,10 @@ use std::{
 };
 
 use glam::Vec3;
-use rigsmith::files::{RealDisk, load_model, load_template};
+use rigsmith::{
+    algo::face::expression::ExpressionSet,
+    files::{RealDisk, load_model, load_template},
+};
 
 use crate::{cli_build::rigsmith, face_arkit::skinned, prerequisites::test_data};
 
@@ -44,6 +47,29 @@ fn a_head_becomes_a_character_and_a_rig() {
     let first = fs::read(&rig).unwrap();
     assert_eq!(rigsmith(folder.path(), &happy).code, 0);
     assert_eq!(fs::read(&rig).unwrap(), first, "the same command writes the same bytes");
+}
+
+/// What mending of folds takes is told for each unit, and is a twentieth of it at most.
+#[test]
+fn what_mending_takes_of_units_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["face", &head(), "--bones", "12", "-o", "face.rig.ron"];
+    let answer = rigsmith(folder.path(), &[&args[..], &["--json"]].concat());
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    let json = answer.json();
+    let told = json["mended_percent"].as_object().unwrap();
+    let units = ExpressionSet::bundled().units();
+    assert_eq!(told.len(), units.len());
+    for unit in units {
+        let taken = told[&unit.name].as_f64().unwrap();
+        assert!((0.0..=5.0).contains(&taken), "mending takes {taken} % of {}", unit.name);
+    }
+    let line = rigsmith(folder.path(), &args).out;
+    let line = line.lines().find(|line| line.starts_with("mending of folds takes")).unwrap();
+    for (unit, taken) in told {
+        let is_named = line.contains(&format!(" {unit} {} %", taken.as_f64().unwrap()));
+        assert_eq!(is_named, taken.as_f64().unwrap() > 0.0, "{unit} in {line}");
+    }
 }
 
 /// Bones and weights are fitted for as many influences as the file holds, and the error told is that of the file.

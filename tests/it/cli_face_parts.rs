@@ -72,6 +72,64 @@ fn eyes_teeth_and_tongue_are_stiff() {
     assert!(furthest(left) > 0.002 && shift < 0.5 * furthest(left), "the eye turns: {} {shift}", furthest(left));
 }
 
+/// Largest difference of the posed points of an object.
+fn apart(one: &[Moved], other: &[Moved]) -> f32 {
+    one.iter().zip(other).map(|(a, b)| a[1].distance(b[1])).fold(0.0, f32::max)
+}
+
+/// The tongue is told by its name, and without names by its shape and place, and comes out with the jaw below it.
+#[test]
+fn a_tongue_comes_out_of_an_open_mouth() {
+    let Some(data) = test_data() else { return };
+    let named = data.join("bodies/female_young/full.obj");
+    let folder = tempfile::tempdir().unwrap();
+    let unnamed = folder.path().join("unnamed.obj");
+    let mut text = fs::read_to_string(&named).unwrap();
+    for (number, name) in ["l-eye", "r-eye", "upper-teeth", "lower-teeth", "tongue"].iter().enumerate() {
+        text = text.replace(&format!("helper-{name}"), &format!("piece-{number}"));
+    }
+    fs::write(&unnamed, text).unwrap();
+    for (mesh, tongue) in [(&named, "helper-tongue"), (&unnamed, "piece-4")] {
+        let (open, out) = (posed(mesh, &["jawOpen=1"]), posed(mesh, &["jawOpen=1", "tongueOut=1"]));
+        let tip = |objects: &BTreeMap<String, Vec<Moved>>| {
+            objects[tongue].iter().max_by(|a, b| a[0].z.total_cmp(&b[0].z)).map(|[_, moved]| *moved).unwrap()
+        };
+        let moved = tip(&out) - tip(&open);
+        println!("{tongue}: the tip moves by {moved}");
+        // In metres.
+        assert!(moved.z > 0.02 && moved.y < 0.0 && moved.x.abs() < 1e-3, "{tongue} moves by {moved}");
+        for (name, points) in out.iter().filter(|(name, _)| *name != tongue) {
+            let most = apart(points, &open[name]);
+            assert!(most < 1e-4, "{name} moves by {most} with the tongue");
+        }
+    }
+}
+
+#[test]
+fn a_face_with_a_tongue_has_all_shapes_of_arkit() {
+    let Some(data) = test_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (mesh, glb) = (data.join("bodies/female_young/full.obj"), folder.path().join("tongue.glb"));
+    let (mesh, file) = (mesh.display().to_string(), glb.display().to_string());
+    let answer = rigsmith(folder.path(), &["face", &mesh, "--arkit", "-o", &file, "--json"]);
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    assert_eq!(answer.json()["arkit"].as_array().unwrap().len(), 52);
+    assert_eq!(answer.json()["arkit_left_out"], serde_json::json!([]));
+    let model = load_model(&RealDisk, &glb).unwrap();
+    assert!(model.clips.iter().any(|clip| clip.name == "tongueOut"));
+    let mut furthest: BTreeMap<&str, f32> = BTreeMap::new();
+    for part in &model.parts {
+        let object = &model.objects[part.object];
+        let Some(number) = object.morph_names.iter().position(|name| name == "tongueOut") else { continue };
+        let most = part.morphs[number].positions.iter().map(|offset| offset.length()).fold(0.0, f32::max);
+        let known = furthest.entry(&object.name).or_default();
+        *known = known.max(most);
+    }
+    let tongue = furthest.remove("helper-tongue");
+    assert!(tongue.is_some_and(|most| most > 0.02), "the tongue moves by {tongue:?}");
+    assert!(furthest.values().all(|most| *most < 1e-5), "{furthest:?}");
+}
+
 /// A copy of the triangles whose corners are all kept, with its points moved, as an object of an OBJ file.
 fn object(
     text: &mut String,

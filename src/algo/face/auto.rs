@@ -16,7 +16,7 @@ use super::{
     head_bones::{HeadBones, HeadBonesError, head_bones},
     head_part::{HeadPartError, head_part},
     landmarks::{LandmarkError, Landmarks, find_landmarks},
-    shells::{Shells, find_shells},
+    shells::{MouthName, Shells, find_shells},
     weights::{FaceWeightsError, face_weights},
 };
 use crate::{algo::fit::FitError, mesh::model::Weights};
@@ -34,7 +34,7 @@ pub struct AutoSettings {
     pub starts: usize,
     /// Places bones in mirrored pairs if `true`.
     pub symmetric: bool,
-    /// Adds bones of jaw and eyes, where the mesh has them, if `true`.
+    /// Adds bones of jaw, eyes and tongue, where the mesh has them, if `true`.
     pub extras: bool,
     /// Up direction in the mesh's space; guessed if `None`.
     pub up: Option<Vec3>,
@@ -241,8 +241,9 @@ impl FaceAnalysis {
             }
         }
         step(FaceStep::Landmarks)?;
-        let shells = find_shells(&head, &faces);
+        let mut shells = find_shells(&head, &faces);
         let landmarks = find_landmarks(&head, &faces, &shells).map_err(FaceError::Landmarks)?;
+        shells.mark_tongue(&head, &faces, &landmarks, &|_| None);
         step(FaceStep::Grouping)?;
         let groups =
             group_head(&head, &faces, &shells, &landmarks, settings.groups, &within(progress, FaceStep::Grouping))
@@ -261,6 +262,15 @@ impl FaceAnalysis {
             groups,
             head_bones: bones,
         })
+    }
+
+    /// The analysis with a tongue that names of objects tell: `name_of` gives the part of the mouth that the name of a point's
+    /// object tells, for points of the *mesh*. Where no name tells the tongue, its shape and place do.
+    pub fn with_names(mut self, name_of: &dyn Fn(usize) -> Option<MouthName>) -> Self {
+        let Self { part, points, triangles, landmarks, shells, .. } = &mut self;
+        let of_head = |point: usize| name_of(part.as_ref().map_or(point, |part| part[point] as usize));
+        shells.mark_tongue(points, triangles, landmarks, &of_head);
+        self
     }
 
     /// Number of triangles that the six expressions together may fold over without anybody noticing: a thousandth of the

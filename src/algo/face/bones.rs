@@ -64,9 +64,11 @@ pub enum FaceBoneKind {
     Jaw,
     /// Turns an eyeball.
     Eye,
+    /// Moves the tongue; carried by the jaw.
+    Tongue,
 }
 
-/// One facial bone, a child of the head bone.
+/// One facial bone, a child of the head bone; that of the tongue is one of the jaw bone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FaceBone {
     /// Position in head space.
@@ -105,7 +107,7 @@ pub struct FaceBonesSettings {
     pub starts: usize,
     /// Places bones in mirrored pairs if `true`.
     pub symmetric: bool,
-    /// Adds bones for jaw and eyes where the mesh has them if `true`.
+    /// Adds bones for jaw, eyes and tongue where the mesh has them if `true`.
     pub extras: bool,
 }
 
@@ -118,7 +120,7 @@ impl Default for FaceBonesSettings {
 /// The bones of a face.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FaceBones {
-    /// Skin bones by region and number, then jaw, then eyes.
+    /// Skin bones by region and number, then jaw, eyes and tongue.
     pub bones: Vec<FaceBone>,
     /// Sum over the vertices of the mask of the squared distance to the nearest bone.
     pub square_error: f64,
@@ -188,8 +190,8 @@ impl From<KMeansError> for FaceBonesError {
 ///
 /// `points` are in head space, `shells`, `groups` and `landmarks` belong to them. `fixed` are places of bones that stay
 /// where they are and count among the bones; the rest is clustered around them. The answer has exactly
-/// [`FaceBonesSettings::bones`] bones on the skin, each on the surface, then a jaw bone if the mouth can open and eye
-/// bones where there are eyeballs. The same input and seed give the same bits. `progress` is called with a share from 0
+/// [`FaceBonesSettings::bones`] bones on the skin, each on the surface, then a jaw bone if the mouth can open, eye bones
+/// where there are eyeballs, and with a jaw bone one of the tongue where there is one. The same input and seed give the same bits. `progress` is called with a share from 0
 /// to 1 and returns whether to go on.
 ///
 /// If the landmarks are too uncertain (creatures), the mask is clustered as one part and every bone is a `cheek`.
@@ -442,11 +444,12 @@ pub fn side_of(position: Vec3, landmarks: &Landmarks) -> Side {
     }
 }
 
-/// Label of a bone: `brow_01_l`; `jaw` and `eye_l` for jaw and eyes.
+/// Label of a bone: `brow_01_l`; `jaw`, `eye_l` and `tongue` for jaw, eyes and tongue.
 pub fn label(region: Region, side: Side, number: usize, kind: FaceBoneKind) -> String {
     match kind {
         FaceBoneKind::Skin => format!("{}_{number:02}_{}", region.word(), side.letter()),
         FaceBoneKind::Jaw => "jaw".to_owned(),
         FaceBoneKind::Eye => format!("eye_{}", side.letter()),
+        FaceBoneKind::Tongue => "tongue".to_owned(),
     }
 }

@@ -58,6 +58,19 @@ impl BonePose {
             translation: glam::Vec3A::from(position + self.translation) - matrix * glam::Vec3A::from(position),
         }
     }
+
+    /// The rest of the pose of a bone at `position` that another bone's pose leaves to it: the pose of a joint below that
+    /// bone's. Rounding is no movement.
+    pub fn below(&self, position: Vec3, carrier: &Self, carrier_position: Vec3) -> Self {
+        let back = carrier.affine(carrier_position).inverse();
+        let moved = back.transform_point3(position + self.translation);
+        let turned = (carrier.rotation.inverse() * self.rotation).normalize();
+        let slack = 1e-5 * (position - carrier_position).length();
+        Self {
+            translation: if moved.distance(position) > slack { moved - position } else { Vec3::ZERO },
+            rotation: if turned.xyz().length() > 1e-5 { turned } else { Quat::IDENTITY },
+        }
+    }
 }
 
 /// Strength of each unit on each side: any blend of expressions reduces to a mix.
@@ -131,7 +144,7 @@ pub fn pose(
 
 /// Poses of bones for a mix of units, without regard to weights: the field, sampled at the bones.
 ///
-/// Skin bones move, the jaw bone turns about its position, eye bones turn. Skin bones follow the whole field, as if the
+/// Skin bones move, the jaw bone turns about its position and carries that of the tongue, eye bones turn. Skin bones follow the whole field, as if the
 /// jaw bone held no skin. All bones rest if the landmarks are degenerate. Cost: bones times moves.
 pub fn pose_sampled(mix: &Mix, units: &UnitSet, bones: &[FaceBone], landmarks: &Landmarks) -> Vec<BonePose> {
     let Some(field) = Field::new(mix, units, bones, landmarks) else { return vec![BonePose::REST; bones.len()] };

@@ -9,7 +9,10 @@ use glam::Vec3;
 use crate::mesh::adjacency;
 
 mod eyes;
+mod tongue;
 mod visibility;
+
+pub use tongue::MouthName;
 
 /// Kind of a shell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,8 +23,10 @@ pub enum ShellKind {
     LeftEye,
     /// The eyeball on the character's right.
     RightEye,
-    /// Teeth, tongue, lashes and everything else.
+    /// Teeth, lashes and everything else.
     Inside,
+    /// The tongue, once [`Shells::mark_tongue`] has found it among the parts inside.
+    Tongue,
 }
 
 /// The loose parts of a head.

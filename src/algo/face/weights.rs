@@ -80,6 +80,8 @@ pub(crate) struct Face<'a> {
     pub chin: f32,
     /// Joint of each eye, left and right.
     pub eyes: [u32; 2],
+    /// The joint that the tongue follows from its tip to its root.
+    pub tongue: Option<u32>,
     pub upper_mean: Vec3,
     pub lower_mean: Vec3,
 }
@@ -152,6 +154,7 @@ pub fn face_weights(
         pivot: jaw.and_then(|j| bones.get((j - FIRST) as usize)).map_or(ear, |b| b.position),
         chin: if groups.chin.is_finite() { groups.chin } else { 0.0 },
         eyes: [Side::Left, Side::Right].map(|s| joint(FaceBoneKind::Eye, Some(s)).unwrap_or(HEAD)),
+        tongue: joint(FaceBoneKind::Tongue, None),
         upper_mean: groups.upper_mean,
         lower_mean: groups.lower_mean,
         map,

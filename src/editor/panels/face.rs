@@ -289,6 +289,7 @@ fn regions(ui: &mut Ui, shown: &DisplayedRig, known: &FaceRig, face: Option<&Fac
 fn region_name(kind: FaceBoneKind, region: Region) -> &'static str {
     match (kind, region) {
         (FaceBoneKind::Jaw, _) => "jaw pivot",
+        (FaceBoneKind::Tongue, _) => "tongue",
         (FaceBoneKind::Eye, _) | (_, Region::Eye) => "eyes",
         (_, Region::Forehead) => "forehead",
         (_, Region::Brow) => "brow",

@@ -1,4 +1,4 @@
-//! Blend shapes of ARKit, baked from the facial bones.
+//! Blend shapes of ARKit and poses of other units, baked from the facial bones.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,8 @@ use super::{
 use crate::{
     algo::face::{
         auto::FaceAnalysis,
-        expression::{BonePose, ExpressionSet, Mix, Sides, apply},
+        bones::FaceBoneKind,
+        expression::{BonePose, ExpressionSet, Mix, Sides, Unit, apply},
     },
     mesh::{influences::keep_strongest, model::Weights},
     plugins::surface::RigMesh,
@@ -27,7 +28,7 @@ const STILL: f32 = 1e-4;
 /// A blend shape as the facial bones make it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FaceShape {
-    /// Name in ARKit.
+    /// Name in ARKit, or that of a unit and its side.
     pub name: String,
     /// Displacement of each point of the mesh, in the mesh's space and unit.
     pub offsets: Vec<Vec3>,
@@ -35,8 +36,8 @@ pub struct FaceShape {
     pub pose: BTreeMap<Uid, PoseOffset>,
 }
 
-/// The blend shapes of ARKit for which the set has units, in the order of the units, as linear skinning by the facial
-/// bones with the strongest `influences` of each point gives them.
+/// The blend shapes of ARKit for which the set has units, in the order of the units, without those of the tongue on a face that
+/// has none, as linear skinning by the facial bones with the strongest `influences` of each point gives them.
 ///
 /// # Errors
 /// [`ExpressError::NoBones`] and [`ExpressError::NotSkinned`].
@@ -46,6 +47,49 @@ pub fn arkit_shapes(
     analysis: &FaceAnalysis,
     set: &ExpressionSet,
     influences: usize,
+) -> Result<Vec<FaceShape>, ExpressError> {
+    let names = set.unit_set().arkit_shapes().map(|(name, unit, side)| (name.to_owned(), unit, side));
+    baked(rig, mesh, analysis, set, influences, &names.collect::<Vec<_>>())
+}
+
+/// The shapes of units that have no name in ARKit, as [`arkit_shapes`] makes those of the others: `cheek_raise_l` and
+/// `cheek_raise_r`, for example.
+///
+/// # Errors
+/// [`ExpressError::NoBones`] and [`ExpressError::NotSkinned`].
+pub fn unit_shapes(
+    rig: &Rig,
+    mesh: &RigMesh,
+    analysis: &FaceAnalysis,
+    set: &ExpressionSet,
+    influences: usize,
+) -> Result<Vec<FaceShape>, ExpressError> {
+    let others = set.units().iter().enumerate().filter(|(_, unit)| unit.arkit.is_empty());
+    let names = others.flat_map(|(number, unit)| {
+        let [left, right] = pose_names(unit);
+        [(left, number, Sides::Left), (right, number, Sides::Right)]
+    });
+    baked(rig, mesh, analysis, set, influences, &names.collect::<Vec<_>>())
+}
+
+/// Names of the stored poses of a unit, of its left and its right side: those of ARKit, of which both sides may have the same,
+/// or else the unit's own with `_l` and `_r`.
+pub fn pose_names(unit: &Unit) -> [String; 2] {
+    match unit.arkit.as_slice() {
+        [both] => [both.clone(), both.clone()],
+        [left, right] => [left.clone(), right.clone()],
+        _ => ["l", "r"].map(|side| format!("{}_{side}", unit.name)),
+    }
+}
+
+/// Bakes shapes: name, index of the unit, and side of each.
+fn baked(
+    rig: &Rig,
+    mesh: &RigMesh,
+    analysis: &FaceAnalysis,
+    set: &ExpressionSet,
+    influences: usize,
+    names: &[(String, usize, Sides)],
 ) -> Result<Vec<FaceShape>, ExpressError> {
     let (face, skin) = facial_bones(rig, mesh)?;
     let weights = strongest(&analysed_weights(skin, &face, analysis), influences);
@@ -63,10 +107,13 @@ pub fn arkit_shapes(
     };
     let open = units.arkit(OPEN);
     let still = STILL * analysis.landmarks.eye_distance();
-    let shapes = units.arkit_shapes().map(|(name, unit, side)| {
-        let mut own = poses(&[(unit, side)]);
+    let has_tongue = bones.iter().any(|bone| bone.kind == FaceBoneKind::Tongue);
+    let is_of_tongue = |unit: usize| units.units().get(unit).is_some_and(|unit| unit.is_of_tongue());
+    let known = names.iter().filter(|(_, unit, _)| has_tongue || !is_of_tongue(*unit));
+    let shapes = known.map(|(name, unit, side)| {
+        let mut own = poses(&[(*unit, *side)]);
         if let Some(open) = open.filter(|_| name == CLOSE) {
-            for ((own, both), open) in own.iter_mut().zip(poses(&[(unit, side), open])).zip(poses(&[open])) {
+            for ((own, both), open) in own.iter_mut().zip(poses(&[(*unit, *side), open])).zip(poses(&[open])) {
                 *own = BonePose { translation: both.translation - open.translation, ..BonePose::REST };
             }
         }
@@ -78,11 +125,12 @@ pub fn arkit_shapes(
                 *slot = analysis.to_mesh() * offset;
             }
         }
-        let pose = face.bones.iter().zip(&own).filter_map(|(bone, pose)| {
+        let posed = face.joint_poses(analysis, &own);
+        let pose = face.bones.iter().zip(&posed).filter_map(|(bone, pose)| {
             let offset = Frame::of(rig, bone.uid, analysis).offset(pose);
             (!offset.is_rest(1e-7)).then_some((bone.uid, offset))
         });
-        FaceShape { name: name.to_owned(), offsets, pose: pose.collect() }
+        FaceShape { name: name.clone(), offsets, pose: pose.collect() }
     });
     Ok(shapes.collect())
 }

@@ -72,12 +72,20 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
         .map(|bone| bone.fixed.and_then(|fixed| kept.get(fixed)).map_or_else(|| uids.next_uid(), |bone| bone.uid))
         .collect();
     let eye = analysis.landmarks.eye_distance();
+    let jaw = face.bones.iter().position(|bone| bone.kind == FaceBoneKind::Jaw).map(|jaw| {
+        let made = Affine3A::from_rotation_translation(to_rig, to_rig * face.bones[jaw].position);
+        (joints[jaw], rig.joint(joints[jaw]).map_or(made, |joint| rig_affine(rig, joint.data.uid)))
+    });
     for (bone, uid) in face.bones.iter().zip(&joints) {
         if bone.fixed.is_some_and(|fixed| fixed < kept.len()) {
             continue;
         }
         let position = to_rig * bone.position;
         let global = Affine3A::from_rotation_translation(to_rig, position);
+        let (parent, parent_global) = match jaw {
+            Some((jaw, global)) if bone.kind == FaceBoneKind::Tongue => (jaw, global),
+            _ => (head, head_global),
+        };
         let kind = TagKind::Command {
             module: "control".to_owned(),
             params: differing_params(&control(bone, eye)),
@@ -88,18 +96,21 @@ pub(super) fn face_edits(rig: &Rig, known: &FaceRig, new: &NewFace, uids: &mut U
             uid: *uid,
             label: Some(bone.label.clone()),
             group: Some(group),
-            rest: local(&head_global, &global),
+            rest: local(&parent_global, &global),
             tags: vec![tag],
             face: Some(placement(bone, position)),
             ..JointData::default()
         };
-        edits.push(RigEdit::AddJoint { joint: Box::new(joint), parent: Some(head), index: usize::MAX });
+        edits.push(RigEdit::AddJoint { joint: Box::new(joint), parent: Some(parent), index: usize::MAX });
     }
     pairs(rig, face, &joints, &mut edits);
     let skin = skin(rig, new, known, neck, head, &joints);
     edits.push(RigEdit::SetSkin(mesh, Some(Arc::new(skin))));
     let stays: Vec<Uid> = kept.iter().map(|bone| bone.uid).collect();
-    for bone in known.bones.iter().filter(|bone| !stays.contains(&bone.uid)) {
+    let gone = known.bones.iter().filter(|bone| !stays.contains(&bone.uid));
+    // A joint goes before the one that it hangs on.
+    let (carried, others): (Vec<&PlacedBone>, Vec<&PlacedBone>) = gone.partition(|bone| bone.carrier.is_some());
+    for bone in carried.into_iter().chain(others) {
         // A partner that stays must not refer to a removed joint.
         let partner = rig.joint(bone.uid).and_then(|joint| joint.data.mirror);
         if let Some(partner) = partner.filter(|partner| stays.contains(partner)) {
@@ -174,6 +185,7 @@ fn comment(bone: &FaceBone) -> String {
         FaceBoneKind::Skin => "face",
         FaceBoneKind::Jaw => "jaw",
         FaceBoneKind::Eye => "eye",
+        FaceBoneKind::Tongue => "tongue",
     };
     format!("{part} bone {}", bone.label)
 }
@@ -184,6 +196,7 @@ fn control(bone: &FaceBone, eye: f32) -> ControlModule {
         FaceBoneKind::Skin => ("sphere", 0.035),
         FaceBoneKind::Jaw => ("half_circle", 0.3),
         FaceBoneKind::Eye => ("eye", 0.12),
+        FaceBoneKind::Tongue => ("sphere", 0.06),
     };
     let range = |(low, high): (f32, f32), unit: f32| (Some(rounded(low * unit)), Some(rounded(high * unit)));
     let (translate, rotate) = limits(bone);
@@ -213,6 +226,9 @@ fn limits(bone: &FaceBone) -> ([(f32, f32); 3], [(f32, f32); 3]) {
     let (side, up, down, depth) = match bone.kind {
         FaceBoneKind::Jaw => return ([both(0.08), (-0.1, 0.04), (-0.06, 0.1)], [(-5.0, 35.0), both(12.0), both(6.0)]),
         FaceBoneKind::Eye => return ([both(0.0); 3], [both(35.0), both(45.0), both(0.0)]),
+        FaceBoneKind::Tongue => {
+            return ([both(0.2), (-0.2, 0.2), (-0.25, 0.8)], [(-40.0, 40.0), both(30.0), both(30.0)]);
+        }
         FaceBoneKind::Skin => match bone.region {
             Region::Brow => (0.1, 0.2, 0.14, 0.06),
             Region::Forehead => (0.06, 0.12, 0.08, 0.04),

@@ -57,6 +57,16 @@ pub enum ExpressError {
         /// Nearest names, as the rest of a sentence.
         nearest: String,
     },
+    /// A rig without a mesh stores no pose of a unit.
+    #[error(
+        "the rig stores no pose of \"{unit}\" for \"{name}\"; `rigsmith face --arkit` writes a .rig.ron with poses"
+    )]
+    NoPose {
+        /// Name of the expression or unit.
+        name: String,
+        /// The unit without a pose.
+        unit: String,
+    },
     /// The mesh cannot be analysed.
     #[error(transparent)]
     Face(#[from] FaceError),

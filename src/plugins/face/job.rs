@@ -22,10 +22,11 @@ use super::{
 };
 use crate::{
     algo::face::{
-        auto::{AutoFace, AutoSettings, FaceAnalysis, FaceError, FaceFit, FaceStep},
+        auto::{AutoFace, AutoSettings, FaceAnalysis, FaceError, FaceFit, FaceProgress, FaceStep},
         bones::{FaceBone, FaceBoneKind, FixedBone, label},
         expression::{BonePose, ExpressionSet},
         grouping::HeadGroup,
+        shells::MouthName,
     },
     mesh::{model::Model, shapes::Shapes},
     plugins::{
@@ -165,6 +166,23 @@ pub(super) fn start(
     }
 }
 
+/// Analysis of a mesh, with what the names of its objects tell.
+pub(super) fn analysed(
+    mesh: &Model,
+    triangles: &[[u32; 3]],
+    settings: &AutoSettings,
+    progress: FaceProgress,
+) -> Result<FaceAnalysis, FaceError> {
+    let mut names: BTreeMap<u32, MouthName> = BTreeMap::new();
+    for part in &mesh.parts {
+        let name = mesh.objects.get(part.object).and_then(|object| MouthName::of(&object.name));
+        names.extend(name.into_iter().flat_map(|name| part.vertices.iter().map(move |point| (*point, name))));
+    }
+    let analysis = FaceAnalysis::new(&mesh.points, triangles, settings, progress)?;
+    let name_of = |point: usize| names.get(&u32::try_from(point).ok()?).copied();
+    Ok(if names.is_empty() { analysis } else { analysis.with_names(&name_of) })
+}
+
 /// Input of a task.
 struct JobInput {
     rig: Rig,
@@ -181,7 +199,7 @@ impl JobInput {
         let report = |step: FaceStep, part: f32| progress.report(step, part);
         let analysis = match ready {
             Some(analysis) => analysis,
-            None => Arc::new(FaceAnalysis::new(&mesh.rest.points, &mesh.triangles, &settings, &report)?),
+            None => Arc::new(analysed(&mesh.rest, &mesh.triangles, &settings, &report)?),
         };
         let known = FaceRig::read(&rig);
         let turn = analysis.axes.rotation();
@@ -325,6 +343,11 @@ impl JobResult {
             let joint = rig.joint(*uid)?;
             let mut global = rig.rest_global(*uid);
             global.translation = to_rig * bone.position;
+            // The jaw that carries the tongue is moved by an edit of its own.
+            let jaw = self.face.bones.iter().zip(joints).find(|(_, uid)| Some(**uid) == joint.parent);
+            if let Some((jaw, above)) = jaw {
+                global.translation -= to_rig * jaw.position - rig.position(*above);
+            }
             let rest = rig.local_rest(joint.parent, &global);
             let rest = crate::rig::RestTransform { translation: rest.translation, ..joint.data.rest };
             (rest != joint.data.rest).then_some(RigEdit::SetRest(*uid, rest))
@@ -334,16 +357,23 @@ impl JobResult {
 
     /// Edits that store a pose for each shape; poses of the same name are replaced.
     fn poses(&self, rig: &Rig, fit: &FaceFit, shapes: &Shapes, joints: &[Uid], uids: &mut UidSource) -> Vec<RigEdit> {
+        let carriers = self.carriers(rig, joints);
         let frames: Vec<pose::Frame> = joints.iter().map(|uid| pose::Frame::of(rig, *uid, &self.analysis)).collect();
         let mut added = rig.stored_poses().len();
         let mut edits = Vec::new();
         for (name, transforms) in shapes.names.iter().zip(&fit.poses) {
+            let bones = self.face.bones.iter().zip(&carriers).zip(transforms);
+            let own = bones.map(|((bone, carrier), pose)| match carrier {
+                Some(jaw) => pose.below(bone.position, &transforms[*jaw], self.face.bones[*jaw].position),
+                None => *pose,
+            });
+            let transforms: Vec<BonePose> = own.collect();
             let offset = |((uid, frame), transform): ((&Uid, &pose::Frame), &BonePose)| {
                 let offset = frame.offset(transform);
                 (!offset.is_rest(1e-7)).then_some((*uid, offset))
             };
             let offsets: BTreeMap<Uid, PoseOffset> =
-                joints.iter().zip(&frames).zip(transforms).filter_map(offset).collect();
+                joints.iter().zip(&frames).zip(&transforms).filter_map(offset).collect();
             let same = rig.stored_poses().iter().find(|pose| pose.name == *name);
             let stored = |uid: Uid| StoredPose { uid, name: name.clone(), offsets, ..StoredPose::default() };
             edits.push(match same {
@@ -355,6 +385,17 @@ impl JobResult {
             });
         }
         edits
+    }
+
+    /// Number of the bone whose joint each bone's joint hangs on, if it is not the head's: the jaw's, for the tongue.
+    fn carriers(&self, rig: &Rig, joints: &[Uid]) -> Vec<Option<usize>> {
+        let jaw = self.face.bones.iter().position(|bone| bone.kind == FaceBoneKind::Jaw);
+        let carrier = |(bone, uid): (&FaceBone, &Uid)| {
+            let jaw = jaw.filter(|_| bone.kind == FaceBoneKind::Tongue)?;
+            let hangs_on_it = rig.joint(*uid).is_none_or(|joint| joint.parent == Some(joints[jaw]));
+            hangs_on_it.then_some(jaw)
+        };
+        self.face.bones.iter().zip(joints).map(carrier).collect()
     }
 
     fn report(&self) -> FaceReport {

@@ -6,6 +6,7 @@ use crate::{
     algo::face::{
         auto::FaceAnalysis,
         bones::{FaceBone, FaceBoneKind, region_of, side_of},
+        expression::BonePose,
     },
     rig::{FaceBonePart, FacePlacement, Rig, RigJoint, TagKind, Uid},
 };
@@ -24,7 +25,7 @@ pub struct FaceRig {
     pub group: Option<Uid>,
     /// The feature tag.
     pub feature: Option<Uid>,
-    /// The facial bones, in the rig's order.
+    /// The facial bones, in the rig's order, and then those that a facial bone carries.
     pub bones: Vec<PlacedBone>,
 }
 
@@ -41,6 +42,8 @@ pub struct PlacedBone {
     pub label: String,
     /// Marks a bone that a person made, or has moved, renamed, locked, retagged or given a child.
     pub touched: bool,
+    /// The bone above, by its number among the face's, if it is a facial one.
+    pub carrier: Option<usize>,
 }
 
 /// The record of a bone's placement, from which later manual changes are recognised.
@@ -49,6 +52,7 @@ pub(super) fn placement(bone: &FaceBone, position: Vec3) -> FacePlacement {
         FaceBoneKind::Skin => FaceBonePart::Skin,
         FaceBoneKind::Jaw => FaceBonePart::Jaw,
         FaceBoneKind::Eye => FaceBonePart::Eye,
+        FaceBoneKind::Tongue => FaceBonePart::Tongue,
     };
     FacePlacement { part, label: bone.label.clone(), position }
 }
@@ -58,6 +62,7 @@ fn kind_of(part: FaceBonePart) -> FaceBoneKind {
         FaceBonePart::Skin => FaceBoneKind::Skin,
         FaceBonePart::Jaw => FaceBoneKind::Jaw,
         FaceBonePart::Eye => FaceBoneKind::Eye,
+        FaceBonePart::Tongue => FaceBoneKind::Tongue,
     }
 }
 
@@ -92,8 +97,26 @@ impl FaceRig {
         };
         let around = head.map(|head| rig.children(Some(head))).unwrap_or_default();
         let joints = around.iter().filter_map(|uid| rig.joint(*uid));
-        let bones = joints.filter(is_facial).map(|joint| placed_bone(rig, joint)).collect();
+        let mut bones: Vec<PlacedBone> = joints.filter(is_facial).map(|joint| placed_bone(rig, joint)).collect();
+        if let Some(jaw) = bones.iter().position(|bone| bone.kind == FaceBoneKind::Jaw) {
+            let below = rig.children(Some(bones[jaw].uid)).iter().filter_map(|uid| rig.joint(*uid));
+            let tongues = below.filter(|joint| is_tongue(joint));
+            bones.extend(tongues.map(|joint| PlacedBone { carrier: Some(jaw), ..placed_bone(rig, joint) }));
+        }
         Self { head, neck, group, feature, bones }
+    }
+
+    /// The poses of the joints, of poses of the bones in head space: a joint moves with the one that carries it.
+    pub fn joint_poses(&self, analysis: &FaceAnalysis, poses: &[BonePose]) -> Vec<BonePose> {
+        let turn = analysis.axes.rotation();
+        let own = |(bone, pose): (&PlacedBone, &BonePose)| {
+            let carrier = bone.carrier.and_then(|carrier| Some((self.bones.get(carrier)?, poses.get(carrier)?)));
+            match carrier {
+                Some((carrier, carried)) => pose.below(turn * bone.position, carried, turn * carrier.position),
+                None => *pose,
+            }
+        };
+        self.bones.iter().zip(poses).map(own).collect()
     }
 
     /// The bones in the form of the algorithms, in head space.
@@ -128,11 +151,20 @@ fn placed_bone(rig: &Rig, joint: &RigJoint) -> PlacedBone {
             let slack = 1e-5 * (position.abs().max_element() + placed.position.abs().max_element());
             let moved = (position - placed.position).abs().max_element() > slack;
             let is_tagged_as_made = data.tags.len() == 1 && data.tags.iter().all(|tag| tag.enabled);
-            let as_made = is_tagged_as_made && joint.children.is_empty() && !data.locked;
+            // The tongue hangs on the jaw.
+            let is_as_made = |child: &Uid| {
+                let child = rig.joint(*child).filter(|child| placed.part == FaceBonePart::Jaw && is_tongue(child));
+                child.is_some_and(|child| !placed_bone(rig, child).touched)
+            };
+            let as_made = is_tagged_as_made && joint.children.iter().all(is_as_made) && !data.locked;
             (kind_of(placed.part), moved || !as_made || placed.label != label)
         }
     };
-    PlacedBone { uid: data.uid, position, kind, label, touched }
+    PlacedBone { uid: data.uid, position, kind, label, touched, carrier: None }
+}
+
+fn is_tongue(joint: &RigJoint) -> bool {
+    joint.data.face.as_ref().is_some_and(|placed| placed.part == FaceBonePart::Tongue)
 }
 
 /// The first joint with that name, ignoring prefixes of exporters (`mixamorig:Head`).

@@ -202,6 +202,7 @@ pub fn mixed(set: &ExpressionSet, strengths: &BTreeMap<String, f32>) -> Result<M
 fn expression_edits(rig: &Rig, prepared: &PreparedParts, mix: &Mix) -> Vec<RigEdit> {
     let PreparedParts { analysis, known, fitted, .. } = prepared;
     let poses = fitted.pose(mix);
+    let poses = known.joint_poses(analysis, &poses);
     let edits = known.bones.iter().zip(&poses).filter_map(|(bone, pose)| {
         let offset = Frame::of(rig, bone.uid, analysis).offset(pose);
         let offset = (!offset.is_rest(1e-7)).then_some(offset);

@@ -3,7 +3,10 @@
 //! A face is prepared when its bones and weights change: when it was placed, or when a file with a face was opened. A
 //! request that comes earlier waits for it.
 
-use std::sync::{Arc, Weak};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Weak},
+};
 
 use bevy::{
     ecs::entity::EntityHashMap,
@@ -13,6 +16,7 @@ use bevy::{
 
 use super::{
     ExpressError, ExpressRequest, ExpressionAnswer, Face, FaceExpressions,
+    job::analysed,
     placed_bones::FaceRig,
     pose::{analysed_weights, facial_bones},
 };
@@ -64,6 +68,13 @@ impl PreparedFace {
     }
 }
 
+/// Largest share of each unit's movement that mending of folds takes on a mesh's face, by the unit's name; see
+/// [`FittedFace::taken_of_units`]. Nothing while the face is not prepared. Cost: a pose of each unit and expression.
+pub fn mended_shares(world: &World, mesh: Entity) -> BTreeMap<String, f32> {
+    let prepared = world.get::<PreparedFace>(mesh).map(|prepared| prepared.0.clone());
+    prepared.map(|parts| parts.fitted.taken_of_units(&parts.set)).unwrap_or_default()
+}
+
 impl FacePreparation {
     /// Starts to prepare a face; a mesh whose analysis is not `ready` is analysed first.
     pub(super) fn start(
@@ -82,7 +93,7 @@ impl FacePreparation {
                 Some(face) => face,
                 None => {
                     let settings = AutoSettings::default();
-                    let analysis = FaceAnalysis::new(&rest.points, &triangles, &settings, &|_, _| true)?;
+                    let analysis = analysed(&rest, &triangles, &settings, &|_, _| true)?;
                     Face { analysis: analysis.into(), settings, rest }
                 }
             };

@@ -1,4 +1,4 @@
-//! Bones of jaw and eyes.
+//! Bones of jaw, eyes and tongue.
 
 use glam::Vec3;
 
@@ -8,7 +8,7 @@ use crate::algo::face::{
     shells::{ShellKind, Shells},
 };
 
-/// Adds the bones of jaw and eyes: fixed ones at their places, others if `wanted` and the mesh has them.
+/// Adds the bones of jaw, eyes and tongue: fixed ones at their places, others if `wanted` and the mesh has them.
 pub(super) fn add(
     points: &[Vec3],
     shells: &Shells,
@@ -28,6 +28,7 @@ pub(super) fn add(
     if let Some((position, fixed)) = given(FaceBoneKind::Jaw, None).or(own) {
         bones.push(FaceBone { fixed, ..name::extra(position, FaceBoneKind::Jaw, Side::Middle) });
     }
+    let has_jaw = bones.iter().any(|bone| bone.kind == FaceBoneKind::Jaw);
     let first = bones.len();
     for (kind, side) in [(ShellKind::LeftEye, Side::Left), (ShellKind::RightEye, Side::Right)] {
         let ball = || {
@@ -43,6 +44,25 @@ pub(super) fn add(
         bones[first].pair = Some(first + 1);
         bones[first + 1].pair = Some(first);
     }
+    // The jaw carries the tongue.
+    let root = || tongue_root(points, shells, map).filter(|_| wanted && has_jaw).map(|root| (root, None));
+    if let Some((position, fixed)) = given(FaceBoneKind::Tongue, None).or_else(root) {
+        bones.push(FaceBone { fixed, ..name::extra(position, FaceBoneKind::Tongue, Side::Middle) });
+    }
+}
+
+/// Share of the tongue's length that lies behind its bone.
+const ROOT: f32 = 0.3;
+
+/// Place in the back of the tongue.
+fn tongue_root(points: &[Vec3], shells: &Shells, map: &FaceMap) -> Option<Vec3> {
+    let of = |(index, _): &(usize, &Vec3)| shells.kind(*index) == ShellKind::Tongue;
+    let tongue = || points.iter().enumerate().filter(of).map(|(_, point)| *point);
+    let low = tongue().reduce(Vec3::min)?;
+    let high = tongue().reduce(Vec3::max)?;
+    let middle = 0.5 * (low + high);
+    let is_central = (middle.x - map.middle).abs() <= 0.01 * map.scale;
+    Some(Vec3::new(if is_central { map.middle } else { middle.x }, middle.y, low.z + ROOT * (high.z - low.z)))
 }
 
 /// Centre of an eyeball: that of the best-fitting sphere, or of its box if no sphere fits nearby.

@@ -143,7 +143,7 @@ fn partners(seats: &[Seat], map: &FaceMap) -> Vec<Option<usize>> {
     partners
 }
 
-/// A bone of jaw or eyes, which come on top of the skin's bones.
+/// A bone of jaw, eyes or tongue, which come on top of the skin's bones.
 pub(crate) fn extra(position: Vec3, kind: FaceBoneKind, side: Side) -> FaceBone {
     let region = if kind == FaceBoneKind::Eye { Region::Eye } else { Region::Jaw };
     let label = super::label(region, side, 1, kind);

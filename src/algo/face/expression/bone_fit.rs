@@ -12,7 +12,7 @@ mod pose_problem;
 mod samples;
 mod targets;
 
-use std::sync::OnceLock;
+use std::{collections::BTreeMap, sync::OnceLock};
 
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
@@ -20,11 +20,12 @@ use rayon::prelude::*;
 use self::{
     factor::{Factor, SparseMatrix},
     moving_skin::MovingSkin,
+    pose_problem::Repair,
     samples::{Mark, Sample},
     targets::UnitTargets,
 };
 use super::{
-    BonePose, Mix, UnitSet,
+    BonePose, ExpressionSet, Mix, Sides, UnitSet,
     field::{Field, jaw_pivot},
     limited,
     openings::OpeningLines,
@@ -49,7 +50,7 @@ pub(super) const SLIVER: f32 = 1e-3;
 const ROUNDS: [f32; 8] = [0.3, 0.3, 0.3, 0.3, 0.6, 0.6, 0.6, 0.6];
 /// Rounds without fewer problems after which a repair ends.
 const PATIENCE: usize = 2;
-/// The most that a repair of folds takes of an expression, as a share of the furthest movement. Skin may crease; an
+/// The most that a repair of folds takes of each unit of a mix, as a share of the unit's furthest movement. Skin may crease; an
 /// expression may not vanish for it.
 const TAKEN: f32 = 0.05;
 
@@ -128,22 +129,53 @@ impl FittedFace {
 
     /// The pose of each bone, as [`pose`](super::pose) gives it, for a mix of the units that the face was made with.
     ///
-    /// Bones of skin whose triangles would flip are brought nearer to equal movements, by 5 % of the furthest movement
-    /// at most, and alike on both sides in a mix that is alike on both sides; lips or lids that would cross are moved
-    /// apart.
+    /// Bones of skin whose triangles would flip are brought nearer to equal movements, by 5 % of the furthest movement of
+    /// each unit at most, and alike on both sides in a mix that is alike on both sides; lips or lids that would cross are
+    /// moved apart.
     /// Cost: points that bones move times rounds of repair, and for each unit once samples times moves of the field.
     pub fn pose(&self, mix: &Mix) -> Vec<BonePose> {
-        self.pose_and_folds(mix).0
+        self.pose_and_repair(mix).0
     }
 
-    /// The pose of each bone, and the triangles that stay folded, in rising order.
-    pub(super) fn pose_and_folds(&self, mix: &Mix) -> (Vec<BonePose>, Vec<u32>) {
-        let rest = (vec![BonePose::REST; self.bones.len()], Vec::new());
-        let Some(opening_lines) = self.opening_lines.as_ref().filter(|_| !mix.is_rest()) else { return rest };
-        let Some(field) = Field::new(mix, &self.units, &self.bones, &self.landmarks) else { return rest };
-        let mut poses = self.solve(mix, &field, opening_lines);
-        let folded = self.repair(&mut poses, mix.strengths.iter().all(|[left, right]| left == right));
-        (poses, folded)
+    /// The pose of each bone before its repair.
+    pub(super) fn pose_unrepaired(&self, mix: &Mix) -> Vec<BonePose> {
+        let lines = self.opening_lines.as_ref().filter(|_| !mix.is_rest());
+        let solved = lines.and_then(|lines| {
+            let field = Field::new(mix, &self.units, &self.bones, &self.landmarks)?;
+            Some(self.solve(mix, &field, lines))
+        });
+        solved.unwrap_or_else(|| vec![BonePose::REST; self.bones.len()])
+    }
+
+    /// The pose of each bone, and what its repair took and left.
+    pub(super) fn pose_and_repair(&self, mix: &Mix) -> (Vec<BonePose>, Repair) {
+        let mut poses = self.pose_unrepaired(mix);
+        let repair = match self.opening_lines.as_ref().filter(|_| !mix.is_rest()) {
+            Some(opening_lines) => self.repair(&mut poses, mix, opening_lines),
+            None => Repair::none(mix),
+        };
+        (poses, repair)
+    }
+
+    /// Share of the furthest movement of each unit of a mix that mending of folds takes, on the left and on the right: 0.05 at
+    /// most. A change of a bone is charged to the units that move it, in their shares.
+    pub fn taken(&self, mix: &Mix) -> Vec<[f32; 2]> {
+        self.pose_and_repair(mix).1.taken
+    }
+
+    /// Largest share that mending of folds takes of each unit, by its name: of the unit alone and in each of the six expressions,
+    /// all at full strength. Cost: a pose of each.
+    pub fn taken_of_units(&self, set: &ExpressionSet) -> BTreeMap<String, f32> {
+        let alone = |name: &str| {
+            let mut mix = Mix::rest(&self.units);
+            mix.add(name, Sides::Both, 1.0, &self.units);
+            mix
+        };
+        let mut mixes: Vec<Mix> = self.units.units().iter().map(|unit| alone(&unit.name)).collect();
+        mixes.extend(set.six().map(|expression| Mix::of(&[(expression, 1.0)], &self.units)));
+        let taken: Vec<Vec<[f32; 2]>> = mixes.par_iter().map(|mix| self.taken(mix)).collect();
+        let most = |unit: usize| taken.iter().flat_map(|taken| taken[unit]).fold(0.0, f32::max);
+        self.units.units().iter().enumerate().map(|(number, unit)| (unit.name.clone(), most(number))).collect()
     }
 
     /// Face as it is, which keeps what units ask of its skin for [`FittedFace::with_weights`].

@@ -22,6 +22,8 @@ pub(super) struct Field {
     /// Rotation and movement of the jaw bone.
     jaw: Quat,
     jaw_shift: Vec3,
+    /// Movement of the tongue bone, which the jaw carries.
+    tongue: Vec3,
     /// Rotation of the skin below the mouth by units that say nothing else of the skin, and its pivot.
     skin_jaw: Option<Quat>,
     pivot: Vec3,
@@ -52,7 +54,7 @@ impl Field {
         let opening_lines = OpeningLines::new(landmarks)?;
         let distance = landmarks.eye_distance();
         let mut sources = Vec::new();
-        let (mut open, mut open_skin, mut jaw_shift) = (0.0, 0.0, Vec3::ZERO);
+        let (mut open, mut open_skin, mut jaw_shift, mut tongue) = (0.0, 0.0, Vec3::ZERO, Vec3::ZERO);
         let mut gaze = [[0.0_f32; 2]; 2];
         for (unit, strengths) in units.units().iter().zip(&mix.strengths) {
             let both = (strengths[0] + strengths[1]) * 0.5;
@@ -65,6 +67,7 @@ impl Field {
                 true => shift * strengths[0] + shift.with_x(-shift.x) * strengths[1],
                 false => shift.with_x(0.0) * both,
             };
+            tongue += unit.tongue.with_x(0.0) * both;
             for (side, &strength) in strengths.iter().enumerate().filter(|(_, strength)| **strength > 0.0) {
                 gaze[side][0] += unit.gaze.out * strength;
                 gaze[side][1] += unit.gaze.up * strength;
@@ -80,6 +83,7 @@ impl Field {
             sources,
             jaw: pitch(open.clamp(0.0, 35.0)),
             jaw_shift: jaw_shift * distance,
+            tongue: tongue * distance,
             skin_jaw: (open_skin > 0.0).then(|| pitch(open_skin.min(35.0))),
             pivot: jaw_pivot(bones, landmarks),
             eyes: [eye(0, gaze[0]), eye(1, gaze[1])],
@@ -94,6 +98,7 @@ impl Field {
             sources: vec![Source::new(unit, side, 1.0, landmarks)],
             jaw: Quat::IDENTITY,
             jaw_shift: Vec3::ZERO,
+            tongue: Vec3::ZERO,
             skin_jaw: None,
             pivot: Vec3::ZERO,
             eyes: [Quat::IDENTITY; 2],
@@ -122,11 +127,15 @@ impl Field {
         self.skin_jaw
     }
 
-    /// Pose of a jaw or eye bone.
+    /// Pose of a bone of jaw, eyes or tongue.
     pub fn turn(&self, bone: &FaceBone) -> BonePose {
         let (translation, rotation) = match bone.kind {
             FaceBoneKind::Skin => (Vec3::ZERO, Quat::IDENTITY),
             FaceBoneKind::Jaw => (self.jaw_shift, self.jaw),
+            FaceBoneKind::Tongue => {
+                let arm = bone.position - self.pivot;
+                (self.jaw * (arm + self.tongue) - arm + self.jaw_shift, self.jaw)
+            }
             FaceBoneKind::Eye => {
                 let [left, right] = self.eyes;
                 (Vec3::ZERO, if self.opening_lines.side(bone.position, 0) >= 0.5 { left } else { right })

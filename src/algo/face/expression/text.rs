@@ -65,6 +65,9 @@ pub struct Unit {
     /// Movement of the jaw.
     #[serde(default, deserialize_with = "vector")]
     pub jaw_shift: Vec3,
+    /// Movement of the tongue's tip, which the jaw carries; its root stays.
+    #[serde(default, deserialize_with = "vector")]
+    pub tongue: Vec3,
     /// Rotation of the eyeballs.
     #[serde(default)]
     pub gaze: Gaze,
@@ -176,6 +179,12 @@ pub struct UnitUse {
 }
 
 impl Unit {
+    /// Returns `true` if the unit moves the tongue and nothing else, and so nothing on a face without one.
+    pub fn is_of_tongue(&self) -> bool {
+        let is_still = self.moves.is_empty() && self.jaw == 0.0 && self.jaw_shift == Vec3::ZERO;
+        self.tongue != Vec3::ZERO && is_still && self.gaze == Gaze::default()
+    }
+
     /// Reads a file of units; `file` is its name in errors. Names are unique in it.
     pub fn parse_list(text: &str, file: &str) -> Result<Vec<Self>, ExpressionError> {
         #[derive(Deserialize)]

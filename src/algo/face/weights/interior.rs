@@ -19,13 +19,22 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
             ShellKind::Skin => {}
             ShellKind::LeftEye => rows[v] = vec![(face.eyes[0], 1.0)],
             ShellKind::RightEye => rows[v] = vec![(face.eyes[1], 1.0)],
-            ShellKind::Inside => members.entry(shell[v]).or_default().push(v),
+            ShellKind::Inside | ShellKind::Tongue => members.entry(shell[v]).or_default().push(v),
         }
     }
-    let (inside, outside): (Vec<_>, Vec<_>) = members.values().partition(|members| in_mouth(face, members));
+    let is_tongue = |members: &[usize]| members.first().is_some_and(|&v| kinds[v] == ShellKind::Tongue);
+    let (inside, outside): (Vec<_>, Vec<_>) =
+        members.values().partition(|members| is_tongue(members) || in_mouth(face, members));
     let inside: Vec<MouthPart> = inside.into_iter().map(|members| MouthPart::new(face, members)).collect();
+    let ends = inside.iter().filter(|part| is_tongue(part.members)).map(|part| [part.low.z, part.high.z]);
+    let ends = ends.reduce(|[back, front], [low, high]| [back.min(low), front.max(high)]);
     for part in &inside {
-        mouth(face, part, &inside, rows);
+        match (face.jaw, face.tongue, ends) {
+            (Some(jaw), Some(tongue), Some(ends)) if is_tongue(part.members) => {
+                stretched(face, part, [jaw, tongue], ends, rows);
+            }
+            _ => mouth(face, part, &inside, rows),
+        }
     }
     for members in outside {
         if !lashes(face, sides, members, rows) {
@@ -88,6 +97,18 @@ impl<'a> MouthPart<'a> {
             && (self.mean - other.mean).abs() > 0.05 * e
             && !within(self, other)
             && !within(other, self)
+    }
+}
+
+/// Share of the tongue's length from its root in which its own bone takes over from the jaw's.
+const ROOT: f32 = 0.75;
+
+/// Fills the rows of a tongue, whose root stays with the jaw when its bone moves.
+fn stretched(face: &Face, part: &MouthPart, [jaw, tongue]: [u32; 2], [back, front]: [f32; 2], rows: &mut [Row]) {
+    let least = f32::MIN_POSITIVE;
+    for &v in part.members {
+        let share = smooth(back, back + (ROOT * (front - back)).max(least), face.places[v].z);
+        rows[v] = vec![(tongue, share), (jaw, 1.0 - share)];
     }
 }
 

@@ -13,7 +13,7 @@ use crate::{
         face::{ExpressRequest, Expressions, Face},
         surface::RigMesh,
     },
-    rig::Rig,
+    rig::{FaceBonePart, Rig},
 };
 
 /// Beginning of the names of visemes.
@@ -85,7 +85,9 @@ pub(super) fn show(
         });
     }
     CollapsingHeader::new("Units").show(ui, |ui| {
-        for unit in set.0.units() {
+        let is_tongue = |part: FaceBonePart| part == FaceBonePart::Tongue;
+        let has_tongue = rig.1.walk().any(|joint| joint.data.face.as_ref().is_some_and(|face| is_tongue(face.part)));
+        for unit in set.0.units().iter().filter(|unit| has_tongue || !unit.is_of_tongue()) {
             let facs = unit.facs.iter().map(|number| format!("AU {number}"));
             let names: Vec<String> = facs.chain(unit.arkit.iter().cloned()).collect();
             row(ui, &unit.name, &unit.name, format!("{}\n{}", unit.about, names.join(", ")));

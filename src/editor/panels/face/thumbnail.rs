@@ -81,5 +81,6 @@ fn tone(kind: ShellKind) -> [f32; 3] {
         ShellKind::Skin => [226.0, 190.0, 170.0],
         ShellKind::LeftEye | ShellKind::RightEye => [240.0, 240.0, 240.0],
         ShellKind::Inside => [190.0, 150.0, 145.0],
+        ShellKind::Tongue => [200.0, 120.0, 118.0],
     }
 }

@@ -4,8 +4,8 @@ use glam::{Affine3A, Vec3};
 
 use super::{FittedFace, PATIENCE, ROUNDS, TAKEN, moving_skin::PosedSkin, samples::influences};
 use crate::algo::face::{
-    bones::FaceBoneKind,
-    expression::{BonePose, limited},
+    bones::{FaceBone, FaceBoneKind},
+    expression::{BonePose, Mix, field::Field, limited, openings::OpeningLines},
 };
 
 /// Distance of lids and lips that counts as closed, as a share of that at rest.
@@ -26,17 +26,71 @@ impl PoseProblems {
     }
 }
 
+/// Outcome of the repair of a pose.
+pub(in crate::algo::face::expression) struct Repair {
+    /// Triangles that stay folded, in rising order.
+    pub folded: Vec<u32>,
+    /// Share of each unit's furthest movement that the repair took, on the left and on the right.
+    pub taken: Vec<[f32; 2]>,
+}
+
+impl Repair {
+    /// The outcome for a pose that needs none.
+    pub(super) fn none(mix: &Mix) -> Self {
+        Self { folded: Vec::new(), taken: vec![[0.0; 2]; mix.strengths.len()] }
+    }
+}
+
+/// One unit on one side of a mix.
+struct UsedUnit {
+    unit: usize,
+    side: usize,
+    /// Length of each bone's movement for it.
+    lengths: Vec<f32>,
+    /// The longest of them.
+    furthest: f32,
+}
+
+/// The units of a mix. A change of a bone is charged to them in the shares that they have in its movement.
+struct UsedUnits {
+    units: Vec<UsedUnit>,
+    /// Sum of the units' lengths for each bone.
+    totals: Vec<f32>,
+    /// The most that each bone may be changed.
+    bounds: Vec<f32>,
+}
+
+impl UsedUnits {
+    fn bound(&self, bone: usize) -> f32 {
+        let moving = self.units.iter().filter(|used| used.lengths[bone] > 0.0);
+        let most = moving.map(|used| used.furthest * (self.totals[bone] / used.lengths[bone]));
+        most.reduce(f32::min).map_or(0.0, |most| TAKEN * most)
+    }
+
+    /// Charges changes of bones to the units.
+    fn charge(&self, changes: &[f32], taken: &mut [[f32; 2]]) {
+        for UsedUnit { unit, side, lengths, furthest } in &self.units {
+            let bones = changes.iter().zip(lengths).zip(&self.totals).filter(|(_, total)| **total > 0.0);
+            let shares = bones.map(|((change, length), total)| change * (length / total) / furthest);
+            taken[*unit][*side] = shares.fold(0.0, f32::max);
+        }
+    }
+}
+
 impl FittedFace {
-    /// Repairs a pose as far as it may; alike on both sides if `is_alike`. Returns the triangles that stay folded.
-    pub(super) fn repair(&self, poses: &mut [BonePose], is_alike: bool) -> Vec<u32> {
-        let furthest = poses.iter().map(|pose| pose.translation.length()).fold(0.0, f32::max);
+    /// Repairs the pose of a mix as far as it may; alike on both sides in a mix that is alike on both sides.
+    pub(super) fn repair(&self, poses: &mut [BonePose], mix: &Mix, opening_lines: &OpeningLines) -> Repair {
+        let is_alike = mix.strengths.iter().all(|[left, right]| left == right);
         let solved: Vec<Vec3> = poses.iter().map(|pose| pose.translation).collect();
         let mut apart = vec![0.0; poses.len()];
+        let mut repair = Repair::none(mix);
         if self.moving.triangles.is_empty() && self.moving.apart.is_empty() {
-            return Vec::new();
+            return repair;
         }
         let mut posed = PosedSkin::new(&self.moving, self.matrices(poses));
         let (mut fewest, mut in_vain) = (usize::MAX, 0);
+        let mut used: Option<UsedUnits> = None;
+        let mut taken = vec![0.0_f32; poses.len()];
         for share in ROUNDS {
             let problems = self.problems(&posed);
             in_vain = if problems.count() < fewest { 0 } else { in_vain + 1 };
@@ -52,13 +106,52 @@ impl FittedFace {
             if is_alike {
                 self.even_out(&mut changes);
             }
-            for (((pose, solved), apart), change) in poses.iter_mut().zip(&solved).zip(&apart).zip(changes) {
-                let change = change.clamp_length_max(TAKEN * furthest);
-                pose.translation = limited(*solved + change + Vec3::Y * *apart, &self.landmarks);
+            let bounds = &used.get_or_insert_with(|| self.used_units(mix, opening_lines, is_alike)).bounds;
+            for (bone, change) in changes.into_iter().enumerate() {
+                let change = change.clamp_length_max(bounds[bone]);
+                taken[bone] = change.length();
+                poses[bone].translation = limited(solved[bone] + change + Vec3::Y * apart[bone], &self.landmarks);
             }
             posed.update(self.matrices(poses));
         }
-        posed.folded_numbers()
+        if let Some(used) = used {
+            used.charge(&taken, &mut repair.taken);
+        }
+        repair.folded = posed.folded_numbers();
+        repair
+    }
+
+    /// The units of a mix, and the most that each bone may be changed so that none of them loses more than its share.
+    fn used_units(&self, mix: &Mix, opening_lines: &OpeningLines, is_alike: bool) -> UsedUnits {
+        let mut used = UsedUnits { units: Vec::new(), totals: vec![0.0; self.bones.len()], bounds: Vec::new() };
+        for (unit, strengths) in mix.strengths.iter().enumerate().take(self.units.units().len()) {
+            for (side, strength) in strengths.iter().enumerate().filter(|(_, strength)| **strength > 0.0) {
+                let mut alone = Mix::rest(&self.units);
+                alone.strengths[unit][side] = *strength;
+                let Some(field) = Field::new(&alone, &self.units, &self.bones, &self.landmarks) else { continue };
+                let poses = self.solve(&alone, &field, opening_lines);
+                let length = |(pose, bone): (&BonePose, &FaceBone)| match bone.kind {
+                    FaceBoneKind::Skin => pose.translation.length(),
+                    _ => 0.0,
+                };
+                let lengths: Vec<f32> = poses.iter().zip(&self.bones).map(length).collect();
+                let furthest = lengths.iter().copied().fold(0.0, f32::max);
+                if furthest > 0.0 {
+                    for (total, length) in used.totals.iter_mut().zip(&lengths) {
+                        *total += length;
+                    }
+                    used.units.push(UsedUnit { unit, side, lengths, furthest });
+                }
+            }
+        }
+        used.bounds = (0..self.bones.len()).map(|bone| used.bound(bone)).collect();
+        if is_alike {
+            for &[one, other] in &self.pairs {
+                let least = used.bounds[one].min(used.bounds[other]);
+                (used.bounds[one], used.bounds[other]) = (least, least);
+            }
+        }
+        used
     }
 
     /// Matrices of neck, head and each bone.

@@ -242,7 +242,7 @@ impl Skin<'_> {
             match self.bones[bone].kind {
                 FaceBoneKind::Skin => sample.influences.push((self.unknown_of[bone], f64::from(weight))),
                 FaceBoneKind::Jaw => sample.mark.jaw += f64::from(weight),
-                FaceBoneKind::Eye => {}
+                FaceBoneKind::Eye | FaceBoneKind::Tongue => {}
             }
         }
         (all > 0.02 && place.is_finite() && !sample.influences.is_empty()).then_some(sample)
