@@ -178,8 +178,6 @@ fn bends_lie_beside_those_of_painted_weights() {
 /// A character from a file: its points at rest, the joints with the helpers or without, and what the file's weights say.
 struct Character {
     joints: Vec<WeightJoint>,
-    /// The joint's number in the file.
-    nodes: Vec<u32>,
     weights: Weights,
     report: WeightReport,
     truth: Weights,
@@ -231,7 +229,9 @@ impl Character {
                 }
             }
         }
-        let settings = WeightSettings::default();
+        let is_slot = |joint: &usize| model.nodes[nodes[*joint] as usize].name.contains("slot");
+        let slots = (0..nodes.len()).filter(is_slot).collect();
+        let settings = WeightSettings { slots, ..WeightSettings::default() };
         let (weights, report) =
             skin_weights(&rest.points, &rest.point_triangles(), &joints, &rigid, None, &settings, &|_| true).unwrap();
         let mut named = Weights::default();
@@ -240,7 +240,7 @@ impl Character {
         }
         let objects = model.objects.iter().zip(points).filter(|(object, _)| object.skin.is_some());
         let objects = objects.map(|(object, points)| (object.name.clone(), points)).collect();
-        Self { joints, nodes, weights: named, report, truth, objects, held }
+        Self { joints, weights: named, report, truth, objects, held }
     }
 
     fn error(&self, name: &str) -> f64 {
@@ -271,11 +271,9 @@ fn characters_of_many_parts_are_bound_part_by_part() {
     println!("{} joints, error {:.4}, head {:.4}", all.joints.len(), all.error(""), all.error("Head"));
     assert!(all.error("") < 1.1 * 0.241 && all.error("Head") < 0.03);
     // Slots lie inside of the hands and are their last joints; all other helpers stand beside the body.
-    let is_slot = |node: usize| {
-        let parent = all.joints[all.nodes.iter().position(|n| *n as usize == node).unwrap()].parent;
-        parent.is_some_and(|parent| all.held[all.nodes[parent] as usize] > 0.0)
-    };
-    assert_eq!(all.claims_of_helpers(|node| all.held[node] == 0.0 && !is_slot(node)), 0);
+    assert_eq!(all.claims_of_helpers(|node| all.held[node] == 0.0), 0);
+    let slots = all.report.idle_joints.iter().filter(|idle| idle.reason == IdleReason::Slot).count();
+    assert_eq!(slots, 2, "{:?}", all.report.idle_joints);
     // Poles of knees and elbows are told with their distance from the body.
     let reasons = all.report.idle_joints.iter().map(|idle| idle.reason);
     let far = reasons.filter(|reason| matches!(reason, IdleReason::Outside { distance } if *distance > 0.1)).count();
@@ -311,6 +309,45 @@ fn what_hangs_on_a_joint_in_its_file_is_bound_to_it_by_the_command() {
         count += 1;
     }
     assert!(count >= 2, "{count} objects hang on joints");
+}
+
+/// Joints whose names say that things hang on them or that they steer hold no skin, are told, and may claim it.
+#[cfg(feature = "cli")]
+#[test]
+fn slots_in_hands_hold_what_they_carry_and_no_skin() {
+    let Some(data) = test_data() else { return };
+    let path = data.join("characters/Mage.glb").display().to_string();
+    let path = path.as_str();
+    let folder = tempfile::tempdir().unwrap();
+    let run = |options: &[&str]| {
+        let args = [&["--json", "skin", path, path, "-o", "mage.glb"][..], options].concat();
+        let answer = crate::cli_build::rigsmith(folder.path(), &args);
+        assert_eq!(answer.code, 0, "{}", answer.err);
+        let model = load_model(&RealDisk, &folder.path().join("mage.glb")).unwrap();
+        let weights = model.weights.as_ref().unwrap();
+        let is_slot = |node: u32| model.nodes[node as usize].name.starts_with("handslot");
+        let points = model.parts.iter().filter(|part| {
+            let name = &model.objects[part.object].name;
+            ["Arm", "Body", "Head", "Leg"].iter().any(|skinned| name.starts_with(&format!("Mage_{skinned}")))
+        });
+        let points: BTreeSet<u32> = points.flat_map(|part| &part.vertices).copied().collect();
+        assert!(points.len() > 2500, "{} points of skin", points.len());
+        let is_held = |point: &&u32| weights.of(**point as usize).any(|(node, _)| is_slot(node));
+        let json: Value = serde_json::from_str(&answer.out).unwrap();
+        (points.iter().filter(is_held).count(), json)
+    };
+    let (held, json) = run(&[]);
+    assert_eq!(held, 0, "{json}");
+    let idle = json["idle_joints"].as_array().unwrap();
+    for slot in ["handslot.l", "handslot.r"] {
+        assert!(idle.iter().any(|idle| idle["joint"] == slot && idle["reason"] == "slot"), "{json}");
+    }
+    let carries = |part: &Value| part["joint"] == "handslot.l" && part["part"] == "Spellbook";
+    assert!(json["rigid_parts"].as_array().unwrap().iter().any(carries), "{json}");
+    let (held, json) = run(&["--claim", "handslot.l"]);
+    assert!(held > 50, "{held} points: {json}");
+    let idle = json["idle_joints"].as_array().unwrap();
+    assert!(idle.iter().all(|idle| idle["joint"] != "handslot.l"), "{json}");
 }
 
 /// Errors against the weights of the files, as measured.

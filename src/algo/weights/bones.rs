@@ -42,15 +42,20 @@ impl Bones {
     pub fn may_hold(&self, bone: u32, island: usize) -> bool {
         self.homes.is_at_home(self.segments[bone as usize].joint, island)
     }
+
+    /// The bones without those of slots, for what is bound without regard to its part.
+    pub fn without_slots(&self) -> Vec<BoneSegment> {
+        self.segments.iter().filter(|segment| !self.homes.is_slot(segment.joint)).copied().collect()
+    }
 }
 
 /// Builds the bones of the joints that take part, in a frame where the surface has unit size. `areas` are those around
 /// the points of the welded surface that `sight` sees. Joints for which `claims` is true have bones and may hold any part
-/// even if they hang in the air.
+/// even if they hang in the air; those for which `slots` is true hold no part that other bones run through.
 pub(crate) fn build(
     joints: &[WeightJoint],
     takes_part: &[bool],
-    claims: &[bool],
+    (claims, slots): (&[bool], &[bool]),
     points: &[Vec3],
     areas: &[f32],
     sight: &Sight,
@@ -112,7 +117,7 @@ pub(crate) fn build(
         );
     }
     drop_repeats(&mut segments, &mut leaves, claims);
-    let homes = Homes::new(claims, &segments, points, sight);
+    let homes = Homes::new(claims, slots, &segments, points, sight);
     grow_leaves(joints, &mut segments, &leaves, points, areas, (sight, &homes));
     let tree = BoneTree::new(&segments);
     let girths = girths(&segments, &tree, points, areas, sight);
