@@ -103,7 +103,8 @@ pub struct WeightSettings {
     /// Weights below this are dropped before the rest is made to sum to one.
     pub prune: f32,
     /// Parts of the mesh (connected pieces) that one joint holds in nearly their whole size move with that joint alone,
-    /// as helmets, swords and eyes do, and small parts move as one; `false` lets them bend.
+    /// as helmets, swords and eyes do, and small parts move as one, with what they lie on if one joint holds that; `false` lets
+    /// them bend.
     pub stiff_parts: bool,
     /// Ranges of points whose parts bend although [`WeightSettings::stiff_parts`] would hold them stiff.
     pub bending: Vec<Range<u32>>,

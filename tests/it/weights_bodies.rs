@@ -350,6 +350,34 @@ fn slots_in_hands_hold_what_they_carry_and_no_skin() {
     assert!(idle.iter().all(|idle| idle["joint"] != "handslot.l"), "{json}");
 }
 
+/// A robot of hard parts, opened without its skeleton: bolts on the head move with the head, although the neck's bone ends
+/// as near.
+#[cfg(feature = "cli")]
+#[test]
+fn small_parts_move_with_the_stiff_part_that_they_lie_on() {
+    let Some(data) = test_data() else { return };
+    let robot = data.join("gltf_skinned/RobotExpressive.glb").display().to_string();
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let answer = crate::cli_build::rigsmith(folder.path(), args);
+        assert_eq!(answer.code, 0, "{args:?}: {}", answer.err);
+        answer.out
+    };
+    run(&["convert", robot.as_str(), "robot.obj"]);
+    let out = run(&["--json", "skin", robot.as_str(), "robot.obj", "-o", "robot.glb"]);
+    let json: Value = serde_json::from_str(&out).unwrap();
+    let parts = json["rigid_parts"].as_array().unwrap();
+    let alone = |part: &&Value| part["share"] == 1.0;
+    // The shell, two ears, two eyes and 24 bolts.
+    let head = parts.iter().filter(alone).filter(|part| part["joint"] == "Head").count();
+    println!(
+        "{head} of 29 parts of the head, {} of {} rigid parts with one joint",
+        parts.iter().filter(alone).count(),
+        parts.len()
+    );
+    assert_eq!(head, 29, "{json}");
+}
+
 /// Errors against the weights of the files, as measured.
 #[test]
 fn characters_and_creatures_are_bound_as_well_as_they_were() {
