@@ -26,6 +26,7 @@ mod finish;
 mod half;
 mod heat;
 mod islands;
+mod keypoints;
 pub(crate) mod laplacian;
 pub(crate) mod ldl;
 mod odds;

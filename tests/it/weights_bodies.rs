@@ -37,6 +37,19 @@ fn vector(value: &Value) -> Vec3 {
 
 impl Body {
     pub fn read(bodies: &Path, body: &str, rig: &str) -> Self {
+        let painted = json(&bodies.join(format!("gt_weights_{rig}.json")));
+        let order = painted["bone_order"].as_array().unwrap();
+        let names = order.iter().map(|name| name.as_str().unwrap().to_owned()).collect();
+        let mut truth = Weights::default();
+        for row in painted["weights"].as_array().unwrap() {
+            let influence = |e: &Value| (e[0].as_u64().unwrap() as u32, e[1].as_f64().unwrap() as f32);
+            truth.push(row.as_array().unwrap().iter().map(influence));
+        }
+        Self { truth, ..Self::unpainted(bodies, body, rig, Some(names)) }
+    }
+
+    /// A body with a rig that no weights are painted for, whose joints are in the order of `names` or of the alphabet.
+    pub fn unpainted(bodies: &Path, body: &str, rig: &str, names: Option<Vec<String>>) -> Self {
         let text = std::fs::read_to_string(bodies.join(body).join("body.obj")).unwrap();
         let (mut points, mut triangles) = (Vec::new(), Vec::new());
         for line in text.lines() {
@@ -49,10 +62,10 @@ impl Body {
                 triangles.extend((2..f.len()).map(|i| [f[0], f[i - 1], f[i]]));
             }
         }
-        let painted = json(&bodies.join(format!("gt_weights_{rig}.json")));
         let bones = json(&bodies.join(body).join("joints.json"))[rig].take();
-        let order = painted["bone_order"].as_array().unwrap();
-        let names: Vec<String> = order.iter().map(|name| name.as_str().unwrap().to_owned()).collect();
+        let mut all: Vec<String> = bones.as_object().unwrap().keys().cloned().collect();
+        all.sort_unstable();
+        let names = names.unwrap_or(all);
         let index = |name: &str| names.iter().position(|other| other == name);
         let joint = |name: &String| WeightJoint {
             head: vector(&bones[name]["head"]),
@@ -63,15 +76,10 @@ impl Body {
             halves: None,
         };
         let joints = names.iter().map(joint).collect();
-        let mut truth = Weights::default();
-        for row in painted["weights"].as_array().unwrap() {
-            let influence = |e: &Value| (e[0].as_u64().unwrap() as u32, e[1].as_f64().unwrap() as f32);
-            truth.push(row.as_array().unwrap().iter().map(influence));
-        }
-        Self { points, triangles, names, joints, truth }
+        Self { points, triangles, names, joints, truth: Weights::default() }
     }
 
-    fn bound(&self) -> (Weights, WeightReport) {
+    pub fn bound(&self) -> (Weights, WeightReport) {
         skin_weights(&self.points, &self.triangles, &self.joints, &[], None, &WeightSettings::default(), &|_| true)
             .unwrap()
     }

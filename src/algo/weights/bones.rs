@@ -11,6 +11,7 @@ use super::{
     WeightJoint,
     bone::BoneSegment,
     bone_tree::{BoneTree, closest_on},
+    keypoints,
     roots::{Homes, Roots},
     sight::Sight,
 };
@@ -62,6 +63,8 @@ pub(crate) fn build(
 ) -> Bones {
     /// Joints closer than this share a place.
     const SAME: f32 = 1e-6;
+    let joints = keypoints::set_back(joints, sight);
+    let joints = &joints[..];
     let owners: Vec<Option<u32>> = owners(joints).into_iter().map(|o| o.filter(|&j| takes_part[j as usize])).collect();
     let mut children = vec![0usize; joints.len()];
     for parent in joints.iter().filter_map(|j| j.parent) {
