@@ -26,6 +26,7 @@ mod finish;
 mod half;
 mod heat;
 mod islands;
+mod keypoints;
 pub(crate) mod laplacian;
 pub(crate) mod ldl;
 mod odds;
@@ -103,13 +104,18 @@ pub struct WeightSettings {
     /// Weights below this are dropped before the rest is made to sum to one.
     pub prune: f32,
     /// Parts of the mesh (connected pieces) that one joint holds in nearly their whole size move with that joint alone,
-    /// as helmets, swords and eyes do, and small parts move as one; `false` lets them bend.
+    /// as helmets, swords and eyes do, and small parts move as one, with what they lie on if one joint holds that; `false` lets
+    /// them bend.
     pub stiff_parts: bool,
     /// Ranges of points whose parts bend although [`WeightSettings::stiff_parts`] would hold them stiff.
     pub bending: Vec<Range<u32>>,
     /// Indices of joints that claim skin although they hang outside of the mesh or do not deform. Such a joint holds what
     /// lies nearer to it than to others, which may be nothing.
     pub claims: Vec<usize>,
+    /// Indices of joints that carry or steer things, as sockets in hands and targets. Such a joint holds nothing of a part of the
+    /// mesh that other joints hold, though it lies in it, unless it is one of [`WeightSettings::claims`]. What is no joint's
+    /// index counts for nothing.
+    pub slots: Vec<usize>,
 }
 
 impl Default for WeightSettings {
@@ -123,6 +129,7 @@ impl Default for WeightSettings {
             stiff_parts: true,
             bending: Vec::new(),
             claims: Vec::new(),
+            slots: Vec::new(),
         }
     }
 }
@@ -241,6 +248,10 @@ pub fn skin_weights(
     check::input(points, triangles, joints, rigid, locks.as_ref())?;
     check::claims(joints, &settings.claims)?;
     let (joints, claims) = &claiming(joints, &settings.claims);
+    let mut slots = vec![false; joints.len()];
+    for &joint in settings.slots.iter().filter(|joint| **joint < joints.len()) {
+        slots[joint] = !claims[joint];
+    }
     let step = |share: f32| if progress(share) { Ok(()) } else { Err(WeightError::Cancelled) };
     step(0.0)?;
     let shaping = Shaping::new(points.len(), rigid, locks, settings);
@@ -248,17 +259,20 @@ pub fn skin_weights(
     let limbs = Limbs::new(joints, &shaping.free_joints(joints));
     let finish = |of: &dyn Fn(usize) -> Vec<(u32, f32)>| shaping.finish(|point| of(point).into_iter(), points.len());
     let is_locked = |joint: usize| locks.is_some_and(|locks| locks.joints[joint]);
+    let is_given = |point: usize| shaping.is_given(point);
     if let [only] = limbs.free[..] {
         report.given = points.len();
         let result = finish(&|point| limbs.spread(points[point], [(only, 1.0)].into_iter()));
-        report.idle_joints = report::idle_joints(joints, &result, is_locked, |_| None);
+        report.idle_joints = report::idle_joints(joints, &result, is_locked, &slots, is_given, |_| None);
         return Ok((result, report));
     }
     // Rigid parts neither spread heat nor hide bones.
     let soft: Vec<[u32; 3]> =
         triangles.iter().copied().filter(|t| !t.iter().any(|&p| shaping.is_given(p as usize))).collect();
+    let (bound_claims, bound_slots) = (limbs.flags(claims), limbs.flags(&slots));
+    let bound_joints = (&*limbs.joints, &*bound_claims, &*bound_slots);
     let BoundSurface { place, weights, sources, stiff, gaps } =
-        bind::bind(points, &soft, (&limbs.joints, &limbs.claims(claims)), &limbs.free, settings, progress)?;
+        bind::bind(points, &soft, bound_joints, &limbs.free, settings, progress)?;
     for (point, &place) in place.iter().enumerate() {
         let count = match sources[place as usize] {
             _ if shaping.is_given(point) => &mut report.given,
@@ -273,7 +287,7 @@ pub fn skin_weights(
     report.stiff = report.stiff_pieces.iter().map(|piece| piece.points).sum();
     let result = finish(&|point| limbs.spread(points[point], weights.of(place[point] as usize)));
     let outside = |joint: usize| limbs.index(joint).and_then(|core| gaps.outside(core));
-    report.idle_joints = report::idle_joints(joints, &result, is_locked, outside);
+    report.idle_joints = report::idle_joints(joints, &result, is_locked, &slots, is_given, outside);
     step(1.0)?;
     Ok((result, report))
 }

@@ -172,6 +172,7 @@ fn reason_word(reason: IdleReason) -> (&'static str, Option<f32>) {
     match reason {
         IdleReason::Outside { distance } => ("outside", Some(distance)),
         IdleReason::NoSurface => ("no_surface", None),
+        IdleReason::Slot => ("slot", None),
         IdleReason::NotDeforming => ("not_deforming", None),
         IdleReason::Locked => ("locked", None),
     }
@@ -206,6 +207,7 @@ fn idle_lines(names: &JointNames, idle: &[IdleJoint], claims: &[Uid]) -> Vec<Str
     let kinds = [
         ("outside", "hold no skin, outside of the mesh"),
         ("no_surface", "hold no skin, all of it belongs to other joints"),
+        ("slot", "hold no skin, carry or steer things by their names (--claim lets them)"),
         ("not_deforming", "hold no skin, do not deform"),
         ("locked", "hold no skin, locked without weights"),
     ];

@@ -22,7 +22,7 @@ pub use self::{
 };
 use self::{
     bends::{TriedBend, push_edits, tried_bends},
-    carriers::joints_at_nodes,
+    carriers::{joints_at_nodes, named_slots},
     parts::{object_points, runs_by_value},
 };
 use super::{
@@ -197,6 +197,8 @@ pub struct SkinningInput {
     pub bending: Vec<Range<u32>>,
     /// Indices of joints that claim skin although they would be idle.
     pub claims: Vec<usize>,
+    /// Indices of joints that carry or steer things, by their labels: sockets, props, targets, poles, controls.
+    pub slots: Vec<usize>,
     /// Parts of `rigid` with their number of points and the joint's index.
     given: Vec<(MeshPart, usize, usize)>,
     /// Parts of `bending`.
@@ -241,6 +243,7 @@ impl SkinningInput {
             rigid: Vec::new(),
             bending: Vec::new(),
             claims: Vec::new(),
+            slots: named_slots(rig, &skeleton),
             given: Vec::new(),
             bending_parts: Vec::new(),
             bends,
@@ -299,7 +302,8 @@ impl SkinningInput {
         let locks = self.existing.as_ref().filter(|_| any_locked);
         let locks = locks.map(|weights| Locks { weights, joints: &self.locked });
         let claims = settings.claims.iter().chain(&self.claims).copied().collect();
-        let settings = &WeightSettings { bending: self.bending.clone(), claims, ..settings.clone() };
+        let slots = settings.slots.iter().chain(&self.slots).copied().collect();
+        let settings = &WeightSettings { bending: self.bending.clone(), claims, slots, ..settings.clone() };
         let (weights, report) =
             skin_weights(&mesh.rest.points, &mesh.triangles, &self.joints, &self.rigid, locks, settings, progress)?;
         let (weights, pushes) = self.try_bends(mesh, weights, settings, &|_| false, &|_| true);

@@ -460,6 +460,27 @@ fn reports_count_what_they_name() {
     assert!(text.contains("outside of the mesh: far (2 joints, 8.3"), "{text}");
 }
 
+/// Whole words of labels tell joints that carry or steer things, unless flesh hangs below them.
+#[test]
+fn slots_are_told_by_their_labels() {
+    let folder = folder();
+    fs::write(folder.path().join("tube.obj"), tube_with_pouch([2.8, 0.5, -0.1], [3.1, 0.7, 0.1])).unwrap();
+    let slots = |tip: &str, end: &str| {
+        let rig = format!("rig 1\njoint 0 -1 0.1 0 0 base\njoint 1 0 2 0 0 {tip}\njoint 2 1 3.4 0 0 {end}\n");
+        fs::write(folder.path().join("tube.rig"), rig).unwrap();
+        let json = rigsmith(folder.path(), &["--json", "skin", "tube.rig", "tube.obj", "-o", "a.glb"]).json();
+        let idle = json["idle_joints"].as_array().unwrap().iter();
+        idle.map(|idle| format!("{} {}", idle["joint"], idle["reason"])).collect::<Vec<String>>()
+    };
+    for label in ["handslot.l", "WeaponSocketR", "hand_prop", "IKTarget", "kneeIK.l", "POLE", "attach-1"] {
+        assert_eq!(slots("tip", label), [format!("\"{label}\" \"slot\"")]);
+    }
+    for label in ["eye_socket", "proper", "Mike", "controller", "slotted"] {
+        assert!(slots("tip", label).is_empty(), "{label}");
+    }
+    assert!(slots("tip_ctrl", "end").is_empty(), "flesh hangs below the control");
+}
+
 /// A character of many parts: poles and targets are idle, and a part goes to the joint that a person names.
 #[test]
 fn parts_of_a_character_go_by_their_names() {

@@ -218,6 +218,7 @@ mod weight_paint;
 mod weight_paint_tool;
 mod weights;
 mod weights_bodies;
+mod weights_rigs;
 mod whole;
 #[cfg(all(feature = "editor", feature = "cli"))]
 mod window;

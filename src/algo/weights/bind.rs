@@ -43,12 +43,12 @@ pub(crate) struct BoundSurface {
     pub gaps: Gaps,
 }
 
-/// Binds checked input to the joints in `free`. Beside the joints stands a flag of each: whether it claims skin even outside
-/// of the surface.
+/// Binds checked input to the joints in `free`. Beside the joints stand two flags of each: whether it claims skin even outside
+/// of the surface, and whether it is a slot, which holds no flesh of others.
 pub(crate) fn bind(
     points: &[Vec3],
     triangles: &[[u32; 3]],
-    (joints, claims): (&[WeightJoint], &[bool]),
+    (joints, claims, slots): (&[WeightJoint], &[bool], &[bool]),
     free: &[u32],
     settings: &WeightSettings,
     progress: &(dyn Fn(f32) -> bool + Sync),
@@ -60,7 +60,7 @@ pub(crate) fn bind(
     for &joint in free {
         takes_part[joint as usize] = true;
     }
-    let job = Job { joints: &joints, takes_part: &takes_part, claims, settings, progress };
+    let job = Job { joints: &joints, takes_part: &takes_part, claims, slots, settings, progress };
     let triangles: Vec<[u32; 3]> =
         triangles.iter().map(|t| t.map(|p| place[p as usize])).filter(|[a, b, c]| a != b && b != c && c != a).collect();
     let graph = Graph::new(&places, &triangles);
@@ -83,7 +83,7 @@ pub(crate) fn bind(
     if settings.stiff_parts {
         let bending = settings.bending.iter().cloned().flatten();
         let bending: Vec<u32> = bending.filter_map(|point| place.get(point as usize).copied()).collect();
-        (weights, stiff) = Islands::new(&places, &triangles).stiffened(&weights, &bending);
+        (weights, stiff) = Islands::new(&places, &triangles).stiffened((&places, &triangles), &weights, &bending);
     }
     Ok(BoundSurface { place, weights, sources, stiff, gaps: Gaps { sight, joints, scale } })
 }
@@ -110,6 +110,7 @@ struct Job<'a> {
     joints: &'a [WeightJoint],
     takes_part: &'a [bool],
     claims: &'a [bool],
+    slots: &'a [bool],
     settings: &'a WeightSettings,
     progress: &'a (dyn Fn(f32) -> bool + Sync),
 }
@@ -130,7 +131,7 @@ impl Job<'_> {
         let islands = Islands::new(places, triangles);
         let sight = Sight::new(places, triangles, &islands);
         self.step(0.2)?;
-        let bones = bones::build(self.joints, self.takes_part, self.claims, places, &graph.areas, &sight);
+        let bones = bones::build(self.joints, self.takes_part, (self.claims, self.slots), places, &graph.areas, &sight);
         self.step(0.25)?;
         let mut weights = empty(places.len());
         let mut sources = vec![Source::None; places.len()];
@@ -153,8 +154,9 @@ impl Job<'_> {
             mark(&weights, &mut sources, Source::Voxels);
         }
         self.step(0.9)?;
+        let fleshed = bones.without_slots();
         // Without bones only neighbours count, so that the two can be told apart.
-        for (bones, source) in [(&[][..], Source::Fill), (&bones.segments[..], Source::Nearest)] {
+        for (bones, source) in [(&[][..], Source::Fill), (&fleshed[..], Source::Nearest)] {
             if (0..places.len()).any(|v| weights.of(v).len() == 0) {
                 weights = fill_unweighted(places, triangles, &weights, bones).0;
                 mark(&weights, &mut sources, source);
@@ -166,7 +168,7 @@ impl Job<'_> {
     /// Weights of all places by voxels; none if the mesh has no volume to speak of.
     fn by_voxels(&self, places: &[Vec3], triangles: &[[u32; 3]], bones: &Bones) -> Result<Weights, WeightError> {
         let settings = VoxelSettings { resolution: self.settings.voxel_resolution, ..VoxelSettings::default() };
-        match geodesic_voxel_weights(places, triangles, &bones.segments, &settings, &|share| {
+        match geodesic_voxel_weights(places, triangles, &bones.without_slots(), &settings, &|share| {
             (self.progress)(0.7 + 0.2 * share)
         }) {
             Ok(weights) => Ok(weights),

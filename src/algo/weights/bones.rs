@@ -11,6 +11,7 @@ use super::{
     WeightJoint,
     bone::BoneSegment,
     bone_tree::{BoneTree, closest_on},
+    keypoints,
     roots::{Homes, Roots},
     sight::Sight,
 };
@@ -42,21 +43,28 @@ impl Bones {
     pub fn may_hold(&self, bone: u32, island: usize) -> bool {
         self.homes.is_at_home(self.segments[bone as usize].joint, island)
     }
+
+    /// The bones without those of slots, for what is bound without regard to its part.
+    pub fn without_slots(&self) -> Vec<BoneSegment> {
+        self.segments.iter().filter(|segment| !self.homes.is_slot(segment.joint)).copied().collect()
+    }
 }
 
 /// Builds the bones of the joints that take part, in a frame where the surface has unit size. `areas` are those around
 /// the points of the welded surface that `sight` sees. Joints for which `claims` is true have bones and may hold any part
-/// even if they hang in the air.
+/// even if they hang in the air; those for which `slots` is true hold no part that other bones run through.
 pub(crate) fn build(
     joints: &[WeightJoint],
     takes_part: &[bool],
-    claims: &[bool],
+    (claims, slots): (&[bool], &[bool]),
     points: &[Vec3],
     areas: &[f32],
     sight: &Sight,
 ) -> Bones {
     /// Joints closer than this share a place.
     const SAME: f32 = 1e-6;
+    let joints = keypoints::set_back(joints, sight);
+    let joints = &joints[..];
     let owners: Vec<Option<u32>> = owners(joints).into_iter().map(|o| o.filter(|&j| takes_part[j as usize])).collect();
     let mut children = vec![0usize; joints.len()];
     for parent in joints.iter().filter_map(|j| j.parent) {
@@ -112,7 +120,7 @@ pub(crate) fn build(
         );
     }
     drop_repeats(&mut segments, &mut leaves, claims);
-    let homes = Homes::new(claims, &segments, points, sight);
+    let homes = Homes::new(claims, slots, &segments, points, sight);
     grow_leaves(joints, &mut segments, &leaves, points, areas, (sight, &homes));
     let tree = BoneTree::new(&segments);
     let girths = girths(&segments, &tree, points, areas, sight);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 
 use super::{Method, claim::Claim, laplacian::Graph, report::Stiffness};
-use crate::mesh::{adjacency, model::Weights};
+use crate::mesh::{adjacency, model::Weights, surface::Surface};
 
 /// Heat is trusted on an island if at least this share of its area sees the bone that claims it.
 const SEEN: f32 = 0.15;
@@ -14,6 +14,9 @@ const SPECK: f32 = 0.2;
 
 /// A part moves with one joint if that joint holds at least this share of it.
 const HELD: f32 = 0.8;
+
+/// Approximate number of places of a small part that look for the part that it lies on.
+const SAMPLES: usize = 32;
 
 /// The connected pieces of a surface.
 pub(crate) struct Islands {
@@ -63,7 +66,12 @@ impl Islands {
     /// eye, sword) moves with that joint, and each small part moves as one. The holder of a small part is the joint with
     /// the largest share. A surface in one piece stays as it is, and so do the parts that have one of the `bending`
     /// places.
-    pub fn stiffened(&self, weights: &Weights, bending: &[u32]) -> (Weights, Stiffness) {
+    pub fn stiffened(
+        &self,
+        (places, triangles): (&[Vec3], &[[u32; 3]]),
+        weights: &Weights,
+        bending: &[u32],
+    ) -> (Weights, Stiffness) {
         let mut sums: Vec<BTreeMap<u32, f32>> = vec![BTreeMap::new(); self.extents.len()];
         let mut counts = vec![0usize; self.extents.len()];
         for (place, &island) in self.of.iter().enumerate() {
@@ -75,7 +83,7 @@ impl Islands {
         let mut bends = vec![false; self.extents.len()];
         bending.iter().for_each(|place| bends[self.of[*place as usize] as usize] = true);
         let is_part = counts.iter().filter(|count| **count > 2).count() > 1;
-        let rows: Vec<Option<Vec<(u32, f32)>>> = (sums.iter().zip(&counts).enumerate())
+        let mut rows: Vec<Option<Vec<(u32, f32)>>> = (sums.iter().zip(&counts).enumerate())
             .map(|(island, (sums, count))| {
                 let whole: f32 = sums.values().sum();
                 let first = sums.iter().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)))?;
@@ -89,6 +97,7 @@ impl Islands {
                 }
             })
             .collect();
+        self.take_along(places, triangles, &mut rows);
         let mut stiff = Weights { starts: vec![0], ..Weights::default() };
         for (place, &island) in self.of.iter().enumerate() {
             match &rows[island as usize] {
@@ -100,5 +109,39 @@ impl Islands {
             |row: &Vec<(u32, f32)>| row.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
         let holders = rows.iter().map(|row| row.as_ref().and_then(strongest)).collect();
         (stiff, Stiffness { of: self.of.clone(), holders })
+    }
+
+    /// Gives each small part that several joints share to the joint that alone holds the large part on which it lies: a bolt
+    /// on a helmet moves with the helmet, whatever bones are near. Rows shared by joints would shrink it as they turn apart.
+    fn take_along(&self, places: &[Vec3], triangles: &[[u32; 3]], rows: &mut [Option<Vec<(u32, f32)>>]) {
+        let joints = |island: usize| rows[island].as_ref().map_or(0, Vec::len);
+        let is_bearer = |island: usize| joints(island) == 1 && !self.are_small(island);
+        if !(0..rows.len()).any(is_bearer) {
+            return;
+        }
+        let mut shared: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (place, &island) in self.of.iter().enumerate().filter(|(_, island)| joints(**island as usize) > 1) {
+            shared.entry(island as usize).or_default().push(place);
+        }
+        if shared.is_empty() {
+            return;
+        }
+        let island_of = |triangle: &[u32; 3]| self.of[triangle[0] as usize] as usize;
+        let large: Vec<[u32; 3]> = triangles.iter().copied().filter(|t| !self.are_small(island_of(t))).collect();
+        let surface = Surface::build(places, &large);
+        let bearer = |(&island, members): (&usize, &Vec<usize>)| {
+            let samples = members.iter().step_by(members.len().div_ceil(SAMPLES));
+            let (count, mut votes) = (samples.len(), BTreeMap::<usize, usize>::new());
+            let nearest = samples.filter_map(|place| surface.closest_point(places[*place]));
+            for nearest in nearest.filter(|nearest| nearest.distance <= self.extents[island]) {
+                *votes.entry(island_of(&large[nearest.triangle as usize])).or_default() += 1;
+            }
+            let most = votes.into_iter().find(|(_, votes)| 2 * votes > count);
+            most.filter(|(bearer, _)| is_bearer(*bearer)).map(|(bearer, _)| (island, bearer))
+        };
+        let taken: Vec<(usize, usize)> = shared.iter().filter_map(bearer).collect();
+        for (island, bearer) in taken {
+            rows[island] = rows[bearer].clone();
+        }
     }
 }

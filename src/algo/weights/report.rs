@@ -24,7 +24,7 @@ pub struct WeightReport {
     pub stiff: usize,
     /// Pieces that `stiff` counts, in the order of their first points.
     pub stiff_pieces: Vec<StiffPiece>,
-    /// Joints that hold no point, in order.
+    /// Joints that hold no skin, in order.
     pub idle_joints: Vec<IdleJoint>,
 }
 
@@ -41,7 +41,7 @@ pub struct StiffPiece {
     pub share: f32,
 }
 
-/// Joint that holds no point of the mesh.
+/// Joint that holds no point of the mesh, or, of slots, only points of parts that were given to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IdleJoint {
     /// Index of the joint.
@@ -60,6 +60,9 @@ pub enum IdleReason {
     },
     /// All of the surface belongs to other joints.
     NoSurface,
+    /// The joint carries or steers things ([`WeightSettings::slots`](super::WeightSettings::slots)): the flesh around it belongs
+    /// to other joints.
+    Slot,
     /// The joint must not move points.
     NotDeforming,
     /// The joint is locked without weights.
@@ -95,15 +98,23 @@ impl Stiffness {
     }
 }
 
-/// The joints that hold nothing. `outside` is the distance of joints outside of the mesh, by their indices.
+/// The joints that hold nothing; of slots, what was given to them is no skin. `outside` is the distance of joints outside of the
+/// mesh, by their indices.
 pub(crate) fn idle_joints(
     joints: &[WeightJoint],
     weights: &Weights,
     is_locked: impl Fn(usize) -> bool,
+    slots: &[bool],
+    is_given: impl Fn(usize) -> bool,
     outside: impl Fn(usize) -> Option<f32>,
 ) -> Vec<IdleJoint> {
     let mut is_idle = vec![true; joints.len()];
-    weights.joints.iter().for_each(|joint| is_idle[*joint as usize] = false);
+    for point in 0..weights.len() {
+        let is_given = is_given(point);
+        for (joint, _) in weights.of(point) {
+            is_idle[joint as usize] &= is_given && slots[joint as usize];
+        }
+    }
     let any_deforms = joints.iter().any(|joint| joint.deforms);
     let reason = |joint: usize| {
         if any_deforms && !joints[joint].deforms {
@@ -112,7 +123,8 @@ pub(crate) fn idle_joints(
         if is_locked(joint) {
             return IdleReason::Locked;
         }
-        outside(joint).map_or(IdleReason::NoSurface, |distance| IdleReason::Outside { distance })
+        let within = if slots[joint] { IdleReason::Slot } else { IdleReason::NoSurface };
+        outside(joint).map_or(within, |distance| IdleReason::Outside { distance })
     };
     let idle = (0..joints.len()).filter(|joint| is_idle[*joint]);
     idle.map(|joint| IdleJoint { joint, reason: reason(joint) }).collect()

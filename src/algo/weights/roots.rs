@@ -91,16 +91,20 @@ impl Roots {
 /// The body parts of a surface of several that each joint holds flesh of.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Homes {
-    /// Flags of each island: whether it is home to each joint; empty where everybody may hold it.
+    /// Flags of each island: whether it is home to each joint; empty where everybody may hold it but slots.
     parts: Vec<Vec<bool>>,
+    /// Flag of each joint: whether it is a slot; empty if nothing else holds flesh.
+    slots: Vec<bool>,
 }
 
 /// Approximate number of points of a part without bones that look for the part that it lies on.
 const SAMPLES: usize = 32;
 
 impl Homes {
-    /// Looks where the bones of joints run. Joints for which `claims` is true and that are at home nowhere may hold all parts.
-    pub fn new(claims: &[bool], segments: &[BoneSegment], points: &[Vec3], sight: &Sight) -> Self {
+    /// Looks where the bones of joints run. Joints for which `claims` is true and that are at home nowhere may hold all parts;
+    /// those for which `slots` is true hold nothing of a part that others are at home in, nor of small ones: a sword is the
+    /// slot's that it is around, the hand is not.
+    pub fn new(claims: &[bool], slots: &[bool], segments: &[BoneSegment], points: &[Vec3], sight: &Sight) -> Self {
         let mut parts = vec![Vec::new(); sight.islands()];
         for part in sight.parts() {
             let mut at_home = vec![false; claims.len()];
@@ -130,12 +134,29 @@ impl Homes {
                 parts[part] = parts[bearer(samples, &bearers, sight)].clone();
             }
         }
-        Self { parts }
+        if segments.iter().all(|segment| slots[segment.joint as usize]) {
+            return Self { parts, slots: Vec::new() };
+        }
+        // Only now, so that what lies on such a part, as a book in a hand, may be a slot's.
+        for part in bearers {
+            if parts[part].iter().zip(slots).any(|(is_home, is_slot)| *is_home && !is_slot) {
+                parts[part].iter_mut().zip(slots).for_each(|(is_home, is_slot)| *is_home &= !is_slot);
+            }
+        }
+        Self { parts, slots: slots.to_vec() }
     }
 
     /// True if a joint may hold flesh of an island.
     pub fn is_at_home(&self, joint: u32, island: usize) -> bool {
-        self.parts.get(island).is_none_or(|part| part.is_empty() || part[joint as usize])
+        match self.parts.get(island).filter(|part| !part.is_empty()) {
+            Some(part) => part[joint as usize],
+            None => !self.is_slot(joint),
+        }
+    }
+
+    /// True if a joint is a slot beside joints that hold flesh.
+    pub fn is_slot(&self, joint: u32) -> bool {
+        self.slots.get(joint as usize).is_some_and(|is_slot| *is_slot)
     }
 }
 

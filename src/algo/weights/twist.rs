@@ -93,8 +93,8 @@ impl Limbs {
     }
 
     /// Flags of all joints of the rig as flags of [`Limbs::joints`].
-    pub fn claims(&self, claims: &[bool]) -> Vec<bool> {
-        self.places.iter().map(|place| claims[*place as usize]).collect()
+    pub fn flags(&self, flags: &[bool]) -> Vec<bool> {
+        self.places.iter().map(|place| flags[*place as usize]).collect()
     }
 
     /// Influences of the bound joints at a point as influences of all joints.

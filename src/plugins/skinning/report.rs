@@ -16,7 +16,7 @@ pub struct SkinningReport {
     pub rigid_parts: Vec<RigidPart>,
     /// Parts that bend because a person chose it, with their names.
     pub bending_parts: Vec<(MeshPart, String)>,
-    /// Joints that hold nothing of the mesh.
+    /// Joints that hold no skin of the mesh.
     pub idle_joints: Vec<IdleJoint>,
 }
 
@@ -35,12 +35,12 @@ pub struct RigidPart {
     pub share: f32,
 }
 
-/// Joint that holds nothing of a mesh.
+/// Joint that holds no skin of a mesh: nothing, or only objects that hang on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IdleJoint {
     /// The joint.
     pub joint: Uid,
-    /// Reason why it holds nothing.
+    /// Reason why it holds no skin.
     pub reason: IdleReason,
 }
 

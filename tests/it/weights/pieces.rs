@@ -123,3 +123,38 @@ fn claims_let_idle_joints_hold_what_is_nearest_to_them() {
     assert_eq!(report.idle_joints.iter().map(|idle| idle.joint).collect::<Vec<_>>(), [3]);
     assert_eq!(with(vec![9], &joints).unwrap_err(), WeightError::Claim { joint: 9, joints: 4 });
 }
+
+/// A slot in the flesh holds none of it, but a thing that is around it, as a sword in a hand, and what is given to it.
+#[test]
+fn slots_hold_things_and_no_flesh() {
+    let (mut points, mut triangles) = tube();
+    let body = points.len();
+    let thing = add_box(&mut points, &mut triangles, Vec3::new(3.6, -0.1, -1.4), Vec3::new(4.0, 0.1, 1.4));
+    let mut joints = tube_joints();
+    joints[2].head.x = 3.2;
+    joints.push(joint([3.8, 0.0, 0.0], Some(2)));
+    let with = |slots: Vec<usize>, claims: Vec<usize>, rigid: &[(Range<u32>, u32)]| {
+        let settings = WeightSettings { slots, claims, ..WeightSettings::default() };
+        skin_weights(&points, &triangles, &joints, rigid, None, &settings, &|_| true).unwrap()
+    };
+    let held = |weights: &Weights| (0..body).filter(|point| weight(weights, *point, 3) > 0.0).count();
+    let plain = with(Vec::new(), Vec::new(), &[]).0;
+    assert!(held(&plain) > 10);
+    let (weights, report) = with(vec![3], Vec::new(), &[]);
+    check_sound(&weights, points.len(), &joints, 8);
+    assert_eq!(held(&weights), 0);
+    assert!(thing.clone().all(|point| weight(&weights, point, 3) > 0.5));
+    assert!(report.idle_joints.is_empty(), "{:?}", report.idle_joints);
+    // What is given to a slot is no skin: it is told.
+    let given = [(thing.start as u32..thing.end as u32, 3)];
+    let (weights, report) = with(vec![3], Vec::new(), &given);
+    assert_eq!(held(&weights), 0);
+    assert!(thing.clone().all(|point| weights.of(point).eq([(3, 1.0)])));
+    assert_eq!(report.idle_joints, [IdleJoint { joint: 3, reason: IdleReason::Slot }]);
+    // Asked to, it claims skin; and where nothing else may hold any, slots do. Numbers of no joint count for nothing.
+    assert_eq!(with(vec![3, 99], vec![3], &[]).0, plain);
+    let (weights, report) = with(vec![0, 1, 2, 3], Vec::new(), &[]);
+    check_sound(&weights, points.len(), &joints, 8);
+    assert!(report.idle_joints.iter().all(|idle| idle.reason != IdleReason::Slot), "{:?}", report.idle_joints);
+    assert!((0..body).any(|point| weight(&weights, point, 0) > 0.9));
+}

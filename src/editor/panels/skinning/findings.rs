@@ -129,6 +129,7 @@ fn note(reason: IdleReason) -> String {
     match reason {
         IdleReason::Outside { distance } => format!("{} outside of the mesh", short(f64::from(distance), 3)),
         IdleReason::NoSurface => "all skin is of other joints".to_owned(),
+        IdleReason::Slot => "carries or steers things, by its name".to_owned(),
         IdleReason::NotDeforming => "does not deform".to_owned(),
         IdleReason::Locked => "locked without weights".to_owned(),
     }
