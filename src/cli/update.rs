@@ -12,12 +12,14 @@ use serde_json::{Value, json};
 
 use super::{Failure, InPlaceArgs, Report, explanation::Explanation, limits, report::counted};
 use crate::{
-    files::{Disk, FileKind, RealDisk, StoreError, TemplateVersion, base_text, save_atomic, update_template},
+    files::{
+        Disk, FileKind, RealDisk, StoreError, TemplateVersion, base_text, diff_templates, save_atomic, update_template,
+    },
     processor::keep_poses,
     rig::{
         Rig,
         part::Part,
-        update::{Change, Take, diff},
+        update::{Change, Take},
         version::VersionChange,
     },
 };
@@ -73,8 +75,8 @@ enum TakeArg {
 
 pub(super) fn run_diff(args: &DiffArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
-    let (from, to) = (load(&args.from, &mut report)?, load(&args.to, &mut report)?);
-    tell(&mut report, &diff(&from, &to));
+    let (from, to) = (version(&args.from, &mut report)?, version(&args.to, &mut report)?);
+    tell(&mut report, &diff_templates(&RealDisk, &from, &to));
     Ok(report)
 }
 

@@ -3,8 +3,12 @@
 use std::{fs, path::Path};
 
 use rigsmith::rig::{Uid, part::PartInstance, update::same_parts};
+use serde_json::Value;
 
-use super::{cli_outputs::rigsmith, part_instances::load};
+use super::{
+    cli_outputs::{json, rigsmith},
+    part_instances::load,
+};
 
 pub(super) const PART: &str = r#"(
     format: 2,
@@ -338,4 +342,43 @@ fn parts_that_could_be_several_are_none_of_them() {
     assert!(uids(&[&a, &c], &[&b, &d]).is_empty(), "two moved");
     assert!(uids(&[&part(1, "", &["a"])], &[&part(2, "", &["b"])]).is_empty(), "both uids are written");
     assert!(uids(&[&part(1, "index", &[])], &[&b]).is_empty(), "one has a name");
+}
+
+/// What `rigsmith diff` lists: kind, field and the values of each change.
+fn differences(folder: &Path, from: &str, to: &str) -> Vec<[Value; 4]> {
+    let (code, told) = json(folder, &["diff", from, to]);
+    assert_eq!(code, 0, "{told}");
+    let changes = told["changes"].as_array().unwrap();
+    changes.iter().map(|change| ["kind", "field", "from", "to"].map(|key| change[key].clone())).collect()
+}
+
+#[test]
+fn differences_of_parts_are_told_at_their_instances() {
+    let thumb = "        (part: \"finger.rig.ron\", name: \"thumb\", parent: \"palm\", translation: (0.3, 0, 0), prefix: \"t_\"),\n    ],\n)\n";
+    let text = |text: &str| Value::from(text);
+    let finger = "\"finger.rig.ron\"";
+    let cases: [(String, [Value; 4]); 4] = [
+        (
+            BASE.replace("prefix: \"a_\",", "prefix: \"a_\", count: 5,"),
+            [text("changed"), text("part index count"), Value::Null, text("5")],
+        ),
+        (
+            BASE.replace("\"a_\"", "\"b_\"").replace("/a_base", "/b_base"),
+            [text("changed"), text("part index prefix"), text("\"a_\""), text("\"b_\"")],
+        ),
+        (
+            BASE.replace("finger.rig.ron", "finger_v2.rig.ron"),
+            [text("changed"), text("part index part"), text(finger), text("\"finger_v2.rig.ron\"")],
+        ),
+        (BASE.replace("    ],\n)\n", thumb), [text("added"), text("part thumb"), Value::Null, text(finger)]),
+    ];
+    for (file, told) in cases {
+        assert_ne!(file, BASE);
+        let folder = folder(&file, BASE);
+        fs::write(folder.path().join("finger_v2.rig.ron"), longer()).unwrap();
+        assert_eq!(differences(folder.path(), "base.rig.ron", "file.rig.ron"), [told.clone()]);
+        let [kind, field, from, to] = told;
+        let back = if kind == "added" { text("removed") } else { kind };
+        assert_eq!(differences(folder.path(), "file.rig.ron", "base.rig.ron"), [[back, field, to, from]]);
+    }
 }
