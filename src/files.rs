@@ -76,5 +76,5 @@ pub use store::{
 };
 pub use template_origin::{TemplateOrigin, has_parts, store_rig_from};
 pub(crate) use template_text::template_text;
-pub use template_update::{TemplateUpdate, TemplateVersion, base_text, update_template};
+pub use template_update::{TemplateUpdate, TemplateVersion, base_text, diff_templates, update_template};
 pub use watch::{FileWatch, LOOK, TemplateWatch};

@@ -1,6 +1,7 @@
 //! `rigsmith diff` and `rigsmith update`: what differs between versions of a template, and how a rig gets the new one.
 
 mod clips;
+mod project;
 
 use std::{
     path::{Path, PathBuf},
@@ -12,12 +13,14 @@ use serde_json::{Value, json};
 
 use super::{Failure, InPlaceArgs, Report, explanation::Explanation, limits, report::counted};
 use crate::{
-    files::{Disk, FileKind, RealDisk, StoreError, TemplateVersion, base_text, save_atomic, update_template},
+    files::{
+        Disk, FileKind, RealDisk, StoreError, TemplateVersion, base_text, diff_templates, save_atomic, update_template,
+    },
     processor::keep_poses,
     rig::{
         Rig,
         part::Part,
-        update::{Change, Take, diff},
+        update::{Change, Take, Update},
         version::VersionChange,
     },
 };
@@ -34,16 +37,16 @@ pub(super) struct DiffArgs {
 /// Arguments of `rigsmith update`.
 #[derive(Args, Debug)]
 pub(super) struct UpdateArgs {
-    /// The rig, `.rig.ron`
+    /// The rig, `.rig.ron`, or a project, `.rigsmith.ron`: of several rigs the one that follows the template, else the first
     pub rig: PathBuf,
     /// The template in its new version
     #[arg(long)]
     from: PathBuf,
-    /// The template in the version that the rig was made from. Without it that is `RIG.base`, if there is such a file, and
-    /// else every difference is a conflict
+    /// The template in the version that the rig was made from. Without it that is `RIG.base`, if there is such a file, or the
+    /// version that the project took over last, and else every difference is a conflict
     #[arg(long)]
     base: Option<PathBuf>,
-    /// Keep the version that is taken over as `OUT.base`, for the next update
+    /// Keep the version that is taken over as `OUT.base`, or in the project, for the next update
     #[arg(long)]
     keep_base: bool,
     /// Clips of the rig, `.anim.ron`, several times if need be: they are re-expressed, so that the joints move as before, and
@@ -56,11 +59,40 @@ pub(super) struct UpdateArgs {
     /// Side whose value is taken where both changed a field
     #[arg(long, value_enum)]
     take: Option<TakeArg>,
-    /// The file to write, `.rig.ron`
+    /// The file to write, `.rig.ron`; `.rigsmith.ron` for a project
     #[arg(short, long, required_unless_present = "dry_run")]
     output: Option<PathBuf>,
     #[command(flatten)]
     in_place: InPlaceArgs,
+}
+
+impl UpdateArgs {
+    /// Files that are read, clips excepted.
+    fn inputs(&self) -> Vec<&Path> {
+        [Some(&self.rig), Some(&self.from), self.base.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect()
+    }
+
+    /// Side whose values are taken in conflicts.
+    fn side(&self) -> Take {
+        match self.take {
+            Some(TakeArg::Theirs) => Take::Theirs,
+            Some(TakeArg::Mine) | None => Take::Mine,
+        }
+    }
+
+    /// True if there are conflicts that nobody decided, which is told: nothing is written then.
+    fn is_undecided(&self, conflicts: usize, report: &mut Report) -> bool {
+        report.set("conflicts", conflicts);
+        let is_undecided = conflicts > 0 && self.take.is_none();
+        if is_undecided {
+            let fields = counted(conflicts, "field", "fields");
+            let fault = format!("both sides changed {fields}, and nothing was written; say --take theirs or mine");
+            report.fault = Some(Explanation::at(self.rig.display().to_string(), &fault));
+            report.notes.push(fault);
+            report.at_fault = true;
+        }
+        is_undecided
+    }
 }
 
 #[derive(ValueEnum, Debug, Clone, Copy)]
@@ -73,14 +105,16 @@ enum TakeArg {
 
 pub(super) fn run_diff(args: &DiffArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
-    let (from, to) = (load(&args.from, &mut report)?, load(&args.to, &mut report)?);
-    tell(&mut report, &diff(&from, &to));
+    let (from, to) = (version(&args.from, &mut report)?, version(&args.to, &mut report)?);
+    tell(&mut report, &diff_templates(&RealDisk, &from, &to));
     Ok(report)
 }
 
 pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
-    let inputs: Vec<&Path> =
-        [Some(&args.rig), Some(&args.from), args.base.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+    if FileKind::of(&args.rig) == Some(FileKind::Project) {
+        return project::run(args);
+    }
+    let inputs = args.inputs();
     args.in_place.check(&inputs, args.output.as_deref(), &[])?;
     let clip_files = clips::outputs(args, &inputs)?;
     let mut report = Report::default();
@@ -96,33 +130,12 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
         "base",
         is_beside.then(|| beside.display().to_string()).or(args.base.as_ref().map(|base| base.display().to_string())),
     );
-    let take = match args.take {
-        Some(TakeArg::Theirs) => Take::Theirs,
-        Some(TakeArg::Mine) | None => Take::Mine,
-    };
-    let mut update = update_template(&RealDisk, base.as_ref(), &now, &file, &take.into());
+    let mut update = update_template(&RealDisk, base.as_ref(), &now, &file, &args.side().into());
     let updated = &mut update.update;
     let was = base.as_ref().unwrap_or(&now).rig();
-    if let Some(version) = VersionChange::between(was.about(), file.rig().about()) {
-        report.line(format!("version  {version}"));
-        report.set("version", json!({"from": version.from, "to": version.to}));
-    }
-    tell(&mut report, &updated.changes);
-    let poses = keep_poses(now.rig(), &mut updated.rig, &Arc::new(limits::modules()))
-        .map_err(|error| Failure::Input(Box::new(error)))?;
-    for note in &poses {
-        report.line(format!("moves    {note}"));
-    }
-    report.set("poses", serde_json::to_value(&poses).unwrap_or(Value::Null));
+    tell_update(&mut report, (was, file.rig()), now.rig(), updated)?;
     let clips = clips::updated(args, (now.rig(), &updated.rig), &clip_files, &mut report)?;
-    let conflicts = updated.conflicts();
-    report.set("conflicts", conflicts);
-    if conflicts > 0 && args.take.is_none() {
-        let fields = counted(conflicts, "field", "fields");
-        let fault = format!("both sides changed {fields}, and nothing was written; say --take theirs or mine");
-        report.fault = Some(Explanation::at(args.rig.display().to_string(), &fault));
-        report.notes.push(fault);
-        report.at_fault = true;
+    if args.is_undecided(updated.conflicts(), &mut report) {
         return Ok(report);
     }
     if let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) {
@@ -136,6 +149,22 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
         }
     }
     Ok(report)
+}
+
+/// Tells versions and changes of an update of the rig `now`, and re-expresses the poses.
+fn tell_update(report: &mut Report, (was, is): (&Rig, &Rig), now: &Rig, updated: &mut Update) -> Result<(), Failure> {
+    if let Some(version) = VersionChange::between(was.about(), is.about()) {
+        report.line(format!("version  {version}"));
+        report.set("version", json!({"from": version.from, "to": version.to}));
+    }
+    tell(report, &updated.changes);
+    let poses = keep_poses(now, &mut updated.rig, &Arc::new(limits::modules()))
+        .map_err(|error| Failure::Input(Box::new(error)))?;
+    for note in &poses {
+        report.line(format!("moves    {note}"));
+    }
+    report.set("poses", serde_json::to_value(&poses).unwrap_or(Value::Null));
+    Ok(())
 }
 
 /// File beside a rig that has the version of the template that it was made from, or updated to last.

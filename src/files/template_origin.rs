@@ -162,12 +162,12 @@ fn is_same(a: &Template, own: &Rig, b: Template) -> bool {
     template::says_the_same(&a.rig, &b.rig, own)
 }
 
-fn folder_of(file: &Path) -> Option<PathBuf> {
+pub(super) fn folder_of(file: &Path) -> Option<PathBuf> {
     Some(std::path::absolute(file).ok()?.parent()?.to_owned())
 }
 
 /// The way from a folder to a file, both absolute, with slashes; `None` if they are on different drives.
-fn way(folder: &Path, file: &Path) -> Option<String> {
+pub(super) fn way(folder: &Path, file: &Path) -> Option<String> {
     let (folder, file) = (straight(folder), straight(file));
     let shared = folder.iter().zip(&file).take_while(|(a, b)| a == b).count();
     if shared == 0 {
@@ -179,7 +179,7 @@ fn way(folder: &Path, file: &Path) -> Option<String> {
 }
 
 /// The components of an absolute path without detours.
-fn straight(path: &Path) -> Vec<Component<'_>> {
+pub(super) fn straight(path: &Path) -> Vec<Component<'_>> {
     let mut out: Vec<Component> = Vec::new();
     for component in path.components() {
         match component {

@@ -1,10 +1,16 @@
 //! Updates of templates with parts: what a new version changes of a part instance is changed of the instance, not of what comes
 //! of it.
 
-use std::path::{Path, PathBuf};
+mod part_files;
+mod same_parts;
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use super::{
-    Disk, LoadError, PartFiles, StoreError,
+    Disk, FoundPart, LoadError, PartFiles, StoreError,
     load::{in_source, template_file},
     store::{save_template, store_rig_over},
     template_origin::moved_text,
@@ -15,10 +21,12 @@ use crate::rig::{
     part::PartInstance,
     template::{FileMarks, read_template, text_of, with_instance_fields, with_instances_of, write_template},
     update::{
-        Change, ChangeKind, Choices, MergedParts, RefittedTemplate, TemplateWithParts, Update, diff, merge_parts,
-        update_with,
+        Change, ChangeKind, Choices, MergedParts, RefittedTemplate, Take, TemplateWithParts, Update, diff, merge_parts,
+        update_with, with_whole_parts,
     },
 };
+use part_files::Sides;
+use same_parts::with_same_parts;
 
 /// A version of a template: its file, and the rig with its parts.
 #[derive(Debug, Clone)]
@@ -26,6 +34,8 @@ pub struct TemplateVersion {
     path: PathBuf,
     text: String,
     content: TemplateWithParts,
+    /// Files of the parts, by the places beside the template.
+    found: BTreeMap<PathBuf, FoundPart>,
     notes: Vec<String>,
 }
 
@@ -36,16 +46,21 @@ impl TemplateVersion {
     /// Those of [`load_template`](super::load_template).
     pub fn read(disk: &dyn Disk, path: &Path) -> Result<Self, LoadError> {
         let (path, bytes) = template_file(disk, path)?;
-        let fault = |source| in_source(&path, &bytes, source);
-        let text = text_of(&bytes).map_err(fault)?;
-        let template = read_template(&bytes).map_err(fault)?;
+        Self::of(disk, path, &bytes)
+    }
+
+    /// The template with that content of its file.
+    fn of(disk: &dyn Disk, path: PathBuf, bytes: &[u8]) -> Result<Self, LoadError> {
+        let fault = |source| in_source(&path, bytes, source);
+        let text = text_of(bytes).map_err(fault)?;
+        let template = read_template(bytes).map_err(fault)?;
         let mut files = PartFiles::new(disk);
         let whole = files.put_together(&path, text, template.clone()).map_err(fault)?;
         let fitted = files.fitted(&path, &template).unwrap_or_default();
         // The marks of the file are kept.
-        let text = String::from_utf8_lossy(&bytes).into_owned();
+        let text = String::from_utf8_lossy(bytes).into_owned();
         let content = TemplateWithParts { template, rig: whole.rig, fitted };
-        Ok(Self { path, text, content, notes: whole.notes })
+        Ok(Self { path, text, content, found: files.found, notes: whole.notes })
     }
 
     /// The rig with its parts.
@@ -62,14 +77,14 @@ impl TemplateVersion {
         &self.content.template.parts
     }
 
-    /// The version with the fields of `merged` instances, and its rig then. `None` where its parts do not fit so.
-    fn refitted(&self, disk: &dyn Disk, merged: &MergedParts) -> Option<(RefittedTemplate, Rig)> {
+    /// The version with the fields of merged `instances`, and its rig then. `None` where its parts do not fit so.
+    fn refitted(&self, disk: &dyn Disk, instances: &[PartInstance]) -> Option<(RefittedTemplate, Rig)> {
         if self.content.fitted.len() != self.parts().len() {
             return None;
         }
         let mut files = PartFiles::new(disk);
         let mut fit = |instance: &PartInstance| files.fitted_part(&self.path, instance).ok();
-        let refitted = self.content.with_fields(&merged.instances, &mut fit)?;
+        let refitted = self.content.with_fields(instances, &mut fit)?;
         let (_, text) = FileMarks::of(&self.text);
         let whole = files.put_together(&self.path, &text, refitted.template.clone()).ok()?;
         Some((refitted, whole.rig))
@@ -87,9 +102,10 @@ pub struct TemplateUpdate {
     texts: Vec<String>,
 }
 
-/// The update of a template to the content of `file`: see [`update_with`]. Fields of part instances, such as `prefix`, `count`
-/// and `socket`, are compared by themselves, and the rigs as they are with the fields that come of that. Without a base whatever
-/// differs is a conflict.
+/// The update of a template to the content of `file`: see [`update_with`]. Fields of part instances, such as `part`, `prefix`,
+/// `count` and `socket`, are compared by themselves, and the rigs as they are with the fields that come of that. An instance
+/// that has another uid in a version because its name or its joints are others is the same one where it has one counterpart
+/// alone, which is told. Without a base whatever differs is a conflict.
 pub fn update_template(
     disk: &dyn Disk,
     base: Option<&TemplateVersion>,
@@ -98,10 +114,10 @@ pub fn update_template(
     choices: &Choices,
 ) -> TemplateUpdate {
     let path = now.path.clone();
-    let merged = merge_parts(base.map(|base| &base.content), &now.content, &file.content, choices);
-    let refitted = if merged.differs { with_merged_fields(disk, base, now, file, &merged, choices) } else { None };
-    let plain = || (update_with(base.map(TemplateVersion::rig), now.rig(), file.rig(), choices), None);
-    let (update, text) = refitted.unwrap_or_else(plain);
+    let same = with_same_parts(disk, base, now, file);
+    let (base, file) = (same.base.as_ref().or(base), same.file.as_ref().unwrap_or(file));
+    let FieldUpdate { mut update, told, brought, text } = with_fields_of_parts(disk, base, now, file, choices);
+    update.changes = same.moved.into_iter().chain(told).chain(brought).chain(update.changes).collect();
     let (marks, plain) = FileMarks::of(&now.text);
     let of_fields = text.as_deref().unwrap_or(&plain);
     let fresh = fresh_parts(base, now, file);
@@ -115,6 +131,16 @@ pub fn update_template(
     TemplateUpdate { update, path, texts }
 }
 
+/// Differences of two versions of a template, from the first to the second. Those of a part instance are told at the instance,
+/// without what comes of them, and so is an instance that one of the two alone has.
+pub fn diff_templates(disk: &dyn Disk, from: &TemplateVersion, to: &TemplateVersion) -> Vec<Change> {
+    let same = with_same_parts(disk, None, from, to);
+    let to = same.file.as_ref().unwrap_or(to);
+    let FieldUpdate { update, told, .. } = with_fields_of_parts(disk, Some(from), from, to, &Take::Theirs.into());
+    let changes = same.moved.into_iter().chain(told).chain(update.changes).collect();
+    with_whole_parts(changes, [&from.content, &to.content])
+}
+
 /// Part instances of the file that neither the base nor the template has now.
 fn fresh_parts(base: Option<&TemplateVersion>, now: &TemplateVersion, file: &TemplateVersion) -> Vec<Uid> {
     let is_known = |uid: Uid| {
@@ -124,32 +150,64 @@ fn fresh_parts(base: Option<&TemplateVersion>, now: &TemplateVersion, file: &Tem
     file.parts().iter().map(|part| part.uid).filter(|uid| !is_known(*uid)).collect()
 }
 
-/// The update of the versions with the fields of instances that were merged, and the text with these fields. `None` where a
-/// version does not take them.
+/// An update of versions whose part instances have the fields that they have after it.
+struct FieldUpdate {
+    /// The update, with what differs besides the fields.
+    update: Update,
+    /// Changes of fields, and of instances that lose what they changed.
+    told: Vec<Change>,
+    /// Joints and tags that come and go with the fields.
+    brought: Vec<Change>,
+    /// Text of the template with the fields.
+    text: Option<String>,
+}
+
+/// The update of the versions with the fields of their part instances merged; as they are where a version does not take these.
+fn with_fields_of_parts(
+    disk: &dyn Disk,
+    base: Option<&TemplateVersion>,
+    now: &TemplateVersion,
+    file: &TemplateVersion,
+    choices: &Choices,
+) -> FieldUpdate {
+    let sides = Sides::of(base, now, file);
+    let merged = merge_parts(sides.base.as_ref(), &now.content, &sides.file, choices);
+    let refitted =
+        if merged.differs { with_merged_fields(disk, base, now, file, (&sides, merged), choices) } else { None };
+    refitted.unwrap_or_else(|| FieldUpdate {
+        update: update_with(base.map(TemplateVersion::rig), now.rig(), file.rig(), choices),
+        told: Vec::new(),
+        brought: Vec::new(),
+        text: None,
+    })
+}
+
+/// The update of the versions with the fields of instances that were merged. `None` where a version does not take them.
 fn with_merged_fields(
     disk: &dyn Disk,
     base: Option<&TemplateVersion>,
     now: &TemplateVersion,
     file: &TemplateVersion,
-    merged: &MergedParts,
+    (sides, merged): (&Sides, MergedParts),
     choices: &Choices,
-) -> Option<(Update, Option<String>)> {
-    let was = match base {
-        Some(base) => Some(base.refitted(disk, merged)?.1),
-        None => None,
+) -> Option<FieldUpdate> {
+    let was = match (base, &sides.base) {
+        (Some(base), Some(called)) => {
+            Some(base.refitted(disk, &base.instances_of(disk, now, called, &merged.instances))?.1)
+        }
+        _ => None,
     };
-    let (refitted, rig) = now.refitted(disk, merged)?;
-    let (_, theirs) = file.refitted(disk, merged)?;
-    let mut update = update_with(was.as_ref(), &rig, &theirs, choices);
+    let (refitted, rig) = now.refitted(disk, &merged.instances)?;
+    let (_, theirs) = file.refitted(disk, &file.instances_of(disk, now, &sides.file, &merged.instances))?;
+    let update = update_with(was.as_ref(), &rig, &theirs, choices);
     // What comes and goes with other fields is told with them.
     let comes_or_goes = |change: &Change| matches!(change.kind, ChangeKind::Added | ChangeKind::Removed);
-    let brought = diff(now.rig(), &rig).into_iter().filter(comes_or_goes);
-    let changes = merged.changes.iter().cloned().chain(refitted.lost).chain(brought).chain(update.changes);
-    update.changes = changes.collect();
+    let brought = diff(now.rig(), &rig).into_iter().filter(comes_or_goes).collect();
+    let told = merged.changes.into_iter().chain(refitted.lost).collect();
     let parts: Vec<(PartInstance, Rig)> = refitted.template.parts.into_iter().zip(refitted.fitted).collect();
     let (_, text) = FileMarks::of(&now.text);
     let text = with_instance_fields(&text, [now.content.fitted.as_slice(), parts.as_slice()], [now.rig(), &rig]);
-    Some((update, text))
+    Some(FieldUpdate { update, told, brought, text })
 }
 
 impl TemplateUpdate {
@@ -182,6 +240,8 @@ impl TemplateUpdate {
 /// The text that a version is kept as for the next update of the rig in a file: with its parts if that has them all, too.
 pub fn base_text(disk: &dyn Disk, version: &TemplateVersion, rig: &Path) -> String {
     let saved = TemplateVersion::read(disk, rig);
+    let same = saved.as_ref().ok().and_then(|saved| with_same_parts(disk, None, saved, version).file);
+    let version = same.as_ref().unwrap_or(version);
     let has = |uid: Uid| saved.as_ref().is_ok_and(|saved| saved.parts().iter().any(|part| part.uid == uid));
     let has_parts = !version.parts().is_empty() && version.parts().iter().all(|part| has(part.uid));
     let (_, text) = FileMarks::of(&version.text);

@@ -15,6 +15,7 @@ mod fields;
 mod order;
 mod parts;
 mod rename_detection;
+mod same_parts;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -31,6 +32,7 @@ pub use change::{Change, ChangeKind};
 pub use choices::{Choices, Take};
 pub use edits::{clip_edits, edits_between, pose_edits};
 pub use parts::{MergedParts, RefittedTemplate, TemplateWithParts, merge_parts};
+pub use same_parts::{moved_part, same_parts, with_whole_parts};
 
 /// An update.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, fs, path::Path, sync::Arc};
 
 use bevy::math::Quat;
 use rigsmith::{
-    files::{RealDisk, load_animation, load_template},
+    files::{ProjectTemplate, ProjectToSave, RealDisk, load_animation, load_project, load_template, store_project},
     modules,
     processor::Builder,
     rig::{
@@ -90,6 +90,58 @@ fn clips_are_written_beside_the_output_and_move_the_joints_as_before() {
     // What is no clip is told before anything is written.
     let answer = rigsmith(folder.path(), &[&base[..], &["--clips", "next.rig.ron", "-o", "out/x.rig.ron"]].concat());
     assert!(answer.code == 2 && !at("out/x.rig.ron").exists(), "{}", answer.err);
+}
+
+#[test]
+fn clips_of_a_project_move_the_joints_as_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mine = gentle();
+    let clip = mine.clips()[0].clone();
+    let mut first = mine.clone();
+    first.apply(&RigEdit::RemoveClip(clip.uid)).unwrap();
+    let mut next = first.clone();
+    flip_all(&mut next);
+    fs::write(at("biped.rig.ron"), write_template(&first)).unwrap();
+    fs::write(at("next.rig.ron"), write_template(&next)).unwrap();
+    let followed = ProjectTemplate { rig: mine.uid(), path: at("biped.rig.ron"), base: Arc::new(first) };
+    let rigs = vec![mine.clone()];
+    let project = ProjectToSave { name: "shot".into(), rigs, templates: vec![followed], ..Default::default() };
+    store_project(&RealDisk, &at("shot.rigsmith.ron"), &project).unwrap();
+    let saved = fs::read(at("shot.rigsmith.ron")).unwrap();
+    let update = ["update", "shot.rigsmith.ron", "--from", "next.rig.ron"];
+
+    let told = json(folder.path(), &[&update[..], &["--dry-run"]].concat());
+    assert_eq!(told["conflicts"], 0, "the project knows the version that it took over last: {told}");
+    let answer = rigsmith(folder.path(), &[&update[..], &["-o", "out.rig.ron"]].concat());
+    assert!(answer.code == 2 && answer.err.contains("give a .rigsmith.ron"), "{} {}", answer.out, answer.err);
+    let told = json(folder.path(), &[&update[..], &["-o", "out.rigsmith.ron"]].concat());
+    assert_eq!(fs::read(at("shot.rigsmith.ron")).unwrap(), saved, "an input stays");
+    let facts = &told["own_clips"];
+    assert_eq!((&facts["clips"], &facts["re_expressed"]), (&1.into(), &1.into()), "{facts}");
+    let updated = load_project(&RealDisk, &at("out.rigsmith.ron")).unwrap();
+    let (rig, kept) = (&updated.rigs[0], updated.rigs[0].clip(clip.uid).unwrap());
+    let listed: BTreeSet<Uid> = facts["notes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|note| note["joint"].as_str().unwrap().parse().unwrap())
+        .collect();
+    assert!(listed.len() * 2 < mine.len(), "{facts}");
+    let (from, to) = (program(&mine), program(rig));
+    let times: Vec<f32> = (0..=60).map(|frame| frame as f32 / clip.frame_rate).chain(clip.key_times()).collect();
+    for (joint, (distance, angle)) in joints_off((&from, &clip), (&to, kept), &times) {
+        let is_held = distance <= NEAR.0 && angle <= NEAR.1;
+        assert!(is_held || listed.contains(&joint), "{joint} is off by {distance} m and {angle}°");
+    }
+    let plain = joints_off((&from, &clip), (&to, &clip), &times);
+    assert!(plain.values().any(|(distance, _)| *distance > 0.01), "the change would move joints");
+
+    // The project follows that version now, and the next update begins with it.
+    assert!(updated.templates[0].path.ends_with("next.rig.ron"), "{:?}", updated.templates[0].path);
+    let again = ["update", "out.rigsmith.ron", "--from", "next.rig.ron", "--in-place", "-o", "out.rigsmith.ron"];
+    let told = json(folder.path(), &again);
+    assert_eq!((&told["changes"], &told["own_clips"]["re_expressed"]), (&Value::Array(vec![]), &0.into()), "{told}");
 }
 
 /// A joint with a control, and another that hangs on it.

@@ -51,6 +51,18 @@ fn a_ring_grows_until_it_is_around_the_flesh() {
     assert_eq!(clear_factor(&surface, &[], Vec3::ZERO), 1.0, "without lines");
 }
 
+#[test]
+fn a_ring_in_wide_flesh_grows_further_until_half_of_it_is_seen() {
+    let surface = flesh(1.0);
+    let small = ring(0.16);
+    assert_eq!(outside_share(&surface, &small, Vec3::ZERO, 4.0), 0.0);
+    let factor = clear_factor(&surface, &small, Vec3::ZERO);
+    assert!((6.0..=8.0).contains(&factor), "{factor}");
+    let share = outside_share(&surface, &small, Vec3::ZERO, factor);
+    assert!((0.5..0.9).contains(&share), "no larger than it has to be: {share}");
+    assert_eq!(clear_factor(&surface, &ring(0.1), Vec3::ZERO), 1.0, "one that nothing helps stays");
+}
+
 /// Runs frames until the shapes of the rig's controls are measured.
 fn measured(bench: &mut Workbench) {
     for _ in 0..20_000 {
@@ -199,7 +211,7 @@ fn no_control_of_fitted_animals_lies_in_their_flesh() {
         for (control, share, factor) in &drawn {
             assert!(*share >= 0.25, "{}: {control}: {share} outside, enlarged by {factor}", mesh.display());
         }
-        // A tenth of the eagle's have a half within the feathers: the limit of enlargement is reached.
+        // Feathers may be wider than any enlargement.
         let seen = drawn.iter().filter(|(_, share, _)| *share >= 0.5).count();
         assert!(seen * 9 >= drawn.len() * 8, "{}: {seen} of {}", mesh.display(), drawn.len());
         std::fs::remove_file(folder.path().join("fitted.rig.ron")).unwrap();

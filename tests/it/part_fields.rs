@@ -2,7 +2,13 @@
 
 use std::{fs, path::Path};
 
-use super::{cli_outputs::rigsmith, part_instances::load};
+use rigsmith::rig::{Uid, part::PartInstance, update::same_parts};
+use serde_json::Value;
+
+use super::{
+    cli_outputs::{json, rigsmith},
+    part_instances::load,
+};
 
 pub(super) const PART: &str = r#"(
     format: 2,
@@ -190,4 +196,189 @@ fn fields_that_one_side_changed_each_come_together_and_so_do_more_parts() {
     assert!(code == 0 && said.contains("changed  part index count: 4 to 6"), "{said}");
     let text = fs::read_to_string(folder.path().join("next.rig.ron")).unwrap();
     assert!(text.contains("count: 6") && text.contains("options: {\"size\": 0.75}"), "{text}");
+}
+
+/// The finger with a joint more.
+fn longer() -> String {
+    let tip =
+        "        (label: \"bone_4\", parent: \"bone_3\", translation: (0, 1, 0), tags: [control()]),\n    ],\n)\n";
+    let longer = PART.replace("    ],\n)\n", tip);
+    assert_ne!(longer, PART);
+    longer
+}
+
+#[test]
+fn another_file_of_a_part_is_a_field_of_the_instance() {
+    let file = BASE.replace("finger.rig.ron", "finger_v2.rig.ron");
+    let folder = folder(&file, &mine());
+    fs::write(folder.path().join("finger_v2.rig.ron"), longer()).unwrap();
+    let before = load(&folder.path().join("mine.rig.ron"));
+    let (text, said) = updated(folder.path(), &[]);
+    assert!(said.contains("changed  part index part: \"finger.rig.ron\" to \"finger_v2.rig.ron\""), "{said}");
+    assert!(said.contains("added    a_bone_4") && !said.contains("renamed"), "{said}");
+    assert!(text.contains("part: \"finger_v2.rig.ron\"") && text.contains(CHANGES.trim()), "{text}");
+    assert!(!text.contains("label: \"a_") && text.contains("// The finger."), "{text}");
+    let rig = load(&folder.path().join("out.rig.ron"));
+    assert_eq!(rig.len(), before.len() + 1);
+    for joint in before.walk() {
+        assert!(rig.joint(joint.data.uid).is_some(), "{:?} keeps its identity", joint.data.label);
+    }
+    // The same version again says nothing more.
+    let again = ["update", "out.rig.ron", "--from", "file.rig.ron", "--base", "file.rig.ron", "-o", "again.rig.ron"];
+    let (code, said) = rigsmith(folder.path(), &again);
+    assert!(code == 0 && !said.contains("renamed") && !said.contains("part index"), "{said}");
+    assert_eq!(fs::read_to_string(folder.path().join("again.rig.ron")).unwrap(), text);
+}
+
+#[test]
+fn another_file_of_a_part_on_both_sides_is_a_conflict() {
+    let file = BASE.replace("finger.rig.ron", "finger_v2.rig.ron");
+    let folder = folder(&file, &mine().replace("finger.rig.ron", "finger_own.rig.ron"));
+    fs::write(folder.path().join("finger_v2.rig.ron"), longer()).unwrap();
+    fs::write(folder.path().join("finger_own.rig.ron"), PART).unwrap();
+    let (code, said) = rigsmith(folder.path(), &UPDATE);
+    let told = "conflict part index part: \"finger_own.rig.ron\" here, \"finger_v2.rig.ron\" there";
+    assert!(code == 1 && said.contains(told), "{said}");
+    assert_eq!(said.matches("conflict ").count(), 1, "one field, not a line for each joint: {said}");
+    for (side, joints, file) in [("mine", 5, "finger_own.rig.ron"), ("theirs", 6, "finger_v2.rig.ron")] {
+        let (text, _) = updated(folder.path(), &["--take", side]);
+        assert!(text.contains(&format!("part: \"{file}\"")) && text.contains(CHANGES.trim()), "{side}: {text}");
+        assert_eq!(load(&folder.path().join("out.rig.ron")).len(), joints, "{side}");
+        fs::remove_file(folder.path().join("out.rig.ron")).unwrap();
+    }
+}
+
+#[test]
+fn files_of_parts_are_compared_over_folders() {
+    let folder = folder(BASE, &mine());
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("new")).unwrap();
+    let update =
+        ["update", "mine.rig.ron", "--from", "new/file.rig.ron", "--base", "base.rig.ron", "-o", "out.rig.ron"];
+    // The same file by another way is no change.
+    let same =
+        BASE.replace("finger.rig.ron", "../finger.rig.ron").replace("prefix: \"a_\",", "prefix: \"a_\", count: 5,");
+    fs::write(at("new/file.rig.ron"), same).unwrap();
+    let (code, said) = rigsmith(folder.path(), &update);
+    assert!(code == 0 && said.contains("part index count") && !said.contains("part index part"), "{said}");
+    let text = fs::read_to_string(at("out.rig.ron")).unwrap();
+    assert!(text.contains("part: \"finger.rig.ron\"") && text.contains("count: 5"), "{text}");
+    fs::remove_file(at("out.rig.ron")).unwrap();
+    // Another file is called by its way from the rig.
+    fs::write(at("new/file.rig.ron"), BASE.replace("finger.rig.ron", "finger_v2.rig.ron")).unwrap();
+    fs::write(at("new/finger_v2.rig.ron"), longer()).unwrap();
+    let (code, said) = rigsmith(folder.path(), &update);
+    assert!(code == 0 && said.contains("part index part: \"finger.rig.ron\" to \"new/finger_v2.rig.ron\""), "{said}");
+    let text = fs::read_to_string(at("out.rig.ron")).unwrap();
+    assert!(text.contains("part: \"new/finger_v2.rig.ron\"") && text.contains(CHANGES.trim()), "{text}");
+}
+
+/// A part without a name.
+const NAMELESS: &str = r#"(
+    format: 2,
+    name: "hand",
+    joints: [
+        (label: "palm", translation: (0.5, 1, 0)),
+        (label: "ring", parent: "palm", translation: (0, 1, 0)),
+    ],
+    parts: [
+        (part: "finger.rig.ron", onto: ["palm"], adds: true, prefix: "a_"),
+    ],
+)
+"#;
+
+#[test]
+fn a_nameless_part_that_goes_onto_other_joints_is_the_same_part() {
+    let own = "prefix: \"a_\", changes: [(tag: \"control/bone_2\", params: (relative_size: 0.9))]";
+    let mine = NAMELESS.replace("prefix: \"a_\"", own);
+    let file = NAMELESS.replace("onto: [\"palm\"]", "onto: [\"ring\"]");
+    let folder = folder(&file, &mine);
+    fs::write(folder.path().join("base.rig.ron"), NAMELESS).unwrap();
+    let before = load(&folder.path().join("mine.rig.ron"));
+    let (text, said) = updated(folder.path(), &["--keep-base"]);
+    assert!(said.contains("renamed  part finger.rig.ron on palm to finger.rig.ron on ring?"), "{said}");
+    assert!(said.contains("part finger.rig.ron onto: [palm#") && !said.contains("conflict"), "{said}");
+    assert!(text.contains("onto: [\"ring\"]") && text.contains("relative_size: 0.9"), "{text}");
+    assert!(!text.contains("label: \"a_"), "the part stays a part: {text}");
+    let rig = load(&folder.path().join("out.rig.ron"));
+    for joint in before.walk() {
+        assert!(rig.joint(joint.data.uid).is_some(), "{:?} keeps its identity", joint.data.label);
+        for tag in &joint.data.tags {
+            assert!(rig.find_tag(tag.uid).is_some(), "{:?} keeps the identities of its tags", joint.data.label);
+        }
+    }
+    // The next version is compared with this one, and does not tell of it again.
+    fs::write(folder.path().join("file.rig.ron"), file.replace("adds: true", "adds: true, count: 4")).unwrap();
+    let next = ["update", "out.rig.ron", "--from", "file.rig.ron", "-o", "next.rig.ron"];
+    let (code, said) = rigsmith(folder.path(), &next);
+    assert!(code == 0 && said.contains("count: nothing to 4") && !said.contains("renamed"), "{said}");
+    let text = fs::read_to_string(folder.path().join("next.rig.ron")).unwrap();
+    assert!(text.contains("count: 4") && text.contains("relative_size: 0.9"), "{text}");
+}
+
+#[test]
+fn parts_that_could_be_several_are_none_of_them() {
+    let part = |uid: u64, name: &str, onto: &[&str]| {
+        let onto: Vec<String> = onto.iter().map(|label| (*label).to_owned()).collect();
+        PartInstance {
+            uid: Uid(uid),
+            part: "finger.rig.ron".to_owned(),
+            name: name.to_owned(),
+            onto,
+            ..PartInstance::default()
+        }
+    };
+    let derived = |onto: &str| PartInstance {
+        uid: Uid::derived(["part instance", "finger.rig.ron", onto]),
+        ..part(0, "", &[onto])
+    };
+    let uids = |own: &[&PartInstance], other: &[&PartInstance]| {
+        let lists = [own, other].map(|list| list.iter().map(|part| (*part).clone()).collect::<Vec<_>>());
+        same_parts(&lists[0], &lists[1]).into_iter().collect::<Vec<_>>()
+    };
+    let (a, b, c, d) = (derived("a"), derived("b"), derived("c"), derived("d"));
+    assert_eq!(uids(&[&a], &[&b]), [(b.uid, a.uid)]);
+    assert_eq!(uids(&[&a, &c], &[&b, &c]), [(b.uid, a.uid)], "one stays as it is");
+    assert!(uids(&[&a, &c], &[&b, &d]).is_empty(), "two moved");
+    assert!(uids(&[&part(1, "", &["a"])], &[&part(2, "", &["b"])]).is_empty(), "both uids are written");
+    assert!(uids(&[&part(1, "index", &[])], &[&b]).is_empty(), "one has a name");
+}
+
+/// What `rigsmith diff` lists: kind, field and the values of each change.
+fn differences(folder: &Path, from: &str, to: &str) -> Vec<[Value; 4]> {
+    let (code, told) = json(folder, &["diff", from, to]);
+    assert_eq!(code, 0, "{told}");
+    let changes = told["changes"].as_array().unwrap();
+    changes.iter().map(|change| ["kind", "field", "from", "to"].map(|key| change[key].clone())).collect()
+}
+
+#[test]
+fn differences_of_parts_are_told_at_their_instances() {
+    let thumb = "        (part: \"finger.rig.ron\", name: \"thumb\", parent: \"palm\", translation: (0.3, 0, 0), prefix: \"t_\"),\n    ],\n)\n";
+    let text = |text: &str| Value::from(text);
+    let finger = "\"finger.rig.ron\"";
+    let cases: [(String, [Value; 4]); 4] = [
+        (
+            BASE.replace("prefix: \"a_\",", "prefix: \"a_\", count: 5,"),
+            [text("changed"), text("part index count"), Value::Null, text("5")],
+        ),
+        (
+            BASE.replace("\"a_\"", "\"b_\"").replace("/a_base", "/b_base"),
+            [text("changed"), text("part index prefix"), text("\"a_\""), text("\"b_\"")],
+        ),
+        (
+            BASE.replace("finger.rig.ron", "finger_v2.rig.ron"),
+            [text("changed"), text("part index part"), text(finger), text("\"finger_v2.rig.ron\"")],
+        ),
+        (BASE.replace("    ],\n)\n", thumb), [text("added"), text("part thumb"), Value::Null, text(finger)]),
+    ];
+    for (file, told) in cases {
+        assert_ne!(file, BASE);
+        let folder = folder(&file, BASE);
+        fs::write(folder.path().join("finger_v2.rig.ron"), longer()).unwrap();
+        assert_eq!(differences(folder.path(), "base.rig.ron", "file.rig.ron"), [told.clone()]);
+        let [kind, field, from, to] = told;
+        let back = if kind == "added" { text("removed") } else { kind };
+        assert_eq!(differences(folder.path(), "file.rig.ron", "base.rig.ron"), [[back, field, to, from]]);
+    }
 }

@@ -36,7 +36,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use file_marks::FileMarks;
-pub(crate) use moved_text::{with_changes_on_lines, with_part_files, with_rig_uid};
+pub(crate) use moved_text::{with_changes_on_lines, with_part_files, with_part_uids, with_rig_uid};
 pub(in crate::rig) use read::read_text;
 pub use read::{read_header, read_template, survey_template, text_of};
 pub use shorthand::{Explicit, explicit};

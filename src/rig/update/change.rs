@@ -25,13 +25,14 @@ pub enum ChangeKind {
 pub struct Change {
     /// Kind of the change.
     pub kind: ChangeKind,
-    /// Uid of the joint, tag, group or pose; of the rig for its header.
+    /// Uid of the joint, tag, group, pose or part instance; of the rig for its header.
     pub uid: Uid,
     /// Label of the joint, or of the joint of the tag; its uid without one. `None` for groups, poses and the header.
     pub joint: Option<String>,
     /// Module or kind of feature, and the name that the tag gives after a `/`; `None` if no tag is concerned.
     pub tag: Option<String>,
-    /// Name of the field; of a parameter as `params.NAME`; `group NAME`, `input NAME` or `pose NAME` for those.
+    /// Name of the field; of a parameter as `params.NAME`; `group NAME`, `input NAME` or `pose NAME` for those, and
+    /// `part NAME FIELD` for a field of a part instance.
     pub field: Option<String>,
     /// Value before, as it is written in files.
     pub from: Option<String>,

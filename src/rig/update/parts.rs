@@ -126,6 +126,7 @@ impl Sides<'_> {
         let flag = |is_on: bool| is_on.then(|| "true".to_owned());
         let prefix = |a: &PartInstance| (!a.prefix.is_empty()).then(|| quoted(&a.prefix));
         let mut list: Vec<Field<PartInstance>> = vec![
+            field("part", |a: &PartInstance| Some(quoted(&a.part)), |a, b| a.part.clone_from(&b.part)),
             field("onto", onto, |a: &mut PartInstance, b: &PartInstance| a.onto.clone_from(&b.onto)),
             field("adds", move |a: &PartInstance| flag(a.adds), |a, b| a.adds = b.adds),
             field("parent", parent, |a: &mut PartInstance, b: &PartInstance| a.parent.clone_from(&b.parent)),
@@ -259,6 +260,7 @@ impl TemplateWithParts {
             let has_place = |to: &&PartInstance| to.onto.iter().chain(&to.parent).all(is_here);
             take_place(part, to.filter(has_place).unwrap_or(&own));
             let Some(to) = to else { continue };
+            part.part.clone_from(&to.part);
             part.counts.clone_from(&to.counts);
             part.options.clone_from(&to.options);
             part.prefix.clone_from(&to.prefix);

@@ -47,10 +47,10 @@ const TURN_FREELY: [&[&str]; 4] = [
     // Ball joints, whose ends depend on where the limb is.
     &[
         "arm_fk", "leg_fk", "front_fk", "foot_fk", "head", "neck", "neck_fk", "thumb", "index", "middle", "ring",
-        "pinky", "paw", "fingers",
+        "pinky",
     ],
     // Chains of no anatomy, and what is soft.
-    &["chain", "control", "tail", "tail_fan", "tail_fk", "tail_bend", "tongue_fk", "tongue_bend", "ear"],
+    &["chain", "control", "tail_bend", "tongue_fk", "tongue_bend"],
 ];
 
 /// Name of a control without the side, the number and the ending of those that are called like their joints.
@@ -97,7 +97,7 @@ fn every_control_has_ends_or_locks_to_its_turns_or_is_free_by_intent() {
 }
 
 #[test]
-fn eyes_lids_lips_wings_and_toes_turn_as_far_as_they_do() {
+fn eyes_lids_lips_wings_paws_toes_ears_and_tails_turn_as_far_as_they_do() {
     // Template, control, whether it stays in its place.
     let ended = [
         ("parts/eye", "eye_l", true),
@@ -108,7 +108,13 @@ fn eyes_lids_lips_wings_and_toes_turn_as_far_as_they_do() {
         ("bird", "wing_fk_r", true),
         ("bird", "quill_6_r", true),
         ("bird", "toe_middle_l_control", true),
+        ("bird", "tail_fan_r_control", true),
         ("quadruped", "toes_r_control", true),
+        ("quadruped", "paw_l_control", true),
+        ("quadruped", "fingers_r_control", true),
+        ("quadruped", "ear_l_control", true),
+        ("quadruped", "tail_fk_6", true),
+        ("parts/tail", "tail_fk", true),
         ("parts/leg", "leg_fk_l_4", false),
         ("biped", "leg_fk_r_4", false),
     ];

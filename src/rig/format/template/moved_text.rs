@@ -31,6 +31,24 @@ pub(crate) fn with_part_files(text: &str, files: &[Option<(String, Uid)>]) -> Op
     Some(patch.text())
 }
 
+/// The text with those uids of some of its part instances, in their order. `None` for a text with another number of instances.
+pub(crate) fn with_part_uids(text: &str, uids: &[Option<Uid>]) -> Option<String> {
+    let tree = Tree::parse(text)?;
+    let elements = tree.elements(tree.root(), "parts");
+    if elements.len() != uids.len() {
+        return None;
+    }
+    let mut patch = Patch::new(&tree);
+    for (item, uid) in elements.iter().zip(uids) {
+        let Some(uid) = uid else { continue };
+        match tree.field(item.value, "uid") {
+            Some(field) => patch.replace(field.value, &format!("\"{uid}\"")),
+            None => patch.put_first(item.value, &format!("uid: \"{uid}\"")),
+        }
+    }
+    Some(patch.text())
+}
+
 /// The text with that uid of its rig; `None` for a text whose brackets do not match.
 pub(crate) fn with_rig_uid(text: &str, uid: Uid) -> Option<String> {
     let tree = Tree::parse(text)?;

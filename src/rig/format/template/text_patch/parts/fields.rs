@@ -47,8 +47,9 @@ fn instance_fields(
     (was, was_fitted): &(PartInstance, Rig),
     (is, is_fitted): &(PartInstance, Rig),
 ) {
-    // The uid of a part without a name follows from the joints that it goes onto.
-    if was.onto != is.onto && was.name.is_empty() && tree.field(node, "uid").is_none() {
+    // The uid follows from the file, and of a part without a name from the joints that it goes onto.
+    let follows = was.part != is.part || was.name.is_empty() && was.onto != is.onto;
+    if follows && tree.field(node, "uid").is_none() {
         patch.put_first(node, &format!("uid: \"{}\"", was.uid));
     }
     for ((name, before), (_, after)) in field_texts(was).into_iter().zip(field_texts(is)) {
@@ -101,6 +102,7 @@ fn field_texts(instance: &PartInstance) -> Vec<(&'static str, Option<String>)> {
     let rest = &instance.rest;
     let (at, scale) = (vector(rest.translation), format!("{:?}", rest.scale.x));
     vec![
+        ("part", Some(quoted(&instance.part))),
         ("onto", list(&instance.onto)),
         ("adds", flag(instance.adds)),
         ("parent", instance.parent.as_deref().map(quoted)),
