@@ -64,7 +64,7 @@ const OPENED: &[(&str, &[FileKind])] = &[
 
 /// Kinds of files with motion, by name.
 const MOTION: &[(&str, &[FileKind])] = &[
-    ("Motion (.bvh, .anim.ron, .glb, .gltf)", MOTION_FILES),
+    ("Motion (.bvh, .anim.ron, .glb, .gltf, .vrm)", MOTION_FILES),
     ("Motion capture (.bvh)", &[FileKind::Bvh]),
     ("Clips (.anim.ron)", &[FileKind::Animation]),
 ];

@@ -18,6 +18,7 @@ mod joint_table;
 mod marks;
 mod mask;
 mod menu;
+pub mod motion_options;
 mod row;
 mod ruler;
 mod sheet;

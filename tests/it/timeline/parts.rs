@@ -270,9 +270,14 @@ fn imported_motion_waits_for_steps_that_were_undone_meanwhile() {
 
 /// The bundled biped beside a capture of a human, whose map waits.
 fn captured() -> (Desk, tempfile::TempDir) {
+    captured_of(crate::fuzz_bvh::HUMAN)
+}
+
+/// The same beside the capture of this text.
+fn captured_of(text: &str) -> (Desk, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("step.bvh");
-    std::fs::write(&path, crate::fuzz_bvh::HUMAN).unwrap();
+    std::fs::write(&path, text).unwrap();
     let (mut desk, _) = desk_with(TimelinePanel::default());
     let rig = crate::bench::shipped("biped");
     let entity = desk.rig;
@@ -330,4 +335,40 @@ fn the_map_of_joints_is_changed_or_dropped_before_anything_is_applied() {
     desk.frames(3);
     assert!(draft(&desk).is_none() && desk.look("Joint for LeftLeg").is_none());
     assert_eq!((bytes(&desk), desk.steps()), (before, steps));
+}
+
+/// What the command has options for is chosen below the table: the control that carries the rig gets the travel, and feet are let
+/// go. The next import begins with the same choices.
+#[test]
+fn motion_capture_has_choices() {
+    let walk = include_str!("../retarget/walker.bvh");
+    let moved = |clip: &RigClip| -> std::collections::BTreeSet<Uid> {
+        let tracks = clip.layers.iter().flat_map(|layer| layer.tracks.keys());
+        tracks.filter(|target| target.property == Property::Translation).map(|target| target.node).collect()
+    };
+    let told = |desk: &Desk, text: &str| desk.told().iter().any(|told| told.contains(text));
+    let (mut plain, _folder) = captured_of(walk);
+    accept(&mut plain);
+    let [without] = plain.rig().clips() else { panic!("{:?}", plain.told()) };
+    assert!(!told(&plain, "for root motion") && told(&plain, "feet stand 4 times"), "{:?}", plain.told());
+
+    let (mut desk, folder) = captured_of(walk);
+    for label in ["Root motion", "Lock feet"] {
+        desk.time += 1.0;
+        desk.click(label);
+        desk.frames(3);
+    }
+    let wanted = |desk: &Desk| {
+        let options = desk.app.world().resource::<ClipImport>().draft().expect("a map").options;
+        assert_eq!((options.root_motion, options.lock_feet), (true, false), "{options:?}");
+        assert!(options.travel && options.lock_hands, "{options:?}");
+    };
+    wanted(&desk);
+    accept(&mut desk);
+    let [with] = desk.rig().clips() else { panic!("{:?}", desk.told()) };
+    assert!(told(&desk, "the travel is on root, for root motion"), "{:?}", desk.told());
+    assert!(!told(&desk, "feet stand"), "{:?}", desk.told());
+    assert!(moved(with).difference(&moved(without)).next().is_some(), "the root has keys");
+    import(&mut desk, folder.path().join("step.bvh"));
+    wanted(&desk);
 }

@@ -4,7 +4,10 @@ use bevy_egui::egui::{
     Align, Button, ComboBox, Key, Layout, Popup, Rect, Ui, UiBuilder, WidgetInfo, WidgetType, pos2, vec2,
 };
 
-use super::import::{MapDraft, MapRequest};
+use super::{
+    import::{MapDraft, MapRequest, target_of},
+    motion_options::choices,
+};
 use crate::{
     editor::{
         counted::counted,
@@ -53,6 +56,11 @@ pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy:
             counted(all, "joint", "joints")
         ));
     });
+    let onto = target_of(&shown.rig);
+    let options = ui.add_enabled_ui(!is_busy, |ui| choices(ui, draft.options, onto)).inner;
+    if options != draft.options {
+        requests.send(MapRequest::Options(options));
+    }
     if is_cancelled && !is_busy {
         requests.send(MapRequest::Cancel);
     }
