@@ -16,7 +16,7 @@ use super::{
     error::WriteError,
     file_name,
     open::spawn,
-    save::{Job, SaveJob, SavedContent, settled},
+    save::{Job, SaveJob, SavedContent, animated_names, settled},
 };
 use crate::{
     algo::face::expression::{ExpressionSet, vrm_mixes},
@@ -36,6 +36,7 @@ use crate::{
     processor::Modules,
     rig::{
         BuiltRig, Rig, Uid,
+        animation::NodeNames,
         bake::baked,
         character::{Character, character, mark_joints},
         skeleton_preset::{SkeletonPreset, apply_preset},
@@ -101,10 +102,11 @@ pub(super) fn export(world: &mut World, path: PathBuf) {
     let base = world.get::<RigSource>(rig).and_then(RigSource::base).or(base).cloned();
     let options = world.get_resource::<ExportOptions>().cloned().unwrap_or_default();
     let FaceExpressions(expressions) = world.get_resource().cloned().unwrap_or_default();
+    let names = animated_names(world, &data);
     let task = spawn(move || {
         let (built, base) = (built.as_deref(), base.as_deref());
-        let (mesh, expressions) = (mesh.as_ref(), &*expressions);
-        let source = ExportSource { rig: &data, built, modules: &modules, expressions, mesh, base };
+        let (mesh, expressions, names) = (mesh.as_ref(), &*expressions, &names);
+        let source = ExportSource { rig: &data, built, modules: &modules, expressions, mesh, base, names };
         let mut notes = source.write(&path, template.as_deref(), &options)?;
         if more > 0 {
             notes.push(format!("only the first mesh was exported; {more} more are open"));
@@ -130,6 +132,8 @@ struct ExportSource<'a> {
     mesh: Option<&'a RigMesh>,
     /// The version of the template that the document took over last.
     base: Option<&'a Rig>,
+    /// Names of animated nodes that the window knows.
+    names: &'a NodeNames,
 }
 
 impl ExportSource<'_> {
@@ -156,7 +160,9 @@ impl ExportSource<'_> {
             }
             Some(FileKind::Animation) if rig.clips().is_empty() => Err(WriteError::NoClips),
             Some(FileKind::Animation) => {
-                store_animation(&RealDisk, path, rig, self.built, rig.clips())?;
+                let mut clips = rig.clips().to_vec();
+                clips.iter_mut().for_each(|clip| clip.names.extend(self.names));
+                store_animation(&RealDisk, path, rig, self.built, &clips)?;
                 Ok(Vec::new())
             }
             Some(FileKind::Template | FileKind::RigText) => {
