@@ -19,6 +19,7 @@ mod marks;
 mod mask;
 mod menu;
 pub mod motion_options;
+pub(in crate::editor) mod own_motion;
 mod row;
 mod ruler;
 mod sheet;

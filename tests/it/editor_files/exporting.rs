@@ -32,6 +32,10 @@ fn clips_of_the_document_are_exported_as_they_are_edited() {
     let clips = window.rig().clips().to_vec();
     assert_eq!((clips.len(), clips[0].name.as_str()), (1, "turn"), "{:?}", window.notices.list);
     assert!(clips[0].key_count() >= 2 && !has_unsaved_changes(window.world()));
+    // Clips whose joints a template replaces can be put onto it.
+    window.open_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/templates/biped.rig.ron"));
+    let offer = "\"Import motion of the mesh's file\" in the Timeline puts them onto";
+    assert!(window.notices.include(Severity::Info, offer), "{:?}", window.notices.list);
 }
 
 #[test]

@@ -372,3 +372,35 @@ fn motion_capture_has_choices() {
     import(&mut desk, folder.path().join("step.bvh"));
     wanted(&desk);
 }
+
+/// The clips of a character whose joints a template has replaced go onto the controls of that template.
+#[cfg(feature = "cli")]
+#[test]
+fn motion_of_the_meshs_file_is_put_onto_the_controls() {
+    use rigsmith::editor::files::MeshSource;
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("walker.bvh"), include_str!("../retarget/walker.bvh")).unwrap();
+    let answer = crate::cli_build::rigsmith(folder.path(), &["animate", "biped", "walker.bvh", "-o", "walker.glb"]);
+    assert_eq!(answer.code, 0, "{} {}", answer.out, answer.err);
+    let (mut desk, _) = desk_with(TimelinePanel::default());
+    let entity = desk.rig;
+    desk.app.world_mut().entity_mut(entity).insert(crate::bench::shipped("biped"));
+    let body = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/biped.obj");
+    let mesh = RigMesh::new(Uid(0x3E5), load_model(&RealDisk, &body).unwrap(), Vec::new());
+    let mesh = desk.app.world_mut().spawn((mesh, SkinOf(entity), MeshSource::File(body))).id();
+    desk.frames(3);
+    let own = Action::Timeline(TimelineAction::ImportOwn);
+    assert_eq!(obstacle(desk.app.world(), own), Some("the mesh has no file with motion"));
+    let source = MeshSource::File(folder.path().join("walker.glb"));
+    desk.app.world_mut().entity_mut(mesh).insert(source);
+    assert_eq!(obstacle(desk.app.world(), own), None);
+    act(&mut desk, TimelineAction::ImportOwn);
+    crate::bench::wait(&mut desk, "the map", Desk::frame, |desk| {
+        desk.app.world().resource::<ClipImport>().draft().is_some()
+    });
+    desk.frames(2);
+    accept(&mut desk);
+    let [clip] = desk.rig().clips() else { panic!("{:?}", desk.told()) };
+    assert_eq!(clip.name, "walker");
+    assert!(clip.nodes().iter().any(|node| desk.rig().joint(*node).is_none()), "controls have the keys");
+}
