@@ -2,7 +2,7 @@
 
 use rigsmith::{
     editor::panels::timeline::import::{ClipImport, MapRequest},
-    rig::animation::{LayerMode, Marker},
+    rig::animation::{LayerAbout, LayerMode, Marker},
 };
 
 use super::*;
@@ -142,6 +142,13 @@ fn layers_have_weights_modes_and_a_mute() {
     assert!(clip(&desk).layers[1].muted);
     assert_eq!(desk.steps().1, steps + 3);
     desk.secondary_click("Layer 2");
+    desk.click("Rename layer");
+    desk.frames(3);
+    desk.type_text("breath");
+    desk.key(KeyboardKey::Enter);
+    desk.frames(3);
+    assert_eq!((clip(&desk).layers[1].name.as_str(), desk.steps().1), ("breath", steps + 4));
+    desk.secondary_click("breath");
     desk.click("Delete layer");
     desk.frames(3);
     assert_eq!(clip(&desk).layers.len(), 1);
@@ -171,6 +178,32 @@ fn keys_of_nodes_that_are_gone_are_set_aside_under_their_names() {
     desk.frames(3);
     assert!(desk.look("Set aside (1)").is_none());
     assert_eq!(clip(&desk).key_count(), 4);
+}
+
+/// Nodes that came back under other identities get all keys in one step, in layers that concern only some nodes, too.
+#[test]
+fn all_keys_that_are_set_aside_are_given_at_once() {
+    let (mut desk, [_, left, right]) = opened();
+    let about = Box::new(LayerAbout { mask: vec![left, right], ..clip(&desk).layers[0].about() });
+    desk.edit(Operation::Clips(ClipOperation::SetLayer { clip: CLIP, layer: BASE, about }));
+    desk.edit(Operation::Delete { joints: vec![left, right], keep_children: true });
+    desk.frames(2);
+    desk.click("Set aside (2)");
+    desk.frames(2);
+    assert!(desk.look("Give all to nodes of their names").is_none());
+    let others = desk.chain(&["arm_l", "arm_r"]);
+    desk.frames(2);
+    let (before, steps) = (bytes(&desk), desk.steps().1);
+    desk.click("Give all to nodes of their names");
+    desk.frames(3);
+    assert_eq!(desk.steps().1, steps + 1);
+    assert!(desk.look("Set aside (2)").is_none());
+    for other in others {
+        assert_eq!(times(&desk, other).len(), 4);
+        assert!(clip(&desk).layers[0].concerns(other), "the layer's mask has the node");
+    }
+    undo(&mut desk);
+    assert_eq!(bytes(&desk), before);
 }
 
 #[test]
