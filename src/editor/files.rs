@@ -244,7 +244,9 @@ fn act(world: &mut World, action: Action) {
 /// Opens a document; asks about unsaved changes first if it would replace the open one.
 fn request_open(world: &mut World, request: OpenRequest) {
     if let OpenRequest::File(path) = &request {
-        if matches!(FileKind::of(path), Some(FileKind::Bvh | FileKind::Animation)) && has_joints(world) {
+        if matches!(FileKind::of(path), Some(FileKind::Bvh | FileKind::PackedClips | FileKind::Animation))
+            && has_joints(world)
+        {
             // Motion is no document; it is put onto the open rig.
             world.write_message(ImportRequest(path.clone()));
             return;

@@ -64,9 +64,9 @@ const OPENED: &[(&str, &[FileKind])] = &[
 
 /// Kinds of files with motion, by name.
 const MOTION: &[(&str, &[FileKind])] = &[
-    ("Motion (.bvh, .anim.ron, .glb, .gltf, .vrm)", MOTION_FILES),
+    ("Motion (.bvh, .anim.ron, .rigclip, .glb, .gltf, .vrm)", MOTION_FILES),
     ("Motion capture (.bvh)", &[FileKind::Bvh]),
-    ("Clips (.anim.ron)", &[FileKind::Animation]),
+    ("Clips (.anim.ron, .rigclip)", &[FileKind::Animation, FileKind::PackedClips]),
 ];
 
 impl EditorOverlay for DialogView {

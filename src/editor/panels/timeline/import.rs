@@ -24,7 +24,7 @@ use crate::{
         files::dialog::{Dialog, Question},
         notice::Notice,
     },
-    files::{FileKind, LoadError, RealDisk, load_animation, load_model, load_motion, stem},
+    files::{FileKind, LoadError, RealDisk, load_animation, load_model, load_motion, load_packed_clips, stem},
     plugins::{
         commands::RigModules,
         document::EditRequest,
@@ -48,7 +48,7 @@ use crate::{
 
 /// Kinds of files that have motion.
 pub const MOTION_FILES: &[FileKind] =
-    &[FileKind::Bvh, FileKind::Animation, FileKind::Glb, FileKind::Gltf, FileKind::Vrm];
+    &[FileKind::Bvh, FileKind::Animation, FileKind::PackedClips, FileKind::Glb, FileKind::Gltf, FileKind::Vrm];
 
 /// Request to put the motion of a file onto the active rig. Motion of another skeleton waits for [`MapRequest::Accept`].
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
@@ -166,7 +166,7 @@ struct ImportedMotion {
 #[derive(Debug, thiserror::Error)]
 enum ImportError {
     /// The file's name has no ending of motion.
-    #[error("it is no file of motion; those end in .bvh, .anim.ron, .glb, .gltf or .vrm")]
+    #[error("it is no file of motion; those end in .bvh, .anim.ron, .rigclip, .glb, .gltf or .vrm")]
     Kind,
     /// The file has no motion.
     #[error("it has no clips that move joints; choose a file with animations of its skeleton")]
@@ -311,8 +311,11 @@ fn read(
             limits.check_motion(name, &motion)?;
             motions.push(motion);
         }
-        Some(FileKind::Glb | FileKind::Gltf | FileKind::Vrm) => {
-            let model = load_model(&RealDisk, path)?;
+        Some(kind) if kind == FileKind::PackedClips || kind.is_gltf() => {
+            let model = match kind {
+                FileKind::PackedClips => load_packed_clips(&RealDisk, path)?.model(&stem(path)),
+                _ => load_model(&RealDisk, path)?,
+            };
             limits.check_model(name, &model)?;
             let joints = (target_of(rig) == MotionTarget::Joints).then(|| own_joints(&model, rig)).flatten();
             for (number, clip) in model.clips.iter().enumerate() {
