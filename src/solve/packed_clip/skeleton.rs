@@ -5,7 +5,12 @@ use bevy::math::{Quat, Vec3};
 use super::{MOST_NODES, MOST_TEXT, PackedClip, PackedClipError, Reader, write_number};
 use crate::{
     mesh::model::{Model, Node, Trs},
-    rig::{BuiltRig, Rig, Uid, bake::baked},
+    rig::{
+        BuiltRig, JointData, Rig, RigEdit, Uid,
+        animation::{NodeNames, file_clip::rig_clips},
+        bake::baked,
+        format::animation::ReadAnimation,
+    },
     solve::bake_clip::BakedNode,
 };
 
@@ -70,6 +75,31 @@ impl PackedSkeleton {
             nodes: self.nodes.iter().map(node).collect(),
             clips: self.clips.iter().map(PackedClip::unpacked).collect(),
             ..Model::default()
+        }
+    }
+
+    /// True if bytes begin as those of a skeleton with packed clips do.
+    pub fn may_begin_with(bytes: &[u8]) -> bool {
+        bytes.starts_with(MAGIC)
+    }
+
+    /// The clips with keys on the nodes, as a file of clips would have them for a rig of these nodes alone.
+    pub fn animation(&self, name: &str) -> ReadAnimation {
+        let mut rig = Rig::new(Uid::derived(["packed clips", name]), name);
+        for node in &self.nodes {
+            let label = Some(node.name.clone()).filter(|name| !name.is_empty());
+            let joint = JointData { uid: node.uid, label, rest: node.rest.into(), ..JointData::default() };
+            let parent = node.parent.and_then(|parent| self.nodes.get(parent)).map(|parent| parent.uid);
+            // A uid that is there twice is refused.
+            let _ = rig.apply(&RigEdit::AddJoint { joint: Box::new(joint), parent, index: usize::MAX });
+        }
+        let joints: Vec<Option<Uid>> = self.nodes.iter().map(|node| Some(node.uid)).collect();
+        ReadAnimation {
+            rig: rig.uid(),
+            rig_name: name.to_owned(),
+            clips: rig_clips(&rig, &self.model(name), &joints),
+            names: NodeNames::of(&rig, None),
+            notes: Vec::new(),
         }
     }
 
