@@ -26,8 +26,8 @@ use rigsmith::{
         settings::EditorSettings,
     },
     files::{
-        Disk, RealDisk, bundled_characters, journal::journal_beside, load_animation, load_model, load_template,
-        store_rig,
+        Disk, RealDisk, bundled_characters, journal::journal_beside, load_animation, load_model, load_packed_clips,
+        load_template, store_rig,
     },
     headless::headless_app,
     plugins::{

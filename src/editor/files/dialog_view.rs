@@ -208,7 +208,7 @@ impl DialogView {
                 "Export",
                 "Export",
                 "The ending says what: .glb or .gltf the character with its clips, .vrm an avatar, .obj at rest, \
-                 .anim.ron the clips, .rig.ron the template, .rig the skeleton, .skin the weights. What is written is \
+                 .anim.ron the clips, .rigclip the motion of the joints in few bytes, .rig.ron the template, .rig the skeleton, .skin the weights. What is written is \
                  read back.",
             ),
         };

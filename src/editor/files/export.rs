@@ -10,7 +10,7 @@ use bevy::prelude::*;
 
 use super::{
     active,
-    clips::put_clips,
+    clips::{packed_clips, put_clips},
     dialog::Purpose,
     document::{OpenDocument, last_step, meshes},
     error::WriteError,
@@ -23,8 +23,8 @@ use crate::{
     editor::counted::counted,
     files::{
         FileKind, LoadError, RealDisk, StoreError, TemplateOrigin, is_template_of, load_animation, load_model,
-        load_rig_text, load_skin, load_template, stem, store_animation, store_avatar, store_document_over, store_model,
-        store_rig_from, store_skin,
+        load_packed_clips, load_rig_text, load_skin, load_template, stem, store_animation, store_avatar,
+        store_document_over, store_model, store_packed_clips, store_rig_from, store_skin,
     },
     instance::RigSource,
     mesh::{gltf::GltfWriteSettings, model::Model},
@@ -165,6 +165,11 @@ impl ExportSource<'_> {
                 store_animation(&RealDisk, path, rig, self.built, &clips)?;
                 Ok(Vec::new())
             }
+            Some(FileKind::PackedClips) if rig.clips().is_empty() => Err(WriteError::NoClips),
+            Some(FileKind::PackedClips) => {
+                store_packed_clips(&RealDisk, path, &packed_clips(rig, self.built, self.modules)?)?;
+                Ok(Vec::new())
+            }
             Some(FileKind::Template | FileKind::RigText) => {
                 let sources = [Some(path), template];
                 let sources: Vec<&Path> = sources.into_iter().flatten().collect();
@@ -263,6 +268,11 @@ fn check(path: &Path) -> Result<String, LoadError> {
             let read = load_animation(&RealDisk, path)?;
             let keys = read.clips.iter().map(crate::rig::animation::RigClip::key_count).sum();
             vec![counted(read.clips.len(), "clip", "clips"), counted(keys, "key", "keys")]
+        }
+        Some(FileKind::PackedClips) => {
+            let packed = load_packed_clips(&RealDisk, path)?;
+            let (clips, joints) = (packed.clips.len(), packed.nodes.len());
+            vec![counted(clips, "clip", "clips"), counted(joints, "joint", "joints")]
         }
         Some(FileKind::Template) => {
             let rig = load_template(&RealDisk, path)?.rig;

@@ -27,6 +27,9 @@ fn clips_of_the_document_are_exported_as_they_are_edited() {
     // The clips alone come back as they were, and a file with animations opens with them.
     let read = load_animation(&RealDisk, &window.export("turn.anim.ron")).expect("clips");
     assert_eq!(read.clips, [clip]);
+    let packed = load_packed_clips(&RealDisk, &window.export("turn.rigclip")).expect("packed clips");
+    assert_eq!((packed.nodes[0].uid, packed.clips[0].name(), packed.clips[0].frames()), (joint, "turn", 31));
+    assert!(window.notices.include(Severity::Done, "Exported turn.rigclip; read back: 1 clip, 1 joint"));
     window.open_file(&folder.path().join("turn.glb"));
     window.answer(Answer::Discard);
     let clips = window.rig().clips().to_vec();
