@@ -2,7 +2,7 @@
 
 use rigsmith::{
     editor::panels::timeline::import::{ClipImport, MapRequest},
-    rig::animation::{LayerAbout, LayerMode, Marker},
+    rig::animation::{LayerAbout, LayerMode, Marker, joint_map::FoundBy},
 };
 
 use super::*;
@@ -368,6 +368,33 @@ fn the_map_of_joints_is_changed_or_dropped_before_anything_is_applied() {
     desk.frames(3);
     assert!(draft(&desk).is_none() && desk.look("Joint for LeftLeg").is_none());
     assert_eq!((bytes(&desk), desk.steps()), (before, steps));
+}
+
+/// A map file wins over the guess, as with the command; one that does not fit changes nothing.
+#[test]
+fn a_map_file_takes_the_place_of_the_guess() {
+    let (mut desk, folder) = captured();
+    let draft = |desk: &Desk| desk.app.world().resource::<ClipImport>().draft().cloned().expect("a map");
+    let first = draft(&desk);
+    let [left, right] = ["LeftLeg", "RightLeg"].map(|name| first.joints().position(|joint| joint == name).unwrap());
+    let [shin_l, shin_r] = ["shin_l", "shin_r"].map(|label| desk.rig().find_label(label));
+    assert_eq!((first.targets[left], first.targets[right]), (shin_l, shin_r));
+    assert!(desk.look("Load map…").is_some());
+    let load = |desk: &mut Desk, text: &str| {
+        let path = folder.path().join("map.ron");
+        std::fs::write(&path, text).unwrap();
+        desk.app.world_mut().write_message(MapRequest::File(path));
+        desk.frames(3);
+    };
+    load(&mut desk, "[(\"LeftLeg\", \"nobody\")]");
+    assert!(desk.told().iter().any(|told| told.contains("has no joint \"nobody\"")), "{:?}", desk.told());
+    assert_eq!((draft(&desk).targets, draft(&desk).found_by), (first.targets.clone(), first.found_by));
+    load(&mut desk, "[(\"LeftLeg\", \"shin_r\"), (\"RightLeg\", \"shin_l\")]");
+    let now = draft(&desk);
+    assert_eq!((now.targets[left], now.targets[right]), (shin_r, shin_l));
+    assert_eq!(now.found_by, Some(FoundBy::Map));
+    accept(&mut desk);
+    assert_eq!(desk.rig().clips().len(), 1);
 }
 
 /// What the command has options for is chosen below the table: the control that carries the rig gets the travel, and feet are let

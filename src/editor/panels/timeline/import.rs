@@ -14,6 +14,7 @@ use bevy::{
 
 use super::{
     carry_out::open,
+    map_file::{self, targets_of},
     motion_options::{MotionOptions, sentences},
 };
 use crate::{
@@ -61,6 +62,10 @@ pub enum MapRequest {
     Set(usize, Option<Uid>),
     /// Chooses how the motion is put onto the rig; later imports begin with the same choices.
     Options(MotionOptions),
+    /// Asks for a map file.
+    AskFile,
+    /// Takes the map of a file in place of the guess.
+    File(PathBuf),
     /// Puts the motion onto the rig by the map.
     Accept,
     /// Drops the motion.
@@ -71,7 +76,7 @@ pub enum MapRequest {
 #[derive(Resource, Default)]
 pub struct ClipImport {
     job: Option<Job>,
-    draft: Option<MapDraft>,
+    pub(super) draft: Option<MapDraft>,
     /// Choices of the last import.
     options: MotionOptions,
 }
@@ -106,7 +111,7 @@ pub struct MapDraft {
     /// Name of the file.
     pub name: String,
     /// Motions of one skeleton.
-    motions: Arc<Vec<Motion>>,
+    pub(super) motions: Arc<Vec<Motion>>,
     /// Joint of the rig for each joint of the motion.
     pub targets: Vec<Option<Uid>>,
     /// Way in which the guess was found; `None` if nothing was found.
@@ -261,6 +266,8 @@ fn answer(world: &mut World, request: &MapRequest) {
                 draft.options = *options;
             }
         }
+        MapRequest::AskFile => map_file::ask(world),
+        MapRequest::File(path) => map_file::load(world, path),
         MapRequest::Cancel => {
             import.draft = None;
             import.drop_waiting();
@@ -342,14 +349,9 @@ fn read(
 
 /// Motions with the map that names, shape or labels suggest. Where nothing is found all is for people to choose.
 fn draft(rig: Entity, name: &str, document: &Rig, motions: Vec<Motion>) -> MapDraft {
-    let joints: Vec<Uid> = document.walk().map(|joint| joint.data.uid).collect();
     let guess = motions.first().and_then(|motion| JointMap::new(motion, document, &[]).ok());
-    let mut targets = vec![None; motions.first().map_or(0, |motion| motion.joints.len())];
-    for (from, to) in guess.iter().flat_map(JointMap::joint_pairs) {
-        if let Some(target) = targets.get_mut(from) {
-            *target = joints.get(to).copied();
-        }
-    }
+    let count = motions.first().map_or(0, |motion| motion.joints.len());
+    let targets = guess.as_ref().map_or_else(|| vec![None; count], |guess| targets_of(guess, document, count));
     let notes = motions.iter().flat_map(|motion| motion.notes.iter().cloned()).collect();
     MapDraft {
         rig,

@@ -38,6 +38,10 @@ pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy:
         if import.on_disabled_hover_text(why_not).clicked() {
             requests.send(MapRequest::Accept);
         }
+        let load = ui.add_enabled(!is_busy, Button::new("Load map…"));
+        if load.on_hover_text("Takes pairs of joints from a map file, as --map of the command does").clicked() {
+            requests.send(MapRequest::AskFile);
+        }
         is_cancelled |= ui.add_enabled(!is_busy, Button::new("Cancel import")).clicked();
         let found = match draft.found_by {
             Some(FoundBy::Names) => "guessed from names",
