@@ -55,8 +55,8 @@ pub use library::{
     TemplatePlace, VersionedTemplate, list_bundled, list_templates, newest_versions, read_listed,
 };
 pub use load::{
-    FileKind, LoadError, load_animation, load_gestures, load_joint_map, load_model, load_motion, load_rig_text,
-    load_skin, load_template, stem,
+    FileKind, LoadError, load_animation, load_gestures, load_joint_map, load_model, load_motion, load_packed_clips,
+    load_rig_text, load_skin, load_template, stem,
 };
 pub use model_watch::{ModelWatch, SETTLE};
 pub use parts::{
@@ -71,8 +71,8 @@ pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
 pub use site::{SITE_FILE, SearchPaths, SiteError, TEMPLATES_VARIABLE};
 pub use store::{
-    StoreError, is_template_of, store_animation, store_avatar, store_document_over, store_model, store_rig,
-    store_rig_over, store_skin,
+    StoreError, is_template_of, store_animation, store_avatar, store_document_over, store_model, store_packed_clips,
+    store_rig, store_rig_over, store_skin,
 };
 pub use template_origin::{TemplateOrigin, has_parts, store_rig_from};
 pub(crate) use template_text::template_text;

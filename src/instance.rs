@@ -12,7 +12,7 @@
 //! Skinned meshes that Bevy loaded below an instance are moved by it, and by the file's own clips where no command of the rig drives
 //! a joint; [`JointsHeld`] tells the others.
 //!
-//! Clips of a `.anim.ron` go onto an instance with [`InstanceClips`]; a [`ClipPlayer`](crate::plugins::animation::ClipPlayer)
+//! Clips of a `.anim.ron` or `.rigclip` go onto an instance with [`InstanceClips`]; a [`ClipPlayer`](crate::plugins::animation::ClipPlayer)
 //! plays them where [`ClipPlugin`](crate::plugins::animation::ClipPlugin) is added, or Bevy's own player. When a saved template
 //! changes what their keys mean, they are re-expressed, so that the joints move as before; [`RigUpdated`] tells what is not kept.
 //!

@@ -1,6 +1,7 @@
 //! `rigsmith animate`: a clip, or the motion of another skeleton, on a rig.
 
 mod choice;
+mod packed;
 mod source;
 #[cfg(feature = "render")]
 mod strip;
@@ -42,8 +43,8 @@ use crate::{
 pub(super) struct AnimateArgs {
     /// The rig: a .rig.ron, a template by its name, a project (.rigsmith.ron), or a skeleton in a .glb, .gltf, .vrm or .rig
     rig: PathBuf,
-    /// The motion: clips of a rig (.anim.ron), motion capture (.bvh) or the animations of a model (.glb, .gltf, .vrm) of
-    /// any skeleton; several files become several animations
+    /// The motion: clips of a rig (.anim.ron), motion capture (.bvh), packed clips (.rigclip) or the animations of a model
+    /// (.glb, .gltf, .vrm) of any skeleton; several files become several animations
     #[arg(required = true, value_name = "CLIP")]
     pub clips: Vec<PathBuf>,
     /// A clip to take from the files, by its name or its number from 1; may be repeated; all, if left out
@@ -64,7 +65,7 @@ pub(super) struct AnimateArgs {
     #[arg(long, value_name = "N", value_parser = positive)]
     fps: Option<f32>,
     /// Distance by which a joint may be off its place through the removal of keys, in millimetres on a figure of 1.7 m;
-    /// if left out, 0.5 for motion of other skeletons, and 0.05 in a .glb, where turns are kept to 0.01 degrees
+    /// if left out, 0.5 for motion of other skeletons, and 0.05 in a .glb or .rigclip, where turns are kept to 0.01 degrees
     #[arg(long, value_name = "MM", value_parser = positive)]
     tolerance: Option<f32>,
     /// Play the clip over and over
@@ -89,7 +90,8 @@ pub(super) struct AnimateArgs {
     #[arg(long, value_enum, default_value = "plain")]
     preset: PresetArg,
     /// The file to write: .glb or .gltf for the character with its animation, .vrm for an avatar in VRM 1.0 (at rest in a
-    /// T-pose, with bones, expressions, gaze and springs), .anim.ron for the clip, .png for a strip of frames
+    /// T-pose, with bones, expressions, gaze and springs), .anim.ron for the clip, .rigclip for the motion of its joints in
+    /// few bytes, .png for a strip of frames
     #[arg(short, long)]
     output: Output,
     /// Number of frames of a .png
@@ -169,6 +171,8 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
         picture(args, &mut bench, &clips, &mut report)?;
     } else if FileKind::of(&args.output) == Some(FileKind::Animation) {
         store_animation(&RealDisk, &args.output, bench.rig(), bench.built(), &clips)?;
+    } else if FileKind::of(&args.output) == Some(FileKind::PackedClips) {
+        packed::store(args, &bench, &clips, &mut report)?;
     } else {
         let (mut model, settings) = match own_character(args, &bench, &mut report)? {
             Some(model) => {
@@ -202,22 +206,24 @@ fn running(rig: Rig) -> Result<Workbench, Failure> {
 
 /// True if a file has the motion of a skeleton of its own.
 fn is_motion(path: &Path) -> bool {
-    FileKind::of(path).is_some_and(|kind| kind == FileKind::Bvh || kind.is_gltf())
+    FileKind::of(path).is_some_and(|kind| matches!(kind, FileKind::Bvh | FileKind::PackedClips) || kind.is_gltf())
 }
 
 fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
     let kind = FileKind::of(&args.output);
     let is_character = kind.is_some_and(FileKind::is_gltf);
-    if !is_picture && !is_character && kind != Some(FileKind::Animation) {
-        let text = format!("cannot write `{}`; give .glb, .gltf, .vrm, .anim.ron or .png", args.output.display());
+    let is_packed = kind == Some(FileKind::PackedClips);
+    if !is_picture && !is_character && !is_packed && kind != Some(FileKind::Animation) {
+        let text =
+            format!("cannot write `{}`; give .glb, .gltf, .vrm, .anim.ron, .rigclip or .png", args.output.display());
         return Err(Failure::Usage(text));
     }
-    if args.mesh.is_some() && kind == Some(FileKind::Animation) {
+    if args.mesh.is_some() && (is_packed || kind == Some(FileKind::Animation)) {
         return Err(Failure::Usage("--mesh is for a character; write one with -o NAME.glb".to_owned()));
     }
     let is_known = |clip: &PathBuf| is_motion(clip) || FileKind::of(clip) == Some(FileKind::Animation);
     if let Some(clip) = args.clips.iter().find(|clip| !is_known(clip)) {
-        let text = format!("`{}` has no motion; give .bvh, .glb, .gltf, .vrm or .anim.ron", clip.display());
+        let text = format!("`{}` has no motion; give .bvh, .glb, .gltf, .vrm, .rigclip or .anim.ron", clip.display());
         return Err(Failure::Usage(text));
     }
     args.vrm.check(Some(&args.output))?;
@@ -226,19 +232,19 @@ fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
     }
     let motions = args.clips.iter().filter(|clip| is_motion(clip)).count();
     if motions == 0 && (args.map.is_some() || args.map_out.is_some() || args.onto.is_some()) {
-        let text = "--map, --map-out and --onto are for a .bvh, .glb, .gltf or .vrm; a clip of a rig knows its nodes";
+        let text = "--map, --map-out and --onto are for a .bvh, .glb, .gltf, .vrm or .rigclip; a clip of a rig knows its nodes";
         return Err(Failure::Usage(text.to_owned()));
     }
     if motions == 0 && (args.in_place || args.free_feet || args.free_hands || args.root_motion) {
-        let text = "--in-place, --root-motion, --free-feet and --free-hands are for a .bvh, .glb, .gltf or .vrm; a clip of a rig moves as its keys say";
+        let text = "--in-place, --root-motion, --free-feet and --free-hands are for a .bvh, .glb, .gltf, .vrm or .rigclip; a clip of a rig moves as its keys say";
         return Err(Failure::Usage(text.to_owned()));
     }
-    if motions == 0 && args.tolerance.is_some() && !is_character {
-        let text = "--tolerance is for motion of another skeleton and for a .glb, .gltf or .vrm; the keys of a clip of a rig stay as they are in a .anim.ron or .png";
+    if motions == 0 && args.tolerance.is_some() && !is_character && !is_packed {
+        let text = "--tolerance is for motion of another skeleton and for a .glb, .gltf, .vrm or .rigclip; the keys of a clip of a rig stay as they are in a .anim.ron or .png";
         return Err(Failure::Usage(text.to_owned()));
     }
     if motions > 1 && args.map_out.is_some() {
-        let text = "--map-out is for one file of motion; give one .bvh, .glb, .gltf or .vrm";
+        let text = "--map-out is for one file of motion; give one .bvh, .glb, .gltf, .vrm or .rigclip";
         return Err(Failure::Usage(text.to_owned()));
     }
     let inputs = [Some(&args.rig), args.mesh.as_ref(), args.map.as_ref()].into_iter().flatten().chain(&args.clips);

@@ -19,7 +19,7 @@ use super::{
 use crate::{
     files::{
         FileKind, LoadError, PartFiles, ProjectNote, RealDisk, load_animation, load_gestures, load_model, load_motion,
-        load_project, load_skin, read_capped,
+        load_packed_clips, load_project, load_skin, read_capped,
     },
     mesh::{
         adjacency::{edges, islands, weld},
@@ -139,12 +139,13 @@ fn check(path: &Path) -> Result<Findings, Failure> {
         Some(FileKind::Skin) => load_skin(&RealDisk, path).map(drop),
         Some(FileKind::Animation) => load_animation(&RealDisk, path).map(|read| found.remarks = read.notes),
         Some(FileKind::Bvh) => load_motion(&RealDisk, path).map(|motion| found.remarks = motion.notes),
+        Some(FileKind::PackedClips) => load_packed_clips(&RealDisk, path).map(drop),
         Some(FileKind::Gestures) => load_gestures(&RealDisk, path).map(|gestures| {
             found.error = limits::check_gestures(path, &gestures).err().map(|error| error.to_string());
         }),
         None => {
             found.error = Some(
-                "Rigsmith knows .obj, .gltf, .glb, .vrm, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .bvh, .skin and .ron"
+                "Rigsmith knows .obj, .gltf, .glb, .vrm, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .rigclip, .bvh, .skin and .ron"
                     .to_owned(),
             );
             Ok(())

@@ -13,7 +13,9 @@ use super::{
     sketch::describe_rig,
 };
 use crate::{
-    files::{FileKind, RealDisk, load_animation, load_gestures, load_motion, load_rig_text, load_skin},
+    files::{
+        FileKind, RealDisk, load_animation, load_gestures, load_motion, load_packed_clips, load_rig_text, load_skin,
+    },
     mesh::model::Model,
     rig::{
         Rig, Uid, UidSource,
@@ -147,6 +149,18 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             report.set("frames", frames);
             report.set("seconds", seconds);
         }
+        Some(FileKind::PackedClips) => {
+            let packed = load_packed_clips(&RealDisk, path)?;
+            for clip in &packed.clips {
+                let (frames, keys) =
+                    (counted(clip.frames(), "frame", "frames"), counted(clip.key_count(), "key", "keys"));
+                report.line(format!("packed clip \"{}\": {frames}, {keys}", clip.name()));
+            }
+            report.line(counted(packed.nodes.len(), "joint", "joints"));
+            report.set("kind", "packed_clips");
+            report.set("joints", packed.nodes.len());
+            report.set("clips", packed.clips.len());
+        }
         Some(FileKind::Gestures) => {
             let gestures = load_gestures(&RealDisk, path)?;
             limits::check_gestures(path, &gestures)?;
@@ -156,7 +170,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         }
         None => {
             let message = format!(
-                "`{}`: Rigsmith knows .obj, .gltf, .glb, .vrm, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .bvh, .skin and .ron",
+                "`{}`: Rigsmith knows .obj, .gltf, .glb, .vrm, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .rigclip, .bvh, .skin and .ron",
                 path.display()
             );
             return Err(Failure::Usage(message));

@@ -44,7 +44,7 @@ use super::{
     camera::FrameWhenReady,
     notice::Notice,
     panel::PanelApp,
-    panels::timeline::import::ImportRequest,
+    panels::timeline::import::{ImportRequest, MapRequest},
     recovery,
     settings::EditorSettings,
 };
@@ -66,6 +66,7 @@ impl Plugin for FilesPlugin {
             .add_message::<Notice>()
             .add_message::<JournalTrouble>()
             .add_message::<ImportRequest>()
+            .add_message::<MapRequest>()
             .add_message::<ExportRequest>()
             .add_message::<WindowCloseRequested>()
             .add_message::<FileDragAndDrop>()
@@ -244,7 +245,9 @@ fn act(world: &mut World, action: Action) {
 /// Opens a document; asks about unsaved changes first if it would replace the open one.
 fn request_open(world: &mut World, request: OpenRequest) {
     if let OpenRequest::File(path) = &request {
-        if matches!(FileKind::of(path), Some(FileKind::Bvh | FileKind::Animation)) && has_joints(world) {
+        if matches!(FileKind::of(path), Some(FileKind::Bvh | FileKind::PackedClips | FileKind::Animation))
+            && has_joints(world)
+        {
             // Motion is no document; it is put onto the open rig.
             world.write_message(ImportRequest(path.clone()));
             return;
@@ -319,6 +322,9 @@ fn dialog_answered(world: &mut World, question: Question, answer: Answer) {
         (Question::Open, Answer::Path(path)) => request_open(world, OpenRequest::File(path)),
         (Question::Motion, Answer::Path(path)) => {
             world.write_message(ImportRequest(path));
+        }
+        (Question::JointMap, Answer::Path(path)) => {
+            world.write_message(MapRequest::File(path));
         }
         (Question::Path { purpose, suggestion, then }, Answer::Path(path)) => {
             let path = save::completed(&path, purpose);

@@ -161,6 +161,7 @@ pub(super) fn show(
             };
             entries(ui, &list(&[TimelineAction::NewClip, TimelineAction::DuplicateClip, TimelineAction::DeleteClip]));
             entries(ui, &[Some(("Import motion…", Action::Timeline(TimelineAction::Import)))]);
+            entries(ui, &list(&[TimelineAction::ImportOwn]));
             ui.separator();
             entries(ui, &list(&[TimelineAction::Play, TimelineAction::Loop]));
             entries(ui, &list(&[TimelineAction::NextKey, TimelineAction::PreviousKey]));

@@ -26,6 +26,7 @@ use crate::{
         template::{self, Template},
         text::{self, RigText, RigTextError},
     },
+    solve::packed_clip::{PackedClipError, PackedSkeleton},
 };
 
 /// Largest size in bytes of a glTF file, or of one of its buffers, that is read.
@@ -36,6 +37,9 @@ const MAX_RIG_BYTES: u64 = 1 << 30;
 
 /// Largest size in bytes of a BVH file that is read.
 const MAX_BVH_BYTES: u64 = 4 << 30;
+
+/// Largest size in bytes of a file of packed clips that is read.
+const MAX_PACKED_BYTES: u64 = 1 << 30;
 
 /// Largest size in bytes of a material library that is read.
 const MAX_MTL_BYTES: u64 = 64 << 20;
@@ -59,6 +63,8 @@ pub enum FileKind {
     Animation,
     /// Motion of a skeleton of its own, `.bvh`.
     Bvh,
+    /// Skeleton with packed clips, `.rigclip`.
+    PackedClips,
     /// Project, `.rigsmith.ron`.
     Project,
     /// Weights of a mesh, `.skin`.
@@ -79,6 +85,7 @@ impl FileKind {
             (".rig", Self::RigText),
             (".skin", Self::Skin),
             (".bvh", Self::Bvh),
+            (".rigclip", Self::PackedClips),
             (".obj", Self::Obj),
             (".gltf", Self::Gltf),
             (".glb", Self::Glb),
@@ -144,6 +151,14 @@ pub enum LoadError {
         /// Error of the reader, with its line.
         source: BvhError,
     },
+    /// The file of packed clips is invalid.
+    #[error("`{}`: {source}", path.display())]
+    PackedClips {
+        /// The file.
+        path: PathBuf,
+        /// Error of the reader, with its place.
+        source: PackedClipError,
+    },
     /// The `.skin` file is invalid.
     #[error("`{}`: {source}", path.display())]
     Skin {
@@ -182,6 +197,7 @@ impl LoadError {
             | Self::RigText { path, .. }
             | Self::Source { path, .. }
             | Self::Bvh { path, .. }
+            | Self::PackedClips { path, .. }
             | Self::Skin { path, .. }
             | Self::Outside { path, .. }
             | Self::Broken { path } => Some(path),
@@ -266,6 +282,12 @@ pub fn load_motion(disk: &dyn Disk, path: &Path) -> Result<Motion, LoadError> {
     read_bvh(&bytes, &stem(path)).map_err(|source| LoadError::Bvh { path: path.into(), source })
 }
 
+/// Reads packed clips with their skeleton.
+pub fn load_packed_clips(disk: &dyn Disk, path: &Path) -> Result<PackedSkeleton, LoadError> {
+    let bytes = read_capped(disk, path, MAX_PACKED_BYTES)?;
+    PackedSkeleton::from_bytes(&bytes).map_err(|source| LoadError::PackedClips { path: path.into(), source })
+}
+
 /// Reads a map of joints.
 pub fn load_joint_map(disk: &dyn Disk, path: &Path) -> Result<NamePairs, LoadError> {
     let bytes = read_capped(disk, path, joint_map::MAX_BYTES as u64)?;
@@ -309,8 +331,20 @@ pub(super) fn in_source(path: &Path, bytes: &[u8], source: SourceError) -> LoadE
 /// Name of a file without folder and endings.
 pub fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let endings =
-        [".rig.ron", ".rigsmith.ron", ".anim.ron", ".obj", ".gltf", ".glb", ".vrm", ".rig", ".ron", ".skin", ".bvh"];
+    let endings = [
+        ".rig.ron",
+        ".rigsmith.ron",
+        ".anim.ron",
+        ".obj",
+        ".gltf",
+        ".glb",
+        ".vrm",
+        ".rig",
+        ".ron",
+        ".skin",
+        ".bvh",
+        ".rigclip",
+    ];
     for ending in endings {
         let split = name.len().saturating_sub(ending.len());
         if split > 0 && name.is_char_boundary(split) && name[split..].eq_ignore_ascii_case(ending) {

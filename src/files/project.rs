@@ -18,6 +18,7 @@ use crate::{
     mesh::model::Model,
     rig::{
         Rig, Uid,
+        animation::NodeNames,
         project::{JournalReference, ProjectView},
         skin::{SkinFile, mesh_hash},
     },
@@ -39,6 +40,9 @@ pub struct ProjectToSave {
     pub view: ProjectView,
     /// Journal that continues from this save.
     pub journal: Option<JournalReference>,
+    /// Names of animated nodes that are no joints of the rigs, those of nodes that are gone among them:
+    /// see [`Project`](crate::rig::project::Project).
+    pub names: NodeNames,
 }
 
 /// A template that a rig of a project follows.

@@ -30,6 +30,7 @@ use crate::{
         template::{self, write_template},
         text::{self, RigTextError},
     },
+    solve::packed_clip::PackedSkeleton,
 };
 
 /// Reason for not saving a file. The former content of the file is unchanged.
@@ -396,6 +397,16 @@ pub fn store_animation(
     }
     verify::animation(path, text.as_bytes(), clips)?;
     Ok(save_atomic(disk, path, text.as_bytes())?)
+}
+
+/// Saves packed clips with their skeleton as `.rigclip`, after reading back what is to be written.
+pub fn store_packed_clips(disk: &dyn Disk, path: &Path, packed: &PackedSkeleton) -> Result<(), StoreError> {
+    if FileKind::of(path) != Some(FileKind::PackedClips) {
+        return Err(StoreError::Kind { path: path.into(), wanted: "packed clips are saved as .rigclip" });
+    }
+    let bytes = packed.to_bytes();
+    verify::packed_clips(path, &bytes, packed)?;
+    Ok(save_atomic(disk, path, &bytes)?)
 }
 
 /// Saves weights as `.skin`.

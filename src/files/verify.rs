@@ -25,6 +25,7 @@ use crate::{
         template::read_template,
         text,
     },
+    solve::packed_clip::PackedSkeleton,
 };
 
 /// Reads back a model before it is saved, and compares the counts of its content.
@@ -114,6 +115,17 @@ pub(super) fn animation(path: &Path, bytes: &[u8], clips: &[RigClip]) -> Result<
         return Ok(());
     }
     Err(StoreError::Lost { path: path.into(), what: "keys", written: count(clips), read: count(&read) })
+}
+
+/// Reads back packed clips before they are saved, and compares them.
+pub(super) fn packed_clips(path: &Path, bytes: &[u8], packed: &PackedSkeleton) -> Result<(), StoreError> {
+    let read = PackedSkeleton::from_bytes(bytes).map_err(|source| LoadError::PackedClips { path: path.into(), source });
+    let read = readable(path, read)?;
+    if read == *packed {
+        return Ok(());
+    }
+    let (written, read) = (packed.clips.len(), read.clips.len());
+    Err(StoreError::Lost { path: path.into(), what: "packed clips", written, read })
 }
 
 fn readable<T>(path: &Path, read: Result<T, LoadError>) -> Result<T, StoreError> {

@@ -19,10 +19,13 @@ use crate::{
         animation::{NodeNames, RigClip},
         format::animation::{BoundClips, ReadAnimation, read_animation},
     },
-    solve::program::RigProgram,
+    solve::{
+        packed_clip::{PackedClipError, PackedSkeleton},
+        program::RigProgram,
+    },
 };
 
-/// Clips of a file as an asset, `.anim.ron`.
+/// Clips of a file as an asset: `.anim.ron`, or packed ones (`.rigclip`), which have keys on joints.
 #[derive(Asset, TypePath, Debug, Clone)]
 pub struct RigAnimation(Arc<ReadAnimation>);
 
@@ -33,6 +36,14 @@ impl RigAnimation {
     /// See [`read_animation`].
     pub fn read(content: &[u8]) -> Result<Self, SourceError> {
         Ok(Self(Arc::new(read_animation(content)?)))
+    }
+
+    /// Clips of packed ones; `name` is for their identities, and files on one instance have names of their own.
+    ///
+    /// # Errors
+    /// See [`PackedSkeleton::from_bytes`].
+    pub fn unpack(content: &[u8], name: &str) -> Result<Self, PackedClipError> {
+        Ok(Self(Arc::new(PackedSkeleton::from_bytes(content)?.animation(name))))
     }
 
     /// Clips as the file has them.
@@ -59,6 +70,9 @@ pub enum RigAnimationError {
     /// The file has no clips that can be read.
     #[error(transparent)]
     Source(#[from] SourceError),
+    /// The file has no packed clips that can be read.
+    #[error(transparent)]
+    Packed(#[from] PackedClipError),
 }
 
 impl AssetLoader for RigAnimationLoader {
@@ -70,15 +84,18 @@ impl AssetLoader for RigAnimationLoader {
         &self,
         reader: &mut dyn Reader,
         (): &(),
-        _: &mut LoadContext<'_>,
+        context: &mut LoadContext<'_>,
     ) -> Result<RigAnimation, Self::Error> {
         let mut content = Vec::new();
         reader.read_to_end(&mut content).await?;
+        if PackedSkeleton::may_begin_with(&content) {
+            return Ok(RigAnimation::unpack(&content, &context.path().to_string())?);
+        }
         Ok(RigAnimation::read(&content)?)
     }
 
     fn extensions(&self) -> &[&str] {
-        &["anim.ron"]
+        &["anim.ron", "rigclip"]
     }
 }
 

@@ -7,6 +7,7 @@
 //! every frame.
 
 mod bits;
+mod skeleton;
 mod steps;
 mod track;
 
@@ -33,6 +34,8 @@ use crate::{
         operations::KeyTolerance,
     },
 };
+
+pub use self::skeleton::{PackedNode, PackedSkeleton};
 
 /// First bytes of a packed clip.
 const MAGIC: &[u8; 8] = b"rigclip1";
@@ -62,7 +65,7 @@ pub struct PackedClip {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum PackedClipError {
     /// The bytes are something else.
-    #[error("no packed clip of this version; pack the clip again")]
+    #[error("it is no packed clip of this version; pack the clip again")]
     Other,
     /// The bytes end too early.
     #[error("the packed clip is cut off at byte {0}; copy or pack it again")]

@@ -1,6 +1,7 @@
 //! `rigsmith animate`: clips and motion capture onto rigs, with the real binary, real files and exit codes.
 
 mod options;
+mod packed;
 
 use std::{fs, path::Path};
 
@@ -112,8 +113,8 @@ fn wrong_uses_are_told() {
         assert_eq!(answer.code, code, "{args:?}: {}", answer.err);
         assert!(answer.err.contains(told), "{args:?}: {}", answer.err);
     };
-    check(&["biped.rig.ron", "walker.bvh", "-o", "a.obj"], 2, "give .glb, .gltf, .vrm, .anim.ron or .png");
-    check(&["biped.rig.ron", "walker.obj", "-o", "a.glb"], 2, "give .bvh, .glb, .gltf, .vrm or .anim.ron");
+    check(&["biped.rig.ron", "walker.bvh", "-o", "a.obj"], 2, "give .glb, .gltf, .vrm, .anim.ron, .rigclip or .png");
+    check(&["biped.rig.ron", "walker.obj", "-o", "a.glb"], 2, "give .bvh, .glb, .gltf, .vrm, .rigclip or .anim.ron");
     check(&["biped.rig.ron", "walker.bvh", "-o", "walker.bvh"], 2, "cannot write");
     check(&["biped.rig.ron", "missing.bvh", "-o", "a.glb"], 1, "missing.bvh");
     check(&["biped.rig.ron", "broken.bvh", "-o", "a.glb"], 1, "line ");

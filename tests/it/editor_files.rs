@@ -18,13 +18,16 @@ use rigsmith::{
             dialog::{Answer, Dialog, DialogAnswer, Purpose, Question},
             has_unsaved_changes, title,
         },
+        follow::FollowPlugin,
         notice::Severity,
+        panels::PanelsPlugin,
         recovery::{Recovery, can_recover, describe},
+        result_queue::HeldPlugin,
         settings::EditorSettings,
     },
     files::{
-        Disk, RealDisk, bundled_characters, journal::journal_beside, load_animation, load_model, load_template,
-        store_rig,
+        Disk, RealDisk, bundled_characters, journal::journal_beside, load_animation, load_model, load_packed_clips,
+        load_template, store_rig,
     },
     headless::headless_app,
     plugins::{
@@ -35,7 +38,7 @@ use rigsmith::{
     },
     prelude::*,
     rig::{
-        animation::{Key, Property, RigClip, Track, TrackTarget},
+        animation::{Key, NodeNames, Property, RigClip, Track, TrackTarget, orphaned_keys},
         operations::Operation,
         skeleton_preset::SkeletonPreset,
         update::{diff, edits_between},
@@ -60,7 +63,16 @@ impl Window {
     }
 
     fn with_state(folder: &Path, state: PathBuf) -> Self {
-        let base = AppBench::with_files(state, FilesPlugin);
+        Self::of(AppBench::with_files(state, FilesPlugin), folder)
+    }
+
+    /// A window with its panels.
+    fn with_panels(folder: &Path) -> Self {
+        let plugins = (FilesPlugin, FollowPlugin, PanelsPlugin, HeldPlugin);
+        Self::of(AppBench::with_files(folder.join("state"), plugins), folder)
+    }
+
+    fn of(base: AppBench, folder: &Path) -> Self {
         let mut window = Self { base, folder: folder.to_owned(), notices: Notices::default() };
         window.settle();
         window

@@ -9,11 +9,12 @@ use std::{
 use rigsmith::{
     files::{
         Disk, Fault, FaultPlan, FaultyDisk, FileWatch, PartFiles, RealDisk, SaveError, SearchPaths, StoreError,
-        TemplateWatch, load_template, remove_stale_temps, store_animation, store_model, store_rig, store_rig_over,
-        store_skin,
+        TemplateWatch, load_template, remove_stale_temps, store_animation, store_model, store_packed_clips, store_rig,
+        store_rig_over, store_skin,
     },
-    mesh::gltf::GltfWriteSettings,
+    mesh::{gltf::GltfWriteSettings, model::Trs},
     rig::{JointData, Rig, RigEdit, Uid, animation::RigClip},
+    solve::packed_clip::{PackedNode, PackedSkeleton},
 };
 use tempfile::TempDir;
 
@@ -60,6 +61,7 @@ enum Single {
     Elsewhere,
     Weights,
     Clips,
+    Packed,
     Character,
 }
 
@@ -102,8 +104,14 @@ fn clip(version: u32) -> RigClip {
     }
 }
 
+fn packed(version: u32) -> PackedSkeleton {
+    let name = format!("hips {version}");
+    let node = PackedNode { uid: Uid(10), name, parent: None, rest: Trs::IDENTITY };
+    PackedSkeleton { nodes: vec![node], clips: Vec::new() }
+}
+
 impl Single {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::Template,
         Self::Skeleton,
         Self::Over,
@@ -111,6 +119,7 @@ impl Single {
         Self::Elsewhere,
         Self::Weights,
         Self::Clips,
+        Self::Packed,
         Self::Character,
     ];
 
@@ -120,6 +129,7 @@ impl Single {
             Self::Skeleton => "hero.rig",
             Self::Weights => "hero.skin",
             Self::Clips => "hero.anim.ron",
+            Self::Packed => "hero.rigclip",
             Self::Character => "hero.glb",
         }
     }
@@ -158,6 +168,7 @@ impl Single {
             }
             Self::Weights => store_skin(disk, &path, &sample(version == 1)).map(|()| Vec::new()),
             Self::Clips => store_animation(disk, &path, &rig(1), None, &[clip(version)]).map(|()| Vec::new()),
+            Self::Packed => store_packed_clips(disk, &path, &packed(version)).map(|()| Vec::new()),
             Self::Character => store_model(disk, &path, &triangle(version), &GltfWriteSettings::default()),
         }
     }

@@ -321,6 +321,7 @@ fn cube(mesh: &Path) -> ProjectToSave {
         templates: Vec::new(),
         view: frozen().view,
         journal: frozen().journal,
+        ..Default::default()
     }
 }
 

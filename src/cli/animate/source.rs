@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     cli::{Failure, Report, limits, progress::spinning, report::counted},
-    files::{FileKind, RealDisk, load_animation, load_joint_map, load_motion, save_atomic, stem},
+    files::{FileKind, RealDisk, load_animation, load_joint_map, load_motion, load_packed_clips, save_atomic, stem},
     headless::{Workbench, posing::PoseError},
     mesh::model::Model,
     rig::{
@@ -58,6 +58,11 @@ pub(super) fn clips(
         match FileKind::of(path) {
             Some(kind) if kind.is_gltf() => {
                 let model = spinning("reading the animations", || limits::load_model(path))?;
+                taking.add_model(path, &model, bench, report)?;
+            }
+            Some(FileKind::PackedClips) => {
+                let model = load_packed_clips(&RealDisk, path)?.model(&stem(path));
+                limits::check_model(path, &model)?;
                 taking.add_model(path, &model, bench, report)?;
             }
             Some(FileKind::Bvh) => {
@@ -171,13 +176,14 @@ impl Taking<'_> {
     /// Tells of options that have no effect on clips of the rig; those that are baked have other keys.
     fn tell_unused(&self, path: &Path, is_baked: bool, report: &mut Report) {
         let args = self.args;
-        let is_character = FileKind::of(&args.output).is_some_and(FileKind::is_gltf);
+        let is_baked =
+            is_baked || FileKind::of(&args.output).is_some_and(|kind| kind == FileKind::PackedClips || kind.is_gltf());
         let options = [
             (args.in_place, "--in-place"),
             (args.free_feet, "--free-feet"),
             (args.free_hands, "--free-hands"),
             (args.root_motion, "--root-motion"),
-            (args.tolerance.is_some() && !is_character && !is_baked, "--tolerance"),
+            (args.tolerance.is_some() && !is_baked, "--tolerance"),
         ];
         let unused: Vec<&str> = options.iter().filter(|(is_given, _)| *is_given).map(|(_, name)| *name).collect();
         if !unused.is_empty() {

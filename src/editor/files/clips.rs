@@ -16,6 +16,7 @@ use crate::{
     },
     solve::{
         bake_clip::{BakedNode, bake_clip},
+        packed_clip::{PackedSkeleton, pack_clip},
         program::{CompileOptions, RigProgram},
     },
 };
@@ -51,11 +52,7 @@ pub(super) fn put_clips(
     let node = |(uid, node): (Uid, &crate::mesh::model::Node)| BakedNode { uid, parent: node.parent, rest: node.rest };
     let nodes: Vec<BakedNode> = uids.into_iter().zip(&model.nodes).map(node).collect();
     // The tolerance is for humans in metres.
-    let globals = model.rest_globals();
-    let places = || globals.iter().map(|at| at.translation);
-    let extent = places().reduce(Vec3A::max).zip(places().reduce(Vec3A::min));
-    let size = extent.map_or(0.0, |(most, least)| (most - least).max_element());
-    let tolerance = KeyTolerance::default().for_height(size);
+    let tolerance = KeyTolerance::default().for_height(size_of(model));
     let bake = |clip: &RigClip| bake_clip(&program, clip, &nodes, clip.frame_rate, &tolerance);
     let mut clips: Vec<Clip> = rig.clips().iter().map(bake).collect::<Result<_, _>>()?;
     for mut clip in std::mem::take(&mut model.clips) {
@@ -80,4 +77,39 @@ fn earlier(channels: Vec<Channel>, by: f32) -> impl Iterator<Item = Channel> {
         let times = channel.times.iter().map(|time| (time - by).max(0.0)).collect();
         Channel { times, ..channel }
     })
+}
+
+/// The clips of the document packed into few bytes, with the skeleton that they move.
+///
+/// # Errors
+/// The rig cannot be built, the built rig cannot run, or a clip is too long.
+pub(super) fn packed_clips(
+    rig: &Rig,
+    built: Option<&BuiltRig>,
+    modules: &Arc<Modules>,
+) -> Result<PackedSkeleton, WriteError> {
+    let own;
+    let built = match built {
+        Some(built) => built,
+        None => {
+            own = Builder::build(rig, modules)?;
+            &own
+        }
+    };
+    let program = Arc::new(RigProgram::compile(built, &CompileOptions::default())?);
+    let mut packed = PackedSkeleton::of(rig, built);
+    let nodes = packed.baked_nodes();
+    let tolerance = KeyTolerance::default().for_height(size_of(&packed.model("")));
+    for clip in rig.clips() {
+        packed.clips.push(pack_clip(&program, clip, &nodes, clip.frame_rate, &tolerance)?);
+    }
+    Ok(packed)
+}
+
+/// Longest edge of the box around the nodes of a model at rest.
+fn size_of(model: &Model) -> f32 {
+    let globals = model.rest_globals();
+    let places = || globals.iter().map(|at| at.translation);
+    let extent = places().reduce(Vec3A::max).zip(places().reduce(Vec3A::min));
+    extent.map_or(0.0, |(most, least)| (most - least).max_element())
 }

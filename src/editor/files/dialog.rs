@@ -50,6 +50,8 @@ pub enum Question {
     Open,
     /// Choice of a file of motion, to put it onto the rig.
     Motion,
+    /// Choice of a map of joints for motion that waits.
+    JointMap,
     /// Choice of a path to write to.
     Path {
         /// Content to write.

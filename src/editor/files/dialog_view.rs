@@ -19,7 +19,7 @@ use crate::{
     editor::{
         counted::counted,
         panel::{EditorOverlay, Requests},
-        panels::timeline::import::MOTION_FILES,
+        panels::timeline::{import::MOTION_FILES, map_file::MAP_FILES},
         recovery, style,
     },
     files::{
@@ -64,10 +64,13 @@ const OPENED: &[(&str, &[FileKind])] = &[
 
 /// Kinds of files with motion, by name.
 const MOTION: &[(&str, &[FileKind])] = &[
-    ("Motion (.bvh, .anim.ron, .glb, .gltf)", MOTION_FILES),
+    ("Motion (.bvh, .anim.ron, .rigclip, .glb, .gltf, .vrm)", MOTION_FILES),
     ("Motion capture (.bvh)", &[FileKind::Bvh]),
-    ("Clips (.anim.ron)", &[FileKind::Animation]),
+    ("Clips (.anim.ron, .rigclip)", &[FileKind::Animation, FileKind::PackedClips]),
 ];
+
+/// Kinds of files with maps of joints, by name.
+const MAPS: &[(&str, &[FileKind])] = &[("Maps of joints (.ron)", MAP_FILES)];
 
 impl EditorOverlay for DialogView {
     fn show(&mut self, ctx: &egui::Context, world: &World, requests: &mut Requests) {
@@ -85,6 +88,7 @@ impl EditorOverlay for DialogView {
                 }
                 Question::Open => self.browser = Some(browser(world, "Open", OPENED)),
                 Question::Motion => self.browser = Some(browser(world, "Import motion", MOTION)),
+                Question::JointMap => self.browser = Some(browser(world, "Load map of joints", MAPS)),
                 _ => {}
             }
         }
@@ -134,8 +138,8 @@ impl DialogView {
             let picked = browser.take_picked();
             let is_open = *browser.state() == DialogState::Open;
             return match (question, picked) {
-                (Question::Open | Question::Motion, Some(path)) => Some(Answer::Path(path)),
-                (Question::Open | Question::Motion, None) => (!is_open).then_some(Answer::Cancel),
+                (Question::Open | Question::Motion | Question::JointMap, Some(path)) => Some(Answer::Path(path)),
+                (Question::Open | Question::Motion | Question::JointMap, None) => (!is_open).then_some(Answer::Cancel),
                 (_, picked) => {
                     if let Some(path) = picked {
                         self.text = path.display().to_string();
@@ -157,7 +161,7 @@ impl DialogView {
                 Question::Replace { path, .. } => self.replace(ui, path),
                 Question::Fit(fit) => self.fit(ui, fit),
                 Question::Recover(list) => self.recover(ui, list),
-                Question::Open | Question::Motion => None,
+                Question::Open | Question::Motion | Question::JointMap => None,
             }
         });
         let escaped = ctx.input(|input| input.key_pressed(egui::Key::Escape));
@@ -208,7 +212,7 @@ impl DialogView {
                 "Export",
                 "Export",
                 "The ending says what: .glb or .gltf the character with its clips, .vrm an avatar, .obj at rest, \
-                 .anim.ron the clips, .rig.ron the template, .rig the skeleton, .skin the weights. What is written is \
+                 .anim.ron the clips, .rigclip the motion of the joints in few bytes, .rig.ron the template, .rig the skeleton, .skin the weights. What is written is \
                  read back.",
             ),
         };

@@ -126,7 +126,7 @@ pub(in crate::editor) enum WriteError {
     /// The file's name has no fitting ending.
     #[error(
         "a character is exported as .glb, .gltf, .vrm or .obj, a rig as .rig.ron or .rig, weights as .skin, clips as \
-         .anim.ron; choose one of these endings"
+         .anim.ron or .rigclip; choose one of these endings"
     )]
     Ending,
     /// Rigsmith comes with no such mesh, which work of another version may have.

@@ -10,21 +10,21 @@ use bevy::prelude::*;
 
 use super::{
     active,
-    clips::put_clips,
+    clips::{packed_clips, put_clips},
     dialog::Purpose,
     document::{OpenDocument, last_step, meshes},
     error::WriteError,
     file_name,
     open::spawn,
-    save::{Job, SaveJob, SavedContent, settled},
+    save::{Job, SaveJob, SavedContent, animated_names, settled},
 };
 use crate::{
     algo::face::expression::{ExpressionSet, vrm_mixes},
     editor::counted::counted,
     files::{
         FileKind, LoadError, RealDisk, StoreError, TemplateOrigin, is_template_of, load_animation, load_model,
-        load_rig_text, load_skin, load_template, stem, store_animation, store_avatar, store_document_over, store_model,
-        store_rig_from, store_skin,
+        load_packed_clips, load_rig_text, load_skin, load_template, stem, store_animation, store_avatar,
+        store_document_over, store_model, store_packed_clips, store_rig_from, store_skin,
     },
     instance::RigSource,
     mesh::{gltf::GltfWriteSettings, model::Model},
@@ -36,6 +36,7 @@ use crate::{
     processor::Modules,
     rig::{
         BuiltRig, Rig, Uid,
+        animation::NodeNames,
         bake::baked,
         character::{Character, character, mark_joints},
         skeleton_preset::{SkeletonPreset, apply_preset},
@@ -101,10 +102,11 @@ pub(super) fn export(world: &mut World, path: PathBuf) {
     let base = world.get::<RigSource>(rig).and_then(RigSource::base).or(base).cloned();
     let options = world.get_resource::<ExportOptions>().cloned().unwrap_or_default();
     let FaceExpressions(expressions) = world.get_resource().cloned().unwrap_or_default();
+    let names = animated_names(world, &data);
     let task = spawn(move || {
         let (built, base) = (built.as_deref(), base.as_deref());
-        let (mesh, expressions) = (mesh.as_ref(), &*expressions);
-        let source = ExportSource { rig: &data, built, modules: &modules, expressions, mesh, base };
+        let (mesh, expressions, names) = (mesh.as_ref(), &*expressions, &names);
+        let source = ExportSource { rig: &data, built, modules: &modules, expressions, mesh, base, names };
         let mut notes = source.write(&path, template.as_deref(), &options)?;
         if more > 0 {
             notes.push(format!("only the first mesh was exported; {more} more are open"));
@@ -130,6 +132,8 @@ struct ExportSource<'a> {
     mesh: Option<&'a RigMesh>,
     /// The version of the template that the document took over last.
     base: Option<&'a Rig>,
+    /// Names of animated nodes that the window knows.
+    names: &'a NodeNames,
 }
 
 impl ExportSource<'_> {
@@ -156,7 +160,14 @@ impl ExportSource<'_> {
             }
             Some(FileKind::Animation) if rig.clips().is_empty() => Err(WriteError::NoClips),
             Some(FileKind::Animation) => {
-                store_animation(&RealDisk, path, rig, self.built, rig.clips())?;
+                let mut clips = rig.clips().to_vec();
+                clips.iter_mut().for_each(|clip| clip.names.extend(self.names));
+                store_animation(&RealDisk, path, rig, self.built, &clips)?;
+                Ok(Vec::new())
+            }
+            Some(FileKind::PackedClips) if rig.clips().is_empty() => Err(WriteError::NoClips),
+            Some(FileKind::PackedClips) => {
+                store_packed_clips(&RealDisk, path, &packed_clips(rig, self.built, self.modules)?)?;
                 Ok(Vec::new())
             }
             Some(FileKind::Template | FileKind::RigText) => {
@@ -257,6 +268,11 @@ fn check(path: &Path) -> Result<String, LoadError> {
             let read = load_animation(&RealDisk, path)?;
             let keys = read.clips.iter().map(crate::rig::animation::RigClip::key_count).sum();
             vec![counted(read.clips.len(), "clip", "clips"), counted(keys, "key", "keys")]
+        }
+        Some(FileKind::PackedClips) => {
+            let packed = load_packed_clips(&RealDisk, path)?;
+            let (clips, joints) = (packed.clips.len(), packed.nodes.len());
+            vec![counted(clips, "clip", "clips"), counted(joints, "joint", "joints")]
         }
         Some(FileKind::Template) => {
             let rig = load_template(&RealDisk, path)?.rig;

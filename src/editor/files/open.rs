@@ -155,7 +155,7 @@ pub(super) fn recognise(path: &Path) -> Result<(), OpenError> {
         Some(FileKind::Skin) => Err(OpenError::WeightsAlone { name: name() }),
         Some(FileKind::Gestures) => Err(OpenError::Gestures { name: name() }),
         Some(FileKind::Animation) => Err(OpenError::ClipsAlone { name: name() }),
-        Some(FileKind::Bvh) => Err(OpenError::MotionAlone { name: name() }),
+        Some(FileKind::Bvh | FileKind::PackedClips) => Err(OpenError::MotionAlone { name: name() }),
         None => Err(OpenError::Unknown { name: name() }),
     }
 }

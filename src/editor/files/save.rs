@@ -23,7 +23,7 @@ use super::{
     view,
 };
 use crate::{
-    editor::{notice::Notice, settings::EditorSettings},
+    editor::{notice::Notice, panels::timeline::Timeline, settings::EditorSettings},
     files::{
         Disk, FileKind, LoadError, MeshShape, MeshToSave, ProjectTemplate, ProjectToSave, RealDisk,
         journal::{Journal, SaveMark},
@@ -31,7 +31,11 @@ use crate::{
     },
     instance::RigSource,
     plugins::history::RigHistory,
-    rig::{Rig, step::Step},
+    rig::{
+        Rig, Uid,
+        animation::{NodeNames, RigClip},
+        step::Step,
+    },
 };
 
 /// Document that is being saved.
@@ -151,6 +155,19 @@ pub(in crate::editor) fn settled(world: &World, rig: Entity) -> Option<Rig> {
     Some(world.get::<RigHistory>(rig).map_or_else(|| data.clone(), |history| history.settled(data).into_owned()))
 }
 
+/// Names of animated nodes that are no joints, as the window knows them. In a file they stand beside the keys, so that those of
+/// nodes that are gone are offered to others after the file was opened again, too.
+pub(super) fn animated_names(world: &World, rig: &Rig) -> NodeNames {
+    let Some(timeline) = world.get_resource::<Timeline>() else { return NodeNames::default() };
+    let nodes = |clip: &RigClip| -> Vec<Uid> {
+        let masked = clip.layers.iter().flat_map(|layer| layer.mask.iter().copied());
+        clip.nodes().into_iter().chain(masked).collect()
+    };
+    let others = rig.clips().iter().flat_map(nodes).filter(|node| rig.joint(*node).is_none());
+    let named = others.filter_map(|node| Some((node, timeline.names.0.get(&node)?.clone())));
+    NodeNames(named.collect())
+}
+
 /// Snapshot of the document; returns with it the bundled mesh that is open, by name.
 pub(in crate::editor) fn snapshot(world: &mut World, rig: Entity) -> Option<(ProjectToSave, Option<String>)> {
     let view = view::now(world);
@@ -178,7 +195,8 @@ pub(in crate::editor) fn snapshot(world: &mut World, rig: Entity) -> Option<(Pro
     let base = world.get::<RigSource>(rig).and_then(RigSource::base).or(document.base.as_ref());
     let followed = document.template.clone().zip(base.cloned());
     let templates = followed.map(|(path, base)| ProjectTemplate { rig: data.uid(), path, base }).into_iter().collect();
-    Some((ProjectToSave { name, rigs: vec![data], meshes: open, templates, view, journal: None }, bundled))
+    let names = animated_names(world, &data);
+    Some((ProjectToSave { name, rigs: vec![data], meshes: open, templates, view, journal: None, names }, bundled))
 }
 
 /// Saves the project.

@@ -11,7 +11,11 @@ use super::{
     open::LoadedDocument,
 };
 use crate::{
-    editor::{counted::counted, notice::Notice},
+    editor::{
+        counted::counted,
+        notice::Notice,
+        panels::timeline::{TimelineAction, own_motion::own_file},
+    },
     files::journal::Origin,
     plugins::document::EditRequest,
     rig::{PoseOffset, Rig, RigEdit, operations::Operation, step::edits_from_empty},
@@ -87,6 +91,7 @@ pub(super) fn put(world: &mut World, fit: &Fit, scale: f32) {
     let Some(entity) = active(world) else { return };
     let Some(rig) = world.get::<Rig>(entity) else { return };
     let had = rig.len();
+    let has_clips = had > 0 && rig.clips().iter().any(|clip| clip.key_count() > 0);
     let edits = replacing(rig, &fit.rig, scale);
     world.write_message(EditRequest::operation(entity, Operation::Edits(edits)));
     world.write_message(DocumentLanded { origin: Origin::Empty });
@@ -95,6 +100,14 @@ pub(super) fn put(world: &mut World, fit: &Fit, scale: f32) {
         if had > 0 { format!(" instead of the {had} that were there; undo brings them back") } else { String::new() };
     let sized = if scale == 1.0 { String::new() } else { format!(", scaled by {scale:.3}") };
     world.write_message(Notice::done(format!("Put {} onto the mesh: {joints}{sized}{replaced}", fit.name)));
+    if has_clips && own_file(world).is_some() {
+        let text = format!(
+            "The clips move joints that were replaced. \"{}\" in the Timeline puts them onto {}, once it fits the mesh",
+            TimelineAction::ImportOwn.name(),
+            fit.name
+        );
+        world.write_message(Notice::info(text).at("Timeline"));
+    }
 }
 
 /// Edits that put a template, scaled by `scale`, in place of a rig. Weights of the template are left out.

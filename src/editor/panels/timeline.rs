@@ -15,11 +15,15 @@ mod drag;
 mod follow;
 pub mod import;
 mod joint_table;
+pub(in crate::editor) mod map_file;
 mod marks;
 mod mask;
 mod menu;
+pub mod motion_options;
+pub(in crate::editor) mod own_motion;
 mod row;
 mod ruler;
+mod set_aside;
 mod sheet;
 mod shown_pose;
 mod state;
@@ -46,7 +50,7 @@ pub(super) use self::{
 use self::{
     area::{Gesture, Grid},
     bar::Bar,
-    row::RowContext,
+    row::{LayerRename, RowContext},
     sheet::{Choice, Row, Sheet},
 };
 use super::{
@@ -98,6 +102,8 @@ pub struct TimelinePanel {
     markers: Markers,
     numbers: Numbers,
     gesture: Option<Gesture>,
+    /// Name of a layer that is being typed.
+    renaming: Option<LayerRename>,
     /// Number of changes of keys that are being dragged.
     drags: u64,
     /// True if the pointer was last told to be over the panel.

@@ -38,7 +38,7 @@ use crate::{
 /// [`LoadError`] for errors in the project file itself.
 pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadError> {
     let read = load_project_file(disk, path)?;
-    let Project { name, meshes: references, rigs: entries, templates, view, journal } = read.project;
+    let Project { name, meshes: references, rigs: entries, templates, view, journal, .. } = read.project;
     let mut notes: Vec<ProjectNote> = read.notes.into_iter().map(ProjectNote::File).collect();
     let templates = templates.into_iter().filter_map(|template| {
         let file = template_file(disk, path, &template.path, &mut notes)?;

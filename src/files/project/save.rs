@@ -98,7 +98,8 @@ pub fn project_files(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> R
     });
     let templates = templates.collect();
     let (name, view, journal) = (project.name.clone(), project.view.clone(), project.journal.clone());
-    let text = write_project(&Project { name, meshes, rigs, templates, view, journal });
+    let names = project.names.clone();
+    let text = write_project(&Project { name, meshes, rigs, templates, view, journal, names });
     if text.len() > project::MAX_BYTES {
         return Err(StoreError::ProjectTooLarge { path: path.into(), mebibytes: text.len() >> 20 });
     }

@@ -15,7 +15,7 @@ use serde::Deserialize;
 pub use read::read_project;
 pub use write::write_project;
 
-use crate::rig::{Rig, Uid};
+use crate::rig::{Rig, Uid, animation::NodeNames};
 
 /// Highest format that this version reads; written only for content that needs it.
 ///
@@ -41,6 +41,9 @@ pub struct Project {
     pub view: ProjectView,
     /// Journal that continues from this file.
     pub journal: Option<JournalReference>,
+    /// Names of animated nodes that are no joints of the rigs, by which their keys are offered to others once they are gone.
+    /// They are written beside the keys; what is read is in the names of the clips.
+    pub names: NodeNames,
 }
 
 /// Reference of a project to a mesh in a file of its own.

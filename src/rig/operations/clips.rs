@@ -103,6 +103,13 @@ pub enum ClipOperation {
         /// Largest differences.
         tolerance: KeyTolerance,
     },
+    /// Gives the keys of nodes that are gone to others, in all layers, as [`KeyOperation::Adopt`] does for one.
+    Adopt {
+        /// The clip.
+        clip: Uid,
+        /// Pairs of a node that is gone, and the one that gets its keys.
+        nodes: Vec<[Uid; 2]>,
+    },
     /// Changes keys of a layer.
     Keys {
         /// The clip.
@@ -191,7 +198,8 @@ pub enum KeyOperation {
         /// Largest differences.
         tolerance: KeyTolerance,
     },
-    /// Gives the keys of a node that is gone to another one; a property that the other one has keys of keeps those.
+    /// Gives the keys of a node that is gone to another one; a property that the other one has keys of keeps those. A layer that
+    /// concerns only some nodes, the one that is gone among them, concerns the other one, too.
     Adopt {
         /// The node that is gone.
         from: Uid,
@@ -217,6 +225,7 @@ impl ClipOperation {
             Self::SetRate { .. } => "Retime clip to frame rate",
             Self::Bake(_) => "Bake clip",
             Self::Reduce { .. } => "Reduce clip",
+            Self::Adopt { .. } => "Adopt keys",
             Self::Keys { change, .. } => match change {
                 KeyOperation::Pose { .. } | KeyOperation::Values { .. } | KeyOperation::Set(_) => "Set keys",
                 KeyOperation::Move { .. } | KeyOperation::Place(_) => "Move keys",
@@ -280,6 +289,15 @@ pub(super) fn run(draft: &mut Draft, operation: &ClipOperation) -> Result<(), Op
         }
         ClipOperation::Reduce { clip, tolerance } => {
             on_all_keys(draft, *clip, |targets| KeyOperation::Reduce { targets, tolerance: *tolerance })
+        }
+        ClipOperation::Adopt { clip, nodes } => {
+            let layers: Vec<Uid> = find(draft, *clip)?.layers.iter().map(|layer| layer.uid).collect();
+            for layer in layers {
+                for [from, to] in nodes {
+                    keys::run(draft, *clip, layer, &KeyOperation::Adopt { from: *from, to: *to })?;
+                }
+            }
+            Ok(())
         }
         ClipOperation::Keys { clip, layer, change } => keys::run(draft, *clip, *layer, change),
     }

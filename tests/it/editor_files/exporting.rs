@@ -27,11 +27,18 @@ fn clips_of_the_document_are_exported_as_they_are_edited() {
     // The clips alone come back as they were, and a file with animations opens with them.
     let read = load_animation(&RealDisk, &window.export("turn.anim.ron")).expect("clips");
     assert_eq!(read.clips, [clip]);
+    let packed = load_packed_clips(&RealDisk, &window.export("turn.rigclip")).expect("packed clips");
+    assert_eq!((packed.nodes[0].uid, packed.clips[0].name(), packed.clips[0].frames()), (joint, "turn", 31));
+    assert!(window.notices.include(Severity::Done, "Exported turn.rigclip; read back: 1 clip, 1 joint"));
     window.open_file(&folder.path().join("turn.glb"));
     window.answer(Answer::Discard);
     let clips = window.rig().clips().to_vec();
     assert_eq!((clips.len(), clips[0].name.as_str()), (1, "turn"), "{:?}", window.notices.list);
     assert!(clips[0].key_count() >= 2 && !has_unsaved_changes(window.world()));
+    // Clips whose joints a template replaces can be put onto it.
+    window.open_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/templates/biped.rig.ron"));
+    let offer = "\"Import motion of the mesh's file\" in the Timeline puts them onto";
+    assert!(window.notices.include(Severity::Info, offer), "{:?}", window.notices.list);
 }
 
 #[test]
@@ -103,4 +110,47 @@ fn avatars_are_exported_with_an_author() {
     assert_eq!(avatar.vrm.meta.authors, ["Ann"]);
     assert!(avatar.vrm.humanoid.human_bones.contains_key("leftHand"));
     assert_eq!(window.rig(), before, "an export changes nothing");
+}
+
+/// Keys of a joint that is gone are offered to another one of its name after the project was saved and opened again, and clips
+/// that are exported alone find it.
+#[test]
+fn names_of_animated_nodes_that_are_gone_are_saved() {
+    let folder = folder();
+    let mut window = Window::with_panels(folder.path());
+    window.open(OpenRequest::Bundled);
+    let named = |window: &mut Window| {
+        let known = window.rig().roots().to_vec();
+        window.place(1.0);
+        let joint = window.rig().roots().iter().copied().find(|joint| !known.contains(joint)).expect("a joint");
+        let label = RigEdit::SetLabel(joint, Some("arm".to_owned()));
+        window.change(Change::Do(Operation::Edits(vec![label])));
+        joint
+    };
+    let joint = named(&mut window);
+    let mut clip = RigClip::new(Uid(77), Uid(78), "turn");
+    let target = TrackTarget { node: joint, property: Property::Rotation };
+    let keys = vec![Key::rotation(0.5, Quat::from_rotation_z(0.5))];
+    clip.layers[0].tracks.insert(target, std::sync::Arc::new(Track { keys }));
+    window.change(Change::Do(Operation::Edits(vec![RigEdit::AddClip(Box::new(clip), 0)])));
+    window.change(Change::Do(Operation::Delete { joints: vec![joint], keep_children: true }));
+    let project = window.save_as("gone.rigsmith.ron");
+    let clips = window.export("gone.anim.ron");
+
+    let mut other = Window::with_panels(folder.path());
+    // A joint that is made here is another one.
+    other.base.app.insert_resource(UidSource::seeded(99));
+    other.open_file(&project);
+    let orphans = |rig: &Rig| orphaned_keys(rig, None, &NodeNames::default());
+    let first = orphans(&other.rig());
+    assert_eq!((first.len(), first[0].name.label.as_str(), first[0].offer), (1, "arm", None));
+    let again = named(&mut other);
+    assert_ne!(again, joint);
+    assert_eq!(orphans(&other.rig())[0].offer, Some(again));
+    // What is saved once more says the same.
+    other.act(Action::Save);
+    let text = std::fs::read_to_string(&project).expect("saved");
+    assert!(text.contains(&format!("node: \"{joint}\", label: \"arm\"")), "{text}");
+    let bound = load_animation(&RealDisk, &clips).expect("clips").onto(&other.rig(), None);
+    assert_eq!(bound.by_label, [(joint, again)]);
 }

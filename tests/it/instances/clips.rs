@@ -17,7 +17,12 @@ use rigsmith::{
         Uid,
         animation::{Key, Marker, NodeNames, Property, RigClip, Track, TrackTarget},
         format::animation::write_named,
+        operations::KeyTolerance,
         template::read_template,
+    },
+    solve::{
+        packed_clip::{PackedSkeleton, pack_clip},
+        program::{CompileOptions, RigProgram},
     },
 };
 
@@ -162,6 +167,42 @@ fn a_file_of_clips_becomes_animations_of_bevy() {
     }
 }
 
+/// Packed clips are clips of the joints, markers and all.
+#[test]
+fn packed_clips_play_on_an_instance() {
+    let folder = tempfile::tempdir().unwrap();
+    let bare = TWO.replace(", tags: [control(creation: (name: \"ctl_a\"))]", "");
+    let rig = read_template(bare.as_bytes()).unwrap().rig;
+    let built = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
+    let program = Arc::new(RigProgram::compile(&built, &CompileOptions::default()).unwrap());
+    let mut clip = RigClip::new(Uid(0xC1), Uid(0xC2), "rise");
+    clip.markers = vec![Marker { time: 0.25, name: "low".into() }];
+    let target = TrackTarget { node: rig.find_label("a").unwrap(), property: Property::Translation };
+    let keys = vec![Key::vector(0.0, Vec3::ZERO), Key::vector(1.0, Vec3::Y)];
+    clip.layers[0].tracks.insert(target, Arc::new(Track { keys }));
+    let mut packed = PackedSkeleton::of(&rig, &built);
+    let nodes = packed.baked_nodes();
+    packed.clips.push(pack_clip(&program, &clip, &nodes, 30.0, &KeyTolerance::default()).unwrap());
+    fs::write(folder.path().join("rise.rigclip"), packed.to_bytes()).unwrap();
+
+    let path = saved(folder.path(), &bare);
+    let mut game = game(folder.path());
+    let clips = game.app.world().resource::<AssetServer>().load::<RigAnimation>("rise.rigclip");
+    let instance = game.open(&path, InstanceMode::Hierarchy);
+    game.app.world_mut().entity_mut(instance).insert(InstanceClips(clips));
+    bound(&mut game, 1);
+    assert_eq!(told(&game).bound, [Vec::<Uid>::new()]);
+    let own = game.app.world().get::<RigClips>(instance).unwrap().0[0].clone();
+    assert_eq!((own.name.as_str(), &own.markers), ("rise", &clip.markers));
+    let player = ClipPlayer { time: 0.5, playing: false, ..ClipPlayer::new(&own) };
+    game.app.world_mut().entity_mut(instance).insert(player);
+    game.app.update();
+    let end = game.node(instance, "a_end");
+    let height = game.app.world().get::<GlobalTransform>(end).unwrap().translation().y;
+    assert!((height - 2.0).abs() < 1e-3, "{height}");
+    assert!(RigAnimation::unpack(b"rigpack1", "cut").is_err());
+}
+
 #[test]
 fn clips_of_a_file_go_through_versions_of_the_template() {
     let folder = tempfile::tempdir().unwrap();
@@ -193,7 +234,7 @@ fn clips_of_a_file_go_through_versions_of_the_template() {
 fn a_file_without_clips_that_can_be_read_is_an_error() {
     let error = RigAnimation::read(b"(format: 1, rig: ").unwrap_err();
     assert!(!error.to_string().is_empty());
-    assert_eq!(bevy::asset::AssetLoader::extensions(&RigAnimationLoader), ["anim.ron"]);
+    assert_eq!(bevy::asset::AssetLoader::extensions(&RigAnimationLoader), ["anim.ron", "rigclip"]);
     let folder = tempfile::tempdir().unwrap();
     let path = saved(folder.path(), TWO);
     fs::write(folder.path().join("bad.anim.ron"), "(format: 1, rig: ").unwrap();

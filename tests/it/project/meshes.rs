@@ -16,7 +16,7 @@ fn to_save(loaded: LoadedProject) -> ProjectToSave {
     });
     let meshes = meshes.collect();
     let LoadedProject { name, rigs, templates, view, journal, .. } = loaded;
-    ProjectToSave { name, rigs, meshes, templates, view, journal }
+    ProjectToSave { name, rigs, meshes, templates, view, journal, ..Default::default() }
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use rigsmith::{
     editor::panels::timeline::import::{ClipImport, MapRequest},
-    rig::animation::{LayerMode, Marker},
+    rig::animation::{LayerAbout, LayerMode, Marker, joint_map::FoundBy},
 };
 
 use super::*;
@@ -142,6 +142,13 @@ fn layers_have_weights_modes_and_a_mute() {
     assert!(clip(&desk).layers[1].muted);
     assert_eq!(desk.steps().1, steps + 3);
     desk.secondary_click("Layer 2");
+    desk.click("Rename layer");
+    desk.frames(3);
+    desk.type_text("breath");
+    desk.key(KeyboardKey::Enter);
+    desk.frames(3);
+    assert_eq!((clip(&desk).layers[1].name.as_str(), desk.steps().1), ("breath", steps + 4));
+    desk.secondary_click("breath");
     desk.click("Delete layer");
     desk.frames(3);
     assert_eq!(clip(&desk).layers.len(), 1);
@@ -171,6 +178,32 @@ fn keys_of_nodes_that_are_gone_are_set_aside_under_their_names() {
     desk.frames(3);
     assert!(desk.look("Set aside (1)").is_none());
     assert_eq!(clip(&desk).key_count(), 4);
+}
+
+/// Nodes that came back under other identities get all keys in one step, in layers that concern only some nodes, too.
+#[test]
+fn all_keys_that_are_set_aside_are_given_at_once() {
+    let (mut desk, [_, left, right]) = opened();
+    let about = Box::new(LayerAbout { mask: vec![left, right], ..clip(&desk).layers[0].about() });
+    desk.edit(Operation::Clips(ClipOperation::SetLayer { clip: CLIP, layer: BASE, about }));
+    desk.edit(Operation::Delete { joints: vec![left, right], keep_children: true });
+    desk.frames(2);
+    desk.click("Set aside (2)");
+    desk.frames(2);
+    assert!(desk.look("Give all to nodes of their names").is_none());
+    let others = desk.chain(&["arm_l", "arm_r"]);
+    desk.frames(2);
+    let (before, steps) = (bytes(&desk), desk.steps().1);
+    desk.click("Give all to nodes of their names");
+    desk.frames(3);
+    assert_eq!(desk.steps().1, steps + 1);
+    assert!(desk.look("Set aside (2)").is_none());
+    for other in others {
+        assert_eq!(times(&desk, other).len(), 4);
+        assert!(clip(&desk).layers[0].concerns(other), "the layer's mask has the node");
+    }
+    undo(&mut desk);
+    assert_eq!(bytes(&desk), before);
 }
 
 #[test]
@@ -270,9 +303,14 @@ fn imported_motion_waits_for_steps_that_were_undone_meanwhile() {
 
 /// The bundled biped beside a capture of a human, whose map waits.
 fn captured() -> (Desk, tempfile::TempDir) {
+    captured_of(crate::fuzz_bvh::HUMAN)
+}
+
+/// The same beside the capture of this text.
+fn captured_of(text: &str) -> (Desk, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("step.bvh");
-    std::fs::write(&path, crate::fuzz_bvh::HUMAN).unwrap();
+    std::fs::write(&path, text).unwrap();
     let (mut desk, _) = desk_with(TimelinePanel::default());
     let rig = crate::bench::shipped("biped");
     let entity = desk.rig;
@@ -330,4 +368,99 @@ fn the_map_of_joints_is_changed_or_dropped_before_anything_is_applied() {
     desk.frames(3);
     assert!(draft(&desk).is_none() && desk.look("Joint for LeftLeg").is_none());
     assert_eq!((bytes(&desk), desk.steps()), (before, steps));
+}
+
+/// A map file wins over the guess, as with the command; one that does not fit changes nothing.
+#[test]
+fn a_map_file_takes_the_place_of_the_guess() {
+    let (mut desk, folder) = captured();
+    let draft = |desk: &Desk| desk.app.world().resource::<ClipImport>().draft().cloned().expect("a map");
+    let first = draft(&desk);
+    let [left, right] = ["LeftLeg", "RightLeg"].map(|name| first.joints().position(|joint| joint == name).unwrap());
+    let [shin_l, shin_r] = ["shin_l", "shin_r"].map(|label| desk.rig().find_label(label));
+    assert_eq!((first.targets[left], first.targets[right]), (shin_l, shin_r));
+    assert!(desk.look("Load map…").is_some());
+    let load = |desk: &mut Desk, text: &str| {
+        let path = folder.path().join("map.ron");
+        std::fs::write(&path, text).unwrap();
+        desk.app.world_mut().write_message(MapRequest::File(path));
+        desk.frames(3);
+    };
+    load(&mut desk, "[(\"LeftLeg\", \"nobody\")]");
+    assert!(desk.told().iter().any(|told| told.contains("has no joint \"nobody\"")), "{:?}", desk.told());
+    assert_eq!((draft(&desk).targets, draft(&desk).found_by), (first.targets.clone(), first.found_by));
+    load(&mut desk, "[(\"LeftLeg\", \"shin_r\"), (\"RightLeg\", \"shin_l\")]");
+    let now = draft(&desk);
+    assert_eq!((now.targets[left], now.targets[right]), (shin_r, shin_l));
+    assert_eq!(now.found_by, Some(FoundBy::Map));
+    accept(&mut desk);
+    assert_eq!(desk.rig().clips().len(), 1);
+}
+
+/// What the command has options for is chosen below the table: the control that carries the rig gets the travel, and feet are let
+/// go. The next import begins with the same choices.
+#[test]
+fn motion_capture_has_choices() {
+    let walk = include_str!("../retarget/walker.bvh");
+    let moved = |clip: &RigClip| -> std::collections::BTreeSet<Uid> {
+        let tracks = clip.layers.iter().flat_map(|layer| layer.tracks.keys());
+        tracks.filter(|target| target.property == Property::Translation).map(|target| target.node).collect()
+    };
+    let told = |desk: &Desk, text: &str| desk.told().iter().any(|told| told.contains(text));
+    let (mut plain, _folder) = captured_of(walk);
+    accept(&mut plain);
+    let [without] = plain.rig().clips() else { panic!("{:?}", plain.told()) };
+    assert!(!told(&plain, "for root motion") && told(&plain, "feet stand 4 times"), "{:?}", plain.told());
+
+    let (mut desk, folder) = captured_of(walk);
+    for label in ["Root motion", "Lock feet"] {
+        desk.time += 1.0;
+        desk.click(label);
+        desk.frames(3);
+    }
+    let wanted = |desk: &Desk| {
+        let options = desk.app.world().resource::<ClipImport>().draft().expect("a map").options;
+        assert_eq!((options.root_motion, options.lock_feet), (true, false), "{options:?}");
+        assert!(options.travel && options.lock_hands, "{options:?}");
+    };
+    wanted(&desk);
+    accept(&mut desk);
+    let [with] = desk.rig().clips() else { panic!("{:?}", desk.told()) };
+    assert!(told(&desk, "the travel is on root, for root motion"), "{:?}", desk.told());
+    assert!(!told(&desk, "feet stand"), "{:?}", desk.told());
+    assert!(moved(with).difference(&moved(without)).next().is_some(), "the root has keys");
+    import(&mut desk, folder.path().join("step.bvh"));
+    wanted(&desk);
+}
+
+/// The clips of a character whose joints a template has replaced go onto the controls of that template.
+#[cfg(feature = "cli")]
+#[test]
+fn motion_of_the_meshs_file_is_put_onto_the_controls() {
+    use rigsmith::editor::files::MeshSource;
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("walker.bvh"), include_str!("../retarget/walker.bvh")).unwrap();
+    let answer = crate::cli_build::rigsmith(folder.path(), &["animate", "biped", "walker.bvh", "-o", "walker.glb"]);
+    assert_eq!(answer.code, 0, "{} {}", answer.out, answer.err);
+    let (mut desk, _) = desk_with(TimelinePanel::default());
+    let entity = desk.rig;
+    desk.app.world_mut().entity_mut(entity).insert(crate::bench::shipped("biped"));
+    let body = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/biped.obj");
+    let mesh = RigMesh::new(Uid(0x3E5), load_model(&RealDisk, &body).unwrap(), Vec::new());
+    let mesh = desk.app.world_mut().spawn((mesh, SkinOf(entity), MeshSource::File(body))).id();
+    desk.frames(3);
+    let own = Action::Timeline(TimelineAction::ImportOwn);
+    assert_eq!(obstacle(desk.app.world(), own), Some("the mesh has no file with motion"));
+    let source = MeshSource::File(folder.path().join("walker.glb"));
+    desk.app.world_mut().entity_mut(mesh).insert(source);
+    assert_eq!(obstacle(desk.app.world(), own), None);
+    act(&mut desk, TimelineAction::ImportOwn);
+    crate::bench::wait(&mut desk, "the map", Desk::frame, |desk| {
+        desk.app.world().resource::<ClipImport>().draft().is_some()
+    });
+    desk.frames(2);
+    accept(&mut desk);
+    let [clip] = desk.rig().clips() else { panic!("{:?}", desk.told()) };
+    assert_eq!(clip.name, "walker");
+    assert!(clip.nodes().iter().any(|node| desk.rig().joint(*node).is_none()), "controls have the keys");
 }

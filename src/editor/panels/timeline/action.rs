@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     import::ClipImport,
+    own_motion::own_file,
     state::{OpenClip, Timeline, has_any},
     switches,
 };
@@ -77,6 +78,8 @@ pub enum TimelineAction {
     DeleteClip,
     /// Asks for a file of motion and puts it onto the rig.
     Import,
+    /// Puts the motion of the file that the mesh has come from onto the rig.
+    ImportOwn,
     /// Adds a layer on top of the clip, which adds to those below.
     NewLayer,
     /// Replaces the keys of the tracks with selected keys by linear ones, one a frame.
@@ -101,7 +104,7 @@ pub enum TimelineAction {
 
 impl TimelineAction {
     /// Every action.
-    pub const ALL: [Self; 40] = [
+    pub const ALL: [Self; 41] = [
         Self::Play,
         Self::NextFrame,
         Self::PreviousFrame,
@@ -132,6 +135,7 @@ impl TimelineAction {
         Self::DuplicateClip,
         Self::DeleteClip,
         Self::Import,
+        Self::ImportOwn,
         Self::NewLayer,
         Self::Bake,
         Self::BakeClip,
@@ -177,6 +181,7 @@ impl TimelineAction {
             Self::DuplicateClip => "Duplicate clip",
             Self::DeleteClip => "Delete clip",
             Self::Import => "Import motion",
+            Self::ImportOwn => "Import motion of the mesh's file",
             Self::NewLayer => "New animation layer",
             Self::Bake => "Bake tracks to frames",
             Self::BakeClip => "Bake the whole clip to frames",
@@ -229,11 +234,13 @@ pub fn obstacle(world: &World, action: TimelineAction) -> Option<&'static str> {
     match action {
         TimelineAction::AutoKey | TimelineAction::Stretch => return None,
         TimelineAction::NewClip => return rig.is_empty().then_some("there are no joints"),
-        TimelineAction::Import => {
+        TimelineAction::Import | TimelineAction::ImportOwn => {
             let is_busy = world.get_resource::<ClipImport>().is_some_and(|import| import.what().is_some());
+            let is_own = action == TimelineAction::ImportOwn;
             return match (rig.is_empty(), is_busy) {
                 (true, _) => Some("there are no joints"),
                 (false, true) => Some("another file is being read"),
+                (false, false) if is_own && own_file(world).is_none() => Some("the mesh has no file with motion"),
                 (false, false) => None,
             };
         }

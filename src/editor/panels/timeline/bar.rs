@@ -196,6 +196,7 @@ impl Bar {
             entry(ui, world, TimelineAction::DeleteClip, requests);
             ui.separator();
             entry(ui, world, TimelineAction::Import, requests);
+            entry(ui, world, TimelineAction::ImportOwn, requests);
             entry(ui, world, TimelineAction::NewLayer, requests);
             entry(ui, world, TimelineAction::KeyAll, requests);
             ui.separator();

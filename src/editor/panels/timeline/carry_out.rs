@@ -8,6 +8,7 @@ use bevy::{prelude::*, window::RequestRedraw};
 use super::{
     action::{TimelineAction, obstacle},
     import,
+    own_motion::own_file,
     shown_pose::{all_nodes, shown_values},
     state::{OpenClip, Timeline, TimelineRequest, all_keys, fitted, frame_at, key_times, second_of, snapped},
     switches,
@@ -150,6 +151,12 @@ fn act(world: &mut World, action: TimelineAction) {
         }
         TimelineAction::NewClip => new_clip(world),
         TimelineAction::Import => import::ask(world),
+        TimelineAction::ImportOwn => {
+            if let Some(path) = own_file(world) {
+                world.write_message(import::ImportRequest(path));
+                world.write_message(RequestRedraw);
+            }
+        }
         _ => {
             let Some(open) = OpenClip::of(world) else { return };
             match edit(world, &open, action) {

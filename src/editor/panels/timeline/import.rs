@@ -12,7 +12,11 @@ use bevy::{
     window::RequestRedraw,
 };
 
-use super::carry_out::open;
+use super::{
+    carry_out::open,
+    map_file::{self, targets_of},
+    motion_options::{MotionOptions, sentences},
+};
 use crate::{
     editor::{
         ActiveRig,
@@ -21,7 +25,7 @@ use crate::{
         files::dialog::{Dialog, Question},
         notice::Notice,
     },
-    files::{FileKind, LoadError, RealDisk, load_animation, load_model, load_motion, stem},
+    files::{FileKind, LoadError, RealDisk, load_animation, load_model, load_motion, load_packed_clips, stem},
     plugins::{
         commands::RigModules,
         document::EditRequest,
@@ -40,11 +44,12 @@ use crate::{
         },
         operations::{ClipOperation, Operation, OperationError},
     },
-    solve::retarget::{MotionTarget, RetargetError, RetargetSettings, retarget},
+    solve::retarget::{MotionTarget, RetargetError, retarget},
 };
 
 /// Kinds of files that have motion.
-pub const MOTION_FILES: &[FileKind] = &[FileKind::Bvh, FileKind::Animation, FileKind::Glb, FileKind::Gltf];
+pub const MOTION_FILES: &[FileKind] =
+    &[FileKind::Bvh, FileKind::Animation, FileKind::PackedClips, FileKind::Glb, FileKind::Gltf, FileKind::Vrm];
 
 /// Request to put the motion of a file onto the active rig. Motion of another skeleton waits for [`MapRequest::Accept`].
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
@@ -55,6 +60,12 @@ pub struct ImportRequest(pub PathBuf);
 pub enum MapRequest {
     /// Gives a joint of the motion, by its number, another joint of the rig, or none.
     Set(usize, Option<Uid>),
+    /// Chooses how the motion is put onto the rig; later imports begin with the same choices.
+    Options(MotionOptions),
+    /// Asks for a map file.
+    AskFile,
+    /// Takes the map of a file in place of the guess.
+    File(PathBuf),
     /// Puts the motion onto the rig by the map.
     Accept,
     /// Drops the motion.
@@ -65,7 +76,9 @@ pub enum MapRequest {
 #[derive(Resource, Default)]
 pub struct ClipImport {
     job: Option<Job>,
-    draft: Option<MapDraft>,
+    pub(super) draft: Option<MapDraft>,
+    /// Choices of the last import.
+    options: MotionOptions,
 }
 
 struct Job {
@@ -98,11 +111,13 @@ pub struct MapDraft {
     /// Name of the file.
     pub name: String,
     /// Motions of one skeleton.
-    motions: Arc<Vec<Motion>>,
+    pub(super) motions: Arc<Vec<Motion>>,
     /// Joint of the rig for each joint of the motion.
     pub targets: Vec<Option<Uid>>,
     /// Way in which the guess was found; `None` if nothing was found.
     pub found_by: Option<FoundBy>,
+    /// Choices of how the motion is put onto the rig.
+    pub options: MotionOptions,
     /// Remarks, a sentence each.
     notes: Vec<String>,
 }
@@ -156,7 +171,7 @@ struct ImportedMotion {
 #[derive(Debug, thiserror::Error)]
 enum ImportError {
     /// The file's name has no ending of motion.
-    #[error("it is no file of motion; those end in .bvh, .anim.ron, .glb or .gltf")]
+    #[error("it is no file of motion; those end in .bvh, .anim.ron, .rigclip, .glb, .gltf or .vrm")]
     Kind,
     /// The file has no motion.
     #[error("it has no clips that move joints; choose a file with animations of its skeleton")]
@@ -245,6 +260,14 @@ fn answer(world: &mut World, request: &MapRequest) {
                 *known = *target;
             }
         }
+        MapRequest::Options(options) => {
+            import.options = *options;
+            if let Some(draft) = &mut import.draft {
+                draft.options = *options;
+            }
+        }
+        MapRequest::AskFile => map_file::ask(world),
+        MapRequest::File(path) => map_file::load(world, path),
         MapRequest::Cancel => {
             import.draft = None;
             import.drop_waiting();
@@ -261,7 +284,7 @@ fn answer(world: &mut World, request: &MapRequest) {
 }
 
 /// Nodes of a rig that get keys.
-fn target_of(rig: &Rig) -> MotionTarget {
+pub(super) fn target_of(rig: &Rig) -> MotionTarget {
     let has_commands = rig.walk().any(|joint| !joint.data.tags.is_empty());
     if has_commands { MotionTarget::Controls } else { MotionTarget::Joints }
 }
@@ -295,8 +318,11 @@ fn read(
             limits.check_motion(name, &motion)?;
             motions.push(motion);
         }
-        Some(FileKind::Glb | FileKind::Gltf) => {
-            let model = load_model(&RealDisk, path)?;
+        Some(kind) if kind == FileKind::PackedClips || kind.is_gltf() => {
+            let model = match kind {
+                FileKind::PackedClips => load_packed_clips(&RealDisk, path)?.model(&stem(path)),
+                _ => load_model(&RealDisk, path)?,
+            };
             limits.check_model(name, &model)?;
             let joints = (target_of(rig) == MotionTarget::Joints).then(|| own_joints(&model, rig)).flatten();
             for (number, clip) in model.clips.iter().enumerate() {
@@ -323,14 +349,9 @@ fn read(
 
 /// Motions with the map that names, shape or labels suggest. Where nothing is found all is for people to choose.
 fn draft(rig: Entity, name: &str, document: &Rig, motions: Vec<Motion>) -> MapDraft {
-    let joints: Vec<Uid> = document.walk().map(|joint| joint.data.uid).collect();
     let guess = motions.first().and_then(|motion| JointMap::new(motion, document, &[]).ok());
-    let mut targets = vec![None; motions.first().map_or(0, |motion| motion.joints.len())];
-    for (from, to) in guess.iter().flat_map(JointMap::joint_pairs) {
-        if let Some(target) = targets.get_mut(from) {
-            *target = joints.get(to).copied();
-        }
-    }
+    let count = motions.first().map_or(0, |motion| motion.joints.len());
+    let targets = guess.as_ref().map_or_else(|| vec![None; count], |guess| targets_of(guess, document, count));
     let notes = motions.iter().flat_map(|motion| motion.notes.iter().cloned()).collect();
     MapDraft {
         rig,
@@ -338,6 +359,7 @@ fn draft(rig: Entity, name: &str, document: &Rig, motions: Vec<Motion>) -> MapDr
         motions: Arc::new(motions),
         targets,
         found_by: guess.map(|guess| guess.found_by),
+        options: MotionOptions::default(),
         notes,
     }
 }
@@ -352,18 +374,26 @@ fn retargeted(draft: &MapDraft, rig: &Rig, modules: &Arc<Modules>) -> Result<Imp
     let mut imported = ImportedMotion { clips: Vec::new(), notes: draft.notes.clone() };
     for motion in draft.motions.iter() {
         let map = JointMap::of_pairs(motion, rig, &pairs)?;
-        imported.retarget(rig, &built, motion, &map)?;
+        imported.retarget(rig, &built, motion, &map, draft.options)?;
     }
     Ok(imported)
 }
 
 impl ImportedMotion {
     /// Adds the motion of another skeleton.
-    fn retarget(&mut self, rig: &Rig, built: &BuiltRig, motion: &Motion, map: &JointMap) -> Result<(), ImportError> {
-        let settings = RetargetSettings { onto: target_of(rig), ..RetargetSettings::default() };
-        let done = retarget(rig, built, motion, map, &settings)?;
+    fn retarget(
+        &mut self,
+        rig: &Rig,
+        built: &BuiltRig,
+        motion: &Motion,
+        map: &JointMap,
+        options: MotionOptions,
+    ) -> Result<(), ImportError> {
+        let done = retarget(rig, built, motion, map, &options.settings(target_of(rig)))?;
         let unmapped = map.unmapped_source(motion).len();
+        let sentences = sentences(rig, built, map, &done)?;
         self.notes.extend(done.notes);
+        self.notes.extend(sentences);
         self.notes.push(format!(
             "\"{}\": {} found; {} of the motion without effect",
             done.clip.name,
@@ -401,7 +431,9 @@ pub(super) fn land(mut import: ResMut<ClipImport>, mut commands: Commands) {
             let text = format!("{name}: check in the Timeline which joints its motion goes to, then import it.");
             world.write_message(Notice::info(text).at("Timeline"));
             world.write_message(ShowPanel("Timeline"));
-            world.resource_mut::<ClipImport>().draft = Some(draft);
+            let mut import = world.resource_mut::<ClipImport>();
+            let options = import.options;
+            import.draft = Some(MapDraft { options, ..draft });
         }
         Err(error) => {
             world.write_message(Notice::error(format!("Could not import {name}: {error}")));

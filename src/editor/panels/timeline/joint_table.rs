@@ -4,7 +4,10 @@ use bevy_egui::egui::{
     Align, Button, ComboBox, Key, Layout, Popup, Rect, Ui, UiBuilder, WidgetInfo, WidgetType, pos2, vec2,
 };
 
-use super::import::{MapDraft, MapRequest};
+use super::{
+    import::{MapDraft, MapRequest, target_of},
+    motion_options::choices,
+};
 use crate::{
     editor::{
         counted::counted,
@@ -35,6 +38,10 @@ pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy:
         if import.on_disabled_hover_text(why_not).clicked() {
             requests.send(MapRequest::Accept);
         }
+        let load = ui.add_enabled(!is_busy, Button::new("Load map…"));
+        if load.on_hover_text("Takes pairs of joints from a map file, as --map of the command does").clicked() {
+            requests.send(MapRequest::AskFile);
+        }
         is_cancelled |= ui.add_enabled(!is_busy, Button::new("Cancel import")).clicked();
         let found = match draft.found_by {
             Some(FoundBy::Names) => "guessed from names",
@@ -53,6 +60,11 @@ pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy:
             counted(all, "joint", "joints")
         ));
     });
+    let onto = target_of(&shown.rig);
+    let options = ui.add_enabled_ui(!is_busy, |ui| choices(ui, draft.options, onto)).inner;
+    if options != draft.options {
+        requests.send(MapRequest::Options(options));
+    }
     if is_cancelled && !is_busy {
         requests.send(MapRequest::Cancel);
     }

@@ -10,7 +10,7 @@ use super::{
     TimelinePanel,
     bar::entry,
     colors::KeyColors,
-    mask,
+    mask, set_aside,
     sheet::Row,
     state::{OpenClip, Timeline, TimelineRequest, add},
 };
@@ -20,7 +20,7 @@ use crate::{
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
-            fields::{Look, NumberEdit},
+            fields::{self, Look, NumberEdit, Renaming},
             list,
         },
     },
@@ -30,8 +30,8 @@ use crate::{
     },
     rig::{
         Uid,
-        animation::{ClipLayer, LayerAbout, LayerMode, OrphanedKeys},
-        operations::{ClipOperation, KeyOperation, KeyTimes, Operation},
+        animation::{ClipLayer, LayerAbout, LayerMode},
+        operations::{ClipOperation, KeyTimes, Operation},
         proportion::Quantity,
     },
 };
@@ -62,6 +62,7 @@ pub(super) fn show(
         Row::Aside => {
             let text = format!("Set aside ({})", panel.sheet.orphans.len());
             header(&mut panel.choice.aside, ui, cell, &text);
+            set_aside::give_all(ui, rect, split, &panel.sheet.orphans, context, requests);
         }
         Row::Layer(number) => {
             if let Some(layer) = context.open.clip.layers.get(number) {
@@ -79,7 +80,7 @@ pub(super) fn show(
         Row::Track(number, track) => self::track(panel, ui, cell, (number, track), context, requests),
         Row::Orphan(number) => {
             if let Some(orphan) = panel.sheet.orphans.get(number) {
-                self::orphan(ui, rect, split, orphan, context, requests);
+                set_aside::orphan(ui, rect, split, orphan, context, requests);
             }
         }
     }
@@ -209,32 +210,15 @@ fn layer(
     let is_active = open.layer.is_some_and(|active| active.uid == layer.uid);
     let id = ui.id().with(layer.uid);
     let said = if layer.name.is_empty() { format!("Layer {}", number + 1) } else { layer.name.clone() };
-    let response = name(ui, cell.with_min_x(cell.left() + 18.0), &said, is_active, id);
-    if response.clicked() {
-        requests.send(TimelineRequest::Layer(layer.uid));
+    let place = cell.with_min_x(cell.left() + 18.0);
+    if !rename(&mut panel.renaming, ui, place, layer, open, requests) {
+        let response = name(ui, place, &said, is_active, id);
+        if response.clicked() {
+            requests.send(TimelineRequest::Layer(layer.uid));
+        }
+        let response = response.on_hover_text("A click shows the keys of the layer; new keys go there");
+        menu(panel, &response, (number, layer), &said, context, requests);
     }
-    response.on_hover_text("A click shows the keys of the layer; new keys go there").context_menu(|ui| {
-        let count = open.clip.layers.len();
-        let operate = |operation: ClipOperation| EditRequest::operation(open.entity, Operation::Clips(operation));
-        let (clip, uid) = (open.clip.uid, layer.uid);
-        for (text, enabled, index) in
-            [("Move up", number + 1 < count, number + 1), ("Move down", number > 0, number.saturating_sub(1))]
-        {
-            if ui.add_enabled(enabled, Button::new(text)).clicked() {
-                requests.send(operate(ClipOperation::MoveLayer { clip, layer: uid, index }));
-                ui.close();
-            }
-        }
-        if let Some(mask) = mask::entries(ui, layer, context) {
-            let about = Box::new(LayerAbout { mask, ..layer.about() });
-            requests.send(operate(ClipOperation::SetLayer { clip, layer: uid, about }));
-        }
-        entry(ui, context.world, super::TimelineAction::NewLayer, requests);
-        if ui.add_enabled(count > 1, Button::new("Delete layer")).clicked() {
-            requests.send(operate(ClipOperation::DeleteLayer { clip, layer: uid }));
-            ui.close();
-        }
-    });
     let set = |change: &dyn Fn(&mut LayerAbout)| {
         let mut about = layer.about();
         change(&mut about);
@@ -293,41 +277,74 @@ fn layer(
     });
 }
 
-fn orphan(ui: &mut Ui, rect: Rect, split: f32, orphan: &OrphanedKeys, context: &RowContext, requests: &mut Requests) {
-    let name = if orphan.name.label.is_empty() {
-        format!("node {:04x}", orphan.node.0 >> 48)
-    } else {
-        orphan.name.label.clone()
-    };
-    let cell = Rect::from_min_max(pos2(rect.left() + 18.0, rect.top()), pos2(split - 4.0, rect.bottom()));
-    let response = ui.interact(cell, ui.id().with(("aside", orphan.layer, orphan.node)), Sense::hover());
-    response.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, &name));
-    list::line(ui, cell.shrink2(vec2(3.0, 0.0)), &name, ui.visuals().weak_text_color());
-    response.on_hover_text("The node is gone; its keys take effect again when it is back");
-    let right = Rect::from_min_max(pos2(split, rect.top()), rect.right_bottom());
-    let builder = UiBuilder::new()
-        .id_salt((orphan.layer, orphan.node))
-        .max_rect(right)
-        .layout(Layout::left_to_right(Align::Center));
-    ui.scope_builder(builder, |ui| {
-        let mut ask = |change: KeyOperation| {
-            let operation = ClipOperation::Keys { clip: orphan.clip, layer: orphan.layer, change };
-            requests.send(EditRequest::operation(context.open.entity, Operation::Clips(operation)));
-        };
-        if list::symbol_button(ui, "🗑", &format!("Delete the keys of {name}")) {
-            let layer = context.open.clip.layer(orphan.layer);
-            let tracks = layer.into_iter().flat_map(|layer| &layer.tracks);
-            let own = tracks.filter(|(target, _)| target.node == orphan.node);
-            let times = own.map(|(target, track)| (target.clone(), track.keys.iter().map(|key| key.time).collect()));
-            ask(KeyOperation::Delete(times.collect()));
+/// The menu of a layer.
+fn menu(
+    panel: &mut TimelinePanel,
+    response: &Response,
+    (number, layer): (usize, &ClipLayer),
+    said: &str,
+    context: &RowContext,
+    requests: &mut Requests,
+) {
+    let open = context.open;
+    response.context_menu(|ui| {
+        if ui.button("Rename layer").clicked() {
+            panel.renaming = Some(LayerRename { layer: layer.uid, text: said.to_owned(), focused: false });
+            ui.close();
         }
-        if let Some(to) = orphan.offer {
-            let button = Button::new(format!("Give to {name}")).truncate();
-            if ui.add(button).on_hover_text("To the node that has this name now").clicked() {
-                ask(KeyOperation::Adopt { from: orphan.node, to });
+        let count = open.clip.layers.len();
+        let operate = |operation: ClipOperation| EditRequest::operation(open.entity, Operation::Clips(operation));
+        let (clip, uid) = (open.clip.uid, layer.uid);
+        for (text, enabled, index) in
+            [("Move up", number + 1 < count, number + 1), ("Move down", number > 0, number.saturating_sub(1))]
+        {
+            if ui.add_enabled(enabled, Button::new(text)).clicked() {
+                requests.send(operate(ClipOperation::MoveLayer { clip, layer: uid, index }));
+                ui.close();
             }
         }
-        let text = format!("{} of {}", counted(orphan.keys, "key", "keys"), counted(orphan.tracks, "track", "tracks"));
-        ui.add(Label::new(RichText::new(text).color(KeyColors::of(ui.visuals()).quiet)).truncate());
+        if let Some(mask) = mask::entries(ui, layer, context) {
+            let about = Box::new(LayerAbout { mask, ..layer.about() });
+            requests.send(operate(ClipOperation::SetLayer { clip, layer: uid, about }));
+        }
+        entry(ui, context.world, super::TimelineAction::NewLayer, requests);
+        if ui.add_enabled(count > 1, Button::new("Delete layer")).clicked() {
+            requests.send(operate(ClipOperation::DeleteLayer { clip, layer: uid }));
+            ui.close();
+        }
     });
+}
+
+/// Name of a layer that is being typed.
+pub(super) struct LayerRename {
+    layer: Uid,
+    text: String,
+    focused: bool,
+}
+
+/// Draws the field of a layer's name while it is typed; `false` while it is not.
+fn rename(
+    renaming: &mut Option<LayerRename>,
+    ui: &mut Ui,
+    rect: Rect,
+    layer: &ClipLayer,
+    open: &OpenClip,
+    requests: &mut Requests,
+) -> bool {
+    let Some(typed) = renaming.as_mut().filter(|typed| typed.layer == layer.uid) else { return false };
+    let id = ui.id().with((layer.uid, "rename"));
+    match fields::rename(ui, rect, id, "Rename layer", &mut typed.text, &mut typed.focused) {
+        Renaming::Typing => {}
+        Renaming::Dropped => *renaming = None,
+        Renaming::Accepted => {
+            let name = typed.text.trim().to_owned();
+            *renaming = None;
+            if !name.is_empty() && name != layer.name {
+                let about = Box::new(LayerAbout { name, ..layer.about() });
+                let operation = ClipOperation::SetLayer { clip: open.clip.uid, layer: layer.uid, about };
+                requests.send(EditRequest::operation(open.entity, Operation::Clips(operation)));
+            }
+        }
+    }
+    true
 }

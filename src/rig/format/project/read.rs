@@ -113,7 +113,8 @@ pub fn read_project(bytes: &[u8]) -> Result<ReadProject, SourceError> {
         view.camera = None;
         notes.push("the view's camera is not finite; the whole character is shown instead".to_owned());
     }
-    Ok(ReadProject { project: Project { name, meshes, rigs, templates, view, journal }, notes })
+    let project = Project { name, meshes, rigs, templates, view, journal, names: NodeNames::default() };
+    Ok(ReadProject { project, notes })
 }
 
 fn check_meshes(places: &Places, meshes: &[MeshReference], rigs: &[ProjectRig]) -> Result<(), SourceError> {

@@ -41,7 +41,7 @@ fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
     }
     writeln!(out, "    ],\n    rigs: [")?;
     for rig in &project.rigs {
-        write_rig(out, rig)?;
+        write_rig(out, rig, &project.names)?;
     }
     writeln!(out, "    ],")?;
     if !project.templates.is_empty() {
@@ -64,7 +64,7 @@ fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
     writeln!(out, ")")
 }
 
-fn write_rig(out: &mut String, entry: &ProjectRig) -> std::fmt::Result {
+fn write_rig(out: &mut String, entry: &ProjectRig, known: &NodeNames) -> std::fmt::Result {
     write!(out, "        (\n            rig: ")?;
     write_indented(out, &write_without_poses(&entry.rig), "            ");
     writeln!(out, ",\n            skins: [")?;
@@ -87,7 +87,9 @@ fn write_rig(out: &mut String, entry: &ProjectRig) -> std::fmt::Result {
     writeln!(out, "            ],")?;
     if !entry.rig.clips().is_empty() {
         writeln!(out, "            clips: [")?;
-        write_clips(out, entry.rig.clips(), &NodeNames::of(&entry.rig, None), "                ")?;
+        let mut names = known.clone();
+        names.extend(&NodeNames::of(&entry.rig, None));
+        write_clips(out, entry.rig.clips(), &names, "                ")?;
         writeln!(out, "            ],")?;
     }
     if !entry.rig.dropped_parts().is_empty() {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{KeyOperation, KeyTimes, OperationError, ease, layer_of, mirror, pose, reduce, time};
 use crate::rig::{
     RigEdit, Uid,
-    animation::{ClipLayer, Key, TrackTarget},
+    animation::{ClipLayer, Key, LayerAbout, TrackTarget},
     operations::Draft,
 };
 
@@ -79,6 +79,11 @@ pub(super) fn run(draft: &mut Draft, clip: Uid, layer: Uid, change: &KeyOperatio
                     changes.remove(target, track.keys.iter().map(|key| key.time));
                     changes.insert(&next, track.keys.iter().copied());
                 }
+            }
+            if own.mask.contains(from) && !own.mask.contains(to) {
+                let mask = own.mask.iter().copied().chain([*to]).collect();
+                let about = Box::new(LayerAbout { mask, ..own.about() });
+                draft.apply(RigEdit::SetLayer { clip, layer, about })?;
             }
         }
     }
