@@ -13,7 +13,7 @@ use bevy_egui::egui;
 use rigsmith::{
     editor::{
         panel::{EditorPanel, Requests},
-        panels::{process::ProcessPanel, properties::PropertiesPanel, tags::TagsPanel},
+        panels::{hierarchy::HierarchyPanel, process::ProcessPanel, properties::PropertiesPanel, tags::TagsPanel},
     },
     files::{RealDisk, load_template, store_rig_over},
     plugins::{
@@ -124,6 +124,38 @@ fn tags_are_listed_with_what_became_of_them() {
     desk.click("control");
     desk.frames(3);
     assert!(is_on(&desk) && !desk.says("passed over"));
+}
+
+#[test]
+fn a_module_is_dragged_onto_a_joint() {
+    let sheet = Both::sheet(HierarchyPanel::default(), TagsPanel::default());
+    let mut desk = Desk::with(sheet, egui::vec2(900.0, 900.0));
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    desk.select(&[a]);
+    let (before, steps) = (desk.rig().clone(), desk.steps().1);
+    desk.click("+ Add");
+    desk.frames(3);
+    desk.type_text("null");
+    desk.frames(3);
+    let (null, row) = (desk.find("null").rect, desk.find("b").rect);
+    assert!(!null.x_range().contains(row.center().x), "the library lies over the joints: {null:?} {row:?}");
+    desk.drag(null.center(), row.center());
+    desk.frames(3);
+    let modules = |desk: &Desk, joint: Uid| -> Vec<String> {
+        let tags = desk.rig().joint(joint).unwrap().data.tags.iter();
+        let module = |tag: &TagData| match &tag.kind {
+            TagKind::Command { module, .. } => module.clone(),
+            TagKind::Feature { name, .. } => panic!("{name} is no command"),
+        };
+        tags.map(module).collect()
+    };
+    assert!(modules(&desk, a).is_empty(), "{:?}", modules(&desk, a));
+    assert_eq!(modules(&desk, b), ["null"], "{:?}", desk.told());
+    assert_eq!(desk.steps().1, steps + 1);
+    let rig = desk.rig;
+    desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+    desk.frames(2);
+    assert_eq!(*desk.rig(), before);
 }
 
 #[test]
