@@ -96,6 +96,38 @@ fn a_failed_command_leads_to_its_card_and_commands_to_what_they_made() {
 }
 
 #[test]
+fn a_failed_command_leads_to_the_field_at_fault() {
+    let height = 240.0;
+    let sheet = Both::sheet(ProcessPanel::default(), TagsPanel::default());
+    let mut desk = Desk::with(sheet, egui::vec2(900.0, height));
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    let params = |direction: &str| format!("(targets: \"@joint a#{a}\", direction: {direction})");
+    let kind = TagKind::Command { module: "aim".into(), params: params("(0.0, 0.0, 0.0)"), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: vec![b], kind, index: None }));
+    let tag = desk.rig().joint(b).unwrap().data.tags[0].uid;
+    desk.select(&[]);
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::All });
+    desk.frames(3);
+    let marks = |desk: &Desk| -> Vec<String> {
+        let marks = desk.seen.iter().filter(|seen| seen.label.ends_with(" is wrong"));
+        marks.map(|seen| seen.label.clone()).collect()
+    };
+    assert!(marks(&desk).is_empty(), "{:?}", marks(&desk));
+    let failed = desk.seen.iter().find(|seen| seen.label.starts_with("b aim failed"));
+    let failed = failed.unwrap_or_else(|| panic!("no failed command in {:?}", desk.seen)).label.clone();
+    desk.click(&failed);
+    desk.frames(60);
+    assert_eq!(desk.selected(), [b]);
+    assert_eq!(marks(&desk), ["direction is wrong"]);
+    let field = desk.find("direction is wrong").rect;
+    assert!(field.top() > 0.0 && field.bottom() < height, "the field is in sight: {field:?}");
+    // Once it is mended, nothing is marked.
+    desk.edit(Operation::Tags(TagOperation::Params(vec![(tag, params("(0.0, 1.0, 0.0)"))])));
+    desk.frames(5);
+    assert!(marks(&desk).is_empty(), "{:?}", marks(&desk));
+}
+
+#[test]
 fn tags_are_listed_with_what_became_of_them() {
     let mut desk = Desk::new(PropertiesPanel::default());
     desk.resize(320.0, 1200.0);
