@@ -14,7 +14,9 @@ mod values;
 use std::{collections::HashSet, sync::Arc};
 
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Checkbox, RichText, ScrollArea, Sense, Ui, WidgetInfo, WidgetType};
+use bevy_egui::egui::{
+    self, Checkbox, CursorIcon, DragAndDrop, RichText, ScrollArea, Sense, Ui, WidgetInfo, WidgetType,
+};
 
 use super::{
     displayed_rig::DisplayedRig,
@@ -76,6 +78,14 @@ pub struct TagsPanel {
     answered: u64,
     /// Card that is scrolled into view.
     reveal: Option<Uid>,
+}
+
+/// A card that is dragged by its handle.
+pub(super) struct DraggedCard {
+    /// Place of the card in the stack.
+    place: usize,
+    /// Its commands; none for a feature.
+    pub commands: Vec<Uid>,
 }
 
 /// Request of a card.
@@ -264,7 +274,11 @@ impl TagsPanel {
             ui.horizontal(|ui| {
                 let handle = ui.add(egui::Label::new(RichText::new("☰").weak()).sense(Sense::drag()));
                 handle.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, format!("Drag {}", entry.title())));
-                handle.dnd_set_drag_payload(number);
+                if handle.drag_started() {
+                    let commands = if entry.module().is_some() { entry.uids() } else { Vec::new() };
+                    DragAndDrop::set_payload(ui.ctx(), DraggedCard { place: number, commands });
+                }
+                handle.on_hover_cursor(CursorIcon::Grab);
                 let is_open = self.open.contains(&tag);
                 let title = entry.title();
                 if list::symbol_button(ui, if is_open { "⏷" } else { "⏵" }, &format!("Values of {title}")) {
@@ -326,8 +340,8 @@ impl TagsPanel {
             card.response.scroll_to_me(Some(egui::Align::Center));
         }
         // A card that was dragged here goes before this one.
-        if let Some(dragged) = card.response.dnd_release_payload::<usize>() {
-            request = request.or(moved(entries, *dragged, number));
+        if let Some(dragged) = card.response.dnd_release_payload::<DraggedCard>() {
+            request = request.or(moved(entries, dragged.place, number));
         }
         request
     }

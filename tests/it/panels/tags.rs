@@ -13,7 +13,10 @@ use bevy_egui::egui;
 use rigsmith::{
     editor::{
         panel::{EditorPanel, Requests},
-        panels::{hierarchy::HierarchyPanel, process::ProcessPanel, properties::PropertiesPanel, tags::TagsPanel},
+        panels::{
+            controls::ControlsPanel, hierarchy::HierarchyPanel, process::ProcessPanel, properties::PropertiesPanel,
+            tags::TagsPanel,
+        },
     },
     files::{RealDisk, load_template, store_rig_over},
     plugins::{
@@ -187,6 +190,54 @@ fn a_module_is_dragged_onto_a_joint() {
     let rig = desk.rig;
     desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
     desk.frames(2);
+    assert_eq!(*desk.rig(), before);
+}
+
+#[test]
+fn a_card_is_dragged_into_a_feature_and_its_switch() {
+    let sheet = Both::sheet(ControlsPanel::default(), TagsPanel::default());
+    let mut desk = Desk::with(sheet, egui::vec2(900.0, 900.0));
+    let [a, _] = desk.chain(&["a", "b"])[..] else { panic!() };
+    let feature = |switch: &str| TagKind::Feature {
+        kind: "feature".into(),
+        name: "arm".into(),
+        switch: switch.into(),
+        choice: String::new(),
+    };
+    let null = TagKind::Command { module: "null".into(), params: "()".into(), feature: None };
+    for kind in [feature(""), feature("soft"), null] {
+        desk.edit(Operation::Tags(TagOperation::Add { joints: vec![a], kind, index: None }));
+    }
+    let [arm, soft, command] = desk.rig().joint(a).unwrap().data.tags.iter().map(|tag| tag.uid).collect::<Vec<_>>()[..]
+    else {
+        panic!()
+    };
+    desk.select(&[a]);
+    desk.click("Features");
+    desk.frames(30);
+    let owner = |desk: &Desk| match &desk.rig().find_tag(command).unwrap().1.kind {
+        TagKind::Command { feature, .. } => *feature,
+        TagKind::Feature { .. } => panic!("it is a command"),
+    };
+    let onto = |desk: &mut Desk, dragged: &str, name: &str| {
+        let (from, to) = (desk.find(dragged).rect.center(), desk.find(name).rect.center());
+        desk.drag(from, to);
+        desk.frames(3);
+    };
+    let (before, steps) = (desk.rig().clone(), desk.steps().1);
+    onto(&mut desk, "Drag null", "soft");
+    assert_eq!((owner(&desk), desk.steps().1), (Some(soft), steps + 1), "{:?}", desk.told());
+    onto(&mut desk, "Drag null", "soft");
+    assert_eq!(desk.steps().1, steps + 1, "it is there already");
+    onto(&mut desk, "Drag null", "arm");
+    assert_eq!((owner(&desk), desk.steps().1), (Some(arm), steps + 2), "{:?}", desk.told());
+    onto(&mut desk, "Drag feature arm", "soft");
+    assert_eq!(desk.steps().1, steps + 2, "a feature is no command");
+    let rig = desk.rig;
+    for _ in 0..2 {
+        desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+        desk.frames(3);
+    }
     assert_eq!(*desk.rig(), before);
 }
 
