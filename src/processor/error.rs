@@ -110,8 +110,8 @@ pub enum BuildProblem {
 }
 
 impl BuildProblem {
-    /// The parameter that is wrong, as the module names it: a field, or a value in one. `None` where no parameter that can
-    /// be read is at fault.
+    /// The parameter that is wrong, as the module names it: a field, or a value in one. `None` where no parameter that
+    /// can be read is at fault.
     pub fn parameter(&self) -> Option<&str> {
         match self {
             Self::Module(

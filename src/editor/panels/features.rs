@@ -1,5 +1,5 @@
-//! Features of a rig: local groups and the features in them, on or off, with their switches and choices. A card of the Tags
-//! panel that is let go on a feature or a switch goes into it.
+//! Features of a rig: local groups and the features in them, on or off, with their switches and choices. A card of the
+//! Tags panel that is let go on a feature or a switch goes into it.
 
 use bevy_egui::egui::{Checkbox, CollapsingHeader, RadioButton, Response, Stroke, StrokeKind, Ui};
 
@@ -101,8 +101,8 @@ fn switch_box(ui: &mut Ui, switch: &FeatureSwitch) -> (Response, Option<bool>) {
     (field, on)
 }
 
-/// Marks a box under a card of the Tags panel, and puts the card's commands into one of the feature's tags when it is let go:
-/// the one on the same joint, if there is one.
+/// Marks a box under a card of the Tags panel, and puts the card's commands into one of the feature's tags when it is let
+/// go: the one on the same joint, if there is one.
 fn drop_card(ui: &Ui, field: &Response, features: &[Uid], shown: &DisplayedRig, send: &mut impl FnMut(TagOperation)) {
     let Some(card) = field.dnd_hover_payload::<DraggedCard>() else { return };
     let joint = |tag: Uid| shown.rig.find_tag(tag).map(|(joint, _)| joint.data.uid);

@@ -10,7 +10,7 @@ use crate::{
     editor::{
         counted::counted,
         dock::ShowPanel,
-        notice::{Notice, Severity},
+        notice::{EditNotice, Notice, Severity},
         panel::{EditorPanel, Requests},
     },
     plugins::{
@@ -27,12 +27,16 @@ impl Plugin for LogPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<LogBook>()
             .add_message::<Notice>()
+            .add_message::<EditNotice>()
             .add_message::<ClearLog>()
             .add_message::<EditRefusal>()
             .add_message::<EditReport>()
             .add_message::<SwitchedOver>()
             .add_message::<RequestRedraw>()
-            .add_systems(Last, (tell_notes, tell_refusals, tell_switches, keep_notices).chain().in_set(LogSystems));
+            .add_systems(
+                Last,
+                (tell_made, tell_notes, tell_refusals, tell_switches, keep_notices).chain().in_set(LogSystems),
+            );
     }
 }
 
@@ -99,6 +103,22 @@ impl LogEntry {
     pub fn line(&self) -> String {
         let times = if self.times > 1 { format!(" ({} times)", self.times) } else { String::new() };
         format!("{} {}: {}{times}", clock(self.at), severity_name(self.notice.severity), self.notice.text)
+    }
+}
+
+/// Tells the success of edits that were made. Each step stands for one notice, for two requests of one title may be one
+/// that is made and one that is refused.
+fn tell_made(
+    mut waiting: MessageReader<EditNotice>,
+    mut edited: MessageReader<EditReport>,
+    mut notices: MessageWriter<Notice>,
+) {
+    let mut made: Vec<&EditReport> = edited.read().filter(|report| report.is_new_step()).collect();
+    for EditNotice { rig, step, notice } in waiting.read() {
+        if let Some(at) = made.iter().position(|report| report.rig == *rig && report.name == *step) {
+            made.remove(at);
+            notices.write(notice.clone());
+        }
     }
 }
 

@@ -77,8 +77,8 @@ impl BuiltTree {
     }
 }
 
-/// Nodes of a built rig, each below its parent unless they are to be `flat`; those alone that contain all words of a filter, if
-/// there are any words.
+/// Nodes of a built rig, each below its parent unless they are to be `flat`; those alone that contain all words of a
+/// filter, if there are any words.
 fn rows(built: &BuiltRig, filter: &str, flat: bool) -> Vec<BuiltRow> {
     let words: Vec<String> = filter.split_whitespace().map(str::to_lowercase).collect();
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); built.nodes.len()];

@@ -1,5 +1,5 @@
-//! Tags of a joint in its row: the first one by its name and the number of the others, or the number alone where there is no
-//! room beside the name of the joint.
+//! Tags of a joint in its row: the first one by its name and the number of the others, or the number alone where there is
+//! no room beside the name of the joint.
 
 use bevy_egui::egui::{Align2, FontId, Rect, Sense, TextStyle, Ui, WidgetInfo, WidgetType, vec2};
 
