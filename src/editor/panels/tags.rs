@@ -84,7 +84,7 @@ pub struct TagsPanel {
 pub(super) struct DraggedCard {
     /// Place of the card in the stack.
     place: usize,
-    /// Its commands; none for a feature.
+    /// Commands of the card; none for a feature.
     pub commands: Vec<Uid>,
 }
 
