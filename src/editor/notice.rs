@@ -1,5 +1,7 @@
 //! Notices for people: toasts, the log and the status line.
 
+use std::borrow::Cow;
+
 use bevy::prelude::*;
 
 /// Importance of a notice.
@@ -58,6 +60,18 @@ impl Notice {
     pub fn quiet(self) -> Self {
         Self { quiet: true, ..self }
     }
+}
+
+/// A notice about the success of an edit that is asked for in the same frame: told once the edit is made, and not at all
+/// if it is refused or has nothing to do.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct EditNotice {
+    /// The rig.
+    pub rig: Entity,
+    /// Title of the step that the edit makes.
+    pub step: Cow<'static, str>,
+    /// The notice.
+    pub notice: Notice,
 }
 
 /// The status line. Tools update it when it changes, so that it describes a click before it is made.

@@ -128,6 +128,13 @@ pub struct EditReport {
     pub notes: Vec<String>,
 }
 
+impl EditReport {
+    /// True if a step was made, and not one undone or redone.
+    pub fn is_new_step(&self) -> bool {
+        matches!(self.committed, Some(Commit::Done(_)))
+    }
+}
+
 /// Message that a change was refused; the rig stays as it was.
 #[derive(Message, Debug, Clone)]
 pub struct EditRefusal {
@@ -256,7 +263,7 @@ fn deletes(edits: &[RigEdit]) -> bool {
 }
 
 /// Title of an operation's step, with the names of joints and of nodes that commands created.
-fn titled(operation: &Operation, rig: &Rig, built: Option<&BuildResult>) -> Cow<'static, str> {
+pub(crate) fn titled(operation: &Operation, rig: &Rig, built: Option<&BuildResult>) -> Cow<'static, str> {
     operation.title(&|node| {
         let created = || Some(built?.0.node(node)?.name.to_string());
         joint_name(rig, node).or_else(created)

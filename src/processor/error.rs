@@ -109,6 +109,21 @@ pub enum BuildProblem {
     OutOfTime(#[from] OutOfTime),
 }
 
+impl BuildProblem {
+    /// The parameter that is wrong, as the module names it: a field, or a value in one. `None` where no parameter that
+    /// can be read is at fault.
+    pub fn parameter(&self) -> Option<&str> {
+        match self {
+            Self::Module(
+                ModuleError::Reference { parameter, .. }
+                | ModuleError::Parameter { parameter, .. }
+                | ModuleError::OutOfRange { parameter, .. },
+            ) => Some(parameter),
+            _ => None,
+        }
+    }
+}
+
 /// A command that failed. What stood before it stands; nothing after it ran.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{module} on {joint_label}: {problem}")]

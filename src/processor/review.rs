@@ -345,12 +345,7 @@ fn faulty_parameter(rig: &Rig, error: &BuildError) -> Option<String> {
             let faulty = fields.find(|field| field.start <= inner.offset && inner.offset < field.end)?;
             Some(faulty.name.to_owned())
         }
-        BuildProblem::Module(
-            ModuleError::Reference { parameter, .. }
-            | ModuleError::Parameter { parameter, .. }
-            | ModuleError::OutOfRange { parameter, .. },
-        ) => Some(field_of(parameter).to_owned()),
-        _ => None,
+        problem => Some(field_of(problem.parameter()?).to_owned()),
     }
 }
 

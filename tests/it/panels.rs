@@ -24,7 +24,10 @@ use rigsmith::{
         panel::EditorPanel,
         panels::{
             controls::ControlsPanel,
-            hierarchy::{HierarchyPanel, rows::rows},
+            hierarchy::{
+                HierarchyPanel,
+                rows::{flat_rows, rows},
+            },
             history::HistoryPanel,
             log::{LogBook, LogPanel},
             poses::PosesPanel,

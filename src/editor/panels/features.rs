@@ -1,13 +1,17 @@
-//! Features of a rig: local groups and the features in them, on or off, with their switches and choices.
+//! Features of a rig: local groups and the features in them, on or off, with their switches and choices. A card of the
+//! Tags panel that is let go on a feature or a switch goes into it.
 
-use bevy_egui::egui::{Checkbox, CollapsingHeader, RadioButton, Ui};
+use bevy_egui::egui::{Checkbox, CollapsingHeader, RadioButton, Response, Stroke, StrokeKind, Ui};
 
-use super::displayed_rig::{DisplayedRig, Stamp};
+use super::{
+    displayed_rig::{DisplayedRig, Stamp},
+    tags::DraggedCard,
+};
 use crate::{
     editor::panel::Requests,
     plugins::document::EditRequest,
     rig::{
-        Uid,
+        TagKind, Uid,
         feature::{CombinedFeature, FeatureState, FeatureSwitch, combined_features},
         operations::{Operation, TagOperation},
     },
@@ -41,7 +45,7 @@ impl Features {
                     group_box(ui, shown, group, &mut send);
                 }
                 ui.indent((first.key.group, "features"), |ui| {
-                    run.iter().for_each(|feature| feature_boxes(ui, feature, &mut send));
+                    run.iter().for_each(|feature| feature_boxes(ui, feature, shown, &mut send));
                 });
             }
         });
@@ -57,10 +61,15 @@ fn group_box(ui: &mut Ui, shown: &DisplayedRig, group: Uid, send: &mut impl FnMu
     }
 }
 
-fn feature_boxes(ui: &mut Ui, feature: &CombinedFeature, send: &mut impl FnMut(TagOperation)) {
+fn feature_boxes(ui: &mut Ui, feature: &CombinedFeature, shown: &DisplayedRig, send: &mut impl FnMut(TagOperation)) {
     let mut on = feature.state == FeatureState::On;
     let field = Checkbox::new(&mut on, &feature.key.name).indeterminate(feature.state == FeatureState::Mixed);
-    if ui.add(field).on_hover_text(&feature.key.kind).clicked() {
+    let field = ui.add(field);
+    // What belongs to the whole feature goes into a part of it that no switch turns off.
+    let is_of_switch = |tag: &Uid| feature.switches.iter().any(|switch| switch.tags.contains(tag));
+    let whole: Vec<Uid> = feature.tags.iter().copied().filter(|tag| !is_of_switch(tag)).collect();
+    drop_card(ui, &field, &whole, shown, send);
+    if field.on_hover_text(&feature.key.kind).clicked() {
         send(TagOperation::SetFeature(feature.key.clone(), feature.state != FeatureState::On));
     }
     if feature.switches.is_empty() {
@@ -68,21 +77,49 @@ fn feature_boxes(ui: &mut Ui, feature: &CombinedFeature, send: &mut impl FnMut(T
     }
     ui.indent((feature.key.group, &feature.key.kind, &feature.key.name), |ui| {
         for switch in &feature.switches {
-            if let Some(on) = switch_box(ui, switch) {
+            let (field, on) = switch_box(ui, switch);
+            drop_card(ui, &field, &switch.tags, shown, send);
+            if let Some(on) = on {
                 send(TagOperation::SetSwitch(feature.key.clone(), switch.name.clone(), on));
             }
         }
     });
 }
 
-/// Draws one switch; returns its state after a click that changes it.
-fn switch_box(ui: &mut Ui, switch: &FeatureSwitch) -> Option<bool> {
+/// Draws one switch; returns its box, and its state after a click that changes it.
+fn switch_box(ui: &mut Ui, switch: &FeatureSwitch) -> (Response, Option<bool>) {
     let is_on = switch.state == FeatureState::On;
     if switch.choice.is_empty() {
         let mut on = is_on;
         let field = Checkbox::new(&mut on, &switch.name).indeterminate(switch.state == FeatureState::Mixed);
-        return ui.add(field).clicked().then_some(!is_on);
+        let field = ui.add(field);
+        let on = field.clicked().then_some(!is_on);
+        return (field, on);
     }
-    let field = ui.add(RadioButton::new(is_on, &switch.name));
-    (field.on_hover_text(format!("One of \"{}\"", switch.choice)).clicked() && !is_on).then_some(true)
+    let field = ui.add(RadioButton::new(is_on, &switch.name)).on_hover_text(format!("One of \"{}\"", switch.choice));
+    let on = (field.clicked() && !is_on).then_some(true);
+    (field, on)
+}
+
+/// Marks a box under a card of the Tags panel, and puts the card's commands into one of the feature's tags when it is let
+/// go: the one on the same joint, if there is one.
+fn drop_card(ui: &Ui, field: &Response, features: &[Uid], shown: &DisplayedRig, send: &mut impl FnMut(TagOperation)) {
+    let Some(card) = field.dnd_hover_payload::<DraggedCard>() else { return };
+    let joint = |tag: Uid| shown.rig.find_tag(tag).map(|(joint, _)| joint.data.uid);
+    let Some(home) = card.commands.first().and_then(|command| joint(*command)) else { return };
+    let near = features.iter().find(|feature| joint(**feature) == Some(home));
+    let Some(feature) = near.or(features.first()).copied() else { return };
+    let is_elsewhere = |command: &Uid| {
+        let tag = shown.rig.find_tag(*command).map(|(_, tag)| &tag.kind);
+        matches!(tag, Some(TagKind::Command { feature: own, .. }) if *own != Some(feature))
+    };
+    let commands: Vec<Uid> = card.commands.iter().copied().filter(is_elsewhere).collect();
+    if commands.is_empty() {
+        return;
+    }
+    let stroke = Stroke::new(1.5, ui.visuals().selection.stroke.color);
+    ui.painter().rect_stroke(field.rect, 3.0, stroke, StrokeKind::Outside);
+    if field.dnd_release_payload::<DraggedCard>().is_some() {
+        send(TagOperation::Attach(commands, Some(feature)));
+    }
 }

@@ -1,4 +1,4 @@
-//! Hierarchy panel: the tree of joints, or of all nodes that are built.
+//! Hierarchy panel: the joints with their tags, or all nodes that are built, as a tree or as a list.
 //!
 //! The panel shows the rig's own selection and changes it with pick requests, so the viewport and the tree never
 //! differ.
@@ -7,6 +7,7 @@ mod built;
 mod keys;
 mod menu;
 mod row;
+mod row_tags;
 pub mod rows;
 
 use std::collections::HashSet;
@@ -32,7 +33,7 @@ use crate::{
     rig::{Rig, Uid, operations::Operation},
 };
 use built::BuiltTree;
-use rows::{Row, rows};
+use rows::{Row, flat_rows, rows};
 
 /// The panel.
 #[derive(Default)]
@@ -58,6 +59,8 @@ pub struct HierarchyPanel {
     built: BuiltTree,
     /// True if all nodes of the built rig are listed, not its joints alone.
     shows_built: bool,
+    /// True if the rows are a list, without their hierarchy.
+    is_flat: bool,
 }
 
 /// The listed rows with the state they were made from.
@@ -120,19 +123,26 @@ impl HierarchyPanel {
             requests.send(HoverJoint { rig: shown.entity, joint: None });
         }
         let tip = "Nodes whose name, kind or module contains all of these words";
-        let mut is_back = false;
+        let (mut is_back, is_flat) = (false, &mut self.is_flat);
         list::search_bar(ui, "Filter", tip, &mut self.filter, |ui| {
+            // The joints change with it.
+            self.stale |= flat_button(ui, is_flat);
             is_back = ui.button("Joints").on_hover_text("Back to the joints").clicked();
         });
         self.shows_built = !is_back;
-        self.built.show(ui, world, shown, &self.filter, requests);
+        self.built.show(ui, world, shown, (self.filter.as_str(), self.is_flat), requests);
     }
 
-    /// Draws the filter and the fold buttons.
+    /// Draws the filter, the fold buttons and the switch to a list.
     fn bar(&mut self, ui: &mut Ui, shown: &DisplayedRig) {
         let mut fold: Option<bool> = None;
         let tip = "Joints whose label, group or tags contain all of these words";
+        let is_flat = &mut self.is_flat;
         list::search_bar(ui, "Filter", tip, &mut self.filter, |ui| {
+            self.stale |= flat_button(ui, is_flat);
+            if *is_flat {
+                return;
+            }
             if list::symbol_button(ui, "⏵", "Fold all") {
                 fold = Some(true);
             }
@@ -157,7 +167,10 @@ impl HierarchyPanel {
         let fresh = self.tree.made_from.as_ref().is_some_and(|(from, filter)| *from == stamp && *filter == self.filter);
         if !fresh || std::mem::take(&mut self.stale) {
             self.folded.retain(|joint| shown.rig.joint(*joint).is_some());
-            self.tree.rows = rows(&shown.rig, &self.folded, &self.filter);
+            self.tree.rows = match self.is_flat {
+                true => flat_rows(&shown.rig, &self.filter),
+                false => rows(&shown.rig, &self.folded, &self.filter),
+            };
             self.tree.deepest = self.tree.rows.iter().map(|row| row.depth).max().unwrap_or_default();
             self.tree.made_from = Some((stamp, self.filter.clone()));
         }
@@ -271,6 +284,16 @@ impl HierarchyPanel {
         }
         self.stale = true;
     }
+}
+
+/// Draws the switch between a list and a tree; returns `true` if it was clicked.
+fn flat_button(ui: &mut Ui, is_flat: &mut bool) -> bool {
+    let said = "As a list";
+    let button = ui.selectable_label(*is_flat, "☰").on_hover_text("As a list, without the hierarchy");
+    button.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, *is_flat, said));
+    let is_clicked = button.clicked();
+    *is_flat ^= is_clicked;
+    is_clicked
 }
 
 /// Selects joints; the last is active.

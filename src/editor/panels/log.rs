@@ -10,7 +10,7 @@ use crate::{
     editor::{
         counted::counted,
         dock::ShowPanel,
-        notice::{Notice, Severity},
+        notice::{EditNotice, Notice, Severity},
         panel::{EditorPanel, Requests},
     },
     plugins::{
@@ -27,12 +27,16 @@ impl Plugin for LogPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<LogBook>()
             .add_message::<Notice>()
+            .add_message::<EditNotice>()
             .add_message::<ClearLog>()
             .add_message::<EditRefusal>()
             .add_message::<EditReport>()
             .add_message::<SwitchedOver>()
             .add_message::<RequestRedraw>()
-            .add_systems(Last, (tell_notes, tell_refusals, tell_switches, keep_notices).chain().in_set(LogSystems));
+            .add_systems(
+                Last,
+                (tell_made, tell_notes, tell_refusals, tell_switches, keep_notices).chain().in_set(LogSystems),
+            );
     }
 }
 
@@ -99,6 +103,22 @@ impl LogEntry {
     pub fn line(&self) -> String {
         let times = if self.times > 1 { format!(" ({} times)", self.times) } else { String::new() };
         format!("{} {}: {}{times}", clock(self.at), severity_name(self.notice.severity), self.notice.text)
+    }
+}
+
+/// Tells the success of edits that were made. Each step stands for one notice, for two requests of one title may be one
+/// that is made and one that is refused.
+fn tell_made(
+    mut waiting: MessageReader<EditNotice>,
+    mut edited: MessageReader<EditReport>,
+    mut notices: MessageWriter<Notice>,
+) {
+    let mut made: Vec<&EditReport> = edited.read().filter(|report| report.is_new_step()).collect();
+    for EditNotice { rig, step, notice } in waiting.read() {
+        if let Some(at) = made.iter().position(|report| report.rig == *rig && report.name == *step) {
+            made.remove(at);
+            notices.write(notice.clone());
+        }
     }
 }
 
@@ -174,15 +194,30 @@ fn keep_notices(
 #[derive(Default)]
 pub struct LogPanel {
     search: String,
+    /// True for each of [`KINDS`] that is left out.
+    hidden: [bool; 3],
     /// The entry whose full text is shown.
     chosen: Option<u64>,
     listed: MatchedEntries,
 }
 
-/// Numbers of the entries that match the search, with the search they belong to.
+/// Kinds of entries that are listed or left out, by a severity of each.
+const KINDS: [(Severity, &str); 3] =
+    [(Severity::Info, "Show information"), (Severity::Warning, "Show warnings"), (Severity::Error, "Show errors")];
+
+/// Number of an entry's kind in [`KINDS`].
+fn kind_of(severity: Severity) -> usize {
+    match severity {
+        Severity::Info | Severity::Done => 0,
+        Severity::Warning => 1,
+        Severity::Error => 2,
+    }
+}
+
+/// Numbers of the entries that match the search, with the search and the kinds they belong to.
 #[derive(Default)]
 struct MatchedEntries {
-    made_from: Option<(u64, usize, String)>,
+    made_from: Option<(u64, usize, String, [bool; 3])>,
     places: Vec<usize>,
 }
 
@@ -225,7 +260,7 @@ impl EditorPanel for LogPanel {
 impl LogPanel {
     /// Searches again if the entries or the search changed; returns `true` if so.
     fn refresh(&mut self, book: &LogBook) -> bool {
-        let key = (book.next, book.entries.len(), self.search.clone());
+        let key = (book.next, book.entries.len(), self.search.clone(), self.hidden);
         if self.listed.made_from.as_ref() == Some(&key) {
             return false;
         }
@@ -233,7 +268,8 @@ impl LogPanel {
         let found = |entry: &LogEntry| {
             let text = entry.notice.text.to_lowercase();
             let kind = severity_name(entry.notice.severity);
-            words.iter().all(|word| text.contains(word) || kind.starts_with(word.as_str()))
+            !self.hidden[kind_of(entry.notice.severity)]
+                && words.iter().all(|word| text.contains(word) || kind.starts_with(word.as_str()))
         };
         self.listed.places =
             book.entries().enumerate().filter(|(_, entry)| found(entry)).map(|(place, _)| place).collect();
@@ -243,10 +279,15 @@ impl LogPanel {
 
     fn bar(&mut self, ui: &mut Ui, book: &LogBook, requests: &mut Requests) {
         let (mut copy, mut clear) = (false, false);
+        let hidden = &mut self.hidden;
         let tip = "Entries with all of these words; error, warning, done and info stand for the kinds";
         list::search_bar(ui, "Search", tip, &mut self.search, |ui| {
             clear = ui.button("Clear").on_hover_text("Forget all entries").clicked();
             copy = ui.button("Copy").on_hover_text("Copy what is listed").clicked();
+            // From right to left.
+            for ((severity, name), hidden) in KINDS.into_iter().zip(hidden).rev() {
+                kind_button(ui, severity, name, hidden);
+            }
         });
         if copy {
             let lines = self.listed.places.iter().filter_map(|place| book.entries.get(*place)).map(LogEntry::line);
@@ -267,6 +308,18 @@ impl LogPanel {
                 entry_row(ui, row(number), entry, chosen);
             }
         });
+    }
+}
+
+/// Draws a button that lists entries of a kind or leaves them out.
+fn kind_button(ui: &mut Ui, severity: Severity, name: &str, hidden: &mut bool) {
+    let (symbol, color) = severity_symbol(ui, severity);
+    let is_listed = !*hidden;
+    let color = if is_listed { color } else { ui.visuals().weak_text_color() };
+    let button = ui.selectable_label(is_listed, RichText::new(symbol).color(color)).on_hover_text(name);
+    button.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, is_listed, name));
+    if button.clicked() {
+        *hidden = is_listed;
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Tags that several selected joints have alike are one card and are changed together.
 
+mod fault;
 pub(super) mod library;
 mod parameter_text;
 mod parts;
@@ -13,7 +14,9 @@ mod values;
 use std::{collections::HashSet, sync::Arc};
 
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Checkbox, RichText, ScrollArea, Sense, Ui, WidgetInfo, WidgetType};
+use bevy_egui::egui::{
+    self, Checkbox, CursorIcon, DragAndDrop, RichText, ScrollArea, Sense, Ui, WidgetInfo, WidgetType,
+};
 
 use super::{
     displayed_rig::DisplayedRig,
@@ -33,12 +36,13 @@ use crate::{
         document::{Change, EditRequest},
         picking::{Pick, PickRequest},
     },
-    processor::{CommandState, Modules},
+    processor::{CommandState, CommandStatus, Modules},
     rig::{
         TagKind, Uid,
         operations::{Operation, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation},
     },
 };
+use fault::Fault;
 use stack::{Entry, Stack};
 use values::{ValueEdit, Values};
 
@@ -74,6 +78,14 @@ pub struct TagsPanel {
     answered: u64,
     /// Card that is scrolled into view.
     reveal: Option<Uid>,
+}
+
+/// A card that is dragged by its handle.
+pub(super) struct DraggedCard {
+    /// Place of the card in the stack.
+    place: usize,
+    /// Commands of the card; none for a feature.
+    pub commands: Vec<Uid>,
 }
 
 /// Request of a card.
@@ -254,13 +266,19 @@ impl TagsPanel {
         let entry = entries.get(number)?;
         let tag = entry.first.uid;
         let mut request = None;
+        let reveals = self.reveal.take_if(|revealed| *revealed == tag).is_some();
+        let mut is_field_shown = false;
         let frame = egui::Frame::group(ui.style()).inner_margin(4.0).outer_margin(egui::Margin::symmetric(0, 1));
         let card = frame.show(ui, |ui| {
             ui.set_width(ui.available_width());
             ui.horizontal(|ui| {
                 let handle = ui.add(egui::Label::new(RichText::new("☰").weak()).sense(Sense::drag()));
                 handle.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, format!("Drag {}", entry.title())));
-                handle.dnd_set_drag_payload(number);
+                if handle.drag_started() {
+                    let commands = if entry.module().is_some() { entry.uids() } else { Vec::new() };
+                    DragAndDrop::set_payload(ui.ctx(), DraggedCard { place: number, commands });
+                }
+                handle.on_hover_cursor(CursorIcon::Grab);
                 let is_open = self.open.contains(&tag);
                 let title = entry.title();
                 if list::symbol_button(ui, if is_open { "⏷" } else { "⏵" }, &format!("Values of {title}")) {
@@ -303,10 +321,13 @@ impl TagsPanel {
             match modules.get(name) {
                 Some(module) => {
                     ui.weak(module.doc);
-                    if let Some(reason) = failure(world, shown, entry) {
+                    let failed = failure(world, shown, entry);
+                    if let Some(reason) = failed.and_then(reason) {
                         ui.colored_label(ui.visuals().error_fg_color, reason);
                     }
-                    let edit = self.values.show(ui, shown, builder, module, entry);
+                    let fault = failed.and_then(|status| Fault::of(status, reveals));
+                    let edit = self.values.show(ui, shown, builder, module, entry, fault.as_ref());
+                    is_field_shown = fault.is_some_and(|fault| fault.is_shown());
                     request = request.take().or(edit.map(CardRequest::Value));
                 }
                 None => {
@@ -315,12 +336,12 @@ impl TagsPanel {
                 }
             }
         });
-        if self.reveal.take_if(|revealed| *revealed == tag).is_some() {
+        if reveals && !is_field_shown {
             card.response.scroll_to_me(Some(egui::Align::Center));
         }
         // A card that was dragged here goes before this one.
-        if let Some(dragged) = card.response.dnd_release_payload::<usize>() {
-            request = request.or(moved(entries, *dragged, number));
+        if let Some(dragged) = card.response.dnd_release_payload::<DraggedCard>() {
+            request = request.or(moved(entries, dragged.place, number));
         }
         request
     }
@@ -349,11 +370,11 @@ fn enabled(ui: &mut Ui, shown: &DisplayedRig, entry: &Entry) -> Option<CardReque
     clicked.then_some(CardRequest::Operation(TagOperation::Enable(tags, mixed || value)))
 }
 
-/// Reason why a command of an entry failed, if one did.
-fn failure(world: &World, shown: &DisplayedRig, entry: &Entry) -> Option<String> {
+/// State of a command of an entry that failed, if one did.
+fn failure<'w>(world: &'w World, shown: &DisplayedRig, entry: &Entry) -> Option<&'w CommandStatus> {
     let entities = world.get::<TagEntities>(shown.entity)?;
     let mut reports = entry.tags.iter().filter_map(|(_, tag)| world.get::<CommandReport>(entities.get(*tag)?));
-    reports.find(|report| report.0.state == CommandState::Failed).and_then(|report| reason(&report.0))
+    reports.find(|report| report.0.state == CommandState::Failed).map(|report| &report.0)
 }
 
 /// Draws the state of the commands in the build: the worst state of all.

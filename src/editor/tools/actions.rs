@@ -9,10 +9,10 @@ use super::{
 use crate::{
     editor::{
         actions::{Action, ActionRequest},
-        notice::Notice,
+        notice::{EditNotice, Notice},
     },
     plugins::{
-        document::EditRequest,
+        document::{EditRequest, titled},
         picking::{Pick, PickRequest},
     },
     rig::{Uid, operations::Operation},
@@ -23,7 +23,7 @@ pub struct ToolActionsPlugin;
 
 impl Plugin for ToolActionsPlugin {
     fn build(&self, app: &mut App) {
-        app.add_systems(Update, act_on_selection.in_set(ToolSystems::Actions));
+        app.add_message::<EditNotice>().add_systems(Update, act_on_selection.in_set(ToolSystems::Actions));
     }
 }
 
@@ -33,6 +33,7 @@ pub(super) fn act_on_selection(
     mut edits: MessageWriter<EditRequest>,
     mut picks: MessageWriter<PickRequest>,
     mut notices: MessageWriter<Notice>,
+    mut done: MessageWriter<EditNotice>,
 ) {
     for ActionRequest(action) in actions.read() {
         let Some(rig) = scene.rig() else { continue };
@@ -59,14 +60,13 @@ pub(super) fn act_on_selection(
             continue;
         }
         let what = joints(count);
-        notices.write(
-            match action {
-                Action::MirrorSelected => Notice::done(format!("Made the other side of {what} and all below.")),
-                Action::Delete => Notice::done(format!("Deleted {what}; what hung below moved up.")),
-                _ => Notice::done(format!("Deleted {what} and all below.")),
-            }
-            .quiet(),
-        );
+        let told = match action {
+            Action::MirrorSelected => format!("Made the other side of {what} and all below."),
+            Action::Delete => format!("Deleted {what}; what hung below moved up."),
+            _ => format!("Deleted {what} and all below."),
+        };
+        let step = titled(&operation, &rig.rig, rig.built);
+        done.write(EditNotice { rig: rig.entity, step, notice: Notice::done(told).quiet() });
         edits.write(EditRequest::operation(rig.entity, operation));
     }
 }

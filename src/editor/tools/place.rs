@@ -20,6 +20,7 @@ use crate::{
     },
     mesh::ray::Ray,
     plugins::{
+        document::EditReport,
         picking::{HoverRequest, Pick, PickRequest},
         placement::{PlaceAnswer, PlaceRequest, PlacedJoint, joint_at},
         viewport::Sight,
@@ -245,14 +246,21 @@ pub(super) fn place(
     }
 }
 
-/// Tells what became of clicks that waited for the mesh.
-fn tell_late(mut answers: MessageReader<PlaceAnswer>, mut notices: MessageWriter<Notice>) {
-    for PlaceAnswer { placement, refusal, .. } in answers.read().filter(|answer| answer.waited) {
+/// Tells what became of clicks that waited for the mesh. Edits are made in the frame of their answer; what is refused is
+/// told with all refusals.
+fn tell_late(
+    mut answers: MessageReader<PlaceAnswer>,
+    mut edited: MessageReader<EditReport>,
+    mut notices: MessageWriter<Notice>,
+) {
+    let changed: Vec<Entity> = edited.read().filter(|report| report.is_new_step()).map(|report| report.rig).collect();
+    for PlaceAnswer { rig, placement, refusal, .. } in answers.read().filter(|answer| answer.waited) {
         notices.write(match (refusal, placement) {
             (Some(why), _) => Notice::info(format!("No joint was placed: {why}.")),
             (None, Placement::Nothing) => {
                 Notice::info("No joint was placed: the click waited for the mesh, and is beside it.")
             }
+            (None, _) if !changed.contains(rig) => continue,
             (None, _) => Notice::done("Placed the joint of the click that waited for the mesh.").quiet(),
         });
     }

@@ -50,6 +50,70 @@ fn the_filter_finds_joints_by_what_is_built_on_them() {
 }
 
 #[test]
+fn rows_tell_their_tags() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let [a, b, long] = desk.chain(&["a", "b", "a joint whose name takes all the room of its row and more"])[..] else {
+        panic!()
+    };
+    for (joint, module) in [(b, "control"), (b, "null"), (b, "spring"), (long, "control"), (long, "null")] {
+        let kind = TagKind::Command { module: module.into(), params: "()".into(), feature: None };
+        desk.edit(Operation::Tags(TagOperation::Add { joints: vec![joint], kind, index: None }));
+    }
+    desk.select(&[a]);
+    let tags = |desk: &Desk| -> Vec<String> {
+        let told = desk.seen.iter().filter(|seen| seen.label.starts_with("Tags of "));
+        told.map(|seen| seen.label.clone()).collect()
+    };
+    let of_long = format!("Tags of {}: control, null", desk.label(long));
+    assert_eq!(tags(&desk), ["Tags of b: control, null, spring", of_long.as_str()]);
+    // The number alone takes little from a long name.
+    let (row, told) = (desk.find(&desk.label(long).to_owned()).rect, desk.find(&of_long).rect);
+    assert!(told.width() < 0.1 * row.width() && row.contains_rect(told), "{told:?} {row:?}");
+    let short = desk.find("Tags of b: control, null, spring").rect;
+    assert!(short.width() > told.width() && short.width() < 0.4 * row.width(), "{short:?}");
+    // A click there is one on the row.
+    desk.click("Tags of b: control, null, spring");
+    assert_eq!(desk.selected(), [b]);
+    let tag = desk.rig().joint(b).unwrap().data.tags[1].uid;
+    desk.edit(Operation::Tags(TagOperation::Enable(vec![tag], false)));
+    assert!(desk.look("Tags of b: control, null (off), spring").is_some(), "{:?}", tags(&desk));
+}
+
+#[test]
+fn joints_are_a_tree_or_a_list() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let joints = desk.chain(&["hips", "spine", "Arm_L"]);
+    desk.chain(&["tail"]);
+    for (filter, expected) in
+        [("", vec!["hips", "spine", "Arm_L", "tail"]), ("arm", vec!["Arm_L"]), ("nothing", vec![])]
+    {
+        let found = flat_rows(desk.rig(), filter);
+        assert!(found.iter().all(|row| row.depth == 0 && !row.parent && row.matches), "{found:?}");
+        let labels: Vec<&str> = found.iter().map(|row| desk.label(row.joint)).collect();
+        assert_eq!(labels, expected, "{filter}");
+    }
+    let (before, steps) = (desk.rig().clone(), desk.steps());
+    desk.click("Fold hips");
+    desk.frames(2);
+    assert!(desk.look("spine").is_none());
+    desk.click("As a list");
+    desk.frames(2);
+    assert_eq!(desk.find("As a list").on, Some(true));
+    assert!(desk.look("Arm_L").is_some() && desk.look("Fold hips").is_none() && desk.look("Fold all").is_none());
+    desk.click("spine");
+    desk.hold(Modifiers::SHIFT);
+    desk.click("tail");
+    desk.hold(Modifiers::NONE);
+    let tail = desk.rig().walk().last().unwrap().data.uid;
+    assert_eq!(desk.selected(), [joints[1], joints[2], tail]);
+    desk.click("As a list");
+    desk.frames(2);
+    assert_eq!(desk.find("As a list").on, Some(false));
+    assert!(desk.look("Fold all").is_some());
+    assert_eq!((desk.rig(), desk.steps()), (&before, steps), "looking is no step");
+}
+
+#[test]
 fn built_nodes_are_listed_and_lead_to_their_commands() {
     let mut desk = Desk::new(HierarchyPanel::default());
     let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };

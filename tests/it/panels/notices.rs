@@ -42,6 +42,42 @@ fn everything_is_told_and_the_log_is_capped() {
 }
 
 #[test]
+fn the_log_is_filtered_by_severity() {
+    let mut desk = Desk::new(LogPanel::default());
+    for notice in
+        [Notice::info("told"), Notice::done("made"), Notice::warning("doubtful"), Notice::error("wrong").at("Process")]
+    {
+        desk.app.world_mut().write_message(notice);
+    }
+    desk.frames(3);
+    let listed = |desk: &Desk| -> Vec<&str> {
+        ["told", "made", "doubtful", "wrong"].into_iter().filter(|text| desk.look(text).is_some()).collect()
+    };
+    let toggled = |desk: &mut Desk, name: &str| {
+        let was_on = desk.find(name).on;
+        desk.click(name);
+        desk.frames(2);
+        assert_ne!(desk.find(name).on, was_on, "{name} tells its state");
+    };
+    assert_eq!(listed(&desk), ["told", "made", "doubtful", "wrong"]);
+    toggled(&mut desk, "Show information");
+    assert_eq!(listed(&desk), ["doubtful", "wrong"]);
+    toggled(&mut desk, "Show warnings");
+    assert_eq!(listed(&desk), ["wrong"]);
+    toggled(&mut desk, "Show errors");
+    assert!(listed(&desk).is_empty());
+    // Others that come are sorted in, too, and words narrow what is listed.
+    desk.app.world_mut().write_message(Notice::done("made again"));
+    toggled(&mut desk, "Show information");
+    assert_eq!(listed(&desk), ["told", "made"]);
+    assert!(desk.look("made again").is_some());
+    desk.click("Search");
+    desk.type_text("again");
+    desk.frames(2);
+    assert!(listed(&desk).is_empty() && desk.look("made again").is_some());
+}
+
+#[test]
 fn toasts_are_few_and_errors_stay_longest() {
     let size = egui::vec2(1280.0, 720.0);
     let mut desk = Desk::with(Sheet::Overlay(Box::new(Toasts::default())), size);

@@ -13,7 +13,10 @@ use bevy_egui::egui;
 use rigsmith::{
     editor::{
         panel::{EditorPanel, Requests},
-        panels::{process::ProcessPanel, properties::PropertiesPanel, tags::TagsPanel},
+        panels::{
+            controls::ControlsPanel, hierarchy::HierarchyPanel, process::ProcessPanel, properties::PropertiesPanel,
+            tags::TagsPanel,
+        },
     },
     files::{RealDisk, load_template, store_rig_over},
     plugins::{
@@ -96,6 +99,38 @@ fn a_failed_command_leads_to_its_card_and_commands_to_what_they_made() {
 }
 
 #[test]
+fn a_failed_command_leads_to_the_field_at_fault() {
+    let height = 240.0;
+    let sheet = Both::sheet(ProcessPanel::default(), TagsPanel::default());
+    let mut desk = Desk::with(sheet, egui::vec2(900.0, height));
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    let params = |direction: &str| format!("(targets: \"@joint a#{a}\", direction: {direction})");
+    let kind = TagKind::Command { module: "aim".into(), params: params("(0.0, 0.0, 0.0)"), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: vec![b], kind, index: None }));
+    let tag = desk.rig().joint(b).unwrap().data.tags[0].uid;
+    desk.select(&[]);
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::All });
+    desk.frames(3);
+    let marks = |desk: &Desk| -> Vec<String> {
+        let marks = desk.seen.iter().filter(|seen| seen.label.ends_with(" is wrong"));
+        marks.map(|seen| seen.label.clone()).collect()
+    };
+    assert!(marks(&desk).is_empty(), "{:?}", marks(&desk));
+    let failed = desk.seen.iter().find(|seen| seen.label.starts_with("b aim failed"));
+    let failed = failed.unwrap_or_else(|| panic!("no failed command in {:?}", desk.seen)).label.clone();
+    desk.click(&failed);
+    desk.frames(60);
+    assert_eq!(desk.selected(), [b]);
+    assert_eq!(marks(&desk), ["direction is wrong"]);
+    let field = desk.find("direction is wrong").rect;
+    assert!(field.top() > 0.0 && field.bottom() < height, "the field is in sight: {field:?}");
+    // Once it is mended, nothing is marked.
+    desk.edit(Operation::Tags(TagOperation::Params(vec![(tag, params("(0.0, 1.0, 0.0)"))])));
+    desk.frames(5);
+    assert!(marks(&desk).is_empty(), "{:?}", marks(&desk));
+}
+
+#[test]
 fn tags_are_listed_with_what_became_of_them() {
     let mut desk = Desk::new(PropertiesPanel::default());
     desk.resize(320.0, 1200.0);
@@ -124,6 +159,86 @@ fn tags_are_listed_with_what_became_of_them() {
     desk.click("control");
     desk.frames(3);
     assert!(is_on(&desk) && !desk.says("passed over"));
+}
+
+#[test]
+fn a_module_is_dragged_onto_a_joint() {
+    let sheet = Both::sheet(HierarchyPanel::default(), TagsPanel::default());
+    let mut desk = Desk::with(sheet, egui::vec2(900.0, 900.0));
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    desk.select(&[a]);
+    let (before, steps) = (desk.rig().clone(), desk.steps().1);
+    desk.click("+ Add");
+    desk.frames(3);
+    desk.type_text("null");
+    desk.frames(3);
+    let (null, row) = (desk.find("null").rect, desk.find("b").rect);
+    assert!(!null.x_range().contains(row.center().x), "the library lies over the joints: {null:?} {row:?}");
+    desk.drag(null.center(), row.center());
+    desk.frames(3);
+    let modules = |desk: &Desk, joint: Uid| -> Vec<String> {
+        let tags = desk.rig().joint(joint).unwrap().data.tags.iter();
+        let module = |tag: &TagData| match &tag.kind {
+            TagKind::Command { module, .. } => module.clone(),
+            TagKind::Feature { name, .. } => panic!("{name} is no command"),
+        };
+        tags.map(module).collect()
+    };
+    assert!(modules(&desk, a).is_empty(), "{:?}", modules(&desk, a));
+    assert_eq!(modules(&desk, b), ["null"], "{:?}", desk.told());
+    assert_eq!(desk.steps().1, steps + 1);
+    let rig = desk.rig;
+    desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+    desk.frames(2);
+    assert_eq!(*desk.rig(), before);
+}
+
+#[test]
+fn a_card_is_dragged_into_a_feature_and_its_switch() {
+    let sheet = Both::sheet(ControlsPanel::default(), TagsPanel::default());
+    let mut desk = Desk::with(sheet, egui::vec2(900.0, 900.0));
+    let [a, _] = desk.chain(&["a", "b"])[..] else { panic!() };
+    let feature = |switch: &str| TagKind::Feature {
+        kind: "feature".into(),
+        name: "arm".into(),
+        switch: switch.into(),
+        choice: String::new(),
+    };
+    let null = TagKind::Command { module: "null".into(), params: "()".into(), feature: None };
+    for kind in [feature(""), feature("soft"), null] {
+        desk.edit(Operation::Tags(TagOperation::Add { joints: vec![a], kind, index: None }));
+    }
+    let [arm, soft, command] = desk.rig().joint(a).unwrap().data.tags.iter().map(|tag| tag.uid).collect::<Vec<_>>()[..]
+    else {
+        panic!()
+    };
+    desk.select(&[a]);
+    desk.click("Features");
+    desk.frames(30);
+    let owner = |desk: &Desk| match &desk.rig().find_tag(command).unwrap().1.kind {
+        TagKind::Command { feature, .. } => *feature,
+        TagKind::Feature { .. } => panic!("it is a command"),
+    };
+    let onto = |desk: &mut Desk, dragged: &str, name: &str| {
+        let (from, to) = (desk.find(dragged).rect.center(), desk.find(name).rect.center());
+        desk.drag(from, to);
+        desk.frames(3);
+    };
+    let (before, steps) = (desk.rig().clone(), desk.steps().1);
+    onto(&mut desk, "Drag null", "soft");
+    assert_eq!((owner(&desk), desk.steps().1), (Some(soft), steps + 1), "{:?}", desk.told());
+    onto(&mut desk, "Drag null", "soft");
+    assert_eq!(desk.steps().1, steps + 1, "it is there already");
+    onto(&mut desk, "Drag null", "arm");
+    assert_eq!((owner(&desk), desk.steps().1), (Some(arm), steps + 2), "{:?}", desk.told());
+    onto(&mut desk, "Drag feature arm", "soft");
+    assert_eq!(desk.steps().1, steps + 2, "a feature is no command");
+    let rig = desk.rig;
+    for _ in 0..2 {
+        desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+        desk.frames(3);
+    }
+    assert_eq!(*desk.rig(), before);
 }
 
 #[test]

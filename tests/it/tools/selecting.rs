@@ -1,5 +1,17 @@
 //! The tool for selections: hovering, clicks, boxes, and actions on what is selected.
 
+use rigsmith::{
+    editor::{
+        ActiveRig,
+        actions::ActionRequest,
+        notice::Severity,
+        panels::log::{LogBook, LogPlugin},
+        tools::ToolsPlugin,
+    },
+    headless::headless_app,
+    test_app::strict_app,
+};
+
 use super::*;
 
 #[test]
@@ -65,6 +77,29 @@ fn drags_select_boxes() {
     assert_eq!(bench.selected().len(), joints.len());
     bench.point(CONTROL, &drag);
     assert_eq!(bench.selected(), joints[3..]);
+}
+
+#[test]
+fn success_is_told_of_edits_that_are_made_alone() {
+    let mut app = headless_app(1);
+    app.add_plugins((ToolsPlugin, LogPlugin));
+    let mut bench = RigBench::with(strict_app(app), Rig::new(Uid(1), "rig"));
+    bench.app.insert_resource(ActiveRig(bench.rig)).insert_resource(ViewportSight(Some(front())));
+    let joints = bench.chain(&[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 2.0, 0.0]]);
+    bench.send(PickRequest { rig: bench.rig, what: Pick::Joints(vec![joints[2]]), add: false });
+    // When the second request comes, there is nothing left to delete.
+    bench.app.world_mut().write_message(ActionRequest(Action::Delete));
+    bench.app.world_mut().write_message(ActionRequest(Action::Delete));
+    bench.frames(3);
+    assert_eq!(bench.rig().len(), 2);
+    let book = bench.app.world().resource::<LogBook>();
+    let told = |severity: Severity| -> Vec<(&str, u32)> {
+        let entries = book.entries().filter(|entry| entry.notice.severity == severity);
+        entries.map(|entry| (entry.notice.text.as_str(), entry.times)).collect()
+    };
+    assert_eq!(told(Severity::Done), [("Deleted 1 joint; what hung below moved up.", 1)]);
+    let [(refused, 1)] = told(Severity::Error)[..] else { panic!("{:?}", told(Severity::Error)) };
+    assert!(refused.starts_with("There is no joint"), "{refused}");
 }
 
 #[test]

@@ -22,10 +22,10 @@ use crate::{
     rig::{BuiltRig, NodeType, Uid},
 };
 
-/// Nodes that are listed, with the build and the filter that they were made from.
+/// Nodes that are listed, with what they were made from: the build, the filter, and `true` for a list.
 #[derive(Default)]
 pub(super) struct BuiltTree {
-    made_from: Option<(Arc<BuiltRig>, String)>,
+    made_from: Option<(Arc<BuiltRig>, String, bool)>,
     rows: Vec<BuiltRow>,
 }
 
@@ -47,17 +47,25 @@ const INDENT: f32 = 12.0;
 const MOST_STEPS: usize = 10;
 
 impl BuiltTree {
-    /// Draws the nodes that contain all words of a filter.
-    pub fn show(&mut self, ui: &mut Ui, world: &World, shown: &DisplayedRig, filter: &str, requests: &mut Requests) {
+    /// Draws the nodes that contain all words of a filter; as a list if it is to be `flat`.
+    pub fn show(
+        &mut self,
+        ui: &mut Ui,
+        world: &World,
+        shown: &DisplayedRig,
+        (filter, flat): (&str, bool),
+        requests: &mut Requests,
+    ) {
         let Some(BuildResult(built)) = world.get::<BuildResult>(shown.entity) else {
             self.made_from = None;
             return list::nothing(ui, "Nothing is built yet.");
         };
-        let is_fresh =
-            self.made_from.as_ref().is_some_and(|(from, words)| Arc::ptr_eq(from, built) && words.as_str() == filter);
+        let is_fresh = self.made_from.as_ref().is_some_and(|(from, words, was_flat)| {
+            Arc::ptr_eq(from, built) && words.as_str() == filter && *was_flat == flat
+        });
         if !is_fresh {
-            self.rows = rows(built, filter);
-            self.made_from = Some((Arc::clone(built), filter.to_owned()));
+            self.rows = rows(built, filter, flat);
+            self.made_from = Some((Arc::clone(built), filter.to_owned(), flat));
         }
         let (rows, height) = (&self.rows, list::row_height(ui));
         let list = List { id: "built nodes", count: rows.len(), height, reveal: None, follow: false };
@@ -69,8 +77,9 @@ impl BuiltTree {
     }
 }
 
-/// Nodes of a built rig, each below its parent; those alone that contain all words of a filter, if there are any words.
-fn rows(built: &BuiltRig, filter: &str) -> Vec<BuiltRow> {
+/// Nodes of a built rig, each below its parent unless they are to be `flat`; those alone that contain all words of a
+/// filter, if there are any words.
+fn rows(built: &BuiltRig, filter: &str, flat: bool) -> Vec<BuiltRow> {
     let words: Vec<String> = filter.split_whitespace().map(str::to_lowercase).collect();
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); built.nodes.len()];
     let mut roots = Vec::new();
@@ -97,7 +106,7 @@ fn rows(built: &BuiltRig, filter: &str) -> Vec<BuiltRow> {
         let name = node.label.as_deref().unwrap_or(&node.name).to_owned();
         let text = format!("{name} {about}").to_lowercase();
         if words.iter().all(|word| text.contains(word.as_str())) {
-            let depth = if words.is_empty() { depth.min(MOST_STEPS) } else { 0 };
+            let depth = if words.is_empty() && !flat { depth.min(MOST_STEPS) } else { 0 };
             let command = node.origin.as_ref().map(|origin| origin.command);
             rows.push(BuiltRow { node: node.uid, name, depth, about, command });
         }

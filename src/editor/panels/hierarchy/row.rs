@@ -5,7 +5,7 @@ use bevy_egui::egui::{
     StrokeKind, Ui, UiBuilder, WidgetInfo, WidgetType, containers::collapsing_header::paint_default_icon, pos2, vec2,
 };
 
-use super::{DraggedJoints, HierarchyPanel, Tree, menu, obstacle, reparent, rows::Row, select, tops};
+use super::{DraggedJoints, HierarchyPanel, Tree, menu, obstacle, reparent, row_tags, rows::Row, select, tops};
 use crate::{
     editor::{
         counted::counted,
@@ -126,7 +126,9 @@ fn paint(
         (false, true) => visuals.text_color(),
         (false, false) => visuals.weak_text_color(),
     };
-    list::line(ui, text, &shown.name(row.joint), color)
+    let name = shown.name(row.joint);
+    let text = row_tags::show(ui, text, (row.joint, &*name), data.map_or(&[][..], |data| data.tags.as_slice()));
+    list::line(ui, text, &name, color)
 }
 
 /// Handles clicks: a plain click selects the joint alone, Control adds or removes it, Shift selects the range from the

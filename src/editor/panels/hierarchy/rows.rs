@@ -22,8 +22,18 @@ pub struct Row {
 /// The listed joints, top to bottom: all but those below a folded one, or, with a filter, those that match it and their
 /// ancestors. All words of the filter must be in the label, the group's name or a module of the joint's tags, in any case.
 pub fn rows(rig: &Rig, folded: &HashSet<Uid>, filter: &str) -> Vec<Row> {
-    let words: Vec<String> = filter.split_whitespace().map(str::to_lowercase).collect();
+    let words = words(filter);
     if words.is_empty() { unfolded(rig, folded) } else { matching(rig, &words) }
+}
+
+/// The joints that match a filter as a list, without their hierarchy, in the order in which it has them.
+pub fn flat_rows(rig: &Rig, filter: &str) -> Vec<Row> {
+    let found = matching(rig, &words(filter)).into_iter().filter(|row| row.matches);
+    found.map(|row| Row { depth: 0, parent: false, ..row }).collect()
+}
+
+fn words(filter: &str) -> Vec<String> {
+    filter.split_whitespace().map(str::to_lowercase).collect()
 }
 
 fn unfolded(rig: &Rig, folded: &HashSet<Uid>) -> Vec<Row> {

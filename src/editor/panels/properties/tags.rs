@@ -45,7 +45,8 @@ pub(super) fn tags(ui: &mut Ui, world: &World, shown: &DisplayedRig, joint: Uid,
     }
 }
 
-fn name(tag: &TagData) -> String {
+/// Name of a tag for people.
+pub(in crate::editor::panels) fn name(tag: &TagData) -> String {
     match &tag.kind {
         TagKind::Command { module, .. } => module.clone(),
         TagKind::Feature { kind, name, switch, .. } => {

@@ -24,7 +24,9 @@ pub(super) fn found<'m>(modules: &'m Modules, words: &str) -> Vec<&'m ModuleInfo
 
 /// Draws the library; returns the module that was chosen. `Enter` in the search field takes the first.
 pub(in crate::editor::panels) fn library(ui: &mut Ui, modules: &Modules, words: &mut String) -> Option<&'static str> {
+    // The search field takes all width that there is; a wider list would cover joints that modules are dragged onto.
     ui.set_min_width(240.0);
+    ui.set_max_width(300.0);
     let field = ui.add(egui::TextEdit::singleline(words).hint_text("Search modules").desired_width(f32::INFINITY));
     field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "Search modules"));
     let entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));

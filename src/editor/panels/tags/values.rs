@@ -12,6 +12,7 @@ use bevy_egui::egui::{
 use serde::Serialize;
 
 use super::{
+    fault::Fault,
     parameter_text::{ValueError, read, typed_number},
     read_values::{CommandValues, ReadValues},
     references,
@@ -74,6 +75,7 @@ pub(super) struct Subject<'a> {
     pub module: &'a ModuleInfo,
     pub entry: &'a Entry,
     values: Arc<CommandValues>,
+    fault: Option<&'a Fault<'a>>,
 }
 
 impl Subject<'_> {
@@ -159,11 +161,12 @@ impl Values {
         builder: Option<&Builder>,
         module: &ModuleInfo,
         entry: &Entry,
+        fault: Option<&Fault>,
     ) -> Option<ValueEdit> {
         let form = self.forms.remove(module.name).unwrap_or_else(|| form_of(module));
         let edit = match self.read.of(module, &form, entry) {
             Ok(values) => {
-                let subject = Subject { shown, builder, module, entry, values };
+                let subject = Subject { shown, builder, module, entry, values, fault };
                 let edit = self.elements(ui, &subject, &form.content);
                 let source = CollapsingHeader::new("As text")
                     .id_salt((entry.first.uid, "text"))
@@ -199,7 +202,8 @@ impl Values {
                 FormElement::Frame { label, open, content } => {
                     let frame = CollapsingHeader::new(RichText::new(label).strong())
                         .id_salt((subject.tag(), label))
-                        .default_open(*open);
+                        .default_open(*open)
+                        .open(subject.fault.is_some_and(|fault| fault.unfolds(content)).then_some(true));
                     frame.show(ui, |ui| self.elements(ui, subject, content)).body_returned.flatten()
                 }
                 FormElement::Separator => {
@@ -222,6 +226,9 @@ impl Values {
         let name = path.split('.').next().unwrap_or(path);
         let about = subject.module.parameters.iter().find(|parameter| parameter.name == name);
         let row = ui.scope(|ui| self.element(ui, subject, element, path));
+        if let Some(fault) = subject.fault {
+            fault.mark(ui, &row.response, path, &element.label());
+        }
         if let Some(about) = about.filter(|about| !about.doc.is_empty()) {
             row.response.clone().on_hover_text(about.doc);
         }

@@ -10,7 +10,10 @@ use crate::{
         notice::Notice,
         tools::scene::{EditedRig, joints},
     },
-    plugins::stroke::{StrokeDone, StrokePlan, StrokeResult, stroke_kind},
+    plugins::{
+        document::EditReport,
+        stroke::{StrokeDone, StrokePlan, StrokeResult, stroke_kind},
+    },
     rig::{Uid, operations::Operation},
 };
 
@@ -87,24 +90,28 @@ fn heard(note: &StrokeNote) -> String {
     }
 }
 
-/// Sends notices about finished strokes.
+/// Sends notices about finished strokes. Edits are made in the frame of their stroke; what is refused is told with all
+/// refusals.
 pub(super) fn answer(
     mut done: MessageReader<StrokeDone>,
+    mut edited: MessageReader<EditReport>,
     active: Option<Res<ActiveRig>>,
     mut notices: MessageWriter<Notice>,
 ) {
+    let changed: Vec<Entity> = edited.read().filter(|report| report.is_new_step()).map(|report| report.rig).collect();
     let Some(active) = active else { return done.clear() };
     for StrokeDone { rig, result } in done.read() {
         if *rig != active.0 {
             continue;
         }
         let notice = match result {
+            StrokeResult::Nothing(why) => Notice::warning(format!("Nothing was drawn: {why}.")),
+            _ if !changed.contains(rig) => continue,
             StrokeResult::Chain { chain, .. } => Notice::done(format!("Drew {}.", joints(chain.joints.len()))).quiet(),
             StrokeResult::Inserted { .. } => Notice::done("Put a joint into a bone.").quiet(),
             StrokeResult::Erased(under) => {
                 Notice::done(format!("Deleted {}; Ctrl+Z brings back.", joints(under.len())))
             }
-            StrokeResult::Nothing(why) => Notice::warning(format!("Nothing was drawn: {why}.")),
         };
         notices.write(notice);
     }
