@@ -54,6 +54,7 @@ const POINTER: &[(&str, &str)] = &[
     ("Graph: click, or drag a box", "select commands (with Shift more, with Ctrl one more or less)"),
     ("Graph: click on a frame's title or box", "fold the frame to a box, or open it"),
     ("Graph: drag selected nodes", "move them on the grid; the document stays as it is"),
+    ("Graph: point at a node or box", "its wires in full, others faded; those of up to 40 selected commands, too"),
     ("Graph: drag from an output to an input", "refer to what the command makes (with Shift besides what is there)"),
     ("Graph: right click on a wire", "remove its reference, or insert a command"),
     ("Graph: right drag, wheel, Ctrl + wheel", "pan, pan, zoom"),
