@@ -3,6 +3,7 @@
 mod crashes;
 mod exporting;
 mod failures;
+mod views;
 
 use std::{
     path::{Path, PathBuf},

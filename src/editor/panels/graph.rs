@@ -3,8 +3,8 @@
 //! The same document as the Tags and the Process panel, seen as a graph that lays itself out: the graph is derived from the
 //! rig and its builder whenever one of them changes, and every edit is an operation on tags. In a graph of many commands
 //! frames are folded to boxes, but for those of selected joints. Only places of nodes that a person moved, and frames that
-//! a person opened or folded, are the graph's own ([`GraphView`]); they last as long as the window, since no document has a
-//! place for them.
+//! a person opened or folded, are the graph's own ([`GraphView`]); places are stored with the project's view, frames last as
+//! long as the window.
 
 mod action;
 mod arrange;
