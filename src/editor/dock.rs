@@ -53,6 +53,15 @@ const BELOW: &[&str] = &["Timeline", "Curves", "Graph", "Process", "Updater", "D
 /// Size of the letters of tabs. All tabs of a place have to fit into its bar in a window of 1280 pixels.
 const TAB_TEXT: f32 = 12.0;
 
+/// Largest distance of a place from a border that it touches.
+const NEAR: f32 = 4.0;
+
+/// Largest thickness of borders and of scroll bars of tabs.
+const THIN: f32 = 8.5;
+
+/// Height of a bar of tabs with its scroll bar.
+const TAB_BAR: f32 = 36.0;
+
 /// Arrangement of the panels; stored between runs.
 #[derive(Resource, Clone, Serialize, Deserialize)]
 #[serde(transparent)]
@@ -129,6 +138,28 @@ impl Layout {
         path.is_some_and(|path| self.dock.leaf(path.node_path()).is_ok_and(|leaf| leaf.active == path.tab))
     }
 
+    /// Panels in front at the two sides of a border between places: left and right, or above and below.
+    fn beside(&self, border: egui::Rect) -> Option<[&str; 2]> {
+        let centre = border.center();
+        let front = |distance: &dyn Fn(egui::Rect) -> f32| {
+            let touches = |rect: egui::Rect| distance(rect).abs() <= NEAR && rect.expand(NEAR).intersects(border);
+            let mut leaves = self.dock.iter_leaves().map(|(_, leaf)| leaf);
+            let leaf = leaves.find(|leaf| touches(leaf.rect))?;
+            leaf.tabs.get(leaf.active.0).map(String::as_str)
+        };
+        if border.height() > border.width() {
+            Some([front(&|rect| rect.right() - centre.x)?, front(&|rect| rect.left() - centre.x)?])
+        } else {
+            Some([front(&|rect| rect.bottom() - centre.y)?, front(&|rect| rect.top() - centre.y)?])
+        }
+    }
+
+    /// True for what lies in a bar of tabs, or just below it.
+    fn is_in_tabs(&self, rect: egui::Rect) -> bool {
+        let bar = |area: egui::Rect| area.with_max_y(area.top() + TAB_BAR);
+        self.dock.iter_leaves().any(|(_, leaf)| bar(leaf.rect).contains(rect.center()))
+    }
+
     /// Shows a panel in front of the others in its place.
     pub fn bring_forward(&mut self, title: &str) {
         if !self.shows(title) {
@@ -197,7 +228,9 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
             .show_leaf_close_all_buttons(false)
             .show_leaf_collapse_buttons(false)
             .show_inside(ui, &mut tabs);
-        if let Some(closed) = tabs.closed.filter(|closed| layout.shows(closed)) {
+        let closed = tabs.closed;
+        name_borders(ui, &layout);
+        if let Some(closed) = closed.filter(|closed| layout.shows(closed)) {
             layout.toggle(&closed);
         }
     });
@@ -213,6 +246,30 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
         world.write_message(bevy::window::RequestRedraw);
     }
     requests.carry_out(world);
+}
+
+/// Tells screen readers what the borders between places and the scroll bars of tabs are, which the dock draws without names.
+fn name_borders(ui: &egui::Ui, layout: &Layout) {
+    let is_thin = |widget: &&egui::WidgetRect| {
+        widget.sense.senses_drag() && widget.sense.is_focusable() && widget.rect.size().min_elem() <= THIN
+    };
+    let thin: Vec<(egui::Id, egui::Rect)> = ui.ctx().viewport(|viewport| {
+        let widgets = viewport.this_pass.widgets.get_layer(ui.layer_id());
+        widgets.filter(is_thin).map(|widget| (widget.id, widget.rect)).collect()
+    });
+    for (id, rect) in thin {
+        let (name, role) = match layout.beside(rect) {
+            Some([one, other]) => (format!("Border between {one} and {other}"), egui::accesskit::Role::Splitter),
+            None if layout.is_in_tabs(rect) => ("Scroll bar of tabs".to_owned(), egui::accesskit::Role::ScrollBar),
+            None => continue,
+        };
+        ui.ctx().accesskit_node_builder(id, |node| {
+            if node.label().is_none() {
+                node.set_label(name);
+                node.set_role(role);
+            }
+        });
+    }
 }
 
 /// Publishes the viewport's area for the pointer and the camera.
