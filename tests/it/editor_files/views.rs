@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use bevy_panorbit_camera::PanOrbitCamera;
 use rigsmith::{
-    editor::panels::graph::GraphView,
-    rig::{TagKind, operations::TagOperation},
+    editor::{camera, panels::graph::GraphView},
+    rig::{TagKind, operations::TagOperation, project::ProjectCamera},
 };
 
 use super::*;
@@ -35,4 +36,17 @@ fn nodes_of_the_graph_are_where_a_person_left_them() {
     other.act(Action::Save);
     let text = std::fs::read_to_string(&path).expect("the project was saved");
     assert!(!text.contains("graph:"), "{text}");
+}
+
+/// The wheel stops before the camera is inside of what it looks at, whatever the size of the character.
+#[test]
+fn zoom_ends_near_what_is_in_view() {
+    for distance in [0.02, 4.0, 400.0] {
+        let kept = ProjectCamera { distance, ..default() };
+        let (mut orbit, mut projection) = (PanOrbitCamera::default(), Projection::default());
+        camera::take(&kept, &mut orbit, &mut projection);
+        let least = orbit.zoom_lower_limit / distance;
+        assert!((0.004..0.04).contains(&least), "{least} of {distance}");
+        assert!(orbit.zoom_upper_limit.is_some_and(|most| most >= 10.0 * distance), "{distance}");
+    }
 }
