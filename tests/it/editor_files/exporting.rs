@@ -32,6 +32,14 @@ fn clips_of_the_document_are_exported_as_they_are_edited() {
     let clips = window.rig().clips().to_vec();
     assert_eq!((clips.len(), clips[0].name.as_str()), (1, "turn"), "{:?}", window.notices.list);
     assert!(clips[0].key_count() >= 2 && !has_unsaved_changes(window.world()));
+    // With joints of its own it takes the place of an open rig without a mesh, which is asked about.
+    window.open(OpenRequest::Empty);
+    window.place(1.0);
+    let rig = window.rig();
+    window.open_file(&folder.path().join("turn.glb"));
+    assert!(matches!(window.question(), Some(Question::Unsaved { .. })), "{:?}", window.notices.list);
+    window.answer(Answer::Cancel);
+    assert_eq!(window.rig(), rig);
 }
 
 #[test]
