@@ -91,6 +91,28 @@ fn the_help_finds_actions_and_says_why_not() {
 }
 
 #[test]
+fn the_palette_says_why_an_action_can_do_nothing() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    page.send(ActionRequest(Action::Cancel));
+    let why = |page: &Page, action: Action| palette::obstacle(page.world(), action);
+    assert_eq!(why(&page, Action::Accept), Some("nothing is drawn or fitted"));
+    assert_eq!(why(&page, Action::NextVolume), Some("no joint is placed, and no stroke is drawn"));
+    for action in [Action::XRay, Action::Wireframe, Action::Meshes, Action::Fit, Action::Skin] {
+        assert_eq!(why(&page, action), Some("no mesh is open"), "{action:?}");
+    }
+    page.send(ActionRequest(Action::Palette));
+    page.desk.type_text("x-ray");
+    page.settle();
+    assert!(page.desk.says("X-ray") && page.desk.says("no mesh is open"), "{:?}", page.desk.seen);
+    page.desk.key(egui::Key::Escape);
+    page.settle();
+    page.desk.app.insert_resource(Mode::Place);
+    page.send(OpenRequest::Bundled);
+    assert_eq!([Action::NextVolume, Action::XRay, Action::Fit].map(|action| why(&page, action)), [None; 3]);
+}
+
+#[test]
 fn toasts_keep_clear_of_windows() {
     let folder = folder();
     let mut page = Page::open(folder.path(), None);
