@@ -50,8 +50,19 @@ const LOWER_RIGHT: &[&str] = &["History", "Poses", "Weights", "Face"];
 /// Panels below the viewport, which are wide and low.
 const BELOW: &[&str] = &["Timeline", "Curves", "Graph", "Process", "Updater", "Display", "Log"];
 
-/// Size of the letters of tabs. All tabs of a place have to fit into its bar in a window of 1280 pixels.
+/// Size of the letters of tabs. All tabs of a place have to fit into its bar in a window of [`FULL_WIDTH`] pixels.
 const TAB_TEXT: f32 = 12.0;
+
+/// Width of a window whose tabs have letters of the full size.
+const FULL_WIDTH: f32 = 1280.0;
+
+/// Least part of the full size, that of a window of 1024 pixels: smaller letters cannot be read.
+const LEAST_TEXT: f32 = 0.8;
+
+/// Size of the letters of tabs in a window of a width, so that none is cut.
+fn tab_text(width: f32) -> f32 {
+    TAB_TEXT * (width / FULL_WIDTH).clamp(LEAST_TEXT, 1.0)
+}
 
 /// Largest distance of a place from a border that it touches.
 const NEAR: f32 = 4.0;
@@ -219,8 +230,14 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
     egui::Panel::top("toolbar").frame(style::bar(&ctx)).show(&mut ui, |ui| toolbar::show(ui, world, &mut requests));
     egui::Panel::bottom("status").frame(style::bar(&ctx)).show(&mut ui, |ui| status::show(ui, world, &mut requests));
     egui::CentralPanel::no_frame().show(&mut ui, |ui| {
-        let mut tabs =
-            Tabs { panels: &mut panels, world, requests: &mut requests, viewport: &mut viewport, closed: None };
+        let mut tabs = Tabs {
+            panels: &mut panels,
+            world,
+            requests: &mut requests,
+            viewport: &mut viewport,
+            closed: None,
+            text: tab_text(ctx.viewport_rect().width()),
+        };
         // A button on each tab would take as much room as a word.
         DockArea::new(&mut layout.dock)
             .style(style::dock(&ctx))
@@ -297,6 +314,8 @@ struct Tabs<'a> {
     viewport: &'a mut Option<egui::Rect>,
     /// Panel that a person closes.
     closed: Option<String>,
+    /// Size of the letters of tabs.
+    text: f32,
 }
 
 impl TabViewer for Tabs<'_> {
@@ -309,9 +328,9 @@ impl TabViewer for Tabs<'_> {
     fn title(&mut self, tab: &mut String) -> egui::WidgetText {
         match tab.as_str() {
             UPDATER if follow::offer(self.world).is_some() => {
-                egui::RichText::new(format!("{UPDATER} ⬆")).size(TAB_TEXT).color(style::ACCENT).into()
+                egui::RichText::new(format!("{UPDATER} ⬆")).size(self.text).color(style::ACCENT).into()
             }
-            name => egui::RichText::new(name).size(TAB_TEXT).into(),
+            name => egui::RichText::new(name).size(self.text).into(),
         }
     }
 

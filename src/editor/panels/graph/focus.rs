@@ -6,7 +6,7 @@ use super::model::{Graph, GraphWire};
 use crate::rig::Uid;
 
 /// Most selected commands whose wires are drawn in full; those of more would crowd the graph.
-pub const MOST_LIT: usize = 40;
+pub const MOST_LIT: usize = 20;
 
 /// Selected commands, if they are few, and those under the pointer.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
