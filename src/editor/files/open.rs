@@ -382,6 +382,7 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     if let Some(path) = origin.path() {
         world.resource_mut::<EditorSettings>().remember(path.to_owned());
     }
+    let clips = if matches!(origin, Origin::Mesh { .. }) { rig.clips().len() } else { 0 };
     let context = Context {
         name: title.clone(),
         meshes: meshes
@@ -428,6 +429,10 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     world.resource_mut::<FrameWhenReady>().0 = !restored;
     world.write_message(match is_recovered {
         true => Notice::done(format!("Recovered {title}; save it to keep it")),
+        false if clips > 0 => {
+            let clips = counted(clips, "clip", "clips");
+            Notice::done(format!("Opened {name} with {clips}, which the Timeline has")).at("Timeline")
+        }
         false => Notice::done(format!("Opened {name}")),
     });
     for warning in warnings {

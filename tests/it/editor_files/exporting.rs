@@ -32,6 +32,7 @@ fn clips_of_the_document_are_exported_as_they_are_edited() {
     let clips = window.rig().clips().to_vec();
     assert_eq!((clips.len(), clips[0].name.as_str()), (1, "turn"), "{:?}", window.notices.list);
     assert!(clips[0].key_count() >= 2 && !has_unsaved_changes(window.world()));
+    assert!(window.notices.include(Severity::Done, "Opened turn.glb with 1 clip"), "{:?}", window.notices.list);
     // With joints of its own it takes the place of an open rig without a mesh, which is asked about.
     window.open(OpenRequest::Empty);
     window.place(1.0);

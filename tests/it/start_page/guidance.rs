@@ -1,5 +1,7 @@
 //! Help over the window: the tour, the search, toasts, looks and keys.
 
+use rigsmith::rig::animation::RigClip;
+
 use super::*;
 
 #[test]
@@ -110,6 +112,22 @@ fn the_palette_says_why_an_action_can_do_nothing() {
     page.desk.app.insert_resource(Mode::Place);
     page.send(OpenRequest::Bundled);
     assert_eq!([Action::NextVolume, Action::XRay, Action::Fit].map(|action| why(&page, action)), [None; 3]);
+}
+
+#[test]
+fn the_next_step_leads_to_clips_that_came_with_a_rig() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    page.send(ActionRequest(Action::Cancel));
+    change(&mut page, Change::Do(Operation::Place { position: Vec3::Y, parent: None }));
+    for (number, said) in
+        [(0, r#"The rig has a clip, "clip 0""#), (1, "The rig has 2 clips: choose one in the Timeline")]
+    {
+        let clip = RigClip::new(Uid(70 + number), Uid(80 + number), format!("clip {number}"));
+        change(&mut page, Change::Do(Operation::Edits(vec![RigEdit::AddClip(Box::new(clip), usize::MAX)])));
+        let next = next_step(page.world()).expect("a next step");
+        assert!(next.starts_with(said), "{next}");
+    }
 }
 
 #[test]
