@@ -30,7 +30,7 @@ fn nodes_of_the_graph_are_where_a_person_left_them() {
     other.open_file(&path);
     let view = other.world().resource::<GraphView>().clone();
     assert_eq!(view.rig, Some(other.base.open_rig()), "{:?}", other.notices.list);
-    assert_eq!(view.moved, [(tag, [60.0, -40.0])].into(), "what is gone has no place");
+    assert_eq!(view.moved, BTreeMap::from([(tag, [60.0, -40.0])]), "what is gone has no place");
     // Laid out by itself, the project is as before there was a graph.
     other.base.app.world_mut().resource_mut::<GraphView>().moved.clear();
     other.act(Action::Save);
