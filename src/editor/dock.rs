@@ -254,6 +254,7 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
     for overlay in &mut panels.overlays {
         overlay.show(&ctx, world, &mut requests);
     }
+    name_menus(&ctx);
     world.insert_resource(panels);
     world.insert_resource(layout);
     remember_area(world, viewport);
@@ -284,6 +285,24 @@ fn name_borders(ui: &egui::Ui, layout: &Layout) {
             if node.label().is_none() {
                 node.set_label(name);
                 node.set_role(role);
+            }
+        });
+    }
+}
+
+/// Tells screen readers what the grounds of open menus and lists are: they take clicks and have no names of their own.
+fn name_menus(ctx: &egui::Context) {
+    let grounds: Vec<egui::Id> = ctx.viewport(|viewport| {
+        let widgets = &viewport.this_pass.widgets;
+        // An area has its ground under this name.
+        let grounds = widgets.layer_ids().map(|layer| layer.id.with("move"));
+        grounds.filter(|ground| widgets.get(*ground).is_some_and(|widget| widget.sense.is_focusable())).collect()
+    });
+    for ground in grounds {
+        ctx.accesskit_node_builder(ground, |node| {
+            if node.label().is_none() {
+                node.set_label("Menu");
+                node.set_role(egui::accesskit::Role::Menu);
             }
         });
     }
