@@ -167,7 +167,7 @@ pub fn take(kept: &ProjectCamera, orbit: &mut PanOrbitCamera, projection: &mut P
     orbit.target_pitch = kept.pitch;
     orbit.target_radius = kept.distance.max(1e-3);
     orbit.target_focus = kept.focus;
-    orbit.zoom_upper_limit = Some(orbit.target_radius * 50.0);
+    limit_zoom(orbit);
     orbit.force_update = true;
     if matches!(projection, Projection::Orthographic(_)) != kept.orthographic {
         *projection = projected(kept.orthographic);
@@ -233,8 +233,19 @@ fn frame(camera: &mut PanOrbitCamera, bounds: [Vec3; 2], size: Vec2) {
     let (focus, distance) = framing(bounds, view.axes(), aspect);
     camera.target_focus = focus;
     camera.target_radius = distance;
-    camera.zoom_upper_limit = Some(distance * 50.0);
+    limit_zoom(camera);
     camera.force_update = true;
+}
+
+/// Least and greatest distance to the focus, in parts of the distance at which something fills the view.
+const ZOOM: [f32; 2] = [0.01, 50.0];
+
+/// Keeps the wheel between a close look at what is in view, which ends before joints and surfaces are behind the camera, and
+/// a distance at which it can still be found.
+fn limit_zoom(camera: &mut PanOrbitCamera) {
+    let [least, most] = ZOOM.map(|part| camera.target_radius * part);
+    camera.zoom_lower_limit = least.max(1e-4);
+    camera.zoom_upper_limit = Some(most);
 }
 
 /// Frames the whole character once the mesh of an opened file is loaded.

@@ -50,8 +50,28 @@ const LOWER_RIGHT: &[&str] = &["History", "Poses", "Weights", "Face"];
 /// Panels below the viewport, which are wide and low.
 const BELOW: &[&str] = &["Timeline", "Curves", "Graph", "Process", "Updater", "Display", "Log"];
 
-/// Size of the letters of tabs. All tabs of a place have to fit into its bar in a window of 1280 pixels.
+/// Size of the letters of tabs. All tabs of a place have to fit into its bar in a window of [`FULL_WIDTH`] pixels.
 const TAB_TEXT: f32 = 12.0;
+
+/// Width of a window whose tabs have letters of the full size.
+const FULL_WIDTH: f32 = 1280.0;
+
+/// Least part of the full size, that of a window of 1024 pixels: smaller letters cannot be read.
+const LEAST_TEXT: f32 = 0.8;
+
+/// Size of the letters of tabs in a window of a width, so that none is cut.
+fn tab_text(width: f32) -> f32 {
+    TAB_TEXT * (width / FULL_WIDTH).clamp(LEAST_TEXT, 1.0)
+}
+
+/// Largest distance of a place from a border that it touches.
+const NEAR: f32 = 4.0;
+
+/// Largest thickness of borders and of scroll bars of tabs.
+const THIN: f32 = 8.5;
+
+/// Height of a bar of tabs with its scroll bar.
+const TAB_BAR: f32 = 36.0;
 
 /// Arrangement of the panels; stored between runs.
 #[derive(Resource, Clone, Serialize, Deserialize)]
@@ -129,6 +149,28 @@ impl Layout {
         path.is_some_and(|path| self.dock.leaf(path.node_path()).is_ok_and(|leaf| leaf.active == path.tab))
     }
 
+    /// Panels in front at the two sides of a border between places: left and right, or above and below.
+    fn beside(&self, border: egui::Rect) -> Option<[&str; 2]> {
+        let centre = border.center();
+        let front = |distance: &dyn Fn(egui::Rect) -> f32| {
+            let touches = |rect: egui::Rect| distance(rect).abs() <= NEAR && rect.expand(NEAR).intersects(border);
+            let mut leaves = self.dock.iter_leaves().map(|(_, leaf)| leaf);
+            let leaf = leaves.find(|leaf| touches(leaf.rect))?;
+            leaf.tabs.get(leaf.active.0).map(String::as_str)
+        };
+        if border.height() > border.width() {
+            Some([front(&|rect| rect.right() - centre.x)?, front(&|rect| rect.left() - centre.x)?])
+        } else {
+            Some([front(&|rect| rect.bottom() - centre.y)?, front(&|rect| rect.top() - centre.y)?])
+        }
+    }
+
+    /// True for what lies in a bar of tabs, or just below it.
+    fn is_in_tabs(&self, rect: egui::Rect) -> bool {
+        let bar = |area: egui::Rect| area.with_max_y(area.top() + TAB_BAR);
+        self.dock.iter_leaves().any(|(_, leaf)| bar(leaf.rect).contains(rect.center()))
+    }
+
     /// Shows a panel in front of the others in its place.
     pub fn bring_forward(&mut self, title: &str) {
         if !self.shows(title) {
@@ -188,8 +230,14 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
     egui::Panel::top("toolbar").frame(style::bar(&ctx)).show(&mut ui, |ui| toolbar::show(ui, world, &mut requests));
     egui::Panel::bottom("status").frame(style::bar(&ctx)).show(&mut ui, |ui| status::show(ui, world, &mut requests));
     egui::CentralPanel::no_frame().show(&mut ui, |ui| {
-        let mut tabs =
-            Tabs { panels: &mut panels, world, requests: &mut requests, viewport: &mut viewport, closed: None };
+        let mut tabs = Tabs {
+            panels: &mut panels,
+            world,
+            requests: &mut requests,
+            viewport: &mut viewport,
+            closed: None,
+            text: tab_text(ctx.viewport_rect().width()),
+        };
         // A button on each tab would take as much room as a word.
         DockArea::new(&mut layout.dock)
             .style(style::dock(&ctx))
@@ -197,13 +245,16 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
             .show_leaf_close_all_buttons(false)
             .show_leaf_collapse_buttons(false)
             .show_inside(ui, &mut tabs);
-        if let Some(closed) = tabs.closed.filter(|closed| layout.shows(closed)) {
+        let closed = tabs.closed;
+        name_borders(ui, &layout);
+        if let Some(closed) = closed.filter(|closed| layout.shows(closed)) {
             layout.toggle(&closed);
         }
     });
     for overlay in &mut panels.overlays {
         overlay.show(&ctx, world, &mut requests);
     }
+    name_menus(&ctx);
     world.insert_resource(panels);
     world.insert_resource(layout);
     remember_area(world, viewport);
@@ -213,6 +264,48 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
         world.write_message(bevy::window::RequestRedraw);
     }
     requests.carry_out(world);
+}
+
+/// Tells screen readers what the borders between places and the scroll bars of tabs are, which the dock draws without names.
+fn name_borders(ui: &egui::Ui, layout: &Layout) {
+    let is_thin = |widget: &&egui::WidgetRect| {
+        widget.sense.senses_drag() && widget.sense.is_focusable() && widget.rect.size().min_elem() <= THIN
+    };
+    let thin: Vec<(egui::Id, egui::Rect)> = ui.ctx().viewport(|viewport| {
+        let widgets = viewport.this_pass.widgets.get_layer(ui.layer_id());
+        widgets.filter(is_thin).map(|widget| (widget.id, widget.rect)).collect()
+    });
+    for (id, rect) in thin {
+        let (name, role) = match layout.beside(rect) {
+            Some([one, other]) => (format!("Border between {one} and {other}"), egui::accesskit::Role::Splitter),
+            None if layout.is_in_tabs(rect) => ("Scroll bar of tabs".to_owned(), egui::accesskit::Role::ScrollBar),
+            None => continue,
+        };
+        ui.ctx().accesskit_node_builder(id, |node| {
+            if node.label().is_none() {
+                node.set_label(name);
+                node.set_role(role);
+            }
+        });
+    }
+}
+
+/// Tells screen readers what the grounds of open menus and lists are: they take clicks and have no names of their own.
+fn name_menus(ctx: &egui::Context) {
+    let grounds: Vec<egui::Id> = ctx.viewport(|viewport| {
+        let widgets = &viewport.this_pass.widgets;
+        // An area has its ground under this name.
+        let grounds = widgets.layer_ids().map(|layer| layer.id.with("move"));
+        grounds.filter(|ground| widgets.get(*ground).is_some_and(|widget| widget.sense.is_focusable())).collect()
+    });
+    for ground in grounds {
+        ctx.accesskit_node_builder(ground, |node| {
+            if node.label().is_none() {
+                node.set_label("Menu");
+                node.set_role(egui::accesskit::Role::Menu);
+            }
+        });
+    }
 }
 
 /// Publishes the viewport's area for the pointer and the camera.
@@ -240,6 +333,8 @@ struct Tabs<'a> {
     viewport: &'a mut Option<egui::Rect>,
     /// Panel that a person closes.
     closed: Option<String>,
+    /// Size of the letters of tabs.
+    text: f32,
 }
 
 impl TabViewer for Tabs<'_> {
@@ -252,9 +347,9 @@ impl TabViewer for Tabs<'_> {
     fn title(&mut self, tab: &mut String) -> egui::WidgetText {
         match tab.as_str() {
             UPDATER if follow::offer(self.world).is_some() => {
-                egui::RichText::new(format!("{UPDATER} ⬆")).size(TAB_TEXT).color(style::ACCENT).into()
+                egui::RichText::new(format!("{UPDATER} ⬆")).size(self.text).color(style::ACCENT).into()
             }
-            name => egui::RichText::new(name).size(TAB_TEXT).into(),
+            name => egui::RichText::new(name).size(self.text).into(),
         }
     }
 

@@ -4,6 +4,7 @@
 //! when it is complete. Actions that would lose unsaved changes ask first; see [`dialog`] for the questions. Every
 //! document has a journal from its first frame; see [`recovery`] for work left by a crash.
 
+mod added_mesh;
 mod bundle;
 mod clips;
 pub mod dialog;
@@ -84,7 +85,7 @@ impl Plugin for FilesPlugin {
     }
 }
 
-/// Request to open a document in place of the open one.
+/// Request to open a document in place of the open one. A mesh without joints comes to an open rig that has no mesh.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub enum OpenRequest {
     /// The bundled character.
@@ -106,10 +107,11 @@ impl OpenRequest {
     }
 }
 
-/// Message that a document has taken the place of the open one, or a template has been put onto the open mesh.
+/// Message that a document has taken the place of the open one, a template has been put onto the open mesh, or a mesh has come
+/// to the open rig.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct DocumentLanded {
-    /// Start of the document; a template on an open mesh has none of its own.
+    /// Start of the document; a template on an open mesh and a mesh of an open rig have none of their own.
     pub origin: Origin,
 }
 
@@ -259,6 +261,12 @@ fn request_open(world: &mut World, request: OpenRequest) {
         if open::is_rig_file(path) && template::has_mesh(world) {
             // A template is put onto the open mesh as one step, which can be undone, so no question is asked.
             open::start(world, request);
+            return;
+        }
+        if added_mesh::is_mesh_file(path) && added_mesh::is_awaited(world) {
+            // The mesh comes to the rig. Only one with joints of its own would take the rig's place, and is asked about then.
+            open::start(world, request);
+            world.resource_mut::<LoadJob>().ask_later();
             return;
         }
     }

@@ -10,10 +10,15 @@ use super::{
     help::describe,
     keys::KeyBindings,
     library,
+    mode::Mode,
     panel::{EditorOverlay, PanelApp, Requests},
     panels::{graph, timeline},
     style,
-    tools::paint::brush,
+    tools::{
+        paint::brush,
+        region::RegionTool,
+        stroke::{StrokeState, StrokeTool},
+    },
 };
 use crate::{
     plugins::{commands::Processor, document::Selection, fit::FittedRig, history::RigHistory, surface::RigMeshes},
@@ -81,7 +86,18 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
             rig.is_empty().then_some("there are no joints")
         }
         Action::OnionSkin => timeline::OpenClip::of(world).is_none().then_some("no clip is open"),
-        Action::Fit | Action::FitPart | Action::Meshes => (!has_mesh).then_some("no mesh is open"),
+        Action::Accept => {
+            let is_fitted = world.get::<FittedRig>(entity).is_some();
+            let chooses = world.get_resource::<RegionTool>().is_some_and(RegionTool::is_open);
+            (!is_fitted && !chooses && !is_drawing(world)).then_some("nothing is drawn or fitted")
+        }
+        Action::NextVolume => {
+            let places = world.get_resource::<Mode>() == Some(&Mode::Place);
+            (!places && !is_drawing(world)).then_some("no joint is placed, and no stroke is drawn")
+        }
+        Action::Fit | Action::FitPart | Action::Meshes | Action::XRay | Action::Wireframe => {
+            (!has_mesh).then_some("no mesh is open")
+        }
         Action::NextDoubt => {
             let fitted = world.get::<FittedRig>(entity);
             fitted
@@ -100,6 +116,11 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
         }
         _ => None,
     }
+}
+
+/// True while a stroke is drawn or shown.
+fn is_drawing(world: &World) -> bool {
+    world.get_resource::<StrokeTool>().is_some_and(|tool| !matches!(tool.state, StrokeState::Idle))
 }
 
 /// True for actions that need no rig.

@@ -114,13 +114,16 @@ fn titles(frames: &Frames) -> Vec<&'static str> {
 
 #[test]
 fn all_tabs_of_the_usual_layout_lie_in_their_bars() {
-    let frames = Frames::new(USUAL);
-    for title in titles(&frames) {
-        let (word, clip) = frames.tab(title);
-        let area = frames.layout().area(title).unwrap();
-        assert!(clip.contains_rect(word), "{title} is cut: {word:?} in {clip:?}");
-        assert!(area.x_range().contains(word.left() - 7.0), "{title}: {word:?} in {area:?}");
-        assert!(area.x_range().contains(word.right() + 7.0), "{title}: {word:?} in {area:?}");
+    for size in [USUAL, [1024.0, 600.0], [1920.0, 1080.0], [3840.0, 2160.0]] {
+        let frames = Frames::new(size);
+        for title in titles(&frames) {
+            let (word, clip) = frames.tab(title);
+            let area = frames.layout().area(title).unwrap();
+            assert!(clip.contains_rect(word), "{size:?}: {title} is cut: {word:?} in {clip:?}");
+            assert!(area.x_range().contains(word.left() - 7.0), "{size:?}: {title}: {word:?} in {area:?}");
+            assert!(area.x_range().contains(word.right() + 7.0), "{size:?}: {title}: {word:?} in {area:?}");
+            assert!(word.height() >= 9.0, "{size:?}: {title} can be read: {word:?}");
+        }
     }
 }
 

@@ -360,6 +360,25 @@ fn ghosts_show_what_would_be_made() {
     assert!(x < 0.01 && y > 1.8, "the plane stands at x = 0 and reaches over the mesh");
 }
 
+/// The symmetry plane is an area from where it is seen at an angle; from the side, where it would lie over everything, it is a
+/// border.
+#[test]
+fn the_symmetry_plane_leaves_the_side_view_clear() {
+    let theme = RigDrawing::default().theme;
+    let bounds = [Vec3::new(-0.5, 0.0, -0.2), Vec3::new(0.5, 1.8, 0.2)];
+    let drawn = |towards: Vec3| {
+        let mut ink = Ink::default();
+        draw_plane(&MirrorPlane::sagittal(1.8), bounds, &flat(towards, Vec3::Y, 2.0), &theme, &mut ink);
+        assert!(has(&ink, theme.plane_border), "the border is drawn from everywhere");
+        let area = ink.tints.iter().filter(|tint| tint[..3] == theme.plane[..3] && **tint != theme.plane_border);
+        area.map(|tint| tint[3]).max()
+    };
+    assert_eq!(drawn(Vec3::Z), Some(theme.plane[3]), "in full from the front");
+    assert_eq!([drawn(Vec3::X), drawn(Vec3::NEG_X)], [None; 2], "no tint from the side");
+    let slanted = drawn(Vec3::new(1.0, 0.0, 1.0).normalize()).expect("a part of it from between");
+    assert!(slanted > 0 && slanted < theme.plane[3], "{slanted}");
+}
+
 fn long_rig(joints: usize) -> Rig {
     let mut app = headless_app(1);
     app.finish();

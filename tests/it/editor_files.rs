@@ -3,6 +3,7 @@
 mod crashes;
 mod exporting;
 mod failures;
+mod views;
 
 use std::{
     path::{Path, PathBuf},
@@ -405,6 +406,39 @@ fn a_template_is_put_onto_the_mesh() {
     window.answer(Answer::AsItIs);
     assert!((height(&window) / mesh / 100.0 - 1.0).abs() < 1e-4);
     assert!(window.mesh().is_some());
+}
+
+/// Who opens a mesh while a rig without one is open wants to see them together.
+#[test]
+fn a_mesh_comes_to_the_open_rig() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("box.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n").unwrap();
+    let mut rig = Rig::new(Uid(1), "arm");
+    let joint = rigsmith::rig::JointData { uid: Uid(10), ..default() };
+    rig.apply(&RigEdit::AddJoint { joint: Box::new(joint), parent: None, index: 0 }).expect("a joint");
+    store_rig(&RealDisk, &at("arm.rig.ron"), &rig).expect("written");
+    let mut window = Window::new(folder.path());
+    window.open_file(&at("arm.rig.ron"));
+    window.place(0.5);
+    let rig = window.rig();
+    window.open_file(&at("box.obj"));
+    assert!(window.question().is_none() && window.mesh().is_some(), "{:?}", window.notices.list);
+    assert_eq!((rig.len(), window.rig()), (2, rig), "the rig is as it was");
+    assert!(window.is_unsaved(), "no file has both");
+    assert!(window.notices.include(Severity::Done, "Opened box.obj with the 2 joints"), "{:?}", window.notices.list);
+    window.change(Change::Undo);
+    assert_eq!(window.rig().len(), 1, "the history goes on");
+
+    let path = window.save_as("both.rigsmith.ron");
+    assert!(!window.is_unsaved());
+    let mut other = Window::new(folder.path());
+    other.open_file(&path);
+    assert!(other.mesh().is_some() && other.rig() == window.rig(), "{:?}", other.notices.list);
+    // With a mesh there, another one is another document.
+    std::fs::copy(at("box.obj"), at("crate.obj")).unwrap();
+    other.open_file(&at("crate.obj"));
+    assert!(other.rig().is_empty() && other.mesh().is_some_and(|mesh| mesh.file.name == "crate"));
 }
 
 /// A character of Rigsmith in a document's rig, as a fit puts it there, keeps its parts in the first file and in the next ones.

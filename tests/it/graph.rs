@@ -1,6 +1,7 @@
 //! The Graph panel: it shows what the rig and its builder say, and what a person does there reaches the document as one step.
 
 mod edits;
+mod focus;
 mod frames;
 mod layout;
 
@@ -290,7 +291,11 @@ fn a_command_that_ran_flashes_and_then_all_is_quiet() {
 
 /// Commands on one joint, of which most refer to the one before.
 fn many(count: usize) -> Desk {
-    let mut desk = Desk::with(Sheet::Panel(Box::new(GraphPanel::default())), egui::vec2(900.0, 600.0));
+    many_in(Sheet::Panel(Box::new(GraphPanel::default())), count)
+}
+
+fn many_in(sheet: Sheet, count: usize) -> Desk {
+    let mut desk = Desk::with(sheet, egui::vec2(900.0, 600.0));
     let joint = desk.chain(&["a"])[0];
     let tag = |number: usize| {
         let uid = |number: usize| Uid(0xC0_0000 + number as u64);

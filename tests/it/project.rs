@@ -109,6 +109,7 @@ fn the_frozen_file_of_format_1_opens() {
         mode: "Pose".into(),
         shading: "x_ray".into(),
         switches: [("axes".to_owned(), false), ("grid".to_owned(), true)].into(),
+        graph: [].into(),
     };
     assert_eq!(project.view, view);
     assert_eq!(project.journal, Some(JournalReference { file: "biped.rigsmith.journal".into(), last: 1234 }));
@@ -238,6 +239,23 @@ fn a_broken_view_is_no_reason_to_refuse_a_project() {
     let mut project = frozen();
     project.view.camera.as_mut().unwrap().distance = f32::INFINITY;
     assert_eq!(read_project(write_project(&project).as_bytes()).unwrap().project.view.camera, None);
+}
+
+#[test]
+fn the_frozen_file_of_format_5_keeps_places_in_the_graph() {
+    let text = include_str!("../frozen/format-5.rigsmith.ron");
+    let read = read_project(text.as_bytes()).unwrap();
+    assert_eq!(read.notes, Vec::<String>::new());
+    let mut project = read.project;
+    let places: [(Uid, [f32; 2]); 2] = [(Uid(0xb1), [-40.0, 220.0]), (Uid(0xc0), [0.0, 1020.5])];
+    assert!(project.view.graph.iter().map(|(uid, place)| (*uid, *place)).eq(places));
+    assert_eq!(write_project(&project), text);
+    // A place that is none is left out, and told.
+    let broken = read_project(text.replacen("220.0", "inf", 1).as_bytes()).unwrap();
+    assert_eq!((broken.project.view.graph.len(), broken.notes.len()), (1, 1), "{:?}", broken.notes);
+    // Without places the file is of the format before.
+    project.view.graph.clear();
+    assert_eq!(write_project(&project), include_str!("../frozen/format-4.rigsmith.ron"));
 }
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\

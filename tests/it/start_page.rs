@@ -26,7 +26,7 @@ use rigsmith::{
         mode::Mode,
         next_step::next_step,
         notice::Notice,
-        palette::PalettePlugin,
+        palette::{self, PalettePlugin},
         panels::{PanelsPlugin, display::DisplayPanel, log::LogBook, skinning::SkinningPanel},
         recovery::Recovery,
         screen::{HiddenMeshes, ScreenPlugin},

@@ -8,7 +8,7 @@ use bevy::{
 };
 
 use super::{
-    DocumentLanded, FollowUp, OpenRequest, active,
+    DocumentLanded, FollowUp, OpenRequest, active, added_mesh,
     bundle::{self, BundledModel},
     dialog::{Dialog, Question},
     document::{
@@ -64,12 +64,21 @@ struct Job {
     task: Task<Result<LoadedFile, OpenError>>,
     /// Last step of the open document when its loss was accepted.
     confirmed: Option<Arc<Step>>,
+    /// True if nobody has been asked yet about changes that would be lost.
+    asks: bool,
 }
 
 impl LoadJob {
     /// Name of the document that is being opened.
     pub fn what(&self) -> Option<&str> {
         self.job.as_ref().map(|job| job.name.as_str())
+    }
+
+    /// Has unsaved changes asked about once it is known that they would be lost.
+    pub(super) fn ask_later(&mut self) {
+        if let Some(job) = &mut self.job {
+            job.asks = true;
+        }
     }
 }
 
@@ -191,7 +200,7 @@ pub(super) fn start(world: &mut World, request: OpenRequest) {
 pub(in crate::editor) fn begin(world: &mut World, name: String, task: Task<Result<LoadedFile, OpenError>>) {
     let confirmed = active(world).and_then(|rig| last_step(world, rig));
     let mut loading = world.resource_mut::<LoadJob>();
-    loading.job = Some(Job { name, task, confirmed });
+    loading.job = Some(Job { name, task, confirmed, asks: false });
     loading.held = None;
 }
 
@@ -309,7 +318,7 @@ pub(super) fn poll(world: &mut World) {
     let mut loading = world.resource_mut::<LoadJob>();
     let Some(job) = &mut loading.bypass_change_detection().job else { return };
     let Some(result) = check_ready(&mut job.task) else { return };
-    let Some(Job { name, confirmed, .. }) = loading.job.take() else { return };
+    let Some(Job { name, confirmed, asks, .. }) = loading.job.take() else { return };
     match result {
         Err(error) => {
             world.write_message(Notice::error(format!("Could not open {name}: {error}")));
@@ -318,9 +327,13 @@ pub(super) fn poll(world: &mut World) {
             }
         }
         Ok(LoadedFile::Template(opened)) if template::has_mesh(world) => template::consider(world, *opened),
+        Ok(LoadedFile::Document(opened)) if added_mesh::is_alone(&opened) && added_mesh::is_awaited(world) => {
+            added_mesh::put(world, &name, *opened);
+        }
         Ok(LoadedFile::Document(opened) | LoadedFile::Template(opened)) => {
+            let is_settled = |rig: Entity| !asks && is_same(&last_step(world, rig), &confirmed);
             let changed = active(world)
-                .filter(|rig| is_unsaved(world, *rig) && !is_same(&last_step(world, *rig), &confirmed))
+                .filter(|rig| is_unsaved(world, *rig) && !is_settled(*rig))
                 .and_then(|rig| world.get::<OpenDocument>(rig));
             match changed.map(|document| document.name.clone()) {
                 Some(document) => {
@@ -369,6 +382,7 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     if let Some(path) = origin.path() {
         world.resource_mut::<EditorSettings>().remember(path.to_owned());
     }
+    let clips = if matches!(origin, Origin::Mesh { .. }) { rig.clips().len() } else { 0 };
     let context = Context {
         name: title.clone(),
         meshes: meshes
@@ -415,6 +429,10 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     world.resource_mut::<FrameWhenReady>().0 = !restored;
     world.write_message(match is_recovered {
         true => Notice::done(format!("Recovered {title}; save it to keep it")),
+        false if clips > 0 => {
+            let clips = counted(clips, "clip", "clips");
+            Notice::done(format!("Opened {name} with {clips}, which the Timeline has")).at("Timeline")
+        }
         false => Notice::done(format!("Opened {name}")),
     });
     for warning in warnings {

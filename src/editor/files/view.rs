@@ -4,12 +4,12 @@ use bevy::{ecs::system::SystemState, prelude::*};
 use bevy_panorbit_camera::PanOrbitCamera;
 
 use crate::{
-    editor::{camera, mode::Mode, screen::HiddenMeshes},
+    editor::{ActiveRig, camera, mode::Mode, panels::graph::GraphView, screen::HiddenMeshes},
     plugins::{
         display::{MeshDisplay, Shading},
         drawing::{LabelChoice, RigDrawing},
     },
-    rig::project::ProjectView,
+    rig::{Rig, project::ProjectView},
 };
 
 /// Current view state of the document.
@@ -39,6 +39,10 @@ pub(in crate::editor) fn now(world: &mut World) -> ProjectView {
     if let Some(hidden) = world.get_resource::<HiddenMeshes>() {
         view.switches.insert("meshes".to_owned(), !hidden.all);
     }
+    let active = world.get_resource::<ActiveRig>().map(|active| active.0);
+    if let (Some(rig), Some(graph)) = (active, world.get_resource::<GraphView>().filter(|graph| graph.rig == active)) {
+        view.graph = world.get::<Rig>(rig).map(|rig| graph.places(rig)).unwrap_or_default();
+    }
     view
 }
 
@@ -59,9 +63,10 @@ pub(super) fn restore(world: &mut World, view: &ProjectView) -> bool {
         Option<ResMut<MeshDisplay>>,
         Option<ResMut<RigDrawing>>,
         Option<ResMut<HiddenMeshes>>,
+        (Option<Res<ActiveRig>>, Option<ResMut<GraphView>>),
         Query<(&mut PanOrbitCamera, &mut Projection)>,
     )> = SystemState::new(world);
-    let Ok((mode, display, drawing, hidden, mut cameras)) = state.get_mut(world) else { return false };
+    let Ok((mode, display, drawing, hidden, (active, graph), mut cameras)) = state.get_mut(world) else { return false };
     let switch = |name: &str| view.switches.get(name).copied();
     if let (Some(mut mode), Some(kept)) = (mode, Mode::ALL.into_iter().find(|mode| mode.name() == view.mode)) {
         mode.set_if_neq(kept);
@@ -90,6 +95,9 @@ pub(super) fn restore(world: &mut World, view: &ProjectView) -> bool {
     }
     if let (Some(mut hidden), Some(shown)) = (hidden, switch("meshes")) {
         hidden.set_if_neq(HiddenMeshes { all: !shown, ..default() });
+    }
+    if let (Some(active), Some(mut graph)) = (active, graph) {
+        *graph = GraphView::opened(active.0, &view.graph);
     }
     let Some(kept) = &view.camera else { return false };
     for (mut orbit, mut projection) in &mut cameras {

@@ -3,8 +3,8 @@
 //! The same document as the Tags and the Process panel, seen as a graph that lays itself out: the graph is derived from the
 //! rig and its builder whenever one of them changes, and every edit is an operation on tags. In a graph of many commands
 //! frames are folded to boxes, but for those of selected joints. Only places of nodes that a person moved, and frames that
-//! a person opened or folded, are the graph's own ([`GraphView`]); they last as long as the window, since no document has a
-//! place for them.
+//! a person opened or folded, are the graph's own ([`GraphView`]); places are stored with the project's view, frames last as
+//! long as the window.
 
 mod action;
 mod arrange;
@@ -13,6 +13,7 @@ mod canvas;
 mod carry_out;
 mod chart;
 mod edits;
+mod focus;
 mod gesture;
 pub mod layout;
 mod look;
@@ -23,7 +24,10 @@ mod state;
 mod wires;
 mod words;
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 use bevy::{ecs::change_detection::Tick, prelude::*};
 use bevy_egui::egui::{self, Id, Popup, Pos2, Rect, Response, SetOpenCommand, Ui, emath::TSTransform};
@@ -32,12 +36,14 @@ use egui_snarl::{NodeId, Snarl};
 pub use self::{
     action::{GraphAction, obstacle, over_graph},
     chart::{ChartFrame, GraphChart},
+    focus::MOST_LIT,
     state::{FEW, GraphLook, GraphRequest, GraphView},
 };
 use self::{
     boxes::Tally,
     canvas::{Canvas, NodePart, SCALES, Scene},
     edits::Bench,
+    focus::Focus,
     gesture::{Gesture, Hand, Outcome, is_dropped, pointer},
     layout::LayoutNode,
     look::ModuleLooks,
@@ -121,6 +127,8 @@ pub struct GraphPanel {
     /// Rig that is in view, and the number of the last request of the view.
     looked: Option<(Entity, u64)>,
     gesture: Option<Gesture>,
+    /// Commands whose wires are drawn in full.
+    focus: Focus,
     menu: Option<MenuTarget>,
     words: String,
     /// True if all nodes were in view in the last frame.
@@ -311,9 +319,11 @@ impl GraphPanel {
         };
         let is_free = self.gesture.is_none() && ui.rect_contains_pointer(area);
         let hovered = if is_free { hand.wire_at() } else { None };
+        let under = if is_free { hand.commands_at() } else { BTreeSet::new() };
         let (rects, boxes) = (self.rects(view, by), self.boxes(view, by));
         let hand = Hand { rects: &rects, boxes: &boxes, ..hand };
         let ink = self.gesture.as_ref().and_then(|gesture| hand.ink(gesture));
+        self.focus = Focus::of(&view.selected, under);
         let id = Id::new("command graph");
         let mut canvas = Canvas {
             scene: Scene {
@@ -325,6 +335,7 @@ impl GraphPanel {
                 glow: &glow,
                 selected: &view.selected,
                 hovered,
+                focus: &self.focus,
                 ink: ink.as_ref(),
             },
             id,

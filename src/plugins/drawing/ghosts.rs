@@ -116,7 +116,8 @@ fn draw_span(pen: &mut Pen, span: [Vec3; 2], at: Option<Vec3>, theme: &Theme) {
     }
 }
 
-/// Draws a symmetry plane through the box `bounds` (rig space): a faint area within the scene and its border.
+/// Draws a symmetry plane through the box `bounds` (rig space): a faint area within the scene and its border. From the side
+/// the border is left alone: an area would lie over all that is seen.
 pub fn draw_plane(plane: &MirrorPlane, bounds: [Vec3; 2], sight: &Sight, theme: &Theme, ink: &mut Ink) {
     let normal = plane.normal.normalize_or(Vec3::X);
     let centre = plane.onto(bounds[0].midpoint(bounds[1]));
@@ -126,9 +127,13 @@ pub fn draw_plane(plane: &MirrorPlane, bounds: [Vec3; 2], sight: &Sight, theme: 
     let reach = |axis: Vec3| 0.5 * (bounds[1] - bounds[0]).dot(axis.abs()) + 0.08 * size;
     let (up, side) = (up * reach(up), side * reach(side));
     let corners = [centre - up - side, centre - up + side, centre + up + side, centre + up - side];
+    let facing = sight.towards(centre).dot(normal);
+    let area = fade(theme.plane, 1.0 - facing * facing);
     let mut pen = Pen::new(ink, sight);
     pen.layer = Layer::Scene;
-    pen.quad(corners, 0.0, theme.plane);
+    if area[3] > 0 {
+        pen.quad(corners, 0.0, area);
+    }
     for corner in 0..4 {
         pen.line([corners[corner], corners[(corner + 1) % 4]], 1.5, 0.0, theme.plane_border);
     }

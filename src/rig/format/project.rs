@@ -20,8 +20,9 @@ use crate::rig::{Rig, Uid, animation::NodeNames};
 /// Highest format that this version reads; written only for content that needs it.
 ///
 /// Format 2 adds values of attributes, and poses of nodes that are not joints; format 3 adds clips, and the templates that rigs
-/// follow; format 4 adds parts that were dropped onto joints, and selection sets. A project is written in the first format that can hold it.
-pub const FORMAT: u32 = 4;
+/// follow; format 4 adds parts that were dropped onto joints, and selection sets; format 5 adds places in the graph. A project is written
+/// in the first format that can hold it.
+pub const FORMAT: u32 = 5;
 
 /// Largest size in bytes of a project that is read.
 pub const MAX_BYTES: usize = 64 << 20;
@@ -115,6 +116,9 @@ pub struct ProjectView {
     /// Display switches by name, `true` for what is shown.
     #[serde(default)]
     pub switches: BTreeMap<String, bool>,
+    /// Places of the graph's nodes and folded frames that a person moved, by the uid of the command tag, feature or local group.
+    #[serde(default)]
+    pub graph: BTreeMap<Uid, [f32; 2]>,
 }
 
 /// A camera that orbits a point of the world.

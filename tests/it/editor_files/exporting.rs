@@ -35,10 +35,28 @@ fn clips_of_the_document_are_exported_as_they_are_edited() {
     let clips = window.rig().clips().to_vec();
     assert_eq!((clips.len(), clips[0].name.as_str()), (1, "turn"), "{:?}", window.notices.list);
     assert!(clips[0].key_count() >= 2 && !has_unsaved_changes(window.world()));
+    assert!(window.notices.include(Severity::Done, "Opened turn.glb with 1 clip"), "{:?}", window.notices.list);
     // Clips whose joints a template replaces can be put onto it.
     window.open_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/templates/biped.rig.ron"));
     let offer = "\"Import motion of the mesh's file\" in the Timeline puts them onto";
     assert!(window.notices.include(Severity::Info, offer), "{:?}", window.notices.list);
+}
+
+#[test]
+fn a_mesh_with_joints_replaces_a_rig_after_a_question() {
+    let folder = folder();
+    let mut window = Window::bundled(folder.path());
+    window.place(1.0);
+    window.export("turn.glb");
+    window.open(OpenRequest::Empty);
+    window.answer(Answer::Discard);
+    // With joints of its own it takes the place of an open rig without a mesh, which is asked about.
+    window.place(1.0);
+    let rig = window.rig();
+    window.open_file(&folder.path().join("turn.glb"));
+    assert!(matches!(window.question(), Some(Question::Unsaved { .. })), "{:?}", window.notices.list);
+    window.answer(Answer::Cancel);
+    assert_eq!(window.rig(), rig);
 }
 
 #[test]

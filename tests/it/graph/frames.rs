@@ -16,7 +16,7 @@ use crate::bench::shipped;
 
 /// A panel that the test looks into.
 #[derive(Clone, Default)]
-struct Shared(Arc<Mutex<GraphPanel>>);
+pub(super) struct Shared(pub(super) Arc<Mutex<GraphPanel>>);
 
 impl EditorPanel for Shared {
     fn title(&self) -> &'static str {

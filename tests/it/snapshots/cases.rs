@@ -68,9 +68,10 @@ pub const LIGHT: (&str, Look) = ("light", look(WindowTheme::Light, false));
 pub const CONTRAST: (&str, Look) = ("contrast", look(WindowTheme::Dark, true));
 pub const LIGHT_CONTRAST: (&str, Look) = ("light_contrast", look(WindowTheme::Light, true));
 
-pub const ALL: Asked = Asked { names: true, room: true };
-pub const NAMES: Asked = Asked { names: true, room: false };
-pub const NOTHING: Asked = Asked { names: false, room: false };
+pub const ALL: Asked = Asked { names: true, apart: true, room: true };
+pub const NAMES: Asked = Asked { names: true, apart: true, room: false };
+/// Questions about the whole window: panels that stand side by side have fields of the same names.
+pub const WHOLE: Asked = Asked { names: true, apart: false, room: false };
 
 type Panel = (&'static str, fn() -> Box<dyn EditorPanel>);
 
@@ -119,8 +120,9 @@ fn panel((name, panel): Panel, (look_name, look): (&str, Look), size: [u16; 2], 
         before: states::as_it_is,
         steps: &[],
         asked: Asked {
-            // The graph lays widgets with names over the pins of its crate, which have none.
-            names: asked.names && name != "graph",
+            names: asked.names,
+            // Commands of one module on one joint are the same for the graph.
+            apart: asked.apart && name != "graph",
             room: asked.room && !is_scrolled,
         },
         kept: None,
@@ -224,7 +226,7 @@ pub fn whole(name: &str, (look_name, look): (&str, Look), size: [u16; 2]) -> Cas
         frame: Frame { size, scale: 1.0, look },
         before: states::as_it_is,
         steps: &[],
-        asked: NOTHING,
+        asked: WHOLE,
         kept: None,
     }
 }

@@ -22,7 +22,7 @@ use rigsmith::{
 
 use super::{
     booth::{Booth, Frame, Step},
-    cases::{ALL, CONTRAST, Case, DARK, LARGE, LIGHT, NAMES, NOTHING, SMALL, What},
+    cases::{ALL, CONTRAST, Case, DARK, LARGE, LIGHT, NAMES, SMALL, WHOLE, What},
     queries::Asked,
 };
 
@@ -73,8 +73,8 @@ pub fn cases() -> Vec<Case> {
         over("start", CONTRAST, SMALL, show_start),
         asked(over("start_recent", DARK, SMALL, show_start_with_files), NAMES),
         asked(over("start_column", DARK, [560, 640], show_start_with_files), NAMES),
-        asked(case("empty_window", What::Window, DARK, LARGE, show_nothing), NOTHING),
-        asked(case("empty_window", What::Window, LIGHT, SMALL, show_nothing), NOTHING),
+        asked(case("empty_window", What::Window, DARK, LARGE, show_nothing), WHOLE),
+        asked(case("empty_window", What::Window, LIGHT, SMALL, show_nothing), WHOLE),
     ]
 }
 

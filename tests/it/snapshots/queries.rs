@@ -74,8 +74,10 @@ pub fn texts(shapes: &[ClippedShape]) -> Vec<Text> {
 /// Questions about a picture.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Asked {
-    /// Everything that can be clicked has a name, which says which one is meant in its row.
+    /// Everything that can be clicked has a name.
     pub names: bool,
+    /// Names of one kind in a row differ, so that each says which one is meant.
+    pub apart: bool,
     /// Nothing is laid out beside the picture, and no text is cut off at its side.
     pub room: bool,
 }
@@ -85,6 +87,8 @@ pub fn problems(shot: &Shot, width: f32, asked: Asked) -> Vec<String> {
     let mut problems: Vec<String> = shot.missed.iter().map(ToString::to_string).collect();
     if asked.names {
         problems.extend(unnamed(&shot.widgets));
+    }
+    if asked.apart {
         problems.extend(ambiguous(&shot.widgets));
     }
     if asked.room {

@@ -1,5 +1,7 @@
 //! Help over the window: the tour, the search, toasts, looks and keys.
 
+use rigsmith::rig::animation::RigClip;
+
 use super::*;
 
 #[test]
@@ -88,6 +90,44 @@ fn the_help_finds_actions_and_says_why_not() {
     page.desk.type_text("mesh is open");
     page.settle();
     assert!(page.desk.says("Meshes") && !page.desk.says("Select mode"), "{:?}", page.desk.seen);
+}
+
+#[test]
+fn the_palette_says_why_an_action_can_do_nothing() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    page.send(ActionRequest(Action::Cancel));
+    let why = |page: &Page, action: Action| palette::obstacle(page.world(), action);
+    assert_eq!(why(&page, Action::Accept), Some("nothing is drawn or fitted"));
+    assert_eq!(why(&page, Action::NextVolume), Some("no joint is placed, and no stroke is drawn"));
+    for action in [Action::XRay, Action::Wireframe, Action::Meshes, Action::Fit, Action::Skin] {
+        assert_eq!(why(&page, action), Some("no mesh is open"), "{action:?}");
+    }
+    page.send(ActionRequest(Action::Palette));
+    page.desk.type_text("x-ray");
+    page.settle();
+    assert!(page.desk.says("X-ray") && page.desk.says("no mesh is open"), "{:?}", page.desk.seen);
+    page.desk.key(egui::Key::Escape);
+    page.settle();
+    page.desk.app.insert_resource(Mode::Place);
+    page.send(OpenRequest::Bundled);
+    assert_eq!([Action::NextVolume, Action::XRay, Action::Fit].map(|action| why(&page, action)), [None; 3]);
+}
+
+#[test]
+fn the_next_step_leads_to_clips_that_came_with_a_rig() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    page.send(ActionRequest(Action::Cancel));
+    change(&mut page, Change::Do(Operation::Place { position: Vec3::Y, parent: None }));
+    for (number, said) in
+        [(0, r#"The rig has a clip, "clip 0""#), (1, "The rig has 2 clips: choose one in the Timeline")]
+    {
+        let clip = RigClip::new(Uid(70 + number), Uid(80 + number), format!("clip {number}"));
+        change(&mut page, Change::Do(Operation::Edits(vec![RigEdit::AddClip(Box::new(clip), usize::MAX)])));
+        let next = next_step(page.world()).expect("a next step");
+        assert!(next.starts_with(said), "{next}");
+    }
 }
 
 #[test]

@@ -16,6 +16,7 @@ use egui_snarl::{
 
 use super::{
     boxes::{self, Tally},
+    focus::Focus,
     model::{Graph, GraphWire},
     node,
     wires::{self, Spots, WireInk},
@@ -65,6 +66,8 @@ pub(super) struct Scene<'a> {
     pub glow: &'a [f32],
     pub selected: &'a BTreeSet<Uid>,
     pub hovered: Option<GraphWire>,
+    /// Commands whose wires are drawn in full.
+    pub focus: &'a Focus,
     pub ink: Option<&'a Ink>,
 }
 
@@ -254,12 +257,11 @@ impl SnarlViewer<Uid> for Canvas<'_> {
         let visuals = &look.visuals;
         let unit = 1.0 / self.transform.scaling.max(1e-3);
         boxes::draw(painter, *viewport, &self.scene, visuals, unit);
-        let (graph, selected) = (self.scene.graph, self.scene.selected);
         let ink = WireInk {
             reference: visuals.text_color().gamma_multiply(0.6),
             besides: style::quiet(visuals).gamma_multiply(0.35),
             selected: style::accent(visuals),
-            is_selected: &|number: usize| selected.contains(&graph.nodes[number].tag),
+            focus: self.scene.focus,
             hovered: self.scene.hovered,
             unit,
         };

@@ -69,4 +69,14 @@ impl GraphPanel {
             wires: graph.wires.iter().filter_map(|wire| spots.ends(*wire)).collect(),
         }
     }
+
+    /// Ends of the wires that were drawn in full in the last frame; all others were faded if anything was selected, or under
+    /// the pointer.
+    pub fn wires_in_full(&self, view: &GraphView) -> Vec<[Pos2; 2]> {
+        let (rects, boxes) = (self.rects(view, Vec2::ZERO), self.boxes(view, Vec2::ZERO));
+        let graph = &self.graph;
+        let spots = Spots { graph, rects: &rects, boxes: &boxes };
+        let full = graph.wires.iter().filter(|wire| !self.focus.fades || self.focus.has(graph, **wire));
+        full.filter_map(|wire| spots.ends(*wire)).collect()
+    }
 }

@@ -91,6 +91,17 @@ impl Hand<'_> {
         self.rects.iter().rposition(|rect| rect.contains(at))
     }
 
+    /// Commands under the pointer: that of a node, or all of a folded frame.
+    pub fn commands_at(&self) -> BTreeSet<Uid> {
+        let Some(at) = self.at else { return BTreeSet::new() };
+        if let Some(number) = self.node_at(at) {
+            return BTreeSet::from([self.graph.nodes[number].tag]);
+        }
+        let Some(folded) = self.folded_at(at) else { return BTreeSet::new() };
+        let is_inside = |frame: Option<usize>| frame.is_some_and(|frame| self.graph.frames[frame].uid == folded);
+        self.graph.nodes.iter().filter(|node| is_inside(node.frame)).map(|node| node.tag).collect()
+    }
+
     /// The wire under the pointer, where no node is.
     pub fn wire_at(&self) -> Option<GraphWire> {
         let at = self.at.filter(|at| self.node_at(*at).is_none())?;

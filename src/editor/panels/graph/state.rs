@@ -1,11 +1,12 @@
 //! State of the graph: selected commands, nodes that were moved by hand, frames that are folded, what is in view. It belongs
-//! to the window and lasts as long as it; no document has any of it.
+//! to the window and lasts as long as the rig is open; only the places of nodes are stored, with the project's view.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use bevy::prelude::*;
 
-use crate::rig::Uid;
+use super::{layout::snapped, model::frame_of};
+use crate::rig::{Rig, Uid};
 
 /// State of the graph of the active rig.
 #[derive(Resource, Debug, Clone, PartialEq, Default)]
@@ -32,6 +33,21 @@ pub struct GraphView {
 pub const FEW: usize = 60;
 
 impl GraphView {
+    /// State of a rig that was opened, with stored places.
+    pub fn opened(rig: Entity, places: &BTreeMap<Uid, [f32; 2]>) -> Self {
+        let finite = places.iter().filter(|(_, place)| place.iter().all(|number| number.is_finite()));
+        let moved = finite.map(|(uid, place)| (*uid, snapped(*place))).collect();
+        Self { rig: Some(rig), moved, ..Self::default() }
+    }
+
+    /// Places that are stored: those of commands and frames that a rig has.
+    pub fn places(&self, rig: &Rig) -> BTreeMap<Uid, [f32; 2]> {
+        let tags = rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (&joint.data, tag)));
+        let known: BTreeSet<Uid> =
+            tags.flat_map(|(joint, tag)| [Some(tag.uid), frame_of(rig, joint, tag)]).flatten().collect();
+        self.moved.iter().filter(|(uid, _)| known.contains(uid)).map(|(uid, place)| (*uid, *place)).collect()
+    }
+
     /// True if a frame is open in a graph of so many commands.
     pub fn is_open(&self, frame: Uid, commands: usize) -> bool {
         let usual = || self.every.unwrap_or(commands <= FEW) || self.lit.contains(&frame);

@@ -7,7 +7,10 @@ use std::collections::BTreeSet;
 
 use bevy_egui::egui::{Color32, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
-use super::model::{Graph, GraphWire};
+use super::{
+    focus::Focus,
+    model::{Graph, GraphWire},
+};
 
 /// Width of a node.
 pub(super) const WIDTH: f32 = 220.0;
@@ -23,8 +26,10 @@ pub(super) const BOX: [f32; 2] = [240.0, 60.0];
 pub(super) const TITLE: f32 = 30.0;
 /// Number of straight parts of a wire.
 const PARTS: usize = 14;
-/// Most wires that are drawn as curves; more are straight.
+/// Most wires that are drawn as curves; of more, those out of focus are straight.
 const MOST_CURVES: usize = 240;
+/// Strength of wires out of focus.
+const FADED: f32 = 0.3;
 
 /// Width and height of a node with a number of inputs.
 pub(super) fn node_size(inputs: usize) -> [f32; 2] {
@@ -123,9 +128,9 @@ pub(super) struct WireInk<'a> {
     pub reference: Color32,
     /// Colour of wires that no reference makes.
     pub besides: Color32,
-    /// Colour of the wires of selected commands.
+    /// Colour of the wires of commands in focus.
     pub selected: Color32,
-    pub is_selected: &'a dyn Fn(usize) -> bool,
+    pub focus: &'a Focus,
     /// Wire under the pointer.
     pub hovered: Option<GraphWire>,
     /// Units of the graph in a point of the screen.
@@ -133,40 +138,49 @@ pub(super) struct WireInk<'a> {
 }
 
 impl WireInk<'_> {
+    fn is_lit(&self, graph: &Graph, wire: GraphWire) -> bool {
+        self.hovered == Some(wire) || self.focus.has(graph, wire)
+    }
+
     fn stroke(&self, graph: &Graph, wire: GraphWire) -> Stroke {
         let is_reference = wire.input < graph.nodes[wire.to].inputs.len();
-        let color = match is_reference {
-            _ if self.hovered == Some(wire) => self.selected,
-            _ if (self.is_selected)(wire.from) || (self.is_selected)(wire.to) => self.selected,
-            true => self.reference,
-            false => self.besides,
+        let usual = if is_reference { self.reference } else { self.besides };
+        let color = if self.is_lit(graph, wire) {
+            self.selected
+        } else if self.focus.fades {
+            usual.gamma_multiply(FADED)
+        } else {
+            usual
         };
         let width = if self.hovered == Some(wire) { 3.0 } else { 1.5 };
         Stroke::new(width * self.unit.max(1.0), color)
     }
 }
 
-/// Draws the wires that cross the view: curves, or straight lines in one shape where there are many.
+/// Draws the wires that cross the view, those in focus above all others: curves, or straight lines in one shape where there
+/// are many out of focus.
 pub(super) fn draw(painter: &Painter, view: Rect, spots: Spots, ink: &WireInk) {
     let graph = spots.graph;
-    // Of the wires between two folded frames one is drawn.
+    // Of the wires between two folded frames one is drawn, and one in focus before others.
     let mut drawn: BTreeSet<[u32; 4]> = BTreeSet::new();
-    let mut is_new = |[from, to]: [Pos2; 2]| drawn.insert([from.x, from.y, to.x, to.y].map(f32::to_bits));
-    let seen: Vec<(GraphWire, [Pos2; 2])> = graph
-        .wires
-        .iter()
-        .filter_map(|wire| Some((*wire, spots.ends(*wire)?)))
-        .filter(|(_, ends)| bounds(*ends).intersects(view) && is_new(*ends))
-        .collect();
-    if seen.len() <= MOST_CURVES {
-        painter.extend(seen.into_iter().map(|(wire, ends)| Shape::line(curve(ends), ink.stroke(graph, wire))));
-        return;
+    let mut seen = |are_lit: bool| -> Vec<(GraphWire, [Pos2; 2])> {
+        let mut is_new = |[from, to]: [Pos2; 2]| drawn.insert([from.x, from.y, to.x, to.y].map(f32::to_bits));
+        let wires = graph.wires.iter().copied().filter(|wire| ink.is_lit(graph, *wire) == are_lit);
+        let placed = wires.filter_map(|wire| Some((wire, spots.ends(wire)?)));
+        placed.filter(|(_, ends)| bounds(*ends).intersects(view) && is_new(*ends)).collect()
+    };
+    let (lit, others) = (seen(true), seen(false));
+    let curved = |(wire, ends): (GraphWire, [Pos2; 2])| Shape::line(curve(ends), ink.stroke(graph, wire));
+    if lit.len() + others.len() <= MOST_CURVES {
+        painter.extend(others.into_iter().map(curved));
+    } else {
+        let mut mesh = Mesh::default();
+        for (wire, ends) in others {
+            add_line(&mut mesh, ends, ink.stroke(graph, wire));
+        }
+        painter.add(Shape::mesh(mesh));
     }
-    let mut mesh = Mesh::default();
-    for (wire, ends) in seen {
-        add_line(&mut mesh, ends, ink.stroke(graph, wire));
-    }
-    painter.add(Shape::mesh(mesh));
+    painter.extend(lit.into_iter().map(curved));
 }
 
 /// Adds a straight line to a mesh.

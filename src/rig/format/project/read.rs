@@ -113,6 +113,11 @@ pub fn read_project(bytes: &[u8]) -> Result<ReadProject, SourceError> {
         view.camera = None;
         notes.push("the view's camera is not finite; the whole character is shown instead".to_owned());
     }
+    let kept = view.graph.len();
+    view.graph.retain(|_, place| place.iter().all(|number| number.is_finite()));
+    if view.graph.len() < kept {
+        notes.push("places of the graph are not finite; those nodes are laid out instead".to_owned());
+    }
     let project = Project { name, meshes, rigs, templates, view, journal, names: NodeNames::default() };
     Ok(ReadProject { project, notes })
 }
@@ -316,7 +321,7 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
         (5, ["poses", "rigs", ""]) => Some(&["uid", "name", "offsets", "values"]),
         (7, ["offsets", "poses", "rigs"]) => Some(OFFSET),
         (5, ["values", "rigs", ""]) | (7, ["values", "poses", "rigs"]) => Some(&["node", "name", "value"]),
-        (2, ["view", "", ""]) => Some(&["camera", "mode", "shading", "switches"]),
+        (2, ["view", "", ""]) => Some(&["camera", "mode", "shading", "switches", "graph"]),
         (3, ["camera", "view", ""]) => Some(&["yaw", "pitch", "distance", "focus", "orthographic"]),
         (2, ["journal", "", ""]) => Some(&["file", "last"]),
         _ => None,

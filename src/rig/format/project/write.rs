@@ -24,7 +24,8 @@ pub fn write_project(project: &Project) -> String {
 
 fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
     let of_rigs = project.rigs.iter().map(|entry| needed_format(&entry.rig)).max().unwrap_or(1);
-    let format = if project.templates.is_empty() { of_rigs } else { of_rigs.max(3) };
+    let of_content = if project.templates.is_empty() { of_rigs } else { of_rigs.max(3) };
+    let format = if project.view.graph.is_empty() { of_content } else { FORMAT };
     writeln!(out, "(\n    format: {format},\n    name: {},", quoted(&project.name))?;
     writeln!(out, "    meshes: [")?;
     for mesh in &project.meshes {
@@ -119,7 +120,7 @@ fn needed_format(rig: &Rig) -> u32 {
         || rig.pose().keys().any(|node| rig.joint(*node).is_none());
     let is_plain = rig.dropped_parts().is_empty() && rig.selection_sets().is_empty();
     match (is_plain, rig.clips().is_empty(), needs_values) {
-        (false, ..) => FORMAT,
+        (false, ..) => 4,
         (true, false, _) => 3,
         (true, true, true) => 2,
         (true, true, false) => 1,
@@ -161,5 +162,13 @@ fn write_view(out: &mut String, view: &ProjectView) -> std::fmt::Result {
     for (name, on) in &view.switches {
         writeln!(out, "            {}: {on},", quoted(name))?;
     }
-    writeln!(out, "        }},\n    ),")
+    writeln!(out, "        }},")?;
+    if !view.graph.is_empty() {
+        writeln!(out, "        graph: {{")?;
+        for (uid, [x, y]) in view.graph.iter().filter(|(_, place)| place.iter().all(|number| number.is_finite())) {
+            writeln!(out, "            \"{uid}\": ({x:?}, {y:?}),")?;
+        }
+        writeln!(out, "        }},")?;
+    }
+    writeln!(out, "    ),")
 }
