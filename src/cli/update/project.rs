@@ -14,6 +14,7 @@ use crate::{
     processor::{BuildError, Builder, keep_clips},
     rig::{
         EditError, Rig,
+        animation::NodeNames,
         update::{clip_edits, edits_between, pose_edits, update_with, with_identities},
     },
 };
@@ -66,7 +67,7 @@ pub(super) fn run(args: &UpdateArgs) -> Result<Report, Failure> {
         }
         (None, _) => {}
     }
-    report.notes(store_project(&RealDisk, output, &to_save(project))?);
+    report.notes(store_project(&RealDisk, output, &to_save(project, names_before(&now)))?);
     report.line(format!("wrote {}", output.display()));
     clips::store(&clips, &mut report)?;
     Ok(report)
@@ -125,12 +126,23 @@ fn exchange(rig: &mut Rig, next: &Rig) -> Result<(), EditError> {
     Ok(())
 }
 
+/// Names of the nodes that a rig had before an update: keys of those that are gone wait for others of their names.
+fn names_before(rig: &Rig) -> NodeNames {
+    let built = Builder::build(rig, &Arc::new(limits::modules())).ok();
+    let mut names = NodeNames::default();
+    for clip in rig.clips() {
+        names.extend(&clip.names);
+    }
+    names.extend(&NodeNames::of(rig, built.as_ref()));
+    names
+}
+
 fn refused(error: EditError) -> Failure {
     Failure::Input(Box::new(error))
 }
 
 /// The project as it is saved. A journal that continues from another save does not go on from this one.
-fn to_save(project: LoadedProject) -> ProjectToSave {
+fn to_save(project: LoadedProject, names: NodeNames) -> ProjectToSave {
     let LoadedProject { name, rigs, meshes, templates, view, .. } = project;
     let meshes = meshes.into_iter().map(|mesh| {
         let LoadedMesh { uid, rig, path, nodes, shape } = mesh;
@@ -142,5 +154,5 @@ fn to_save(project: LoadedProject) -> ProjectToSave {
         };
         MeshToSave { uid, rig, path, nodes, shape }
     });
-    ProjectToSave { name, rigs, meshes: meshes.collect(), templates, view, journal: None }
+    ProjectToSave { name, rigs, meshes: meshes.collect(), templates, view, journal: None, names }
 }
