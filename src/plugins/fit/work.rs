@@ -218,6 +218,11 @@ impl Work {
             }
         };
         let mut markers = request.markers.iter().map(marker).collect::<Result<Vec<_>, _>>()?;
+        let is_second =
+            |(at, (joint, _)): (usize, &(usize, Vec3))| markers[..at].iter().any(|(other, _)| other == joint);
+        if let Some(at) = markers.iter().enumerate().position(is_second) {
+            return Err(FitFailure::TwoMarkers { label: request.markers[at].0.clone() });
+        }
         for (uid, place) in &self.markers {
             let joint = uids.iter().position(|known| known == uid);
             let is_given = joint.is_some_and(|joint| markers.iter().any(|(given, _)| *given == joint));
