@@ -98,6 +98,30 @@ fn the_biped_fits_the_body_it_was_made_for() {
     assert!(hand.unwrap().entity.translation.distance(goal) < 1e-3 * height);
 }
 
+/// A figure that stands along Z has controls that do, too: up is Y of its foot's control.
+#[test]
+fn controls_stand_as_the_figure_does() {
+    let mut model = bundled_body();
+    model.points.iter_mut().for_each(|point| *point = Vec3::new(point.x, -point.z, point.y));
+    let mut bench = bench(model);
+    let report = fit(&mut bench).unwrap();
+    assert_eq!((report.fit.up, report.fit.forward), (Vec3::Z, Vec3::NEG_Y));
+    assert_eq!(bench.build(BuildStep::All).error, None);
+    let place = |bench: &mut Workbench, name: &str| {
+        let nodes = bench.nodes().unwrap();
+        let node = nodes.iter().find(|node| &*node.node.name == name).unwrap_or_else(|| panic!("no node {name}"));
+        node.entity.translation
+    };
+    for control in ["root", "foot_ik_l"] {
+        let before = place(&mut bench, control);
+        let by = |offset: &str| format!("{control}.translate={offset}").parse().unwrap();
+        bench.pose(&[by("(0,0.2,0)")]).unwrap();
+        let moved = place(&mut bench, control) - before;
+        assert!(moved.distance(Vec3::new(0.0, 0.0, 0.2)) < 1e-3, "{control} is moved by {moved}");
+        bench.pose(&[by("(0,0,0)")]).unwrap();
+    }
+}
+
 /// One step of the history; undone, the rig has the first bytes again. The same input gives the same bytes.
 #[test]
 fn a_fit_is_one_step_and_repeats_exactly() {
