@@ -68,7 +68,8 @@ pub(super) struct FitArgs {
     #[arg(long = "region", value_name = "NAME|X,Y,Z,X,Y,Z", value_parser = region, allow_hyphen_values = true)]
     regions: Vec<RegionArg>,
     /// Output file: the fitted template as .rig.ron, with its parts (OUT.base beside it keeps the template for updates), the
-    /// skinned character as .glb or .gltf, an avatar in VRM 1.0 as .vrm, or a picture as .png
+    /// skinned character as .glb or .gltf, an avatar in VRM 1.0 as .vrm, or a picture from the figure's front as .png, with the
+    /// doubtful joints highlighted
     #[arg(short, long)]
     output: Output,
     #[command(flatten)]
@@ -121,6 +122,7 @@ fn region(text: &str) -> Result<RegionArg, ArgumentError> {
             is_finite.then_some(RegionArg::Box(corners)).ok_or(ArgumentError::NoRegion)
         }
         Some([_, _, ..]) => Err(ArgumentError::NoRegion),
+        _ if text.trim().is_empty() => Err(ArgumentError::NoRegion),
         _ => Ok(RegionArg::Name(text.to_owned())),
     }
 }
@@ -171,7 +173,7 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
     drop(progress);
     describe(&mut report, &fitted);
     if is_picture {
-        picture(args, &bench)?;
+        picture(args, &bench, &fitted)?;
     } else if kind == Some(FileKind::Template) {
         let origin = origin(args, &fitted.template)?;
         store_made(&args.output, bench.rig(), origin, &mut report)?;
@@ -258,8 +260,12 @@ fn chosen_region(args: &FitArgs, model: &Model) -> Result<FitRegion, Failure> {
         let objects = model.objects.iter().map(|object| &object.name);
         let bones = model.nodes.iter().filter(|node| bones && node.joint).map(|node| &node.name);
         let names: Vec<&str> = objects.chain(bones).map(String::as_str).collect();
-        let what = if names.is_empty() { "nothing with a name".to_owned() } else { names.join(", ") };
-        Failure::Input(format!("--{option}: the mesh has no \"{name}\"; it has: {what}").into())
+        let has = match (names.is_empty(), bones) {
+            (true, true) => "nothing in it has a name, so give the corners of a box: --region X,Y,Z,X,Y,Z".to_owned(),
+            (true, false) => "nothing in it has a name, so give a box: --region X,Y,Z,X,Y,Z".to_owned(),
+            _ => format!("it has: {}", names.join(", ")),
+        };
+        Failure::Input(format!("--{option}: the mesh has no \"{name}\"; {has}").into())
     };
     let number = |name: &String| object(name).ok_or_else(|| known("object", name, false));
     let mut objects = args.objects.iter().map(number).collect::<Result<Vec<_>, _>>()?;
@@ -354,12 +360,12 @@ fn describe(report: &mut Report, fitted: &FitReport) {
 }
 
 #[cfg(feature = "render")]
-fn picture(args: &FitArgs, bench: &Workbench) -> Result<(), Failure> {
-    super::render::picture_of_bench(bench, &args.output)
+fn picture(args: &FitArgs, bench: &Workbench, fitted: &FitReport) -> Result<(), Failure> {
+    super::render::picture_of_fit(bench, fitted, &args.output)
 }
 
 #[cfg(not(feature = "render"))]
-fn picture(args: &FitArgs, _: &Workbench) -> Result<(), Failure> {
+fn picture(args: &FitArgs, _: &Workbench, _: &FitReport) -> Result<(), Failure> {
     let reason = format!("cannot draw `{}`: this program was built without pictures", args.output.display());
     Err(Failure::Usage(reason))
 }

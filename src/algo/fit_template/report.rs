@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use glam::Vec3;
+use glam::{Mat3, Quat, Vec3};
 use thiserror::Error;
 
 use super::{assign::Hypothesis, human::FittedBody, limbs::LimbKind};
@@ -36,6 +36,12 @@ impl FittedSkeleton {
     /// Mean distance between the body model and the surface as a share of the height, where a model was registered.
     pub fn body_residual(&self) -> Option<f32> {
         self.body.as_ref().map(|body| body.residual)
+    }
+
+    /// Rotation from the axes of the template (Y up, facing +Z) to those of the figure.
+    pub fn turn(&self) -> Quat {
+        let left = self.up.cross(self.forward).normalize_or(Vec3::X);
+        Quat::from_mat3(&Mat3::from_cols(left, self.up, left.cross(self.up))).normalize()
     }
 
     /// True if mesh and pose have a plane of symmetry, or left and right were made alike as asked.
