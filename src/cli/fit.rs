@@ -21,8 +21,8 @@ use super::{
 use crate::{
     algo::fit_template::FitSymmetry,
     files::{
-        BUNDLED_CHARACTERS, FileKind, RealDisk, StoreError, TemplateOrigin, bundled_characters, bundled_part,
-        save_atomic, stem, store_model, store_rig_from, store_rig_over,
+        BUNDLED_CHARACTERS, BUNDLED_PARTS, FileKind, LoadError, ReadError, RealDisk, StoreError, TemplateOrigin,
+        bundled_characters, bundled_part, save_atomic, stem, store_model, store_rig_from, store_rig_over,
     },
     headless::Workbench,
     mesh::model::Model,
@@ -33,7 +33,7 @@ use crate::{
             region::{triangles_held, triangles_in_box},
         },
     },
-    rig::{Rig, part::Part, template::write_template},
+    rig::{Rig, nearest::did_you_mean, part::Part, template::write_template},
 };
 
 /// Kind of templates that are parts.
@@ -243,7 +243,7 @@ fn template(args: &FitArgs, report: &mut Report) -> Result<FitTemplate, Failure>
     let part = match known {
         Some(part) => part,
         None => {
-            let template = limits::load_template(file)?;
+            let template = limits::load_template(file).map_err(|failure| unknown_template(name, failure))?;
             report.notes(template.notes.iter().cloned());
             if template.rig.about().kind != PART {
                 return Ok(FitTemplate::Rig(Arc::new(template.rig)));
@@ -252,6 +252,23 @@ fn template(args: &FitArgs, report: &mut Report) -> Result<FitTemplate, Failure>
         }
     };
     Ok(FitTemplate::Part { part: FitPart::Given(part), parent: None })
+}
+
+/// The failure to read a template, with the nearest names if neither a file nor a template is called so.
+fn unknown_template(name: &str, failure: Failure) -> Failure {
+    let is_missing = match &failure {
+        Failure::Input(error) => {
+            matches!(error.downcast_ref::<LoadError>(), Some(LoadError::Read(ReadError::Missing { .. })))
+        }
+        Failure::Usage(_) => false,
+    };
+    let parts = BUNDLED_PARTS.iter().map(|(part, _)| part.strip_suffix(".rig.ron").unwrap_or(part));
+    let known = BUNDLED_CHARACTERS.iter().map(|(character, _)| *character).chain(parts);
+    let nearest = did_you_mean(name, known);
+    match is_missing && !nearest.is_empty() {
+        true => Failure::Input(format!("there is no template and no file `{name}`{nearest}").into()),
+        false => failure,
+    }
 }
 
 fn chosen_region(args: &FitArgs, model: &Model) -> Result<FitRegion, Failure> {

@@ -125,6 +125,8 @@ pub enum FitNote {
     BodyModel,
     /// The figure's front is uncertain.
     UncertainFront,
+    /// The side of a part is uncertain.
+    UncertainSide,
     /// Left and right were made alike.
     MadeSymmetric,
     /// Pairs of joints that were made alike as asked, in a mesh or pose that is not symmetric.
@@ -185,6 +187,9 @@ impl fmt::Display for FitNote {
             Self::UncertainFront => {
                 f.write_str("the front is uncertain: give the forward axis if the skeleton faces backwards")
             }
+            Self::UncertainSide => f.write_str(
+                "the side of the part is uncertain: give a marker for a joint of its thumb if it is the other one",
+            ),
             Self::MadeSymmetric => f.write_str("left and right were made alike"),
             Self::ForcedSymmetric(pairs) => {
                 let pairs = counted(*pairs, "pair of joints", "pairs of joints");
