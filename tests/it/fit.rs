@@ -208,11 +208,11 @@ fn gestures_fit() {
     assert!(answers[2].done, "{answers:?}");
 }
 
-/// The left hand of the bundled body and the end of its forearm.
-fn hand_mesh() -> Model {
+/// A hand of the bundled body and the end of its forearm: the left one for 1, the right one for -1.
+fn hand_mesh(side: f32) -> Model {
     let mut model = bundled_body();
     for part in &mut model.parts {
-        let is_of_hand = |corner: &u32| model.points[part.vertices[*corner as usize] as usize].x > 0.5;
+        let is_of_hand = |corner: &u32| side * model.points[part.vertices[*corner as usize] as usize].x > 0.5;
         part.triangles.retain(|corners| corners.iter().all(is_of_hand));
         part.faces.starts = (0..=part.triangles.len() as u32).map(|face| 3 * face).collect();
         part.faces.corners = part.triangles.concat();
@@ -220,10 +220,25 @@ fn hand_mesh() -> Model {
     model
 }
 
+/// The hand as a skeleton of its own is that of the side that the mesh shows, by its name and by choice.
+#[test]
+fn hands_are_of_their_side() {
+    for (side, ending) in [(1.0, "_l"), (-1.0, "_r")] {
+        for template in [FitTemplate::Named("hand".into()), FitTemplate::Choose] {
+            let mut bench = bench(hand_mesh(side));
+            let report = bench.fit(|request| request.template = template.clone(), &mut |_| ()).unwrap();
+            assert_eq!(report.template, "hand", "{}", report.choice);
+            let labels: Vec<&str> = report.joints.iter().map(|(_, label)| label.as_str()).collect();
+            assert!(labels.iter().all(|label| label.ends_with(ending)), "{template:?} {labels:?}");
+            assert!(at(bench.rig(), labels[0]).x * side > 0.0);
+        }
+    }
+}
+
 /// A part is a skeleton of its own in an empty rig, and comes below the selected joint of another one.
 #[test]
 fn gestures_fit_parts() {
-    let mut bench = bench(hand_mesh());
+    let mut bench = bench(hand_mesh(1.0));
     bench.offer_parts(FitParts(Arc::new(bundled_part)));
     let fit = || Gesture::Fit { template: Some("parts/hand".into()) };
     let answers = bench.gestures(vec![Gesture::Fit { template: Some("parts/hund".into()) }, fit(), Gesture::Undo]);
