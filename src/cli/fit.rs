@@ -275,8 +275,8 @@ fn chosen_region(args: &FitArgs, model: &Model) -> Result<FitRegion, Failure> {
     let object = |name: &String| model.objects.iter().position(|object| object.name == *name);
     let known = |option: &str, name: &str, bones: bool| {
         let objects = model.objects.iter().map(|object| &object.name);
-        let bones = model.nodes.iter().filter(|node| bones && node.joint).map(|node| &node.name);
-        let names: Vec<&str> = objects.chain(bones).map(String::as_str).filter(|name| !name.is_empty()).collect();
+        let joints = model.nodes.iter().filter(|node| bones && node.joint).map(|node| &node.name);
+        let names: Vec<&str> = objects.chain(joints).map(String::as_str).filter(|name| !name.is_empty()).collect();
         let has = match (names.is_empty(), bones) {
             (true, true) => "nothing in it has a name, so give the corners of a box: --region X,Y,Z,X,Y,Z".to_owned(),
             (true, false) => "nothing in it has a name, so give a box: --region X,Y,Z,X,Y,Z".to_owned(),
