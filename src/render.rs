@@ -51,6 +51,8 @@ pub struct PictureSettings {
     pub size: UVec2,
     /// Direction of the camera.
     pub view: View,
+    /// Rotation from the axes that the view is about (Y up, facing +Z) to those of the character.
+    pub turn: Quat,
     /// Orthographic projection if `true`.
     pub orthographic: bool,
     /// Display of the mesh.
@@ -78,6 +80,7 @@ impl Default for PictureSettings {
         Self {
             size: UVec2::new(1280, 720),
             view: View::Front,
+            turn: Quat::IDENTITY,
             orthographic: false,
             display: MeshDisplay::default(),
             drawing: RigDrawing::default(),
@@ -327,7 +330,7 @@ fn aim(world: &mut World, rig: Entity, camera: Entity, settings: &PictureSetting
     {
         bounds = [bounds[0].min(low), bounds[1].max(high)];
     }
-    let [right, up, towards] = settings.view.axes();
+    let [right, up, towards] = settings.view.axes().map(|axis| settings.turn * axis);
     let aspect = settings.size.x as f32 / settings.size.y as f32;
     let (focus, distance) = framing(bounds, [right, up, towards], aspect);
     let projection = if settings.orthographic {

@@ -21,8 +21,8 @@ use super::{
 use crate::{
     algo::fit_template::FitSymmetry,
     files::{
-        BUNDLED_CHARACTERS, FileKind, RealDisk, StoreError, TemplateOrigin, bundled_characters, bundled_part,
-        save_atomic, stem, store_model, store_rig_from, store_rig_over,
+        BUNDLED_CHARACTERS, BUNDLED_PARTS, FileKind, LoadError, ReadError, RealDisk, StoreError, TemplateOrigin,
+        bundled_characters, bundled_part, save_atomic, stem, store_model, store_rig_from, store_rig_over,
     },
     headless::Workbench,
     mesh::model::Model,
@@ -33,7 +33,7 @@ use crate::{
             region::{triangles_held, triangles_in_box},
         },
     },
-    rig::{Rig, part::Part, template::write_template},
+    rig::{Rig, nearest::did_you_mean, part::Part, template::write_template},
 };
 
 /// Kind of templates that are parts.
@@ -68,7 +68,8 @@ pub(super) struct FitArgs {
     #[arg(long = "region", value_name = "NAME|X,Y,Z,X,Y,Z", value_parser = region, allow_hyphen_values = true)]
     regions: Vec<RegionArg>,
     /// Output file: the fitted template as .rig.ron, with its parts (OUT.base beside it keeps the template for updates), the
-    /// skinned character as .glb or .gltf, an avatar in VRM 1.0 as .vrm, or a picture as .png
+    /// skinned character as .glb or .gltf, an avatar in VRM 1.0 as .vrm, or a picture from the figure's front as .png, with the
+    /// doubtful joints highlighted
     #[arg(short, long)]
     output: Output,
     #[command(flatten)]
@@ -121,6 +122,7 @@ fn region(text: &str) -> Result<RegionArg, ArgumentError> {
             is_finite.then_some(RegionArg::Box(corners)).ok_or(ArgumentError::NoRegion)
         }
         Some([_, _, ..]) => Err(ArgumentError::NoRegion),
+        _ if text.trim().is_empty() => Err(ArgumentError::NoRegion),
         _ => Ok(RegionArg::Name(text.to_owned())),
     }
 }
@@ -171,7 +173,7 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
     drop(progress);
     describe(&mut report, &fitted);
     if is_picture {
-        picture(args, &bench)?;
+        picture(args, &bench, &fitted)?;
     } else if kind == Some(FileKind::Template) {
         let origin = origin(args, &fitted.template)?;
         store_made(&args.output, bench.rig(), origin, &mut report)?;
@@ -241,7 +243,7 @@ fn template(args: &FitArgs, report: &mut Report) -> Result<FitTemplate, Failure>
     let part = match known {
         Some(part) => part,
         None => {
-            let template = limits::load_template(file)?;
+            let template = limits::load_template(file).map_err(|failure| unknown_template(name, failure))?;
             report.notes(template.notes.iter().cloned());
             if template.rig.about().kind != PART {
                 return Ok(FitTemplate::Rig(Arc::new(template.rig)));
@@ -252,14 +254,35 @@ fn template(args: &FitArgs, report: &mut Report) -> Result<FitTemplate, Failure>
     Ok(FitTemplate::Part { part: FitPart::Given(part), parent: None })
 }
 
+/// The failure to read a template, with the nearest names if neither a file nor a template is called so.
+fn unknown_template(name: &str, failure: Failure) -> Failure {
+    let is_missing = match &failure {
+        Failure::Input(error) => {
+            matches!(error.downcast_ref::<LoadError>(), Some(LoadError::Read(ReadError::Missing { .. })))
+        }
+        Failure::Usage(_) => false,
+    };
+    let parts = BUNDLED_PARTS.iter().map(|(part, _)| part.strip_suffix(".rig.ron").unwrap_or(part));
+    let known = BUNDLED_CHARACTERS.iter().map(|(character, _)| *character).chain(parts);
+    let nearest = did_you_mean(name, known);
+    match is_missing && !nearest.is_empty() {
+        true => Failure::Input(format!("there is no template and no file `{name}`{nearest}").into()),
+        false => failure,
+    }
+}
+
 fn chosen_region(args: &FitArgs, model: &Model) -> Result<FitRegion, Failure> {
     let object = |name: &String| model.objects.iter().position(|object| object.name == *name);
     let known = |option: &str, name: &str, bones: bool| {
         let objects = model.objects.iter().map(|object| &object.name);
-        let bones = model.nodes.iter().filter(|node| bones && node.joint).map(|node| &node.name);
-        let names: Vec<&str> = objects.chain(bones).map(String::as_str).collect();
-        let what = if names.is_empty() { "nothing with a name".to_owned() } else { names.join(", ") };
-        Failure::Input(format!("--{option}: the mesh has no \"{name}\"; it has: {what}").into())
+        let joints = model.nodes.iter().filter(|node| bones && node.joint).map(|node| &node.name);
+        let names: Vec<&str> = objects.chain(joints).map(String::as_str).filter(|name| !name.is_empty()).collect();
+        let has = match (names.is_empty(), bones) {
+            (true, true) => "nothing in it has a name, so give the corners of a box: --region X,Y,Z,X,Y,Z".to_owned(),
+            (true, false) => "nothing in it has a name, so give a box: --region X,Y,Z,X,Y,Z".to_owned(),
+            _ => format!("it has: {}", names.join(", ")),
+        };
+        Failure::Input(format!("--{option}: the mesh has no \"{name}\"; {has}").into())
     };
     let number = |name: &String| object(name).ok_or_else(|| known("object", name, false));
     let mut objects = args.objects.iter().map(number).collect::<Result<Vec<_>, _>>()?;
@@ -354,12 +377,12 @@ fn describe(report: &mut Report, fitted: &FitReport) {
 }
 
 #[cfg(feature = "render")]
-fn picture(args: &FitArgs, bench: &Workbench) -> Result<(), Failure> {
-    super::render::picture_of_bench(bench, &args.output)
+fn picture(args: &FitArgs, bench: &Workbench, fitted: &FitReport) -> Result<(), Failure> {
+    super::render::picture_of_fit(bench, fitted, &args.output)
 }
 
 #[cfg(not(feature = "render"))]
-fn picture(args: &FitArgs, _: &Workbench) -> Result<(), Failure> {
+fn picture(args: &FitArgs, _: &Workbench, _: &FitReport) -> Result<(), Failure> {
     let reason = format!("cannot draw `{}`: this program was built without pictures", args.output.display());
     Err(Failure::Usage(reason))
 }

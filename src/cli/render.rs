@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use bevy::math::UVec2;
+use bevy::math::{UVec2, Vec3};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
@@ -21,6 +21,7 @@ use crate::{
         commands::BuildStep,
         display::{MeshDisplay, WeightColors},
         drawing::{LabelChoice, RigDrawing},
+        fit::FitReport,
         surface::RigMesh,
     },
     render::{Deform, PictureSettings, adapter, png, take_picture},
@@ -247,10 +248,15 @@ pub(super) fn picture_of(
     save_atomic(&RealDisk, output, &png(image).map_err(picture)?).map_err(|error| Failure::Input(Box::new(error)))
 }
 
-/// Draws the rig and the mesh of a workbench as they are at rest, the mesh half transparent.
-pub(super) fn picture_of_bench(bench: &Workbench, output: &Path) -> Result<(), Failure> {
+/// Draws a rig that was fitted to the mesh of a workbench as it is at rest, seen from the figure's front, the mesh half
+/// transparent; joints that the fit is not sure of are shown as selected, as in the window.
+pub(super) fn picture_of_fit(bench: &Workbench, fitted: &FitReport, output: &Path) -> Result<(), Failure> {
     let display = MeshDisplay { xray: true, ..MeshDisplay::default() };
-    let settings = PictureSettings { display, ..PictureSettings::default() };
+    // The grid lies on the ground of the file's Y axis, which a figure that stands otherwise would hang beside.
+    let drawing = RigDrawing { grid: fitted.fit.up == Vec3::Y, ..RigDrawing::default() };
+    let selected = fitted.doubtful().collect();
+    let settings =
+        PictureSettings { display, drawing, selected, turn: fitted.fit.turn(), ..PictureSettings::default() };
     let picture = |error| Failure::Input(Box::new(error));
     let (rig, meshes) = (bench.rig().clone(), bench.mesh().cloned().into_iter().collect());
     let image = spinning("drawing", || Ok::<_, Failure>(take_picture(rig, meshes, &settings)))?.map_err(picture)?;

@@ -29,7 +29,7 @@ use crate::{
         document::Selection,
         fit::{
             EndFit, FitAnswer, FitFailure, FitJob, FitPart, FitParts, FitRegion, FitReport, FitRequest, FitTemplate,
-            FitTemplates, FittedRig, RemoveMarker,
+            FitTemplates, FittedRig, RefitFailed, RemoveMarker,
         },
         history::RigHistory,
         picking::{Pick, PickRequest},
@@ -52,6 +52,7 @@ impl Plugin for FittingPlugin {
             .add_message::<EndFit>()
             .add_message::<RemoveMarker>()
             .add_message::<FitAnswer>()
+            .add_message::<RefitFailed>()
             .add_message::<PickRequest>()
             .add_message::<ShowDoubt>()
             .add_painter(bar::FitBar)
@@ -64,7 +65,7 @@ impl Plugin for FittingPlugin {
                         .before(RigSystems::Script)
                         .before(toggle_help)
                         .before(start::toggle),
-                    show_result.after(RigSystems::Bind),
+                    (show_result, show_refusals).chain().after(RigSystems::Bind),
                 ),
             );
     }
@@ -223,6 +224,13 @@ fn show_doubts(
     let (Some(ShowDoubt(joint)), Some(active)) = (requests.read().last(), active) else { return };
     commands.write_message(PickRequest { rig: active.0, what: Pick::Joints(vec![*joint]), add: false });
     *is_selected = true;
+}
+
+/// Tells why joints around a moved one stayed where they are.
+fn show_refusals(mut failures: MessageReader<RefitFailed>, mut commands: Commands) {
+    for RefitFailed { reason, .. } in failures.read() {
+        commands.write_message(Notice::error(format!("The joints around it were not fitted again: {reason}.")));
+    }
 }
 
 /// Tells what a fit found, and selects the joints that it is not sure of.

@@ -112,6 +112,9 @@ parameters! {
         pub hierarchy: bool = true,
         /// Directions of the control's axes, node: like its node's; rig: like the rig's.
         pub axes: ControlAxes = ControlAxes::Node,
+        /// Turn of the axes of the rig that the control or its shape has, about X, Y and Z, in degrees: of a figure that does
+        /// not stand along Y.
+        pub axes_rotate: Vec3 = Vec3::ZERO,
         /// True: a null takes its place, so that its own base changes nothing.
         pub offset_group: bool = true,
         /// True: the nodes follow their controls in place and turn.
@@ -164,7 +167,7 @@ impl RigModule for ControlModule {
     const NAME: &'static str = "control";
     const DOC: &'static str = "Makes a control, which people move and animate, for each of some nodes.";
     const PARAMETERS: &'static [(&'static str, &'static str)] = Self::PARAMETERS;
-    const SIDED: &'static [&'static str] = &["shape_translate", "shape_rotate", "limits", "color"];
+    const SIDED: &'static [&'static str] = &["axes_rotate", "shape_translate", "shape_rotate", "limits", "color"];
     const FORM: Option<&'static str> = Some(include_str!("../../assets/modules/control.ui.ron"));
     const ICON: Option<&'static str> = Some(include_str!("../../assets/modules/control.svg"));
 
@@ -197,9 +200,13 @@ impl RigModule for ControlModule {
         self.size = self.size.map(|size| size * change.factor);
         self.shape_translate *= change.factor;
         self.limits = self.limits.resized(change.factor);
+        if self.axes == ControlAxes::Rig || self.shape_axes == ShapeAxes::Rig {
+            self.axes_rotate = change.turned_angles(self.axes_rotate);
+        }
     }
 
     fn mirror(&mut self) {
+        self.axes_rotate = mirrored_angles(self.axes_rotate);
         self.shape_translate = mirrored_direction(self.shape_translate);
         self.shape_rotate = mirrored_angles(self.shape_rotate);
         self.limits = self.limits.mirrored();
@@ -238,6 +245,7 @@ impl ControlModule {
         scope.in_range("size", self.size.unwrap_or(1.0), f32::MIN_POSITIVE..=f32::INFINITY)?;
         scope.in_range("relative_size", self.relative_size, f32::MIN_POSITIVE..=f32::INFINITY)?;
         for (parameter, vector) in [
+            ("axes_rotate", self.axes_rotate),
             ("shape_translate", self.shape_translate),
             ("shape_rotate", self.shape_rotate),
             ("shape_scale", self.shape_scale),
@@ -311,7 +319,9 @@ impl ControlModule {
         let place = match (self.axes, &hinge) {
             (ControlAxes::Node, Some(hinge)) => Trs { rotation: hinge.rotation, ..own },
             (ControlAxes::Node, None) => own,
-            (ControlAxes::Rig, _) => Trs { translation: own.translation, ..Trs::IDENTITY },
+            (ControlAxes::Rig, _) => {
+                Trs { translation: own.translation, rotation: degrees(self.axes_rotate), scale: Vec3::ONE }
+            }
         };
         let channels = match hinge {
             Some(_) => Channels { rotate: [true, false, false], ..self.channels },
@@ -393,7 +403,9 @@ impl ControlModule {
         let back = place.rotation.inverse();
         let axes = match self.shape_axes {
             ShapeAxes::Control => Quat::IDENTITY,
-            ShapeAxes::Rig => back,
+            // Without a turn to the bit as the inverse.
+            ShapeAxes::Rig if self.axes_rotate == Vec3::ZERO => back,
+            ShapeAxes::Rig => (back * degrees(self.axes_rotate)).normalize(),
             ShapeAxes::Bone => match scope.bone(node).map(|bone| (back * bone).normalize()) {
                 // Exactly along an axis is the rule, and shall not become nearly so by rounding.
                 Some(bone) if bone.dot(Vec3::Y) < 1.0 - 1e-5 => Quat::from_rotation_arc(Vec3::Y, bone),

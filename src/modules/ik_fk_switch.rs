@@ -5,7 +5,7 @@ use glam::Vec3;
 use crate::{
     mesh::model::Trs,
     parameters,
-    processor::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, RigModule, mirrored_direction},
+    processor::{Amount, BuildScope, Creation, Ik, IkSolver, ModuleError, Resize, RigModule, mirrored_direction},
     rig::{
         AttributeKind, Constraint, Matching, NodeType, Scalar, SwitchData, Target,
         reference::{NodeRef, NodeRefs},
@@ -180,6 +180,10 @@ impl RigModule for IkFkSwitch {
             },
         };
         scope.switch("switch", start, switch)
+    }
+
+    fn resize(&mut self, change: &Resize) {
+        self.prefer = self.prefer.map(|prefer| change.turned(prefer));
     }
 
     fn mirror(&mut self) {

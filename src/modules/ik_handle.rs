@@ -5,7 +5,8 @@ use glam::Vec3;
 use crate::{
     parameters,
     processor::{
-        Amount, BuildScope, Ik, IkSolver, JointAngles, ModuleError, RigModule, mirrored_direction, mirrored_limits,
+        Amount, BuildScope, Ik, IkSolver, JointAngles, ModuleError, Resize, RigModule, mirrored_direction,
+        mirrored_limits,
     },
     rig::reference::{NodeRef, NodeRefs},
 };
@@ -104,6 +105,10 @@ impl RigModule for IkHandle {
             ..Ik::new(chain, goal)
         })?;
         Ok(())
+    }
+
+    fn resize(&mut self, change: &Resize) {
+        self.prefer = self.prefer.map(|prefer| change.turned(prefer));
     }
 
     fn mirror(&mut self) {

@@ -85,8 +85,11 @@ impl RigModule for NullModule {
 
     fn resize(&mut self, change: &Resize) {
         self.translate *= if self.world { change.floor_factor } else { change.factor };
-        if self.translate != Vec3::ZERO && !self.orient {
-            self.translate = change.turn * self.translate;
+        if !self.orient {
+            if self.translate != Vec3::ZERO {
+                self.translate = change.turned(self.translate);
+            }
+            self.rotate = change.turned_angles(self.rotate);
         }
     }
 

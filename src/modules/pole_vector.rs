@@ -5,7 +5,9 @@ use glam::Vec3;
 use crate::{
     mesh::model::Trs,
     parameters,
-    processor::{Amount, BuildScope, Creation, ModuleError, RigModule, TargetParams, check_finite, mirrored_direction},
+    processor::{
+        Amount, BuildScope, Creation, ModuleError, Resize, RigModule, TargetParams, check_finite, mirrored_direction,
+    },
     rig::{Constraint, NodeType, reference::NodeRefs},
 };
 
@@ -92,6 +94,10 @@ impl RigModule for PoleVectorModule {
         };
         scope.constrain("constraint", chain[0], 0, constraint)?;
         Ok(())
+    }
+
+    fn resize(&mut self, change: &Resize) {
+        self.prefer = change.turned(self.prefer);
     }
 
     fn mirror(&mut self) {

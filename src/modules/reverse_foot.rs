@@ -6,7 +6,7 @@ use crate::{
     mesh::model::Trs,
     modules::control::side_color,
     parameters,
-    processor::{Amount, BuildScope, Creation, ModuleError, NodeId, RigModule, mirrored_direction},
+    processor::{Amount, BuildScope, Creation, ModuleError, NodeId, Resize, RigModule, mirrored_direction},
     rig::{
         AttributeKind, Channel, Channels, Constraint, ControlData, KeyEase, Limits, NodeType, Output, Scalar, Target,
         reference::{NodeRef, NodeRefs},
@@ -169,6 +169,10 @@ impl RigModule for ReverseFoot {
             scope.constrain("toes", ball, 0, follow)?;
         }
         Ok(())
+    }
+
+    fn resize(&mut self, change: &Resize) {
+        self.up = change.turned(self.up);
     }
 
     fn mirror(&mut self) {

@@ -58,6 +58,7 @@ impl Plugin for FitPlugin {
             .add_message::<FitAnswer>()
             .add_message::<EndFit>()
             .add_message::<RemoveMarker>()
+            .add_message::<RefitFailed>()
             .add_message::<ResultHeld>()
             .add_message::<super::document::EditReport>()
             .add_message::<EditRequest>()
@@ -210,6 +211,15 @@ pub struct RemoveMarker {
     pub rig: Entity,
     /// The joint.
     pub joint: Uid,
+}
+
+/// Message that the joints around a moved one were not fitted again; the moved joint stays where it was put.
+#[derive(Message, Debug, Clone)]
+pub struct RefitFailed {
+    /// The rig.
+    pub rig: Entity,
+    /// Reason of the failure.
+    pub reason: FitFailure,
 }
 
 struct FinishedFit {

@@ -2,12 +2,15 @@
 
 use std::{any::TypeId, borrow::Cow, collections::BTreeMap, sync::Arc};
 
-use bevy::reflect::{Reflect, TypeInfo, Typed};
-use glam::Quat;
+use bevy::{
+    math::ops,
+    reflect::{Reflect, TypeInfo, Typed},
+};
+use glam::{Mat3, Quat, Vec3};
 use serde::{Serialize, de::DeserializeOwned};
 
 use super::{BuildProblem, BuildScope, Deadline, ModuleError, form::read_module_form, mirror};
-use crate::rig::{SourceError, nearest::did_you_mean, parse_ron, ron_text};
+use crate::rig::{SourceError, degrees, nearest::did_you_mean, parse_ron, ron_text};
 
 /// Module of commands: its fields are the parameters of the tag, [`RigModule::construct`] is the work.
 ///
@@ -61,6 +64,29 @@ pub struct Resize {
     pub floor_factor: f32,
     /// Rotation of the rig's axes.
     pub turn: Quat,
+}
+
+impl Resize {
+    /// Direction along the rig's axes, turned with them.
+    pub fn turned(&self, direction: Vec3) -> Vec3 {
+        if self.turn == Quat::IDENTITY { direction } else { self.turn * direction }
+    }
+
+    /// Angles about X, Y and Z in degrees, against the rig's axes, turned with them.
+    pub fn turned_angles(&self, angles: Vec3) -> Vec3 {
+        if self.turn == Quat::IDENTITY {
+            return angles;
+        }
+        let axes = Mat3::from_quat((self.turn * degrees(angles)).normalize());
+        let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis];
+        let level = (x.x * x.x + y.x * y.x).sqrt();
+        let about_y = ops::atan2(z.x, level);
+        // With Y at a right angle, X and Z turn about one line.
+        let (about_x, about_z) =
+            if level > 1e-4 { (ops::atan2(-z.y, z.z), ops::atan2(-y.x, x.x)) } else { (ops::atan2(y.z, y.y), 0.0) };
+        // Right angles are written as such, not nearly so by rounding, and zero without a sign.
+        [about_x, about_y, about_z].map(|angle| (angle.to_degrees() * 1e4).round() / 1e4 + 0.0).into()
+    }
 }
 
 /// A [`RigModule`] whose type is not known: parameters, ready to be carried out.

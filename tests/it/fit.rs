@@ -98,6 +98,30 @@ fn the_biped_fits_the_body_it_was_made_for() {
     assert!(hand.unwrap().entity.translation.distance(goal) < 1e-3 * height);
 }
 
+/// A figure that stands along Z has controls that do, too: up is Y of its foot's control.
+#[test]
+fn controls_stand_as_the_figure_does() {
+    let mut model = bundled_body();
+    model.points.iter_mut().for_each(|point| *point = Vec3::new(point.x, -point.z, point.y));
+    let mut bench = bench(model);
+    let report = fit(&mut bench).unwrap();
+    assert_eq!((report.fit.up, report.fit.forward), (Vec3::Z, Vec3::NEG_Y));
+    assert_eq!(bench.build(BuildStep::All).error, None);
+    let place = |bench: &mut Workbench, name: &str| {
+        let nodes = bench.nodes().unwrap();
+        let node = nodes.iter().find(|node| &*node.node.name == name).unwrap_or_else(|| panic!("no node {name}"));
+        node.entity.translation
+    };
+    for control in ["root", "foot_ik_l"] {
+        let before = place(&mut bench, control);
+        let by = |offset: &str| format!("{control}.translate={offset}").parse().unwrap();
+        bench.pose(&[by("(0,0.2,0)")]).unwrap();
+        let moved = place(&mut bench, control) - before;
+        assert!(moved.distance(Vec3::new(0.0, 0.0, 0.2)) < 1e-3, "{control} is moved by {moved}");
+        bench.pose(&[by("(0,0,0)")]).unwrap();
+    }
+}
+
 /// One step of the history; undone, the rig has the first bytes again. The same input gives the same bytes.
 #[test]
 fn a_fit_is_one_step_and_repeats_exactly() {
@@ -184,11 +208,11 @@ fn gestures_fit() {
     assert!(answers[2].done, "{answers:?}");
 }
 
-/// The left hand of the bundled body and the end of its forearm.
-fn hand_mesh() -> Model {
+/// A hand of the bundled body and the end of its forearm: the left one for 1, the right one for -1.
+fn hand_mesh(side: f32) -> Model {
     let mut model = bundled_body();
     for part in &mut model.parts {
-        let is_of_hand = |corner: &u32| model.points[part.vertices[*corner as usize] as usize].x > 0.5;
+        let is_of_hand = |corner: &u32| side * model.points[part.vertices[*corner as usize] as usize].x > 0.5;
         part.triangles.retain(|corners| corners.iter().all(is_of_hand));
         part.faces.starts = (0..=part.triangles.len() as u32).map(|face| 3 * face).collect();
         part.faces.corners = part.triangles.concat();
@@ -196,10 +220,25 @@ fn hand_mesh() -> Model {
     model
 }
 
+/// The hand as a skeleton of its own is that of the side that the mesh shows, by its name and by choice.
+#[test]
+fn hands_are_of_their_side() {
+    for (side, ending) in [(1.0, "_l"), (-1.0, "_r")] {
+        for template in [FitTemplate::Named("hand".into()), FitTemplate::Choose] {
+            let mut bench = bench(hand_mesh(side));
+            let report = bench.fit(|request| request.template = template.clone(), &mut |_| ()).unwrap();
+            assert_eq!(report.template, "hand", "{}", report.choice);
+            let labels: Vec<&str> = report.joints.iter().map(|(_, label)| label.as_str()).collect();
+            assert!(labels.iter().all(|label| label.ends_with(ending)), "{template:?} {labels:?}");
+            assert!(at(bench.rig(), labels[0]).x * side > 0.0);
+        }
+    }
+}
+
 /// A part is a skeleton of its own in an empty rig, and comes below the selected joint of another one.
 #[test]
 fn gestures_fit_parts() {
-    let mut bench = bench(hand_mesh());
+    let mut bench = bench(hand_mesh(1.0));
     bench.offer_parts(FitParts(Arc::new(bundled_part)));
     let fit = || Gesture::Fit { template: Some("parts/hand".into()) };
     let answers = bench.gestures(vec![Gesture::Fit { template: Some("parts/hund".into()) }, fit(), Gesture::Undo]);

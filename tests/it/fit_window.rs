@@ -213,6 +213,21 @@ impl Window {
     }
 }
 
+/// A joint that is put far outside of the mesh stays there, and it is told that the others stay where they are.
+#[test]
+fn a_drag_out_of_the_mesh_is_told() {
+    let mut window = Window::fitted();
+    let (hand, knee) = (window.at("hand_l"), window.at("shin_r"));
+    let place = window.drag("forearm_l", Vec3::new(50.0, 0.0, 0.0));
+    window.says("were not fitted again");
+    assert!(window.at("forearm_l").distance(place) < 1e-3 && window.at("shin_r").distance(knee) < 1e-4);
+    // Back in the mesh it takes its neighbours along again.
+    let out = window.at("hand_l");
+    window.drag("forearm_l", Vec3::new(-49.97, 0.04, 0.0));
+    assert!(window.at("hand_l").distance(hand) < 0.2, "{} was {out}", window.at("hand_l"));
+    assert_eq!(window.markers().len(), 1);
+}
+
 #[test]
 fn undo_and_redo_of_a_fit_keep_what_a_drag_needs() {
     let mut window = Window::fitted();

@@ -89,6 +89,8 @@ mod fit_hinges;
 mod fit_parts;
 #[cfg(feature = "editor")]
 mod fit_window;
+#[cfg(feature = "cli")]
+mod fit_wishes;
 #[cfg(feature = "editor")]
 mod folder_watch;
 mod fuzz_animation;

@@ -143,6 +143,34 @@ fn the_same_input_gives_the_same_picture_on_a_gpu() {
     assert_eq!(take(), take());
 }
 
+/// The camera turns with a figure that stands along Z.
+#[test]
+fn the_view_follows_the_axes_of_the_figure_on_a_gpu() {
+    if !can_draw() {
+        return;
+    }
+    let _turn = TURN.lock();
+    let take = |places: [&str; 2], turn: Quat| {
+        let text = format!(
+            r#"(format: 2, name: "two", joints: [
+                (label: "a"),
+                (label: "b", parent: "a", translation: {}),
+                (label: "c", parent: "b", translation: {}),
+            ])"#,
+            places[0], places[1]
+        );
+        let rig = read_template(text.as_bytes()).unwrap().rig;
+        let drawing = RigDrawing { grid: false, ..RigDrawing::default() };
+        let settings = PictureSettings { size: UVec2::new(120, 90), turn, drawing, ..PictureSettings::default() };
+        image::load_from_memory(&png(take_picture(rig, Vec::new(), &settings).unwrap()).unwrap()).unwrap().to_rgb8()
+    };
+    let upright = take(["(0, 1, 0)", "(0.5, 0.2, 0)"], Quat::IDENTITY);
+    let along_z = ["(0, 0, 1)", "(0.5, 0, 0.2)"];
+    let (_, turned) = difference(&upright, &take(along_z, Quat::from_rotation_x(std::f32::consts::FRAC_PI_2)));
+    let (_, still) = difference(&upright, &take(along_z, Quat::IDENTITY));
+    assert!(turned < 0.02 && 2.0 * turned < still, "{turned} of the pixels differ, {still} without the turn");
+}
+
 #[test]
 fn impossible_sizes_are_refused() {
     for (width, height) in [(0, 10), (10, 0), (100_000, 10)] {

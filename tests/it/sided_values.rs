@@ -35,9 +35,9 @@ const SIDED: &[(&str, &str, &str)] = &[
     ("aim", "(aim: z, up_axis: neg_x)", "(aim: z, up_axis: x)"),
     (
         "control",
-        "(shape_translate: (0.1, 0.2, 0.3), shape_rotate: (10.0, 20.0, 30.0), color: Some((0.25, 0.55, 1.0)), limits: \
+        "(axes_rotate: (90.0, 10.0, 20.0), shape_translate: (0.1, 0.2, 0.3), shape_rotate: (10.0, 20.0, 30.0), color: Some((0.25, 0.55, 1.0)), limits: \
          (rotate: ((Some(1.0), None), (Some(-2.0), Some(3.0)), (None, None))))",
-        "(shape_translate: (-0.1,0.2,0.3), shape_rotate: (10.0,-20.0,-30.0), color: COLOR, limits: (rotate: LIMITS))",
+        "(axes_rotate: (90.0,-10.0,-20.0), shape_translate: (-0.1,0.2,0.3), shape_rotate: (10.0,-20.0,-30.0), color: COLOR, limits: (rotate: LIMITS))",
     ),
     (
         "driven_key",

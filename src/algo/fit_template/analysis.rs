@@ -147,12 +147,26 @@ impl MeshAnalysis {
             let limb = template.limbs.iter().position(|l| l.joints.contains(&marker.joint))?;
             Some(LimbMarker { limb, place: marker.place })
         };
-        let limb_markers: Vec<LimbMarker> = markers.iter().filter_map(of_limb).collect();
+        let told = markers.iter().filter(|marker| !marker.is_alone());
+        let limb_markers: Vec<LimbMarker> = told.filter_map(of_limb).collect();
         let found = assign::assign(&self.graph, &self.trees, template, &directions, &limb_markers);
         let ends = self.trees.iter().map(|t| t.branches.leaves.len()).max().unwrap_or(0);
         let wanted = template.limbs.len();
         let shown = found.first().map_or(0, |best| best.leaves.iter().filter(|l| l.is_some()).count());
         if shown * 2 < wanted { Err(FitError::TooFewLimbs { found: ends, wanted }) } else { Ok(found) }
+    }
+
+    /// Least and greatest corner of the mesh in its space.
+    pub(super) fn bounds(&self) -> (Vec3, Vec3) {
+        let used = self.mesh.triangles.iter().flatten();
+        let corners = used.map(|&c| self.mesh.space.to_file(self.mesh.points[c as usize]));
+        corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
+    }
+
+    /// Distance of a place from the volume, in unit space.
+    pub(super) fn distance_from_volume(&self, place: Vec3) -> f32 {
+        let centres = self.graph.centres.iter();
+        centres.map(|centre| centre.distance_squared(place)).fold(f32::INFINITY, f32::min).sqrt()
     }
 
     /// Extent of the mesh along a direction of unit space, in the mesh's unit.

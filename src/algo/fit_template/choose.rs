@@ -30,7 +30,7 @@ impl fmt::Display for TemplateChoice {
             write!(f, "{before}{found} of {wanted} {kind}{plural}")?;
         }
         if self.unused > 0 {
-            write!(f, ", {} branches unused", self.unused)?;
+            write!(f, ", {} {} unused", self.unused, if self.unused == 1 { "branch" } else { "branches" })?;
         }
         Ok(())
     }

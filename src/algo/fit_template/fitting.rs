@@ -8,9 +8,11 @@ use super::{
     assign::Hypothesis,
     bends, chain, confidence,
     human::{self, Role},
-    limbs::{self, TemplateLimbs},
+    limbs::{self, LimbKind, TemplateLimbs},
     markers::{self, Marker},
-    place, symmetry,
+    place,
+    report::axis_name,
+    symmetry,
 };
 
 /// Angle (its cosine) within which up and forward are taken to be an axis of the file.
@@ -19,6 +21,27 @@ const SNAP: f32 = 0.9;
 const UNCERTAIN: f32 = 0.06;
 /// Distance between body model and surface, as a share of the height, above which the model is not used.
 const UNLIKE: f32 = 0.018;
+/// Distance outside of the mesh's bounds from which on a marker is a mistake, as a share of the mesh's longest side.
+const MARGIN: f32 = 0.25;
+/// Distance from the volume from which on a marker lies outside of it, in unit space.
+const OUTSIDE: f32 = 0.05;
+/// Confidence of a fit from which on what it shows counts more than a wish that contradicts it.
+const SURE: f32 = 0.7;
+/// Distance of a marker from where a sure fit has its joint that contradicts it, as a share of the height.
+const FAR: f32 = 0.25;
+/// Distance, as a share of the height, within which a joint is where its marker is.
+const AT_PLACE: f32 = 1e-4;
+/// Cosine of the angle from which on two up directions are one.
+const SAME_UP: f32 = 0.9;
+/// Cosine of the angle below which a direction contradicts another one.
+const OTHER_WAY: f32 = 0.5;
+/// Cosine of the angle from which on up and forward are one line.
+const PARALLEL: f32 = 0.98;
+/// Most confidence in a fit by a direction that the mesh contradicts.
+const CONTRADICTED: f32 = 0.45;
+
+/// Function that takes the share of the work done, and cancels with `false`.
+type Progress<'p> = &'p (dyn Fn(f32) -> bool + Sync);
 
 /// A fit at work.
 pub(super) struct Fit<'a> {
@@ -46,26 +69,148 @@ impl<'a> Fit<'a> {
                 return Err(FitError::Direction(name));
             }
         }
+        if let (Some(up), Some(forward)) = (settings.up, settings.forward)
+            && up.normalize_or_zero().dot(forward.normalize_or_zero()).abs() > PARALLEL
+        {
+            return Err(FitError::Parallel);
+        }
         let bad = |&(joint, position): &(usize, Vec3)| joint >= joints.len() || !position.is_finite();
         if let Some(marker) = settings.markers.iter().position(bad) {
             return Err(FitError::Marker { marker, joint: settings.markers[marker].0, joints: joints.len() });
         }
         let template = limbs::limbs(joints).filter(|t| !t.limbs.is_empty()).ok_or(FitError::NoChain)?;
         let space = &analysis.mesh.space;
-        let markers = settings.markers.iter().map(|&(joint, p)| Marker { joint, place: space.to_unit(p) }).collect();
+        if !settings.markers.is_empty() {
+            let (low, high) = analysis.bounds();
+            let margin = MARGIN * (high - low).max_element();
+            let is_far = |place: Vec3| place.cmplt(low - margin).any() || place.cmpgt(high + margin).any();
+            if let Some(&(joint, place)) = settings.markers.iter().find(|(_, place)| is_far(*place)) {
+                return Err(FitError::FarMarker { label: joints[joint].label.to_owned(), place, low, high });
+            }
+        }
+        let marker = |&(joint, position): &(usize, Vec3)| {
+            let place = space.to_unit(position);
+            Marker { joint, place, outside: analysis.distance_from_volume(place) > OUTSIDE, against: false }
+        };
+        let markers = settings.markers.iter().map(marker).collect();
         Ok(Self { analysis, joints, settings, template, markers })
     }
 
     /// Runs the fit, starting from an earlier one if it still holds.
     pub(super) fn run(
+        self,
+        before: Option<&FittedSkeleton>,
+        progress: Progress<'_>,
+    ) -> Result<FittedSkeleton, FitError> {
+        let is_given = self.settings.up.is_some() || self.settings.forward.is_some();
+        let has_sides = self.template.limbs.iter().any(|limb| limb.kind != LimbKind::Free);
+        let is_weighed = before.is_none() && is_given && has_sides;
+        let contradictions: Vec<FitNote> = match before {
+            Some(before) => before.notes.iter().filter(|note| note.is_of_direction()).cloned().collect(),
+            None if is_weighed => self.contradictions(&|share| progress(0.5 * share))?,
+            None => Vec::new(),
+        };
+        let begun = if is_weighed { 0.5 } else { 0.0 };
+        let mut fit = self.by_markers(before, &|share| progress(begun + (1.0 - begun) * share))?;
+        if !contradictions.is_empty() {
+            fit.confidence = fit.confidence.min(CONTRADICTED);
+            fit.notes.extend(contradictions);
+        }
+        let is_finite = |joint: &JointFit| joint.position.is_finite() && joint.confidence.is_finite();
+        match fit.joints.iter().all(is_finite) && fit.confidence.is_finite() {
+            true => Ok(fit),
+            false => Err(FitError::NotFinite),
+        }
+    }
+
+    /// Directions of which the mesh shows the contrary: what a fit without them finds for sure.
+    fn contradictions(&self, progress: Progress<'_>) -> Result<Vec<FitNote>, FitError> {
+        let free = FitSettings { up: None, forward: None, markers: Vec::new(), ..self.settings.clone() };
+        let shown = match Fit::new(self.analysis, self.joints, &free)?.settled(None, progress) {
+            Ok((shown, _)) if shown.confidence >= SURE => shown,
+            Err(FitError::Cancelled) => return Err(FitError::Cancelled),
+            _ => return Ok(Vec::new()),
+        };
+        let cosine = |given: Option<Vec3>, shown: Vec3| given.map_or(1.0, |given| given.normalize_or_zero().dot(shown));
+        let (up, forward) = (cosine(self.settings.up, shown.up), cosine(self.settings.forward, shown.forward));
+        let mut notes = Vec::new();
+        if up < OTHER_WAY {
+            notes.push(FitNote::OtherUp(axis_name(shown.up)));
+        }
+        let is_uncertain = shown.notes.contains(&FitNote::UncertainFront);
+        // Where the front is uncertain, the plane of symmetry still tells it from a side.
+        if forward < OTHER_WAY && (!is_uncertain || forward > -OTHER_WAY) {
+            notes.push(FitNote::OtherForward(axis_name(shown.forward)));
+        }
+        Ok(notes)
+    }
+
+    /// Fits with markers, which are weighed against what the mesh shows without them: where that is sure, a marker that
+    /// contradicts it moves its own limb alone.
+    fn by_markers(
+        mut self,
+        before: Option<&FittedSkeleton>,
+        progress: Progress<'_>,
+    ) -> Result<FittedSkeleton, FitError> {
+        // A marker that was against the first fit is so until it is moved.
+        for (marker, (joint, place)) in self.markers.iter_mut().zip(&self.settings.markers) {
+            let Some((before, was)) = before.and_then(|before| Some((before, before.joints.get(*joint)?))) else {
+                break;
+            };
+            let note = FitNote::MarkerAgainst(self.joints[*joint].label.to_owned());
+            let is_there = was.position.distance(*place) <= AT_PLACE * before.height;
+            marker.against = is_there && before.notes.contains(&note);
+        }
+        if let Some(before) = before.filter(|before| self.still_holds(&before.assignments)) {
+            return Ok(self.settled(Some(before), progress)?.0);
+        }
+        if self.markers.is_empty() {
+            return Ok(self.settled(None, progress)?.0);
+        }
+        let bare = FitSettings { markers: Vec::new(), ..self.settings.clone() };
+        let shown = match before {
+            Some(before) => Ok(before.clone()),
+            None => {
+                let first = |share: f32| progress(0.5 * share);
+                Fit::new(self.analysis, self.joints, &bare)?.settled(None, &first).map(|(fit, _)| fit)
+            }
+        };
+        let rest = |share: f32| progress(0.5 + 0.5 * share);
+        let shown = match shown {
+            Ok(shown) if shown.confidence >= SURE => shown,
+            Err(FitError::Cancelled) => return Err(FitError::Cancelled),
+            _ => return Ok(self.settled(None, &rest)?.0),
+        };
+        let far = FAR * shown.height;
+        let is_against = |marker: &(usize, Vec3)| shown.joints[marker.0].position.distance(marker.1) > far;
+        let against: Vec<bool> = self.settings.markers.iter().map(is_against).collect();
+        if !against.contains(&true) && self.still_holds(&shown.assignments) {
+            return Ok(self.settled(Some(&shown), &rest)?.0);
+        }
+        // Markers that agree with each other may know the sides or the front better; a figure that stands has its feet below.
+        if !self.markers.iter().all(Marker::is_alone) {
+            match self.settled(None, &rest) {
+                Ok((marked, pull)) if marked.up.dot(shown.up) > SAME_UP && pull <= far => return Ok(marked),
+                Err(FitError::Cancelled) => return Err(FitError::Cancelled),
+                _ => {}
+            }
+        }
+        for (marker, against) in self.markers.iter_mut().zip(against) {
+            marker.against |= against;
+        }
+        Ok(self.settled(Some(&shown), &rest)?.0)
+    }
+
+    /// The fit by an earlier one, or by the best assignment of limbs; with it, the largest distance over which a marker
+    /// pulls its joint, in the mesh's unit.
+    fn settled(
         &self,
         before: Option<&FittedSkeleton>,
-        progress: &(dyn Fn(f32) -> bool + Sync),
-    ) -> Result<FittedSkeleton, FitError> {
+        progress: Progress<'_>,
+    ) -> Result<(FittedSkeleton, f32), FitError> {
         let analysis = self.analysis;
         let step = |share: f32| if progress(share) { Ok(()) } else { Err(FitError::Cancelled) };
         step(0.0)?;
-        let before = before.filter(|b| self.still_holds(&b.assignments));
         let hypotheses = match before {
             Some(before) => before.assignments.clone(),
             None => analysis.hypotheses(&self.template, self.settings, &self.markers)?,
@@ -74,6 +219,8 @@ impl<'a> Fit<'a> {
         let tree = &analysis.trees[best.tree];
         let placement = place::place(&self.template, tree, &analysis.graph, best);
         let mut places = placement.places.clone();
+        let told = self.markers.iter().filter(|marker| !marker.is_alone());
+        let pull = told.map(|marker| places[marker.joint].distance(marker.place)).fold(0.0, f32::max);
         if let Some(leaf) = best.leaves.first().copied().flatten().filter(|_| chain::is_lone(&self.template)) {
             chain::spread(&self.template, tree, leaf, analysis.root(self.settings), &mut places);
         }
@@ -87,7 +234,7 @@ impl<'a> Fit<'a> {
             places = self.by_roles(body, roles, best);
         }
         step(0.95)?;
-        let plane = self.make_symmetric(&mut places);
+        let (plane, is_forced) = self.make_symmetric(&mut places);
         markers::warp(&self.template, &mut places, &self.markers, body.is_some());
         let (up, forward) = self.directions(best, body.as_ref());
         self.bend_as_template(best, up, forward, &mut places);
@@ -115,7 +262,12 @@ impl<'a> Fit<'a> {
             confidence,
             reason,
         });
-        Ok(FittedSkeleton {
+        let mut notes = self.notes(best, body.as_ref());
+        if plane.is_some() && self.settings.symmetry != FitSymmetry::Off {
+            let pairs = self.template.mirror.iter().flatten().count() / 2;
+            notes.push(if is_forced { FitNote::ForcedSymmetric(pairs) } else { FitNote::MadeSymmetric });
+        }
+        let fit = FittedSkeleton {
             up,
             forward,
             symmetry: plane.map(|(p, n)| (space.to_file(p), space.direction_to_file(n))),
@@ -123,10 +275,11 @@ impl<'a> Fit<'a> {
             confidence,
             joints: fits.collect(),
             hypotheses: hypotheses.iter().map(|h| self.summary(h)).collect(),
-            notes: self.notes(best, body.as_ref(), plane.is_some()),
+            notes,
             body,
             assignments: hypotheses,
-        })
+        };
+        Ok((fit, (f64::from(pull) / space.scale) as f32))
     }
 
     /// The body model on the mesh; `None` for a figure that is unlike all bodies and is left to its centre lines.
@@ -161,7 +314,7 @@ impl<'a> Fit<'a> {
         };
         let Some(tree) = self.analysis.trees.get(best.tree) else { return false };
         let slack = 4.0 * self.analysis.graph.cell;
-        self.markers.iter().all(|marker| {
+        self.markers.iter().filter(|marker| !marker.is_alone()).all(|marker| {
             let Some(limb) = self.template.limbs.iter().position(|l| l.joints.contains(&marker.joint)) else {
                 return true;
             };
@@ -175,7 +328,7 @@ impl<'a> Fit<'a> {
     fn refitted_body(&self, body: &human::FittedBody, roles: &[Option<Role>]) -> human::FittedBody {
         // A person's idea of the spine and of clavicles, which the surface hides, must not bend the body.
         let of_bone = |m: &Marker| match roles[m.joint] {
-            Some(Role::Bone(bone)) if human::is_shown(bone) => Some((bone, m.place)),
+            Some(Role::Bone(bone)) if human::is_shown(bone) && !m.is_alone() => Some((bone, m.place)),
             _ => None,
         };
         let kept: Vec<(usize, Vec3)> = self.markers.iter().filter_map(of_bone).collect();
@@ -222,7 +375,8 @@ impl<'a> Fit<'a> {
         place::follow(template, &align::Stretch::fit(&pairs, &similarity), &places)
     }
 
-    fn make_symmetric(&self, places: &mut [Vec3]) -> Option<(Vec3, Vec3)> {
+    /// Makes left and right alike, where they shall be. Returns the plane of symmetry, and whether it is only asked for.
+    fn make_symmetric(&self, places: &mut [Vec3]) -> (Option<(Vec3, Vec3)>, bool) {
         let analysis = self.analysis;
         let of_mesh = analysis.mirror.filter(|plane| plane.is_of(&self.template, places));
         let found = symmetry::find(&self.template, places, &analysis.graph, &analysis.voxels)
@@ -239,7 +393,7 @@ impl<'a> Fit<'a> {
         {
             symmetry::centre(&self.template, places, (plane.point, plane.normal));
         }
-        found
+        (plane.or(found), found.is_none() && plane.is_some())
     }
 
     /// Bends elbows and knees as the template does; a place that a person gave stays with its neighbours.
@@ -277,7 +431,7 @@ impl<'a> Fit<'a> {
         HypothesisSummary { cost: hypothesis.cost, limbs }
     }
 
-    fn notes(&self, best: &Hypothesis, body: Option<&human::FittedBody>, symmetric: bool) -> Vec<FitNote> {
+    fn notes(&self, best: &Hypothesis, body: Option<&human::FittedBody>) -> Vec<FitNote> {
         let analysis = self.analysis;
         let mut notes = Vec::new();
         let mut counted = |count: usize, note: fn(usize) -> FitNote| {
@@ -301,8 +455,10 @@ impl<'a> Fit<'a> {
                 notes.push(FitNote::UncertainFront);
             }
         }
-        if symmetric && self.settings.symmetry != FitSymmetry::Off {
-            notes.push(FitNote::MadeSymmetric);
+        for marker in &self.markers {
+            let label = || self.joints[marker.joint].label.to_owned();
+            notes.extend(marker.outside.then(|| FitNote::MarkerOutside(label())));
+            notes.extend(marker.against.then(|| FitNote::MarkerAgainst(label())));
         }
         notes
     }

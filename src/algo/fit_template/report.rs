@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use glam::Vec3;
+use glam::{Mat3, Quat, Vec3};
 use thiserror::Error;
 
 use super::{assign::Hypothesis, human::FittedBody, limbs::LimbKind};
@@ -14,7 +14,8 @@ pub struct FittedSkeleton {
     pub up: Vec3,
     /// Direction that the figure faces in the mesh's space, unit length.
     pub forward: Vec3,
-    /// Plane of symmetry of mesh and pose, where they have one: a point and the unit normal to the figure's left.
+    /// Plane of symmetry of mesh and pose, where they have one, or the plane about which left and right were made alike as
+    /// asked: a point and the unit normal to the figure's left.
     pub symmetry: Option<(Vec3, Vec3)>,
     /// Extent of the mesh along `up`, in its unit.
     pub height: f32,
@@ -37,7 +38,13 @@ impl FittedSkeleton {
         self.body.as_ref().map(|body| body.residual)
     }
 
-    /// True if mesh and pose have a plane of symmetry.
+    /// Rotation from the axes of the template (Y up, facing +Z) to those of the figure.
+    pub fn turn(&self) -> Quat {
+        let left = self.up.cross(self.forward).normalize_or(Vec3::X);
+        Quat::from_mat3(&Mat3::from_cols(left, self.up, left.cross(self.up))).normalize()
+    }
+
+    /// True if mesh and pose have a plane of symmetry, or left and right were made alike as asked.
     pub fn symmetric(&self) -> bool {
         self.symmetry.is_some()
     }
@@ -100,13 +107,13 @@ pub struct HypothesisSummary {
 }
 
 /// Note about a fit for the person who asked for it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FitNote {
     /// Loose specks that were ignored.
     Specks(usize),
-    /// Loose parts that were tied to the body over gaps.
+    /// Pieces of the volume that were tied to the body over gaps.
     Tied(usize),
-    /// Loose parts that are too far from the body.
+    /// Pieces of the volume that are too far from the body.
     Loose(usize),
     /// Objects that hang on a bone and were left out: a hat, a weapon.
     Gear(usize),
@@ -118,26 +125,89 @@ pub enum FitNote {
     BodyModel,
     /// The figure's front is uncertain.
     UncertainFront,
+    /// The side of a part is uncertain.
+    UncertainSide,
     /// Left and right were made alike.
     MadeSymmetric,
+    /// Pairs of joints that were made alike as asked, in a mesh or pose that is not symmetric.
+    ForcedSymmetric(usize),
+    /// Label of a joint whose marker lies outside of the mesh's volume.
+    MarkerOutside(String),
+    /// Label of a joint that the mesh shows far from its marker.
+    MarkerAgainst(String),
+    /// Up direction that the mesh shows, other than the given one.
+    OtherUp(String),
+    /// Direction in which the mesh faces, other than the given one.
+    OtherForward(String),
+}
+
+impl FitNote {
+    /// True for notes about directions that contradict the mesh.
+    pub(super) fn is_of_direction(&self) -> bool {
+        matches!(self, Self::OtherUp(_) | Self::OtherForward(_))
+    }
+}
+
+/// Name of an axis for a direction along one, else its coordinates.
+pub(super) fn axis_name(direction: Vec3) -> String {
+    let axes =
+        [(Vec3::X, "x"), (Vec3::Y, "y"), (Vec3::Z, "z"), (Vec3::NEG_X, "-x"), (Vec3::NEG_Y, "-y"), (Vec3::NEG_Z, "-z")];
+    let axis = axes.iter().find(|(axis, _)| axis.dot(direction) > 0.99);
+    axis.map_or_else(|| format!("{direction:.2}"), |(_, name)| (*name).to_owned())
+}
+
+fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 impl fmt::Display for FitNote {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::Specks(count) => write!(f, "{count} loose specks were ignored"),
-            Self::Tied(count) => write!(f, "{count} loose parts were tied to the body over gaps"),
-            Self::Loose(count) => write!(f, "{count} loose parts are too far from the body and were ignored"),
-            Self::Gear(count) => {
-                write!(f, "{count} objects that hang on a bone were left out; name objects to fit to others")
+            Self::Specks(count) => {
+                f.write_str(&counted(*count, "loose speck was ignored", "loose specks were ignored"))
             }
-            Self::UnusedBranches(count) => write!(f, "{count} branches of the mesh belong to no limb of the template"),
+            Self::Tied(count) => {
+                let pieces = counted(*count, "piece of the volume was", "pieces of the volume were");
+                write!(f, "{pieces} tied to the body over gaps")
+            }
+            Self::Loose(count) => {
+                let pieces = counted(*count, "piece of the volume is", "pieces of the volume are");
+                write!(f, "{pieces} too far from the body, and ignored")
+            }
+            Self::Gear(count) => {
+                let objects = counted(*count, "object that hangs on a bone was", "objects that hang on a bone were");
+                write!(f, "{objects} left out; name objects to fit to others")
+            }
+            Self::UnusedBranches(count) => {
+                let branches = counted(*count, "branch of the mesh belongs", "branches of the mesh belong");
+                write!(f, "{branches} to no limb of the template")
+            }
             Self::MissingLimb(kind) => write!(f, "the mesh shows no {kind} for one of the template"),
             Self::BodyModel => f.write_str("joints follow a model of the human body"),
             Self::UncertainFront => {
                 f.write_str("the front is uncertain: give the forward axis if the skeleton faces backwards")
             }
+            Self::UncertainSide => f.write_str(
+                "the side of the part is uncertain: give a marker for a joint of its thumb if it is the other one",
+            ),
             Self::MadeSymmetric => f.write_str("left and right were made alike"),
+            Self::ForcedSymmetric(pairs) => {
+                let pairs = counted(*pairs, "pair of joints", "pairs of joints");
+                write!(f, "left and right were made alike as asked, though mesh or pose is not symmetric: {pairs}")
+            }
+            Self::MarkerOutside(label) => {
+                write!(f, "the marker of \"{label}\" lies outside of the mesh's volume; it moves its own limb alone")
+            }
+            Self::MarkerAgainst(label) => {
+                write!(
+                    f,
+                    "the marker of \"{label}\" is far from where the mesh shows that joint; it moves its own limb alone"
+                )
+            }
+            Self::OtherUp(axis) => write!(f, "the given up direction contradicts the mesh, which stands along {axis}"),
+            Self::OtherForward(axis) => {
+                write!(f, "the given forward direction contradicts the mesh, which faces along {axis}")
+            }
         }
     }
 }
@@ -189,6 +259,26 @@ pub enum FitError {
     /// A chosen direction is not finite or has no length.
     #[error("the {0} direction is not finite or has no length")]
     Direction(&'static str),
+    /// Up and forward are one line.
+    #[error("the up and forward directions are parallel; give directions at right angles")]
+    Parallel,
+    /// A marker lies far outside of the mesh.
+    #[error(
+        "the marker of \"{label}\" at {place} is far outside of the mesh, which reaches from {low} to {high}; give a place in the mesh's space and unit"
+    )]
+    FarMarker {
+        /// Label of the joint.
+        label: String,
+        /// The place.
+        place: Vec3,
+        /// Least corner of the mesh.
+        low: Vec3,
+        /// Greatest corner of the mesh.
+        high: Vec3,
+    },
+    /// A joint came out without a finite place.
+    #[error("the fit found no finite place for every joint; give the mesh in a usual unit, and markers that are in it")]
+    NotFinite,
     /// The mesh shows too few limbs.
     #[error(
         "the mesh shows {found} limbs where the template has {wanted}; choose another template or a part of the mesh"

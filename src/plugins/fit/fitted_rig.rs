@@ -10,7 +10,7 @@ use super::{
     refit::rests_of,
 };
 use crate::{
-    algo::fit_template::{FitSettings, FittedSkeleton, MeshAnalysis},
+    algo::fit_template::{FitSettings, MeshAnalysis},
     processor::{Fitting, Modules, fitted_rig},
     rig::{EditError, Rig, RigEdit, Uid, step::Step, update::edits_between},
 };
@@ -207,10 +207,9 @@ impl FittedRig {
     }
 
     fn placed(&self, rig: &Rig, modules: &Modules) -> Result<Rig, EditError> {
-        let FittedSkeleton { up, forward, joints, .. } = &self.report.fit;
-        let places = self.report.joints.iter().zip(joints).map(|((uid, _), joint)| (*uid, joint.position)).collect();
-        let left = up.cross(*forward).normalize_or(Vec3::X);
-        let turn = Quat::from_mat3(&Mat3::from_cols(left, *up, left.cross(*up))).normalize();
-        fitted_rig(rig, &Fitting { places, turn, floor: self.floor }, modules)
+        let fit = &self.report.fit;
+        let places =
+            self.report.joints.iter().zip(&fit.joints).map(|((uid, _), joint)| (*uid, joint.position)).collect();
+        fitted_rig(rig, &Fitting { places, turn: fit.turn(), floor: self.floor }, modules)
     }
 }

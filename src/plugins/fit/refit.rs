@@ -10,7 +10,7 @@ use std::{
 use bevy::prelude::*;
 
 use super::{
-    EndFit, FIT, FIT_AROUND, FitMarkers, FitReport, FittedRig, RemoveMarker,
+    EndFit, FIT, FIT_AROUND, FitFailure, FitMarkers, FitReport, FittedRig, RefitFailed, RemoveMarker,
     fitted_rig::{PastFits, PendingFit},
     work::{centre, skeleton, template_joints},
 };
@@ -54,11 +54,15 @@ pub(super) fn follow_moves(
             past: past.cloned().unwrap_or_default(),
             markers: markers.cloned().unwrap_or_default(),
             is_changed: false,
+            failures: Vec::new(),
         };
         for report in reports {
             if let Some(operation) = followed.follow(report, &modules) {
                 commands.write_message(EditRequest::operation(entity, operation));
             }
+        }
+        for reason in followed.failures.drain(..) {
+            commands.write_message(RefitFailed { rig: entity, reason });
         }
         followed.write(entity, &mut commands);
     }
@@ -72,6 +76,8 @@ struct FitHistory<'a> {
     past: PastFits,
     markers: FitMarkers,
     is_changed: bool,
+    /// Reasons why joints were not fitted again.
+    failures: Vec<FitFailure>,
 }
 
 impl FitHistory<'_> {
@@ -169,8 +175,17 @@ impl FitHistory<'_> {
         }
         // Of corrections that were undone no marker is left.
         fitted.markers.retain(|uid, place| is_at(rig, *uid, *place, least));
+        let kept = fitted.markers.clone();
         fitted.markers.extend(top_of(rig, &moved));
-        refitted(rig, fitted, modules)
+        match refitted(rig, fitted, modules) {
+            Ok(operation) => Some(operation),
+            Err(reason) => {
+                // A place that cannot be fitted to is none to start from.
+                fitted.markers = kept;
+                self.failures.push(reason);
+                None
+            }
+        }
     }
 
     fn write(mut self, entity: Entity, commands: &mut Commands) {
@@ -224,17 +239,17 @@ fn top_of(rig: &Rig, moved: &[(Uid, Vec3)]) -> Vec<(Uid, Vec3)> {
     moved.iter().filter(is_top).copied().collect()
 }
 
-fn refitted(rig: &Rig, fitted: &mut FittedRig, modules: &RigModules) -> Option<Operation> {
+fn refitted(rig: &Rig, fitted: &mut FittedRig, modules: &RigModules) -> Result<Operation, FitFailure> {
     let (uids, labels, parents, places) = skeleton(&fitted.template);
     let joints = template_joints(&labels, &parents, &places);
     let index = |uid: &Uid| uids.iter().position(|known| known == uid);
     fitted.settings.markers = fitted.markers.iter().filter_map(|(uid, place)| Some((index(uid)?, *place))).collect();
-    let mut fit = refit_template(&fitted.analysis, &joints, &fitted.settings, &fitted.first.fit).ok()?;
+    let mut fit = refit_template(&fitted.analysis, &joints, &fitted.settings, &fitted.first.fit)?;
     centre(&mut fit, &labels, &fitted.settings.markers);
     fitted.report = Arc::new(FitReport { fit, ..(*fitted.report).clone() });
-    let target = fitted.target(&modules.0).ok()?;
-    let edits = rests_of(rig, &target).ok()?;
-    Some(Operation::Named { name: FIT_AROUND, edits })
+    let target = fitted.target(&modules.0)?;
+    let edits = rests_of(rig, &target)?;
+    Ok(Operation::Named { name: FIT_AROUND, edits })
 }
 
 /// The edits that put the joints of a rig where those of the same uid are in another. Joints that only the rig has go along
@@ -284,9 +299,15 @@ pub(super) fn remove_markers(
         }
         if let Some(mut fitted) = fitted
             && fitted.markers.remove(joint).is_some()
-            && let Some(operation) = refitted(rig, &mut fitted, &modules)
         {
-            commands.write_message(EditRequest::operation(*entity, operation));
+            match refitted(rig, &mut fitted, &modules) {
+                Ok(operation) => {
+                    commands.write_message(EditRequest::operation(*entity, operation));
+                }
+                Err(reason) => {
+                    commands.write_message(RefitFailed { rig: *entity, reason });
+                }
+            }
         }
     }
 }

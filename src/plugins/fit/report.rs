@@ -67,6 +67,12 @@ pub enum FitFailure {
         /// Nearest labels, as the rest of a sentence.
         nearest: String,
     },
+    /// Two markers are given for one joint.
+    #[error("there are two markers for \"{label}\"; give one place for each joint")]
+    TwoMarkers {
+        /// Label of the joint.
+        label: String,
+    },
     /// No triangle of the mesh is in the region.
     #[error("no face of the mesh is in the region; choose faces, or joints that the mesh has weights of")]
     EmptyRegion,

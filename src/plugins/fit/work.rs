@@ -15,11 +15,15 @@ use crate::{
     },
     plugins::surface::RigMesh,
     processor::Modules,
-    rig::{NodeKind, Rig, Uid, label::label_side, nearest::did_you_mean},
+    rig::{NodeKind, Rig, Uid, label::label_side, nearest::did_you_mean, part::Part},
 };
 
 /// Distance from the plane of symmetry, as a share of the body's height, up to which a joint is on it.
 const CENTRE: f32 = 0.003;
+/// Difference of the penalties of a part's two sides below which the side is uncertain.
+const SAME_SIDE: f32 = 0.03;
+/// Kind of templates that are parts.
+const PART: &str = "part";
 
 /// Work of a fit: plain data for a task.
 pub(super) struct Work {
@@ -122,9 +126,19 @@ impl Work {
         sides(&part, &self.from, parent, &self.modules).into_iter().map(candidate).collect()
     }
 
+    /// A part that was chosen as a skeleton of its own, on either side.
+    fn either_side(&self, chosen: Candidate) -> Vec<Candidate> {
+        let is_skeleton = self.from.is_empty() && matches!(chosen.extent, FitExtent::Skeleton);
+        if !is_skeleton || chosen.template.about().kind != PART {
+            return vec![chosen];
+        }
+        let part = Part::from((*chosen.template).clone());
+        sides(&part, &self.from, None, &self.modules).into_iter().map(Candidate::skeleton).collect()
+    }
+
     pub(super) fn run(self, progress: &(dyn Fn(f32) -> bool + Sync)) -> Result<FinishedFit, FitFailure> {
         let begin = Instant::now();
-        let candidates = self.candidates()?;
+        let mut candidates = self.candidates()?;
         let (region, gear) = self.request.region.triangles(&self.mesh, &self.from);
         if region.as_ref().is_some_and(Vec::is_empty) {
             return Err(FitFailure::EmptyRegion);
@@ -134,26 +148,27 @@ impl Work {
             MeshAnalysis::new(points, &self.mesh.triangles, region.as_deref(), &|part| progress(0.5 * part))?;
         let (best, choice) = choose(&analysis, &candidates, &self.request.template)?;
         // The sides of a part are all fitted: the order of its chains tells them apart, but not before.
-        let kept = match best {
-            Some(best) => best..best + 1,
-            None => 0..candidates.len(),
-        };
-        let (first, count) = (kept.start, kept.len() as f32);
+        if let Some(best) = best {
+            candidates = self.either_side(candidates.swap_remove(best));
+        }
+        let count = candidates.len() as f32;
         let mut found: Vec<(usize, FitSettings, FittedSkeleton)> = Vec::new();
         let mut refused: Option<FitFailure> = None;
-        for at in kept {
-            let share = |part: f32| progress(0.5 + 0.5 * ((at - first) as f32 + part) / count);
-            match self.fitted(&analysis, &candidates[at].template, &share) {
+        for (at, candidate) in candidates.iter().enumerate() {
+            let share = |part: f32| progress(0.5 + 0.5 * (at as f32 + part) / count);
+            match self.fitted(&analysis, &candidate.template, &share) {
                 Ok((settings, fit)) => found.push((at, settings, fit)),
                 Err(FitFailure::Fit(FitError::Cancelled)) => return Err(FitError::Cancelled.into()),
                 Err(error) => refused = refused.or(Some(error)),
             }
         }
         let cost = |fit: &FittedSkeleton| fit.hypotheses.first().map_or(f32::INFINITY, |best| best.cost);
-        let least = found.into_iter().min_by(|a, b| cost(&a.2).total_cmp(&cost(&b.2)));
-        let Some((at, settings, mut fit)) = least else {
+        found.sort_by(|a, b| cost(&a.2).total_cmp(&cost(&b.2)));
+        let is_close = matches!(&found[..], [first, second, ..] if cost(&second.2) - cost(&first.2) < SAME_SIDE);
+        let Some((at, settings, mut fit)) = found.into_iter().next() else {
             return Err(refused.unwrap_or(FitFailure::NoTemplate));
         };
+        fit.notes.extend(is_close.then_some(FitNote::UncertainSide));
         let Candidate { template, extent } = &candidates[at];
         let (uids, labels, ..) = skeleton(template);
         fit.notes.extend((gear > 0).then_some(FitNote::Gear(gear)));
@@ -218,6 +233,11 @@ impl Work {
             }
         };
         let mut markers = request.markers.iter().map(marker).collect::<Result<Vec<_>, _>>()?;
+        let is_second =
+            |(at, (joint, _)): (usize, &(usize, Vec3))| markers[..at].iter().any(|(other, _)| other == joint);
+        if let Some(at) = markers.iter().enumerate().position(is_second) {
+            return Err(FitFailure::TwoMarkers { label: request.markers[at].0.clone() });
+        }
         for (uid, place) in &self.markers {
             let joint = uids.iter().position(|known| known == uid);
             let is_given = joint.is_some_and(|joint| markers.iter().any(|(given, _)| *given == joint));

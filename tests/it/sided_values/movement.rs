@@ -319,4 +319,22 @@ fn lengths_follow_the_body_that_a_template_is_fitted_to() {
     }
     let turned = modules.get("null").unwrap().resized("(orient: false, translate: (0.0, 1.0, 0.0))", &change).unwrap();
     assert!(turned.contains("0.27") && turned.contains("0.42"), "along the rig's axes, with them: {turned}");
+
+    // Axes of the rig turn with the figure, those of nodes follow their joints.
+    let lying = rigsmith::processor::Resize {
+        factor: 1.0,
+        floor_factor: 1.0,
+        turn: Quat::from_rotation_x(std::f32::consts::FRAC_PI_2),
+    };
+    let cases = [
+        ("null", "(orient: false)", "rotate:(90.0,0.0,0.0)"),
+        ("null", "(world: true)", "(world:true)"),
+        ("control", "(axes: rig)", "axes_rotate:(90.0,0.0,0.0)"),
+        ("control", "(shape_axes: rig, axes_rotate: (-90.0, 0.0, 0.0))", "axes_rotate:(0.0,0.0,0.0)"),
+        ("control", "(follow: false)", "(follow:false)"),
+    ];
+    for (name, params, expected) in cases {
+        let resized = modules.get(name).unwrap().resized(params, &lying).unwrap().replace(' ', "");
+        assert!(resized.contains(expected), "{name} {params}: {resized}");
+    }
 }
