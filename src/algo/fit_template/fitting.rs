@@ -288,6 +288,8 @@ impl<'a> Fit<'a> {
         counted(analysis.mesh.specks, FitNote::Specks);
         counted(analysis.graph.tied, FitNote::Tied);
         counted(analysis.graph.loose, FitNote::Loose);
+        counted(analysis.grounds, FitNote::Grounds);
+        counted(analysis.sheets, FitNote::Sheets);
         let used = best.leaves.iter().filter(|l| l.is_some()).count();
         counted(analysis.trees[best.tree].branches.leaves.len() - used, FitNote::UnusedBranches);
         for (limb, leaf) in self.template.limbs.iter().zip(&best.leaves) {

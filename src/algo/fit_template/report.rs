@@ -108,6 +108,10 @@ pub enum FitNote {
     Tied(usize),
     /// Loose parts that are too far from the body.
     Loose(usize),
+    /// Pieces that the figure stands on.
+    Grounds(usize),
+    /// Sheets about a body that is whole without them.
+    Sheets(usize),
     /// Objects that hang on a bone and were left out: a hat, a weapon.
     Gear(usize),
     /// Branches that no limb of the template took: hair, clothes, weapons.
@@ -128,6 +132,13 @@ impl fmt::Display for FitNote {
             Self::Specks(count) => write!(f, "{count} loose specks were ignored"),
             Self::Tied(count) => write!(f, "{count} loose parts were tied to the body over gaps"),
             Self::Loose(count) => write!(f, "{count} loose parts are too far from the body and were ignored"),
+            Self::Grounds(count) => write!(f, "{count} flat pieces that the figure stands on were left out"),
+            Self::Sheets(count) => {
+                write!(
+                    f,
+                    "{count} open sheets about the body, such as a cloak, were left out; name objects to fit to them"
+                )
+            }
             Self::Gear(count) => {
                 write!(f, "{count} objects that hang on a bone were left out; name objects to fit to others")
             }
