@@ -23,6 +23,7 @@ mod confidence;
 mod eigen;
 mod fitting;
 mod human;
+mod left_out;
 mod limbs;
 mod line;
 mod markers;

@@ -81,10 +81,13 @@ mod files_read;
 mod files_set;
 mod fill;
 mod fit;
+mod fit_choice;
 #[cfg(feature = "cli")]
 mod fit_cli;
 mod fit_data;
 mod fit_hinges;
+#[cfg(feature = "cli")]
+mod fit_left_out;
 #[cfg(feature = "cli")]
 mod fit_parts;
 #[cfg(feature = "editor")]

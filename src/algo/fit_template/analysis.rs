@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::{
     FitError, FitSettings,
     assign::{self, Directions, Hypothesis, LimbMarker},
-    chain, clean,
+    chain, clean, left_out,
     limbs::TemplateLimbs,
     markers::Marker,
     symmetry::{self, MirrorPlane},
@@ -29,6 +29,9 @@ const BLOCK: usize = 250_000;
 /// Extent of a mesh along its thinnest axis below which it is flat, as a share of the longest.
 const FLAT: f32 = 0.004;
 
+/// Times that a mesh is looked at without parts that are too far from the body: from nearer, there may be more of them.
+const NEARER: usize = 3;
+
 /// Analysis of a mesh, independent of any template; several fits may use it.
 #[derive(Debug, Clone)]
 pub struct MeshAnalysis {
@@ -42,6 +45,9 @@ pub struct MeshAnalysis {
     pub(super) mirror: Option<MirrorPlane>,
     /// Seam on which the part of the mesh hangs on the rest of it, in unit space.
     pub(super) seam: Option<Vec3>,
+    /// Shells that the figure stands on, and sheets about its body, which were left out.
+    pub(super) grounds: usize,
+    pub(super) sheets: usize,
 }
 
 impl MeshAnalysis {
@@ -69,23 +75,25 @@ impl MeshAnalysis {
             }
             None => triangles,
         };
-        let mesh = clean::clean(points, triangles).ok_or(FitError::NoSurface)?;
-        step(0.15)?;
-        let (low, high) =
-            mesh.points.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
-        if (high - low).min_element() < FLAT {
-            return Err(FitError::Flat);
+        // Whatever is left out is left out of all that follows: the figure is fitted as if it were alone.
+        let figure = if region.is_none() { left_out::figure(points, triangles) } else { None };
+        let (grounds, sheets) = figure.as_ref().map_or((0, 0), |figure| (figure.grounds, figure.sheets));
+        let triangles = figure.as_ref().map_or(triangles, |figure| figure.triangles.as_slice());
+        let mut look = Look::new(points, triangles, &step)?;
+        let loose = look.graph.loose;
+        let mut kept: Option<Vec<[u32; 3]>> = None;
+        for _ in 0..NEARER {
+            let Look { mesh, voxels, graph, .. } = &look;
+            if graph.loose == 0 {
+                break;
+            }
+            let from = kept.as_deref().unwrap_or(triangles);
+            let Some(near) = left_out::near(points, from, mesh.space, voxels, graph) else { break };
+            look = Look::new(points, &near, &step)?;
+            kept = Some(near);
         }
-        // A first look tells how many cells are solid at a resolution; a stout body gets larger cells.
-        let voxels = |resolution: usize| Voxels::new(&mesh.points, &mesh.triangles, resolution, None);
-        let coarse = voxels(COARSE).map_err(|_| FitError::NoSurface)?;
-        let fine = COARSE as f32 * bevy::math::ops::cbrt(NODES / coarse.len().max(1) as f32);
-        let voxels = voxels(resolution(coarse.len(), fine as usize)).map_err(|_| FitError::NoSurface)?;
-        step(0.4)?;
-        let (surface, (graph, target)) = rayon::join(
-            || Surface::build(&mesh.points, &mesh.triangles),
-            || (volume::graph(&voxels), target::Target::new(&mesh, &voxels)),
-        );
+        let Look { mesh, voxels, surface, target, mut graph } = look;
+        graph.loose = loose.max(graph.loose);
         step(0.7)?;
         let mut trees = tree::trees(&graph);
         let file_axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|d| mesh.space.direction_to_unit(d));
@@ -99,7 +107,7 @@ impl MeshAnalysis {
             return Err(FitError::NoSurface);
         }
         let seam = seam.map(|place| mesh.space.to_unit(place));
-        Ok(Self { mesh, voxels, surface, target, graph, trees, mirror, seam })
+        Ok(Self { mesh, voxels, surface, target, graph, trees, mirror, seam, grounds, sheets })
     }
 
     /// Number of the solid cells in which the mesh is analysed.
@@ -169,12 +177,56 @@ impl MeshAnalysis {
         centres.map(|centre| centre.distance_squared(place)).fold(f32::INFINITY, f32::min).sqrt()
     }
 
+    /// Height of the lowest place of the figure along a direction of the mesh's space, where what it stands on was left out.
+    pub fn floor(&self, up: Vec3) -> Option<f32> {
+        let used = self.mesh.triangles.iter().flatten().map(|&c| self.mesh.points[c as usize]);
+        let heights = used.map(|place| self.mesh.space.to_file(place).dot(up));
+        (self.grounds > 0).then(|| heights.fold(f32::INFINITY, f32::min))
+    }
+
     /// Extent of the mesh along a direction of unit space, in the mesh's unit.
     pub(super) fn height(&self, up: Vec3) -> f32 {
         let along = |p: &Vec3| p.dot(up);
         let used = self.mesh.triangles.iter().flatten().map(|&c| along(&self.mesh.points[c as usize]));
         let (low, high) = used.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), d| (l.min(d), h.max(d)));
         ((high - low) as f64 / self.mesh.space.scale) as f32
+    }
+}
+
+/// First part of an analysis: surface and volume.
+struct Look {
+    mesh: clean::CleanMesh,
+    voxels: Voxels,
+    surface: Surface,
+    target: target::Target,
+    graph: volume::VoxelGraph,
+}
+
+impl Look {
+    fn new(
+        points: &[Vec3],
+        triangles: &[[u32; 3]],
+        step: &dyn Fn(f32) -> Result<(), FitError>,
+    ) -> Result<Self, FitError> {
+        let mesh = clean::clean(points, triangles).ok_or(FitError::NoSurface)?;
+        step(0.15)?;
+        let (low, high) =
+            mesh.points.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
+        if (high - low).min_element() < FLAT {
+            return Err(FitError::Flat);
+        }
+        // A first look tells how many cells are solid at a resolution; a stout body gets larger cells.
+        let voxels = |resolution: usize| Voxels::new(&mesh.points, &mesh.triangles, resolution, None);
+        let coarse = voxels(COARSE).map_err(|_| FitError::NoSurface)?;
+        let fine = COARSE as f32 * bevy::math::ops::cbrt(NODES / coarse.len().max(1) as f32);
+        let voxels = voxels(resolution(coarse.len(), fine as usize)).map_err(|_| FitError::NoSurface)?;
+        step(0.4)?;
+        let origin = mesh.space.to_unit(Vec3::ZERO);
+        let (surface, (graph, target)) = rayon::join(
+            || Surface::build(&mesh.points, &mesh.triangles),
+            || (volume::graph(&voxels, origin), target::Target::new(&mesh, &voxels)),
+        );
+        Ok(Self { mesh, voxels, surface, target, graph })
     }
 }
 

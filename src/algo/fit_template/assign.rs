@@ -144,6 +144,13 @@ pub(super) fn assign(
     kept
 }
 
+/// Penalty of an up direction that few files with these axes have.
+pub(super) fn unusual_up(up: Vec3, axes: [Vec3; 3]) -> f32 {
+    let [_, y, z] = axes.map(|usual| (1.0 - up.dot(usual)).min(1.0));
+    let near = axes.iter().map(|a| a.dot(up).abs()).fold(0.0, f32::max);
+    UNUSUAL_UP * y.min(z + 0.25) + ODD_UP * (1.0 - near)
+}
+
 struct Search<'a> {
     number: usize,
     graph: &'a VoxelGraph,
@@ -399,12 +406,7 @@ impl Search<'_> {
         let forward = alignment.rotation * Vec3::Z;
         match self.directions.up {
             Some(wanted) => cost += 1.0 - up.dot(wanted),
-            None => {
-                let axes = self.directions.file_axes;
-                let [_, y, z] = axes.map(|usual| (1.0 - up.dot(usual)).min(1.0));
-                let near = axes.iter().map(|a| a.dot(up).abs()).fold(0.0, f32::max);
-                cost += UNUSUAL_UP * y.min(z + 0.25) + ODD_UP * (1.0 - near);
-            }
+            None => cost += unusual_up(up, self.directions.file_axes),
         }
         if let Some(wanted) = self.directions.forward {
             cost += 1.0 - forward.dot(wanted);

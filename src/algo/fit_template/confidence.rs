@@ -6,7 +6,7 @@ use super::{
     assign::Hypothesis,
     human::FittedBody,
     limbs::{Limb, LimbKind, TemplateLimbs},
-    place::Placement,
+    place::{self, Placement},
     report::FitReason,
     tree::Tree,
     volume::VoxelGraph,
@@ -137,6 +137,63 @@ pub(super) fn doubt_folded(
         doubts[joint] = doubts[joint].min(above);
     }
     joints.iter_mut().zip(doubts).for_each(|(joint, doubt)| joint.0 *= doubt);
+}
+
+/// Penalty above the best assignment's up to which another one is nearly as good.
+const RIVAL: f32 = 0.05;
+/// Distance of a joint from where another assignment has it, as a share of the height, above which they disagree.
+const ELSEWHERE: f32 = 0.05;
+/// Confidence that is left to a joint that an equally good assignment has elsewhere.
+const AMBIGUOUS: f32 = 0.65;
+
+/// Lessens the confidence in joints that another assignment, which is nearly as good, has elsewhere. Left and right may be
+/// swapped: a figure that faces the other way is told of apart.
+pub(super) fn doubt_ambiguous(
+    template: &TemplateLimbs,
+    trees: &[Tree],
+    graph: &VoxelGraph,
+    hypotheses: &[Hypothesis],
+    placement: &Placement,
+    joints: &mut [(f32, FitReason)],
+) {
+    let Some((best, others)) = hypotheses.split_first() else { return };
+    // Without sides, limbs differ by their place alone, and each is fitted to know.
+    if template.limbs.iter().all(|limb| limb.kind == LimbKind::Free) {
+        return;
+    }
+    let up = best.alignment.rotation * Vec3::Y;
+    let heights =
+        graph.centres.iter().zip(&graph.body).filter(|(_, is_body)| **is_body).map(|(place, _)| place.dot(up));
+    let (low, high) = heights.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
+    let far = ELSEWHERE * (high - low);
+    let end = |of: &Hypothesis, limb: usize| of.leaves[limb].map(|leaf| trees[of.tree].lines[leaf].at(0.0));
+    let is_same_end = |other: &Hypothesis, limb: usize| {
+        let Some(here) = end(other, limb) else { return end(best, limb).is_none() };
+        let sides = [Some(limb), template.limbs[limb].partner];
+        sides.into_iter().flatten().filter_map(|side| end(best, side)).any(|there| there.distance(here) <= far)
+    };
+    let mut doubts = vec![1.0f32; joints.len()];
+    for other in others.iter().filter(|other| other.cost - best.cost < RIVAL) {
+        if (0..template.limbs.len()).all(|limb| is_same_end(other, limb)) {
+            continue;
+        }
+        let share = ((other.cost - best.cost) / RIVAL).clamp(0.0, 1.0);
+        let doubt = AMBIGUOUS + (1.0 - AMBIGUOUS) * share;
+        let places = place::place(template, &trees[other.tree], graph, other).places;
+        for (joint, place) in places.iter().enumerate() {
+            let sides = [Some(joint), template.mirror[joint]];
+            let is_near = sides.into_iter().flatten().any(|side| placement.places[side].distance(*place) <= far);
+            if !is_near {
+                doubts[joint] = doubts[joint].min(doubt);
+            }
+        }
+    }
+    for ((confidence, reason), doubt) in joints.iter_mut().zip(doubts).filter(|(_, doubt)| *doubt < 1.0) {
+        *confidence *= doubt;
+        if matches!(reason, FitReason::CentreLine | FitReason::Proportion) {
+            *reason = FitReason::Ambiguous;
+        }
+    }
 }
 
 /// Confidence in the whole fit.

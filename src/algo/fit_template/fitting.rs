@@ -246,6 +246,10 @@ impl<'a> Fit<'a> {
         let mut trusted = confidence::joints(&placement, with_body, best, &analysis.voxels, &analysis.graph, &places);
         if body.is_some() {
             confidence::doubt_folded(&self.template, tree, best, &places, &mut trusted);
+        } else {
+            // A body model has tried the assignments on the surface.
+            let (trees, graph) = (&analysis.trees, &analysis.graph);
+            confidence::doubt_ambiguous(&self.template, trees, graph, &hypotheses, &placement, &mut trusted);
         }
         confidence::doubt_uneven(&self.template, &places, &mut trusted);
         let confidence = confidence::whole(&self.template, best, body.as_ref(), &trusted);
@@ -442,6 +446,8 @@ impl<'a> Fit<'a> {
         counted(analysis.mesh.specks, FitNote::Specks);
         counted(analysis.graph.tied, FitNote::Tied);
         counted(analysis.graph.loose, FitNote::Loose);
+        counted(analysis.grounds, FitNote::Grounds);
+        counted(analysis.sheets, FitNote::Sheets);
         let used = best.leaves.iter().filter(|l| l.is_some()).count();
         counted(analysis.trees[best.tree].branches.leaves.len() - used, FitNote::UnusedBranches);
         for (limb, leaf) in self.template.limbs.iter().zip(&best.leaves) {

@@ -115,6 +115,10 @@ pub enum FitNote {
     Tied(usize),
     /// Pieces of the volume that are too far from the body.
     Loose(usize),
+    /// Pieces that the figure stands on.
+    Grounds(usize),
+    /// Sheets about a body that is whole without them.
+    Sheets(usize),
     /// Objects that hang on a bone and were left out: a hat, a weapon.
     Gear(usize),
     /// Branches that no limb of the template took: hair, clothes, weapons.
@@ -173,6 +177,19 @@ impl fmt::Display for FitNote {
             Self::Loose(count) => {
                 let pieces = counted(*count, "piece of the volume is", "pieces of the volume are");
                 write!(f, "{pieces} too far from the body, and ignored")
+            }
+            Self::Grounds(count) => {
+                let pieces = counted(
+                    *count,
+                    "flat piece that the figure stands on was",
+                    "flat pieces that the figure stands on were",
+                );
+                write!(f, "{pieces} left out")
+            }
+            Self::Sheets(count) => {
+                let sheets = counted(*count, "open sheet about the body", "open sheets about the body");
+                let are = if *count == 1 { "was" } else { "were" };
+                write!(f, "{sheets}, such as a cloak, {are} left out; name objects to fit to them")
             }
             Self::Gear(count) => {
                 let objects = counted(*count, "object that hangs on a bone was", "objects that hang on a bone were");

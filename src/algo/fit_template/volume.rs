@@ -16,6 +16,8 @@ pub(super) const FAR: u32 = u32::MAX;
 const LONGEST_TIE: u32 = 14;
 /// Share of all nodes that a component needs to be tied over a gap of more than two cells.
 const TIED_SHARE: f32 = 1e-3;
+/// Size of a component, as a share of the largest, from which on both may be the body.
+const ALIKE: f32 = 0.9;
 
 /// Neighbours of a cell that lie inside, from which on it is inside of something thick.
 const DEEP: u32 = 10;
@@ -33,6 +35,8 @@ pub(super) struct VoxelGraph {
     pub(super) depth: Vec<u8>,
     /// Nodes that are part of the connected body.
     pub(super) body: Vec<bool>,
+    /// Node of each solid cell; `u32::MAX` for a cell of the surface layer of something thick.
+    node_of: Vec<u32>,
     /// Components that were tied to the largest one, and those left loose.
     pub(super) tied: usize,
     pub(super) loose: usize,
@@ -46,6 +50,23 @@ impl VoxelGraph {
 
     pub(super) fn neighbours(&self, node: u32) -> &[(u32, u32)] {
         &self.links[self.starts[node as usize] as usize..self.starts[node as usize + 1] as usize]
+    }
+
+    /// True if the surface at a place belongs to the body; `None` where nothing is solid.
+    pub(super) fn is_of_body(&self, voxels: &Voxels, place: Vec3) -> Option<bool> {
+        let cell = voxels.cell_at(voxels.to_grid(place))?;
+        let of_node = |node: u32| self.body.get(node as usize).copied();
+        let own = of_node(self.node_of[voxels.solid_index(cell)?]);
+        if own.is_some() {
+            return own;
+        }
+        let mut found = None;
+        voxels.neighbours(cell, |next, _, _| {
+            if let Some(is_body) = of_node(self.node_of[next]) {
+                found = Some(is_body || found == Some(true));
+            }
+        });
+        found
     }
 
     /// The largest connected part of some nodes as the body; other nodes stay without neighbours.
@@ -108,8 +129,8 @@ impl VoxelGraph {
     }
 }
 
-/// Builds the graph of `voxels`.
-pub(super) fn graph(voxels: &Voxels) -> VoxelGraph {
+/// Builds the graph of `voxels`. Of components that are as large the body is the one nearest to `origin`.
+pub(super) fn graph(voxels: &Voxels, origin: Vec3) -> VoxelGraph {
     let cells = voxels.cells();
     let coordinate = |cell: &[u16; 3]| cell.map(usize::from);
     let core: Vec<bool> = cells.iter().map(|c| voxels.is_core(coordinate(c))).collect();
@@ -154,11 +175,12 @@ pub(super) fn graph(voxels: &Voxels) -> VoxelGraph {
         cell: voxels.cell() as f32,
         starts,
         links,
+        node_of,
         tied: 0,
         loose: 0,
     };
     let places: Vec<[u16; 3]> = nodes.iter().map(|&i| cells[i as usize]).collect();
-    tie_components(&mut graph, &places, voxels.dims());
+    tie_components(&mut graph, &places, voxels.dims(), origin);
     graph
 }
 
@@ -214,7 +236,7 @@ fn components(graph: &VoxelGraph) -> (Vec<u32>, Vec<u32>) {
 }
 
 /// Ties components over the shortest gaps, as a spanning tree, and marks what stays loose.
-fn tie_components(graph: &mut VoxelGraph, places: &[[u16; 3]], dims: [usize; 3]) {
+fn tie_components(graph: &mut VoxelGraph, places: &[[u16; 3]], dims: [usize; 3], origin: Vec3) {
     let (component, sizes) = components(graph);
     if sizes.len() < 2 {
         return;
@@ -282,9 +304,21 @@ fn tie_components(graph: &mut VoxelGraph, places: &[[u16; 3]], dims: [usize; 3])
     graph.tied = extra.len();
     add_links(graph, &extra);
     let (component, sizes) = components(graph);
-    let largest = (0..sizes.len()).max_by_key(|&c| (sizes[c], std::cmp::Reverse(c))).unwrap_or(0);
+    let main = main_component(graph, &component, &sizes, origin);
     graph.loose = sizes.len() - 1;
-    graph.body = component.iter().map(|&c| c as usize == largest).collect();
+    graph.body = component.iter().map(|&c| c as usize == main).collect();
+}
+
+/// The largest component; of those nearly as large, such as figures side by side, the one nearest to `origin`.
+fn main_component(graph: &VoxelGraph, component: &[u32], sizes: &[u32], origin: Vec3) -> usize {
+    let mut sums = vec![Vec3::ZERO; sizes.len()];
+    for (&c, centre) in component.iter().zip(&graph.centres) {
+        sums[c as usize] += *centre;
+    }
+    let largest = sizes.iter().copied().max().unwrap_or(0) as f32;
+    let away = |c: usize| (sums[c] / sizes[c].max(1) as f32).distance(origin);
+    let large = (0..sizes.len()).filter(|&c| sizes[c] as f32 >= ALIKE * largest);
+    large.min_by(|&a, &b| away(a).total_cmp(&away(b)).then(a.cmp(&b))).unwrap_or(0)
 }
 
 fn find(group: &mut [u32], mut c: u32) -> u32 {

@@ -146,7 +146,7 @@ impl Work {
         let points = &self.mesh.rest.points;
         let analysis =
             MeshAnalysis::new(points, &self.mesh.triangles, region.as_deref(), &|part| progress(0.5 * part))?;
-        let (best, choice) = choose(&analysis, &candidates, &self.request.template)?;
+        let Choice { best, words: choice, certainty } = choose(&analysis, &candidates, &self.request)?;
         // The sides of a part are all fitted: the order of its chains tells them apart, but not before.
         if let Some(best) = best {
             candidates = self.either_side(candidates.swap_remove(best));
@@ -171,8 +171,10 @@ impl Work {
         fit.notes.extend(is_close.then_some(FitNote::UncertainSide));
         let Candidate { template, extent } = &candidates[at];
         let (uids, labels, ..) = skeleton(template);
+        fit.confidence *= certainty;
         fit.notes.extend((gear > 0).then_some(FitNote::Gear(gear)));
-        let floor = points.iter().filter(|p| p.is_finite()).map(|p| p.dot(fit.up)).fold(f32::INFINITY, f32::min);
+        let lowest = || points.iter().filter(|p| p.is_finite()).map(|p| p.dot(fit.up)).fold(f32::INFINITY, f32::min);
+        let floor = analysis.floor(fit.up).unwrap_or_else(lowest);
         let name = match extent {
             FitExtent::Part(part) => part.rig.about().name.clone(),
             FitExtent::Skeleton | FitExtent::Joints => template.about().name.clone(),
@@ -257,16 +259,28 @@ impl Work {
     }
 }
 
-/// The candidate whose limbs the mesh shows, with the reason in words; `None` where each has to be fitted to know.
-fn choose(
-    analysis: &MeshAnalysis,
-    candidates: &[Candidate],
-    template: &FitTemplate,
-) -> Result<(Option<usize>, String), FitFailure> {
+/// Choice among candidates.
+struct Choice {
+    /// Number of the candidate; `None` where each has to be fitted to know.
+    best: Option<usize>,
+    /// Reason in words; empty without a choice.
+    words: String,
+    /// Factor of the confidence in the fit.
+    certainty: f32,
+}
+
+impl Choice {
+    fn of(best: Option<usize>) -> Self {
+        Self { best, words: String::new(), certainty: 1.0 }
+    }
+}
+
+/// The candidate whose limbs the mesh shows, in the directions and with the markers of the request.
+fn choose(analysis: &MeshAnalysis, candidates: &[Candidate], request: &FitRequest) -> Result<Choice, FitFailure> {
     match candidates.len() {
         0 => return Err(FitFailure::NoTemplate),
-        1 => return Ok((Some(0), String::new())),
-        _ if !matches!(template, FitTemplate::Choose) => return Ok((None, String::new())),
+        1 => return Ok(Choice::of(Some(0))),
+        _ if !matches!(request.template, FitTemplate::Choose) => return Ok(Choice::of(None)),
         _ => {}
     }
     let skeletons: Vec<_> = candidates.iter().map(|candidate| skeleton(&candidate.template)).collect();
@@ -277,9 +291,18 @@ fn choose(
         .zip(&joints)
         .map(|(candidate, joints)| (candidate.template.about().name.as_str(), &joints[..]))
         .collect();
-    let ranked = choose_template(analysis, &named)?;
-    let best = ranked.first().ok_or(FitFailure::NoTemplate)?;
-    Ok((Some(best.index), best.to_string()))
+    let wishes = |labels: &[String]| {
+        let marker = |(label, place): &(String, Vec3)| Some((labels.iter().position(|known| known == label)?, *place));
+        let markers = request.markers.iter().filter_map(marker).collect();
+        FitSettings { up: request.up, forward: request.forward, markers, ..FitSettings::default() }
+    };
+    let settings: Vec<FitSettings> = skeletons.iter().map(|(_, labels, ..)| wishes(labels)).collect();
+    let ranked = choose_template(analysis, &named, &settings)?;
+    // A template that has all joints of the markers goes before those that lack one.
+    let has_all = |index: usize| settings[index].markers.len() == request.markers.len();
+    let known = ranked.iter().find(|choice| has_all(choice.index));
+    let best = known.or(ranked.first()).ok_or(FitFailure::NoTemplate)?;
+    Ok(Choice { best: Some(best.index), words: best.to_string(), certainty: best.certainty() })
 }
 
 /// Puts joints of neither side that lie beside the rig's plane of symmetry by rounding of the mesh onto it, where mesh and pose
