@@ -1,7 +1,13 @@
 //! Draws a sheet of meshes, each with the template that was fitted into it and, beside it, the skinned figure with that skeleton
 //! posed.
 //!
-//! `cargo run --release --example fit_sheet -- SHEET.png MESH...`; without meshes, the bundled body.
+//! ```text
+//! RIGSMITH_DATA=DATA cargo run --release --example fit_sheet -- --screenshot docs/fit.png
+//! cargo run --release --example fit_sheet -- MESH...
+//! ```
+//!
+//! The meshes that are named, else those of the folder of test meshes that `RIGSMITH_DATA` names, else the bundled body. The
+//! sheet is written to `fit_sheet.png` in the current folder, or to the file after `--screenshot`.
 
 use std::{
     error::Error,
@@ -23,13 +29,49 @@ use rigsmith::{
 const TILE: UVec2 = UVec2::new(300, 400);
 const COLUMNS: u32 = 4;
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1).map(PathBuf::from);
-    let sheet = arguments.next().unwrap_or_else(|| PathBuf::from("docs/fit.png"));
-    let mut meshes: Vec<PathBuf> = arguments.collect();
-    if meshes.is_empty() {
-        meshes.push(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/models/biped.obj").into());
+/// Meshes of the sheet, in the folder of test meshes.
+const MESHES: [&str; 16] = [
+    "bodies/male_young/body.obj",
+    "bodies/female_young/body.obj",
+    "bodies/female_heavy_tpose/body.obj",
+    "bodies/female_young_armsdown/body.obj",
+    "bodies/male_muscular_action/body.obj",
+    "bodies/male_child_tpose/body.obj",
+    "bodies/baby/body.obj",
+    "gltf_skinned/CesiumMan.glb",
+    "gltf_skinned/RobotExpressive.glb",
+    "characters/Mage.glb",
+    "hands/webxr_generic_hand_left.glb",
+    "creatures/fox-fox.glb",
+    "creatures/fox-dog.glb",
+    "gltf_skinned/Fox.glb",
+    "creatures/spot.obj",
+    "creatures/bird-eagle.glb",
+];
+
+/// The file of the sheet and its meshes, as arguments and `RIGSMITH_DATA` name them.
+fn asked() -> Result<(PathBuf, Vec<PathBuf>), Box<dyn Error>> {
+    let mut sheet = PathBuf::from("fit_sheet.png");
+    let mut meshes = Vec::new();
+    let mut arguments = std::env::args_os().skip(1);
+    while let Some(argument) = arguments.next() {
+        if argument == "--screenshot" {
+            sheet = arguments.next().ok_or("name a file after --screenshot")?.into();
+        } else {
+            meshes.push(PathBuf::from(argument));
+        }
     }
+    if meshes.is_empty() {
+        match std::env::var_os("RIGSMITH_DATA").filter(|folder| !folder.is_empty()) {
+            Some(folder) => meshes.extend(MESHES.map(|mesh| Path::new(&folder).join(mesh))),
+            None => meshes.push(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/models/biped.obj").into()),
+        }
+    }
+    Ok((sheet, meshes))
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let (sheet, meshes) = asked()?;
     let mut tiles = Vec::new();
     for mesh in &meshes {
         match pictures(mesh) {
@@ -37,8 +79,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             Err(error) => eprintln!("{}: {error}", mesh.display()),
         }
     }
+    if tiles.is_empty() {
+        return Err("no mesh has been fitted; nothing is written".into());
+    }
     let columns = (2 * COLUMNS).min(tiles.len() as u32);
-    let rows = (tiles.len() as u32).div_ceil(columns.max(1));
+    let rows = (tiles.len() as u32).div_ceil(columns);
     let mut all = image::RgbImage::new(columns * TILE.x, rows * TILE.y);
     for (tile, number) in tiles.iter().zip(0..) {
         let (x, y) = (number % columns * TILE.x, number / columns * TILE.y);

@@ -154,3 +154,19 @@ fn headless_build_writes_a_character() {
     let model = rigsmith::files::load_model(&rigsmith::files::RealDisk, &file).unwrap();
     assert!(model.weights.is_some() && model.nodes.len() > 52);
 }
+
+/// The sheet of fits: a mesh with the skeleton in it, and beside it the skinned figure in another pose.
+#[test]
+fn fit_sheet_shows_skeletons_and_poses() {
+    let body = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/models/biped.obj");
+    let Some(pictures) = run("fit_sheet", &[body], &[]) else { return };
+    let sheet = &pictures[0];
+    assert_eq!(sheet.dimensions(), (600, 400));
+    let [fitted, posed] = [0, 300].map(|left| image::imageops::crop_imm(sheet, left, 0, 300, 400).to_image());
+    for (name, picture) in [("fitted", &fitted), ("posed", &posed)] {
+        let share = shown(picture).0;
+        assert!(share > 0.03, "{name}: {share} of the picture");
+    }
+    let differs = changed(&fitted, &posed);
+    assert!(differs > 0.01, "{differs} of the two pictures differ");
+}

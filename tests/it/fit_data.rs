@@ -5,6 +5,10 @@
 
 mod decimate;
 mod known_joints;
+mod limbs;
+mod shapes;
+mod turns;
+mod variants;
 
 use std::{collections::BTreeMap, sync::OnceLock};
 
@@ -18,7 +22,10 @@ use rigsmith::{
     mesh::surface::Surface,
 };
 
-use self::known_joints::{Figure, HUMAN, figures, held_back, is_finger, template_joints};
+use self::{
+    known_joints::{Figure, HUMAN, figures, held_back, is_finger, template_joints},
+    variants::{subdivided, with_specks},
+};
 use crate::{
     prerequisites::test_data,
     random::Random,
@@ -297,39 +304,6 @@ fn the_same_figure_given_otherwise() {
             assert!(off <= bound, "{name}, {what}: {off}");
         }
     }
-}
-
-/// Every triangle in four.
-fn subdivided(points: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let mut points = points.to_vec();
-    let mut middles = BTreeMap::new();
-    let mut faces = Vec::with_capacity(4 * triangles.len());
-    for corners in triangles {
-        let mut middle = |a: u32, b: u32| {
-            *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                points.push(points[a as usize].midpoint(points[b as usize]));
-                points.len() as u32 - 1
-            })
-        };
-        let [a, b, c] = *corners;
-        let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-        faces.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-    }
-    (points, faces)
-}
-
-/// Twelve loose triangles around the figure.
-fn with_specks(points: &[Vec3], triangles: &[[u32; 3]], random: &mut Random) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let (low, high) = points.iter().fold((Vec3::MAX, Vec3::MIN), |(a, b), p| (a.min(*p), b.max(*p)));
-    let (mut points, mut triangles) = (points.to_vec(), triangles.to_vec());
-    let size = 0.002 * (high - low).max_element();
-    for _ in 0..12 {
-        let at = low + (high - low) * Vec3::new(random.unit(), random.unit(), random.unit());
-        let first = points.len() as u32;
-        points.extend([at, at + size * Vec3::X, at + size * Vec3::Y]);
-        triangles.push([first, first + 1, first + 2]);
-    }
-    (points, triangles)
 }
 
 /// Meshes that show no figure, or half of one: an error, or a low confidence.

@@ -31,11 +31,12 @@ fn a_part_is_fitted_into_chosen_faces() {
             assert!(label.ends_with(ending), "{label} is of the other side");
             let known = template.position(template.find_label(&label).unwrap());
             let off = window.at(&label).distance(known);
-            assert!(off < 0.06, "{label} is off by {off}");
+            // A box through the command line leaves 0.018 and 0.0086 in the mean, of a hand that is 0.2 long.
+            assert!(off < 0.025, "{label} is off by {off}");
             sum += off;
         }
         println!("hand{ending}: {:.4} off in the mean", sum / 16.0);
-        assert!(sum / 16.0 < 0.03, "{}", sum / 16.0);
+        assert!(sum / 16.0 < 0.0125, "{}", sum / 16.0);
         // One step; Esc takes it back.
         assert_eq!(window.steps(), 1);
         window.act(Action::Cancel);
@@ -70,7 +71,9 @@ fn a_part_hangs_on_the_selected_joint() {
     let hand = window.joint("hand_r");
     assert_eq!(window.rig().joint(hand).unwrap().parent, Some(joints[1]));
     assert_eq!(arm.map(|label| window.at(label)), places, "the arm stays");
-    assert!(window.at("middle_02_r").distance(template.position(template.find_label("middle_02_r").unwrap())) < 0.06);
+    let known = template.position(template.find_label("middle_02_r").unwrap());
+    let off = window.at("middle_02_r").distance(known);
+    assert!(off < 0.01, "the finger is off by {off}");
     assert!(!window.rig().joint(hand).unwrap().data.tags.is_empty(), "it brings its commands");
     assert_eq!(window.steps(), steps + 1);
     // A finger that is put right is a marker of the part's fit.
@@ -116,7 +119,8 @@ fn selected_joints_are_fitted_alone() {
             continue;
         }
         let known = template.position(template.find_label(&label).unwrap());
-        assert!(now.distance(known) < 0.06, "{label} is off by {}", now.distance(known));
+        println!("{label} is off by {:.4}", now.distance(known));
+        assert!(now.distance(known) < 0.025, "{label} is off by {}", now.distance(known));
     }
     assert_eq!(window.rig().joint(hand).unwrap().parent, was.joint(hand).unwrap().parent);
     window.change(Change::Undo);
