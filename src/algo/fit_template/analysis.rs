@@ -28,6 +28,8 @@ const FINE: RangeInclusive<usize> = 96..=240;
 const BLOCK: usize = 250_000;
 /// Extent of a mesh along its thinnest axis below which it is flat, as a share of the longest.
 const FLAT: f32 = 0.004;
+/// Distance from the volume from which on a marker lies outside of it, in unit space.
+const OUTSIDE: f32 = 0.05;
 
 /// Times that a mesh is looked at without parts that are too far from the body: from nearer, there may be more of them.
 const NEARER: usize = 3;
@@ -171,8 +173,17 @@ impl MeshAnalysis {
         corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
     }
 
+    /// Markers of the settings in unit space.
+    pub(super) fn markers(&self, settings: &FitSettings) -> Vec<Marker> {
+        let marker = |&(joint, position): &(usize, Vec3)| {
+            let place = self.mesh.space.to_unit(position);
+            Marker { joint, place, outside: self.distance_from_volume(place) > OUTSIDE, against: false }
+        };
+        settings.markers.iter().map(marker).collect()
+    }
+
     /// Distance of a place from the volume, in unit space.
-    pub(super) fn distance_from_volume(&self, place: Vec3) -> f32 {
+    fn distance_from_volume(&self, place: Vec3) -> f32 {
         let centres = self.graph.centres.iter();
         centres.map(|centre| centre.distance_squared(place)).fold(f32::INFINITY, f32::min).sqrt()
     }

@@ -8,7 +8,6 @@ use super::{
     FitError, FitSettings, MeshAnalysis, TemplateJoint,
     assign::{self, Hypothesis},
     limbs::{LimbKind, TemplateLimbs, limbs},
-    markers::Marker,
 };
 
 /// Penalty of a template for a mesh, with the limbs that it is made of.
@@ -161,9 +160,7 @@ pub fn choose_template(
     for (index, (_, joints)) in templates.iter().enumerate() {
         let Some(template) = limbs(joints).filter(|t| !t.limbs.is_empty()) else { continue };
         let wishes = settings.get(index).unwrap_or(&without);
-        let markers: Vec<Marker> =
-            wishes.markers.iter().map(|&(joint, place)| Marker { joint, place: space.to_unit(place) }).collect();
-        match analysis.hypotheses(&template, wishes, &markers) {
+        match analysis.hypotheses(&template, wishes, &analysis.markers(wishes)) {
             Ok(hypotheses) => {
                 is_up_known |= wishes.up.is_some();
                 let up = space.direction_to_unit(wishes.up.unwrap_or(Vec3::Y));

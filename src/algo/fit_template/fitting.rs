@@ -23,8 +23,6 @@ const UNCERTAIN: f32 = 0.06;
 const UNLIKE: f32 = 0.018;
 /// Distance outside of the mesh's bounds from which on a marker is a mistake, as a share of the mesh's longest side.
 const MARGIN: f32 = 0.25;
-/// Distance from the volume from which on a marker lies outside of it, in unit space.
-const OUTSIDE: f32 = 0.05;
 /// Confidence of a fit from which on what it shows counts more than a wish that contradicts it.
 const SURE: f32 = 0.7;
 /// Distance of a marker from where a sure fit has its joint that contradicts it, as a share of the height.
@@ -79,7 +77,6 @@ impl<'a> Fit<'a> {
             return Err(FitError::Marker { marker, joint: settings.markers[marker].0, joints: joints.len() });
         }
         let template = limbs::limbs(joints).filter(|t| !t.limbs.is_empty()).ok_or(FitError::NoChain)?;
-        let space = &analysis.mesh.space;
         if !settings.markers.is_empty() {
             let (low, high) = analysis.bounds();
             let margin = MARGIN * (high - low).max_element();
@@ -88,11 +85,7 @@ impl<'a> Fit<'a> {
                 return Err(FitError::FarMarker { label: joints[joint].label.to_owned(), place, low, high });
             }
         }
-        let marker = |&(joint, position): &(usize, Vec3)| {
-            let place = space.to_unit(position);
-            Marker { joint, place, outside: analysis.distance_from_volume(place) > OUTSIDE, against: false }
-        };
-        let markers = settings.markers.iter().map(marker).collect();
+        let markers = analysis.markers(settings);
         Ok(Self { analysis, joints, settings, template, markers })
     }
 
