@@ -49,7 +49,7 @@ fn a_head_becomes_a_character_and_a_rig() {
     assert_eq!(fs::read(&rig).unwrap(), first, "the same command writes the same bytes");
 }
 
-/// What mending of folds takes is told for each unit, and is a twentieth of it at most.
+/// Loss of each unit by the mending of folds is told, and is a twentieth of the unit at most.
 #[test]
 fn what_mending_takes_of_units_is_told() {
     let folder = tempfile::tempdir().unwrap();

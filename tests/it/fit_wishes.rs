@@ -1,5 +1,5 @@
-//! What people ask of a fit on the command line: markers, directions, symmetry and names, and what they are told where the
-//! mesh shows something else.
+//! Wishes of people for a fit on the command line: markers, directions, symmetry and names, and the notes where the mesh
+//! shows something else.
 
 use std::{
     collections::BTreeMap,

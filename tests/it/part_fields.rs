@@ -344,7 +344,7 @@ fn parts_that_could_be_several_are_none_of_them() {
     assert!(uids(&[&part(1, "index", &[])], &[&b]).is_empty(), "one has a name");
 }
 
-/// What `rigsmith diff` lists: kind, field and the values of each change.
+/// Differences that `rigsmith diff` lists: kind, field and the values of each change.
 fn differences(folder: &Path, from: &str, to: &str) -> Vec<[Value; 4]> {
     let (code, told) = json(folder, &["diff", from, to]);
     assert_eq!(code, 0, "{told}");

@@ -79,7 +79,7 @@ fn up_of(found: &Hypothesis) -> Vec3 {
     found.alignment.rotation * Vec3::Y
 }
 
-/// How far the mesh's trunk lies otherwise than the template's, 0 to 1, whichever way the file is turned: arms and legs of an
+/// Deviation of the lie of the mesh's trunk from the template's, 0 to 1, whichever way the file is turned: limbs of an
 /// animal on all fours are across its trunk, those of an upright figure along it. `None` without two pairs of them.
 fn misfit(analysis: &MeshAnalysis, found: &Hypothesis, template: &TemplateLimbs) -> Option<f32> {
     let lines = &analysis.trees[found.tree].lines;

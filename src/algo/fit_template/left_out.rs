@@ -17,7 +17,7 @@ const MOST_GROUNDS: usize = 3;
 /// Thickness of a pedestal, as a share of its width, and its least width as a share of the height of what stands on it. It is
 /// below along the file's second axis.
 const PEDESTAL: (f64, f64) = (0.6, 0.25);
-/// The same for a ground that may lie on any side, in a file that is turned.
+/// Thickness and least width, in the same shares, of a ground that may lie on any side, in a file that is turned.
 const GROUND: (f64, f64) = (0.1, 0.8);
 /// Cosine of the angle between the file's second axis and a pedestal's.
 const LEVEL: f64 = 0.9;
@@ -41,7 +41,8 @@ const EVEN: f64 = 0.9;
 /// below which it is closed, in its areas.
 const BODY_AREA: f64 = 0.45;
 const CLOSED: f64 = 0.5;
-/// The same from which on a shell is a sheet: a box without one face has 3.2, a half sphere 6.3, a long skirt about 7.
+/// Square of the length of its rims, in its areas, from which on a shell is a sheet: a box without one face has 3.2, a half
+/// sphere 6.3, a long skirt about 7.
 const OPEN: f64 = 3.0;
 /// Share of the body's area from which on a sheet is left out, and share of the body's longest side by which it may stand out:
 /// wings stand out further.

@@ -1,4 +1,4 @@
-//! The same figure given in another way: turned, with its points in another order, with other diagonals, with more faces, and
+//! Figures given in another way: turned, with its points in another order, with other diagonals, with more faces, and
 //! with specks around it.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -397,7 +397,7 @@ fn a_map_file_takes_the_place_of_the_guess() {
     assert_eq!(desk.rig().clips().len(), 1);
 }
 
-/// What the command has options for is chosen below the table: the control that carries the rig gets the travel, and feet are let
+/// Choices of the command are offered below the table: the control that carries the rig gets the travel, and feet are let
 /// go. The next import begins with the same choices.
 #[test]
 fn motion_capture_has_choices() {
