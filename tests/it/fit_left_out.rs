@@ -105,8 +105,8 @@ fn what_is_no_part_of_the_figure_is_left_out() {
         ("a pedestal", cuboid([-0.4, -0.3, -0.4], [0.4, 0.001, 0.4]), "that the figure stands on"),
         ("a box elsewhere", cuboid([2.0, 0.0, 0.0], [2.3, 0.3, 0.3]), "too far from the body"),
         ("a second figure", second, "too far from the body"),
-        ("a cloak", cloak, "open sheets"),
-        ("a skirt", skirt, "open sheets"),
+        ("a cloak", cloak, "open sheet about"),
+        ("a skirt", skirt, "open sheet about"),
     ];
     for (name, added, note) in cases {
         let fit = fitted(&mesh(&[added], same));

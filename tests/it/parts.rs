@@ -183,10 +183,11 @@ fn files_are_written_by_people() {
         let text = std::fs::read_to_string(path).unwrap();
         assert_eq!(format_template(&text, UidStyle::Derived).unwrap(), text, "{name} has uids");
         assert!(format_template(&text, UidStyle::Kept).unwrap() == text, "{name}: `rigsmith format` it");
-        // A hand has five fingers, each with its own controls, and a bird eight toes.
+        // A hand has five fingers, each with its own controls, and a bird eight toes and a tail with limits of their own.
         let most = match name.as_str() {
             "biped" => 300,
-            "parts/hand" | "bird" => 600,
+            "parts/hand" => 600,
+            "bird" => 620,
             _ => 550,
         };
         assert!(text.lines().count() <= most, "{name} has {} lines", text.lines().count());

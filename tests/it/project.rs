@@ -214,14 +214,14 @@ fn mistakes_are_named_with_their_place() {
 #[test]
 fn a_newer_format_opens_and_says_what_it_does_not_know() {
     let text = FROZEN
-        .replacen("format: 1,", "format: 5, lights: [(x: 1)],", 1)
+        .replacen("format: 1,", "format: 6, lights: [(x: 1)],", 1)
         .replacen("mode: \"Pose\"", "fog: 0.5, mode: \"Pose\"", 1)
         .replacen("skins: [", "muscles: [], skins: [", 1)
         .replacen("format: 1,", "format: 5, meaning: 42,", 1);
     let read = read_project(text.as_bytes()).unwrap();
     assert_eq!(read.project, frozen());
     let told = read.notes.join("\n");
-    for part in ["project has format 5", "`lights`", "`fog`", "`muscles`", "template has format 5"] {
+    for part in ["project has format 6", "`lights`", "`fog`", "`muscles`", "template has format 5"] {
         assert!(told.contains(part), "{part}: {told}");
     }
     let line = place(&text, "meaning: 42").0;

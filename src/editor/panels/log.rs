@@ -1,6 +1,6 @@
 //! Log panel: all notices, and their storage.
 
-use std::{collections::VecDeque, time::Duration};
+use std::{borrow::Cow, collections::VecDeque, time::Duration};
 
 use bevy::{prelude::*, window::RequestRedraw};
 use bevy_egui::egui::{self, Color32, Label, Rect, RichText, ScrollArea, Sense, Ui, WidgetInfo, WidgetType};
@@ -18,6 +18,7 @@ use crate::{
         document::{ChangeError, EditRefusal, EditReport},
         limits::RigLimits,
     },
+    rig::step::Commit,
 };
 
 /// Plugin that stores notices, and makes notices of refused edits and of what operations note.
@@ -113,9 +114,13 @@ fn tell_made(
     mut edited: MessageReader<EditReport>,
     mut notices: MessageWriter<Notice>,
 ) {
-    let mut made: Vec<&EditReport> = edited.read().filter(|report| report.is_new_step()).collect();
+    let step_of = |report: &EditReport| match &report.committed {
+        Some(Commit::Done(step)) => Some((report.rig, step.name.clone())),
+        _ => None,
+    };
+    let mut made: Vec<(Entity, Cow<'static, str>)> = edited.read().filter_map(step_of).collect();
     for EditNotice { rig, step, notice } in waiting.read() {
-        if let Some(at) = made.iter().position(|report| report.rig == *rig && report.name == *step) {
+        if let Some(at) = made.iter().position(|(of, title)| of == rig && title == step) {
             made.remove(at);
             notices.write(notice.clone());
         }

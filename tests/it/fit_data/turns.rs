@@ -91,11 +91,11 @@ fn a_body_in_any_turn() {
     check_known("male_child_tpose", 3, 0.3, 0.3);
 }
 
-/// A figure of few faces; other diagonals change its shape. 0.3 is missed by them as by other changes of its faces, and by its
-/// scale.
+/// A figure of few faces; other diagonals change its shape, and move a joint by 0.95 as measured: 0.3 is missed by them as by
+/// other changes of its faces.
 #[test]
 fn a_figure_of_few_faces_in_any_turn() {
-    check_known("gltf_skinned/CesiumMan.glb", 1, 0.55, 0.6);
+    check_known("gltf_skinned/CesiumMan.glb", 1, 0.3, 1.05);
 }
 
 /// A figure in pieces; other diagonals move the fingers of its mitten hands, by 4.6 as measured.

@@ -38,6 +38,10 @@ pub fn with_points_shuffled(points: &[Vec3], triangles: &[[u32; 3]], random: &mu
 
 /// The same surface triangulated otherwise: two triangles that lie nearly in a plane share the other diagonal.
 pub fn with_other_diagonals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    // Triangles with corners of their own share sides where these lie at one place.
+    let mut first: BTreeMap<[u32; 3], u32> = BTreeMap::new();
+    let mut welded = |corner: u32| *first.entry(points[corner as usize].to_array().map(f32::to_bits)).or_insert(corner);
+    let triangles: Vec<[u32; 3]> = triangles.iter().map(|corners| corners.map(&mut welded)).collect();
     let key = |a: u32, b: u32| (a.min(b), a.max(b));
     let mut sides: BTreeMap<(u32, u32), Vec<(usize, usize)>> = BTreeMap::new();
     for (number, corners) in triangles.iter().enumerate() {
@@ -50,7 +54,7 @@ pub fn with_other_diagonals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<[u32
         (b - a).cross(c - a)
     };
     let mut known: BTreeSet<(u32, u32)> = sides.keys().copied().collect();
-    let mut faces = triangles.to_vec();
+    let mut faces = triangles.clone();
     let mut is_turned = vec![false; triangles.len()];
     for pair in sides.values() {
         let &[(one, side), (two, other)] = pair.as_slice() else { continue };

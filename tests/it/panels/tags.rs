@@ -121,8 +121,8 @@ fn a_failed_command_leads_to_the_field_at_fault() {
     desk.click(&failed);
     desk.frames(60);
     assert_eq!(desk.selected(), [b]);
-    assert_eq!(marks(&desk), ["direction is wrong"]);
-    let field = desk.find("direction is wrong").rect;
+    assert_eq!(marks(&desk), ["Direction is wrong"]);
+    let field = desk.find("Direction is wrong").rect;
     assert!(field.top() > 0.0 && field.bottom() < height, "the field is in sight: {field:?}");
     // Once it is mended, nothing is marked.
     desk.edit(Operation::Tags(TagOperation::Params(vec![(tag, params("(0.0, 1.0, 0.0)"))])));

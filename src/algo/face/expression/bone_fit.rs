@@ -137,23 +137,13 @@ impl FittedFace {
         self.pose_and_repair(mix).0
     }
 
-    /// The pose of each bone before its repair.
-    pub(super) fn pose_unrepaired(&self, mix: &Mix) -> Vec<BonePose> {
-        let lines = self.opening_lines.as_ref().filter(|_| !mix.is_rest());
-        let solved = lines.and_then(|lines| {
-            let field = Field::new(mix, &self.units, &self.bones, &self.landmarks)?;
-            Some(self.solve(mix, &field, lines))
-        });
-        solved.unwrap_or_else(|| vec![BonePose::REST; self.bones.len()])
-    }
-
     /// The pose of each bone, and what its repair took and left.
     pub(super) fn pose_and_repair(&self, mix: &Mix) -> (Vec<BonePose>, Repair) {
-        let mut poses = self.pose_unrepaired(mix);
-        let repair = match self.opening_lines.as_ref().filter(|_| !mix.is_rest()) {
-            Some(opening_lines) => self.repair(&mut poses, mix, opening_lines),
-            None => Repair::none(mix),
-        };
+        let rest = || (vec![BonePose::REST; self.bones.len()], Repair::none(mix));
+        let Some(opening_lines) = self.opening_lines.as_ref().filter(|_| !mix.is_rest()) else { return rest() };
+        let Some(field) = Field::new(mix, &self.units, &self.bones, &self.landmarks) else { return rest() };
+        let mut poses = self.solve(mix, &field, opening_lines);
+        let repair = self.repair(&mut poses, mix, opening_lines);
         (poses, repair)
     }
 

@@ -4,12 +4,10 @@
 //! movement that opens the two flips it. Holding the bones back would weaken the expression; averaging the weights of
 //! the triangle's corners with their neighbours' is not visible.
 
-mod further;
-
 use glam::{Affine3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
-use super::{BonePose, ExpressionSet, FittedFace, Mix, bone_fit::SLIVER};
+use super::{ExpressionSet, FittedFace, Mix, bone_fit::SLIVER, text::Expression};
 use crate::{
     algo::face::{bones::FaceBone, landmarks::Landmarks, weights::Mirror},
     mesh::{adjacency::weld, influences::keep_strongest_alike, model::Weights},
@@ -29,8 +27,7 @@ const OWN: f32 = 0.25;
 
 type Influences = Vec<(u32, f32)>;
 
-/// Averages weights where one of the six expressions at full strength turns a triangle by more than a right angle, and then
-/// where the jaw alone or one of the six at its largest strength does.
+/// Averages weights where one of the six expressions at full strength turns a triangle by more than a right angle.
 ///
 /// All in head space; `mask` and `weights` as [`FittedFace::new`] takes them. Points at the same place keep the same
 /// weights. Bones move otherwise with other weights, so that each pass poses anew, and the weights with the fewest folds
@@ -49,91 +46,53 @@ pub fn repair_folds(
     if weights.len() != points.len() || triangles.iter().flatten().any(|&corner| corner as usize >= points.len()) {
         return 0;
     }
-    let six: Vec<Mix> = set.six().map(|expression| Mix::of(&[(expression, 1.0)], set.unit_set())).collect();
+    let six: Vec<&Expression> = set.six().collect();
+    let mut surface: Option<Surface> = None;
+    let mut best: Option<(usize, Weights)> = None;
     let mirror = Mirror::new(points, bones, landmarks);
-    let mut head = MendedHead { points, triangles, mask, bones, most, mirror, surface: None };
-    let face = FittedFace::new(points, triangles, mask, weights, bones, landmarks, set.unit_set()).keeping_targets();
-    let (face, [left, _]) = head.mend(face, weights, &six, six.len(), PASSES);
-    further::mend(&mut head, face, weights, set, &six, left)
-}
-
-/// A head whose weights are averaged.
-struct MendedHead<'a> {
-    points: &'a [Vec3],
-    triangles: &'a [[u32; 3]],
-    mask: &'a [bool],
-    bones: &'a [FaceBone],
-    /// Largest number of influences of a point.
-    most: usize,
-    mirror: Option<Mirror>,
-    surface: Option<Surface>,
-}
-
-impl MendedHead<'_> {
-    /// Matrices of neck, head and each bone in a pose.
-    fn matrices(&self, poses: &[BonePose]) -> Vec<Affine3A> {
-        let moved = poses.iter().zip(self.bones).map(|(pose, bone)| pose.affine(bone.position));
-        [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
-    }
-
-    /// Averages weights where mixes fold skin, in `passes` at most. The folds of the first `main` mixes count before those of
-    /// all. Returns the head with the weights that are kept, and the folds that it has in the first mixes and in all.
-    fn mend(
-        &mut self,
-        mut face: FittedFace,
-        weights: &mut Weights,
-        mixes: &[Mix],
-        main: usize,
-        passes: usize,
-    ) -> (FittedFace, [usize; 2]) {
-        let mut best: Option<([usize; 2], Weights)> = None;
-        let mut is_best = true;
-        for pass in 0..=passes {
-            if pass > 0 {
-                face = face.with_weights(self.points, self.triangles, self.mask, weights);
-            }
-            let posed = |mix: &Mix| {
-                let (poses, repair) = face.pose_and_repair(mix);
-                (self.matrices(&poses), repair.folded)
-            };
-            let (poses, all): (Vec<Vec<Affine3A>>, Vec<Vec<u32>>) = mixes.par_iter().map(posed).unzip();
-            let count = |of: &[Vec<u32>]| of.iter().map(Vec::len).sum::<usize>();
-            let sums = [count(&all[..main.min(all.len())]), count(&all)];
-            // A pass that helped nothing is the last.
-            is_best = best.as_ref().is_none_or(|(least, _)| sums < *least);
-            if !is_best {
-                break;
-            }
-            best = Some((sums, weights.clone()));
-            if sums[1] == 0 || pass == passes {
-                break;
-            }
-            let surface = self.surface.get_or_insert_with(|| Surface::new(self.points, self.triangles));
-            let mut folded = all.concat();
-            sort(&mut folded);
-            let mut averaged = AveragedWeights {
-                surface,
-                points: self.points,
-                triangles: self.triangles,
-                weights,
-                most: self.most,
-                poses: &poses,
-                own: vec![Vec::new(); surface.first.len()],
-                posed: vec![Vec::new(); surface.first.len()],
-            };
-            averaged.smooth(folded);
-            *weights = averaged.weights();
-            if let Some(mirror) = &self.mirror {
-                mirror.apply(weights, self.most);
-            }
+    let mut face =
+        FittedFace::new(points, triangles, mask, weights, bones, landmarks, set.unit_set()).keeping_targets();
+    for pass in 0..=PASSES {
+        if pass > 0 {
+            face = face.with_weights(points, triangles, mask, weights);
         }
-        let Some((left, best)) = best else { return (face, [0; 2]) };
-        if !is_best {
-            face = face.with_weights(self.points, self.triangles, self.mask, &best);
+        let posed = |expression: &&Expression| {
+            let (poses, repair) = face.pose_and_repair(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
+            let moved = poses.into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
+            ([Affine3A::IDENTITY; 2].into_iter().chain(moved).collect(), repair.folded)
+        };
+        let (poses, all): (Vec<Vec<Affine3A>>, Vec<Vec<u32>>) = six.par_iter().map(posed).unzip();
+        let sum = all.iter().map(Vec::len).sum();
+        // A pass that helped nothing is the last.
+        if best.as_ref().is_some_and(|(least, _)| sum >= *least) {
+            break;
         }
-        *weights = best;
-        (face, left)
+        best = Some((sum, weights.clone()));
+        if sum == 0 || pass == PASSES {
+            break;
+        }
+        let surface = surface.get_or_insert_with(|| Surface::new(points, triangles));
+        let mut folded = all.concat();
+        sort(&mut folded);
+        let mut averaged = AveragedWeights {
+            surface,
+            points,
+            triangles,
+            weights,
+            most,
+            poses: &poses,
+            own: vec![Vec::new(); surface.first.len()],
+            posed: vec![Vec::new(); surface.first.len()],
+        };
+        averaged.smooth(folded);
+        *weights = averaged.weights();
+        if let Some(mirror) = &mirror {
+            mirror.apply(weights, most);
+        }
     }
+    let Some((left, best)) = best else { return 0 };
+    *weights = best;
+    left
 }
 
 /// Sorts numbers and drops those that come again.
