@@ -376,7 +376,7 @@ fn differences_of_parts_are_told_at_their_instances() {
         assert_ne!(file, BASE);
         let folder = folder(&file, BASE);
         fs::write(folder.path().join("finger_v2.rig.ron"), longer()).unwrap();
-        assert_eq!(differences(folder.path(), "base.rig.ron", "file.rig.ron"), [told.clone()]);
+        assert_eq!(differences(folder.path(), "base.rig.ron", "file.rig.ron"), std::slice::from_ref(&told));
         let [kind, field, from, to] = told;
         let back = if kind == "added" { text("removed") } else { kind };
         assert_eq!(differences(folder.path(), "file.rig.ron", "base.rig.ron"), [[back, field, to, from]]);

@@ -73,7 +73,7 @@ pub(super) fn figure(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<Figure> 
     let sheets = shells.sheets();
     shells.leave_out(&sheets);
     let is_less = grounds + sheets.len() > 0;
-    is_less.then(|| Figure { triangles: shells.triangles, grounds, sheets: sheets.len() })
+    is_less.then_some(Figure { triangles: shells.triangles, grounds, sheets: sheets.len() })
 }
 
 /// Triangles of the shells that belong to the body of a graph; `None` where all do.

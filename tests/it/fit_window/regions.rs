@@ -120,7 +120,7 @@ fn selected_joints_are_fitted_alone() {
         }
         let known = template.position(template.find_label(&label).unwrap());
         println!("{label} is off by {:.4}", now.distance(known));
-        assert!(now.distance(known) < 0.033, "{label} is off by {}", now.distance(known));
+        assert!(now.distance(known) < 0.05, "{label} is off by {}", now.distance(known));
     }
     assert_eq!(window.rig().joint(hand).unwrap().parent, was.joint(hand).unwrap().parent);
     window.change(Change::Undo);

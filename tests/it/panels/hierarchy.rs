@@ -67,7 +67,7 @@ fn rows_tell_their_tags() {
     let of_long = format!("Tags of {}: control, null", desk.label(long));
     assert_eq!(tags(&desk), ["Tags of b: control, null, spring", of_long.as_str()]);
     // The number alone takes little from a long name.
-    let (row, told) = (desk.find(&desk.label(long).to_owned()).rect, desk.find(&of_long).rect);
+    let (row, told) = (desk.find(desk.label(long)).rect, desk.find(&of_long).rect);
     assert!(told.width() < 0.1 * row.width() && row.contains_rect(told), "{told:?} {row:?}");
     let short = desk.find("Tags of b: control, null, spring").rect;
     assert!(short.width() > told.width() && short.width() < 0.4 * row.width(), "{short:?}");
