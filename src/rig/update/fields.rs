@@ -235,15 +235,38 @@ pub(super) fn tag_fields<'a>(versions: &[Option<&TagData>; 3], now: &'a Rig, fil
         let (own, name) = (key.clone(), format!("params.{key}"));
         let value =
             move |tag: &TagData| parameter(params_of(tag), &own).map(|text| refresh_names(&text, now).into_owned());
+        let same = key.clone();
+        let is_close = move |a: &TagData, b: &TagData| {
+            let [a, b] = [a, b].map(|tag| parameter(params_of(tag), &same));
+            matches!((a, b), (Some(a), Some(b)) if without_spaces(&a) == without_spaces(&b))
+        };
         let take = move |a: &mut TagData, b: &TagData| {
             let value = parameter(params_of(b), &key);
             if let TagKind::Command { params, .. } = &mut a.kind {
                 *params = with_parameter(params, &key, value.as_deref());
             }
         };
-        list.push(field(&name, value, take));
+        list.push(Field { is_close: Box::new(is_close), ..field(&name, value, take) });
     }
     list
+}
+
+/// A value without the white space between its parts, by which nothing differs. Raw strings keep theirs.
+fn without_spaces(text: &str) -> String {
+    if text.contains('#') {
+        return text.to_owned();
+    }
+    let (mut is_quoted, mut is_escaped) = (false, false);
+    let kept = text.chars().filter(|letter| {
+        if is_escaped {
+            is_escaped = false;
+            return true;
+        }
+        is_escaped = is_quoted && *letter == '\\';
+        is_quoted ^= *letter == '"';
+        is_quoted || !letter.is_whitespace()
+    });
+    kept.collect()
 }
 
 fn params_of(tag: &TagData) -> &str {
