@@ -33,6 +33,12 @@ fn program(rig: &Rig) -> Arc<RigProgram> {
     Arc::new(RigProgram::compile(&built, &CompileOptions::default()).unwrap())
 }
 
+/// Joints that the notes of updated clips name.
+fn noted_joints(facts: &Value) -> BTreeSet<Uid> {
+    let notes = facts["notes"].as_array().unwrap().iter();
+    notes.map(|note| note["joint"].as_str().unwrap().parse().unwrap()).collect()
+}
+
 #[test]
 fn clips_are_written_beside_the_output_and_move_the_joints_as_before() {
     let folder = tempfile::tempdir().unwrap();
@@ -62,12 +68,7 @@ fn clips_are_written_beside_the_output_and_move_the_joints_as_before() {
     let read = load_animation(&RealDisk, &at("out/sway.anim.ron")).unwrap();
     let facts = &told["clips"][0];
     assert_eq!((&facts["set_aside"], &facts["missing"]), (&Value::Array(vec![]), &Value::Array(vec![])), "{facts}");
-    let listed: BTreeSet<Uid> = facts["notes"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|note| note["joint"].as_str().unwrap().parse().unwrap())
-        .collect();
+    let listed = noted_joints(facts);
     assert!(listed.len() * 2 < mine.len(), "{facts}");
     let (from, to) = (program(&mine), program(&updated));
     let times: Vec<f32> = (0..=60).map(|frame| frame as f32 / clip.frame_rate).chain(clip.key_times()).collect();
@@ -121,12 +122,7 @@ fn clips_of_a_project_move_the_joints_as_before() {
     assert_eq!((&facts["clips"], &facts["re_expressed"]), (&1.into(), &1.into()), "{facts}");
     let updated = load_project(&RealDisk, &at("out.rigsmith.ron")).unwrap();
     let (rig, kept) = (&updated.rigs[0], updated.rigs[0].clip(clip.uid).unwrap());
-    let listed: BTreeSet<Uid> = facts["notes"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|note| note["joint"].as_str().unwrap().parse().unwrap())
-        .collect();
+    let listed = noted_joints(facts);
     assert!(listed.len() * 2 < mine.len(), "{facts}");
     let (from, to) = (program(&mine), program(rig));
     let times: Vec<f32> = (0..=60).map(|frame| frame as f32 / clip.frame_rate).chain(clip.key_times()).collect();

@@ -181,8 +181,8 @@ fn units_do_what_another_source_shows() {
             let (cosine, amplitude) = (along / (own * square).sqrt(), along / square);
             let told = format!("{name}, {action} beside {unit}: cosine {cosine:.2}, amplitude {amplitude:.2}");
             println!("{told}");
-            // The least is 0.657, and hangs on a few triangles that are mended; 0.75 is missed.
-            if cosine < 0.63 || !(0.6..=1.4).contains(&amplitude) {
+            // The least is 0.66, rounded, and hangs on a few triangles that are mended; 0.75 is missed.
+            if cosine < 0.65 || !(0.6..=1.4).contains(&amplitude) {
                 wrong.push(told);
             }
         }

@@ -1,6 +1,6 @@
 //! Clips of the document as animations of an exported character: played by the rig's own program, for every node of the model.
 
-use std::sync::Arc;
+use std::{borrow::Cow, sync::Arc};
 
 use bevy::math::Vec3A;
 
@@ -40,15 +40,8 @@ pub(super) fn put_clips(
         Some(built) => baked(rig, built).walk().map(|joint| joint.data.uid).collect(),
         None => rig.walk().map(|joint| joint.data.uid).collect(),
     };
-    let own;
-    let built = match built {
-        Some(built) => built,
-        None => {
-            own = Builder::build(rig, modules)?;
-            &own
-        }
-    };
-    let program = Arc::new(RigProgram::compile(built, &CompileOptions::default())?);
+    let built = built_or_made(rig, built, modules)?;
+    let program = Arc::new(RigProgram::compile(&built, &CompileOptions::default())?);
     let node = |(uid, node): (Uid, &crate::mesh::model::Node)| BakedNode { uid, parent: node.parent, rest: node.rest };
     let nodes: Vec<BakedNode> = uids.into_iter().zip(&model.nodes).map(node).collect();
     // The tolerance is for humans in metres.
@@ -72,6 +65,18 @@ pub(super) fn put_clips(
     Ok(())
 }
 
+/// Nodes and constraints that the commands of the rig made, made now if it is not there.
+fn built_or_made<'b>(
+    rig: &Rig,
+    built: Option<&'b BuiltRig>,
+    modules: &Arc<Modules>,
+) -> Result<Cow<'b, BuiltRig>, WriteError> {
+    Ok(match built {
+        Some(built) => Cow::Borrowed(built),
+        None => Cow::Owned(Builder::build(rig, modules)?),
+    })
+}
+
 fn earlier(channels: Vec<Channel>, by: f32) -> impl Iterator<Item = Channel> {
     channels.into_iter().map(move |channel| {
         let times = channel.times.iter().map(|time| (time - by).max(0.0)).collect();
@@ -88,16 +93,9 @@ pub(super) fn packed_clips(
     built: Option<&BuiltRig>,
     modules: &Arc<Modules>,
 ) -> Result<PackedSkeleton, WriteError> {
-    let own;
-    let built = match built {
-        Some(built) => built,
-        None => {
-            own = Builder::build(rig, modules)?;
-            &own
-        }
-    };
-    let program = Arc::new(RigProgram::compile(built, &CompileOptions::default())?);
-    let mut packed = PackedSkeleton::of(rig, built);
+    let built = built_or_made(rig, built, modules)?;
+    let program = Arc::new(RigProgram::compile(&built, &CompileOptions::default())?);
+    let mut packed = PackedSkeleton::of(rig, &built);
     let nodes = packed.baked_nodes();
     let tolerance = KeyTolerance::default().for_height(size_of(&packed.model("")));
     for clip in rig.clips() {
