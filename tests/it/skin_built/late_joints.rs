@@ -131,15 +131,20 @@ fn painted_weights_get_their_shares_too() {
     let head = bench.rig().find_label("head").unwrap();
     let number = before.joints.iter().position(|joint| *joint == head).unwrap() as u32;
     let is_other = |point: &u32| before.weights.of(*point as usize).all(|(joint, _)| joint != number);
-    let point = (0..before.weights.len() as u32).find(is_other).unwrap();
+    let others: Vec<u32> = (0..before.weights.len() as u32).filter(is_other).take(2).collect();
+    let (begun, point) = (others[0], others[1]);
     let joint = PaintableJoint { uid: head, subject: None };
-    let painted = row_edit(bench.rig(), (mesh, &before), joint, [point], 1.0).unwrap();
-    let (rig, done) = (bench.rig_entity(), steps(&mut bench));
+    let painted = |points: &[u32]| row_edit(bench.rig(), (mesh, &before), joint, points.to_vec(), 1.0).unwrap();
+    let (begins, goes_on) = (painted(&[begun]), painted(&[begun, point]));
     let edits = switch(bench.rig(), "twist", true);
-    for change in [Change::Do(Operation::Edits(edits)), Change::Preview(painted)] {
+    let (rig, done) = (bench.rig_entity(), steps(&mut bench));
+    // The stroke begins with the switch, so that the shares wait for its end however fast they are computed.
+    for change in [Change::Do(Operation::Edits(edits)), Change::Preview(begins)] {
         bench.app_mut().world_mut().write_message(EditRequest { rig, change });
-        bench.app_mut().update();
     }
+    bench.app_mut().update();
+    bench.app_mut().world_mut().write_message(EditRequest { rig, change: Change::Preview(goes_on) });
+    bench.app_mut().update();
     let waits = |bench: &mut Workbench| {
         let world = bench.app_mut().world_mut();
         world.query::<&SkinningJob>().single(world).expect("the shares wait for the end of the stroke").waits()
