@@ -71,7 +71,7 @@ fn a_rate_that_leaves_one_frame_is_refused() {
     assert_eq!((bytes(&desk), desk.steps()), (before, steps));
 }
 
-/// What people changed comes back from the file that they saved, joints that are to move nothing as well.
+/// A changed map comes back from the file that people saved, with joints that are to move nothing.
 #[test]
 fn the_map_of_joints_is_saved_and_read_again() {
     let (mut desk, folder) = captured();
