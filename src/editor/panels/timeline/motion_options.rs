@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bevy_egui::egui::{Checkbox, DragValue, Ui};
+use bevy_egui::egui::{Checkbox, DragValue, Key, Ui};
 
 use crate::{
     editor::counted::counted,
@@ -107,9 +107,17 @@ fn rate(ui: &mut Ui, chosen: &mut Option<f32>) -> bool {
     *chosen = is_own.then(|| chosen.unwrap_or(FIRST_RATE));
     let Some(rate) = chosen else { return false };
     let number = DragValue::new(rate).range(1.0..=1000.0).speed(0.2).max_decimals(3).update_while_editing(false);
-    let field = ui.add(number).on_hover_text("Frames a second of the clip");
+    // A field takes the text over one frame after Escape; another identity leaves the text behind.
+    let drops = ui.id().with("dropped rates");
+    let dropped = ui.data(|data| data.get_temp::<u32>(drops)).unwrap_or_default();
+    let field = ui.push_id(("rate", dropped), |ui| ui.add(number)).inner;
+    let field = field.on_hover_text("Frames a second that the clip gets");
     ui.ctx().accesskit_node_builder(field.id, |node| node.set_label("Frames a second of the clip"));
-    field.lost_focus()
+    let is_left = field.lost_focus();
+    if is_left && ui.input(|input| input.key_pressed(Key::Escape)) {
+        ui.data_mut(|data| data.insert_temp(drops, dropped.wrapping_add(1)));
+    }
+    is_left
 }
 
 /// Sentences about motion that was put onto a rig: the control with its travel, and how well feet and hands stay in their places.
