@@ -55,7 +55,7 @@ pub(super) struct AnimateArgs {
     #[arg(long)]
     mesh: Option<PathBuf>,
     /// A map of joints for motion of another skeleton: a RON list of pairs of names, [("LeftUpLeg", "thigh_l"), ...];
-    /// it wins over what is guessed
+    /// it wins over what is guessed, and "" beside a joint lets it move nothing
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
     /// Write the map that was used, to correct it and give it to --map

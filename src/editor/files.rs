@@ -316,7 +316,8 @@ fn save(world: &mut World, then: Option<FollowUp>) {
     }
 }
 
-fn ask_path(world: &mut World, purpose: Purpose, then: Option<FollowUp>) {
+/// Asks for a path to write to.
+pub(in crate::editor) fn ask_path(world: &mut World, purpose: Purpose, then: Option<FollowUp>) {
     let Some(rig) = active(world) else { return };
     let suggestion = save::suggestion(world, rig, purpose);
     world.resource_mut::<Dialog>().ask(Question::Path { purpose, suggestion, then });

@@ -5,6 +5,7 @@ mod captured;
 mod files;
 pub mod keep;
 mod keys;
+mod layers;
 mod random;
 mod sampler;
 mod switch_over;

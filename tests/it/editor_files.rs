@@ -3,6 +3,7 @@
 mod crashes;
 mod exporting;
 mod failures;
+mod joint_maps;
 mod views;
 
 use std::{

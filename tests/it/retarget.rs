@@ -6,6 +6,7 @@ mod joints;
 mod keyed_nodes;
 mod maps;
 mod reduction;
+mod rests;
 
 use std::{path::Path, sync::Arc};
 

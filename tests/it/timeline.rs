@@ -1,6 +1,7 @@
 //! The timeline and its curves: what a person does there reaches the document as one step, and looking at a clip never does.
 
 mod curves;
+mod import_choices;
 mod keys;
 mod looks;
 mod parts;

@@ -83,6 +83,8 @@ pub enum Purpose {
     Save,
     /// The character, its rig or its weights.
     Export,
+    /// The map of joints of motion that waits.
+    JointMap,
 }
 
 /// Answer to the current question.

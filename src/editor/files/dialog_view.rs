@@ -215,6 +215,11 @@ impl DialogView {
                  .anim.ron the clips, .rigclip the motion of the joints in few bytes, .rig.ron the template, .rig the skeleton, .skin the weights. What is written is \
                  read back.",
             ),
+            Purpose::JointMap => (
+                "Save the map of joints",
+                "Save",
+                "A list of pairs: a joint of the motion and one of the rig, or \"\" for none. Load map… and --map take it.",
+            ),
         };
         ui.heading(title);
         let mut browse = false;

@@ -23,7 +23,14 @@ use super::{
     view,
 };
 use crate::{
-    editor::{notice::Notice, panels::timeline::Timeline, settings::EditorSettings},
+    editor::{
+        notice::Notice,
+        panels::timeline::{
+            Timeline,
+            import::{ClipImport, MapRequest},
+        },
+        settings::EditorSettings,
+    },
     files::{
         Disk, FileKind, LoadError, MeshShape, MeshToSave, ProjectTemplate, ProjectToSave, RealDisk,
         journal::{Journal, SaveMark},
@@ -111,6 +118,11 @@ pub(super) fn suggestion(world: &World, rig: Entity, purpose: Purpose) -> PathBu
         (Purpose::Save, Some(project)) => project.clone(),
         (Purpose::Save, None) => folder.join(format!("{}.rigsmith.ron", document.name)),
         (Purpose::Export, _) => folder.join(format!("{}.glb", document.name)),
+        (Purpose::JointMap, _) => {
+            let draft = world.get_resource::<ClipImport>().and_then(ClipImport::draft);
+            let name = draft.map_or_else(|| document.name.clone(), |draft| stem(Path::new(&draft.name)));
+            folder.join(format!("{name}.map.ron"))
+        }
     }
 }
 
@@ -133,6 +145,8 @@ pub(super) fn completed(path: &Path, purpose: Purpose) -> PathBuf {
         Purpose::Save => ".rigsmith.ron",
         Purpose::Export if kind.is_some() => "",
         Purpose::Export => ".glb",
+        Purpose::JointMap if kind == Some(FileKind::Gestures) => "",
+        Purpose::JointMap => ".map.ron",
     };
     if let (false, Some(name)) = (ending.is_empty(), path.file_name().map(|name| name.to_string_lossy().into_owned())) {
         let name = name.strip_suffix(".ron").filter(|_| purpose == Purpose::Save).unwrap_or(&name).to_owned();
@@ -141,11 +155,14 @@ pub(super) fn completed(path: &Path, purpose: Purpose) -> PathBuf {
     path
 }
 
-/// Saves the project or exports the character.
+/// Saves the project, exports the character, or writes a map of joints.
 pub(super) fn to(world: &mut World, purpose: Purpose, path: PathBuf, then: Option<FollowUp>) {
     match purpose {
         Purpose::Save => project(world, path, then),
         Purpose::Export => export::export(world, path),
+        Purpose::JointMap => {
+            world.write_message(MapRequest::Save(path));
+        }
     }
 }
 

@@ -15,6 +15,7 @@ mod drag;
 mod follow;
 pub mod import;
 mod joint_table;
+mod map_draft;
 pub(in crate::editor) mod map_file;
 mod marks;
 mod mask;

@@ -68,7 +68,8 @@ pub(super) fn name_targets(
 /// A clip for Bevy's animation of instances of a program, with all layers mixed. Second 0 is the start of the clip. Markers are
 /// told as [`MarkerReached`] of the entity with the player.
 ///
-/// Nodes that the program does not have or that cannot be posed are left out. A node gets all of its transform from the clip:
+/// Nodes that the program does not have or that cannot be posed are left out, and so is what no layer in effect concerns: keys of
+/// layers that are muted, have no weight, or leave the node out by their mask. A node gets all of its transform from the clip:
 /// where the clip has no keys of it, it is at its base. Root motion is not taken out: see
 /// [`RootMotion`](super::RootMotion).
 pub fn animation_clip(clip: &RigClip, program: &RigProgram, mode: InstanceMode) -> AnimationClip {
@@ -76,6 +77,10 @@ pub fn animation_clip(clip: &RigClip, program: &RigProgram, mode: InstanceMode) 
     let targets: std::collections::BTreeSet<&TrackTarget> =
         clip.layers.iter().flat_map(|layer| layer.tracks.keys()).collect();
     for target in targets {
+        // A curve would hold the node at its base, which other motion of the game moves.
+        if clip.value(target, clip.range[0]).is_none() {
+            continue;
+        }
         let Some(slot) = program.node(target.node) else { continue };
         let node = &program.nodes()[slot];
         let is_direct = mode == InstanceMode::Direct;

@@ -82,7 +82,7 @@ pub enum JointMapError {
     },
 }
 
-/// Pairs of names: joint of the motion, joint of the rig.
+/// Pairs of names: joint of the motion, joint of the rig. A joint of the motion with an empty name beside it moves nothing.
 pub type NamePairs = Vec<(String, String)>;
 
 /// Reads a map file: a RON list of pairs of names, `[("LeftUpLeg", "thigh_l")]`.
@@ -95,7 +95,7 @@ pub fn read_joint_map(bytes: &[u8]) -> Result<NamePairs, SourceError> {
 
 /// Text of a map file.
 pub fn write_joint_map(pairs: &[(String, String)]) -> String {
-    let mut text = "// Joint of the motion, joint of the rig.\n[\n".to_owned();
+    let mut text = "// Joint of the motion, joint of the rig; \"\" for none.\n[\n".to_owned();
     for (source, target) in pairs {
         text.push_str(&format!("    ({source:?}, {target:?}),\n"));
     }
@@ -105,21 +105,34 @@ pub fn write_joint_map(pairs: &[(String, String)]) -> String {
 
 impl JointMap {
     /// Map of a motion to a rig. Pairs that are given win over what names and shape say, and complete names that say too little.
+    /// A joint of the motion that is given an empty name moves nothing.
     ///
     /// # Errors
     /// A given name is unknown, or nothing can be mapped.
     pub fn new(motion: &Motion, rig: &Rig, given: &[(String, String)]) -> Result<Self, JointMapError> {
         let (sources, targets) = (motion_joints(motion), rig_joints(rig));
-        let mut places = Vec::with_capacity(given.len());
+        let (mut places, mut unwanted) = (Vec::with_capacity(given.len()), BTreeSet::new());
         for (from, to) in given {
             let from = find(&sources, from).map_err(|(name, nearest)| JointMapError::NoSource { name, nearest })?;
+            if to.is_empty() {
+                unwanted.insert(from);
+                continue;
+            }
             let to = find(&targets, to).map_err(|(name, nearest)| JointMapError::NoTarget { name, nearest })?;
             places.push((from, to));
         }
-        if let Some(animals) = animals(&sources, &targets) {
-            return Ok(Self::of_animals([&sources, &targets], &animals, &places));
-        }
-        let target = target_bones(&sources, &targets, &places);
+        let map = match animals(&sources, &targets) {
+            Some(animals) => Self::of_animals([&sources, &targets], &animals, &places),
+            None => Self::of_bones([&sources, &targets], places)?,
+        };
+        let found_by = if given.is_empty() { map.found_by } else { FoundBy::Map };
+        Self { found_by, ..map }.without(&unwanted)
+    }
+
+    /// Map by the bones of two humans, or else by equal labels, with pairs that are given.
+    fn of_bones([sources, targets]: [&[SkeletonJoint]; 2], places: Vec<(usize, usize)>) -> Result<Self, JointMapError> {
+        let is_guessed = places.is_empty();
+        let target = target_bones(sources, targets, &places);
         let mut pairs = Vec::new();
         let mut replaced: BTreeMap<HumanBone, BTreeSet<usize>> = BTreeMap::new();
         for (from, to) in places {
@@ -129,10 +142,7 @@ impl JointMap {
             }
         }
         let known = replaced.iter().filter_map(|(bone, joints)| Some((*bone, *joints.first()?))).collect();
-        let (mut source, mut found_by) = found(&sources, &known);
-        if !given.is_empty() {
-            found_by = FoundBy::Map;
-        }
+        let (mut source, found_by) = found(sources, &known);
         for (bone, joints) in replaced {
             source.insert(bone, joints.into_iter().collect());
         }
@@ -148,13 +158,28 @@ impl JointMap {
         }
         if !is_human {
             let Some((first, _)) = pairs.first() else { return Err(JointMapError::Nothing) };
-            if given.is_empty() && are_roots(&sources, &targets, &pairs) {
+            if is_guessed && are_roots(sources, targets, &pairs) {
                 return Err(JointMapError::OnlyRoot { name: sources[*first].name.clone() });
             }
-            let found_by = if given.is_empty() { FoundBy::Labels } else { found_by };
-            return Ok(Self { source: HumanJoints::new(), target: HumanJoints::new(), pairs, found_by, axes: None });
+            let (source, target, found_by) = (HumanJoints::new(), HumanJoints::new(), FoundBy::Labels);
+            return Ok(Self { source, target, pairs, found_by, axes: None });
         }
         Ok(Self { source, target, pairs, found_by, axes: None })
+    }
+
+    /// The map without joints of the motion that are to move nothing.
+    fn without(mut self, unwanted: &BTreeSet<usize>) -> Result<Self, JointMapError> {
+        if unwanted.is_empty() {
+            return Ok(self);
+        }
+        self.source.retain(|_, joints| {
+            joints.retain(|joint| !unwanted.contains(joint));
+            !joints.is_empty()
+        });
+        self.target.retain(|bone, _| self.source.contains_key(bone));
+        self.pairs.retain(|(from, _)| !unwanted.contains(from));
+        let is_empty = self.pairs.is_empty() && self.bones().next().is_none();
+        if is_empty { Err(JointMapError::Nothing) } else { Ok(self) }
     }
 
     /// Map of two animals: hips to hips, and other joints by their chains, but for those of pairs that are given.
@@ -172,7 +197,7 @@ impl JointMap {
             source: HumanJoints::from([(HumanBone::Hips, vec![hips])]),
             target: HumanJoints::from([(HumanBone::Hips, vec![to.hips])]),
             pairs,
-            found_by: if given.is_empty() { FoundBy::Shape } else { FoundBy::Map },
+            found_by: FoundBy::Shape,
             axes: Some([from.axes, to.axes]),
         }
     }

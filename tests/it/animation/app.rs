@@ -34,7 +34,7 @@ use super::{BASE, CLIP, animated, apply, biped, controls, keep::state, program, 
 struct Markers(Vec<(String, f32)>);
 
 /// An app with frames of a tenth of a second.
-fn app() -> App {
+pub fn app() -> App {
     let mut app = headless_app(1);
     app.add_plugins((AssetPlugin::default(), AnimationPlugin))
         .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(100)))
@@ -46,7 +46,7 @@ fn app() -> App {
 }
 
 /// A rig with a document, built and running.
-fn with_document(app: &mut App, rig: Rig) -> Entity {
+pub fn with_document(app: &mut App, rig: Rig) -> Entity {
     let entity = app.world_mut().spawn(rig).id();
     app.update();
     app.world_mut().write_message(BuildRequest { rig: entity, step: BuildStep::All });

@@ -127,3 +127,20 @@ fn a_map_completes_names_that_say_too_little() {
     assert_eq!((&map.source, &map.target), (&wanted.source, &wanted.target));
     assert_eq!(map.found_by, FoundBy::Map);
 }
+
+/// An empty name beside a joint of the motion wins over its guess.
+#[test]
+fn a_map_lets_joints_move_nothing() {
+    let motion = read_bvh(include_bytes!("walker.bvh"), "walker").unwrap();
+    let rig = shipped("biped");
+    let none = |name: &str| (name.to_owned(), String::new());
+    let guessed = JointMap::new(&motion, &rig, &[]).unwrap();
+    let map = JointMap::new(&motion, &rig, &[none("LeftLeg")]).unwrap();
+    let shin = HumanBone::Limb(BodySide::Left, LimbBone::LowerLeg);
+    assert!(guessed.source.contains_key(&shin) && !map.source.contains_key(&shin));
+    assert_eq!(map.bones().count() + 1, guessed.bones().count());
+    assert!(map.unmapped_source(&motion).contains(&"LeftLeg".to_owned()));
+    assert_eq!(map.found_by, FoundBy::Map);
+    let all: Vec<(String, String)> = motion.joints.iter().map(|joint| none(&joint.name)).collect();
+    assert_eq!(JointMap::new(&motion, &rig, &all), Err(JointMapError::Nothing));
+}

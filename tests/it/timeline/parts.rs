@@ -228,7 +228,7 @@ fn rows_are_filtered_and_folded() {
     assert!(desk.look("arm_l rotation").is_none());
 }
 
-fn import(desk: &mut Desk, path: std::path::PathBuf) {
+pub(super) fn import(desk: &mut Desk, path: std::path::PathBuf) {
     let clips = desk.rig().clips().len();
     let told = desk.told().len();
     desk.app.world_mut().write_message(ImportRequest(path));
@@ -302,12 +302,12 @@ fn imported_motion_waits_for_steps_that_were_undone_meanwhile() {
 }
 
 /// The bundled biped beside a capture of a human, whose map waits.
-fn captured() -> (Desk, tempfile::TempDir) {
+pub(super) fn captured() -> (Desk, tempfile::TempDir) {
     captured_of(crate::fuzz_bvh::HUMAN)
 }
 
 /// The same beside the capture of this text.
-fn captured_of(text: &str) -> (Desk, tempfile::TempDir) {
+pub(super) fn captured_of(text: &str) -> (Desk, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("step.bvh");
     std::fs::write(&path, text).unwrap();
@@ -321,7 +321,7 @@ fn captured_of(text: &str) -> (Desk, tempfile::TempDir) {
 }
 
 /// Accepts the map, and waits for the clip.
-fn accept(desk: &mut Desk) {
+pub(super) fn accept(desk: &mut Desk) {
     desk.click("Import motion");
     desk.frames(2);
     crate::bench::wait(desk, "the clip", Desk::frame, |desk| {

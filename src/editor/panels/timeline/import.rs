@@ -12,10 +12,11 @@ use bevy::{
     window::RequestRedraw,
 };
 
+pub use super::map_draft::MapDraft;
 use super::{
     carry_out::open,
-    map_file::{self, targets_of},
-    motion_options::{MotionOptions, sentences},
+    map_file,
+    motion_options::{MotionOptions, RateError, sentences},
 };
 use crate::{
     editor::{
@@ -39,7 +40,7 @@ use crate::{
         animation::{
             RigClip,
             file_clip::{motion_of, numbered_clip, own_joints},
-            joint_map::{FoundBy, JointMap, JointMapError},
+            joint_map::{JointMap, JointMapError},
             motion::Motion,
         },
         operations::{ClipOperation, Operation, OperationError},
@@ -56,7 +57,7 @@ pub const MOTION_FILES: &[FileKind] =
 pub struct ImportRequest(pub PathBuf);
 
 /// Change of the map of joints of motion that waits.
-#[derive(Message, Debug, Clone, PartialEq, Eq)]
+#[derive(Message, Debug, Clone, PartialEq)]
 pub enum MapRequest {
     /// Gives a joint of the motion, by its number, another joint of the rig, or none.
     Set(usize, Option<Uid>),
@@ -66,6 +67,10 @@ pub enum MapRequest {
     AskFile,
     /// Takes the map of a file in place of the guess.
     File(PathBuf),
+    /// Asks for a path to which the map is saved.
+    AskSave,
+    /// Writes the map to a file.
+    Save(PathBuf),
     /// Puts the motion onto the rig by the map.
     Accept,
     /// Drops the motion.
@@ -101,42 +106,6 @@ enum ReadMotion {
     Clips(ImportedMotion),
     /// Motion of another skeleton.
     Draft(MapDraft),
-}
-
-/// Motion of another skeleton, with the joints of the rig that its joints move.
-#[derive(Debug, Clone)]
-pub struct MapDraft {
-    /// The rig.
-    pub rig: Entity,
-    /// Name of the file.
-    pub name: String,
-    /// Motions of one skeleton.
-    pub(super) motions: Arc<Vec<Motion>>,
-    /// Joint of the rig for each joint of the motion.
-    pub targets: Vec<Option<Uid>>,
-    /// Way in which the guess was found; `None` if nothing was found.
-    pub found_by: Option<FoundBy>,
-    /// Choices of how the motion is put onto the rig.
-    pub options: MotionOptions,
-    /// Remarks, a sentence each.
-    notes: Vec<String>,
-}
-
-impl MapDraft {
-    /// Names of the motion's joints, in order.
-    pub fn joints(&self) -> impl ExactSizeIterator<Item = &str> {
-        self.motions.first().map_or(&[][..], |motion| &motion.joints[..]).iter().map(|joint| joint.name.as_str())
-    }
-
-    /// Number of motions.
-    pub fn motions(&self) -> usize {
-        self.motions.len()
-    }
-
-    /// Number of joints of the motion that move a joint of the rig.
-    pub fn mapped(&self) -> usize {
-        self.targets.iter().flatten().count()
-    }
 }
 
 impl ClipImport {
@@ -188,6 +157,9 @@ enum ImportError {
     /// No joints correspond.
     #[error(transparent)]
     Map(#[from] JointMapError),
+    /// The frame rate leaves nothing of a motion.
+    #[error(transparent)]
+    Rate(#[from] RateError),
     /// The motion does not fit the rig.
     #[error(transparent)]
     Retarget(#[from] RetargetError),
@@ -268,6 +240,8 @@ fn answer(world: &mut World, request: &MapRequest) {
         }
         MapRequest::AskFile => map_file::ask(world),
         MapRequest::File(path) => map_file::load(world, path),
+        MapRequest::AskSave => map_file::ask_save(world),
+        MapRequest::Save(path) => map_file::save(world, path),
         MapRequest::Cancel => {
             import.draft = None;
             import.drop_waiting();
@@ -341,26 +315,9 @@ fn read(
         _ => return Err(ImportError::Kind),
     }
     match (motions.is_empty(), imported.clips.is_empty()) {
-        (false, _) => Ok(ReadMotion::Draft(draft(entity, name, rig, motions))),
+        (false, _) => Ok(ReadMotion::Draft(MapDraft::new(entity, name, rig, motions))),
         (true, false) => Ok(ReadMotion::Clips(imported)),
         (true, true) => Err(ImportError::Empty),
-    }
-}
-
-/// Motions with the map that names, shape or labels suggest. Where nothing is found all is for people to choose.
-fn draft(rig: Entity, name: &str, document: &Rig, motions: Vec<Motion>) -> MapDraft {
-    let guess = motions.first().and_then(|motion| JointMap::new(motion, document, &[]).ok());
-    let count = motions.first().map_or(0, |motion| motion.joints.len());
-    let targets = guess.as_ref().map_or_else(|| vec![None; count], |guess| targets_of(guess, document, count));
-    let notes = motions.iter().flat_map(|motion| motion.notes.iter().cloned()).collect();
-    MapDraft {
-        rig,
-        name: name.to_owned(),
-        motions: Arc::new(motions),
-        targets,
-        found_by: guess.map(|guess| guess.found_by),
-        options: MotionOptions::default(),
-        notes,
     }
 }
 
@@ -373,6 +330,7 @@ fn retargeted(draft: &MapDraft, rig: &Rig, modules: &Arc<Modules>) -> Result<Imp
     let pairs: Vec<(usize, usize)> = pairs.filter_map(|(from, to)| Some((from, place((*to)?)?))).collect();
     let mut imported = ImportedMotion { clips: Vec::new(), notes: draft.notes.clone() };
     for motion in draft.motions.iter() {
+        draft.options.check_rate(motion)?;
         let map = JointMap::of_pairs(motion, rig, &pairs)?;
         imported.retarget(rig, &built, motion, &map, draft.options)?;
     }

@@ -28,7 +28,7 @@ const NOTHING: &str = "nothing";
 pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy: bool, requests: &mut Requests) {
     // An open list of joints takes Escape for itself.
     let is_escaped = ui.input(|input| input.key_pressed(Key::Escape)) && !Popup::is_any_open(ui.ctx());
-    let mut is_cancelled = is_escaped;
+    let mut is_cancelled = false;
     let (mapped, all) = (draft.mapped(), draft.targets.len());
     ui.horizontal_wrapped(|ui| {
         let can_import = mapped > 0 && !is_busy;
@@ -41,6 +41,10 @@ pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy:
         let load = ui.add_enabled(!is_busy, Button::new("Load map…"));
         if load.on_hover_text("Takes pairs of joints from a map file, as --map of the command does").clicked() {
             requests.send(MapRequest::AskFile);
+        }
+        let save = ui.add_enabled(mapped > 0 && !is_busy, Button::new("Save map…"));
+        if save.on_hover_text("Writes the pairs of joints to a map file, as --map-out of the command does").clicked() {
+            requests.send(MapRequest::AskSave);
         }
         is_cancelled |= ui.add_enabled(!is_busy, Button::new("Cancel import")).clicked();
         let found = match draft.found_by {
@@ -61,7 +65,9 @@ pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy:
         ));
     });
     let onto = target_of(&shown.rig);
-    let options = ui.add_enabled_ui(!is_busy, |ui| choices(ui, draft.options, onto)).inner;
+    let (options, is_left) = ui.add_enabled_ui(!is_busy, |ui| choices(ui, draft.options, onto)).inner;
+    // A field that is being typed into takes Escape for itself, too.
+    is_cancelled |= is_escaped && !is_left;
     if options != draft.options {
         requests.send(MapRequest::Options(options));
     }

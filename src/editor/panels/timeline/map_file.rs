@@ -1,4 +1,5 @@
-//! Map files for motion that waits: pairs of names from a file take the place of what was guessed.
+//! Map files for motion that waits: pairs of names from a file take the place of what was guessed, and the map is saved as such
+//! a file, for other files of the same skeleton and for the command.
 
 use std::path::Path;
 
@@ -7,13 +8,17 @@ use bevy::prelude::*;
 use super::import::{ClipImport, MapDraft};
 use crate::{
     editor::{
-        files::dialog::{Dialog, Question},
+        counted::counted,
+        files::{
+            ask_path,
+            dialog::{Dialog, Purpose, Question},
+        },
         notice::Notice,
     },
-    files::{FileKind, LoadError, RealDisk, load_joint_map},
+    files::{FileKind, LoadError, RealDisk, load_joint_map, save_atomic},
     rig::{
         Rig, Uid,
-        animation::joint_map::{FoundBy, JointMap, JointMapError},
+        animation::joint_map::{FoundBy, JointMap, JointMapError, write_joint_map},
     },
 };
 
@@ -54,7 +59,7 @@ pub(super) fn ask(world: &mut World) {
 pub(super) fn load(world: &mut World, path: &Path) {
     let Some(draft) = world.resource::<ClipImport>().draft().cloned() else { return };
     let Some(rig) = world.get::<Rig>(draft.rig) else { return };
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let name = file_name(path);
     match mapped(&draft, rig, path) {
         Ok(targets) => {
             if let Some(known) = &mut world.resource_mut::<ClipImport>().draft {
@@ -66,6 +71,35 @@ pub(super) fn load(world: &mut World, path: &Path) {
             world.write_message(Notice::error(format!("Could not take the map of joints from {name}: {error}")));
         }
     }
+}
+
+/// Asks for a path to which the map of the motion that waits is saved.
+pub(super) fn ask_save(world: &mut World) {
+    let is_waiting = world.resource::<ClipImport>().draft().is_some();
+    if is_waiting && world.contains_resource::<Dialog>() {
+        ask_path(world, Purpose::JointMap, None);
+    }
+}
+
+/// Writes the map of the motion that waits to a file, and tells of it.
+pub(super) fn save(world: &mut World, path: &Path) {
+    let Some(draft) = world.resource::<ClipImport>().draft() else { return };
+    let Some(rig) = world.get::<Rig>(draft.rig) else { return };
+    let (name, pairs) = (file_name(path), draft.pairs(rig));
+    let differing = draft.differing(rig, &pairs);
+    let notice = match save_atomic(&RealDisk, path, write_joint_map(&pairs).as_bytes()) {
+        Ok(()) if differing > 0 => Notice::warning(format!(
+            "Saved the map of joints to {name}; what {} moves is otherwise once it is read: names are missing, or say more",
+            counted(differing, "joint", "joints")
+        )),
+        Ok(()) => Notice::done(format!("Saved the map of joints to {name}")),
+        Err(error) => Notice::error(format!("Could not save the map of joints to {name}: {error}")),
+    };
+    world.write_message(notice);
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn mapped(draft: &MapDraft, rig: &Rig, path: &Path) -> Result<Vec<Option<Uid>>, MapFileError> {
