@@ -22,7 +22,9 @@ type Moved = [Vec3; 2];
 fn posed(mesh: &Path, expressions: &[&str]) -> BTreeMap<String, Vec<Moved>> {
     let folder = tempfile::tempdir().unwrap();
     let exports = std::env::var_os("RIGSMITH_EXPORTS").map(PathBuf::from);
-    let glb = exports.unwrap_or_else(|| folder.path().to_owned()).join(format!("parts_{}.glb", expressions.len()));
+    // Tests run side by side, and each reads its own file.
+    let name = format!("{}_{}.glb", mesh.file_stem().unwrap().display(), expressions.join("_").replace('=', "_"));
+    let glb = exports.unwrap_or_else(|| folder.path().to_owned()).join(name);
     let (mesh, glb) = (mesh.display().to_string(), glb.display().to_string());
     let mut args = vec!["face", &mesh, "-o", &glb];
     args.extend(expressions.iter().flat_map(|expression| ["--expression", *expression]));
@@ -103,6 +105,21 @@ fn a_tongue_comes_out_of_an_open_mouth() {
             assert!(most < 1e-4, "{name} moves by {most} with the tongue");
         }
     }
+}
+
+/// The tongue comes between the teeth in the viseme of th, further than the jaw carries it.
+#[test]
+fn th_brings_the_tongue_to_the_front() {
+    let Some(data) = test_data() else { return };
+    let mesh = data.join("bodies/female_young/full.obj");
+    let tip = |expression: &str| {
+        let objects = posed(&mesh, &[expression]);
+        objects["helper-tongue"].iter().max_by(|a, b| a[0].z.total_cmp(&b[0].z)).map(|[_, moved]| *moved).unwrap()
+    };
+    let (between, behind) = (tip("viseme_th=1"), tip("viseme_kk=1"));
+    println!("the tip of th is {} before that of kk", between - behind);
+    // In metres.
+    assert!(between.z - behind.z > 0.005, "{between} {behind}");
 }
 
 #[test]

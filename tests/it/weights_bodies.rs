@@ -146,20 +146,29 @@ pub fn difference(a: &Weights, b: &Weights, points: impl Iterator<Item = usize>)
 #[test]
 fn bodies_are_bound_better_than_by_plain_bone_heat() {
     let Some(data) = test_data() else { return };
-    // Errors as measured; a tenth more is the most. Blender's bone heat has 0.233 and 0.159 on the first body.
-    for (body, rig, measured) in [
-        ("male_young", "game_engine", 0.121),
-        ("male_young", "mixamo", 0.123),
-        ("female_young", "game_engine", 0.128),
-        ("baby", "game_engine", 0.108),
-        ("baby", "mixamo", 0.167),
+    // Errors as measured, with the rig `game_engine` and with `mixamo`; a tenth more is the most, and no more than Blender's
+    // bone heat has with the true tails, which leaves the baby without weights.
+    const NONE: f64 = f64::INFINITY;
+    for (body, [game_engine, mixamo]) in [
+        ("male_young", [(0.121, 0.233), (0.123, 0.159)]),
+        ("female_young", [(0.128, 0.236), (0.124, 0.140)]),
+        ("female_heavy_tpose", [(0.129, 0.239), (0.126, 0.140)]),
+        ("female_young_armsdown", [(0.128, 0.234), (0.125, 0.140)]),
+        ("male_child_tpose", [(0.106, 0.218), (0.125, 0.160)]),
+        ("male_muscular_action", [(0.121, 0.232), (0.124, 0.157)]),
+        ("baby", [(0.108, NONE), (0.167, NONE)]),
     ] {
-        let body_data = Body::read(&data.join("bodies"), body, rig);
-        let (weights, report) = body_data.bound();
-        assert_eq!(report.by_surface, body_data.points.len());
-        let error = difference(&weights, &body_data.truth, 0..body_data.points.len());
-        println!("{body} with {rig}: error {error:.4}");
-        assert!(error <= 1.1 * measured, "{body} with {rig}: error {error:.4}, measured {measured:.4}");
+        for (rig, (measured, peer)) in [("game_engine", game_engine), ("mixamo", mixamo)] {
+            let body_data = Body::read(&data.join("bodies"), body, rig);
+            let (weights, report) = body_data.bound();
+            assert_eq!(report.by_surface, body_data.points.len());
+            let error = difference(&weights, &body_data.truth, 0..body_data.points.len());
+            println!("{body} with {rig}: error {error:.4}");
+            assert!(
+                error <= f64::min(1.1 * measured, peer),
+                "{body} with {rig}: error {error:.4}, measured {measured:.4}"
+            );
+        }
     }
 }
 
@@ -170,6 +179,9 @@ fn bodies_are_bound_better_than_by_plain_bone_heat() {
 fn bends_lie_beside_those_of_painted_weights() {
     let Some(data) = test_data() else { return };
     const KINDS: [&str; 6] = ["elbow", "knee", "shoulder", "hip", "wrist", "neck"];
+    // Nine tenths of the peer's errors, of the limbs that it was measured on.
+    const MOST: [[f32; 4]; 2] =
+        [[0.9 * 0.049, 0.9 * 0.057, 0.9 * 0.149, 0.9 * 0.362], [0.9 * 0.049, 0.9 * 0.057, 0.9 * 0.189, 0.9 * 0.348]];
     let rigs: [(&str, [[&str; 2]; 6], [f32; 6]); 2] = [
         (
             "game_engine",
@@ -196,7 +208,7 @@ fn bends_lie_beside_those_of_painted_weights() {
             [0.034, 0.047, 0.159, 0.149, 0.028, 0.062],
         ),
     ];
-    for (rig, bends, measured) in rigs {
+    for ((rig, bends, measured), most) in rigs.into_iter().zip(MOST) {
         let mut sums = [0.0_f32; 6];
         // The baby is left out, as the peer cannot bind it.
         for body in &BODIES[1..] {
@@ -210,6 +222,9 @@ fn bends_lie_beside_those_of_painted_weights() {
         println!("{rig}: {KINDS:?} {means:.4?} % of the height");
         for ((mean, measured), kind) in means.iter().zip(measured).zip(KINDS) {
             assert!(*mean <= 1.1 * measured, "{rig}: {kind} {mean:.4}, measured {measured}");
+        }
+        for ((mean, most), kind) in means.iter().zip(most).zip(KINDS) {
+            assert!(*mean <= most, "{rig}: {kind} {mean:.4}, {most} at most");
         }
     }
 }
