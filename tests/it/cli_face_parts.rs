@@ -217,3 +217,34 @@ fn brows_and_hair_ride_along() {
         assert!(moved >= least && worst <= most, "{name}: moves {moved}, {worst} off the skin");
     }
 }
+
+/// Lashes that are a mesh of their own go down with the lid that they stand on.
+#[test]
+fn lashes_follow_their_lid() {
+    let mesh = heads::bundled();
+    let analysis = FaceAnalysis::new(&mesh.0, &mesh.1, &AutoSettings::default(), &|_, _| true).unwrap();
+    let (eyes, marks) = (analysis.landmarks.eye_distance(), &analysis.landmarks.points);
+    let lash = |point: Vec3| {
+        let is_on_lid = |mark: &Vec3| mark.distance(point) < 0.07 * eyes && point.y > mark.y;
+        marks[43..45].iter().any(is_on_lid).then(|| point + 0.015 * eyes * Vec3::Z)
+    };
+    let (mut text, mut first) = (String::new(), 0);
+    object(&mut text, "head", &mesh, &mut first, Some);
+    object(&mut text, "lashes", &mesh, &mut first, lash);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("lashes.obj");
+    fs::write(&file, text).unwrap();
+    let objects = posed(&file, &["eyeBlinkLeft=1"]);
+    let (head, lashes) = (&objects["head"], &objects["lashes"]);
+    assert!(lashes.len() > 6, "{} points are lashes", lashes.len());
+    let off = |point: &Moved| {
+        let nearest =
+            head.iter().min_by(|a, b| a[0].distance_squared(point[0]).total_cmp(&b[0].distance_squared(point[0])));
+        let below = nearest.map_or(Vec3::ZERO, |[rest, moved]| *moved - *rest);
+        (point[1] - point[0]).distance(below)
+    };
+    let (moved, worst) = (furthest(lashes) / eyes, lashes.iter().map(off).fold(0.0, f32::max) / eyes);
+    let down = lashes.iter().map(|[rest, moved]| rest.y - moved.y).fold(0.0, f32::max) / eyes;
+    println!("{} points of lashes move {moved:.3} eye distances, {down:.3} down, {worst:.3} off the lid", lashes.len());
+    assert!(down > 0.03 && worst < 0.05, "lashes move {moved}, {down} down, {worst} off the lid");
+}
