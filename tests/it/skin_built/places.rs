@@ -118,7 +118,7 @@ fn dual_quaternions_show_the_posed_mesh() {
         ..PoseOffset::IDENTITY
     };
     bench.operate(Operation::Edits(vec![RigEdit::SetOffset(hand, Some(offset))])).unwrap();
-    bench.app_mut().update();
+    (0..3).for_each(|_| bench.app_mut().update());
     let mut state = figure.state();
     state.set_offset(hand, offset).unwrap();
     state.evaluate(0.0);
