@@ -14,6 +14,7 @@ use rigsmith::files::{RealDisk, load_model};
 use rigsmith::{
     algo::weights::{IdleReason, WeightJoint, WeightReport, WeightSettings, skin_weights},
     mesh::{
+        adjacency::weld,
         gltf::{ExternalFile, read_gltf},
         model::Weights,
     },
@@ -239,6 +240,8 @@ struct Character {
     objects: Vec<(String, Vec<usize>)>,
     /// Sum of the file's weights of each joint of the file.
     held: Vec<f32>,
+    points: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
 }
 
 impl Character {
@@ -286,20 +289,50 @@ impl Character {
         let is_slot = |joint: &usize| model.nodes[nodes[*joint] as usize].name.contains("slot");
         let slots = (0..nodes.len()).filter(is_slot).collect();
         let settings = WeightSettings { slots, ..WeightSettings::default() };
+        let triangles = rest.point_triangles();
         let (weights, report) =
-            skin_weights(&rest.points, &rest.point_triangles(), &joints, &rigid, None, &settings, &|_| true).unwrap();
+            skin_weights(&rest.points, &triangles, &joints, &rigid, None, &settings, &|_| true).unwrap();
         let mut named = Weights::default();
         for point in 0..weights.len() {
             named.push(weights.of(point).map(|(joint, weight)| (nodes[joint as usize], weight)));
         }
         let objects = model.objects.iter().zip(points).filter(|(object, _)| object.skin.is_some());
         let objects = objects.map(|(object, points)| (object.name.clone(), points)).collect();
-        Self { joints, weights: named, report, truth, objects, held }
+        Self { joints, weights: named, report, truth, objects, held, points: rest.points, triangles }
     }
 
     fn error(&self, name: &str) -> f64 {
         let points = self.objects.iter().filter(|(object, _)| object.contains(name)).flat_map(|(_, points)| points);
         difference(&self.weights, &self.truth, points.copied())
+    }
+
+    /// Number of islands of skinned objects that are rigid in the file, and of those among them that are rigid here.
+    fn rigid_islands(&self) -> [usize; 2] {
+        let (place_of, count) = weld(&self.points);
+        let mut above: Vec<usize> = (0..count).collect();
+        let root = |above: &[usize], mut at: usize| {
+            while above[at] != at {
+                at = above[at];
+            }
+            at
+        };
+        for corners in &self.triangles {
+            let [a, b, c] = corners.map(|corner| root(&above, place_of[corner as usize] as usize));
+            let least = a.min(b).min(c);
+            for place in [a, b, c] {
+                above[place] = least;
+            }
+        }
+        let mut islands: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for point in self.objects.iter().flat_map(|(_, points)| points) {
+            islands.entry(root(&above, place_of[*point] as usize)).or_default().push(*point);
+        }
+        let is_rigid = |weights: &Weights, points: &[usize]| {
+            let holder = weights.of(points[0]).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(joint, _)| joint);
+            points.iter().all(|point| weights.of(*point).any(|(joint, w)| Some(joint) == holder && w > 0.99))
+        };
+        let rigid: Vec<&Vec<usize>> = islands.values().filter(|points| is_rigid(&self.truth, points)).collect();
+        [rigid.len(), rigid.iter().filter(|points| is_rigid(&self.weights, points)).count()]
     }
 
     /// Number of points of skinned objects in which a joint takes part that holds nothing in the file.
@@ -321,6 +354,9 @@ fn characters_of_many_parts_are_bound_part_by_part() {
     assert!(plain.error("") < 1.1 * 0.227, "{}", plain.error(""));
     assert!(plain.error("Head") < 0.03, "{}", plain.error("Head"));
     assert_eq!(plain.report.by_voxels, 0, "parts are bound by heat, each alone");
+    let [in_truth, rigid] = plain.rigid_islands();
+    println!("{rigid} of {in_truth} islands that are rigid in the file");
+    assert!(in_truth >= 5 && 10 * rigid >= 9 * in_truth, "{rigid} of {in_truth} islands stay rigid");
     let all = Character::bind(&path, true);
     println!("{} joints, error {:.4}, head {:.4}", all.joints.len(), all.error(""), all.error("Head"));
     assert!(all.error("") < 1.1 * 0.241 && all.error("Head") < 0.03);

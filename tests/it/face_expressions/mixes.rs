@@ -1,5 +1,5 @@
-//! Expressions beside the six, and positions of the mouth for speech: the regions that they move, and the directions; and lips
-//! and lids in caricature.
+//! Expressions beside the six, and positions of the mouth for speech: the regions that they move, and the directions; and
+//! lips and lids in caricature.
 
 use std::ops::RangeInclusive;
 
@@ -167,8 +167,8 @@ fn pain_lowers_brows_shuts_eyes_and_raises_the_upper_lip() {
 /// Range of a measure.
 type Range = [f32; 2];
 
-/// Ranges of visemes: drop of the chin, widening of the mouth, and movement of the upper lip to the front; from about half of
-/// what the units ask to nearly twice as much.
+/// Ranges of visemes: drop of the chin, widening of the mouth, and movement of the upper lip to the front; from about half
+/// of what the units ask to nearly twice as much.
 const VISEMES: [(&str, Range, Range, Range); 14] = [
     ("viseme_pp", [-0.05, 0.005], [-0.03, 0.04], [-0.05, 0.01]),
     ("viseme_ff", [0.0, 0.05], [-0.03, 0.03], [-0.03, 0.02]),
@@ -241,7 +241,7 @@ fn visemes_close_roll_and_part_the_lips() {
     faults.assert_none();
 }
 
-/// Skin under the chin and at the corners of the mouth creases where the jaw opens: 277 triangles of the bundled head turn over
+/// Skin under the chin and at the corners of the mouth creases where the jaw opens: 277 triangles of the bundled head turn
 /// by more than a right angle, and no more than a tenth above that may.
 #[test]
 fn the_open_jaw_folds_no_more_than_it_did() {
