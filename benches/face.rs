@@ -1,12 +1,15 @@
-//! Faces, from a click to the skinned face: the heads of the test data and one of them subdivided, at several
-//! densities, and what the six expressions move.
+//! Faces, from a click to the skinned face: the bundled head, the heads of the test data and one of them subdivided, at
+//! several densities; and the expressions, units and shapes of ARKit of these faces.
 //!
 //! Prints a line for people and one JSON line for each. Times are medians of several runs through the plugins, the edit
-//! of the rig included.
+//! of the rig included; those of one expression are of the algorithm, points included.
 //!
 //! ```text
 //! RIGSMITH_DATA=DATA cargo bench --no-default-features --bench face
 //! ```
+
+#[path = "face/expressions.rs"]
+mod expressions;
 
 use std::{collections::BTreeMap, error::Error, path::Path, time::Instant};
 
@@ -20,12 +23,17 @@ use rigsmith::{
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
+    let bundled = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/head.obj");
+    let bundled = load_model(&RealDisk, &bundled)?;
+    for bones in [20, 40, 80] {
+        row("the bundled head", &bundled, bones, 9)?;
+    }
     let Some(data) = std::env::var_os("RIGSMITH_DATA") else {
         println!("skipped: RIGSMITH_DATA names no folder with test meshes");
         return Ok(());
     };
     let heads = Path::new(&data).join("heads");
-    for name in ["ict_neutral", "ict_identity_1", "ict_identity_2", "lee_perry_smith"] {
+    for name in ["ict_neutral", "ict_identity_1", "ict_identity_2", "ict_identity_3", "lee_perry_smith"] {
         let model = load_model(&RealDisk, &heads.join(format!("{name}.obj")))?;
         for bones in [20, 40, 80] {
             row(name, &model, bones, 9)?;
@@ -40,6 +48,7 @@ fn row(name: &str, model: &Model, bones: usize, runs: usize) -> Result<(), Box<d
     let mut times = Vec::new();
     let mut slides = Vec::new();
     let mut report = FaceReport::default();
+    let mut placed = None;
     for _ in 0..runs {
         let mut bench = Workbench::new(1, name);
         bench.open(model.clone(), true)?;
@@ -55,6 +64,8 @@ fn row(name: &str, model: &Model, bones: usize, runs: usize) -> Result<(), Box<d
             bench.express(BTreeMap::from([("happiness".to_owned(), 0.1 * step as f32)]))?;
             slides.push(start.elapsed().as_secs_f64() * 1e3);
         }
+        bench.express(BTreeMap::new())?;
+        placed = Some(bench);
     }
     let [median, slide] = [times, slides].map(|mut times| {
         times.sort_by(f64::total_cmp);
@@ -74,6 +85,10 @@ fn row(name: &str, model: &Model, bones: usize, runs: usize) -> Result<(), Box<d
         report.folds,
         steps.join(", ")
     );
+    if let Some(bench) = placed {
+        expressions::print_expressions(name, &bench, bones)?;
+        expressions::print_bake(name, &bench, bones)?;
+    }
     Ok(())
 }
 

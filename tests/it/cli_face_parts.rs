@@ -22,7 +22,9 @@ type Moved = [Vec3; 2];
 fn posed(mesh: &Path, expressions: &[&str]) -> BTreeMap<String, Vec<Moved>> {
     let folder = tempfile::tempdir().unwrap();
     let exports = std::env::var_os("RIGSMITH_EXPORTS").map(PathBuf::from);
-    let glb = exports.unwrap_or_else(|| folder.path().to_owned()).join(format!("parts_{}.glb", expressions.len()));
+    // Tests run side by side, and each reads its own file.
+    let name = format!("{}_{}.glb", mesh.file_stem().unwrap().display(), expressions.join("_").replace('=', "_"));
+    let glb = exports.unwrap_or_else(|| folder.path().to_owned()).join(name);
     let (mesh, glb) = (mesh.display().to_string(), glb.display().to_string());
     let mut args = vec!["face", &mesh, "-o", &glb];
     args.extend(expressions.iter().flat_map(|expression| ["--expression", *expression]));
@@ -103,6 +105,21 @@ fn a_tongue_comes_out_of_an_open_mouth() {
             assert!(most < 1e-4, "{name} moves by {most} with the tongue");
         }
     }
+}
+
+/// The tongue comes between the teeth in the viseme of th, further than the jaw carries it.
+#[test]
+fn th_brings_the_tongue_to_the_front() {
+    let Some(data) = test_data() else { return };
+    let mesh = data.join("bodies/female_young/full.obj");
+    let tip = |expression: &str| {
+        let objects = posed(&mesh, &[expression]);
+        objects["helper-tongue"].iter().max_by(|a, b| a[0].z.total_cmp(&b[0].z)).map(|[_, moved]| *moved).unwrap()
+    };
+    let (between, behind) = (tip("viseme_th=1"), tip("viseme_kk=1"));
+    println!("the tip of th is {} before that of kk", between - behind);
+    // In metres.
+    assert!(between.z - behind.z > 0.005, "{between} {behind}");
 }
 
 #[test]
@@ -199,4 +216,35 @@ fn brows_and_hair_ride_along() {
         println!("{name}: moves {moved:.3} eye distances, {worst:.3} off the skin");
         assert!(moved >= least && worst <= most, "{name}: moves {moved}, {worst} off the skin");
     }
+}
+
+/// Lashes that are a mesh of their own go down with the lid that they stand on.
+#[test]
+fn lashes_follow_their_lid() {
+    let mesh = heads::bundled();
+    let analysis = FaceAnalysis::new(&mesh.0, &mesh.1, &AutoSettings::default(), &|_, _| true).unwrap();
+    let (eyes, marks) = (analysis.landmarks.eye_distance(), &analysis.landmarks.points);
+    let lash = |point: Vec3| {
+        let is_on_lid = |mark: &Vec3| mark.distance(point) < 0.07 * eyes && point.y > mark.y;
+        marks[43..45].iter().any(is_on_lid).then(|| point + 0.015 * eyes * Vec3::Z)
+    };
+    let (mut text, mut first) = (String::new(), 0);
+    object(&mut text, "head", &mesh, &mut first, Some);
+    object(&mut text, "lashes", &mesh, &mut first, lash);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("lashes.obj");
+    fs::write(&file, text).unwrap();
+    let objects = posed(&file, &["eyeBlinkLeft=1"]);
+    let (head, lashes) = (&objects["head"], &objects["lashes"]);
+    assert!(lashes.len() > 6, "{} points are lashes", lashes.len());
+    let off = |point: &Moved| {
+        let nearest =
+            head.iter().min_by(|a, b| a[0].distance_squared(point[0]).total_cmp(&b[0].distance_squared(point[0])));
+        let below = nearest.map_or(Vec3::ZERO, |[rest, moved]| *moved - *rest);
+        (point[1] - point[0]).distance(below)
+    };
+    let (moved, worst) = (furthest(lashes) / eyes, lashes.iter().map(off).fold(0.0, f32::max) / eyes);
+    let down = lashes.iter().map(|[rest, moved]| rest.y - moved.y).fold(0.0, f32::max) / eyes;
+    println!("{} points of lashes move {moved:.3} eye distances, {down:.3} down, {worst:.3} off the lid", lashes.len());
+    assert!(down > 0.03 && worst < 0.05, "lashes move {moved}, {down} down, {worst} off the lid");
 }

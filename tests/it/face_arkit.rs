@@ -56,7 +56,9 @@ fn the_shapes_of_arkit_are_those_of_the_bones() {
         }
     }
     assert!(largest > 0.02 * size, "shapes move: {largest}");
-    assert!(furthest <= 2e-4 * size, "{furthest} between shapes and bones on a head of {size}");
+    println!("{furthest} between shapes and bones on a head of {size}");
+    // In metres.
+    assert!(furthest <= 5e-5, "{furthest} between shapes and bones on a head of {size}");
 
     assert_eq!(rigsmith(folder.path(), &["face", &head, "--arkit", "-o", &rig]).code, 0);
     let template = load_template(&RealDisk, Path::new(&rig)).unwrap();

@@ -1,5 +1,7 @@
 //! Expressions: their files, and what they do to real heads.
 
+mod mixes;
+
 use glam::Vec3;
 use rigsmith::{
     algo::face::{

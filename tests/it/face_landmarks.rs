@@ -1,7 +1,5 @@
 //! Landmarks: where the 68 points lie on heads that tell, and what holds on those that do not.
 
-use std::collections::HashMap;
-
 use glam::{Quat, Vec3, vec3};
 use rigsmith::algo::face::{
     depth_map::{DepthFrame, DepthMap},
@@ -10,7 +8,7 @@ use rigsmith::algo::face::{
 };
 
 use crate::{
-    heads::{HEADS, Mesh, bundled, bundled_and, mesh, truth},
+    heads::{HEADS, Mesh, bundled, bundled_and, mesh, subdivided, truth},
     prerequisites::test_data,
 };
 
@@ -28,23 +26,6 @@ fn errors(points: &[Vec3], truth: &[usize], found: &Landmarks) -> Vec<f32> {
 fn apart(a: &[Vec3; 68], b: &[Vec3; 68]) -> f32 {
     let eyes = a[36].distance(a[45]);
     a.iter().zip(b).map(|(a, b)| 100.0 * a.distance(*b) / eyes).fold(0.0, f32::max)
-}
-
-fn subdivided((points, triangles): &Mesh) -> Mesh {
-    let mut all = points.clone();
-    let mut middles = HashMap::new();
-    let mut finer = Vec::new();
-    for corners in triangles {
-        let [a, b, c] = [0, 1, 2].map(|i| {
-            let (from, to) = (corners[i], corners[(i + 1) % 3]);
-            *middles.entry((from.min(to), from.max(to))).or_insert_with(|| {
-                all.push((points[from as usize] + points[to as usize]) / 2.0);
-                all.len() as u32 - 1
-            })
-        });
-        finer.extend([[corners[0], a, c], [corners[1], b, a], [corners[2], c, b], [a, b, c]]);
-    }
-    (all, finer)
 }
 
 /// Landmarks of any face: finite, left is left, and from brows to chin in order.

@@ -1,6 +1,6 @@
 //! Heads for the tests of faces: the bundled one, and real ones with their landmarks.
 
-use std::path::Path;
+use std::{collections::HashMap, path::Path};
 
 use glam::Vec3;
 use rigsmith::{
@@ -40,6 +40,24 @@ pub fn mesh(path: &Path) -> Mesh {
     let model = model(path);
     let triangles = model.point_triangles();
     (model.points, triangles)
+}
+
+/// Triangles cut into four at the middles of their edges.
+pub fn subdivided((points, triangles): &Mesh) -> Mesh {
+    let mut all = points.clone();
+    let mut middles = HashMap::new();
+    let mut finer = Vec::new();
+    for corners in triangles {
+        let [a, b, c] = [0, 1, 2].map(|i| {
+            let (from, to) = (corners[i], corners[(i + 1) % 3]);
+            *middles.entry((from.min(to), from.max(to))).or_insert_with(|| {
+                all.push((points[from as usize] + points[to as usize]) / 2.0);
+                all.len() as u32 - 1
+            })
+        });
+        finer.extend([[corners[0], a, c], [corners[1], b, a], [corners[2], c, b], [a, b, c]]);
+    }
+    (all, finer)
 }
 
 /// The points of the 68 landmarks, the same on all of [`HEADS`].

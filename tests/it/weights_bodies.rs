@@ -14,6 +14,7 @@ use rigsmith::files::{RealDisk, load_model};
 use rigsmith::{
     algo::weights::{IdleReason, WeightJoint, WeightReport, WeightSettings, skin_weights},
     mesh::{
+        adjacency::weld,
         gltf::{ExternalFile, read_gltf},
         model::Weights,
     },
@@ -146,20 +147,29 @@ pub fn difference(a: &Weights, b: &Weights, points: impl Iterator<Item = usize>)
 #[test]
 fn bodies_are_bound_better_than_by_plain_bone_heat() {
     let Some(data) = test_data() else { return };
-    // Errors as measured; a tenth more is the most. Blender's bone heat has 0.233 and 0.159 on the first body.
-    for (body, rig, measured) in [
-        ("male_young", "game_engine", 0.121),
-        ("male_young", "mixamo", 0.123),
-        ("female_young", "game_engine", 0.128),
-        ("baby", "game_engine", 0.108),
-        ("baby", "mixamo", 0.167),
+    // Errors as measured, with the rig `game_engine` and with `mixamo`; a tenth more is the most, and no more than Blender's
+    // bone heat has with the true tails, which leaves the baby without weights.
+    const NONE: f64 = f64::INFINITY;
+    for (body, [game_engine, mixamo]) in [
+        ("male_young", [(0.121, 0.233), (0.123, 0.159)]),
+        ("female_young", [(0.128, 0.236), (0.124, 0.140)]),
+        ("female_heavy_tpose", [(0.129, 0.239), (0.126, 0.140)]),
+        ("female_young_armsdown", [(0.128, 0.234), (0.125, 0.140)]),
+        ("male_child_tpose", [(0.106, 0.218), (0.125, 0.160)]),
+        ("male_muscular_action", [(0.121, 0.232), (0.124, 0.157)]),
+        ("baby", [(0.108, NONE), (0.167, NONE)]),
     ] {
-        let body_data = Body::read(&data.join("bodies"), body, rig);
-        let (weights, report) = body_data.bound();
-        assert_eq!(report.by_surface, body_data.points.len());
-        let error = difference(&weights, &body_data.truth, 0..body_data.points.len());
-        println!("{body} with {rig}: error {error:.4}");
-        assert!(error <= 1.1 * measured, "{body} with {rig}: error {error:.4}, measured {measured:.4}");
+        for (rig, (measured, peer)) in [("game_engine", game_engine), ("mixamo", mixamo)] {
+            let body_data = Body::read(&data.join("bodies"), body, rig);
+            let (weights, report) = body_data.bound();
+            assert_eq!(report.by_surface, body_data.points.len());
+            let error = difference(&weights, &body_data.truth, 0..body_data.points.len());
+            println!("{body} with {rig}: error {error:.4}");
+            assert!(
+                error <= f64::min(1.1 * measured, peer),
+                "{body} with {rig}: error {error:.4}, measured {measured:.4}"
+            );
+        }
     }
 }
 
@@ -170,6 +180,9 @@ fn bodies_are_bound_better_than_by_plain_bone_heat() {
 fn bends_lie_beside_those_of_painted_weights() {
     let Some(data) = test_data() else { return };
     const KINDS: [&str; 6] = ["elbow", "knee", "shoulder", "hip", "wrist", "neck"];
+    // Nine tenths of the peer's errors, of the limbs that it was measured on.
+    const MOST: [[f32; 4]; 2] =
+        [[0.9 * 0.049, 0.9 * 0.057, 0.9 * 0.149, 0.9 * 0.362], [0.9 * 0.049, 0.9 * 0.057, 0.9 * 0.189, 0.9 * 0.348]];
     let rigs: [(&str, [[&str; 2]; 6], [f32; 6]); 2] = [
         (
             "game_engine",
@@ -196,7 +209,7 @@ fn bends_lie_beside_those_of_painted_weights() {
             [0.034, 0.047, 0.159, 0.149, 0.028, 0.062],
         ),
     ];
-    for (rig, bends, measured) in rigs {
+    for ((rig, bends, measured), most) in rigs.into_iter().zip(MOST) {
         let mut sums = [0.0_f32; 6];
         // The baby is left out, as the peer cannot bind it.
         for body in &BODIES[1..] {
@@ -211,6 +224,9 @@ fn bends_lie_beside_those_of_painted_weights() {
         for ((mean, measured), kind) in means.iter().zip(measured).zip(KINDS) {
             assert!(*mean <= 1.1 * measured, "{rig}: {kind} {mean:.4}, measured {measured}");
         }
+        for ((mean, most), kind) in means.iter().zip(most).zip(KINDS) {
+            assert!(*mean <= most, "{rig}: {kind} {mean:.4}, {most} at most");
+        }
     }
 }
 
@@ -224,6 +240,8 @@ struct Character {
     objects: Vec<(String, Vec<usize>)>,
     /// Sum of the file's weights of each joint of the file.
     held: Vec<f32>,
+    points: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
 }
 
 impl Character {
@@ -271,20 +289,50 @@ impl Character {
         let is_slot = |joint: &usize| model.nodes[nodes[*joint] as usize].name.contains("slot");
         let slots = (0..nodes.len()).filter(is_slot).collect();
         let settings = WeightSettings { slots, ..WeightSettings::default() };
+        let triangles = rest.point_triangles();
         let (weights, report) =
-            skin_weights(&rest.points, &rest.point_triangles(), &joints, &rigid, None, &settings, &|_| true).unwrap();
+            skin_weights(&rest.points, &triangles, &joints, &rigid, None, &settings, &|_| true).unwrap();
         let mut named = Weights::default();
         for point in 0..weights.len() {
             named.push(weights.of(point).map(|(joint, weight)| (nodes[joint as usize], weight)));
         }
         let objects = model.objects.iter().zip(points).filter(|(object, _)| object.skin.is_some());
         let objects = objects.map(|(object, points)| (object.name.clone(), points)).collect();
-        Self { joints, weights: named, report, truth, objects, held }
+        Self { joints, weights: named, report, truth, objects, held, points: rest.points, triangles }
     }
 
     fn error(&self, name: &str) -> f64 {
         let points = self.objects.iter().filter(|(object, _)| object.contains(name)).flat_map(|(_, points)| points);
         difference(&self.weights, &self.truth, points.copied())
+    }
+
+    /// Number of islands of skinned objects that are rigid in the file, and of those among them that are rigid here.
+    fn rigid_islands(&self) -> [usize; 2] {
+        let (place_of, count) = weld(&self.points);
+        let mut above: Vec<usize> = (0..count).collect();
+        let root = |above: &[usize], mut at: usize| {
+            while above[at] != at {
+                at = above[at];
+            }
+            at
+        };
+        for corners in &self.triangles {
+            let [a, b, c] = corners.map(|corner| root(&above, place_of[corner as usize] as usize));
+            let least = a.min(b).min(c);
+            for place in [a, b, c] {
+                above[place] = least;
+            }
+        }
+        let mut islands: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for point in self.objects.iter().flat_map(|(_, points)| points) {
+            islands.entry(root(&above, place_of[*point] as usize)).or_default().push(*point);
+        }
+        let is_rigid = |weights: &Weights, points: &[usize]| {
+            let holder = weights.of(points[0]).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(joint, _)| joint);
+            points.iter().all(|point| weights.of(*point).any(|(joint, w)| Some(joint) == holder && w > 0.99))
+        };
+        let rigid: Vec<&Vec<usize>> = islands.values().filter(|points| is_rigid(&self.truth, points)).collect();
+        [rigid.len(), rigid.iter().filter(|points| is_rigid(&self.weights, points)).count()]
     }
 
     /// Number of points of skinned objects in which a joint takes part that holds nothing in the file.
@@ -306,6 +354,9 @@ fn characters_of_many_parts_are_bound_part_by_part() {
     assert!(plain.error("") < 1.1 * 0.227, "{}", plain.error(""));
     assert!(plain.error("Head") < 0.03, "{}", plain.error("Head"));
     assert_eq!(plain.report.by_voxels, 0, "parts are bound by heat, each alone");
+    let [in_truth, rigid] = plain.rigid_islands();
+    println!("{rigid} of {in_truth} islands that are rigid in the file");
+    assert!(in_truth >= 5 && 10 * rigid >= 9 * in_truth, "{rigid} of {in_truth} islands stay rigid");
     let all = Character::bind(&path, true);
     println!("{} joints, error {:.4}, head {:.4}", all.joints.len(), all.error(""), all.error("Head"));
     assert!(all.error("") < 1.1 * 0.241 && all.error("Head") < 0.03);

@@ -4,6 +4,7 @@ use bevy::math::{Quat, Vec3};
 use rigsmith::{
     algo::weights::WeightSettings,
     headless::Workbench,
+    mesh::skinning::skin_points_dual,
     plugins::{
         commands::{BuildRequest, BuildResult, BuildStep},
         skinning::SkinningInput,
@@ -102,4 +103,33 @@ fn the_posed_surface_hangs_on_created_joints() {
         let closest = surface.ready().unwrap().closest_point(*point).unwrap().point;
         assert!(closest.distance(*point) < 2e-3, "{point} is {closest} on the surface");
     }
+}
+
+/// Dual quaternions blend the joints of an app as they blend those of the program, and otherwise than linear blending does.
+#[test]
+fn dual_quaternions_show_the_posed_mesh() {
+    let figure = Figure::bundled();
+    let mut bench = app(&figure);
+    bench.skin(WeightSettings::default(), Vec::new(), &mut |_| {}).unwrap();
+    let hand = figure.control("hand_ik_l");
+    let offset = PoseOffset {
+        rotation: Quat::from_rotation_x(1.2),
+        translation: Vec3::new(0.02, -0.05, 0.03),
+        ..PoseOffset::IDENTITY
+    };
+    bench.operate(Operation::Edits(vec![RigEdit::SetOffset(hand, Some(offset))])).unwrap();
+    (0..3).for_each(|_| bench.app_mut().update());
+    let mut state = figure.state();
+    state.set_offset(hand, offset).unwrap();
+    state.evaluate(0.0);
+    let wanted = skin_points_dual(&figure.model.points, &figure.skin.weights, &figure.matrices(&state));
+    let rig = bench.rig_entity();
+    let models = bench.app_mut().world().get::<RigSurface>(rig).unwrap().dual_quaternion_models();
+    assert!(models.len() == 1 && models[0].weights.is_none());
+    let mut other = 0.0_f32;
+    for ((is, wanted), linear) in models[0].points.iter().zip(&wanted).zip(figure.posed(&state)) {
+        assert!(is.distance(wanted.position) < 5e-4, "{is} is not {}", wanted.position);
+        other = other.max(is.distance(linear));
+    }
+    assert!(other > 1e-3, "linear blending differs by {other}");
 }
