@@ -278,6 +278,9 @@ fn files_and_builds_stay_within_their_memory() {
     for (name, text) in triangles(6_000) {
         fs::write(at(name), text).unwrap();
     }
+    // Objects of one triangle each, which are more than a file of this size may have.
+    let object = |n: usize| format!("o p{n}\nv {n} 0 0\nv {n} 1 0\nv {n} 0 1\nf -3 -2 -1\n");
+    fs::write(at("objects.obj"), (0..40_000).map(object).collect::<String>()).unwrap();
     fs::write(at("chain.rig"), skeleton(8_000, true)).unwrap();
     fs::write(at("long.rig"), skeleton(40_000, true)).unwrap();
     fs::write(at("unknown.rig.ron"), tags(6_000, |_| command("nope", ""))).unwrap();
@@ -289,6 +292,8 @@ fn files_and_builds_stay_within_their_memory() {
         (&["info", "images.gltf"], size("images.gltf")),
         (&["check", "stacked.obj"], size("stacked.obj")),
         (&["convert", "soup.obj", "soup.glb"], size("soup.obj")),
+        (&["check", "objects.obj"], size("objects.obj")),
+        (&["convert", "objects.obj", "objects.glb"], size("objects.obj")),
         (&["check", "chain.rig"], size("chain.rig")),
         (&["convert", "chain.rig", "chain.rig.ron"], size("chain.rig")),
         (&["check", "unknown.rig.ron"], size("unknown.rig.ron")),
