@@ -315,6 +315,10 @@ fn files_and_builds_stay_within_their_memory() {
             memory_allowance(size) >> 10
         );
     }
+    // The chain that was written last, as a template.
+    let (ended, _) = json_answer(folder.path(), &["format", "--check", "long.rig.ron"]);
+    let allowance = memory_allowance(size("long.rig.ron"));
+    assert!(ended.memory <= allowance, "format: {} KiB of {}", ended.memory >> 10, allowance >> 10);
 }
 
 /// Gigabytes that are no file of their kind are refused by their beginning, and what is too large is told as that.
