@@ -41,8 +41,9 @@ pub use self::skeleton::{PackedNode, PackedSkeleton};
 const MAGIC: &[u8; 8] = b"rigclip1";
 /// Share of a track's tolerance that its lines get; the other part is for the bits of its numbers.
 const LINES: f32 = 0.85;
-/// Most frames, nodes, and bytes of texts of a packed clip that is read. The times of so many frames are different numbers.
-const MOST_FRAMES: u32 = 1 << 22;
+/// Most frames, nodes, and bytes of texts of a packed clip that is read: frames are as many as baked clips have, so that no
+/// track of few bytes takes hundreds of megabytes, and their times are different numbers.
+const MOST_FRAMES: u32 = 1 << 20;
 const MOST_NODES: u32 = 1_000_000;
 const MOST_TEXT: usize = 1 << 20;
 /// Parts of a transform, in the order of their tracks.
