@@ -149,8 +149,8 @@ fn chain_of_nulls(joints: usize) -> String {
     format!("(format: 2, name: \"n\", joints: [{}])", joints.join(",\n"))
 }
 
-/// Triangles: equal ones, a fan about one point, and a soup that joins points at random.
-fn triangles(count: usize) -> [(&'static str, String); 3] {
+/// Triangles: equal ones, a fan about one point, a soup that joins points at random, and loose ones of all sizes.
+fn triangles(count: usize) -> [(&'static str, String); 4] {
     let stacked = "v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_owned() + &"f 1 2 3\n".repeat(count);
     let mut fan = String::from("v 0 0 0\n");
     for corner in 0..=count {
@@ -170,7 +170,14 @@ fn triangles(count: usize) -> [(&'static str, String); 3] {
         let corner = |random: &mut crate::random::Random| random.below(points) + 1;
         let _ = writeln!(soup, "f {} {} {}", corner(&mut random), corner(&mut random), corner(&mut random));
     }
-    [("stacked.obj", stacked), ("fan.obj", fan), ("soup.obj", soup)]
+    let mut loose = String::new();
+    for at in 0..count {
+        for _ in 0..3 {
+            let _ = writeln!(loose, "v {} {} {}", random.unit(), random.unit(), random.unit());
+        }
+        let _ = writeln!(loose, "f {} {} {}", 3 * at + 1, 3 * at + 2, 3 * at + 3);
+    }
+    [("stacked.obj", stacked), ("fan.obj", fan), ("soup.obj", soup), ("loose.obj", loose)]
 }
 
 #[test]
