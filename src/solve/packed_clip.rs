@@ -169,7 +169,7 @@ impl PackedClip {
             if packed.len() > 1
                 && let Some(steps) = Steps::new(&track.property, &track.values, least)
             {
-                packed = packed.smaller(PackedTrack::Steps(steps));
+                packed = packed.smaller(PackedTrack::Steps(Box::new(steps)));
             }
             let keys = packed.keys(&track.property);
             let line = |(frame, value): (u32, [f32; 4])| Key { time: times[frame as usize], value, ease: Ease::Linear };

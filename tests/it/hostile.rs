@@ -12,7 +12,7 @@ use std::{
 };
 
 use rigsmith::{
-    files::{RealDisk, load_model, load_template},
+    files::{RealDisk, load_model, load_packed_clips, load_template},
     rig::template::{read_template, survey_template},
 };
 use serde_json::Value;
@@ -265,6 +265,36 @@ fn a_minified_file_with_a_typo_shows_a_piece_of_its_line() {
     }
 }
 
+/// A file of packed clips in which all nodes stay at rest: three bytes of each clip a node.
+fn resting_clips(nodes: u64, clips: u64) -> Vec<u8> {
+    let number = |out: &mut Vec<u8>, mut number: u64| {
+        while number >= 0x80 {
+            out.push(number as u8 | 0x80);
+            number >>= 7;
+        }
+        out.push(number as u8);
+    };
+    let floats = |out: &mut Vec<u8>, list: &[f32]| list.iter().for_each(|number| out.extend(number.to_le_bytes()));
+    let mut clip = b"rigclip1\0\0".to_vec();
+    floats(&mut clip, &[30.0, 0.0]);
+    number(&mut clip, 1);
+    number(&mut clip, nodes);
+    clip.resize(clip.len() + 3 * nodes as usize, 0);
+    let mut out = b"rigpack1".to_vec();
+    number(&mut out, nodes);
+    for node in 0..nodes {
+        out.extend((node + 1).to_le_bytes());
+        out.extend([0, 0]);
+        floats(&mut out, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]);
+    }
+    number(&mut out, clips);
+    for _ in 0..clips {
+        number(&mut out, clip.len() as u64);
+        out.extend_from_slice(&clip);
+    }
+    out
+}
+
 /// Memory of a command, in bytes, that its input of `size` bytes may take.
 fn memory_allowance(size: u64) -> u64 {
     (64 << 20) + 16 * size
@@ -288,6 +318,8 @@ fn files_and_builds_stay_within_their_memory() {
     // Objects of one triangle each, which are more than a file of this size may have.
     let object = |n: usize| format!("o p{n}\nv {n} 0 0\nv {n} 1 0\nv {n} 0 1\nf -3 -2 -1\n");
     fs::write(at("objects.obj"), (0..40_000).map(object).collect::<String>()).unwrap();
+    fs::write(at("clips.rigclip"), resting_clips(1_000, 500)).unwrap();
+    assert_eq!(load_packed_clips(&RealDisk, &at("clips.rigclip")).unwrap().clips.len(), 500);
     fs::write(at("chain.rig"), skeleton(8_000, true)).unwrap();
     fs::write(at("long.rig"), skeleton(40_000, true)).unwrap();
     fs::write(at("unknown.rig.ron"), tags(6_000, |_| command("nope", ""))).unwrap();
@@ -299,6 +331,8 @@ fn files_and_builds_stay_within_their_memory() {
         (&["info", "images.gltf"], size("images.gltf")),
         (&["check", "stacked.obj"], size("stacked.obj")),
         (&["convert", "soup.obj", "soup.glb"], size("soup.obj")),
+        (&["info", "clips.rigclip"], size("clips.rigclip")),
+        (&["check", "clips.rigclip"], size("clips.rigclip")),
         (&["check", "objects.obj"], size("objects.obj")),
         (&["convert", "objects.obj", "objects.glb"], size("objects.obj")),
         (&["check", "chain.rig"], size("chain.rig")),
