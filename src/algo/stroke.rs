@@ -107,7 +107,7 @@ impl Default for StrokeSettings {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ChainChoice {
     /// Joints wherever the stroke is further than this from the line between two neighbours; model units on the view
-    /// plane. Zero, negative or NaN makes a joint of every point of the stroke.
+    /// plane. Zero, negative or NaN makes a joint of every point of the stroke, of [`MAX_JOINTS`] at most.
     Threshold(f32),
     /// Automatic: joints at the firm corners of the stroke as for [`ChainChoice::Threshold`] and at the bends of the
     /// limb, in depth, too (an ankle seen from the front), each moved to the bend near it. A piece that is most of the

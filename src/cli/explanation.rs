@@ -69,8 +69,13 @@ fn of_load(error: &(dyn Error + 'static)) -> Option<String> {
     if let Some(error) = error.downcast_ref::<ReadError>() {
         return Some(named(error.path()));
     }
-    if let Some(LoadShapesError::Load(error)) = error.downcast_ref() {
-        return of_load(error);
+    if let Some(error) = error.downcast_ref::<LoadShapesError>() {
+        return match error {
+            LoadShapesError::Load(error) => of_load(error),
+            LoadShapesError::Shapes { path, .. }
+            | LoadShapesError::TooMany { path, .. }
+            | LoadShapesError::Kind { path } => Some(named(path)),
+        };
     }
     match error.downcast_ref::<LoadError>()? {
         LoadError::Read(error) => Some(named(error.path())),

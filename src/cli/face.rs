@@ -36,7 +36,7 @@ use crate::{
 pub(super) struct FaceArgs {
     /// The mesh: a head, or a body whose head is found. .obj, .gltf, .glb or .vrm
     pub mesh: PathBuf,
-    /// Number of bones on the facial skin: the density. Jaw and eyes come on top
+    /// Number of bones on the facial skin, 500 at most: the density. Jaw and eyes come on top
     #[arg(long, value_name = "K", default_value_t = 40)]
     bones: usize,
     /// Up direction in the mesh, if the guess is wrong

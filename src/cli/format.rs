@@ -72,8 +72,8 @@ fn format(path: &Path, style: UidStyle) -> Result<(String, String), Failure> {
     }
     let bytes =
         read_capped(&RealDisk, path, template::MAX_BYTES as u64).map_err(|error| Failure::Input(Box::new(error)))?;
-    let all = String::from_utf8_lossy(&bytes).into_owned();
     let formatted = template::text_of(&bytes).and_then(|text| template::format_template(text, style));
+    let all = String::from_utf8_lossy(&bytes).into_owned();
     match formatted {
         Ok(after) => Ok((all, after)),
         Err(source) => Err(LoadError::Source { path: path.into(), text: all, source }.into()),

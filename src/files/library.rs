@@ -102,6 +102,14 @@ pub struct FolderListError {
     pub source: io::Error,
 }
 
+/// Reason why names of a folder are left out.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "it has more than {} names, and what comes after them is left out; move its templates to a folder of their own",
+    MOST_NAMES
+)]
+struct TooManyNames;
+
 /// State of a file, which tells whether its header has to be read again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FileState {
@@ -204,7 +212,7 @@ pub fn list_templates(
     let mut left_out = Vec::new();
     let mut folders = vec![(top.to_owned(), depth)];
     while let Some((folder, depth)) = folders.pop() {
-        let names = match disk.list(&folder, MOST_NAMES) {
+        let mut names = match disk.list(&folder, MOST_NAMES + 1) {
             Ok(names) => names,
             Err(source) if folder == top => return Err(FolderListError { folder, source }),
             Err(source) => {
@@ -212,6 +220,11 @@ pub fn list_templates(
                 continue;
             }
         };
+        if names.len() > MOST_NAMES {
+            names.truncate(MOST_NAMES);
+            let source = io::Error::other(TooManyNames);
+            left_out.push(FolderListError { folder: folder.clone(), source });
+        }
         for name in names {
             let path = folder.join(&name);
             match disk.entry(&path, false) {

@@ -284,7 +284,7 @@ pub fn load_motion(disk: &dyn Disk, path: &Path) -> Result<Motion, LoadError> {
 
 /// Reads packed clips with their skeleton.
 pub fn load_packed_clips(disk: &dyn Disk, path: &Path) -> Result<PackedSkeleton, LoadError> {
-    let bytes = read_capped(disk, path, MAX_PACKED_BYTES)?;
+    let bytes = read_plausible(disk, path, MAX_PACKED_BYTES, PackedSkeleton::may_begin_with)?;
     PackedSkeleton::from_bytes(&bytes).map_err(|source| LoadError::PackedClips { path: path.into(), source })
 }
 

@@ -31,6 +31,18 @@ pub enum LoadShapesError {
         /// Error of the reader.
         source: ShapeError,
     },
+    /// A folder has more meshes than shapes are read.
+    #[error(
+        "`{}` has {found} meshes, and {} at most are read as shapes; move some to another folder",
+        path.display(),
+        MAX_SHAPES
+    )]
+    TooMany {
+        /// The folder.
+        path: PathBuf,
+        /// Number of its meshes.
+        found: usize,
+    },
     /// The file is of a kind that holds no shapes.
     #[error(
         "`{}` holds no shapes; give a .glb or .gltf with morph targets, a folder of meshes, or a .json beside its .f32",
@@ -52,12 +64,15 @@ pub fn load_shapes(disk: &dyn Disk, path: &Path, rest: &Model) -> Result<Shapes,
     if disk.entry(path, true).is_ok_and(|entry| entry.kind == EntryKind::Folder) {
         let io = |error: std::io::Error| LoadError::from(ReadError::Io { path: path.into(), source: error.into() });
         let mut shapes = Shapes::default();
-        for name in disk.list(path, MAX_SHAPES).map_err(io)? {
+        let mut meshes = disk.list(path, usize::MAX).map_err(io)?;
+        meshes.retain(|name| FileKind::of(Path::new(name)) == Some(FileKind::Obj));
+        if meshes.len() > MAX_SHAPES {
+            return Err(LoadShapesError::TooMany { path: path.into(), found: meshes.len() });
+        }
+        for name in meshes {
             let file = path.join(name);
-            if FileKind::of(&file) == Some(FileKind::Obj) {
-                let model = load_model(disk, &file)?;
-                shapes.add_mesh(&stem(&file), &rest.points, &model.points).map_err(wrong(&file))?;
-            }
+            let model = load_model(disk, &file)?;
+            shapes.add_mesh(&stem(&file), &rest.points, &model.points).map_err(wrong(&file))?;
         }
         return if shapes.names.is_empty() { Err(LoadShapesError::Kind { path: path.into() }) } else { Ok(shapes) };
     }

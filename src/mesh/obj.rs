@@ -47,6 +47,16 @@ pub const NONE: u32 = u32::MAX;
 /// Largest length of a list: one bit of each index is reserved.
 pub const MAX_ELEMENTS: usize = i32::MAX as usize;
 
+/// Largest number of parts: a file with more is noise and not a character.
+const MOST_PARTS: usize = 1 << 16;
+
+/// Number of parts that a file of any size may have.
+const FREE_PARTS: usize = 1500;
+
+/// Bytes of a file for each further part: a part costs some 20 KiB when it is written as glTF and read back, and memory is
+/// bounded by the size of the file.
+const BYTES_PER_PART: u64 = 2048;
+
 /// Content of an OBJ file as flat lists.
 ///
 /// Indices count from 0 and are all in range after a successful read.
@@ -77,6 +87,7 @@ pub struct ObjArrays {
     pub material_libraries: Vec<String>,
     /// Sentences about content of the file that these arrays do not hold.
     pub notes: Vec<String>,
+    file_size: pipeline::FileSize,
     spare: pipeline::SpareBlocks,
 }
 
@@ -110,6 +121,7 @@ impl ObjArrays {
         self.names.clear();
         self.material_libraries.clear();
         self.notes.clear();
+        self.file_size = pipeline::FileSize::default();
     }
 
     /// The number of faces.
@@ -148,6 +160,15 @@ impl ObjArrays {
             && self.runs.first().map_or(faces == 0, |run| run.first_face == 0)
             && self.runs.windows(2).all(|pair| pair[0].first_face < pair[1].first_face)
             && self.runs.last().is_none_or(|run| (run.first_face as usize) < faces)
+    }
+
+    /// Largest number of parts that the file may have.
+    fn most_parts(&self) -> usize {
+        let of_size = |size: u64| usize::try_from(size / BYTES_PER_PART).unwrap_or(MOST_PARTS);
+        match self.file_size.0 {
+            0 => MOST_PARTS,
+            size => MOST_PARTS.min(of_size(size).saturating_add(FREE_PARTS)),
+        }
     }
 
     /// Bytes in use by all lists.
@@ -198,7 +219,8 @@ pub fn read_obj(reader: impl Read + Send, arrays: &mut ObjArrays, settings: &Obj
 ///
 /// - [`Model::points`] are all positions in the order of the file, used or not.
 /// - Objects are those of `o`, or of `g` where the file has no `o`, in the order of their first faces; faces before the
-///   first are in an object without name. Names that come again go on with the same object.
+///   first are in an object without name. Names that come again go on with the same object. A file of more objects than
+///   its size can hold (1,500, and one for each 2 KiB of the file) is one object, because each costs memory.
 /// - Parts are the faces of one object with one material. Their vertices are the different corners in the order of
 ///   their first use; [`Part::faces`](crate::mesh::model::Part::faces) are kept if any face is not a triangle.
 ///   Polygons, concave ones too, are cut into triangles along diagonals inside them.

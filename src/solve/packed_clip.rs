@@ -41,8 +41,9 @@ pub use self::skeleton::{PackedNode, PackedSkeleton};
 const MAGIC: &[u8; 8] = b"rigclip1";
 /// Share of a track's tolerance that its lines get; the other part is for the bits of its numbers.
 const LINES: f32 = 0.85;
-/// Most frames, nodes, and bytes of texts of a packed clip that is read.
-const MOST_FRAMES: u32 = 10_000_000;
+/// Most frames, nodes, and bytes of texts of a packed clip that is read: frames are as many as baked clips have, so that no
+/// track of few bytes takes hundreds of megabytes, and their times are different numbers.
+const MOST_FRAMES: u32 = 1 << 20;
 const MOST_NODES: u32 = 1_000_000;
 const MOST_TEXT: usize = 1 << 20;
 /// Parts of a transform, in the order of their tracks.
@@ -168,7 +169,7 @@ impl PackedClip {
             if packed.len() > 1
                 && let Some(steps) = Steps::new(&track.property, &track.values, least)
             {
-                packed = packed.smaller(PackedTrack::Steps(steps));
+                packed = packed.smaller(PackedTrack::Steps(Box::new(steps)));
             }
             let keys = packed.keys(&track.property);
             let line = |(frame, value): (u32, [f32; 4])| Key { time: times[frame as usize], value, ease: Ease::Linear };
@@ -248,6 +249,10 @@ impl PackedClip {
             return Err(PackedClipError::Damaged { what: "a frame rate or duration", at: reader.at() });
         }
         let frames = reader.number("a count of frames", MOST_FRAMES)?;
+        // The last frame is the end of the clip, and times rise.
+        if frames >= 2 && duration <= (frames - 2) as f32 / rate {
+            return Err(PackedClipError::Damaged { what: "a duration of fewer frames", at: reader.at() });
+        }
         let count = reader.number("a count of nodes", MOST_NODES)?;
         let mut nodes: Vec<[PackedTrack; 3]> = Vec::new();
         for _ in 0..count {

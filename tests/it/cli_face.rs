@@ -174,6 +174,8 @@ fn wrong_use_is_told() {
     let cases: &[(&[&str], i32, &str)] = &[
         (&["face", &head, "--bones", "0", "-o", "a.glb"], 2, "at least 1"),
         (&["face", &head, "--bones", "9999999", "-o", "a.glb"], 1, "bones"),
+        (&["face", &head, "--bones", "5000", "-o", "a.glb"], 1, "bones"),
+        (&["face", &head, "--bones", "501", "-o", "a.glb"], 1, "500 at most"),
         (&["face", &head, "-o", "a.obj"], 2, ".glb"),
         (&["face", &head, "--expression", "hapiness=1", "-o", "a.glb"], 2, "happiness"),
         (&["face", &head, "--expression", "happiness=2", "-o", "a.glb"], 2, "0 to 1"),

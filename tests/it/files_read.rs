@@ -7,7 +7,8 @@ use std::{
 };
 
 use rigsmith::files::{
-    Disk, DiskFile, Entry, Fault, FaultPlan, FaultyDisk, ModelFolder, ReadError, RealDisk, UriError, open, read_capped,
+    Disk, DiskFile, Entry, Fault, FaultPlan, FaultyDisk, LoadShapesError, ModelFolder, ReadError, RealDisk, UriError,
+    load_model, load_shapes, open, read_capped,
 };
 use tempfile::{TempDir, tempdir};
 
@@ -210,4 +211,17 @@ fn folders_of_missing_files_are_listed_once() {
     let (listed, hinted) = lists(400);
     assert_eq!(listed, 1);
     assert!((20..100).contains(&hinted), "{hinted} of 400 missing files are compared with all names");
+}
+
+#[test]
+fn a_folder_of_shapes_is_read_whole_or_not_at_all() {
+    let folder = fresh();
+    let at = |name: &str| folder.path().join(name);
+    (0..4096).for_each(|number| fs::write(at(&format!("a{number:04}.txt")), "").unwrap());
+    fs::write(at("z.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let rest = load_model(&RealDisk, &at("z.obj")).unwrap();
+    assert_eq!(load_shapes(&RealDisk, folder.path(), &rest).unwrap().names, ["z"]);
+    (0..4096).for_each(|number| fs::write(at(&format!("b{number:04}.obj")), "").unwrap());
+    let error = load_shapes(&RealDisk, folder.path(), &rest).unwrap_err();
+    assert!(matches!(error, LoadShapesError::TooMany { found: 4097, .. }), "{error}");
 }

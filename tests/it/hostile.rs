@@ -12,7 +12,7 @@ use std::{
 };
 
 use rigsmith::{
-    files::{RealDisk, load_model, load_template},
+    files::{RealDisk, load_model, load_packed_clips, load_template},
     rig::template::{read_template, survey_template},
 };
 use serde_json::Value;
@@ -149,8 +149,8 @@ fn chain_of_nulls(joints: usize) -> String {
     format!("(format: 2, name: \"n\", joints: [{}])", joints.join(",\n"))
 }
 
-/// Triangles: equal ones, a fan about one point, and a soup that joins points at random.
-fn triangles(count: usize) -> [(&'static str, String); 3] {
+/// Triangles: equal ones, a fan about one point, a soup that joins points at random, and loose ones of all sizes.
+fn triangles(count: usize) -> [(&'static str, String); 4] {
     let stacked = "v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_owned() + &"f 1 2 3\n".repeat(count);
     let mut fan = String::from("v 0 0 0\n");
     for corner in 0..=count {
@@ -170,7 +170,14 @@ fn triangles(count: usize) -> [(&'static str, String); 3] {
         let corner = |random: &mut crate::random::Random| random.below(points) + 1;
         let _ = writeln!(soup, "f {} {} {}", corner(&mut random), corner(&mut random), corner(&mut random));
     }
-    [("stacked.obj", stacked), ("fan.obj", fan), ("soup.obj", soup)]
+    let mut loose = String::new();
+    for at in 0..count {
+        for _ in 0..3 {
+            let _ = writeln!(loose, "v {} {} {}", random.unit(), random.unit(), random.unit());
+        }
+        let _ = writeln!(loose, "f {} {} {}", 3 * at + 1, 3 * at + 2, 3 * at + 3);
+    }
+    [("stacked.obj", stacked), ("fan.obj", fan), ("soup.obj", soup), ("loose.obj", loose)]
 }
 
 #[test]
@@ -258,6 +265,36 @@ fn a_minified_file_with_a_typo_shows_a_piece_of_its_line() {
     }
 }
 
+/// A file of packed clips in which all nodes stay at rest: three bytes of each clip a node.
+fn resting_clips(nodes: u64, clips: u64) -> Vec<u8> {
+    let number = |out: &mut Vec<u8>, mut number: u64| {
+        while number >= 0x80 {
+            out.push(number as u8 | 0x80);
+            number >>= 7;
+        }
+        out.push(number as u8);
+    };
+    let floats = |out: &mut Vec<u8>, list: &[f32]| list.iter().for_each(|number| out.extend(number.to_le_bytes()));
+    let mut clip = b"rigclip1\0\0".to_vec();
+    floats(&mut clip, &[30.0, 0.0]);
+    number(&mut clip, 1);
+    number(&mut clip, nodes);
+    clip.resize(clip.len() + 3 * nodes as usize, 0);
+    let mut out = b"rigpack1".to_vec();
+    number(&mut out, nodes);
+    for node in 0..nodes {
+        out.extend((node + 1).to_le_bytes());
+        out.extend([0, 0]);
+        floats(&mut out, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]);
+    }
+    number(&mut out, clips);
+    for _ in 0..clips {
+        number(&mut out, clip.len() as u64);
+        out.extend_from_slice(&clip);
+    }
+    out
+}
+
 /// Memory of a command, in bytes, that its input of `size` bytes may take.
 fn memory_allowance(size: u64) -> u64 {
     (64 << 20) + 16 * size
@@ -278,6 +315,11 @@ fn files_and_builds_stay_within_their_memory() {
     for (name, text) in triangles(6_000) {
         fs::write(at(name), text).unwrap();
     }
+    // Objects of one triangle each, which are more than a file of this size may have.
+    let object = |n: usize| format!("o p{n}\nv {n} 0 0\nv {n} 1 0\nv {n} 0 1\nf -3 -2 -1\n");
+    fs::write(at("objects.obj"), (0..40_000).map(object).collect::<String>()).unwrap();
+    fs::write(at("clips.rigclip"), resting_clips(1_000, 500)).unwrap();
+    assert_eq!(load_packed_clips(&RealDisk, &at("clips.rigclip")).unwrap().clips.len(), 500);
     fs::write(at("chain.rig"), skeleton(8_000, true)).unwrap();
     fs::write(at("long.rig"), skeleton(40_000, true)).unwrap();
     fs::write(at("unknown.rig.ron"), tags(6_000, |_| command("nope", ""))).unwrap();
@@ -289,6 +331,10 @@ fn files_and_builds_stay_within_their_memory() {
         (&["info", "images.gltf"], size("images.gltf")),
         (&["check", "stacked.obj"], size("stacked.obj")),
         (&["convert", "soup.obj", "soup.glb"], size("soup.obj")),
+        (&["info", "clips.rigclip"], size("clips.rigclip")),
+        (&["check", "clips.rigclip"], size("clips.rigclip")),
+        (&["check", "objects.obj"], size("objects.obj")),
+        (&["convert", "objects.obj", "objects.glb"], size("objects.obj")),
         (&["check", "chain.rig"], size("chain.rig")),
         (&["convert", "chain.rig", "chain.rig.ron"], size("chain.rig")),
         (&["check", "unknown.rig.ron"], size("unknown.rig.ron")),
@@ -310,6 +356,10 @@ fn files_and_builds_stay_within_their_memory() {
             memory_allowance(size) >> 10
         );
     }
+    // The chain that was written last, as a template.
+    let (ended, _) = json_answer(folder.path(), &["format", "--check", "long.rig.ron"]);
+    let allowance = memory_allowance(size("long.rig.ron"));
+    assert!(ended.memory <= allowance, "format: {} KiB of {}", ended.memory >> 10, allowance >> 10);
 }
 
 /// Gigabytes that are no file of their kind are refused by their beginning, and what is too large is told as that.
@@ -317,8 +367,10 @@ fn files_and_builds_stay_within_their_memory() {
 fn gigabytes_of_nothing_are_not_read() {
     let folder = tempfile::tempdir().unwrap();
     let long = |name: &str, size: u64| fs::File::create(folder.path().join(name)).unwrap().set_len(size).unwrap();
-    for name in ["zeros.glb", "zeros.gltf", "zeros.vrm", "zeros.skin", "zeros.bvh"] {
-        long(name, 3 << 30);
+    let large = ["zeros.glb", "zeros.gltf", "zeros.vrm", "zeros.skin", "zeros.bvh"].map(|name| (name, 3 << 30));
+    // Packed clips of more than a gigabyte are too large, whatever is in them.
+    for (name, size) in large.into_iter().chain([("zeros.rigclip", 1 << 30)]) {
+        long(name, size);
         let (ended, answer) = json_answer(folder.path(), &["check", name]);
         assert_eq!(ended.code, Some(1), "{answer}");
         assert!(ended.memory <= memory_allowance(0), "{name}: {} KiB", ended.memory >> 10);

@@ -312,6 +312,23 @@ fn headers_are_read_again_only_where_the_file_has_changed() {
 }
 
 #[test]
+fn a_folder_of_too_many_names_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let list =
+        || list_templates(&RealDisk, folder.path(), 0, &SearchPaths::default(), &HeaderMemory::default()).unwrap();
+    fs::write(at("a.rig.ron"), MAN).unwrap();
+    (1..10_000).for_each(|number| fs::write(at(&format!("n{number:05}.txt")), "").unwrap());
+    let listing = list();
+    assert_eq!((listing.templates.len(), listing.left_out.len()), (1, 0));
+    fs::write(at("z.rig.ron"), MAN).unwrap();
+    let listing = list();
+    let told: Vec<String> = listing.left_out.iter().map(ToString::to_string).collect();
+    assert_eq!((listing.templates.len(), told.len()), (1, 1), "{told:?}");
+    assert!(told[0].contains("more than 10000 names"), "{told:?}");
+}
+
+#[test]
 fn a_template_is_loaded_with_poses_and_keys_kept_and_taken_back_whole() {
     let mut studio = Studio::new(LoaderPanel::default());
     let arm = studio.joint("arm_l");

@@ -102,6 +102,7 @@ mod fuzz_gestures;
 mod fuzz_gltf;
 mod fuzz_journal;
 mod fuzz_obj;
+mod fuzz_packed_clips;
 mod fuzz_peers;
 mod fuzz_project;
 mod fuzz_rig_text;

@@ -485,3 +485,16 @@ fn too_many_groups_become_one_object() {
     assert_eq!(model.parts[0].triangles.len(), 70_000);
     assert!(model.notes.iter().any(|note| note.contains("one object")), "{:?}", model.notes);
 }
+
+/// Each object costs memory, which the size of the file bounds.
+#[test]
+fn a_file_has_as_many_objects_as_its_size_allows() {
+    let text = |count: usize, padding: &str| {
+        let objects: String = (0..count).map(|i| format!("o {i}\n{padding}f 1 2 3\n")).collect();
+        TRIANGLE.to_owned() + &objects
+    };
+    let comment = format!("#{}\n", "x".repeat(2100));
+    for (count, padding, objects) in [(1400, "", 1400), (4000, "", 1), (4000, comment.as_str(), 4000)] {
+        assert_eq!(model(&text(count, padding)).objects.len(), objects, "{count} with {} bytes each", padding.len());
+    }
+}

@@ -129,6 +129,16 @@ fn damaged_bytes_are_told_and_never_panic() {
     let mut longer = bytes.clone();
     longer.push(0);
     assert!(matches!(PackedClip::from_bytes(&longer), Err(PackedClipError::Damaged { .. })));
+    // Times rise: a clip of many frames does not end where it starts.
+    let rate = (1.0 / swinging().frame_time).to_le_bytes();
+    let place = bytes.windows(4).position(|window| window == rate).unwrap();
+    let mut ended = bytes.clone();
+    ended[place + 4..place + 8].fill(0);
+    let is_told = matches!(
+        PackedClip::from_bytes(&ended),
+        Err(PackedClipError::Damaged { what: "a duration of fewer frames", .. })
+    );
+    assert!(is_told);
     let mut random = Random(5);
     let mut told = 0;
     for _ in 0..500 {

@@ -5,7 +5,8 @@ use rigsmith::{
     algo::{
         placement::PlaceSettings,
         stroke::{
-            ChainChoice, StrokeChain, StrokeError, StrokeKind, StrokeNote, StrokeSettings, classify, stroke_chain,
+            ChainChoice, MAX_JOINTS, StrokeChain, StrokeError, StrokeKind, StrokeNote, StrokeSettings, classify,
+            stroke_chain,
         },
         view::{View, ViewPlane},
     },
@@ -128,6 +129,23 @@ fn no_point_stays_further_than_the_threshold() {
         assert!(stroke.iter().all(|&p| far(p) <= threshold * 1.001), "{threshold}");
         assert!(joints.len() < before, "a larger threshold makes fewer joints");
         before = joints.len();
+    }
+}
+
+/// Tens of thousands of points, each of them a bend, make as many joints as a stroke may have, the largest bend among them.
+#[test]
+fn a_stroke_of_very_many_bends_has_so_many_joints() {
+    let surface = slab();
+    let point = |i: usize| {
+        let height = if i == 10_001 { 0.5 } else { 0.001 * (i % 2) as f32 };
+        Vec2::new(i as f32 * 5e-5, height)
+    };
+    let stroke: Vec<Vec2> = (0..20_000).map(point).collect();
+    for threshold in [0.0, f32::NAN] {
+        let joints = chain(&surface, View::Front, &stroke, RAW, ChainChoice::Threshold(threshold)).joints;
+        assert!((900..=MAX_JOINTS).contains(&joints.len()), "{} joints", joints.len());
+        let nearest = joints.iter().map(|joint| joint.source.distance(stroke[10_001])).fold(f32::INFINITY, f32::min);
+        assert!(nearest < 1e-3, "{nearest}");
     }
 }
 

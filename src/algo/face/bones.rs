@@ -96,10 +96,13 @@ pub struct FixedBone {
     pub kind: FaceBoneKind,
 }
 
+/// Most bones on the skin. Their clustering takes time with the square of their number: thousands seem to hang.
+pub const MOST_BONES: usize = 500;
+
 /// Settings of the placement of bones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FaceBonesSettings {
-    /// The number of bones on the skin, fixed ones included; jaw and eyes come on top.
+    /// The number of bones on the skin, fixed ones included, [`MOST_BONES`] at most; jaw and eyes come on top.
     pub bones: usize,
     /// Seed of the clustering.
     pub seed: u64,
@@ -143,6 +146,12 @@ pub enum FaceBonesError {
         bones: usize,
         /// Number of vertices of the mask.
         vertices: usize,
+    },
+    /// More bones than are placed.
+    #[error("{bones} facial bones are too many; ask for {} at most", MOST_BONES)]
+    AboveMost {
+        /// Number of bones requested.
+        bones: usize,
     },
     /// A mask without vertices.
     #[error("the facial mask is empty; check which way the head looks (up and forward)")]
@@ -218,6 +227,9 @@ pub fn place_bones(
     }
     if settings.bones > vertices {
         return Err(FaceBonesError::TooManyBones { bones: settings.bones, vertices });
+    }
+    if settings.bones > MOST_BONES {
+        return Err(FaceBonesError::AboveMost { bones: settings.bones });
     }
     let patches = sample::patches(points, triangles, &seen, &map, group_of, PARTS.len());
     let on_skin: Vec<FixedPlace> = fixed

@@ -1,22 +1,27 @@
 //! Subdivision of a stroke at its bends, after Pencil Rigger, section 5.3.
 
+use std::collections::VecDeque;
+
 use glam::Vec2;
 
-use super::path::Path;
+use super::{MAX_JOINTS, path::Path};
 
 /// Arc lengths of the joints, ends included, rising.
 ///
 /// While a point of the stroke is further than `threshold` from the segment between two neighbouring joints, the furthest
-/// point on each side of that segment that is too far becomes a joint. O(points · depth of the recursion).
+/// point on each side of that segment that is too far becomes a joint, until there are [`MAX_JOINTS`].
+/// O(points · depth of the recursion); no deeper than there are joints.
 pub(super) fn by_threshold(path: &Path, threshold: f32) -> Vec<f32> {
     let threshold = threshold.max(0.0);
     let last = path.points.len() - 1;
     let mut joint = vec![false; path.points.len()];
     joint[0] = true;
     joint[last] = true;
-    // An explicit stack: a spiral of a million points must not exhaust the thread's.
-    let mut pieces = vec![(0, last)];
-    while let Some((from, to)) = pieces.pop() {
+    let mut count = 2;
+    // No recursion: a spiral of a million points must not exhaust the thread's stack. Pieces come in the order of their making,
+    // so that a stroke of more bends than joints has the large ones.
+    let mut pieces = VecDeque::from([(0, last)]);
+    'pieces: while let Some((from, to)) = pieces.pop_front() {
         let mut cuts = [None; 2];
         let mut furthest = [threshold; 2];
         let (a, b) = (path.points[from], path.points[to]);
@@ -34,11 +39,15 @@ pub(super) fn by_threshold(path: &Path, threshold: f32) -> Vec<f32> {
             continue;
         }
         for cut in inner {
+            if count >= MAX_JOINTS {
+                break 'pieces;
+            }
             joint[cut] = true;
-            pieces.push((start, cut));
+            count += 1;
+            pieces.push_back((start, cut));
             start = cut;
         }
-        pieces.push((start, to));
+        pieces.push_back((start, to));
     }
     joint.iter().zip(&path.lengths).filter_map(|(&is_joint, &length)| is_joint.then_some(length)).collect()
 }

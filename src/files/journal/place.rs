@@ -14,7 +14,7 @@ use super::{
 };
 use crate::files::{Disk, EntryKind, ReadError, atomic::folder_of, read::is_missing, read_capped};
 
-/// Largest number of names in a folder that are searched.
+/// Largest number of journals of one name that are kept aside.
 const MAX_NAMES: usize = 10_000;
 /// Largest size in bytes of a project file that is hashed.
 const MAX_PROJECT: u64 = 1 << 30;
@@ -143,7 +143,8 @@ pub struct PendingJournal {
 ///
 /// Reads the journals and hashes the projects they belong to; a folder that cannot be read counts as empty.
 pub fn pending_journals(disk: &dyn Disk, folder: &Path) -> Vec<PendingJournal> {
-    let names = disk.list(folder, MAX_NAMES).unwrap_or_default();
+    // A folder for temporary files has any number of names of others.
+    let names = disk.list(folder, usize::MAX).unwrap_or_default();
     let journals = names.iter().filter(|name| is_journal_name(name));
     let mut pending: Vec<_> = journals.filter_map(|name| pending_journal(disk, &folder.join(name))).collect();
     pending.sort_by(|a, b| b.modified.cmp(&a.modified).then_with(|| a.path.cmp(&b.path)));

@@ -45,6 +45,7 @@ impl<'a> Collector<'a> {
             Some(Failure::Line(problem)) => return Err(ObjError::Line { line: self.line(0), problem }),
             None => {}
         }
+        self.arrays.file_size.0 += block.filled as u64;
         let parsed = &mut block.parsed;
         self.resolve_relative(parsed)?;
         if let Some(error) = parsed.error.take() {

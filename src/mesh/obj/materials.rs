@@ -43,12 +43,14 @@ pub(super) fn material_set(
         Builder { material_set: MaterialSet::default(), images: HashMap::new(), bytes: 0, sidecar, notes };
     let mut numbers = HashMap::new();
     let mut unknown = Vec::new();
+    // Faces without a material are a part, too.
+    let most = MOST_MATERIALS.min(arrays.most_parts() - 1);
     for run in &arrays.runs {
         if run.material == NONE || numbers.contains_key(&run.material) {
             continue;
         }
-        if numbers.len() == MOST_MATERIALS {
-            builder.note(format!("more than {MOST_MATERIALS} materials: the others were left out"));
+        if numbers.len() == most {
+            builder.note(format!("more than {most} materials in a file of this size: the others were left out"));
             break;
         }
         let name = arrays.names.get(run.material);

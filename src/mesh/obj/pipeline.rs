@@ -28,6 +28,16 @@ const KEPT_BLOCK: usize = 8 << 20;
 /// Largest number of threads: more would wait for the reader and the memory.
 const MOST_THREADS: usize = 8;
 
+/// Bytes of the file that arrays hold; 0 for arrays that no file filled. The size is no content: any two are equal.
+#[derive(Debug, Default, Clone, Copy)]
+pub(super) struct FileSize(pub u64);
+
+impl PartialEq for FileSize {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
 /// Blocks kept between reads.
 #[derive(Debug, Default)]
 pub(super) struct SpareBlocks(Vec<Block>);

@@ -14,9 +14,6 @@ use super::{
 };
 use crate::mesh::model::{Faces, Model, Object, Part};
 
-/// Largest number of parts: a file with more is noise and not a character, and each part costs memory.
-const MOST_PARTS: usize = 1 << 16;
-
 /// Largest number of corners for ear clipping; larger faces are cut into plain fans, which take no memory.
 const LARGEST_POLYGON: usize = 1 << 20;
 
@@ -54,16 +51,18 @@ pub(super) fn model(arrays: &ObjArrays, name: &str, sidecar: &mut Sidecar) -> Mo
 /// Objects and parts in the order of their first faces.
 fn plan(arrays: &ObjArrays, materials: &HashMap<u32, usize>, notes: &mut Vec<String>) -> (Vec<Object>, Vec<Plan>) {
     let by_object = arrays.runs.iter().any(|run| run.object != NONE);
+    let most = arrays.most_parts();
     for split in [Split { objects: true, materials: true }, Split { objects: false, materials: true }] {
-        if let Some(planned) = try_plan(arrays, materials, by_object, split) {
+        if let Some(planned) = try_plan(arrays, materials, by_object, split, most) {
             if !split.objects {
-                notes.push(format!("more than {MOST_PARTS} objects or groups: taken as one object"));
+                notes.push(format!("more than {most} objects or groups in a file of this size: taken as one object"));
             }
             return planned;
         }
     }
-    notes.push(format!("more than {MOST_PARTS} materials: left out"));
-    try_plan(arrays, materials, by_object, Split { objects: false, materials: false }).unwrap_or_default()
+    notes.push(format!("more than {most} materials in a file of this size: left out"));
+    let split = Split { objects: false, materials: false };
+    try_plan(arrays, materials, by_object, split, most).unwrap_or_default()
 }
 
 #[derive(Clone, Copy)]
@@ -77,6 +76,7 @@ fn try_plan(
     materials: &HashMap<u32, usize>,
     by_object: bool,
     split: Split,
+    most: usize,
 ) -> Option<(Vec<Object>, Vec<Plan>)> {
     let mut objects = Vec::new();
     let mut plans: Vec<Plan> = Vec::new();
@@ -98,7 +98,7 @@ fn try_plan(
             plans.len() - 1
         });
         plans[plan].runs.push(number);
-        if plans.len() > MOST_PARTS {
+        if plans.len() > most {
             return None;
         }
     }

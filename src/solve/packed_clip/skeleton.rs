@@ -1,5 +1,7 @@
 //! Skeletons with packed clips, as files have them: nodes with their uids, names and rests, and the clips of all of them.
 
+use std::collections::HashMap;
+
 use bevy::math::{Quat, Vec3};
 
 use super::{MOST_NODES, MOST_TEXT, PackedClip, PackedClipError, Reader, write_number};
@@ -45,11 +47,11 @@ impl PackedSkeleton {
     /// Skeleton of a built rig, as files of characters have it, without clips.
     pub fn of(rig: &Rig, built: &BuiltRig) -> Self {
         let skeleton = baked(rig, built);
-        let places: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
+        let places: HashMap<Uid, usize> = skeleton.walk().map(|joint| joint.data.uid).zip(0..).collect();
         let node = |joint: &crate::rig::RigJoint| PackedNode {
             uid: joint.data.uid,
             name: joint.data.label.clone().unwrap_or_default(),
-            parent: joint.parent.and_then(|parent| places.iter().position(|uid| *uid == parent)),
+            parent: joint.parent.and_then(|parent| places.get(&parent).copied()),
             rest: joint.data.rest.into(),
         };
         Self { nodes: skeleton.walk().map(node).collect(), clips: Vec::new() }

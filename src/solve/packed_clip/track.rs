@@ -17,7 +17,7 @@ const NEAR: f32 = 0.3;
 /// Bound of numbers of ranges; larger ones are damage.
 const MOST: f32 = 1e12;
 
-/// Track of one property of a node.
+/// Track of one property of a node. Large ones are boxed: a track at rest is a byte of a file, and takes little memory, too.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) enum PackedTrack {
     /// The node stays at rest.
@@ -28,9 +28,9 @@ pub(super) enum PackedTrack {
     /// Keys as they are: frames and values.
     Whole(Vec<(u32, [f32; 4])>),
     /// Keys whose numbers have few bits.
-    Few(FewBits),
+    Few(Box<FewBits>),
     /// A value for each frame.
-    Steps(Steps),
+    Steps(Box<Steps>),
 }
 
 /// Keys whose numbers have few bits.
@@ -144,7 +144,7 @@ impl PackedTrack {
         };
         let range = ValueRange::of(property, &values);
         let found = range.and_then(|range| BITS.map(|bits| few(bits, range)).find(is_near));
-        found.map_or_else(|| Self::Whole(keys.to_vec()), Self::Few)
+        found.map_or_else(|| Self::Whole(keys.to_vec()), |few| Self::Few(Box::new(few)))
     }
 
     /// The track that takes fewer bytes.
@@ -244,9 +244,9 @@ impl PackedTrack {
                 }
                 let range = ValueRange::read(reader)?;
                 let numbers = reader.bytes((3 * frames.len() * bits as usize).div_ceil(8))?.to_vec();
-                Ok(Self::Few(FewBits { frames, bits, range, numbers }))
+                Ok(Self::Few(Box::new(FewBits { frames, bits, range, numbers })))
             }
-            4 => Ok(Self::Steps(Steps::read(reader, property, frames)?)),
+            4 => Ok(Self::Steps(Box::new(Steps::read(reader, property, frames)?))),
             _ => Err(damaged("a kind of track")),
         }
     }

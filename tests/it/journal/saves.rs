@@ -150,6 +150,23 @@ fn only_work_that_nobody_has_any_more_is_offered() {
     assert!(pending_journals(&RealDisk, &folder.path().join("nowhere")).is_empty());
 }
 
+/// The folder for temporary files, where journals may be, has as many names of others as there are.
+#[test]
+fn a_crowded_folder_hides_no_work() {
+    let folder = fresh();
+    let mut desk = Desk::apart(folder.path());
+    desk.place(1);
+    desk.flush();
+    let path = desk.journal.path().unwrap();
+    drop(desk);
+    let state = path.parent().unwrap();
+    (0..10_050).for_each(|number| fs::write(state.join(format!("a{number:05}")), b"").unwrap());
+    assert_eq!(
+        pending_journals(&RealDisk, state).into_iter().map(|pending| pending.path).collect::<Vec<_>>(),
+        [path.clone()]
+    );
+}
+
 #[test]
 fn recovered_work_is_safe_from_the_next_crash() {
     for beside in [false, true] {

@@ -20,7 +20,7 @@ const POOL: usize = 256;
 /// Mutants that a test tries, on every machine the same ones.
 const MUTANTS: u64 = 4000;
 /// Targets, each with a folder of findings of its own.
-const TARGETS: [&str; 23] = [
+const TARGETS: [&str; 24] = [
     "animation",
     "bvh",
     "edit_sequence",
@@ -29,6 +29,7 @@ const TARGETS: [&str; 23] = [
     "gltf",
     "journal",
     "obj",
+    "packed_clips",
     "peer_gltf",
     "peer_obj",
     "pose_command",

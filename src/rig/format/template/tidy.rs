@@ -1,8 +1,13 @@
 //! Layout of a template's text, and its uids written in or taken out.
 
-use std::collections::{HashMap, HashSet};
+use std::{
+    collections::{HashMap, HashSet},
+    fmt::{self, Write},
+    hash::{DefaultHasher, Hasher},
+};
 
 use super::{
+    Template,
     read::{bind_references, read_text},
     shorthand::{Declaration, Declarations, NameError, NameIndex, TAG_FIELDS, TagForm, feature_name},
     text_patch::{comparable, patch::Patch},
@@ -35,21 +40,45 @@ pub enum UidStyle {
 /// # Errors
 /// What keeps the text from being read as a template, and comments for which there is no place in the layout.
 pub fn format_template(source: &str, uids: UidStyle) -> Result<String, SourceError> {
-    let before = read_text(source, 1)?;
-    let text = match (uids, Declarations::find(source)) {
-        (UidStyle::Kept, _) | (_, None) => source.to_owned(),
-        (style, Some(declared)) => Uids::new(&declared, &before.rig, style, !before.parts.is_empty()).text(),
+    let Template { rig, parts, .. } = read_text(source, 1)?;
+    let written = match uids {
+        UidStyle::Kept => None,
+        style => Declarations::find(source).map(|declared| Uids::new(&declared, &rig, style, !parts.is_empty()).text()),
     };
-    let text = laid_out(&text)?;
-    // Names that parts bring are bound once those are there.
+    // Names that parts bring are bound once those are there. Of large templates, one rig or one tree is held at a time.
     let said = |mut rig: Rig| {
         bind_references(&mut rig, &mut Vec::new());
-        comparable(rig)
+        fingerprint(comparable(rig))
     };
-    let before = said(before.rig);
+    let before = said(rig);
+    let text = laid_out(written.as_deref().unwrap_or(source))?;
     match read_text(&text, 1).is_ok_and(|after| said(after.rig) == before) {
         true => Ok(text),
         false => Err(SourceError::at(source, 0, "formatted, the template would say something else; it stays as it is")),
+    }
+}
+
+/// Hash of all that a rig holds. Joints come in the order of the hierarchy, whatever the order in their map.
+fn fingerprint(mut rig: Rig) -> u64 {
+    let mut hash = HashedText(DefaultHasher::new());
+    // Hashes take all text.
+    for joint in rig.walk() {
+        let _ = write!(hash, "{:?} {:?}", joint.parent, joint.data);
+    }
+    // Tags are those of the joints.
+    rig.joints.clear();
+    rig.tags.clear();
+    let _ = write!(hash, "{rig:?}");
+    hash.0.finish()
+}
+
+/// Text that is hashed as it is written.
+struct HashedText(DefaultHasher);
+
+impl Write for HashedText {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        self.0.write(text.as_bytes());
+        Ok(())
     }
 }
 
@@ -172,6 +201,30 @@ impl<'d, 'a> Uids<'d, 'a> {
             if text != written {
                 self.patch.replace(node, &text);
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fingerprints_tell_rigs_apart_and_not_their_layouts() {
+        let of = |text: &str| fingerprint(read_text(text, 1).unwrap().rig);
+        let joint = |number: usize, more: &str| {
+            let parent = number.checked_sub(1).map_or(String::new(), |above| format!("parent: \"j{}\", ", above / 3));
+            format!("(label: \"j{number}\", {parent}translation: (0, 0.1, 0){more})")
+        };
+        let text = |more: &str| {
+            let joints: Vec<String> =
+                (0..40).map(|number| joint(number, if number == 30 { more } else { "" })).collect();
+            format!("(format: 2, name: \"n\", joints: [{}])", joints.join(", "))
+        };
+        let plain = of(&text(""));
+        assert_eq!(plain, of(&laid_out(&text("")).unwrap()));
+        for more in [", rotation: (0, 0, 1, 0)", ", locked: true", ", tags: [null]"] {
+            assert_ne!(plain, of(&text(more)), "{more}");
         }
     }
 }
