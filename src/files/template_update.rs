@@ -117,6 +117,7 @@ pub fn update_template(
     let same = with_same_parts(disk, base, now, file);
     let (base, file) = (same.base.as_ref().or(base), same.file.as_ref().unwrap_or(file));
     let FieldUpdate { mut update, told, brought, text } = with_fields_of_parts(disk, base, now, file, choices);
+    let told = without_told_names(told, &same.moved);
     update.changes = same.moved.into_iter().chain(told).chain(brought).chain(update.changes).collect();
     let (marks, plain) = FileMarks::of(&now.text);
     let of_fields = text.as_deref().unwrap_or(&plain);
@@ -137,8 +138,19 @@ pub fn diff_templates(disk: &dyn Disk, from: &TemplateVersion, to: &TemplateVers
     let same = with_same_parts(disk, None, from, to);
     let to = same.file.as_ref().unwrap_or(to);
     let FieldUpdate { update, told, .. } = with_fields_of_parts(disk, Some(from), from, to, &Take::Theirs.into());
+    let told = without_told_names(told, &same.moved);
     let changes = same.moved.into_iter().chain(told).chain(update.changes).collect();
     with_whole_parts(changes, [&from.content, &to.content])
+}
+
+/// Changes of fields without the names of instances that are told as `moved`.
+fn without_told_names(mut told: Vec<Change>, moved: &[Change]) -> Vec<Change> {
+    let is_name = |change: &Change, of: &Change| {
+        let (Some(field), Some(part)) = (&change.field, &of.field) else { return false };
+        change.uid == of.uid && field.strip_prefix(part.as_str()) == Some(" name")
+    };
+    told.retain(|change| change.conflict || !moved.iter().any(|of| is_name(change, of)));
+    told
 }
 
 /// Part instances of the file that neither the base nor the template has now.
