@@ -25,7 +25,7 @@ pub use self::{
 };
 use crate::rig::{
     FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput, RigJoint,
-    SelectionSet, StoredPose, TagData, TagKind, Uid,
+    SelectionSet, StoredPose, TagData, Uid,
     animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
     document::{RigAbout, SkinData},
     part::DroppedPart,

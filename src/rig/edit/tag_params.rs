@@ -23,7 +23,7 @@ const PLAIN_DIGITS: usize = 15;
 pub(super) fn checked(tag: &TagData) -> Result<TagData, EditError> {
     let mut tag = tag.clone();
     if let TagKind::Command { params, .. } = &mut tag.kind {
-        let stored = stored(params).map_err(|reason| EditError::BadParams(tag.uid, reason))?;
+        let stored = stored(params).map_err(|reason| EditError::BadParams(tag.uid, reason.to_string()))?;
         if stored.len() < params.len() {
             *params = stored.into_owned();
         }
@@ -31,16 +31,19 @@ pub(super) fn checked(tag: &TagData) -> Result<TagData, EditError> {
     Ok(tag)
 }
 
-/// Parameters without white space and comments around them, or the reason why they are none.
-fn stored(params: &str) -> Result<Cow<'_, str>, String> {
+/// Parameters without white space and comments around them.
+///
+/// # Errors
+/// The reason why the text is no RON.
+fn stored(params: &str) -> Result<Cow<'_, str>, ron::Error> {
     let trimmed = params.trim_matches(SPACES);
-    // A template that is built has thousands of tags that were checked in the files of its parts, and are checked here again.
+    // Tags of a template are checked in the files of its parts, and again where the parts are put into it.
     if is_plain(trimmed) {
         return Ok(Cow::Borrowed(trimmed));
     }
     // Extensions would let values through that trimming, which knows none, does not take.
     let options = Options::default().with_recursion_limit(PARAMS_DEPTH);
-    let raw: Box<RawValue> = options.from_str(&format!("{params}\n")).map_err(|error| error.code.to_string())?;
+    let raw: Box<RawValue> = options.from_str(&format!("{params}\n")).map_err(|error| error.code)?;
     // Trimming parses once more, for the sake of comments.
     Ok(match params.is_ascii() && !params.contains('/') {
         true => Cow::Borrowed(trimmed),
