@@ -29,6 +29,7 @@ mod kept_lists;
 mod library;
 mod load;
 mod model_watch;
+mod part_cache;
 mod parts;
 mod project;
 mod read;
@@ -59,9 +60,10 @@ pub use load::{
     load_rig_text, load_skin, load_template, stem,
 };
 pub use model_watch::{ModelWatch, SETTLE};
+pub use part_cache::PartCache;
 pub use parts::{
-    BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartCache, PartFileError, PartFiles, bundled_characters,
-    bundled_part, bundled_parts,
+    BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartFileError, PartFiles, bundled_characters, bundled_part,
+    bundled_parts,
 };
 pub use project::{
     LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote,

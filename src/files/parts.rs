@@ -6,7 +6,9 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
-use super::{Disk, ReadError, SearchPaths, SiteError, read::is_missing, read_capped, similar_parts::similar_parts};
+use super::{
+    Disk, PartCache, ReadError, SearchPaths, SiteError, read::is_missing, read_capped, similar_parts::similar_parts,
+};
 use crate::{
     modules,
     processor::Modules,
@@ -172,23 +174,6 @@ pub enum PartFileError {
     Again(Arc<PartFileError>),
 }
 
-/// Parts that were read from files, with the contents that these had: for one who reads the same templates again and again.
-/// Parts that have others in them are not among them.
-#[derive(Debug, Default)]
-pub struct PartCache(BTreeMap<PathBuf, (Vec<u8>, Arc<Part>)>);
-
-impl PartCache {
-    fn part(&self, path: &Path, content: &[u8]) -> Option<&Arc<Part>> {
-        self.0.get(path).filter(|(known, _)| known == content).map(|(_, part)| part)
-    }
-
-    /// Forgets the parts of all other files.
-    pub fn keep<'f>(&mut self, files: impl IntoIterator<Item = &'f PathBuf>) {
-        let mut known = std::mem::take(&mut self.0);
-        self.0 = files.into_iter().filter_map(|file| known.remove_entry(file)).collect();
-    }
-}
-
 /// Reader of templates with their parts. A part is looked for beside its template, then in the folders of the site
 /// ([`SearchPaths`]), then among those that come with Rigsmith. The reader notes the files that it has asked for.
 pub struct PartFiles<'a> {
@@ -202,7 +187,7 @@ pub struct PartFiles<'a> {
     pub found: BTreeMap<PathBuf, FoundPart>,
     site: Option<SearchPaths>,
     known: BTreeMap<PathBuf, Arc<Part>>,
-    /// Parts of readers before this one.
+    /// Parts and mirrored parameters of readers before this one.
     pub cache: PartCache,
     /// Errors of parts that cannot be had, by the places beside their templates: a part that many others use is read once,
     /// and refused once.
@@ -257,7 +242,7 @@ impl<'a> PartFiles<'a> {
         Self { site: Some(site), ..self }
     }
 
-    /// The reader with the parts that others have read.
+    /// The reader with what others with the same modules have read.
     pub fn with_cache(self, cache: PartCache) -> Self {
         Self { cache, ..self }
     }
@@ -281,8 +266,8 @@ impl<'a> PartFiles<'a> {
         }
         self.begin();
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let modules = self.modules.clone();
-        let mirror = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
+        let (modules, mirrored) = (self.modules.clone(), self.cache.mirrored.clone());
+        let mirror = |module: &str, params: &str| mirrored.of(&modules, module, params);
         template.with_parts(text, &mut |part| self.part(&folder.join(part), part), &mirror)
     }
 
@@ -293,8 +278,8 @@ impl<'a> PartFiles<'a> {
         }
         self.begin();
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let modules = self.modules.clone();
-        let mirror = |module: &str, params: &str| modules.get(module)?.mirrored(params).ok();
+        let (modules, mirrored) = (self.modules.clone(), self.cache.mirrored.clone());
+        let mirror = |module: &str, params: &str| mirrored.of(&modules, module, params);
         template.survey_parts(text, &mut |part| self.part(&folder.join(part), part), &mirror)
     }
 
@@ -313,7 +298,7 @@ impl<'a> PartFiles<'a> {
     /// A part that cannot be had or does not fit.
     pub fn fitted_part(&mut self, path: &Path, instance: &PartInstance) -> Result<Rig, PartFileError> {
         let part = self.of_instance(path, instance)?;
-        let mirror = |module: &str, params: &str| self.modules.get(module)?.mirrored(params).ok();
+        let mirror = |module: &str, params: &str| self.cache.mirrored.of(&self.modules, module, params);
         Ok(instance.fitted(&part, &mirror)?)
     }
 
@@ -398,7 +383,7 @@ impl<'a> PartFiles<'a> {
         let is_alone = template.parts.is_empty() && template.instances.is_empty();
         let part = Arc::new(Part { source: Some(Arc::new(source)), ..Part::from(template) });
         if is_alone {
-            self.cache.0.insert(path, (bytes, part.clone()));
+            self.cache.insert(path, bytes, part.clone());
         }
         self.known.insert(first.to_owned(), part.clone());
         Ok(part)

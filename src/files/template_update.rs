@@ -117,7 +117,8 @@ pub fn update_template(
     let same = with_same_parts(disk, base, now, file);
     let (base, file) = (same.base.as_ref().or(base), same.file.as_ref().unwrap_or(file));
     let FieldUpdate { mut update, told, brought, text } = with_fields_of_parts(disk, base, now, file, choices);
-    update.changes = same.moved.into_iter().chain(told).chain(brought).chain(update.changes).collect();
+    let told = told_once(same.moved, told);
+    update.changes = told.into_iter().chain(brought).chain(update.changes).collect();
     let (marks, plain) = FileMarks::of(&now.text);
     let of_fields = text.as_deref().unwrap_or(&plain);
     let fresh = fresh_parts(base, now, file);
@@ -137,8 +138,20 @@ pub fn diff_templates(disk: &dyn Disk, from: &TemplateVersion, to: &TemplateVers
     let same = with_same_parts(disk, None, from, to);
     let to = same.file.as_ref().unwrap_or(to);
     let FieldUpdate { update, told, .. } = with_fields_of_parts(disk, Some(from), from, to, &Take::Theirs.into());
-    let changes = same.moved.into_iter().chain(told).chain(update.changes).collect();
+    let changes = told_once(same.moved, told).into_iter().chain(update.changes).collect();
     with_whole_parts(changes, [&from.content, &to.content])
+}
+
+/// Changes of part instances that are `moved`, and of fields, each told once: another name as such, and as a conflict where both
+/// sides gave one.
+fn told_once(mut moved: Vec<Change>, mut told: Vec<Change>) -> Vec<Change> {
+    let is_name_of = |change: &Change, of: &Change| {
+        let field = change.field.as_deref().is_some_and(|field| field.starts_with("part ") && field.ends_with(" name"));
+        change.uid == of.uid && field
+    };
+    moved.retain(|of| !told.iter().any(|change| change.conflict && is_name_of(change, of)));
+    told.retain(|change| !moved.iter().any(|of| is_name_of(change, of)));
+    moved.into_iter().chain(told).collect()
 }
 
 /// Part instances of the file that neither the base nor the template has now.

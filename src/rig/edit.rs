@@ -11,21 +11,23 @@ mod inputs;
 mod poses;
 mod skin_weights;
 mod skins;
+mod tag_params;
 mod weight_patch;
 
 use std::{collections::HashSet, sync::Arc};
 
-use ron::value::RawValue;
 use serde::{Deserialize, Serialize};
 
-pub use self::header::HeaderFault;
-pub use self::weight_patch::{PatchFault, WeightPatch, joint_numbers, weight_edit};
+use self::tag_params::checked;
+pub use self::{
+    header::HeaderFault,
+    weight_patch::{PatchFault, WeightPatch, joint_numbers, weight_edit},
+};
 use crate::rig::{
     FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput, RigJoint,
-    SelectionSet, StoredPose, TagData, TagKind, Uid,
+    SelectionSet, StoredPose, TagData, Uid,
     animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
     document::{RigAbout, SkinData},
-    format::source::ron_options,
     part::DroppedPart,
 };
 
@@ -458,26 +460,6 @@ impl Rig {
         self.joint_mut(uid)?.parent = parent;
         Ok(RigEdit::SetParent { joint: uid, parent: old_parent, index: old_index })
     }
-}
-
-/// Largest depth of brackets in a tag's parameters, so that the template around them can still be read.
-const PARAMS_DEPTH: usize = 100;
-
-/// The tag in its stored form: parameters without white space and comments around them.
-fn checked(tag: &TagData) -> Result<TagData, EditError> {
-    let mut tag = tag.clone();
-    if let TagKind::Command { params, .. } = &mut tag.kind {
-        let options = ron_options().with_recursion_limit(PARAMS_DEPTH);
-        let raw: Box<RawValue> = options
-            .from_str(&format!("{params}\n"))
-            .map_err(|error| EditError::BadParams(tag.uid, error.code.to_string()))?;
-        // Trimming parses once more, for the sake of comments.
-        *params = match params.is_ascii() && !params.contains('/') {
-            true => params.trim_matches([' ', '\t', '\n', '\r', '\u{b}', '\u{c}']).to_owned(),
-            false => raw.trim().get_ron().to_owned(),
-        };
-    }
-    Ok(tag)
 }
 
 fn check_color(group: &GroupData) -> Result<(), EditError> {

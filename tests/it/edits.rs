@@ -1,6 +1,7 @@
 //! Editing a rig: every edit has its exact inverse, every operation is done as a whole or not at all.
 
 mod skeleton;
+mod tag_params;
 
 use std::sync::Arc;
 

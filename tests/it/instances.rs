@@ -18,12 +18,21 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bevy::{asset::AssetPlugin, ecs::system::RunSystemOnce, mesh::skinning::SkinnedMesh, prelude::*};
+use bevy::{
+    asset::{
+        AssetPath, AssetPlugin,
+        saver::{SavedAsset, save_using_saver},
+    },
+    ecs::system::RunSystemOnce,
+    mesh::skinning::SkinnedMesh,
+    prelude::*,
+    tasks::block_on,
+};
 use rigsmith::{
     headless::Workbench,
     instance::{
-        BoundTo, InstanceNodes, RigBuilt, RigFailed, RigInstance, RigInstancePlugin, RigTemplate, RunningTemplate,
-        SkinBound, TemplateFiles,
+        BoundTo, InstanceNodes, RigBuilt, RigFailed, RigInstance, RigInstancePlugin, RigTemplate, RigTemplateSaver,
+        RunningTemplate, SkinBound, TemplateFiles,
     },
     plugins::{
         commands::BuildStep,
@@ -320,6 +329,36 @@ fn the_asset_server_loads_templates_and_a_failed_first_load_is_tried_again() {
     let place = game.node(other, "b_end");
     game.app.update();
     assert!((game.app.world().get::<GlobalTransform>(place).unwrap().translation().y - 1.75).abs() < 1e-5);
+}
+
+#[test]
+fn the_asset_server_saves_a_template_as_a_change_of_its_text() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = TWO.replace("        (label: \"b\"", "        // The second.\n        (label: \"b\"");
+    assert_ne!(text, TWO);
+    saved(folder.path(), &text);
+    let mut game = AppBench::game(RigInstancePlugin::live(), folder.path());
+    let server = game.app.world().resource::<AssetServer>().clone();
+    let handle = server.load::<RigTemplate>("t.rig.ron");
+    game.spawn(handle.clone(), InstanceMode::Hierarchy);
+    let mut template = game.app.world().resource::<Assets<RigTemplate>>().get(&handle).unwrap().clone();
+    let mut rig = (**template.rig()).clone();
+    let tip = rig.find_label("b_end").unwrap();
+    let raised = RestTransform::from_translation(Vec3::Y * 0.75);
+    rig.apply(&rigsmith::rig::RigEdit::SetRest(tip, raised)).unwrap();
+    template.set_rig(rig);
+    let path = AssetPath::from("copy.rig.ron");
+    let asset = SavedAsset::from_asset(&template);
+    block_on(save_using_saver(server.clone(), &RigTemplateSaver, &path, asset, &())).unwrap();
+    let written = fs::read_to_string(folder.path().join("copy.rig.ron")).unwrap();
+    let changed: Vec<(&str, &str)> = text.lines().zip(written.lines()).filter(|(was, is)| was != is).collect();
+    assert!(matches!(changed[..], [(_, is)] if is.contains("0.75")), "{written}");
+    assert_eq!(written.lines().count(), text.lines().count());
+    // The loader reads it, with the settings that the server wrote beside it.
+    let copy = game.spawn(server.load("copy.rig.ron"), InstanceMode::Hierarchy);
+    let end = game.node(copy, "b_end");
+    game.app.update();
+    assert!((game.app.world().get::<GlobalTransform>(end).unwrap().translation().y - 1.75).abs() < 1e-5);
 }
 
 /// A skinned mesh as a loaded file has it below an entity: joints with names, and one that the rig does not have.

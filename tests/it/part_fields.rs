@@ -2,7 +2,11 @@
 
 use std::{fs, path::Path};
 
-use rigsmith::rig::{Uid, part::PartInstance, update::same_parts};
+use rigsmith::rig::{
+    Rig, Uid,
+    part::PartInstance,
+    update::{Take, same_parts, update},
+};
 use serde_json::Value;
 
 use super::{
@@ -316,6 +320,82 @@ fn a_nameless_part_that_goes_onto_other_joints_is_the_same_part() {
     assert!(text.contains("count: 4") && text.contains("relative_size: 0.9"), "{text}");
 }
 
+/// The text with another name of the finger.
+fn called(text: &str, name: &str) -> String {
+    let called = text.replace("name: \"index\"", &format!("name: \"{name}\""));
+    assert_ne!(called, text);
+    called
+}
+
+#[test]
+fn a_part_with_another_name_is_the_same_part() {
+    let part = PART.replace("    joints: [", "    sockets: [(name: \"tip\", joint: \"bone_3\")],\n    joints: [");
+    // A part of one's own hangs on the one that is called otherwise.
+    let own = "        (part: \"finger.rig.ron\", name: \"nail\", socket: \"index.tip\", prefix: \"n_\"),\n    ],\n)\n";
+    let mine = mine().replace("    ],\n)\n", own);
+    let file = called(BASE, "pointer").replace("prefix: \"a_\",", "prefix: \"a_\", count: 4,");
+    let folder = folder(&file, &mine);
+    fs::write(folder.path().join("finger.rig.ron"), part).unwrap();
+    let before = load(&folder.path().join("mine.rig.ron"));
+    let (text, said) = updated(folder.path(), &["--keep-base"]);
+    assert!(said.contains("renamed  part index to pointer?") && !said.contains("index name"), "{said}");
+    assert!(said.contains("count: nothing to 4") && !said.contains("conflict"), "{said}");
+    assert!(text.contains("name: \"pointer\"") && text.contains(CHANGES.trim()), "{text}");
+    assert!(text.contains("socket: \"pointer.tip\"") && text.contains("// The finger."), "{text}");
+    assert!(!text.contains("label: \"a_"), "the part stays a part: {text}");
+    let rig = load(&folder.path().join("out.rig.ron"));
+    for joint in before.walk() {
+        assert!(rig.joint(joint.data.uid).is_some(), "{:?} keeps its identity", joint.data.label);
+        for tag in &joint.data.tags {
+            assert!(rig.find_tag(tag.uid).is_some(), "{:?} keeps the identities of its tags", joint.data.label);
+        }
+    }
+    // The next version is compared with this one, and does not tell of the name again.
+    fs::write(folder.path().join("file.rig.ron"), file.replace("count: 4", "count: 5")).unwrap();
+    let next = ["update", "out.rig.ron", "--from", "file.rig.ron", "-o", "next.rig.ron"];
+    let (code, said) = rigsmith(folder.path(), &next);
+    assert!(code == 0 && said.contains("count: 4 to 5") && !said.contains("renamed"), "{said}");
+}
+
+#[test]
+fn two_names_of_one_part_are_a_conflict() {
+    let folder = folder(&called(BASE, "pointer"), &called(&mine(), "forefinger"));
+    let (code, said) = rigsmith(folder.path(), &UPDATE);
+    assert!(code == 1 && said.contains("name: \"forefinger\" here, \"pointer\" there"), "{said}");
+    assert!(!said.contains("renamed"), "{said}");
+    assert_eq!(said.matches("conflict ").count(), 1, "{said}");
+    for (side, name) in [("mine", "forefinger"), ("theirs", "pointer")] {
+        let (text, _) = updated(folder.path(), &["--take", side]);
+        assert!(text.contains(&format!("name: \"{name}\"")) && text.contains(CHANGES.trim()), "{side}: {text}");
+        fs::remove_file(folder.path().join("out.rig.ron")).unwrap();
+    }
+}
+
+#[test]
+fn what_a_part_with_another_name_brings_onto_joints_is_the_same() {
+    // References to commands of the part have uids that follow from its instance.
+    let part = PART.replace(
+        "(label: \"bone_3\", parent: \"bone_2\", translation: (0, 1, 0), tags: [control()])",
+        "(label: \"bone_3\", parent: \"bone_2\", translation: (0, 1, 0), tags: [parent(targets: \"@command control/base role:control\"), point(targets: \"@command control/base role:control\")])",
+    );
+    assert_ne!(part, PART);
+    let file = |name: &str| {
+        format!(
+            "(\n    format: 2,\n    name: \"hand\",\n    joints: [\n        (label: \"a\"),\n        (label: \"b\", parent: \"a\", translation: (0, 1, 0)),\n        (label: \"c\", parent: \"b\", translation: (0, 1, 0)),\n    ],\n    parts: [(part: \"finger.rig.ron\", name: \"{name}\", onto: [\"a\", \"b\", \"c\"])],\n)\n"
+        )
+    };
+    let folder = folder(&file("pointer"), &file("index"));
+    fs::write(folder.path().join("finger.rig.ron"), part).unwrap();
+    let [before, after] = ["mine", "file"].map(|name| load(&folder.path().join(format!("{name}.rig.ron"))));
+    let tags = |rig: &Rig| rig.walk().flat_map(|joint| &joint.data.tags).map(|tag| tag.uid).collect::<Vec<_>>();
+    assert_eq!(tags(&before).len(), 5);
+    assert!(tags(&before).iter().all(|tag| after.find_tag(*tag).is_none()), "all have other uids in the file");
+    // As rigs that run are updated, whose document has the joints and tags alone.
+    let updated = update(Some(&before), &before, &after, Take::Mine);
+    assert_eq!(tags(&updated.rig), tags(&before));
+    assert!(updated.changes.is_empty(), "{:?}", updated.changes);
+}
+
 #[test]
 fn parts_that_could_be_several_are_none_of_them() {
     let part = |uid: u64, name: &str, onto: &[&str]| {
@@ -342,6 +422,13 @@ fn parts_that_could_be_several_are_none_of_them() {
     assert!(uids(&[&a, &c], &[&b, &d]).is_empty(), "two moved");
     assert!(uids(&[&part(1, "", &["a"])], &[&part(2, "", &["b"])]).is_empty(), "both uids are written");
     assert!(uids(&[&part(1, "index", &[])], &[&b]).is_empty(), "one has a name");
+    let named = |name: &str| PartInstance { name: name.to_owned(), ..derived(name) };
+    let (one, other) = (named("one"), named("other"));
+    let moved = PartInstance { parent: Some("palm".to_owned()), ..other.clone() };
+    let of = |part: &PartInstance| PartInstance { onto: Vec::new(), ..part.clone() };
+    assert_eq!(uids(&[&of(&one)], &[&of(&other)]), [(other.uid, one.uid)], "another name in one place");
+    assert!(uids(&[&of(&one)], &[&of(&moved)]).is_empty(), "another name in another place");
+    assert!(uids(&[&of(&one), &of(&named("third"))], &[&of(&other)]).is_empty(), "two in one place");
 }
 
 /// Differences that `rigsmith diff` lists: kind, field and the values of each change.

@@ -5,19 +5,24 @@ use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
     time::Instant,
 };
 
 use bevy::{ecs::system::RunSystemOnce, prelude::*};
 use rigsmith::{
-    files::{PartFiles, RealDisk, load_template, store_rig_over},
+    files::{PartCache, PartFiles, RealDisk, load_template, store_rig_over},
     headless::headless_app,
     instance::{RigBuilt, RigFailed, RigInstance, RigInstancePlugin, RigUpdated, RunningTemplate, TemplateFiles},
     modules,
-    processor::{Builder, review},
+    processor::{BuildScope, Builder, ModuleError, RigModule, review},
     rig::{Rig, RigEdit, TagKind, Uid, template::read_template},
 };
+
+use serde::{Deserialize, Serialize};
 
 use super::{bench::HANG, saved_text, template_text::apply};
 
@@ -327,4 +332,68 @@ fn the_example_of_the_page_on_writing_rigs_is_right() {
     let built = Builder::build(&rig, &modules).unwrap();
     let named = |name: &str| built.nodes.iter().any(|node| node.name.contains(name));
     assert!(named("index_base") && !named("thumb_base") && named("nail"));
+}
+
+/// Number of times that parameters of [`Sided`] were mirrored.
+static MIRRORED: AtomicUsize = AtomicUsize::new(0);
+
+/// A module that counts how often its parameters are mirrored.
+#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Default)]
+#[serde(default, deny_unknown_fields)]
+struct Sided {
+    aside: f32,
+}
+
+impl RigModule for Sided {
+    const NAME: &'static str = "sided";
+    const DOC: &'static str = "Counts how often it is mirrored.";
+    const PARAMETERS: &'static [(&'static str, &'static str)] = &[("aside", "A number with a side.")];
+    const SIDED: &'static [&'static str] = &["aside"];
+
+    fn construct(&self, _scope: &mut BuildScope<'_>) -> Result<(), ModuleError> {
+        Ok(())
+    }
+
+    fn mirror(&mut self) {
+        MIRRORED.fetch_add(1, Ordering::Relaxed);
+        self.aside = -self.aside;
+    }
+}
+
+#[test]
+fn parameters_are_mirrored_once_however_often_a_template_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = folder.path().join("part.rig.ron");
+    let text = "(format: 2, name: \"part\", kind: \"part\", joints: [(label: \"one\", tags: [sided(aside: 1.0)]), (label: \"two\", parent: \"one\", tags: [sided(aside: 2.0)])])";
+    fs::write(&part, text).unwrap();
+    let path = folder.path().join("t.rig.ron");
+    let instance =
+        |name: &str, more: &str| format!("(part: \"part.rig.ron\", name: \"{name}\", prefix: \"{name}_\"{more})");
+    let right = ", mirror: true";
+    let parts = [instance("a", ""), instance("b", right), instance("c", right)].join(", ");
+    fs::write(&path, format!("(format: 2, name: \"t\", parts: [{parts}])")).unwrap();
+    let mut modules = modules::all();
+    modules.add::<Sided>();
+    let mut cache = PartCache::default();
+    let mut read = || {
+        let before = MIRRORED.load(Ordering::Relaxed);
+        let mut files = PartFiles::with_modules(&RealDisk, modules.clone()).with_cache(std::mem::take(&mut cache));
+        let rig = files.complete(&path, &fs::read(&path).unwrap()).unwrap().rig;
+        cache = std::mem::take(&mut files.cache);
+        cache.keep(files.asked.keys());
+        (rig, MIRRORED.load(Ordering::Relaxed) - before)
+    };
+    let (rig, first) = read();
+    assert_eq!(first, 2, "once for each parameter of the part, which is used twice");
+    assert!(params(&rig, "a_two").contains("2.0") && params(&rig, "c_two").contains("-2.0"));
+    assert_eq!(read(), (rig.clone(), 0));
+    // What is changed is mirrored, and nothing else.
+    fs::write(&part, text.replace("2.0", "3.0")).unwrap();
+    let (changed, again) = read();
+    assert_eq!(again, 1);
+    assert!(params(&changed, "b_one").contains("-1.0") && params(&changed, "c_two").contains("-3.0"));
+    // What no reading asks for is forgotten after the next one.
+    assert_eq!(read(), (changed, 0));
+    fs::write(&part, text).unwrap();
+    assert_eq!(read(), (rig, 1));
 }

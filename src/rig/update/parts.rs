@@ -124,9 +124,11 @@ impl Sides<'_> {
             Some(format!("({x:?}, {y:?}, {z:?}, {w:?})"))
         };
         let flag = |is_on: bool| is_on.then(|| "true".to_owned());
+        let name = |a: &PartInstance| (!a.name.is_empty()).then(|| quoted(&a.name));
         let prefix = |a: &PartInstance| (!a.prefix.is_empty()).then(|| quoted(&a.prefix));
         let mut list: Vec<Field<PartInstance>> = vec![
             field("part", |a: &PartInstance| Some(quoted(&a.part)), |a, b| a.part.clone_from(&b.part)),
+            field("name", name, |a: &mut PartInstance, b: &PartInstance| a.name.clone_from(&b.name)),
             field("onto", onto, |a: &mut PartInstance, b: &PartInstance| a.onto.clone_from(&b.onto)),
             field("adds", move |a: &PartInstance| flag(a.adds), |a, b| a.adds = b.adds),
             field("parent", parent, |a: &mut PartInstance, b: &PartInstance| a.parent.clone_from(&b.parent)),
@@ -261,12 +263,14 @@ impl TemplateWithParts {
             take_place(part, to.filter(has_place).unwrap_or(&own));
             let Some(to) = to else { continue };
             part.part.clone_from(&to.part);
+            part.name.clone_from(&to.name);
             part.counts.clone_from(&to.counts);
             part.options.clone_from(&to.options);
             part.prefix.clone_from(&to.prefix);
             part.off.clone_from(&to.off);
             (part.rest, part.is_world, part.mirror) = (to.rest, to.is_world, to.mirror);
         }
+        self.rename_sockets(&mut template.parts);
         let labelled = self.rig.walk().filter_map(|joint| Some((joint.data.uid, joint.data.label.clone()?)));
         let mut labels: BTreeMap<Uid, String> = labelled.collect();
         let (mut fitted, mut lost) = (Vec::new(), Vec::new());
@@ -306,6 +310,21 @@ impl TemplateWithParts {
             }
         }
         Some(RefittedTemplate { template, fitted, lost })
+    }
+
+    /// Gives the sockets that `parts` hang on the names that they have with the instances called as they are there.
+    fn rename_sockets(&self, parts: &mut [PartInstance]) {
+        let titles = |of: &[PartInstance]| of.iter().map(|part| part.title().to_owned()).collect::<Vec<_>>();
+        let (was, is) = (titles(&self.template.parts), titles(parts));
+        for socket in parts.iter_mut().filter_map(|part| part.socket.as_mut()) {
+            let Some((instance, name)) = socket.rsplit_once('.') else { continue };
+            // A name that an instance has is no former one.
+            let place =
+                was.iter().position(|title| title == instance).filter(|_| !is.iter().any(|title| title == instance));
+            if let Some(title) = place.and_then(|place| is.get(place)) {
+                *socket = format!("{title}.{name}");
+            }
+        }
     }
 
     /// Refers by uids to what parts bring, in the template's own tags, joints and changes of instances.

@@ -10,6 +10,9 @@ use crate::rig::{
     remap::Remap,
 };
 
+/// Length of a uid as it is written.
+const UID_DIGITS: usize = 16;
+
 /// The file with the uids of `base` for joints, tags, groups and inputs that are at the same place with the same content under
 /// another name; `None` if there are none. Each is told as a change. Nothing of `others` is one of them.
 pub(super) fn renamed(
@@ -61,7 +64,7 @@ fn module(tag: &TagData) -> &str {
 }
 
 /// Pairs the tags that only one of the two has: those of a renamed joint by their order, others if they are the same but for the
-/// name: module and parameters of commands, kind and commands of features.
+/// name (module and parameters of commands, kind and commands of features), or else but for uids.
 fn tags(
     (old, new): (&RigJoint, &RigJoint),
     (base, file): (&Rig, &Rig),
@@ -85,8 +88,14 @@ fn tags(
         let is_of_kind = |old: &TagData| {
             std::mem::discriminant(&old.kind) == std::mem::discriminant(&tag.kind) && module(old) == module(tag)
         };
-        let fits = |old: &TagData| is_of_kind(old) && (is_renamed_joint || is_same(old));
-        let places: Vec<usize> = (0..gone.len()).filter(|place| free[*place] && fits(gone[*place])).collect();
+        let places_of = |fits: &dyn Fn(&TagData) -> bool| -> Vec<usize> {
+            (0..gone.len()).filter(|place| free[*place] && is_of_kind(gone[*place]) && fits(gone[*place])).collect()
+        };
+        let mut places = places_of(&|old: &TagData| is_renamed_joint || is_same(old));
+        if !is_renamed_joint && places.len() != 1 {
+            // What a part brings has other uids where its instance has another name, and so has what that refers to.
+            places = places_of(&|old: &TagData| is_same_but_uids(old, tag));
+        }
         let place = match places[..] {
             [place] => place,
             [place, ..] if is_renamed_joint => place,
@@ -111,6 +120,27 @@ fn is_same_but_name(a: &TagData, b: &TagData) -> bool {
         TagKind::Feature { .. } => None,
     };
     a.enabled == b.enabled && plain(a).is_some() && plain(a) == plain(b)
+}
+
+/// Returns `true` if two tags say the same under the same names, whatever the uids of themselves and of what they refer to.
+fn is_same_but_uids(a: &TagData, b: &TagData) -> bool {
+    let is_same = match (&a.kind, &b.kind) {
+        (TagKind::Command { params: a, .. }, TagKind::Command { params: b, .. }) => without_uids(a) == without_uids(b),
+        (a, b) => a == b,
+    };
+    a.enabled == b.enabled && is_same
+}
+
+/// Parameters without the uids that stand beside names.
+fn without_uids(params: &str) -> String {
+    let mut pieces = params.split('#');
+    let mut out = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        let is_uid = piece.get(..UID_DIGITS).is_some_and(|digits| digits.parse::<Uid>().is_ok());
+        out.push('#');
+        out.push_str(if is_uid { &piece[UID_DIGITS..] } else { piece });
+    }
+    out
 }
 
 /// Returns `true` if two features of one kind turn the same commands on and off, or none, and differ in the name or the switch

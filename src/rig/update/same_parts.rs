@@ -9,13 +9,14 @@ use super::{Change, ChangeKind, TemplateWithParts};
 use crate::rig::{Uid, format::template::quoted, part::PartInstance};
 
 /// Uids in `own` of instances of `other` that have another uid there, by those that they have there. Each has one counterpart
-/// alone: by its name, by its joints, or by its part with prefix and side, in this order. Where both uids are written, they are
-/// two.
+/// alone: by its name, by its joints, by its part and the place where that stands, or by its part with prefix and side, in this
+/// order. Where both uids are written, they are two.
 pub fn same_parts(own: &[PartInstance], other: &[PartInstance]) -> BTreeMap<Uid, Uid> {
     let is_in = |list: &[PartInstance], uid: Uid| list.iter().any(|part| part.uid == uid);
     let mut gone: Vec<&PartInstance> = own.iter().filter(|part| !is_in(other, part.uid)).collect();
     let mut come: Vec<&PartInstance> = other.iter().filter(|part| !is_in(own, part.uid)).collect();
-    let rules: [fn(&PartInstance, &PartInstance) -> bool; 3] = [have_one_name, have_one_place, are_of_one_kind];
+    let rules: [fn(&PartInstance, &PartInstance) -> bool; 4] =
+        [have_one_name, have_one_place, stand_in_one_place, are_of_one_kind];
     let mut same = BTreeMap::new();
     for rule in rules {
         let are_one = |old: &PartInstance, new: &PartInstance| rule(old, new) && (is_derived(old) || is_derived(new));
@@ -41,6 +42,13 @@ fn have_one_name(old: &PartInstance, new: &PartInstance) -> bool {
 
 fn have_one_place(old: &PartInstance, new: &PartInstance) -> bool {
     !old.onto.is_empty() && old.onto == new.onto && are_alike(old, new)
+}
+
+/// True for one part in one place, whatever it is called: another name is no other part.
+fn stand_in_one_place(old: &PartInstance, new: &PartInstance) -> bool {
+    let place = |of: &PartInstance| (of.adds, of.mirror, of.is_world, of.rest);
+    let hangs_on_one = (&old.onto, &old.parent, &old.socket) == (&new.onto, &new.parent, &new.socket);
+    old.part == new.part && hangs_on_one && place(old) == place(new)
 }
 
 fn are_of_one_kind(old: &PartInstance, new: &PartInstance) -> bool {

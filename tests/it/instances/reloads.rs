@@ -175,3 +175,62 @@ fn a_thousand_instances_go_on_in_one_frame() {
         assert!((place(&game, at) - before).distance(Vec3::Y * 0.1) < 1e-4, "{at}");
     }
 }
+
+#[test]
+fn what_a_part_with_another_name_brings_keeps_its_poses() {
+    // The control refers to a command of the part, whose uid follows from the instance.
+    let part = r#"(
+    format: 2,
+    name: "finger",
+    kind: "part",
+    joints: [
+        (label: "one", tags: [null(creation: (name: "world"))]),
+        (
+            label: "two",
+            parent: "one",
+            translation: (0, 1, 0),
+            tags: [control(parent: "@command null/world", follow: false, creation: (name: "tip"))],
+        ),
+    ],
+)
+"#;
+    let text = r#"(
+    format: 2,
+    name: "hand",
+    joints: [
+        (label: "a"),
+        (label: "b", parent: "a", translation: (0, 1, 0)),
+    ],
+    parts: [(part: "finger.rig.ron", name: "index", onto: ["a", "b"])],
+)
+"#;
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("finger.rig.ron"), part).unwrap();
+        let path = saved(folder.path(), text);
+        let mut game = AppBench::live_game();
+        let instance = game.open(&path, mode);
+        let control = game.node(instance, "tip");
+        let turned = Quat::from_rotation_z(0.5);
+        let world = game.app.world_mut();
+        match mode {
+            InstanceMode::Hierarchy => world.get_mut::<Transform>(control).unwrap().rotation = turned,
+            InstanceMode::Direct => world.get_mut::<ControlPose>(control).unwrap().rotation = turned,
+        }
+        game.app.update();
+        // A joint more tells when the version is there.
+        let next =
+            text.replace("index", "pointer").replace("(label: \"a\"),", "(label: \"a\"),\n        (label: \"c\"),");
+        fs::write(&path, next).unwrap();
+        game.until("the other name", |told| !told.updated.is_empty());
+        game.node(instance, "c");
+        assert_eq!(game.node(instance, "tip"), control, "{mode:?}: the entity stays");
+        let world = game.app.world();
+        let rotation = match mode {
+            InstanceMode::Hierarchy => world.get::<Transform>(control).unwrap().rotation,
+            InstanceMode::Direct => world.get::<ControlPose>(control).unwrap().rotation,
+        };
+        assert!(rotation.angle_between(turned) < 1e-5, "{mode:?}: {rotation}");
+        assert_eq!(game.instance_report().failed, Vec::<String>::new());
+    }
+}

@@ -47,8 +47,8 @@ fn instance_fields(
     (was, was_fitted): &(PartInstance, Rig),
     (is, is_fitted): &(PartInstance, Rig),
 ) {
-    // The uid follows from the file, and of a part without a name from the joints that it goes onto.
-    let follows = was.part != is.part || was.name.is_empty() && was.onto != is.onto;
+    // The uid follows from the file and the name, and of a part without a name from the joints that it goes onto.
+    let follows = was.part != is.part || was.name != is.name || was.name.is_empty() && was.onto != is.onto;
     if follows && tree.field(node, "uid").is_none() {
         patch.put_first(node, &format!("uid: \"{}\"", was.uid));
     }
@@ -103,6 +103,7 @@ fn field_texts(instance: &PartInstance) -> Vec<(&'static str, Option<String>)> {
     let (at, scale) = (vector(rest.translation), format!("{:?}", rest.scale.x));
     vec![
         ("part", Some(quoted(&instance.part))),
+        ("name", (!instance.name.is_empty()).then(|| quoted(&instance.name))),
         ("onto", list(&instance.onto)),
         ("adds", flag(instance.adds)),
         ("parent", instance.parent.as_deref().map(quoted)),
