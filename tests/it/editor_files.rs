@@ -47,7 +47,7 @@ use rigsmith::{
 };
 
 use crate::{
-    bench::{AppBench, HANG},
+    bench::{AppBench, HANG, wait},
     window_app::Notices,
 };
 
@@ -356,14 +356,7 @@ fn what_dead_saves_left_is_cleared_at_the_start() {
     app.add_plugins(FilesPlugin).add_message::<bevy::app::AppExit>();
     app.finish();
     app.cleanup();
-    for _ in 0..10_000 {
-        app.update();
-        if dead.iter().all(|path| !path.exists()) {
-            break;
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    assert!(dead.iter().all(|path| !path.exists()));
+    wait(&mut app, "the end of what dead saves left", App::update, |_| dead.iter().all(|path| !path.exists()));
     assert!(living.exists(), "its process still saves");
 }
 
