@@ -39,6 +39,7 @@ use rigsmith::{
 use super::{
     bench::save_whole,
     panels::desk::{Desk, Sheet},
+    window_app::decline_foreign_offers,
 };
 
 const CHAIN: &str = r#"(
@@ -76,7 +77,7 @@ impl Studio {
         let mut app = headless_app(7);
         app.insert_resource(StateFolder(Some(folder.path().join("state"))))
             .insert_resource(LibraryFolders(Some(SearchPaths::default())))
-            .add_plugins((FilesPlugin, FollowPlugin, PanelsPlugin, DockPlugin))
+            .add_plugins((FilesPlugin, FollowPlugin, PanelsPlugin, DockPlugin, decline_foreign_offers))
             .add_message::<AppExit>();
         let sheet = Sheet::Panel(Box::new(UpdaterPanel::default()));
         let desk = Desk::of(strict_app(app), Entity::PLACEHOLDER, sheet, egui::vec2(320.0, 500.0));
