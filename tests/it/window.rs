@@ -3,6 +3,7 @@
 //! Needs `Xvfb`, `xdotool` and a graphics adapter (a software one will do); it says what is missing, and fails for it
 //! where `RIGSMITH_REQUIRE_GPU=1`. `RIGSMITH_SHOTS` names a folder for pictures of the window on the way.
 
+mod mouse;
 mod pictures;
 mod whole_job;
 
@@ -161,28 +162,6 @@ impl<'a> Hands<'a> {
         }
     }
 
-    /// Moves the pointer, and waits until the window has drawn a frame with the pointer there.
-    fn point(&self, at: [f32; 2]) {
-        let at = at.map(f32::round);
-        self.xdotool(&["mousemove", &at[0].to_string(), &at[1].to_string()]);
-        // No event tells of a pointer that has not moved.
-        self.within(PATIENCE / 12, |report| report.pointer == Some(at));
-    }
-
-    /// Presses or releases the button of the mouse, and waits until the window has drawn a frame since then.
-    fn hold(&self, is_held: bool) {
-        self.xdotool(&[if is_held { "mousedown" } else { "mouseup" }, "1"]);
-        self.within(PATIENCE / 12, |report| report.pressed == is_held);
-    }
-
-    /// Lets the window draw some frames, however long they take: the pointer moves a pixel and back.
-    fn frames(&self) {
-        let [x, y] = self.report().and_then(|report| report.pointer).unwrap_or([640.0, 300.0]);
-        for step in [1.0, 0.0, 1.0, 0.0] {
-            self.point([x + step, y]);
-        }
-    }
-
     /// Answers where to write with a name: it is what is selected in the path that is proposed.
     fn answer_with(&self, name: &str) {
         self.until("a path is asked for", |report| report.asked);
@@ -211,34 +190,6 @@ impl<'a> Hands<'a> {
         self.key("p");
         sleep(Duration::from_millis(3000));
         self.shot("pose");
-    }
-
-    fn drag(&self, line: &[[f32; 2]]) {
-        self.count("drag".to_owned());
-        let place = |at: [f32; 2]| [at[0].round().to_string(), at[1].round().to_string()];
-        self.point(line[0]);
-        sleep(Duration::from_millis(200));
-        self.hold(true);
-        for w in line.windows(2) {
-            for step in 1..=6 {
-                let t = step as f32 / 6.0;
-                let [x, y] = place([w[0][0] + (w[1][0] - w[0][0]) * t, w[0][1] + (w[1][1] - w[0][1]) * t]);
-                self.xdotool(&["mousemove", &x, &y]);
-            }
-        }
-        if let Some(end) = line.last() {
-            self.point(*end);
-        }
-        sleep(Duration::from_millis(200));
-        self.hold(false);
-    }
-
-    fn click(&self, at: [f32; 2]) {
-        self.count("click".to_owned());
-        self.point(at);
-        sleep(Duration::from_millis(300));
-        // Both events at once: a press that lasts is no click.
-        self.xdotool(&["click", "1"]);
     }
 
     /// The middle of the last drawn widget that is meant, once it stands still and can be used: popups are drawn last.
