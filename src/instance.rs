@@ -75,7 +75,7 @@ pub use self::{
     faces::ExpressFailed,
     file_nodes::JointsHeld,
     folders::{FolderError, FolderFault, FolderRead, GesturesRead, WatchedFolder, WatchedFolderPlugin, WatchedFolders},
-    model_files::{ModelFault, ModelFile, ModelFileError, ModelFilesPlugin},
+    model_files::{FollowedModels, ModelFault, ModelFile, ModelFileError, ModelFilesPlugin},
     skins::{BoundTo, SkinBound},
     source::{AcceptUpdate, RigSource, UPDATE, UpdateOffer},
 };

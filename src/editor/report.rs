@@ -6,7 +6,7 @@
 
 use std::{collections::BTreeMap, path::PathBuf};
 
-use bevy::{ecs::system::SystemParam, prelude::*};
+use bevy::{ecs::system::SystemParam, prelude::*, window::PrimaryWindow};
 use bevy_egui::{EguiContext, EguiOutput, PrimaryEguiContext, egui::accesskit};
 use serde::{Deserialize, Serialize};
 
@@ -87,6 +87,10 @@ pub struct WindowReport {
     pub offered: usize,
     /// Labels of the selected joints and nodes; the uid of one without.
     pub selection: Vec<String>,
+    /// Place of the pointer in pixels of the window, whole; `None` outside of the window.
+    pub pointer: Option<[f32; 2]>,
+    /// Marks that a button of the mouse is pressed.
+    pub pressed: bool,
     /// Widgets of the last frame that have a name, in the order of drawing.
     pub widgets: Vec<ReportedWidget>,
 }
@@ -140,12 +144,14 @@ fn reported(node: &accesskit::Node) -> Option<ReportedWidget> {
     })
 }
 
-/// Builds and panels, for the report.
+/// Builds, panels and the hand on the mouse, for the report.
 #[derive(SystemParam)]
 struct Progress<'w, 's> {
     rigs: Query<'w, 's, (Option<&'static Processor>, Option<&'static UpdateOffer>)>,
     builds: MessageReader<'w, 's, BuildDone>,
     outputs: Query<'w, 's, &'static EguiOutput, With<PrimaryEguiContext>>,
+    windows: Query<'w, 's, &'static Window, With<PrimaryWindow>>,
+    buttons: Option<Res<'w, ButtonInput<MouseButton>>>,
 }
 
 fn write(
@@ -169,6 +175,9 @@ fn write(
         file.ran = done.report.executed.len();
     }
     report.ran = file.ran;
+    let pointer = progress.windows.single().ok().and_then(Window::cursor_position);
+    report.pointer = pointer.map(|at| at.round().to_array());
+    report.pressed = progress.buttons.as_ref().is_some_and(|buttons| buttons.get_pressed().next().is_some());
     report.widgets = progress.outputs.iter().next().map(widgets).unwrap_or_default();
     let mut surface_busy = false;
     let active = rig.map(|rig| rig.0);

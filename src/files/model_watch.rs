@@ -136,11 +136,13 @@ impl ModelWatch {
     pub fn read(&mut self, disk: &dyn Disk) -> Option<Result<Model, LoadError>> {
         let before = stamps(disk, self.stamps.keys());
         let (model, asked) = read_with_names(disk, &self.path);
-        if stamps(disk, self.stamps.keys()) != before {
+        self.follow(asked, disk);
+        // What is saved while files are read or hashed is another version than the model, whatever was hashed.
+        if stamps(disk, before.keys()) != before {
+            self.known.clear();
             self.next = Some(Unsettled { since: Instant::now(), contents: None });
             return None;
         }
-        self.follow(asked, disk);
         Some(model)
     }
 

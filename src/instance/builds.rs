@@ -253,7 +253,12 @@ fn refused(id: Id, error: TemplateError) -> Outcome {
 impl TemplateBuild {
     /// Looks at the file: takes over a new content, or tells why not once it has been so for a while.
     fn look(&mut self, id: Id, patience: Duration) -> Option<Outcome> {
-        let content = self.watch.as_mut()?.look(&RealDisk);
+        // A save after this moment is not seen by the look, so what the look finds cannot be told for longer.
+        let now = Instant::now();
+        let watch = self.watch.as_mut()?;
+        let content = watch.look(&RealDisk);
+        // Another content that may still be written decides first.
+        let is_pending = watch.is_pending();
         let outcome = content.and_then(|content| match self.content(id, &content) {
             Ok(outcome) => {
                 self.fault = None;
@@ -265,7 +270,8 @@ impl TemplateBuild {
             }
         });
         if outcome.is_none()
-            && let Some((_, error)) = self.fault.take_if(|(since, _)| since.elapsed() >= patience)
+            && !is_pending
+            && let Some((_, error)) = self.fault.take_if(|(since, _)| now.saturating_duration_since(*since) >= patience)
         {
             return Some(refused(id, error));
         }

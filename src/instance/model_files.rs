@@ -5,7 +5,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -54,6 +54,7 @@ impl Plugin for ModelFilesPlugin {
                 looked: None,
                 watches: Some(BTreeMap::new()),
                 task: None,
+                known: BTreeSet::new(),
             })
             .add_message::<ModelFault>()
             .add_systems(PreUpdate, follow_models);
@@ -108,15 +109,24 @@ pub enum ModelFileError {
 type Watches = BTreeMap<PathBuf, ModelWatch>;
 type ReadModels = Vec<(PathBuf, Result<Model, LoadError>)>;
 
-/// Files that are followed.
+/// Files of [`ModelFile`]s that are followed.
 #[derive(Resource)]
-struct FollowedModels {
+pub struct FollowedModels {
     look: Duration,
     settle: Duration,
     looked: Option<Instant>,
     /// The watches, unless a task looks at the files.
     watches: Option<Watches>,
     task: Option<Task<(Watches, ReadModels)>>,
+    /// Files of the last finished look.
+    known: BTreeSet<PathBuf>,
+}
+
+impl FollowedModels {
+    /// True once a file has been looked at: a version that is saved from then on is noticed.
+    pub fn is_followed(&self, file: &Path) -> bool {
+        self.known.contains(file)
+    }
 }
 
 /// Looks at the files of all meshes, and requests the exchange of those that changed.
@@ -138,6 +148,9 @@ fn follow_models(
     }
     let Some((watches, read)) = followed.task.as_mut().and_then(check_ready) else { return };
     followed.task = None;
+    if !followed.known.iter().eq(watches.keys()) {
+        followed.known = watches.keys().cloned().collect();
+    }
     followed.watches = Some(watches);
     for (path, model) in read {
         let checked = model.map_err(ModelFileError::from).and_then(|model| {

@@ -283,7 +283,10 @@ fn land(
             _ if was_held && job.control.is_cancelled() => Some(Err(FitError::Cancelled.into())),
             _ if was_held => job.held.take().map(Ok),
             Some(late) => Some(Err(late.into())),
-            None => check_ready(&mut job.task),
+            // A computation that ends before it notices the wish to stop has no result either.
+            None => check_ready(&mut job.task).map(|result| {
+                if job.control.is_cancelled() { result.and(Err(FitError::Cancelled.into())) } else { result }
+            }),
         };
         let Some(result) = finished else { continue };
         let result = match (result, rigs.get(of.0)) {

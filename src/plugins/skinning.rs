@@ -406,7 +406,11 @@ fn land_skinning(
             Some(late) => Some(Err(late.into())),
             None if was_held && job.control.is_cancelled() => Some(Err(WeightError::Cancelled.into())),
             None if was_held => job.held.take().map(|held| held.map_err(SkinningError::from)),
-            None => check_ready(&mut job.task).map(|result| result.map_err(SkinningError::from)),
+            // A computation that ends before it notices the wish to stop has no result either.
+            None => check_ready(&mut job.task).map(|result| {
+                let result = result.map_err(SkinningError::from);
+                if job.control.is_cancelled() { result.and(Err(WeightError::Cancelled.into())) } else { result }
+            }),
         };
         let Some(result) = finished else { continue };
         let result = match (result, rigs.get(of.0)) {

@@ -2,6 +2,8 @@
 
 use std::{
     fmt::Debug,
+    fs,
+    path::Path,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -26,6 +28,13 @@ pub const HANG: Duration = Duration::from_secs(120);
 pub fn shipped(name: &str) -> Rig {
     let path = format!("{}/assets/templates/{name}.rig.ron", env!("CARGO_MANIFEST_DIR"));
     load_template(&RealDisk, path.as_ref()).unwrap_or_else(|error| panic!("{error}")).rig
+}
+
+/// Saves a file beside its place and renames it: whoever watches the file sees it whole, whenever this thread is stopped.
+pub fn save_whole(path: &Path, content: impl AsRef<[u8]>) {
+    let beside = path.with_extension("saved");
+    fs::write(&beside, content).unwrap();
+    fs::rename(&beside, path).unwrap();
 }
 
 /// Runs frames until something holds, and gives background work some time between them.

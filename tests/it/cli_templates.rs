@@ -22,7 +22,7 @@ use rigsmith::{
 use serde_json::Value;
 
 use super::{
-    bench::HANG,
+    bench::{HANG, save_whole},
     cli_outputs::{json, rig, rigsmith},
 };
 
@@ -228,14 +228,13 @@ fn a_watched_template_is_built_at_every_save_and_no_broken_one_is_taken_over() {
     assert_eq!((ran(&first), first["commands"].as_u64()), (3, Some(3)), "{first}");
     let first_bytes = glb();
     // One parameter: one command; another file in its place, as most programs save.
-    fs::write(at("new"), text.replace("square", "cube")).unwrap();
-    fs::rename(at("new"), at("a.rig.ron")).unwrap();
+    save_whole(&at("a.rig.ron"), text.replace("square", "cube"));
     let told = watch.next();
     assert_eq!(told["ran"], serde_json::json!(["control on link_1"]), "{told}");
     // A broken file, one whose build fails, and the next good one.
-    fs::write(at("a.rig.ron"), &text[..200]).unwrap();
+    save_whole(&at("a.rig.ron"), &text[..200]);
     assert_eq!(watch.next()["ok"], false);
-    fs::write(at("a.rig.ron"), text.replace("square", "no such shape")).unwrap();
+    save_whole(&at("a.rig.ron"), text.replace("square", "no such shape"));
     let told = watch.next();
     assert!(crate::cli::explained(&told).contains("no such shape"), "{told}");
     // The command is told by its line and column, and no program is told to start over.
@@ -244,10 +243,10 @@ fn a_watched_template_is_built_at_every_save_and_no_broken_one_is_taken_over() {
     assert!(place.starts_with(&format!("a.rig.ron:{line}:")) && !place.ends_with(":1"), "{place}, not {line}:{column}");
     assert!(!told.to_string().contains("(tag ") && !told.to_string().contains("run the command again"), "{told}");
     let after_cube = glb();
-    fs::write(at("a.rig.ron"), text.replace("(0, 0.3, 0)", "(0, 0.5, 0)")).unwrap();
+    save_whole(&at("a.rig.ron"), text.replace("(0, 0.3, 0)", "(0, 0.5, 0)"));
     assert_eq!(watch.next()["ok"], true);
     assert_ne!(glb(), after_cube);
-    fs::write(at("a.rig.ron"), &text).unwrap();
+    save_whole(&at("a.rig.ron"), &text);
     assert_eq!(watch.next()["ok"], true);
     assert!(glb() == first_bytes, "back to the first bytes");
     assert!(watch.ended());
@@ -263,7 +262,7 @@ fn a_character_that_could_not_be_written_is_written_as_soon_as_it_can_be() {
     let mut watch = Watch::start(folder.path(), "out/a.glb", "2");
     assert_eq!(watch.next()["ok"], true);
     fs::remove_dir_all(at("out")).unwrap();
-    fs::write(at("a.rig.ron"), text.replace("(0, 0.3, 0)", "(0, 0.5, 0)")).unwrap();
+    save_whole(&at("a.rig.ron"), text.replace("(0, 0.3, 0)", "(0, 0.5, 0)"));
     let told = watch.next();
     assert!(crate::cli::explained(&told).contains("create it or choose another"), "{told}");
     // The folder is there again, and nobody has saved the template since. The same error is not told again meanwhile.
@@ -312,15 +311,15 @@ fn a_first_template_and_a_first_mesh_are_waited_for() {
         assert!(!told.to_string().contains("run the command again"), "{told}");
     }
     // A broken template, and one whose command fails, end nothing either.
-    fs::write(at("a.rig.ron"), &text[..200]).unwrap();
+    save_whole(&at("a.rig.ron"), &text[..200]);
     assert_eq!(watch.next()["ok"], false);
-    fs::write(at("a.rig.ron"), text.replace("square", "no such shape")).unwrap();
+    save_whole(&at("a.rig.ron"), text.replace("square", "no such shape"));
     let told = watch.next();
     let line = place_of(&text, "square").0;
     assert!(told["error"]["where"].as_str().unwrap().starts_with(&format!("a.rig.ron:{line}:")), "{told}");
     // With both of them there, the character is written.
-    fs::write(at("a.obj"), column(0.1, 5)).unwrap();
-    fs::write(at("a.rig.ron"), &text).unwrap();
+    save_whole(&at("a.obj"), column(0.1, 5));
+    save_whole(&at("a.rig.ron"), &text);
     let told = watch.next();
     assert!(told["ok"] == true && at("a.glb").exists(), "{told}");
     assert!(watch.ended());
@@ -331,13 +330,13 @@ fn a_saved_mesh_is_written_with_its_weights() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "a.rig.ron"]).0, 0);
-    fs::write(at("a.obj"), column(0.1, 5)).unwrap();
+    save_whole(&at("a.obj"), column(0.1, 5));
     let mut watch = Watch::with(folder.path(), "a.glb", "4", &["--mesh", "a.obj"]);
     let glb = || load_model(&RealDisk, &at("a.glb")).unwrap();
     assert_eq!(watch.next()["ok"], true);
     let first = glb();
     // Wider: as many points, and nothing of the rig runs.
-    fs::write(at("a.obj"), column(0.2, 5)).unwrap();
+    save_whole(&at("a.obj"), column(0.2, 5));
     let told = watch.next();
     assert_eq!((&told["ok"], &told["ran"]), (&Value::from(true), &serde_json::json!([])), "{told}");
     let moved = told["mesh"]["moved"].as_f64().unwrap();
@@ -349,7 +348,7 @@ fn a_saved_mesh_is_written_with_its_weights() {
     let joints = |model: &Model| model.nodes.iter().map(|node| node.name.clone()).collect::<Vec<_>>();
     assert_eq!(joints(&wider), joints(&first));
     // More points, each of them held by joints.
-    fs::write(at("a.obj"), column(0.2, 9)).unwrap();
+    save_whole(&at("a.obj"), column(0.2, 9));
     let told = watch.next();
     assert_eq!(told["mesh"]["points"], serde_json::json!([20, 36]), "{told}");
     assert!(told["mesh"]["weights"]["copied"].as_u64().unwrap() >= 20, "{told}");
@@ -357,11 +356,11 @@ fn a_saved_mesh_is_written_with_its_weights() {
     assert!(more.points.len() >= 36 && !more.skins.is_empty());
     // A broken mesh changes nothing, and the next good one is taken.
     let written = fs::read(at("a.glb")).unwrap();
-    fs::write(at("a.obj"), "v 1 2\nf 1 2 3 4 5 6 7 8 9\n").unwrap();
+    save_whole(&at("a.obj"), "v 1 2\nf 1 2 3 4 5 6 7 8 9\n");
     let told = watch.next();
     assert!(told["ok"] == false && told["error"]["where"].as_str().unwrap().contains("a.obj"), "{told}");
     assert_eq!(fs::read(at("a.glb")).unwrap(), written);
-    fs::write(at("a.obj"), column(0.1, 5)).unwrap();
+    save_whole(&at("a.obj"), column(0.1, 5));
     assert_eq!(watch.next()["mesh"]["points"], serde_json::json!([36, 20]));
     assert!(watch.ended());
 }

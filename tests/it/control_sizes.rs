@@ -1,8 +1,8 @@
 //! Sizes of control shapes on a body: none lies in the flesh.
 
-use std::{path::Path, sync::Arc, time::Duration};
+use std::{path::Path, sync::Arc};
 
-use bevy::math::Vec3;
+use bevy::{app::App, math::Vec3};
 use rigsmith::{
     algo::control_size::{OUTSIDE, clear_factor, is_inside, outside_share},
     files::{RealDisk, load_model},
@@ -20,6 +20,8 @@ use rigsmith::{
     processor::Builder,
     rig::{BuiltRig, Rig, Uid},
 };
+
+use crate::bench::wait;
 
 /// A box about the origin, twice as long as half of it is wide.
 fn flesh(half: f32) -> Surface {
@@ -65,17 +67,14 @@ fn a_ring_in_wide_flesh_grows_further_until_half_of_it_is_seen() {
 
 /// Runs frames until the shapes of the rig's controls are measured.
 fn measured(bench: &mut Workbench) {
-    for _ in 0..20_000 {
-        let rig = bench.rig_entity();
-        bench.app_mut().update();
-        let world = bench.app_mut().world();
+    let (rig, app) = (bench.rig_entity(), bench.app_mut());
+    app.update();
+    wait(app, "the shapes", App::update, |app| {
+        let world = app.world();
         let is_done = |measured: &MeasuredShapes| !measured.is_busy();
-        if world.get::<RigMeshes>(rig).is_some() && world.get::<MeasuredShapes>(rig).is_some_and(is_done) {
-            return bench.app_mut().update();
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    panic!("the shapes are not measured");
+        world.get::<RigMeshes>(rig).is_some() && world.get::<MeasuredShapes>(rig).is_some_and(is_done)
+    });
+    app.update();
 }
 
 /// Controls of a built rig: name, share of its shape outside of the mesh as it is drawn, and the factor.

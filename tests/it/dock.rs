@@ -17,6 +17,8 @@ use rigsmith::{
     test_app::strict_app,
 };
 
+use crate::window_app::decline_foreign_offers;
+
 /// Size of the window as it opens.
 pub const USUAL: [f32; 2] = [1280.0, 720.0];
 
@@ -37,7 +39,7 @@ impl Frames {
         let state = tempfile::tempdir().unwrap();
         let mut app = headless_app(7);
         app.insert_resource(StateFolder(Some(state.path().to_owned())))
-            .add_plugins((FilesPlugin, FollowPlugin, PanelsPlugin, DockPlugin))
+            .add_plugins((FilesPlugin, FollowPlugin, PanelsPlugin, DockPlugin, decline_foreign_offers))
             .add_message::<AppExit>();
         let mut app = strict_app(app);
         app.update();

@@ -112,11 +112,10 @@ impl Studio {
                 taken.0 = Some(shot.image.clone());
             },
         );
-        let image = (0..200).find_map(|_| {
-            self.base.app.update();
-            self.base.app.world_mut().resource_mut::<LastPicture>().0.take()
-        });
-        let image = image.unwrap_or_else(|| panic!("no picture of {name} came back"));
+        let what = format!("the picture of {name}");
+        self.base.app.update();
+        self.base.wait(&what, |base| base.app.world().resource::<LastPicture>().0.is_some());
+        let image = self.base.app.world_mut().resource_mut::<LastPicture>().0.take().expect("it is there");
         if let Some(folder) = &self.folder {
             let path = folder.join(format!("{name}.png"));
             image.clone().try_into_dynamic().unwrap().to_rgb8().save(path).unwrap();

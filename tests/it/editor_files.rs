@@ -4,6 +4,7 @@ mod crashes;
 mod exporting;
 mod failures;
 mod joint_maps;
+mod journals;
 mod views;
 
 use std::{
@@ -48,7 +49,7 @@ use rigsmith::{
 };
 
 use crate::{
-    bench::{AppBench, HANG},
+    bench::{AppBench, HANG, wait},
     window_app::Notices,
 };
 
@@ -288,37 +289,6 @@ fn what_was_saved_opens_the_same() {
 }
 
 #[test]
-fn quitting_asks_about_unsaved_changes_and_leaves_no_journal() {
-    let folder = folder();
-    let mut window = Window::bundled(folder.path());
-    let journal = window.journal();
-    assert!(journal.exists(), "there is a journal before the first edit");
-    window.place(1.0);
-    window.act(Action::Quit);
-    assert!(matches!(window.question(), Some(Question::Unsaved { .. })));
-    assert!(window.base.app.should_exit().is_none());
-    window.answer(Answer::Cancel);
-    assert!(window.question().is_none() && window.base.app.should_exit().is_none() && journal.exists());
-    window.base.app.world_mut().write_message(ActionRequest(Action::Quit));
-    window.update();
-    window.base.app.world_mut().write_message(DialogAnswer(Answer::Save));
-    window.update();
-    assert!(matches!(window.question(), Some(Question::Path { purpose: Purpose::Save, .. })));
-    let path = folder.path().join("guy.rigsmith.ron");
-    window.base.app.world_mut().write_message(DialogAnswer(Answer::Path(path.clone())));
-    let start = Instant::now();
-    while window.base.app.should_exit().is_none() {
-        assert!(start.elapsed() < HANG, "it never quits: {:?}", window.notices.list);
-        window.update();
-    }
-    assert!(path.exists() && !journal.exists());
-    drop(window);
-    let left: Vec<_> = std::fs::read_dir(folder.path().join("state")).into_iter().flatten().flatten().collect();
-    assert!(left.is_empty(), "{left:?}");
-    assert!(!folder.path().join("guy.rigsmith.journal").exists());
-}
-
-#[test]
 fn opening_something_else_asks_first() {
     let folder = folder();
     let mut window = Window::bundled(folder.path());
@@ -357,14 +327,7 @@ fn what_dead_saves_left_is_cleared_at_the_start() {
     app.add_plugins(FilesPlugin).add_message::<bevy::app::AppExit>();
     app.finish();
     app.cleanup();
-    for _ in 0..10_000 {
-        app.update();
-        if dead.iter().all(|path| !path.exists()) {
-            break;
-        }
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    assert!(dead.iter().all(|path| !path.exists()));
+    wait(&mut app, "the end of what dead saves left", App::update, |_| dead.iter().all(|path| !path.exists()));
     assert!(living.exists(), "its process still saves");
 }
 
@@ -465,43 +428,4 @@ fn what_a_fit_made_keeps_its_parts_in_its_first_file() {
         assert_eq!((read.rig.uid(), diff(&read.rig, &window.rig())), (window.rig().uid(), Vec::new()));
         assert_eq!(read.rig.joint(thigh).expect("a thigh").data.rest.translation.y, height);
     }
-}
-
-/// Waits until the journal of a window is at a path.
-fn wait_for_journal(window: &Window, path: &Path) {
-    let start = Instant::now();
-    while window.journal() != path {
-        assert!(start.elapsed() < HANG, "the journal never moves to {}", path.display());
-        std::thread::sleep(Duration::from_millis(2));
-    }
-}
-
-#[test]
-fn the_second_window_on_a_project_is_told() {
-    let told = |window: &Window| window.notices.include(Severity::Warning, "open in another window");
-    let folder = folder();
-    let mut first = Window::bundled(folder.path());
-    first.place(1.0);
-    let project = first.save_as("guy.rigsmith.ron");
-    first.place(1.1);
-    wait_for_journal(&first, &journal_beside(&project));
-    first.settle();
-    assert!(!told(&first), "{:?}", first.notices.list);
-    let mut second = Window::new(folder.path());
-    second.open_file(&project);
-    assert_ne!(second.journal(), journal_beside(&project));
-    second.settle();
-    assert!(told(&second), "{:?}", second.notices.list);
-    assert!(!told(&first), "{:?}", first.notices.list);
-    // The first window's journal is its own: both can be recovered.
-    assert!(journal_beside(&project).exists() && second.journal().exists());
-    second.act(Action::Quit);
-    drop(second);
-    first.act(Action::Save);
-    first.act(Action::Quit);
-    let mut third = Window::new(folder.path());
-    third.open_file(&project);
-    wait_for_journal(&third, &journal_beside(&project));
-    third.settle();
-    assert!(!told(&third), "{:?}", third.notices.list);
 }

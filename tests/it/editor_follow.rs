@@ -25,7 +25,7 @@ use rigsmith::{
 };
 
 use super::{
-    bench::{AppBench, wait_with},
+    bench::{AppBench, save_whole, wait_with},
     part_fields::PART,
     window_app::Notices,
 };
@@ -103,10 +103,12 @@ impl Window {
         wait_with(self, what, Self::frame, is_so, |window| window.notices.list.clone());
     }
 
-    /// Runs frames until nothing is loaded or saved, and the file was looked at several times.
+    /// Runs frames until nothing is loaded or saved, and for a while in which nothing has to happen that is not there after
+    /// four of them.
     fn settle(&mut self) {
         self.until("the end of work", |window| !window.base.has_file_jobs());
         let start = Instant::now();
+        (0..4).for_each(|_| self.frame());
         while start.elapsed() < Duration::from_millis(1200) {
             std::thread::sleep(Duration::from_millis(1));
             self.frame();
@@ -116,7 +118,7 @@ impl Window {
     fn save(&mut self, from: &str, to: &str) {
         let text = fs::read_to_string(&self.file).expect("the template is there");
         assert!(text.contains(from), "{text}");
-        fs::write(&self.file, text.replacen(from, to, 1)).expect("the template is written");
+        save_whole(&self.file, text.replacen(from, to, 1));
     }
 
     fn send<M: Message>(&mut self, message: M) {
@@ -190,6 +192,7 @@ fn what_both_sides_changed_is_a_conflict_that_people_decide() {
             window.offer().into_iter().flat_map(|offer| offer.changes.iter()).filter(|c| c.conflict).count();
         assert_eq!(conflicts, 1);
         window.send(OfferAnswer::Take(take));
+        window.until("the update", |window| window.offer().is_none() && window.height("b") == height);
         window.settle();
         assert_eq!((window.height("b"), window.height("c")), (height, 0.1), "{take:?}");
         assert!(window.offer().is_none(), "{take:?}");
@@ -248,10 +251,10 @@ fn fields_of_parts_that_the_file_changed_are_there_after_the_next_save() {
 #[test]
 fn a_broken_save_changes_nothing_and_is_told() {
     let mut window = Window::new();
-    fs::write(&window.file, "(format: 2, name: \"chain\", joints: [(").expect("the template is written");
+    save_whole(&window.file, "(format: 2, name: \"chain\", joints: [(");
     window.until("the notice", |window| window.notices.include(Severity::Error, "not taken over"));
     assert!(window.offer().is_none() && window.height("b") == 0.3);
-    fs::write(&window.file, CHAIN.replace("0.3", "0.35")).expect("the template is written");
+    save_whole(&window.file, CHAIN.replace("0.3", "0.35"));
     window.until("the offer", |window| window.offer().is_some());
 }
 

@@ -359,14 +359,18 @@ fn a_face_waits_for_steps_that_were_undone_while_it_was_placed() {
 fn placing_can_be_cancelled() {
     let mut bench = bench(bundled("head.obj"));
     let mesh = mesh_of(&mut bench);
-    let before = bench.rig().clone();
+    let (rig, before) = (bench.rig_entity(), bench.rig().clone());
     let app = bench.app_mut();
+    // Nothing lands during a drag, however fast it is computed.
+    begin_drag(app, rig);
     app.world_mut().write_message(FaceRequest { mesh, settings: settings(60), fit: None });
     app.update();
     app.world().get::<FaceJob>(mesh).expect("the job is under way").cancel();
     wait(app, "an answer", App::update, |app| !app.world().resource::<Messages<FacePlaced>>().is_empty());
     let result = app.world_mut().resource_mut::<Messages<FacePlaced>>().drain().last().unwrap().result;
     assert_eq!(result.unwrap_err(), PlaceFaceError::Face(FaceError::Cancelled));
+    app.world_mut().write_message(EditRequest { rig, change: Change::CancelPreview });
+    app.update();
     assert_eq!(*bench.rig(), before);
 }
 

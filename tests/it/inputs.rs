@@ -27,7 +27,7 @@ use rigsmith::{
     test_app::strict_app,
 };
 
-use super::bench::HANG;
+use super::bench::{HANG, save_whole};
 
 const DRIVER: &str = include_str!("../frozen/format-2-inputs.rig.ron");
 
@@ -289,7 +289,7 @@ fn a_hand_of_a_document_holds_a_wheel_through_edits_and_updates() {
     assert!(place(&app, hand).distance(Vec3::new(0.2, 2.0, 0.5)) < 1e-5, "{}", place(&app, hand));
 
     // A saved file with another place for the wheel is taken over.
-    fs::write(&file, DRIVER.replace("(0, 1, 0.5), rotation", "(0.05, 1, 0.5), rotation")).unwrap();
+    save_whole(&file, DRIVER.replace("(0, 1, 0.5), rotation", "(0.05, 1, 0.5), rotation"));
     until(&mut app, &|world| wheel(world.get::<Rig>(rig).unwrap()).rest.translation.x == 0.05);
     assert!(place(&app, hand).distance(Vec3::new(0.15, 2.0, 0.5)) < 1e-5, "{}", place(&app, hand));
     app.world_mut().entity_mut(rig).remove::<RigInputs>();

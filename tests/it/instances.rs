@@ -27,6 +27,7 @@ use bevy::{
     mesh::skinning::SkinnedMesh,
     prelude::*,
     tasks::block_on,
+    time::TimeUpdateStrategy,
 };
 use rigsmith::{
     headless::Workbench,
@@ -43,7 +44,7 @@ use rigsmith::{
 };
 
 use super::{
-    bench::{AppBench, HANG, wait_with},
+    bench::{AppBench, HANG, save_whole, wait_with},
     mutate::Mutator,
     template_text::{CHAIN, Dice},
 };
@@ -68,6 +69,7 @@ impl AppBench {
         let mut app = App::new();
         let files = AssetPlugin { file_path: assets.display().to_string(), ..default() };
         app.add_plugins((MinimalPlugins, files, TransformPlugin, plugin)).init_resource::<InstanceReport>();
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(16)));
         more(&mut app);
         app.add_observer(|_: On<RigBuilt>, mut told: ResMut<InstanceReport>| told.built += 1)
             .add_observer(|failed: On<RigFailed>, mut told: ResMut<InstanceReport>| {
@@ -101,9 +103,10 @@ impl AppBench {
         wait_with(self, what, |game| game.app.update(), done, report);
     }
 
-    /// Updates for a while.
+    /// Updates for a while, in which nothing has to happen that is not there after four updates.
     fn go_on(&mut self, time: Duration) {
         let start = Instant::now();
+        self.frames(4);
         while start.elapsed() < time {
             self.app.update();
             sleep(Duration::from_millis(1));
@@ -232,11 +235,10 @@ fn a_saved_file_reaches_its_instances_and_leaves_the_rest_to_the_bit() {
         game.app.update();
         game.app.update();
         let before = game.places(instance);
-        fs::write(
+        save_whole(
             &path,
             TWO.replace("parent: \"a\", translation: (0, 0.5, 0)", "parent: \"a\", translation: (0, 0.7, 0)"),
-        )
-        .unwrap();
+        );
         game.until("the update", |told| told.updated.len() == 1);
         let changed = game.app.world().get::<RunningTemplate>(instance).unwrap().get().rig.find_label("a_end").unwrap();
         let after = game.places(instance);
@@ -251,12 +253,14 @@ fn a_saved_file_reaches_its_instances_and_leaves_the_rest_to_the_bit() {
         assert_eq!(game.node(instance, "b_end"), other, "the entity stays");
         assert_eq!(game.instance_report().updated, [1]);
         // A comment is no change.
-        fs::write(&path, fs::read_to_string(&path).unwrap().replace("(\n    format", "( // mine\n    format")).unwrap();
+        save_whole(&path, fs::read_to_string(&path).unwrap().replace("(\n    format", "( // mine\n    format"));
+        game.wait("the comment, which stays in what a save writes", |game| {
+            let assets = game.app.world().resource::<Assets<RigTemplate>>();
+            assets.iter().next().unwrap().1.text().contains("// mine")
+        });
         game.go_on(Duration::from_millis(100));
         assert_eq!(game.instance_report().updated, [1]);
         assert!(game.instance_report().failed.is_empty());
-        let assets = game.app.world().resource::<Assets<RigTemplate>>();
-        assert!(assets.iter().next().unwrap().1.text().contains("// mine"), "and stays in what a save writes");
     }
 }
 
@@ -302,9 +306,9 @@ fn the_asset_server_loads_templates_and_a_failed_first_load_is_tried_again() {
     let instance = game.app.world_mut().spawn(RigInstance(handle)).id();
     game.until("the failure", |told| !told.failed.is_empty());
     assert!(game.app.world().get::<RigRuntime>(instance).is_none());
-    fs::write(&path, TWO).unwrap();
+    save_whole(&path, TWO);
     game.until("the first good save", |told| told.built == 1);
-    fs::write(&path, TWO.replace("(0, 1, 0)", "(0, 3, 0)")).unwrap();
+    save_whole(&path, TWO.replace("(0, 1, 0)", "(0, 3, 0)"));
     game.until("the next", |told| told.updated.len() == 1);
     let place = game.node(instance, "a_end");
     assert!((game.app.world().get::<GlobalTransform>(place).unwrap().translation().y - 3.5).abs() < 1e-5);
@@ -408,7 +412,7 @@ fn joints_are_handed_over_and_taken_back() {
         let mut game = AppBench::still_game();
         let instance = game.open(&saved(folder.path(), TWO), mode);
         let joints = ["a", "b", "b_end"].map(|name| game.node(instance, name));
-        game.go_on(Duration::from_millis(5));
+        game.frames(3);
         let places = |game: &AppBench| joints.map(|joint| *game.app.world().get::<GlobalTransform>(joint).unwrap());
         let before = places(&game);
         let to = Isometry3d::new(Vec3::new(1.0, 2.0, 3.0), Quat::from_rotation_z(0.5));
@@ -456,11 +460,11 @@ fn the_asset_server_loads_parts_too() {
         let knee = game.node(instance, "knee");
         game.app.world().get::<GlobalTransform>(knee).unwrap().translation().y
     };
-    game.go_on(Duration::from_millis(50));
+    game.frames(3);
     assert_eq!(height(&mut game), 1.0);
     game.node(instance, "jaw_tip");
-    fs::write(&limb, part.replace("(0, 1, 0)", "(0, 3, 0)")).unwrap();
+    save_whole(&limb, part.replace("(0, 1, 0)", "(0, 3, 0)"));
     game.until("the part", |told| !told.updated.is_empty());
-    game.go_on(Duration::from_millis(50));
+    game.frames(3);
     assert_eq!((height(&mut game), game.instance_report().failed.len()), (3.0, 0));
 }

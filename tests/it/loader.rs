@@ -32,6 +32,7 @@ use rigsmith::{
         palette,
         panel::{EditorPanel, Requests},
         panels::{PanelsPlugin, hierarchy::HierarchyPanel, loader::LoaderPanel, tags::TagsPanel},
+        recovery::Recovery,
         result_queue::HeldPlugin,
     },
     files::{HeaderMemory, RealDisk, SearchPaths, TemplatePlace, list_templates, load_template},
@@ -47,7 +48,10 @@ use rigsmith::{
     test_app::strict_app,
 };
 
-use super::panels::desk::{Desk, Sheet};
+use super::{
+    panels::desk::{Desk, Sheet},
+    window_app::decline_foreign_offers,
+};
 
 /// A part of the left side, with a group, a feature, an option and a socket.
 const LIMB: &str = r#"(
@@ -128,7 +132,7 @@ impl Studio {
         let mut app = headless_app(7);
         app.insert_resource(StateFolder(Some(folder.path().join("state"))))
             .insert_resource(LibraryFolders(Some(SearchPaths { folders: vec![site.clone()] })))
-            .add_plugins((FilesPlugin, FollowPlugin, PanelsPlugin, HeldPlugin))
+            .add_plugins((FilesPlugin, FollowPlugin, PanelsPlugin, HeldPlugin, decline_foreign_offers))
             .add_message::<AppExit>();
         let size = egui::vec2(620.0, 1400.0);
         let desk = Desk::of(strict_app(app), Entity::PLACEHOLDER, sheet, size);
@@ -171,6 +175,7 @@ impl Studio {
             let world = self.world();
             let busy = world.resource::<LoadJob>().what().is_some()
                 || world.resource::<SaveJob>().what().is_some()
+                || world.resource::<Recovery>().is_looking()
                 || world.resource::<LibraryJobs>().what().is_some()
                 || world.resource::<TemplateSave>().is_writing()
                 || world.resource::<TemplateLibrary>().is_listing();

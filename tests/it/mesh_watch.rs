@@ -1,6 +1,6 @@
 //! The window reads a mesh again that another program saved, and keeps what it has where the file is none.
 
-use std::{fs, time::Duration};
+use std::fs;
 
 use bevy::prelude::*;
 use rigsmith::{
@@ -10,10 +10,11 @@ use rigsmith::{
         mesh_watch::MeshWatchPlugin,
         notice::Severity,
     },
+    instance::FollowedModels,
     plugins::surface::{RigMesh, RigMeshes},
 };
 
-use super::window_app::WindowBench;
+use super::{bench::save_whole, window_app::WindowBench};
 
 fn cube(half: f32) -> String {
     let mut text = String::new();
@@ -44,19 +45,15 @@ fn a_saved_mesh_is_read_again_and_a_broken_one_is_told() {
     };
     window.until("the mesh", |window| half(window) == Some(0.5) && !window.base.has_file_jobs());
     // The file is looked at before it changes.
-    let looks = std::time::Instant::now();
-    while looks.elapsed() < Duration::from_millis(700) {
-        window.frame();
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    fs::write(&file, cube(0.75)).unwrap();
+    window.until("the first look", |window| window.world().resource::<FollowedModels>().is_followed(&file));
+    save_whole(&file, cube(0.75));
     window.until("the next version", |window| {
         let is_told = window.notices.list.iter().any(|notice| notice.text.contains("was read again"));
         half(window) == Some(0.75) && is_told
     });
-    fs::write(&file, "v 1 2\nf 1 2 3 4 5 6 7 8 9\n").unwrap();
+    save_whole(&file, "v 1 2\nf 1 2 3 4 5 6 7 8 9\n");
     window.until("the error", |window| window.notices.include(Severity::Error, ""));
     assert_eq!(half(&window), Some(0.75), "a broken file changes nothing");
-    fs::write(&file, cube(0.6)).unwrap();
+    save_whole(&file, cube(0.6));
     window.until("the version after the broken one", |window| half(window) == Some(0.6));
 }

@@ -1,17 +1,22 @@
 //! Model files that are saved while a game runs, in every way that programs save.
 
 use std::{
-    fs,
+    ffi::OsString,
+    fs, io,
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
     time::{Duration, Instant, SystemTime},
 };
 
 use bevy::{ecs::message::MessageCursor, prelude::*};
 use rigsmith::{
-    files::{ModelWatch, RealDisk, SETTLE, load_model},
+    files::{Disk, DiskFile, Entry, ModelWatch, RealDisk, SETTLE, load_model},
     instance::{
-        InstanceSkins, ModelFault, ModelFile, ModelFilesPlugin, RigInstance, RigInstancePlugin, RigSource, RigTemplate,
+        FollowedModels, InstanceSkins, ModelFault, ModelFile, ModelFilesPlugin, RigInstance, RigInstancePlugin,
+        RigSource, RigTemplate,
     },
     plugins::{
         document::{Change, EditRequest},
@@ -22,7 +27,7 @@ use rigsmith::{
     rig::{Rig, Uid},
 };
 
-use crate::bench::{AppBench, wait_with};
+use crate::bench::{AppBench, HANG, save_whole, wait_with};
 
 /// A square column around [`ARM`], that wide, with so many rings of points.
 fn column(width: f32, rings: u32) -> String {
@@ -74,16 +79,30 @@ impl Watched {
         self.folder.path().join(name)
     }
 
+    fn look(&mut self) {
+        self.now += Duration::from_millis(10);
+        if self.watch.look_at(&RealDisk, self.now)
+            && let Some(model) = self.watch.read(&RealDisk)
+        {
+            self.read.push(model.ok().map(|model| model.points.len()));
+        }
+    }
+
     fn pass(&mut self, time: Duration) {
         let end = self.now + time;
         while self.now < end {
-            self.now += Duration::from_millis(10);
-            if self.watch.look_at(&RealDisk, self.now)
-                && let Some(model) = self.watch.read(&RealDisk)
-            {
-                self.read.push(model.ok().map(|model| model.points.len()));
-            }
+            self.look();
         }
+    }
+
+    /// Looks until a version is as expected: the watch rests longer where the machine takes long to read.
+    fn until(&mut self, what: &str, is_expected: impl Fn(&Option<usize>) -> bool) {
+        let start = Instant::now();
+        while !self.read.iter().any(&is_expected) {
+            assert!(start.elapsed() < HANG, "{what}: {:?}", self.read);
+            self.look();
+        }
+        self.pass(40 * SETTLE);
     }
 }
 
@@ -161,7 +180,7 @@ fn every_way_of_saving_is_one_version() {
     for (way, save) in ways {
         let mut watched = Watched::new("a.obj", &before);
         save(&mut watched);
-        watched.pass(40 * SETTLE);
+        watched.until(way, Option::is_some);
         let points = if way == "of the same length and time" { 16 } else { 24 };
         let good: Vec<usize> = watched.read.iter().flatten().copied().collect();
         assert_eq!(good, [points], "{way}: {:?}", watched.read);
@@ -174,11 +193,85 @@ fn every_way_of_saving_is_one_version() {
 fn a_broken_file_is_told_once_and_the_next_good_one_is_read() {
     let mut watched = Watched::new("a.obj", &column(0.1, 4));
     fs::write(watched.at("a.obj"), "v 1 2\nf 1 2 3 4 5 6 7 8 9\n").unwrap();
-    watched.pass(40 * SETTLE);
+    watched.until("the broken file", Option::is_none);
     assert_eq!(watched.read, [None]);
     fs::write(watched.at("a.obj"), column(0.1, 5)).unwrap();
-    watched.pass(40 * SETTLE);
+    watched.until("the good file", Option::is_some);
     assert_eq!(watched.read, [None, Some(20)]);
+}
+
+/// A disk on which a file is saved right before the opening of a file with that number, from 1; it can only be read.
+struct RacedDisk {
+    file: PathBuf,
+    content: String,
+    number: usize,
+    opened: AtomicUsize,
+}
+
+impl Disk for RacedDisk {
+    fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
+        RealDisk.entry(path, follow)
+    }
+    fn read_link(&self, path: &Path) -> io::Result<PathBuf> {
+        RealDisk.read_link(path)
+    }
+    fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
+        RealDisk.canonical(path)
+    }
+    fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
+        RealDisk.list(folder, limit)
+    }
+    fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>> {
+        if self.opened.fetch_add(1, Ordering::Relaxed) + 1 == self.number {
+            save_whole(&self.file, &self.content);
+        }
+        RealDisk.open(path)
+    }
+    fn create(&self, _: &Path) -> io::Result<Box<dyn DiskFile>> {
+        unreachable!()
+    }
+    fn rename(&self, _: &Path, _: &Path) -> io::Result<()> {
+        unreachable!()
+    }
+    fn hard_link(&self, _: &Path, _: &Path) -> io::Result<()> {
+        unreachable!()
+    }
+    fn sync_folder(&self, _: &Path) -> io::Result<()> {
+        unreachable!()
+    }
+    fn remove(&self, _: &Path) -> io::Result<()> {
+        unreachable!()
+    }
+    fn create_folder(&self, _: &Path) -> io::Result<()> {
+        unreachable!()
+    }
+}
+
+#[test]
+fn a_version_that_is_saved_while_another_one_is_read_is_not_missed() {
+    // Reads a version, while the next one is saved right before the opening of a file; the number of openings, too.
+    let raced = |number: usize| {
+        let mut watched = Watched::new("a.obj", &column(0.1, 4));
+        let file = watched.at("a.obj");
+        save_whole(&file, column(0.1, 5));
+        let start = Instant::now();
+        while !watched.watch.look_at(&RealDisk, watched.now) {
+            assert!(start.elapsed() < HANG, "the version is not noticed");
+            watched.now += Duration::from_millis(10);
+        }
+        let disk = RacedDisk { file, content: column(0.1, 6), number, opened: AtomicUsize::new(0) };
+        let model = watched.watch.read(&disk);
+        watched.read.extend(model.map(|model| model.ok().map(|model| model.points.len())));
+        (watched, disk.opened.into_inner())
+    };
+    let (alone, opened) = raced(0);
+    assert_eq!(alone.read, [Some(20)]);
+    assert!(opened > 1, "it is read, and hashed");
+    for number in 1..=opened {
+        let (mut watched, _) = raced(number);
+        watched.until("the version that was saved meanwhile", |points| *points == Some(24));
+        assert_eq!(watched.read.iter().filter(|points| **points == Some(24)).count(), 1, "{number} of {opened}");
+    }
 }
 
 /// A triangle as `.gltf`, whose points are in `a.bin`.
@@ -200,12 +293,11 @@ fn a_file_that_the_model_names_is_followed() {
     let mut watch = ModelWatch::new(&at("a.gltf"));
     watch.know(&RealDisk);
     fs::write(at("a.bin"), points(2.0)).unwrap();
-    let mut now = Instant::now();
-    let mut looks = 0..2000;
-    assert!(looks.any(|_| {
+    let (start, mut now) = (Instant::now(), Instant::now());
+    while !watch.look_at(&RealDisk, now) {
+        assert!(start.elapsed() < HANG, "the other buffer is not noticed");
         now += Duration::from_millis(10);
-        watch.look_at(&RealDisk, now)
-    }));
+    }
     let model = watch.read(&RealDisk).unwrap().unwrap();
     assert_eq!(model.points.iter().map(|point| point.y).fold(0.0, f32::max), 2.0);
 }
@@ -259,8 +351,10 @@ impl Game {
         wait_with(self, what, Self::update, is_so, |game| game.told.clone());
     }
 
-    /// Updates until the files have been looked at a few times.
+    /// Updates until the file is followed, and for a while in which nothing more has to happen.
     fn settle(&mut self) {
+        let path = self.path();
+        self.until("the first look", |game| game.base.app.world().resource::<FollowedModels>().is_followed(&path));
         let start = Instant::now();
         while start.elapsed() < Duration::from_millis(200) {
             std::thread::sleep(Duration::from_millis(1));
@@ -269,14 +363,8 @@ impl Game {
     }
 
     fn save(&self, text: &str) {
-        save(&self.path(), text);
+        save_whole(&self.path(), text);
     }
-}
-
-fn save(path: &Path, text: &str) {
-    let beside = path.with_extension("saving");
-    fs::write(&beside, text).unwrap();
-    fs::rename(&beside, path).unwrap();
 }
 
 #[test]

@@ -24,7 +24,11 @@ use rigsmith::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{bench::HANG, saved_text, template_text::apply};
+use super::{
+    bench::{HANG, save_whole},
+    saved_text,
+    template_text::apply,
+};
 
 pub(super) const FINGER: &str = r#"(
     format: 2,
@@ -293,7 +297,7 @@ fn a_saved_part_reaches_every_character_that_uses_it() {
         built.nodes.iter().filter_map(of).collect()
     };
     let before: Vec<Vec<f32>> = characters.iter().map(|(character, _)| sizes(&app, *character)).collect();
-    fs::write(&part, FINGER.replace("relative_size: 0.5", "relative_size: 0.6")).unwrap();
+    save_whole(&part, FINGER.replace("relative_size: 0.5", "relative_size: 0.6"));
     until(&mut app, "the saved part", |told| told.updated.len() == 3);
     let told = app.world().resource::<InstanceReport>();
     assert_eq!(told.failed, Vec::<String>::new());
@@ -310,10 +314,10 @@ fn a_saved_part_reaches_every_character_that_uses_it() {
         assert_eq!(ran.len(), fingers - usize::from(number == 0), "character {number}");
     }
     // A part that breaks changes nothing; the next good save is taken over.
-    fs::write(&part, "(format: 2, name: \"finger\", joints: [").unwrap();
+    save_whole(&part, "(format: 2, name: \"finger\", joints: [");
     until(&mut app, "the failure", |told| told.failed.len() == 3);
     assert!(app.world().resource::<InstanceReport>().failed[0].contains("finger.rig.ron"));
-    fs::write(&part, FINGER).unwrap();
+    save_whole(&part, FINGER);
     until(&mut app, "the good part", |told| told.updated.len() == 6);
     assert_eq!(sizes(&app, characters[1].0), before[1]);
 }

@@ -182,7 +182,7 @@ fn a_million_joints_are_read_quickly() {
         println!("{name}: {} bytes in {took:?}", text.len());
         assert_eq!(rig.joints.len(), 1_000_000);
         // A step that takes time with the square of a million lines takes hours.
-        assert!(took < crate::bench::HANG, "{name}: {took:?}");
+        assert!(took < 10 * crate::bench::HANG, "{name}: {took:?}");
     }
 }
 

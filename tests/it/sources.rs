@@ -2,12 +2,7 @@
 
 mod long_life;
 
-use std::{
-    collections::HashSet,
-    fs,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{collections::HashSet, fs, path::PathBuf, sync::Arc};
 
 use bevy::{ecs::system::RunSystemOnce, prelude::*};
 use rigsmith::{
@@ -35,7 +30,7 @@ use rigsmith::{
 };
 
 use super::{
-    bench::{RigBench, wait_with},
+    bench::{RigBench, save_whole, wait_with},
     template_text::{CHAIN, Dice},
 };
 
@@ -334,11 +329,4 @@ impl Studio {
     fn is_built(&self, node: Uid) -> bool {
         self.base.get::<BuildResult>(self.base.rig).unwrap().0.node(node).is_some()
     }
-}
-
-/// Saves a text by a rename, so that nobody reads half of it: how other ways to save are taken is tested elsewhere.
-fn save_whole(path: &Path, text: &str) {
-    let beside = path.with_extension("saved");
-    fs::write(&beside, text).unwrap();
-    fs::rename(&beside, path).unwrap();
 }

@@ -291,7 +291,7 @@ fn large_nonsense_is_refused_and_never_hangs() {
         assert!(read_template(text.as_bytes()).is_err());
     }
     // What takes time with the square of a text of 4 MiB takes hours.
-    assert!(started.elapsed() < crate::bench::HANG, "{:?}", started.elapsed());
+    assert!(started.elapsed() < 10 * crate::bench::HANG, "{:?}", started.elapsed());
 }
 
 #[test]

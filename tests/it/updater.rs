@@ -36,7 +36,11 @@ use rigsmith::{
     test_app::strict_app,
 };
 
-use super::panels::desk::{Desk, Sheet};
+use super::{
+    bench::save_whole,
+    panels::desk::{Desk, Sheet},
+    window_app::decline_foreign_offers,
+};
 
 const CHAIN: &str = r#"(
     format: 2,
@@ -73,7 +77,7 @@ impl Studio {
         let mut app = headless_app(7);
         app.insert_resource(StateFolder(Some(folder.path().join("state"))))
             .insert_resource(LibraryFolders(Some(SearchPaths::default())))
-            .add_plugins((FilesPlugin, FollowPlugin, PanelsPlugin, DockPlugin))
+            .add_plugins((FilesPlugin, FollowPlugin, PanelsPlugin, DockPlugin, decline_foreign_offers))
             .add_message::<AppExit>();
         let sheet = Sheet::Panel(Box::new(UpdaterPanel::default()));
         let desk = Desk::of(strict_app(app), Entity::PLACEHOLDER, sheet, egui::vec2(320.0, 500.0));
@@ -89,9 +93,10 @@ impl Studio {
         studio
     }
 
-    /// Runs frames until the file was looked at several times.
+    /// Runs frames for a while, in which nothing has to happen that is not there after four of them.
     fn settle(&mut self) {
         let start = Instant::now();
+        self.desk.frames(4);
         while start.elapsed() < Duration::from_millis(1200) {
             self.desk.frame();
             std::thread::sleep(Duration::from_millis(1));
@@ -112,7 +117,7 @@ impl Studio {
     }
 
     fn save(&mut self, text: &str) {
-        fs::write(&self.file, text).unwrap();
+        save_whole(&self.file, text);
         self.desk.until("the offer", |desk| desk.app.world().get::<UpdateOffer>(desk.rig).is_some());
         self.desk.frames(2);
     }
@@ -318,7 +323,7 @@ fn an_update_is_left_and_later_ones_come_live() {
         let rig = desk.rig();
         rig.find_label("b").and_then(|b| rig.joint(b)).is_some_and(|b| b.data.rest.translation.y == 0.6)
     });
-    fs::write(&studio.file, CHAIN.replace("(0, 0.4, 0)", "(0, 0.9, 0)")).unwrap();
+    save_whole(&studio.file, CHAIN.replace("(0, 0.4, 0)", "(0, 0.9, 0)"));
     studio.desk.until("the live update", |desk| {
         let rig = desk.rig();
         rig.find_label("c").and_then(|c| rig.joint(c)).is_some_and(|c| c.data.rest.translation.y == 0.9)
@@ -329,6 +334,11 @@ fn an_update_is_left_and_later_ones_come_live() {
     assert_eq!(studio.height("c"), 0.1);
     let take = ActionRequest(Action::Library(LibraryAction::TakeTheirs));
     studio.desk.app.world_mut().write_message(take);
+    studio.desk.until("the answer", |desk| {
+        let rig = desk.rig();
+        let c = rig.find_label("c").and_then(|c| rig.joint(c));
+        c.is_some_and(|c| (c.data.rest.translation.y - 0.95).abs() < 1e-6)
+    });
     studio.settle();
     assert!((studio.height("c") - 0.95).abs() < 1e-6);
     studio.desk.click("Live");

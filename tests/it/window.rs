@@ -3,6 +3,7 @@
 //! Needs `Xvfb`, `xdotool` and a graphics adapter (a software one will do); it says what is missing, and fails for it
 //! where `RIGSMITH_REQUIRE_GPU=1`. `RIGSMITH_SHOTS` names a folder for pictures of the window on the way.
 
+mod mouse;
 mod pictures;
 mod whole_job;
 
@@ -15,7 +16,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use rigsmith::{editor::report::WindowReport, files::FileKind, render::adapter};
+use rigsmith::{
+    editor::report::WindowReport,
+    files::{
+        FileKind,
+        journal::{Basis, file_hash, recover},
+    },
+    render::adapter,
+};
 
 use crate::prerequisites::{skip, test_data};
 
@@ -159,8 +167,10 @@ impl<'a> Hands<'a> {
         self.until("a path is asked for", |report| report.asked);
         // The question may be known before it is drawn and its field has the keyboard.
         sleep(Duration::from_millis(2500));
+        self.frames();
         self.write(name);
         sleep(Duration::from_millis(500));
+        self.frames();
         self.shot("answered");
         self.key("Return");
         self.until("the question is answered", |report| !report.asked);
@@ -182,31 +192,6 @@ impl<'a> Hands<'a> {
         self.shot("pose");
     }
 
-    fn drag(&self, line: &[[f32; 2]]) {
-        self.count("drag".to_owned());
-        let place = |at: [f32; 2]| [at[0].round().to_string(), at[1].round().to_string()];
-        let [x, y] = place(line[0]);
-        self.xdotool(&["mousemove", &x, &y]);
-        sleep(Duration::from_millis(200));
-        self.xdotool(&["mousedown", "1"]);
-        for w in line.windows(2) {
-            for step in 1..=6 {
-                let t = step as f32 / 6.0;
-                let [x, y] = place([w[0][0] + (w[1][0] - w[0][0]) * t, w[0][1] + (w[1][1] - w[0][1]) * t]);
-                self.xdotool(&["mousemove", &x, &y]);
-            }
-        }
-        sleep(Duration::from_millis(200));
-        self.xdotool(&["mouseup", "1"]);
-    }
-
-    fn click(&self, at: [f32; 2]) {
-        self.count("click".to_owned());
-        self.xdotool(&["mousemove", &at[0].round().to_string(), &at[1].round().to_string()]);
-        sleep(Duration::from_millis(300));
-        self.xdotool(&["click", "1"]);
-    }
-
     /// The middle of the last drawn widget that is meant, once it stands still and can be used: popups are drawn last.
     fn widget(&self, what: &str, is_meant: impl Fn(&str) -> bool) -> [f32; 2] {
         let find = |report: &WindowReport| {
@@ -217,6 +202,7 @@ impl<'a> Hands<'a> {
         loop {
             let seen = self.until(&format!("there is {what}"), |report| find(report).is_some());
             sleep(Duration::from_millis(700));
+            self.frames();
             let again = self.report().as_ref().and_then(find);
             if let Some([left, top, width, height]) = again.filter(|again| find(&seen) == Some(*again)) {
                 return [left + 0.5 * width, top + 0.5 * height];
@@ -313,6 +299,21 @@ fn pixel(report: &WindowReport, place: [f32; 3]) -> [f32; 2] {
     at
 }
 
+/// True once a journal beside the project, or in the folder of the window's state, holds a change that the project lacks.
+fn is_change_kept(folder: &Path) -> bool {
+    let files = [folder.to_owned(), folder.join("state")].map(std::fs::read_dir).into_iter().flatten().flatten();
+    let paths = files.flatten().map(|file| file.path());
+    let journals = paths.filter(|path| path.extension().is_some_and(|ending| ending == "journal"));
+    let hash = |path: &Path| std::fs::read(path).ok().map(|bytes| file_hash(&bytes));
+    let holds = |bytes: Vec<u8>| {
+        recover(&bytes).is_ok_and(|journal| match journal.basis(hash) {
+            Basis::Project { contained } => journal.changes().len() > contained,
+            _ => false,
+        })
+    };
+    journals.flat_map(std::fs::read).any(holds)
+}
+
 /// Fitted, skinned and posed in six gestures: a key, a key, a key, a click, a drag; and all of a fit taken back with one key.
 #[test]
 fn a_body_is_fitted_by_a_key_on_a_display_and_gpu() {
@@ -347,6 +348,7 @@ fn a_body_is_fitted_by_a_key_on_a_display_and_gpu() {
     assert_eq!(corrected.steps.last().map(String::as_str), Some("Fit around"), "{:?}", corrected.steps);
     hands.shot("corrected");
     hands.key("Return");
+    hands.until("the fit is accepted", |report| report.widgets.iter().all(|widget| widget.name != "Accept"));
     hands.key("b");
     hands.until("it is skinned", |report| report.skinned == 1 && !report.busy);
     hands.shot("fitted_and_skinned");
@@ -382,6 +384,7 @@ fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
         let line: Vec<[f32; 2]> = stroke.iter().map(|place| at(*place)).collect();
         hands.drag(&line);
         sleep(Duration::from_millis(800));
+        hands.frames();
         hands.shot(["stroke_spine", "stroke", "stroke_leg"][number]);
         hands.key("Return");
         hands.until("the stroke is taken", |report| report.steps.len() == number + 1 && !report.busy);
@@ -406,6 +409,7 @@ fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
         hands.click(joint);
         hands.until("a joint is selected", |report| report.selected == 1);
         sleep(Duration::from_millis(500));
+        hands.frames();
         hands.drag(&[[joint[0] + ring, joint[1]], [joint[0] + 0.8 * ring, joint[1] - 0.6 * ring]]);
         // A drag shows before it is a step.
         hands.within(PATIENCE / 6, |report| report.posed > 0 && report.steps.len() == 5 && !report.busy)
@@ -439,12 +443,17 @@ fn a_person_rigs_a_body_by_hand_on_a_display_and_gpu() {
     hands.until("joints are selected", |report| report.mode == "Select");
     hands.key("shift+p");
     hands.until("the pose is taken back", |report| report.posed == 0);
-    sleep(Duration::from_millis(300));
+    let start = Instant::now();
+    while !is_change_kept(folder) {
+        assert!(start.elapsed() < PATIENCE, "the journal does not hold the change");
+        sleep(Duration::from_millis(50));
+    }
     drop(hands);
 
     let hands = Hands::open(&display, folder, &project);
     hands.until("the work is offered back", |report| report.asked);
     sleep(Duration::from_millis(1500));
+    hands.frames();
     hands.shot("offered");
     hands.key("Return");
     let recovered = hands.until("the work is back", |report| {

@@ -6,7 +6,10 @@ use bevy::{app::Plugins, ecs::message::MessageCursor, prelude::*};
 use rigsmith::{
     editor::{
         ActiveRig,
-        files::{LoadJob, SaveJob, StateFolder},
+        files::{
+            LoadJob, SaveJob, StateFolder,
+            dialog::{Answer, Dialog, DialogAnswer, Question},
+        },
         notice::{Notice, Severity},
     },
     headless::headless_app,
@@ -15,11 +18,25 @@ use rigsmith::{
 
 use crate::bench::{AppBench, wait_with};
 
+/// Declines offers of work that other tests left in the system's folder for temporary files, which all of them share.
+pub fn decline_foreign_offers(app: &mut App) {
+    app.add_systems(Last, decline);
+}
+
+fn decline(dialog: Option<Res<Dialog>>, mut commands: Commands) {
+    let Some(Question::Recover(list)) = dialog.as_ref().and_then(|dialog| dialog.question()) else { return };
+    let shared = std::env::temp_dir();
+    if list.iter().all(|pending| pending.path.parent() == Some(shared.as_path())) {
+        commands.write_message(DialogAnswer(Answer::Cancel));
+    }
+}
+
 impl AppBench {
     /// An app with these plugins of the window, whose journals lie in a folder.
     pub fn with_files<M>(state: PathBuf, plugins: impl Plugins<M>) -> Self {
         let mut app = headless_app(7);
-        app.insert_resource(StateFolder(Some(state))).add_plugins(plugins).add_message::<AppExit>();
+        app.insert_resource(StateFolder(Some(state))).add_plugins(plugins).add_plugins(decline_foreign_offers);
+        app.add_message::<AppExit>();
         Self::bare(strict_app(app))
     }
 

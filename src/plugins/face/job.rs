@@ -277,7 +277,12 @@ pub(super) fn land(
             (Some(_), _) if job.progress.cancelled.load(Ordering::Relaxed) => Some(Err(FaceError::Cancelled.into())),
             (Some(held), _) => Some(Ok(held)),
             (None, Some(late)) => Some(Err(late.into())),
-            (None, None) => check_ready(&mut job.task).map(|result| result.map_err(PlaceFaceError::from)),
+            // A computation that ends before it notices the wish to stop has no result either.
+            (None, None) => check_ready(&mut job.task).map(|result| {
+                let result = result.map_err(PlaceFaceError::from);
+                let is_cancelled = job.progress.cancelled.load(Ordering::Relaxed);
+                if is_cancelled { result.and(Err(FaceError::Cancelled.into())) } else { result }
+            }),
         };
         let Some(finished) = finished else { continue };
         let result = match (finished, rigs.get(of.0)) {

@@ -1,6 +1,6 @@
 //! Crashes of a window: journals are offered, recovered and kept.
 
-use super::*;
+use super::{journals::crash, *};
 
 #[test]
 fn a_crash_loses_nothing() {
@@ -12,7 +12,7 @@ fn a_crash_loses_nothing() {
     let (rig, points) = (window.rig(), window.mesh().map(|mesh| mesh.rest.points.clone()));
     let journal = window.journal();
     assert!(journal.starts_with(folder.path().join("state")));
-    drop(window);
+    crash(window);
 
     let mut window = Window::bundled(folder.path());
     let Some(Question::Recover(list)) = window.question() else { panic!("nothing is offered") };
@@ -28,7 +28,7 @@ fn a_crash_loses_nothing() {
     window.change(Change::Undo);
     assert_eq!(window.rig().len(), rig.len() - 1);
     // A second crash.
-    drop(window);
+    crash(window);
     let mut window = Window::bundled(folder.path());
     let offered = match window.question() {
         Some(Question::Recover(list)) => list.iter().find(|p| p.path.starts_with(folder.path())).cloned(),
@@ -47,7 +47,7 @@ fn a_damaged_journal_is_offered_recovered_and_kept() {
         window.place(height);
     }
     let journal = window.journal();
-    drop(window);
+    crash(window);
     let mut bytes = std::fs::read(&journal).expect("the journal of the crash");
     // In the text of the last step but one.
     let middle = bytes.windows(5).enumerate().filter(|(_, word)| word == b"after").map(|(at, _)| at).nth(1).unwrap();
@@ -77,7 +77,7 @@ fn a_damaged_journal_is_offered_recovered_and_kept() {
     // Nobody is asked about the other one again before the next start, and it stays until somebody says so.
     window.answer(Answer::Cancel);
     assert!(unreadable.exists());
-    drop(window);
+    crash(window);
     let mut window = Window::bundled(folder.path());
     window.answer(Answer::Forget(unreadable.clone()));
     assert!(!unreadable.exists() && PathBuf::from(kept).exists());
@@ -91,7 +91,7 @@ fn a_crash_after_saving_recovers_what_came_later() {
     let path = window.save_as("guy.rigsmith.ron");
     window.place(0.5);
     let rig = window.rig();
-    drop(window);
+    crash(window);
     let mut window = Window::new(folder.path());
     window.open_file(&path);
     let Some(Question::Recover(list)) = window.question() else {

@@ -242,7 +242,8 @@ fn a_file_without_clips_that_can_be_read_is_an_error() {
     let clips = game.app.world().resource::<AssetServer>().load::<RigAnimation>("bad.anim.ron");
     let instance = game.open(&path, InstanceMode::Direct);
     game.app.world_mut().entity_mut(instance).insert(InstanceClips(clips.clone()));
-    game.go_on(Duration::from_millis(100));
+    game.wait("the refused file", |game| game.app.world().resource::<AssetServer>().load_state(&clips).is_failed());
+    game.frames(4);
     assert!(told(&game).bound.is_empty() && game.app.world().get::<RigClips>(instance).is_none());
     assert!(game.app.world().get::<RigInstance>(instance).is_some());
 }

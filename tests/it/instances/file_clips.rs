@@ -10,7 +10,7 @@ use rigsmith::{
     plugins::runtime::InstanceMode,
 };
 
-use std::{collections::BTreeSet, path::Path, time::Duration};
+use std::{collections::BTreeSet, path::Path};
 
 use super::{AppBench, TWO, saved};
 
@@ -97,7 +97,7 @@ fn a_clip_of_the_file_moves_the_joints_that_the_rig_leaves_free() {
         assert_eq!(game.app.world().get::<SkinnedMesh>(loaded.mesh).unwrap().joints, joints);
         assert_eq!(game.app.world().resource::<Held>().0, Vec::<String>::new(), "nothing moves yet");
         loaded.play(&mut game);
-        game.go_on(Duration::from_millis(100));
+        game.frames(6);
         let running = game.app.world().get::<RunningTemplate>(instance).unwrap().get().clone();
         let driven: BTreeSet<&str> = NODES
             .iter()

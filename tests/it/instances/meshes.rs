@@ -21,14 +21,13 @@ use rigsmith::{
 };
 
 use std::{
-    fs,
     path::Path,
     sync::Arc,
     time::{Duration, Instant},
 };
 
 use super::{AppBench, Bindings, HANG, TWO, saved};
-use crate::prerequisites::test_data;
+use crate::{bench::save_whole, prerequisites::test_data};
 
 /// A tube around both chains of [`TWO`], as a mesh of an instance.
 fn tube() -> RigMesh {
@@ -95,16 +94,17 @@ fn meshes_of_instances_are_bound_once_for_all() {
     };
     assert!(held(1, "a") > 0.9 && held(25, "b") > 0.9 && held(1, "b") == 0.0, "{} {}", held(1, "a"), held(25, "b"));
     // A value of a control leaves the weights; another place of a joint at rest binds anew.
-    fs::write(
+    save_whole(
         &path,
         TWO.replace("control(creation: (name: \"ctl_b\"))", "control(size: 0.7, creation: (name: \"ctl_b\"))"),
-    )
-    .unwrap();
+    );
     game.until("the update", |told| told.updated.len() == 2);
     game.go_on(Duration::from_millis(50));
     assert!(Arc::ptr_eq(&skin(&game, meshes[1]).unwrap(), &skins[1]));
-    fs::write(&path, TWO.replace("parent: \"a\", translation: (0, 0.5, 0)", "parent: \"a\", translation: (0, 0.3, 0)"))
-        .unwrap();
+    save_whole(
+        &path,
+        TWO.replace("parent: \"a\", translation: (0, 0.5, 0)", "parent: \"a\", translation: (0, 0.3, 0)"),
+    );
     game.until("the other update", |told| told.updated.len() == 4);
     let start = Instant::now();
     while game.app.world().resource::<InstanceSkins>().computed() < 2 {
@@ -177,7 +177,7 @@ fn a_loaded_character_with_an_animation_of_its_own_is_moved_by_an_instance() {
         // The rest pose of the rig is that of the file, so the character stands as it did.
         let hand = game.node(instance, &above);
         assert_eq!(game.app.world().get::<ChildOf>(animated).map(|of| of.0), Some(hand));
-        game.go_on(Duration::from_millis(100));
+        game.frames(6);
         let played = game.app.world().get::<Transform>(animated).unwrap().translation;
         assert!(played.y > 0.0, "{mode:?}: the file's own animation goes on, {played}");
     }

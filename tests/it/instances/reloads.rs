@@ -18,6 +18,7 @@ use rigsmith::{
 
 use super::{AppBench, HANG, TWO, saved};
 use crate::{
+    bench::save_whole,
     mutate::Mutator,
     template_text::{CHAIN, Dice},
 };
@@ -34,11 +35,7 @@ fn a_thousand_broken_files_on_the_disk_change_nothing_and_are_told() {
     let mut mutator = Mutator::new(17, &[b"tags", b")", b"["], 1 << 16);
     let dice = &mut Dice(UidSource::seeded(18));
     let mut last = CHAIN.as_bytes().to_vec();
-    let save = |content: &[u8]| {
-        let beside = folder.path().join("saving");
-        fs::write(&beside, content).unwrap();
-        fs::rename(&beside, &path).unwrap();
-    };
+    let save = |content: &[u8]| save_whole(&path, content);
     let mut count = 0;
     while count < 1000 {
         let content = match dice.below(3) {
@@ -104,7 +101,7 @@ fn no_frame_of_a_reload_shows_the_rest_pose_or_moves_an_untouched_limb() {
             let offset = PoseOffset { translation: Vec3::new(0.05, 0.1, 0.03), ..PoseOffset::IDENTITY };
             game.app.world_mut().run_system_once(move |mut poses: ControlPoses| poses.set(node, offset)).unwrap();
         }
-        game.go_on(Duration::from_millis(20));
+        game.frames(4);
         let posed = game.places(instance);
         let stands_off = |places: &BTreeMap<Uid, (GlobalTransform, Option<ControlPose>)>, uid: &Uid| {
             let (Some(now), Some(rest)) = (places.get(uid), rest.get(uid)) else { return false };
@@ -221,7 +218,7 @@ fn what_a_part_with_another_name_brings_keeps_its_poses() {
         // A joint more tells when the version is there.
         let next =
             text.replace("index", "pointer").replace("(label: \"a\"),", "(label: \"a\"),\n        (label: \"c\"),");
-        fs::write(&path, next).unwrap();
+        save_whole(&path, next);
         game.until("the other name", |told| !told.updated.is_empty());
         game.node(instance, "c");
         assert_eq!(game.node(instance, "tip"), control, "{mode:?}: the entity stays");

@@ -50,6 +50,7 @@ use rigsmith::{
             weights::WeightsPanel,
         },
         pointer::ViewportArea,
+        recovery::Recovery,
         screen::ScreenPlugin,
         settings::{SettingsFolder, SettingsPlugin},
         start::StartPlugin,
@@ -196,7 +197,8 @@ impl Walk {
             let world = self.desk.app.world();
             let is_busy = world.resource::<LibraryJobs>().what().is_some()
                 || world.resource::<LoadJob>().what().is_some()
-                || world.resource::<SaveJob>().what().is_some();
+                || world.resource::<SaveJob>().what().is_some()
+                || world.resource::<Recovery>().is_looking();
             // Work that other tests left in the system's folder for temporary files is none of ours.
             let asks = matches!(world.resource::<Dialog>().question(), Some(Question::Recover(_)));
             if asks {

@@ -22,6 +22,7 @@ use rigsmith::{
 };
 
 use super::figure::Figure;
+use crate::bench::wait;
 
 /// Edits that turn the features of a name on or off.
 fn switch(rig: &Rig, feature: &str, on: bool) -> Vec<RigEdit> {
@@ -47,15 +48,13 @@ fn app(feature: &str) -> Workbench {
 
 /// Updates an app until its background jobs are over and what they found is in the document.
 fn settle(bench: &mut Workbench) {
-    for _ in 0..20_000 {
-        bench.app_mut().update();
-        let world = bench.app_mut().world_mut();
-        if world.query::<&SkinningJob>().iter(world).next().is_none() {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    (0..2).for_each(|_| bench.app_mut().update());
+    let app = bench.app_mut();
+    app.update();
+    wait(app, "the end of the jobs", App::update, |app| {
+        let mut jobs = app.world().try_query::<&SkinningJob>();
+        jobs.as_mut().is_none_or(|jobs| jobs.iter(app.world()).next().is_none())
+    });
+    (0..2).for_each(|_| app.update());
 }
 
 fn change(bench: &mut Workbench, change: Change) {
@@ -145,14 +144,10 @@ fn painted_weights_get_their_shares_too() {
     bench.app_mut().update();
     bench.app_mut().world_mut().write_message(EditRequest { rig, change: Change::Preview(goes_on) });
     bench.app_mut().update();
-    let waits = |bench: &mut Workbench| {
-        let world = bench.app_mut().world_mut();
-        world.query::<&SkinningJob>().single(world).expect("the shares wait for the end of the stroke").waits()
-    };
-    while !waits(&mut bench) {
-        bench.app_mut().update();
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
+    wait(bench.app_mut(), "the shares", App::update, |app| {
+        let mut jobs = app.world().try_query::<&SkinningJob>().expect("there are jobs");
+        jobs.single(app.world()).expect("the shares wait for the end of the stroke").waits()
+    });
     change(&mut bench, Change::Commit);
     assert_eq!(steps(&mut bench), done + 3, "the switch, the stroke, and the shares");
     let after = bench.weights().unwrap();

@@ -1,6 +1,9 @@
 //! Library, app and command line: the same weights of the same joints, and the surface where they take it.
 
-use bevy::math::{Quat, Vec3};
+use bevy::{
+    app::App,
+    math::{Quat, Vec3},
+};
 use rigsmith::{
     algo::weights::WeightSettings,
     headless::Workbench,
@@ -88,16 +91,13 @@ fn the_posed_surface_hangs_on_created_joints() {
     let moved = wanted.iter().zip(&figure.model.points).filter(|(a, b)| a.distance(**b) > 1e-3).count();
     assert!(moved > 300, "{moved} points move");
     assert!(bench.app_mut().world().get::<BuildResult>(rig).is_some());
-    for _ in 0..500 {
-        bench.app_mut().update();
-        let surface = bench.app_mut().world().get::<RigSurface>(rig);
-        if surface.is_some_and(|surface| surface.ready().is_some() && !surface.is_stale()) {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
+    let app = bench.app_mut();
+    app.update();
+    crate::bench::wait(app, "the surface", App::update, |app| {
+        let surface = app.world().get::<RigSurface>(rig);
+        surface.is_some_and(|surface| surface.ready().is_some() && !surface.is_stale())
+    });
     let surface = bench.app_mut().world().get::<RigSurface>(rig).unwrap();
-    assert!(!surface.is_stale());
     // Every moved point lies on the surface.
     for point in wanted.iter().step_by(37) {
         let closest = surface.ready().unwrap().closest_point(*point).unwrap().point;

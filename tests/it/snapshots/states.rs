@@ -26,7 +26,7 @@ use rigsmith::{
 };
 
 use super::booth::Booth;
-use crate::gestures::boxes;
+use crate::{bench::save_whole, gestures::boxes};
 
 const MESH: Uid = Uid(0x5A_0001);
 const CLIP: Uid = Uid(0x5A_0002);
@@ -306,7 +306,7 @@ pub fn make_conflicts(booth: &mut Booth) {
     let raise = |joint: &Uid| RigEdit::SetRest(*joint, RestTransform::from_translation(Vec3::Y * 0.5));
     edits(booth, moved.iter().map(raise).collect());
     let file = booth.folder().join("chain_of_many_joints.rig.ron");
-    fs::write(&file, chain("1.1.0", 0.2)).expect("written");
+    save_whole(&file, chain("1.1.0", 0.2));
     let rig = booth.entity();
     booth.until("the offer", |world| world.get::<UpdateOffer>(rig).is_some());
     booth.stand_still();

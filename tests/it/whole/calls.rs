@@ -73,6 +73,7 @@ impl RemoteApp {
         let settings = RemoteSettings {
             token: Some(TOKEN.to_owned()),
             folders: vec![folder.join("allowed")],
+            read_timeout: HANG,
             answer_timeout: HANG / 3,
             ..default()
         };

@@ -67,6 +67,7 @@ fn an_unseen_body_becomes_an_animated_character_by_hand_on_a_display_and_gpu() {
     assert_eq!(corrected.selection, ["forearm_l"]);
     hands.shot("job_corrected");
     hands.key("Return");
+    hands.until("the fit is accepted", |report| report.widgets.iter().all(|widget| widget.name != "Accept"));
     hands.key("b");
     let skinned = hands.until("it is skinned", |report| report.skinned == 1 && !report.busy);
     assert_eq!(skinned.steps.last().map(String::as_str), Some("Skin mesh"));
@@ -101,6 +102,7 @@ fn an_unseen_body_becomes_an_animated_character_by_hand_on_a_display_and_gpu() {
     hands.press("Values of control");
     hands.press("Relative size");
     sleep(Duration::from_millis(1500));
+    hands.frames();
     hands.write("0.9");
     hands.key("Return");
     let changed = hands.until("the value is set", |report| report.steps.len() > added.steps.len() && !report.busy);
