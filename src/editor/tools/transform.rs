@@ -82,6 +82,11 @@ impl GizmoTool {
     pub fn dragged(&self) -> Option<Handle> {
         self.drag.as_ref().map(|drag| drag.gizmo.handle)
     }
+
+    /// True while a drag has changed something: a press alone changes nothing.
+    pub fn is_moving(&self) -> bool {
+        self.drag.as_ref().is_some_and(|drag| !drag.gizmo.delta().is_none())
+    }
 }
 
 /// Shows arrows beside the rings in Pose mode for every joint if `true`, not only for roots.
