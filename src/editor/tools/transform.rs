@@ -236,8 +236,8 @@ pub(super) fn drag(
                 } else {
                     let pick = match (drag.grabbed, scene.sight()) {
                         (Some(_), Some(sight)) => {
-                            let hovered = hovered.get(rig.entity).ok();
-                            Some(select::clicked(&scene, rig, &sight, pointer.at, pointer.held, count, hovered))
+                            let pick = select::click(&scene, rig, &sight, pointer.at);
+                            Some(select::clicked(rig, pick, pointer.held, count, hovered.get(rig.entity).ok()))
                         }
                         _ => clicked(&scene, rig, pointer.at, pointer.held),
                     };
