@@ -20,14 +20,14 @@ use crate::{
     plugins::{
         controls::{
             ControlsInUse,
-            outline::{ControlNodes, control_at},
+            outline::{ControlNodes, ControlOutline, control_at},
         },
         document::HoveredNode,
         picking::{HoverRequest, Pick, PickRequest},
         schema::RigNodes,
         viewport::Sight,
     },
-    rig::Uid,
+    rig::{LayerDisplay, Uid},
 };
 
 /// Plugin of the select tool.
@@ -68,6 +68,21 @@ pub(super) struct DrawnControls<'w, 's> {
 }
 
 impl DrawnControls<'_, '_> {
+    /// Controls whose outlines have their middles between two corners of the view plane, in the order of the rig's nodes.
+    fn within(&self, rig: &EditedRig, sight: &Sight, corners: [Vec2; 2]) -> Vec<Uid> {
+        if !self.in_use.0 {
+            return Vec::new();
+        }
+        let visible = self.nodes.visible(self.rigs.get(rig.entity).ok(), rig.place.affine().inverse());
+        let middle = |control: &ControlOutline| {
+            let points: Vec<Vec3> = control.lines.iter().flatten().copied().collect();
+            points.iter().sum::<Vec3>() / points.len().max(1) as f32
+        };
+        let free: Vec<&ControlOutline> = visible.iter().filter(|it| it.display == LayerDisplay::Normal).collect();
+        let middles: Vec<Vec3> = free.iter().map(|control| middle(control)).collect();
+        in_box(&sight.plane, corners, &middles).into_iter().map(|number| free[number].uid).collect()
+    }
+
     /// The control whose outline is at a pixel; `None` while a skeleton is drawn in place of controls.
     pub(super) fn at(&self, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<Uid> {
         if !self.in_use.0 {
@@ -140,7 +155,13 @@ pub(super) fn select(
                 let band = tool.band.take();
                 let Some(press) = tool.press.take() else { continue };
                 let request = match band.filter(|_| dragged) {
-                    Some(band) => boxed(&scene, &rig, &sight, band, pointer.held),
+                    Some(band) => {
+                        let corners = band.map(|corner| sight.point(corner));
+                        // Where people pose, a box is for controls; joints are boxed where there are none in it.
+                        let is_posing = *mode == Mode::Pose;
+                        let found = if is_posing { controls.within(&rig, &sight, corners) } else { Vec::new() };
+                        boxed(&scene, &rig, &sight, corners, found, pointer.held)
+                    }
                     None => {
                         let pick = click_or_control(&scene, &controls, &rig, &sight, press);
                         clicked(&rig, pick, pointer.held, count, hovered.get(rig.entity).ok())
@@ -202,14 +223,26 @@ pub(super) fn clicked(
     }
 }
 
-fn boxed(scene: &Scene, rig: &EditedRig, sight: &Sight, band: [Vec2; 2], held: ModifierKeys) -> PickRequest {
-    let corners = band.map(|corner| sight.point(corner));
+/// The request of a box with the controls in it, or with its joints if there are none.
+fn boxed(
+    scene: &Scene,
+    rig: &EditedRig,
+    sight: &Sight,
+    corners: [Vec2; 2],
+    controls: Vec<Uid>,
+    held: ModifierKeys,
+) -> PickRequest {
     if !held.control {
-        return PickRequest { rig: rig.entity, what: Pick::Box { plane: sight.plane, corners }, add: held.shift };
+        let what = match controls.is_empty() {
+            true => Pick::Box { plane: sight.plane, corners },
+            false => Pick::Joints(controls),
+        };
+        return PickRequest { rig: rig.entity, what, add: held.shift };
     }
     let posed = scene.posed(rig);
     let places: Vec<Vec3> = posed.iter().map(|(_, place)| *place).collect();
-    let inside: Vec<Uid> = in_box(&sight.plane, corners, &places).into_iter().map(|number| posed[number].0).collect();
+    let joints = in_box(&sight.plane, corners, &places).into_iter().map(|number| posed[number].0);
+    let inside: Vec<Uid> = controls.into_iter().chain(joints).collect();
     let rest = rig.selection.0.iter().copied().filter(|joint| !inside.contains(joint)).collect();
     PickRequest { rig: rig.entity, what: Pick::Joints(rest), add: false }
 }

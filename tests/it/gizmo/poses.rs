@@ -192,6 +192,24 @@ fn a_click_on_an_outline_beside_the_body_takes_its_control() {
                 assert_eq!(bench.base.selected(), [*control], "{mode:?}, click {count}");
             }
         }
+        // A box takes controls where people pose, and joints elsewhere; with Control it takes both away.
+        bench.base.select(&[]);
+        let [low, high] = [Vec2::splat(1.0), Vec2::splat(799.0)];
+        let control = ModifierKeys { control: true, ..default() };
+        for held in [ModifierKeys::default(), control] {
+            bench.pointer(low, PointerAct::Pressed, held);
+            bench.pointer(high, PointerAct::Dragged, held);
+            bench.pointer(high, PointerAct::Released { dragged: true, count: 1 }, held);
+            let boxed = bench.base.selected();
+            let is_joint = |node: &Uid| bench.base.rig().joint(*node).is_some();
+            match held.control {
+                true => assert!(boxed.is_empty(), "{mode:?}: {} are left", boxed.len()),
+                false => assert!(
+                    boxed.len() >= places.len() && boxed.iter().all(|node| is_joint(node) != (mode == Mode::Pose)),
+                    "{mode:?}: {boxed:?}"
+                ),
+            }
+        }
         bench.pointer(Vec2::new(3.0, 3.0), PointerAct::Moved, ModifierKeys::default());
         assert_eq!(bench.base.get::<HoveredNode>(rig).unwrap().0, None, "{mode:?}: beside everything");
     }
