@@ -350,7 +350,7 @@ fn all_that_panels_do_is_taken_back_by_undo() {
     assert!(made.len() > 20, "only these made a step: {made:?}");
 }
 
-/// What panels ask for is not carried out here: clicks, drags and menus alone leave the document and the window as they are.
+/// Clicks, drags and menus leave the document and the window as they are while nothing that panels ask for is carried out.
 #[test]
 fn panels_change_nothing_themselves() {
     let mut count = 0;

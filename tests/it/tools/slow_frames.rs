@@ -32,7 +32,7 @@ const ACCEPTED: &str = "accepted as you left its mode";
 
 const ARM: [[f32; 3]; 3] = [[0.17, 1.4, 0.0], [0.37, 1.2, 0.0], [0.53, 1.02, 0.0]];
 
-/// What a hand does at the mouse and the keyboard.
+/// Deed of a hand at the mouse or the keyboard.
 #[derive(Debug, Clone, Copy)]
 enum Input {
     To(Vec2),
