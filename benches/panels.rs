@@ -5,13 +5,13 @@
 //! cargo bench --bench panels -- Graph
 //! ```
 //!
-//! A rig of 200 joints with 1000 commands, of which each other one refers to the one before, built, a long history, 60 stored
-//! poses, a clip with 10,000 keys, the bundled body with weights of all joints, 200 of its points and 100 joints selected. A row
-//! for each panel has the medians over 300 frames, in milliseconds: while nothing happens, with the pointer moving over it, and
-//! with a rig that changes before each frame, which is what a panel does while a value is dragged. `asks` is the number of idle
-//! frames after which it asked for another one at once, which has to be 0: the window sleeps then. Below the panels stand the
-//! medians of their rows, and the whole window as the dock draws it by default, with the timeline open. `over` marks a row with a
-//! median above its target, or with frames that were asked for.
+//! A rig of 200 joints with 1000 commands, of which each other one refers to the one before, built, a long history, 60
+//! stored poses, a clip with 10,000 keys, the bundled body with weights of all joints, 200 of its points and 100 joints
+//! selected. A row for each panel has the medians over 300 frames, in milliseconds: while nothing happens, with the pointer
+//! moving over it, and with a rig that changes before each frame, which is what a panel does while a value is dragged.
+//! `asks` is the number of idle frames after which it asked for another one at once, which has to be 0: the window sleeps
+//! then. Below the panels stand the medians of their rows, and the whole window as the dock draws it by default, with the
+//! timeline open. `over` marks a row with a median above its target, or with frames that were asked for.
 
 use std::{
     sync::Arc,
