@@ -4,7 +4,7 @@ use bevy::prelude::*;
 
 use super::{
     ActiveRig,
-    files::{LoadJob, attend},
+    files::{LoadJob, SaveJob, attend},
     library::LibraryJobs,
     notice::Notice,
     panels::timeline::import::ClipImport,
@@ -49,6 +49,9 @@ pub fn running(world: &World) -> Option<(String, Option<StoppableWork>)> {
     }
     if let Some(what) = world.get_resource::<LibraryJobs>().and_then(LibraryJobs::what) {
         return Some((format!("Reading {what}"), None));
+    }
+    if let Some(what) = world.get_resource::<SaveJob>().and_then(SaveJob::what) {
+        return Some((format!("Saving {what}"), None));
     }
     let meshes: Vec<Entity> = world.get::<RigMeshes>(rig?)?.iter().collect();
     let skinning = meshes.iter().filter_map(|mesh| world.get::<SkinningJob>(*mesh));
