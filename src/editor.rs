@@ -33,6 +33,7 @@ pub mod recovery;
 pub mod render_errors;
 pub mod report;
 pub mod result_queue;
+pub mod running_work;
 pub mod screen;
 pub mod settings;
 mod skeleton_lines;

@@ -7,11 +7,24 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    ActiveRig,
     library::LibraryAction,
     mode::Mode,
     panels::{graph::GraphAction, timeline::TimelineAction},
     tools::paint::brush::BrushAction,
 };
+use crate::plugins::document::{Change, EditRequest};
+
+/// Plugin that carries out changes of mode, undo and redo, once tools have taken an undo that ends their drag.
+pub struct ActionsPlugin;
+
+impl Plugin for ActionsPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Mode>()
+            .add_message::<ActionRequest>()
+            .add_systems(RunFixedMainLoop, change_mode_or_history.in_set(RunFixedMainLoopSystems::AfterFixedMainLoop));
+    }
+}
 
 /// An action that a person can request with a key, a menu entry or a button.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -216,6 +229,28 @@ impl Action {
 /// Request for an action.
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ActionRequest(pub Action);
+
+/// Carries out changes of mode, undo and redo.
+fn change_mode_or_history(
+    mut actions: MessageReader<ActionRequest>,
+    mut mode: ResMut<Mode>,
+    rig: Option<Res<ActiveRig>>,
+    mut edits: MessageWriter<EditRequest>,
+) {
+    for ActionRequest(action) in actions.read() {
+        match action {
+            Action::Mode(next) => {
+                mode.set_if_neq(*next);
+            }
+            Action::Undo | Action::Redo => {
+                let Some(rig) = &rig else { continue };
+                let change = if *action == Action::Undo { Change::Undo } else { Change::Redo };
+                edits.write(EditRequest { rig: rig.0, change });
+            }
+            _ => {}
+        }
+    }
+}
 
 /// Queues the requests of a panel, each for `answer`, and the actions that are its `own`, each for `act`: both need the whole
 /// world, before the edits of the same frame.

@@ -19,8 +19,6 @@ use wgpu::BlendState;
 
 use super::tools::stroke::StrokeTool;
 use super::{
-    ActiveRig,
-    actions::{Action, ActionRequest},
     camera::CameraPlugin,
     dock::DockPlugin,
     files::{FilesPlugin, LoadJob},
@@ -40,7 +38,7 @@ use crate::plugins::{
     RigPlugins,
     controls::size::MeasuredShapes,
     display::{DisplayJob, DisplayPlugin},
-    document::{Change, EditReport, EditRequest},
+    document::EditReport,
     drawing::DrawingPlugin,
     fit::FitJob,
     limits::RigLimits,
@@ -133,7 +131,7 @@ impl Plugin for EditorPlugin {
         .add_plugins((RigPlugins, DisplayPlugin, DrawingPlugin))
         .add_plugins(super::panels::PanelsPlugin)
         .add_plugins((
-            super::tools::ToolsPlugin,
+            (super::tools::ToolsPlugin, super::actions::ActionsPlugin),
             SettingsPlugin,
             KeysPlugin,
             PointerPlugin,
@@ -158,7 +156,6 @@ impl Plugin for EditorPlugin {
         .init_resource::<StatusLine>()
         .add_message::<Notice>()
         .add_systems(Startup, (spawn_interface, say_adapter))
-        .add_systems(Update, carry_out)
         .add_systems(
             PreUpdate,
             drop_old_modifiers.after(EguiPreUpdateSet::ProcessInput).before(EguiPreUpdateSet::BeginPass),
@@ -207,28 +204,6 @@ fn say_adapter(adapter: Option<Res<RenderAdapterInfo>>, mut notices: MessageWrit
     if adapter.device_type == wgpu::DeviceType::Cpu {
         notices
             .write(Notice::info(format!("No graphics card: drawing in software ({}), which is slower", adapter.name)));
-    }
-}
-
-/// Carries out changes of mode, undo and redo.
-fn carry_out(
-    mut actions: MessageReader<ActionRequest>,
-    mut mode: ResMut<Mode>,
-    rig: Option<Res<ActiveRig>>,
-    mut edits: MessageWriter<EditRequest>,
-) {
-    for ActionRequest(action) in actions.read() {
-        match action {
-            Action::Mode(next) => {
-                mode.set_if_neq(*next);
-            }
-            Action::Undo | Action::Redo => {
-                let Some(rig) = &rig else { continue };
-                let change = if *action == Action::Undo { Change::Undo } else { Change::Redo };
-                edits.write(EditRequest { rig: rig.0, change });
-            }
-            _ => {}
-        }
     }
 }
 

@@ -14,6 +14,7 @@ use super::{
     panel::{Panels, Requests},
     pointer::ViewportArea,
     result_queue::HeldPlugin,
+    running_work::RunningWorkPlugin,
     settings::EditorSettings,
     status, style, toolbar,
 };
@@ -23,7 +24,7 @@ pub struct DockPlugin;
 
 impl Plugin for DockPlugin {
     fn build(&self, app: &mut App) {
-        app.add_plugins(HeldPlugin)
+        app.add_plugins((HeldPlugin, RunningWorkPlugin))
             .init_resource::<Panels>()
             .init_resource::<Layout>()
             .add_message::<ShowPanel>()

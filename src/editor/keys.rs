@@ -6,7 +6,7 @@ use bevy::{
         keyboard::{Key, KeyboardInput},
     },
     prelude::*,
-    window::WindowFocused,
+    window::{WindowEvent, WindowFocused},
 };
 use bevy_egui::{EguiContext, PrimaryEguiContext};
 use serde::{Deserialize, Serialize};
@@ -35,7 +35,11 @@ impl Plugin for KeysPlugin {
             .add_message::<ActionRequest>()
             .add_message::<KeyBound>()
             .add_message::<Notice>()
-            .add_systems(PreUpdate, (press_keys, bind).chain().after(bevy::input::InputSystems));
+            .add_message::<WindowEvent>()
+            .add_systems(
+                PreUpdate,
+                (press_keys, bind).chain().after(bevy::input::InputSystems).after(super::pointer::follow_pointer),
+            );
     }
 }
 
@@ -287,8 +291,13 @@ pub fn key_name(input: &KeyboardInput) -> Option<String> {
 }
 
 /// Turns key presses into actions, unless a text field has the keyboard focus.
+///
+/// Actions are carried out before the pointer's events of their frame. In a slow frame a button may be released and a key be
+/// pressed after it: that key waits for the next frame, and so meets what the release did.
 fn press_keys(
     mut keys: MessageReader<KeyboardInput>,
+    mut events: MessageReader<WindowEvent>,
+    mut waiting: Local<Vec<Action>>,
     mut lost: MessageReader<WindowFocused>,
     mut held: Local<ModifierKeys>,
     bindings: Res<KeyBindings>,
@@ -297,6 +306,8 @@ fn press_keys(
     mut contexts: Query<&mut EguiContext, With<PrimaryEguiContext>>,
     (mut actions, mut bound): (MessageWriter<ActionRequest>, MessageWriter<KeyBound>),
 ) {
+    actions.write_batch(waiting.drain(..).map(ActionRequest));
+    let first_late = keys.len().saturating_sub(keys_after_release(events.read()));
     if lost.read().any(|focus| !focus.focused) {
         *held = ModifierKeys::default();
     }
@@ -307,7 +318,7 @@ fn press_keys(
     let is_over_timeline = timeline.is_some_and(|timeline| timeline.hovered);
     let is_over_graph = graph.is_some_and(|graph| graph.hovered);
     let is_asked = dialog.is_some_and(|dialog| dialog.question().is_some());
-    for input in keys.read() {
+    for (number, input) in keys.read().enumerate() {
         if held.follow(input) || is_asked || input.state == ButtonState::Released || input.repeat {
             continue;
         }
@@ -324,11 +335,26 @@ fn press_keys(
             // Text fields do not use these chords.
             Some(action) if !typing || matches!(action, Action::Save | Action::SaveAs | Action::Help) => {
                 let action = if is_over_timeline { over_timeline(action) } else { action };
-                actions.write(ActionRequest(if is_over_graph { over_graph(action) } else { action }));
+                let action = if is_over_graph { over_graph(action) } else { action };
+                if number < first_late {
+                    actions.write(ActionRequest(action));
+                } else {
+                    waiting.push(action);
+                }
             }
             _ => {}
         }
     }
+}
+
+/// Number of key events of a frame that came after a release of a mouse button.
+fn keys_after_release<'e>(events: impl Iterator<Item = &'e WindowEvent>) -> usize {
+    let is_release = |event: &WindowEvent| match event {
+        WindowEvent::MouseButtonInput(input) => input.state == ButtonState::Released,
+        _ => false,
+    };
+    let late = events.skip_while(|event| !is_release(event));
+    late.filter(|event| matches!(event, WindowEvent::KeyboardInput(_))).count()
 }
 
 /// Binds keys that were pressed for actions, and tells of actions that lost theirs.

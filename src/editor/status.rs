@@ -6,20 +6,17 @@ use bevy_egui::egui;
 use super::{
     ActiveRig,
     counted::counted,
-    files::LoadJob,
     follow,
-    library::LibraryJobs,
     next_step::next_step,
     notice::StatusLine,
     panel::Requests,
-    panels::timeline::import::ClipImport,
     result_queue::{DiscardResult, waiting},
+    running_work::{StopWork, running},
     style,
 };
 use crate::{
     plugins::{
         document::Selection,
-        skinning::SkinningJob,
         surface::{RigMesh, RigMeshes},
     },
     rig::Rig,
@@ -47,9 +44,16 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
         };
         ui.scope(|ui| {
             ui.set_max_width((room - right - 24.0).max(80.0));
-            if let Some(doing) = doing(world) {
+            if let Some((words, kind)) = running(world) {
                 ui.add(egui::Spinner::new().size(12.0));
-                ui.label(egui::RichText::new(doing).color(accent));
+                // Before the words: a long name leaves no room behind it.
+                if let Some(kind) = kind {
+                    let button = ui.small_button("Stop").on_hover_text("Stops it; the document stays as it is");
+                    if button.clicked() {
+                        requests.send(StopWork(kind));
+                    }
+                }
+                ui.label(egui::RichText::new(words).color(accent));
             } else if let Some((kind, words)) = held {
                 let text = egui::RichText::new(format!("{words}: redo, or go on editing")).color(accent);
                 ui.label(text).on_hover_text(kind.sentence());
@@ -67,30 +71,6 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
             ui.label(egui::RichText::new(counts).size(12.0).color(quiet));
         });
     });
-}
-
-/// Description of background work.
-fn doing(world: &World) -> Option<String> {
-    if let Some(loading) = world.get_resource::<LoadJob>()
-        && let Some(what) = loading.what()
-    {
-        return Some(format!("Opening {what}"));
-    }
-    if let Some(import) = world.get_resource::<ClipImport>()
-        && let Some(what) = import.what()
-    {
-        return Some(format!("Importing {what}"));
-    }
-    if let Some(jobs) = world.get_resource::<LibraryJobs>()
-        && let Some(what) = jobs.what()
-    {
-        return Some(format!("Reading {what}"));
-    }
-    let rig = world.get_resource::<ActiveRig>()?.0;
-    let jobs = world.get::<RigMeshes>(rig)?.iter().filter_map(|mesh| world.get::<SkinningJob>(mesh));
-    let progress: Vec<f32> = jobs.filter(|job| !job.waits()).map(SkinningJob::progress).collect();
-    let least = progress.iter().copied().reduce(f32::min)?;
-    Some(format!("Skinning {:.0} %", least * 100.0))
 }
 
 fn counts(world: &World) -> String {

@@ -33,7 +33,7 @@ pub mod weights;
 use bevy::prelude::*;
 
 use super::{
-    actions::ActionRequest,
+    actions::{Action, ActionRequest},
     camera::ViewportSight,
     mode::Mode,
     notice::{Notice, StatusLine},
@@ -63,6 +63,7 @@ impl Plugin for ToolsPlugin {
                 (ToolSystems::Route, ToolSystems::Actions, ToolSystems::Tools).chain().before(RigSystems::Script),
             )
             .configure_sets(PostUpdate, ToolSystems::Show.after(RigSystems::Surface).before(DrawingSystems))
+            .add_systems(RunFixedMainLoop, end_instead_of_undo.in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop))
             .add_systems(Update, route.in_set(ToolSystems::Route))
             .add_systems(PostUpdate, give_wheel.in_set(ToolSystems::Show).after(stroke::show))
             .add_plugins((
@@ -147,6 +148,24 @@ pub struct GizmoHover(pub bool);
 /// Marks that a press in this frame is on a joint or control that a drag pulls. Written before the press is routed.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PullHover(pub bool);
+
+/// Turns an undo during a drag, or before a drawing is accepted, into a cancel: the drag is dropped and the last step stays.
+/// Runs after keys are read and before actions are carried out.
+fn end_instead_of_undo(
+    stroke: Res<stroke::StrokeTool>,
+    paint: Res<paint::PaintTool>,
+    gizmo: Res<transform::GizmoTool>,
+    pull: Res<pull::PullTool>,
+    mut actions: MessageMutator<ActionRequest>,
+) {
+    let is_drawn = !matches!(stroke.state, stroke::StrokeState::Idle);
+    if !(is_drawn || paint.is_painting() || gizmo.is_moving() || pull.pulled().is_some()) {
+        return;
+    }
+    for request in actions.read().filter(|request| request.0 == Action::Undo) {
+        request.0 = Action::Cancel;
+    }
+}
 
 fn route(
     mut pointers: MessageReader<ViewportPointer>,

@@ -1,15 +1,19 @@
-//! Results that wait for undone steps are discarded with the button of the status line, and the steps can be redone.
+//! Work in the background: results that wait for undone steps are discarded with the button of the status line, so that the
+//! steps can be redone, and work that runs is stopped with it.
 
 use std::sync::Arc;
 
-use bevy::prelude::*;
+use bevy::{ecs::message::MessageCursor, prelude::*};
 use bevy_egui::egui::PointerButton;
 use rigsmith::{
     algo::face::auto::AutoSettings,
     editor::{
         ActiveRig,
+        files::{LoadJob, OpenRequest},
+        notice::Notice,
         panels::timeline::import::{ClipImport, ImportRequest},
         result_queue::waiting,
+        running_work::{StopWork, StoppableWork},
     },
     files::{RealDisk, load_model},
     mesh::model::{Model, Weights},
@@ -164,4 +168,87 @@ fn jobs_answer_that_their_result_was_discarded() {
     frames.app.update();
     let answer = frames.app.world_mut().resource_mut::<Messages<WeightChangeAnswer>>().drain().next();
     assert_eq!(answer.map(|answer| answer.result), Some(Err(WeightChangeError::Discarded)));
+
+    // Stopped, it makes no step, however far it has come.
+    change(&mut frames, rig, Change::Redo);
+    let before = frames.app.world().get::<Rig>(rig).unwrap().skin(MESH).cloned();
+    held(&mut frames, rig, WeightChangeRequest { mesh, change: WeightChange::Normalise });
+    frames.app.world_mut().resource_mut::<Messages<WeightChangeAnswer>>().clear();
+    frames.app.world_mut().get_mut::<WeightChangeJob>(mesh).unwrap().stop();
+    frames.app.update();
+    let answer = frames.app.world_mut().resource_mut::<Messages<WeightChangeAnswer>>().drain().next();
+    assert_eq!(answer.map(|answer| answer.result), Some(Err(WeightChangeError::Stopped)));
+    assert!(frames.app.world().get::<WeightChangeJob>(mesh).is_none());
+    assert_eq!(frames.app.world().get::<Rig>(rig).unwrap().skin(MESH).cloned(), before);
+}
+
+#[test]
+fn work_that_runs_is_stopped_in_the_status_line() {
+    let (mut frames, rig, _) = opened();
+    // Two hundred thousand points are not done within a few frames.
+    let cube = |number: usize| {
+        let low = [number % 30, number / 30 % 30, number / 900].map(|place| place as f32 * 0.03);
+        [low, low.map(|place| place + 0.029)]
+    };
+    let cubes: Vec<[[f32; 3]; 2]> = (0..25_000).map(cube).collect();
+    let uid = Uid(0x52);
+    let mesh = (RigMesh::new(uid, boxes(&cubes), Vec::new()), SkinOf(rig));
+    let mesh = frames.app.world_mut().spawn(mesh).id();
+    frames.frame();
+    assert!(frames.find("Stop").is_none(), "nothing runs");
+    frames.app.world_mut().write_message(BindRequest::new(mesh));
+    wait(&mut frames, "the button", Frames::frame, |frames| frames.find("Stop").is_some());
+    let button = frames.find("Stop").unwrap();
+    frames.click(button.center(), PointerButton::Primary);
+    wait(&mut frames, "the end", Frames::frame, |frames| frames.app.world().get::<SkinningJob>(mesh).is_none());
+    frames.frame();
+    assert!(frames.find("Stop").is_none() && frames.app.world().get::<Rig>(rig).unwrap().skin(uid).is_none());
+}
+
+fn active(frames: &Frames) -> Entity {
+    frames.app.world().resource::<ActiveRig>().0
+}
+
+/// Asks for work until it is stopped before its end; false if it always ends first. The document is then as before.
+fn is_stopped<M: Message + Clone>(
+    frames: &mut Frames,
+    request: M,
+    kind: StoppableWork,
+    is_running: impl Fn(&World) -> bool,
+) -> bool {
+    (0..100).any(|_| {
+        frames.app.world_mut().write_message(request.clone());
+        frames.app.update();
+        let rig = active(frames);
+        let before = frames.app.world().get::<Rig>(rig).unwrap().clone();
+        if !is_running(frames.app.world()) {
+            return false;
+        }
+        frames.app.world_mut().write_message(StopWork(kind));
+        frames.app.update();
+        let notices = frames.app.world().resource::<Messages<Notice>>();
+        let mut notices = MessageCursor::<Notice>::default().read(notices).cloned().collect::<Vec<_>>().into_iter();
+        if !notices.any(|notice| notice.text.ends_with("it was stopped")) {
+            return false;
+        }
+        (0..3).for_each(|_| frames.app.update());
+        assert!(!is_running(frames.app.world()), "it goes on");
+        assert_eq!((active(frames), frames.app.world().get::<Rig>(rig)), (rig, Some(&before)));
+        true
+    })
+}
+
+#[test]
+fn files_that_are_read_can_be_stopped() {
+    let (mut frames, ..) = opened();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("long.bvh");
+    let channels = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation";
+    let head = format!("HIERARCHY\nROOT a\n{{\nOFFSET 0 0 0\n{channels}\nEnd Site\n{{\nOFFSET 0 1 0\n}}\n}}\n");
+    let lines = "0 0 0 0 0 0\n".repeat(20_000);
+    std::fs::write(&path, format!("{head}MOTION\nFrames: 20000\nFrame Time: 0.01\n{lines}")).unwrap();
+    let is_read = |world: &World| world.resource::<ClipImport>().what().is_some();
+    assert!(is_stopped(&mut frames, ImportRequest(path), StoppableWork::Motion, is_read));
+    let is_opened = |world: &World| world.resource::<LoadJob>().what().is_some();
+    assert!(is_stopped(&mut frames, OpenRequest::Bundled, StoppableWork::Opening, is_opened));
 }

@@ -1,6 +1,7 @@
 //! The editor's tools without a window: what the pointer does becomes what the screen had promised.
 
 mod selecting;
+mod slow_frames;
 mod strokes;
 
 use bevy::prelude::*;
@@ -78,6 +79,12 @@ impl RigBench {
 
     /// A stroke through places of the rig's space, drawn in many small movements over several frames.
     fn stroke(&mut self, places: &[[f32; 3]]) {
+        let end = self.draw(places);
+        self.point(PLAIN, &[(end, DROPPED)]);
+    }
+
+    /// A stroke that is not released yet; the pixel where it is.
+    fn draw(&mut self, places: &[[f32; 3]]) -> Vec2 {
         let sight = self.sight();
         let pixels: Vec<Vec2> = places.iter().map(|place| sight.project(Vec3::from(*place)).unwrap()).collect();
         self.point(PLAIN, &[(pixels[0], PointerAct::Pressed)]);
@@ -86,7 +93,7 @@ impl RigBench {
             let moves: Vec<_> = (1..=10).map(between).collect();
             self.point(PLAIN, &moves);
         }
-        self.point(PLAIN, &[(pixels[pixels.len() - 1], DROPPED)]);
+        pixels[pixels.len() - 1]
     }
 
     /// Draws and waits until the chain is shown.

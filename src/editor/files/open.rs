@@ -74,6 +74,11 @@ impl LoadJob {
         self.job.as_ref().map(|job| job.name.as_str())
     }
 
+    /// Stops opening; returns the name of the document, which is not opened.
+    pub(in crate::editor) fn stop(&mut self) -> Option<String> {
+        self.job.take().map(|job| job.name)
+    }
+
     /// Has unsaved changes asked about once it is known that they would be lost.
     pub(super) fn ask_later(&mut self) {
         if let Some(job) = &mut self.job {

@@ -4,7 +4,7 @@ mod dendrogram;
 mod expressions;
 mod thumbnail;
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{collections::BTreeMap, ops::RangeInclusive, sync::Arc};
 
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Button, CollapsingHeader, DragValue, ProgressBar, RichText, ScrollArea, Slider, Ui};
@@ -122,6 +122,9 @@ fn summary(report: &FaceReport) -> String {
     format!("{} in {sum:.0} ms{kept}{fitted}.", counted(skin, "facial bone", "facial bones"))
 }
 
+/// Numbers of bones of the facial skin that people choose from.
+const DENSITIES: RangeInclusive<usize> = 4..=150;
+
 /// The panel.
 #[derive(Default)]
 pub struct FacePanel {
@@ -152,7 +155,7 @@ impl EditorPanel for FacePanel {
         let Some((entity, mesh)) = first.and_then(|entity| Some((entity, world.get::<RigMesh>(entity)?))) else {
             return list::nothing(ui, "Open a head, or a character with one, to place a face in it.");
         };
-        self.renew(&shown, entity, mesh, world.get::<Face>(entity));
+        self.renew(&shown, entity, world.get::<Face>(entity));
         ScrollArea::vertical().id_salt("face").auto_shrink(false).show(ui, |ui| {
             self.place(ui, world, entity, requests);
             ui.add_space(4.0);
@@ -178,15 +181,26 @@ impl EditorPanel for FacePanel {
 }
 
 impl FacePanel {
-    /// Reads the rig's face again if the rig has changed.
-    fn renew(&mut self, shown: &DisplayedRig, mesh: Entity, _: &RigMesh, _: Option<&Face>) {
+    /// Reads the rig's face again if the rig has changed. The settings go on from the face of a mesh that is shown anew.
+    fn renew(&mut self, shown: &DisplayedRig, mesh: Entity, face: Option<&Face>) {
         let stamp = shown.stamp();
         if self.shown.as_ref().is_some_and(|drawn| drawn.mesh == mesh && drawn.stamp == stamp) {
             return;
         }
         let known = FaceRig::read(&shown.rig);
-        let pictures = self.shown.take().filter(|drawn| drawn.mesh == mesh).map(|drawn| drawn.pictures);
-        self.shown = Some(FaceData { mesh, stamp, known, pictures: pictures.unwrap_or_default() });
+        let former = self.shown.take().filter(|drawn| drawn.mesh == mesh);
+        let density = known.bones.iter().filter(|bone| bone.kind == FaceBoneKind::Skin).count();
+        if former.is_none() && density > 0 {
+            if let Some(face) = face {
+                self.settings = face.settings.clone();
+            }
+            // A file has the bones, not the number that was asked for, which a mesh may not allow.
+            if density.abs_diff(self.settings.bones) * 10 > density {
+                self.settings.bones = density.clamp(*DENSITIES.start(), *DENSITIES.end());
+            }
+        }
+        let pictures = former.map(|drawn| drawn.pictures).unwrap_or_default();
+        self.shown = Some(FaceData { mesh, stamp, known, pictures });
     }
 
     /// Draws the button; while a job runs, its progress and a button that cancels it.
@@ -212,7 +226,7 @@ impl FacePanel {
         }
         fields::labelled(ui, "Bones", |ui| {
             ui.spacing_mut().slider_width = (ui.available_width() - 52.0).max(30.0);
-            let slider = ui.add(Slider::new(&mut self.settings.bones, 4..=150).logarithmic(true));
+            let slider = ui.add(Slider::new(&mut self.settings.bones, DENSITIES).logarithmic(true));
             let slider = slider.on_hover_text("Density: bones of the facial skin");
             fields::named(ui, slider.id, "Bones");
             // Releasing the slider is enough: an existing face is placed again with the new density.

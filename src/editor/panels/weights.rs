@@ -61,7 +61,7 @@ fn tell_answers(
                 let points = counted(*count, "point", "points");
                 Notice::done(format!("The weights of {name} are {what}: {points} changed."))
             }
-            Err(error @ WeightChangeError::Discarded) => {
+            Err(error @ (WeightChangeError::Discarded | WeightChangeError::Stopped)) => {
                 Notice::info(format!("The weights of {name} were not {what}: {error}."))
             }
             Err(error) => Notice::warning(format!("The weights of {name} were not {what}: {error}.")).at("Weights"),

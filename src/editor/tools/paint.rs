@@ -54,12 +54,6 @@ impl Plugin for PaintPlugin {
         app.init_resource::<PaintTool>()
             .init_resource::<CanvasUse>()
             .add_message::<ShowPanel>()
-            .add_systems(
-                RunFixedMainLoop,
-                cancel_instead_of_undo
-                    .in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop)
-                    .after(super::stroke::drop_instead_of_undo),
-            )
             .add_systems(Update, paint.in_set(ToolSystems::Tools).after(super::stroke::draw))
             .add_systems(PostUpdate, show.in_set(ToolSystems::Show).after(super::weights::show_weights))
             .add_painter(CursorPainter);
@@ -110,16 +104,6 @@ impl SelectedPoints {
             return;
         }
         self.add(mesh, [point]);
-    }
-}
-
-/// Turns an undo during a stroke into a cancel: the stroke is dropped and the last step stays.
-fn cancel_instead_of_undo(tool: Res<PaintTool>, mut actions: MessageMutator<ActionRequest>) {
-    if !tool.is_painting() {
-        return;
-    }
-    for request in actions.read().filter(|request| request.0 == Action::Undo) {
-        request.0 = Action::Cancel;
     }
 }
 

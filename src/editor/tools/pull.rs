@@ -10,7 +10,8 @@ use super::{
     gizmo::{Delta, GizmoDrag, GizmoFrame, Handle},
     pose::PosedJoint,
     scene::{EditedRig, Scene, joints},
-    select, transform,
+    select::{self, DrawnControls},
+    transform,
 };
 use crate::{
     editor::{
@@ -22,13 +23,9 @@ use crate::{
         pointer::{PointerAct, ViewportPointer},
     },
     plugins::{
-        controls::{
-            ControlsInUse,
-            outline::{ControlNodes, control_at},
-        },
+        controls::ControlsInUse,
         document::{Change, EditReport, EditRequest, HoveredNode},
         picking::{Pick, PickRequest},
-        schema::RigNodes,
         viewport::Sight,
     },
     rig::{PoseOffset, Uid, operations::Operation},
@@ -99,37 +96,21 @@ enum Way {
 fn aim(
     mut pointers: MessageReader<ViewportPointer>,
     mode: Res<Mode>,
-    scene: Scene,
-    nodes: Query<&RigNodes>,
-    controls: ControlNodes,
-    in_use: Res<ControlsInUse>,
+    (scene, controls): (Scene, DrawnControls),
     mut tool: ResMut<PullTool>,
     mut hover: ResMut<PullHover>,
 ) {
     let presses = pointers.read().filter(|pointer| pointer.act == PointerAct::Pressed).map(|pointer| pointer.at);
     let Some(at) = presses.last() else { return };
-    let found = (*mode == Mode::Pose).then(|| node_at(&scene, &nodes, &controls, *in_use, at)).flatten();
+    let found = (*mode == Mode::Pose).then(|| node_at(&scene, &controls, at)).flatten();
     tool.aim = found;
     hover.set_if_neq(PullHover(found.is_some()));
 }
 
 /// The control whose outline is at a pixel, or else the joint there.
-fn node_at(
-    scene: &Scene,
-    nodes: &Query<&RigNodes>,
-    controls: &ControlNodes,
-    in_use: ControlsInUse,
-    at: Vec2,
-) -> Option<Uid> {
+fn node_at(scene: &Scene, controls: &DrawnControls, at: Vec2) -> Option<Uid> {
     let (rig, sight) = (scene.rig()?, scene.sight()?);
-    if in_use.0 {
-        let visible = controls.visible(nodes.get(rig.entity).ok(), rig.place.affine().inverse());
-        let control = control_at(&visible, &sight.plane, sight.point(at), select::REACH * sight.pixel);
-        if control.is_some() {
-            return control;
-        }
-    }
-    joint_at(scene, &rig, &sight, at)
+    controls.at(&rig, &sight, at).or_else(|| joint_at(scene, &rig, &sight, at))
 }
 
 /// The joint nearest to a pixel within reach; the selected one of several at the same distance.
@@ -155,7 +136,7 @@ fn drag(
     mut pointers: MessageReader<ToolPointer>,
     mut actions: MessageReader<ActionRequest>,
     mut edited: MessageReader<EditReport>,
-    scene: Scene,
+    (scene, controls): (Scene, DrawnControls),
     hovered: Query<&HoveredNode>,
     mut tool: ResMut<PullTool>,
     mut status: ResMut<StatusLine>,
@@ -222,9 +203,9 @@ fn drag(
                         edits.write(EditRequest { rig: held.rig, change: Change::Commit });
                     }
                     (None, Some(sight)) if !dragged => {
+                        let pick = select::click_or_control(&scene, &controls, rig, &sight, held.at);
                         let hovered = hovered.get(rig.entity).ok();
-                        let held_keys = pointer.held;
-                        picks.write(select::clicked(&scene, rig, &sight, held.at, held_keys, count, hovered));
+                        picks.write(select::clicked(rig, pick, pointer.held, count, hovered));
                     }
                     _ => {}
                 }

@@ -2,7 +2,7 @@
 //!
 //! The joint that a click would pick is highlighted before the click, by the same code.
 
-use bevy::prelude::*;
+use bevy::{ecs::system::SystemParam, prelude::*};
 use bevy_egui::egui;
 
 use super::{
@@ -18,11 +18,16 @@ use crate::{
         pointer::{ModifierKeys, PointerAct, ViewportArea},
     },
     plugins::{
+        controls::{
+            ControlsInUse,
+            outline::{ControlNodes, ControlOutline, control_at},
+        },
         document::HoveredNode,
         picking::{HoverRequest, Pick, PickRequest},
+        schema::RigNodes,
         viewport::Sight,
     },
-    rig::Uid,
+    rig::{LayerDisplay, Uid},
 };
 
 /// Plugin of the select tool.
@@ -31,6 +36,7 @@ pub struct SelectPlugin;
 impl Plugin for SelectPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<SelectTool>()
+            .init_resource::<ControlsInUse>()
             .add_systems(Update, select.in_set(ToolSystems::Tools))
             .add_systems(PostUpdate, say.in_set(ToolSystems::Show))
             .add_painter(BandPainter);
@@ -53,13 +59,59 @@ pub const REACH: f32 = 8.0;
 /// Largest distance of a click beside the mesh from the joint it picks, in pixels.
 const BESIDE: f32 = 24.0;
 
-/// The pick of a click; `None` for a click beside the mesh and all joints.
+/// Outlines of controls, as far as they are drawn.
+#[derive(SystemParam)]
+pub(super) struct DrawnControls<'w, 's> {
+    rigs: Query<'w, 's, &'static RigNodes>,
+    nodes: ControlNodes<'w, 's>,
+    in_use: Res<'w, ControlsInUse>,
+}
+
+impl DrawnControls<'_, '_> {
+    /// Controls whose outlines have their middles between two corners of the view plane, in the order of the rig's nodes.
+    fn within(&self, rig: &EditedRig, sight: &Sight, corners: [Vec2; 2]) -> Vec<Uid> {
+        if !self.in_use.0 {
+            return Vec::new();
+        }
+        let visible = self.nodes.visible(self.rigs.get(rig.entity).ok(), rig.place.affine().inverse());
+        let middle = |control: &ControlOutline| {
+            let points: Vec<Vec3> = control.lines.iter().flatten().copied().collect();
+            points.iter().sum::<Vec3>() / points.len().max(1) as f32
+        };
+        let free: Vec<&ControlOutline> = visible.iter().filter(|it| it.display == LayerDisplay::Normal).collect();
+        let middles: Vec<Vec3> = free.iter().map(|control| middle(control)).collect();
+        in_box(&sight.plane, corners, &middles).into_iter().map(|number| free[number].uid).collect()
+    }
+
+    /// The control whose outline is at a pixel; `None` while a skeleton is drawn in place of controls.
+    pub(super) fn at(&self, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<Uid> {
+        if !self.in_use.0 {
+            return None;
+        }
+        let visible = self.nodes.visible(self.rigs.get(rig.entity).ok(), rig.place.affine().inverse());
+        control_at(&visible, &sight.plane, sight.point(at), REACH * sight.pixel)
+    }
+}
+
+/// The pick of a click where no controls are drawn; `None` for a click beside the mesh and all joints.
 pub fn click(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<Pick> {
-    is_over(scene, rig, sight, at).then(|| Pick::Click {
-        plane: sight.plane,
-        point: sight.point(at),
-        reach: REACH * sight.pixel,
-    })
+    is_over(scene, rig, sight, at).then(|| pick_at(sight, at))
+}
+
+/// The pick of a click; `None` for a click beside the mesh, all joints and all outlines of controls.
+pub(super) fn click_or_control(
+    scene: &Scene,
+    controls: &DrawnControls,
+    rig: &EditedRig,
+    sight: &Sight,
+    at: Vec2,
+) -> Option<Pick> {
+    let is_met = is_over(scene, rig, sight, at) || controls.at(rig, sight, at).is_some();
+    is_met.then(|| pick_at(sight, at))
+}
+
+fn pick_at(sight: &Sight, at: Vec2) -> Pick {
+    Pick::Click { plane: sight.plane, point: sight.point(at), reach: REACH * sight.pixel }
 }
 
 /// Returns `true` if a pixel is over the mesh or near a joint.
@@ -76,7 +128,7 @@ fn is_over(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> bool {
 pub(super) fn select(
     mut shown: ResMut<SelectTool>,
     mut pointers: MessageReader<ToolPointer>,
-    scene: Scene,
+    (scene, controls): (Scene, DrawnControls),
     (mode, area, gizmo): (Res<Mode>, Res<ViewportArea>, Res<GizmoHover>),
     hovered: Query<&HoveredNode>,
     mut picks: MessageWriter<PickRequest>,
@@ -103,8 +155,17 @@ pub(super) fn select(
                 let band = tool.band.take();
                 let Some(press) = tool.press.take() else { continue };
                 let request = match band.filter(|_| dragged) {
-                    Some(band) => boxed(&scene, &rig, &sight, band, pointer.held),
-                    None => clicked(&scene, &rig, &sight, press, pointer.held, count, hovered.get(rig.entity).ok()),
+                    Some(band) => {
+                        let corners = band.map(|corner| sight.point(corner));
+                        // Where people pose, a box is for controls; joints are boxed where there are none in it.
+                        let is_posing = *mode == Mode::Pose;
+                        let found = if is_posing { controls.within(&rig, &sight, corners) } else { Vec::new() };
+                        boxed(&scene, &rig, &sight, corners, found, pointer.held)
+                    }
+                    None => {
+                        let pick = click_or_control(&scene, &controls, &rig, &sight, press);
+                        clicked(&rig, pick, pointer.held, count, hovered.get(rig.entity).ok())
+                    }
                 };
                 picks.write(request);
             }
@@ -118,7 +179,7 @@ pub(super) fn select(
     if asked != tool.asked {
         // The request is not repeated while another tool has the pointer, because that tool may have sent one.
         tool.asked = asked;
-        let what = at.and_then(|at| match click(&scene, &rig, &sight, at) {
+        let what = at.and_then(|at| match click_or_control(&scene, &controls, &rig, &sight, at) {
             Some(Pick::Click { plane, point, reach }) => Some((plane, point, reach)),
             _ => None,
         });
@@ -129,11 +190,10 @@ pub(super) fn select(
     }
 }
 
+/// The request of a click with what it meets; of a double click, with the hierarchy of the active joint.
 pub(super) fn clicked(
-    scene: &Scene,
     rig: &EditedRig,
-    sight: &Sight,
-    at: Vec2,
+    pick: Option<Pick>,
     held: ModifierKeys,
     count: u8,
     hovered: Option<&HoveredNode>,
@@ -141,14 +201,14 @@ pub(super) fn clicked(
     let request = |what, add| PickRequest { rig: rig.entity, what, add };
     let selected = &rig.selection.0;
     if count > 1
-        && let Some(active) = rig.selection.active()
+        && let Some(active) = rig.selection.active().filter(|active| rig.rig.joint(*active).is_some())
     {
         // The whole hierarchy, the joint itself last: it stays the active one.
         let mut below: Vec<Uid> = rig.rig.hierarchy(active).map(|joint| joint.data.uid).collect();
         below.reverse();
         return request(Pick::Joints(below), held.shift || held.control);
     }
-    let Some(pick) = click(scene, rig, sight, at) else {
+    let Some(pick) = pick else {
         return if held.shift || held.control {
             request(Pick::Joints(Vec::new()), true)
         } else {
@@ -163,14 +223,26 @@ pub(super) fn clicked(
     }
 }
 
-fn boxed(scene: &Scene, rig: &EditedRig, sight: &Sight, band: [Vec2; 2], held: ModifierKeys) -> PickRequest {
-    let corners = band.map(|corner| sight.point(corner));
+/// The request of a box with the controls in it, or with its joints if there are none.
+fn boxed(
+    scene: &Scene,
+    rig: &EditedRig,
+    sight: &Sight,
+    corners: [Vec2; 2],
+    controls: Vec<Uid>,
+    held: ModifierKeys,
+) -> PickRequest {
     if !held.control {
-        return PickRequest { rig: rig.entity, what: Pick::Box { plane: sight.plane, corners }, add: held.shift };
+        let what = match controls.is_empty() {
+            true => Pick::Box { plane: sight.plane, corners },
+            false => Pick::Joints(controls),
+        };
+        return PickRequest { rig: rig.entity, what, add: held.shift };
     }
     let posed = scene.posed(rig);
     let places: Vec<Vec3> = posed.iter().map(|(_, place)| *place).collect();
-    let inside: Vec<Uid> = in_box(&sight.plane, corners, &places).into_iter().map(|number| posed[number].0).collect();
+    let joints = in_box(&sight.plane, corners, &places).into_iter().map(|number| posed[number].0);
+    let inside: Vec<Uid> = controls.into_iter().chain(joints).collect();
     let rest = rig.selection.0.iter().copied().filter(|joint| !inside.contains(joint)).collect();
     PickRequest { rig: rig.entity, what: Pick::Joints(rest), add: false }
 }

@@ -55,7 +55,7 @@ impl Plugin for StrokeToolPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<StrokeTool>()
             .add_message::<StrokeTune>()
-            .add_systems(RunFixedMainLoop, drop_instead_of_undo.in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop))
+            .add_message::<TakenOnLeaving>()
             .add_systems(Update, draw.in_set(ToolSystems::Tools).after(super::place::place))
             .add_systems(PostUpdate, (show, answer).chain().in_set(ToolSystems::Show).after(super::place::show))
             .add_painter(bar::StrokeBar);
@@ -170,16 +170,9 @@ fn begin(rig: &EditedRig, sight: &Sight, at: Vec2, threshold: f32) -> StrokeRequ
     }
 }
 
-/// Turns an undo during drawing into a cancel: the drawing is dropped and the last step stays. Runs after keys are read
-/// and before actions are carried out.
-pub(super) fn drop_instead_of_undo(tool: Res<StrokeTool>, mut actions: MessageMutator<ActionRequest>) {
-    if matches!(tool.state, StrokeState::Idle) {
-        return;
-    }
-    for request in actions.read().filter(|request| request.0 == Action::Undo) {
-        request.0 = Action::Cancel;
-    }
-}
+/// Stroke of a rig that was accepted because its mode was left. Whoever left is told once its chain is in the rig.
+#[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
+struct TakenOnLeaving(Entity);
 
 /// Position of the press, and the view at that moment, which holds for the whole line.
 #[derive(Debug, Clone, Copy)]
@@ -192,6 +185,7 @@ pub(super) struct Press {
 #[derive(SystemParam)]
 pub(super) struct Outcomes<'w> {
     strokes: MessageWriter<'w, StrokeRequest>,
+    left: MessageWriter<'w, TakenOnLeaving>,
     picks: MessageWriter<'w, PickRequest>,
     notices: MessageWriter<'w, Notice>,
 }
@@ -208,6 +202,8 @@ pub(super) fn draw(
     mut hovered: Query<&mut HoveredNode>,
     mut out: Outcomes,
 ) {
+    // In a slow frame the button may be released beside the key: actions come first, so the preview is not there yet.
+    let mut is_accepted = false;
     for ActionRequest(action) in actions.read() {
         match action {
             // Actions that save, compute or leave must not leave a drawing behind.
@@ -218,18 +214,24 @@ pub(super) fn draw(
             | Action::Skin
             | Action::Quit
             | Action::New
-            | Action::Open => take(&mut tool, &mut out.strokes),
+            | Action::Open => {
+                is_accepted |= !matches!(tool.state, StrokeState::Preview(_));
+                take(&mut tool, &mut out.strokes);
+            }
             Action::Cancel if !matches!(tool.state, StrokeState::Idle) => {
                 tool.state = StrokeState::Idle;
                 *press = None;
+                is_accepted = false;
             }
             Action::NextVolume => next_volume(&mut tool),
             _ => {}
         }
     }
-    if *mode != Mode::Stroke && matches!(tool.state, StrokeState::Preview(_)) {
+    if *mode != Mode::Stroke
+        && let StrokeState::Preview(preview) = &tool.state
+    {
+        out.left.write(TakenOnLeaving(preview.request.rig));
         take(&mut tool, &mut out.strokes);
-        out.notices.write(Notice::info("The stroke was accepted as you left its mode; Ctrl+Z takes it back."));
     }
     for change in tunes.read() {
         tune(&mut tool, *change, scene.rig());
@@ -274,6 +276,9 @@ pub(super) fn draw(
             hovered.set_if_neq(HoveredNode(under));
         }
         *hovering = under.is_some();
+    }
+    if is_accepted {
+        take(&mut tool, &mut out.strokes);
     }
     if *mode != Mode::Stroke
         && std::mem::take(&mut *hovering)

@@ -82,6 +82,11 @@ impl GizmoTool {
     pub fn dragged(&self) -> Option<Handle> {
         self.drag.as_ref().map(|drag| drag.gizmo.handle)
     }
+
+    /// True while a drag has changed something: a press alone changes nothing.
+    pub fn is_moving(&self) -> bool {
+        self.drag.as_ref().is_some_and(|drag| !drag.gizmo.delta().is_none())
+    }
 }
 
 /// Shows arrows beside the rings in Pose mode for every joint if `true`, not only for roots.
@@ -231,8 +236,8 @@ pub(super) fn drag(
                 } else {
                     let pick = match (drag.grabbed, scene.sight()) {
                         (Some(_), Some(sight)) => {
-                            let hovered = hovered.get(rig.entity).ok();
-                            Some(select::clicked(&scene, rig, &sight, pointer.at, pointer.held, count, hovered))
+                            let pick = select::click(&scene, rig, &sight, pointer.at);
+                            Some(select::clicked(rig, pick, pointer.held, count, hovered.get(rig.entity).ok()))
                         }
                         _ => clicked(&scene, rig, pointer.at, pointer.held),
                     };

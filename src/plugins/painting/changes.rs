@@ -88,6 +88,9 @@ pub enum WeightChangeError {
     /// The finished change waited, and a person discarded it.
     #[error("the change was discarded while it waited; the weights stay as they are")]
     Discarded,
+    /// A person stopped the change.
+    #[error("the change was stopped; the weights stay as they are")]
+    Stopped,
     /// Another change of the same mesh is being worked out.
     #[error("the weights of the mesh are being changed already; wait for it")]
     Running,
@@ -118,6 +121,11 @@ impl WeightChangeJob {
     /// True if the change is finished, and waits to be committed.
     pub fn waits(&self) -> bool {
         self.held.is_some()
+    }
+
+    /// Stops the change; the weights stay as they are.
+    pub fn stop(&mut self) {
+        self.held = Some(Err(WeightChangeError::Stopped));
     }
 
     /// Discards a change that waits; the weights stay as they are.

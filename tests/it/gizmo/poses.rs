@@ -1,6 +1,17 @@
 //! Gizmos that pose joints and controls, and the rest pose while it is edited.
 
+use bevy::ecs::system::RunSystemOnce;
+use rigsmith::{
+    editor::tools::select::REACH,
+    plugins::{
+        controls::outline::{ControlNodes, control_at},
+        document::HoveredNode,
+        schema::RigNodes,
+    },
+};
+
 use super::*;
+use crate::viewport_app::front;
 
 #[test]
 fn poses_leave_the_rest_pose_alone_and_follow_the_pointer() {
@@ -129,5 +140,77 @@ fn a_click_takes_a_control_and_the_gizmo_moves_what_it_drives() {
         // Drawing a skeleton, nobody takes a control by mistake.
         bench.mode(Mode::Move);
         assert!(!bench.base.app.world().resource::<ControlsInUse>().0);
+    }
+}
+
+/// The bundled biped without its mesh: outlines go round the body, and most of them is far from any joint.
+#[test]
+fn a_click_on_an_outline_beside_the_body_takes_its_control() {
+    let sight = front();
+    let mut app = headless_app(1);
+    app.add_plugins((ToolsPlugin, BuildingPlugin));
+    let mut app = strict_app(app);
+    let rig = app.world_mut().spawn(crate::bench::shipped("biped")).id();
+    app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(sight)));
+    app.update();
+    app.update();
+    let mut bench = Bench { base: RigBench { app, rig }, sink: Sink::default() };
+    let visible = move |controls: ControlNodes, nodes: Query<&RigNodes>| {
+        controls.visible(nodes.get(rig).ok(), bevy::math::Affine3A::IDENTITY)
+    };
+    let outlines = bench.base.app.world_mut().run_system_once(visible).unwrap();
+    let state = bench.base.get::<RigRuntime>(rig).expect("a built rig").state();
+    let joints: Vec<Vec2> =
+        bench.base.rig().walk().filter_map(|joint| sight.project(state.global(joint.data.uid)?.translation)).collect();
+    // A place of each outline, with which no other outline is mistaken.
+    let is_clear = |control: Uid, at: Vec2| {
+        let met = control_at(&outlines, &sight.plane, sight.point(at), REACH * sight.pixel);
+        met == Some(control) && joints.iter().all(|joint| joint.distance(at) > 30.0)
+    };
+    let places: Vec<(Uid, Vec2)> = outlines
+        .iter()
+        .filter_map(|outline| {
+            let mut pixels = outline.lines.iter().flatten().filter_map(|place| sight.project(*place));
+            Some((outline.uid, pixels.find(|at| is_clear(outline.uid, *at))?))
+        })
+        .collect();
+    assert!(places.len() > 1, "no outlines are beside the body: {} outlines, {} joints", outlines.len(), joints.len());
+    for mode in [Mode::Select, Mode::Pose] {
+        bench.mode(mode);
+        for (control, at) in &places {
+            bench.base.select(&[]);
+            bench.pointer(*at, PointerAct::Moved, ModifierKeys::default());
+            assert_eq!(
+                bench.base.get::<HoveredNode>(rig).unwrap().0,
+                Some(*control),
+                "{mode:?}: what a click would take"
+            );
+            // The second click of a double click, too: nothing of the document hangs below a control.
+            for count in [1, 2] {
+                bench.pointer(*at, PointerAct::Pressed, ModifierKeys::default());
+                bench.pointer(*at, PointerAct::Released { dragged: false, count }, ModifierKeys::default());
+                assert_eq!(bench.base.selected(), [*control], "{mode:?}, click {count}");
+            }
+        }
+        // A box takes controls where people pose, and joints elsewhere; with Control it takes both away.
+        bench.base.select(&[]);
+        let [low, high] = [Vec2::splat(1.0), Vec2::splat(799.0)];
+        let control = ModifierKeys { control: true, ..default() };
+        for held in [ModifierKeys::default(), control] {
+            bench.pointer(low, PointerAct::Pressed, held);
+            bench.pointer(high, PointerAct::Dragged, held);
+            bench.pointer(high, PointerAct::Released { dragged: true, count: 1 }, held);
+            let boxed = bench.base.selected();
+            let is_joint = |node: &Uid| bench.base.rig().joint(*node).is_some();
+            match held.control {
+                true => assert!(boxed.is_empty(), "{mode:?}: {} are left", boxed.len()),
+                false => assert!(
+                    boxed.len() >= places.len() && boxed.iter().all(|node| is_joint(node) != (mode == Mode::Pose)),
+                    "{mode:?}: {boxed:?}"
+                ),
+            }
+        }
+        bench.pointer(Vec2::new(3.0, 3.0), PointerAct::Moved, ModifierKeys::default());
+        assert_eq!(bench.base.get::<HoveredNode>(rig).unwrap().0, None, "{mode:?}: beside everything");
     }
 }

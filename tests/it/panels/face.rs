@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use bevy::prelude::*;
 use bevy_egui::egui;
 use rigsmith::{
+    algo::face::{auto::AutoSettings, bones::FaceBoneKind},
     editor::panels::face::FacePanel,
     files::{RealDisk, load_model},
     plugins::{
         document::{Change, EditRequest},
-        face::{Expressions, Face, FaceJob, FaceRig},
+        face::{Expressions, Face, FaceJob, FaceRequest, FaceRig, PlacedBone},
         surface::{RigMesh, SkinOf},
     },
     prelude::*,
@@ -19,7 +20,16 @@ use super::desk::{Desk, Sheet};
 
 /// The panel, tall enough for all of it, and the bundled head.
 fn with_head() -> (Desk, Entity) {
+    opened(None)
+}
+
+/// The panel with the bundled head, which belongs to a rig, or to an empty one.
+fn opened(rig: Option<Rig>) -> (Desk, Entity) {
     let mut desk = Desk::with(Sheet::Panel(Box::new(FacePanel::default())), egui::vec2(320.0, 1400.0));
+    let entity = desk.rig;
+    if let Some(rig) = rig {
+        desk.app.world_mut().entity_mut(entity).insert(rig);
+    }
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/models/head.obj");
     let mesh = RigMesh::new(Uid(99), load_model(&RealDisk, &path).unwrap(), Vec::new());
     let mesh = desk.app.world_mut().spawn((mesh, SkinOf(desk.rig))).id();
@@ -97,6 +107,26 @@ fn a_click_makes_a_face_that_sliders_pose() {
     desk.click("Reset");
     desk.frames(4);
     assert!(desk.rig().pose().is_empty(), "back at rest");
+}
+
+/// A face that is opened from a file has the density that it was placed with, and is placed again with it.
+#[test]
+fn the_density_is_that_of_the_opened_face() {
+    let number_of_bones = |desk: &Desk| {
+        let row = written(desk, "Bones").expect("the density").center().y;
+        let mut in_row = desk.seen.iter().filter(|seen| seen.rect.y_range().contains(row));
+        in_row.find_map(|seen| seen.value.parse::<f32>().ok()).expect("its number")
+    };
+    let (mut desk, mesh) = with_head();
+    assert_eq!(number_of_bones(&desk), 40.0);
+    let settings = AutoSettings { bones: 24, ..AutoSettings::default() };
+    desk.app.world_mut().write_message(FaceRequest { mesh, settings, fit: None });
+    wait(&mut desk, mesh);
+    let is_skin = |bone: &&PlacedBone| bone.kind == FaceBoneKind::Skin;
+    let count = FaceRig::read(desk.rig()).bones.iter().filter(is_skin).count();
+    assert!((4..36).contains(&count), "{count} bones");
+    let (reopened, _) = opened(Some(desk.rig().clone()));
+    assert_eq!(number_of_bones(&reopened), count as f32);
 }
 
 #[test]

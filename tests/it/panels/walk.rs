@@ -26,6 +26,8 @@ use rigsmith::{
         follow::FollowPlugin,
         help::HelpPlugin,
         library::{LibraryFolders, LibraryJobs},
+        mode::Mode,
+        onion::OnionSkin,
         palette::PalettePlugin,
         panel::EditorPanel,
         panels::{
@@ -45,7 +47,7 @@ use rigsmith::{
             selection_sets::SelectionSetsPanel,
             skinning::SkinningPanel,
             tags::TagsPanel,
-            timeline::{TimelinePanel, TimelineRequest},
+            timeline::{Timeline, TimelinePanel, TimelineRequest},
             updater::UpdaterPanel,
             weights::WeightsPanel,
         },
@@ -54,7 +56,7 @@ use rigsmith::{
         screen::ScreenPlugin,
         settings::{SettingsFolder, SettingsPlugin},
         start::StartPlugin,
-        tools::ToolsPlugin,
+        tools::{ToolsPlugin, paint::brush::PaintBrush},
     },
     files::SearchPaths,
     headless::headless_app,
@@ -348,6 +350,35 @@ fn all_that_panels_do_is_taken_back_by_undo() {
     }
     assert!(wrong.is_empty(), "{} are wrong:\n{}", wrong.len(), wrong.join("\n"));
     assert!(made.len() > 20, "only these made a step: {made:?}");
+}
+
+/// Clicks, drags and menus leave the document and the window as they are while nothing that panels ask for is carried out.
+#[test]
+fn panels_change_nothing_themselves() {
+    let mut count = 0;
+    for (name, panel, size) in panels() {
+        let mut walk = Walk::new(panel, size);
+        walk.ready();
+        let state = |walk: &Walk| {
+            let world = walk.desk.app.world();
+            let of_window =
+                (*world.resource::<Mode>(), *world.resource::<OnionSkin>(), *world.resource::<PaintBrush>());
+            let of_timeline = format!("{:?}", world.resource::<Timeline>());
+            (walk.desk.steps(), walk.desk.selected().to_vec(), of_window, of_timeline)
+        };
+        let (rig, before) = (walk.desk.rig().clone(), state(&walk));
+        walk.desk.deaf = true;
+        for (widget, at) in walk.names().into_iter().take(MOST_WIDGETS / 3) {
+            open(&mut walk.desk, at, count % 2 == 1);
+            escape(&mut walk.desk);
+            walk.desk.drag(at, at + egui::vec2(40.0, 3.0));
+            escape(&mut walk.desk);
+            assert!(*walk.desk.rig() == rig, "{name}: {widget} changes the document");
+            assert_eq!(state(&walk), before, "{name}: {widget}");
+            count += 1;
+        }
+    }
+    assert!(count > 80, "only {count} widgets were met");
 }
 
 /// Actions that are no edits of the open document by what they are: they open, save or close documents, or are undo itself.

@@ -124,6 +124,11 @@ impl ClipImport {
         self.job.take_if(|job| matches!(job.work, Work::Waits(_))).map(|job| job.name)
     }
 
+    /// Stops reading or retargeting; returns the name of the file. Motion whose map was being carried out waits again.
+    pub fn stop(&mut self) -> Option<String> {
+        self.job.take_if(|job| matches!(job.work, Work::Runs(_))).map(|job| job.name)
+    }
+
     /// Motion that waits until its map is accepted.
     pub fn draft(&self) -> Option<&MapDraft> {
         self.draft.as_ref()

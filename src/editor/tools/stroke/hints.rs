@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use super::{StrokePreview, StrokeState, StrokeTool};
+use super::{StrokePreview, StrokeState, StrokeTool, TakenOnLeaving};
 use crate::{
     algo::stroke::{StrokeKind, StrokeNote},
     editor::{
@@ -95,18 +95,26 @@ fn heard(note: &StrokeNote) -> String {
 pub(super) fn answer(
     mut done: MessageReader<StrokeDone>,
     mut edited: MessageReader<EditReport>,
+    mut left: MessageReader<TakenOnLeaving>,
+    mut leaving: Local<Option<Entity>>,
     active: Option<Res<ActiveRig>>,
     mut notices: MessageWriter<Notice>,
 ) {
+    *leaving = left.read().last().map(|left| left.0).or(*leaving);
     let changed: Vec<Entity> = edited.read().filter(|report| report.is_new_step()).map(|report| report.rig).collect();
     let Some(active) = active else { return done.clear() };
     for StrokeDone { rig, result } in done.read() {
         if *rig != active.0 {
             continue;
         }
+        let is_leaving = leaving.take_if(|left| *left == *rig).is_some();
         let notice = match result {
             StrokeResult::Nothing(why) => Notice::warning(format!("Nothing was drawn: {why}.")),
             _ if !changed.contains(rig) => continue,
+            StrokeResult::Chain { chain, .. } if is_leaving => {
+                let drawn = joints(chain.joints.len());
+                Notice::info(format!("The stroke was accepted as you left its mode: {drawn}; Ctrl+Z takes them back."))
+            }
             StrokeResult::Chain { chain, .. } => Notice::done(format!("Drew {}.", joints(chain.joints.len()))).quiet(),
             StrokeResult::Inserted { .. } => Notice::done("Put a joint into a bone.").quiet(),
             StrokeResult::Erased(under) => {
