@@ -7,6 +7,7 @@ mod hierarchy;
 mod notices;
 mod posing;
 mod skinning;
+mod tag_values;
 mod tags;
 mod walk;
 mod weights;

@@ -22,7 +22,6 @@ mod model;
 mod node;
 mod state;
 mod wires;
-mod words;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
