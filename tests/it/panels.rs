@@ -3,6 +3,7 @@
 pub(crate) mod desk;
 mod face;
 mod features;
+mod groups;
 mod hierarchy;
 mod notices;
 mod posing;
