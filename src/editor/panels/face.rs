@@ -52,6 +52,9 @@ impl Plugin for FacePanelPlugin {
     }
 }
 
+/// Least and greatest number of bones on the facial skin.
+const DENSITIES: [usize; 2] = [4, 150];
+
 /// Last report of each mesh.
 #[derive(Resource, Debug, Default)]
 pub struct FaceResults(Vec<(Entity, FaceReport)>);
@@ -185,6 +188,12 @@ impl FacePanel {
             return;
         }
         let known = FaceRig::read(&shown.rig);
+        // A face that comes with its file has the density that it was placed with.
+        let is_other = self.shown.as_ref().is_none_or(|drawn| drawn.mesh != mesh);
+        let density = known.bones.iter().filter(|bone| bone.kind == FaceBoneKind::Skin).count();
+        if is_other && density > 0 {
+            self.settings.bones = density.clamp(DENSITIES[0], DENSITIES[1]);
+        }
         let pictures = self.shown.take().filter(|drawn| drawn.mesh == mesh).map(|drawn| drawn.pictures);
         self.shown = Some(FaceData { mesh, stamp, known, pictures: pictures.unwrap_or_default() });
     }
@@ -212,7 +221,7 @@ impl FacePanel {
         }
         fields::labelled(ui, "Bones", |ui| {
             ui.spacing_mut().slider_width = (ui.available_width() - 52.0).max(30.0);
-            let slider = ui.add(Slider::new(&mut self.settings.bones, 4..=150).logarithmic(true));
+            let slider = ui.add(Slider::new(&mut self.settings.bones, DENSITIES[0]..=DENSITIES[1]).logarithmic(true));
             let slider = slider.on_hover_text("Density: bones of the facial skin");
             fields::named(ui, slider.id, "Bones");
             // Releasing the slider is enough: an existing face is placed again with the new density.

@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use bevy::prelude::*;
 use bevy_egui::egui;
 use rigsmith::{
+    algo::face::{auto::AutoSettings, bones::FaceBoneKind},
     editor::panels::face::FacePanel,
     files::{RealDisk, load_model},
     plugins::{
         document::{Change, EditRequest},
-        face::{Expressions, Face, FaceJob, FaceRig},
+        face::{Expressions, Face, FaceJob, FaceRequest, FaceRig},
         surface::{RigMesh, SkinOf},
     },
     prelude::*,
@@ -100,6 +101,22 @@ fn a_click_makes_a_face_that_sliders_pose() {
 }
 
 #[test]
+fn a_face_that_comes_with_its_file_has_its_density() {
+    let (mut desk, mesh) = with_head();
+    let settings = AutoSettings { bones: 24, ..default() };
+    desk.app.world_mut().write_message(FaceRequest { mesh, settings, fit: None });
+    wait(&mut desk, mesh);
+    let known = FaceRig::read(desk.rig());
+    let density = known.bones.iter().filter(|bone| bone.kind == FaceBoneKind::Skin).count();
+    assert!(density > 0 && density != AutoSettings::default().bones, "{density}");
+    // The panel of a window that opens the document.
+    let sheet = Sheet::Panel(Box::new(FacePanel::default()));
+    let mut again = Desk::of(desk.app, desk.rig, sheet, egui::vec2(320.0, 1400.0));
+    again.frames(3);
+    assert!(again.look("Place again").is_some() && again.says(&density.to_string()), "{density}: {:?}", again.seen);
+}
+
+#[test]
 fn the_merge_history_can_be_cut() {
     let (mut desk, mesh) = with_head();
     desk.click("Place face");
@@ -109,10 +126,14 @@ fn the_merge_history_can_be_cut() {
     assert!(before >= 3);
     desk.click("Grouping");
     desk.frames(20);
-    let slider = written(&desk, "groups").unwrap_or_else(|| panic!("{:?}", desk.seen));
+    assert!(written(&desk, "groups").is_some(), "{:?}", desk.seen);
     assert!(written(&desk, HINT_AUTO).is_some(), "{:?}", desk.seen);
-    // Near the roots of the tree, which stands above its slider, all merges that are drawn are undone.
-    desk.click_at(egui::pos2(slider.left() + 60.0, slider.top() - 16.0));
+    // Its colours and its ends have names.
+    let key = ["Front to back:", "⏺ face", "⏺ middle", "⏺ back", "- - cut"].map(|word| written(&desk, word).is_some());
+    assert_eq!(key, [true; 5], "{:?}", desk.seen);
+    // Near the roots of the tree all merges that are drawn are undone.
+    let tree = desk.find("Merge history").rect;
+    desk.click_at(egui::pos2(tree.left() + 60.0, tree.bottom() - 10.0));
     desk.frames(2);
     assert!(written(&desk, HINT_BY_HAND).is_some(), "{:?}", desk.seen);
     desk.click("Place again");
@@ -120,8 +141,8 @@ fn the_merge_history_can_be_cut() {
     let deep = groups(&desk);
     assert!(deep > before && deep > 10, "{before} groups became {deep}");
     // Cut near its top, and left to the mesh again.
-    let slider = written(&desk, "groups").unwrap();
-    desk.click_at(egui::pos2(slider.left() + 60.0, slider.top() - 90.0));
+    let tree = desk.find("Merge history").rect;
+    desk.click_at(egui::pos2(tree.left() + 60.0, tree.top() + 22.0));
     desk.frames(2);
     desk.click("Place again");
     wait(&mut desk, mesh);
