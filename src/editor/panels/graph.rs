@@ -53,12 +53,12 @@ use self::{
 use super::{
     displayed_rig::{DisplayedRig, Stamp},
     list,
-    tags::library::DraggedModule,
 };
 use crate::{
     editor::{
         actions::ActionRequest,
         counted::counted,
+        library::DraggedModule,
         notice::Notice,
         panel::{EditorPanel, Requests},
     },
