@@ -2,6 +2,7 @@
 //!
 //! Tags that several selected joints have alike are one card and are changed together.
 
+mod curve_field;
 mod fault;
 mod forms;
 mod header;

@@ -209,3 +209,59 @@ fn tags_are_copied_and_pasted_over_a_scope_and_mirrored() {
     choose(&mut desk, "Copy", "Cut all tags");
     assert_eq!(of(&desk), ["", "null", ""], "{:?}", desk.told());
 }
+
+#[test]
+fn keys_of_a_curve_are_dragged_added_and_removed() {
+    let mut desk = Desk::new(TagsPanel::default());
+    desk.resize(400.0, 1600.0);
+    let [a, _] = desk.chain(&["a", "b"])[..] else { panic!() };
+    let tag = add_command(&mut desk, a, "driven_key", "()");
+    desk.select(&[a]);
+    desk.click("Values of driven_key");
+    desk.frames(3);
+    let keys = |desk: &Desk| -> Vec<String> {
+        let keys = desk.seen.iter().filter(|seen| seen.label.starts_with("Keys key "));
+        let mut keys: Vec<String> = keys.map(|seen| seen.label.clone()).collect();
+        keys.sort_unstable();
+        keys
+    };
+    assert_eq!(keys(&desk), ["Keys key 1: 0, 0", "Keys key 2: 1, 1"]);
+    let (before, steps) = (desk.rig().clone(), desk.steps().1);
+    let last = desk.find("Keys key 2: 1, 1").rect.center();
+    desk.drag(last, last + egui::vec2(-80.0, 20.0));
+    desk.frames(3);
+    assert_eq!(desk.steps().1, steps + 1, "a drag is one step");
+    assert!(params_of(&desk, tag).contains("keys: ["), "{}", params_of(&desk, tag));
+    let moved = keys(&desk);
+    assert!(moved.len() == 2 && moved[0] == "Keys key 1: 0, 0" && moved[1] != "Keys key 2: 1, 1", "{moved:?}");
+    // A drag that Escape ends changes nothing.
+    let last = desk.find(&moved[1]).rect.center();
+    desk.time += 1.0;
+    desk.press(last);
+    desk.move_to(last + egui::vec2(-10.0, 5.0));
+    desk.move_to(last + egui::vec2(-30.0, 10.0));
+    desk.key(egui::Key::Escape);
+    desk.release(last);
+    desk.frames(3);
+    assert_eq!((keys(&desk), desk.steps().1), (moved, steps + 1));
+    let ground = desk.find("Keys as a curve").rect.center();
+    desk.double_click("Keys as a curve");
+    desk.frames(3);
+    assert_eq!((keys(&desk).len(), desk.steps().1), (3, steps + 2), "{:?}", keys(&desk));
+    let middle = keys(&desk)[1].clone();
+    assert!(desk.find(&middle).rect.center().distance(ground) < 3.0, "it is where the click was");
+    desk.secondary_click(&middle);
+    desk.frames(3);
+    assert_eq!((keys(&desk).len(), desk.steps().1), (2, steps + 3));
+    // Two keys are the least.
+    let first = keys(&desk)[0].clone();
+    desk.secondary_click(&first);
+    desk.frames(3);
+    assert_eq!((keys(&desk).len(), desk.steps().1), (2, steps + 3));
+    let rig = desk.rig;
+    for _ in 0..3 {
+        desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+        desk.frames(2);
+    }
+    assert_eq!(*desk.rig(), before);
+}

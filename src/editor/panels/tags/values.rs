@@ -13,6 +13,7 @@ use bevy_egui::egui::{
 use serde::Serialize;
 
 use super::{
+    curve_field::{self, CurveDrag, CurveEdit},
     fault::Fault,
     forms::form_of,
     parameter_text::{ValueError, read, typed_number},
@@ -48,6 +49,7 @@ const FIRST_COLOR: [f32; 3] = [1.0, 0.8, 0.1];
 pub(super) struct Values {
     numbers: Numbers,
     draft: Option<Draft>,
+    curve: Option<CurveDrag>,
     forms: HashMap<&'static str, Form>,
     read: ReadValues,
     /// Parameter that waits for nodes.
@@ -112,6 +114,17 @@ impl Subject<'_> {
         match changed.collect::<Result<Vec<_>, crate::rig::SourceError>>() {
             Ok(changed) => ValueEdit::Set(changed),
             Err(error) => ValueEdit::Refused(ValueError::Parameters(error)),
+        }
+    }
+
+    fn curve(&self, path: &str, edit: CurveEdit) -> ValueEdit {
+        match edit {
+            CurveEdit::Set(keys) => self.set_to(path, &keys),
+            CurveEdit::Preview(keys) => {
+                self.changed(path, &[ron_text(&keys)]).map_or_else(ValueEdit::Refused, ValueEdit::Preview)
+            }
+            CurveEdit::Commit => ValueEdit::Commit,
+            CurveEdit::Cancel => ValueEdit::Cancel,
         }
     }
 
@@ -306,7 +319,15 @@ impl Values {
                     _ => subject.set_to(path, text),
                 })
             }
-            FormElement::Curve(_) | FormElement::List(_) => {
+            FormElement::Curve(_) => {
+                let drawn = subject.values.get(path).and_then(|known| known.curve.as_deref()).filter(|_| !mixed);
+                let field = (subject.tag(), path);
+                let edit = drawn.and_then(|keys| curve_field::show(ui, field, &label, keys, &mut self.curve));
+                let text = self.text(ui, subject.tag(), path, &label, if mixed { "" } else { value }, true);
+                let edit = edit.map(|edit| subject.curve(path, edit));
+                edit.or_else(|| text.map(|text| subject.set(path, &[text])))
+            }
+            FormElement::List(_) => {
                 let text = self.text(ui, subject.tag(), path, &label, if mixed { "" } else { value }, true)?;
                 Some(subject.set(path, &[text]))
             }
