@@ -345,11 +345,20 @@ impl TagsPanel {
     }
 }
 
-/// Puts the tags of an entry before those of another.
+/// Puts the tags of an entry before those of another, on each joint: before the next tag of that joint where the other entry has
+/// none there.
 fn moved(entries: &[Entry], dragged: usize, before: usize) -> Option<CardRequest> {
-    let [(joint, tag)] = entries.get(dragged)?.tags[..] else { return None };
-    let before = entries.get(before).and_then(|entry| entry.tags.first()).map(|(_, tag)| *tag);
-    (before != Some(tag)).then_some(CardRequest::Operation(TagOperation::Move { tags: vec![tag], joint, before }))
+    if dragged == before {
+        return None;
+    }
+    let tags = &entries.get(dragged)?.tags;
+    let behind = move || entries.iter().enumerate().skip(before).filter(move |(number, _)| *number != dragged);
+    let next = |joint: Uid| {
+        let mut on_joint = behind().flat_map(|(_, entry)| &entry.tags).filter(|(other, _)| *other == joint);
+        on_joint.next().map(|(_, tag)| *tag)
+    };
+    let moves = tags.iter().map(|(joint, tag)| (*tag, *joint, next(*joint))).collect();
+    Some(CardRequest::Operation(TagOperation::MoveEach(moves)))
 }
 
 fn enabled(ui: &mut Ui, shown: &DisplayedRig, entry: &Entry) -> Option<CardRequest> {
@@ -398,9 +407,8 @@ fn card_menu(ui: &mut Ui, shown: &DisplayedRig, entries: &[Entry], number: usize
             ui.close();
         }
     };
-    let is_one = entry.tags.len() == 1;
-    item(ui, "Move up", is_one && number > 0, &|| moved(entries, number, number.checked_sub(1)?));
-    item(ui, "Move down", is_one && number + 1 < entries.len(), &|| moved(entries, number, number + 2));
+    item(ui, "Move up", number > 0, &|| moved(entries, number, number.checked_sub(1)?));
+    item(ui, "Move down", number + 1 < entries.len(), &|| moved(entries, number, number + 2));
     ui.separator();
     item(ui, "Copy", true, &|| Some(CardRequest::Copy));
     item(ui, "Cut", true, &|| Some(CardRequest::Cut));

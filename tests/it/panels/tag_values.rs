@@ -265,3 +265,50 @@ fn keys_of_a_curve_are_dragged_added_and_removed() {
     }
     assert_eq!(*desk.rig(), before);
 }
+
+#[test]
+fn alike_tags_of_several_joints_are_reordered_at_once() {
+    let mut desk = Desk::new(TagsPanel::default());
+    desk.resize(420.0, 900.0);
+    let joints = desk.chain(&["a", "b", "c"]);
+    for (joint, modules) in
+        joints.iter().zip([&["control", "null", "aim"][..], &["control", "aim"][..], &["aim", "null"][..]])
+    {
+        for module in modules {
+            add_command(&mut desk, *joint, module, "()");
+        }
+    }
+    desk.select(&joints);
+    desk.frames(2);
+    let order = |desk: &Desk| -> Vec<String> {
+        let of = |joint: &Uid| {
+            let tags = desk.rig().joint(*joint).unwrap().data.tags.iter();
+            let module = |tag: &TagData| match &tag.kind {
+                TagKind::Command { module, .. } => module.clone(),
+                TagKind::Feature { name, .. } => panic!("{name} is no command"),
+            };
+            tags.map(module).collect::<Vec<_>>().join(" ")
+        };
+        joints.iter().map(of).collect()
+    };
+    let (before, steps) = (desk.rig().clone(), desk.steps().1);
+    let [from, to] = ["Drag aim", "Drag control"].map(|label| desk.find(label).rect.center());
+    desk.drag(from, to);
+    desk.frames(3);
+    assert_eq!(order(&desk), ["aim control null", "aim control", "aim null"], "{:?}", desk.told());
+    assert_eq!(desk.steps().1, steps + 1);
+    // And back by the menu.
+    for _ in 0..2 {
+        desk.click("Menu of aim");
+        desk.frames(3);
+        desk.click("Move down");
+        desk.frames(3);
+    }
+    assert_eq!(order(&desk), ["control null aim", "control aim", "null aim"], "{:?}", desk.told());
+    let rig = desk.rig;
+    for _ in 0..3 {
+        desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
+        desk.frames(2);
+    }
+    assert_eq!(*desk.rig(), before);
+}
