@@ -160,6 +160,9 @@ fn cards_say_their_values_in_words() {
     desk.select(&[b]);
     desk.frames(2);
     assert!(desk.says("targets a, up axis x, no keep offset"), "{:?}", desk.seen);
+    add_command(&mut desk, b, "control", "(shape: \"cube\", creation: (name: \"body\"))");
+    desk.frames(2);
+    assert!(desk.says("shape cube, creation name body"), "{:?}", desk.seen);
 }
 
 #[test]
