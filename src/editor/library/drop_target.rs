@@ -68,7 +68,7 @@ pub(in crate::editor) fn attach(rig: Entity, joint: Uid, module: &str) -> EditRe
     EditRequest::operation(rig, Operation::Tags(TagOperation::Add { joints: vec![joint], kind, index: None }))
 }
 
-/// What is dragged.
+/// Subject of a drag.
 enum Dragged {
     Template(Arc<DraggedTemplate>),
     Module(&'static str),

@@ -1,5 +1,5 @@
-//! Hierarchy panel: the joints with their tags, or all nodes that are built, as a tree or as a list; of the whole document, or
-//! of one of several rigs in it, as they are after a merge.
+//! Hierarchy panel: the joints with their tags, or all nodes that are built, as a tree or as a list; of the whole document,
+//! or of one of several rigs in it, as they are after a merge.
 //!
 //! The panel shows the rig's own selection and changes it with pick requests, so the viewport and the tree never
 //! differ.

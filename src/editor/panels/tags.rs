@@ -345,8 +345,8 @@ impl TagsPanel {
     }
 }
 
-/// Puts the tags of an entry before those of another, on each joint: before the next tag of that joint where the other entry has
-/// none there.
+/// Puts the tags of an entry before those of another, on each joint: before the next tag of that joint where the other entry
+/// has none there.
 fn moved(entries: &[Entry], dragged: usize, before: usize) -> Option<CardRequest> {
     if dragged == before {
         return None;

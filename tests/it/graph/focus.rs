@@ -75,7 +75,7 @@ fn wires_of_a_hub_are_cut_short_where_they_are_out_of_focus() {
     select(&mut desk, []);
     let all = full(&desk);
     assert!(all >= 30 && short(&desk) == 0, "{all}: nothing is out of focus");
-    // A reader of the hub: its own wire stays whole, those of the other 19 readers do not; wires of commands with few readers do.
+    // A reader of the hub: its own wire stays whole, those of the other 19 readers do not; those of few readers do.
     select(&mut desk, [command(3)]);
     let (own, cut) = (full(&desk), short(&desk));
     assert!(own >= 1 && cut >= 19 && own + cut < all, "{own} and {cut} of {all}");

@@ -30,8 +30,8 @@ const PARTS: usize = 14;
 const MOST_CURVES: usize = 240;
 /// Strength of wires out of focus.
 const FADED: f32 = 0.3;
-/// Most readers of a command whose wires are drawn from end to end while they are out of focus: those of a hub would lie over
-/// everything else.
+/// Most readers of a command whose wires are drawn from end to end while they are out of focus: those of a hub would lie
+/// over everything else.
 pub(super) const MOST_READERS: usize = 12;
 /// Length of the ends of a wire that is cut short.
 const STUB: f32 = 22.0;

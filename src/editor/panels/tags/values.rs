@@ -440,8 +440,8 @@ impl Values {
     }
 }
 
-/// Draws a button that resets a value. Its name does not depend on what else is drawn, so that fields below keep the keyboard
-/// when it comes or goes.
+/// Draws a button that resets a value. Its name does not depend on what else is drawn, so that fields below keep the
+/// keyboard when it comes or goes.
 fn reset_button(ui: &Ui, place: Rect, of: (Uid, &str), label: &str) -> bool {
     let button = ui.interact(place, ui.id().with((of, "reset")), Sense::click());
     let said = format!("Reset {label} to default");
