@@ -250,12 +250,13 @@ impl Numbers {
         let slider = Slider::new(&mut value, f64::from(low)..=f64::from(high)).step_by(step);
         let response = ui.add(slider.clamping(SliderClamping::Edits).show_value(false));
         named(ui, response.id, &format!("{name} slider"));
-        if response.dragged() && response.changed() {
+        let is_held = response.dragged() || response.is_pointer_button_down_on();
+        if is_held && response.changed() {
             let from = held.map_or(f64::from(now), |held| held.from);
             self.dragged = Some(DraggedNumber { id, from, value });
             return Some(NumberEdit::Preview(value as f32));
         }
-        if let Some(DraggedNumber { from, value, .. }) = held.filter(|_| !response.dragged()) {
+        if let Some(DraggedNumber { from, value, .. }) = held.filter(|_| !is_held) {
             self.dragged = None;
             let is_escaped = ui.input(|input| input.key_pressed(Key::Escape));
             let is_dropped = is_escaped || !response.drag_stopped() || value == from;
