@@ -26,7 +26,7 @@ pub use self::{
     work::{LOAD, LibraryAct, LibraryJobs, LibraryRequest},
 };
 pub(in crate::editor) use self::{
-    drop_target::{dropping, goes_onto_both},
+    drop_target::{attach, dropping, goes_onto_both},
     save::{HEADER, header_step},
     sides::{partner, partners},
 };
@@ -100,6 +100,10 @@ impl Plugin for LibraryPlugin {
 /// Template that was chosen in the list.
 #[derive(Resource, Debug, Clone, PartialEq, Eq, Default)]
 pub struct ChosenTemplate(pub Option<TemplatePlace>);
+
+/// Module that is dragged from the library of the Tags panel onto a joint or a wire.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DraggedModule(pub &'static str);
 
 /// Template that is dragged from the list onto a joint.
 #[derive(Debug, Clone, PartialEq, Eq)]

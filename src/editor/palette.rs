@@ -1,4 +1,4 @@
-//! Command palette: every action by words, with its key, and the reason if it can do nothing at present.
+//! Command palette: every action by words, with its key, and the reason if it can do nothing at present; and every panel.
 
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Key, RichText, TextEdit, WidgetInfo, WidgetType};
@@ -6,12 +6,13 @@ use bevy_egui::egui::{self, Key, RichText, TextEdit, WidgetInfo, WidgetType};
 use super::{
     ActiveRig,
     actions::{Action, ActionRequest},
+    dock::ShowPanel,
     files::attend,
     help::describe,
     keys::KeyBindings,
     library,
     mode::Mode,
-    panel::{EditorOverlay, PanelApp, Requests},
+    panel::{EditorOverlay, PanelApp, PanelTitles, Requests},
     panels::{graph, timeline},
     style,
     tools::{
@@ -32,6 +33,7 @@ impl Plugin for PalettePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<PaletteShown>()
             .add_message::<ActionRequest>()
+            .add_message::<ShowPanel>()
             .add_overlay(Palette::default())
             .add_systems(Update, toggle_palette.after(attend));
     }
@@ -155,6 +157,28 @@ pub fn found(words: &str) -> Vec<Action> {
     list.into_iter().map(|(action, _)| action).collect()
 }
 
+/// Titles of the panels whose names, such as "Process panel", contain all words.
+pub fn found_panels(world: &World, words: &str) -> Vec<&'static str> {
+    let words: Vec<String> = words.split_whitespace().map(str::to_lowercase).collect();
+    let titles = world.get_resource::<PanelTitles>().map(|titles| titles.0.as_slice()).unwrap_or_default();
+    let fits = |title: &str| {
+        let text = panel_name(title).to_lowercase();
+        words.iter().all(|word| text.contains(word.as_str()))
+    };
+    titles.iter().copied().filter(|title| fits(title)).collect()
+}
+
+fn panel_name(title: &str) -> String {
+    format!("{title} panel")
+}
+
+/// Entry of the palette that is chosen.
+#[derive(Clone, Copy)]
+enum Chosen {
+    Action(Action),
+    Panel(&'static str),
+}
+
 #[derive(Default)]
 struct Palette {
     words: String,
@@ -174,13 +198,17 @@ impl EditorOverlay for Palette {
         if opened {
             (self.words, self.place) = (String::new(), 0);
         }
-        let list = found(&self.words);
+        let (list, panels) = (found(&self.words), found_panels(world, &self.words));
+        let at = |place: usize| match list.get(place) {
+            Some(action) => Some(Chosen::Action(*action)),
+            None => panels.get(place - list.len()).copied().map(Chosen::Panel),
+        };
         let moved = ctx.input_mut(|input| {
             let down = input.consume_key(egui::Modifiers::NONE, Key::ArrowDown);
             let up = input.consume_key(egui::Modifiers::NONE, Key::ArrowUp);
             i32::from(down) - i32::from(up)
         });
-        let last = list.len().saturating_sub(1);
+        let last = (list.len() + panels.len()).saturating_sub(1);
         self.place = self.place.saturating_add_signed(moved as isize).min(last);
         let mut chosen = None;
         let mut is_open = true;
@@ -198,7 +226,7 @@ impl EditorOverlay for Palette {
                 self.place = 0;
             }
             if field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter)) {
-                chosen = list.get(self.place).copied();
+                chosen = at(self.place);
             } else if opened || !field.has_focus() {
                 field.request_focus();
             }
@@ -215,7 +243,7 @@ impl EditorOverlay for Palette {
                             row.scroll_to_me(None);
                         }
                         if row.clicked() {
-                            chosen = Some(*action);
+                            chosen = Some(Chosen::Action(*action));
                         }
                         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                             if let Some(key) = keys.and_then(|keys| keys.key(*action)) {
@@ -229,16 +257,32 @@ impl EditorOverlay for Palette {
                         });
                     });
                 }
-                if list.is_empty() {
+                for (number, title) in panels.iter().enumerate() {
+                    let is_at = list.len() + number == self.place;
+                    let row = ui.selectable_label(is_at, panel_name(title));
+                    if moved != 0 && is_at {
+                        row.scroll_to_me(None);
+                    }
+                    if row.clicked() {
+                        chosen = Some(Chosen::Panel(*title));
+                    }
+                }
+                if list.is_empty() && panels.is_empty() {
                     ui.weak("No action is called so.");
                 }
             });
         });
-        if let Some(action) = chosen.filter(|action| obstacle(world, *action).is_none()) {
-            requests.set(PaletteShown(false));
-            requests.send(ActionRequest(action));
-        } else if !is_open || ctx.input(|input| input.key_pressed(Key::Escape)) {
-            requests.set(PaletteShown(false));
+        match chosen {
+            Some(Chosen::Action(action)) if obstacle(world, action).is_none() => {
+                requests.set(PaletteShown(false));
+                requests.send(ActionRequest(action));
+            }
+            Some(Chosen::Panel(title)) => {
+                requests.set(PaletteShown(false));
+                requests.send(ShowPanel(title));
+            }
+            _ if !is_open || ctx.input(|input| input.key_pressed(Key::Escape)) => requests.set(PaletteShown(false)),
+            _ => {}
         }
     }
 }

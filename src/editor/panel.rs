@@ -70,6 +70,10 @@ pub struct Panels {
     pub painters: Vec<Box<dyn ViewportPainter>>,
 }
 
+/// Titles of the panels in the dock, in the order in which they were added.
+#[derive(Resource, Debug, Clone, Default)]
+pub struct PanelTitles(pub Vec<&'static str>);
+
 /// Extension of [`App`] that adds to [`Panels`].
 pub trait PanelApp {
     /// Adds a panel to the dock.
@@ -82,7 +86,8 @@ pub trait PanelApp {
 
 impl PanelApp for App {
     fn add_panel(&mut self, panel: impl EditorPanel) -> &mut Self {
-        self.init_resource::<Panels>();
+        self.init_resource::<Panels>().init_resource::<PanelTitles>();
+        self.world_mut().resource_mut::<PanelTitles>().0.push(panel.title());
         self.world_mut().resource_mut::<Panels>().panels.push(Box::new(panel));
         self
     }

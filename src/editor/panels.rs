@@ -30,6 +30,7 @@ mod fields;
 mod groups;
 mod list;
 mod node_menu;
+mod words;
 
 use bevy::prelude::*;
 

@@ -25,9 +25,9 @@ use rigsmith::{
         files::{FilesPlugin, LoadJob, OpenRequest, SaveJob, StateFolder},
         follow::FollowPlugin,
         library::{
-            ChosenTemplate, DraggedTemplate, LibraryAct, LibraryAction, LibraryFolders, LibraryJobs, LibraryPictures,
-            LibraryRequest, SaveTemplate, TemplateContent, TemplateDraft, TemplateLibrary, TemplatePicture,
-            TemplateSave, obstacle,
+            ChosenTemplate, DraggedModule, DraggedTemplate, LibraryAct, LibraryAction, LibraryFolders, LibraryJobs,
+            LibraryPictures, LibraryRequest, SaveTemplate, TemplateContent, TemplateDraft, TemplateLibrary,
+            TemplatePicture, TemplateSave, obstacle,
         },
         palette,
         panel::{EditorPanel, Requests},

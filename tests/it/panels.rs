@@ -3,10 +3,12 @@
 pub(crate) mod desk;
 mod face;
 mod features;
+mod groups;
 mod hierarchy;
 mod notices;
 mod posing;
 mod skinning;
+mod tag_values;
 mod tags;
 mod walk;
 mod weights;

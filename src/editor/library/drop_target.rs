@@ -1,9 +1,11 @@
-//! Templates that are dragged from the list onto a joint in the viewport.
+//! Templates and modules that are dragged from their lists onto a joint in the viewport.
+
+use std::sync::Arc;
 
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, DragAndDrop, FontId, Stroke};
 
-use super::{DraggedTemplate, LibraryAct, LibraryRequest, PartSides, TemplateLibrary, partner};
+use super::{DraggedModule, DraggedTemplate, LibraryAct, LibraryRequest, PartSides, TemplateLibrary, partner};
 use crate::{
     editor::{
         ActiveRig,
@@ -13,14 +15,17 @@ use crate::{
         panels::joint_name,
         style,
     },
-    plugins::document::JointEntities,
-    rig::{Rig, Uid},
+    plugins::document::{EditRequest, JointEntities},
+    rig::{
+        Rig, TagKind, Uid,
+        operations::{Operation, TagOperation},
+    },
 };
 
 /// Distance in points up to which a joint is meant.
 const REACH: f32 = 48.0;
 
-/// Mark of the joint under a dragged template; it takes the template when it is let go.
+/// Mark of the joint under a dragged template or module; it takes that when it is let go.
 pub(super) struct DropTarget;
 
 /// The joint nearest to a place in the viewport, and where it is.
@@ -57,18 +62,55 @@ fn pointer(ctx: &egui::Context, area: egui::Rect) -> Option<Vec2> {
     Some(Vec2::new(at.x - area.min.x, at.y - area.min.y))
 }
 
+/// Request that gives a joint a command of a module.
+pub(in crate::editor) fn attach(rig: Entity, joint: Uid, module: &str) -> EditRequest {
+    let kind = TagKind::Command { module: module.to_owned(), feature: None, params: "()".to_owned() };
+    EditRequest::operation(rig, Operation::Tags(TagOperation::Add { joints: vec![joint], kind, index: None }))
+}
+
+/// Subject of a drag.
+enum Dragged {
+    Template(Arc<DraggedTemplate>),
+    Module(&'static str),
+}
+
+impl Dragged {
+    fn of(ctx: &egui::Context) -> Option<Self> {
+        let template = DragAndDrop::payload::<DraggedTemplate>(ctx).map(Self::Template);
+        template.or_else(|| DragAndDrop::payload::<DraggedModule>(ctx).map(|module| Self::Module(module.0)))
+    }
+
+    fn name(&self) -> &str {
+        match self {
+            Self::Template(template) => &template.name,
+            Self::Module(module) => module,
+        }
+    }
+
+    /// Effect of a drop on a joint, in words.
+    fn dropping(&self, world: &World, rig: &Rig, joint: Uid) -> String {
+        match self {
+            Self::Template(template) => dropping(rig, template, joint, goes_onto_both(world, template)),
+            Self::Module(module) => {
+                let name = rig.joint(joint).map(|joint| joint_name(&joint.data)).unwrap_or_default();
+                format!("{module} on {name}")
+            }
+        }
+    }
+}
+
 impl ViewportPainter for DropTarget {
     fn paint(&mut self, painter: &egui::Painter, area: egui::Rect, world: &World) {
-        let Some(dragged) = DragAndDrop::payload::<DraggedTemplate>(painter.ctx()) else { return };
+        let Some(dragged) = Dragged::of(painter.ctx()) else { return };
         let Some(at) = pointer(painter.ctx(), area) else { return };
         let active = world.get_resource::<ActiveRig>().and_then(|active| world.get::<Rig>(active.0));
         let color = style::ACCENT;
         let text = match nearest(world, at) {
             Some((joint, place)) => {
                 painter.circle_stroke(area.min + egui::vec2(place.x, place.y), 10.0, Stroke::new(2.0, color));
-                active.map_or_else(String::new, |rig| dropping(rig, &dragged, joint, goes_onto_both(world, &dragged)))
+                active.map_or_else(String::new, |rig| dragged.dropping(world, rig, joint))
             }
-            None => format!("{}: drop it on a joint", dragged.name),
+            None => format!("{}: drop it on a joint", dragged.name()),
         };
         let beside = area.min + egui::vec2(at.x + 14.0, at.y + 10.0);
         painter.text(beside, Align2::LEFT_TOP, text, FontId::proportional(12.0), color);
@@ -76,17 +118,21 @@ impl ViewportPainter for DropTarget {
 
     fn widgets(&mut self, ui: &mut egui::Ui, area: egui::Rect, world: &World, requests: &mut Requests) {
         let ctx = ui.ctx();
-        if !DragAndDrop::has_payload_of_type::<DraggedTemplate>(ctx) || !ctx.input(|input| input.pointer.any_released())
-        {
+        if !ctx.input(|input| input.pointer.any_released()) {
             return;
         }
-        let Some(at) = pointer(ctx, area) else { return };
-        let Some(dragged) = DragAndDrop::take_payload::<DraggedTemplate>(ctx) else { return };
-        match nearest(world, at) {
-            Some((joint, _)) => {
-                requests.send(LibraryRequest { place: dragged.place.clone(), act: LibraryAct::Drop { joint } });
+        let (Some(dragged), Some(at)) = (Dragged::of(ctx), pointer(ctx, area)) else { return };
+        let Some(rig) = world.get_resource::<ActiveRig>().map(|active| active.0) else { return };
+        DragAndDrop::clear_payload(ctx);
+        match (nearest(world, at), dragged) {
+            (Some((joint, _)), Dragged::Template(template)) => {
+                let act = LibraryAct::Drop { joint };
+                requests.send(LibraryRequest { place: template.place.clone(), act });
             }
-            None => requests.send(Notice::warning(format!("{}: there is no joint; drop it on one", dragged.name))),
+            (Some((joint, _)), Dragged::Module(module)) => requests.send(attach(rig, joint, module)),
+            (None, dragged) => {
+                requests.send(Notice::warning(format!("{}: there is no joint; drop it on one", dragged.name())));
+            }
         }
     }
 }

@@ -3,7 +3,8 @@
 use std::cell::Cell;
 
 use bevy_egui::egui::{
-    self, Align, Color32, DragValue, Id, Key, Layout, Rect, RichText, Sense, TextEdit, Ui, WidgetInfo, WidgetType,
+    self, Align, Color32, DragValue, Id, Key, Layout, Rect, RichText, Sense, Slider, SliderClamping, TextEdit, Ui,
+    WidgetInfo, WidgetType,
     text::{CCursor, CCursorRange},
     text_edit::TextEditState,
     vec2,
@@ -37,6 +38,11 @@ impl<T: PartialEq> CommonValue<T> {
         Some(Self { value, mixed })
     }
 }
+
+/// Width of the number beside a slider.
+const SLIDER_NUMBER: f32 = 52.0;
+/// Least width of a slider.
+const LEAST_SLIDER: f32 = 48.0;
 
 /// Text for values that differ.
 pub(super) const MIXED: &str = "mixed";
@@ -211,6 +217,53 @@ impl Numbers {
             let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
             self.field(ui, name, RichText::new(""), shown.into(), look, size)
         })
+    }
+
+    /// One number beside its name, with a slider between two ends where there is room for it. Numbers beyond the ends can be
+    /// typed.
+    pub fn slider(
+        &mut self,
+        ui: &mut Ui,
+        name: &str,
+        shown: CommonValue<f32>,
+        ends: [f32; 2],
+        look: Look,
+    ) -> Option<NumberEdit> {
+        labelled(ui, name, |ui| {
+            let (width, height) = (ui.available_width(), ui.spacing().interact_size.y);
+            let room = width - SLIDER_NUMBER - ui.spacing().item_spacing.x;
+            if room < LEAST_SLIDER {
+                return self.field(ui, name, RichText::new(""), shown, look, vec2(width, height));
+            }
+            ui.spacing_mut().slider_width = room;
+            let slid = self.slide(ui, name, shown.value, ends, look.speed);
+            let typed = self.field(ui, name, RichText::new(""), shown, look, vec2(SLIDER_NUMBER, height));
+            slid.or(typed)
+        })
+    }
+
+    /// Draws the slider of a number. Escape drops the dragged value.
+    fn slide(&mut self, ui: &mut Ui, name: &str, now: f32, [low, high]: [f32; 2], step: f64) -> Option<NumberEdit> {
+        let id = ui.id().with((name, "slider"));
+        let held = self.dragged.filter(|dragged| dragged.id == id);
+        let mut value = held.map_or(f64::from(now), |held| held.value);
+        let slider = Slider::new(&mut value, f64::from(low)..=f64::from(high)).step_by(step);
+        let response = ui.add(slider.clamping(SliderClamping::Edits).show_value(false));
+        named(ui, response.id, &format!("{name} slider"));
+        let is_held = response.dragged() || response.is_pointer_button_down_on();
+        if is_held && response.changed() {
+            let from = held.map_or(f64::from(now), |held| held.from);
+            self.dragged = Some(DraggedNumber { id, from, value });
+            return Some(NumberEdit::Preview(value as f32));
+        }
+        if let Some(DraggedNumber { from, value, .. }) = held.filter(|_| !is_held) {
+            self.dragged = None;
+            let is_escaped = ui.input(|input| input.key_pressed(Key::Escape));
+            let is_dropped = is_escaped || !response.drag_stopped() || value == from;
+            return Some(if is_dropped { NumberEdit::Cancel } else { NumberEdit::Commit });
+        }
+        // Keys move it, too.
+        response.changed().then_some(NumberEdit::Set(value as f32))
     }
 
     /// Draws one field. Escape drops the typed or dragged value.

@@ -22,7 +22,6 @@ mod model;
 mod node;
 mod state;
 mod wires;
-mod words;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -54,12 +53,12 @@ use self::{
 use super::{
     displayed_rig::{DisplayedRig, Stamp},
     list,
-    tags::library::DraggedModule,
 };
 use crate::{
     editor::{
         actions::ActionRequest,
         counted::counted,
+        library::DraggedModule,
         notice::Notice,
         panel::{EditorPanel, Requests},
     },

@@ -1,4 +1,5 @@
-//! Hierarchy panel: the joints with their tags, or all nodes that are built, as a tree or as a list.
+//! Hierarchy panel: the joints with their tags, or all nodes that are built, as a tree or as a list; of the whole document,
+//! or of one of several rigs in it, as they are after a merge.
 //!
 //! The panel shows the rig's own selection and changes it with pick requests, so the viewport and the tree never
 //! differ.
@@ -13,7 +14,7 @@ pub mod rows;
 use std::collections::HashSet;
 
 use bevy::prelude::*;
-use bevy_egui::egui::{self, DragAndDrop, Rect, Sense, Ui, WidgetInfo, WidgetType};
+use bevy_egui::egui::{self, ComboBox, DragAndDrop, Rect, Sense, Ui, WidgetInfo, WidgetType};
 
 use super::{
     displayed_rig::{DisplayedRig, Stamp},
@@ -27,13 +28,14 @@ use crate::{
         panel::{EditorPanel, Requests},
     },
     plugins::{
+        commands::BuildResult,
         document::EditRequest,
         picking::{HoverJoint, Pick, PickRequest},
     },
     rig::{Rig, Uid, operations::Operation},
 };
-use built::BuiltTree;
-use rows::{Row, flat_rows, rows};
+use built::{BuiltTree, WantedNodes};
+use rows::{Row, flat_rows, rows, within};
 
 /// The panel.
 #[derive(Default)]
@@ -61,6 +63,8 @@ pub struct HierarchyPanel {
     shows_built: bool,
     /// True if the rows are a list, without their hierarchy.
     is_flat: bool,
+    /// Joint whose hierarchy alone is listed.
+    top: Option<Uid>,
 }
 
 /// The listed rows with the state they were made from.
@@ -95,10 +99,12 @@ impl EditorPanel for HierarchyPanel {
             self.rename = None;
             return list::nothing(ui, "No joints yet: place them with clicks or draw them with strokes.");
         }
+        self.top = self.top.filter(|top| shown.rig.joint(*top).is_some());
         if self.shows_built {
             return self.built_nodes(ui, world, &shown, requests);
         }
-        self.bar(ui, &shown);
+        self.bar(ui, &shown, world.get::<BuildResult>(shown.entity).is_some());
+        self.choose_top(ui, &shown);
         self.reveal_active(&shown);
         self.refresh(&shown);
         keys::press(self, ui, &shown, requests);
@@ -130,16 +136,50 @@ impl HierarchyPanel {
             is_back = ui.button("Joints").on_hover_text("Back to the joints").clicked();
         });
         self.shows_built = !is_back;
-        self.built.show(ui, world, shown, (self.filter.as_str(), self.is_flat), requests);
+        self.choose_top(ui, shown);
+        let wanted = WantedNodes { filter: &self.filter, is_flat: self.is_flat, top: self.top };
+        self.built.show(ui, world, shown, wanted, requests);
     }
 
-    /// Draws the filter, the fold buttons and the switch to a list.
-    fn bar(&mut self, ui: &mut Ui, shown: &DisplayedRig) {
+    /// Draws the choice between all hierarchies and one of them, where there are several, or one was chosen in the menu of a
+    /// joint.
+    fn choose_top(&mut self, ui: &mut Ui, shown: &DisplayedRig) {
+        let roots = shown.rig.roots();
+        if roots.len() < 2 && self.top.is_none() {
+            return;
+        }
+        let mut next = self.top;
+        let only = |top: Uid| format!("Only {}", shown.name(top));
+        let now = next.map_or_else(|| "All".to_owned(), only);
+        let combo = ComboBox::from_id_salt("top").selected_text(now).width(ui.available_width()).truncate();
+        let combo = combo.show_ui(ui, |ui| {
+            ui.selectable_value(&mut next, None, "All");
+            for root in roots {
+                ui.selectable_value(&mut next, Some(*root), only(*root));
+            }
+        });
+        combo.response.widget_info(|| WidgetInfo::labeled(WidgetType::ComboBox, true, "Listed hierarchy"));
+        combo.response.on_hover_text("All nodes, or those of one hierarchy");
+        self.list_below(next);
+    }
+
+    /// Lists the hierarchy of a joint alone, or everything.
+    fn list_below(&mut self, top: Option<Uid>) {
+        self.stale |= self.top != top;
+        self.top = top;
+    }
+
+    /// Draws the filter, the fold buttons, the switch to a list, and that to the built nodes if there are any.
+    fn bar(&mut self, ui: &mut Ui, shown: &DisplayedRig, is_built: bool) {
         let mut fold: Option<bool> = None;
+        let shows_built = &mut self.shows_built;
         let tip = "Joints whose label, group or tags contain all of these words";
         let is_flat = &mut self.is_flat;
         list::search_bar(ui, "Filter", tip, &mut self.filter, |ui| {
             self.stale |= flat_button(ui, is_flat);
+            if is_built && ui.button("Nodes").on_hover_text("All built nodes, controls too").clicked() {
+                *shows_built = true;
+            }
             if *is_flat {
                 return;
             }
@@ -167,9 +207,16 @@ impl HierarchyPanel {
         let fresh = self.tree.made_from.as_ref().is_some_and(|(from, filter)| *from == stamp && *filter == self.filter);
         if !fresh || std::mem::take(&mut self.stale) {
             self.folded.retain(|joint| shown.rig.joint(*joint).is_some());
-            self.tree.rows = match self.is_flat {
+            for above in self.top.into_iter().flat_map(|top| shown.rig.ancestors(top)) {
+                self.folded.remove(&above.data.uid);
+            }
+            let all = match self.is_flat {
                 true => flat_rows(&shown.rig, &self.filter),
                 false => rows(&shown.rig, &self.folded, &self.filter),
+            };
+            self.tree.rows = match self.top {
+                Some(top) => within(&shown.rig, all, top),
+                None => all,
             };
             self.tree.deepest = self.tree.rows.iter().map(|row| row.depth).max().unwrap_or_default();
             self.tree.made_from = Some((stamp, self.filter.clone()));

@@ -1,9 +1,10 @@
-//! Groups panel: the local groups of a rig with their colours and joints; create, rename, recolour, assign, merge, remove.
+//! Groups panel: the local groups of a rig with their colours and joints; create, rename, recolour, assign, merge, reset,
+//! remove.
 
 use std::{collections::BTreeMap, sync::Arc};
 
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Checkbox, Key, ScrollArea, TextEdit, Ui, WidgetInfo, WidgetType};
+use bevy_egui::egui::{self, Checkbox, ComboBox, Key, ScrollArea, TextEdit, Ui, WidgetInfo, WidgetType};
 
 use super::{
     displayed_rig::{DisplayedRig, Stamp, color},
@@ -17,7 +18,7 @@ use crate::{
         picking::{Pick, PickRequest},
     },
     rig::{
-        GroupData, RigEdit, Uid,
+        GroupData, Rig, RigEdit, Uid,
         operations::{Operation, TagOperation, TagScope},
     },
 };
@@ -25,6 +26,8 @@ use crate::{
 /// The panel.
 #[derive(Default)]
 pub struct GroupsPanel {
+    /// Joints that a new group takes, and that are taken out of their groups.
+    reach: Reach,
     /// Name of a group that is being made.
     draft: String,
     /// Group that is being renamed, with the typed name.
@@ -48,6 +51,39 @@ const COLORS: [[f32; 3]; 8] = [
     [0.60, 0.55, 0.35],
 ];
 
+/// Joints of a change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Reach {
+    /// The selected joints.
+    #[default]
+    Selected,
+    /// The selected joints and those below them.
+    Below,
+    /// All joints of the rig.
+    All,
+}
+
+impl Reach {
+    const ALL: [Self; 3] = [Self::Selected, Self::Below, Self::All];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Selected => "Selected joints",
+            Self::Below => "Selected and below",
+            Self::All => "All joints",
+        }
+    }
+
+    fn joints(self, rig: &Rig, selected: &[Uid]) -> Vec<Uid> {
+        let scope = match self {
+            Self::Selected => TagScope::Joints(selected.to_vec()),
+            Self::Below => TagScope::Hierarchy(selected.to_vec()),
+            Self::All => TagScope::Rig,
+        };
+        scope.joints(rig).unwrap_or_default()
+    }
+}
+
 /// Request of a row.
 enum RowRequest {
     Edits(Vec<RigEdit>),
@@ -68,7 +104,9 @@ impl EditorPanel for GroupsPanel {
         let selected: Vec<Uid> =
             shown.selection.0.iter().copied().filter(|joint| shown.rig.joint(*joint).is_some()).collect();
         self.refresh(&shown);
-        self.create(ui, &shown, &selected, requests);
+        let reached = self.reach.joints(&shown.rig, &selected);
+        self.reach(ui, &shown, &reached, requests);
+        self.create(ui, &shown, &reached, requests);
         ui.separator();
         let empty: Vec<Uid> =
             shown.rig.groups().iter().map(|group| group.uid).filter(|uid| self.of(*uid).is_empty()).collect();
@@ -124,28 +162,50 @@ impl GroupsPanel {
         self.members.get(&group).cloned().unwrap_or_default()
     }
 
-    /// A field for the name of a new group, which takes the selected joints.
-    fn create(&mut self, ui: &mut Ui, shown: &DisplayedRig, selected: &[Uid], requests: &mut Requests) {
+    /// Draws the choice of the joints that the next change is for, and the button that takes them out of their groups.
+    fn reach(&mut self, ui: &mut Ui, shown: &DisplayedRig, reached: &[Uid], requests: &mut Requests) {
+        ui.horizontal(|ui| {
+            let width = (ui.available_width() - 70.0).max(60.0);
+            let combo = ComboBox::from_id_salt("reach").selected_text(self.reach.name()).width(width).truncate();
+            let combo = combo.show_ui(ui, |ui| {
+                for reach in Reach::ALL {
+                    ui.selectable_value(&mut self.reach, reach, reach.name());
+                }
+            });
+            combo.response.widget_info(|| WidgetInfo::labeled(WidgetType::ComboBox, true, "Joints of the change"));
+            let is_grouped = |joint: &Uid| shown.rig.joint(*joint).is_some_and(|joint| joint.data.group.is_some());
+            let grouped: Vec<Uid> = reached.iter().copied().filter(is_grouped).collect();
+            let reset = ui.add_enabled(!grouped.is_empty(), egui::Button::new("Reset"));
+            let reset = reset.on_disabled_hover_text("None of these joints is in a group");
+            if reset.on_hover_text("Takes these joints out of their groups").clicked() {
+                let operation = Operation::Group { joints: grouped, name: String::new(), color: None };
+                requests.send(EditRequest::operation(shown.entity, operation));
+            }
+        });
+    }
+
+    /// A field for the name of a new group, which takes the joints that are reached.
+    fn create(&mut self, ui: &mut Ui, shown: &DisplayedRig, reached: &[Uid], requests: &mut Requests) {
         ui.horizontal(|ui| {
             let width = (ui.available_width() - 70.0).max(60.0);
             let field = ui.add(TextEdit::singleline(&mut self.draft).hint_text("New group").desired_width(width));
             field.widget_info(|| WidgetInfo::labeled(WidgetType::TextEdit, true, "New group"));
             let name = self.draft.trim().to_owned();
             let is_free = shown.rig.groups().iter().all(|group| group.name != name);
-            let can = !name.is_empty() && is_free && !selected.is_empty();
-            let tip = if selected.is_empty() {
-                "Select the joints that go into it first"
+            let can = !name.is_empty() && is_free && !reached.is_empty();
+            let tip = if reached.is_empty() {
+                "Select the joints that go into it first, or choose all"
             } else if !is_free {
                 "There is a group of this name"
             } else {
-                "Puts the selected joints into a new group"
+                "Puts these joints into a new group"
             };
             let button =
                 ui.add_enabled(can, egui::Button::new("Create")).on_hover_text(tip).on_disabled_hover_text(tip);
             let entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
             if can && (button.clicked() || entered) {
                 let color = Some(COLORS[shown.rig.groups().len() % COLORS.len()]);
-                let operation = Operation::Group { joints: selected.to_vec(), name, color };
+                let operation = Operation::Group { joints: reached.to_vec(), name, color };
                 requests.send(EditRequest::operation(shown.entity, operation));
                 self.draft.clear();
             }

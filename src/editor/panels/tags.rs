@@ -2,16 +2,21 @@
 //!
 //! Tags that several selected joints have alike are one card and are changed together.
 
+mod curve_field;
 mod fault;
+mod forms;
+mod header;
 pub(super) mod library;
 mod parameter_text;
 mod parts;
+mod pick;
 mod read_values;
 mod references;
 mod stack;
+mod value_edit;
 mod values;
 
-use std::{collections::HashSet, sync::Arc};
+use std::{collections::HashSet, fmt::Display, sync::Arc};
 
 use bevy::prelude::*;
 use bevy_egui::egui::{
@@ -39,12 +44,14 @@ use crate::{
     processor::{CommandState, CommandStatus, Modules},
     rig::{
         TagKind, Uid,
-        operations::{Operation, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation},
+        operations::{Operation, PasteTo, PasteWhat, TagClipboard, TagOperation},
     },
 };
 use fault::Fault;
+use pick::{PickStep, Picking};
 use stack::{Entry, Stack};
-use values::{ValueEdit, Values};
+use value_edit::{ValueEdit, with_text};
+use values::Values;
 
 /// Request to open the card of a tag, with the number of requests before it.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,7 +113,9 @@ impl EditorPanel for TagsPanel {
         let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
-        self.stack.refresh(&shown);
+        let pick = self.values.picking.take().map(|picking| picking.step(ui, world, &shown));
+        self.stack.refresh(&shown, pick.as_ref().and_then(PickStep::joints));
+        let taken = pick.and_then(|pick| self.picked(pick, &shown, requests));
         if self.stack.joints.is_empty() {
             return list::nothing(ui, "Select a joint to see its tags: what the rig builds on it.");
         }
@@ -115,6 +124,13 @@ impl EditorPanel for TagsPanel {
         ui.separator();
         let entries = std::mem::take(&mut self.stack.entries);
         self.answer(world, &entries);
+        if let Some((picking, text)) = taken
+            && let Some(entry) = entries.iter().find(|entry| entry.first.uid == picking.tag)
+            && let Some(module) = entry.module().and_then(|name| modules.0.get(name))
+        {
+            let edit = with_text(module, entry, &picking.path, &text);
+            self.carry_out(CardRequest::Value(edit), entry, &modules.0, &shown, requests);
+        }
         ScrollArea::vertical().id_salt("tags").auto_shrink(false).show(ui, |ui| {
             if entries.is_empty() {
                 ui.weak("Nothing is built here. Add a control, an IK handle, a spring …");
@@ -150,60 +166,41 @@ impl TagsPanel {
         }
     }
 
-    fn header(&mut self, ui: &mut Ui, world: &World, modules: &Modules, shown: &DisplayedRig, requests: &mut Requests) {
-        ui.horizontal_wrapped(|ui| {
-            // Buttons go on in the next row, not letter by letter.
-            ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
-            let joints = &self.stack.joints;
-            let name = match joints[..] {
-                [joint] => shown.name(joint).into_owned(),
-                _ => counted(joints.len(), "joint", "joints"),
-            };
-            ui.strong(name);
-            let to = joints.clone();
-            ui.menu_button("+ Add", |ui| {
-                if let Some(module) = library::library(ui, modules, &mut self.words) {
-                    let kind = TagKind::Command { module: module.to_owned(), feature: None, params: "()".to_owned() };
-                    send(TagOperation::Add { joints: to.clone(), kind, index: None }, shown, requests);
-                }
-                ui.separator();
-                if ui.button("Feature").on_hover_text("A switch that other tags can be put into").clicked() {
-                    let kind = TagKind::Feature {
-                        kind: "feature".to_owned(),
-                        name: "feature".to_owned(),
-                        switch: String::new(),
-                        choice: String::new(),
-                    };
-                    send(TagOperation::Add { joints: to.clone(), kind, index: Some(0) }, shown, requests);
-                    ui.close();
-                }
-            });
-            self.parts.show(ui, world, shown, requests);
-            if ui.button("Copy all").on_hover_text("Copies all tags of the selected joints").clicked() {
-                let tags = self.stack.entries.iter().flat_map(Entry::uids).collect::<Vec<_>>();
-                self.copied(TagClipboard::copy_tags(&shown.rig, &tags), requests);
+    /// Lets a person pick the nodes of a parameter; takes the joints of the card where it waits for nodes already.
+    fn pick(&mut self, path: String, entry: &Entry, modules: &Modules, shown: &DisplayedRig, requests: &mut Requests) {
+        let tag = entry.first.uid;
+        let waits = self.values.picking.take_if(|picking| picking.tag == tag && picking.path == path);
+        match (waits, entry.module().and_then(|name| modules.get(name))) {
+            (Some(picking), Some(module)) => {
+                let edit = with_text(module, entry, &path, &pick::joints(shown, &picking.joints));
+                self.carry_out(CardRequest::Value(edit), entry, modules, shown, requests);
             }
-            // Not in `add_enabled_ui`: what is within another `Ui` does not go on in the next row.
-            let Some(clipboard) = self.clipboard.clone() else {
-                ui.add_enabled(false, egui::Button::new("Paste"));
-                return;
-            };
-            ui.menu_button("Paste", |ui| {
-                let both =
-                    [("Tags", PasteWhat::Tags), ("Values", PasteWhat::Values), ("Tags and values", PasteWhat::Both)];
-                for (name, what) in both {
-                    if ui.button(name).clicked() {
-                        let to = PasteTo::Joints(self.stack.joints.clone());
-                        let clipboard = Arc::clone(&clipboard);
-                        send(TagOperation::Paste { clipboard, what, to }, shown, requests);
-                        ui.close();
-                    }
-                }
-            });
-        });
+            (Some(_), None) => {}
+            (None, _) => self.values.picking = Some(Picking::new(shown, tag, path, self.stack.joints.clone())),
+        }
     }
 
-    fn copied(&mut self, clipboard: Result<TagClipboard, TagError>, requests: &mut Requests) {
+    /// Takes in what was picked: the joints of the card are selected again, and the text goes to the parameter.
+    fn picked(&mut self, pick: PickStep, shown: &DisplayedRig, requests: &mut Requests) -> Option<(Picking, String)> {
+        let mut restore = |picking: &Picking| {
+            if shown.selection.0 != picking.joints {
+                let what = Pick::Joints(picking.joints.clone());
+                requests.send(PickRequest { rig: shown.entity, what, add: false });
+            }
+        };
+        match pick {
+            PickStep::Waits(picking) => self.values.picking = Some(picking),
+            PickStep::Taken(picking, text) => {
+                restore(&picking);
+                return Some((picking, text));
+            }
+            PickStep::Dropped(picking) => restore(&picking),
+            PickStep::Left => {}
+        }
+        None
+    }
+
+    fn copied<E: Display>(&mut self, clipboard: Result<TagClipboard, E>, requests: &mut Requests) {
         match clipboard {
             Ok(clipboard) => {
                 let count: usize = clipboard.joints.iter().map(|joint| joint.tags.len()).sum();
@@ -247,6 +244,7 @@ impl TagsPanel {
                     ValueEdit::Preview(list) => Change::Preview(params(list)),
                     ValueEdit::Commit => Change::Commit,
                     ValueEdit::Cancel => Change::CancelPreview,
+                    ValueEdit::Pick(path) => return self.pick(path, entry, modules, shown, requests),
                     ValueEdit::Refused(reason) => return requests.send(Notice::error(format!("{reason}."))),
                 };
                 requests.send(EditRequest { rig: shown.entity, change });
@@ -347,11 +345,20 @@ impl TagsPanel {
     }
 }
 
-/// Puts the tags of an entry before those of another.
+/// Puts the tags of an entry before those of another, on each joint: before the next tag of that joint where the other entry
+/// has none there.
 fn moved(entries: &[Entry], dragged: usize, before: usize) -> Option<CardRequest> {
-    let [(joint, tag)] = entries.get(dragged)?.tags[..] else { return None };
-    let before = entries.get(before).and_then(|entry| entry.tags.first()).map(|(_, tag)| *tag);
-    (before != Some(tag)).then_some(CardRequest::Operation(TagOperation::Move { tags: vec![tag], joint, before }))
+    if dragged == before {
+        return None;
+    }
+    let tags = &entries.get(dragged)?.tags;
+    let behind = move || entries.iter().enumerate().skip(before).filter(move |(number, _)| *number != dragged);
+    let next = |joint: Uid| {
+        let mut on_joint = behind().flat_map(|(_, entry)| &entry.tags).filter(|(other, _)| *other == joint);
+        on_joint.next().map(|(_, tag)| *tag)
+    };
+    let moves = tags.iter().map(|(joint, tag)| (*tag, *joint, next(*joint))).collect();
+    Some(CardRequest::Operation(TagOperation::MoveEach(moves)))
 }
 
 fn enabled(ui: &mut Ui, shown: &DisplayedRig, entry: &Entry) -> Option<CardRequest> {
@@ -400,9 +407,8 @@ fn card_menu(ui: &mut Ui, shown: &DisplayedRig, entries: &[Entry], number: usize
             ui.close();
         }
     };
-    let is_one = entry.tags.len() == 1;
-    item(ui, "Move up", is_one && number > 0, &|| moved(entries, number, number.checked_sub(1)?));
-    item(ui, "Move down", is_one && number + 1 < entries.len(), &|| moved(entries, number, number + 2));
+    item(ui, "Move up", number > 0, &|| moved(entries, number, number.checked_sub(1)?));
+    item(ui, "Move down", number + 1 < entries.len(), &|| moved(entries, number, number + 2));
     ui.separator();
     item(ui, "Copy", true, &|| Some(CardRequest::Copy));
     item(ui, "Cut", true, &|| Some(CardRequest::Cut));

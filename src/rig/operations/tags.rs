@@ -59,6 +59,8 @@ pub enum TagOperation {
         /// Tag to insert before; `None` appends.
         before: Option<Uid>,
     },
+    /// Moves tags of several joints at once: (tag, joint that gets it, tag of that joint to insert before).
+    MoveEach(Vec<(Uid, Uid, Option<Uid>)>),
     /// Gives a tag a comment.
     Comment(Uid, String),
     /// Gives commands other parameters. Names without a uid in their references are bound.
@@ -226,7 +228,7 @@ impl TagOperation {
             Self::Delete(..) => "Delete tags",
             Self::Enable(_, true) => "Enable tags",
             Self::Enable(_, false) => "Disable tags",
-            Self::Move { .. } => "Move tags",
+            Self::Move { .. } | Self::MoveEach(..) => "Move tags",
             Self::Comment(..) => "Comment tag",
             Self::Params(..) | Self::Feature { .. } | Self::Choice(..) => "Change tag",
             Self::Attach(_, Some(_)) => "Attach to feature",
@@ -270,6 +272,9 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
             tags.iter().try_for_each(|tag| change(draft, *tag, |tag| tag.enabled = *enabled))
         }
         TagOperation::Move { tags, joint, before } => relocate(draft, tags, *joint, *before),
+        TagOperation::MoveEach(moves) => {
+            moves.iter().try_for_each(|(tag, joint, before)| relocate(draft, &[*tag], *joint, *before))
+        }
         TagOperation::Comment(tag, comment) => change(draft, *tag, |tag| tag.comment.clone_from(comment)),
         TagOperation::Params(tags) => tags.iter().try_for_each(|(uid, text)| {
             let (joint, mut tag) = found(draft, *uid)?;

@@ -66,6 +66,33 @@ fn a_part_is_dropped_onto_a_joint_in_the_viewport() {
 }
 
 #[test]
+fn a_module_is_dropped_onto_a_joint_in_the_viewport() {
+    let mut studio = Studio::with(Sheet::Window);
+    let plane = ViewPlane::orthographic(View::Front, [Vec3::splat(-3.0), Vec3::splat(3.0)]);
+    let sight = Sight { plane, pixel: 0.01, size: Vec2::new(620.0, 1400.0) };
+    studio.desk.app.insert_resource(ViewportSight(Some(sight)));
+    studio.desk.frames(2);
+    let arm = studio.joint("arm_r");
+    let at = sight.project(studio.desk.rig().position(arm)).unwrap();
+    let joint = egui::pos2(at.x, at.y);
+    let drop = |studio: &mut Studio, to: egui::Pos2| {
+        studio.desk.press(egui::pos2(20.0, 1300.0));
+        egui::DragAndDrop::set_payload(&studio.desk.ctx, DraggedModule("null"));
+        studio.desk.move_to(to);
+        studio.desk.release(to);
+        studio.settle();
+    };
+    let tags = |studio: &Studio| studio.desk.rig().joint(arm).unwrap().data.tags.len();
+    let (before, steps, count) = (studio.desk.rig().clone(), studio.desk.steps().1, tags(&studio));
+    drop(&mut studio, joint + egui::vec2(0.0, 500.0));
+    assert!(*studio.desk.rig() == before && studio.told("there is no joint"), "{:?}", studio.desk.told());
+    drop(&mut studio, joint + egui::vec2(6.0, 4.0));
+    assert_eq!((tags(&studio), studio.desk.steps().1), (count + 1, steps + 1), "{:?}", studio.desk.told());
+    studio.change(Change::Undo);
+    assert_eq!(*studio.desk.rig(), before);
+}
+
+#[test]
 fn a_part_goes_onto_the_stroke_that_was_just_drawn() {
     let mut studio = Studio::new(TagsPanel::default());
     let hips = studio.joint("hips");

@@ -139,10 +139,14 @@ fn the_merge_history_can_be_cut() {
     assert!(before >= 3);
     desk.click("Grouping");
     desk.frames(20);
-    let slider = written(&desk, "groups").unwrap_or_else(|| panic!("{:?}", desk.seen));
+    assert!(written(&desk, "groups").is_some(), "{:?}", desk.seen);
     assert!(written(&desk, HINT_AUTO).is_some(), "{:?}", desk.seen);
-    // Near the roots of the tree, which stands above its slider, all merges that are drawn are undone.
-    desk.click_at(egui::pos2(slider.left() + 60.0, slider.top() - 16.0));
+    // Its colours and its ends have names.
+    let key = ["Front to back:", "⏺ face", "⏺ middle", "⏺ back", "- - cut"].map(|word| written(&desk, word).is_some());
+    assert_eq!(key, [true; 5], "{:?}", desk.seen);
+    // Near the roots of the tree all merges that are drawn are undone.
+    let tree = desk.find("Merge history").rect;
+    desk.click_at(egui::pos2(tree.left() + 60.0, tree.bottom() - 10.0));
     desk.frames(2);
     assert!(written(&desk, HINT_BY_HAND).is_some(), "{:?}", desk.seen);
     desk.click("Place again");
@@ -150,8 +154,8 @@ fn the_merge_history_can_be_cut() {
     let deep = groups(&desk);
     assert!(deep > before && deep > 10, "{before} groups became {deep}");
     // Cut near its top, and left to the mesh again.
-    let slider = written(&desk, "groups").unwrap();
-    desk.click_at(egui::pos2(slider.left() + 60.0, slider.top() - 90.0));
+    let tree = desk.find("Merge history").rect;
+    desk.click_at(egui::pos2(tree.left() + 60.0, tree.top() + 22.0));
     desk.frames(2);
     desk.click("Place again");
     wait(&mut desk, mesh);

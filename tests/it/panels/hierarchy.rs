@@ -148,6 +148,81 @@ fn built_nodes_are_listed_and_lead_to_their_commands() {
 }
 
 #[test]
+fn nodes_of_one_rig_or_of_all_are_listed() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let [hips, spine, _] = desk.chain(&["hips", "spine", "head"])[..] else { panic!() };
+    assert!(desk.look("Listed hierarchy").is_none(), "there is one alone");
+    let [_, tip] = desk.chain(&["tail", "tip"])[..] else { panic!() };
+    for joint in [spine, tip] {
+        let kind = TagKind::Command { module: "control".into(), params: "()".into(), feature: None };
+        desk.edit(Operation::Tags(TagOperation::Add { joints: vec![joint], kind, index: None }));
+    }
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::All });
+    desk.frames(3);
+    let (before, steps) = (desk.rig().clone(), desk.steps());
+    let choose = |desk: &mut Desk, entry: &str| {
+        desk.click("Listed hierarchy");
+        desk.frames(3);
+        desk.click(entry);
+        desk.frames(3);
+    };
+    let shows = |desk: &Desk| ["hips", "spine", "head", "tail", "tip"].map(|label| desk.look(label).is_some());
+    assert_eq!(shows(&desk), [true; 5]);
+    choose(&mut desk, "Only tail");
+    assert_eq!(shows(&desk), [false, false, false, true, true]);
+    // Of built nodes those stay that the commands of its joints made.
+    let controls = |desk: &Desk| desk.seen.iter().filter(|seen| seen.label.ends_with(", control")).count();
+    desk.click("Nodes");
+    desk.frames(2);
+    assert_eq!((controls(&desk), desk.look("spine, joint").is_some()), (1, false), "{:?}", desk.seen);
+    assert!(desk.look("tip, joint").is_some(), "{:?}", desk.seen);
+    choose(&mut desk, "All");
+    assert_eq!((controls(&desk), desk.look("spine, joint").is_some()), (2, true), "{:?}", desk.seen);
+    desk.click("Joints");
+    desk.frames(2);
+    assert_eq!(shows(&desk), [true; 5]);
+    // Any joint can be the top, though one above it is folded.
+    desk.secondary_click("spine");
+    desk.click("List this hierarchy only");
+    desk.frames(3);
+    assert_eq!(shows(&desk), [false, true, true, false, false]);
+    desk.secondary_click("head");
+    desk.click("List everything");
+    desk.frames(3);
+    assert_eq!(shows(&desk), [true; 5]);
+    desk.click("Fold hips");
+    desk.frames(2);
+    choose(&mut desk, "Only hips");
+    assert_eq!(shows(&desk), [true, false, false, false, false]);
+    assert_eq!((desk.rig(), desk.steps()), (&before, steps), "looking is no step");
+    // Without the joint all are back.
+    desk.edit(Operation::Delete { joints: vec![hips], keep_children: true });
+    desk.frames(2);
+    assert_eq!(shows(&desk), [false, true, true, true, true]);
+}
+
+#[test]
+fn a_built_node_that_is_picked_comes_into_sight() {
+    let mut desk = Desk::new(HierarchyPanel::default());
+    let labels: Vec<String> = (0..80).map(|number| format!("joint_{number}")).collect();
+    let joints = desk.chain(&labels.iter().map(String::as_str).collect::<Vec<_>>());
+    let kind = TagKind::Command { module: "null".into(), params: "()".into(), feature: None };
+    desk.edit(Operation::Tags(TagOperation::Add { joints: vec![joints[0]], kind, index: None }));
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::All });
+    desk.frames(3);
+    desk.select(&[joints[0]]);
+    desk.click("Nodes");
+    desk.frames(3);
+    assert!(desk.look("joint_0, joint").is_some() && desk.look("joint_79, joint").is_none(), "{:?}", desk.seen);
+    desk.select(&[joints[79]]);
+    desk.frames(3);
+    assert_eq!(desk.find("joint_79, joint").on, Some(true));
+    // The list stays where a person scrolls it to.
+    desk.scroll(egui::pos2(150.0, 300.0), 5000.0);
+    assert!(desk.look("joint_0, joint").is_some() && desk.look("joint_79, joint").is_none(), "{:?}", desk.seen);
+}
+
+#[test]
 fn joints_are_renamed_in_place() {
     let mut desk = Desk::new(HierarchyPanel::default());
     let joints = desk.chain(&["a", "b", "c"]);

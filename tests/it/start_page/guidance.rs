@@ -115,6 +115,25 @@ fn the_palette_says_why_an_action_can_do_nothing() {
 }
 
 #[test]
+fn the_palette_brings_panels_forward() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    page.send(ActionRequest(Action::Cancel));
+    let all = palette::found_panels(page.world(), "");
+    assert!(all.contains(&"Process") && all.contains(&"Timeline") && all.len() > 15, "{all:?}");
+    assert_eq!(palette::found_panels(page.world(), "PANEL proc"), ["Process"]);
+    page.panels.clear();
+    page.send(ActionRequest(Action::Palette));
+    page.desk.type_text("process panel");
+    page.settle();
+    assert!(page.desk.says("Process panel"), "{:?}", page.desk.seen);
+    page.desk.key(egui::Key::Enter);
+    page.settle();
+    assert_eq!(page.panels, ["Process"]);
+    assert!(!page.desk.says("Process panel"), "the palette is closed");
+}
+
+#[test]
 fn the_next_step_leads_to_clips_that_came_with_a_rig() {
     let folder = folder();
     let mut page = Page::open(folder.path(), None);

@@ -1,6 +1,6 @@
 //! The merge history in depth as a tree, with its cut.
 
-use bevy_egui::egui::{self, Color32, Pos2, Rect, Sense, Stroke, Ui, WidgetInfo, WidgetType, vec2};
+use bevy_egui::egui::{self, Color32, Pos2, Rect, RichText, Sense, Stroke, Ui, WidgetInfo, WidgetType, vec2};
 
 use crate::algo::{
     face::{auto::FaceAnalysis, grouping::HeadGroup},
@@ -48,6 +48,7 @@ pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usi
         let height = at * at * top;
         *groups = Some(heights.iter().filter(|merge| **merge > height).count() + 1);
     }
+    key(ui);
     let mut count = cut;
     let slider = ui.add(egui::Slider::new(&mut count, 1..=heights.len() + 1).text("groups"));
     if slider.changed() {
@@ -56,6 +57,18 @@ pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usi
     ui.weak(match groups {
         Some(_) => "Cut by hand; place again to use it. The front groups that hold features are joined.",
         None => "Cut where every feature lies in the face. Front groups are joined.",
+    });
+}
+
+/// Draws what stands where in the tree, and the colours of the groups.
+fn key(ui: &mut Ui) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.label(RichText::new("Front to back:").small().weak());
+        for (group, name) in [(HeadGroup::Face, "face"), (HeadGroup::Middle, "middle"), (HeadGroup::Back, "back")] {
+            ui.label(RichText::new(format!("⏺ {name}")).small().color(color(group)));
+        }
+        ui.label(RichText::new("- - cut").small().color(ui.visuals().warn_fg_color));
     });
 }
 

@@ -2,7 +2,11 @@
 
 use bevy_egui::egui::{Pos2, Rect, Vec2};
 
-use super::{GraphPanel, state::GraphView, wires::Spots};
+use super::{
+    GraphPanel,
+    state::GraphView,
+    wires::{Readers, Spots},
+};
 use crate::rig::Uid;
 
 /// Places of everything in the graph, in its own space.
@@ -78,5 +82,15 @@ impl GraphPanel {
         let spots = Spots { graph, rects: &rects, boxes: &boxes };
         let full = graph.wires.iter().filter(|wire| !self.focus.fades || self.focus.has(graph, **wire));
         full.filter_map(|wire| spots.ends(*wire)).collect()
+    }
+
+    /// Ends of the wires that were cut short in the last frame, out of focus and beside many others of the same command.
+    pub fn wires_cut_short(&self, view: &GraphView) -> Vec<[Pos2; 2]> {
+        let (rects, boxes) = (self.rects(view, Vec2::ZERO), self.boxes(view, Vec2::ZERO));
+        let graph = &self.graph;
+        let spots = Spots { graph, rects: &rects, boxes: &boxes };
+        let readers = Readers::of(graph);
+        let short = graph.wires.iter().filter(|wire| readers.cut_short(graph, &self.focus, **wire));
+        short.filter_map(|wire| spots.ends(*wire)).collect()
     }
 }

@@ -14,7 +14,7 @@ use crate::{
         actions::{Action, ActionRequest},
         notice::Notice,
         panel::Requests,
-        panels::{displayed_rig::DisplayedRig, tags::library::library},
+        panels::{displayed_rig::DisplayedRig, tags::library::library, words},
     },
     plugins::document::EditRequest,
     rig::{
@@ -164,7 +164,7 @@ impl Menu<'_> {
             for joint in self.shown.rig.walk() {
                 for tag in &joint.data.tags {
                     if let TagKind::Feature { kind, name, switch, .. } = &tag.kind {
-                        attach(ui, &super::words::feature(kind, name, switch), Some(tag.uid));
+                        attach(ui, &words::feature(kind, name, switch), Some(tag.uid));
                     }
                 }
             }

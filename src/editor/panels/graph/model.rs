@@ -3,12 +3,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{
-    look::{ModuleLook, ModuleLooks},
-    words,
-};
+use super::look::{ModuleLook, ModuleLooks};
 use crate::{
-    editor::panels::joint_name,
+    editor::panels::{joint_name, words},
     processor::{Builder, Modules},
     rig::{
         JointData, Rig, TagData, TagKind, Uid, fields,

@@ -30,6 +30,11 @@ const PARTS: usize = 14;
 const MOST_CURVES: usize = 240;
 /// Strength of wires out of focus.
 const FADED: f32 = 0.3;
+/// Most readers of a command whose wires are drawn from end to end while they are out of focus: those of a hub would lie
+/// over everything else.
+pub(super) const MOST_READERS: usize = 12;
+/// Length of the ends of a wire that is cut short.
+const STUB: f32 = 22.0;
 
 /// Width and height of a node with a number of inputs.
 pub(super) fn node_size(inputs: usize) -> [f32; 2] {
@@ -157,8 +162,26 @@ impl WireInk<'_> {
     }
 }
 
+/// Number of readers of each command.
+pub(super) struct Readers(Vec<usize>);
+
+impl Readers {
+    pub fn of(graph: &Graph) -> Self {
+        let mut counts = vec![0; graph.nodes.len()];
+        for wire in &graph.wires {
+            counts[wire.from] += 1;
+        }
+        Self(counts)
+    }
+
+    /// True for a wire that is cut short: out of focus, and one of many that leave a command.
+    pub fn cut_short(&self, graph: &Graph, focus: &Focus, wire: GraphWire) -> bool {
+        focus.fades && self.0[wire.from] > MOST_READERS && !focus.has(graph, wire)
+    }
+}
+
 /// Draws the wires that cross the view, those in focus above all others: curves, or straight lines in one shape where there
-/// are many out of focus.
+/// are many out of focus. Of wires that are cut short the ends alone are drawn.
 pub(super) fn draw(painter: &Painter, view: Rect, spots: Spots, ink: &WireInk) {
     let graph = spots.graph;
     // Of the wires between two folded frames one is drawn, and one in focus before others.
@@ -170,16 +193,27 @@ pub(super) fn draw(painter: &Painter, view: Rect, spots: Spots, ink: &WireInk) {
         placed.filter(|(_, ends)| bounds(*ends).intersects(view) && is_new(*ends)).collect()
     };
     let (lit, others) = (seen(true), seen(false));
+    let readers = Readers::of(graph);
+    let is_short = |(wire, _): &(GraphWire, [Pos2; 2])| readers.cut_short(graph, ink.focus, *wire);
+    let (short, others): (Vec<_>, Vec<_>) = others.into_iter().partition(is_short);
+    let mut mesh = Mesh::default();
+    let mut stubs: BTreeSet<[u32; 2]> = BTreeSet::new();
+    for (wire, [from, to]) in short {
+        for [start, end] in [[from, from + vec2(STUB, 0.0)], [to, to - vec2(STUB, 0.0)]] {
+            if stubs.insert([start.x, start.y].map(f32::to_bits)) {
+                add_line(&mut mesh, [start, end], ink.stroke(graph, wire));
+            }
+        }
+    }
     let curved = |(wire, ends): (GraphWire, [Pos2; 2])| Shape::line(curve(ends), ink.stroke(graph, wire));
     if lit.len() + others.len() <= MOST_CURVES {
         painter.extend(others.into_iter().map(curved));
     } else {
-        let mut mesh = Mesh::default();
         for (wire, ends) in others {
             add_line(&mut mesh, ends, ink.stroke(graph, wire));
         }
-        painter.add(Shape::mesh(mesh));
     }
+    painter.add(Shape::mesh(mesh));
     painter.extend(lit.into_iter().map(curved));
 }
 

@@ -1,7 +1,7 @@
 //! Nodes of the built rig in place of its joints alone: what commands made, below what carries it, with the modules. A
 //! filter turns the tree into a list.
 
-use std::sync::Arc;
+use std::{collections::HashSet, sync::Arc};
 
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Sense, Ui, WidgetInfo, WidgetType, pos2};
@@ -19,14 +19,28 @@ use crate::{
         commands::BuildResult,
         picking::{Pick, PickRequest},
     },
-    rig::{BuiltRig, NodeType, Uid},
+    rig::{BuiltRig, NodeType, Rig, Uid},
 };
 
-/// Nodes that are listed, with what they were made from: the build, the filter, and `true` for a list.
+/// Nodes that are listed, with what they were made from: the build, the filter, `true` for a list, and the joint whose
+/// hierarchy alone is listed.
 #[derive(Default)]
 pub(super) struct BuiltTree {
-    made_from: Option<(Arc<BuiltRig>, String, bool)>,
+    made_from: Option<(Arc<BuiltRig>, String, bool, Option<Uid>)>,
     rows: Vec<BuiltRow>,
+    /// Active node that was last scrolled into view.
+    revealed: Option<Uid>,
+}
+
+/// Nodes that are asked for.
+#[derive(Clone, Copy)]
+pub(super) struct WantedNodes<'a> {
+    /// Words that each of them has to contain.
+    pub filter: &'a str,
+    /// True for a list in place of a tree.
+    pub is_flat: bool,
+    /// Joint whose hierarchy alone is listed, with what its commands made.
+    pub top: Option<Uid>,
 }
 
 /// A node in the list.
@@ -47,28 +61,33 @@ const INDENT: f32 = 12.0;
 const MOST_STEPS: usize = 10;
 
 impl BuiltTree {
-    /// Draws the nodes that contain all words of a filter; as a list if it is to be `flat`.
+    /// Draws the nodes that are asked for. The active node is brought into sight when another becomes active.
     pub fn show(
         &mut self,
         ui: &mut Ui,
         world: &World,
         shown: &DisplayedRig,
-        (filter, flat): (&str, bool),
+        wanted: WantedNodes,
         requests: &mut Requests,
     ) {
         let Some(BuildResult(built)) = world.get::<BuildResult>(shown.entity) else {
             self.made_from = None;
             return list::nothing(ui, "Nothing is built yet.");
         };
-        let is_fresh = self.made_from.as_ref().is_some_and(|(from, words, was_flat)| {
-            Arc::ptr_eq(from, built) && words.as_str() == filter && *was_flat == flat
+        let WantedNodes { filter, is_flat, top } = wanted;
+        let is_fresh = self.made_from.as_ref().is_some_and(|(from, words, was_flat, was_top)| {
+            Arc::ptr_eq(from, built) && words.as_str() == filter && *was_flat == is_flat && *was_top == top
         });
         if !is_fresh {
-            self.rows = rows(built, filter, flat);
-            self.made_from = Some((Arc::clone(built), filter.to_owned(), flat));
+            self.rows = rows(built, &shown.rig, wanted);
+            self.made_from = Some((Arc::clone(built), filter.to_owned(), is_flat, top));
         }
+        let active = shown.selection.active();
+        let is_other = active != self.revealed;
+        self.revealed = active;
         let (rows, height) = (&self.rows, list::row_height(ui));
-        let list = List { id: "built nodes", count: rows.len(), height, reveal: None, follow: false };
+        let reveal = active.filter(|_| is_other).and_then(|node| rows.iter().position(|row| row.node == node));
+        let list = List { id: "built nodes", count: rows.len(), height, reveal, follow: false };
         list.show(ui, |ui, range, place| {
             for number in range {
                 row(ui, place(number), &rows[number], world, shown, requests);
@@ -77,10 +96,24 @@ impl BuiltTree {
     }
 }
 
-/// Nodes of a built rig, each below its parent unless they are to be `flat`; those alone that contain all words of a
-/// filter, if there are any words.
-fn rows(built: &BuiltRig, filter: &str, flat: bool) -> Vec<BuiltRow> {
+/// Nodes that stand in the hierarchy of a joint, or that its commands made: `true` at their places.
+fn belonging(built: &BuiltRig, rig: &Rig, top: Uid) -> Vec<bool> {
+    let joints: HashSet<Uid> = rig.hierarchy(top).map(|joint| joint.data.uid).collect();
+    let mut inside: Vec<bool> = Vec::with_capacity(built.nodes.len());
+    for node in &built.nodes {
+        let maker = || node.origin.as_ref().and_then(|origin| rig.find_tag(origin.command));
+        let is_below = node.parent.is_some_and(|parent| inside[parent]);
+        let is_inside =
+            is_below || joints.contains(&node.uid) || maker().is_some_and(|(of, _)| joints.contains(&of.data.uid));
+        inside.push(is_inside);
+    }
+    inside
+}
+
+/// Nodes of a built rig that are asked for: each below its parent, or as a list, as they are with words.
+fn rows(built: &BuiltRig, rig: &Rig, WantedNodes { filter, is_flat, top }: WantedNodes) -> Vec<BuiltRow> {
     let words: Vec<String> = filter.split_whitespace().map(str::to_lowercase).collect();
+    let inside = top.map(|top| belonging(built, rig, top));
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); built.nodes.len()];
     let mut roots = Vec::new();
     for (number, node) in built.nodes.iter().enumerate() {
@@ -105,12 +138,15 @@ fn rows(built: &BuiltRig, filter: &str, flat: bool) -> Vec<BuiltRow> {
         };
         let name = node.label.as_deref().unwrap_or(&node.name).to_owned();
         let text = format!("{name} {about}").to_lowercase();
-        if words.iter().all(|word| text.contains(word.as_str())) {
-            let depth = if words.is_empty() && !flat { depth.min(MOST_STEPS) } else { 0 };
+        let is_inside = inside.as_ref().is_none_or(|inside| inside[number]);
+        if is_inside && words.iter().all(|word| text.contains(word.as_str())) {
+            let depth = if words.is_empty() && !is_flat { depth } else { 0 };
             let command = node.origin.as_ref().map(|origin| origin.command);
             rows.push(BuiltRow { node: node.uid, name, depth, about, command });
         }
     }
+    let left = rows.iter().map(|row| row.depth).min().unwrap_or_default();
+    rows.iter_mut().for_each(|row| row.depth = (row.depth - left).min(MOST_STEPS));
     rows
 }
 

@@ -55,6 +55,12 @@ pub(super) fn show(panel: &mut HierarchyPanel, response: &Response, shown: &Disp
             all.push(active);
             select(all, shown, requests);
         }
+        if panel.top != Some(active) && entry(ui, "List this hierarchy only", "") {
+            panel.list_below(Some(active));
+        }
+        if panel.top.is_some() && entry(ui, "List everything", "") {
+            panel.list_below(None);
+        }
         if entry(ui, "Show all built nodes", "") {
             panel.shows_built = true;
         }

@@ -9,20 +9,15 @@ use super::{DraggedJoints, HierarchyPanel, Tree, menu, obstacle, reparent, row_t
 use crate::{
     editor::{
         counted::counted,
-        library::{DraggedTemplate, LibraryAct, LibraryRequest, dropping},
+        library::{DraggedModule, DraggedTemplate, LibraryAct, LibraryRequest, attach, dropping},
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
             fields::{self, Renaming},
             groups, list,
-            tags::library::DraggedModule,
         },
     },
-    plugins::document::EditRequest,
-    rig::{
-        NodeKind, TagKind, Uid,
-        operations::{Operation, TagOperation},
-    },
+    rig::{NodeKind, Uid},
 };
 
 /// Draws a row and handles its input.
@@ -249,9 +244,7 @@ fn drop_module(ui: &Ui, response: &Response, rect: Rect, joint: Uid, shown: &Dis
         beside_pointer(ui, format!("{} on {}", dragged.0, shown.name(joint)));
     }
     if let Some(dragged) = response.dnd_release_payload::<DraggedModule>() {
-        let kind = TagKind::Command { module: dragged.0.to_owned(), feature: None, params: "()".to_owned() };
-        let operation = Operation::Tags(TagOperation::Add { joints: vec![joint], kind, index: None });
-        requests.send(EditRequest::operation(shown.entity, operation));
+        requests.send(attach(shown.entity, joint, dragged.0));
     }
 }
 

@@ -32,6 +32,15 @@ pub fn flat_rows(rig: &Rig, filter: &str) -> Vec<Row> {
     found.map(|row| Row { depth: 0, parent: false, ..row }).collect()
 }
 
+/// Rows of a joint and of the joints below it, with the first of them at the left.
+pub fn within(rig: &Rig, mut rows: Vec<Row>, top: Uid) -> Vec<Row> {
+    let inside: HashSet<Uid> = rig.hierarchy(top).map(|joint| joint.data.uid).collect();
+    rows.retain(|row| inside.contains(&row.joint));
+    let left = rows.iter().map(|row| row.depth).min().unwrap_or_default();
+    rows.iter_mut().for_each(|row| row.depth -= left);
+    rows
+}
+
 fn words(filter: &str) -> Vec<String> {
     filter.split_whitespace().map(str::to_lowercase).collect()
 }

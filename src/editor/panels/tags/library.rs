@@ -3,13 +3,9 @@
 use bevy_egui::egui::{self, Key, ScrollArea, Sense, TextStyle, Ui, WidgetInfo, WidgetType, vec2};
 
 use crate::{
-    editor::panels::list,
+    editor::{library::DraggedModule, panels::list},
     processor::{ModuleInfo, Modules},
 };
-
-/// Module of the library that is dragged.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::editor::panels) struct DraggedModule(pub &'static str);
 
 /// Modules that fit all words, the name counting more than the description; all without words.
 pub(super) fn found<'m>(modules: &'m Modules, words: &str) -> Vec<&'m ModuleInfo> {

@@ -40,6 +40,8 @@ pub(super) struct KnownValue {
     pub limits: Limits,
     /// A colour.
     pub color: Option<[f32; 3]>,
+    /// Keys of a curve.
+    pub curve: Option<Vec<(f32, f32)>>,
 }
 
 /// Values of the commands of a card.
@@ -83,6 +85,7 @@ impl CommandValues {
             FormElement::Vector(_) => (known.vector, known.boxes) = (self.vector(path), read(text)),
             FormElement::Limits(_) => known.limits = read(text).unwrap_or_default(),
             FormElement::Color(_) => known.color = read(text),
+            FormElement::Curve(_) => known.curve = read(text),
             _ => {}
         }
         known

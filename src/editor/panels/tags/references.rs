@@ -1,10 +1,10 @@
-//! References in forms: the nodes that they find in the built rig, and a button that refers to the selected joints.
+//! References in forms: the nodes that they find in the built rig, and a button that lets a person pick others.
 
 use bevy_egui::egui::{Label, RichText, Ui};
 
 use super::values::Subject;
 use crate::{
-    editor::{counted::counted, panels::list},
+    editor::{counted::counted, panels::list, style},
     processor::FindError,
     rig::Uid,
 };
@@ -12,13 +12,21 @@ use crate::{
 /// The most names that are listed.
 const NAMED: usize = 3;
 
-/// Draws the nodes that a reference finds, and a button that puts the selected joints in its place; returns the reference to them.
+/// Draws the nodes that a reference finds, and a button that lets a person pick others; returns true if it was clicked.
 /// `text` is `None` where several commands differ.
-pub(super) fn about(ui: &mut Ui, subject: &Subject, label: &str, text: Option<&str>) -> Option<String> {
-    let mut picked = None;
+pub(super) fn about(ui: &mut Ui, subject: &Subject, label: &str, path: &str, text: Option<&str>) -> bool {
+    let is_waiting = subject.picking.as_deref() == Some(path);
+    let tip = match is_waiting {
+        true => format!("{label}: take the joints of this card"),
+        false => format!("{label}: pick in the viewport"),
+    };
+    let mut is_clicked = false;
     ui.horizontal(|ui| {
-        if list::symbol_button(ui, "⌖", &format!("{label}: take the selected joints")) {
-            picked = selected(subject);
+        is_clicked = list::symbol_button(ui, "⌖", &tip);
+        if is_waiting {
+            let text = RichText::new("Click a joint or a control; Esc leaves it").small();
+            ui.add(Label::new(text.color(style::accent(ui.visuals()))).truncate());
+            return;
         }
         let Some(text) = text else { return };
         let (said, color, whole) = match found(subject, text) {
@@ -42,7 +50,7 @@ pub(super) fn about(ui: &mut Ui, subject: &Subject, label: &str, text: Option<&s
             line.on_hover_text(whole);
         }
     });
-    picked
+    is_clicked
 }
 
 fn found(subject: &Subject, text: &str) -> Option<Result<Vec<Uid>, FindError>> {
@@ -58,12 +66,4 @@ fn name(subject: &Subject, node: Uid) -> String {
         Some(_) => subject.shown.name(node).into_owned(),
         None => subject.builder.and_then(|builder| builder.name_of(node)).unwrap_or_else(|| node.to_string()),
     }
-}
-
-/// A reference to the selected joints by their uids, with the labels that they have.
-fn selected(subject: &Subject) -> Option<String> {
-    let joints = subject.shown.selection.0.iter().filter(|joint| subject.shown.rig.joint(**joint).is_some());
-    let joint = |joint: &Uid| format!("@joint {}#{joint}", subject.shown.name(*joint).replace([' ', '#'], "_"));
-    let joints: Vec<String> = joints.map(joint).collect();
-    (!joints.is_empty()).then(|| joints.join(" + "))
 }

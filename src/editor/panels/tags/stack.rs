@@ -3,14 +3,18 @@
 use std::collections::HashMap;
 
 use crate::{
-    editor::panels::displayed_rig::{DisplayedRig, Stamp},
+    editor::panels::{
+        displayed_rig::{DisplayedRig, Stamp},
+        words,
+    },
     rig::{TagData, TagKind, Uid},
 };
 
 /// Tags of the selected joints.
 #[derive(Default)]
 pub(super) struct Stack {
-    made_from: Option<(Stamp, Stamp)>,
+    /// State of the rig and of the selection, and whether other joints than the selected ones are shown.
+    made_from: Option<(Stamp, Stamp, bool)>,
     /// The selected joints.
     pub joints: Vec<Uid>,
     /// Entries in the order of the joints' tags.
@@ -60,21 +64,19 @@ impl Entry {
         if others.iter().any(|other| other != first) {
             return format!("{} values", super::MIXED);
         }
-        let text = first.trim().trim_start_matches('(').trim_end_matches(')').trim();
-        let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
-        if self.first.comment.is_empty() { line } else { format!("{} · {line}", self.first.comment) }
+        words::summary(&self.first.comment, first)
     }
 }
 
 impl Stack {
-    /// Reads the selected joints again if they or the rig changed.
-    pub fn refresh(&mut self, shown: &DisplayedRig) {
-        let made_from = Some((shown.stamp(), shown.selection_stamp()));
+    /// Reads the selected joints again if they or the rig changed, or others in their place.
+    pub fn refresh(&mut self, shown: &DisplayedRig, others: Option<&[Uid]>) {
+        let made_from = Some((shown.stamp(), shown.selection_stamp(), others.is_some()));
         if self.made_from == made_from {
             return;
         }
-        let joints = shown.selection.0.iter().copied().filter(|uid| shown.rig.joint(*uid).is_some());
-        let joints: Vec<Uid> = joints.collect();
+        let joints = others.unwrap_or(&shown.selection.0).iter().copied();
+        let joints: Vec<Uid> = joints.filter(|uid| shown.rig.joint(*uid).is_some()).collect();
         let mut entries: Vec<Entry> = Vec::new();
         let mut places: HashMap<(String, usize), usize> = HashMap::new();
         for joint in &joints {

@@ -6,17 +6,22 @@ use std::{
 };
 
 use bevy_egui::egui::{
-    Checkbox, CollapsingHeader, ComboBox, Key, RichText, TextEdit, TextStyle, Ui, WidgetInfo, WidgetType,
+    Checkbox, CollapsingHeader, ComboBox, Key, Rect, RichText, Sense, TextEdit, TextStyle, Ui, WidgetInfo, WidgetType,
+    pos2, vec2,
 };
 
 use serde::Serialize;
 
 use super::{
+    curve_field::{self, CurveDrag, CurveEdit},
     fault::Fault,
+    forms::form_of,
     parameter_text::{ValueError, read, typed_number},
+    pick::Picking,
     read_values::{CommandValues, ReadValues},
     references,
     stack::Entry,
+    value_edit::{ValueEdit, changed},
 };
 use crate::{
     editor::{
@@ -29,36 +34,26 @@ use crate::{
     },
     processor::{
         Builder, ModuleInfo,
-        form::{Form, FormElement, read_module_form},
+        form::{Form, FormElement},
     },
     rig::{Uid, proportion::Quantity, ron_text},
 };
 
+/// Width of the button that resets a value.
+const RESET_WIDTH: f32 = 20.0;
 /// Colour of a parameter that gets its first one.
 const FIRST_COLOR: [f32; 3] = [1.0, 0.8, 0.1];
-
-/// Change of a value.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum ValueEdit {
-    /// Other parameters of tags.
-    Set(Vec<(Uid, String)>),
-    /// Preview of parameters while a number is dragged.
-    Preview(Vec<(Uid, String)>),
-    /// End of a drag.
-    Commit,
-    /// End of a drag that discards the value.
-    Cancel,
-    /// A value that the module does not take, with the reason.
-    Refused(ValueError),
-}
 
 /// Forms of modules, with the text that a person is typing.
 #[derive(Default)]
 pub(super) struct Values {
     numbers: Numbers,
     draft: Option<Draft>,
+    curve: Option<CurveDrag>,
     forms: HashMap<&'static str, Form>,
     read: ReadValues,
+    /// Parameter that waits for nodes.
+    pub picking: Option<Picking>,
 }
 
 /// A text being typed.
@@ -74,6 +69,8 @@ pub(super) struct Subject<'a> {
     pub builder: Option<&'a Builder>,
     pub module: &'a ModuleInfo,
     pub entry: &'a Entry,
+    /// Path of the parameter that waits for nodes.
+    pub picking: Option<String>,
     values: Arc<CommandValues>,
     fault: Option<&'a Fault<'a>>,
 }
@@ -108,21 +105,7 @@ impl Subject<'_> {
     }
 
     fn changed(&self, path: &str, texts: &[String]) -> Result<Vec<(Uid, String)>, ValueError> {
-        let mut refused = ValueError::Missing;
-        'texts: for text in texts {
-            let mut changed = Vec::new();
-            for ((_, tag), params) in self.entry.tags.iter().zip(&self.entry.params) {
-                match self.module.with_value(params, path, text) {
-                    Ok(params) => changed.push((*tag, params)),
-                    Err(error) => {
-                        refused = ValueError::Value { path: path.to_owned(), value: text.clone(), source: error };
-                        continue 'texts;
-                    }
-                }
-            }
-            return Ok(changed);
-        }
-        Err(refused)
+        changed(self.module, self.entry, path, texts)
     }
 
     fn reset(&self, path: &str) -> ValueEdit {
@@ -131,6 +114,17 @@ impl Subject<'_> {
         match changed.collect::<Result<Vec<_>, crate::rig::SourceError>>() {
             Ok(changed) => ValueEdit::Set(changed),
             Err(error) => ValueEdit::Refused(ValueError::Parameters(error)),
+        }
+    }
+
+    fn curve(&self, path: &str, edit: CurveEdit) -> ValueEdit {
+        match edit {
+            CurveEdit::Set(keys) => self.set_to(path, &keys),
+            CurveEdit::Preview(keys) => {
+                self.changed(path, &[ron_text(&keys)]).map_or_else(ValueEdit::Refused, ValueEdit::Preview)
+            }
+            CurveEdit::Commit => ValueEdit::Commit,
+            CurveEdit::Cancel => ValueEdit::Cancel,
         }
     }
 
@@ -166,7 +160,9 @@ impl Values {
         let form = self.forms.remove(module.name).unwrap_or_else(|| form_of(module));
         let edit = match self.read.of(module, &form, entry) {
             Ok(values) => {
-                let subject = Subject { shown, builder, module, entry, values, fault };
+                let waits = self.picking.as_ref().filter(|picking| picking.tag == entry.first.uid);
+                let picking = waits.map(|picking| picking.path.clone());
+                let subject = Subject { shown, builder, module, entry, picking, values, fault };
                 let edit = self.elements(ui, &subject, &form.content);
                 let source = CollapsingHeader::new("As text")
                     .id_salt((entry.first.uid, "text"))
@@ -221,28 +217,30 @@ impl Values {
         edit
     }
 
-    /// Draws an element, and a button that resets its value if it is not the default.
+    /// Draws an element, and beside it a button that resets its value if it is not the default.
     fn bound(&mut self, ui: &mut Ui, subject: &Subject, element: &FormElement, path: &str) -> Option<ValueEdit> {
         let name = path.split('.').next().unwrap_or(path);
         let about = subject.module.parameters.iter().find(|parameter| parameter.name == name);
-        let row = ui.scope(|ui| self.element(ui, subject, element, path));
+        let is_changed = subject.values.get(path).is_some_and(|known| !known.is_default);
+        let right = ui.available_rect_before_wrap().right();
+        let row = ui.scope(|ui| {
+            if is_changed {
+                ui.set_max_width((ui.available_width() - RESET_WIDTH).max(60.0));
+            }
+            self.element(ui, subject, element, path)
+        });
         if let Some(fault) = subject.fault {
             fault.mark(ui, &row.response, path, &element.label());
         }
         if let Some(about) = about.filter(|about| !about.doc.is_empty()) {
             row.response.clone().on_hover_text(about.doc);
         }
-        if subject.values.get(path).is_some_and(|known| !known.is_default) {
-            let mut reset = false;
-            row.response.context_menu(|ui| {
-                reset = ui.button("Reset to default").clicked();
-            });
-            if reset {
-                ui.close();
-                return Some(subject.reset(path));
-            }
-        }
-        row.inner
+        let is_reset = is_changed && {
+            let corner = pos2(right - RESET_WIDTH, row.response.rect.top());
+            let place = Rect::from_min_size(corner, vec2(RESET_WIDTH, ui.spacing().interact_size.y));
+            reset_button(ui, place, (subject.tag(), path), &element.label())
+        };
+        if is_reset { Some(subject.reset(path)) } else { row.inner }
     }
 
     fn element(&mut self, ui: &mut Ui, subject: &Subject, element: &FormElement, path: &str) -> Option<ValueEdit> {
@@ -282,7 +280,13 @@ impl Values {
                 match value.parse::<f32>() {
                     Ok(number) => {
                         let look = Look { speed: f64::from(*step), decimals: 4, suffix: "", quantity: Quantity::Plain };
-                        let edit = self.numbers.number(ui, &label, CommonValue { value: number, mixed }, look)?;
+                        let shown = CommonValue { value: number, mixed };
+                        let edit = match element {
+                            FormElement::Slider { min, max, .. } => {
+                                self.numbers.slider(ui, &label, shown, [*min, *max], look)?
+                            }
+                            _ => self.numbers.number(ui, &label, shown, look)?,
+                        };
                         Some(subject.number(path, edit))
                     }
                     Err(_) => self.optional_number(ui, subject, path, &label),
@@ -301,8 +305,9 @@ impl Values {
             FormElement::Node(_) => {
                 let text = if mixed { "" } else { subject.plain(path) };
                 let typed = self.text(ui, subject.tag(), path, &label, text, false);
-                let picked = references::about(ui, subject, &label, (!mixed).then_some(text));
-                typed.or(picked).map(|text| subject.set_to(path, &text))
+                let picks = references::about(ui, subject, &label, path, (!mixed).then_some(text));
+                let typed = typed.map(|text| subject.set_to(path, &text));
+                typed.or_else(|| picks.then(|| ValueEdit::Pick(path.to_owned())))
             }
             FormElement::Text(_) | FormElement::Amount(_) => {
                 let shown = if mixed || value == "None" { "" } else { subject.plain(path) };
@@ -314,7 +319,15 @@ impl Values {
                     _ => subject.set_to(path, text),
                 })
             }
-            FormElement::Curve(_) | FormElement::List(_) => {
+            FormElement::Curve(_) => {
+                let drawn = subject.values.get(path).and_then(|known| known.curve.as_deref()).filter(|_| !mixed);
+                let field = (subject.tag(), path);
+                let edit = drawn.and_then(|keys| curve_field::show(ui, field, &label, keys, &mut self.curve));
+                let text = self.text(ui, subject.tag(), path, &label, if mixed { "" } else { value }, true);
+                let edit = edit.map(|edit| subject.curve(path, edit));
+                edit.or_else(|| text.map(|text| subject.set(path, &[text])))
+            }
+            FormElement::List(_) => {
                 let text = self.text(ui, subject.tag(), path, &label, if mixed { "" } else { value }, true)?;
                 Some(subject.set(path, &[text]))
             }
@@ -427,29 +440,17 @@ impl Values {
     }
 }
 
-/// The form of a module; one made of its parameters if it has none, or none that can be read.
-fn form_of(module: &ModuleInfo) -> Form {
-    let form = module.form.as_ref().and_then(|form| read_module_form(form.as_bytes(), module).ok());
-    form.unwrap_or_else(|| made_form(module))
-}
-
-fn made_form(module: &ModuleInfo) -> Form {
-    let element = |name: &str, kind: &str| {
-        let bound = crate::processor::form::FormBinding { param: name.to_owned(), label: String::new() };
-        match kind {
-            "bool" => FormElement::Check(bound),
-            "f32" => {
-                FormElement::Number { param: name.to_owned(), label: String::new(), step: 0.01, unit: String::new() }
-            }
-            "Vec3" => FormElement::Vector(bound),
-            "NodeRef" | "NodeRefs" => FormElement::Node(bound),
-            "String" => FormElement::Text(bound),
-            "Amount" => FormElement::Amount(bound),
-            _ => FormElement::List(bound),
-        }
-    };
-    let content = module.parameters.iter().map(|parameter| element(parameter.name, &parameter.kind)).collect();
-    Form { title: module.name.to_owned(), content }
+/// Draws a button that resets a value. Its name does not depend on what else is drawn, so that fields below keep the
+/// keyboard when it comes or goes.
+fn reset_button(ui: &Ui, place: Rect, of: (Uid, &str), label: &str) -> bool {
+    let button = ui.interact(place, ui.id().with((of, "reset")), Sense::click());
+    let said = format!("Reset {label} to default");
+    button.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, &said));
+    let visuals = ui.visuals();
+    let is_lit = button.hovered() || button.has_focus();
+    let color = if is_lit { visuals.strong_text_color() } else { visuals.weak_text_color() };
+    list::symbol(ui, place, "⮪", color);
+    button.on_hover_text("Reset to default").clicked()
 }
 
 fn axis_edit(subject: &Subject, path: &str, axis: usize, edit: NumberEdit) -> ValueEdit {

@@ -34,6 +34,8 @@ pub(super) fn summary(comment: &str, params: &str) -> String {
 /// A value without quotation marks, uids and what only files need.
 fn value(text: &str) -> String {
     let plain = text.trim_matches('"').replace("@command ", "").replace("@joint ", "").replace('@', "");
+    let has_fields = plain.starts_with('(') && plain.contains(": ");
+    let plain = if has_fields { plain.replace(['(', ')', '"'], "").replace(": ", " ") } else { plain };
     let mut said = String::new();
     let mut is_uid = false;
     for letter in plain.chars() {
