@@ -264,7 +264,7 @@ impl EditorOverlay for Palette {
                         row.scroll_to_me(None);
                     }
                     if row.clicked() {
-                        chosen = Some(Chosen::Panel(*title));
+                        chosen = Some(Chosen::Panel(title));
                     }
                 }
                 if list.is_empty() && panels.is_empty() {

@@ -163,7 +163,7 @@ fn a_crowded_folder_hides_no_work() {
     (0..10_050).for_each(|number| fs::write(state.join(format!("a{number:05}")), b"").unwrap());
     assert_eq!(
         pending_journals(&RealDisk, state).into_iter().map(|pending| pending.path).collect::<Vec<_>>(),
-        [path.clone()]
+        std::slice::from_ref(&path)
     );
 }
 

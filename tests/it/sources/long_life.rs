@@ -161,7 +161,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                     let next =
                         (1..).map(|more| version + more).find(|next| written_part(*next) != written_part(version));
                     version = next.unwrap_or_default();
-                    save_whole(&studio.file.with_file_name("link.rig.ron"), &written_part(version));
+                    save_whole(&studio.file.with_file_name("link.rig.ron"), written_part(version));
                     parts += 1;
                 } else {
                     means_other = rewrite(&mut joints, dice, step);
