@@ -84,6 +84,8 @@ pub(crate) struct Face<'a> {
     pub tongue: Option<u32>,
     pub upper_mean: Vec3,
     pub lower_mean: Vec3,
+    /// True if the lips can part; a mouth that is one closed surface stretches instead.
+    pub lips_part: bool,
 }
 
 /// Weights of all points of a head.
@@ -157,6 +159,7 @@ pub fn face_weights(
         tongue: joint(FaceBoneKind::Tongue, None),
         upper_mean: groups.upper_mean,
         lower_mean: groups.lower_mean,
+        lips_part: landmarks.mouth_open,
         map,
     };
     let sides = sides::Sides::new(&face);

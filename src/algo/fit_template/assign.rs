@@ -35,6 +35,11 @@ const MISSING_TAIL: f32 = 0.08;
 const MISSING_FREE: f32 = 0.5;
 /// Penalty of a branch that has no limb, for a branch as long as the body's reach.
 const UNUSED: f32 = 0.12;
+/// Share of that penalty for an ear of a head, and the length, as a factor of the head's, from which on it is none.
+const EAR: f32 = 0.2;
+const NO_EAR: f32 = 1.5;
+/// Penalty of a centre of the branches beyond the trunk, for a way to it as long as the body's reach.
+const BEYOND: f32 = 1.0;
 
 /// Weight of what remains of the alignment for a template without sides, whose limbs differ by their place alone.
 const RIGID: f32 = 6.0;
@@ -263,11 +268,15 @@ impl Search<'_> {
             if chosen.contains(&Some(number)) || !arc.children.is_empty() {
                 continue;
             }
-            // An ear of a head that is taken counts little.
-            let ear = chosen.iter().flatten().any(|&c| self.tree.branches.on_one_way(self.leaves[c], leaf));
-            let share = if ear { 0.2 } else { 1.0 };
-            cost += share * UNUSED * (arc.far - arc.near) as f32 / self.tree.branches.reach.max(1) as f32;
+            // An ear of a head that is taken counts little; what is longer than the head is no ear.
+            let bearer = chosen.iter().flatten().find(|&&c| self.tree.branches.on_one_way(self.leaves[c], leaf));
+            let share = bearer.map_or(1.0, |&bearer| {
+                let length = self.arc_length(leaf) / self.arc_length(self.leaves[bearer]).max(1.0);
+                EAR + (1.0 - EAR) * ((length - 1.0) / (NO_EAR - 1.0)).clamp(0.0, 1.0)
+            });
+            cost += share * UNUSED * self.arc_length(leaf) / self.tree.branches.reach.max(1) as f32;
         }
+        cost += BEYOND * self.beyond_trunk(chosen);
         let thickness = |leaf: usize| self.tree.lines[self.leaves[leaf]].thickness();
         let heads = limbs.iter().zip(chosen).filter(|(l, _)| l.kind == LimbKind::Head);
         if let Some(head) = heads.filter_map(|(_, c)| *c).next() {
@@ -290,6 +299,30 @@ impl Search<'_> {
             }
         }
         cost
+    }
+
+    /// Length over which arms and legs run together on their way to the centre of the branches, without the head, as a share of the
+    /// body's reach: there the centre lies in a large head, beyond the trunk.
+    fn beyond_trunk(&self, chosen: &Assignment) -> f32 {
+        let branches = &self.tree.branches;
+        let of = |kind: LimbKind| {
+            let limbs = self.template.limbs.iter().zip(chosen).filter(move |(limb, _)| limb.kind == kind);
+            limbs.filter_map(|(_, leaf)| Some(branches.path(self.leaves[(*leaf)?])))
+        };
+        let Some(head) = of(LimbKind::Head).next() else { return 0.0 };
+        let mut paths = of(LimbKind::Arm).chain(of(LimbKind::Leg));
+        let Some(mut shared) = paths.next() else { return 0.0 };
+        shared.retain(|arc| !head.contains(arc));
+        for path in paths {
+            shared.retain(|arc| path.contains(arc));
+        }
+        shared.into_iter().map(|arc| self.arc_length(arc)).sum::<f32>() / branches.reach.max(1) as f32
+    }
+
+    /// Length of an arc, as a cost of steps.
+    fn arc_length(&self, leaf: usize) -> f32 {
+        let arc = &self.tree.branches.arcs[leaf];
+        (arc.far - arc.near) as f32
     }
 
     /// Difference of two leaves as the two sides of a pair.

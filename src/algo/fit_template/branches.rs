@@ -250,7 +250,7 @@ fn fill_slices(graph: &VoxelGraph, distance: &[u32], arc_of: &[u32], order: &[u3
         sum[slice].2 = sum[slice].2.max(graph.depth[node as usize]);
     }
     let cell = graph.cell;
-    for (arc, sums) in arcs.iter_mut().zip(sums) {
+    for (arc, sums) in arcs.iter_mut().zip(&sums) {
         arc.slices = sums
             .iter()
             .filter(|sum| sum.1 > 0)
@@ -263,6 +263,69 @@ fn fill_slices(graph: &VoxelGraph, distance: &[u32], arc_of: &[u32], order: &[u3
                 }
             })
             .collect();
+    }
+    // Number of each slice among those that are not empty.
+    let numbers: Vec<Vec<usize>> = sums
+        .iter()
+        .map(|sums| {
+            let mut next = 0;
+            let number = |sum: &(Vec3, u32, u8)| {
+                next += usize::from(sum.1 > 0);
+                next.saturating_sub(1)
+            };
+            sums.iter().map(number).collect()
+        })
+        .collect();
+    let mut rings: Vec<Vec<Ring>> = arcs.iter().map(|arc| vec![Ring::default(); arc.slices.len()]).collect();
+    for &node in order {
+        let arc = arc_of[node as usize] as usize;
+        let slice = numbers[arc][(arcs[arc].far.saturating_sub(distance[node as usize]) / SLICE) as usize];
+        rings[arc][slice].add(graph.centres[node as usize] - arcs[arc].slices[slice].centre);
+    }
+    for (arc, rings) in arcs.iter_mut().zip(rings) {
+        for (slice, ring) in arc.slices.iter_mut().zip(rings) {
+            if let Some((inner, mean)) = ring.hollow(HOLLOW * cell) {
+                slice.depth = slice.depth.max(inner / cell);
+                slice.radius = slice.radius.max(mean);
+            }
+        }
+    }
+}
+
+/// Distance of a slice's centre from its nodes, in cells, from which on it is a ring.
+const HOLLOW: f32 = 2.0;
+/// Length of the mean direction from a slice's centre to its nodes up to which they lie on all sides of it.
+const AROUND: f32 = 0.35;
+
+/// Nodes of a slice around its centre.
+#[derive(Debug, Clone, Copy)]
+struct Ring {
+    directions: Vec3,
+    distance: f32,
+    least: f32,
+    count: u32,
+}
+
+impl Default for Ring {
+    fn default() -> Self {
+        Self { directions: Vec3::ZERO, distance: 0.0, least: f32::INFINITY, count: 0 }
+    }
+}
+
+impl Ring {
+    fn add(&mut self, away: Vec3) {
+        let length = away.length();
+        self.directions += away.normalize_or_zero();
+        self.distance += length;
+        self.least = self.least.min(length);
+        self.count += 1;
+    }
+
+    /// Least and mean radius of nodes that lie around an empty middle, as those of a shell do that is not closed.
+    fn hollow(&self, least: f32) -> Option<(f32, f32)> {
+        let count = self.count.max(1) as f32;
+        let is_ring = self.least >= least && self.directions.length() <= AROUND * count;
+        (is_ring && self.count > 0).then(|| (self.least, self.distance / count))
     }
 }
 

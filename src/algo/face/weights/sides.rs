@@ -30,7 +30,8 @@ pub(crate) struct Sides {
 }
 
 impl Sides {
-    /// Floods the surroundings of each opening from the outer rims of lips and lids.
+    /// Floods the surroundings of each opening from the outer rims of lips and lids. A mouth that is one closed surface has no
+    /// rims: its skin stretches.
     ///
     /// `O(n log n)` in the vertices around the openings.
     pub fn new(face: &Face) -> Self {
@@ -40,7 +41,7 @@ impl Sides {
         if !face.map.trusted {
             return Self { rims, bones };
         }
-        for (opening, rims) in rims.iter_mut().enumerate() {
+        for (opening, rims) in rims.iter_mut().enumerate().skip(usize::from(!face.lips_part)) {
             let zone = Zone::new(face, opening);
             flood(face, &zone, rims);
             for (bone, rim) in face.bones.iter().zip(&mut bones) {

@@ -39,7 +39,7 @@ pub struct MotionOptions {
 /// A frame rate leaves a single frame of a motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "the clip \"{clip}\" lasts {seconds} s, which is no frame more than the first at {rate} frames a second; give a higher rate"
+    "the clip \"{clip}\" lasts {seconds} s, which is no frame more than the first at a frame rate of {rate}; give a higher one"
 )]
 pub(super) struct RateError {
     clip: String,
