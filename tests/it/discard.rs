@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use bevy::{ecs::message::MessageCursor, prelude::*};
+use bevy::prelude::*;
 use bevy_egui::egui::PointerButton;
 use rigsmith::{
     algo::face::auto::AutoSettings,
@@ -224,11 +224,12 @@ fn is_stopped<M: Message + Clone>(
         if !is_running(frames.app.world()) {
             return false;
         }
+        // Notices of earlier work may still be there.
+        let mut cursor = frames.app.world().resource::<Messages<Notice>>().get_cursor_current();
         frames.app.world_mut().write_message(StopWork(kind));
         frames.app.update();
         let notices = frames.app.world().resource::<Messages<Notice>>();
-        let mut notices = MessageCursor::<Notice>::default().read(notices).cloned().collect::<Vec<_>>().into_iter();
-        if !notices.any(|notice| notice.text.ends_with("it was stopped")) {
+        if !cursor.read(notices).any(|notice| notice.text.ends_with("it was stopped")) {
             return false;
         }
         (0..3).for_each(|_| frames.app.update());

@@ -47,7 +47,7 @@ impl Posable {
     /// Largest opening of an eye that counts as shut, as a share of that at rest: the points nearest to the landmarks lie beside
     /// the rims, and the true shapes leave 0.28 between them. On the bundled head two points of a lid share a bone.
     fn shut(&self) -> f32 {
-        if self.name == HEADS[0] { 0.45 } else { 0.7 }
+        if self.name == HEADS[0] { 0.5 } else { 0.7 }
     }
 }
 

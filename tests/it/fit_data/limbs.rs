@@ -25,6 +25,9 @@ const KINDS: [(&str, &[&str]); 5] = [
     ("head", &["neck", "head"]),
 ];
 
+/// Beginnings of the labels of joints at which a limb leaves the trunk.
+const FIRST: [&str; 5] = ["upper_arm", "thigh", "wing_1", "tail_1", "neck"];
+
 fn limb(label: &str) -> Limb {
     let side = i8::from(label.ends_with("_l")) - i8::from(label.ends_with("_r"));
     let kind = KINDS.iter().find(|(_, starts)| starts.iter().any(|start| label.starts_with(start)));
@@ -59,7 +62,8 @@ fn every_joint_of_a_body_is_near() {
     }
 }
 
-/// Every joint of a limb is nearer to a true joint of that limb, on that side, than to one of any other limb or of the trunk.
+/// Every joint of a limb is nearer to a true joint of that limb, on that side, than to one of any other limb or of the trunk; the
+/// joint at which it leaves the trunk may be nearer to the trunk's.
 #[test]
 fn limbs_are_assigned_right() {
     let Some(all) = all() else { return };
@@ -72,7 +76,8 @@ fn limbs_are_assigned_right() {
             let known = fitted.figure.truth.iter().filter(|(label, _)| !super::is_finger(label));
             let nearest = known.min_by(|a, b| a.1.distance(place).total_cmp(&b.1.distance(place))).unwrap();
             let name = &fitted.figure.name;
-            assert_eq!(limb(label), limb(&nearest.0), "{name}: {label} lies at {}", nearest.0);
+            let is_at_trunk = limb(&nearest.0) == TRUNK && FIRST.iter().any(|first| label.starts_with(first));
+            assert!(limb(label) == limb(&nearest.0) || is_at_trunk, "{name}: {label} lies at {}", nearest.0);
             *count.entry(limb(label)).or_insert(0) += 1;
         }
         println!("{}: {count:?}", fitted.figure.name);

@@ -65,7 +65,9 @@ fn a_rate_that_leaves_one_frame_is_refused() {
     let slow = MotionOptions { frame_rate: Some(12.0), ..options(&desk) };
     send(&mut desk, MapRequest::Options(slow));
     send(&mut desk, MapRequest::Accept);
-    let is_refused = |desk: &Desk| desk.told().iter().any(|told| told.contains("no frame more than the first at 12"));
+    let is_refused = |desk: &Desk| {
+        desk.told().iter().any(|told| told.contains("no frame more than the first at a frame rate of 12"))
+    };
     desk.until("the reason", is_refused);
     assert!(draft(&desk).is_some());
     assert_eq!((bytes(&desk), desk.steps()), (before, steps));

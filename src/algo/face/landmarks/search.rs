@@ -27,32 +27,45 @@ pub(super) struct Pose {
     pub worth: f32,
 }
 
-/// Least share of points with a mirror image on a symmetric head. Quads that are cut along other diagonals on the two sides and
-/// are then subdivided leave some points without one; a head that was not drawn symmetric has hardly any.
-const MIRRORED: f32 = 0.85;
+/// Least share of points with a mirror image on a symmetric head.
+const MIRRORED: f32 = 0.97;
+/// Distance of a point from the image of another, as a share of the distance to its own neighbour, up to which they are on
+/// quads that are cut along other diagonals on the two sides and were subdivided.
+const CUT: f32 = 0.7;
+/// Least share of points with a mirror image of their own on such a head.
+const EXACT: f32 = 0.7;
 
 /// The x of the plane in which the points mirror onto each other, if they do.
 ///
 /// Tries the middle of the bounds, the mean and zero, on up to 400 points. Sorting dominates: `n log n`.
 pub(super) fn exact_mirror(points: &[Vec3], low: Vec3, high: Vec3) -> Option<f32> {
     let size = (high - low).max_element();
-    let tolerance = size * 2e-4;
+    let (tolerance, widest) = (size * 2e-4, size * 1e-2);
     let mut order: Vec<Vec3> = points.to_vec();
     order.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
+    // Distance of a place from the nearest point that is at least `least` away, if it is not further than `reach`.
+    let nearest = |place: Vec3, least: f32, reach: f32| {
+        let start = order.partition_point(|other| other.x < place.x - reach);
+        let near = order[start..].iter().take_while(|other| other.x <= place.x + reach);
+        let distances = near.map(|other| other.distance(place)).filter(|distance| (least..=reach).contains(distance));
+        distances.reduce(f32::min)
+    };
     let stride = (order.len() / 400).max(1);
     let mean = points.iter().map(|point| f64::from(point.x)).sum::<f64>() / points.len().max(1) as f64;
     [(low.x + high.x) / 2.0, 0.0, mean as f32].into_iter().find(|&middle| {
-        let (mut found, mut asked) = (0, 0);
-        for point in order.iter().step_by(stride) {
+        let (mut exact, mut cut, mut asked) = (0, 0, 0);
+        for &point in order.iter().step_by(stride) {
             asked += 1;
-            let mirror = Vec3::new(2.0 * middle - point.x, point.y, point.z);
-            let start = order.partition_point(|other| other.x < mirror.x - tolerance);
-            let near = order.iter().skip(start).take_while(|other| other.x <= mirror.x + tolerance);
-            if near.into_iter().any(|other| other.distance_squared(mirror) <= tolerance * tolerance) {
-                found += 1;
+            let mirror = point.with_x(2.0 * middle - point.x);
+            if nearest(mirror, 0.0, tolerance).is_some() {
+                exact += 1;
+            } else if let Some(off) = nearest(mirror, 0.0, widest) {
+                let beside = nearest(point, tolerance, widest).unwrap_or(widest);
+                cut += usize::from(off <= CUT * beside);
             }
         }
-        asked > 0 && found as f32 >= MIRRORED * asked as f32
+        let share = |count: usize| count as f32 / asked.max(1) as f32;
+        share(exact) >= EXACT && share(exact + cut) >= MIRRORED
     })
 }
 

@@ -69,6 +69,11 @@ impl Sides {
         self.rims[0][vertex]
     }
 
+    /// True for a vertex on a rim of any opening.
+    pub fn is_rim(&self, vertex: usize) -> bool {
+        self.rims.iter().any(|rims| rims[vertex] != Rim::None)
+    }
+
     /// Rim of a vertex at an opening.
     pub fn rim(&self, vertex: usize, opening: usize) -> Rim {
         self.rims[opening][vertex]

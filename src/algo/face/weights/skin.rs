@@ -18,6 +18,9 @@ use crate::algo::{
 const WIDTH: f32 = 0.36;
 /// Largest distance of bones that counts, as a share of the face's scale.
 const WIDEST: f32 = 0.22;
+/// Distance behind the visible part of lips and lids, as a share of the face's scale, over which hidden skin follows their bones:
+/// where the eye sees the rim end is another place at each vertex.
+const ROLL: f32 = 0.08;
 /// The largest share of the jaw in the skin.
 const JAW: f32 = 0.5;
 
@@ -32,7 +35,7 @@ pub(crate) fn rows(
     let bones: Vec<usize> = (0..face.bones.len()).filter(|&b| face.bones[b].kind == FaceBoneKind::Skin).collect();
     let spacing = spacings(face, sides, &bones);
     let widest = spacing.iter().copied().fold(0.0, f32::max);
-    let active = around(face, widest);
+    let (active, inwards) = around(face, widest);
     let index: Vec<u32> = {
         let mut index = vec![u32::MAX; n];
         for (i, &v) in active.iter().enumerate() {
@@ -54,7 +57,8 @@ pub(crate) fn rows(
                 }
             }
             let width = spacing.get(best.1).copied().unwrap_or(0.0);
-            (if face.mask[v] && !bones.is_empty() { best.1 } else { bones.len() + inner(face, v) }, width)
+            let follows = face.mask[v] || (inwards[v] <= ROLL * face.map.scale && sides.is_rim(v));
+            (if follows && !bones.is_empty() { best.1 } else { bones.len() + inner(face, v) }, width)
         })
         .collect();
     if !progress(0.2) {
@@ -184,8 +188,8 @@ fn spacings(face: &Face, sides: &Sides, bones: &[usize]) -> Vec<f32> {
         .collect()
 }
 
-/// The vertices of the skin within `reach` of the mask, along the surface, in order.
-fn around(face: &Face, reach: f32) -> Vec<u32> {
+/// The vertices of the skin within `reach` of the mask, along the surface, in order, and the distance of all vertices.
+fn around(face: &Face, reach: f32) -> (Vec<u32>, Vec<f32>) {
     let n = face.places.len();
     let mut distance = vec![f32::INFINITY; n];
     let mut heap = BinaryHeap::new();
@@ -208,7 +212,7 @@ fn around(face: &Face, reach: f32) -> Vec<u32> {
             }
         }
     }
-    (0..n as u32).filter(|&v| distance[v as usize].is_finite()).collect()
+    ((0..n as u32).filter(|&v| distance[v as usize].is_finite()).collect(), distance)
 }
 
 /// Lets the patches spread: `(A + t L) w = A w₀`, twice, where `t` follows the distance of the bones.
