@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy::prelude::World;
-use bevy_egui::egui::{Button, Response, TextWrapMode, Ui};
+use bevy_egui::egui::{Button, Label, Response, RichText, TextWrapMode, Ui};
 
 use super::{TagsPanel, library, send};
 use crate::{
@@ -37,7 +37,7 @@ impl TagsPanel {
                 [joint] => shown.name(joint).into_owned(),
                 _ => counted(joints.len(), "joint", "joints"),
             };
-            ui.strong(name);
+            ui.add(Label::new(RichText::new(name).strong()).truncate());
             self.add(ui, modules, shown, requests);
             self.parts.show(ui, world, shown, requests);
             ui.menu_button("Copy", |ui| self.copy(ui, shown, requests));
