@@ -46,6 +46,17 @@ fn head(name: &str, density: usize) -> Option<Head> {
     Some(rigged(mesh, shells, landmarks, marks, density))
 }
 
+/// A head of the test data with bones at the landmarks that are found on it, and the points of the true ones; `None` where
+/// there is none.
+#[track_caller]
+fn found(name: &str, density: usize) -> Option<Head> {
+    let folder = test_data()?;
+    let mesh = heads::mesh(&folder.join(format!("heads/{name}.obj")));
+    let shells = find_shells(&mesh.0, &mesh.1);
+    let landmarks = find_landmarks(&mesh.0, &mesh.1, &shells).unwrap();
+    Some(rigged(mesh, shells, landmarks, heads::truth(&folder), density))
+}
+
 /// The bundled head, with bones at the landmarks that are found on it.
 fn bundled(density: usize) -> Head {
     let mesh = heads::bundled();

@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use glam::{Vec3, vec3};
 use rigsmith::algo::face::expression::{ExpressionSet, FittedFace, MAX_STRENGTH, Mix, apply};
 
-use super::{Head, bundled, head};
+use super::{Head, bundled, found, head};
 use crate::heads::HEADS;
 
 /// Upper and lower lids of an eye.
@@ -34,6 +34,13 @@ impl Posable {
     fn all() -> Vec<Self> {
         let real = head(HEADS[0], 40).map(|real| Self::new(HEADS[0], real));
         [Self::new("the bundled head", bundled(40))].into_iter().chain(real).collect()
+    }
+
+    /// The heads of the test data with bones at the landmarks that are found on them, few, some and many.
+    fn all_found() -> Vec<Self> {
+        let names = ["ict_neutral", "ict_identity_1", "ict_identity_2", "ict_identity_3"];
+        let densities = |name| [20, 40, 80].map(|density| Some(Self::new(name, found(name, density)?)));
+        names.into_iter().flat_map(densities).flatten().collect()
     }
 
     fn moved(&self, expression: &str, strength: f32) -> Moved<'_> {
@@ -256,8 +263,9 @@ fn the_open_jaw_folds_no_more_than_it_did() {
 #[test]
 fn no_expression_crosses_lips_or_lids() {
     let mut faults = Faults::default();
-    for posable in Posable::all() {
+    for posable in Posable::all().into_iter().chain(Posable::all_found()) {
         let Posable { name, head, .. } = &posable;
+        let name = format!("{name} with {} bones", head.bones.len());
         for expression in ExpressionSet::bundled().expressions() {
             for strength in [1.0, MAX_STRENGTH] {
                 let moved = posable.moved(&expression.name, strength);

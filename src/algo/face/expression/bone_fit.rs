@@ -73,7 +73,7 @@ pub struct FittedFace {
     jaw: JawMovements,
     /// The skin that bones move.
     moving: MovingSkin,
-    /// Bones of skin that mirror each other.
+    /// Bones of skin that mirror each other; one in the middle stands twice.
     pairs: Vec<[usize; 2]>,
 }
 
@@ -143,6 +143,9 @@ impl FittedFace {
         let Some(opening_lines) = self.opening_lines.as_ref().filter(|_| !mix.is_rest()) else { return rest() };
         let Some(field) = Field::new(mix, &self.units, &self.bones, &self.landmarks) else { return rest() };
         let mut poses = self.solve(mix, &field, opening_lines);
+        if self.landmarks.symmetric && is_alike(mix) {
+            self.mirror(&mut poses);
+        }
         let repair = self.repair(&mut poses, mix, opening_lines);
         (poses, repair)
     }
@@ -249,6 +252,16 @@ impl FittedFace {
         })
     }
 
+    /// Gives the bones of each pair the mean of their movements: the skin of a symmetric head may be sampled and cut into
+    /// triangles otherwise on its two sides.
+    fn mirror(&self, poses: &mut [BonePose]) {
+        let mut movements: Vec<Vec3> = poses.iter().map(|pose| pose.translation).collect();
+        self.even_out(&mut movements);
+        for &bone in self.pairs.iter().flatten() {
+            poses[bone].translation = movements[bone];
+        }
+    }
+
     /// The poses that follow a mix best, before folds are repaired.
     fn solve(&self, mix: &Mix, field: &Field, opening_lines: &OpeningLines) -> Vec<BonePose> {
         let mut poses: Vec<BonePose> = self.bones.iter().map(|bone| field.turn(bone)).collect();
@@ -290,6 +303,11 @@ impl FittedFace {
     }
 }
 
+/// True for a mix that is the same on the left and on the right.
+fn is_alike(mix: &Mix) -> bool {
+    mix.strengths.iter().all(|[left, right]| left == right)
+}
+
 /// Displacement that a field asks of a place.
 fn asked(field: &Field, mark: &Mark) -> DVec3 {
     field.at(mark.place, mark.known).as_dvec3() * GAIN
@@ -300,7 +318,7 @@ fn unsolved<T>(units: &UnitSet) -> Vec<[OnceLock<T>; 2]> {
     units.units().iter().map(|_| [OnceLock::new(), OnceLock::new()]).collect()
 }
 
-/// Bones of skin that are each nearest to the other's mirror image, and near it.
+/// Bones of skin that are each nearest to the other's mirror image, and near it; a bone of the middle with itself.
 fn mirrored_pairs(bones: &[FaceBone], landmarks: &Landmarks) -> Vec<[usize; 2]> {
     let near = 0.1 * landmarks.eye_distance();
     let image = |bone: &FaceBone| bone.position.with_x(2.0 * landmarks.middle - bone.position.x);
@@ -310,6 +328,6 @@ fn mirrored_pairs(bones: &[FaceBone], landmarks: &Landmarks) -> Vec<[usize; 2]> 
         skin.min_by(|a, b| away(a).total_cmp(&away(b))).filter(|bone| away(bone) < near)
     };
     let partners: Vec<Option<usize>> = (0..bones.len()).map(partner).collect();
-    let mutual = |bone: usize| partners[bone].filter(|other| *other > bone && partners[*other] == Some(bone));
+    let mutual = |bone: usize| partners[bone].filter(|other| *other >= bone && partners[*other] == Some(bone));
     (0..bones.len()).filter_map(|bone| Some([bone, mutual(bone)?])).collect()
 }

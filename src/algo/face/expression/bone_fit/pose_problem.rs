@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, Vec3};
 
-use super::{FittedFace, PATIENCE, ROUNDS, TAKEN, moving_skin::PosedSkin, samples::influences};
+use super::{FittedFace, PATIENCE, ROUNDS, TAKEN, is_alike, moving_skin::PosedSkin, samples::influences};
 use crate::algo::face::{
     bones::{FaceBone, FaceBoneKind},
     expression::{BonePose, Mix, field::Field, limited, openings::OpeningLines},
@@ -80,7 +80,7 @@ impl UsedUnits {
 impl FittedFace {
     /// Repairs the pose of a mix as far as it may; alike on both sides in a mix that is alike on both sides.
     pub(super) fn repair(&self, poses: &mut [BonePose], mix: &Mix, opening_lines: &OpeningLines) -> Repair {
-        let is_alike = mix.strengths.iter().all(|[left, right]| left == right);
+        let is_alike = is_alike(mix);
         let solved: Vec<Vec3> = poses.iter().map(|pose| pose.translation).collect();
         let mut apart = vec![0.0; poses.len()];
         let mut repair = Repair::none(mix);
@@ -99,10 +99,13 @@ impl FittedFace {
                 break;
             }
             self.relax(poses, &problems.folded, share);
-            self.part(poses, &problems.crossed, &mut apart);
             let mut changes: Vec<Vec3> = (poses.iter().zip(&solved).zip(&apart))
                 .map(|((pose, solved), apart)| pose.translation - *solved - Vec3::Y * *apart)
                 .collect();
+            self.part(&problems.crossed, &mut apart);
+            if is_alike {
+                self.widen_alike(&mut apart);
+            }
             if is_alike {
                 self.even_out(&mut changes);
             }
@@ -161,7 +164,7 @@ impl FittedFace {
     }
 
     /// Gives both bones of each pair the mean of their changes.
-    fn even_out(&self, changes: &mut [Vec3]) {
+    pub(super) fn even_out(&self, changes: &mut [Vec3]) {
         for &[one, other] in &self.pairs {
             let over = |v: Vec3| v.with_x(-v.x);
             let mean = 0.5 * (changes[one] + over(changes[other]));
@@ -186,12 +189,20 @@ impl FittedFace {
         PoseProblems { folded: posed.folded().collect(), crossed }
     }
 
-    /// Raises the first of two points above the second by the missing distance, with the least movement of bones, which
-    /// is added to `apart`.
-    fn part(&self, poses: &mut [BonePose], crossed: &[([u32; 2], f32)], apart: &mut [f32]) {
-        let mut more = vec![0.0_f32; poses.len()];
+    /// Gives both bones of each pair the larger one of their heights.
+    fn widen_alike(&self, heights: &mut [f32]) {
+        for &[one, other] in &self.pairs {
+            let most = if heights[other].abs() > heights[one].abs() { heights[other] } else { heights[one] };
+            (heights[one], heights[other]) = (most, most);
+        }
+    }
+
+    /// Adds to the heights of bones what raises the first of two points above the second by the missing distance, with the
+    /// least movement of bones.
+    fn part(&self, crossed: &[([u32; 2], f32)], apart: &mut [f32]) {
+        let mut more = vec![0.0_f32; apart.len()];
         for &([above, below], missing) in crossed {
-            let mut shares = vec![0.0_f32; poses.len()];
+            let mut shares = vec![0.0_f32; apart.len()];
             for (point, sign) in [(above, 1.0), (below, -1.0)] {
                 for (joint, weight) in influences(&self.moving.weights, point as usize) {
                     let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < shares.len()) else {
@@ -215,8 +226,7 @@ impl FittedFace {
                 }
             }
         }
-        for ((pose, apart), more) in poses.iter_mut().zip(apart).zip(more) {
-            pose.translation.y += more;
+        for (apart, more) in apart.iter_mut().zip(more) {
             *apart += more;
         }
     }

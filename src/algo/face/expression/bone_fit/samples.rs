@@ -24,6 +24,11 @@ const PAIRS: [[usize; 2]; 9] =
 /// Number of the first [`PAIRS`] whose first landmark must stay above the second: lips and lids.
 const APART: usize = 7;
 
+/// Inner landmarks of the lips from corner to corner.
+const INNER_LIPS: [[usize; 2]; 5] = [[60, 60], [61, 67], [62, 66], [63, 65], [64, 64]];
+/// Places along the lips at which the upper one stays above the lower one.
+const STATIONS: usize = 15;
+
 /// A place at which the field is sampled.
 #[derive(Clone)]
 pub(super) struct Mark {
@@ -159,7 +164,34 @@ pub(super) fn gather(
             apart.push([*point as u32, *other_point as u32]);
         }
     }
+    apart.extend(rims_of_lips(points, &candidates, &lower_share, landmarks));
     (samples, apart)
+}
+
+/// Points of the upper and the lower lip that face each other, at even places between the corners of the mouth.
+fn rims_of_lips(
+    points: &[Vec3],
+    candidates: &[usize],
+    lower_share: &[f32],
+    landmarks: &Landmarks,
+) -> Vec<[u32; 2]> {
+    let line = INNER_LIPS.map(|[above, below]| landmarks.points[above].midpoint(landmarks.points[below]));
+    let near = 0.2 * landmarks.eye_distance();
+    let lips: Vec<usize> =
+        candidates.iter().copied().filter(|&index| line.iter().any(|mark| mark.distance(points[index]) < near)).collect();
+    let nearest = |place: Vec3, is_lower: bool| {
+        let on_lip = lips.iter().copied().filter(|&index| (lower_share[index] >= 0.5) == is_lower);
+        let away = |index: &usize| points[*index].distance_squared(place);
+        on_lip.min_by(|a, b| away(a).total_cmp(&away(b)))
+    };
+    let steps = (line.len() - 1) as f32 / (STATIONS + 1) as f32;
+    let facing = |station: usize| {
+        let along = station as f32 * steps;
+        let from = (along as usize).min(line.len() - 2);
+        let place = line[from].lerp(line[from + 1], along - from as f32);
+        Some([nearest(place, false)? as u32, nearest(place, true)? as u32])
+    };
+    (1..=STATIONS).filter_map(facing).collect()
 }
 
 impl Skin<'_> {
