@@ -280,6 +280,14 @@ impl Desk {
         self.frames(2);
     }
 
+    /// Undoes that many steps, one after the other.
+    pub fn undo(&mut self, count: usize) {
+        for _ in 0..count {
+            self.app.world_mut().write_message(EditRequest { rig: self.rig, change: Change::Undo });
+            self.frames(3);
+        }
+    }
+
     /// A chain with these labels, one below the other, upwards from the rig's origin.
     pub fn chain(&mut self, labels: &[&str]) -> Vec<Uid> {
         let from = self.rig().len();
@@ -333,8 +341,7 @@ impl Desk {
             }
             1 => {
                 assert_ne!(saved(self), before, "{what}");
-                self.app.world_mut().write_message(EditRequest { rig: self.rig, change: Change::Undo });
-                self.frames(3);
+                self.undo(1);
                 assert_eq!((saved(self), self.steps().1), (before, done), "{what}");
                 true
             }
