@@ -27,7 +27,10 @@ use rigsmith::{
     rig::{Rig, Uid},
 };
 
-use crate::bench::{AppBench, HANG, save_whole, wait_with};
+use crate::{
+    bench::{AppBench, HANG, save_whole, wait_with},
+    disks::{entries_of_the_disk, no_changes},
+};
 
 /// A square column around [`ARM`], that wide, with so many rings of points.
 fn column(width: f32, rings: u32) -> String {
@@ -209,41 +212,14 @@ struct RacedDisk {
 }
 
 impl Disk for RacedDisk {
-    fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
-        RealDisk.entry(path, follow)
-    }
-    fn read_link(&self, path: &Path) -> io::Result<PathBuf> {
-        RealDisk.read_link(path)
-    }
-    fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
-        RealDisk.canonical(path)
-    }
-    fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
-        RealDisk.list(folder, limit)
-    }
+    entries_of_the_disk!();
+    no_changes!();
+
     fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>> {
         if self.opened.fetch_add(1, Ordering::Relaxed) + 1 == self.number {
             save_whole(&self.file, &self.content);
         }
         RealDisk.open(path)
-    }
-    fn create(&self, _: &Path) -> io::Result<Box<dyn DiskFile>> {
-        unreachable!()
-    }
-    fn rename(&self, _: &Path, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn hard_link(&self, _: &Path, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn sync_folder(&self, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn remove(&self, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn create_folder(&self, _: &Path) -> io::Result<()> {
-        unreachable!()
     }
 }
 
