@@ -11,6 +11,7 @@ use rigsmith::{
     headless::headless_app,
     plugins::history::RigHistory,
     prelude::*,
+    rig::TagKind,
     test_app::strict_app,
 };
 
@@ -316,6 +317,16 @@ impl Desk {
 
     pub fn label(&self, joint: Uid) -> &str {
         self.rig().joint(joint).unwrap().data.label.as_deref().unwrap_or_default()
+    }
+
+    /// Modules of the tags of a joint, all of which are commands.
+    pub fn modules(&self, joint: Uid) -> Vec<String> {
+        let tags = self.rig().joint(joint).unwrap().data.tags.iter();
+        tags.map(|tag| match &tag.kind {
+            TagKind::Command { module, .. } => module.clone(),
+            TagKind::Feature { name, .. } => panic!("{name} is no command"),
+        })
+        .collect()
     }
 
     pub fn parent(&self, joint: Uid) -> Option<Uid> {

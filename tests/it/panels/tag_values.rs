@@ -5,7 +5,7 @@ use rigsmith::{
     editor::panels::tags::TagsPanel,
     plugins::commands::{BuildRequest, BuildResult, BuildStep},
     rig::{
-        RigEdit, TagData, TagKind, Uid,
+        RigEdit, TagKind, Uid,
         operations::{Operation, TagOperation},
     },
 };
@@ -164,14 +164,6 @@ fn tags_are_copied_and_pasted_over_a_scope_and_mirrored() {
     let [d, e, f] = desk.chain(&["d", "e", "f"])[..] else { panic!() };
     add_command(&mut desk, a, "control", "()");
     add_command(&mut desk, b, "null", "()");
-    let modules = |desk: &Desk, joint: Uid| -> Vec<String> {
-        let tags = desk.rig().joint(joint).unwrap().data.tags.iter();
-        let module = |tag: &TagData| match &tag.kind {
-            TagKind::Command { module, .. } => module.clone(),
-            TagKind::Feature { name, .. } => panic!("{name} is no command"),
-        };
-        tags.map(module).collect()
-    };
     let choose = |desk: &mut Desk, menu: &str, entry: &str| {
         desk.click(menu);
         desk.frames(3);
@@ -184,7 +176,7 @@ fn tags_are_copied_and_pasted_over_a_scope_and_mirrored() {
     desk.select(&[d]);
     let (before, steps) = (desk.rig().clone(), desk.steps().1);
     choose(&mut desk, "Paste", "Tags and values onto the hierarchy");
-    let of = |desk: &Desk| [d, e, f].map(|joint| modules(desk, joint).join(" "));
+    let of = |desk: &Desk| [d, e, f].map(|joint| desk.modules(joint).join(" "));
     assert_eq!(of(&desk), ["control", "null", ""], "{:?}", desk.told());
     assert_eq!(desk.steps().1, steps + 1);
     desk.undo(1);
@@ -268,17 +260,7 @@ fn alike_tags_of_several_joints_are_reordered_at_once() {
     }
     desk.select(&joints);
     desk.frames(2);
-    let order = |desk: &Desk| -> Vec<String> {
-        let of = |joint: &Uid| {
-            let tags = desk.rig().joint(*joint).unwrap().data.tags.iter();
-            let module = |tag: &TagData| match &tag.kind {
-                TagKind::Command { module, .. } => module.clone(),
-                TagKind::Feature { name, .. } => panic!("{name} is no command"),
-            };
-            tags.map(module).collect::<Vec<_>>().join(" ")
-        };
-        joints.iter().map(of).collect()
-    };
+    let order = |desk: &Desk| -> Vec<String> { joints.iter().map(|joint| desk.modules(*joint).join(" ")).collect() };
     let (before, steps) = (desk.rig().clone(), desk.steps().1);
     let [from, to] = ["Drag aim", "Drag control"].map(|label| desk.find(label).rect.center());
     desk.drag(from, to);

@@ -173,16 +173,8 @@ fn a_module_is_dragged_onto_a_joint() {
     assert!(!null.x_range().contains(row.center().x), "the library lies over the joints: {null:?} {row:?}");
     desk.drag(null.center(), row.center());
     desk.frames(3);
-    let modules = |desk: &Desk, joint: Uid| -> Vec<String> {
-        let tags = desk.rig().joint(joint).unwrap().data.tags.iter();
-        let module = |tag: &TagData| match &tag.kind {
-            TagKind::Command { module, .. } => module.clone(),
-            TagKind::Feature { name, .. } => panic!("{name} is no command"),
-        };
-        tags.map(module).collect()
-    };
-    assert!(modules(&desk, a).is_empty(), "{:?}", modules(&desk, a));
-    assert_eq!(modules(&desk, b), ["null"], "{:?}", desk.told());
+    assert!(desk.modules(a).is_empty(), "{:?}", desk.modules(a));
+    assert_eq!(desk.modules(b), ["null"], "{:?}", desk.told());
     assert_eq!(desk.steps().1, steps + 1);
     desk.undo(1);
     assert_eq!(*desk.rig(), before);
