@@ -4,6 +4,7 @@
 //! work and measure no time: the benches do.
 
 mod animation;
+mod architecture;
 mod bench;
 mod build_limits;
 mod bvh;
