@@ -31,6 +31,8 @@ mod cli_pose;
 mod cli_saved_parts;
 #[cfg(feature = "cli")]
 mod cli_site;
+#[cfg(feature = "cli")]
+mod cli_skin;
 #[cfg(all(feature = "cli", target_os = "linux"))]
 mod cli_streams;
 #[cfg(feature = "cli")]
