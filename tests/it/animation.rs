@@ -9,7 +9,7 @@ mod layers;
 mod random;
 mod root_motion;
 mod sampler;
-mod switch_over;
+mod switch_range;
 
 use std::sync::Arc;
 

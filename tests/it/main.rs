@@ -87,10 +87,10 @@ mod fit;
 mod fit_choice;
 #[cfg(feature = "cli")]
 mod fit_cli;
+#[cfg(feature = "cli")]
+mod fit_clutter;
 mod fit_data;
 mod fit_hinges;
-#[cfg(feature = "cli")]
-mod fit_left_out;
 #[cfg(feature = "cli")]
 mod fit_parts;
 #[cfg(feature = "editor")]
