@@ -332,7 +332,8 @@ fn documentation(text: &str) -> Vec<(usize, &str)> {
     blocks
 }
 
-fn rust_files(folder: &Path) -> Vec<PathBuf> {
+/// Files of Rust in a folder and below it, sorted.
+pub fn rust_files(folder: &Path) -> Vec<PathBuf> {
     let mut open = vec![folder.to_owned()];
     let mut files = Vec::new();
     while let Some(path) = open.pop() {

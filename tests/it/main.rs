@@ -4,7 +4,6 @@
 //! work and measure no time: the benches do.
 
 mod animation;
-mod architecture;
 mod bench;
 mod build_limits;
 mod bvh;
@@ -50,6 +49,7 @@ mod disks;
 mod display;
 #[cfg(feature = "editor")]
 mod dock;
+mod documents;
 #[cfg(feature = "draw")]
 mod drawing;
 #[cfg(feature = "render")]
