@@ -1,7 +1,7 @@
 //! `rigsmith animate`: a clip, or the motion of another skeleton, on a rig.
 
 mod choice;
-mod packed;
+mod packed_clips;
 mod source;
 #[cfg(feature = "render")]
 mod strip;
@@ -172,7 +172,7 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     } else if FileKind::of(&args.output) == Some(FileKind::Animation) {
         store_animation(&RealDisk, &args.output, bench.rig(), bench.built(), &clips)?;
     } else if FileKind::of(&args.output) == Some(FileKind::PackedClips) {
-        packed::store(args, &bench, &clips, &mut report)?;
+        packed_clips::store(args, &bench, &clips, &mut report)?;
     } else {
         let (mut model, settings) = match own_character(args, &bench, &mut report)? {
             Some(model) => {

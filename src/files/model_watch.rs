@@ -43,7 +43,7 @@ pub struct ModelWatch {
     stamps: BTreeMap<PathBuf, FileStamp>,
     /// Contents that are known or were told.
     known: Contents,
-    next: Option<Unsettled>,
+    next: Option<UnsettledVersion>,
     /// Time of the last look at the contents, and the pause before the next one.
     read: Option<Instant>,
     pause: Duration,
@@ -51,7 +51,7 @@ pub struct ModelWatch {
 
 /// Another version that may still be written.
 #[derive(Debug, Clone)]
-struct Unsettled {
+struct UnsettledVersion {
     since: Instant,
     /// Contents of files that kept time and length; `None` where the stamps tell that there is another version.
     contents: Option<Contents>,
@@ -101,7 +101,7 @@ impl ModelWatch {
         let stamps = stamps(disk, self.stamps.keys());
         if stamps != self.stamps {
             self.stamps = stamps;
-            self.next = Some(Unsettled { since: now, contents: None });
+            self.next = Some(UnsettledVersion { since: now, contents: None });
             return false;
         }
         let since = |then: Instant| now.saturating_duration_since(then);
@@ -125,7 +125,7 @@ impl ModelWatch {
             self.known = contents;
             return true;
         }
-        self.next = Some(Unsettled { since: now, contents: Some(contents) });
+        self.next = Some(UnsettledVersion { since: now, contents: Some(contents) });
         false
     }
 
@@ -140,7 +140,7 @@ impl ModelWatch {
         // What is saved while files are read or hashed is another version than the model, whatever was hashed.
         if stamps(disk, before.keys()) != before {
             self.known.clear();
-            self.next = Some(Unsettled { since: Instant::now(), contents: None });
+            self.next = Some(UnsettledVersion { since: Instant::now(), contents: None });
             return None;
         }
         Some(model)

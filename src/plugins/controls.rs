@@ -4,7 +4,7 @@
 //! attribute like any other, so the controls of inverse kinematics hide while a limb follows the forward ones.
 
 pub mod outline;
-mod over;
+mod range;
 pub mod size;
 mod visibility;
 
@@ -27,7 +27,7 @@ use crate::{
     solve::matching::{MatchError, SwitchOverError, match_switch},
 };
 
-pub use over::{SwitchOverRequest, SwitchedOver, switch_over};
+pub use range::{SwitchOverRequest, SwitchedOver, switch_over};
 
 pub use crate::rig::VISIBLE;
 
@@ -43,7 +43,7 @@ impl Plugin for ControlsPlugin {
             .add_message::<SwitchedOver>()
             .add_message::<EditRequest>()
             .add_message::<EditRefusal>()
-            .add_systems(Update, (throw_switches, over::throw_over).chain().in_set(RigSystems::Gesture))
+            .add_systems(Update, (throw_switches, range::throw_over).chain().in_set(RigSystems::Gesture))
             .register_type::<size::ShapeFactor>()
             .add_systems(
                 PostUpdate,

@@ -1,8 +1,8 @@
 //! Scope of a command: the only way in which a module reads and changes the built world.
 
+mod node_changes;
 mod references;
 mod trace;
-mod writing;
 
 use std::sync::Arc;
 

@@ -9,10 +9,10 @@ mod change;
 mod dropped_part;
 mod error;
 mod instance;
-mod lacking;
 mod option;
 mod overrides;
 mod resize;
+mod shortfall;
 mod socket;
 
 use std::{
@@ -26,11 +26,11 @@ pub(crate) use dropped_part::without_dropped;
 pub use error::PartError;
 pub(in crate::rig) use instance::{MOST_BROUGHT, switch_name};
 pub use instance::{MirrorParams, Part, PartInstance};
-pub(in crate::rig) use lacking::Lacking;
 pub use option::{OptionError, OptionForm, PartOption};
 pub use overrides::PartOverride;
 pub(in crate::rig) use resize::MOST_JOINTS;
 pub use resize::PartChain;
+pub(in crate::rig) use shortfall::Shortfall;
 pub use socket::{HeaderSocket, PartSocket, SocketError};
 
 use crate::rig::{

@@ -7,7 +7,7 @@
 
 mod followers;
 mod limb;
-mod over;
+mod range;
 
 use crate::{
     mesh::model::Trs,
@@ -15,7 +15,7 @@ use crate::{
     solve::program::{RigState, StateError},
 };
 
-pub use over::{SwitchNote, SwitchOverError, SwitchRange, SwitchedRange, match_switch_over, tolerance_of};
+pub use range::{SwitchNote, SwitchOverError, SwitchRange, SwitchedRange, match_switch_over, tolerance_of};
 
 /// Error of matching a switch.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -7,8 +7,9 @@ pub mod keep;
 mod keys;
 mod layers;
 mod random;
+mod root_motion;
 mod sampler;
-mod switch_over;
+mod switch_range;
 
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! `rigsmith animate`: clips and motion capture onto rigs, with the real binary, real files and exit codes.
 
 mod options;
-mod packed;
+mod packed_clips;
 
 use std::{fs, path::Path};
 

@@ -13,6 +13,8 @@ use rigsmith::{
 };
 use serde_json::Value;
 
+use crate::cli::BOX;
+
 pub(super) fn rigsmith(folder: &Path, args: &[&str]) -> (i32, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_rigsmith")).current_dir(folder).args(args).output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
@@ -33,9 +35,6 @@ pub(super) fn json(folder: &Path, args: &[&str]) -> (i32, Value) {
     let mut values = serde_json::Deserializer::from_str(&said[start..]).into_iter::<Value>();
     (code, values.next().unwrap().unwrap_or_else(|error| panic!("{args:?}: {error}: {said}")))
 }
-
-const BOX: &str = "o box\nv -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n\
-    f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
 const RIG: &str = "rig 1\njoint 0 -1 0 -0.5 0 root\njoint 1 0 0 0.5 0 tip\n";
 

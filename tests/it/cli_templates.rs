@@ -24,6 +24,8 @@ use serde_json::Value;
 use super::{
     bench::{HANG, save_whole},
     cli_outputs::{json, rig, rigsmith},
+    model_files,
+    template::place,
 };
 
 fn builds(rig: &Rig) {
@@ -238,7 +240,7 @@ fn a_watched_template_is_built_at_every_save_and_no_broken_one_is_taken_over() {
     let told = watch.next();
     assert!(crate::cli::explained(&told).contains("no such shape"), "{told}");
     // The command is told by its line and column, and no program is told to start over.
-    let (line, column) = place_of(&text, "square");
+    let (line, column) = place(&text, "square");
     let place = told["error"]["where"].as_str().unwrap().to_owned();
     assert!(place.starts_with(&format!("a.rig.ron:{line}:")) && !place.ends_with(":1"), "{place}, not {line}:{column}");
     assert!(!told.to_string().contains("(tag ") && !told.to_string().contains("run the command again"), "{told}");
@@ -272,29 +274,9 @@ fn a_character_that_could_not_be_written_is_written_as_soon_as_it_can_be() {
     assert!(watch.ended());
 }
 
-/// Line and column of the first place of a word.
-fn place_of(text: &str, word: &str) -> (usize, usize) {
-    let at = text.find(word).unwrap();
-    let start = text[..at].rfind('\n').map_or(0, |end| end + 1);
-    (text[..at].matches('\n').count() + 1, at - start + 1)
-}
-
-/// A box around the chain of `rigsmith new chain`, that wide, with a ring of points every so often.
+/// A box around the chain of `rigsmith new chain`, that wide, with so many rings of points.
 fn column(width: f32, rings: u32) -> String {
-    let mut text = String::new();
-    for ring in 0..rings {
-        let y = 0.9 + ring as f32 * 1.2 / (rings - 1) as f32;
-        for (x, z) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
-            text.push_str(&format!("v {} {y} {}\n", x * width, z * width));
-        }
-    }
-    for ring in 0..rings - 1 {
-        for side in 0..4 {
-            let (a, b) = (ring * 4 + side + 1, ring * 4 + (side + 1) % 4 + 1);
-            text.push_str(&format!("f {a} {b} {} {}\n", b + 4, a + 4));
-        }
-    }
-    text
+    model_files::column(width, 1.2, rings)
 }
 
 #[test]
@@ -315,7 +297,7 @@ fn a_first_template_and_a_first_mesh_are_waited_for() {
     assert_eq!(watch.next()["ok"], false);
     save_whole(&at("a.rig.ron"), text.replace("square", "no such shape"));
     let told = watch.next();
-    let line = place_of(&text, "square").0;
+    let line = place(&text, "square").0;
     assert!(told["error"]["where"].as_str().unwrap().starts_with(&format!("a.rig.ron:{line}:")), "{told}");
     // With both of them there, the character is written.
     save_whole(&at("a.obj"), column(0.1, 5));

@@ -1,15 +1,27 @@
 //! Methods of disks that tests put in the place of the real one. Call them where `Disk` is implemented, with what it names
 //! in scope.
 
-/// Methods that change something, or ask for more than content, of a disk that is only read.
-macro_rules! only_read {
+/// Questions about files and folders, as the real disk answers them.
+macro_rules! entries_of_the_disk {
     () => {
-        fn read_link(&self, _: &Path) -> io::Result<PathBuf> {
-            unreachable!()
+        fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
+            RealDisk.entry(path, follow)
         }
-        fn canonical(&self, _: &Path) -> io::Result<PathBuf> {
-            unreachable!()
+        fn read_link(&self, path: &Path) -> io::Result<PathBuf> {
+            RealDisk.read_link(path)
         }
+        fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
+            RealDisk.canonical(path)
+        }
+        fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
+            RealDisk.list(folder, limit)
+        }
+    };
+}
+
+/// Methods that change something, of a disk on which nothing is changed.
+macro_rules! no_changes {
+    () => {
         fn create(&self, _: &Path) -> io::Result<Box<dyn DiskFile>> {
             unreachable!()
         }
@@ -31,21 +43,23 @@ macro_rules! only_read {
     };
 }
 
+/// Methods that change something, or ask for more than content, of a disk that is only read.
+macro_rules! only_read {
+    () => {
+        fn read_link(&self, _: &Path) -> io::Result<PathBuf> {
+            unreachable!()
+        }
+        fn canonical(&self, _: &Path) -> io::Result<PathBuf> {
+            unreachable!()
+        }
+        $crate::disks::no_changes!();
+    };
+}
+
 /// All methods but `create` and `hard_link`, as the real disk has them.
 macro_rules! as_on_the_disk {
     () => {
-        fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
-            RealDisk.entry(path, follow)
-        }
-        fn read_link(&self, path: &Path) -> io::Result<PathBuf> {
-            RealDisk.read_link(path)
-        }
-        fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
-            RealDisk.canonical(path)
-        }
-        fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
-            RealDisk.list(folder, limit)
-        }
+        $crate::disks::entries_of_the_disk!();
         fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
             RealDisk.rename(from, to)
         }
@@ -64,4 +78,4 @@ macro_rules! as_on_the_disk {
     };
 }
 
-pub(crate) use {as_on_the_disk, only_read};
+pub(crate) use {as_on_the_disk, entries_of_the_disk, no_changes, only_read};

@@ -90,6 +90,17 @@ impl Bench {
         Self { base, sink }
     }
 
+    /// A rig with commands in view, which are carried out as soon as it is open; the tools are added to the app.
+    fn built(mut app: App, rig: Rig, sight: Sight) -> Self {
+        app.add_plugins((ToolsPlugin, BuildingPlugin));
+        let mut app = strict_app(app);
+        let rig = app.world_mut().spawn(rig).id();
+        app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(sight)));
+        app.update();
+        app.update();
+        Self { base: RigBench { app, rig }, sink: Sink::default() }
+    }
+
     fn place(&mut self, position: [f32; 3], parent: Option<Uid>) -> Uid {
         self.base.edit(Operation::Place { position: position.into(), parent });
         self.base.get::<Selection>(self.base.rig).unwrap().active().unwrap()

@@ -84,11 +84,6 @@ fn act(desk: &mut Desk, action: GraphAction) {
     desk.frames(3);
 }
 
-fn undo(desk: &mut Desk) {
-    desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
-    desk.frames(3);
-}
-
 fn bytes(desk: &Desk) -> String {
     write_template(desk.rig())
 }

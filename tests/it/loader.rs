@@ -4,6 +4,7 @@
 mod authoring;
 mod dropping;
 mod landing;
+mod listing;
 mod older_projects;
 mod saving;
 mod sides;
@@ -11,7 +12,7 @@ mod sides;
 use std::{
     fs,
     path::{Path, PathBuf},
-    time::{Duration, SystemTime},
+    time::Duration,
 };
 
 use bevy::prelude::*;
@@ -35,7 +36,7 @@ use rigsmith::{
         recovery::Recovery,
         result_queue::HeldPlugin,
     },
-    files::{HeaderMemory, RealDisk, SearchPaths, TemplatePlace, list_templates, load_template},
+    files::{RealDisk, SearchPaths, TemplatePlace, load_template},
     headless::headless_app,
     instance::RigSource,
     plugins::{document::Change, fit::FittedRig, stage::RigStage, surface::RigMeshes, viewport::Sight},
@@ -232,105 +233,6 @@ impl Studio {
         let source = self.world().get::<RigSource>(self.desk.rig)?;
         source.base().map(|base| base.about().name.clone())
     }
-}
-
-#[test]
-fn templates_are_found_by_words_and_folder_and_are_those_of_the_command() {
-    let mut studio = Studio::new(LoaderPanel::default());
-    studio.settle();
-    let seen = studio.tiles();
-    for tile in ["Template man", "Template tall man", "Part limb", "Template biped", "Part arm"] {
-        assert!(seen.contains(&tile), "{tile} is not among {seen:?}");
-    }
-    let find = |studio: &mut Studio, words: &str| -> Vec<String> {
-        studio.desk.click("Search templates");
-        studio.desk.type_text(words);
-        studio.settle();
-        let found = studio.tiles().into_iter().map(str::to_owned).collect();
-        studio.desk.click("Clear search templates");
-        studio.settle();
-        found
-    };
-    assert_eq!(find(&mut studio, "limb upper"), ["Part limb"], "by name and description");
-    assert_eq!(find(&mut studio, "ANNA"), ["Part limb"], "by author");
-    assert_eq!(find(&mut studio, "tall"), ["Template tall man"]);
-    assert_eq!(find(&mut studio, "nothing like this"), [""; 0]);
-    // The command lists the same in the folder of the site.
-    let listing = studio.world().resource::<TemplateLibrary>().listing().clone();
-    let of_site = &listing.folders[1];
-    assert_eq!(of_site.name, studio.site.display().to_string());
-    let names: Vec<String> = of_site.templates.iter().map(|listed| listed.name()).collect();
-    assert_eq!(names, ["limb", "tall_man"]);
-    #[cfg(feature = "cli")]
-    {
-        let (code, said) = super::cli_outputs::rigsmith(studio.folder.path(), &["list", "site", "--json"]);
-        let start = said.find('{').unwrap();
-        let value: serde_json::Value =
-            serde_json::Deserializer::from_str(&said[start..]).into_iter().next().unwrap().unwrap();
-        let listed = value["templates"].as_array().unwrap();
-        let of_command: Vec<&str> = listed.iter().filter_map(|one| one["name"].as_str()).collect();
-        assert_eq!((code, of_command), (0, names.iter().map(String::as_str).collect()));
-    }
-    // A file that is no template is there, with its reason.
-    fs::write(studio.site.join("broken.rig.ron"), "(format: 2, nam").unwrap();
-    studio.click("List the templates again");
-    assert!(studio.tiles().contains(&"Template broken"), "{:?}", studio.tiles());
-    // Pictures come by themselves: skeletons, and the reason in place of a broken one.
-    let pictured = |desk: &Desk, name: &str| {
-        let world = desk.app.world();
-        let listing = world.resource::<TemplateLibrary>().listing();
-        let listed = listing.templates().find(|listed| listed.name() == name)?;
-        world.resource::<LibraryPictures>().get(listed).cloned()
-    };
-    studio
-        .desk
-        .until("the pictures", |desk| ["limb", "biped", "broken"].iter().all(|name| pictured(desk, name).is_some()));
-    let Some(TemplatePicture::Bones(bones)) = pictured(&studio.desk, "limb") else { panic!("the limb has no picture") };
-    assert_eq!((bones.joints.len(), bones.bones.len()), (2, 1));
-    assert!(matches!(pictured(&studio.desk, "broken"), Some(TemplatePicture::Nothing)));
-}
-
-#[test]
-fn headers_are_read_again_only_where_the_file_has_changed() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("man.rig.ron");
-    let list = |known: &HeaderMemory| {
-        let listing = list_templates(&RealDisk, folder.path(), 0, &SearchPaths::default(), known).unwrap();
-        let name = listing.templates[0].header.as_ref().unwrap().name.clone();
-        (listing, name)
-    };
-    let write = |name: &str, time: SystemTime| {
-        fs::write(&path, MAN.replace("name: \"man\"", &format!("name: \"{name}\""))).unwrap();
-        fs::File::options().write(true).open(&path).unwrap().set_modified(time).unwrap();
-    };
-    let time = SystemTime::UNIX_EPOCH + Duration::from_secs(1_000_000);
-    write("man", time);
-    let mut known = HeaderMemory::default();
-    let (listing, name) = list(&known);
-    assert_eq!(name, "man");
-    known.remember(&listing.templates);
-    // Another content of the same length and time is not looked at; one of another time is.
-    write("cat", time);
-    assert_eq!(list(&known).1, "man");
-    write("cat", time + Duration::from_secs(1));
-    assert_eq!(list(&known).1, "cat");
-}
-
-#[test]
-fn a_folder_of_too_many_names_is_told() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    let list =
-        || list_templates(&RealDisk, folder.path(), 0, &SearchPaths::default(), &HeaderMemory::default()).unwrap();
-    fs::write(at("a.rig.ron"), MAN).unwrap();
-    (1..10_000).for_each(|number| fs::write(at(&format!("n{number:05}.txt")), "").unwrap());
-    let listing = list();
-    assert_eq!((listing.templates.len(), listing.left_out.len()), (1, 0));
-    fs::write(at("z.rig.ron"), MAN).unwrap();
-    let listing = list();
-    let told: Vec<String> = listing.left_out.iter().map(ToString::to_string).collect();
-    assert_eq!((listing.templates.len(), told.len()), (1, 1), "{told:?}");
-    assert!(told[0].contains("more than 10000 names"), "{told:?}");
 }
 
 #[test]

@@ -30,6 +30,8 @@ mod cli_pose;
 mod cli_saved_parts;
 #[cfg(feature = "cli")]
 mod cli_site;
+#[cfg(feature = "cli")]
+mod cli_skin;
 #[cfg(all(feature = "cli", target_os = "linux"))]
 mod cli_streams;
 #[cfg(feature = "cli")]
@@ -47,6 +49,7 @@ mod disks;
 mod display;
 #[cfg(feature = "editor")]
 mod dock;
+mod documents;
 #[cfg(feature = "draw")]
 mod drawing;
 #[cfg(feature = "render")]
@@ -84,10 +87,10 @@ mod fit;
 mod fit_choice;
 #[cfg(feature = "cli")]
 mod fit_cli;
+#[cfg(feature = "cli")]
+mod fit_clutter;
 mod fit_data;
 mod fit_hinges;
-#[cfg(feature = "cli")]
-mod fit_left_out;
 #[cfg(feature = "cli")]
 mod fit_parts;
 #[cfg(feature = "editor")]

@@ -27,13 +27,16 @@ use rigsmith::{
     rig::{Rig, Uid},
 };
 
-use crate::bench::{AppBench, HANG, save_whole, wait_with};
+use crate::{
+    bench::{AppBench, HANG, save_whole, wait_with},
+    disks::{entries_of_the_disk, no_changes},
+};
 
-/// A square column around [`ARM`], that wide, with so many rings of points.
-fn column(width: f32, rings: u32) -> String {
+/// A square column from a height of 0.9, that wide and high, with so many rings of points, as an OBJ.
+pub fn column(width: f32, height: f32, rings: u32) -> String {
     let mut text = String::new();
     for ring in 0..rings {
-        let y = 0.9 + 0.7 * ring as f32 / (rings - 1) as f32;
+        let y = 0.9 + height * ring as f32 / (rings - 1) as f32;
         for (x, z) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
             text.push_str(&format!("v {} {y} {}\n", x * width, z * width));
         }
@@ -45,6 +48,11 @@ fn column(width: f32, rings: u32) -> String {
         }
     }
     text
+}
+
+/// A column around [`ARM`].
+fn sleeve(width: f32, rings: u32) -> String {
+    column(width, 0.7, rings)
 }
 
 const ARM: &[u8] = b"(format: 2, name: \"arm\", joints: [
@@ -108,7 +116,7 @@ impl Watched {
 
 #[test]
 fn every_way_of_saving_is_one_version() {
-    let (before, after) = (column(0.1, 4), column(0.1, 6));
+    let (before, after) = (sleeve(0.1, 4), sleeve(0.1, 6));
     let half = after.len() / 2;
     let short = Duration::from_millis(100);
     type Save<'a> = &'a dyn Fn(&mut Watched);
@@ -154,7 +162,7 @@ fn every_way_of_saving_is_one_version() {
         }),
         ("twenty times in two seconds", &|watched| {
             for save in 0..20 {
-                fs::write(watched.at("a.obj"), column(0.2, 4 + save)).unwrap();
+                fs::write(watched.at("a.obj"), sleeve(0.2, 4 + save)).unwrap();
                 watched.pass(short);
             }
             fs::write(watched.at("a.obj"), &after).unwrap();
@@ -191,11 +199,11 @@ fn every_way_of_saving_is_one_version() {
 
 #[test]
 fn a_broken_file_is_told_once_and_the_next_good_one_is_read() {
-    let mut watched = Watched::new("a.obj", &column(0.1, 4));
+    let mut watched = Watched::new("a.obj", &sleeve(0.1, 4));
     fs::write(watched.at("a.obj"), "v 1 2\nf 1 2 3 4 5 6 7 8 9\n").unwrap();
     watched.until("the broken file", Option::is_none);
     assert_eq!(watched.read, [None]);
-    fs::write(watched.at("a.obj"), column(0.1, 5)).unwrap();
+    fs::write(watched.at("a.obj"), sleeve(0.1, 5)).unwrap();
     watched.until("the good file", Option::is_some);
     assert_eq!(watched.read, [None, Some(20)]);
 }
@@ -209,41 +217,14 @@ struct RacedDisk {
 }
 
 impl Disk for RacedDisk {
-    fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
-        RealDisk.entry(path, follow)
-    }
-    fn read_link(&self, path: &Path) -> io::Result<PathBuf> {
-        RealDisk.read_link(path)
-    }
-    fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
-        RealDisk.canonical(path)
-    }
-    fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
-        RealDisk.list(folder, limit)
-    }
+    entries_of_the_disk!();
+    no_changes!();
+
     fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>> {
         if self.opened.fetch_add(1, Ordering::Relaxed) + 1 == self.number {
             save_whole(&self.file, &self.content);
         }
         RealDisk.open(path)
-    }
-    fn create(&self, _: &Path) -> io::Result<Box<dyn DiskFile>> {
-        unreachable!()
-    }
-    fn rename(&self, _: &Path, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn hard_link(&self, _: &Path, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn sync_folder(&self, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn remove(&self, _: &Path) -> io::Result<()> {
-        unreachable!()
-    }
-    fn create_folder(&self, _: &Path) -> io::Result<()> {
-        unreachable!()
     }
 }
 
@@ -251,15 +232,15 @@ impl Disk for RacedDisk {
 fn a_version_that_is_saved_while_another_one_is_read_is_not_missed() {
     // Reads a version, while the next one is saved right before the opening of a file; the number of openings, too.
     let raced = |number: usize| {
-        let mut watched = Watched::new("a.obj", &column(0.1, 4));
+        let mut watched = Watched::new("a.obj", &sleeve(0.1, 4));
         let file = watched.at("a.obj");
-        save_whole(&file, column(0.1, 5));
+        save_whole(&file, sleeve(0.1, 5));
         let start = Instant::now();
         while !watched.watch.look_at(&RealDisk, watched.now) {
             assert!(start.elapsed() < HANG, "the version is not noticed");
             watched.now += Duration::from_millis(10);
         }
-        let disk = RacedDisk { file, content: column(0.1, 6), number, opened: AtomicUsize::new(0) };
+        let disk = RacedDisk { file, content: sleeve(0.1, 6), number, opened: AtomicUsize::new(0) };
         let model = watched.watch.read(&disk);
         watched.read.extend(model.map(|model| model.ok().map(|model| model.points.len())));
         (watched, disk.opened.into_inner())
@@ -315,7 +296,7 @@ struct Game {
 impl Game {
     fn new(mut app: App) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("arm.obj"), column(0.1, 4)).unwrap();
+        fs::write(folder.path().join("arm.obj"), sleeve(0.1, 4)).unwrap();
         app.add_plugins((
             RigInstancePlugin::default(),
             ModelFilesPlugin { look: Duration::from_millis(2), settle: Duration::from_millis(20) },
@@ -382,7 +363,7 @@ fn meshes_of_instances_follow_their_file_with_one_transfer_for_all() {
     let points = |game: &Game, mesh: Entity| game.base.get::<RigMesh>(mesh).unwrap().rest.points.len();
     game.until("the weights", |game| meshes.iter().all(|mesh| skin(game, *mesh).is_some()));
     game.settle();
-    game.save(&column(0.2, 7));
+    game.save(&sleeve(0.2, 7));
     game.until("the next version", |game| meshes.iter().all(|mesh| points(game, *mesh) == 28));
     let skins = meshes.map(|mesh| skin(&game, mesh).unwrap());
     assert!(skins[0].weights.len() == 28 && Arc::ptr_eq(&skins[0], &skins[1]), "the weights come with the points");
@@ -399,11 +380,11 @@ fn meshes_of_instances_follow_their_file_with_one_transfer_for_all() {
     game.save("v 1 2\nf 1 2 3 4 5 6 7 8 9\n");
     game.until("the error", |game| game.told.len() == 2);
     assert!(game.told[0].contains("arm.obj") && points(&game, meshes[1]) == 28, "{:?}", game.told);
-    game.save(&column(0.1, 5));
+    game.save(&sleeve(0.1, 5));
     game.until("the good version", |game| meshes.iter().all(|mesh| points(game, *mesh) == 20));
     // One that follows nothing any more stays as it is.
     game.base.app.world_mut().entity_mut(meshes[0]).remove::<ModelFile>();
-    game.save(&column(0.1, 6));
+    game.save(&sleeve(0.1, 6));
     game.until("the last version", |game| points(game, meshes[1]) == 24);
     assert_eq!(points(&game, meshes[0]), 20);
 }
@@ -419,7 +400,7 @@ fn a_mesh_of_a_document_follows_its_file_as_a_step_that_can_be_undone() {
     let points = |game: &Game| game.base.get::<RigMesh>(mesh).unwrap().rest.points.len();
     game.until("the weights", |game| weights(game) == Some(16));
     game.settle();
-    game.save(&column(0.2, 7));
+    game.save(&sleeve(0.2, 7));
     game.until("the next version", |game| points(game) == 28);
     assert_eq!(weights(&game), Some(28));
     game.until("the report", |game| game.reports.len() == 1);

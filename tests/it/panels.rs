@@ -270,10 +270,7 @@ fn wrong_numbers_are_told() {
         desk.frames(2);
     }
     assert_eq!(desk.steps().1, steps.1 + 3, "{:?}", desk.told());
-    for _ in 0..3 {
-        desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
-        desk.frames(2);
-    }
+    desk.undo(3);
     assert_eq!(text(&desk), bytes);
 }
 
@@ -302,10 +299,7 @@ fn steps_name_their_joints() {
     }
     let number = before + count;
     assert_eq!(desk.find(&format!("{number} Delete hand_r")).on, Some(true));
-    for _ in 0..count {
-        desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
-        desk.frames(2);
-    }
+    desk.undo(count);
     assert_eq!(*desk.rig(), start);
 }
 

@@ -291,6 +291,17 @@ const NAMELESS: &str = r#"(
 )
 "#;
 
+/// Asserts that the joints of a rig, and the tags on them, have their identities in the updated rig.
+#[track_caller]
+fn assert_same_identities(before: &Rig, updated: &Rig) {
+    for joint in before.walk() {
+        assert!(updated.joint(joint.data.uid).is_some(), "{:?} keeps its identity", joint.data.label);
+        for tag in &joint.data.tags {
+            assert!(updated.find_tag(tag.uid).is_some(), "{:?} keeps the identities of its tags", joint.data.label);
+        }
+    }
+}
+
 #[test]
 fn a_nameless_part_that_goes_onto_other_joints_is_the_same_part() {
     let own = "prefix: \"a_\", changes: [(tag: \"control/bone_2\", params: (relative_size: 0.9))]";
@@ -304,13 +315,7 @@ fn a_nameless_part_that_goes_onto_other_joints_is_the_same_part() {
     assert!(said.contains("part finger.rig.ron onto: [palm#") && !said.contains("conflict"), "{said}");
     assert!(text.contains("onto: [\"ring\"]") && text.contains("relative_size: 0.9"), "{text}");
     assert!(!text.contains("label: \"a_"), "the part stays a part: {text}");
-    let rig = load(&folder.path().join("out.rig.ron"));
-    for joint in before.walk() {
-        assert!(rig.joint(joint.data.uid).is_some(), "{:?} keeps its identity", joint.data.label);
-        for tag in &joint.data.tags {
-            assert!(rig.find_tag(tag.uid).is_some(), "{:?} keeps the identities of its tags", joint.data.label);
-        }
-    }
+    assert_same_identities(&before, &load(&folder.path().join("out.rig.ron")));
     // The next version is compared with this one, and does not tell of it again.
     fs::write(folder.path().join("file.rig.ron"), file.replace("adds: true", "adds: true, count: 4")).unwrap();
     let next = ["update", "out.rig.ron", "--from", "file.rig.ron", "-o", "next.rig.ron"];
@@ -343,13 +348,7 @@ fn a_part_with_another_name_is_the_same_part() {
     assert!(text.contains("name: \"pointer\"") && text.contains(CHANGES.trim()), "{text}");
     assert!(text.contains("socket: \"pointer.tip\"") && text.contains("// The finger."), "{text}");
     assert!(!text.contains("label: \"a_"), "the part stays a part: {text}");
-    let rig = load(&folder.path().join("out.rig.ron"));
-    for joint in before.walk() {
-        assert!(rig.joint(joint.data.uid).is_some(), "{:?} keeps its identity", joint.data.label);
-        for tag in &joint.data.tags {
-            assert!(rig.find_tag(tag.uid).is_some(), "{:?} keeps the identities of its tags", joint.data.label);
-        }
-    }
+    assert_same_identities(&before, &load(&folder.path().join("out.rig.ron")));
     // The next version is compared with this one, and does not tell of the name again.
     fs::write(folder.path().join("file.rig.ron"), file.replace("count: 4", "count: 5")).unwrap();
     let next = ["update", "out.rig.ron", "--from", "file.rig.ron", "-o", "next.rig.ron"];

@@ -27,7 +27,10 @@ use rigsmith::{
     },
 };
 
-use crate::edits::{Bench, command, random_rig, steps};
+use crate::{
+    edits::{Bench, command, random_rig, steps},
+    template::place,
+};
 
 const FROZEN: &str = include_str!("../frozen/format-1.rigsmith.ron");
 
@@ -150,13 +153,6 @@ fn parameters_stay_as_they_are_with_their_line_breaks_and_however_deep() {
     };
     assert!((20..200).rev().any(|depth| bench.rig.apply(&deep(depth)).is_ok()));
     assert_eq!(as_file(&bench.rig), bench.rig);
-}
-
-/// Where `needle` first starts in `text`: line and column from one.
-fn place(text: &str, needle: &str) -> (usize, usize) {
-    let at = text.find(needle).unwrap_or_else(|| panic!("no {needle}"));
-    let line = text[..at].matches('\n').count() + 1;
-    (line, text[..at].chars().rev().take_while(|c| *c != '\n').count() + 1)
 }
 
 #[test]

@@ -420,9 +420,6 @@ fn nothing_stale_is_told_of_weights_without_joints() {
     desk.chain(&["other"]);
     desk.frames(2);
     assert!(next(&desk).contains("no weights yet"), "{}", next(&desk));
-    for _ in 0..3 {
-        desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
-        desk.frames(2);
-    }
+    desk.undo(3);
     assert!(desk.says(&all), "undo brings them back");
 }

@@ -185,8 +185,8 @@ fn the_header_reads_alone() {
     assert!(read_template(turned.as_bytes()).is_ok());
 }
 
-/// Where `needle` first starts in `text`: line and column from one.
-fn place(text: &str, needle: &str) -> (usize, usize) {
+/// Line and column, from one, of the first place of `needle` in `text`.
+pub fn place(text: &str, needle: &str) -> (usize, usize) {
     let at = text.find(needle).unwrap_or_else(|| panic!("no {needle}"));
     let line = text[..at].matches('\n').count() + 1;
     (line, text[..at].chars().rev().take_while(|c| *c != '\n').count() + 1)

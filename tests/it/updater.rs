@@ -23,7 +23,6 @@ use rigsmith::{
     headless::headless_app,
     instance::{RigSource, UpdateOffer},
     modules,
-    plugins::document::Change,
     prelude::*,
     processor::Builder,
     rig::{
@@ -234,9 +233,7 @@ fn a_newer_file_is_listed_and_taken_over_as_the_command_does() {
         #[cfg(feature = "cli")]
         assert_eq!(studio.text(), studio.of_command(&now, take));
         assert_ne!(studio.text(), now);
-        let rig = studio.desk.rig;
-        studio.desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-        studio.desk.frames(3);
+        studio.desk.undo(1);
         assert_eq!(studio.text(), now, "undo gives equal bytes");
         assert_eq!(*studio.desk.rig(), before);
     }

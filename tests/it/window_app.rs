@@ -2,16 +2,28 @@
 
 use std::path::PathBuf;
 
-use bevy::{app::Plugins, ecs::message::MessageCursor, prelude::*};
+use bevy::{app::Plugins, ecs::message::MessageCursor, prelude::*, time::TimeUpdateStrategy};
 use rigsmith::{
     editor::{
         ActiveRig,
+        building::BuildingPlugin,
+        dock::DockPlugin,
         files::{
-            LoadJob, SaveJob, StateFolder,
+            FilesPlugin, LoadJob, SaveJob, StateFolder,
             dialog::{Answer, Dialog, DialogAnswer, Question},
         },
+        follow::FollowPlugin,
+        help::HelpPlugin,
+        library::LibraryFolders,
         notice::{Notice, Severity},
+        palette::PalettePlugin,
+        panels::PanelsPlugin,
+        pointer::ViewportArea,
+        screen::ScreenPlugin,
+        settings::{SettingsFolder, SettingsPlugin},
+        start::StartPlugin,
     },
+    files::SearchPaths,
     headless::headless_app,
     test_app::strict_app,
 };
@@ -29,6 +41,31 @@ fn decline(dialog: Option<Res<Dialog>>, mut commands: Commands) {
     if list.iter().all(|pending| pending.path.parent() == Some(shared.as_path())) {
         commands.write_message(DialogAnswer(Answer::Cancel));
     }
+}
+
+/// An app with the dock and the panels of the window, to which other plugins can be added before it is finished. Its journals
+/// lie in `state`, its settings nowhere, and its library has these folders.
+pub fn docked_app(state: PathBuf, folders: Vec<PathBuf>, time: TimeUpdateStrategy) -> App {
+    let mut app = headless_app(7);
+    app.insert_resource(time)
+        .insert_resource(StateFolder(Some(state)))
+        .insert_resource(SettingsFolder(None))
+        .insert_resource(LibraryFolders(Some(SearchPaths { folders })))
+        .init_resource::<ViewportArea>()
+        .add_plugins((
+            FilesPlugin,
+            SettingsPlugin,
+            ScreenPlugin,
+            StartPlugin { file: None },
+            HelpPlugin,
+            PalettePlugin,
+            PanelsPlugin,
+            FollowPlugin,
+            BuildingPlugin,
+            DockPlugin,
+        ))
+        .add_message::<AppExit>();
+    app
 }
 
 impl AppBench {

@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::{
     FitError, FitSettings,
     assign::{self, Directions, Hypothesis, LimbMarker},
-    chain, clean, left_out,
+    chain, clean, clutter,
     limbs::TemplateLimbs,
     markers::Marker,
     symmetry::{self, MirrorPlane},
@@ -78,7 +78,7 @@ impl MeshAnalysis {
             None => triangles,
         };
         // Whatever is left out is left out of all that follows: the figure is fitted as if it were alone.
-        let figure = if region.is_none() { left_out::figure(points, triangles) } else { None };
+        let figure = if region.is_none() { clutter::figure(points, triangles) } else { None };
         let (grounds, sheets) = figure.as_ref().map_or((0, 0), |figure| (figure.grounds, figure.sheets));
         let triangles = figure.as_ref().map_or(triangles, |figure| figure.triangles.as_slice());
         let mut look = Look::new(points, triangles, &step)?;
@@ -90,7 +90,7 @@ impl MeshAnalysis {
                 break;
             }
             let from = kept.as_deref().unwrap_or(triangles);
-            let Some(near) = left_out::near(points, from, mesh.space, voxels, graph) else { break };
+            let Some(near) = clutter::near(points, from, mesh.space, voxels, graph) else { break };
             look = Look::new(points, &near, &step)?;
             kept = Some(near);
         }

@@ -43,7 +43,7 @@ pub(super) fn clips(
     report: &mut Report,
 ) -> Result<Vec<RigClip>, Failure> {
     let pairs = args.map.as_deref().map(|path| load_joint_map(&RealDisk, path)).transpose()?.unwrap_or_default();
-    let mut taking = Taking {
+    let mut taking = ClipCollector {
         args,
         onto,
         choice: Choice::new(&args.chosen),
@@ -96,7 +96,7 @@ pub(super) fn clips(
 }
 
 /// Work of taking clips from files.
-struct Taking<'a> {
+struct ClipCollector<'a> {
     args: &'a AnimateArgs,
     onto: MotionTarget,
     choice: Choice<'a>,
@@ -109,7 +109,7 @@ struct Taking<'a> {
     set_aside: Vec<Value>,
 }
 
-impl Taking<'_> {
+impl ClipCollector<'_> {
     /// Adds the chosen clips of a file of clips.
     fn add_clips(
         &mut self,
@@ -221,7 +221,7 @@ fn add(bench: &mut Workbench, clip: RigClip) -> Result<RigClip, Failure> {
 }
 
 /// Motion of models and of motion capture.
-impl Taking<'_> {
+impl ClipCollector<'_> {
     /// Adds the chosen animations of a model: key by key where the model's joints are those of the rig, else retargeted.
     fn add_model(
         &mut self,

@@ -69,12 +69,12 @@ pub(in crate::editor) fn attach(rig: Entity, joint: Uid, module: &str) -> EditRe
 }
 
 /// Subject of a drag.
-enum Dragged {
+enum DragSubject {
     Template(Arc<DraggedTemplate>),
     Module(&'static str),
 }
 
-impl Dragged {
+impl DragSubject {
     fn of(ctx: &egui::Context) -> Option<Self> {
         let template = DragAndDrop::payload::<DraggedTemplate>(ctx).map(Self::Template);
         template.or_else(|| DragAndDrop::payload::<DraggedModule>(ctx).map(|module| Self::Module(module.0)))
@@ -101,7 +101,7 @@ impl Dragged {
 
 impl ViewportPainter for DropTarget {
     fn paint(&mut self, painter: &egui::Painter, area: egui::Rect, world: &World) {
-        let Some(dragged) = Dragged::of(painter.ctx()) else { return };
+        let Some(dragged) = DragSubject::of(painter.ctx()) else { return };
         let Some(at) = pointer(painter.ctx(), area) else { return };
         let active = world.get_resource::<ActiveRig>().and_then(|active| world.get::<Rig>(active.0));
         let color = style::ACCENT;
@@ -121,15 +121,15 @@ impl ViewportPainter for DropTarget {
         if !ctx.input(|input| input.pointer.any_released()) {
             return;
         }
-        let (Some(dragged), Some(at)) = (Dragged::of(ctx), pointer(ctx, area)) else { return };
+        let (Some(dragged), Some(at)) = (DragSubject::of(ctx), pointer(ctx, area)) else { return };
         let Some(rig) = world.get_resource::<ActiveRig>().map(|active| active.0) else { return };
         DragAndDrop::clear_payload(ctx);
         match (nearest(world, at), dragged) {
-            (Some((joint, _)), Dragged::Template(template)) => {
+            (Some((joint, _)), DragSubject::Template(template)) => {
                 let act = LibraryAct::Drop { joint };
                 requests.send(LibraryRequest { place: template.place.clone(), act });
             }
-            (Some((joint, _)), Dragged::Module(module)) => requests.send(attach(rig, joint, module)),
+            (Some((joint, _)), DragSubject::Module(module)) => requests.send(attach(rig, joint, module)),
             (None, dragged) => {
                 requests.send(Notice::warning(format!("{}: there is no joint; drop it on one", dragged.name())));
             }

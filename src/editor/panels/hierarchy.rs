@@ -4,7 +4,7 @@
 //! The panel shows the rig's own selection and changes it with pick requests, so the viewport and the tree never
 //! differ.
 
-mod built;
+mod built_nodes;
 mod keys;
 mod menu;
 mod row;
@@ -34,7 +34,7 @@ use crate::{
     },
     rig::{Rig, Uid, operations::Operation},
 };
-use built::{BuiltTree, WantedNodes};
+use built_nodes::{BuiltTree, WantedNodes};
 use rows::{Row, flat_rows, rows, within};
 
 /// The panel.

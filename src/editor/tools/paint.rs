@@ -7,7 +7,7 @@
 pub mod brush;
 mod cursor;
 mod hover;
-mod running;
+mod running_stroke;
 
 use std::collections::BTreeSet;
 
@@ -16,7 +16,7 @@ use bevy::prelude::*;
 use self::{
     brush::{BrushPlugin, PaintBrush, mode_of},
     cursor::CursorPainter,
-    running::RunningStroke,
+    running_stroke::RunningStroke,
 };
 pub use self::{
     cursor::BrushCursor,

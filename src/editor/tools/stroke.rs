@@ -55,7 +55,7 @@ impl Plugin for StrokeToolPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<StrokeTool>()
             .add_message::<StrokeTune>()
-            .add_message::<TakenOnLeaving>()
+            .add_message::<AcceptedStroke>()
             .add_systems(Update, draw.in_set(ToolSystems::Tools).after(super::place::place))
             .add_systems(PostUpdate, (show, answer).chain().in_set(ToolSystems::Show).after(super::place::show))
             .add_painter(bar::StrokeBar);
@@ -172,7 +172,7 @@ fn begin(rig: &EditedRig, sight: &Sight, at: Vec2, threshold: f32) -> StrokeRequ
 
 /// Stroke of a rig that was accepted because its mode was left. Whoever left is told once its chain is in the rig.
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
-struct TakenOnLeaving(Entity);
+struct AcceptedStroke(Entity);
 
 /// Position of the press, and the view at that moment, which holds for the whole line.
 #[derive(Debug, Clone, Copy)]
@@ -185,7 +185,7 @@ pub(super) struct Press {
 #[derive(SystemParam)]
 pub(super) struct Outcomes<'w> {
     strokes: MessageWriter<'w, StrokeRequest>,
-    left: MessageWriter<'w, TakenOnLeaving>,
+    left: MessageWriter<'w, AcceptedStroke>,
     picks: MessageWriter<'w, PickRequest>,
     notices: MessageWriter<'w, Notice>,
 }
@@ -230,7 +230,7 @@ pub(super) fn draw(
     if *mode != Mode::Stroke
         && let StrokeState::Preview(preview) = &tool.state
     {
-        out.left.write(TakenOnLeaving(preview.request.rig));
+        out.left.write(AcceptedStroke(preview.request.rig));
         take(&mut tool, &mut out.strokes);
     }
     for change in tunes.read() {

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use bevy::math::{Quat, Vec3};
 use serde::Deserialize;
 
-use super::template::{quoted, vector};
+use super::template::{quaternion, quoted, vector};
 use crate::rig::{AttributeValues, PoseOffset, Rig, RigEdit, StoredPose, Uid};
 
 /// A stored pose.
@@ -88,8 +88,7 @@ pub(super) fn write_offsets<'a>(
             write!(out, ", translation: {}", vector(offset.translation))?;
         }
         if offset.rotation != Quat::IDENTITY {
-            let [x, y, z, w] = offset.rotation.to_array();
-            write!(out, ", rotation: ({x:?}, {y:?}, {z:?}, {w:?})")?;
+            write!(out, ", rotation: {}", quaternion(offset.rotation))?;
         }
         if offset.scale != Vec3::ONE {
             write!(out, ", scale: {}", vector(offset.scale))?;

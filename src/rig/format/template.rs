@@ -47,7 +47,9 @@ pub(crate) use text_patch::{
 };
 pub use tidy::{UidStyle, format_template};
 pub use write::write_template;
-pub(in crate::rig) use write::{option_text, quoted, socket_text, vector, write_without_poses};
+pub(in crate::rig) use write::{
+    option_text, quaternion, quoted, rotation_text, socket_text, vector, write_without_poses,
+};
 
 use crate::rig::{
     Rig, Uid,

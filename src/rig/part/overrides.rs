@@ -3,7 +3,10 @@
 use super::PartInstance;
 use crate::rig::{
     TagKind,
-    format::{template::vector, tree::Tree},
+    format::{
+        template::{quaternion, vector},
+        tree::Tree,
+    },
 };
 
 /// One thing that an instance changes of its part.
@@ -63,8 +66,7 @@ impl PartInstance {
                 add(&target, "translation", vector(translation.into()));
             }
             if let Some(rotation) = change.rotation {
-                let [x, y, z, w] = rotation.to_array();
-                add(&target, "rotation", format!("({x:?}, {y:?}, {z:?}, {w:?})"));
+                add(&target, "rotation", quaternion(rotation));
             }
             if let Some(scale) = change.scale {
                 add(&target, "scale", vector(scale.into()));

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use crate::rig::{
     GroupData, JointData, Rig, RigAbout, RigInput, StoredPose, TagData, TagKind, Uid,
     format::{
-        template::{option_text, quoted, socket_text, vector},
+        template::{option_text, quaternion, quoted, socket_text, vector},
         tree::Tree,
     },
     part::HeaderSocket,
@@ -83,10 +83,7 @@ pub(super) fn group_fields() -> Vec<Field<'static, GroupData>> {
 }
 
 pub(super) fn input_fields() -> Vec<Field<'static, RigInput>> {
-    let rotation = |input: &RigInput| {
-        let [x, y, z, w] = input.rest.rotation.to_array();
-        Some(format!("({x:?}, {y:?}, {z:?}, {w:?})"))
-    };
+    let rotation = |input: &RigInput| Some(quaternion(input.rest.rotation));
     vec![
         field("name", |a: &RigInput| Some(quoted(&a.name)), |a, b| a.name.clone_from(&b.name)),
         rounded(
@@ -130,10 +127,7 @@ pub(super) fn joint_fields<'a>(now: &'a Rig, file: &'a Rig) -> Vec<Field<'a, (Jo
         format!("{}#{uid}", name.unwrap_or_default())
     };
     let face = |(data, _): &Joint| data.face.as_ref().map(|face| format!("{face:?}"));
-    let rotation = |(data, _): &Joint| {
-        let [x, y, z, w] = data.rest.rotation.to_array();
-        Some(format!("({x:?}, {y:?}, {z:?}, {w:?})"))
-    };
+    let rotation = |(data, _): &Joint| Some(quaternion(data.rest.rotation));
     vec![
         field("label", |(a, _): &Joint| a.label.as_deref().map(quoted), |(a, _), (b, _)| a.label.clone_from(&b.label)),
         field("parent", move |(_, parent): &Joint| parent.map(joint), |(_, a), (_, b)| *a = *b),

@@ -12,7 +12,7 @@ use super::{
 use crate::rig::{
     Rig, TagData, TagKind, Uid,
     format::{
-        template::{Template, quoted, vector},
+        template::{Template, quaternion, quoted, vector},
         tree::{Tree, with_field},
     },
     part::{PartChange, PartInstance},
@@ -119,10 +119,7 @@ impl Sides<'_> {
             (!joints.is_empty()).then(|| format!("[{}]", joints.join(", ")))
         };
         let parent = move |a: &PartInstance| a.parent.as_ref().map(joint);
-        let rotation = |a: &PartInstance| {
-            let [x, y, z, w] = a.rest.rotation.to_array();
-            Some(format!("({x:?}, {y:?}, {z:?}, {w:?})"))
-        };
+        let rotation = |a: &PartInstance| Some(quaternion(a.rest.rotation));
         let flag = |is_on: bool| is_on.then(|| "true".to_owned());
         let name = |a: &PartInstance| (!a.name.is_empty()).then(|| quoted(&a.name));
         let prefix = |a: &PartInstance| (!a.prefix.is_empty()).then(|| quoted(&a.prefix));

@@ -77,14 +77,8 @@ fn rest_is_shown_while_it_is_edited() {
 fn a_click_takes_a_control_and_the_gizmo_moves_what_it_drives() {
     let rig = crate::bench::shipped("biped");
     for sight in sights(Transform::IDENTITY) {
-        let mut app = headless_app(1);
-        app.add_plugins((ToolsPlugin, BuildingPlugin));
-        let mut app = strict_app(app);
-        let rig = app.world_mut().spawn(rig.clone()).id();
-        app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(sight)));
-        app.update();
-        app.update();
-        let mut bench = Bench { base: RigBench { app, rig }, sink: Sink::default() };
+        let mut bench = Bench::built(headless_app(1), rig.clone(), sight);
+        let rig = bench.base.rig;
         let world = bench.base.app.world();
         let built = world.get::<BuildResult>(rig).expect("a rig with commands is built when it is opened").0.clone();
         assert!(world.get::<BuildFailure>(rig).is_none());
@@ -147,14 +141,8 @@ fn a_click_takes_a_control_and_the_gizmo_moves_what_it_drives() {
 #[test]
 fn a_click_on_an_outline_beside_the_body_takes_its_control() {
     let sight = front();
-    let mut app = headless_app(1);
-    app.add_plugins((ToolsPlugin, BuildingPlugin));
-    let mut app = strict_app(app);
-    let rig = app.world_mut().spawn(crate::bench::shipped("biped")).id();
-    app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(sight)));
-    app.update();
-    app.update();
-    let mut bench = Bench { base: RigBench { app, rig }, sink: Sink::default() };
+    let mut bench = Bench::built(headless_app(1), crate::bench::shipped("biped"), sight);
+    let rig = bench.base.rig;
     let visible = move |controls: ControlNodes, nodes: Query<&RigNodes>| {
         controls.visible(nodes.get(rig).ok(), bevy::math::Affine3A::IDENTITY)
     };

@@ -137,13 +137,9 @@ fn a_root_moves_a_click_selects_and_a_drag_beside_joints_is_a_box() {
 fn a_built_rig_is_pulled_by_its_controls() {
     let [sight, _] = sights(Transform::IDENTITY);
     let mut app = headless_app(1);
-    app.add_plugins((ToolsPlugin, BuildingPlugin)).insert_resource(RigDrawing { controls: false, ..default() });
-    let mut app = strict_app(app);
-    let rig = app.world_mut().spawn(crate::bench::shipped("biped")).id();
-    app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(sight)));
-    app.update();
-    app.update();
-    let mut bench = Bench { base: RigBench { app, rig }, sink: Sink::default() };
+    app.insert_resource(RigDrawing { controls: false, ..default() });
+    let mut bench = Bench::built(app, crate::bench::shipped("biped"), sight);
+    let rig = bench.base.rig;
     let built = bench.base.get::<BuildResult>(rig).expect("a built rig").0.clone();
     let [hand, shoulder] = ["hand_l", "upper_arm_l"].map(|label| built.find_label(label).expect("a joint").uid);
     let switch = built.switches.iter().find(|switch| match &switch.matching {

@@ -12,7 +12,7 @@ fn middle_of(desk: &Desk, from: &str, to: &str) -> Pos2 {
 fn undone(desk: &mut Desk, before: &str, steps: usize) {
     assert_eq!(desk.steps().1, steps + 1, "{:?}", desk.told());
     assert_ne!(bytes(desk), before);
-    undo(desk);
+    desk.undo(1);
     assert_eq!((bytes(desk).as_str(), desk.steps().1), (before, steps));
 }
 

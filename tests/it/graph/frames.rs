@@ -307,7 +307,7 @@ fn a_failed_command_is_counted_in_its_box_and_nothing_moves() {
     let now = biped.frame(arm.uid);
     assert_eq!((now.failed, now.commands.len(), now.rect), (1, arm.commands.len(), arm.rect));
     assert!(biped.seen(&now).label.ends_with("1 failed"), "{}", biped.seen(&now).label);
-    undo(&mut biped.desk);
+    biped.desk.undo(1);
     // One more command in a folded frame moves nothing.
     let joint = biped.desk.rig().find_tag(arm.commands[0]).unwrap().0.data.uid;
     let kind = TagKind::Command { module: "null".into(), params: "()".into(), feature: Some(arm.uid) };

@@ -11,6 +11,7 @@ use rigsmith::{
     headless::headless_app,
     plugins::history::RigHistory,
     prelude::*,
+    rig::TagKind,
     test_app::strict_app,
 };
 
@@ -280,6 +281,14 @@ impl Desk {
         self.frames(2);
     }
 
+    /// Undoes that many steps, one after the other.
+    pub fn undo(&mut self, count: usize) {
+        for _ in 0..count {
+            self.app.world_mut().write_message(EditRequest { rig: self.rig, change: Change::Undo });
+            self.frames(3);
+        }
+    }
+
     /// A chain with these labels, one below the other, upwards from the rig's origin.
     pub fn chain(&mut self, labels: &[&str]) -> Vec<Uid> {
         let from = self.rig().len();
@@ -310,6 +319,16 @@ impl Desk {
         self.rig().joint(joint).unwrap().data.label.as_deref().unwrap_or_default()
     }
 
+    /// Modules of the tags of a joint, all of which are commands.
+    pub fn modules(&self, joint: Uid) -> Vec<String> {
+        let tags = self.rig().joint(joint).unwrap().data.tags.iter();
+        tags.map(|tag| match &tag.kind {
+            TagKind::Command { module, .. } => module.clone(),
+            TagKind::Feature { name, .. } => panic!("{name} is no command"),
+        })
+        .collect()
+    }
+
     pub fn parent(&self, joint: Uid) -> Option<Uid> {
         self.rig().joint(joint).unwrap().parent
     }
@@ -333,8 +352,7 @@ impl Desk {
             }
             1 => {
                 assert_ne!(saved(self), before, "{what}");
-                self.app.world_mut().write_message(EditRequest { rig: self.rig, change: Change::Undo });
-                self.frames(3);
+                self.undo(1);
                 assert_eq!((saved(self), self.steps().1), (before, done), "{what}");
                 true
             }

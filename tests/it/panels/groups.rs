@@ -1,9 +1,6 @@
 //! Local groups: made and reset by the selection, by hierarchies and for the whole rig.
 
-use rigsmith::{
-    editor::panels::local_groups::GroupsPanel,
-    plugins::document::{Change, EditRequest},
-};
+use rigsmith::editor::panels::local_groups::GroupsPanel;
 
 use super::desk::Desk;
 
@@ -58,10 +55,6 @@ fn groups_are_made_and_reset_by_selection_hierarchy_and_all() {
     desk.frames(3);
     let names: Vec<&str> = desk.rig().groups().iter().map(|group| group.name.as_str()).collect();
     assert_eq!((names, desk.steps().1), (vec!["all"], steps + 6));
-    let rig = desk.rig;
-    for _ in 0..6 {
-        desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-        desk.frames(2);
-    }
+    desk.undo(6);
     assert_eq!(*desk.rig(), before);
 }

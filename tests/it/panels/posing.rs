@@ -59,11 +59,6 @@ fn bytes(desk: &Desk) -> String {
     format!("{}{:?}{:?}", write_template(rig), rig.pose(), rig.selection_sets())
 }
 
-fn undo(desk: &mut Desk) {
-    desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
-    desk.frames(3);
-}
-
 #[track_caller]
 fn assert_turned(desk: &Desk, joint: Uid, angle: f32) {
     let turn = desk.rig().offset(joint).copied().unwrap_or_default().rotation;
@@ -79,7 +74,7 @@ fn one_step(desk: &mut Desk, what: impl FnOnce(&mut Desk), check: impl FnOnce(&D
     check(desk);
     assert_eq!(desk.steps().1, steps + 1, "one step");
     assert_ne!(bytes(desk), before);
-    undo(desk);
+    desk.undo(1);
     assert_eq!((bytes(desk), desk.steps().1), (before, steps));
 }
 
@@ -329,7 +324,7 @@ fn the_menu_of_a_control_switches_kinematics_without_a_jump() {
     assert!(place(&desk).distance(before) < 1e-3, "the hand jumps");
     assert_eq!(desk.steps().1, steps + 1);
     assert!(desk.look("Reset pose").is_none(), "the menu is closed");
-    undo(&mut desk);
+    desk.undo(1);
     assert_eq!(state(&desk).attribute(switch.control, &switch.attribute), Some(value));
     desk.secondary_click_at(middle);
     assert!(desk.look("Reset pose").is_some());
@@ -369,7 +364,7 @@ fn a_slider_tweens_the_shown_pose_to_a_neighbouring_key() {
         assert_eq!(desk.steps().1, steps + 1);
         let turn = desk.rig().offset(left).expect("a pose").rotation.angle_between(Quat::IDENTITY);
         assert!((turn - (0.5 + angle) / 2.0).abs() < 0.06, "{target}: {turn}");
-        undo(&mut desk);
+        desk.undo(1);
         assert_eq!(bytes(&desk), before, "{target}");
     }
 }

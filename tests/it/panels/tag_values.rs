@@ -3,12 +3,9 @@
 use bevy_egui::egui;
 use rigsmith::{
     editor::panels::tags::TagsPanel,
-    plugins::{
-        commands::{BuildRequest, BuildResult, BuildStep},
-        document::{Change, EditRequest},
-    },
+    plugins::commands::{BuildRequest, BuildResult, BuildStep},
     rig::{
-        RigEdit, TagData, TagKind, Uid,
+        RigEdit, TagKind, Uid,
         operations::{Operation, TagOperation},
     },
 };
@@ -83,11 +80,7 @@ fn a_reference_is_picked_while_its_card_stays() {
     desk.select(&[a]);
     desk.frames(3);
     assert_eq!((desk.selected(), desk.steps().1), (&[a][..], steps + 3), "nothing waits");
-    let rig = desk.rig;
-    for _ in 0..3 {
-        desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-        desk.frames(2);
-    }
+    desk.undo(3);
     assert_eq!(*desk.rig(), before);
 }
 
@@ -113,9 +106,7 @@ fn values_are_reset_by_a_button_beside_them() {
     let params = params_of(&desk, aim);
     assert!(!params.contains("direction") && params.contains("targets"), "{params}");
     assert_eq!((offered(&desk), desk.steps().1), (vec!["Reset Targets to default".to_owned()], steps + 1));
-    let rig = desk.rig;
-    desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-    desk.frames(2);
+    desk.undo(1);
     assert_eq!(*desk.rig(), before);
 }
 
@@ -173,14 +164,6 @@ fn tags_are_copied_and_pasted_over_a_scope_and_mirrored() {
     let [d, e, f] = desk.chain(&["d", "e", "f"])[..] else { panic!() };
     add_command(&mut desk, a, "control", "()");
     add_command(&mut desk, b, "null", "()");
-    let modules = |desk: &Desk, joint: Uid| -> Vec<String> {
-        let tags = desk.rig().joint(joint).unwrap().data.tags.iter();
-        let module = |tag: &TagData| match &tag.kind {
-            TagKind::Command { module, .. } => module.clone(),
-            TagKind::Feature { name, .. } => panic!("{name} is no command"),
-        };
-        tags.map(module).collect()
-    };
     let choose = |desk: &mut Desk, menu: &str, entry: &str| {
         desk.click(menu);
         desk.frames(3);
@@ -193,12 +176,10 @@ fn tags_are_copied_and_pasted_over_a_scope_and_mirrored() {
     desk.select(&[d]);
     let (before, steps) = (desk.rig().clone(), desk.steps().1);
     choose(&mut desk, "Paste", "Tags and values onto the hierarchy");
-    let of = |desk: &Desk| [d, e, f].map(|joint| modules(desk, joint).join(" "));
+    let of = |desk: &Desk| [d, e, f].map(|joint| desk.modules(joint).join(" "));
     assert_eq!(of(&desk), ["control", "null", ""], "{:?}", desk.told());
     assert_eq!(desk.steps().1, steps + 1);
-    let rig = desk.rig;
-    desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-    desk.frames(2);
+    desk.undo(1);
     assert_eq!(*desk.rig(), before);
     // Onto the other side of what was copied.
     let pairs = [(a, d), (b, e), (d, a), (e, b)];
@@ -261,11 +242,7 @@ fn keys_of_a_curve_are_dragged_added_and_removed() {
     desk.secondary_click(&first);
     desk.frames(3);
     assert_eq!((keys(&desk).len(), desk.steps().1), (2, steps + 3));
-    let rig = desk.rig;
-    for _ in 0..3 {
-        desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-        desk.frames(2);
-    }
+    desk.undo(3);
     assert_eq!(*desk.rig(), before);
 }
 
@@ -283,17 +260,7 @@ fn alike_tags_of_several_joints_are_reordered_at_once() {
     }
     desk.select(&joints);
     desk.frames(2);
-    let order = |desk: &Desk| -> Vec<String> {
-        let of = |joint: &Uid| {
-            let tags = desk.rig().joint(*joint).unwrap().data.tags.iter();
-            let module = |tag: &TagData| match &tag.kind {
-                TagKind::Command { module, .. } => module.clone(),
-                TagKind::Feature { name, .. } => panic!("{name} is no command"),
-            };
-            tags.map(module).collect::<Vec<_>>().join(" ")
-        };
-        joints.iter().map(of).collect()
-    };
+    let order = |desk: &Desk| -> Vec<String> { joints.iter().map(|joint| desk.modules(*joint).join(" ")).collect() };
     let (before, steps) = (desk.rig().clone(), desk.steps().1);
     let [from, to] = ["Drag aim", "Drag control"].map(|label| desk.find(label).rect.center());
     desk.drag(from, to);
@@ -308,10 +275,6 @@ fn alike_tags_of_several_joints_are_reordered_at_once() {
         desk.frames(3);
     }
     assert_eq!(order(&desk), ["control null aim", "control aim", "null aim"], "{:?}", desk.told());
-    let rig = desk.rig;
-    for _ in 0..3 {
-        desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-        desk.frames(2);
-    }
+    desk.undo(3);
     assert_eq!(*desk.rig(), before);
 }

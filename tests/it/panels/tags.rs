@@ -19,10 +19,7 @@ use rigsmith::{
         },
     },
     files::{RealDisk, load_template, store_rig_over},
-    plugins::{
-        commands::{BuildRequest, BuildStep, Processor, RegisterRigModule},
-        document::{Change, EditRequest},
-    },
+    plugins::commands::{BuildRequest, BuildStep, Processor, RegisterRigModule},
     processor::{BuildScope, ModuleError, RigModule},
     rig::{
         RigEdit, TagData, TagKind, Uid,
@@ -176,20 +173,10 @@ fn a_module_is_dragged_onto_a_joint() {
     assert!(!null.x_range().contains(row.center().x), "the library lies over the joints: {null:?} {row:?}");
     desk.drag(null.center(), row.center());
     desk.frames(3);
-    let modules = |desk: &Desk, joint: Uid| -> Vec<String> {
-        let tags = desk.rig().joint(joint).unwrap().data.tags.iter();
-        let module = |tag: &TagData| match &tag.kind {
-            TagKind::Command { module, .. } => module.clone(),
-            TagKind::Feature { name, .. } => panic!("{name} is no command"),
-        };
-        tags.map(module).collect()
-    };
-    assert!(modules(&desk, a).is_empty(), "{:?}", modules(&desk, a));
-    assert_eq!(modules(&desk, b), ["null"], "{:?}", desk.told());
+    assert!(desk.modules(a).is_empty(), "{:?}", desk.modules(a));
+    assert_eq!(desk.modules(b), ["null"], "{:?}", desk.told());
     assert_eq!(desk.steps().1, steps + 1);
-    let rig = desk.rig;
-    desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-    desk.frames(2);
+    desk.undo(1);
     assert_eq!(*desk.rig(), before);
 }
 
@@ -233,11 +220,7 @@ fn a_card_is_dragged_into_a_feature_and_its_switch() {
     assert_eq!((owner(&desk), desk.steps().1), (Some(arm), steps + 2), "{:?}", desk.told());
     onto(&mut desk, "Drag feature arm", "soft");
     assert_eq!(desk.steps().1, steps + 2, "a feature is no command");
-    let rig = desk.rig;
-    for _ in 0..2 {
-        desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-        desk.frames(3);
-    }
+    desk.undo(2);
     assert_eq!(*desk.rig(), before);
 }
 
@@ -262,9 +245,7 @@ fn what_an_operation_notes_is_told_once_it_is_done() {
     let told = "1 copied joint is left over: the selection has only 1.";
     assert!(desk.told().iter().any(|known| known == told), "{:?}", desk.told());
     // Undo tells nothing again.
-    let rig = desk.rig;
-    desk.app.world_mut().write_message(EditRequest { rig, change: Change::Undo });
-    desk.frames(2);
+    desk.undo(1);
     assert_eq!((desk.steps().1, is_told(&desk)), (steps.1, 1), "{:?}", desk.told());
 }
 
@@ -299,8 +280,7 @@ fn a_part_that_is_added_stays_a_part() {
     assert!(text.contains(line) && !text.contains("Command"), "{text}");
     assert_eq!(load_template(&RealDisk, &path).unwrap().instances.len(), 1);
     // Undo takes it out of the rig and, with the next save, out of the file.
-    desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
-    desk.frames(3);
+    desk.undo(1);
     assert_eq!(*desk.rig(), before);
     assert!(!save(&desk).contains("parts"));
 }

@@ -16,22 +16,16 @@ use rigsmith::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
-        building::BuildingPlugin,
-        dock::DockPlugin,
         files::{
-            FilesPlugin, LoadJob, OpenRequest, SaveJob, StateFolder,
+            LoadJob, OpenRequest, SaveJob,
             dialog::{Answer, Dialog, DialogAnswer, Question},
         },
         fitting::FittingPlugin,
-        follow::FollowPlugin,
-        help::HelpPlugin,
-        library::{LibraryFolders, LibraryJobs},
+        library::LibraryJobs,
         mode::Mode,
         onion::OnionSkin,
-        palette::PalettePlugin,
         panel::EditorPanel,
         panels::{
-            PanelsPlugin,
             controls::ControlsPanel,
             curves::CurvesPanel,
             display::DisplayPanel,
@@ -51,15 +45,9 @@ use rigsmith::{
             updater::UpdaterPanel,
             weights::WeightsPanel,
         },
-        pointer::ViewportArea,
         recovery::Recovery,
-        screen::ScreenPlugin,
-        settings::{SettingsFolder, SettingsPlugin},
-        start::StartPlugin,
         tools::{ToolsPlugin, paint::brush::PaintBrush},
     },
-    files::SearchPaths,
-    headless::headless_app,
     plugins::history::RigHistory,
     prelude::*,
     rig::{
@@ -70,7 +58,7 @@ use rigsmith::{
 };
 
 use super::desk::{Desk, Sheet, ShownWidget};
-use crate::bench::HANG;
+use crate::{bench::HANG, window_app::docked_app};
 
 const CLIP: Uid = Uid(0xA1_0001);
 const BASE: Uid = Uid(0xA1_0002);
@@ -121,27 +109,9 @@ struct Walk {
 impl Walk {
     fn new(panel: Box<dyn EditorPanel>, size: egui::Vec2) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let mut app = headless_app(7);
-        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO))
-            .insert_resource(StateFolder(Some(folder.path().join("state"))))
-            .insert_resource(SettingsFolder(None))
-            .insert_resource(LibraryFolders(Some(SearchPaths { folders: Vec::new() })))
-            .init_resource::<ViewportArea>()
-            .add_plugins((
-                FilesPlugin,
-                SettingsPlugin,
-                ScreenPlugin,
-                StartPlugin { file: None },
-                HelpPlugin,
-                PalettePlugin,
-                PanelsPlugin,
-                FollowPlugin,
-                BuildingPlugin,
-                DockPlugin,
-                ToolsPlugin,
-                FittingPlugin,
-            ))
-            .add_message::<AppExit>();
+        let time = TimeUpdateStrategy::ManualDuration(Duration::ZERO);
+        let mut app = docked_app(folder.path().join("state"), Vec::new(), time);
+        app.add_plugins((ToolsPlugin, FittingPlugin));
         app.finish();
         app.cleanup();
         let desk = Desk::of(app, Entity::PLACEHOLDER, Sheet::Panel(panel), size);

@@ -66,8 +66,7 @@ fn one_step(desk: &mut Desk, what: &str, act: impl FnOnce(&mut Desk)) -> Rig {
     assert_eq!(desk.steps().1, before.2 + 1, "{what} is one step: {names:?} {:?}", desk.told());
     let after = desk.rig().clone();
     assert_ne!(after, before.0, "{what}");
-    desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
-    desk.frames(3);
+    desk.undo(1);
     assert_eq!(desk.rig(), &before.0, "{what} is taken back");
     assert_eq!(bytes(desk), before.1, "{what} is taken back to the bit");
     after

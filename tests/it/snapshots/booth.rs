@@ -12,27 +12,18 @@ use bevy_egui::{
 use rigsmith::{
     editor::{
         ActiveRig,
-        building::BuildingPlugin,
-        dock::DockPlugin,
         files::{
-            FilesPlugin, LoadJob, OpenRequest, SaveJob, StateFolder,
+            LoadJob, OpenRequest, SaveJob,
             dialog::{Answer, Dialog, DialogAnswer, Question},
         },
-        follow::FollowPlugin,
-        help::HelpPlugin,
-        library::{LibraryFolders, LibraryPictures, TemplateLibrary},
-        palette::PalettePlugin,
+        library::{LibraryPictures, TemplateLibrary},
         panel::{EditorOverlay, EditorPanel, Panels, Requests},
-        panels::{PanelsPlugin, log::ClearLog},
-        pointer::ViewportArea,
+        panels::log::ClearLog,
         recovery::Recovery,
-        screen::ScreenPlugin,
-        settings::{EditorSettings, SettingsFolder, SettingsPlugin},
-        start::{StartPage, StartPictures, StartPlugin},
+        settings::EditorSettings,
+        start::{StartPage, StartPictures},
         style::{self, Look},
     },
-    files::SearchPaths,
-    headless::headless_app,
     plugins::{
         face::FaceJob,
         fit::FitJob,
@@ -47,7 +38,10 @@ use super::{
     queries::{Text, Widget, texts, widgets},
     raster::{self, Textures},
 };
-use crate::bench::{HANG, wait};
+use crate::{
+    bench::{HANG, wait},
+    window_app::docked_app,
+};
 
 /// Subject of a picture.
 pub enum Subject {
@@ -243,25 +237,8 @@ impl Booth {
 
     fn with(folders: &[&str], time: TimeUpdateStrategy) -> Self {
         let folder = tempfile::tempdir().expect("a folder for the test");
-        let mut app = headless_app(7);
-        app.insert_resource(time)
-            .insert_resource(StateFolder(Some(folder.path().join("state"))))
-            .insert_resource(SettingsFolder(None))
-            .insert_resource(LibraryFolders(Some(SearchPaths { folders: folders.iter().map(PathBuf::from).collect() })))
-            .init_resource::<ViewportArea>()
-            .add_plugins((
-                FilesPlugin,
-                SettingsPlugin,
-                ScreenPlugin,
-                StartPlugin { file: None },
-                HelpPlugin,
-                PalettePlugin,
-                PanelsPlugin,
-                FollowPlugin,
-                BuildingPlugin,
-                DockPlugin,
-            ))
-            .add_message::<AppExit>();
+        let folders = folders.iter().map(PathBuf::from).collect();
+        let mut app = docked_app(folder.path().join("state"), folders, time);
         app.finish();
         app.cleanup();
         let window = app.world_mut().spawn(PrimaryEguiContext).id();

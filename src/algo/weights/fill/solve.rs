@@ -107,6 +107,15 @@ pub(crate) fn complete(
     result
 }
 
+/// Number of each node among those that are free; `usize::MAX` for the others.
+fn numbers(free: &[usize], nodes: usize) -> Vec<usize> {
+    let mut numbers = vec![usize::MAX; nodes];
+    for (number, &node) in free.iter().enumerate() {
+        numbers[node] = number;
+    }
+    numbers
+}
+
 /// One sparse Cholesky factorisation, then a solve for each joint. `None` if the factorisation fails.
 fn direct<I: Iterator<Item = (usize, f32)>>(
     free: &[usize],
@@ -116,10 +125,7 @@ fn direct<I: Iterator<Item = (usize, f32)>>(
     pull: &impl Fn(f32) -> f64,
     most: usize,
 ) -> Option<Vec<Sparse>> {
-    let mut index = vec![usize::MAX; nodes];
-    for (i, &node) in free.iter().enumerate() {
-        index[node] = i;
-    }
+    let index = numbers(free, nodes);
     let mut entries = Vec::new();
     let mut joints: Vec<u32> = Vec::new();
     for (i, &node) in free.iter().enumerate() {
@@ -182,10 +188,7 @@ fn stepwise<I: Iterator<Item = (usize, f32)>>(
     pull: &impl Fn(f32) -> f64,
     most: usize,
 ) -> Vec<Sparse> {
-    let mut index = vec![usize::MAX; nodes];
-    for (i, &node) in free.iter().enumerate() {
-        index[node] = i;
-    }
+    let index = numbers(free, nodes);
     let mut result = vec![Sparse::new(); free.len()];
     for _ in 0..=ROUNDS {
         for (i, &node) in free.iter().enumerate() {

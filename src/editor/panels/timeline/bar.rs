@@ -33,12 +33,12 @@ pub(super) struct Bar {
     rename: Option<Rename>,
     numbers: Numbers,
     /// Clip whose range or frame rate is being dragged, as it was before, where its keys are stretched with them.
-    dragged: Option<Stretched>,
+    dragged: Option<ClipTiming>,
 }
 
 /// Range and frame rate of a clip before its keys are stretched.
 #[derive(Debug, Clone, Copy)]
-struct Stretched {
+struct ClipTiming {
     clip: Uid,
     range: [f32; 2],
     rate: f32,
@@ -248,7 +248,7 @@ impl Bar {
         for (header, edit) in edits {
             let Some(edit) = edit else { continue };
             let change = if is_stretched {
-                let now = Stretched { clip: clip.uid, range: clip.range, rate: clip.frame_rate };
+                let now = ClipTiming { clip: clip.uid, range: clip.range, rate: clip.frame_rate };
                 let before = self.dragged.filter(|before| before.clip == clip.uid).unwrap_or(now);
                 if matches!(edit, NumberEdit::Preview(_)) {
                     self.dragged = Some(before);
@@ -282,8 +282,8 @@ fn as_change(edit: NumberEdit, operation: impl Fn(f32) -> Operation) -> Change {
 }
 
 /// Operation that stretches a clip to another start, end or frame rate; a clip is a frame long at least.
-fn stretched(before: &Stretched, header: Header, value: f32) -> Operation {
-    let Stretched { clip, range: [start, end], rate } = *before;
+fn stretched(before: &ClipTiming, header: Header, value: f32) -> Operation {
+    let ClipTiming { clip, range: [start, end], rate } = *before;
     let (seconds, frame) = (value / rate, 1.0 / rate);
     let to = match header {
         Header::Start => [seconds.min(end - frame), end],

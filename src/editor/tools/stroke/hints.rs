@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use super::{StrokePreview, StrokeState, StrokeTool, TakenOnLeaving};
+use super::{AcceptedStroke, StrokePreview, StrokeState, StrokeTool};
 use crate::{
     algo::stroke::{StrokeKind, StrokeNote},
     editor::{
@@ -95,7 +95,7 @@ fn heard(note: &StrokeNote) -> String {
 pub(super) fn answer(
     mut done: MessageReader<StrokeDone>,
     mut edited: MessageReader<EditReport>,
-    mut left: MessageReader<TakenOnLeaving>,
+    mut left: MessageReader<AcceptedStroke>,
     mut leaving: Local<Option<Entity>>,
     active: Option<Res<ActiveRig>>,
     mut notices: MessageWriter<Notice>,

@@ -299,33 +299,36 @@ pub(super) fn yes() -> bool {
     true
 }
 
+/// Fields of a template, in the order in which they are written: those of its header come first.
+pub(super) const TEMPLATE_FIELDS: &[&str] = &[
+    "format",
+    "uid",
+    "name",
+    "version",
+    "kind",
+    "author",
+    "description",
+    "preview",
+    "joint_count",
+    "features",
+    "needs",
+    "chains",
+    "branches",
+    "sockets",
+    "options",
+    "groups",
+    "inputs",
+    "joints",
+    "parts",
+    "poses",
+];
+
 /// Names that are allowed for a field at its place; `None` where any name is allowed (parameters of modules).
 pub(super) fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str]> {
     let parent = field.parent.map(|parent| &fields[parent]);
     let above = parent.and_then(|parent| parent.parent).map(|above| fields[above].name);
     match (field.depth, parent.map(|parent| parent.name)) {
-        (1, None) => Some(&[
-            "format",
-            "uid",
-            "name",
-            "version",
-            "kind",
-            "author",
-            "description",
-            "preview",
-            "joint_count",
-            "features",
-            "needs",
-            "chains",
-            "branches",
-            "sockets",
-            "options",
-            "groups",
-            "inputs",
-            "joints",
-            "parts",
-            "poses",
-        ]),
+        (1, None) => Some(TEMPLATE_FIELDS),
         (3, Some("parts")) => Some(&[
             "uid",
             "part",

@@ -1,6 +1,6 @@
 //! Reader of templates: strict, with the place of each error.
 
-mod hung;
+mod hung_joints;
 mod inputs;
 mod parts;
 mod survey;

@@ -18,7 +18,7 @@ use crate::rig::{
     Uid, UidError, degrees,
     format::{
         source::SourceError,
-        template::quoted,
+        template::{quaternion, quoted},
         tree::{Item, NodeId, Tree},
     },
     nearest::{did_you_mean, listed},
@@ -357,8 +357,7 @@ impl<'d, 'a> Writer<'d, 'a> {
         let angles: Vec<f32> =
             tree.node(value).items.iter().filter_map(|item| tree.written(item.value).parse().ok()).collect();
         if let ([x, y, z], 3) = (angles.as_slice(), tree.node(value).items.len()) {
-            let [x, y, z, w] = degrees([*x, *y, *z].into()).to_array();
-            self.replace(value, format!("({x:?}, {y:?}, {z:?}, {w:?})"));
+            self.replace(value, quaternion(degrees([*x, *y, *z].into())));
         }
     }
 

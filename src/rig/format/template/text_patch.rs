@@ -19,9 +19,9 @@ use super::{
     write_template,
 };
 use crate::rig::{
-    JointData, NodeKind, RestTransform, Rig, RigJoint, TagData, TagKind, Uid, degrees,
+    JointData, NodeKind, RestTransform, Rig, RigJoint, TagData, TagKind, Uid,
     format::{
-        template::{quoted, vector},
+        template::{quaternion, quoted, rotation_text},
         tree::{Item, NodeId, Tree},
     },
     reference::{RigNameIndex, bind_names, given_name, refresh_names, without_uids},
@@ -322,13 +322,7 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         if written == Some(4) {
             return self.patch.set_numbers(node, "rotation", &old.to_array(), &new.to_array());
         }
-        let (x, y, z) = new.to_euler(bevy::math::EulerRot::XYZ);
-        let angles = Vec3::new(x, y, z).map(|angle| (angle.to_degrees() * 1000.0).round() / 1000.0);
-        let [x, y, z, w] = new.to_array();
-        let text = match written == Some(3) && degrees(angles) == new {
-            true => vector(angles),
-            false => format!("({x:?}, {y:?}, {z:?}, {w:?})"),
-        };
+        let text = if written == Some(3) { rotation_text(new) } else { quaternion(new) };
         self.patch.set(node, "rotation", &text);
     }
 

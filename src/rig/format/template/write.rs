@@ -5,11 +5,12 @@ use std::{
     fmt::Write,
 };
 
-use bevy::math::{Quat, Vec3};
+use bevy::math::{EulerRot, Quat, Vec3};
 
 use super::{FORMAT, FeatureSummary, NeedsSummary};
 use crate::rig::{
     FacePlacement, GroupData, NodeKind, RestTransform, Rig, RigInput, RigJoint, StoredPose, TagData, TagKind, Uid,
+    degrees,
     format::poses::{write_stored_pose, write_stored_poses},
     part::{HeaderSocket, OptionForm, PartNeeds, PartOption},
     reference::refresh_names,
@@ -190,8 +191,7 @@ pub(super) fn input_text(input: &RigInput) -> String {
         out.push_str(&format!(", translation: {}", vector(translation)));
     }
     if rotation != Quat::IDENTITY {
-        let [x, y, z, w] = rotation.to_array();
-        out.push_str(&format!(", rotation: ({x:?}, {y:?}, {z:?}, {w:?})"));
+        out.push_str(&format!(", rotation: {}", quaternion(rotation)));
     }
     if scale != Vec3::ONE {
         out.push_str(&format!(", scale: {}", vector(scale)));
@@ -299,8 +299,7 @@ fn write_joint(out: &mut String, rig: &Rig, joint: &RigJoint, features: &HashSet
     let rest = &data.rest;
     write!(out, "\n            translation: {},", vector(rest.translation))?;
     if rest.rotation != Quat::IDENTITY {
-        let [x, y, z, w] = rest.rotation.to_array();
-        write!(out, "\n            rotation: ({x:?}, {y:?}, {z:?}, {w:?}),")?;
+        write!(out, "\n            rotation: {},", quaternion(rest.rotation))?;
     }
     if rest.scale != Vec3::ONE {
         write!(out, "\n            scale: {},", vector(rest.scale))?;
@@ -360,6 +359,18 @@ fn write_uid(out: &mut String, field: &str, uid: Option<Uid>) -> std::fmt::Resul
 
 pub(in crate::rig) fn vector(v: Vec3) -> String {
     format!("({:?}, {:?}, {:?})", v.x, v.y, v.z)
+}
+
+/// A rotation as the four numbers of its quaternion.
+pub(in crate::rig) fn quaternion(q: Quat) -> String {
+    format!("({:?}, {:?}, {:?}, {:?})", q.x, q.y, q.z, q.w)
+}
+
+/// A rotation as angles in whole thousandths of a degree where these are exact, else as a quaternion.
+pub(in crate::rig) fn rotation_text(rotation: Quat) -> String {
+    let (x, y, z) = rotation.to_euler(EulerRot::XYZ);
+    let angles = Vec3::new(x, y, z).map(|angle| (angle.to_degrees() * 1000.0).round() / 1000.0);
+    if degrees(angles) == rotation { vector(angles) } else { quaternion(rotation) }
 }
 
 /// A RON string literal.

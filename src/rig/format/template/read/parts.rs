@@ -25,8 +25,8 @@ use crate::rig::{
         source::ron_text,
     },
     part::{
-        Lacking, MOST_BROUGHT, MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance,
-        PartOption, PartSocket, unpaired_sides,
+        MOST_BROUGHT, MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption,
+        PartSocket, Shortfall, unpaired_sides,
     },
 };
 
@@ -406,7 +406,7 @@ impl Template {
         let groups = self.take_groups();
         let hung = std::mem::take(&mut self.hung);
         let mut waiting = hung.clone();
-        let (mut faults, mut lacking, mut brings) = (Vec::new(), Lacking::default(), 0);
+        let (mut faults, mut shortfall, mut brings) = (Vec::new(), Shortfall::default(), 0);
         let places = InstancePlaces { fields: fields(source) };
         for instance in std::mem::take(&mut self.parts) {
             let message = |error: &dyn fmt::Display| format!("part \"{}\": {error}", instance.title());
@@ -422,7 +422,7 @@ impl Template {
                 Ok(found) => found,
                 Err(error) => {
                     faults.push(SourceError::at(source, instance.offset, message(&error)));
-                    lacking.add_unknown(&instance);
+                    shortfall.add_unknown(&instance);
                     continue;
                 }
             };
@@ -446,8 +446,8 @@ impl Template {
                 }
                 Err(reason) => {
                     let mut found = instance.faults(&self.rig, &part, &fitted, reason);
-                    found.retain(|(_, error)| !lacking.explains(error));
-                    lacking.add(&instance, &fitted);
+                    found.retain(|(_, error)| !shortfall.explains(error));
+                    shortfall.add(&instance, &fitted);
                     found
                 }
             };
@@ -461,7 +461,7 @@ impl Template {
             }
         }
         self.give_groups(groups);
-        faults.extend(self.settle_hung(&hung, &waiting, source, &lacking));
+        faults.extend(self.settle_hung(&hung, &waiting, source, &shortfall));
         place_sockets(&self.rig, &mut self.sockets, source, &mut faults);
         self.rig.about.sockets = self.sockets.iter().filter_map(PartSocket::header).collect();
         self.sockets.extend(of_parts);

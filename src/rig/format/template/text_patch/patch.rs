@@ -10,25 +10,13 @@ use crate::rig::{
     Uid,
     format::{
         layout::{INDENT, value_laid_out, value_on_one_line},
-        template::shorthand::Declaration,
+        template::{file::TEMPLATE_FIELDS, shorthand::Declaration},
         tree::{Item, NodeId, Tree},
     },
 };
 
 /// Fields of a template's header, in the order in which they are written. What lists headers reads the beginning of a file alone.
-const HEADER: [&str; 11] = [
-    "format",
-    "uid",
-    "name",
-    "version",
-    "kind",
-    "author",
-    "description",
-    "preview",
-    "joint_count",
-    "features",
-    "needs",
-];
+const HEADER: &[&str] = TEMPLATE_FIELDS.split_at(11).0;
 
 /// Changes of a text, collected in any order.
 pub(in crate::rig::format::template) struct Patch<'d, 'a> {

@@ -2,13 +2,11 @@
 
 use std::collections::HashSet;
 
-use bevy::math::{Quat, Vec3};
-
 use crate::rig::{
-    JointData, TagData, TagKind, Uid, degrees,
+    JointData, TagData, TagKind, Uid,
     format::{
         layout::value_on_one_line,
-        template::{quoted, shorthand::TAG_FIELDS, text_patch::canonical, vector},
+        template::{quoted, rotation_text, shorthand::TAG_FIELDS, text_patch::canonical, vector},
         tree::{Item, Tree},
     },
     reference::{Names, RigNameIndex, bind_names, refresh_names, without_uids},
@@ -124,17 +122,6 @@ impl JointDiff<'_> {
         }
         fields
     }
-}
-
-/// A rotation as angles in whole thousandths of a degree where these are exact, else as a quaternion.
-fn rotation_text(rotation: Quat) -> String {
-    let (x, y, z) = rotation.to_euler(bevy::math::EulerRot::XYZ);
-    let angles = Vec3::new(x, y, z).map(|angle| (angle.to_degrees() * 1000.0).round() / 1000.0);
-    if degrees(angles) == rotation {
-        return vector(angles);
-    }
-    let [x, y, z, w] = rotation.to_array();
-    format!("({x:?}, {y:?}, {z:?}, {w:?})")
 }
 
 /// A tag before and after a change, and as the part gives it.

@@ -7,14 +7,14 @@ use crate::rig::Rig;
 
 /// Joints and sockets that are not there because parts are at fault: that others do not find them is no fault of theirs.
 #[derive(Default)]
-pub(in crate::rig) struct Lacking {
+pub(in crate::rig) struct Shortfall {
     labels: HashSet<String>,
     titles: Vec<String>,
     /// True if nobody knows what one of the parts would have brought.
     is_unknown: bool,
 }
 
-impl Lacking {
+impl Shortfall {
     /// Notes an instance whose part is not known.
     pub fn add_unknown(&mut self, instance: &PartInstance) {
         self.titles.push(instance.title().to_owned());

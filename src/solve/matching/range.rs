@@ -127,7 +127,7 @@ pub struct SwitchedRange {
 }
 
 /// Track that gets keys.
-struct Matched {
+struct MatchedTrack {
     target: TrackTarget,
     /// Place of the layer.
     layer: usize,
@@ -192,8 +192,8 @@ pub fn match_switch_over(
 
     let mut done = SwitchedRange { frames: frames.times.len(), ..SwitchedRange::default() };
     let mut next = clip.clone();
-    let mut change = |track: &Matched, keys: &[Key]| {
-        let Matched { target, layer, former } = track;
+    let mut change = |track: &MatchedTrack, keys: &[Key]| {
+        let MatchedTrack { target, layer, former } = track;
         done.keys += keys.len();
         let after = splice.spliced(former, &target.property, keys);
         let layer = &mut next.layers[*layer];
@@ -263,7 +263,7 @@ fn matched(
     splice: &Splice,
     target: TrackTarget,
     own: impl Fn(&Property) -> [f32; 4],
-) -> Result<Matched, SwitchOverError> {
+) -> Result<MatchedTrack, SwitchOverError> {
     let clip = over.clip;
     let layer = layer_for(over, &target)
         .ok_or_else(|| SwitchOverError::NoLayer { clip: clip.name.clone(), node: target.node })?;
@@ -276,7 +276,7 @@ fn matched(
             vec![Key { time, value, ease: Ease::Stepped }]
         }
     };
-    Ok(Matched { target, layer, former })
+    Ok(MatchedTrack { target, layer, former })
 }
 
 /// Topmost layer in effect that animates a target, else the layer that was asked for, else the lowest one that can have keys.
@@ -301,7 +301,7 @@ fn tracks(
     over: &SwitchRange<'_>,
     frames: &Frames<'_>,
     splice: &Splice,
-) -> Result<(Vec<Matched>, Vec<Values>), SwitchOverError> {
+) -> Result<(Vec<MatchedTrack>, Vec<Values>), SwitchOverError> {
     let (mut tracks, mut samples) = (Vec::new(), Vec::new());
     let nodes: BTreeSet<Uid> = frames.posed.iter().flat_map(|posed| posed.keys()).copied().collect();
     for node in nodes {

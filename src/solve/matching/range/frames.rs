@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use bevy::math::{Quat, Vec3};
 use rayon::prelude::*;
 
-use super::{Matched, SwitchNote, Values, set};
+use super::{MatchedTrack, SwitchNote, Values, set};
 use crate::{
     mesh::model::Trs,
     rig::{
@@ -121,7 +121,7 @@ impl<'a> Frames<'a> {
     }
 
     /// Places of the joints at each frame with the switch thrown; `values` are those of the tracks in their layers.
-    pub fn play(&self, clip: &RigClip, tracks: &[Matched], values: &[Values]) -> Vec<Vec<JointPlace>> {
+    pub fn play(&self, clip: &RigClip, tracks: &[MatchedTrack], values: &[Values]) -> Vec<Vec<JointPlace>> {
         each(self.state, self.times.len(), |state, frame| {
             let values: Vec<[f32; 4]> = values.iter().map(|of| of[frame]).collect();
             self.places(state, clip, frame, tracks, &values)
@@ -133,11 +133,11 @@ impl<'a> Frames<'a> {
         state: &mut RigState,
         clip: &RigClip,
         frame: usize,
-        tracks: &[Matched],
+        tracks: &[MatchedTrack],
         values: &[[f32; 4]],
     ) -> Vec<JointPlace> {
         let mut pose = self.poses[frame].clone();
-        for (Matched { target, layer, .. }, value) in tracks.iter().zip(values) {
+        for (MatchedTrack { target, layer, .. }, value) in tracks.iter().zip(values) {
             let mixed = clip.value_with(*layer, target, self.times[frame], *value).unwrap_or(*value);
             let offset = pose.offsets.entry(target.node).or_insert_with(|| self.own(target.node));
             set(offset, &target.property, mixed);
@@ -153,7 +153,7 @@ impl<'a> Frames<'a> {
     }
 
     /// Greatest way of a joint for one unit of each track, a degree for rotations: tried at three frames.
-    pub fn reaches(&self, tracks: &[Matched], values: &[Values], clip: &RigClip) -> Vec<f32> {
+    pub fn reaches(&self, tracks: &[MatchedTrack], values: &[Values], clip: &RigClip) -> Vec<f32> {
         let count = self.times.len();
         let places = || self.before[0].iter().map(|at| at.translation);
         let first = places().next().unwrap_or_default();

@@ -6,7 +6,7 @@ use super::super::{
     HungJoint, Template,
     shorthand::{Declarations, NameError},
 };
-use crate::rig::{Rig, RigEdit, RigJoint, SourceError, Uid, nearest::did_you_mean, part::Lacking};
+use crate::rig::{Rig, RigEdit, RigJoint, SourceError, Uid, nearest::did_you_mean, part::Shortfall};
 
 /// Reason why a joint of a template cannot hang on a joint that a part brings.
 #[derive(Debug, thiserror::Error)]
@@ -44,13 +44,13 @@ impl Template {
     }
 
     /// Puts the joints that hang on what parts have brought behind the joints of the parts. Returns what is wrong with the parents
-    /// of the others, which are still `waiting`; one of the parts that are `lacking` may have had such a parent.
+    /// of the others, which are still `waiting`; a parent of the `shortfall` is the fault of a part, and not told again.
     pub(super) fn settle_hung(
         &mut self,
         hung: &[HungJoint],
         waiting: &[HungJoint],
         source: &str,
-        lacking: &Lacking,
+        shortfall: &Shortfall,
     ) -> Vec<SourceError> {
         if hung.is_empty() {
             return Vec::new();
@@ -68,7 +68,7 @@ impl Template {
             let name = one.parent.clone();
             let uids = bearers.get(&name).map(Vec::as_slice).unwrap_or_default();
             let fault = match uids {
-                [] if lacking.may_have(&name) => continue,
+                [] if shortfall.may_have(&name) => continue,
                 [] => HangError::Unknown { nearest: did_you_mean(&name, labels(&self.rig)), name },
                 [_] if !waiting.contains(one) => continue,
                 [_] => HangError::Circle { name },
