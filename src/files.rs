@@ -47,7 +47,9 @@ pub use allowed_folders::{AllowedError, AllowedFolders};
 pub use atomic::{FileSet, SaveError, SaveStep, is_temp_name, remove_stale_temps, save_atomic, save_set};
 pub use disk::{Disk, DiskFile, Entry, EntryKind, Hold, RealDisk};
 pub use disk_error::DiskError;
-pub use expressions::{ExpressionFileError, SITE_DEPTH, files_below, is_expression_file, load_expressions};
+pub use expressions::{
+    ExpressionFileError, FoundFiles, LeftOut, SITE_DEPTH, files_below, is_expression_file, load_expressions,
+};
 pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use identity::is_same_file;

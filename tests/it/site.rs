@@ -3,7 +3,10 @@
 use std::{cmp::Ordering, fs, path::Path};
 
 use rigsmith::{
-    files::{PartFiles, RealDisk, SITE_FILE, SearchPaths, SiteError, TemplateWatch},
+    files::{
+        ExpressionFileError, LeftOut, PartFiles, RealDisk, SITE_FILE, SearchPaths, SiteError, TemplateWatch, files_below,
+        is_expression_file, load_expressions,
+    },
     rig::{
         RigAbout,
         template::{read_template, write_template},
@@ -117,4 +120,34 @@ fn parts_are_found_in_the_project_then_in_the_site_and_each_place_is_watched() {
     let error = load().0.unwrap_err();
     assert!(error.message.contains("part of itself"), "{error}");
     assert_eq!(read_template(template.as_bytes()).unwrap().parts.len(), 1);
+}
+
+/// A folder that is too full gives its first files, in order, and says which ones are left out.
+#[test]
+fn files_that_are_left_out_of_a_folder_are_told() {
+    let full = tempfile::tempdir().unwrap();
+    let at = |name: &str| full.path().join(name);
+    fs::create_dir(at("a")).unwrap();
+    fs::write(at("a/below.expr.ron"), "").unwrap();
+    (0..1003).for_each(|number| fs::write(at(&format!("e{number:04}.expr.ron")), "").unwrap());
+    let found = files_below(&RealDisk, full.path(), 3, &is_expression_file);
+    let files: Vec<_> = (0..1000).map(|number| at(&format!("e{number:04}.expr.ron"))).collect();
+    assert!(found.files == files, "{} files, first {:?}", found.files.len(), found.files.first());
+    let first = at("e1000.expr.ron");
+    assert_eq!(found.left_out, [LeftOut::Files { folder: full.path().to_owned(), first }]);
+
+    let many = tempfile::tempdir().unwrap();
+    (0..10_000).for_each(|number| fs::write(many.path().join(format!("a{number:05}.txt")), "").unwrap());
+    fs::write(many.path().join("z.expr.ron"), "(").unwrap();
+    let found = files_below(&RealDisk, many.path(), 3, &is_expression_file);
+    assert_eq!((found.files.len(), found.left_out.len()), (0, 1), "{found:?}");
+    let folders = [many.path().to_owned()];
+    let told = |faults: &[ExpressionFileError]| faults.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let faults = told(&load_expressions(&RealDisk, &folders).1);
+    let name = many.path().display().to_string();
+    assert!(matches!(&faults[..], [one] if one.contains(&name) && one.contains("`a09999.txt`")), "{faults:?}");
+    // With one name less the file is looked at.
+    fs::remove_file(many.path().join("a00000.txt")).unwrap();
+    let faults = told(&load_expressions(&RealDisk, &folders).1);
+    assert!(matches!(&faults[..], [one] if one.contains("z.expr.ron")), "{faults:?}");
 }
