@@ -4,8 +4,8 @@ use std::{cmp::Ordering, fs, path::Path};
 
 use rigsmith::{
     files::{
-        ExpressionFileError, LeftOut, PartFiles, RealDisk, SITE_FILE, SearchPaths, SiteError, TemplateWatch, files_below,
-        is_expression_file, load_expressions,
+        ExpressionFileError, LeftOut, PartFiles, RealDisk, SITE_FILE, SearchPaths, SiteError, TemplateWatch,
+        files_below, is_expression_file, load_expressions,
     },
     rig::{
         RigAbout,
