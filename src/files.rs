@@ -30,6 +30,7 @@ mod library;
 mod load;
 mod model_watch;
 mod part_cache;
+mod part_error;
 mod parts;
 mod project;
 mod read;

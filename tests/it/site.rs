@@ -122,6 +122,50 @@ fn parts_are_found_in_the_project_then_in_the_site_and_each_place_is_watched() {
     assert_eq!(read_template(template.as_bytes()).unwrap().parts.len(), 1);
 }
 
+/// Templates from elsewhere name no files of the machine, as projects do not: an absolute path leads below the template's folder or
+/// below one of the site's.
+#[test]
+fn absolute_paths_of_parts_stay_in_the_folders() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for place in ["project/parts", "site", "away"] {
+        fs::create_dir_all(at(place)).unwrap();
+        fs::write(at(place).join("p.rig.ron"), PART).unwrap();
+    }
+    let site = SearchPaths { folders: vec![at("site")] };
+    let read = |part: &Path| {
+        let text =
+            format!("(format: 2, name: \"t\", joints: [(label: \"b\")], parts: [(part: {part:?}, parent: \"b\")])");
+        PartFiles::new(&RealDisk).with_site(site.clone()).complete(&at("project/t.rig.ron"), text.as_bytes())
+    };
+    for inside in [at("project/parts/p.rig.ron"), at("site/p.rig.ron"), "../away/p.rig.ron".into()] {
+        assert!(read(&inside).unwrap().rig.find_label("a").is_some(), "{inside:?}");
+    }
+    let refused = |part: &Path| {
+        let error = read(part).unwrap_err();
+        let (path, folder) = (part.display().to_string(), at("project").display().to_string());
+        let is_told =
+            [path.as_str(), folder.as_str(), "RIGSMITH_TEMPLATES"].iter().all(|word| error.message.contains(word));
+        assert!(is_told && error.message.contains("is not read"), "{error}");
+    };
+    refused(&at("away/p.rig.ron"));
+    refused(&at("project/../away/p.rig.ron"));
+    refused(&at("away/nothing.rig.ron"));
+    // A part of the site is no way out.
+    let nested = PART.replace(
+        "joints:",
+        &format!("parts: [(part: {:?}, parent: \"a\", prefix: \"q_\")], joints:", at("away/p.rig.ron")),
+    );
+    fs::write(at("site/n.rig.ron"), nested).unwrap();
+    let error = read(Path::new("n.rig.ron")).unwrap_err();
+    assert!(error.to_string().contains("is not read"), "{error}");
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(at("away/p.rig.ron"), at("project/parts/link.rig.ron")).unwrap();
+        refused(&at("project/parts/link.rig.ron"));
+    }
+}
+
 /// A folder that is too full gives its first files, in order, and says which ones are left out.
 #[test]
 fn files_that_are_left_out_of_a_folder_are_told() {
