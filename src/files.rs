@@ -64,9 +64,9 @@ pub use load::{
 };
 pub use model_watch::{ModelWatch, SETTLE};
 pub use part_cache::PartCache;
+pub use part_error::PartFileError;
 pub use parts::{
-    BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartFileError, PartFiles, bundled_characters, bundled_part,
-    bundled_parts,
+    BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartFiles, bundled_characters, bundled_part, bundled_parts,
 };
 pub use project::{
     LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote,
