@@ -140,8 +140,8 @@ fn texts_of(disk: &dyn Disk, files: Vec<PathBuf>, faults: &mut Vec<ExpressionFil
     texts
 }
 
-/// Files with wanted names in a folder and up to so many levels below it: of each folder its files in order, then those of the
-/// folders in it. A folder that is not there has none.
+/// Files with wanted names in a folder and up to so many levels below it: of each folder its files in order, then those of
+/// the folders in it. A folder that is not there has none.
 pub fn files_below(disk: &dyn Disk, top: &Path, depth: usize, is_wanted: &dyn Fn(&Path) -> bool) -> FoundFiles {
     let (mut found, mut folders) = (FoundFiles::default(), vec![(top.to_owned(), depth)]);
     'folders: while let Some((folder, depth)) = folders.pop() {

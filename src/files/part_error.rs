@@ -38,8 +38,8 @@ pub enum PartFileError {
     },
     /// A file outside of the template's folder that the template names by an absolute path.
     #[error(
-        "`{}` is outside of `{}`, the folder of the template that names it, and of the site's folders, and is not read; name the \
-         part relative to the template, or name its folder as one of templates (RIGSMITH_TEMPLATES)",
+        "`{}` is outside of `{}`, the folder of the template that names it, and of the site's folders, and is not read; \
+         name the part relative to the template, or name its folder as one of templates (RIGSMITH_TEMPLATES)",
         path.display(), folder.display()
     )]
     Outside {

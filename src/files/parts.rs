@@ -125,8 +125,9 @@ pub struct FoundPart {
 /// Reader of templates with their parts. A part is looked for beside its template, then in the folders of the site
 /// ([`SearchPaths`]), then among those that come with Rigsmith. The reader notes the files that it has asked for.
 ///
-/// A template from elsewhere may name any file of the machine. An absolute path is one below the template's folder or a folder of
-/// the site, or it is refused, as a project's meshes are; ways up (`../parts/arm.rig.ron`) lead to parts that templates share.
+/// A template from elsewhere may name any file of the machine. An absolute path is one below the template's folder or a
+/// folder of the site, or it is refused, as a project's meshes are; ways up (`../parts/arm.rig.ron`) lead to parts that
+/// templates share.
 pub struct PartFiles<'a> {
     source: Source<'a>,
     modules: Modules,
@@ -300,8 +301,8 @@ impl<'a> PartFiles<'a> {
         })
     }
 
-    /// Refuses an absolute path to a file that lies, links followed, neither below the template's folder nor below one of the
-    /// site's. Contents and parts that are given were read by others.
+    /// Refuses an absolute path to a file that lies, links followed, neither below the template's folder nor below one of
+    /// the site's. Contents and parts that are given were read by others.
     fn check_inside(&mut self, folder: &Path, name: &Path) -> Result<(), PartFileError> {
         let Source::Disk(disk) = self.source else { return Ok(()) };
         if !name.is_absolute() {

@@ -48,8 +48,8 @@ const MOST_NODES: u32 = 1_000_000;
 const MOST_TEXT: usize = 1 << 20;
 /// Parts of a transform, in the order of their tracks.
 const PARTS: [Property; 3] = [Property::Translation, Property::Rotation, Property::Scale];
-/// Bytes of memory of what is unpacked: of a key as key of a channel and of a rig, of a key of the track that is being changed
-/// from one to the other, of a track and a clip without their keys, and of a byte of their texts.
+/// Bytes of memory of what is unpacked: of a key as key of a channel and of a rig, of a key of the track that is being
+/// changed from one to the other, of a track and a clip without their keys, and of a byte of their texts.
 const KEY_BYTES: u64 = 76;
 const CHANGED_KEY_BYTES: u64 = 56;
 const TRACK_BYTES: u64 = 300;
@@ -169,8 +169,8 @@ impl PackedClip {
         self.tracks.iter().map(|own| own.track.len()).sum()
     }
 
-    /// Bytes of memory that the clip takes, about, while it is unpacked and becomes a clip of a rig. Few bytes of a file may be
-    /// many keys.
+    /// Bytes of memory that the clip takes, about, while it is unpacked and becomes a clip of a rig. Few bytes of a file may
+    /// be many keys.
     pub fn unpacked_bytes(&self) -> u64 {
         let keys = |own: &NodeTrack| own.track.len() as u64;
         let tracks: u64 = self.tracks.iter().map(|own| TRACK_BYTES + KEY_BYTES * keys(own)).sum();

@@ -122,8 +122,8 @@ fn parts_are_found_in_the_project_then_in_the_site_and_each_place_is_watched() {
     assert_eq!(read_template(template.as_bytes()).unwrap().parts.len(), 1);
 }
 
-/// Templates from elsewhere name no files of the machine, as projects do not: an absolute path leads below the template's folder or
-/// below one of the site's.
+/// Templates from elsewhere name no files of the machine, as projects do not: an absolute path leads below the template's
+/// folder or below one of the site's.
 #[test]
 fn absolute_paths_of_parts_stay_in_the_folders() {
     let folder = tempfile::tempdir().unwrap();

@@ -19,8 +19,8 @@ pub(super) const REST: u8 = 0;
 /// Bound of numbers of ranges; larger ones are damage.
 const MOST: f32 = 1e12;
 
-/// Track of one property of a node that does not stay at rest. Large ones are boxed: a constant is few bytes of a file, and takes
-/// little memory, too.
+/// Track of one property of a node that does not stay at rest. Large ones are boxed: a constant is few bytes of a file, and
+/// takes little memory, too.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum PackedTrack {
     /// One value all the time.
