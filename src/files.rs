@@ -30,6 +30,7 @@ mod library;
 mod load;
 mod model_watch;
 mod part_cache;
+mod part_error;
 mod parts;
 mod project;
 mod read;
@@ -47,7 +48,9 @@ pub use allowed_folders::{AllowedError, AllowedFolders};
 pub use atomic::{FileSet, SaveError, SaveStep, is_temp_name, remove_stale_temps, save_atomic, save_set};
 pub use disk::{Disk, DiskFile, Entry, EntryKind, Hold, RealDisk};
 pub use disk_error::DiskError;
-pub use expressions::{ExpressionFileError, SITE_DEPTH, files_below, is_expression_file, load_expressions};
+pub use expressions::{
+    ExpressionFileError, FoundFiles, LeftOut, SITE_DEPTH, files_below, is_expression_file, load_expressions,
+};
 pub use fault::{Fault, FaultPlan, FaultyDisk};
 pub use folder::{ModelFolder, UriError};
 pub use identity::is_same_file;
@@ -61,9 +64,9 @@ pub use load::{
 };
 pub use model_watch::{ModelWatch, SETTLE};
 pub use part_cache::PartCache;
+pub use part_error::PartFileError;
 pub use parts::{
-    BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartFileError, PartFiles, bundled_characters, bundled_part,
-    bundled_parts,
+    BUNDLED_CHARACTERS, BUNDLED_PARTS, FoundPart, PartFiles, bundled_characters, bundled_part, bundled_parts,
 };
 pub use project::{
     LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectFiles, ProjectMesh, ProjectNote,

@@ -13,9 +13,7 @@ use super::{
     sketch::describe_rig,
 };
 use crate::{
-    files::{
-        FileKind, RealDisk, load_animation, load_gestures, load_motion, load_packed_clips, load_rig_text, load_skin,
-    },
+    files::{FileKind, RealDisk, load_animation, load_gestures, load_motion, load_packed_clips, load_skin},
     mesh::model::Model,
     rig::{
         Rig, Uid, UidSource,
@@ -84,10 +82,10 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             describe_joints(&mut report, &template.rig);
         }
         Some(FileKind::RigText) => {
-            let text = load_rig_text(&RealDisk, path)?;
+            let text = limits::load_rig_text(path)?;
             let mut rig = Rig::new(Uid(1), "");
             for edit in import_rig_text(&text, &mut UidSource::seeded(super::SEED)).0 {
-                rig.apply(&edit).map_err(|error| Failure::Input(Box::new(error)))?;
+                rig.apply(&edit).map_err(|error| Failure::Input(format!("`{}`: {error}", path.display()).into()))?;
             }
             limits::check_rig(path, &rig)?;
             report.line("skeleton in .rig text");

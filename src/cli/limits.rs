@@ -11,7 +11,7 @@ use crate::{
     modules,
     plugins::gesture::Gesture,
     processor::Modules,
-    rig::{Rig, template::Template},
+    rig::{Rig, template::Template, text::RigText},
 };
 
 /// Most characters of a line of a report, unless more are set for messages.
@@ -117,6 +117,22 @@ pub(super) fn load_model(path: &Path) -> Result<Model, Failure> {
     let model = files::load_model(&RealDisk, path)?;
     check_model(path, &model)?;
     Ok(model)
+}
+
+/// Reads packed clips as a model without a mesh.
+pub(super) fn load_packed_clips(path: &Path) -> Result<Model, Failure> {
+    let packed = files::load_packed_clips(&RealDisk, path)?;
+    chosen().check_packed(&path.display().to_string(), &packed)?;
+    let model = packed.model(&files::stem(path));
+    check_model(path, &model)?;
+    Ok(model)
+}
+
+/// Reads a `.rig` text.
+pub(super) fn load_rig_text(path: &Path) -> Result<RigText, Failure> {
+    let text = files::load_rig_text(&RealDisk, path)?;
+    chosen().check_rig_text(&path.display().to_string(), &text)?;
+    Ok(text)
 }
 
 /// Reads a template with its parts.

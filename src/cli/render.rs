@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     algo::view::View,
-    files::{FileKind, MeshState, RealDisk, load_rig_text, save_atomic},
+    files::{FileKind, MeshState, RealDisk, save_atomic},
     headless::Workbench,
     plugins::{
         commands::BuildStep,
@@ -266,7 +266,7 @@ pub(super) fn picture_of_fit(bench: &Workbench, fitted: &FitReport, output: &Pat
 fn read(args: &RenderArgs, report: &mut Report) -> Result<Scene, Failure> {
     let path = &args.file;
     let mut uids = UidSource::seeded(SEED);
-    let refused = |error: crate::rig::EditError| Failure::Input(Box::new(error));
+    let refused = |error: crate::rig::EditError| Failure::Input(format!("`{}`: {error}", path.display()).into());
     match FileKind::of(path) {
         Some(FileKind::Template) => {
             let template = limits::load_template(path)?;
@@ -274,7 +274,7 @@ fn read(args: &RenderArgs, report: &mut Report) -> Result<Scene, Failure> {
             Ok(Scene { rig: template.rig, meshes: Vec::new() })
         }
         Some(FileKind::RigText) => {
-            let text = load_rig_text(&RealDisk, path)?;
+            let text = limits::load_rig_text(path)?;
             let mut rig = Rig::new(uids.next_uid(), "");
             for edit in import_rig_text(&text, &mut uids).0 {
                 rig.apply(&edit).map_err(refused)?;

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     algo::transfer::{TransferMesh, TransferSettings, transfer_weights},
-    files::{FileKind, RealDisk, load_rig_text, load_skin, stem, store_model, store_skin},
+    files::{FileKind, RealDisk, load_skin, stem, store_model, store_skin},
     headless::Workbench,
     rig::{
         Rig, SkinData, Uid, UidSource,
@@ -117,7 +117,7 @@ pub(super) fn load_rig(path: &Path, report: &mut Report) -> Result<Rig, Failure>
             report.notes(template.notes);
             return Ok(template.rig);
         }
-        Some(FileKind::RigText) => import_rig_text(&load_rig_text(&RealDisk, path)?, &mut uids).0,
+        Some(FileKind::RigText) => import_rig_text(&limits::load_rig_text(path)?, &mut uids).0,
         Some(kind) if kind.is_gltf() => {
             let model = limits::load_model(path)?;
             report.notes(model.notes.iter().cloned());

@@ -14,7 +14,8 @@ use std::{
 use rayon::prelude::*;
 
 use super::{
-    BUNDLED_CHARACTERS, BUNDLED_PARTS, Disk, Entry, EntryKind, FileKind, PartFiles, ReadError, SearchPaths, read_capped,
+    BUNDLED_CHARACTERS, BUNDLED_PARTS, Disk, Entry, EntryKind, FileKind, PartFiles, ReadError, SearchPaths,
+    read_capped, template_origin::way,
 };
 use crate::rig::{
     SourceError, Uid,
@@ -64,7 +65,9 @@ impl TemplatePlace {
     }
 
     /// Name by which a template in the folder `beside` calls this one as its part: relative to that folder or to one of the
-    /// site's, with `/` between folders; the whole path of a file that is in neither.
+    /// site's, with `/` between folders. A file that is in neither is called by its way from the folder
+    /// (`../limbs/arm.rig.ron`), since absolute paths out of the folders are refused; without a folder, or on another drive,
+    /// by its whole path.
     pub fn part_name(&self, beside: Option<&Path>, site: &SearchPaths) -> String {
         let path = match self {
             Self::Bundled(name) => return (*name).to_owned(),
@@ -75,7 +78,10 @@ impl TemplatePlace {
         let short = inside.filter_map(|folder| path.strip_prefix(folder).ok()).next();
         let parts: Vec<_> = match short {
             Some(short) => short.components().map(|part| part.as_os_str().to_string_lossy()).collect(),
-            None => return path.to_string_lossy().into_owned(),
+            None => {
+                let on_the_way = || way(&std::path::absolute(beside?).ok()?, &std::path::absolute(path).ok()?);
+                return on_the_way().unwrap_or_else(|| path.to_string_lossy().into_owned());
+            }
         };
         parts.join("/")
     }

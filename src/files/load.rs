@@ -296,7 +296,7 @@ pub fn load_joint_map(disk: &dyn Disk, path: &Path) -> Result<NamePairs, LoadErr
 
 /// Reads a `.rig` text.
 pub fn load_rig_text(disk: &dyn Disk, path: &Path) -> Result<RigText, LoadError> {
-    let bytes = read_capped(disk, path, MAX_RIG_BYTES)?;
+    let bytes = read_plausible(disk, path, MAX_RIG_BYTES, text::may_begin_with)?;
     text::parse(&bytes).map_err(|source| LoadError::RigText { path: path.into(), source })
 }
 

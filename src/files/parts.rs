@@ -7,7 +7,8 @@ use std::{
 };
 
 use super::{
-    Disk, PartCache, ReadError, SearchPaths, SiteError, read::is_missing, read_capped, similar_parts::similar_parts,
+    Disk, PartCache, ReadError, SearchPaths, SiteError, part_error::PartFileError, read::is_missing, read_capped,
+    similar_parts::similar_parts,
 };
 use crate::{
     modules,
@@ -15,7 +16,7 @@ use crate::{
     rig::{
         Rig, SourceError,
         nearest::listed,
-        part::{Part, PartError, PartInstance},
+        part::{Part, PartInstance},
         template::{self, PartSource, Template, read_template, text_of},
     },
 };
@@ -121,61 +122,12 @@ pub struct FoundPart {
     pub content: Vec<u8>,
 }
 
-/// Reason why a part of a template cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum PartFileError {
-    /// A part that uses itself, at any depth.
-    #[error("`{}` is a part of itself; take it out of one of the files", path.display())]
-    Cycle {
-        /// File of the part.
-        path: PathBuf,
-    },
-    /// A file that the list of contents does not have.
-    #[error("there is no file `{}`", path.display())]
-    Missing {
-        /// File of the part.
-        path: PathBuf,
-    },
-    /// A file that neither the template's folder nor the folders of the site have.
-    #[error("{source}; {folders} of the site's folders were searched, too")]
-    Nowhere {
-        /// Error of reading the file beside the template.
-        source: ReadError,
-        /// Number of folders of the site.
-        folders: usize,
-    },
-    /// A file that no folder has, and parts that are called alike.
-    #[error("there is no file `{}`; did you mean {nearest}?", path.display())]
-    Similar {
-        /// File of the part, beside its template.
-        path: PathBuf,
-        /// Names of such parts as a template calls them.
-        nearest: String,
-    },
-    /// A site file that cannot be read.
-    #[error(transparent)]
-    Site(#[from] SiteError),
-    /// A file that cannot be read.
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    /// A file that is no template, or has such a part itself.
-    #[error("`{}`: {source}", path.display())]
-    Template {
-        /// File of the part.
-        path: PathBuf,
-        /// Place and reason in that file.
-        source: SourceError,
-    },
-    /// A part that does not fit.
-    #[error(transparent)]
-    Part(#[from] PartError),
-    /// A part that was refused before.
-    #[error(transparent)]
-    Again(Arc<PartFileError>),
-}
-
 /// Reader of templates with their parts. A part is looked for beside its template, then in the folders of the site
 /// ([`SearchPaths`]), then among those that come with Rigsmith. The reader notes the files that it has asked for.
+///
+/// A template from elsewhere may name any file of the machine. An absolute path is one below the template's folder or a
+/// folder of the site, or it is refused, as a project's meshes are; ways up (`../parts/arm.rig.ron`) lead to parts that
+/// templates share.
 pub struct PartFiles<'a> {
     source: Source<'a>,
     modules: Modules,
@@ -268,7 +220,7 @@ impl<'a> PartFiles<'a> {
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let (modules, mirrored) = (self.modules.clone(), self.cache.mirrored.clone());
         let mirror = |module: &str, params: &str| mirrored.of(&modules, module, params);
-        template.with_parts(text, &mut |part| self.part(&folder.join(part), part), &mirror)
+        template.with_parts(text, &mut |part| self.part(&folder, part), &mirror)
     }
 
     /// Puts those parts into a template that can be had and fit, and tells all that is wrong with the others.
@@ -280,7 +232,7 @@ impl<'a> PartFiles<'a> {
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let (modules, mirrored) = (self.modules.clone(), self.cache.mirrored.clone());
         let mirror = |module: &str, params: &str| mirrored.of(&modules, module, params);
-        template.survey_parts(text, &mut |part| self.part(&folder.join(part), part), &mirror)
+        template.survey_parts(text, &mut |part| self.part(&folder, part), &mirror)
     }
 
     /// Every part instance of a template with its part, [fitted](PartInstance::fitted).
@@ -321,7 +273,7 @@ impl<'a> PartFiles<'a> {
 
     fn of_instance(&mut self, path: &Path, instance: &PartInstance) -> Result<Arc<Part>, PartFileError> {
         let folder = path.parent().unwrap_or(Path::new(""));
-        self.part(&folder.join(&instance.part), &instance.part)
+        self.part(folder, &instance.part)
     }
 
     /// Begins with another template, unless it is one of the parts of the present one: what stands in the way of a part, such as
@@ -332,8 +284,10 @@ impl<'a> PartFiles<'a> {
         }
     }
 
-    /// The part of that name, beside its template at `first` or elsewhere.
-    fn part(&mut self, first: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
+    /// The part of that name, beside its template, whose folder is given, or elsewhere.
+    fn part(&mut self, folder: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
+        self.check_inside(folder, Path::new(name))?;
+        let first = &folder.join(name);
         if let Some(known) = self.known.get(first) {
             return Ok(known.clone());
         }
@@ -344,6 +298,30 @@ impl<'a> PartFiles<'a> {
             let error = Arc::new(error);
             self.refused.insert(first.to_owned(), error.clone());
             PartFileError::Again(error)
+        })
+    }
+
+    /// Refuses an absolute path to a file that lies, links followed, neither below the template's folder nor below one of
+    /// the site's. Contents and parts that are given were read by others.
+    fn check_inside(&mut self, folder: &Path, name: &Path) -> Result<(), PartFileError> {
+        let Source::Disk(disk) = self.source else { return Ok(()) };
+        if !name.is_absolute() {
+            return Ok(());
+        }
+        let target = disk.canonical(name).unwrap_or_else(|_| name.to_owned());
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let is_below = |folder: &Path| disk.canonical(folder).is_ok_and(|folder| target.starts_with(folder));
+        if is_below(folder) || self.site()?.folders.iter().any(|folder| is_below(folder)) {
+            return Ok(());
+        }
+        Err(PartFileError::Outside { path: name.to_owned(), folder: folder.to_owned() })
+    }
+
+    /// The folders of the site, read once.
+    fn site(&mut self) -> Result<SearchPaths, SiteError> {
+        Ok(match &self.site {
+            Some(site) => site.clone(),
+            None => self.site.insert(SearchPaths::of_site()?).clone(),
         })
     }
 
@@ -409,10 +387,7 @@ impl<'a> PartFiles<'a> {
         if let Some(bytes) = self.read(disk, first)? {
             return Ok(Some((first.to_owned(), bytes)));
         }
-        let site = match &self.site {
-            Some(site) => site.clone(),
-            None => self.site.insert(SearchPaths::of_site()?).clone(),
-        };
+        let site = self.site()?;
         for path in site.candidates(Path::new(name)) {
             if let Some(bytes) = self.read(disk, &path)? {
                 return Ok(Some((path, bytes)));

@@ -18,7 +18,7 @@ use bevy::{
 
 use crate::{
     algo::face::expression::{ExpressionError, ExpressionSet},
-    files::{FileWatch, RealDisk, files_below, is_expression_file, stem},
+    files::{FileWatch, FoundFiles, LeftOut, RealDisk, files_below, is_expression_file, stem},
     plugins::{
         commands::RigModules,
         face::FaceExpressions,
@@ -122,6 +122,9 @@ pub enum FolderError {
     /// The file is no text.
     #[error("the file is not UTF-8; save it as a text")]
     Text,
+    /// The folder has more than is looked at.
+    #[error(transparent)]
+    LeftOut(#[from] LeftOut),
 }
 
 /// Looks at the files of watched folders.
@@ -131,7 +134,7 @@ struct FolderLooks {
     looked: Option<Instant>,
     /// The files, unless a task looks at them.
     files: Option<FolderFiles>,
-    task: Option<Task<(FolderFiles, Vec<SavedFile>)>>,
+    task: Option<Task<(FolderFiles, Vec<SavedFile>, Vec<LeftOut>)>>,
     /// Texts of expressions and units.
     faces: BTreeMap<PathBuf, String>,
 }
@@ -145,6 +148,8 @@ struct SavedFile {
 #[derive(Default)]
 struct FolderFiles {
     watches: BTreeMap<PathBuf, FileWatch>,
+    /// Parts of the folders that are not looked at.
+    left_out: BTreeSet<LeftOut>,
 }
 
 /// Levels of folders in a folder that are followed unless somebody says otherwise.
@@ -173,12 +178,18 @@ impl Kind {
 }
 
 impl FolderFiles {
-    /// Looks at all files of the folders. Returns those with another content.
-    fn look(&mut self, folders: &[WatchedFolder]) -> Vec<SavedFile> {
+    /// Looks at all files of the folders. Returns those with another content, and what is not looked at from now on.
+    fn look(&mut self, folders: &[WatchedFolder]) -> (Vec<SavedFile>, Vec<LeftOut>) {
         let is_wanted = |path: &Path| Kind::of(path).is_some();
-        let below = |folder: &WatchedFolder| files_below(&RealDisk, &folder.path, folder.depth, &is_wanted);
         // A folder may lie in another one.
-        let found: BTreeSet<PathBuf> = folders.iter().flat_map(below).collect();
+        let (mut found, mut left_out) = (BTreeSet::new(), BTreeSet::new());
+        for folder in folders {
+            let below: FoundFiles = files_below(&RealDisk, &folder.path, folder.depth, &is_wanted);
+            found.extend(below.files);
+            left_out.extend(below.left_out);
+        }
+        let news = left_out.difference(&self.left_out).cloned().collect();
+        self.left_out = left_out;
         let mut saved = Vec::new();
         self.watches.retain(|file, _| {
             let is_there = found.contains(file);
@@ -195,7 +206,7 @@ impl FolderFiles {
         }
         // Expressions may use units that are saved with them.
         saved.sort_by_key(|saved| !saved.file.to_string_lossy().ends_with(".units.ron"));
-        saved
+        (saved, news)
     }
 }
 
@@ -215,13 +226,16 @@ fn follow_folders(
         looks.looked = Some(Instant::now());
         let folders = folders.0.clone();
         looks.task = Some(AsyncComputeTaskPool::get().spawn(async move {
-            let saved = files.look(&folders);
-            (files, saved)
+            let (saved, left_out) = files.look(&folders);
+            (files, saved, left_out)
         }));
     }
-    let Some((files, saved)) = looks.task.as_mut().and_then(check_ready) else { return };
+    let Some((files, saved, left_out)) = looks.task.as_mut().and_then(check_ready) else { return };
     looks.task = None;
     looks.files = Some(files);
+    faults.write_batch(
+        left_out.into_iter().map(|part| FolderFault { file: part.folder().to_owned(), error: part.into() }),
+    );
     for SavedFile { file, content } in saved {
         let text = content.map(String::from_utf8).transpose().map_err(|_| FolderError::Text);
         let taken = text.and_then(|text| match (Kind::of(&file), text) {

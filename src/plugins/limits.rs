@@ -22,7 +22,8 @@ use super::{commands::RigModules, gesture::Gesture, surface::RigMesh};
 use crate::{
     mesh::model::Model,
     processor::BuildLimits,
-    rig::{Rig, animation::motion::Motion},
+    rig::{Rig, animation::motion::Motion, text::RigText},
+    solve::packed_clip::PackedSkeleton,
 };
 
 /// Limit that can be set.
@@ -54,10 +55,15 @@ pub enum Limit {
     Notes,
     /// Characters of one note or error.
     Message,
+    /// Bytes of the unpacked clips of a file, beyond [`UNPACKED_FOR_A_BYTE`] for each byte of the file.
+    Unpacked,
 }
 
+/// Bytes of unpacked clips that are taken for each byte of their file.
+pub const UNPACKED_FOR_A_BYTE: u64 = 12;
+
 /// Name, value and meaning of each limit, in the order of [`Limit`].
-const LIMITS: [(Limit, &str, u64, &str); 13] = [
+const LIMITS: [(Limit, &str, u64, &str); 14] = [
     (Limit::Joints, "joints", 500_000, "joints of a rig"),
     (Limit::Nodes, "nodes", 16_384, "nodes and constraints that the commands of a rig make"),
     (Limit::Attributes, "attributes", 1_024, "attributes of one node"),
@@ -71,6 +77,7 @@ const LIMITS: [(Limit, &str, u64, &str); 13] = [
     (Limit::Listed, "listed", 200, "joints and problems that are listed for people"),
     (Limit::Notes, "notes", 200, "notes of one command"),
     (Limit::Message, "message", 1_500, "characters of one note or error"),
+    (Limit::Unpacked, "unpacked", 40_000_000, "bytes of the unpacked clips of a file, beyond 12 for each of its bytes"),
 ];
 
 impl Limit {
@@ -224,6 +231,28 @@ impl RigLimits {
         self.check(Limit::Joints, motion.joints.len(), file, "the motion")
     }
 
+    /// Refuses packed clips that take more memory than is taken while they become clips of a rig.
+    ///
+    /// # Errors
+    /// [`LimitError`].
+    pub fn check_packed(&self, file: &str, packed: &PackedSkeleton) -> Result<(), LimitError> {
+        let count = packed.unpacked_bytes();
+        if count <= self.get(Limit::Unpacked) {
+            return Ok(());
+        }
+        let for_file = UNPACKED_FOR_A_BYTE.saturating_mul(packed.to_bytes().len() as u64);
+        let limit = self.get(Limit::Unpacked).saturating_add(for_file);
+        self.check_against(limit, Limit::Unpacked, count, file, "the motion")
+    }
+
+    /// Refuses a skeleton of a text with more joints than are taken.
+    ///
+    /// # Errors
+    /// [`LimitError`].
+    pub fn check_rig_text(&self, file: &str, text: &RigText) -> Result<(), LimitError> {
+        self.check(Limit::Joints, text.joints.len(), file, "the rig")
+    }
+
     /// Refuses a list with more gestures than are taken, or with a stroke of more points.
     ///
     /// # Errors
@@ -244,7 +273,10 @@ impl RigLimits {
 
     /// Refuses a count above a limit.
     pub(super) fn check(&self, of: Limit, count: usize, file: &str, holder: &str) -> Result<(), LimitError> {
-        let (count, limit) = (count as u64, self.get(of));
+        self.check_against(self.get(of), of, count as u64, file, holder)
+    }
+
+    fn check_against(&self, limit: u64, of: Limit, count: u64, file: &str, holder: &str) -> Result<(), LimitError> {
         if count <= limit {
             return Ok(());
         }

@@ -19,7 +19,7 @@ use serde_json::Value;
 use self::{
     bits::{Reader, write_number},
     steps::Steps,
-    track::PackedTrack,
+    track::{PackedTrack, REST},
 };
 use super::{
     bake_clip::{BakeError, BakedNode, part_of, sample_nodes},
@@ -48,6 +48,13 @@ const MOST_NODES: u32 = 1_000_000;
 const MOST_TEXT: usize = 1 << 20;
 /// Parts of a transform, in the order of their tracks.
 const PARTS: [Property; 3] = [Property::Translation, Property::Rotation, Property::Scale];
+/// Bytes of memory of what is unpacked: of a key as key of a channel and of a rig, of a key of the track that is being
+/// changed from one to the other, of a track and a clip without their keys, and of a byte of their texts.
+const KEY_BYTES: u64 = 76;
+const CHANGED_KEY_BYTES: u64 = 56;
+const TRACK_BYTES: u64 = 300;
+const CLIP_BYTES: u64 = 500;
+const TEXT_BYTES: u64 = 32;
 
 /// Motion of a skeleton's nodes in few bytes.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,8 +65,19 @@ pub struct PackedClip {
     rate: f32,
     duration: f32,
     frames: u32,
-    /// Translation, rotation and scale of each node.
-    nodes: Vec<[PackedTrack; 3]>,
+    /// Count of nodes, most parts of which may stay at rest.
+    node_count: u32,
+    /// Tracks of the parts that do not stay at rest, by node and part.
+    tracks: Vec<NodeTrack>,
+}
+
+/// Track of a part of a node.
+#[derive(Debug, Clone, PartialEq)]
+struct NodeTrack {
+    node: u32,
+    /// Place of the property in [`PARTS`].
+    part: u8,
+    track: PackedTrack,
 }
 
 /// Reason for not reading a packed clip.
@@ -102,7 +120,8 @@ pub fn pack_clip(
         rate,
         duration: times.last().copied().unwrap_or_default(),
         frames: times.len() as u32,
-        nodes: Vec::new(),
+        node_count: 0,
+        tracks: Vec::new(),
     };
     Ok(about.packed(&times, &sampled, &rests, tolerance))
 }
@@ -126,7 +145,8 @@ pub fn pack_motion(motion: &Motion, tolerance: &KeyTolerance) -> PackedClip {
         rate,
         duration: frames.saturating_sub(1) as f32 / rate,
         frames,
-        nodes: Vec::new(),
+        node_count: 0,
+        tracks: Vec::new(),
     };
     let times: Vec<f32> = (0..frames).map(|frame| about.time(frame)).collect();
     about.duration = times.last().copied().unwrap_or_default();
@@ -146,7 +166,17 @@ impl PackedClip {
 
     /// Number of keys of all tracks.
     pub fn key_count(&self) -> usize {
-        self.nodes.iter().flatten().map(PackedTrack::len).sum()
+        self.tracks.iter().map(|own| own.track.len()).sum()
+    }
+
+    /// Bytes of memory that the clip takes, about, while it is unpacked and becomes a clip of a rig. Few bytes of a file may
+    /// be many keys.
+    pub fn unpacked_bytes(&self) -> u64 {
+        let keys = |own: &NodeTrack| own.track.len() as u64;
+        let tracks: u64 = self.tracks.iter().map(|own| TRACK_BYTES + KEY_BYTES * keys(own)).sum();
+        let longest = self.tracks.iter().map(keys).max().unwrap_or_default();
+        let texts = (self.name.len() + self.extras.len()) as u64;
+        CLIP_BYTES + TEXT_BYTES * texts + tracks + CHANGED_KEY_BYTES * longest
     }
 
     /// Second of a frame.
@@ -155,7 +185,7 @@ impl PackedClip {
     }
 
     fn packed(mut self, times: &[f32], nodes: &[SampledNode], rests: &[Trs], tolerance: &KeyTolerance) -> Self {
-        self.nodes = vec![Default::default(); nodes.len()];
+        self.node_count = nodes.len() as u32;
         if times.is_empty() {
             return self;
         }
@@ -186,32 +216,35 @@ impl PackedClip {
             let rest = part_of(&rests[*node], &PARTS[*part]);
             let is_rest =
                 track.constant().is_some_and(|value| value.iter().zip(&rest).all(|(a, b)| (a - b).abs() < 1e-6));
-            self.nodes[*node][*part] = if is_rest { PackedTrack::default() } else { track };
+            if !is_rest {
+                self.tracks.push(NodeTrack { node: *node as u32, part: *part as u8, track });
+            }
         }
+        self.tracks.sort_by_key(|own| (own.node, own.part));
         self
     }
 
     /// The clip as channels of linear keys, whose targets are places among the nodes. Parts that stay at rest have none.
     pub fn unpacked(&self) -> Clip {
-        let mut channels = Vec::new();
-        for (node, tracks) in self.nodes.iter().enumerate() {
-            for (property, track) in PARTS.iter().zip(tracks) {
-                let keys = track.keys(property);
-                if keys.is_empty() {
-                    continue;
-                }
-                let target = match property {
-                    Property::Translation => ChannelTarget::Translation(node),
-                    Property::Rotation => ChannelTarget::Rotation(node),
-                    Property::Scale | Property::Attribute(_) => ChannelTarget::Scale(node),
-                };
-                let times = keys.iter().map(|(frame, _)| self.time(*frame)).collect();
-                let values = keys.iter().flat_map(|(_, value)| value[..property.width()].to_vec()).collect();
-                channels.push(Channel { target, interpolation: Interpolation::Linear, times, values });
-            }
-        }
+        let channels = self.tracks.iter().filter(|own| own.track.len() > 0).map(|own| self.channel(own)).collect();
         let extras = serde_json::from_str::<Value>(&self.extras).ok();
         Clip { name: self.name.clone(), channels, extras }
+    }
+
+    fn channel(&self, own: &NodeTrack) -> Channel {
+        let (property, node) = (&PARTS[usize::from(own.part)], own.node as usize);
+        let target = match property {
+            Property::Translation => ChannelTarget::Translation(node),
+            Property::Rotation => ChannelTarget::Rotation(node),
+            Property::Scale | Property::Attribute(_) => ChannelTarget::Scale(node),
+        };
+        let (count, width) = (own.track.len(), property.width());
+        let (mut times, mut values) = (Vec::with_capacity(count), Vec::with_capacity(count * width));
+        own.track.each_key(property, |frame, value| {
+            times.push(self.time(frame));
+            values.extend_from_slice(&value[..width]);
+        });
+        Channel { target, interpolation: Interpolation::Linear, times, values }
     }
 
     /// Bytes of the clip.
@@ -224,8 +257,14 @@ impl PackedClip {
         out.extend(self.rate.to_le_bytes());
         out.extend(self.duration.to_le_bytes());
         write_number(&mut out, self.frames);
-        write_number(&mut out, self.nodes.len() as u32);
-        self.nodes.iter().flatten().for_each(|track| track.write(&mut out));
+        write_number(&mut out, self.node_count);
+        let mut tracks = self.tracks.iter().peekable();
+        for place in (0..self.node_count).flat_map(|node| (0..PARTS.len() as u8).map(move |part| (node, part))) {
+            match tracks.next_if(|own| (own.node, own.part) == place) {
+                Some(own) => own.track.write(&mut out),
+                None => out.push(REST),
+            }
+        }
         out
     }
 
@@ -253,19 +292,19 @@ impl PackedClip {
         if frames >= 2 && duration <= (frames - 2) as f32 / rate {
             return Err(PackedClipError::Damaged { what: "a duration of fewer frames", at: reader.at() });
         }
-        let count = reader.number("a count of nodes", MOST_NODES)?;
-        let mut nodes: Vec<[PackedTrack; 3]> = Vec::new();
-        for _ in 0..count {
-            let mut node: [PackedTrack; 3] = Default::default();
-            for (track, property) in node.iter_mut().zip(&PARTS) {
-                *track = PackedTrack::read(&mut reader, property, frames)?;
+        let node_count = reader.number("a count of nodes", MOST_NODES)?;
+        let mut tracks: Vec<NodeTrack> = Vec::new();
+        for node in 0..node_count {
+            for (part, property) in (0..).zip(&PARTS) {
+                if let Some(track) = PackedTrack::read(&mut reader, property, frames)? {
+                    tracks.push(NodeTrack { node, part, track });
+                }
             }
-            nodes.push(node);
         }
         if !reader.is_empty() {
             return Err(PackedClipError::Damaged { what: "more bytes", at: reader.at() });
         }
-        Ok(Self { name, extras, rate, duration, frames, nodes })
+        Ok(Self { name, extras, rate, duration, frames, node_count, tracks })
     }
 }
 

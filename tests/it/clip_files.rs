@@ -180,6 +180,34 @@ fn what_channels_cannot_hold_goes_out_and_in_again() {
     assert_eq!(ClipExtras::read(file.clips[0].extras.as_ref()), ClipExtras::of(&plain, 29.97));
 }
 
+/// A few keys far apart are not sampled into more memory than a file of this size may take; keys of each frame are.
+#[test]
+fn frames_between_keys_that_lie_far_apart_are_bounded() {
+    let nodes = 2_000;
+    let node = |number: usize| Node {
+        name: format!("joint {number}"),
+        parent: None,
+        rest: Trs::default(),
+        joint: true,
+        extras: None,
+    };
+    let clip = |times: Vec<f32>, nodes: usize| {
+        let channel = |node: usize| Channel {
+            target: ChannelTarget::Rotation(node),
+            interpolation: Interpolation::Linear,
+            times: times.clone(),
+            values: times.iter().flat_map(|_| [0.0, 0.0, 0.0, 1.0]).collect(),
+        };
+        Clip { name: "long".to_owned(), channels: (0..nodes).map(channel).collect(), extras: None }
+    };
+    let model = Model { nodes: (0..nodes).map(node).collect(), ..Model::default() };
+    let sparse = motion_of(&model, &clip(vec![0.0, 1_000.0], nodes));
+    assert!(sparse.values.len() <= 8 << 20 && sparse.frames() >= 1_000, "{} frames", sparse.frames());
+    assert!(sparse.notes.iter().any(|note| note.contains("\"long\" has more than")), "{:?}", sparse.notes);
+    let dense = motion_of(&model, &clip((0..3_000).map(|frame| frame as f32 / 30.0).collect(), 4));
+    assert_eq!((dense.frames(), dense.notes.len()), (3_000, 0), "{:?}", dense.notes);
+}
+
 #[test]
 fn damaged_extras_are_passed_over_and_others_stay() {
     let read = |text: &str| ClipExtras::read(Some(&serde_json::from_str(text).unwrap()));

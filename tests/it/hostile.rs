@@ -318,8 +318,10 @@ fn files_and_builds_stay_within_their_memory() {
     // Objects of one triangle each, which are more than a file of this size may have.
     let object = |n: usize| format!("o p{n}\nv {n} 0 0\nv {n} 1 0\nv {n} 0 1\nf -3 -2 -1\n");
     fs::write(at("objects.obj"), (0..40_000).map(object).collect::<String>()).unwrap();
-    fs::write(at("clips.rigclip"), resting_clips(1_000, 500)).unwrap();
-    assert_eq!(load_packed_clips(&RealDisk, &at("clips.rigclip")).unwrap().clips.len(), 500);
+    fs::write(at("clips.rigclip"), resting_clips(1_000, 3_000)).unwrap();
+    assert_eq!(load_packed_clips(&RealDisk, &at("clips.rigclip")).unwrap().clips.len(), 3_000);
+    fs::write(at("two.rig"), skeleton(2, true)).unwrap();
+    fs::write(at("dense.rigclip"), crate::packed_clips::dense_clip(1 << 20)).unwrap();
     fs::write(at("chain.rig"), skeleton(8_000, true)).unwrap();
     fs::write(at("long.rig"), skeleton(40_000, true)).unwrap();
     fs::write(at("unknown.rig.ron"), tags(6_000, |_| command("nope", ""))).unwrap();
@@ -333,6 +335,8 @@ fn files_and_builds_stay_within_their_memory() {
         (&["convert", "soup.obj", "soup.glb"], size("soup.obj")),
         (&["info", "clips.rigclip"], size("clips.rigclip")),
         (&["check", "clips.rigclip"], size("clips.rigclip")),
+        (&["info", "dense.rigclip"], size("dense.rigclip")),
+        (&["animate", "two.rig", "dense.rigclip", "-o", "dense.anim.ron"], size("dense.rigclip")),
         (&["check", "objects.obj"], size("objects.obj")),
         (&["convert", "objects.obj", "objects.glb"], size("objects.obj")),
         (&["check", "chain.rig"], size("chain.rig")),
@@ -369,8 +373,8 @@ fn gigabytes_of_nothing_are_not_read() {
     let folder = tempfile::tempdir().unwrap();
     let long = |name: &str, size: u64| fs::File::create(folder.path().join(name)).unwrap().set_len(size).unwrap();
     let large = ["zeros.glb", "zeros.gltf", "zeros.vrm", "zeros.skin", "zeros.bvh"].map(|name| (name, 3 << 30));
-    // Packed clips of more than a gigabyte are too large, whatever is in them.
-    for (name, size) in large.into_iter().chain([("zeros.rigclip", 1 << 30)]) {
+    // Packed clips and skeletons of more than a gigabyte are too large, whatever is in them.
+    for (name, size) in large.into_iter().chain([("zeros.rigclip", 1 << 30), ("zeros.rig", 1 << 30)]) {
         long(name, size);
         let (ended, answer) = json_answer(folder.path(), &["check", name]);
         assert_eq!(ended.code, Some(1), "{answer}");

@@ -5,11 +5,12 @@ use std::sync::Arc;
 use rigsmith::{
     mesh::model::{Clip, Model, Node},
     modules,
+    plugins::limits::{Limit, RigLimits},
     processor::Builder,
     rig::{
         Rig,
         animation::{
-            Marker,
+            Key, Marker,
             clip_extras::ClipExtras,
             file_clip::motion_of,
             joint_map::JointMap,
@@ -20,7 +21,7 @@ use rigsmith::{
     },
     solve::{
         bake_clip::BakedNode,
-        packed_clip::{PackedClip, PackedClipError, pack_clip, pack_motion},
+        packed_clip::{PackedClip, PackedClipError, PackedSkeleton, pack_clip, pack_motion},
         program::{CompileOptions, RigProgram},
         retarget::{RetargetSettings, retarget},
     },
@@ -115,6 +116,73 @@ fn rotations_all_around_and_single_frames_are_kept() {
         assert_eq!(packed.frames(), frames);
         assert_eq!(PackedClip::from_bytes(&packed.to_bytes()).unwrap(), packed);
     }
+}
+
+fn put_number(out: &mut Vec<u8>, mut number: u32) {
+    while number >= 0x80 {
+        out.push(number as u8 | 0x80);
+        number >>= 7;
+    }
+    out.push(number as u8);
+}
+
+/// A file with one node, whose rotation has a value for each frame, each of them in three bits.
+pub fn dense_clip(frames: u32) -> Vec<u8> {
+    let floats = |out: &mut Vec<u8>, list: &[f32]| list.iter().for_each(|number| out.extend(number.to_le_bytes()));
+    let mut clip = b"rigclip1\0\0".to_vec();
+    floats(&mut clip, &[30.0, frames as f32 / 30.0]);
+    put_number(&mut clip, frames);
+    put_number(&mut clip, 1);
+    // Translation and scale stay at rest; steps of a rotation begin with the middle one, the first numbers and a step.
+    clip.extend([0, 4, 1]);
+    floats(&mut clip, &[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1e-3]);
+    for _ in 0..3 {
+        clip.extend([1, 0]);
+        put_number(&mut clip, frames.div_ceil(8));
+        clip.resize(clip.len() + frames.div_ceil(8) as usize, 0);
+    }
+    clip.push(0);
+    let mut out = b"rigpack1\x01".to_vec();
+    out.extend(7_u64.to_le_bytes());
+    out.extend([0, 0]);
+    floats(&mut out, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]);
+    out.push(1);
+    put_number(&mut out, clip.len() as u32);
+    out.extend(clip);
+    out
+}
+
+/// Bytes of the keys of a clip, in a file's model and in a rig.
+fn bytes_of_keys(clip: &Clip) -> u64 {
+    let bytes = |numbers: usize| (size_of::<f32>() * numbers) as u64;
+    let channel = |channel: &rigsmith::mesh::model::Channel| {
+        bytes(channel.times.len() + channel.values.len()) + (size_of::<Key>() * channel.times.len()) as u64
+    };
+    clip.channels.iter().map(channel).sum()
+}
+
+#[test]
+fn memory_of_unpacked_clips_is_known_and_bounded() {
+    let limits = RigLimits::default();
+    let swinging = pack_motion(&swinging(), &KeyTolerance::captured().for_height(170.0));
+    let dense = PackedSkeleton::from_bytes(&dense_clip(5_000)).unwrap();
+    let whole = dense.model("dense").clips.remove(0);
+    assert_eq!(whole.channels.iter().map(|channel| channel.times.len()).collect::<Vec<_>>(), [5_000]);
+    assert!(swinging.unpacked_bytes() >= bytes_of_keys(&swinging.unpacked()));
+    let (told, keys) = (dense.unpacked_bytes(), bytes_of_keys(&whole));
+    assert!(told >= keys && told < 3 * keys, "{told} for {keys}");
+    limits.check_packed("dense.rigclip", &dense).unwrap();
+
+    // 400 KB with a million keys.
+    let bytes = dense_clip(1 << 20);
+    let dense = PackedSkeleton::from_bytes(&bytes).unwrap();
+    assert_eq!(dense.to_bytes(), bytes);
+    let error = limits.check_packed("dense.rigclip", &dense).unwrap_err();
+    assert_eq!((error.name, error.count), ("unpacked", dense.unpacked_bytes()));
+    assert_eq!(error.limit, limits.get(Limit::Unpacked) + 12 * bytes.len() as u64);
+    let text = error.to_string();
+    assert!(text.contains("`dense.rigclip`") && text.contains(&format!("--limit unpacked={}", error.count)), "{text}");
+    limits.with(Limit::Unpacked, error.count).check_packed("dense.rigclip", &dense).unwrap();
 }
 
 #[test]

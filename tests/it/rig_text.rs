@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use glam::Vec3;
 use proptest::prelude::*;
-use rigsmith::rig::text::{RigText, RigTextError, RigTextJoint, parse, write};
+use rigsmith::rig::text::{RigText, RigTextError, RigTextJoint, may_begin_with, parse, write};
 
 fn joint(parent: Option<usize>, position: [f32; 3], label: Option<&str>) -> RigTextJoint {
     RigTextJoint { parent, position: position.into(), label: label.map(str::to_owned) }
@@ -233,5 +233,25 @@ proptest! {
         let read = parse(written.text.as_bytes()).unwrap();
         prop_assert_eq!(read.joints.len(), labels.len());
         prop_assert!(write(&read).unwrap().relabelled.is_empty());
+    }
+}
+
+/// The first bytes of a file are enough to refuse it, and a refused beginning is refused like the whole file.
+#[test]
+fn beginnings_of_other_files_are_known() {
+    for text in
+        ["", "rig 1", "\u{FEFF}rig 1\njoint", "# a comment", "\n\n  # one\r\n\trig 1", "ri", "rig 9", "# cut \u{e9}"]
+    {
+        assert!(may_begin_with(text.as_bytes()), "{text:?}");
+    }
+    // The last character is cut.
+    assert!(may_begin_with(&"# cut \u{e9}".as_bytes()[..7]));
+    let others: [&[u8]; 6] =
+        [&[0; 4096], b"joint 0 -1 0 0 0", b"# a\n{}", b"\xFF\xFEr\0i\0g\0", b"glTF\x02\0\0\0", b"rig 1\n\xFF\xFF"];
+    for bytes in others {
+        assert!(!may_begin_with(bytes), "{bytes:?}");
+        let longer = [bytes, b"\njoint 0 -1 0 0 0\n"].concat();
+        assert_eq!(parse(bytes), parse(&longer), "{bytes:?}");
+        assert!(parse(bytes).is_err());
     }
 }

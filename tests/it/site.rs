@@ -3,7 +3,10 @@
 use std::{cmp::Ordering, fs, path::Path};
 
 use rigsmith::{
-    files::{PartFiles, RealDisk, SITE_FILE, SearchPaths, SiteError, TemplateWatch},
+    files::{
+        ExpressionFileError, LeftOut, PartFiles, RealDisk, SITE_FILE, SearchPaths, SiteError, TemplateWatch,
+        files_below, is_expression_file, load_expressions,
+    },
     rig::{
         RigAbout,
         template::{read_template, write_template},
@@ -117,4 +120,78 @@ fn parts_are_found_in_the_project_then_in_the_site_and_each_place_is_watched() {
     let error = load().0.unwrap_err();
     assert!(error.message.contains("part of itself"), "{error}");
     assert_eq!(read_template(template.as_bytes()).unwrap().parts.len(), 1);
+}
+
+/// Templates from elsewhere name no files of the machine, as projects do not: an absolute path leads below the template's
+/// folder or below one of the site's.
+#[test]
+fn absolute_paths_of_parts_stay_in_the_folders() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for place in ["project/parts", "site", "away"] {
+        fs::create_dir_all(at(place)).unwrap();
+        fs::write(at(place).join("p.rig.ron"), PART).unwrap();
+    }
+    let site = SearchPaths { folders: vec![at("site")] };
+    let read = |part: &Path| {
+        let text =
+            format!("(format: 2, name: \"t\", joints: [(label: \"b\")], parts: [(part: {part:?}, parent: \"b\")])");
+        PartFiles::new(&RealDisk).with_site(site.clone()).complete(&at("project/t.rig.ron"), text.as_bytes())
+    };
+    for inside in [at("project/parts/p.rig.ron"), at("site/p.rig.ron"), "../away/p.rig.ron".into()] {
+        assert!(read(&inside).unwrap().rig.find_label("a").is_some(), "{inside:?}");
+    }
+    let refused = |part: &Path| {
+        let error = read(part).unwrap_err();
+        let (path, folder) = (part.display().to_string(), at("project").display().to_string());
+        let is_told =
+            [path.as_str(), folder.as_str(), "RIGSMITH_TEMPLATES"].iter().all(|word| error.message.contains(word));
+        assert!(is_told && error.message.contains("is not read"), "{error}");
+    };
+    refused(&at("away/p.rig.ron"));
+    refused(&at("project/../away/p.rig.ron"));
+    refused(&at("away/nothing.rig.ron"));
+    // A part of the site is no way out.
+    let nested = PART.replace(
+        "joints:",
+        &format!("parts: [(part: {:?}, parent: \"a\", prefix: \"q_\")], joints:", at("away/p.rig.ron")),
+    );
+    fs::write(at("site/n.rig.ron"), nested).unwrap();
+    let error = read(Path::new("n.rig.ron")).unwrap_err();
+    assert!(error.to_string().contains("is not read"), "{error}");
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(at("away/p.rig.ron"), at("project/parts/link.rig.ron")).unwrap();
+        refused(&at("project/parts/link.rig.ron"));
+    }
+}
+
+/// A folder that is too full gives its first files, in order, and says which ones are left out.
+#[test]
+fn files_that_are_left_out_of_a_folder_are_told() {
+    let full = tempfile::tempdir().unwrap();
+    let at = |name: &str| full.path().join(name);
+    fs::create_dir(at("a")).unwrap();
+    fs::write(at("a/below.expr.ron"), "").unwrap();
+    (0..1003).for_each(|number| fs::write(at(&format!("e{number:04}.expr.ron")), "").unwrap());
+    let found = files_below(&RealDisk, full.path(), 3, &is_expression_file);
+    let files: Vec<_> = (0..1000).map(|number| at(&format!("e{number:04}.expr.ron"))).collect();
+    assert!(found.files == files, "{} files, first {:?}", found.files.len(), found.files.first());
+    let first = at("e1000.expr.ron");
+    assert_eq!(found.left_out, [LeftOut::Files { folder: full.path().to_owned(), first }]);
+
+    let many = tempfile::tempdir().unwrap();
+    (0..10_000).for_each(|number| fs::write(many.path().join(format!("a{number:05}.txt")), "").unwrap());
+    fs::write(many.path().join("z.expr.ron"), "(").unwrap();
+    let found = files_below(&RealDisk, many.path(), 3, &is_expression_file);
+    assert_eq!((found.files.len(), found.left_out.len()), (0, 1), "{found:?}");
+    let folders = [many.path().to_owned()];
+    let told = |faults: &[ExpressionFileError]| faults.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let faults = told(&load_expressions(&RealDisk, &folders).1);
+    let name = many.path().display().to_string();
+    assert!(matches!(&faults[..], [one] if one.contains(&name) && one.contains("`a09999.txt`")), "{faults:?}");
+    // With one name less the file is looked at.
+    fs::remove_file(many.path().join("a00000.txt")).unwrap();
+    let faults = told(&load_expressions(&RealDisk, &folders).1);
+    assert!(matches!(&faults[..], [one] if one.contains("z.expr.ron")), "{faults:?}");
 }

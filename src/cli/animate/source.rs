@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     cli::{Failure, Report, limits, progress::spinning, report::counted},
-    files::{FileKind, RealDisk, load_animation, load_joint_map, load_motion, load_packed_clips, save_atomic, stem},
+    files::{FileKind, RealDisk, load_animation, load_joint_map, load_motion, save_atomic, stem},
     headless::{Workbench, posing::PoseError},
     mesh::model::Model,
     rig::{
@@ -61,8 +61,7 @@ pub(super) fn clips(
                 taking.add_model(path, &model, bench, report)?;
             }
             Some(FileKind::PackedClips) => {
-                let model = load_packed_clips(&RealDisk, path)?.model(&stem(path));
-                limits::check_model(path, &model)?;
+                let model = spinning("unpacking the clips", || limits::load_packed_clips(path))?;
                 taking.add_model(path, &model, bench, report)?;
             }
             Some(FileKind::Bvh) => {

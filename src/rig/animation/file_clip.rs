@@ -27,6 +27,9 @@ const USUAL_RATE: f32 = 60.0;
 /// Most frames, and most values, of a motion that is sampled from a clip.
 const MAX_FRAMES: usize = 200_000;
 const MAX_VALUES: usize = 32 << 20;
+/// Values that any clip may have, and those that it may have for each value of its keys: two keys may lie hours apart.
+const FEW_VALUES: usize = 8 << 20;
+const VALUES_FOR_A_VALUE: usize = 4;
 /// Bound of numbers of a motion; larger ones are damage.
 const MAX_NUMBER: f32 = 1e9;
 
@@ -139,7 +142,9 @@ pub fn motion_of(model: &Model, clip: &Clip) -> Motion {
     motion.markers = facts.markers.iter().map(in_motion).collect();
     let rate = facts.frame_rate.unwrap_or_else(|| frame_rate(clip, start));
     motion.frame_time = 1.0 / rate;
-    let most = MAX_FRAMES.min(MAX_VALUES / motion.width().max(1));
+    let given: usize = tracks.iter().map(|(_, property, track)| track.keys.len() * property.width()).sum();
+    let most_values = MAX_VALUES.min(FEW_VALUES.max(VALUES_FOR_A_VALUE * given));
+    let most = MAX_FRAMES.min(most_values / motion.width().max(1));
     let wanted = (f64::from(end - start) * f64::from(rate) + 0.02).floor();
     let count = (wanted as usize).saturating_add(1).min(most);
     if wanted as usize >= most {

@@ -79,6 +79,18 @@ pub fn parse(bytes: &[u8]) -> Result<RigText, RigTextError> {
     connect(rows)
 }
 
+/// False if the first bytes of a file show that it is no `.rig` text, so that [`parse`] refuses them like the whole file.
+pub fn may_begin_with(bytes: &[u8]) -> bool {
+    let text = match std::str::from_utf8(bytes) {
+        Ok(text) => text.strip_prefix('\u{FEFF}').unwrap_or(text),
+        // The last character may go on.
+        Err(error) => return error.error_len().is_none(),
+    };
+    let keyword =
+        lines(text).find_map(|(_, line)| line.split_whitespace().next().filter(|word| !word.starts_with('#')));
+    keyword.is_none_or(|keyword| "rig".starts_with(keyword) || keyword.starts_with("rig"))
+}
+
 fn decode(bytes: &[u8]) -> Result<&str, RigTextError> {
     if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
         return Err(RigTextError::Utf16);

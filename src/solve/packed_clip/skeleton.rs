@@ -80,6 +80,11 @@ impl PackedSkeleton {
         }
     }
 
+    /// Bytes of memory that the clips take, about, while they are unpacked and become clips of a rig.
+    pub fn unpacked_bytes(&self) -> u64 {
+        self.clips.iter().map(PackedClip::unpacked_bytes).sum()
+    }
+
     /// True if bytes begin as those of a skeleton with packed clips do.
     pub fn may_begin_with(bytes: &[u8]) -> bool {
         bytes.starts_with(MAGIC)
@@ -149,7 +154,7 @@ impl PackedSkeleton {
                 PackedClipError::CutOff(at) => PackedClipError::CutOff(begin + at),
                 PackedClipError::Damaged { what, at } => PackedClipError::Damaged { what, at: begin + at },
             })?;
-            if clip.nodes.len() != nodes.len() {
+            if clip.node_count as usize != nodes.len() {
                 return Err(PackedClipError::Damaged { what: "a clip of another skeleton", at: begin });
             }
             clips.push(clip);

@@ -74,7 +74,8 @@ impl Steps {
             };
             let numbers: Vec<Vec<i64>> = (0..width).map(whole).collect::<Option<_>>()?;
             let is_near = |(frame, value): (usize, &[f32; 4])| {
-                difference(property, value, &scale.value(property, &numbers, frame)) <= most
+                let at = |axis: usize| numbers.get(axis).map_or(0, |list| list[frame]);
+                difference(property, value, &scale.value(property, &std::array::from_fn(at))) <= most
             };
             let is_good = values.iter().enumerate().all(is_near);
             is_good.then(|| {
@@ -89,11 +90,16 @@ impl Steps {
         self.count as usize
     }
 
-    /// Values, one a frame.
-    pub fn values(&self, property: &Property) -> Vec<[f32; 4]> {
-        let numbers: Vec<Vec<i64>> =
-            self.numbers.iter().map(|list| list.numbers(self.count).unwrap_or_default()).collect();
-        (0..self.len()).map(|frame| self.scale.value(property, &numbers, frame)).collect()
+    /// Calls a function with each frame and its value.
+    pub fn each_value(&self, property: &Property, mut take: impl FnMut(u32, [f32; 4])) {
+        let mut lists: Vec<Numbers> = self.numbers.iter().map(Residuals::numbers).collect();
+        for frame in 0..self.count {
+            let mut numbers = [0; 4];
+            for (number, list) in numbers.iter_mut().zip(&mut lists) {
+                *number = list.next().unwrap_or_default();
+            }
+            take(frame, self.scale.value(property, &numbers));
+        }
     }
 
     pub fn write(&self, out: &mut Vec<u8>) {
@@ -133,10 +139,11 @@ impl Steps {
             let list = Residuals { order, shift, bits: reader.bytes(length as usize)?.to_vec() };
             // A number takes a bit at least.
             let is_long = list.bits.len().saturating_mul(8) >= count as usize;
-            let is_good = (1..=3).contains(&order) && shift <= MOST_SHIFT && is_long;
-            let numbers = if is_good { list.numbers(count) } else { None };
-            let is_small = |number: &i64| number.unsigned_abs() < MOST_STEPS as u64;
-            numbers.filter(|numbers| numbers.iter().all(is_small)).map(|_| list).ok_or(damaged("numbers"))
+            let is_told = (1..=3).contains(&order) && shift <= MOST_SHIFT && is_long;
+            let is_small = |number: i64| number.unsigned_abs() < MOST_STEPS as u64;
+            let mut numbers = list.numbers();
+            let is_good = is_told && (0..count).all(|_| numbers.next().is_some_and(is_small));
+            if is_good { Ok(list) } else { Err(damaged("numbers")) }
         };
         let numbers = (0..if has_range { 3 } else { 4 }).map(|_| list()).collect::<Result<_, _>>()?;
         Ok(Self { count, scale: Scale { range: has_range.then_some(range), first, step }, numbers })
@@ -150,12 +157,9 @@ fn own_numbers(property: &Property, range: &Option<ValueRange>, value: &[f32; 4]
 }
 
 impl Scale {
-    /// Value at a frame of lists of whole numbers.
-    fn value(&self, property: &Property, numbers: &[Vec<i64>], frame: usize) -> [f32; 4] {
-        let number = |axis: usize| {
-            let steps = numbers.get(axis).and_then(|list| list.get(frame)).copied().unwrap_or_default();
-            self.first[axis] + steps as f32 * self.step
-        };
+    /// Value of whole numbers of steps.
+    fn value(&self, property: &Property, numbers: &[i64; 4]) -> [f32; 4] {
+        let number = |axis: usize| self.first[axis] + numbers[axis] as f32 * self.step;
         match &self.range {
             Some(range) => range.outer(property, std::array::from_fn(number)),
             None => {
@@ -198,31 +202,41 @@ impl Residuals {
         Self { order, shift, bits: out.finish() }
     }
 
-    /// Numbers again; `None` if there are fewer.
-    fn numbers(&self, count: u32) -> Option<Vec<i64>> {
-        let mut reader = BitReader::new(&self.bits);
-        let mut numbers = Vec::with_capacity(count as usize);
-        for _ in 0..count {
-            let mut high = 0;
-            while high < ESCAPE && reader.take(1)? == 1 {
-                high += 1;
-            }
-            let folded = if high == ESCAPE {
-                reader.take(32)?
-            } else {
-                (u64::from(high) << self.shift) | reader.take(self.shift)?
-            };
-            let sign = -((folded & 1) as i64);
-            numbers.push(((folded >> 1) as i64) ^ sign);
+    /// The numbers again, one after the other.
+    fn numbers(&self) -> Numbers<'_> {
+        Numbers { reader: BitReader::new(&self.bits), order: self.order as usize, shift: self.shift, sums: [0; 3] }
+    }
+}
+
+/// Numbers of [`Residuals`], which end where the bits do.
+struct Numbers<'a> {
+    reader: BitReader<'a>,
+    order: usize,
+    shift: u32,
+    /// Sums of what the forecasts were off, then sums of these.
+    sums: [i64; 3],
+}
+
+impl Iterator for Numbers<'_> {
+    type Item = i64;
+
+    fn next(&mut self) -> Option<i64> {
+        let mut high = 0;
+        while high < ESCAPE && self.reader.take(1)? == 1 {
+            high += 1;
         }
-        for _ in 0..self.order {
-            let mut sum = 0_i64;
-            for number in &mut numbers {
-                sum = sum.wrapping_add(*number);
-                *number = sum;
-            }
+        let folded = if high == ESCAPE {
+            self.reader.take(32)?
+        } else {
+            (u64::from(high) << self.shift) | self.reader.take(self.shift)?
+        };
+        let sign = -((folded & 1) as i64);
+        let mut number = ((folded >> 1) as i64) ^ sign;
+        for sum in self.sums.iter_mut().take(self.order) {
+            *sum = sum.wrapping_add(number);
+            number = *sum;
         }
-        Some(numbers)
+        Some(number)
     }
 }
 

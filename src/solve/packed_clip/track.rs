@@ -14,15 +14,15 @@ use crate::{rig::animation::Property, solve::curve_fit::difference};
 const BITS: std::ops::RangeInclusive<u32> = 3..=22;
 /// Least cosine of half the angle from the middle rotation of a track to its others.
 const NEAR: f32 = 0.3;
+/// Byte of a part that stays at rest, in place of a track.
+pub(super) const REST: u8 = 0;
 /// Bound of numbers of ranges; larger ones are damage.
 const MOST: f32 = 1e12;
 
-/// Track of one property of a node. Large ones are boxed: a track at rest is a byte of a file, and takes little memory, too.
-#[derive(Debug, Clone, PartialEq, Default)]
+/// Track of one property of a node that does not stay at rest. Large ones are boxed: a constant is few bytes of a file, and
+/// takes little memory, too.
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum PackedTrack {
-    /// The node stays at rest.
-    #[default]
-    Rest,
     /// One value all the time.
     Constant([f32; 4]),
     /// Keys as they are: frames and values.
@@ -160,7 +160,6 @@ impl PackedTrack {
     /// Count of keys.
     pub fn len(&self) -> usize {
         match self {
-            Self::Rest => 0,
             Self::Constant(_) => 1,
             Self::Whole(keys) => keys.len(),
             Self::Few(few) => few.frames.len(),
@@ -175,12 +174,18 @@ impl PackedTrack {
 
     /// Frames and values of the keys.
     pub fn keys(&self, property: &Property) -> Vec<(u32, [f32; 4])> {
+        let mut keys = Vec::with_capacity(self.len());
+        self.each_key(property, |frame, value| keys.push((frame, value)));
+        keys
+    }
+
+    /// Calls a function with frame and value of each key.
+    pub fn each_key(&self, property: &Property, mut take: impl FnMut(u32, [f32; 4])) {
         match self {
-            Self::Rest => Vec::new(),
-            Self::Constant(value) => vec![(0, *value)],
-            Self::Whole(keys) => keys.clone(),
-            Self::Few(few) => few.frames.iter().copied().zip(few.values(property)).collect(),
-            Self::Steps(steps) => (0..).zip(steps.values(property)).collect(),
+            Self::Constant(value) => take(0, *value),
+            Self::Whole(keys) => keys.iter().for_each(|(frame, value)| take(*frame, *value)),
+            Self::Few(few) => few.each_key(property, take),
+            Self::Steps(steps) => steps.each_value(property, take),
         }
     }
 
@@ -194,7 +199,6 @@ impl PackedTrack {
             }
         };
         match self {
-            Self::Rest => out.push(0),
             Self::Constant(value) => {
                 out.push(1);
                 floats(out, value);
@@ -222,19 +226,20 @@ impl PackedTrack {
         }
     }
 
-    pub fn read(reader: &mut Reader, property: &Property, frames: u32) -> Result<Self, PackedClipError> {
+    /// Track of a part; `None` for one that stays at rest.
+    pub fn read(reader: &mut Reader, property: &Property, frames: u32) -> Result<Option<Self>, PackedClipError> {
         let at = reader.at();
         let damaged = |what: &'static str| PackedClipError::Damaged { what, at };
-        match reader.byte()? {
-            0 => Ok(Self::Rest),
-            1 => Ok(Self::Constant(value(reader, property)?)),
+        Ok(Some(match reader.byte()? {
+            REST => return Ok(None),
+            1 => Self::Constant(value(reader, property)?),
             2 => {
                 let frames = key_frames(reader, frames)?;
                 let mut keys = Vec::with_capacity(frames.len());
                 for frame in frames {
                     keys.push((frame, value(reader, property)?));
                 }
-                Ok(Self::Whole(keys))
+                Self::Whole(keys)
             }
             3 => {
                 let frames = key_frames(reader, frames)?;
@@ -244,26 +249,31 @@ impl PackedTrack {
                 }
                 let range = ValueRange::read(reader)?;
                 let numbers = reader.bytes((3 * frames.len() * bits as usize).div_ceil(8))?.to_vec();
-                Ok(Self::Few(Box::new(FewBits { frames, bits, range, numbers })))
+                Self::Few(Box::new(FewBits { frames, bits, range, numbers }))
             }
-            4 => Ok(Self::Steps(Box::new(Steps::read(reader, property, frames)?))),
-            _ => Err(damaged("a kind of track")),
-        }
+            4 => Self::Steps(Box::new(Steps::read(reader, property, frames)?)),
+            _ => return Err(damaged("a kind of track")),
+        }))
     }
 }
 
 impl FewBits {
     fn values(&self, property: &Property) -> Vec<[f32; 4]> {
+        let mut values = Vec::with_capacity(self.frames.len());
+        self.each_key(property, |_, value| values.push(value));
+        values
+    }
+
+    fn each_key(&self, property: &Property, mut take: impl FnMut(u32, [f32; 4])) {
         let top = ((1_u32 << self.bits) - 1) as f32;
         let mut reader = BitReader::new(&self.numbers);
-        let value = |_: &u32| {
+        for frame in &self.frames {
             let own = std::array::from_fn(|axis| {
                 let share = reader.take(self.bits).unwrap_or_default() as f32 / top;
                 self.range.low[axis] + self.range.size[axis] * share
             });
-            self.range.outer(property, own)
-        };
-        self.frames.iter().map(value).collect()
+            take(*frame, self.range.outer(property, own));
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use rigsmith::{
 };
 
 use super::{WALKER, json};
-use crate::cli_build::rigsmith;
+use crate::{cli_build::rigsmith, packed_clips::dense_clip};
 
 /// Greatest distance between joints of the same names as the first clips of two files are played.
 fn off(a: &Model, b: &Model) -> f32 {
@@ -57,6 +57,26 @@ fn packed_clips_are_written_and_read() {
     let bytes = |name: &str| fs::read(path(name)).unwrap();
     run(&["animate", "walk.glb", "walk.glb", "-o", "twice.rigclip"]);
     assert_eq!(bytes("own.rigclip"), bytes("twice.rigclip"));
+}
+
+/// Few bytes may be many keys; how much memory they take is told before they are unpacked.
+#[test]
+fn clips_that_unpack_to_too_much_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("dense.rigclip"), dense_clip(2_000)).unwrap();
+    let run = |limit: &str| {
+        rigsmith(folder.path(), &["animate", "biped", "dense.rigclip", "-o", "out.anim.ron", "--limit", limit])
+    };
+    let answer = run("unpacked=1000");
+    assert_eq!(answer.code, 1, "{} {}", answer.out, answer.err);
+    let is_told = |text: &str| text.contains("dense.rigclip") && text.contains("--limit unpacked=");
+    assert!(is_told(&answer.err), "{}", answer.err);
+    assert!(!folder.path().join("out.anim.ron").exists());
+    // The motion has no joint of the rig, which is found out after it is unpacked.
+    let answer = run("unpacked=1000000");
+    assert!(!answer.err.contains("unpacked"), "{}", answer.err);
+    // What the file holds is told without unpacking it.
+    assert_eq!(rigsmith(folder.path(), &["info", "dense.rigclip", "--limit", "unpacked=0"]).code, 0);
 }
 
 #[test]

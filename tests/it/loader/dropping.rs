@@ -173,11 +173,13 @@ fn parts_are_called_relative_to_the_document_or_the_site() {
     let cases = [
         ("/home/parts/arm.rig.ron", "parts/arm.rig.ron"),
         ("/site/limbs/arm.rig.ron", "limbs/arm.rig.ron"),
-        ("/elsewhere/arm.rig.ron", "/elsewhere/arm.rig.ron"),
+        ("/elsewhere/arm.rig.ron", "../elsewhere/arm.rig.ron"),
     ];
     for (file, name) in cases {
         let place = TemplatePlace::File(PathBuf::from(file));
         assert_eq!(place.part_name(Some(Path::new("/home")), &site), name);
     }
+    let elsewhere = TemplatePlace::File(PathBuf::from("/elsewhere/arm.rig.ron"));
+    assert_eq!(elsewhere.part_name(None, &site), "/elsewhere/arm.rig.ron");
     assert_eq!(TemplatePlace::Bundled("parts/arm.rig.ron").part_name(None, &site), "parts/arm.rig.ron");
 }

@@ -299,7 +299,11 @@ fn read(
         }
         Some(kind) if kind == FileKind::PackedClips || kind.is_gltf() => {
             let model = match kind {
-                FileKind::PackedClips => load_packed_clips(&RealDisk, path)?.model(&stem(path)),
+                FileKind::PackedClips => {
+                    let packed = load_packed_clips(&RealDisk, path)?;
+                    limits.check_packed(name, &packed)?;
+                    packed.model(&stem(path))
+                }
                 _ => load_model(&RealDisk, path)?,
             };
             limits.check_model(name, &model)?;
