@@ -82,6 +82,16 @@ pub enum EntityWriteError {
         /// Command or constraint that drives it, in words.
         driver: String,
     },
+    /// An attribute was written that the node does not have.
+    #[error("\"{node}\" has no attribute \"{attribute}\"{nearest}")]
+    UnknownAttribute {
+        /// Name of the node.
+        node: String,
+        /// Name of the attribute.
+        attribute: String,
+        /// Nearest names, as the rest of a sentence.
+        nearest: String,
+    },
     /// A created node was written.
     #[error("`{component}` of \"{name}\", which a command created, stays as that says; change the command")]
     CreatedContent {
@@ -145,7 +155,7 @@ impl EntityWriteError {
             Self::Uid { .. } => "Uid",
             Self::CreatedNode | Self::CreatedConstraint { .. } => "Entity",
             Self::BuiltContent { component, .. } | Self::CreatedContent { component, .. } => component,
-            Self::DrivenAttribute { .. } => "Attributes",
+            Self::DrivenAttribute { .. } | Self::UnknownAttribute { .. } => "Attributes",
             Self::JointParent | Self::ForeignParent(_) => "ChildOf",
             Self::JointMarker(_) => "Joint",
             Self::ForeignGroup(_) => "InGroup",
