@@ -4,14 +4,18 @@
 use bevy::prelude::*;
 use rigsmith::{
     plugins::{
+        commands::BuiltEntities,
         document::{ChangeError, EntityWriteError, GroupEntities, TagEntities},
-        schema::{CommandTag, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, Tag, TagOf},
+        schema::{
+            CommandTag, Constrains, CreatedBy, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, NodeOf, Tag,
+            TagOf,
+        },
     },
     prelude::*,
     rig::{JointData, RestTransform, TagData, TagKind, template::write_template},
 };
 
-use super::{RigBench, shipped};
+use super::{NEAR, RigBench, shipped};
 
 /// Entities where something is put.
 struct Places {
@@ -19,11 +23,19 @@ struct Places {
     joint: Entity,
     control: Entity,
     command: Entity,
+    group: Entity,
+    constraint: Entity,
     /// Child of a joint that is no part of the rig.
     stranger: Entity,
-    /// Local group and feature of another rig.
+    /// Another rig with a joint, a local group and a feature.
+    other: Entity,
+    foreign_joint: Entity,
     foreign_group: Entity,
     foreign_feature: Entity,
+    /// Uids of the joint and of the command on it, and the kind of the constraint.
+    root: Uid,
+    tag: Uid,
+    kind: &'static str,
 }
 
 /// A built arm beside another rig.
@@ -36,6 +48,11 @@ fn arm() -> (RigBench, Places) {
     let tag = stage.rig().joint(root).unwrap().data.tags[0].uid;
     let command = stage.get::<TagEntities>(rig).unwrap().get(tag).unwrap();
     let control = stage.control("arm_fk_l");
+    let group_uid = stage.rig().groups()[0].uid;
+    let group_entity = stage.get::<GroupEntities>(rig).unwrap().get(group_uid).unwrap();
+    let built = stage.built();
+    let kind = built.constraints[0].constraint.kind();
+    let constraint = stage.get::<BuiltEntities>(rig).unwrap().constraint(built.constraints[0].uid).unwrap();
     let world = stage.app.world_mut();
     let stranger = world.spawn((Transform::default(), ChildOf(joint))).id();
     let other = world.spawn(Rig::new(Uid(0xBE51DE), "neighbour")).id();
@@ -45,7 +62,23 @@ fn arm() -> (RigBench, Places) {
     stage.frames(2);
     assert!(stage.get::<Uid>(foreign_group).is_some() && stage.get::<Uid>(foreign_feature).is_some());
     assert_eq!(refusals(&mut stage), NONE);
-    (stage, Places { rig, joint, control, command, stranger, foreign_group, foreign_feature })
+    let places = Places {
+        rig,
+        joint,
+        control,
+        command,
+        group: group_entity,
+        constraint,
+        stranger,
+        other,
+        foreign_joint,
+        foreign_group,
+        foreign_feature,
+        root,
+        tag,
+        kind,
+    };
+    (stage, places)
 }
 
 fn group() -> LocalGroup {
@@ -130,6 +163,132 @@ fn what_is_spawned_in_a_wrong_place_is_told_and_stays_outside() {
         assert_eq!(relations, (false, false, false), "{what}: it is outside");
         assert!(!spawned.contains::<Uid>(), "{what}: it is no part");
         assert_eq!((write_template(stage.rig()), stage.steps()), before, "{what}");
+    }
+}
+
+type Write = fn(&mut World, &Places);
+type Reason = fn(&Places) -> EntityWriteError;
+
+fn built_content(name: &str, component: &'static str) -> EntityWriteError {
+    EntityWriteError::BuiltContent { name: name.to_owned(), component }
+}
+
+#[test]
+fn what_is_put_into_a_wrong_place_is_put_back_and_told() {
+    let table: [(&str, Write, Reason); 13] = [
+        (
+            "a joint without its marker",
+            |world, at| {
+                world.entity_mut(at.joint).remove::<Joint>();
+            },
+            |at| EntityWriteError::JointMarker(at.root),
+        ),
+        (
+            "a joint in a group of another rig",
+            |world, at| {
+                world.entity_mut(at.joint).insert(InGroup(at.foreign_group));
+            },
+            |at| EntityWriteError::ForeignGroup(at.root),
+        ),
+        (
+            "a tag on a joint of another rig",
+            |world, at| {
+                world.entity_mut(at.command).insert(TagOf(at.foreign_joint));
+            },
+            |at| EntityWriteError::TagJoint(at.tag),
+        ),
+        (
+            "a tag on a control",
+            |world, at| {
+                world.entity_mut(at.command).insert(TagOf(at.control));
+            },
+            |at| EntityWriteError::TagJoint(at.tag),
+        ),
+        (
+            "a tag on nothing",
+            |world, at| {
+                world.entity_mut(at.command).remove::<TagOf>();
+            },
+            |at| EntityWriteError::TagJoint(at.tag),
+        ),
+        (
+            "a tag without content",
+            |world, at| {
+                world.entity_mut(at.command).remove::<CommandTag>();
+            },
+            |at| EntityWriteError::TagContent(at.tag),
+        ),
+        (
+            "a command in a feature of another rig",
+            |world, at| {
+                world.entity_mut(at.command).insert(InFeature(at.foreign_feature));
+            },
+            |at| EntityWriteError::TagContent(at.tag),
+        ),
+        (
+            "a group of another rig",
+            |world, at| {
+                world.entity_mut(at.group).insert(GroupOf(at.other));
+            },
+            |_| EntityWriteError::GroupRig { name: "arm_l".into() },
+        ),
+        (
+            "a group without content",
+            |world, at| {
+                world.entity_mut(at.group).remove::<LocalGroup>();
+            },
+            |_| EntityWriteError::GroupContent { name: "arm_l".into() },
+        ),
+        (
+            "a despawned constraint",
+            |world, at| world.entity_mut(at.constraint).despawn(),
+            |at| EntityWriteError::CreatedConstraint { kind: at.kind },
+        ),
+        (
+            "a constraint on another node",
+            |world, at| {
+                world.entity_mut(at.constraint).insert(Constrains(at.stranger));
+            },
+            |at| built_content(at.kind, "Constrains"),
+        ),
+        (
+            "a control of another command",
+            |world, at| {
+                world.entity_mut(at.control).insert(CreatedBy(at.stranger));
+            },
+            |_| built_content("arm_fk_l", "CreatedBy"),
+        ),
+        (
+            "a control of another rig",
+            |world, at| {
+                world.entity_mut(at.control).insert(NodeOf(at.other));
+            },
+            |_| built_content("arm_fk_l", "NodeOf"),
+        ),
+    ];
+    for (what, write, reason) in table {
+        let (mut stage, places) = arm();
+        let constraint = *stage.get::<Uid>(places.constraint).unwrap();
+        let relations = |stage: &RigBench| {
+            let built = stage.get::<BuiltEntities>(stage.rig).unwrap();
+            let constraint = built.constraint(constraint).and_then(|entity| stage.get::<Constrains>(entity)).copied();
+            (
+                (stage.get::<InGroup>(places.joint).copied(), stage.get::<GroupOf>(places.group).copied()),
+                (stage.get::<TagOf>(places.command).copied(), stage.get::<InFeature>(places.command).copied()),
+                (stage.get::<CreatedBy>(places.control).copied(), stage.get::<NodeOf>(places.control).copied()),
+                (stage.get::<CommandTag>(places.command).cloned(), constraint),
+            )
+        };
+        let before = (write_template(stage.rig()), stage.steps(), relations(&stage));
+        write(stage.app.world_mut(), &places);
+        stage.app.update();
+        assert_eq!(refusals(&mut stage), [reason(&places)], "{what}");
+        assert_eq!(refusals_later(&mut stage), NONE, "{what}: told again");
+        assert_eq!((write_template(stage.rig()), stage.steps(), relations(&stage)), before, "{what}");
+        let markers = (stage.get::<Joint>(places.joint).is_some(), stage.get::<LocalGroup>(places.group).is_some());
+        assert_eq!(markers, (true, true), "{what}");
+        let off = stage.off();
+        assert!(off <= NEAR, "{what}: {off}");
     }
 }
 
