@@ -7,7 +7,7 @@
 //!
 //! | component | written by | somebody else writes it |
 //! | --- | --- | --- |
-//! | `Rig` | the edit path ([`document`]) | only with [`document::EditRequest`]; a replaced component is another document without its history |
+//! | `Rig` | the edit path ([`document`]) | only with [`document::EditRequest`]; a replaced component is another document without its history; taking it off despawns what came of it |
 //! | [`NodeLabel`](schema::NodeLabel), [`InGroup`](schema::InGroup), [`RestTransform`](crate::rig::RestTransform), `ChildOf` of a joint | the document | an edit, one step of the history a frame; a value that the document refuses is put back and told |
 //! | [`RestTransform`](crate::rig::RestTransform) of a node of a game's instance | the instance: the built rest pose, below the built parent; that of a joint of the document is the document's instead | no effect on the pose; overwritten by the next template |
 //! | [`LocalGroup`](schema::LocalGroup), [`Tag`](schema::Tag), [`CommandTag`](schema::CommandTag), [`FeatureTag`](schema::FeatureTag), [`TagOf`](schema::TagOf), [`GroupOf`](schema::GroupOf), the order of [`Tags`](schema::Tags), [`InFeature`](schema::InFeature) | the document | an edit, as above; a command that becomes a feature, too, or a feature in a feature is put back and told |
