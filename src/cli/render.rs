@@ -163,6 +163,9 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
     let is_built = args.build || !args.steps.is_empty();
     if is_built {
         let writes = pose::parsed(&args.steps)?;
+        if scene.rig.walk().all(|joint| joint.data.tags.is_empty()) {
+            report.notes.push("the file has no commands, so nothing is built and there are no controls".to_owned());
+        }
         args.steps.parts.apply(&mut scene.rig)?;
         let mut bench = limits::workbench(scene.rig);
         report.notes(pose::run_steps(&mut bench, &args.steps, &writes)?);

@@ -9,14 +9,22 @@ use super::{
 use crate::rig::{
     BuiltNode, Matching, NodeType, Uid,
     feature::off_at,
-    nearest::{did_you_mean, listed},
+    nearest::{did_you_mean, listed, nearest},
 };
 
+/// Channels of a control.
+const CHANNELS: [&str; 3] = ["translate", "rotate", "scale"];
+
 impl Workbench {
-    /// Error of an attribute that a node does not have.
+    /// Error of an attribute that a node does not have, or of a channel with a slip of the pen.
     fn lacks_attribute(&self, node: &BuiltNode, attribute: &str) -> PoseError {
-        let all = node.attributes.iter().map(|attribute| attribute.name.to_string());
-        let known = if node.attributes.is_empty() { "; it has none".to_owned() } else { did_you_mean(attribute, all) };
+        let all: Vec<&str> = node.attributes.iter().map(|attribute| &*attribute.name).collect();
+        let channels = nearest(attribute, CHANNELS, 1);
+        let known = match channels.first().filter(|_| nearest(attribute, &all, 1).is_empty()) {
+            Some(channel) => format!("; did you mean the channel \"{channel}\"?"),
+            None if all.is_empty() => "; it has none".to_owned(),
+            None => did_you_mean(attribute, &all),
+        };
         let off = self.processor().and_then(|processor| processor.builder().off_named(attribute));
         let off = off.map_or_else(String::new, |off| format!("; one of that name is not built: {off}"));
         PoseError::NoAttribute { node: node.name.to_string(), attribute: attribute.to_owned(), known: known + &off }

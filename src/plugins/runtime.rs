@@ -46,7 +46,7 @@ impl Plugin for RuntimePlugin {
                 (
                     (inputs::check_inputs, inputs::read_inputs, systems::note_controls).chain(),
                     systems::feel_motion,
-                    (systems::solve, driven_attributes::tell_driven).chain(),
+                    (systems::solve, driven_attributes::tell_driven, driven_attributes::tell_unknown).chain(),
                     (systems::scatter_locals, systems::scatter_attributes, systems::scatter_morphs).chain(),
                 )
                     .chain()
@@ -106,6 +106,8 @@ pub struct RigRuntime {
     values: Vec<f32>,
     /// Attributes that constraints drive and other code wrote: holder and slot, until they are told.
     driven_writes: Vec<(Entity, u32)>,
+    /// Holders of values of attributes that their nodes do not have, until they are told.
+    unknown_writes: Vec<Entity>,
     /// Pose offsets of the document that were last passed on.
     posed: BTreeMap<Uid, PoseOffset>,
     valued: AttributeValues,
@@ -134,6 +136,7 @@ impl RigRuntime {
             attributes: BTreeMap::new(),
             values: vec![f32::NAN; program.attributes().len()],
             driven_writes: Vec::new(),
+            unknown_writes: Vec::new(),
             posed: BTreeMap::new(),
             valued: AttributeValues::new(),
             all_due: mode == InstanceMode::Hierarchy,

@@ -425,6 +425,8 @@ fn pictures_show_the_pose_and_its_controls_on_a_gpu() {
     }
     let wrong = rigsmith(folder.path(), &["render", "crane.rig.ron", "--set", "lift", "-o", "no.png"]);
     assert!(wrong.code == 2 && !folder.path().join("no.png").exists(), "{}", wrong.err);
+    let bare = rigsmith(folder.path(), &["render", "block.obj", "--build", "-o", "bare.png"]);
+    assert!(bare.code == 0 && bare.err.contains("no commands"), "a mesh has no controls: {}", bare.err);
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod springs;
 mod switches;
 mod visibility;
 mod writes;
+mod wrong_places;
 
 use std::{path::PathBuf, sync::Arc};
 

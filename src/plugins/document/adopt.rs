@@ -27,18 +27,21 @@ use bevy::{
 
 use self::trial::Trial;
 use super::{
-    EditRefusal,
+    EditRefusal, HoveredNode, Selection,
     entities::{BuiltEntities, EntityIndex, EntityPart, GroupEntities, JointEntities, TagEntities},
     error::{EntityWrite, EntityWriteError},
     refusals::{Bearer, ToldRefusals},
 };
 use crate::{
     plugins::{
+        commands::{BuildFailure, BuildResult, Processor, RunFailure},
         history::RigHistory,
+        runtime::RigRuntime,
         schema::{
             CommandTag, ConstraintKind, CreatedRole, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup,
             NodeLabel, NodeOf, NodeSlot, Null, ParkedNode, Tag, TagOf, Tags,
         },
+        stage::RigStage,
     },
     rig::{RestTransform, Rig, RigEdit, Uid, UidSource},
 };
@@ -197,9 +200,15 @@ pub(super) fn adopt_writes(
     let touched = written.take();
     let closed: HashSet<Entity> = written.rigs.read().filter(|rig| !rigs.contains(*rig)).collect();
     if !closed.is_empty() {
-        // Nodes that were rolled back have no place below the rig, with which they would have gone.
-        for entity in index.forget_rigs(&closed).into_iter().filter(|entity| parked.contains(*entity)) {
-            commands.entity(entity).try_despawn();
+        for (entity, indexed) in index.forget_rigs(&closed) {
+            // Nodes that were rolled back have no place below the rig, with which they would have gone, and an entity that
+            // lost its document alone takes nothing along.
+            if parked.contains(entity) || views.contains(indexed.rig) {
+                commands.entity(entity).try_despawn();
+            }
+        }
+        for rig in closed.into_iter().filter(|rig| views.contains(*rig)) {
+            clear_rig(&mut commands, rig);
         }
     }
     if touched.is_empty() {
@@ -250,6 +259,15 @@ pub(super) fn adopt_writes(
             Bearer::Entity(entity) => views.contains(entity),
         });
     }
+}
+
+/// Takes off what an entity had because of its document, so that another document on it begins anew.
+fn clear_rig(commands: &mut Commands, rig: Entity) {
+    commands
+        .entity(rig)
+        .try_remove::<(JointEntities, TagEntities, GroupEntities, BuiltEntities, RigHistory, Uid, Name)>()
+        .try_remove::<(Processor, BuildResult, BuildFailure, RigRuntime, RunFailure, RigStage)>()
+        .try_remove::<(Selection, HoveredNode)>();
 }
 
 /// State of the adoption of one rig's writes.

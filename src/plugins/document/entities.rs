@@ -66,17 +66,18 @@ impl EntityIndex {
         self.0.remove(&entity)
     }
 
-    /// Removes all entities of rigs that no longer exist; returns those of created nodes.
-    pub fn forget_rigs(&mut self, gone: &HashSet<Entity>) -> Vec<Entity> {
-        let mut nodes = Vec::new();
+    /// Removes all entities of rigs that no longer exist, and returns them with the parts that they represented.
+    pub fn forget_rigs(&mut self, gone: &HashSet<Entity>) -> Vec<(Entity, IndexedEntity)> {
+        let mut forgotten = Vec::new();
         self.0.retain(|entity, indexed| {
             let stays = !gone.contains(&indexed.rig);
-            if !stays && indexed.part == EntityPart::Node {
-                nodes.push(*entity);
+            if !stays {
+                forgotten.push((*entity, *indexed));
             }
             stays
         });
-        nodes
+        forgotten.sort_unstable_by_key(|(entity, _)| *entity);
+        forgotten
     }
 }
 

@@ -82,6 +82,16 @@ pub enum EntityWriteError {
         /// Command or constraint that drives it, in words.
         driver: String,
     },
+    /// An attribute was written that the node does not have.
+    #[error("\"{node}\" has no attribute \"{attribute}\"{nearest}")]
+    UnknownAttribute {
+        /// Name of the node.
+        node: String,
+        /// Name of the attribute.
+        attribute: String,
+        /// Nearest names, as the rest of a sentence.
+        nearest: String,
+    },
     /// A created node was written.
     #[error("`{component}` of \"{name}\", which a command created, stays as that says; change the command")]
     CreatedContent {
@@ -96,8 +106,8 @@ pub enum EntityWriteError {
     /// A joint lost its marker component.
     #[error("joint {0} cannot lose its `Joint`; despawn its entity to delete it")]
     JointMarker(Uid),
-    /// A joint was put into a group of another rig.
-    #[error("joint {0} cannot be in a group of another rig; add one to this rig")]
+    /// A joint was put into something that is no group of its rig.
+    #[error("joint {0} can only be in a local group of its own rig; add one to this rig")]
     ForeignGroup(Uid),
     /// A joint was moved below something that is no joint of its rig.
     #[error("joint {0} can only hang below joints of its own rig that are in the document")]
@@ -105,15 +115,24 @@ pub enum EntityWriteError {
     /// A tag was spawned outside of the document.
     #[error("a tag was spawned on an entity that is no joint of the document; put it on a joint")]
     TagBearer,
-    /// A spawned tag names a feature of another rig.
-    #[error("a spawned tag is in a feature of another rig; put it into one of its own rig")]
+    /// A spawned command names something that is no feature of its rig.
+    #[error("a spawned command is in something that is no feature of its rig; put it into a feature of its own rig")]
     ForeignFeature,
-    /// A tag lost its content, or names a feature of another rig.
-    #[error("tag {0} needs a command or a feature of its own rig; despawn it to delete it")]
+    /// A tag is a command and a feature at once.
+    #[error("a tag is a command or a feature, not both; give each an entity of its own")]
+    TagKinds,
+    /// A feature was put into a feature.
+    #[error("a feature cannot be in a feature; put the commands of both into one, or into a switch of it")]
+    NestedFeature,
+    /// A tag lost its content, or names something that is no feature of its rig.
+    #[error("tag {0} needs a command, in no feature but one of its own rig, or a feature; despawn it to delete it")]
     TagContent(Uid),
     /// A tag was put onto something that is no joint of its rig.
     #[error("tag {0} can only be on a joint of its own rig; despawn it to delete it")]
     TagJoint(Uid),
+    /// A local group was spawned on a part of a rig.
+    #[error("a local group was spawned on an entity that is no rig; give it to the rig itself")]
+    GroupBearer,
     /// A local group was moved to another rig.
     #[error("local group \"{name}\" stays with its rig; add one to the other rig")]
     GroupRig {
@@ -136,14 +155,14 @@ impl EntityWriteError {
             Self::Uid { .. } => "Uid",
             Self::CreatedNode | Self::CreatedConstraint { .. } => "Entity",
             Self::BuiltContent { component, .. } | Self::CreatedContent { component, .. } => component,
-            Self::DrivenAttribute { .. } => "Attributes",
+            Self::DrivenAttribute { .. } | Self::UnknownAttribute { .. } => "Attributes",
             Self::JointParent | Self::ForeignParent(_) => "ChildOf",
             Self::JointMarker(_) => "Joint",
             Self::ForeignGroup(_) => "InGroup",
             Self::TagBearer | Self::TagJoint(_) => "TagOf",
-            Self::ForeignFeature => "InFeature",
-            Self::TagContent(_) => "CommandTag",
-            Self::GroupRig { .. } => "GroupOf",
+            Self::ForeignFeature | Self::NestedFeature => "InFeature",
+            Self::TagContent(_) | Self::TagKinds => "CommandTag",
+            Self::GroupBearer | Self::GroupRig { .. } => "GroupOf",
             Self::GroupContent { .. } => "LocalGroup",
         }
     }

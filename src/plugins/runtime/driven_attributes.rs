@@ -1,4 +1,5 @@
-//! Writes of other code to attributes that constraints drive: the run puts them back, and this tells so.
+//! Refused writes of other code to attributes: those that constraints drive, which the run puts back, and those that
+//! a node does not have, which are taken off. Both are told.
 
 use std::{collections::BTreeSet, sync::Arc};
 
@@ -11,7 +12,7 @@ use crate::{
         document::{EditRefusal, EntityWriteError},
         schema::Attributes,
     },
-    rig::{Dependency, Rig, TagKind, Uid},
+    rig::{Dependency, Rig, TagKind, Uid, nearest::did_you_mean},
 };
 
 /// Tells refused writes to driven attributes, once for each entity and attribute.
@@ -42,6 +43,47 @@ pub(super) fn tell_driven(
             };
             warn!("{reason}");
             refused.write(EditRefusal { rig, reason: reason.into() });
+        }
+    }
+}
+
+/// Takes values off nodes of a document that have no such attributes, and tells so, once for each entity and attribute.
+/// Instances of games keep what another template has left.
+pub(super) fn tell_unknown(
+    mut rigs: Query<(Entity, &mut RigRuntime, Option<&BuildResult>, Has<Rig>), Changed<RigRuntime>>,
+    mut told: Local<BTreeSet<(Entity, String)>>,
+    mut refused: MessageWriter<EditRefusal>,
+    mut holders: Query<&mut Attributes>,
+) {
+    for (rig, mut runtime, built, has_document) in &mut rigs {
+        if runtime.unknown_writes.is_empty() {
+            continue;
+        }
+        let writes = std::mem::take(&mut runtime.bypass_change_detection().unknown_writes);
+        if !has_document {
+            continue;
+        }
+        told.retain(|(entity, _)| holders.contains(*entity));
+        let program = runtime.state.program();
+        for entity in writes {
+            let slots = runtime.attributes.get(&entity).map_or(&[][..], Vec::as_slice);
+            let (Some(first), Ok(mut values)) = (slots.first(), holders.get_mut(entity)) else { continue };
+            let known: Vec<&str> = slots.iter().map(|slot| &*program.attributes()[*slot as usize].name).collect();
+            let is_unknown = |name: &&String| !known.contains(&name.as_str());
+            let unknown: Vec<String> = values.0.keys().filter(is_unknown).cloned().collect();
+            let node = &program.nodes()[program.attributes()[*first as usize].node];
+            let name = built.and_then(|built| built.0.node(node.uid)).map(|node| node.name.to_string());
+            let name = name.unwrap_or_else(|| node.uid.to_string());
+            for attribute in unknown {
+                values.0.remove(&attribute);
+                if !told.insert((entity, attribute.clone())) {
+                    continue;
+                }
+                let nearest = did_you_mean(&attribute, &known);
+                let reason = EntityWriteError::UnknownAttribute { node: name.clone(), attribute, nearest };
+                warn!("{reason}");
+                refused.write(EditRefusal { rig, reason: reason.into() });
+            }
         }
     }
 }

@@ -135,6 +135,7 @@ fn gather(
         attributes: holders,
         values,
         driven_writes,
+        unknown_writes,
         ..
     } = runtime;
     for (slot, entity) in controls.iter() {
@@ -164,6 +165,7 @@ fn gather(
     }
     for (entity, slots) in holders.iter() {
         let Ok(Attributes(told)) = attributes.get(*entity) else { continue };
+        let mut found = 0;
         for slot in slots {
             let slot = *slot as usize;
             let Some(value) = told.get(&*state.program().attributes()[slot].name).copied() else {
@@ -172,6 +174,7 @@ fn gather(
                 *attributes_due = true;
                 continue;
             };
+            found += 1;
             if !values[slot].is_nan() && value != values[slot] {
                 if !state.set_attribute_at(slot, value) {
                     driven_writes.push((*entity, slot as u32));
@@ -180,6 +183,10 @@ fn gather(
                 values[slot] = value;
                 *attributes_due = true;
             }
+        }
+        if found < told.len() {
+            unknown_writes.push(*entity);
+            *attributes_due = true;
         }
     }
 }

@@ -61,6 +61,8 @@ fn wrong_inputs_are_refused_and_write_nothing() {
         ("lifd.rotate=(0,0,0)", 1, "lift"),
         ("base.trun=1", 1, "turn"),
         ("lift.turn=1", 1, "lift"),
+        ("lift.rotte=(0,0,9)", 1, "\"lift\" has no attribute \"rotte\"; did you mean the channel \"rotate\"?"),
+        ("base.transalte=(0,1,0)", 1, "did you mean the channel \"translate\"?"),
         ("hook.turn=1", 1, "\"hook\" has no attribute \"turn\"; it has none"),
         ("lift.translate=(1e20,0,0)", 1, "out of all proportion to the rig; write numbers up to"),
         ("lift.scale=(1e6,1,1)", 1, "out of all proportion"),

@@ -1,14 +1,22 @@
 //! The entity of a rig itself: its name is that of the document, both ways, and its uid is the document's for good.
 
-use bevy::prelude::*;
+use bevy::{
+    ecs::{entity_disabling::Disabled, query::Allow},
+    prelude::*,
+};
 use rigsmith::{
-    plugins::document::{ChangeError, EntityWriteError},
+    plugins::{
+        commands::{BuildResult, BuildStep, Processor},
+        document::{ChangeError, EntityWriteError},
+        runtime::RigRuntime,
+        schema::{ConstraintKind, LocalGroup, NodeLabel, ParkedNode, TagOf},
+    },
     prelude::*,
     rig::RigAbout,
     test_app::test_app,
 };
 
-use super::RigBench;
+use super::{NEAR, RigBench, shipped};
 
 fn rig() -> Rig {
     Rig::new(Uid(1000), "rig")
@@ -110,4 +118,45 @@ fn the_uid_of_a_rig_is_put_back_and_told() {
     (0..2).for_each(|_| stage.app.update());
     stage.app.world_mut().entity_mut(entity).remove::<Uid>();
     check(&mut stage, "taken off");
+}
+
+/// Entities of the parts of rigs, parked nodes included.
+type Parts = (
+    Or<(With<NodeOf>, With<Joint>, With<TagOf>, With<LocalGroup>, With<ConstraintKind>, With<ParkedNode>)>,
+    Allow<Disabled>,
+);
+
+/// An entity that loses its document loses what came of it and stays; another document on it begins anew, although its
+/// parts have the same uids.
+#[test]
+fn a_document_that_is_taken_off_takes_its_entities_along() {
+    let (_, document) = shipped().into_iter().find(|(name, _)| name == "arm").unwrap();
+    let mut stage = RigBench::of_built(document.clone());
+    let (entity, root) = (stage.rig, stage.rig().roots()[0]);
+    stage.apply(RigEdit::SetLabel(root, Some("top".into())));
+    stage.step(BuildStep::RollBack);
+    stage.step(BuildStep::Forward);
+    let parts = |stage: &mut RigBench| {
+        let world = stage.app.world_mut();
+        world.query_filtered::<Entity, Parts>().iter(world).count()
+    };
+    assert!(parts(&mut stage) > 50);
+    stage.app.world_mut().entity_mut(entity).insert(Transform::from_xyz(1.0, 0.0, 0.0)).remove::<Rig>();
+    stage.frames(2);
+    assert_eq!(parts(&mut stage), 0);
+    let has_build = (stage.get::<BuildResult>(entity).is_some(), stage.get::<Processor>(entity).is_some());
+    assert_eq!((has_build, stage.get::<RigRuntime>(entity).is_some()), ((false, false), false));
+    assert_eq!(stage.get::<Transform>(entity).unwrap().translation, Vec3::X);
+
+    stage.app.world_mut().entity_mut(entity).insert(document);
+    stage.app.update();
+    assert_eq!(names(&stage), both("arm", 0));
+    stage.step(BuildStep::All);
+    assert!(stage.off() <= NEAR && stage.off_from_document() <= NEAR);
+    let joint = stage.node(root).unwrap();
+    stage.app.world_mut().entity_mut(joint).insert(NodeLabel("mine".into()));
+    stage.app.update();
+    assert_eq!(stage.rig().joint(root).unwrap().data.label.as_deref(), Some("mine"));
+    assert_eq!(stage.steps(), 1);
+    assert!(refusals(&mut stage).is_empty());
 }

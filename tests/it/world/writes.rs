@@ -129,6 +129,41 @@ fn a_driven_attribute_is_put_back_and_told_once() {
     assert!(refused(&mut stage).is_empty());
 }
 
+/// A value of an attribute that the node does not have is taken off in the same frame, and told once with the nearest
+/// name; values beside it drive.
+#[test]
+fn an_unknown_attribute_is_taken_off_and_told_once() {
+    let (_, rig) = shipped().into_iter().find(|(name, _)| name == "arm").unwrap();
+    let mut stage = RigBench::of_built(rig);
+    stage.frames(2);
+    let control = stage.control("arm_settings_l");
+    let before = stage.get::<Attributes>(control).unwrap().clone();
+    stage.messages::<EditRefusal>();
+    let mut told = Vec::new();
+    for value in [0.0, 1.0, f32::NAN] {
+        stage.app.world_mut().get_mut::<Attributes>(control).unwrap().0.insert("ik_fkk".into(), value);
+        stage.app.update();
+        assert_eq!(stage.get::<Attributes>(control), Some(&before), "{value}");
+        told.extend(stage.messages::<EditRefusal>());
+    }
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert_eq!(told[0].rig, stage.rig);
+    let reason = &told[0].reason;
+    assert!(matches!(reason, ChangeError::Entity(EntityWriteError::UnknownAttribute { .. })), "{reason:?}");
+    let text = reason.to_string();
+    assert!(text.contains("\"arm_settings_l\" has no attribute \"ik_fkk\"; did you mean \"ik_fk\""), "{text}");
+    let mut values = stage.app.world_mut().get_mut::<Attributes>(control).unwrap();
+    values.0.insert("ik_fk".into(), 0.25);
+    values.0.insert("nothing".into(), 1.0);
+    stage.app.update();
+    let now = &stage.get::<Attributes>(control).unwrap().0;
+    assert_eq!((now.len(), now["ik_fk"]), (before.0.len(), 0.25));
+    assert_eq!(stage.messages::<EditRefusal>().len(), 1);
+    let uid = *stage.get::<Uid>(control).unwrap();
+    assert_eq!(stage.runtime().state().attribute(uid, "ik_fk"), Some(0.25));
+    assert!(stage.off() <= NEAR);
+}
+
 /// An order of tags counts although one of them is despawned in the same frame.
 #[test]
 fn tags_are_reordered_beside_one_that_is_despawned() {

@@ -11,13 +11,14 @@ use crate::{
 impl Adoption<'_, '_, '_, '_, '_, '_> {
     pub fn groups_written(&mut self, writes: &RigWrites) {
         for &entity in &writes.spawned_groups {
-            let Some(group) =
-                self.views.get(entity).ok().and_then(|view| view.group.cloned().map(|g| (g, view.uid.copied())))
-            else {
-                continue;
-            };
-            let (group, asked) = group;
+            let Ok(view) = self.views.get(entity) else { continue };
+            let (Some(group), asked) = (view.group.cloned(), view.uid.copied()) else { continue };
             self.trial.look_at_entity(entity);
+            if view.group_of != Some(&GroupOf(self.trial.rig_entity)) {
+                self.commands.entity(entity).try_remove::<GroupOf>();
+                self.trial.refuse(EntityWriteError::GroupBearer);
+                continue;
+            }
             let uid = self.trial.free_uid(asked);
             let data = GroupData { uid, name: group.name, color: group.color, enabled: group.enabled };
             let added = RigEdit::AddLocalGroup(data.clone(), usize::MAX);

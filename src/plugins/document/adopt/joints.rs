@@ -68,6 +68,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         write_label(self.commands, entity, label.as_deref());
         if group_entity.is_some() && group.is_none() {
             write_group(self.commands, entity, None);
+            self.trial.refuse(EntityWriteError::ForeignGroup(uid));
         }
         self.index.insert(entity, rig_entity, uid, EntityPart::Joint);
         self.joints

@@ -112,10 +112,12 @@ pub(super) fn sort_by_rig(
             Some(_) => {}
             None => {
                 let Ok(view) = views.get(*entity) else { continue };
-                if let (Some(_), Some(GroupOf(rig))) = (view.group, view.group_of)
-                    && is_rig(*rig)
+                // A part of a rig is no bearer of groups; the rig tells so.
+                let rig_of = |bearer: Entity| is_rig(bearer).then_some(bearer).or_else(|| Some(index.get(bearer)?.rig));
+                if let (Some(_), Some(GroupOf(bearer))) = (view.group, view.group_of)
+                    && let Some(rig) = rig_of(*bearer)
                 {
-                    rigs.entry(*rig).or_default().spawned_groups.push(*entity);
+                    rigs.entry(rig).or_default().spawned_groups.push(*entity);
                 }
             }
         }

@@ -11,7 +11,7 @@ use super::{
     sorting::RigWrites,
 };
 use crate::{
-    plugins::schema::{Tag, TagOf},
+    plugins::schema::{InFeature, Tag, TagOf},
     rig::{RigEdit, TagData, TagKind, Uid},
 };
 
@@ -28,16 +28,16 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         }
     }
 
-    /// Tag data from the components of an entity; `None` if the entity has neither a command nor a feature, or its
-    /// command is in a feature that does not belong to this rig.
+    /// Tag data from the components of an entity; `None` if the entity has neither a command nor a feature, or both, or
+    /// its command is in something that is no feature of this rig.
     fn told_tag(&self, entity: Entity, uid: Uid) -> Option<TagData> {
         let view = self.views.get(entity).ok()?;
         let (enabled, comment) = view.tag.map_or((true, String::new()), |tag| (tag.enabled, tag.comment.clone()));
         let kind = match (view.command, view.feature) {
-            (Some(command), _) => {
+            (Some(command), None) => {
                 let feature = match view.in_feature {
-                    Some(feature) => Some(self.uid_of(feature.0, EntityPart::Tag)?),
-                    None => None,
+                    Some(feature) => Some(self.told_feature(feature.0, uid)?),
+                    None => self.missing_feature(uid),
                 };
                 TagKind::Command { module: command.module.clone(), params: command.params.clone(), feature }
             }
@@ -47,9 +47,40 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 switch: feature.switch.clone(),
                 choice: feature.choice.clone(),
             },
-            (None, None) => return None,
+            (Some(_), Some(_)) | (None, None) => return None,
         };
         Some(TagData { uid, enabled, comment, kind })
+    }
+
+    /// Feature of this rig that an entity represents. The one that the tag is in already counts in any case.
+    fn told_feature(&self, entity: Entity, tag: Uid) -> Option<Uid> {
+        let feature = self.uid_of(entity, EntityPart::Tag)?;
+        let (_, data) = self.rig().find_tag(feature)?;
+        let is_feature = matches!(data.kind, TagKind::Feature { .. });
+        (is_feature || self.mirrored_feature(tag) == Some(feature)).then_some(feature)
+    }
+
+    /// Feature of a tag that the document deleted: the relation went with its entity, and comes back with it.
+    fn missing_feature(&self, tag: Uid) -> Option<Uid> {
+        self.mirrored_feature(tag).filter(|feature| self.rig().find_tag(*feature).is_none())
+    }
+
+    /// Feature that a tag is in, as the document had it when the entities followed it last.
+    fn mirrored_feature(&self, tag: Uid) -> Option<Uid> {
+        match &self.tags.tags.get(&tag)?.data.kind {
+            TagKind::Command { feature, .. } => *feature,
+            TagKind::Feature { .. } => None,
+        }
+    }
+
+    /// Takes a feature out of the feature that other code put it into.
+    fn feature_written(&mut self, entity: Entity, uid: Uid) {
+        let is_feature =
+            self.tags.tags.get(&uid).is_some_and(|mirrored| matches!(mirrored.data.kind, TagKind::Feature { .. }));
+        if is_feature && self.views.get(entity).is_ok_and(|view| view.in_feature.is_some()) {
+            self.commands.entity(entity).try_remove::<InFeature>();
+            self.trial.refuse(EntityWriteError::NestedFeature);
+        }
     }
 
     fn tag_spawned(&mut self, entity: Entity) {
@@ -60,8 +91,10 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             return self.tag_refused(entity, Some(EntityWriteError::TagBearer));
         };
         let uid = self.trial.free_uid(view.uid.copied());
+        let is_both = view.command.is_some() && view.feature.is_some();
         let Some(data) = self.told_tag(entity, uid) else {
-            return self.tag_refused(entity, Some(EntityWriteError::ForeignFeature));
+            let reason = if is_both { EntityWriteError::TagKinds } else { EntityWriteError::ForeignFeature };
+            return self.tag_refused(entity, Some(reason));
         };
         // Index of the tag among the tags of the joint that the document has.
         let before = self.views.get(bearer).ok().and_then(|view| view.tags).map_or(usize::MAX, |tags| {
@@ -80,6 +113,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         if let Some(mirrored) = self.joints.joints.get_mut(&joint) {
             mirrored.tags.insert(before.min(mirrored.tags.len()), uid);
         }
+        self.feature_written(entity, uid);
     }
 
     /// Removes a spawned tag that the document refuses from its joint; the entity stays.
@@ -104,7 +138,9 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             let is_taken = match &told {
                 Some(told) => self.trial.edit(EntityWrite::Tag, vec![RigEdit::SetTag(joint, Box::new(told.clone()))]),
                 None => {
-                    self.trial.refuse(EntityWriteError::TagContent(uid));
+                    let is_both = view.command.is_some() && view.feature.is_some();
+                    let reason = if is_both { EntityWriteError::TagKinds } else { EntityWriteError::TagContent(uid) };
+                    self.trial.refuse(reason);
                     false
                 }
             };
@@ -117,6 +153,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                 None => write_tag(self.commands, entity, &mirrored.data, None, self.tags),
             }
         }
+        self.feature_written(entity, uid);
         if view.tag.is_none()
             && let Some(known) = self.tags.tags.get(&uid)
         {
