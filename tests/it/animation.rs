@@ -7,6 +7,7 @@ pub mod keep;
 mod keys;
 mod layers;
 mod random;
+mod reduced;
 mod sampler;
 mod switch_over;
 

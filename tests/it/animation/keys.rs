@@ -23,11 +23,11 @@ fn run(rig: &mut Rig, operation: Operation) -> Outcome {
     outcome
 }
 
-fn keys(rig: &mut Rig, layer: Uid, change: KeyOperation) -> Outcome {
+pub fn keys(rig: &mut Rig, layer: Uid, change: KeyOperation) -> Outcome {
     run(rig, Operation::Clips(ClipOperation::Keys { clip: CLIP, layer, change }))
 }
 
-fn track<'a>(rig: &'a Rig, layer: usize, target: &TrackTarget) -> &'a [Key] {
+pub fn track<'a>(rig: &'a Rig, layer: usize, target: &TrackTarget) -> &'a [Key] {
     rig.clips()[0].layers[layer].tracks.get(target).map_or(&[], |track| &track.keys)
 }
 
