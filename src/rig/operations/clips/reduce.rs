@@ -1,7 +1,12 @@
 //! Reduction: fewer keys for the same motion within a tolerance.
 
+use bevy::math::Vec3;
+
 use super::keys::Changes;
-use crate::rig::animation::{ClipLayer, Ease, Key, Property, Track, TrackTarget};
+use crate::rig::{
+    Rig,
+    animation::{ClipLayer, Ease, Key, Property, Track, TrackTarget},
+};
 
 /// Largest differences that a reduction may leave.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +46,15 @@ impl KeyTolerance {
     #[must_use]
     pub fn for_height(self, height: f32) -> Self {
         Self { distance: self.distance * (height / 1.7).max(1e-6), ..self }
+    }
+
+    /// Usual tolerance for a rig of any size and units, by the longest edge of the box around its joints at rest.
+    pub fn for_rig(rig: &Rig) -> Self {
+        let globals = rig.rest_globals();
+        let places = || globals.iter().map(|(_, at)| at.translation);
+        let extent = places().reduce(Vec3::max).zip(places().reduce(Vec3::min));
+        let size = extent.map_or(0.0, |(most, least)| (most - least).max_element());
+        if size > 0.0 { Self::default().for_height(size) } else { Self::default() }
     }
 
     /// Keys that are needed for a track to stay within the tolerance.
