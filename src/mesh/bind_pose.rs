@@ -1,15 +1,15 @@
 //! Poses in which meshes were bound to their joints.
 //!
-//! Files may hold their nodes in any pose, that of the frame at which they were saved for example. The inverse bind matrices of
-//! a skin give the pose in which its mesh was bound, in the mesh's space: that may have other axes and units than the space of
-//! the nodes.
+//! Files may hold their nodes in any pose, that of the frame at which they were saved for example. The inverse bind
+//! matrices of a skin give the pose in which its mesh was bound, in the mesh's space: that may have other axes and
+//! units than the space of the nodes.
 
 use glam::{Mat3, Mat4, Quat, Vec3};
 
 use super::model::{Model, SkinBinding, Trs};
 
-/// Least mean of the squares of the cosines of half the angles between joints of both poses; below, the axes of the mesh's space
-/// are unknown.
+/// Least mean of the squares of the cosines of half the angles between joints of both poses; below, the axes of the
+/// mesh's space are unknown.
 const LEAST_ALIKE: f32 = 0.75;
 /// Cosine of half the angle by which joints of the same rotation differ at most: two degrees.
 const SAME: f32 = 0.99985;
@@ -26,9 +26,9 @@ struct BoundJoint {
 }
 
 impl Model {
-    /// Transforms of all nodes to model space in the pose in which the mesh of the largest skin was bound. Other nodes are below
-    /// their parents as at rest. `None` without a skin, where all of its joints are turned as at rest, and where its matrices tell
-    /// no pose.
+    /// Transforms of all nodes to model space in the pose in which the mesh of the largest skin was bound. Other nodes
+    /// are below their parents as at rest. `None` without a skin, where all of its joints are turned as at rest, and
+    /// where its matrices tell no pose.
     pub fn bind_pose(&self) -> Option<Vec<Trs>> {
         let skin = self.skins.iter().max_by_key(|skin| skin.joints.len())?;
         let joints = self.bound_joints(skin);
@@ -96,8 +96,8 @@ impl Model {
     }
 }
 
-/// Rotation from the mesh's space to that of the nodes: the one between axes with which the joints of both poses are turned most
-/// alike. Joints count by what they carry. `None` if they are alike with none.
+/// Rotation from the mesh's space to that of the nodes: the one between axes with which the joints of both poses are
+/// turned most alike. Joints count by what they carry. `None` if they are alike with none.
 fn turn_to_nodes(joints: &[BoundJoint]) -> Option<Quat> {
     let whole: f32 = joints.iter().map(|joint| joint.count).sum();
     let mut best = (0.0, Quat::IDENTITY);

@@ -239,7 +239,8 @@ pub fn named_bones(joints: &[SkeletonJoint]) -> BTreeMap<HumanBone, usize> {
     named
 }
 
-/// Joints without the numbers that nearly all names end with, each with another one, where a web site has numbered the nodes.
+/// Joints without the numbers that nearly all names end with, each with another one, where a web site has numbered the
+/// nodes.
 fn without_numbers(joints: &[SkeletonJoint]) -> Cow<'_, [SkeletonJoint]> {
     let named = joints.iter().filter(|joint| !joint.name.is_empty()).count();
     let number = |joint: &SkeletonJoint| names::node_number(&joint.name).map(|(_, number)| number);

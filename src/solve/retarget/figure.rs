@@ -60,8 +60,8 @@ impl Figure {
         Self::new(rig.walk().zip(&globals).map(joint).collect(), map.target.clone(), axes)
     }
 
-    /// Skeleton of a motion; `None` if it has no size. It stands as at rest or, where that is more like the figure `beside` it, in
-    /// the pose in which its mesh was bound: files may rest in any pose.
+    /// Skeleton of a motion; `None` if it has no size. It stands as at rest or, where that is more like the figure
+    /// `beside` it, in the pose in which its mesh was bound: files may rest in any pose.
     pub fn of_motion(motion: &Motion, map: &JointMap, beside: &Self) -> Option<Self> {
         let rest = Self::of_places(motion, map, motion.rest_globals());
         if motion.bind_pose.len() != motion.joints.len() {

@@ -61,8 +61,8 @@ fn standing(_: &str) -> Quat {
     Quat::IDENTITY
 }
 
-/// File of the walk whose nodes rest in a pose. Its mesh, if it has one, was bound as the walk's skeleton stands, in a space of
-/// its own.
+/// File of the walk whose nodes rest in a pose. Its mesh, if it has one, was bound as the walk's skeleton stands, in a
+/// space of its own.
 fn file(pose: fn(&str) -> Quat, space: Option<Mat4>) -> Model {
     let walk = walk();
     let node = |joint: &MotionJoint| Node {

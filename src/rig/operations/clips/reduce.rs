@@ -123,8 +123,8 @@ fn reduced(track: &Track, property: &Property, tolerance: f32) -> Vec<Key> {
     kept.into_iter().map(|place| keys[place]).collect()
 }
 
-/// Times at which a track is compared with fewer keys, by rising time, and its values there: those of its keys, and of places
-/// between them where the way from one to the next is cubic.
+/// Times at which a track is compared with fewer keys, by rising time, and its values there: those of its keys, and of
+/// places between them where the way from one to the next is cubic.
 fn compared(keys: &[Key], property: &Property) -> Vec<(f32, [f32; 4])> {
     let mut values = Vec::with_capacity(keys.len());
     for (place, key) in keys.iter().enumerate() {
