@@ -10,7 +10,7 @@ use super::model::{Model, SkinBinding, Trs};
 
 /// Least mean of the squares of the cosines of half the angles between joints of both poses; below, the axes of the
 /// mesh's space are unknown.
-const LEAST_ALIKE: f32 = 0.75;
+const LEAST_ALIKE: f32 = 0.65;
 /// Cosine of half the angle by which joints of the same rotation differ at most: two degrees.
 const SAME: f32 = 0.99985;
 

@@ -4,6 +4,7 @@ use std::f32::consts::FRAC_PI_2;
 
 use bevy::math::{EulerRot, Mat4, Quat, Vec3};
 use rigsmith::{
+    files::{RealDisk, load_model},
     mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Model, Node, SkinBinding, Trs},
     rig::{
         Rig, Uid, UidSource,
@@ -17,7 +18,7 @@ use rigsmith::{
     },
 };
 
-use super::{MotionTarget, PlayedRig, RetargetSettings, joints::strip, shipped};
+use super::{MotionTarget, PlayedRig, RetargetSettings, joints::strip, shipped, test_data};
 
 fn walk() -> Motion {
     read_bvh(include_bytes!("walker.bvh"), "walker").unwrap()
@@ -120,6 +121,26 @@ fn the_bind_pose_is_told_by_the_matrices() {
         model.skins[0].inverse_binds.fill(matrix);
         assert_eq!(model.bind_pose(), None);
     }
+}
+
+/// Robot that rests with its fists up, in metres; its mesh was bound with level arms, in hundreds of metres with Z up.
+#[test]
+fn a_robot_with_its_fists_up_was_bound_with_level_arms() {
+    let Some(data) = test_data() else { return };
+    let model = load_model(&RealDisk, &data.join("gltf_skinned/RobotExpressive.glb")).unwrap();
+    let pose = model.bind_pose().unwrap();
+    let rest = model.rest_globals();
+    let node = |name: &str| model.nodes.iter().position(|node| node.name == name).unwrap();
+    for side in ["L", "R"] {
+        let [from, to] = ["UpperArm", "Palm2"].map(|name| node(&format!("{name}.{side}")));
+        let level = (pose[to].translation - pose[from].translation).normalize();
+        assert!(level.x.abs() > 0.99, "{side}: {level}");
+        let raised = (rest[to].translation - rest[from].translation).normalize();
+        assert!(raised.x.abs() < 0.6, "{side}: {raised}");
+    }
+    let [hips, head] = ["Hips", "Head"].map(node);
+    let trunk = pose[head].translation - pose[hips].translation;
+    assert!(trunk.normalize().y > 0.99, "{trunk}");
 }
 
 #[test]
