@@ -4,6 +4,7 @@
 //! return bytes.
 
 pub mod adjacency;
+mod bind_pose;
 mod gear;
 pub mod gltf;
 pub mod influences;

@@ -2,10 +2,11 @@
 //!
 //! Both skeletons are turned so that they stand and face alike at rest. A joint then turns by what its counterpart turns
 //! beyond *its* rest, after a constant rotation that brings the target's rest pose onto the source's: that takes up T-poses,
-//! A-poses and any roll of bones. Limbs go by the directions of the source's bones, and bend about their own hinges, so that
-//! knees and elbows never bend backwards. The hips move by the ratio of the legs' lengths. While a foot stands ([`Stance`]) it
-//! is held in its place on the ground, and a hand is where it touches something ([`Touch`]), each by the inverse controls of its
-//! limb. The figure travels where a clip walks on the spot.
+//! A-poses and any roll of bones. A file whose nodes rest in some other pose stands as its mesh was bound, where that is
+//! more like the target. Limbs go by the directions of the source's bones, and bend about their own hinges, so that knees
+//! and elbows never bend backwards. The hips move by the ratio of the legs' lengths. While a foot stands ([`Stance`]) it is
+//! held in its place on the ground, and a hand is where it touches something ([`Touch`]), each by the inverse controls of
+//! its limb. The figure travels where a clip walks on the spot.
 //!
 //! The result is a clip of the rig's controls, or of its joints where it has no controls.
 
@@ -160,7 +161,7 @@ pub fn retarget(
     }
     let times: Vec<f32> = (0..count).map(|frame| (frame as f64 / f64::from(rate)) as f32).collect();
     let target = Figure::of_rig(rig, map).ok_or(RetargetError::NoSize("rig"))?;
-    let source = Figure::of_motion(motion, map).ok_or(RetargetError::NoSize("motion"))?;
+    let source = Figure::of_motion(motion, map, &target).ok_or(RetargetError::NoSize("motion"))?;
     let mut body = Body::new(&source, &target, map, motion, &times);
     let mut notes = Vec::new();
     if settings.travel && contacts::travel(&mut body, rate) {

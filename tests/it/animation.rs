@@ -7,6 +7,7 @@ pub mod keep;
 mod keys;
 mod layers;
 mod random;
+mod reduced;
 mod root_motion;
 mod sampler;
 mod switch_range;

@@ -1,5 +1,6 @@
 //! Motion of other skeletons on rigs: measured on the clip as the rig's program plays it.
 
+mod bind_poses;
 mod bodies;
 mod hands;
 mod joints;

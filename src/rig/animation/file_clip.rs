@@ -119,6 +119,7 @@ pub fn motion_of(model: &Model, clip: &Clip) -> Motion {
         name: clip.name.clone(),
         joints: model.nodes.iter().map(joint).collect(),
         frame_time: 1.0 / USUAL_RATE,
+        bind_pose: model.bind_pose().unwrap_or_default(),
         ..Motion::default()
     };
     let facts = ClipExtras::read(clip.extras.as_ref());

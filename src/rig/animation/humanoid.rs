@@ -6,11 +6,19 @@
 mod names;
 mod shape;
 
-use std::{collections::BTreeMap, fmt, str::FromStr};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, BTreeSet},
+    fmt,
+    str::FromStr,
+};
 
 use bevy::math::Vec3;
 
 pub use self::shape::by_shape;
+
+/// Fewest joints of a file that numbers all of its nodes.
+const FEWEST_NUMBERED: usize = 8;
 
 /// Side of a bone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -180,6 +188,8 @@ pub enum HeadBone {
 
 /// Joints below a head that stand for its bones, by their names.
 pub fn head_bones(joints: &[SkeletonJoint], head: usize) -> BTreeMap<HeadBone, usize> {
+    let unnumbered = without_numbers(joints);
+    let joints: &[SkeletonJoint] = &unnumbered;
     let mut found = BTreeMap::new();
     for (at, joint) in joints.iter().enumerate().filter(|(at, _)| is_above(joints, head, *at)) {
         if let Some(bone) = names::head_bone_of(&joint.name) {
@@ -208,6 +218,8 @@ pub fn by_names_and(joints: &[SkeletonJoint], known: &BTreeMap<HumanBone, usize>
 /// Joints that are named as bones, whether they make up a human or not. Of spines, only those that go on to the head have
 /// such names.
 pub fn named_bones(joints: &[SkeletonJoint]) -> BTreeMap<HumanBone, usize> {
+    let unnumbered = without_numbers(joints);
+    let joints: &[SkeletonJoint] = &unnumbered;
     let mut named: BTreeMap<HumanBone, usize> = BTreeMap::new();
     let mut ranks: BTreeMap<HumanBone, usize> = BTreeMap::new();
     for (at, joint) in joints.iter().enumerate() {
@@ -225,6 +237,24 @@ pub fn named_bones(joints: &[SkeletonJoint]) -> BTreeMap<HumanBone, usize> {
         named.insert(HumanBone::Head, head);
     }
     named
+}
+
+/// Joints without the numbers that nearly all names end with, each with another one, where a web site has numbered the
+/// nodes.
+fn without_numbers(joints: &[SkeletonJoint]) -> Cow<'_, [SkeletonJoint]> {
+    let named = joints.iter().filter(|joint| !joint.name.is_empty()).count();
+    let number = |joint: &SkeletonJoint| names::node_number(&joint.name).map(|(_, number)| number);
+    let numbers: BTreeSet<u32> = joints.iter().filter_map(number).collect();
+    if numbers.len() < FEWEST_NUMBERED || 5 * numbers.len() < 4 * named {
+        return Cow::Borrowed(joints);
+    }
+    let mut joints = joints.to_vec();
+    for joint in &mut joints {
+        if let Some(length) = names::node_number(&joint.name).map(|(stem, _)| stem.len()) {
+            joint.name.truncate(length);
+        }
+    }
+    Cow::Owned(joints)
 }
 
 /// Names the joints of arms that are called shoulder and wrist: a shoulder that carries the elbow is an upper arm if no other

@@ -47,6 +47,9 @@ pub struct Motion {
     pub frame_time: f32,
     /// Values of all frames: frame after frame, joint after joint, channel after channel; finite.
     pub values: Vec<f32>,
+    /// Transforms of the joints in the motion's space in the pose in which a mesh was bound to them; empty without one,
+    /// and where that is the rest pose.
+    pub bind_pose: Vec<Trs>,
     /// True if the file says that the motion is played over and over.
     pub looped: bool,
     /// Named moments, by rising time: seconds after the first frame.

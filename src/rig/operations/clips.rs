@@ -96,7 +96,8 @@ pub enum ClipOperation {
     },
     /// Replaces the keys of all layers by linear ones at the clip's frame rate; steps stay steps.
     Bake(Uid),
-    /// Removes keys of all layers without which their tracks stay within a tolerance.
+    /// Removes keys of all layers without which their tracks stay within a tolerance, at the keys and between them. The keys
+    /// that stay keep their tangents.
     Reduce {
         /// The clip.
         clip: Uid,
@@ -191,7 +192,7 @@ pub enum KeyOperation {
         /// Keys a second.
         rate: f32,
     },
-    /// Removes keys without which a track stays within a tolerance.
+    /// Removes keys without which a track stays within a tolerance, as [`ClipOperation::Reduce`] does.
     Reduce {
         /// The tracks.
         targets: Vec<TrackTarget>,

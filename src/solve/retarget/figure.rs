@@ -12,7 +12,7 @@ use crate::{
             motion::Motion,
         },
     },
-    solve::human_axes::human_axes,
+    solve::{human_axes::human_axes, rotate::direction},
 };
 
 /// Joint of a skeleton.
@@ -60,8 +60,23 @@ impl Figure {
         Self::new(rig.walk().zip(&globals).map(joint).collect(), map.target.clone(), axes)
     }
 
-    /// Skeleton of a motion; `None` if it has no size.
-    pub fn of_motion(motion: &Motion, map: &JointMap) -> Option<Self> {
+    /// Skeleton of a motion; `None` if it has no size. It stands as at rest or, where that is more like the figure
+    /// `beside` it, in the pose in which its mesh was bound: files may rest in any pose.
+    pub fn of_motion(motion: &Motion, map: &JointMap, beside: &Self) -> Option<Self> {
+        let rest = Self::of_places(motion, map, motion.rest_globals());
+        if motion.bind_pose.len() != motion.joints.len() {
+            return rest;
+        }
+        let bound = Self::of_places(motion, map, motion.bind_pose.clone());
+        match (rest, bound) {
+            (Some(rest), Some(bound)) if bound.likeness(beside) <= rest.likeness(beside) => Some(rest),
+            (rest, None) => rest,
+            (_, bound) => bound,
+        }
+    }
+
+    /// Skeleton of a motion whose joints stand at places.
+    fn of_places(motion: &Motion, map: &JointMap, places: Vec<Trs>) -> Option<Self> {
         let joint = |(joint, rest): (&crate::rig::animation::motion::MotionJoint, Trs)| FigureJoint {
             uid: Uid::default(),
             label: joint.name.clone(),
@@ -70,7 +85,7 @@ impl Figure {
             rest,
         };
         let axes = map.axes.map(|[source, _]| source);
-        Self::new(motion.joints.iter().zip(motion.rest_globals()).map(joint).collect(), map.source.clone(), axes)
+        Self::new(motion.joints.iter().zip(places).map(joint).collect(), map.source.clone(), axes)
     }
 
     fn new(joints: Vec<FigureJoint>, bones: HumanJoints, axes: Option<Quat>) -> Option<Self> {
@@ -87,6 +102,22 @@ impl Figure {
         let legs: Vec<f32> = BodySide::BOTH.into_iter().filter_map(|side| figure.leg_length(side)).collect();
         figure.leg = if legs.is_empty() { figure.height } else { legs.iter().sum::<f32>() / legs.len() as f32 };
         (figure.leg > 0.0).then_some(figure)
+    }
+
+    /// Sum of the cosines between the directions of the trunk and of the limbs' bones of both figures.
+    fn likeness(&self, other: &Self) -> f32 {
+        let way = |figure: &Self, [from, to]: [HumanBone; 2]| {
+            let way = figure.place(to)? - figure.place(from)?;
+            direction(figure.axes.inverse() * way)
+        };
+        let limbs = BodySide::BOTH.into_iter().flat_map(|side| {
+            let of = |bone: LimbBone| HumanBone::Limb(side, bone);
+            let arm = [LimbBone::UpperArm, LimbBone::LowerArm, LimbBone::Hand].map(of);
+            let leg = [LimbBone::UpperLeg, LimbBone::LowerLeg, LimbBone::Foot].map(of);
+            [[arm[0], arm[1]], [arm[1], arm[2]], [leg[0], leg[1]], [leg[1], leg[2]]]
+        });
+        let bones = limbs.chain([[HumanBone::Hips, HumanBone::Head]]);
+        bones.filter_map(|bone| Some(way(self, bone)?.dot(way(other, bone)?))).sum()
     }
 
     /// First joint of a bone.

@@ -6,7 +6,9 @@ use bevy::math::{Quat, Vec3};
 use rigsmith::rig::{
     PoseOffset, Rig, RigEdit, Uid, UidSource,
     animation::{Ease, Key, Property, RigClip, Track, TrackTarget},
-    operations::{ClipOperation, KeyClipboard, KeyEase, KeyOperation, KeyTolerance, Operation, Outcome},
+    operations::{
+        ClipOperation, KeyClipboard, KeyEase, KeyOperation, KeyTolerance, Operation, OperationError, Outcome,
+    },
 };
 
 use super::{BASE, CLIP, Random, TOP, animated, apply, biped, built, controls, program, share, target, turn};
@@ -23,11 +25,11 @@ fn run(rig: &mut Rig, operation: Operation) -> Outcome {
     outcome
 }
 
-fn keys(rig: &mut Rig, layer: Uid, change: KeyOperation) -> Outcome {
+pub fn keys(rig: &mut Rig, layer: Uid, change: KeyOperation) -> Outcome {
     run(rig, Operation::Clips(ClipOperation::Keys { clip: CLIP, layer, change }))
 }
 
-fn track<'a>(rig: &'a Rig, layer: usize, target: &TrackTarget) -> &'a [Key] {
+pub fn track<'a>(rig: &'a Rig, layer: usize, target: &TrackTarget) -> &'a [Key] {
     rig.clips()[0].layers[layer].tracks.get(target).map_or(&[], |track| &track.keys)
 }
 
@@ -210,6 +212,27 @@ fn baked_keys_follow_the_track_and_reduced_ones_stay_within_the_tolerance() {
             }
         }
     }
+}
+
+/// A key far away makes a clip long, and its tracks together have too many keys.
+#[test]
+fn baking_refuses_what_fills_the_memory() {
+    let mut rig = animated();
+    let joints = rig.walk().map(|joint| joint.data.uid).take(12);
+    let targets: Vec<TrackTarget> = joints.map(|joint| target(joint, Property::Translation)).collect();
+    let ends = || [0.0, 30_000.0].map(|time| Key::vector(time, Vec3::ZERO)).to_vec();
+    let far = targets.iter().map(|target| (target.clone(), ends())).collect();
+    keys(&mut rig, BASE, KeyOperation::Set(far));
+    let before = rig.clone();
+    for (targets, rate) in [(&targets[..], 30.0), (&targets[..1], 60.0)] {
+        let change = KeyOperation::Bake { targets: targets.to_vec(), rate };
+        let bake = Operation::Clips(ClipOperation::Keys { clip: CLIP, layer: BASE, change });
+        let refused = bake.run(&mut rig, &mut UidSource::seeded(1), None);
+        assert!(matches!(refused, Err(OperationError::BadNumber(_))), "{} tracks at {rate}", targets.len());
+        assert_eq!(rig, before);
+    }
+    keys(&mut rig, BASE, KeyOperation::Bake { targets: targets[..1].to_vec(), rate: 0.5 });
+    assert_eq!(track(&rig, 0, &targets[0]).len(), 15_001);
 }
 
 #[test]

@@ -115,6 +115,22 @@ fn bones_of_old_and_of_nameless_files_are_found() {
     check(&figure(&nameless, false), FoundBy::Shape, "a shape with a joint above the head");
 }
 
+/// Web sites number the nodes of a file, and scenes of several rigs number those.
+#[test]
+fn numbers_of_nodes_and_of_rigs_are_passed_over() {
+    let plain = "Hips Spine Spine1 Spine2 Neck Head LeftShoulder LeftArm LeftForeArm LeftHand RightShoulder RightArm \
+                 RightForeArm RightHand LeftUpLeg LeftLeg LeftFoot LeftToeBase RightUpLeg RightLeg RightFoot RightToeBase";
+    let check = |what: &str, name: fn(usize, &str) -> String| {
+        let names: Vec<String> = plain.split_whitespace().zip(1..).map(|(joint, at)| name(at, joint)).collect();
+        assert_eq!(names.len(), JOINTS.len());
+        check(&figure(&names, true), FoundBy::Names, what);
+    };
+    check("Mixamo", |_, joint| format!("mixamorig:{joint}"));
+    check("a numbered rig", |_, joint| format!("mixamorig9{joint}"));
+    check("numbered nodes", |at, joint| format!("{joint}_{at:02}"));
+    check("numbered nodes of Mixamo", |at, joint| format!("mixamorig:{joint}_{:03}", 10 * at));
+}
+
 #[test]
 fn a_map_completes_names_that_say_too_little() {
     let text = include_str!("walker.bvh");

@@ -40,6 +40,24 @@ fn tracks_are_baked_and_reduced() {
     assert_eq!(reason(&desk, TimelineAction::ReduceClip), Some("the clip has no keys"));
 }
 
+/// Keys go by what they move in sizes of the rig: four hundredths of a millimetre are nothing on one in centimetres.
+#[test]
+fn keys_are_reduced_by_the_size_of_the_rig() {
+    for (unit, left) in [(1.0_f32, 3), (100.0, 1)] {
+        let (mut desk, joints) = opened();
+        let to = joints.iter().zip(0_u8..).map(|(joint, number)| (*joint, Vec3::Y * f32::from(number) * unit));
+        desk.edit(Operation::Move { to: to.collect(), with_children: false });
+        let moved = TrackTarget { node: joints[1], property: Property::Translation };
+        let list = [(0.0, 0.0), (1.0, 0.004), (2.0, 0.0)].map(|(time, by): (f32, f32)| Key::vector(time, Vec3::Y * by));
+        let change = KeyOperation::Set(vec![(moved.clone(), list.to_vec())]);
+        desk.edit(Operation::Clips(ClipOperation::Keys { clip: CLIP, layer: BASE, change }));
+        let count = |desk: &Desk| clip(desk).layers[0].tracks[&moved].keys.len();
+        assert_eq!(count(&desk), 3);
+        act(&mut desk, TimelineAction::ReduceClip);
+        assert_eq!(count(&desk), left, "a unit of {unit}");
+    }
+}
+
 #[test]
 fn clips_are_retimed_with_their_keys() {
     let (mut desk, [_, left, _]) = opened();

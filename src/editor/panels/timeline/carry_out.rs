@@ -221,11 +221,11 @@ fn edit(world: &World, open: &OpenClip, action: TimelineAction) -> Option<Operat
         }
         TimelineAction::Reduce => {
             let targets = timeline.keys.keys().cloned().collect();
-            on_layer(KeyOperation::Reduce { targets, tolerance: KeyTolerance::default() })
+            on_layer(KeyOperation::Reduce { targets, tolerance: KeyTolerance::for_rig(open.rig) })
         }
         TimelineAction::BakeClip => Some(Operation::Clips(ClipOperation::Bake(clip))),
         TimelineAction::ReduceClip => {
-            Some(Operation::Clips(ClipOperation::Reduce { clip, tolerance: KeyTolerance::default() }))
+            Some(Operation::Clips(ClipOperation::Reduce { clip, tolerance: KeyTolerance::for_rig(open.rig) }))
         }
         TimelineAction::Longer => retimed(open.clip, 2.0),
         TimelineAction::Shorter => retimed(open.clip, 0.5),

@@ -20,9 +20,21 @@ fn own_words(name: &str) -> Vec<String> {
     for prefix in PREFIXES {
         if words.len() > prefix.len() && words.iter().zip(prefix).all(|(word, known)| word == known) {
             words.drain(..prefix.len());
+            // Several rigs of a scene have numbers: `mixamorig9Hips`.
+            if prefix == ["mixamorig"] && words.len() > 1 && words[0].parse::<u32>().is_ok() {
+                words.remove(0);
+            }
         }
     }
     words
+}
+
+/// Name before the number behind its last underscore, and that number: `LeftUpLeg_058`.
+pub(super) fn node_number(name: &str) -> Option<(&str, u32)> {
+    let (stem, number) = name.rsplit_once('_')?;
+    let is_number = number.bytes().all(|byte| byte.is_ascii_digit());
+    let number = number.parse().ok().filter(|_| is_number && !stem.is_empty())?;
+    Some((stem, number))
 }
 
 /// Number of a joint of a numbered spine that goes on to the head, as Rigify has it (`DEF-spine.006`); 0 for the first.

@@ -1,7 +1,12 @@
 //! Reduction: fewer keys for the same motion within a tolerance.
 
+use bevy::math::Vec3;
+
 use super::keys::Changes;
-use crate::rig::animation::{ClipLayer, Ease, Key, Property, Track, TrackTarget};
+use crate::rig::{
+    Rig,
+    animation::{ClipLayer, Ease, Key, Property, Track, TrackTarget},
+};
 
 /// Largest differences that a reduction may leave.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +48,15 @@ impl KeyTolerance {
         Self { distance: self.distance * (height / 1.7).max(1e-6), ..self }
     }
 
+    /// Usual tolerance for a rig of any size and units, by the longest edge of the box around its joints at rest.
+    pub fn for_rig(rig: &Rig) -> Self {
+        let globals = rig.rest_globals();
+        let places = || globals.iter().map(|(_, at)| at.translation);
+        let extent = places().reduce(Vec3::max).zip(places().reduce(Vec3::min));
+        let size = extent.map_or(0.0, |(most, least)| (most - least).max_element());
+        if size > 0.0 { Self::default().for_height(size) } else { Self::default() }
+    }
+
     /// Keys that are needed for a track to stay within the tolerance.
     pub fn reduced(&self, track: &Track, property: &Property) -> Vec<Key> {
         reduced(track, property, self.of(property))
@@ -58,7 +72,10 @@ impl KeyTolerance {
     }
 }
 
-/// Removes keys of tracks. Cubic tracks lose keys only where they are constant.
+/// Equal parts of the way from a key to the next one, between which a cubic track is compared with fewer keys.
+const BETWEEN: u16 = 8;
+
+/// Removes keys of tracks; those that stay are as they were, tangents included.
 pub(super) fn reduce(layer: &ClipLayer, targets: &[TrackTarget], tolerance: &KeyTolerance, changes: &mut Changes) {
     for target in targets {
         let Some(track) = layer.tracks.get(target) else { continue };
@@ -73,16 +90,11 @@ pub(super) fn reduce(layer: &ClipLayer, targets: &[TrackTarget], tolerance: &Key
 fn reduced(track: &Track, property: &Property, tolerance: f32) -> Vec<Key> {
     let keys = &track.keys;
     let Some(first) = keys.first() else { return Vec::new() };
-    let is_flat = |key: &Key| match key.ease {
-        Ease::Cubic { arrive, leave } => [arrive, leave].as_flattened().iter().all(|number| *number == 0.0),
-        Ease::Stepped | Ease::Linear => true,
-    };
-    if keys.iter().all(|key| is_flat(key) && distance(property, key.value, first.value) <= tolerance) {
+    let values = compared(keys, property);
+    if values.iter().all(|(_, value)| distance(property, *value, first.value) <= tolerance) {
         return vec![*first];
     }
-    if keys.iter().any(|key| matches!(key.ease, Ease::Cubic { .. })) {
-        return keys.clone();
-    }
+    let curve = Curve { keys, property, tolerance, values: &values };
     let mut kept = vec![0];
     let mut at = 0;
     while at + 1 < keys.len() {
@@ -90,7 +102,7 @@ fn reduced(track: &Track, property: &Property, tolerance: f32) -> Vec<Key> {
         let (mut good, mut step) = (at + 1, 2);
         let mut bad = keys.len();
         while at + step < keys.len() {
-            if can_follow(keys, at, at + step, property, tolerance) {
+            if curve.can_follow(at, at + step) {
                 good = at + step;
                 step *= 2;
             } else {
@@ -98,12 +110,12 @@ fn reduced(track: &Track, property: &Property, tolerance: f32) -> Vec<Key> {
                 break;
             }
         }
-        if bad == keys.len() && can_follow(keys, at, keys.len() - 1, property, tolerance) {
+        if bad == keys.len() && curve.can_follow(at, keys.len() - 1) {
             good = keys.len() - 1;
         }
         while bad - good > 1 && bad <= keys.len() {
             let middle = good.midpoint(bad);
-            if can_follow(keys, at, middle, property, tolerance) { good = middle } else { bad = middle }
+            if curve.can_follow(at, middle) { good = middle } else { bad = middle }
         }
         kept.push(good);
         at = good;
@@ -111,20 +123,51 @@ fn reduced(track: &Track, property: &Property, tolerance: f32) -> Vec<Key> {
     kept.into_iter().map(|place| keys[place]).collect()
 }
 
-/// True if the keys between two can be left out.
-fn can_follow(keys: &[Key], from: usize, to: usize, property: &Property, tolerance: f32) -> bool {
-    let (first, last) = (keys[from], keys[to]);
-    if to == from + 1 {
-        return true;
+/// Times at which a track is compared with fewer keys, by rising time, and its values there: those of its keys, and of
+/// places between them where the way from one to the next is cubic.
+fn compared(keys: &[Key], property: &Property) -> Vec<(f32, [f32; 4])> {
+    let mut values = Vec::with_capacity(keys.len());
+    for (place, key) in keys.iter().enumerate() {
+        values.push((key.time, key.value));
+        let (Some(next), Ease::Cubic { .. }) = (keys.get(place + 1), key.ease) else { continue };
+        let pair = Track { keys: vec![*key, *next] };
+        for step in 1..BETWEEN {
+            let time = key.time + (next.time - key.time) * f32::from(step) / f32::from(BETWEEN);
+            values.extend(pair.sample(property, time).map(|value| (time, value)));
+        }
     }
-    if keys[from..to].iter().any(|key| key.ease != first.ease) {
-        return false;
+    values
+}
+
+/// Track that loses keys.
+struct Curve<'a> {
+    keys: &'a [Key],
+    property: &'a Property,
+    tolerance: f32,
+    values: &'a [(f32, [f32; 4])],
+}
+
+impl Curve<'_> {
+    /// True if the keys between two can be left out.
+    fn can_follow(&self, from: usize, to: usize) -> bool {
+        let (first, last) = (self.keys[from], self.keys[to]);
+        if to == from + 1 {
+            return true;
+        }
+        let is_cubic = |key: &Key| matches!(key.ease, Ease::Cubic { .. });
+        let is_alike = |key: &Key| if is_cubic(&first) { is_cubic(key) } else { key.ease == first.ease };
+        if !self.keys[from..to].iter().all(is_alike) {
+            return false;
+        }
+        let pair = Track { keys: vec![first, last] };
+        let begin = self.values.partition_point(|(time, _)| *time <= first.time);
+        let end = self.values.partition_point(|(time, _)| *time < last.time);
+        let is_near = |(time, known): &(f32, [f32; 4])| {
+            let value = pair.sample(self.property, *time);
+            value.is_some_and(|value| distance(self.property, value, *known) <= self.tolerance)
+        };
+        self.values[begin..end].iter().all(is_near)
     }
-    let pair = Track { keys: vec![first, last] };
-    let is_near = |key: &Key| {
-        pair.sample(property, key.time).is_some_and(|value| distance(property, value, key.value) <= tolerance)
-    };
-    keys[from + 1..to].iter().all(is_near)
 }
 
 /// Difference of two values: an angle in degrees for rotations, else a distance.

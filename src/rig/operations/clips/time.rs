@@ -7,8 +7,9 @@ use crate::rig::{
     operations::Draft,
 };
 
-/// Most keys that baking gives a track.
+/// Most keys that baking gives a track, and all tracks of a layer.
 const MOST: f32 = 1e6;
+const MOST_TOGETHER: f32 = 1e7;
 
 /// Puts keys to other times. `factor` is the rate at which time runs there: tangents are divided by it.
 pub(super) fn shifted(
@@ -153,23 +154,41 @@ fn split(track: &Track, property: &Property, time: f32) -> Option<Key> {
     Some(Key { time, value, ease })
 }
 
+/// Track that is baked.
+struct BakedSpan<'a> {
+    target: &'a TrackTarget,
+    track: &'a Track,
+    /// Seconds of the first and the last key.
+    first: f32,
+    last: f32,
+    /// Frames between them.
+    frames: f32,
+}
+
 /// Linear keys at a rate in place of the keys of tracks.
-pub(super) fn bake(
-    layer: &ClipLayer,
-    targets: &[TrackTarget],
+pub(super) fn bake<'a>(
+    layer: &'a ClipLayer,
+    targets: &'a [TrackTarget],
     rate: f32,
     changes: &mut Changes,
 ) -> Result<(), OperationError> {
-    for target in targets {
-        let Some(track) = layer.tracks.get(target) else { continue };
-        let (Some(first), Some(last)) = (track.keys.first(), track.keys.last()) else { continue };
-        let frames = ((last.time - first.time) * rate).floor();
-        if frames > MOST {
-            return Err(OperationError::BadNumber("that many keys are too many for a track; bake at a lower rate"));
-        }
-        let at = |frame: u32| first.time + frame as f32 / rate;
-        let mut times: Vec<f32> = (0..=frames as u32).map(at).filter(|time| *time < last.time).collect();
-        times.push(last.time);
+    let span = |target: &'a TrackTarget| {
+        let track = layer.tracks.get(target)?;
+        let (first, last) = (track.keys.first()?.time, track.keys.last()?.time);
+        Some(BakedSpan { target, track, first, last, frames: ((last - first) * rate).floor() })
+    };
+    let spans: Vec<BakedSpan> = targets.iter().filter_map(span).collect();
+    // A key far away makes all tracks long that have one.
+    let together: f32 = spans.iter().map(|span| span.frames).sum();
+    if together > MOST_TOGETHER || spans.iter().any(|span| span.frames > MOST) {
+        return Err(OperationError::BadNumber(
+            "that many keys are too many; bake at a lower rate, or delete keys that are far away",
+        ));
+    }
+    for BakedSpan { target, track, first, last, frames } in spans {
+        let at = |frame: u32| first + frame as f32 / rate;
+        let mut times: Vec<f32> = (0..=frames as u32).map(at).filter(|time| *time < last).collect();
+        times.push(last);
         times.dedup();
         changes.remove(target, track.keys.iter().map(|key| key.time));
         let baked = times.into_iter().filter_map(|time| {
