@@ -28,7 +28,7 @@ pub(super) const PART: &str = r#"(
 )
 "#;
 
-const BASE: &str = r#"(
+pub(super) const BASE: &str = r#"(
     format: 2,
     name: "hand",
     sockets: [(name: "side", joint: "palm", translation: (1, 0, 0))],
@@ -65,7 +65,7 @@ fn folder(file: &str, mine: &str) -> tempfile::TempDir {
     folder
 }
 
-const UPDATE: [&str; 8] =
+pub(super) const UPDATE: [&str; 8] =
     ["update", "mine.rig.ron", "--from", "file.rig.ron", "--base", "base.rig.ron", "-o", "out.rig.ron"];
 
 /// The updated text and what was said.
