@@ -208,6 +208,9 @@ impl RigRuntime {
             }
             self.attributes.insert(entity, slots);
         }
+        if self.mode == InstanceMode::Direct {
+            self.state.mark_moved();
+        }
         self.is_due = true;
         self.all_due = self.mode == InstanceMode::Hierarchy;
     }
@@ -278,6 +281,9 @@ impl RigRuntime {
         let is_same = self.state.hash() == state.hash();
         if is_same {
             self.state.clone_from(state);
+            if self.mode == InstanceMode::Direct {
+                self.state.mark_moved();
+            }
             self.is_due = true;
             self.all_due = self.mode == InstanceMode::Hierarchy;
         }

@@ -161,6 +161,11 @@ impl RigState {
         self.any_dirty = true;
     }
 
+    /// Tells that every node may have moved in the last evaluation, for results that are read by somebody else from now on.
+    pub(crate) fn mark_moved(&mut self) {
+        self.moved.fill(u64::MAX);
+    }
+
     /// Poses a node, within the channels and limits of its control.
     ///
     /// # Errors
