@@ -19,9 +19,9 @@ pub struct DocumentUpdate {
     pub base: TemplateVersion,
 }
 
-/// The update of a document to the content of `file`, as [`update_template`] updates a file. `base` is the version that the document
-/// took over last. `None` where the two have the same part instances, whose fields need no comparison, and where the text of the
-/// base cannot say what the document is.
+/// The update of a document to the content of `file`, as [`update_template`] updates a file. `base` is the version that the
+/// document took over last. `None` where the two have the same part instances, whose fields need no comparison, and where the
+/// text of the base cannot say what the document is.
 pub fn update_document(
     disk: &dyn Disk,
     base: &TemplateVersion,

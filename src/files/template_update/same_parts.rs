@@ -54,8 +54,8 @@ pub(super) fn with_same_parts(
     SameParts { base, file: renewed, moved }
 }
 
-/// The text of a template's file, in which the part instances that are those of `known` have their uids; `None` where no other
-/// one has to be written.
+/// The text of a template's file, in which the part instances that are those of `known` have their uids; `None` where no
+/// other one has to be written.
 pub(in crate::files) fn with_known_uids(
     disk: &dyn Disk,
     file: &Path,

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use super::{RigState, mark};
 use crate::solve::program::RigProgram;
 
-/// A run of a part of a program's operations: those that a difference reaches, and those that compute what these read. Worked
-/// out once for all instances.
+/// A run of a part of a program's operations: those that a difference reaches, and those that compute what these read.
+/// Worked out once for all instances.
 #[derive(Debug)]
 pub(super) struct PartialRun {
     /// Operations in their order.
@@ -19,7 +19,8 @@ pub(super) struct PartialRun {
 
 impl PartialRun {
     /// The run after an exchange in which some operations are others, and some registers have other values at the start
-    /// (transforms first). `None` for a program with springs, which move with every run, and where most operations have to run.
+    /// (transforms first). `None` for a program with springs, which move with every run, and where most operations have to
+    /// run.
     pub fn of(program: &RigProgram, ops: &[u32], registers: impl Iterator<Item = usize>) -> Option<Self> {
         let layout = &program.layout;
         if !layout.spring_ops.is_empty() {
