@@ -116,8 +116,12 @@ fn fields_of_parts_are_merged_as_by_the_command_line() {
         let (code, said) = rigsmith(&folder, &part_fields::UPDATE);
         assert_eq!(code, 0, "{field}: {said}");
         let told = fs::read_to_string(folder.join("out.rig.ron")).unwrap();
+        let known = studio.source().taken_over().parts.to_vec();
         studio.save(&file);
-        studio.until("the update", |world, _| world.resource::<InstanceReport>().updated == 1);
+        studio.until("the update", |world, rig| {
+            world.get::<RigSource>(rig).is_some_and(|source| source.taken_over().parts != known.as_slice())
+        });
+        assert_eq!(studio.instance_report().failed, Vec::<String>::new(), "{field}");
         // The document says what the command line has written, to the byte.
         assert_eq!(studio.document_over("again.rig.ron", &told), told, "{field}");
         assert!(told.contains("relative_size: 0.9") && told != mine, "{field}: {told}");
