@@ -76,10 +76,12 @@ pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
 pub use site::{SITE_FILE, SearchPaths, SiteError, TEMPLATES_VARIABLE};
 pub use store::{
-    StoreError, is_template_of, store_animation, store_avatar, store_document_over, store_model, store_packed_clips,
-    store_rig, store_rig_over, store_skin,
+    DocumentBase, StoreError, is_template_of, store_animation, store_avatar, store_document_over, store_model,
+    store_packed_clips, store_rig, store_rig_over, store_skin,
 };
 pub use template_origin::{TemplateOrigin, has_parts, store_rig_from};
 pub(crate) use template_text::template_text;
-pub use template_update::{TemplateUpdate, TemplateVersion, base_text, diff_templates, update_template};
+pub use template_update::{
+    DocumentUpdate, TemplateUpdate, TemplateVersion, base_text, diff_templates, update_document, update_template,
+};
 pub use watch::{FileWatch, LOOK, TemplateWatch};

@@ -49,6 +49,7 @@ mod folders;
 mod model_files;
 mod skins;
 mod source;
+mod template_file;
 
 use std::{
     collections::{HashMap, HashSet},

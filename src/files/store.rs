@@ -11,6 +11,7 @@ use super::{
     read_capped, save_atomic, save_set, stem,
     template_origin::moved_text,
     template_text::{TemplateText, template_text},
+    template_update::with_known_uids,
     verify,
 };
 use crate::{
@@ -25,6 +26,7 @@ use crate::{
         animation::RigClip,
         character::rig_text,
         format::animation::{self, write_animation},
+        part::PartInstance,
         project,
         skin::{SkinError, SkinFile},
         template::{self, write_template},
@@ -271,6 +273,17 @@ pub fn store_rig_over(
     rig: impl Borrow<Rig>,
     sources: &[&Path],
 ) -> Result<Vec<String>, StoreError> {
+    store_over(disk, path, rig, &[], sources)
+}
+
+/// Saves a rig as [`store_rig_over`] does. Part instances of the text that are those of `parts` get their uids.
+fn store_over(
+    disk: &dyn Disk,
+    path: &Path,
+    rig: impl Borrow<Rig>,
+    parts: &[PartInstance],
+    sources: &[&Path],
+) -> Result<Vec<String>, StoreError> {
     if FileKind::of(path) != Some(FileKind::Template) {
         return store_rig(disk, path, rig);
     }
@@ -279,6 +292,7 @@ pub fn store_rig_over(
     for source in sources {
         match template_of(disk, source, rig.borrow().uid()) {
             Ok(Some(text)) => {
+                let text = with_known_uids(disk, source, &text, parts).unwrap_or(text);
                 found = Some((*source, text));
                 break;
             }
@@ -304,8 +318,18 @@ pub fn store_rig_over(
     Ok(note.into_iter().chain(is_unread.then(|| SOURCE_UNREAD.to_owned())).collect())
 }
 
-/// Saves a document over its template as [`store_rig_over`] does, and keeps the sockets and options of the file that neither the
-/// document nor its base has; a note names them. The base is the version of the template that the document took over last.
+/// Version of its template that a document took over last.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct DocumentBase<'b> {
+    /// The rig of the version; `None` if nobody knows it.
+    pub rig: Option<&'b Rig>,
+    /// Part instances of the version, with the uids that they have in the document; none if nobody knows them.
+    pub parts: &'b [PartInstance],
+}
+
+/// Saves a document over its template as [`store_rig_over`] does. A part instance whose uid is left out, and that has another name
+/// or other joints in the file than in the base, gets the uid that it has in the document. Sockets and options of the file that
+/// neither the document nor its base has stay there; a note names them.
 ///
 /// # Errors
 /// Those of [`store_rig_over`].
@@ -313,16 +337,16 @@ pub fn store_document_over(
     disk: &dyn Disk,
     path: &Path,
     rig: &Rig,
-    base: Option<&Rig>,
+    base: DocumentBase,
     sources: &[&Path],
 ) -> Result<Vec<String>, StoreError> {
     let is_template = FileKind::of(path) == Some(FileKind::Template);
     let mut texts = sources.iter().filter_map(|source| template_of(disk, source, rig.uid()).ok().flatten());
     let text = if is_template { texts.next() } else { None };
-    let Some((kept, note)) = text.and_then(|text| with_kept_lists(rig, base, &text)) else {
-        return store_rig_over(disk, path, rig, sources);
+    let Some((kept, note)) = text.and_then(|text| with_kept_lists(rig, base.rig, &text)) else {
+        return store_over(disk, path, rig, base.parts, sources);
     };
-    let mut notes = store_rig_over(disk, path, kept, sources)?;
+    let mut notes = store_over(disk, path, kept, base.parts, sources)?;
     notes.push(note);
     Ok(notes)
 }

@@ -1,6 +1,7 @@
 //! Updates of templates with parts: what a new version changes of a part instance is changed of the instance, not of what comes
 //! of it.
 
+mod document;
 mod part_files;
 mod same_parts;
 
@@ -16,16 +17,22 @@ use super::{
     template_origin::moved_text,
     template_text::{TemplateText, template_text},
 };
-use crate::rig::{
-    Rig, Uid,
-    part::PartInstance,
-    template::{FileMarks, read_template, text_of, with_instance_fields, with_instances_of, write_template},
-    update::{
-        Change, ChangeKind, Choices, MergedParts, RefittedTemplate, Take, TemplateWithParts, Update, diff, merge_parts,
-        update_with, with_whole_parts,
+use crate::{
+    modules,
+    processor::Modules,
+    rig::{
+        Rig, SourceError, Uid,
+        part::PartInstance,
+        template::{FileMarks, read_template, text_of, with_instance_fields, with_instances_of, write_template},
+        update::{
+            Change, ChangeKind, Choices, MergedParts, RefittedTemplate, Take, TemplateWithParts, Update, diff,
+            merge_parts, update_with, with_whole_parts,
+        },
     },
 };
+pub use document::{DocumentUpdate, update_document};
 use part_files::Sides;
+pub(super) use same_parts::with_known_uids;
 use same_parts::with_same_parts;
 
 /// A version of a template: its file, and the rig with its parts.
@@ -36,6 +43,8 @@ pub struct TemplateVersion {
     content: TemplateWithParts,
     /// Files of the parts, by the places beside the template.
     found: BTreeMap<PathBuf, FoundPart>,
+    /// Modules whose parameters are mirrored.
+    modules: Modules,
     notes: Vec<String>,
 }
 
@@ -49,18 +58,40 @@ impl TemplateVersion {
         Self::of(disk, path, &bytes)
     }
 
+    /// The template with that content of its file, and parts that a reader has [found](PartFiles::found).
+    ///
+    /// # Errors
+    /// See [`PartFiles::complete`].
+    pub fn of_content(
+        path: &Path,
+        content: &[u8],
+        found: &BTreeMap<PathBuf, FoundPart>,
+        modules: &Modules,
+    ) -> Result<Self, SourceError> {
+        Self::put_together(PartFiles::known(found, modules.clone()), path.to_owned(), content)
+    }
+
     /// The template with that content of its file.
     fn of(disk: &dyn Disk, path: PathBuf, bytes: &[u8]) -> Result<Self, LoadError> {
-        let fault = |source| in_source(&path, bytes, source);
-        let text = text_of(bytes).map_err(fault)?;
-        let template = read_template(bytes).map_err(fault)?;
-        let mut files = PartFiles::new(disk);
-        let whole = files.put_together(&path, text, template.clone()).map_err(fault)?;
+        let read = Self::put_together(PartFiles::with_modules(disk, modules::all()), path.clone(), bytes);
+        read.map_err(|source| in_source(&path, bytes, source))
+    }
+
+    fn put_together(mut files: PartFiles, path: PathBuf, bytes: &[u8]) -> Result<Self, SourceError> {
+        let text = text_of(bytes)?;
+        let template = read_template(bytes)?;
+        let whole = files.put_together(&path, text, template.clone())?;
         let fitted = files.fitted(&path, &template).unwrap_or_default();
         // The marks of the file are kept.
         let text = String::from_utf8_lossy(bytes).into_owned();
         let content = TemplateWithParts { template, rig: whole.rig, fitted };
-        Ok(Self { path, text, content, found: files.found, notes: whole.notes })
+        let modules = files.modules().clone();
+        Ok(Self { path, text, content, found: files.found, modules, notes: whole.notes })
+    }
+
+    /// A reader of the files of parts as they are now.
+    fn reader<'d>(&self, disk: &'d dyn Disk) -> PartFiles<'d> {
+        PartFiles::with_modules(disk, self.modules.clone())
     }
 
     /// The rig with its parts.
@@ -73,7 +104,8 @@ impl TemplateVersion {
         &self.notes
     }
 
-    fn parts(&self) -> &[PartInstance] {
+    /// The part instances, in their order.
+    pub fn parts(&self) -> &[PartInstance] {
         &self.content.template.parts
     }
 
@@ -82,7 +114,7 @@ impl TemplateVersion {
         if self.content.fitted.len() != self.parts().len() {
             return None;
         }
-        let mut files = PartFiles::new(disk);
+        let mut files = self.reader(disk);
         let mut fit = |instance: &PartInstance| files.fitted_part(&self.path, instance).ok();
         let refitted = self.content.with_fields(instances, &mut fit)?;
         let (_, text) = FileMarks::of(&self.text);
@@ -127,7 +159,7 @@ pub fn update_template(
         .then(|| with_instances_of(of_fields, now.parts(), (&*of_file, file.parts()), &fresh))
         .flatten();
     // A part that cannot be had from here comes as joints and tags.
-    let is_right = |text: &String| PartFiles::new(disk).complete(&now.path, text.as_bytes()).is_ok();
+    let is_right = |text: &String| now.reader(disk).complete(&now.path, text.as_bytes()).is_ok();
     let texts = whole.into_iter().chain(text).filter(is_right).map(|text| marks.put_on(text)).collect();
     TemplateUpdate { update, path, texts }
 }

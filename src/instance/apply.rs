@@ -280,9 +280,11 @@ fn exchange(
     });
     let mut held: EntityHashMap<Vec<Uid>> = EntityHashMap::default();
     let mut kept: EntityHashMap<KeptPose> = EntityHashMap::default();
+    // Most exchanges leave poses alone.
     for Step { entity, kept: pose, held: nodes, .. } in steps {
+        let Some(pose) = pose else { continue };
         held.insert(entity, nodes);
-        kept.extend(pose.map(|pose| (entity, pose)));
+        kept.insert(entity, pose);
     }
     (others, kept, held)
 }

@@ -16,7 +16,7 @@ use bevy::{
 };
 
 use crate::{
-    files::{FoundPart, PartFiles, template_text},
+    files::{FoundPart, PartFiles, TemplateVersion, template_text},
     modules,
     processor::Modules,
     rig::{
@@ -134,6 +134,20 @@ impl RigTemplate {
         let path = self.parts.path.as_path();
         let source = (!self.text.is_empty()).then(|| (path, &*self.text));
         format!("{mark}{}", template_text(&self.rig, source, path, &|| self.parts.reader()).text)
+    }
+
+    /// The template's own file; empty for a text that comes from none.
+    pub(super) fn file(&self) -> &Path {
+        &self.parts.path
+    }
+
+    /// The template as a version that updates compare, with the parts as they were when it was read. `None` for a rig that was
+    /// made or changed by code.
+    pub(super) fn version(&self) -> Option<TemplateVersion> {
+        let TemplateParts { path, found, modules } = &*self.parts;
+        let mark = if self.has_mark { BYTE_ORDER_MARK } else { "" };
+        let content = format!("{mark}{}", self.text);
+        if self.is_of_text { TemplateVersion::of_content(path, content.as_bytes(), found, modules).ok() } else { None }
     }
 
     /// True if both are the same in memory.

@@ -13,7 +13,7 @@ use std::{
 
 use bevy::{asset::AssetId, log::error};
 
-use super::{RigTemplate, TemplateError, exchange::NextVersion};
+use super::{RigTemplate, TemplateError, exchange::NextVersion, template_file::TemplateFile};
 use crate::{
     files::{PartCache, PartFiles, RealDisk, TemplateWatch},
     processor::{BuildError, Builder, Modules, SourceText},
@@ -51,6 +51,8 @@ pub struct BuiltTemplate {
     pub ran: Arc<[Uid]>,
     /// Way from the build before to this one.
     pub(super) way: Option<NextVersion>,
+    /// The file; `None` for a template that comes from none on this disk.
+    pub(super) file: Option<Arc<TemplateFile>>,
 }
 
 #[cfg(feature = "remote")]
@@ -368,8 +370,10 @@ impl TemplateBuild {
             NextVersion::between(good, &built, [(&good.whole, &whole), (&good.lean, &lean)].into_iter().chain(pairs))
         });
         let some = Mutex::new(some);
+        let is_of_file = self.file.as_deref().is_some_and(|file| file == template.file());
+        let file = is_of_file.then(|| Arc::new(TemplateFile::of(template.clone())));
         let template =
-            BuiltTemplate { rig, source, built, whole, lean, sockets, file_sockets, some, changes, ran, way };
+            BuiltTemplate { rig, source, built, whole, lean, sockets, file_sockets, some, changes, ran, way, file };
         Ok(Arc::new(template))
     }
 

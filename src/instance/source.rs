@@ -4,8 +4,12 @@ use std::sync::Arc;
 
 use bevy::{ecs::entity::EntityHashSet, prelude::*};
 
-use super::{BuiltTemplate, RigBuilt, RigFailed, RigTemplate, RigTemplates, RigUpdated, TemplateError};
+use super::{
+    BuiltTemplate, RigBuilt, RigFailed, RigTemplate, RigTemplates, RigUpdated, TemplateError,
+    template_file::BaseVersion,
+};
 use crate::{
+    files::DocumentBase,
     plugins::{
         commands::{BuildFailure, BuildRequest, BuildResult, BuildStep, RigModules},
         document::{Change, EditRefusal, EditReport, EditRequest},
@@ -42,15 +46,15 @@ pub struct RigSource {
     pub template: Handle<RigTemplate>,
     /// Takes updates over at once.
     pub is_live: bool,
-    base: Option<Arc<Rig>>,
+    base: Option<BaseVersion>,
     /// True if the rig has come from the first version that is seen.
     is_first: bool,
     /// True if meshes without weights stay so.
     is_unbound: bool,
     /// The template that was compared last.
     seen: Option<Arc<BuiltTemplate>>,
-    /// An update that was requested: the base that it brings.
-    pending: Option<Arc<BuiltTemplate>>,
+    /// An update that was requested, and the base that it brings.
+    pending: Option<(Arc<BuiltTemplate>, BaseVersion)>,
     /// An update that was made in this frame.
     trial: Option<Arc<BuiltTemplate>>,
     /// Poses and motion that could not be kept in the update that was requested.
@@ -71,8 +75,8 @@ struct UpdateNotes {
 #[derive(Debug, Clone)]
 struct AcceptedUpdate {
     step: Arc<Step>,
-    before: Option<Arc<Rig>>,
-    after: Arc<Rig>,
+    before: Option<BaseVersion>,
+    after: BaseVersion,
 }
 
 impl RigSource {
@@ -100,7 +104,7 @@ impl RigSource {
 
     /// The rig has come from this version of the template.
     pub fn with_base(mut self, base: Arc<Rig>) -> Self {
-        self.base = Some(base);
+        self.base = Some(BaseVersion { rig: base, file: None });
         self
     }
 
@@ -123,18 +127,36 @@ impl RigSource {
 
     /// Takes note that the template was saved from the rig, as it was then.
     pub fn rebase(&mut self, saved: Arc<Rig>) {
-        self.base = Some(saved);
+        // The file has the same part instances as before.
+        let file = self.base.take().and_then(|base| base.file);
+        self.base = Some(BaseVersion { rig: saved, file });
     }
 
     /// The version of the template that was accepted last; `None` until it is loaded, or if nobody knows.
     pub fn base(&self) -> Option<&Arc<Rig>> {
-        self.base.as_ref()
+        self.base.as_ref().map(|base| &base.rig)
+    }
+
+    /// The version of the template that was accepted last, for a save over its file: with the uids that its part instances have
+    /// in the rig, as a uid that the file leaves out may be another one there.
+    pub fn taken_over(&self) -> DocumentBase<'_> {
+        let parts = self.base.as_ref().map_or(&[][..], BaseVersion::parts);
+        DocumentBase { rig: self.base.as_ref().map(|base| &*base.rig), parts }
     }
 
     /// True if the built template has been compared with the rig.
     #[cfg(feature = "remote")]
     pub(crate) fn has_seen(&self, built: &Arc<BuiltTemplate>) -> bool {
         self.seen.as_ref().is_some_and(|seen| Arc::ptr_eq(seen, built))
+    }
+
+    /// Changes that an update of the rig to a template would make.
+    #[cfg(feature = "remote")]
+    pub(crate) fn changes_to(&self, rig: &Rig, template: &RigTemplate, choices: &Choices) -> Vec<Difference> {
+        let (base, file) = (self.base.as_ref(), super::template_file::TemplateFile::of(template.clone()));
+        let of_parts = base.and_then(|base| base.update_of_parts(rig, &file, choices));
+        let whole = || update_with(base.map(|base| &*base.rig), rig, template.rig(), choices);
+        of_parts.map_or_else(whole, |(update, _)| update).changes
     }
 
     /// True if no update is under way.
@@ -190,8 +212,8 @@ pub(super) fn follow_steps(
         let known = source.steps.iter().find(|known| Arc::ptr_eq(&known.step, committed.step())).cloned();
         match (committed, known) {
             (Commit::Done(step), _) if *name == UPDATE => {
-                let Some(built) = source.pending.take() else { continue };
-                let (before, after) = (source.base.take(), built.rig.clone());
+                let Some((built, after)) = source.pending.take() else { continue };
+                let before = source.base.take();
                 source.base = Some(after.clone());
                 source.steps.push(AcceptedUpdate { step: step.clone(), before, after });
                 source.trial = Some(built);
@@ -248,28 +270,27 @@ pub(super) fn compare_templates(
         }
         source.seen = Some(built.clone());
         let Some(rig) = rig else {
-            source.base = Some(built.rig.clone());
+            source.base = Some(BaseVersion::of(built));
             commands.entity(entity).try_insert((*built.rig).clone());
             builds.write(BuildRequest { rig: entity, step: BuildStep::All });
             continue;
         };
         commands.entity(entity).try_remove::<UpdateOffer>();
         if std::mem::take(&mut source.is_first) {
-            source.base = Some(built.rig.clone());
+            source.base = Some(BaseVersion::of(built));
             continue;
         }
-        let (updated, notes) = updated(source.base.as_deref(), rig, &built.rig, &Take::Mine.into(), &modules);
-        if updated.changes.is_empty() {
-            source.base = Some(built.rig.clone());
-        } else if source.is_live && updated.conflicts() == 0 {
+        let updated = updated(source.base.as_ref(), rig, built, &Take::Mine.into(), &modules);
+        if updated.update.changes.is_empty() {
+            source.base = Some(updated.base);
+        } else if source.is_live && updated.update.conflicts() == 0 {
             source.had_failed = had_failed;
-            source.notes = notes;
             take_over(entity, rig, updated, built, &mut source, &mut edits, &mut commands);
         } else {
-            let from = source.base.as_deref().unwrap_or(rig);
+            let from = source.base().map_or(rig, |base| &**base);
             let version = VersionChange::between(from.about(), built.rig.about());
-            let (UpdateNotes { poses, clips }, built) = (notes, built.clone());
-            let offer = UpdateOffer { changes: updated.changes.into(), poses, clips, version, built };
+            let (UpdateNotes { poses, clips }, built) = (updated.notes, built.clone());
+            let offer = UpdateOffer { changes: updated.update.changes.into(), poses, clips, version, built };
             commands.entity(entity).try_insert(offer);
         }
     }
@@ -289,53 +310,66 @@ pub(super) fn accept_offers(
             continue;
         };
         source.had_failed = had_failed;
-        let (updated, notes) = updated(source.base.as_deref(), rig, &offer.built.rig, choices, &modules);
-        source.notes = notes;
+        let updated = updated(source.base.as_ref(), rig, &offer.built, choices, &modules);
         commands.entity(*entity).try_remove::<UpdateOffer>();
         take_over(*entity, rig, updated, &offer.built, &mut source, &mut edits, &mut commands);
     }
 }
 
-/// An update whose poses and clips mean the same, and what they could not keep.
+/// An update of a rig to its template.
+struct RigUpdate {
+    update: Update,
+    /// What poses and clips could not keep.
+    notes: UpdateNotes,
+    /// The version that the rig has taken over then.
+    base: BaseVersion,
+}
+
+/// An update whose poses and clips mean the same. Fields of part instances are compared by themselves, as
+/// [`update_template`](crate::files::update_template) compares them.
 fn updated(
-    base: Option<&Rig>,
+    base: Option<&BaseVersion>,
     rig: &Rig,
-    file: &Rig,
+    built: &BuiltTemplate,
     choices: &Choices,
     modules: &RigModules,
-) -> (Update, UpdateNotes) {
-    let mut updated = update_with(base, rig, file, choices);
-    let poses = keep_poses(rig, &mut updated.rig, &modules.0).unwrap_or_else(|error| {
+) -> RigUpdate {
+    let of_parts = base.and_then(|base| base.update_of_parts(rig, built.file.as_deref()?, choices));
+    let (mut update, base) = of_parts.unwrap_or_else(|| {
+        (update_with(base.map(|base| &*base.rig), rig, &built.rig, choices), BaseVersion::of(built))
+    });
+    let poses = keep_poses(rig, &mut update.rig, &modules.0).unwrap_or_else(|error| {
         warn!("poses were not re-expressed: {error}");
         Vec::new()
     });
-    let clips = keep_clips(rig, &mut updated.rig, &modules.0).unwrap_or_else(|error| {
+    let clips = keep_clips(rig, &mut update.rig, &modules.0).unwrap_or_else(|error| {
         warn!("clips were not re-expressed: {error}");
         ClipReport::default()
     });
-    (updated, UpdateNotes { poses: poses.into(), clips: clips.into() })
+    RigUpdate { update, notes: UpdateNotes { poses: poses.into(), clips: clips.into() }, base }
 }
 
 /// Requests the edits of an update.
 fn take_over(
     entity: Entity,
     rig: &Rig,
-    updated: Update,
+    RigUpdate { update, notes, base }: RigUpdate,
     built: &Arc<BuiltTemplate>,
     source: &mut RigSource,
     requests: &mut MessageWriter<EditRequest>,
     commands: &mut Commands,
 ) {
-    match edits_between(rig, &updated.rig) {
+    source.notes = notes;
+    match edits_between(rig, &update.rig) {
         // What is taken is there already.
-        Ok(edits) if edits.is_empty() => source.base = Some(built.rig.clone()),
+        Ok(edits) if edits.is_empty() => source.base = Some(base),
         Ok(mut edits) => {
-            edits.extend(pose_edits(rig, &updated.rig));
-            match clip_edits(rig, &updated.rig) {
+            edits.extend(pose_edits(rig, &update.rig));
+            match clip_edits(rig, &update.rig) {
                 Ok(clips) => edits.extend(clips),
                 Err(error) => warn!("clips were not re-expressed: {error}"),
             }
-            source.pending = Some(built.clone());
+            source.pending = Some((built.clone(), base));
             requests.write(EditRequest::operation(entity, Operation::Named { name: UPDATE, edits }));
         }
         Err(error) => commands.trigger(RigFailed { entity, error: TemplateError::Load(error.to_string()) }),

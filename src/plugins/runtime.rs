@@ -211,6 +211,9 @@ impl RigRuntime {
             }
             self.attributes.insert(entity, slots);
         }
+        if self.mode == InstanceMode::Direct {
+            self.state.mark_moved();
+        }
         self.is_due = true;
         self.all_due = self.mode == InstanceMode::Hierarchy;
     }
@@ -281,6 +284,9 @@ impl RigRuntime {
         let is_same = self.state.hash() == state.hash();
         if is_same {
             self.state.clone_from(state);
+            if self.mode == InstanceMode::Direct {
+                self.state.mark_moved();
+            }
             self.is_due = true;
             self.all_due = self.mode == InstanceMode::Hierarchy;
         }

@@ -13,7 +13,7 @@ use super::{
     schema::Verb,
 };
 use crate::{
-    files::{FileKind, PartFiles, RealDisk, read_capped, store_rig_over},
+    files::{FileKind, PartFiles, RealDisk, read_capped, store_document_over},
     instance::{RigSource, RigTemplate, RigTemplates, RunningTemplate, TemplateError, TemplateFiles, UpdateOffer},
     plugins::{
         commands::{BuildFailure, BuildRequest, BuildResult, BuildStep, Processor, RigModules},
@@ -23,7 +23,7 @@ use crate::{
         Rig, RigEdit,
         operations::Operation,
         template::{MAX_BYTES, write_template},
-        update::{Take, update},
+        update::Take,
     },
 };
 
@@ -342,7 +342,9 @@ fn save(world: &mut World, params: SaveParams) -> Result<Value, CallError> {
     let Some(rig) = world.get::<Rig>(entity).cloned() else { return Err(CallError::NoRig(params.rig.to_string())) };
     let sources: Vec<&std::path::Path> =
         [Some(&path), own.as_ref()].into_iter().flatten().map(|path| &**path).collect();
-    let notes = store_rig_over(&RealDisk, &path, &rig, &sources)?;
+    let source = world.get::<RigSource>(entity);
+    let base = source.map(RigSource::taken_over).unwrap_or_default();
+    let notes = store_document_over(&RealDisk, &path, &rig, base, &sources)?;
     if own.as_ref() == Some(&path)
         && let Some(mut source) = world.get_mut::<RigSource>(entity)
     {
@@ -374,8 +376,8 @@ fn renew(world: &mut World, params: UpdateParams) -> Result<StartedCall, CallErr
     let read = RigTemplate::read_with_parts(&content, &path, &mut files);
     let file = read.map_err(|source| TemplateError::Source { file: Some(path), source })?;
     if params.dry_run {
-        let updated = update(source.base().map(|base| &**base), &rig, file.rig(), take);
-        return Ok(StartedCall::Answered(json!({"changes": updated.changes, "ran": [], "poses": [], "clips": []})));
+        let changes = source.changes_to(&rig, &file, &take.into());
+        return Ok(StartedCall::Answered(json!({"changes": changes, "ran": [], "poses": [], "clips": []})));
     }
     let template = source.template.clone();
     let before = world.resource::<RigTemplates>().built(&template).cloned();

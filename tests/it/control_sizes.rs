@@ -191,6 +191,38 @@ fn no_control_of_animals_lies_in_the_flesh_about_their_bones() {
     }
 }
 
+/// Flesh as thick above and below a height as that, and as wide as a bird.
+fn sheet(height: f32, thickness: f32) -> Surface {
+    let corner = |at: usize| Vec3::new((at & 1) as f32, (at >> 1 & 1) as f32, (at >> 2) as f32) * 2.0 - Vec3::ONE;
+    let points: Vec<Vec3> = (0..8).map(|at| corner(at) * Vec3::new(2.0, thickness, 2.0) + Vec3::Y * height).collect();
+    let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles: Vec<[u32; 3]> = sides.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+    Surface::build(&points, &triangles)
+}
+
+/// Quills lie in a wing that is wider than any enlargement, so their controls stand on it.
+#[test]
+fn controls_of_quills_stand_on_the_wing() {
+    let rig = crate::bench::shipped("bird");
+    let quills: Vec<Uid> = rig
+        .walk()
+        .filter(|joint| joint.data.label.as_deref().is_some_and(|label| label.starts_with("feather_")))
+        .map(|joint| joint.data.uid)
+        .collect();
+    assert_eq!(quills.len(), 12);
+    let height = rig.position(quills[0]).y;
+    assert!(quills.iter().all(|quill| (rig.position(*quill).y - height).abs() < 0.01), "the wings are spread flat");
+    for (thickness, most) in [(0.01, 1.0), (0.02, 1.0), (0.05, 3.0)] {
+        let drawn = drawn(&rig, &sheet(height, thickness));
+        let of_quills = drawn.iter().filter(|(control, ..)| control.starts_with("quill_"));
+        assert_eq!(of_quills.clone().count(), 12);
+        for (control, share, factor) in of_quills {
+            assert!(*share >= 0.5, "{thickness}: {control}: {share} of its shape is outside");
+            assert!(*factor <= most, "{thickness}: {control}: enlarged by {factor}");
+        }
+    }
+}
+
 #[cfg(feature = "cli")]
 #[test]
 fn no_control_of_fitted_animals_lies_in_their_flesh() {

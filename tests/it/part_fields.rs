@@ -2,16 +2,20 @@
 
 use std::{fs, path::Path};
 
-use rigsmith::rig::{
-    Rig, Uid,
-    part::PartInstance,
-    update::{Take, same_parts, update},
+use rigsmith::{
+    files::{ProjectToSave, RealDisk, load_project, store_project},
+    rig::{
+        Rig, Uid,
+        part::PartInstance,
+        update::{Take, same_parts, update},
+    },
 };
 use serde_json::Value;
 
 use super::{
     cli_outputs::{json, rigsmith},
     part_instances::load,
+    saved_text::joints,
 };
 
 pub(super) const PART: &str = r#"(
@@ -28,7 +32,7 @@ pub(super) const PART: &str = r#"(
 )
 "#;
 
-const BASE: &str = r#"(
+pub(super) const BASE: &str = r#"(
     format: 2,
     name: "hand",
     sockets: [(name: "side", joint: "palm", translation: (1, 0, 0))],
@@ -65,7 +69,7 @@ fn folder(file: &str, mine: &str) -> tempfile::TempDir {
     folder
 }
 
-const UPDATE: [&str; 8] =
+pub(super) const UPDATE: [&str; 8] =
     ["update", "mine.rig.ron", "--from", "file.rig.ron", "--base", "base.rig.ron", "-o", "out.rig.ron"];
 
 /// The updated text and what was said.
@@ -96,6 +100,26 @@ fn a_count_of_the_file_comes_to_the_instance_and_changes_of_it_stay() {
     let again = ["update", "out.rig.ron", "--from", "file.rig.ron", "--base", "file.rig.ron", "-o", "again.rig.ron"];
     assert_eq!(rigsmith(folder.path(), &again).0, 0);
     assert_eq!(fs::read_to_string(folder.path().join("again.rig.ron")).unwrap(), text);
+}
+
+#[test]
+fn rigs_of_projects_take_fields_of_parts_over_as_templates_do() {
+    let folder = folder(&BASE.replace("prefix: \"a_\",", "prefix: \"a_\", count: 5,"), &mine());
+    let at = |name: &str| folder.path().join(name);
+    let rigs = vec![load(&at("mine.rig.ron"))];
+    let project = ProjectToSave { name: "shot".into(), rigs: rigs.clone(), ..ProjectToSave::default() };
+    store_project(&RealDisk, &at("shot.rigsmith.ron"), &project).unwrap();
+    let update =
+        ["update", "shot.rigsmith.ron", "--from", "file.rig.ron", "--base", "base.rig.ron", "-o", "out.rigsmith.ron"];
+    let (code, said) = rigsmith(folder.path(), &update);
+    assert!(code == 0 && said.contains("changed  part index count: nothing to 5"), "{said}");
+    assert!(!said.contains("conflict"), "{said}");
+    let out = load_project(&RealDisk, &at("out.rigsmith.ron")).unwrap();
+    let (_, told) = updated(folder.path(), &[]);
+    let template = load(&at("out.rig.ron"));
+    assert!(told.contains("part index count"), "{told}");
+    assert_eq!(joints(&out.rigs[0]), joints(&template), "the rig is the template's");
+    assert!(rigs[0].walk().all(|joint| template.joint(joint.data.uid).is_some()), "all joints keep their identity");
 }
 
 #[test]

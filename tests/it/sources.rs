@@ -1,6 +1,7 @@
 //! Rigs with documents of their own that follow their templates, in an app.
 
 mod long_life;
+mod parts;
 
 use std::{collections::HashSet, fs, path::PathBuf, sync::Arc};
 
@@ -53,9 +54,14 @@ impl Studio {
     }
 
     fn of(is_live: bool, text: &str) -> Self {
+        Self::with_part(is_live, text, ("link.rig.ron", written_part(0).as_str()))
+    }
+
+    /// A rig of a template beside the file of a part.
+    fn with_part(is_live: bool, text: &str, (name, part): (&str, &str)) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("t.rig.ron");
-        fs::write(folder.path().join("link.rig.ron"), written_part(0)).unwrap();
+        fs::write(folder.path().join(name), part).unwrap();
         fs::write(&file, text).unwrap();
         let mut app = headless_app(1);
         app.add_plugins(RigInstancePlugin::live()).init_resource::<InstanceReport>();

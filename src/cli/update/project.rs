@@ -8,14 +8,14 @@ use super::{UpdateArgs, clips, limits, tell_update, version};
 use crate::{
     cli::{Failure, Report, report::counted},
     files::{
-        FileKind, LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectTemplate, ProjectToSave,
-        RealDisk, TemplateVersion, is_same_file, store_project,
+        DocumentUpdate, FileKind, LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectTemplate,
+        ProjectToSave, RealDisk, TemplateVersion, is_same_file, store_project, update_document,
     },
     processor::{BuildError, Builder, keep_clips},
     rig::{
         EditError, Rig,
         animation::NodeNames,
-        update::{clip_edits, edits_between, pose_edits, update_with, with_identities},
+        update::{Choices, clip_edits, edits_between, pose_edits, update_with, with_identities},
     },
 };
 
@@ -44,7 +44,13 @@ pub(super) fn run(args: &UpdateArgs) -> Result<Report, Failure> {
     let base: Option<&Rig> = given.as_ref().map(TemplateVersion::rig).or(of_project.as_deref());
     let source = args.base.as_ref().or(known.map(|_| &args.rig));
     report.set("base", source.map(|path| path.display().to_string()));
-    let mut updated = update_with(base, &now, file.rig(), &args.side().into());
+    let choices: Choices = args.side().into();
+    // A base that is known with its parts tells their fields.
+    let of_parts = given.as_ref().and_then(|base| update_document(&RealDisk, base, &now, &file, &choices));
+    let (mut updated, taken_over) = match of_parts {
+        Some(DocumentUpdate { update, base }) => (update, Some(base)),
+        None => (update_with(base, &now, file.rig(), &choices), None),
+    };
     tell_update(&mut report, (base.unwrap_or(&now), file.rig()), &now, &mut updated)?;
     re_express(args, &now, &mut updated.rig, &mut report)?;
     let clips = clips::updated(args, (&now, &updated.rig), &clip_files, &mut report)?;
@@ -53,7 +59,8 @@ pub(super) fn run(args: &UpdateArgs) -> Result<Report, Failure> {
     }
     let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) else { return Ok(report) };
     exchange(&mut project.rigs[number], &updated.rig).map_err(refused)?;
-    let base = Arc::new(with_identities(file.rig(), &updated.identities));
+    let taken_over = taken_over.as_ref().map_or_else(|| file.rig(), TemplateVersion::rig);
+    let base = Arc::new(with_identities(taken_over, &updated.identities));
     // A template that is called by its name has no file that could be followed.
     let path = Some(&args.from).filter(|from| FileKind::of(from) == Some(FileKind::Template));
     match (known, path) {

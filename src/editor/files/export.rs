@@ -22,8 +22,8 @@ use crate::{
     algo::face::expression::{ExpressionSet, vrm_mixes},
     editor::counted::counted,
     files::{
-        FileKind, LoadError, RealDisk, StoreError, TemplateOrigin, is_template_of, load_animation, load_model,
-        load_packed_clips, load_rig_text, load_skin, load_template, stem, store_animation, store_avatar,
+        DocumentBase, FileKind, LoadError, RealDisk, StoreError, TemplateOrigin, is_template_of, load_animation,
+        load_model, load_packed_clips, load_rig_text, load_skin, load_template, stem, store_animation, store_avatar,
         store_document_over, store_model, store_packed_clips, store_rig_from, store_skin,
     },
     instance::RigSource,
@@ -99,12 +99,14 @@ pub(super) fn export(world: &mut World, path: PathBuf) {
     let document = world.get::<OpenDocument>(rig);
     let template = document.and_then(|document| document.template.clone());
     let base = document.and_then(|document| document.base.as_ref());
-    let base = world.get::<RigSource>(rig).and_then(RigSource::base).or(base).cloned();
+    let source = world.get::<RigSource>(rig);
+    let base = source.and_then(RigSource::base).or(base).cloned();
+    let parts = source.map_or_else(Vec::new, |source| source.taken_over().parts.to_vec());
     let options = world.get_resource::<ExportOptions>().cloned().unwrap_or_default();
     let FaceExpressions(expressions) = world.get_resource().cloned().unwrap_or_default();
     let names = animated_names(world, &data);
     let task = spawn(move || {
-        let (built, base) = (built.as_deref(), base.as_deref());
+        let (built, base) = (built.as_deref(), DocumentBase { rig: base.as_deref(), parts: &parts });
         let (mesh, expressions, names) = (mesh.as_ref(), &*expressions, &names);
         let source = ExportSource { rig: &data, built, modules: &modules, expressions, mesh, base, names };
         let mut notes = source.write(&path, template.as_deref(), &options)?;
@@ -131,7 +133,7 @@ struct ExportSource<'a> {
     expressions: &'a ExpressionSet,
     mesh: Option<&'a RigMesh>,
     /// The version of the template that the document took over last.
-    base: Option<&'a Rig>,
+    base: DocumentBase<'a>,
     /// Names of animated nodes that the window knows.
     names: &'a NodeNames,
 }

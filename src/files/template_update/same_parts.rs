@@ -1,6 +1,6 @@
 //! Versions of a template in which the part instances that are one have one uid.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
 use super::{Disk, TemplateVersion};
 use crate::rig::{
@@ -54,6 +54,22 @@ pub(super) fn with_same_parts(
     SameParts { base, file: renewed, moved }
 }
 
+/// The text of a template's file, in which the part instances that are those of `known` have their uids; `None` where no
+/// other one has to be written.
+pub(in crate::files) fn with_known_uids(
+    disk: &dyn Disk,
+    file: &Path,
+    text: &str,
+    known: &[PartInstance],
+) -> Option<String> {
+    if known.is_empty() {
+        return None;
+    }
+    let version = TemplateVersion::of(disk, file.to_owned(), text.as_bytes()).ok()?;
+    let uids = same_parts(known, version.parts());
+    if uids.is_empty() { None } else { version.with_part_uids(disk, &uids).map(|renewed| renewed.text) }
+}
+
 impl TemplateVersion {
     /// The version with other uids of part instances, and what comes of these with the uids that follow. `None` where its text
     /// cannot say so.
@@ -72,6 +88,6 @@ impl TemplateVersion {
                 }
             }
         }
-        Self::of(disk, self.path.clone(), marks.put_on(text).as_bytes()).ok()
+        Self::put_together(self.reader(disk), self.path.clone(), marks.put_on(text).as_bytes()).ok()
     }
 }

@@ -369,20 +369,22 @@ fn is_same_place(now: &Affine3A, wanted: &Affine3A, height: f32) -> bool {
         && is_near(now.matrix3.z_axis, wanted.matrix3.z_axis)
 }
 
-/// Writes the world transforms of joints in [`InstanceMode::Direct`].
+/// Writes the world transforms of joints in [`InstanceMode::Direct`]: those that may have moved, or all where the rig has.
 pub(super) fn scatter_globals(
-    rigs: Query<(&RigRuntime, &GlobalTransform), Or<(Changed<RigRuntime>, Changed<GlobalTransform>)>>,
+    rigs: Query<(&RigRuntime, Ref<GlobalTransform>), Or<(Changed<RigRuntime>, Changed<GlobalTransform>)>>,
     mut joints: Query<(&NodeSlot, &NodeOf, &mut GlobalTransform), Without<RigRuntime>>,
 ) {
-    let is_direct = |(runtime, _): &(&RigRuntime, &GlobalTransform)| runtime.mode == InstanceMode::Direct;
+    let is_direct = |(runtime, _): &(&RigRuntime, Ref<GlobalTransform>)| runtime.mode == InstanceMode::Direct;
     let place = |runtime: &RigRuntime, world: &Affine3A, slot: usize| {
         GlobalTransform::from(*world * runtime.state.global_at(slot).affine())
     };
     if rigs.iter().filter(is_direct).count() < CROWD {
         for (runtime, world) in rigs.iter().filter(is_direct) {
-            for (slot, entity) in &runtime.written {
+            let (is_moved, world) = (world.is_changed(), world.affine());
+            let due = runtime.written.iter().filter(|(slot, _)| is_moved || runtime.state.is_moved(*slot as usize));
+            for (slot, entity) in due {
                 if let Ok((_, _, mut joint)) = joints.get_mut(*entity) {
-                    *joint = place(runtime, &world.affine(), *slot as usize);
+                    *joint = place(runtime, &world, *slot as usize);
                 }
             }
         }
@@ -394,9 +396,11 @@ pub(super) fn scatter_globals(
         for (NodeSlot(slot), NodeOf(of), joint) in joints.iter_mut().flatten() {
             if last != *of {
                 let found = rigs.get(*of).ok().filter(is_direct);
-                (last, rig) = (*of, found.map(|(runtime, world)| (runtime, world.affine())));
+                (last, rig) = (*of, found.map(|(runtime, world)| (runtime, world.affine(), world.is_changed())));
             }
-            if let Some((runtime, world)) = &rig {
+            if let Some((runtime, world, is_moved)) = &rig
+                && (*is_moved || runtime.state.is_moved(*slot as usize))
+            {
                 **joint = place(runtime, world, *slot as usize);
             }
         }

@@ -251,6 +251,16 @@ impl Layout {
         self.fixed.iter().map(|step| of(graph, *step)).collect()
     }
 
+    /// Registers that an operation writes, by their final numbers: transforms first.
+    pub fn written_by(&self, op: usize) -> impl Iterator<Item = usize> {
+        let (transforms, before) = (self.x.order.len(), self.shape.wires.transforms as u32);
+        let written = self.shape.wires.written_by(self.ops[op] as usize).iter();
+        written.map(move |register| match register.checked_sub(before) {
+            Some(number) => transforms + self.n.number(number) as usize,
+            None => self.x.number(*register) as usize,
+        })
+    }
+
     /// Final number of a pose.
     pub fn posed(&self, pose: Pose) -> Pose {
         if pose == Pose::NONE { pose } else { Pose(self.pose.number(pose.0)) }

@@ -2,13 +2,15 @@
 
 mod carry;
 mod four;
+mod partial;
+mod workspace;
 
 use std::{cell::RefCell, sync::Arc};
 
 use glam::{Affine3A, Vec3};
 
-use self::four::Four;
 pub use self::{carry::Carry, four::LANES};
+use self::{four::Four, partial::PartialRun, workspace::Workspace};
 use super::{
     ContentHash, RigProgram, StateError,
     graph::valid,
@@ -78,65 +80,10 @@ pub struct RigState {
     all_dirty: bool,
     /// Marks that any operation has to run.
     any_dirty: bool,
+    /// Run that is enough while no operation has to run for another reason; only with [`Memory::Results`].
+    partial: Option<Arc<PartialRun>>,
     /// A bit for each node register whose transform the last evaluation changed.
     moved: Vec<u64>,
-}
-
-/// Registers and memory that instances of a thread share.
-#[derive(Default)]
-struct Workspace {
-    /// The program whose registers these are.
-    serial: u64,
-    x: Vec<Trs>,
-    n: Vec<f32>,
-    scratch: Scratch,
-}
-
-impl Workspace {
-    /// Loads the inputs of an instance, and returns the first operation to run: operations that depend on attributes
-    /// only are skipped if the instance before had the same attributes.
-    fn take(&mut self, state: &RigState) -> usize {
-        let program = &state.program;
-        let mut is_same = self.serial == program.serial;
-        if !is_same {
-            self.x.clone_from(&program.x);
-            self.n.clone_from(&program.n);
-            self.serial = program.serial;
-        }
-        let nodes = program.nodes.len() + 1;
-        self.x[nodes..state.x.len()].copy_from_slice(&state.x[nodes..]);
-        for ((attribute, known), value) in program.attributes.iter().zip(&mut self.n).zip(&state.n) {
-            if attribute.is_settable && known.to_bits() != value.to_bits() {
-                *known = *value;
-                is_same = false;
-            }
-        }
-        if is_same { program.layout.settings } else { 0 }
-    }
-
-    /// Stores the results in an instance.
-    fn give(&self, state: &mut RigState) {
-        let nodes = state.program.nodes.len() + 1;
-        state.x[..nodes].copy_from_slice(&self.x[..nodes]);
-        let numbers = state.n.len();
-        state.n.copy_from_slice(&self.n[..numbers]);
-        state.settle();
-        state.moved.fill(u64::MAX);
-    }
-
-    fn run(&mut self, state: &mut RigState, first: usize, dt: f32) {
-        let registers = SingleRegisters::<false> {
-            x: &mut self.x,
-            n: &mut self.n,
-            poses: &state.poses,
-            changed: false,
-            moved: &mut [],
-        };
-        let RigState { program, springs, frame, .. } = state;
-        let (tables, scratch) = (&program.tables, &mut self.scratch);
-        let mut machine = Machine { tables, registers, springs, scratch, dt, frame: *frame };
-        program.ops[first..].iter().for_each(|op| machine.run(op));
-    }
 }
 
 thread_local! {
@@ -168,6 +115,7 @@ impl RigState {
             dirty: vec![0; operations.div_ceil(64)],
             all_dirty: true,
             any_dirty: true,
+            partial: None,
             moved: vec![0; nodes.div_ceil(64)],
             program,
         }
@@ -185,7 +133,8 @@ impl RigState {
 
     /// Returns `true` if an evaluation would change anything: an input changed, or, if time passes, a spring moves.
     pub fn is_dirty(&self, dt: f32) -> bool {
-        self.any_dirty || self.frame.is_some() || (dt > 0.0 && self.springs.iter().any(|spring| !spring.is_settled()))
+        let is_changed = self.any_dirty || self.partial.is_some() || self.frame.is_some();
+        is_changed || (dt > 0.0 && self.springs.iter().any(|spring| !spring.is_settled()))
     }
 
     /// Tells that the rig has moved in the world since the last evaluation: `motion` is the rig's space of now, seen from
@@ -210,6 +159,11 @@ impl RigState {
     pub fn mark_all(&mut self) {
         self.all_dirty = true;
         self.any_dirty = true;
+    }
+
+    /// Tells that every node may have moved in the last evaluation, for results that are read by somebody else from now on.
+    pub(crate) fn mark_moved(&mut self) {
+        self.moved.fill(u64::MAX);
     }
 
     /// Poses a node, within the channels and limits of its control.
@@ -326,11 +280,14 @@ impl RigState {
                 self.evaluate_whole(dt, &mut workspace.scratch);
                 self.settle();
             }
-            Memory::Results => {
-                let first = workspace.take(self);
-                workspace.run(self, first, dt);
-                workspace.give(self);
-            }
+            Memory::Results => match self.due_run().cloned() {
+                Some(run) => workspace.run_partially(self, &run, dt),
+                None => {
+                    let (first, program) = (workspace.take(self), self.program.clone());
+                    workspace.run(self, program.ops[first..].iter(), dt);
+                    workspace.give(self);
+                }
+            },
         });
         true
     }
@@ -353,7 +310,13 @@ impl RigState {
         if !is_alike {
             return [a, b, c, d].map(|state| state.evaluate(dt));
         }
-        FOUR.with_borrow_mut(|four| four.evaluate([a, b, c, d], dt));
+        let run = a.due_run().cloned();
+        let run = run
+            .filter(|run| [&*b, &*c, &*d].iter().all(|state| state.due_run().is_some_and(|own| Arc::ptr_eq(own, run))));
+        FOUR.with_borrow_mut(|four| match run {
+            Some(run) => four.evaluate_partially([a, b, c, d], &run, dt),
+            None => four.evaluate([a, b, c, d], dt),
+        });
         [true; LANES]
     }
 
@@ -361,6 +324,7 @@ impl RigState {
     fn settle(&mut self) {
         self.any_dirty = false;
         self.all_dirty = false;
+        self.partial = None;
         self.frame = None;
     }
 

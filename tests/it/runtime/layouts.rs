@@ -9,7 +9,7 @@ use rigsmith::{
     modules,
     processor::Builder,
     rig::{BuiltRig, Channel, Collider, Constraint, NodeType, Output, PoseOffset, Scalar},
-    solve::program::{Carry, CompileOptions, ProgramCache, RigProgram, RigState},
+    solve::program::{Carry, CompileOptions, LANES, Memory, ProgramCache, RigProgram, RigState},
 };
 
 use super::{biped::RigBuilder, controls, turned};
@@ -137,6 +137,72 @@ fn exchanged_programs_run_what_differs() {
     let moved: Vec<usize> = state.moved().collect();
     assert!(moved.contains(&finger), "{moved:?}");
     assert!(moved.len() < 40, "{} nodes moved", moved.len());
+}
+
+/// Bits of the results of an instance.
+fn bits(state: &RigState) -> (Vec<[u32; 10]>, Vec<u32>) {
+    let of = |trs: &Trs| {
+        let [x, y, z, w] = trs.rotation.to_array();
+        let ([a, b, c], [d, e, f]) = (trs.translation.to_array(), trs.scale.to_array());
+        [a, b, c, x, y, z, w, d, e, f].map(f32::to_bits)
+    };
+    let attributes = 0..state.program().attributes().len();
+    (state.globals().iter().map(of).collect(), attributes.map(|slot| state.attribute_at(slot).to_bits()).collect())
+}
+
+/// Instances that remember results only run what a changed number reaches, in step and alone, to the bits of a full run.
+#[test]
+fn instances_of_a_crowd_run_what_a_difference_reaches() {
+    let rig = crate::bench::shipped("biped");
+    let mut built: BuiltRig = (*Arc::new(Builder::build(&rig, &Arc::new(modules::all())).unwrap())).clone();
+    let options = CompileOptions::default();
+    let mut cache = ProgramCache::default();
+    let first = cache.get(&built, &options).unwrap();
+    let posed = |number: usize| {
+        let mut state = RigState::with_memory(Arc::clone(&first), Memory::Results);
+        for slot in (number..first.nodes().len()).step_by(5) {
+            state.set_offset_at(slot, PoseOffset::from_rotation(Quat::from_rotation_y(0.02 * (slot % 13) as f32)));
+        }
+        state.evaluate(0.0);
+        state
+    };
+    let mut states: Vec<RigState> = (0..=LANES).map(posed).collect();
+    let (mut short, mut rounds) = (0, 0);
+    for round in 0..built.constraints.len() {
+        let mut other = (*built.constraints[round].constraint).clone();
+        if !changed(&mut other, 1.0 + 0.01 * (1 + round % 9) as f32) {
+            continue;
+        }
+        built.constraints[round].constraint = Arc::new(other);
+        rounds += 1;
+        let program = cache.get(&built, &options).unwrap();
+        let carry = Carry::between(states[0].program(), &program);
+        let operations = carry.operations_of_results(&program);
+        short += usize::from(operations * 2 < program.operations());
+        let full = |state: &RigState| {
+            let mut fresh = RigState::with_memory(Arc::clone(&program), Memory::Results);
+            fresh.carry_over(state);
+            fresh.evaluate(0.0);
+            bits(&fresh)
+        };
+        let (mut wanted, before): (Vec<_>, Vec<_>) = states.iter().map(|state| (full(state), bits(state))).unzip();
+        states.iter_mut().for_each(|state| state.exchange(&program, &carry));
+        // What is posed in the same frame needs a full run, of all that run in step.
+        if round % 4 == 0 {
+            let slot = (round..program.nodes().len()).find(|slot| program.nodes()[*slot].is_posable()).unwrap_or(0);
+            states[1].set_offset_at(slot, PoseOffset::from_rotation(Quat::from_rotation_z(0.01 * round as f32)));
+            wanted[1] = full(&states[1]);
+        }
+        let [a, b, c, d, alone] = &mut states[..] else { panic!("there are five") };
+        assert_eq!(RigState::evaluate_together([Some(a), Some(b), Some(c), Some(d)], 0.0), [true; LANES]);
+        assert!(alone.evaluate(0.0) && !alone.evaluate(0.0));
+        for ((state, wanted), before) in states.iter().zip(&wanted).zip(&before) {
+            assert!(bits(state) == *wanted, "round {round}: {operations} of {} operations", program.operations());
+            let is_told = |slot: usize| wanted.0[slot] == before.0[slot] || state.is_moved(slot);
+            assert!((0..program.nodes().len()).all(is_told), "round {round}: a node moved and is not told");
+        }
+    }
+    assert!(rounds > 50 && short * 8 > rounds, "{short} of {rounds} exchanges run less than half");
 }
 
 /// Readers, springs with bodies, and nodes on curves and triangles, between a few controls.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Memory, RigState, mark};
+use super::{Memory, RigState, mark, partial::PartialRun};
 use crate::{
     rig::PoseOffset,
     solve::program::{ProgramAttribute, ProgramNode, RigProgram, run::same_bits},
@@ -25,6 +25,8 @@ pub struct Carry {
     ranges: Vec<u32>,
     /// Differences of two programs of one layout; `None` for programs of different layouts.
     changes: Option<Changes>,
+    /// Run of instances that remember results only and are up to date; `None` where all operations have to run.
+    partial: Option<Arc<PartialRun>>,
 }
 
 /// Differences between two programs of one layout: operations with other parameters, and registers with other values at the
@@ -60,6 +62,13 @@ impl Changes {
                 .collect(),
         };
         changes.x.iter().all(|at| *at as usize > to.nodes.len()).then_some(changes)
+    }
+
+    /// Registers with other values, transforms first.
+    fn registers(&self, to: &RigProgram) -> impl Iterator<Item = usize> {
+        let transforms = to.x.len();
+        let numbers = self.n.iter().map(move |at| transforms + *at as usize);
+        self.x.iter().map(|at| *at as usize).chain(numbers)
     }
 }
 
@@ -112,7 +121,14 @@ impl Carry {
             ranges = (0..to.attributes.len() as u32).filter(has_other_range).collect();
             changes = Changes::between(from, to);
         }
-        Self { nodes, attributes, is_aligned, inputs, springs, is_in_place, bounds, ranges, changes }
+        // Poses and values that are clamped again are others.
+        let partial = if bounds.is_empty() && ranges.is_empty() {
+            changes.as_ref().and_then(|changes| PartialRun::of(to, &changes.ops, changes.registers(to)))
+        } else {
+            None
+        };
+        let partial = partial.map(Arc::new);
+        Self { nodes, attributes, is_aligned, inputs, springs, is_in_place, bounds, ranges, changes, partial }
     }
 
     /// Slot, for each node slot of the new program, of the same node in the old one.
@@ -128,6 +144,11 @@ impl Carry {
     /// True if poses have the same bounds in both programs, so that every pose goes on as it is.
     pub fn has_same_bounds(&self) -> bool {
         self.is_in_place && self.bounds.is_empty()
+    }
+
+    /// Number of operations that an instance which remembers results only, and is up to date, runs after the exchange.
+    pub fn operations_of_results(&self, to: &RigProgram) -> usize {
+        self.partial.as_ref().map_or(to.ops.len(), |run| run.ops.len())
     }
 
     /// True if an instance that remembers all registers runs only what differs between the programs.
@@ -154,6 +175,12 @@ impl RigState {
         }
         if let Some(changes) = carry.changes.as_ref().filter(|_| self.memory == Memory::Whole) {
             self.exchange_changes(program, changes, carry);
+            return;
+        }
+        let is_settled = self.memory == Memory::Results && !self.is_dirty(0.0);
+        if let Some(run) = carry.partial.as_ref().filter(|_| is_settled) {
+            self.program = Arc::clone(program);
+            self.partial = Some(Arc::clone(run));
             return;
         }
         let inputs = program.nodes.len() + 1..program.nodes.len() + 1 + program.inputs.len();

@@ -6,7 +6,7 @@
 
 use wide::f32x4;
 
-use super::{RigState, SpringState};
+use super::{RigState, SpringState, partial::PartialRun};
 use crate::{
     mesh::model::Trs,
     rig::PoseOffset,
@@ -28,6 +28,8 @@ pub const LANES: usize = 4;
 pub(super) struct Four {
     /// The program whose registers these are.
     serial: u64,
+    /// True if the last run left out operations.
+    is_partial: bool,
     registers: Columns,
     scratch: Scratch,
 }
@@ -66,16 +68,41 @@ impl Four {
     pub fn evaluate(&mut self, mut states: [&mut RigState; LANES], dt: f32) {
         let first = self.take(&states);
         let program = states[0].program.clone();
-        let frames = states.each_ref().map(|state| state.frame);
-        let mut context = RunContext {
-            tables: &program.tables,
-            springs: states.each_mut().map(|state| state.springs.as_mut_slice()),
-            scratch: &mut self.scratch,
-            dt,
-            frames,
-        };
-        program.ops[first..].iter().for_each(|op| self.registers.run(op, &mut context));
+        self.run(&mut states, &program.tables, program.ops[first..].iter(), dt);
         self.give(states);
+    }
+
+    /// Evaluates what a run reaches of instances of one program.
+    pub fn evaluate_partially(&mut self, mut states: [&mut RigState; LANES], run: &PartialRun, dt: f32) {
+        self.take(&states);
+        self.is_partial = true;
+        let program = states[0].program.clone();
+        self.run(&mut states, &program.tables, run.ops.iter().map(|op| &program.ops[*op as usize]), dt);
+        let Columns { x, n, .. } = &self.registers;
+        for register in run.nodes.iter().map(|register| *register as usize) {
+            for (state, place) in states.iter_mut().zip(apart(&x[register])) {
+                state.x[register] = place;
+            }
+        }
+        for (lane, state) in states.into_iter().enumerate() {
+            for number in run.numbers.iter().map(|number| *number as usize) {
+                state.n[number] = n[number][lane];
+            }
+            state.settle_partially(run);
+        }
+    }
+
+    fn run<'o>(
+        &mut self,
+        states: &mut [&mut RigState; LANES],
+        tables: &Tables,
+        ops: impl Iterator<Item = &'o Op>,
+        dt: f32,
+    ) {
+        let frames = states.each_ref().map(|state| state.frame);
+        let springs = states.each_mut().map(|state| state.springs.as_mut_slice());
+        let mut context = RunContext { tables, springs, scratch: &mut self.scratch, dt, frames };
+        ops.for_each(|op| self.registers.run(op, &mut context));
     }
 
     /// Loads the inputs of the instances, and returns the first operation to run: operations that depend on attributes
@@ -108,7 +135,8 @@ impl Four {
             let is_posed = offsets.map(|offset| *offset != PoseOffset::IDENTITY);
             PoseLanes { offset: together(offsets.map(Place::from)), is_posed: mask(is_posed) }
         }));
-        if is_same { program.layout.settings } else { 0 }
+        let is_whole = !std::mem::take(&mut self.is_partial);
+        if is_same && is_whole { program.layout.settings } else { 0 }
     }
 
     /// Stores the results in the instances.

@@ -1,0 +1,63 @@
+//! Updates of documents: rigs that hold what parts bring, and not the parts themselves.
+//!
+//! A document is written as changes of the version that it took over last, and is then a version like the two others. So
+//! documents and files are updated in one way.
+
+use super::{Disk, PartFiles, TemplateVersion, same_parts::with_same_parts, template_text, update_template};
+use crate::rig::{
+    Rig,
+    part::PartInstance,
+    update::{Choices, Update, edits_between},
+};
+
+/// An update of a document.
+#[derive(Debug, Clone)]
+pub struct DocumentUpdate {
+    /// The document after the update, and the changes: those of fields of part instances first.
+    pub update: Update,
+    /// The version that the document has taken over then, with the uids that part instances have in the document.
+    pub base: TemplateVersion,
+}
+
+/// The update of a document to the content of `file`, as [`update_template`] updates a file. `base` is the version that the
+/// document took over last. `None` where the two have the same part instances, whose fields need no comparison, and where the
+/// text of the base cannot say what the document is.
+pub fn update_document(
+    disk: &dyn Disk,
+    base: &TemplateVersion,
+    document: &Rig,
+    file: &TemplateVersion,
+    choices: &Choices,
+) -> Option<DocumentUpdate> {
+    if base.has_same_instances(file) {
+        return None;
+    }
+    let now = base.saying(document)?;
+    let mut update = update_template(disk, Some(base), &now, file, choices).update;
+    let mut rig = document.clone();
+    for edit in edits_between(now.rig(), &update.rig).ok()? {
+        rig.apply(&edit).ok()?;
+    }
+    update.rig = rig;
+    let base = with_same_parts(disk, Some(base), &now, file).file.unwrap_or_else(|| file.clone());
+    Some(DocumentUpdate { update, base })
+}
+
+impl TemplateVersion {
+    /// True if both versions have the same part instances, whatever these change of their parts.
+    fn has_same_instances(&self, other: &Self) -> bool {
+        let fields = |part: &PartInstance| PartInstance { changes: Vec::new(), offset: 0, ..part.clone() };
+        self.parts().iter().map(fields).eq(other.parts().iter().map(fields))
+    }
+
+    /// The version whose text is changed so that it says what a rig is. `None` where that needs parts to be written out.
+    fn saying(&self, rig: &Rig) -> Option<Self> {
+        let reader = || PartFiles::known(&self.found, self.modules.clone());
+        let source = (self.path.as_path(), self.text.as_str());
+        let written = template_text(rig, Some(source), &self.path, &reader);
+        if written.note.is_some() {
+            return None;
+        }
+        Self::put_together(reader(), self.path.clone(), written.text.as_bytes()).ok()
+    }
+}

@@ -1,0 +1,141 @@
+//! Part instances in the file that a rig with a document follows.
+
+use rigsmith::files::store_document_over;
+
+use super::*;
+
+const HAND: &str = r#"(
+    format: 2,
+    name: "hand",
+    joints: [
+        // The palm.
+        (label: "palm", translation: (0.5, 1, 0), tags: [control]),
+    ],
+    parts: [
+        // The finger.
+        (part: "link.rig.ron", name: "index", parent: "palm", prefix: "a_"),
+    ],
+)
+"#;
+
+impl Studio {
+    fn source(&self) -> &RigSource {
+        self.base.get(self.base.rig).unwrap()
+    }
+
+    /// Saves the document as the window does, over a text; nothing is lost. Returns what is saved.
+    fn document_over(&self, name: &str, text: &str) -> String {
+        let path = self.file.with_file_name(name);
+        fs::write(&path, text).unwrap();
+        let notes =
+            store_document_over(&RealDisk, &path, self.base.rig(), self.source().taken_over(), &[&path]).unwrap();
+        assert_eq!(notes, Vec::<String>::new());
+        fs::read_to_string(path).unwrap()
+    }
+
+    /// Runs frames until the rig has taken over a version with a part instance of that name.
+    fn until_called(&mut self, name: &str) {
+        let has = |source: &RigSource| source.taken_over().parts.iter().any(|part| part.name == name);
+        self.until("the name", |world, rig| world.get::<RigSource>(rig).is_some_and(has));
+    }
+}
+
+#[test]
+fn a_part_that_got_another_name_in_the_file_stays_a_part_in_the_next_save() {
+    let mut studio = Studio::of(true, HAND);
+    assert_eq!(studio.document_over("copy.rig.ron", HAND), HAND);
+    let uid = studio.source().taken_over().parts[0].uid;
+    let tip = studio.joint("a_1");
+    let before = studio.base.rig().clone();
+    let renamed = HAND.replace("\"index\"", "\"pointer\"");
+    studio.save(&renamed);
+    studio.until_called("pointer");
+    assert_eq!(studio.base.rig(), &before, "joints and tags keep their identities");
+    // The uid that the part had by its first name is written, and nothing else.
+    let written = renamed.replace("(part: \"link", &format!("(uid: \"{uid}\", part: \"link"));
+    assert_eq!(studio.document_over("copy.rig.ron", &renamed), written);
+    // One value is one line.
+    let palm = studio.joint("palm");
+    let mut rest = studio.base.rig().joint(palm).unwrap().data.rest;
+    rest.translation.y = 2.0;
+    studio.base.apply(RigEdit::SetRest(palm, rest));
+    let moved = written.replace("(0.5, 1, 0)", "(0.5, 2.0, 0)");
+    assert_eq!(studio.document_over("copy.rig.ron", &renamed), moved);
+    assert_eq!(studio.document_over("copy.rig.ron", &moved), moved);
+    // The next version of the file still has the name alone; what it changes arrives at the same joint.
+    studio.save(&renamed.replace("prefix: \"a_\"", "prefix: \"b_\""));
+    studio.until("the prefix", |world, _| world.resource::<InstanceReport>().updated == 1);
+    assert_eq!(studio.joint("b_1"), tip);
+}
+
+#[test]
+fn undoing_an_update_of_a_part_brings_the_former_instance_back() {
+    let mut studio = Studio::of(true, HAND);
+    let before = studio.base.rig().clone();
+    let longer = HAND.replace("\"index\"", "\"pointer\"").replace("prefix: \"a_\"", "prefix: \"b_\"");
+    studio.save(&longer);
+    studio.until("the update", |world, _| world.resource::<InstanceReport>().updated == 1);
+    let names =
+        |studio: &Studio| studio.source().taken_over().parts.iter().map(|part| part.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&studio), ["pointer"]);
+    studio.base.change(Change::Undo);
+    assert_eq!((studio.base.rig(), names(&studio)), (&before, vec!["index".to_owned()]));
+    assert_eq!(studio.document_over("copy.rig.ron", HAND), HAND);
+    studio.base.change(Change::Redo);
+    assert_eq!(names(&studio), ["pointer"]);
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn fields_of_parts_are_merged_as_by_the_command_line() {
+    use crate::{cli_outputs::rigsmith, part_fields};
+
+    let reference = ", tags: [parent(targets: \"@command control/a_base role:control\")]";
+    let base = part_fields::BASE.replace(reference, "");
+    assert_ne!(base, part_fields::BASE);
+    let place = "            parent: \"palm\",\n            translation: (0, 0.1, 0),\n";
+    let cases = [
+        ("count", base.replace("prefix: \"a_\",", "prefix: \"a_\", count: 5,")),
+        ("prefix", base.replace("prefix: \"a_\",", "prefix: \"b_\",")),
+        ("side", base.replace("prefix: \"a_\",", "prefix: \"a_\", mirror: true,")),
+        ("option", base.replace("prefix: \"a_\",", "prefix: \"a_\", options: {\"size\": 0.25},")),
+        ("feature", base.replace("prefix: \"a_\",", "prefix: \"a_\", off: [\"fk\"],")),
+        ("socket", base.replace(place, "            socket: \"side\",\n")),
+    ];
+    for (field, file) in cases {
+        assert_ne!(file, base, "{field}");
+        let mut studio = Studio::with_part(true, &base, ("finger.rig.ron", part_fields::PART));
+        // What a person changed of the part.
+        let (joint, tag) = control_of(studio.base.rig(), "a_bone_3");
+        studio.base.apply(RigEdit::SetTag(joint, Box::new(tag)));
+        let mine = studio.document_over("mine.rig.ron", &base);
+        assert!(mine.contains("relative_size: 0.9"), "{field}: {mine}");
+        let folder = studio.file.parent().unwrap().to_owned();
+        fs::write(folder.join("base.rig.ron"), &base).unwrap();
+        fs::write(folder.join("file.rig.ron"), &file).unwrap();
+        let (code, said) = rigsmith(&folder, &part_fields::UPDATE);
+        assert_eq!(code, 0, "{field}: {said}");
+        let told = fs::read_to_string(folder.join("out.rig.ron")).unwrap();
+        let known = studio.source().taken_over().parts.to_vec();
+        studio.save(&file);
+        studio.until("the update", |world, rig| {
+            world.get::<RigSource>(rig).is_some_and(|source| source.taken_over().parts != known.as_slice())
+        });
+        assert_eq!(studio.instance_report().failed, Vec::<String>::new(), "{field}");
+        // The document says what the command line has written, to the byte.
+        assert_eq!(studio.document_over("again.rig.ron", &told), told, "{field}");
+        assert!(told.contains("relative_size: 0.9") && told != mine, "{field}: {told}");
+    }
+}
+
+/// The command on a joint, with another size, and the joint.
+#[cfg(feature = "cli")]
+fn control_of(rig: &Rig, label: &str) -> (Uid, rigsmith::rig::TagData) {
+    use rigsmith::rig::TagKind;
+
+    let joint = rig.joint(rig.find_label(label).unwrap()).unwrap();
+    let mut tag = joint.data.tags.first().unwrap().clone();
+    let TagKind::Command { params, .. } = &mut tag.kind else { panic!("{label} has a command") };
+    *params = "(relative_size: 0.9)".to_owned();
+    (joint.data.uid, tag)
+}
