@@ -50,7 +50,7 @@ pub use format::{project, skin, template, text};
 pub(crate) use format::{
     scan::{Field, elements, fields, same_place},
     source::{parse_ron, ron_options, ron_text, utf8},
-    tree::with_field,
+    tree::{list_items, with_field},
 };
 pub use group::{GROUP_COLORS, GroupData};
 pub use input::RigInput;
