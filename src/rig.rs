@@ -11,6 +11,7 @@ pub mod deform;
 mod document;
 pub mod edit;
 pub mod extract;
+mod face_cut;
 pub mod feature;
 pub mod format;
 mod group;
@@ -45,6 +46,7 @@ pub use constraint::{
 };
 pub use document::{Rig, RigAbout, SkinData};
 pub use edit::{EditError, PatchFault, RigEdit, WeightPatch, joint_numbers, weight_edit};
+pub use face_cut::FaceCut;
 pub use format::source::SourceError;
 pub use format::{project, skin, template, text};
 pub(crate) use format::{
