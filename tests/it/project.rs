@@ -24,6 +24,7 @@ use rigsmith::{
             JournalReference, MeshReference, Project, ProjectCamera, ProjectRig, ProjectView, SkinReference,
             read_project, write_project,
         },
+        step::edits_from_empty,
     },
 };
 
@@ -269,6 +270,10 @@ fn the_frozen_file_of_format_6_keeps_cuts_of_faces() {
     assert_eq!(rig.face_cut(Uid(0xd1)), Some(FaceCut { bones: 24, groups: None }));
     assert_eq!(rig.face_cut(Uid(0xd2)), None);
     assert_eq!(write_project(&project), text);
+    // A journal begins with edits that make the whole document.
+    let mut again = Rig::new(rig.uid(), "chain");
+    edits_from_empty(rig).iter().for_each(|edit| drop(again.apply(edit).unwrap()));
+    assert_eq!(again.face_cuts(), rig.face_cuts());
     let twice = text.replacen("00000000000000d1", "00000000000000d0", 1);
     let error = read_project(twice.as_bytes()).unwrap_err();
     assert!(error.to_string().contains("two cuts"), "{error}");
