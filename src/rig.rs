@@ -11,6 +11,7 @@ pub mod deform;
 mod document;
 pub mod edit;
 pub mod extract;
+mod face_cut;
 pub mod feature;
 pub mod format;
 mod group;
@@ -45,12 +46,13 @@ pub use constraint::{
 };
 pub use document::{Rig, RigAbout, SkinData};
 pub use edit::{EditError, PatchFault, RigEdit, WeightPatch, joint_numbers, weight_edit};
+pub use face_cut::FaceCut;
 pub use format::source::SourceError;
 pub use format::{project, skin, template, text};
 pub(crate) use format::{
     scan::{Field, elements, fields, same_place},
     source::{parse_ron, ron_options, ron_text, utf8},
-    tree::with_field,
+    tree::{list_items, with_field},
 };
 pub use group::{GROUP_COLORS, GroupData};
 pub use input::RigInput;

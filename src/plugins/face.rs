@@ -23,6 +23,7 @@ use crate::{
         expression::ExpressionSet,
     },
     mesh::{model::Model, shapes::Shapes},
+    rig::FaceCut,
 };
 
 pub use arkit::{FaceShape, arkit_shapes, pose_names, unit_shapes};
@@ -127,6 +128,23 @@ pub struct FaceReport {
     pub fit_error: Option<f32>,
     /// Duration of each step.
     pub times: Vec<(&'static str, Duration)>,
+}
+
+/// Density and grouping of settings as the document keeps them; `None` for the defaults.
+pub fn cut_of(settings: &AutoSettings) -> Option<FaceCut> {
+    let of = |settings: &AutoSettings| FaceCut {
+        bones: u32::try_from(settings.bones).unwrap_or(u32::MAX),
+        groups: settings.groups.map(|groups| u32::try_from(groups).unwrap_or(u32::MAX)),
+    };
+    Some(of(settings)).filter(|cut| *cut != of(&AutoSettings::default()))
+}
+
+/// Settings with the density and grouping of a document; its defaults for `None`.
+pub fn with_cut(settings: AutoSettings, cut: Option<FaceCut>) -> AutoSettings {
+    let AutoSettings { bones, groups, .. } = AutoSettings::default();
+    let (bones, groups) =
+        cut.map_or((bones, groups), |cut| (cut.bones as usize, cut.groups.map(|count| count as usize)));
+    AutoSettings { bones, groups, ..settings }
 }
 
 /// Analysis of a mesh's face; beside the mesh, and not saved: it is computed again when it is needed.

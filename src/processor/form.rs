@@ -20,8 +20,12 @@
 //! (`creation.label`, `limits.rotate`). What an element shows before anything is written comes from the module, and so
 //! do the label (the name with blanks) and the tip (the parameter's line of documentation) where they are left out.
 
+mod list_item;
+
 use bevy::reflect::TypeInfo;
 use serde::{Deserialize, Serialize};
+
+pub use list_item::ListItem;
 
 use super::ModuleInfo;
 use crate::rig::{SourceError, fields, nearest::did_you_mean, ron_options, ron_text, utf8, with_field};
@@ -111,7 +115,7 @@ pub enum FormElement {
     Node(FormBinding),
     /// Keys of a curve: pairs of numbers, the first ones increasing.
     Curve(FormBinding),
-    /// Several values of one kind, one a line.
+    /// Several values of one kind: a row for each, which can be added, moved and removed ([`ListItem`]).
     List(FormBinding),
     /// A line across.
     Separator,

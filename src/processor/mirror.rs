@@ -10,7 +10,7 @@ use bevy::reflect::{PartialReflect, ReflectMut};
 use glam::Vec3;
 
 use super::{Amount, ik::JointAngles};
-use crate::rig::{fields, label::mirror_label, with_field};
+use crate::rig::{fields, label::mirror_label, list_items, with_field};
 
 /// A number of the opposite sign, without a negative zero.
 pub fn opposite(value: f32) -> f32 {
@@ -153,8 +153,25 @@ pub(super) fn write_whole(params: &mut String, after: &str, name: &str) {
     *params = with_field(params, name, value);
 }
 
-/// Place of the value of a parameter, or of a part of one: `creation.label`.
+/// Place of the value of a parameter, or of a part of one: `creation.label`, `inputs[0].name`.
 pub(super) fn place_of(params: &str, path: &str) -> Option<Range<usize>> {
+    let Some((list, rest)) = path.split_once('[') else { return place_of_field(params, path) };
+    let (number, rest) = rest.split_once(']')?;
+    let list = place_of_field(params, list)?;
+    let items = list_items(&params[list.clone()]);
+    let item = items.get(number.parse::<usize>().ok()?)?;
+    let item = list.start + item.start..list.start + item.end;
+    match rest.strip_prefix('.') {
+        Some(rest) => {
+            let inside = place_of(&params[item.clone()], rest)?;
+            Some(item.start + inside.start..item.start + inside.end)
+        }
+        None => rest.is_empty().then_some(item),
+    }
+}
+
+/// Place of the value of a field, by the names of fields from the outside in.
+fn place_of_field(params: &str, path: &str) -> Option<Range<usize>> {
     let fields = fields(params);
     let mut found = None;
     for name in path.split('.') {

@@ -14,8 +14,8 @@ pub struct ParameterValues {
 }
 
 impl ParameterValues {
-    /// The value of a parameter, or of a part of one (`creation.label`), as RON; `None` if the path names none, or lies in
-    /// an optional value that is left out.
+    /// The value of a parameter, or of a part of one (`creation.label`, `inputs[0].name`), as RON; `None` if the path names
+    /// none, or lies in an optional value that is left out.
     pub fn get(&self, path: &str) -> Option<&str> {
         place_of(&self.complete, path).map(|place| &self.complete[place])
     }
@@ -49,8 +49,8 @@ impl ModuleInfo {
         Ok(ParameterValues { complete: (self.complete)(params)?, default: (self.complete)("()")? })
     }
 
-    /// The parameters as they are written, with another value of one, or of a part of one (`creation.label`). `value` is
-    /// RON.
+    /// The parameters as they are written, with another value of one, or of a part of one (`creation.label`,
+    /// `inputs[0].name`). `value` is RON.
     ///
     /// # Errors
     /// A path that names nothing, or a value that the module does not take.
@@ -64,7 +64,7 @@ impl ModuleInfo {
         let mut text = with_changes(params, &before, &after);
         if !(self.complete)(&text).is_ok_and(|written| written == after) {
             // Lists become shorter, values with names become others: all of the parameter is written.
-            write_whole(&mut text, &after, path.split('.').next().unwrap_or(path));
+            write_whole(&mut text, &after, path.split(['.', '[']).next().unwrap_or(path));
         }
         self.parse(&text)?;
         Ok(text)

@@ -10,8 +10,8 @@ use bevy::{math::Affine3, prelude::*};
 use crate::{
     mesh::model::Weights,
     rig::{
-        AttributeValues, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint, SelectionSet,
-        StoredPose, TagData, Uid,
+        AttributeValues, FaceCut, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint,
+        SelectionSet, StoredPose, TagData, Uid,
         animation::RigClip,
         part::{DroppedPart, HeaderSocket, PartOption},
     },
@@ -42,7 +42,9 @@ pub struct Rig {
     /// Parts that were dropped onto joints, and that the rig's file may not have yet.
     pub(super) dropped: Vec<DroppedPart>,
     pub(super) sets: Vec<SelectionSet>,
-    /// Renewed by each edit of anything but pose, values, stored poses, clips and selection sets.
+    /// Density and grouping of faces, by mesh.
+    pub(super) face_cuts: BTreeMap<Uid, FaceCut>,
+    /// Renewed by each edit of anything but pose, values, stored poses, clips, selection sets and cuts of faces.
     pub(super) revision: Revision,
 }
 

@@ -24,8 +24,8 @@ pub use self::{
     weight_patch::{PatchFault, WeightPatch, joint_numbers, weight_edit},
 };
 use crate::rig::{
-    FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput, RigJoint,
-    SelectionSet, StoredPose, TagData, Uid,
+    FaceCut, FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput,
+    RigJoint, SelectionSet, StoredPose, TagData, Uid,
     animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
     document::{RigAbout, SkinData},
     part::DroppedPart,
@@ -157,6 +157,8 @@ pub enum RigEdit {
     SetSelectionSets(Vec<SelectionSet>),
     /// Changes the influences of some points of a bound mesh; all others stay.
     SetWeights(Uid, Box<WeightPatch>),
+    /// Sets the cut of a mesh's face; `None` sets the defaults.
+    SetFaceCut(Uid, Option<FaceCut>),
 }
 
 /// Error of applying an edit. The rig is unchanged.
@@ -344,6 +346,7 @@ impl Rig {
             }
             RigEdit::SetInputs(inputs) => self.set_inputs(inputs)?,
             RigEdit::SetSelectionSets(sets) => self.set_selection_sets(sets),
+            RigEdit::SetFaceCut(mesh, cut) => self.set_face_cut(*mesh, *cut),
             RigEdit::SetWeights(mesh, patch) => self.set_weights(*mesh, patch)?,
             RigEdit::SetDroppedParts(parts) => {
                 RigEdit::SetDroppedParts(std::mem::replace(&mut self.dropped, parts.clone()))

@@ -208,5 +208,6 @@ pub fn edits_from_empty(rig: &Rig) -> Vec<RigEdit> {
     if !rig.selection_sets().is_empty() {
         edits.push(RigEdit::SetSelectionSets(rig.selection_sets().to_vec()));
     }
+    edits.extend(rig.face_cuts().iter().map(|(mesh, cut)| RigEdit::SetFaceCut(*mesh, Some(*cut))));
     edits
 }

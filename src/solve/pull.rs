@@ -81,6 +81,16 @@ pub fn chain_above(rig: &Rig, joint: Uid) -> Vec<Uid> {
     chain
 }
 
+/// True for a joint that goes on a limb: it is the only child of the joint above, or the only one that has children, as the
+/// hand is beside a helper of the forearm. Such a joint is moved by joints above it, or its bone would become longer; bones of
+/// a face, and the first joint of a limb, are not.
+pub fn is_within_limb(rig: &Rig, joint: Uid) -> bool {
+    let Some(above) = rig.joint(joint).and_then(|joint| joint.parent) else { return false };
+    let has_children = |joint: Uid| !rig.children(Some(joint)).is_empty();
+    let siblings = rig.children(Some(above));
+    siblings.len() == 1 || has_children(joint) && siblings.iter().filter(|sibling| has_children(**sibling)).count() == 1
+}
+
 /// Joints above a joint up to the next one from which several limbs go, from the top.
 fn limb_above(rig: &Rig, joint: Uid) -> Vec<Uid> {
     let has_children = |joint: &&Uid| !rig.children(Some(**joint)).is_empty();

@@ -7,7 +7,7 @@ use crate::mutate::run_fuzz;
 #[test]
 fn no_text_breaks_the_project_reader() {
     let frozen = include_str!("../frozen/format-1.rigsmith.ron");
-    let newer = frozen.replacen("format: 1,", "format: 5, extra: (a: ['\"', r#\"x\"#]),", 1);
+    let newer = frozen.replacen("format: 1,", "format: 99, extra: (a: ['\"', r#\"x\"#]),", 1);
     let seeds = vec![
         frozen.as_bytes().to_vec(),
         newer.into_bytes(),

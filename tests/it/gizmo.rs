@@ -19,7 +19,7 @@ use rigsmith::{
         tools::{
             ToolsPlugin,
             gizmo::{Delta, GizmoDrag, GizmoFrame, GizmoParts, Handle, HandleShape, LENGTH, LinePaint, handle_at},
-            transform::GizmoTool,
+            transform::{GizmoTool, PoseMoves},
         },
     },
     headless::headless_app,

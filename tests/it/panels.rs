@@ -8,6 +8,7 @@ mod hierarchy;
 mod notices;
 mod posing;
 mod skinning;
+mod tag_lists;
 mod tag_values;
 mod tags;
 mod walk;

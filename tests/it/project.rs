@@ -17,13 +17,14 @@ use rigsmith::{
         model::{Model, Weights},
     },
     rig::{
-        PoseOffset, Rig, RigEdit, SkinData, Uid, UidSource, WeightPatch,
+        FaceCut, PoseOffset, Rig, RigEdit, SkinData, Uid, UidSource, WeightPatch,
         character::{Character, character, import_skeleton},
         operations::Operation,
         project::{
             JournalReference, MeshReference, Project, ProjectCamera, ProjectRig, ProjectView, SkinReference,
             read_project, write_project,
         },
+        step::edits_from_empty,
     },
 };
 
@@ -210,14 +211,14 @@ fn mistakes_are_named_with_their_place() {
 #[test]
 fn a_newer_format_opens_and_says_what_it_does_not_know() {
     let text = FROZEN
-        .replacen("format: 1,", "format: 6, lights: [(x: 1)],", 1)
+        .replacen("format: 1,", "format: 7, lights: [(x: 1)],", 1)
         .replacen("mode: \"Pose\"", "fog: 0.5, mode: \"Pose\"", 1)
         .replacen("skins: [", "muscles: [], skins: [", 1)
         .replacen("format: 1,", "format: 5, meaning: 42,", 1);
     let read = read_project(text.as_bytes()).unwrap();
     assert_eq!(read.project, frozen());
     let told = read.notes.join("\n");
-    for part in ["project has format 6", "`lights`", "`fog`", "`muscles`", "template has format 5"] {
+    for part in ["project has format 7", "`lights`", "`fog`", "`muscles`", "template has format 5"] {
         assert!(told.contains(part), "{part}: {told}");
     }
     let line = place(&text, "meaning: 42").0;
@@ -252,6 +253,37 @@ fn the_frozen_file_of_format_5_keeps_places_in_the_graph() {
     // Without places the file is of the format before.
     project.view.graph.clear();
     assert_eq!(write_project(&project), include_str!("../frozen/format-4.rigsmith.ron"));
+}
+
+#[test]
+fn the_frozen_file_of_format_6_keeps_cuts_of_faces() {
+    let text = include_str!("../frozen/format-6.rigsmith.ron");
+    let read = read_project(text.as_bytes()).unwrap();
+    assert_eq!(read.notes, Vec::<String>::new());
+    let mut project = read.project;
+    let rig = &project.rigs[0].rig;
+    assert_eq!(rig.face_cut(Uid(0xd0)), Some(FaceCut { bones: 80, groups: Some(9) }));
+    assert_eq!(rig.face_cut(Uid(0xd1)), Some(FaceCut { bones: 24, groups: None }));
+    assert_eq!(rig.face_cut(Uid(0xd2)), None);
+    assert_eq!(write_project(&project), text);
+    // A journal begins with edits that make the whole document.
+    let mut again = Rig::new(rig.uid(), "chain");
+    edits_from_empty(rig).iter().for_each(|edit| drop(again.apply(edit).unwrap()));
+    assert_eq!(again.face_cuts(), rig.face_cuts());
+    let twice = text.replacen("00000000000000d1", "00000000000000d0", 1);
+    let error = read_project(twice.as_bytes()).unwrap_err();
+    assert!(error.to_string().contains("two cuts"), "{error}");
+    assert_eq!(error.line, place(&twice, "bones: 24").0, "{error}");
+    // All edits have inverses, and without cuts the file is of the format before.
+    let inverses: Vec<RigEdit> = [Uid(0xd0), Uid(0xd1)]
+        .into_iter()
+        .map(|mesh| project.rigs[0].rig.apply(&RigEdit::SetFaceCut(mesh, None)).unwrap())
+        .collect();
+    assert_eq!(write_project(&project), include_str!("../frozen/format-5.rigsmith.ron"));
+    for inverse in inverses {
+        project.rigs[0].rig.apply(&inverse).unwrap();
+    }
+    assert_eq!(write_project(&project), text);
 }
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\

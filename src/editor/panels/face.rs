@@ -27,14 +27,15 @@ use crate::{
     mesh::shapes::Shapes,
     plugins::{
         RigSystems,
+        document::EditRequest,
         face::{
             ExpressionAnswer, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport, FaceRequest, FaceRig,
-            PlaceFaceError,
+            PlaceFaceError, cut_of, with_cut,
         },
         picking::{Pick, PickRequest},
         surface::{RigMesh, RigMeshes},
     },
-    rig::Uid,
+    rig::{FaceCut, RigEdit, Uid, operations::Operation},
 };
 
 /// Plugin of the face panel: reports results of face jobs, and cancels jobs.
@@ -132,6 +133,8 @@ pub struct FacePanel {
     shown: Option<FaceData>,
     /// Strengths while a slider is dragged.
     held: Option<BTreeMap<String, f32>>,
+    /// A face was being placed in the last frame.
+    is_placing: bool,
 }
 
 /// Data of the face in one state of the rig.
@@ -139,6 +142,8 @@ struct FaceData {
     mesh: Entity,
     stamp: Stamp,
     known: FaceRig,
+    /// Density and grouping of the document.
+    cut: Option<FaceCut>,
     pictures: thumbnail::Pictures,
 }
 
@@ -155,11 +160,11 @@ impl EditorPanel for FacePanel {
         let Some((entity, mesh)) = first.and_then(|entity| Some((entity, world.get::<RigMesh>(entity)?))) else {
             return list::nothing(ui, "Open a head, or a character with one, to place a face in it.");
         };
-        self.renew(&shown, entity, world.get::<Face>(entity));
+        self.renew(&shown, (entity, mesh.uid), world.get::<Face>(entity));
         ScrollArea::vertical().id_salt("face").auto_shrink(false).show(ui, |ui| {
-            self.place(ui, world, entity, requests);
+            self.place(ui, world, &shown, (entity, mesh.uid), requests);
             ui.add_space(4.0);
-            self.options(ui, world, entity);
+            self.options(ui, world, &shown, (entity, mesh.uid), requests);
             let Some(drawn) = self.shown.as_mut().filter(|drawn| !drawn.known.bones.is_empty()) else {
                 return;
             };
@@ -181,31 +186,58 @@ impl EditorPanel for FacePanel {
 }
 
 impl FacePanel {
-    /// Reads the rig's face again if the rig has changed. The settings go on from the face of a mesh that is shown anew.
-    fn renew(&mut self, shown: &DisplayedRig, mesh: Entity, face: Option<&Face>) {
+    /// Reads the rig's face again if the rig has changed. The settings go on from the face of a mesh that is shown anew, and
+    /// follow the density and grouping of the document.
+    fn renew(&mut self, shown: &DisplayedRig, (mesh, uid): (Entity, Uid), face: Option<&Face>) {
         let stamp = shown.stamp();
         if self.shown.as_ref().is_some_and(|drawn| drawn.mesh == mesh && drawn.stamp == stamp) {
             return;
         }
         let known = FaceRig::read(&shown.rig);
         let former = self.shown.take().filter(|drawn| drawn.mesh == mesh);
-        let density = known.bones.iter().filter(|bone| bone.kind == FaceBoneKind::Skin).count();
-        if former.is_none() && density > 0 {
-            if let Some(face) = face {
-                self.settings = face.settings.clone();
-            }
-            // A file has the bones, not the number that was asked for, which a mesh may not allow.
-            if density.abs_diff(self.settings.bones) * 10 > density {
-                self.settings.bones = density.clamp(*DENSITIES.start(), *DENSITIES.end());
-            }
+        let cut = shown.rig.face_cut(uid);
+        if let Some(face) = face.filter(|_| former.is_none()) {
+            self.settings = face.settings.clone();
+        }
+        if former.as_ref().is_none_or(|former| former.cut != cut) {
+            self.follow(cut, &known);
         }
         let pictures = former.map(|drawn| drawn.pictures).unwrap_or_default();
-        self.shown = Some(FaceData { mesh, stamp, known, pictures });
+        self.shown = Some(FaceData { mesh, stamp, known, cut, pictures });
+    }
+
+    /// Takes over the density and grouping of the document. Documents of older versions have the bones, not the number that
+    /// was asked for.
+    fn follow(&mut self, cut: Option<FaceCut>, known: &FaceRig) {
+        self.settings = with_cut(std::mem::take(&mut self.settings), cut);
+        let density = known.bones.iter().filter(|bone| bone.kind == FaceBoneKind::Skin).count();
+        if cut.is_none() && density > 0 && density.abs_diff(self.settings.bones) * 10 > density {
+            self.settings.bones = density;
+        }
+        self.settings.bones = self.settings.bones.clamp(*DENSITIES.start(), *DENSITIES.end());
+    }
+
+    /// Puts density and grouping into the document, as a step, if it has others.
+    fn keep_cut(&self, shown: &DisplayedRig, mesh: Uid, requests: &mut Requests) {
+        let cut = cut_of(&self.settings);
+        if shown.rig.face_cut(mesh) != cut {
+            let edits = vec![RigEdit::SetFaceCut(mesh, cut)];
+            let operation = Operation::Named { name: "Cut face", edits };
+            requests.send(EditRequest::operation(shown.entity, operation));
+        }
     }
 
     /// Draws the button; while a job runs, its progress and a button that cancels it.
-    fn place(&mut self, ui: &mut Ui, world: &World, entity: Entity, requests: &mut Requests) {
+    fn place(
+        &mut self,
+        ui: &mut Ui,
+        world: &World,
+        shown: &DisplayedRig,
+        (entity, mesh): (Entity, Uid),
+        requests: &mut Requests,
+    ) {
         let size = egui::vec2(ui.available_width(), 34.0);
+        let was_placing = std::mem::replace(&mut self.is_placing, world.get::<FaceJob>(entity).is_some());
         if let Some(job) = world.get::<FaceJob>(entity) {
             let step = job.step().map_or("", |step| step.name()).replace('_', " ");
             let text = format!("{step} {:.0} %", job.progress() * 100.0);
@@ -218,6 +250,12 @@ impl FacePanel {
             }
             return;
         }
+        // A face that was not placed leaves the density of the document.
+        let is_other = |drawn: &FaceData, settings: &AutoSettings| drawn.cut != cut_of(settings);
+        if let Some(drawn) = self.shown.take_if(|drawn| was_placing && is_other(&*drawn, &self.settings)) {
+            self.follow(drawn.cut, &drawn.known);
+            self.shown = Some(drawn);
+        }
         let again = self.shown.as_ref().is_some_and(|drawn| !drawn.known.bones.is_empty());
         let button = Button::new(RichText::new(if again { "Place again" } else { "Place face" }).size(16.0).strong());
         let hint = "Head, neck and facial bones, weights and controls; bones you have touched stay";
@@ -229,15 +267,25 @@ impl FacePanel {
             let slider = ui.add(Slider::new(&mut self.settings.bones, DENSITIES).logarithmic(true));
             let slider = slider.on_hover_text("Density: bones of the facial skin");
             fields::named(ui, slider.id, "Bones");
-            // Releasing the slider is enough: an existing face is placed again with the new density.
-            if again && (slider.drag_stopped() || slider.lost_focus()) {
+            // Releasing the slider is enough: an existing face is placed again with the new density, in one step with it.
+            let is_released = slider.drag_stopped() || slider.lost_focus();
+            if is_released && again {
                 requests.send(FaceRequest { mesh: entity, settings: self.settings.clone(), fit: None });
+            } else if is_released {
+                self.keep_cut(shown, mesh, requests);
             }
         });
     }
 
     /// Draws the settings, folded by default, with the merge history.
-    fn options(&mut self, ui: &mut Ui, world: &World, entity: Entity) {
+    fn options(
+        &mut self,
+        ui: &mut Ui,
+        world: &World,
+        shown: &DisplayedRig,
+        (entity, mesh): (Entity, Uid),
+        requests: &mut Requests,
+    ) {
         CollapsingHeader::new("Settings").show(ui, |ui| {
             fields::labelled(ui, "Seed", |ui| {
                 let field = ui.add(DragValue::new(&mut self.settings.seed).speed(0.1));
@@ -254,7 +302,9 @@ impl FacePanel {
         });
         let Some(face) = world.get::<Face>(entity) else { return };
         CollapsingHeader::new("Grouping").show(ui, |ui| {
-            dendrogram::show(ui, &face.analysis, &mut self.settings.groups);
+            if dendrogram::show(ui, &face.analysis, &mut self.settings.groups) {
+                self.keep_cut(shown, mesh, requests);
+            }
         });
     }
 }

@@ -82,8 +82,8 @@ struct Drag {
 }
 
 /// Way in which a node follows the pointer.
-#[derive(Debug)]
-enum Way {
+#[derive(Debug, Clone)]
+pub(super) enum Way {
     /// Controls of a built rig, which move it.
     Controls(Box<ControlPull>),
     /// Joints above it, from the top, with their positions and its own.
@@ -223,8 +223,12 @@ fn drag(
     }
 }
 
-impl Drag {
-    fn begin(rig: &EditedRig, sight: &Sight, node: Uid, at: Vec2) -> Result<Self, PullError> {
+impl Way {
+    /// Way in which a node of a rig follows, with its position.
+    ///
+    /// # Errors
+    /// See [`PullError`].
+    pub fn find(rig: &EditedRig, node: Uid) -> Result<(Vec3, Self), PullError> {
         let chain = chain_above(&rig.rig, node);
         let by_controls = match (rig.built, &rig.runtime) {
             (Some(built), Some(runtime)) => {
@@ -239,18 +243,36 @@ impl Drag {
             }
             _ => None,
         };
-        let (origin, way) = match by_controls {
-            Some(pull) => (pull.position(), Way::Controls(Box::new(pull))),
+        Ok(match by_controls {
+            Some(pull) => (pull.position(), Self::Controls(Box::new(pull))),
             None => {
                 let place = |joint: &Uid| rig.posed_global(*joint).translation;
                 let gathered = |joints: &[Uid]| PosedJoint::gather(rig, joints);
                 let way = match chain.is_empty() {
-                    true => Way::Itself(gathered(&[node])),
-                    false => Way::Joints(gathered(&chain), chain.iter().chain([&node]).map(place).collect()),
+                    true => Self::Itself(gathered(&[node])),
+                    false => Self::Joints(gathered(&chain), chain.iter().chain([&node]).map(place).collect()),
                 };
                 (place(&node), way)
             }
-        };
+        })
+    }
+
+    /// Offsets of the joints or controls with which the node is at a goal, or as near to it as they bring it; `by` is its
+    /// movement to there.
+    pub fn to(&self, goal: Vec3, by: Vec3) -> Vec<(Uid, PoseOffset)> {
+        match self {
+            Self::Controls(pull) => pull.to(goal),
+            Self::Joints(joints, points) => turned(joints, points, goal),
+            Self::Itself(roots) => {
+                roots.iter().map(|root| (root.joint, root.dragged(&Delta::Move(by), None))).collect()
+            }
+        }
+    }
+}
+
+impl Drag {
+    fn begin(rig: &EditedRig, sight: &Sight, node: Uid, at: Vec2) -> Result<Self, PullError> {
+        let (origin, way) = Way::find(rig, node)?;
         let axes = [sight.plane.right, sight.plane.up, sight.plane.towards()];
         Ok(Self {
             gizmo: GizmoDrag::new(Handle::MoveView, GizmoFrame { origin, axes }, *sight, at),
@@ -281,12 +303,7 @@ impl Drag {
         if by == Vec3::ZERO {
             return Change::CancelPreview;
         }
-        let goal = self.gizmo.frame.origin + by;
-        Change::Preview(Operation::Pose(match &self.way {
-            Way::Controls(pull) => pull.to(goal),
-            Way::Joints(joints, points) => turned(joints, points, goal),
-            Way::Itself(roots) => roots.iter().map(|root| (root.joint, root.dragged(&Delta::Move(by), None))).collect(),
-        }))
+        Change::Preview(Operation::Pose(self.way.to(self.gizmo.frame.origin + by, by)))
     }
 
     /// Description of the pull, in a few words.

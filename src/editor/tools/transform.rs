@@ -16,7 +16,7 @@ use super::{
     GizmoHover, PointerOwner, Tool, ToolPointer, ToolSystems,
     gizmo::{Delta, GizmoDrag, GizmoFrame, Handle, HandleShape, handle_at},
     pose::PosedJoint,
-    pull::{joint_at, pulls_by_others},
+    pull::{Way, joint_at, pulls_by_others},
     scene::{EditedRig, Scene, joints},
     select::{self, REACH},
 };
@@ -37,6 +37,7 @@ use crate::{
         Uid,
         operations::{MirrorPlane, Operation},
     },
+    solve::pull::is_within_limb,
 };
 
 /// Plugin of gizmos for the modes Move, Rotate, Scale and Pose.
@@ -63,7 +64,7 @@ impl Plugin for TransformPlugin {
 }
 
 /// State of the gizmo.
-#[derive(Resource, Debug, Clone, PartialEq, Default)]
+#[derive(Resource, Debug, Clone, Default)]
 pub struct GizmoTool {
     /// Handles on the screen, in the order of painting.
     pub shapes: Vec<HandleShape>,
@@ -89,12 +90,13 @@ impl GizmoTool {
     }
 }
 
-/// Shows arrows beside the rings in Pose mode for every joint if `true`, not only for roots.
+/// Shows arrows beside the rings in Pose mode for every joint if `true`, not only for roots. Joints of limbs are pulled by
+/// them; others move by themselves.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PoseMoves(pub bool);
 
 /// A press on a handle, and its drag.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 struct Drag {
     rig: Entity,
     gizmo: GizmoDrag,
@@ -115,12 +117,14 @@ impl Drag {
 }
 
 /// The dragged joints in their state at the press.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 enum Start {
     /// Joints at rest, with their positions.
     Rest(Vec<(Uid, Vec3)>),
     /// Joints in their pose.
     Pose(Vec<PosedJoint>),
+    /// Joints of limbs, with their positions, that those above bring along: arrows never stretch a limb.
+    Pull(Vec<(Vec3, Way)>),
 }
 
 /// Step of movements while snapping, as a share of the model's height.
@@ -270,7 +274,9 @@ fn press(scene: &Scene, mode: Mode, space: GizmoSpace, moves: bool, at: Vec2) ->
         several => joints(several.len()),
     };
     let from = if mode == Mode::Pose {
-        Start::Pose(PosedJoint::gather(&rig, &aim.joints))
+        let is_moved = matches!(handle, Handle::MoveAxis(_) | Handle::MovePlane(_) | Handle::MoveView);
+        let pulled = if is_moved { pulled(&rig, &aim.joints) } else { None };
+        pulled.map_or_else(|| Start::Pose(PosedJoint::gather(&rig, &aim.joints)), Start::Pull)
     } else {
         Start::Rest(aim.joints.iter().map(|joint| (*joint, rig.rig.position(*joint))).collect())
     };
@@ -284,6 +290,17 @@ fn press(scene: &Scene, mode: Mode, space: GizmoSpace, moves: bool, at: Vec2) ->
         from,
         step: step(&rig),
     })
+}
+
+/// Ways in which joints of limbs follow arrows; `None` if one of them is a control, no joint of a limb, below another one, or
+/// moved by nothing above it.
+fn pulled(rig: &EditedRig, joints: &[Uid]) -> Option<Vec<(Vec3, Way)>> {
+    let is_pulled = |joint: &Uid| {
+        let is_control = rig.built_node(*joint).is_some_and(|node| node.control.is_some());
+        let is_carried = rig.rig.ancestors(*joint).any(|above| joints.contains(&above.data.uid));
+        !is_control && !is_carried && is_within_limb(&rig.rig, *joint)
+    };
+    joints.iter().map(|joint| is_pulled(joint).then(|| Way::find(rig, *joint).ok()).flatten()).collect()
 }
 
 /// Starts a drag with a press on a joint: it moves as it is seen, and with it the others that are selected if it is.
@@ -343,6 +360,10 @@ impl Drag {
             Start::Rest(places) => rest_operation(places, &self.gizmo, &delta, with_children),
             Start::Pose(starts) => {
                 Operation::Pose(starts.iter().map(|start| (start.joint, start.dragged(&delta, self.own))).collect())
+            }
+            Start::Pull(ways) => {
+                let by = if let Delta::Move(by) = delta { by } else { Vec3::ZERO };
+                Operation::Pose(ways.iter().flat_map(|(at, way)| way.to(*at + by, by)).collect())
             }
         })
     }

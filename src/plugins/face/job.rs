@@ -15,7 +15,7 @@ use bevy::{
 };
 
 use super::{
-    Face, FaceExpressions, FacePlaced, FaceReport, FaceRequest, PlaceFaceError,
+    Face, FaceExpressions, FacePlaced, FaceReport, FaceRequest, PlaceFaceError, cut_of,
     edits::{FaceEdits, NewFace, face_edits},
     placed_bones::{FaceRig, PlacedBone},
     pose,
@@ -336,6 +336,10 @@ impl JobResult {
         if let (Some(fit), Some(shapes)) = (&self.fit, shapes) {
             edits.extend(self.moved(rig, &joints));
             edits.extend(self.poses(rig, fit, shapes, &joints, uids));
+        }
+        let cut = cut_of(&self.settings);
+        if rig.face_cut(mesh.uid) != cut {
+            edits.push(RigEdit::SetFaceCut(mesh.uid, cut));
         }
         (edits, self.report())
     }

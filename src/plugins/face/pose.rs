@@ -143,8 +143,8 @@ pub(super) fn express(
             match preparation {
                 Some(mut preparation) => preparation.wanted = Some(request.clone()),
                 None => {
-                    let wanted = Some(request.clone());
-                    let preparation = FacePreparation::start(mesh, face, known, skin, &set.0, wanted);
+                    let (wanted, cut) = (Some(request.clone()), settled.face_cut(mesh.uid));
+                    let preparation = FacePreparation::start(mesh, face, known, skin, &set.0, wanted, cut);
                     commands.entity(*entity).insert(preparation);
                 }
             }

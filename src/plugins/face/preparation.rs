@@ -19,6 +19,7 @@ use super::{
     job::analysed,
     placed_bones::FaceRig,
     pose::{analysed_weights, facial_bones},
+    with_cut,
 };
 use crate::{
     algo::face::{
@@ -26,7 +27,7 @@ use crate::{
         expression::{ExpressionSet, FittedFace},
     },
     plugins::surface::{RigMesh, SkinOf},
-    rig::{Rig, SkinData},
+    rig::{FaceCut, Rig, SkinData},
 };
 
 /// Preparation of a mesh's face for expressions; gone when it is prepared.
@@ -76,7 +77,7 @@ pub fn mended_shares(world: &World, mesh: Entity) -> BTreeMap<String, f32> {
 }
 
 impl FacePreparation {
-    /// Starts to prepare a face; a mesh whose analysis is not `ready` is analysed first.
+    /// Starts to prepare a face; a mesh whose analysis is not `ready` is analysed first, with the cut of the document.
     pub(super) fn start(
         mesh: &RigMesh,
         ready: Option<&Face>,
@@ -84,6 +85,7 @@ impl FacePreparation {
         skin: &Arc<SkinData>,
         set: &Arc<ExpressionSet>,
         wanted: Option<ExpressRequest>,
+        cut: Option<FaceCut>,
     ) -> Self {
         // An opened file has the positions of the bones, but not of the features.
         let ready = ready.filter(|face| face.serves(&mesh.rest, &face.settings)).cloned();
@@ -92,7 +94,7 @@ impl FacePreparation {
             let face = match ready {
                 Some(face) => face,
                 None => {
-                    let settings = AutoSettings::default();
+                    let settings = with_cut(AutoSettings::default(), cut);
                     let analysis = analysed(&rest, &triangles, &settings, &|_, _| true)?;
                     Face { analysis: analysis.into(), settings, rest }
                 }
@@ -128,7 +130,8 @@ pub(super) fn prepare(
         }
         prepared.0.insert(entity, Arc::downgrade(skin));
         if let Ok((bones, skin)) = facial_bones(&rig, mesh) {
-            commands.entity(entity).insert(FacePreparation::start(mesh, face, bones, skin, &set.0, None));
+            let cut = rig.face_cut(mesh.uid);
+            commands.entity(entity).insert(FacePreparation::start(mesh, face, bones, skin, &set.0, None, cut));
         }
     }
 }

@@ -38,14 +38,15 @@ impl RigEdit {
         }
     }
 
-    /// True if the edit changes nothing but pose, attribute values, stored poses, clips or selection sets, which no command reads.
+    /// True if the edit changes nothing but pose, attribute values, stored poses, clips, selection sets or cuts of faces, which no
+    /// command reads.
     pub fn is_of_motion(&self) -> bool {
         match self {
             Self::SetOffset(..) | Self::SetAttributeValue(..) => true,
             Self::AddStoredPose(..) | Self::RemoveStoredPose(..) | Self::SetStoredPose(..) => true,
             Self::AddClip(..) | Self::RemoveClip(..) | Self::SetClipAbout(..) => true,
             Self::AddLayer { .. } | Self::RemoveLayer { .. } | Self::SetLayer { .. } | Self::SetKeys { .. } => true,
-            Self::SetSelectionSets(..) => true,
+            Self::SetSelectionSets(..) | Self::SetFaceCut(..) => true,
             Self::Batch(edits) => edits.iter().all(Self::is_of_motion),
             _ => false,
         }

@@ -20,9 +20,9 @@ use crate::rig::{Rig, Uid, animation::NodeNames};
 /// Highest format that this version reads; written only for content that needs it.
 ///
 /// Format 2 adds values of attributes, and poses of nodes that are not joints; format 3 adds clips, and the templates that rigs
-/// follow; format 4 adds parts that were dropped onto joints, and selection sets; format 5 adds places in the graph. A project is written
-/// in the first format that can hold it.
-pub const FORMAT: u32 = 5;
+/// follow; format 4 adds parts that were dropped onto joints, and selection sets; format 5 adds places in the graph; format 6 adds cuts
+/// of faces. A project is written in the first format that can hold it.
+pub const FORMAT: u32 = 6;
 
 /// Largest size in bytes of a project that is read.
 pub const MAX_BYTES: usize = 64 << 20;

@@ -208,6 +208,16 @@ pub(crate) fn with_field(text: &str, name: &str, value: &str) -> String {
     [&text[..place.start], &written, &text[place.end..]].concat()
 }
 
+/// Places of the items of a RON list in its text; none for a text that is no list.
+pub(crate) fn list_items(text: &str) -> Vec<Range<usize>> {
+    let Some(tree) = Tree::parse(text) else { return Vec::new() };
+    let root = tree.node(tree.root());
+    if root.bracket != Some('[') {
+        return Vec::new();
+    }
+    root.items.iter().map(|item| tree.node(item.value).range.clone()).collect()
+}
+
 /// Number of the tokens of an attribute of the file, such as `#![enable(implicit_some)]`.
 fn attribute(text: &str) -> usize {
     let is_there = tokens(text).map(|token| token.text).take(3).eq(["#", "!", "["]);
@@ -255,6 +265,16 @@ mod tests {
     fn unbalanced_texts_have_no_tree() {
         for text in ["", "(", "(a: )", "(a: 1))", "[1, , 2]", "(a: [1)]", "1, 2"] {
             assert!(Tree::parse(text).is_none(), "{text}");
+        }
+    }
+
+    #[test]
+    fn items_of_lists_are_whole_values() {
+        let text = "[ (a: \"x, ]\"), b(1), -2.5, [3, 4], ]";
+        let items: Vec<&str> = list_items(text).into_iter().map(|place| &text[place]).collect();
+        assert_eq!(items, ["(a: \"x, ]\")", "b(1)", "-2.5", "[3, 4]"]);
+        for other in ["", "(1, 2)", "[", "[1"] {
+            assert!(list_items(other).is_empty(), "{other}");
         }
     }
 }

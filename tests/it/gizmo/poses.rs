@@ -202,3 +202,51 @@ fn a_click_on_an_outline_beside_the_body_takes_its_control() {
         assert_eq!(bench.base.get::<HoveredNode>(rig).unwrap().0, None, "{mode:?}: beside everything");
     }
 }
+
+/// The switch "Move joints, too" gives all joints arrows; those of limbs bring the limb along, so no bone gets longer.
+#[test]
+fn arrows_in_pose_mode_keep_the_lengths_of_limbs() {
+    for sight in sights(Transform::IDENTITY) {
+        let mut bench = Bench::new(sight, Transform::IDENTITY);
+        let [root, middle, tip] = chain(&mut bench);
+        let leaves = [[0.8, 1.3, 0.0], [0.8, 1.2, 0.2]].map(|place| bench.place(place, Some(tip)));
+        bench.base.select(&[tip]);
+        bench.mode(Mode::Pose);
+        let has_arrows = |bench: &Bench| bench.shapes().iter().any(|shape| matches!(shape.handle, Handle::MoveAxis(_)));
+        assert!(!has_arrows(&bench), "at first only roots have arrows");
+        bench.base.app.insert_resource(PoseMoves(true));
+        bench.base.app.update();
+        assert!(has_arrows(&bench));
+        let (before, steps) = (bench.base.rig().clone(), bench.base.steps());
+        let place = |rig: &Rig, joint: Uid| rig.posed_global(joint).translation;
+        // Back along the arrow, which is within reach.
+        let backwards = |bench: &mut Bench, joint: Uid| {
+            let from = bench.grip(Handle::MoveAxis(0));
+            let by = (sight.project(place(bench.base.rig(), joint)).unwrap() - from).normalize() * 30.0;
+            bench.drag(from, by, ModifierKeys::default());
+            bench.release(from + by);
+        };
+        backwards(&mut bench, tip);
+        let after = bench.base.rig().clone();
+        assert_eq!(bench.base.steps(), steps + 1);
+        assert!(place(&after, tip).distance(place(&before, tip)) > 1e-2, "the joint moves");
+        for (above, below) in [(root, middle), (middle, tip)] {
+            let length = |rig: &Rig| place(rig, above).distance(place(rig, below));
+            assert!((length(&after) - length(&before)).abs() < 1e-4, "the bone becomes longer");
+        }
+        for joint in [root, middle, tip] {
+            let moved = after.offset(joint).map_or(Vec3::ZERO, |offset| offset.translation);
+            assert_eq!(moved, Vec3::ZERO, "joints turn, and none of them moves");
+        }
+        bench.base.change(Change::Undo);
+        assert_eq!(*bench.base.rig(), before);
+
+        // One of several that hang on a joint, as bones of a face do, moves by itself.
+        bench.base.select(&leaves[..1]);
+        bench.base.app.update();
+        backwards(&mut bench, leaves[0]);
+        let after = bench.base.rig().clone();
+        assert!(place(&after, leaves[0]).distance(place(&before, leaves[0])) > 1e-2);
+        assert_eq!(after.pose().keys().collect::<Vec<_>>(), [&leaves[0]], "nothing else is posed");
+    }
+}

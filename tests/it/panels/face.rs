@@ -14,6 +14,7 @@ use rigsmith::{
         surface::{RigMesh, SkinOf},
     },
     prelude::*,
+    rig::FaceCut,
 };
 
 use super::desk::{Desk, Sheet};
@@ -125,8 +126,19 @@ fn the_density_is_that_of_the_opened_face() {
     let is_skin = |bone: &&PlacedBone| bone.kind == FaceBoneKind::Skin;
     let count = FaceRig::read(desk.rig()).bones.iter().filter(is_skin).count();
     assert!((4..36).contains(&count), "{count} bones");
+    assert_eq!(desk.rig().face_cut(Uid(99)), Some(FaceCut { bones: 24, groups: None }));
+    assert_eq!(number_of_bones(&desk), 24.0, "the panel follows the document");
     let (reopened, _) = opened(Some(desk.rig().clone()));
+    assert_eq!(number_of_bones(&reopened), 24.0);
+    // A document of an older version has only the bones.
+    let mut older = desk.rig().clone();
+    older.apply(&RigEdit::SetFaceCut(Uid(99), None)).unwrap();
+    let (reopened, _) = opened(Some(older));
     assert_eq!(number_of_bones(&reopened), count as f32);
+    // What undo takes back, the panel takes back.
+    desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
+    desk.frames(4);
+    assert_eq!((desk.rig().face_cut(Uid(99)), number_of_bones(&desk)), (None, 40.0));
 }
 
 #[test]
@@ -134,7 +146,8 @@ fn the_merge_history_can_be_cut() {
     let (mut desk, mesh) = with_head();
     desk.click("Place face");
     wait(&mut desk, mesh);
-    let groups = |desk: &Desk| desk.app.world().get::<Face>(mesh).unwrap().analysis.groups.groups;
+    let groups_of = |desk: &Desk, mesh: Entity| desk.app.world().get::<Face>(mesh).unwrap().analysis.groups.groups;
+    let groups = |desk: &Desk| groups_of(desk, mesh);
     let before = groups(&desk);
     assert!(before >= 3);
     desk.click("Grouping");
@@ -149,9 +162,25 @@ fn the_merge_history_can_be_cut() {
     desk.click_at(egui::pos2(tree.left() + 60.0, tree.bottom() - 10.0));
     desk.frames(2);
     assert!(written(&desk, HINT_BY_HAND).is_some(), "{:?}", desk.seen);
+    // The cut is a step of the document, which the panel follows.
+    assert_eq!(desk.steps(), (2, 2));
+    let cut = desk.rig().face_cut(Uid(99)).expect("a cut").groups;
+    assert!(cut.is_some_and(|groups| groups as usize > before), "{cut:?}");
+    for (change, hint) in [(Change::Undo, HINT_AUTO), (Change::Redo, HINT_BY_HAND)] {
+        desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change });
+        desk.frames(4);
+        assert!(written(&desk, hint).is_some(), "{hint}: {:?}", desk.seen);
+    }
     desk.click("Place again");
     wait(&mut desk, mesh);
     let deep = groups(&desk);
+    // Opened again, the head is grouped by the cut of the document.
+    let (mut reopened, again) = opened(Some(desk.rig().clone()));
+    crate::bench::wait(&mut reopened, "the face that was opened", Desk::frame, |desk| {
+        desk.app.world().get::<Face>(again).is_some()
+    });
+    assert_eq!(groups_of(&reopened, again), deep);
+    assert_eq!(reopened.steps(), (0, 0), "showing what the document says is no edit");
     assert!(deep > before && deep > 10, "{before} groups became {deep}");
     // Cut near its top, and left to the mesh again.
     let tree = desk.find("Merge history").rect;

@@ -17,7 +17,7 @@ use rigsmith::{
     },
     prelude::*,
     rig::{
-        JointData, Matching, PoseOffset, RestTransform,
+        AttributeKind, JointData, Matching, PoseOffset, RestTransform,
         animation::{Key as ClipKey, Property, RigClip, Track, TrackTarget},
         operations::{MirrorPlane, WholePose},
         project::{Project, ProjectRig, read_project, write_project},
@@ -331,6 +331,63 @@ fn the_menu_of_a_control_switches_kinematics_without_a_jump() {
     desk.key(Key::Escape);
     desk.frames(2);
     assert!(desk.look("Reset pose").is_none());
+}
+
+/// The control of the left hand in a posed biped, whose spaces are at other places than at rest.
+#[test]
+fn the_menu_of_a_control_changes_its_space_without_a_jump() {
+    let mut desk = Desk::with(Sheet::Window, egui::vec2(900.0, 700.0));
+    let (entity, rig) = (desk.rig, crate::bench::shipped("biped"));
+    desk.app.world_mut().entity_mut(entity).insert(rig);
+    desk.app.world_mut().write_message(BuildRequest { rig: entity, step: BuildStep::All });
+    desk.app.insert_resource(Mode::Pose);
+    desk.frames(4);
+    let built = Arc::clone(&desk.app.world().get::<BuildResult>(entity).unwrap().0);
+    let hand = built.nodes.iter().find(|node| *node.name == *"hand_ik_l").expect("the control").uid;
+    let is_of_hand = |switch: &Matching| matches!(switch, Matching::Space { control } if *control == hand);
+    let switch = built.switches.iter().find(|switch| is_of_hand(&switch.matching)).expect("spaces").clone();
+    let others = built.nodes.iter().filter(|node| node.control.is_some() && node.uid != hand);
+    desk.edit(Operation::Pose(others.map(|node| (node.uid, bent(0.2))).collect()));
+    desk.frames(3);
+    assert!(!desk.rig().pose().is_empty());
+    let state = |desk: &Desk| desk.app.world().get::<RigRuntime>(entity).unwrap().state().clone();
+    let value = |desk: &Desk| state(desk).attribute(switch.control, &switch.attribute).unwrap();
+    let place = |desk: &Desk| state(desk).global(hand).unwrap();
+    let (first, before, rig, steps) = (value(&desk), place(&desk), desk.rig().clone(), desk.steps().1);
+    // Without a matching pose the hand would go along with the other space.
+    let jumps = |number: &usize| {
+        let mut other = state(&desk);
+        other.set_attribute(switch.control, &switch.attribute, *number as f32).unwrap();
+        other.evaluate(0.0);
+        other.global(hand).unwrap().translation.distance(before.translation) > 1e-2
+    };
+    let carrier = built.node(switch.control).unwrap();
+    let attribute = carrier.attributes.iter().find(|known| known.name == switch.attribute).expect("the attribute");
+    let AttributeKind::Choice(names) = &attribute.kind else { panic!("{attribute:?}") };
+    let number = (0..names.len()).find(jumps).expect("a space elsewhere");
+
+    desk.app.world_mut().entity_mut(entity).insert(HoveredNode(Some(hand)));
+    desk.frames(2);
+    let middle = Pos2::new(450.0, 350.0);
+    desk.secondary_click_at(middle);
+    // Another switch may have spaces of the same names.
+    let title = format!("Space ({} {})", carrier.name, switch.attribute);
+    let title = desk.seen.iter().find(|seen| seen.label == title || seen.value == title);
+    let title = title.unwrap_or_else(|| panic!("no spaces in {:?}", desk.seen)).rect;
+    let entries = desk.seen.iter().filter(|seen| seen.label == names[number] && seen.rect.top() >= title.top());
+    let entry = entries.min_by(|a, b| a.rect.top().total_cmp(&b.rect.top())).expect("the space").clone();
+    assert_eq!(entry.on, Some(false), "{entry:?}");
+    desk.click_at(entry.rect.center());
+    desk.frames(4);
+    assert!((value(&desk) - number as f32).abs() < 1e-6, "the space is {} in place of {number}", value(&desk));
+    let after = place(&desk);
+    assert!(after.translation.distance(before.translation) < 1e-3, "the hand jumps");
+    assert!(after.rotation.angle_between(before.rotation) < 2e-3, "the hand turns");
+    assert_eq!(desk.steps().1, steps + 1, "one step");
+    assert_ne!(*desk.rig(), rig);
+    undo(&mut desk);
+    assert_eq!((value(&desk), desk.rig(), desk.steps().1), (first, &rig, steps));
+    assert!(place(&desk).translation.distance(before.translation) < 1e-6);
 }
 
 #[test]

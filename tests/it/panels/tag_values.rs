@@ -13,7 +13,7 @@ use rigsmith::{
 use super::desk::Desk;
 
 /// Parameters of a command.
-fn params_of(desk: &Desk, tag: Uid) -> String {
+pub(super) fn params_of(desk: &Desk, tag: Uid) -> String {
     match &desk.rig().find_tag(tag).unwrap().1.kind {
         TagKind::Command { params, .. } => params.clone(),
         TagKind::Feature { name, .. } => panic!("{name} is no command"),
@@ -21,7 +21,7 @@ fn params_of(desk: &Desk, tag: Uid) -> String {
 }
 
 /// Adds a command to a joint; returns its tag.
-fn add_command(desk: &mut Desk, joint: Uid, module: &str, params: &str) -> Uid {
+pub(super) fn add_command(desk: &mut Desk, joint: Uid, module: &str, params: &str) -> Uid {
     let kind = TagKind::Command { module: module.into(), params: params.into(), feature: None };
     desk.edit(Operation::Tags(TagOperation::Add { joints: vec![joint], kind, index: None }));
     desk.rig().joint(joint).unwrap().data.tags.last().unwrap().uid

@@ -1,8 +1,10 @@
 //! A walk over every action and over all widgets of the panels, as far as clicks lead: each changes the document by one step that
 //! undo takes back to the last value, or leaves it alone.
 //!
-//! The Loader is not walked: it writes files, and its own tests do and undo what it asks for. Panels of meshes are walked without
-//! one; `weights.rs` does and undoes their actions with weights.
+//! The panel of the Loader is not walked: it writes files, and its own tests do and undo what it asks for. Its actions, and those on
+//! meshes, are in `with_mesh`.
+
+mod with_mesh;
 
 use std::{
     collections::{BTreeSet, VecDeque},
@@ -21,7 +23,7 @@ use rigsmith::{
             dialog::{Answer, Dialog, DialogAnswer, Question},
         },
         fitting::FittingPlugin,
-        library::LibraryJobs,
+        library::{LibraryAction, LibraryFolders, LibraryJobs, TemplateLibrary},
         mode::Mode,
         onion::OnionSkin,
         panel::EditorPanel,
@@ -46,9 +48,11 @@ use rigsmith::{
             weights::WeightsPanel,
         },
         recovery::Recovery,
+        running_work::running,
         tools::{ToolsPlugin, paint::brush::PaintBrush},
     },
-    plugins::history::RigHistory,
+    files::SearchPaths,
+    plugins::{fit::FitJob, history::RigHistory},
     prelude::*,
     rig::{
         JointData, RestTransform, SelectionSet, TagKind,
@@ -103,7 +107,7 @@ struct Walk {
     wrong: Vec<String>,
     /// Deeds that made a step.
     made: BTreeSet<String>,
-    _folder: tempfile::TempDir,
+    folder: tempfile::TempDir,
 }
 
 impl Walk {
@@ -115,7 +119,7 @@ impl Walk {
         app.finish();
         app.cleanup();
         let desk = Desk::of(app, Entity::PLACEHOLDER, Sheet::Panel(panel), size);
-        let mut walk = Self { desk, size, wrong: Vec::new(), made: BTreeSet::new(), _folder: folder };
+        let mut walk = Self { desk, size, wrong: Vec::new(), made: BTreeSet::new(), folder };
         walk.desk.until("a document", |desk| desk.app.world().contains_resource::<ActiveRig>());
         walk.desk.app.world_mut().write_message(OpenRequest::Empty);
         walk.rest();
@@ -170,7 +174,10 @@ impl Walk {
             let is_busy = world.resource::<LibraryJobs>().what().is_some()
                 || world.resource::<LoadJob>().what().is_some()
                 || world.resource::<SaveJob>().what().is_some()
-                || world.resource::<Recovery>().is_looking();
+                || world.resource::<Recovery>().is_looking()
+                || world.resource::<TemplateLibrary>().is_listing()
+                || running(world).is_some()
+                || is_fitting(world);
             // Work that other tests left in the system's folder for temporary files is none of ours.
             let asks = matches!(world.resource::<Dialog>().question(), Some(Question::Recover(_)));
             if asks {
@@ -277,6 +284,11 @@ impl Walk {
             }
         }
     }
+}
+
+fn is_fitting(world: &World) -> bool {
+    let jobs = world.try_query::<&FitJob>();
+    jobs.is_some_and(|mut jobs| jobs.iter(world).any(|job| !job.waits()))
 }
 
 fn names(desk: &Desk, size: egui::Vec2) -> Vec<(String, Pos2)> {

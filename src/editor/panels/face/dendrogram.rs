@@ -20,13 +20,13 @@ struct Branch {
 }
 
 /// Draws the tree. A click between two heights cuts there at the next placement; a double click restores the automatic
-/// choice.
-pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usize>) {
+/// choice. Returns true once a person has chosen: after a click, and after the release of the slider.
+pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usize>) -> bool {
     let tree = &analysis.groups.depth;
     let heights = tree.heights(LEAVES);
     let Some(top) = heights.first().copied().filter(|top| *top > 0.0) else {
         ui.weak("There is one group only.");
-        return;
+        return false;
     };
     let size = vec2(ui.available_width(), 110.0);
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
@@ -40,6 +40,7 @@ pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usi
     let dashes = [Pos2::new(area.left(), level(line)), Pos2::new(area.right(), level(line))];
     let color = ui.visuals().warn_fg_color;
     ui.painter().extend(egui::Shape::dashed_line(&dashes, Stroke::new(1.5, color), 5.0, 4.0));
+    let mut is_chosen = response.clicked() || response.double_clicked();
     let response = response.on_hover_text("Click where the history is to be cut; double-click to let the mesh decide");
     if response.double_clicked() {
         *groups = None;
@@ -54,10 +55,13 @@ pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usi
     if slider.changed() {
         *groups = Some(count);
     }
+    is_chosen |=
+        slider.drag_stopped() || slider.lost_focus() || slider.changed() && !slider.is_pointer_button_down_on();
     ui.weak(match groups {
         Some(_) => "Cut by hand; place again to use it. The front groups that hold features are joined.",
         None => "Cut where every feature lies in the face. Front groups are joined.",
     });
+    is_chosen
 }
 
 /// Draws what stands where in the tree, and the colours of the groups.

@@ -45,6 +45,11 @@ impl<'a> Fault<'a> {
         is_within(self.parameter, path) || is_within(path, self.parameter)
     }
 
+    /// True if the parameter at fault is a value, or a part of it.
+    pub fn is_within(&self, value: &str) -> bool {
+        is_within(self.parameter, value)
+    }
+
     /// Marks a field if it is that of the parameter, and scrolls to it where that is wanted.
     pub fn mark(&self, ui: &Ui, field: &Response, path: &str, label: &str) {
         if !self.concerns(path) {

@@ -23,6 +23,7 @@ fn made_form(module: &ModuleInfo) -> Form {
             "NodeRef" | "NodeRefs" => FormElement::Node(bound),
             "String" => FormElement::Text(bound),
             "Amount" => FormElement::Amount(bound),
+            "Vec<(f32, f32)>" => FormElement::Curve(bound),
             _ => FormElement::List(bound),
         }
     };

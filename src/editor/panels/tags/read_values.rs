@@ -13,13 +13,35 @@ use crate::{
     editor::panels::fields::CommonValue,
     processor::{
         ModuleInfo, ParameterValues,
-        form::{Form, FormElement},
+        form::{Form, FormElement, ListItem},
     },
-    rig::{SourceError, Uid},
+    rig::{SourceError, Uid, list_items},
 };
 
 /// Lowest and highest values about X, Y and Z.
 pub(super) type Limits = [(Option<f32>, Option<f32>); 3];
+
+/// Most items of a list that is drawn as rows; longer ones are text.
+const MOST_ROWS: usize = 64;
+
+/// Rows of a list.
+#[derive(Debug, Clone)]
+pub(super) struct Rows {
+    /// Elements of each item.
+    pub elements: Vec<Vec<FormElement>>,
+    /// RON of an item that is added.
+    pub fresh: String,
+}
+
+impl Rows {
+    /// Rows of the list at a path with its items as RON; `None` if the items have no elements, or there are too many.
+    fn of(module: &ModuleInfo, path: &str, label: &str, text: &str) -> Option<Self> {
+        let item = ListItem::of(module, path)?;
+        let count = list_items(text).len();
+        let rows = 0..(count <= MOST_ROWS).then_some(count)?;
+        Some(Self { elements: rows.map(|number| item.row(path, number, label)).collect(), fresh: item.fresh })
+    }
+}
 
 /// Value of one parameter in all commands of a card.
 #[derive(Debug, Clone, Default)]
@@ -42,6 +64,8 @@ pub(super) struct KnownValue {
     pub color: Option<[f32; 3]>,
     /// Keys of a curve.
     pub curve: Option<Vec<(f32, f32)>>,
+    /// Rows of a list that is the same in all commands.
+    pub rows: Option<Rows>,
 }
 
 /// Values of the commands of a card.
@@ -56,16 +80,30 @@ impl CommandValues {
     fn read(module: &ModuleInfo, form: &Form, params: &[String]) -> Result<Self, SourceError> {
         let commands = params.iter().map(|params| module.values(params)).collect::<Result<Vec<_>, _>>()?;
         let mut values = Self { commands, known: BTreeMap::new() };
-        values.know(&form.content);
+        values.know(module, &form.content);
         Ok(values)
     }
 
-    fn know(&mut self, elements: &[FormElement]) {
+    fn know(&mut self, module: &ModuleInfo, elements: &[FormElement]) {
         for element in elements {
             if let FormElement::Frame { content, .. } = element {
-                self.know(content);
+                self.know(module, content);
             } else if let Some((path, _)) = element.bound() {
-                let known = self.value(element, path);
+                let mut known = self.value(element, path);
+                if matches!(element, FormElement::List(_)) && !known.mixed {
+                    known.rows = Rows::of(module, path, &element.label(), &known.text);
+                    self.know_items(known.rows.as_ref());
+                }
+                self.known.insert(path.to_owned(), known);
+            }
+        }
+    }
+
+    /// Takes in the values of the items of a list. Only the whole list has a default.
+    fn know_items(&mut self, rows: Option<&Rows>) {
+        for element in rows.into_iter().flat_map(|rows| rows.elements.iter().flatten()) {
+            if let Some((path, _)) = element.bound() {
+                let known = KnownValue { is_default: true, ..self.value(element, path) };
                 self.known.insert(path.to_owned(), known);
             }
         }

@@ -1,5 +1,7 @@
 //! Values of commands: the form of their module, an element a row.
 
+mod list_field;
+
 use std::{
     collections::{HashMap, HashSet},
     sync::Arc,
@@ -109,6 +111,10 @@ impl Subject<'_> {
     }
 
     fn reset(&self, path: &str) -> ValueEdit {
+        // Items of lists have no defaults; they are numbers or texts.
+        if path.contains('[') {
+            return self.set(path, &["0.0".to_owned(), ron_text("")]);
+        }
         let commands = self.entry.tags.iter().zip(&self.entry.params);
         let changed = commands.map(|((_, tag), params)| Ok((*tag, self.module.with_default(params, path)?)));
         match changed.collect::<Result<Vec<_>, crate::rig::SourceError>>() {
@@ -327,10 +333,7 @@ impl Values {
                 let edit = edit.map(|edit| subject.curve(path, edit));
                 edit.or_else(|| text.map(|text| subject.set(path, &[text])))
             }
-            FormElement::List(_) => {
-                let text = self.text(ui, subject.tag(), path, &label, if mixed { "" } else { value }, true)?;
-                Some(subject.set(path, &[text]))
-            }
+            FormElement::List(_) => self.list(ui, subject, &label, path),
             FormElement::Frame { .. } | FormElement::Separator | FormElement::Comment(_) => None,
         }
     }

@@ -13,6 +13,10 @@ use crate::editor::{
 /// Painter of handles, and of the switch for arrows in Pose mode.
 pub(super) struct GizmoPainter;
 
+/// Tip of the switch for arrows in Pose mode.
+const MOVES: &str =
+    "Arrows beside the rings for every joint: limbs follow and keep their lengths. Roots always have arrows.";
+
 const AXES: [Color32; 3] =
     [Color32::from_rgb(235, 80, 75), Color32::from_rgb(120, 200, 70), Color32::from_rgb(85, 145, 245)];
 const VIEW: Color32 = Color32::from_rgb(225, 228, 232);
@@ -43,8 +47,7 @@ impl ViewportPainter for GizmoPainter {
             .show(ui.ctx(), |ui| {
                 egui::Frame::popup(ui.style()).show(ui, |ui| {
                     let switch = ui.checkbox(&mut on, "Move joints, too");
-                    if switch.on_hover_text("Arrows beside the rings for every joint; roots always have them").changed()
-                    {
+                    if switch.on_hover_text(MOVES).changed() {
                         requests.set(PoseMoves(on));
                     }
                 });

@@ -13,7 +13,7 @@ use super::{
     TemplateReference,
 };
 use crate::rig::{
-    AttributeValues, EditError, Rig, RigEdit, SelectionSet, SourceError, StoredPose, Uid,
+    AttributeValues, EditError, FaceCut, Rig, RigEdit, SelectionSet, SourceError, StoredPose, Uid,
     animation::NodeNames,
     format::animation::{ClipFile, clip_fields, clip_offset, clips_in},
     format::poses::{OffsetFile, PoseFile, ValueFile},
@@ -72,6 +72,18 @@ struct RigFile {
     parts: Vec<DroppedPart>,
     #[serde(default)]
     sets: Vec<SelectionSet>,
+    #[serde(default)]
+    faces: Vec<FaceFile>,
+}
+
+/// Cut of a face of a rig.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FaceFile {
+    mesh: Uid,
+    bones: u32,
+    #[serde(default)]
+    groups: Option<u32>,
 }
 
 pub(super) fn vector<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec3, D::Error> {
@@ -203,9 +215,22 @@ fn read_rigs(
         rig.apply(&edit).map_err(|error| places.error(element, "parts", error.to_string()))?;
         let edit = RigEdit::SetSelectionSets(file.sets);
         rig.apply(&edit).map_err(|error| places.error(element, "sets", error.to_string()))?;
+        read_faces(places, element, &mut rig, &file.faces)?;
         rigs.push(ProjectRig { rig, skins: file.skins });
     }
     Ok(rigs)
+}
+
+fn read_faces(places: &Places, element: Option<usize>, rig: &mut Rig, faces: &[FaceFile]) -> Result<(), SourceError> {
+    for (face, place) in faces.iter().zip(places.elements(places.within(element, "faces"))) {
+        if rig.face_cut(face.mesh).is_some() {
+            let message = format!("the face of mesh {} has two cuts; keep one of them", face.mesh);
+            return Err(places.error(place, "mesh", message));
+        }
+        let edit = RigEdit::SetFaceCut(face.mesh, Some(FaceCut { bones: face.bones, groups: face.groups }));
+        rig.apply(&edit).map_err(|error| places.error(place, "mesh", error.to_string()))?;
+    }
+    Ok(())
 }
 
 fn read_pose(
@@ -313,9 +338,10 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
         (1, ["", "", ""]) => Some(&["format", "name", "meshes", "rigs", "templates", "view", "journal"]),
         (3, ["meshes", "", ""]) => Some(&["uid", "rig", "path", "hash", "nodes"]),
         (3, ["templates", "", ""]) => Some(&["rig", "path", "base"]),
-        (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "values", "poses", "clips", "parts", "sets"]),
+        (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "values", "poses", "clips", "parts", "sets", "faces"]),
         (5, ["skins", "rigs", ""]) => Some(&["mesh", "path", "hash", "at_rest"]),
         (5, ["sets", "rigs", ""]) => Some(&["name", "nodes"]),
+        (5, ["faces", "rigs", ""]) => Some(&["mesh", "bones", "groups"]),
         (5, ["parts", "rigs", ""]) => Some(&["uid", "part", "joints", "mirror"]),
         (5, ["pose", "rigs", ""]) => Some(OFFSET),
         (5, ["poses", "rigs", ""]) => Some(&["uid", "name", "offsets", "values"]),

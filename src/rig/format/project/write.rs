@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use super::{FORMAT, Project, ProjectRig, ProjectView, TemplateReference};
+use super::{Project, ProjectRig, ProjectView, TemplateReference};
 use crate::rig::{
-    Rig, SelectionSet,
+    FaceCut, Rig, SelectionSet,
     animation::NodeNames,
     format::{
         animation::write_clips,
@@ -25,7 +25,7 @@ pub fn write_project(project: &Project) -> String {
 fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
     let of_rigs = project.rigs.iter().map(|entry| needed_format(&entry.rig)).max().unwrap_or(1);
     let of_content = if project.templates.is_empty() { of_rigs } else { of_rigs.max(3) };
-    let format = if project.view.graph.is_empty() { of_content } else { FORMAT };
+    let format = if project.view.graph.is_empty() { of_content } else { of_content.max(5) };
     writeln!(out, "(\n    format: {format},\n    name: {},", quoted(&project.name))?;
     writeln!(out, "    meshes: [")?;
     for mesh in &project.meshes {
@@ -110,11 +110,27 @@ fn write_rig(out: &mut String, entry: &ProjectRig, known: &NodeNames) -> std::fm
         }
         writeln!(out, "            ],")?;
     }
+    write_faces(out, &entry.rig)?;
     writeln!(out, "        ),")
 }
 
-/// The first format that can hold the rig's poses, clips, dropped parts and selection sets.
+fn write_faces(out: &mut String, rig: &Rig) -> std::fmt::Result {
+    if rig.face_cuts().is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "            faces: [")?;
+    for (mesh, FaceCut { bones, groups }) in rig.face_cuts() {
+        let groups = groups.map_or_else(String::new, |groups| format!(", groups: {groups}"));
+        writeln!(out, "                (mesh: \"{mesh}\", bones: {bones}{groups}),")?;
+    }
+    writeln!(out, "            ],")
+}
+
+/// The first format that can hold the rig's poses, clips, dropped parts, selection sets and cuts of faces.
 fn needed_format(rig: &Rig) -> u32 {
+    if !rig.face_cuts().is_empty() {
+        return 6;
+    }
     let needs_values = !rig.attribute_values().is_empty()
         || rig.stored_poses().iter().any(|pose| !pose.values.is_empty())
         || rig.pose().keys().any(|node| rig.joint(*node).is_none());
