@@ -3,8 +3,8 @@
 use std::cell::Cell;
 
 use bevy_egui::egui::{
-    self, Align, Color32, DragValue, Id, Key, Layout, Rect, Response, RichText, Sense, Slider, SliderClamping, TextEdit,
-    Ui, WidgetInfo, WidgetType,
+    self, Align, Color32, DragValue, Id, Key, Layout, Rect, Response, RichText, Sense, Slider, SliderClamping,
+    TextEdit, Ui, WidgetInfo, WidgetType,
     text::{CCursor, CCursorRange},
     text_edit::TextEditState,
     vec2,
