@@ -28,6 +28,9 @@ impl Hands<'_> {
     /// Brings a panel of the dock forward by its tab.
     fn bring(&self, panel: &str) {
         self.press(&format!("Show {panel}"));
+        // The pointer stays until the tab has come forward: a click is where the pointer is in the frame that takes it.
+        sleep(Duration::from_millis(1500));
+        self.frames();
     }
 
     /// Clicks a joint in the Hierarchy.
@@ -82,6 +85,7 @@ fn panels_of_a_character_on_a_display_and_gpu() {
     let display = Display::start().expect("Xvfb did not start");
     let start = Hands::run(&display, folder, None);
     start.until("the start page shows", |report| report.widgets.iter().any(|widget| widget.name == "Take the tour"));
+    start.rests();
     start.picture("start");
     drop(start);
 
@@ -148,6 +152,8 @@ fn posed(hands: &Hands) {
     let report = hands.until("selections can be stored", |report| of_sets(report).is_some());
     let [left, top, width, height] = of_sets(&report).unwrap();
     hands.click([left + 0.5 * width, top + 0.5 * height]);
+    sleep(Duration::from_millis(1500));
+    hands.frames();
     hands.picture("poses");
     hands.bring("Curves");
     hands.picture("curves");
