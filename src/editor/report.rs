@@ -4,12 +4,15 @@
 //! The report is off unless `RIGSMITH_WINDOW_REPORT` names the file. Every change replaces the file in one rename. While it
 //! is on, panels tell their widgets as they tell screen readers, so that a program finds a button by its name.
 
+mod handles;
+
 use std::{collections::BTreeMap, path::PathBuf};
 
 use bevy::{ecs::system::SystemParam, prelude::*, window::PrimaryWindow};
 use bevy_egui::{EguiContext, EguiOutput, PrimaryEguiContext, egui::accesskit};
 use serde::{Deserialize, Serialize};
 
+use self::handles::ControlHandles;
 use super::{
     ActiveRig,
     camera::ViewportSight,
@@ -70,6 +73,9 @@ pub struct WindowReport {
     pub places: BTreeMap<String, [f32; 2]>,
     /// Uids of joints by their labels.
     pub labels: BTreeMap<String, String>,
+    /// Pixels of the window at which a press takes a control, by the control's name, in Pose mode. Selected nodes have handles
+    /// of their own, which come first.
+    pub controls: BTreeMap<String, [f32; 2]>,
     /// The viewport in the window: left, top, width and height.
     pub viewport: [f32; 4],
     /// Positions in pixels of the window of the corners (0,0,0), (1,0,0), (0,1,0) and (0,0,1) of the unit cube at the
@@ -85,7 +91,7 @@ pub struct WindowReport {
     pub keys: usize,
     /// Number of changes that the file of the rig's template offers.
     pub offered: usize,
-    /// Labels of the selected joints and nodes; the uid of one without.
+    /// Labels of the selected joints, and names of the selected nodes; the uid of one without.
     pub selection: Vec<String>,
     /// Place of the pointer in pixels of the window, whole; `None` outside of the window.
     pub pointer: Option<[f32; 2]>,
@@ -149,6 +155,7 @@ fn reported(node: &accesskit::Node) -> Option<ReportedWidget> {
 struct Progress<'w, 's> {
     rigs: Query<'w, 's, (Option<&'static Processor>, Option<&'static UpdateOffer>)>,
     builds: MessageReader<'w, 's, BuildDone>,
+    handles: ControlHandles<'w, 's>,
     outputs: Query<'w, 's, &'static EguiOutput, With<PrimaryEguiContext>>,
     windows: Query<'w, 's, &'static Window, With<PrimaryWindow>>,
     buttons: Option<Res<'w, ButtonInput<MouseButton>>>,
@@ -188,9 +195,13 @@ fn write(
         });
         report.offered = offer.map_or(0, |offer| offer.changes.len());
     }
-    if let Some((rig, selection, history, entities, meshes, surface)) = active.and_then(|rig| rigs.get(rig).ok()) {
+    let active = active.and_then(|entity| Some((entity, rigs.get(entity).ok()?)));
+    if let Some((entity, (rig, selection, history, entities, meshes, surface))) = active {
         report.keys = rig.clips().iter().map(RigClip::key_count).sum();
-        let label = |node: &Uid| rig.joint(*node).and_then(|joint| joint.data.label.clone());
+        let label = |node: &Uid| match rig.joint(*node) {
+            Some(joint) => joint.data.label.clone(),
+            None => progress.handles.name(entity, *node),
+        };
         report.selection = selection.0.iter().map(|node| label(node).unwrap_or_else(|| node.to_string())).collect();
         let (steps, head) = history.steps();
         report.joints = rig.len();
@@ -205,6 +216,10 @@ fn write(
         };
         if let Some(sight) = sight.0 {
             let pixel = |place: Vec3| sight.project(place).map(|at| (at + area.min).round().to_array());
+            if *mode == Mode::Pose {
+                let handles = progress.handles.pixels(entity, &sight).into_iter();
+                report.controls = handles.map(|(name, at)| (name, (at + area.min).round().to_array())).collect();
+            }
             report.axes = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(pixel);
             for joint in rig.walk() {
                 if let Some(label) = &joint.data.label {

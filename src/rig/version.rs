@@ -93,10 +93,10 @@ impl VersionChange {
 }
 
 impl fmt::Display for VersionChange {
-    /// `1.0 → 1.2`, or `1.2 → 1.0, which is older`.
+    /// `1.0 to 1.2`, or `1.2 to 1.0, which is older`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let said = |version: &str| if version.is_empty() { "no version".to_owned() } else { version.to_owned() };
-        write!(f, "{} → {}", said(&self.from), said(&self.to))?;
+        write!(f, "{} to {}", said(&self.from), said(&self.to))?;
         if self.is_back() { f.write_str(", which is older") } else { Ok(()) }
     }
 }

@@ -32,9 +32,9 @@ fn versions_are_compared_by_their_numbers() {
     assert_eq!(compare(&long, &format!("1{}", "0".repeat(400))), Ordering::Less);
     let about = |version: &str| RigAbout { version: version.to_owned(), ..RigAbout::default() };
     let said = |from, to| VersionChange::between(&about(from), &about(to)).map(|change| change.to_string());
-    assert_eq!(said("1.0", "1.2").as_deref(), Some("1.0 → 1.2"));
-    assert_eq!(said("1.2", "1.0").as_deref(), Some("1.2 → 1.0, which is older"));
-    assert_eq!(said("", "1.0").as_deref(), Some("no version → 1.0"));
+    assert_eq!(said("1.0", "1.2").as_deref(), Some("1.0 to 1.2"));
+    assert_eq!(said("1.2", "1.0").as_deref(), Some("1.2 to 1.0, which is older"));
+    assert_eq!(said("", "1.0").as_deref(), Some("no version to 1.0"));
     assert_eq!(said("1", "1.0"), None);
 }
 

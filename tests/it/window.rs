@@ -3,13 +3,13 @@
 //! Needs `Xvfb`, `xdotool` and a graphics adapter (a software one will do); it says what is missing, and fails for it
 //! where `RIGSMITH_REQUIRE_GPU=1`. `RIGSMITH_SHOTS` names a folder for pictures of the window on the way.
 
+mod display;
 mod mouse;
 mod pictures;
 mod whole_job;
 
 use std::{
     cell::RefCell,
-    io::{BufRead, BufReader},
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     thread::sleep,
@@ -25,36 +25,8 @@ use rigsmith::{
     render::adapter,
 };
 
+use self::display::Display;
 use crate::prerequisites::{skip, test_data};
-
-/// A display of its own, gone with the test.
-struct Display {
-    server: Child,
-    name: String,
-}
-
-impl Display {
-    /// Starts a display with a number that the server itself finds free: tests start theirs at the same time.
-    fn start() -> Option<Self> {
-        let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1280x720x24", "-nolisten", "tcp"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .ok()?;
-        let mut number = String::new();
-        BufReader::new(server.stdout.take()?).read_line(&mut number).ok()?;
-        let name = format!(":{}", number.trim());
-        (name.len() > 1).then_some(Self { server, name })
-    }
-}
-
-impl Drop for Display {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
-}
 
 /// A running window and the hands on it.
 struct Hands<'a> {
@@ -76,11 +48,16 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 impl<'a> Hands<'a> {
     fn open(display: &'a Display, folder: &'a Path, file: &Path) -> Self {
+        Self::run(display, folder, Some(file))
+    }
+
+    /// Opens the window, with its start page if there is no file.
+    fn run(display: &'a Display, folder: &'a Path, file: Option<&Path>) -> Self {
         let _ = std::fs::remove_file(folder.join("report.json"));
         let log = std::fs::File::create(folder.join("window.log")).unwrap();
         let program = Command::new(env!("CARGO_BIN_EXE_rigsmith"))
             .arg("edit")
-            .arg(file)
+            .args(file)
             .current_dir(folder)
             .env("DISPLAY", &display.name)
             .env("RIGSMITH_WINDOW_REPORT", folder.join("report.json"))
@@ -238,9 +215,9 @@ impl<'a> Hands<'a> {
     /// Keeps a picture of the window if that was asked for.
     fn shot(&self, name: &str) {
         if let Some(folder) = std::env::var_os("RIGSMITH_SHOTS") {
-            let path = PathBuf::from(folder).join(format!("{name}.png"));
-            let _ =
-                Command::new("import").args(["-window", "root"]).arg(path).env("DISPLAY", &self.display.name).status();
+            let folder = PathBuf::from(folder);
+            std::fs::create_dir_all(&folder).unwrap();
+            self.display.picture().save(folder.join(format!("{name}.png"))).unwrap();
         }
     }
 }

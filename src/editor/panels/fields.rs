@@ -3,8 +3,8 @@
 use std::cell::Cell;
 
 use bevy_egui::egui::{
-    self, Align, Color32, DragValue, Id, Key, Layout, Rect, RichText, Sense, Slider, SliderClamping, TextEdit, Ui,
-    WidgetInfo, WidgetType,
+    self, Align, Color32, DragValue, Id, Key, Layout, Rect, Response, RichText, Sense, Slider, SliderClamping,
+    TextEdit, Ui, WidgetInfo, WidgetType,
     text::{CCursor, CCursorRange},
     text_edit::TextEditState,
     vec2,
@@ -66,6 +66,16 @@ pub(super) fn labelled<R>(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui) -> 
 /// Names a widget for screen readers.
 pub(super) fn named(ui: &Ui, widget: Id, name: &str) {
     ui.ctx().accesskit_node_builder(widget, |node| node.set_label(name));
+}
+
+/// Button that shows a colour and opens its picker. The colour is in sRGB, 0 to 1 each, as documents have it.
+pub(super) fn color_button(ui: &mut Ui, color: &mut [f32; 3]) -> Response {
+    let mut bytes = color.map(|share| (share.clamp(0.0, 1.0) * 255.0).round() as u8);
+    let response = ui.color_edit_button_srgb(&mut bytes);
+    if response.changed() {
+        *color = bytes.map(|byte| f32::from(byte) / 255.0);
+    }
+    response
 }
 
 /// Result of editing a name in place.

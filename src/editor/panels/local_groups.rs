@@ -8,7 +8,7 @@ use bevy_egui::egui::{self, Checkbox, ComboBox, Key, ScrollArea, TextEdit, Ui, W
 
 use super::{
     displayed_rig::{DisplayedRig, Stamp, color},
-    fields::named,
+    fields::{color_button, named},
     list,
 };
 use crate::{
@@ -220,7 +220,7 @@ impl GroupsPanel {
                 Some((uid, rgb)) if uid == group.uid => rgb,
                 _ => group.color,
             };
-            let color_field = ui.color_edit_button_rgb(&mut rgb);
+            let color_field = color_button(ui, &mut rgb);
             named(ui, color_field.id, &format!("Colour of {}", group.name));
             if color_field.on_hover_text("Colour").changed() {
                 self.colored = Some((group.uid, rgb));

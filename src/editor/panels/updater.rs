@@ -46,14 +46,16 @@ impl EditorPanel for UpdaterPanel {
                 "This rig follows no file. It does once a template's file is opened, loaded or saved.",
             );
         };
-        head(ui, world.get::<OpenDocument>(rig), source, requests);
+        ui.horizontal_wrapped(|ui| head(ui, world.get::<OpenDocument>(rig), source, requests));
         let Some(offer) = world.get::<UpdateOffer>(rig) else {
             self.of = None;
             return list::nothing(ui, "The rig has everything that its file has.");
         };
         self.refresh(offer);
-        ui.colored_label(style::accent(ui.visuals()), RichText::new(title(offer)).strong());
-        self.buttons(ui, offer, requests);
+        ui.horizontal_wrapped(|ui| {
+            ui.colored_label(style::accent(ui.visuals()), RichText::new(title(offer)).strong());
+            self.buttons(ui, offer, requests);
+        });
         self.rows(ui, offer);
     }
 }
@@ -112,26 +114,22 @@ impl UpdaterPanel {
     fn buttons(&mut self, ui: &mut Ui, offer: &UpdateOffer, requests: &mut Requests) {
         let Some(choices) = &mut self.choices else { return };
         let has_conflicts = offer.changes.iter().any(|change| change.conflict);
-        ui.horizontal_wrapped(|ui| {
-            let take = ui.button(RichText::new("Take over").strong());
-            if take
-                .on_hover_text("All changes, and in conflicts what is chosen; one step, which can be undone")
-                .clicked()
-            {
-                requests.send(OfferAnswer::Choose(choices.clone()));
+        let take = ui.button(RichText::new("Take over").strong());
+        let tip = "All changes, and in conflicts what is chosen; one step, which can be undone";
+        if take.on_hover_text(tip).clicked() {
+            requests.send(OfferAnswer::Choose(choices.clone()));
+        }
+        if has_conflicts {
+            if ui.button("All mine").on_hover_text("In all conflicts the value here").clicked() {
+                *choices = Take::Mine.into();
             }
-            if has_conflicts {
-                if ui.button("All mine").on_hover_text("In all conflicts the value here").clicked() {
-                    *choices = Take::Mine.into();
-                }
-                if ui.button("All theirs").on_hover_text("In all conflicts the value of the file").clicked() {
-                    *choices = Take::Theirs.into();
-                }
+            if ui.button("All theirs").on_hover_text("In all conflicts the value of the file").clicked() {
+                *choices = Take::Theirs.into();
             }
-            if ui.button("Leave").on_hover_text("Until the file is saved again").clicked() {
-                requests.send(OfferAnswer::Leave);
-            }
-        });
+        }
+        if ui.button("Leave").on_hover_text("Until the file is saved again").clicked() {
+            requests.send(OfferAnswer::Leave);
+        }
     }
 
     fn rows(&mut self, ui: &mut Ui, offer: &UpdateOffer) {

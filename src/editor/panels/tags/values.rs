@@ -30,7 +30,7 @@ use crate::{
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
-            fields::{CommonValue, Look, MIXED, NumberEdit, Numbers, labelled, named},
+            fields::{CommonValue, Look, MIXED, NumberEdit, Numbers, color_button, labelled, named},
             list,
         },
     },
@@ -383,7 +383,7 @@ impl Values {
                 }
                 return;
             };
-            let field = ui.color_edit_button_rgb(&mut rgb);
+            let field = color_button(ui, &mut rgb);
             named(ui, field.id, label);
             if field.changed() {
                 ui.data_mut(|data| data.insert_temp(id, rgb));
