@@ -99,7 +99,7 @@ fn dense_heads_are_symmetric_and_hardly_fold() {
     let Measured { lopsided, paired, folds: [folds, tolerated] } = measured(&points, &triangles, 40);
     println!("{} points: {lopsided:.4} lopsided, {folds} folds of {tolerated} at most", points.len());
     // Quads are cut along other diagonals on the two sides, and the middles of those have no partner: their weights are not the
-    // mean of both sides, and bones follow them. 0.03 was asked for.
+    // mean of both sides.
     assert!(paired > 0.9 && lopsided < 0.025, "{paired} are paired, {lopsided} lopsided");
     assert!(folds <= tolerated, "{folds} triangles fold, {tolerated} may");
 }

@@ -71,6 +71,10 @@ pub struct Unit {
     /// Rotation of the eyeballs.
     #[serde(default)]
     pub gaze: Gaze,
+    /// Share of the opening between the lids that is closed, 0 to 1, wherever the lids are: `moves` alone leave a gap on eyes of
+    /// other shapes.
+    #[serde(default, deserialize_with = "closing")]
+    pub closes_eye: f32,
 }
 
 /// Rotation of an eyeball in degrees.
@@ -283,6 +287,10 @@ fn limit<'de, D: Deserializer<'de>>(reader: D) -> Result<f32, D::Error> {
 
 fn strength<'de, D: Deserializer<'de>>(reader: D) -> Result<f32, D::Error> {
     number(reader, "the strength", 0.0, MAX_STRENGTH)
+}
+
+fn closing<'de, D: Deserializer<'de>>(reader: D) -> Result<f32, D::Error> {
+    number(reader, "the share that closes", 0.0, 1.0)
 }
 
 fn angle<'de, D: Deserializer<'de>>(reader: D) -> Result<f32, D::Error> {

@@ -3,7 +3,10 @@
 use glam::{Affine3A, Vec3};
 use rayon::prelude::*;
 
-use super::{SLIVER, samples::influences};
+use super::{
+    SLIVER,
+    samples::{FacingPoints, influences},
+};
 use crate::{
     algo::face::bones::FaceBone,
     mesh::{
@@ -29,8 +32,8 @@ pub(super) struct MovingSkin {
     normals: Vec<Vec3>,
     /// Triangles that each bone moves.
     of_bone: Vec<Vec<u32>>,
-    /// Points of lips and lids of which the first must stay above the second.
-    pub apart: Vec<[u32; 2]>,
+    /// Points of lips and lids that face each other.
+    pub apart: Vec<FacingPoints>,
 }
 
 impl MovingSkin {
@@ -39,7 +42,7 @@ impl MovingSkin {
         triangles: &[[u32; 3]],
         weights: &Weights,
         bones: &[FaceBone],
-        apart: &[[u32; 2]],
+        apart: &[FacingPoints],
     ) -> Self {
         let mut skin = Self { of_bone: vec![Vec::new(); bones.len()], ..Self::default() };
         let moved: Vec<bool> =
@@ -82,7 +85,10 @@ impl MovingSkin {
             skin.numbers.push(triangle as u32);
             skin.normals.push(normal);
         }
-        skin.apart = apart.iter().map(|pair| pair.map(|point| number(&mut skin, point))).collect();
+        for facing in apart {
+            let [above, below] = [facing.above, facing.below].map(|point| number(&mut skin, point));
+            skin.apart.push(FacingPoints { above, below, ..*facing });
+        }
         skin
     }
 
@@ -147,8 +153,8 @@ impl<'a> PosedSkin<'a> {
                 }
             }
         }
-        for point in skin.apart.iter().flatten() {
-            let point = *point as usize;
+        for point in skin.apart.iter().flat_map(|facing| [facing.above, facing.below]) {
+            let point = point as usize;
             self.points[point] = skin_point(point, skin.points[point], &skin.weights, &self.matrices);
         }
     }

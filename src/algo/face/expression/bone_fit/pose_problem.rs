@@ -1,28 +1,51 @@
 //! Problems of a pose, folded skin and crossed lips or lids, and their repair.
 
+use std::collections::BTreeMap;
+
 use glam::{Affine3A, Vec3};
 
-use super::{FittedFace, PATIENCE, ROUNDS, TAKEN, is_alike, moving_skin::PosedSkin, samples::influences};
+use super::{
+    FittedFace, PATIENCE, ROUNDS, TAKEN, is_alike,
+    moving_skin::PosedSkin,
+    samples::{FacingPoints, influences},
+};
 use crate::algo::face::{
     bones::{FaceBone, FaceBoneKind},
     expression::{BonePose, Mix, field::Field, limited, openings::OpeningLines},
 };
 
-/// Distance of lids and lips that counts as closed, as a share of that at rest.
+/// Distance of lips that counts as closed, as a share of that at rest.
 const CLOSED: f32 = 0.2;
+/// Distance of lids that counts as closed, as a share of that at rest.
+const CLOSED_LIDS: f32 = 0.12;
+/// Least distance of lids, as a share of that at rest.
+const CROSSED_LIDS: f32 = 0.05;
+/// Weight of lids that are too near beside those that are too far.
+const CROSSED: f32 = 8.0;
+/// Stiffness of bones of lids that are brought to their distance, beside the number of points.
+const STIFF_LIDS: f32 = 0.02;
+/// Rounds in which bones of lids are moved one after the other.
+const LID_ROUNDS: usize = 40;
+/// Mobility of the lower lid beside that of the upper one.
+const LOWER_LID: f32 = 0.25;
 
 /// Problems of a pose.
 #[derive(Default)]
 struct PoseProblems {
     /// Corners of the triangles that flip.
     folded: Vec<[u32; 3]>,
-    /// Points of lips and lids of which the first should be above the second, and the missing distance.
-    crossed: Vec<([u32; 2], f32)>,
+    /// Points of lips that are too near to each other, and the missing distance.
+    crossed: Vec<(FacingPoints, f32)>,
+    /// Points of the lids of an eye where some of them are too near or too far, and the missing distances: negative where they
+    /// are too far, zero where they are right.
+    lids: Vec<(FacingPoints, f32)>,
+    /// Number of points of lids that are too near or too far.
+    lids_off: usize,
 }
 
 impl PoseProblems {
     fn count(&self) -> usize {
-        self.folded.len() + self.crossed.len()
+        self.folded.len() + self.crossed.len() + self.lids_off
     }
 }
 
@@ -87,12 +110,13 @@ impl FittedFace {
         if self.moving.triangles.is_empty() && self.moving.apart.is_empty() {
             return repair;
         }
+        let closed = self.closed_shares(mix);
         let mut posed = PosedSkin::new(&self.moving, self.matrices(poses));
         let (mut fewest, mut in_vain) = (usize::MAX, 0);
         let mut used: Option<UsedUnits> = None;
         let mut taken = vec![0.0_f32; poses.len()];
         for share in ROUNDS {
-            let problems = self.problems(&posed);
+            let problems = self.problems(&posed, closed);
             in_vain = if problems.count() < fewest { 0 } else { in_vain + 1 };
             fewest = fewest.min(problems.count());
             if problems.count() == 0 || in_vain == PATIENCE {
@@ -103,6 +127,7 @@ impl FittedFace {
                 .map(|((pose, solved), apart)| pose.translation - *solved - Vec3::Y * *apart)
                 .collect();
             self.part(&problems.crossed, &mut apart);
+            self.close(&problems.lids, &mut apart);
             if is_alike {
                 self.widen_alike(&mut apart);
             }
@@ -172,21 +197,45 @@ impl FittedFace {
         }
     }
 
-    /// Finds triangles that turn by more than a right angle, and lips and lids that cross.
-    fn problems(&self, posed: &PosedSkin) -> PoseProblems {
-        let slack = 0.002 * self.landmarks.eye_distance();
-        let mut crossed = Vec::new();
-        for &[above, below] in &self.moving.apart {
-            let gap = |points: &[Vec3]| points[above as usize].y - points[below as usize].y;
-            let rest = gap(&self.moving.points);
-            // Lips that touch at rest may keep touching.
-            let least = if rest > slack { CLOSED * rest } else { rest - slack };
-            let now = gap(&posed.points);
-            if now < least {
-                crossed.push(([above, below], least - now));
+    /// Share of the opening that a mix closes, of the left and of the right eye.
+    fn closed_shares(&self, mix: &Mix) -> [f32; 2] {
+        let mut open = [1.0_f32; 2];
+        for (unit, strengths) in self.units.units().iter().zip(&mix.strengths) {
+            for (open, strength) in open.iter_mut().zip(strengths) {
+                *open *= (1.0 - unit.closes_eye * strength).clamp(0.0, 1.0);
             }
         }
-        PoseProblems { folded: posed.folded().collect(), crossed }
+        open.map(|open| 1.0 - open)
+    }
+
+    /// Finds triangles that turn by more than a right angle, lips and lids that cross, and lids that should be closed.
+    fn problems(&self, posed: &PosedSkin, closed: [f32; 2]) -> PoseProblems {
+        let slack = 0.002 * self.landmarks.eye_distance();
+        let mut problems = PoseProblems { folded: posed.folded().collect(), ..PoseProblems::default() };
+        let mut eyes = [Vec::new(), Vec::new()];
+        let mut off = [0; 2];
+        for facing in &self.moving.apart {
+            let gap = |points: &[Vec3]| points[facing.above as usize].y - points[facing.below as usize].y;
+            let (rest, now) = (gap(&self.moving.points), gap(&posed.points));
+            // Lips and lids that touch at rest may keep touching.
+            let least = |share: f32| if rest > slack { share * rest } else { rest - slack };
+            let Some(eye) = facing.eye else {
+                let missing = least(CLOSED) - now;
+                if missing > 0.0 {
+                    problems.crossed.push((*facing, missing));
+                }
+                continue;
+            };
+            let open = 1.0 - closed[eye] * (1.0 - CLOSED_LIDS);
+            let most = if closed[eye] > 0.0 && rest > slack { open * rest } else { f32::INFINITY };
+            let missing = now.clamp(least(CROSSED_LIDS), most) - now;
+            off[eye] += usize::from(missing.abs() > 0.25 * slack);
+            eyes[eye].push((*facing, missing));
+        }
+        let with_faults = eyes.into_iter().zip(off).filter(|(_, off)| *off > 0);
+        problems.lids = with_faults.flat_map(|(lids, _)| lids).collect();
+        problems.lids_off = off.iter().sum();
+        problems
     }
 
     /// Gives both bones of each pair the larger one of their heights.
@@ -197,37 +246,78 @@ impl FittedFace {
         }
     }
 
-    /// Adds to the heights of bones what raises the first of two points above the second by the missing distance, with the
-    /// least movement of bones.
-    fn part(&self, crossed: &[([u32; 2], f32)], apart: &mut [f32]) {
-        let mut more = vec![0.0_f32; apart.len()];
-        for &([above, below], missing) in crossed {
-            let mut shares = vec![0.0_f32; apart.len()];
-            for (point, sign) in [(above, 1.0), (below, -1.0)] {
-                for (joint, weight) in influences(&self.moving.weights, point as usize) {
-                    let Some(bone) = (joint as usize).checked_sub(2).filter(|&bone| bone < shares.len()) else {
-                        continue;
-                    };
-                    if self.bones[bone].kind == FaceBoneKind::Skin {
-                        shares[bone] += sign * weight;
-                    }
-                }
+    /// Shares of the bones of skin in the height of one facing point above the other; those of the lower one count `lower`.
+    fn shares(&self, facing: &FacingPoints, lower: f32) -> BTreeMap<usize, [f32; 2]> {
+        let mut shares: BTreeMap<usize, [f32; 2]> = BTreeMap::new();
+        for (point, sign, mobility) in [(facing.above, 1.0, 1.0), (facing.below, -1.0, lower)] {
+            for (joint, weight) in influences(&self.moving.weights, point as usize) {
+                let bone = (joint as usize).checked_sub(2);
+                let is_skin = |bone: &usize| self.bones.get(*bone).is_some_and(|bone| bone.kind == FaceBoneKind::Skin);
+                let Some(bone) = bone.filter(is_skin) else { continue };
+                let share = shares.entry(bone).or_default();
+                share[0] += sign * weight;
+                share[1] += sign * weight * mobility;
             }
-            let square: f32 = shares.iter().map(|share| share * share).sum();
+        }
+        shares
+    }
+
+    /// Adds to the heights of bones what brings lips apart by the missing distance, with the least movement of bones.
+    fn part(&self, crossed: &[(FacingPoints, f32)], apart: &mut [f32]) {
+        let mut more = vec![0.0_f32; apart.len()];
+        for (facing, missing) in crossed {
+            let shares = self.shares(facing, 1.0);
+            let square: f32 = shares.values().map(|[share, _]| share * share).sum();
             // Points with equal influences cannot be moved apart.
             if square < 0.01 {
                 continue;
             }
-            for (more, share) in more.iter_mut().zip(shares) {
+            for (bone, [share, _]) in shares {
                 let asked = missing * share / square;
                 // Neighbouring pairs ask for about the same movement, which counts once.
-                if asked.abs() > more.abs() {
-                    *more = asked;
+                if asked.abs() > more[bone].abs() {
+                    more[bone] = asked;
                 }
             }
         }
         for (apart, more) in apart.iter_mut().zip(more) {
             *apart += more;
+        }
+    }
+
+    /// Adds to the heights of bones what brings all lids nearest to the missing distances: least squares, by one bone after the
+    /// other. Bones of the lower lid move less.
+    fn close(&self, lids: &[(FacingPoints, f32)], apart: &mut [f32]) {
+        let counts: Vec<f32> = lids.iter().map(|(_, missing)| if *missing > 0.0 { CROSSED } else { 1.0 }).collect();
+        let mut left: Vec<f32> = lids.iter().map(|(_, missing)| *missing).collect();
+        let mut rows: BTreeMap<usize, Vec<(usize, [f32; 2])>> = BTreeMap::new();
+        for (row, (facing, _)) in lids.iter().enumerate() {
+            for (bone, shares) in self.shares(facing, LOWER_LID) {
+                rows.entry(bone).or_default().push((row, shares));
+            }
+        }
+        // Mobility of each bone, and its effect on the distances.
+        let bones = rows.into_iter().map(|(bone, rows)| {
+            let [all, mobile] = [0, 1].map(|of| rows.iter().map(|(_, shares)| shares[of].abs()).sum::<f32>());
+            let mobility = if all > 0.0 { mobile / all } else { 0.0 };
+            let effect: Vec<(usize, f32)> = rows.iter().map(|(row, [share, _])| (*row, share * mobility)).collect();
+            (bone, mobility, effect)
+        });
+        let bones: Vec<(usize, f32, Vec<(usize, f32)>)> = bones.collect();
+        let stiff = STIFF_LIDS * lids.len() as f32;
+        let mut moved = vec![0.0_f32; bones.len()];
+        for _ in 0..LID_ROUNDS {
+            for ((bone, mobility, effect), moved) in bones.iter().zip(&mut moved) {
+                let before = if *mobility > 0.0 { apart[*bone] / mobility } else { 0.0 };
+                let pull: f32 = effect.iter().map(|(row, share)| counts[*row] * share * left[*row]).sum();
+                let square: f32 = effect.iter().map(|(row, share)| counts[*row] * share * share).sum();
+                let more = (pull - stiff * (before + *moved)) / (square + stiff).max(f32::MIN_POSITIVE);
+                *moved += more;
+                effect.iter().for_each(|(row, share)| left[*row] -= share * more);
+            }
+        }
+        for ((bone, mobility, _), moved) in bones.iter().zip(moved) {
+            apart[*bone] += mobility * moved;
         }
     }
 

@@ -21,13 +21,24 @@ const PAIR: f64 = 0.01;
 /// Landmarks whose distance matters more than their positions: lips, lids, corners of the mouth, inner brows.
 const PAIRS: [[usize; 2]; 9] =
     [[61, 67], [62, 66], [63, 65], [37, 41], [38, 40], [43, 47], [44, 46], [54, 48], [22, 21]];
-/// Number of the first [`PAIRS`] whose first landmark must stay above the second: lips and lids.
-const APART: usize = 7;
+/// Number of the first [`PAIRS`] that are lips, whose first landmark must stay above the second.
+const LIPS: usize = 3;
 
 /// Inner landmarks of the lips from corner to corner.
 const INNER_LIPS: [[usize; 2]; 5] = [[60, 60], [61, 67], [62, 66], [63, 65], [64, 64]];
-/// Places along the lips at which the upper one stays above the lower one.
+/// Landmarks of the upper and the lower lid from corner to corner, of the left and the right eye.
+const LIDS: [[[usize; 4]; 2]; 2] = [[[42, 43, 44, 45], [42, 47, 46, 45]], [[36, 37, 38, 39], [36, 41, 40, 39]]];
+/// Places along lips and lids at which the upper one stays above the lower one.
 const STATIONS: usize = 15;
+
+/// Points of lips or lids of which one must stay above the other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct FacingPoints {
+    pub above: u32,
+    pub below: u32,
+    /// The left (0) or the right eye (1), whose lids may be closed; `None` for lips.
+    pub eye: Option<usize>,
+}
 
 /// A place at which the field is sampled.
 #[derive(Clone)]
@@ -93,8 +104,7 @@ pub(super) fn influences(weights: &Weights, point: usize) -> impl Iterator<Item 
     joints.iter().copied().zip(weights.values.get(range).unwrap_or_default().iter().copied())
 }
 
-/// Samples on the whole skin and at the landmarks, and the points of lips and lids of which the first must stay above
-/// the second.
+/// Samples on the whole skin and at the landmarks, and the points of lips and lids that face each other.
 pub(super) fn gather(
     points: &[Vec3],
     mask: &[bool],
@@ -102,7 +112,7 @@ pub(super) fn gather(
     bones: &[FaceBone],
     landmarks: &Landmarks,
     opening_lines: &OpeningLines,
-) -> (Vec<Sample>, Vec<[u32; 2]>) {
+) -> (Vec<Sample>, Vec<FacingPoints>) {
     let mut unknown_of = vec![u32::MAX; bones.len()];
     let skin_bones = (0..bones.len()).filter(|&bone| bones[bone].kind == FaceBoneKind::Skin);
     for (unknown, bone) in skin_bones.enumerate() {
@@ -160,38 +170,65 @@ pub(super) fn gather(
             }
         }
         samples.push(pair);
-        if number < APART && point != other_point {
-            apart.push([*point as u32, *other_point as u32]);
+        if number < LIPS && point != other_point {
+            apart.push(FacingPoints { above: *point as u32, below: *other_point as u32, eye: None });
         }
     }
-    apart.extend(rims_of_lips(points, &candidates, &lower_share, landmarks));
+    apart.extend(facing_lips(points, &candidates, &lower_share, landmarks));
+    apart.extend([0, 1].into_iter().flat_map(|eye| facing_lids(points, &candidates, landmarks, eye)));
     (samples, apart)
 }
 
 /// Points of the upper and the lower lip that face each other, at even places between the corners of the mouth.
-fn rims_of_lips(
+fn facing_lips(points: &[Vec3], candidates: &[usize], lower_share: &[f32], landmarks: &Landmarks) -> Vec<FacingPoints> {
+    let line = INNER_LIPS.map(|[above, below]| landmarks.points[above].midpoint(landmarks.points[below]));
+    let lips = near_line(points, candidates, &line, landmarks);
+    let facing = |place: Vec3| {
+        let on_lip = |is_lower: bool| lips.iter().copied().filter(move |&lip| (lower_share[lip] >= 0.5) == is_lower);
+        let [above, below] = [nearest(points, on_lip(false), place)?, nearest(points, on_lip(true), place)?];
+        Some(FacingPoints { above, below, eye: None })
+    };
+    (1..=STATIONS).filter_map(|station| facing(along(&line, station))).collect()
+}
+
+/// Points of the upper and the lower lid of the left (0) or the right eye (1) that face each other, at even places between the
+/// corners of the eye.
+fn facing_lids(
     points: &[Vec3],
     candidates: &[usize],
-    lower_share: &[f32],
     landmarks: &Landmarks,
-) -> Vec<[u32; 2]> {
-    let line = INNER_LIPS.map(|[above, below]| landmarks.points[above].midpoint(landmarks.points[below]));
-    let near = 0.2 * landmarks.eye_distance();
-    let lips: Vec<usize> =
-        candidates.iter().copied().filter(|&index| line.iter().any(|mark| mark.distance(points[index]) < near)).collect();
-    let nearest = |place: Vec3, is_lower: bool| {
-        let on_lip = lips.iter().copied().filter(|&index| (lower_share[index] >= 0.5) == is_lower);
-        let away = |index: &usize| points[*index].distance_squared(place);
-        on_lip.min_by(|a, b| away(a).total_cmp(&away(b)))
-    };
-    let steps = (line.len() - 1) as f32 / (STATIONS + 1) as f32;
+    eye: usize,
+) -> impl Iterator<Item = FacingPoints> {
+    let [upper, lower] = LIDS[eye].map(|lid| lid.map(|mark| landmarks.points[mark]));
+    let lids = near_line(points, candidates, &[upper, lower].concat(), landmarks);
     let facing = |station: usize| {
-        let along = station as f32 * steps;
-        let from = (along as usize).min(line.len() - 2);
-        let place = line[from].lerp(line[from + 1], along - from as f32);
-        Some([nearest(place, false)? as u32, nearest(place, true)? as u32])
+        let [upper, lower] = [along(&upper, station), along(&lower, station)];
+        let middle = upper.midpoint(lower);
+        let on_lid = |is_lower: bool| lids.iter().copied().filter(move |&lid| (points[lid].y < middle.y) == is_lower);
+        let [above, below] = [nearest(points, on_lid(false), upper)?, nearest(points, on_lid(true), lower)?];
+        Some(FacingPoints { above, below, eye: Some(eye) })
     };
-    (1..=STATIONS).filter_map(facing).collect()
+    (1..=STATIONS).filter_map(facing).collect::<Vec<_>>().into_iter()
+}
+
+/// Points near the corners of a line.
+fn near_line(points: &[Vec3], candidates: &[usize], line: &[Vec3], landmarks: &Landmarks) -> Vec<usize> {
+    let near = 0.2 * landmarks.eye_distance();
+    let is_near = |point: &usize| line.iter().any(|corner| corner.distance(points[*point]) < near);
+    candidates.iter().copied().filter(is_near).collect()
+}
+
+/// The point that is nearest to a place, the first of equals.
+fn nearest(points: &[Vec3], of: impl Iterator<Item = usize>, place: Vec3) -> Option<u32> {
+    let away = |point: &usize| points[*point].distance_squared(place);
+    of.min_by(|a, b| away(a).total_cmp(&away(b))).map(|point| point as u32)
+}
+
+/// A place on a line, `station` of [`STATIONS`] between its ends.
+fn along(line: &[Vec3], station: usize) -> Vec3 {
+    let at = station as f32 * (line.len() - 1) as f32 / (STATIONS + 1) as f32;
+    let from = (at as usize).min(line.len() - 2);
+    line[from].lerp(line[from + 1], at - from as f32)
 }
 
 impl Skin<'_> {
