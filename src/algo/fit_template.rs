@@ -24,6 +24,7 @@ mod eigen;
 mod fitting;
 mod human;
 mod left_out;
+mod level;
 mod limbs;
 mod line;
 mod markers;
