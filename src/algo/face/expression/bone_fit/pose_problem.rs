@@ -24,6 +24,8 @@ const CROSSED_LIDS: f32 = 0.05;
 const CROSSED: f32 = 8.0;
 /// Stiffness of bones of lids that are brought to their distance, beside the number of points.
 const STIFF_LIDS: f32 = 0.02;
+/// Most rounds, after folds were mended, in which lips and lids that cross are moved apart.
+const GUARDS: usize = 6;
 /// Rounds in which bones of lids are moved one after the other.
 const LID_ROUNDS: usize = 40;
 /// Mobility of the lower lid beside that of the upper one.
@@ -139,6 +141,23 @@ impl FittedFace {
                 let change = change.clamp_length_max(bounds[bone]);
                 taken[bone] = change.length();
                 poses[bone].translation = limited(solved[bone] + change + Vec3::Y * apart[bone], &self.landmarks);
+            }
+            posed.update(self.matrices(poses));
+        }
+        // Whatever folds, lips and lids do not cross.
+        for _ in 0..GUARDS {
+            let problems = self.problems(&posed, [0.0; 2]);
+            if problems.crossed.is_empty() && problems.lids.is_empty() {
+                break;
+            }
+            let before = apart.clone();
+            self.part(&problems.crossed, &mut apart);
+            self.close(&problems.lids, &mut apart);
+            if is_alike {
+                self.widen_alike(&mut apart);
+            }
+            for (pose, (apart, before)) in poses.iter_mut().zip(apart.iter().zip(before)) {
+                pose.translation = limited(pose.translation + Vec3::Y * (apart - before), &self.landmarks);
             }
             posed.update(self.matrices(poses));
         }

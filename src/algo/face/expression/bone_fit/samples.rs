@@ -1,5 +1,7 @@
 //! Samples of the skin that should follow the field.
 
+use std::ops::RangeInclusive;
+
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -30,6 +32,8 @@ const INNER_LIPS: [[usize; 2]; 5] = [[60, 60], [61, 67], [62, 66], [63, 65], [64
 const LIDS: [[[usize; 4]; 2]; 2] = [[[42, 43, 44, 45], [42, 47, 46, 45]], [[36, 37, 38, 39], [36, 41, 40, 39]]];
 /// Places along lips and lids at which the upper one stays above the lower one.
 const STATIONS: usize = 15;
+/// Those of the lips: bones at the corners of the mouth move both.
+const LIP_STATIONS: RangeInclusive<usize> = 4..=12;
 
 /// Points of lips or lids of which one must stay above the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -188,7 +192,7 @@ fn facing_lips(points: &[Vec3], candidates: &[usize], lower_share: &[f32], landm
         let [above, below] = [nearest(points, on_lip(false), place)?, nearest(points, on_lip(true), place)?];
         Some(FacingPoints { above, below, eye: None })
     };
-    (1..=STATIONS).filter_map(|station| facing(along(&line, station))).collect()
+    LIP_STATIONS.filter_map(|station| facing(along(&line, station))).collect()
 }
 
 /// Points of the upper and the lower lid of the left (0) or the right eye (1) that face each other, at even places between the
