@@ -24,7 +24,6 @@ mod confidence;
 mod eigen;
 mod fitting;
 mod human;
-mod level;
 mod limbs;
 mod line;
 mod markers;

@@ -4,13 +4,11 @@
 //! the skeleton and through the volume, do not change with the pose, so they choose the branches; then the rest pose
 //! chooses sides and the front. The best few assignments are kept as hypotheses.
 
-mod front;
-
 use glam::Vec3;
 
 use super::{
     align::{self, Similarity},
-    chain, level,
+    chain,
     limbs::{LimbKind, TemplateLimbs},
     tree::Tree,
     volume::VoxelGraph,
@@ -132,8 +130,7 @@ pub(super) fn assign(
         found.truncate(if free { TRIED_FREE } else { TRIED });
         found.iter().flat_map(|(cost, chosen)| search.sided(*cost, chosen)).collect::<Vec<Hypothesis>>()
     };
-    let mut hypotheses: Vec<Hypothesis> =
-        trees.iter().enumerate().filter(|(_, tree)| tree.suits(template)).flat_map(of_tree).collect();
+    let mut hypotheses: Vec<Hypothesis> = trees.iter().enumerate().flat_map(of_tree).collect();
     hypotheses.sort_by(|a, b| {
         a.cost.total_cmp(&b.cost).then_with(|| a.tree.cmp(&b.tree)).then_with(|| a.leaves.cmp(&b.leaves))
     });
@@ -150,11 +147,6 @@ pub(super) fn assign(
     for hypothesis in hypotheses {
         if kept.len() < KEPT && !kept.iter().any(|k| same(k, &hypothesis)) {
             kept.push(hypothesis);
-        }
-    }
-    for hypothesis in &mut kept {
-        if let Some(turn) = level::level(template, &trees[hypothesis.tree], hypothesis, directions) {
-            hypothesis.alignment = hypothesis.alignment.turned(turn, &hypothesis.pairs);
         }
     }
     kept
@@ -469,9 +461,6 @@ impl Search<'_> {
                 }
             }
             cost += NO_IMAGE * sum / f32::max(count, 1.0);
-        }
-        if !template.is_upright() {
-            cost += self.backwards(&leaves, forward, alignment.scale);
         }
         for marker in self.markers {
             if let Some(leaf) = leaves[marker.limb] {

@@ -1,8 +1,7 @@
 //! Trees: the branches of a volume as seen from one centre, with their centre lines.
 
 use super::{
-    branches::{self, Branches, Centre},
-    limbs::{LimbKind, TemplateLimbs},
+    branches::{self, Branches},
     line::CentreLine,
     volume::VoxelGraph,
 };
@@ -16,15 +15,6 @@ pub(super) struct Tree {
     pub(super) has_forks: bool,
     /// Largest depth of the arc with the centre, in cells.
     pub(super) trunk_thickness: f32,
-    centre: Centre,
-}
-
-impl Tree {
-    /// True if a template is tried with it.
-    pub(super) fn suits(&self, template: &TemplateLimbs) -> bool {
-        let is_lying = !template.is_upright() && template.count(LimbKind::Leg) > 0;
-        if is_lying { self.centre.is_lying } else { self.centre.is_upright }
-    }
 }
 
 /// The trees of a volume, one for each place that may be its centre.
@@ -32,13 +22,13 @@ pub(super) fn trees(graph: &VoxelGraph) -> Vec<Tree> {
     branches::centres(graph)
         .into_iter()
         .map(|centre| {
-            let branches = branches::branches(graph, centre.node);
+            let branches = branches::branches(graph, centre);
             let lines = (0..branches.arcs.len()).map(|arc| CentreLine::new(graph, &branches, arc)).collect();
             let has_forks = !branches.bearers.is_empty();
             let roots = branches.arcs.iter().filter(|arc| arc.parent.is_none());
             let depths = roots.flat_map(|arc| arc.slices.iter().map(|s| s.depth));
             let trunk_thickness = depths.fold(1.0, f32::max);
-            Tree { branches, lines, has_forks, trunk_thickness, centre }
+            Tree { branches, lines, has_forks, trunk_thickness }
         })
         .collect()
 }
