@@ -319,7 +319,7 @@ pub(super) fn accept_offers(
 /// An update of a rig to its template.
 struct RigUpdate {
     update: Update,
-    /// What poses and clips could not keep.
+    /// Losses of poses and clips.
     notes: UpdateNotes,
     /// The version that the rig has taken over then.
     base: BaseVersion,

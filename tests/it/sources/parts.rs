@@ -85,47 +85,79 @@ fn undoing_an_update_of_a_part_brings_the_former_instance_back() {
     assert_eq!(names(&studio), ["pointer"]);
 }
 
+/// Merges a change of a part instance's fields in the window and by the command line, and compares the documents.
 #[cfg(feature = "cli")]
-#[test]
-fn fields_of_parts_are_merged_as_by_the_command_line() {
+fn check_merge(field: &str, change: impl Fn(&str) -> String) {
     use crate::{cli_outputs::rigsmith, part_fields};
 
     let reference = ", tags: [parent(targets: \"@command control/a_base role:control\")]";
     let base = part_fields::BASE.replace(reference, "");
-    assert_ne!(base, part_fields::BASE);
+    let file = change(&base);
+    assert!(base != part_fields::BASE && file != base, "{field}");
+    let mut studio = Studio::with_part(true, &base, ("finger.rig.ron", part_fields::PART));
+    // What a person changed of the part.
+    let (joint, tag) = control_of(studio.base.rig(), "a_bone_3");
+    studio.base.apply(RigEdit::SetTag(joint, Box::new(tag)));
+    let mine = studio.document_over("mine.rig.ron", &base);
+    assert!(mine.contains("relative_size: 0.9"), "{field}: {mine}");
+    let folder = studio.file.parent().unwrap().to_owned();
+    fs::write(folder.join("base.rig.ron"), &base).unwrap();
+    fs::write(folder.join("file.rig.ron"), &file).unwrap();
+    let (code, said) = rigsmith(&folder, &part_fields::UPDATE);
+    assert_eq!(code, 0, "{field}: {said}");
+    let told = fs::read_to_string(folder.join("out.rig.ron")).unwrap();
+    let known = studio.source().taken_over().parts.to_vec();
+    studio.save(&file);
+    studio.until(field, |world, rig| {
+        world.get::<RigSource>(rig).is_some_and(|source| source.taken_over().parts != known.as_slice())
+    });
+    assert_eq!(studio.instance_report().failed, Vec::<String>::new(), "{field}");
+    // The document says what the command line has written, to the byte.
+    assert_eq!(studio.document_over("again.rig.ron", &told), told, "{field}");
+    assert!(told.contains("relative_size: 0.9") && told != mine, "{field}: {told}");
+}
+
+/// Replaces the prefix of the part by fields.
+#[cfg(feature = "cli")]
+fn with_fields(fields: &'static str) -> impl Fn(&str) -> String {
+    move |base| base.replace("prefix: \"a_\",", fields)
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn a_count_is_merged_as_by_the_command_line() {
+    check_merge("count", with_fields("prefix: \"a_\", count: 5,"));
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn a_prefix_is_merged_as_by_the_command_line() {
+    check_merge("prefix", with_fields("prefix: \"b_\","));
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn a_side_is_merged_as_by_the_command_line() {
+    check_merge("side", with_fields("prefix: \"a_\", mirror: true,"));
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn an_option_is_merged_as_by_the_command_line() {
+    check_merge("option", with_fields("prefix: \"a_\", options: {\"size\": 0.25},"));
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn a_feature_is_merged_as_by_the_command_line() {
+    check_merge("feature", with_fields("prefix: \"a_\", off: [\"fk\"],"));
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn a_socket_is_merged_as_by_the_command_line() {
     let place = "            parent: \"palm\",\n            translation: (0, 0.1, 0),\n";
-    let cases = [
-        ("count", base.replace("prefix: \"a_\",", "prefix: \"a_\", count: 5,")),
-        ("prefix", base.replace("prefix: \"a_\",", "prefix: \"b_\",")),
-        ("side", base.replace("prefix: \"a_\",", "prefix: \"a_\", mirror: true,")),
-        ("option", base.replace("prefix: \"a_\",", "prefix: \"a_\", options: {\"size\": 0.25},")),
-        ("feature", base.replace("prefix: \"a_\",", "prefix: \"a_\", off: [\"fk\"],")),
-        ("socket", base.replace(place, "            socket: \"side\",\n")),
-    ];
-    for (field, file) in cases {
-        assert_ne!(file, base, "{field}");
-        let mut studio = Studio::with_part(true, &base, ("finger.rig.ron", part_fields::PART));
-        // What a person changed of the part.
-        let (joint, tag) = control_of(studio.base.rig(), "a_bone_3");
-        studio.base.apply(RigEdit::SetTag(joint, Box::new(tag)));
-        let mine = studio.document_over("mine.rig.ron", &base);
-        assert!(mine.contains("relative_size: 0.9"), "{field}: {mine}");
-        let folder = studio.file.parent().unwrap().to_owned();
-        fs::write(folder.join("base.rig.ron"), &base).unwrap();
-        fs::write(folder.join("file.rig.ron"), &file).unwrap();
-        let (code, said) = rigsmith(&folder, &part_fields::UPDATE);
-        assert_eq!(code, 0, "{field}: {said}");
-        let told = fs::read_to_string(folder.join("out.rig.ron")).unwrap();
-        let known = studio.source().taken_over().parts.to_vec();
-        studio.save(&file);
-        studio.until("the update", |world, rig| {
-            world.get::<RigSource>(rig).is_some_and(|source| source.taken_over().parts != known.as_slice())
-        });
-        assert_eq!(studio.instance_report().failed, Vec::<String>::new(), "{field}");
-        // The document says what the command line has written, to the byte.
-        assert_eq!(studio.document_over("again.rig.ron", &told), told, "{field}");
-        assert!(told.contains("relative_size: 0.9") && told != mine, "{field}: {told}");
-    }
+    check_merge("socket", |base| base.replace(place, "            socket: \"side\",\n"));
 }
 
 /// The command on a joint, with another size, and the joint.

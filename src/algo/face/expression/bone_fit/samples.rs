@@ -32,7 +32,7 @@ const INNER_LIPS: [[usize; 2]; 5] = [[60, 60], [61, 67], [62, 66], [63, 65], [64
 const LIDS: [[[usize; 4]; 2]; 2] = [[[42, 43, 44, 45], [42, 47, 46, 45]], [[36, 37, 38, 39], [36, 41, 40, 39]]];
 /// Places along lips and lids at which the upper one stays above the lower one.
 const STATIONS: usize = 15;
-/// Those of the lips: bones at the corners of the mouth move both.
+/// Places of the lips among them: bones at the corners of the mouth move both.
 const LIP_STATIONS: RangeInclusive<usize> = 4..=12;
 
 /// Points of lips or lids of which one must stay above the other.
