@@ -385,7 +385,7 @@ fn the_menu_of_a_control_changes_its_space_without_a_jump() {
     assert!(after.rotation.angle_between(before.rotation) < 2e-3, "the hand turns");
     assert_eq!(desk.steps().1, steps + 1, "one step");
     assert_ne!(*desk.rig(), rig);
-    undo(&mut desk);
+    desk.undo(1);
     assert_eq!((value(&desk), desk.rig(), desk.steps().1), (first, &rig, steps));
     assert!(place(&desk).translation.distance(before.translation) < 1e-6);
 }
