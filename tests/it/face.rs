@@ -410,9 +410,9 @@ fn faces_of_real_heads_hardly_fold() {
     let heads = [
         ("ict_neutral", [1, 1, 14, 13]),
         ("ict_identity_1", [1, 3, 3, 6]),
-        ("ict_identity_2", [1, 6, 22, 16]),
-        ("ict_identity_3", [2, 7, 16, 14]),
-        ("lee_perry_smith", [1, 7, 28, 16]),
+        ("ict_identity_2", [1, 8, 22, 16]),
+        ("ict_identity_3", [2, 7, 17, 15]),
+        ("lee_perry_smith", [1, 8, 30, 17]),
     ];
     for (head, folds) in heads {
         let file = format!("heads/{head}.obj");

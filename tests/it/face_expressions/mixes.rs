@@ -54,7 +54,7 @@ impl Posable {
 
 /// Largest opening of an eye that counts as shut, as a share of that at rest: the points nearest to the landmarks lie beside the
 /// rims, and the true shapes leave 0.28 between them.
-const SHUT: f32 = 0.35;
+const SHUT: f32 = 0.41;
 
 /// A head in an expression. Lengths are in eye distances.
 struct Moved<'a> {
