@@ -137,12 +137,6 @@ fn a_prefix_is_merged_as_by_the_command_line() {
 
 #[cfg(feature = "cli")]
 #[test]
-fn a_side_is_merged_as_by_the_command_line() {
-    check_merge("side", with_fields("prefix: \"a_\", mirror: true,"));
-}
-
-#[cfg(feature = "cli")]
-#[test]
 fn an_option_is_merged_as_by_the_command_line() {
     check_merge("option", with_fields("prefix: \"a_\", options: {\"size\": 0.25},"));
 }
