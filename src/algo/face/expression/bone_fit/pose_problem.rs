@@ -132,8 +132,6 @@ impl FittedFace {
             self.close(&problems.lids, &mut apart);
             if is_alike {
                 self.widen_alike(&mut apart);
-            }
-            if is_alike {
                 self.even_out(&mut changes);
             }
             let bounds = &used.get_or_insert_with(|| self.used_units(mix, opening_lines, is_alike)).bounds;

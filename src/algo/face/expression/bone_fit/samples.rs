@@ -197,12 +197,7 @@ fn facing_lips(points: &[Vec3], candidates: &[usize], lower_share: &[f32], landm
 
 /// Points of the upper and the lower lid of the left (0) or the right eye (1) that face each other, at even places between the
 /// corners of the eye.
-fn facing_lids(
-    points: &[Vec3],
-    candidates: &[usize],
-    landmarks: &Landmarks,
-    eye: usize,
-) -> impl Iterator<Item = FacingPoints> {
+fn facing_lids(points: &[Vec3], candidates: &[usize], landmarks: &Landmarks, eye: usize) -> Vec<FacingPoints> {
     let [upper, lower] = LIDS[eye].map(|lid| lid.map(|mark| landmarks.points[mark]));
     let lids = near_line(points, candidates, &[upper, lower].concat(), landmarks);
     let facing = |station: usize| {
@@ -212,7 +207,7 @@ fn facing_lids(
         let [above, below] = [nearest(points, on_lid(false), upper)?, nearest(points, on_lid(true), lower)?];
         Some(FacingPoints { above, below, eye: Some(eye) })
     };
-    (1..=STATIONS).filter_map(facing).collect::<Vec<_>>().into_iter()
+    (1..=STATIONS).filter_map(facing).collect()
 }
 
 /// Points near the corners of a line.
