@@ -53,27 +53,6 @@ impl ListItem {
     }
 }
 
-impl FormElement {
-    /// Parameter and label of an element that edits one.
-    fn binding_mut(&mut self) -> Option<(&mut String, &mut String)> {
-        match self {
-            Self::Text(bound)
-            | Self::Check(bound)
-            | Self::Vector(bound)
-            | Self::Limits(bound)
-            | Self::Color(bound)
-            | Self::Node(bound)
-            | Self::Curve(bound)
-            | Self::Amount(bound)
-            | Self::List(bound) => Some((&mut bound.param, &mut bound.label)),
-            Self::Menu { param, label, .. } | Self::Slider { param, label, .. } | Self::Number { param, label, .. } => {
-                Some((param, label))
-            }
-            Self::Frame { .. } | Self::Separator | Self::Comment(_) => None,
-        }
-    }
-}
-
 /// Parameters of a module with one value, at a path.
 fn with_parameter(path: &str, value: &str) -> String {
     path.rsplit('.').fold(value.to_owned(), |value, name| with_field("()", name, &value))
