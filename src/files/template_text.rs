@@ -188,7 +188,7 @@ fn over_parts(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<Te
         // What cannot be said of a part is said without the part.
         let known = written_out.len();
         let said = said.as_ref().unwrap_or(&before.whole);
-        written_out.extend(template::unsaid_parts(said, rig, &before.own, &before.parts));
+        written_out.extend(template::differing_parts(said, rig, &before.own, &before.parts));
         if written_out.len() == known {
             return None;
         }

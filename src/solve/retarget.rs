@@ -27,7 +27,7 @@ use self::{body::Body, contacts::Contacts, figure::Figure, touches::Touches};
 pub use self::{
     contacts::Stance,
     measure::{FootReport, HandReport, measure_feet, measure_hands},
-    touches::{Touch, TouchedThing},
+    touches::{Touch, TouchTarget},
 };
 use super::{
     matching::MatchError,

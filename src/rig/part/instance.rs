@@ -132,7 +132,7 @@ pub(super) const ATTRIBUTE: &str = "attribute";
 
 /// Notes and faults of a part that was put into a rig.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct PutPart {
+pub struct PartReport {
     /// Notes, a sentence each.
     pub notes: Vec<String>,
     /// Options and changes of the instance that do not fit the part; changes with their number.
@@ -163,7 +163,7 @@ impl PartInstance {
         fitted: &Rig,
         mirror: MirrorParams,
         socket: Option<&PartSocket>,
-    ) -> Result<PutPart, PartError> {
+    ) -> Result<PartReport, PartError> {
         let (options, errors) = self.option_changes(part, mirror);
         let mut faults: Vec<(Option<usize>, PartError)> =
             errors.into_iter().map(|error| (None, PartError::from(error))).collect();
@@ -184,7 +184,7 @@ impl PartInstance {
             faults.extend(done.err().map(|error| (number, error)));
         }
         let notes = draft.finish().notes.into_iter().map(|note| format!("part {}: {note}", self.title())).collect();
-        Ok(PutPart { notes, faults })
+        Ok(PartReport { notes, faults })
     }
 
     /// Puts the joints and the tags of the part into a rig; returns the joints there.

@@ -17,7 +17,7 @@ use super::{
     comment_placement::take_placement,
     file::{FaceFile, JointFile, TagFile, TemplateFile, known_names},
     header::complete,
-    shorthand::{Explicit, explicit},
+    shorthand::{ExplicitText, explicit},
     write::{feature_summaries, needs_summary},
 };
 use crate::rig::{
@@ -58,7 +58,7 @@ pub(in crate::rig) fn read_text(source: &str, first_line: usize) -> Result<Templ
     read.map_err(|error| SourceError::cut_short(source).unwrap_or(error))
 }
 
-fn read_explicit(explicit: &Explicit, first_line: usize) -> Result<Template, SourceError> {
+fn read_explicit(explicit: &ExplicitText, first_line: usize) -> Result<Template, SourceError> {
     let (text, mut notes) = (&*explicit.text, Vec::new());
     let fields = scan::fields(text);
     let known = TEMPLATE.readable(text, &fields, first_line, &mut notes)?;
@@ -72,7 +72,7 @@ fn read_explicit(explicit: &Explicit, first_line: usize) -> Result<Template, Sou
 }
 
 /// A template with the places in the source of what is checked later.
-fn in_text(explicit: &Explicit, mut template: Template) -> Template {
+fn in_text(explicit: &ExplicitText, mut template: Template) -> Template {
     let parts = template.parts.iter_mut().map(|part| &mut part.offset);
     for offset in parts.chain(template.sockets.iter_mut().map(|socket| &mut socket.offset)) {
         *offset = explicit.in_source(*offset);
