@@ -37,7 +37,7 @@ pub enum StoppableWork {
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StopWork(pub StoppableWork);
 
-/// Words for the work that runs, with its progress where that is known, and its kind if it can be stopped.
+/// Description of the work that runs, with its progress if it is known, and the kind of the work if a person can stop it.
 pub fn running(world: &World) -> Option<(String, Option<StoppableWork>)> {
     let rig = world.get_resource::<ActiveRig>().map(|active| active.0);
     if let Some(what) = world.get_resource::<LoadJob>().and_then(LoadJob::what) {

@@ -1,4 +1,4 @@
-//! Texts of templates that say what a rig is, as changes of the text that it was read from.
+//! Texts of templates for rigs that were edited, written as changes of the text that the rig was read from.
 
 use std::{
     collections::{BTreeSet, HashSet},

@@ -153,7 +153,7 @@ pub struct BoundSkin {
     pub skin: Arc<SkinData>,
     /// Report of the computation.
     pub report: SkinningReport,
-    /// Lengths by which half joints have to leave a bend so that the mesh keeps its volume.
+    /// Lengths by which half joints leave a bend to keep the volume of the mesh.
     pub pushes: Vec<FittedPush>,
 }
 

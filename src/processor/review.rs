@@ -298,7 +298,7 @@ impl<'a> SourceText<'a> {
         }
     }
 
-    /// The place where a joint, group or tag with that uid is declared, or of its field of that name, if it has one.
+    /// Error at the declaration of the joint, group or tag with that uid, at the named field if the declaration has it.
     pub fn locate_declared(&self, uid: Uid, field: &str, message: String) -> SourceError {
         let Some(declared) = declaration(&self.explicit.text, &self.fields, uid) else { return self.at(0, message) };
         let named = self.fields.iter().find(|other| other.bracket == declared.bracket && other.name == field);

@@ -367,7 +367,7 @@ impl World {
         }
     }
 
-    /// Commands that read the transform, in the rig's space, of one of the nodes or of one that may stand below them.
+    /// Commands that read the rig-space transform of one of the nodes, or of a node that may stand below one of them.
     pub fn global_readers(&mut self, nodes: Vec<NodeId>) -> Vec<u32> {
         let mut readers = Vec::new();
         // Parents differ from place to place, so that two nodes may each stand below the other somewhere.

@@ -135,7 +135,7 @@ pub enum NodeType {
     Control,
 }
 
-/// Name of the attribute that hides its node, and keeps it from being picked, below one half.
+/// Name of the attribute of visibility: a node whose value is below one half is neither drawn nor picked.
 pub const VISIBLE: &str = "visible";
 
 /// Appearance of a control and its free channels.

@@ -192,7 +192,7 @@ pub fn set_feature(rig: &Rig, key: &FeatureKey, on: bool) -> Result<Vec<RigEdit>
     Ok(enabling(rig, feature.tags.iter().map(|tag| (*tag, on && !unchosen.contains(tag)))))
 }
 
-/// The edits that turn one part of a combined feature on or off and leave the others, but those of the same choice,
+/// Edits that turn one part of a combined feature on or off. Other parts stay as they are, except those of the same choice,
 /// which are turned off.
 ///
 /// # Errors

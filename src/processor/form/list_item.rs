@@ -5,7 +5,7 @@ use bevy::reflect::{TypeInfo, enums::EnumInfo};
 use super::{FormBinding, FormElement, TypeAt, type_at};
 use crate::{processor::ModuleInfo, rig::with_field};
 
-/// Elements that edit one item of a list, and the item that is added to one.
+/// Elements for one item of a list, and the item that a person adds to the list.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ListItem {
     /// Elements of an item: a single one without a parameter for a plain value, else one for each field of the item.

@@ -104,8 +104,8 @@ impl WholePose {
         nodes.iter().filter_map(|node| pairs.get(node).copied()).collect()
     }
 
-    /// Operation that brings nodes, or all of them, from the pose that is shown (`self`) to another one. Nodes that are in
-    /// the same pose in both are left alone.
+    /// Operation that changes the shown pose (`self`) of some nodes, or of all nodes, to another pose. Nodes with the same
+    /// offset in both poses are left alone.
     pub fn change_to(&self, other: &Self, nodes: Option<&BTreeSet<Uid>>, name: &'static str) -> Operation {
         let is_meant = |node: &Uid| nodes.is_none_or(|nodes| nodes.contains(node));
         let all: BTreeSet<Uid> = self.nodes().into_iter().chain(other.nodes()).filter(is_meant).collect();

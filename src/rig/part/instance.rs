@@ -29,7 +29,7 @@ use crate::rig::{
 /// eight times, would bring billions.
 pub(in crate::rig) const MOST_BROUGHT: usize = 50_000;
 
-/// A template that others use, with what it lets them vary.
+/// Template that other templates use as a part, with the places and numbers that each use may choose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
     /// Joints and tags.
@@ -89,7 +89,7 @@ impl From<Template> for Part {
 /// A part in a template.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PartInstance {
-    /// Identity, from which those of what comes of it follow.
+    /// Identity of the instance. The uids of the joints and tags that the instance brings follow from it.
     pub uid: Uid,
     /// File of the part, relative to that of the template.
     pub part: String,
