@@ -6,7 +6,7 @@ use super::{
 };
 use crate::rig::{SourceError, fields, ron_text, with_field};
 
-/// Values of a command's parameters, those that it leaves out, too.
+/// Values of all parameters of a command, defaults of omitted parameters included.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterValues {
     complete: String,

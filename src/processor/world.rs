@@ -175,7 +175,7 @@ pub(super) struct World {
     by_command: HashMap<Uid, u32>,
     /// The place of each command in the list, [`NOWHERE`] if it is not there.
     pub places: Vec<u32>,
-    /// Nodes that each command can create, in the order in which it first did.
+    /// Nodes that each command has created in any build, in the order of their first creation.
     pub created: Vec<Vec<NodeId>>,
     /// The joint that carries each command.
     pub bearers: Vec<Uid>,

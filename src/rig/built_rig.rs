@@ -14,7 +14,7 @@ pub struct BuiltRig {
     pub nodes: Vec<BuiltNode>,
     /// Constraints that drive the nodes, in the order of creation: constraints on one node run in this order.
     pub constraints: Vec<BuiltConstraint>,
-    /// Switches whose nodes can be matched, so that setting a switch moves none of them.
+    /// Switches with matching: a matched change of a switch leaves the nodes of a limb or space in their places.
     pub switches: Vec<Arc<SwitchData>>,
     /// Declared inputs, outside of the rig.
     pub inputs: Vec<BuiltInput>,

@@ -48,7 +48,7 @@ pub struct CombinedFeature {
 pub struct FeatureSwitch {
     /// The secondary name.
     pub name: String,
-    /// The choice that it is one of; empty if it stands for itself.
+    /// Choice to which the part belongs, of whose parts one is on at most; empty for a switch of its own.
     pub choice: String,
     /// State of the part's tags.
     pub state: FeatureState,

@@ -1,4 +1,4 @@
-//! Meshes that come to the open rig, which stays as it is.
+//! Meshes that are added to the open rig.
 
 use std::path::Path;
 

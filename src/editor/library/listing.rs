@@ -57,7 +57,7 @@ pub struct LibraryFolder {
 pub struct LibraryListing {
     /// The folders.
     pub folders: Vec<LibraryFolder>,
-    /// Number of the listing, which tells whether it is another one.
+    /// Number of the listing; every further listing has another number.
     pub number: u64,
 }
 

@@ -176,7 +176,7 @@ pub struct Template {
     pub options: Vec<PartOption>,
     /// Parts that have not been put into the rig yet: see [`Template::with_parts`].
     pub parts: Vec<PartInstance>,
-    /// Joints of the rig that hang on what its parts bring; empty once these are in the rig.
+    /// Joints of the rig whose parents come from parts; empty once the parts are in the rig.
     pub hung: Vec<HungJoint>,
     /// Parts that have been put into the rig.
     pub instances: Vec<PartInstance>,

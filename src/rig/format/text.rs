@@ -25,7 +25,7 @@ use glam::Vec3;
 
 use error::quoted;
 
-/// Version of the format that is written, and the highest one that is read.
+/// Number of the format that Rigsmith writes, which is also the highest number that it reads.
 pub const VERSION: u32 = 1;
 
 /// Skeleton in the form of a `.rig` file.

@@ -29,12 +29,12 @@ impl WholePose {
         Self { offsets: rig.pose().clone(), values: rig.attribute_values().clone() }
     }
 
-    /// Nodes that are not at rest, or that have an attribute that was set.
+    /// Nodes with an offset from rest or with a value of an attribute.
     pub fn nodes(&self) -> BTreeSet<Uid> {
         self.offsets.keys().chain(self.values.keys()).copied().collect()
     }
 
-    /// Pose between this one (share 0) and another one (share 1): rotations turn along the shorter way, and choices change
+    /// Pose between `self` (share 0) and `other` (share 1): rotations turn along the shorter way, and choices change
     /// in the middle. Both ends are exact.
     pub fn towards(&self, other: &Self, share: f32, built: Option<&BuiltRig>) -> Self {
         if share <= 0.0 {

@@ -38,9 +38,9 @@ pub struct Part {
     pub chains: Vec<PartChain>,
     /// Places that other parts hang on.
     pub sockets: Vec<PartSocket>,
-    /// Values that its uses may set.
+    /// Values that uses of the part may set.
     pub options: Vec<PartOption>,
-    /// Text of its file, if it has one.
+    /// Text of the part's file; `None` for a part without a file.
     pub source: Option<Arc<PartSource>>,
 }
 

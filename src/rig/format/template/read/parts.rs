@@ -376,7 +376,7 @@ impl PartInstance {
 }
 
 impl Template {
-    /// The template with its parts, each of which `part` gives.
+    /// Template with its parts in the rig; `part` reads a part by its name.
     ///
     /// # Errors
     /// A part that cannot be had or does not fit, with its place in `source`, the text of the template.
