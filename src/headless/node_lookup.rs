@@ -93,7 +93,7 @@ impl Workbench {
                 [] => String::new(),
                 _ => format!("; write {}", listed(&labels, "or")),
             };
-            return Err(PoseError::OtherKind { what: query.what(), name: name.to_owned(), nearest });
+            return Err(PoseError::OtherKind { what: query.kind_name(), name: name.to_owned(), nearest });
         }
         Ok(found)
     }
@@ -111,7 +111,7 @@ impl Workbench {
         let of_kind = built.nodes.iter().filter(|node| query.is_of_kind(node));
         let names = of_kind.flat_map(|node| [Some(node.name.to_string()), node.label.as_deref().map(str::to_owned)]);
         let nearest = did_you_mean(name, names.flatten());
-        PoseError::NoNode { what: query.what(), name: name.to_owned(), nearest }
+        PoseError::NoNode { what: query.kind_name(), name: name.to_owned(), nearest }
     }
 
     /// Error of a name that finds several nodes. Nodes of one name are told apart by their uids.
@@ -137,7 +137,7 @@ struct NodeQuery<'a> {
 
 impl NodeQuery<'_> {
     /// Kind of node, in words.
-    fn what(&self) -> &'static str {
+    fn kind_name(&self) -> &'static str {
         if self.attribute.is_some() { "node" } else { "control" }
     }
 

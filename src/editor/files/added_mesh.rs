@@ -10,7 +10,7 @@ use super::{
     open::LoadedDocument,
 };
 use crate::{
-    editor::{camera::FrameWhenReady, counted::counted, notice::Notice, settings::EditorSettings},
+    editor::{camera::FrameWhenReady, counts::counted, notice::Notice, settings::EditorSettings},
     files::{FileKind, journal::Origin},
     plugins::surface::SkinOf,
     rig::Rig,

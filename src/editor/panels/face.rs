@@ -20,7 +20,7 @@ use crate::{
         bones::{FaceBoneKind, Region},
     },
     editor::{
-        counted::counted,
+        counts::counted,
         notice::Notice,
         panel::{EditorPanel, Requests},
     },

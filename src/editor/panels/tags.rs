@@ -31,7 +31,7 @@ use super::{
 };
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         dock::ShowPanel,
         notice::Notice,
         panel::{EditorPanel, Requests},

@@ -131,7 +131,7 @@ impl EditorPanel for TimelinePanel {
             && let Some(draft) = import.draft().filter(|draft| draft.rig == shown.entity)
         {
             self.gesture = None;
-            return joint_table::show(ui, draft, &shown, import.what().is_some(), requests);
+            return joint_table::show(ui, draft, &shown, import.name().is_some(), requests);
         }
         let (Some(open), Some(timeline)) = (open, world.get_resource::<Timeline>()) else {
             self.gesture = None;
