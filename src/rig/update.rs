@@ -31,7 +31,7 @@ use order::merged_order;
 pub use change::{Change, ChangeKind};
 pub use choices::{Choices, Take};
 pub use edits::{clip_edits, edits_between, pose_edits};
-pub use parts::{MergedParts, RefittedTemplate, TemplateWithParts, merge_parts};
+pub use parts::{FieldChange, MergedParts, RefittedTemplate, TemplateWithParts, merge_parts};
 pub use same_parts::{moved_part, same_parts, with_whole_parts};
 
 /// An update.
