@@ -131,8 +131,8 @@ pub struct FoundPart {
 pub struct PartFiles<'a> {
     source: Source<'a>,
     modules: Modules,
-    /// Paths at which the reader looked for parts, with the content of the files that it could read. The search for a part ends
-    /// at the first file that exists.
+    /// Paths at which the reader looked for parts, with the content of the files that it could read. The search for a part
+    /// ends at the first file that exists.
     pub asked: BTreeMap<PathBuf, Option<Vec<u8>>>,
     /// Files of parts that no list has, in the order in which they were asked for.
     pub missing: Vec<PathBuf>,

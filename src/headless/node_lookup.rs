@@ -157,8 +157,8 @@ impl NodeQuery<'_> {
     }
 }
 
-/// True if a node is the goal of a limb that follows inverse kinematics, or a forward control of one that does not; `None` if
-/// no switch concerns the node.
+/// True if a node is the goal of a limb that follows inverse kinematics, or a forward control of one that does not; `None`
+/// if no switch concerns the node.
 fn is_in_effect(built: &BuiltRig, state: &RigState, node: Uid) -> Option<bool> {
     // The goal of a foot is a node of its own, which the control carries.
     let carrier = |goal: Uid| {

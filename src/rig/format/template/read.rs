@@ -345,8 +345,8 @@ fn placement_of(
     None
 }
 
-/// Puts joints into a rig, parents first, whatever their order in the file. `children` lists the joints below each joint, and
-/// those without a parent.
+/// Puts joints into a rig, parents first, whatever their order in the file. `children` lists the joints below each joint,
+/// and those without a parent.
 fn insert_joints(
     rig: &mut Rig,
     order: &[Uid],
