@@ -55,7 +55,7 @@ pub fn headless_app(seed: u64) -> App {
     app
 }
 
-/// An app with one rig, at most one mesh, and the plugins that work on them.
+/// App without a window, with the plugins of rigs, one rig and at most one mesh.
 pub struct Workbench {
     app: App,
     rig: Entity,
@@ -178,7 +178,7 @@ impl Workbench {
         if edits.is_empty() { Ok(()) } else { self.operate(Operation::Edits(edits)) }
     }
 
-    /// Puts a mesh that the rig knows already below it, such as one of a project: its weights are those that the rig has for it.
+    /// Attaches a mesh whose weights are in the rig already, such as a mesh of a project.
     pub fn attach(&mut self, mesh: RigMesh) {
         self.mesh = Some(self.app.world_mut().spawn((mesh, SkinOf(self.rig))).id());
     }

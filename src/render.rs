@@ -67,8 +67,7 @@ pub struct PictureSettings {
     pub build: bool,
     /// Blend of the joints of a point.
     pub deform: Deform,
-    /// State in which the built rig is shown, its springs on their way, if it is one of the same program; in its pose at
-    /// rest if `None`.
+    /// State of the built rig in the picture, springs included. `None`, or a state of another program: the pose at rest.
     pub state: Option<RigState>,
     /// Least and greatest corner of the box that fills the picture, in the rig's space; the whole character, with the controls that
     /// are drawn, if `None`.

@@ -22,11 +22,14 @@ use crate::{
     algo::face::{
         auto::{AutoSettings, FaceStep},
         bones::FaceBoneKind,
-        expression::MAX_STRENGTH,
+        expression::{ExpressionSet, MAX_STRENGTH},
     },
     files::{FileKind, RealDisk, load_shapes, stem, store_model, store_rig},
     headless::Workbench,
-    mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Model, Morph},
+    mesh::{
+        model::{Channel, ChannelTarget, Clip, Interpolation, Model, Morph},
+        shapes::Shapes,
+    },
     plugins::face::{FaceExpressions, FaceReport, FaceShape, mixed},
     rig::{Rig, StoredPose},
 };
@@ -152,28 +155,10 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     if !args.expression.is_empty() {
         express(args, &mut bench, &mut report)?;
     }
-    let mut shapes = Vec::new();
-    if args.arkit {
-        shapes = spinning("baking blend shapes", || bench.arkit_shapes(args.export.settings().max_influences))?;
-        tell_kept_morphs(&bench, &shapes, &mut report);
-        let mut poses: Vec<_> = shapes.iter().map(|shape| (shape.name.clone(), shape.pose.clone())).collect();
-        if output_kind == OutputKind::Rig {
-            // Expressions of instances are made of all units.
-            let others = bench.unit_shapes(args.export.settings().max_influences)?;
-            poses.extend(others.into_iter().map(|shape| (shape.name, shape.pose)));
-        }
-        bench.store_poses(poses)?;
-        let is_baked = |name: &str| shapes.iter().any(|shape| shape.name == name);
-        let names = set.unit_set().arkit_shapes().map(|(name, ..)| name);
-        let left_out: Vec<&str> = names.filter(|name| !is_baked(name)).collect();
-        let missing = match left_out.as_slice() {
-            [] => String::new(),
-            names => format!(", without {}: no tongue of its own was found in the mouth", names.join(", ")),
-        };
-        report.line(format!("{} blend shapes of ARKit{missing}", shapes.len()));
-        report.set("arkit_left_out", left_out);
-        report.set("arkit", shapes.iter().map(|shape| shape.name.as_str()).collect::<Vec<_>>());
-    }
+    let shapes = match args.arkit {
+        true => bake_arkit(args, output_kind, &set, &mut bench, &mut report)?,
+        false => Vec::new(),
+    };
     report.set("joints", bench.rig().len());
     match output_kind {
         OutputKind::Rig => {
@@ -183,40 +168,84 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
             report.notes(store_rig(&RealDisk, &args.output, bench.rig())?);
         }
         OutputKind::Character => {
-            let mut model = bench.character();
-            add_morphs(&mut model, &shapes);
-            model.clips.extend(clips(bench.rig()));
-            pose(&mut model.nodes, bench.rig());
-            let settings = args.export.settings();
-            let meta = args.vrm.meta(bench.rig(), &args.output)?;
-            let is_avatar = meta.is_some();
-            match meta {
-                Some(meta) => {
-                    let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
-                    draft.store(&mut model, meta, &args.output, &settings, &mut report)?;
-                }
-                None => report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?),
-            }
-            // Another pose, and clips of ARKit of the same names, would be measured.
-            let is_plain = args.expression.is_empty() && !args.arkit && !is_avatar;
-            let placed_face = bench.placed_face().filter(|_| is_plain);
-            if let (Some(shapes), Some(mesh), Some(face)) = (&fitted, bench.mesh(), placed_face) {
-                let rest = &mesh.rest.points;
-                let head: Vec<usize> = (0..placed.points[0]).map(|point| face.analysis.mesh_point(point)).collect();
-                let error =
-                    spinning("reading back", || fit_error::fit_error(&args.output, &model, rest, shapes, &head))?;
-                report_written_error(&mut report, error);
-            } else if fitted.is_some() && !is_plain {
-                let note = "the error of the fit is not measured in a file with other poses; write one without --arkit, \
-                    --expression and .vrm";
-                report.notes.push(note.to_owned());
-            }
+            let fit = fitted.as_ref().map(|shapes| (&**shapes, placed.points[0]));
+            write_character(args, &bench, &shapes, fit, &mut report)?;
         }
         OutputKind::Picture => picture(args, &bench, &mut report)?,
     }
     report.line(format!("wrote {}", args.output.display()));
     report.set("output", args.output.display().to_string());
     Ok(report)
+}
+
+/// Bakes the blend shapes of ARKit, and stores their poses in the rig; a rig gets those of all other units, too.
+fn bake_arkit(
+    args: &FaceArgs,
+    output_kind: OutputKind,
+    set: &ExpressionSet,
+    bench: &mut Workbench,
+    report: &mut Report,
+) -> Result<Vec<FaceShape>, Failure> {
+    let influences = args.export.settings().max_influences;
+    let shapes = spinning("baking blend shapes", || bench.arkit_shapes(influences))?;
+    tell_kept_morphs(bench, &shapes, report);
+    let mut poses: Vec<_> = shapes.iter().map(|shape| (shape.name.clone(), shape.pose.clone())).collect();
+    if output_kind == OutputKind::Rig {
+        // Expressions of instances are made of all units.
+        let others = bench.unit_shapes(influences)?;
+        poses.extend(others.into_iter().map(|shape| (shape.name, shape.pose)));
+    }
+    bench.store_poses(poses)?;
+    let is_baked = |name: &str| shapes.iter().any(|shape| shape.name == name);
+    let names = set.unit_set().arkit_shapes().map(|(name, ..)| name);
+    let left_out: Vec<&str> = names.filter(|name| !is_baked(name)).collect();
+    let missing = match left_out.as_slice() {
+        [] => String::new(),
+        names => format!(", without {}: no tongue of its own was found in the mouth", names.join(", ")),
+    };
+    report.line(format!("{} blend shapes of ARKit{missing}", shapes.len()));
+    report.set("arkit_left_out", left_out);
+    report.set("arkit", shapes.iter().map(|shape| shape.name.as_str()).collect::<Vec<_>>());
+    Ok(shapes)
+}
+
+/// Writes the character with its face and morph targets. `fit` has the shapes that the face was fitted to and the number of
+/// points of the head: their error is measured in the file if it is there in the neutral pose.
+fn write_character(
+    args: &FaceArgs,
+    bench: &Workbench,
+    shapes: &[FaceShape],
+    fit: Option<(&Shapes, usize)>,
+    report: &mut Report,
+) -> Result<(), Failure> {
+    let mut model = bench.character();
+    add_morphs(&mut model, shapes);
+    model.clips.extend(clips(bench.rig()));
+    pose(&mut model.nodes, bench.rig());
+    let settings = args.export.settings();
+    let meta = args.vrm.meta(bench.rig(), &args.output)?;
+    let is_avatar = meta.is_some();
+    match meta {
+        Some(meta) => {
+            let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
+            draft.store(&mut model, meta, &args.output, &settings, report)?;
+        }
+        None => report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?),
+    }
+    // Another pose, and clips of ARKit of the same names, would be measured.
+    let is_plain = args.expression.is_empty() && !args.arkit && !is_avatar;
+    let placed_face = bench.placed_face().filter(|_| is_plain);
+    if let (Some((shapes, points)), Some(mesh), Some(face)) = (fit, bench.mesh(), placed_face) {
+        let head: Vec<usize> = (0..points).map(|point| face.analysis.mesh_point(point)).collect();
+        let rest = &mesh.rest.points;
+        let error = spinning("reading back", || fit_error::fit_error(&args.output, &model, rest, shapes, &head))?;
+        report_written_error(report, error);
+    } else if fit.is_some() && !is_plain {
+        let note = "the error of the fit is not measured in a file with other poses; write one without --arkit, \
+                    --expression and .vrm";
+        report.notes.push(note.to_owned());
+    }
+    Ok(())
 }
 
 /// Reports the error of the fit that the written file shows.

@@ -348,7 +348,7 @@ fn describe(report: &mut Report, fitted: &FitReport) {
     report.set("choice", fitted.choice.as_str());
     report.set("up", json!(fit.up.to_array()));
     report.set("forward", json!(fit.forward.to_array()));
-    report.set("symmetric", fit.symmetric());
+    report.set("symmetric", fit.is_symmetric());
     report.set("height", fit.height);
     report.set("confidence", fit.confidence);
     let hypotheses: Vec<Value> = (fit.hypotheses.iter())

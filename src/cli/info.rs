@@ -1,6 +1,6 @@
 //! `rigsmith info`: content of a file.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -30,142 +30,21 @@ pub(super) struct InfoArgs {
 }
 
 pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
-    let path = &args.file;
+    let path = args.file.as_path();
     let mut report = Report::default();
     match FileKind::of(path) {
         Some(FileKind::Obj | FileKind::Gltf | FileKind::Glb | FileKind::Vrm) => {
             let model = spinning("reading", || limits::load_model(path))?;
             describe_model(&mut report, &model);
         }
-        Some(FileKind::Template) => {
-            let template = limits::load_template(path)?;
-            let about = template.rig.about();
-            report.line(format!("template \"{}\" {}", about.name, about.version));
-            if !about.description.is_empty() {
-                report.line(about.description.clone());
-            }
-            report.set("kind", "template");
-            report.set("about", serde_json::to_value(about).unwrap_or(Value::Null));
-            report.notes(template.notes);
-            for part in &template.instances {
-                let place = match &part.parent {
-                    _ if !part.onto.is_empty() => format!(" on {}", part.onto.join(", ")),
-                    Some(parent) => format!(" below {parent}"),
-                    None => part.socket.as_ref().map_or_else(String::new, |socket| format!(" on socket {socket}")),
-                };
-                let side = if part.mirror { ", mirrored" } else { "" };
-                let overrides = part.overrides();
-                let different = if overrides.is_empty() { "" } else { ", changed here:" };
-                report.line(format!("part {}: {}{place}{side}{different}", part.title(), part.part));
-                for PartOverride { target, field, value } in overrides {
-                    report.line(format!("  {target}: {field} = {value}"));
-                }
-            }
-            report.set("parts", template.instances.iter().map(|part| part.part.clone()).collect::<Vec<_>>());
-            report.set("overrides", template.instances.iter().flat_map(overrides).collect::<Vec<_>>());
-            for socket in &template.sockets {
-                report.line(format!("socket {} on {}", socket.name, socket.label));
-            }
-            report.set("sockets", template.sockets.iter().map(|socket| socket.name.clone()).collect::<Vec<_>>());
-            if about.kind == "part" {
-                let needs = PartNeeds::of(&template.rig);
-                report.line(format!("needs joints: {}", needs.joints.join(", ")));
-                let places: Vec<String> = needs.sockets.iter().map(ToString::to_string).collect();
-                report.line(format!("hangs on: {}", places.join(", ")));
-                report.set("needs", json!({ "joints": needs.joints, "sockets": places }));
-            }
-            for option in &template.options {
-                let about = if option.description.is_empty() { "" } else { ": " };
-                report.line(format!("option {} = {}{about}{}", option.name, option.default, option.description));
-            }
-            report.set("options", template.options.iter().map(|option| option.name.clone()).collect::<Vec<_>>());
-            describe_joints(&mut report, &template.rig);
-        }
-        Some(FileKind::RigText) => {
-            let text = limits::load_rig_text(path)?;
-            let mut rig = Rig::new(Uid(1), "");
-            for edit in import_rig_text(&text, &mut UidSource::seeded(super::SEED)).0 {
-                rig.apply(&edit).map_err(|error| Failure::Input(format!("`{}`: {error}", path.display()).into()))?;
-            }
-            limits::check_rig(path, &rig)?;
-            report.line("skeleton in .rig text");
-            report.set("kind", "rig");
-            describe_joints(&mut report, &rig);
-        }
-        Some(FileKind::Project) => {
-            let project = spinning("reading", || limits::load_project(path))?;
-            report.line(format!("project \"{}\": {}", project.name, counted(project.meshes.len(), "mesh", "meshes")));
-            report.set("kind", "project");
-            report.set("name", project.name);
-            report.notes(project.notes);
-            for mesh in &project.meshes {
-                report.line(format!("mesh {}", mesh.path.display()));
-            }
-            for rig in &project.rigs {
-                let posed = counted(rig.pose().len(), "joint", "joints");
-                let stored = counted(rig.stored_poses().len(), "stored pose", "stored poses");
-                report.line(format!("rig \"{}\": {posed} posed, {stored}", rig.about().name));
-                describe_joints(&mut report, rig);
-            }
-        }
-        Some(FileKind::Skin) => {
-            let skin = load_skin(&RealDisk, path)?;
-            let (points, joints) = (skin.weights().len(), skin.joints().len());
-            let copy = if skin.mesh().is_some() { "with" } else { "without" };
-            report.line(format!(
-                "weights of {} over {}, {copy} a copy of the mesh",
-                counted(points, "point", "points"),
-                counted(joints, "joint", "joints")
-            ));
-            report.set("kind", "skin");
-            report.set("points", points);
-            report.set("joints", joints);
-            report.set("mesh_hash", format!("{:032x}", skin.mesh_hash()));
-        }
-        Some(FileKind::Animation) => {
-            let read = load_animation(&RealDisk, path)?;
-            report.notes(read.notes);
-            for clip in &read.clips {
-                let tracks: usize = clip.layers.iter().map(|layer| layer.tracks.len()).sum();
-                let (tracks, keys) = (counted(tracks, "track", "tracks"), counted(clip.key_count(), "key", "keys"));
-                report.line(format!("clip \"{}\": {:.2} s, {tracks}, {keys}", clip.name, clip.duration()));
-            }
-            report.set("kind", "animation");
-            report.set("clips", read.clips.len());
-        }
-        Some(FileKind::Bvh) => {
-            let motion = load_motion(&RealDisk, path)?;
-            let (joints, frames, seconds) = (motion.joints.len(), motion.frames(), motion.duration());
-            report.line(format!(
-                "motion of {}: {}, {seconds:.2} s",
-                counted(joints, "joint", "joints"),
-                counted(frames, "frame", "frames")
-            ));
-            report.notes(motion.notes);
-            report.set("kind", "motion");
-            report.set("joints", joints);
-            report.set("frames", frames);
-            report.set("seconds", seconds);
-        }
-        Some(FileKind::PackedClips) => {
-            let packed = load_packed_clips(&RealDisk, path)?;
-            for clip in &packed.clips {
-                let (frames, keys) =
-                    (counted(clip.frames(), "frame", "frames"), counted(clip.key_count(), "key", "keys"));
-                report.line(format!("packed clip \"{}\": {frames}, {keys}", clip.name()));
-            }
-            report.line(counted(packed.nodes.len(), "joint", "joints"));
-            report.set("kind", "packed_clips");
-            report.set("joints", packed.nodes.len());
-            report.set("clips", packed.clips.len());
-        }
-        Some(FileKind::Gestures) => {
-            let gestures = load_gestures(&RealDisk, path)?;
-            limits::check_gestures(path, &gestures)?;
-            report.line(counted(gestures.len(), "gesture", "gestures"));
-            report.set("kind", "gestures");
-            report.set("gestures", gestures.len());
-        }
+        Some(FileKind::Template) => describe_template(&mut report, path)?,
+        Some(FileKind::RigText) => describe_rig_text(&mut report, path)?,
+        Some(FileKind::Project) => describe_project(&mut report, path)?,
+        Some(FileKind::Skin) => describe_skin(&mut report, path)?,
+        Some(FileKind::Animation) => describe_animation(&mut report, path)?,
+        Some(FileKind::Bvh) => describe_motion(&mut report, path)?,
+        Some(FileKind::PackedClips) => describe_packed_clips(&mut report, path)?,
+        Some(FileKind::Gestures) => describe_gestures(&mut report, path)?,
         None => {
             let message = format!(
                 "`{}`: Rigsmith knows .obj, .gltf, .glb, .vrm, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .rigclip, .bvh, .skin and .ron",
@@ -175,6 +54,158 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         }
     }
     Ok(report)
+}
+
+/// Adds the content of a template to a report.
+fn describe_template(report: &mut Report, path: &Path) -> Result<(), Failure> {
+    let template = limits::load_template(path)?;
+    let about = template.rig.about();
+    report.line(format!("template \"{}\" {}", about.name, about.version));
+    if !about.description.is_empty() {
+        report.line(about.description.clone());
+    }
+    report.set("kind", "template");
+    report.set("about", serde_json::to_value(about).unwrap_or(Value::Null));
+    report.notes(template.notes);
+    for part in &template.instances {
+        let place = match &part.parent {
+            _ if !part.onto.is_empty() => format!(" on {}", part.onto.join(", ")),
+            Some(parent) => format!(" below {parent}"),
+            None => part.socket.as_ref().map_or_else(String::new, |socket| format!(" on socket {socket}")),
+        };
+        let side = if part.mirror { ", mirrored" } else { "" };
+        let overrides = part.overrides();
+        let different = if overrides.is_empty() { "" } else { ", changed here:" };
+        report.line(format!("part {}: {}{place}{side}{different}", part.title(), part.part));
+        for PartOverride { target, field, value } in overrides {
+            report.line(format!("  {target}: {field} = {value}"));
+        }
+    }
+    report.set("parts", template.instances.iter().map(|part| part.part.clone()).collect::<Vec<_>>());
+    report.set("overrides", template.instances.iter().flat_map(overrides).collect::<Vec<_>>());
+    for socket in &template.sockets {
+        report.line(format!("socket {} on {}", socket.name, socket.label));
+    }
+    report.set("sockets", template.sockets.iter().map(|socket| socket.name.clone()).collect::<Vec<_>>());
+    if about.kind == "part" {
+        let needs = PartNeeds::of(&template.rig);
+        report.line(format!("needs joints: {}", needs.joints.join(", ")));
+        let places: Vec<String> = needs.sockets.iter().map(ToString::to_string).collect();
+        report.line(format!("hangs on: {}", places.join(", ")));
+        report.set("needs", json!({ "joints": needs.joints, "sockets": places }));
+    }
+    for option in &template.options {
+        let about = if option.description.is_empty() { "" } else { ": " };
+        report.line(format!("option {} = {}{about}{}", option.name, option.default, option.description));
+    }
+    report.set("options", template.options.iter().map(|option| option.name.clone()).collect::<Vec<_>>());
+    describe_joints(report, &template.rig);
+    Ok(())
+}
+
+/// Adds the content of a skeleton in `.rig` text to a report.
+fn describe_rig_text(report: &mut Report, path: &Path) -> Result<(), Failure> {
+    let text = limits::load_rig_text(path)?;
+    let mut rig = Rig::new(Uid(1), "");
+    for edit in import_rig_text(&text, &mut UidSource::seeded(super::SEED)).0 {
+        rig.apply(&edit).map_err(|error| Failure::Input(format!("`{}`: {error}", path.display()).into()))?;
+    }
+    limits::check_rig(path, &rig)?;
+    report.line("skeleton in .rig text");
+    report.set("kind", "rig");
+    describe_joints(report, &rig);
+    Ok(())
+}
+
+/// Adds the content of a project to a report.
+fn describe_project(report: &mut Report, path: &Path) -> Result<(), Failure> {
+    let project = spinning("reading", || limits::load_project(path))?;
+    report.line(format!("project \"{}\": {}", project.name, counted(project.meshes.len(), "mesh", "meshes")));
+    report.set("kind", "project");
+    report.set("name", project.name);
+    report.notes(project.notes);
+    for mesh in &project.meshes {
+        report.line(format!("mesh {}", mesh.path.display()));
+    }
+    for rig in &project.rigs {
+        let posed = counted(rig.pose().len(), "joint", "joints");
+        let stored = counted(rig.stored_poses().len(), "stored pose", "stored poses");
+        report.line(format!("rig \"{}\": {posed} posed, {stored}", rig.about().name));
+        describe_joints(report, rig);
+    }
+    Ok(())
+}
+
+/// Adds the content of a file of weights to a report.
+fn describe_skin(report: &mut Report, path: &Path) -> Result<(), Failure> {
+    let skin = load_skin(&RealDisk, path)?;
+    let (points, joints) = (skin.weights().len(), skin.joints().len());
+    let copy = if skin.mesh().is_some() { "with" } else { "without" };
+    report.line(format!(
+        "weights of {} over {}, {copy} a copy of the mesh",
+        counted(points, "point", "points"),
+        counted(joints, "joint", "joints")
+    ));
+    report.set("kind", "skin");
+    report.set("points", points);
+    report.set("joints", joints);
+    report.set("mesh_hash", format!("{:032x}", skin.mesh_hash()));
+    Ok(())
+}
+
+/// Adds the content of a file of clips to a report.
+fn describe_animation(report: &mut Report, path: &Path) -> Result<(), Failure> {
+    let read = load_animation(&RealDisk, path)?;
+    report.notes(read.notes);
+    for clip in &read.clips {
+        let tracks: usize = clip.layers.iter().map(|layer| layer.tracks.len()).sum();
+        let (tracks, keys) = (counted(tracks, "track", "tracks"), counted(clip.key_count(), "key", "keys"));
+        report.line(format!("clip \"{}\": {:.2} s, {tracks}, {keys}", clip.name, clip.duration()));
+    }
+    report.set("kind", "animation");
+    report.set("clips", read.clips.len());
+    Ok(())
+}
+
+/// Adds the content of a motion of a skeleton to a report.
+fn describe_motion(report: &mut Report, path: &Path) -> Result<(), Failure> {
+    let motion = load_motion(&RealDisk, path)?;
+    let (joints, frames, seconds) = (motion.joints.len(), motion.frames(), motion.duration());
+    report.line(format!(
+        "motion of {}: {}, {seconds:.2} s",
+        counted(joints, "joint", "joints"),
+        counted(frames, "frame", "frames")
+    ));
+    report.notes(motion.notes);
+    report.set("kind", "motion");
+    report.set("joints", joints);
+    report.set("frames", frames);
+    report.set("seconds", seconds);
+    Ok(())
+}
+
+/// Adds the content of a file of packed clips to a report.
+fn describe_packed_clips(report: &mut Report, path: &Path) -> Result<(), Failure> {
+    let packed = load_packed_clips(&RealDisk, path)?;
+    for clip in &packed.clips {
+        let (frames, keys) = (counted(clip.frames(), "frame", "frames"), counted(clip.key_count(), "key", "keys"));
+        report.line(format!("packed clip \"{}\": {frames}, {keys}", clip.name()));
+    }
+    report.line(counted(packed.nodes.len(), "joint", "joints"));
+    report.set("kind", "packed_clips");
+    report.set("joints", packed.nodes.len());
+    report.set("clips", packed.clips.len());
+    Ok(())
+}
+
+/// Adds the content of a list of gestures to a report.
+fn describe_gestures(report: &mut Report, path: &Path) -> Result<(), Failure> {
+    let gestures = load_gestures(&RealDisk, path)?;
+    limits::check_gestures(path, &gestures)?;
+    report.line(counted(gestures.len(), "gesture", "gestures"));
+    report.set("kind", "gestures");
+    report.set("gestures", gestures.len());
+    Ok(())
 }
 
 /// Changes that an instance makes to its part, an object each.

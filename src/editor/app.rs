@@ -262,7 +262,7 @@ fn keep_drawing(
     let happened = events.read().any(|event| !matches!(event, WindowEvent::RequestRedraw(_)));
     let told = edited.read().count() + notices.read().count() > 0;
     let surface = surfaces.iter().any(|surface| surface.is_stale() || surface.ready().is_none());
-    let busy = loading.what().is_some()
+    let busy = loading.name().is_some()
         || jobs.are_any()
         || surface
         || stroke.is_busy()

@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use super::{
     ActiveRig,
     actions::{Action, ActionRequest},
-    counted::built_commands,
+    counts::built_commands,
     mode::Mode,
     notice::Notice,
 };

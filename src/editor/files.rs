@@ -197,8 +197,8 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
     recovery::poll(world);
     document::watch_places(world);
     show_title(world);
-    let busy = world.resource::<LoadJob>().what().is_some()
-        || world.resource::<SaveJob>().what().is_some()
+    let busy = world.resource::<LoadJob>().name().is_some()
+        || world.resource::<SaveJob>().name().is_some()
         || world.resource::<recovery::Recovery>().is_looking();
     if busy && let Some(mut redraw) = world.get_resource_mut::<Messages<RequestRedraw>>() {
         redraw.write(RequestRedraw);

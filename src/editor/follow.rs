@@ -6,7 +6,7 @@ use bevy::{prelude::*, winit::WinitSettings};
 
 use super::{
     ActiveRig,
-    counted::counted,
+    counts::counted,
     files::{OpenDocument, attend},
     notice::Notice,
 };

@@ -106,7 +106,7 @@ pub struct KeyBindings(pub Vec<(Chord, Action)>);
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ChosenKey(pub Option<Action>);
 
-/// Key that was pressed for an action, which gets it in place of its keys.
+/// Message that a person pressed a key to bind an action to it. The key takes the place of the action's former keys.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct KeyBound {
     /// The key.

@@ -20,7 +20,7 @@ use bevy::prelude::*;
 pub use self::{
     action::{LibraryAction, obstacle},
     listing::{LibraryFolder, LibraryFolders, LibraryListing, ListTemplates, TemplateLibrary},
-    pictures::{LibraryPictures, TemplatePicture, WantPictures},
+    pictures::{LibraryPictures, PictureRequest, TemplatePicture},
     save::{SaveTemplate, TemplateContent, TemplateDraft, TemplateSave},
     sides::PartSides,
     work::{LOAD, LibraryAct, LibraryJobs, LibraryRequest},
@@ -64,7 +64,7 @@ impl Plugin for LibraryPlugin {
             .init_resource::<TemplateSave>()
             .init_resource::<SaveJob>()
             .add_message::<ListTemplates>()
-            .add_message::<WantPictures>()
+            .add_message::<PictureRequest>()
             .add_message::<LibraryRequest>()
             .add_message::<SaveTemplate>()
             .add_message::<ActionRequest>()

@@ -6,7 +6,7 @@
 use bevy::prelude::*;
 
 use super::{
-    counted::counted,
+    counts::counted,
     files::{MeshSource, attend},
     notice::Notice,
 };

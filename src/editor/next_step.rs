@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use super::{
     ActiveRig,
     actions::Action,
-    counted::{built_commands, counted},
+    counts::{built_commands, counted},
     keys::KeyBindings,
     mode::Mode,
     panels::{

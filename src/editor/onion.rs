@@ -6,7 +6,7 @@ use bevy_egui::egui::{Color32, Painter, Rect, Stroke, pos2};
 use super::{
     actions::{Action, ActionRequest},
     camera::ViewportSight,
-    counted::counted,
+    counts::counted,
     files::attend,
     panel::{PanelApp, ViewportPainter},
     panels::{

@@ -10,7 +10,7 @@ use bevy::{
 
 use super::{
     ActiveRig,
-    counted::counted,
+    counts::counted,
     files::{
         FollowUp, LoadJob, after_asking,
         dialog::{Answer, Dialog, Question},
@@ -84,7 +84,7 @@ pub(super) fn poll(world: &mut World) {
     }
     if world.resource::<Recovery>().found.is_empty()
         || world.resource::<Dialog>().question().is_some()
-        || world.resource::<LoadJob>().what().is_some()
+        || world.resource::<LoadJob>().name().is_some()
         || !world.contains_resource::<ActiveRig>()
     {
         return;

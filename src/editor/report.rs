@@ -232,7 +232,7 @@ fn write(
             }
         }
     }
-    report.busy = loading.what().is_some() || !jobs.is_empty() || surface_busy;
+    report.busy = loading.name().is_some() || !jobs.is_empty() || surface_busy;
     if file.written.as_ref() == Some(&report) {
         return;
     }

@@ -37,20 +37,20 @@ pub enum StoppableWork {
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StopWork(pub StoppableWork);
 
-/// Words for the work that runs, with its progress where that is known, and its kind if it can be stopped.
+/// Description of the work that runs, with its progress if it is known, and the kind of the work if a person can stop it.
 pub fn running(world: &World) -> Option<(String, Option<StoppableWork>)> {
     let rig = world.get_resource::<ActiveRig>().map(|active| active.0);
-    if let Some(what) = world.get_resource::<LoadJob>().and_then(LoadJob::what) {
+    if let Some(what) = world.get_resource::<LoadJob>().and_then(LoadJob::name) {
         // Without an open document there is nothing that could stay.
         return Some((format!("Opening {what}"), rig.map(|_| StoppableWork::Opening)));
     }
-    if let Some(what) = world.get_resource::<ClipImport>().and_then(ClipImport::what) {
+    if let Some(what) = world.get_resource::<ClipImport>().and_then(ClipImport::name) {
         return Some((format!("Importing {what}"), Some(StoppableWork::Motion)));
     }
-    if let Some(what) = world.get_resource::<LibraryJobs>().and_then(LibraryJobs::what) {
+    if let Some(what) = world.get_resource::<LibraryJobs>().and_then(LibraryJobs::name) {
         return Some((format!("Reading {what}"), None));
     }
-    if let Some(what) = world.get_resource::<SaveJob>().and_then(SaveJob::what) {
+    if let Some(what) = world.get_resource::<SaveJob>().and_then(SaveJob::name) {
         return Some((format!("Saving {what}"), None));
     }
     let meshes: Vec<Entity> = world.get::<RigMeshes>(rig?)?.iter().collect();

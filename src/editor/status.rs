@@ -5,7 +5,7 @@ use bevy_egui::egui;
 
 use super::{
     ActiveRig,
-    counted::counted,
+    counts::counted,
     follow,
     next_step::next_step,
     notice::StatusLine,

@@ -82,7 +82,7 @@ impl LeftOut {
     }
 }
 
-/// Files that [`files_below`] finds, and what it leaves out.
+/// Result of [`files_below`]: the files, and the reasons why others are left out.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FoundFiles {
     /// The files, in the order of their paths.

@@ -1,4 +1,4 @@
-//! A disk that fails on purpose, so that tests can try every operation of a save, one after the other.
+//! Disk that fails on purpose. Tests let each operation of a save fail in turn.
 //!
 //! Run the code once on a [`FaultyDisk`] without a plan, ask it for the number of
 //! [`operations`](FaultyDisk::operations), then run it again for each of them with a [`FaultPlan`] that fails just that

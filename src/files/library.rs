@@ -64,10 +64,10 @@ impl TemplatePlace {
         }
     }
 
-    /// Name by which a template in the folder `beside` calls this one as its part: relative to that folder or to one of the
-    /// site's, with `/` between folders. A file that is in neither is called by its way from the folder
+    /// Name of this file as a part of a template in the folder `beside`: relative to that folder or to a folder of the
+    /// site, with `/` between folders. A file that is in neither has its way from `beside` as its name
     /// (`../limbs/arm.rig.ron`), since absolute paths out of the folders are refused; without a folder, or on another drive,
-    /// by its whole path.
+    /// the name is its whole path.
     pub fn part_name(&self, beside: Option<&Path>, site: &SearchPaths) -> String {
         let path = match self {
             Self::Bundled(name) => return (*name).to_owned(),

@@ -131,7 +131,8 @@ pub struct FoundPart {
 pub struct PartFiles<'a> {
     source: Source<'a>,
     modules: Modules,
-    /// Files that parts may be in, up to those that have them, with their content if they could be read.
+    /// Paths at which the reader looked for parts, with the content of the files that it could read. The search for a part
+    /// ends at the first file that exists.
     pub asked: BTreeMap<PathBuf, Option<Vec<u8>>>,
     /// Files of parts that no list has, in the order in which they were asked for.
     pub missing: Vec<PathBuf>,
@@ -158,13 +159,13 @@ impl<'a> PartFiles<'a> {
         Self::of(Source::Disk(disk), modules)
     }
 
-    /// A reader that takes contents of parts from a list, and parts that come with Rigsmith for those that are not there.
-    /// Files that the list does not have are [`missing`](Self::missing).
+    /// Reader that takes the contents of parts from a list, and bundled parts where the list has none. Files that the list
+    /// lacks are [`missing`](Self::missing).
     pub fn given(files: &'a BTreeMap<PathBuf, Option<Vec<u8>>>) -> Self {
         Self::of(Source::Contents(files), modules::all())
     }
 
-    /// A reader of the parts that another one has [found](Self::found), and of those that come with Rigsmith.
+    /// Reader of the parts that another reader has [found](Self::found), and of bundled parts.
     pub fn known(found: &'a BTreeMap<PathBuf, FoundPart>, modules: Modules) -> Self {
         Self::of(Source::Found(found), modules)
     }
@@ -223,7 +224,7 @@ impl<'a> PartFiles<'a> {
         template.with_parts(text, &mut |part| self.part(&folder, part), &mirror)
     }
 
-    /// Puts those parts into a template that can be had and fit, and tells all that is wrong with the others.
+    /// Puts parts into a template, and lists all faults of parts that cannot be read or do not fit; these are left out.
     pub fn survey(&mut self, path: &Path, text: &str, template: Template) -> (Template, Vec<SourceError>) {
         if template.parts.is_empty() {
             return (template, Vec::new());

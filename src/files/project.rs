@@ -40,8 +40,8 @@ pub struct ProjectToSave {
     pub view: ProjectView,
     /// Journal that continues from this save.
     pub journal: Option<JournalReference>,
-    /// Names of animated nodes that are no joints of the rigs, those of nodes that are gone among them:
-    /// see [`Project`](crate::rig::project::Project).
+    /// Names of animated nodes that are no joints of the rigs, nodes that were deleted included: see
+    /// [`Project`](crate::rig::project::Project).
     pub names: NodeNames,
 }
 

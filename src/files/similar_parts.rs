@@ -1,4 +1,4 @@
-//! Names of parts that are called like one that nobody has.
+//! Names of parts that are similar to the name of a missing part.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Texts of templates that say what a rig is, as changes of the text that it was read from.
+//! Texts of templates for rigs that were edited, written as changes of the text that the rig was read from.
 
 use std::{
     collections::{BTreeSet, HashSet},
@@ -188,7 +188,7 @@ fn over_parts(rig: &Rig, at: &Path, text: &str, reader: PartReader) -> Option<Te
         // What cannot be said of a part is said without the part.
         let known = written_out.len();
         let said = said.as_ref().unwrap_or(&before.whole);
-        written_out.extend(template::unsaid_parts(said, rig, &before.own, &before.parts));
+        written_out.extend(template::differing_parts(said, rig, &before.own, &before.parts));
         if written_out.len() == known {
             return None;
         }

@@ -25,8 +25,8 @@ use crate::{
         part::PartInstance,
         template::{FileMarks, read_template, text_of, with_instance_fields, with_instances_of, write_template},
         update::{
-            Change, ChangeKind, Choices, MergedParts, RefittedTemplate, Take, TemplateWithParts, Update, diff,
-            merge_parts, update_with, with_whole_parts,
+            Change, ChangeKind, Choices, FieldChange, MergedParts, RefittedTemplate, Take, TemplateWithParts, Update,
+            diff, merge_parts, update_with, with_whole_parts,
         },
     },
 };
@@ -176,14 +176,11 @@ pub fn diff_templates(disk: &dyn Disk, from: &TemplateVersion, to: &TemplateVers
 
 /// Changes of part instances that are `moved`, and of fields, each told once: another name as such, and as a conflict where both
 /// sides gave one.
-fn told_once(mut moved: Vec<Change>, mut told: Vec<Change>) -> Vec<Change> {
-    let is_name_of = |change: &Change, of: &Change| {
-        let field = change.field.as_deref().is_some_and(|field| field.starts_with("part ") && field.ends_with(" name"));
-        change.uid == of.uid && field
-    };
-    moved.retain(|of| !told.iter().any(|change| change.conflict && is_name_of(change, of)));
-    told.retain(|change| !moved.iter().any(|of| is_name_of(change, of)));
-    moved.into_iter().chain(told).collect()
+fn told_once(mut moved: Vec<Change>, mut told: Vec<FieldChange>) -> Vec<Change> {
+    let is_name_of = |told: &FieldChange, of: &Change| told.is_name && told.change.uid == of.uid;
+    moved.retain(|of| !told.iter().any(|told| told.change.conflict && is_name_of(told, of)));
+    told.retain(|told| !moved.iter().any(|of| is_name_of(told, of)));
+    moved.into_iter().chain(told.into_iter().map(|told| told.change)).collect()
 }
 
 /// Part instances of the file that neither the base nor the template has now.
@@ -200,7 +197,7 @@ struct FieldUpdate {
     /// The update, with what differs besides the fields.
     update: Update,
     /// Changes of fields, and of instances that lose what they changed.
-    told: Vec<Change>,
+    told: Vec<FieldChange>,
     /// Joints and tags that come and go with the fields.
     brought: Vec<Change>,
     /// Text of the template with the fields.
@@ -248,7 +245,8 @@ fn with_merged_fields(
     // What comes and goes with other fields is told with them.
     let comes_or_goes = |change: &Change| matches!(change.kind, ChangeKind::Added | ChangeKind::Removed);
     let brought = diff(now.rig(), &rig).into_iter().filter(comes_or_goes).collect();
-    let told = merged.changes.into_iter().chain(refitted.lost).collect();
+    let lost = refitted.lost.into_iter().map(|change| FieldChange { change, is_name: false });
+    let told = merged.changes.into_iter().chain(lost).collect();
     let parts: Vec<(PartInstance, Rig)> = refitted.template.parts.into_iter().zip(refitted.fitted).collect();
     let (_, text) = FileMarks::of(&now.text);
     let text = with_instance_fields(&text, [now.content.fitted.as_slice(), parts.as_slice()], [now.rig(), &rig]);

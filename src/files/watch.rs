@@ -49,7 +49,7 @@ impl FileWatch {
         self.next.is_some()
     }
 
-    /// Takes note of a content that is no news, such as one that this program saves.
+    /// Takes note of a content that is not to be given out, such as the content that the caller has just saved.
     pub fn know(&mut self, content: Vec<u8>) {
         self.known = Some(content);
     }

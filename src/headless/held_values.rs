@@ -16,7 +16,7 @@ use crate::rig::{
 /// Difference, relative to the value, from which on a value is held.
 const SAME: f32 = 1e-4;
 
-/// Value that was written, and the one that the control or attribute has.
+/// Written value that limits or channels changed, with the value that the control or attribute has in its place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldValue {
     /// Name of the node.

@@ -6,10 +6,13 @@ use super::{
     Workbench,
     posing::{PoseError, WriteValue},
 };
-use crate::rig::{
-    BuiltNode, Matching, NodeType, Uid,
-    feature::off_at,
-    nearest::{did_you_mean, listed, nearest},
+use crate::{
+    rig::{
+        BuiltNode, BuiltRig, Matching, NodeType, Uid,
+        feature::off_at,
+        nearest::{did_you_mean, listed, nearest},
+    },
+    solve::program::RigState,
 };
 
 /// Channels of a control.
@@ -35,46 +38,11 @@ impl Workbench {
     pub(super) fn find_node(&self, name: &str, value: &WriteValue) -> Result<BuiltNode, PoseError> {
         let built = self.built().ok_or(PoseError::NotBuilt)?;
         let state = self.runtime()?.state();
-        let attribute = value.attribute();
-        let what = if attribute.is_some() { "node" } else { "control" };
-        let is_meant = |node: &BuiltNode| match attribute {
-            Some(_) => !node.attributes.is_empty(),
-            None => node.kind == NodeType::Control,
-        };
-        let of_kind = || built.nodes.iter().filter(|node| is_meant(node));
-        let is_named = |node: &&BuiltNode| *node.name == *name;
-        let is_labelled = |node: &&BuiltNode| node.label.as_deref() == Some(name);
-        let mut found: Vec<&BuiltNode> = of_kind().filter(is_named).collect();
-        if found.is_empty() {
-            found = of_kind().filter(is_labelled).collect();
-        }
-        if found.is_empty()
-            && let Some(node) = name.parse::<Uid>().ok().and_then(|uid| built.node(uid))
-        {
-            found.extend(is_meant(node).then_some(node));
-        }
-        if found.is_empty() && name.starts_with('@') {
-            let processor = self.processor().ok_or(PoseError::NotBuilt)?;
-            let uids = processor.builder().find(self.rig(), name)?;
-            let named: Vec<&BuiltNode> = uids.iter().filter_map(|uid| built.node(*uid)).collect();
-            found = named.iter().copied().filter(|node| is_meant(node)).collect();
-            if found.is_empty() && !named.is_empty() {
-                let labels: BTreeSet<&str> = named.iter().filter_map(|node| node.label.as_deref()).collect();
-                let there = |label: &&&str| of_kind().any(|node| node.label.as_deref() == Some(**label));
-                let labels: Vec<&str> = labels.iter().filter(there).copied().collect();
-                let nearest = match labels[..] {
-                    [] => String::new(),
-                    _ => format!("; write {}", listed(&labels, "or")),
-                };
-                return Err(PoseError::OtherKind { what, name: name.to_owned(), nearest });
-            }
-        }
-        if let Some(attribute) = attribute {
-            let with: Vec<&BuiltNode> = found
-                .iter()
-                .copied()
-                .filter(|node| node.attributes.iter().any(|known| *known.name == *attribute))
-                .collect();
+        let query = NodeQuery { name, attribute: value.attribute() };
+        let mut found = self.candidates(built, query)?;
+        if let Some(attribute) = query.attribute {
+            let has_attribute = |node: &&BuiltNode| node.attributes.iter().any(|known| *known.name == *attribute);
+            let with: Vec<&BuiltNode> = found.iter().copied().filter(has_attribute).collect();
             if with.is_empty()
                 && let Some(node) = found.first()
             {
@@ -83,58 +51,130 @@ impl Workbench {
             found = with;
         }
         if found.len() > 1 {
-            // The goal of a foot is a node of its own, which the control carries.
-            let carrier = |goal: Uid| {
-                let mut at = built.nodes.iter().position(|node| node.uid == goal);
-                while let Some(node) = at.map(|at| &built.nodes[at]).filter(|node| node.kind != NodeType::Control) {
-                    at = node.parent;
-                }
-                at.map(|at| built.nodes[at].uid)
-            };
-            let in_effect = |node: &Uid| {
-                let mut of = built.switches.iter().filter_map(|switch| match &switch.matching {
-                    Matching::IkFk { fk, goal, .. } => {
-                        let is_goal = carrier(*goal) == Some(*node);
-                        let on = state.attribute(switch.control, &switch.attribute).unwrap_or_default() >= 0.5;
-                        (is_goal || fk.contains(node)).then_some(on == is_goal)
-                    }
-                    Matching::Space { .. } => None,
-                });
-                of.next_back()
-            };
-            let active: Vec<&BuiltNode> =
-                found.iter().copied().filter(|node| in_effect(&node.uid) == Some(true)).collect();
+            let is_active = |node: &&BuiltNode| is_in_effect(built, state, node.uid) == Some(true);
+            let active: Vec<&BuiltNode> = found.iter().copied().filter(is_active).collect();
             if active.len() == 1 {
                 found = active;
             }
         }
         match found[..] {
             [node] => Ok(node.clone()),
-            [] => {
-                if let Some(off) = self.processor().and_then(|processor| processor.builder().off_named(name)) {
-                    return Err(PoseError::Off { name: name.to_owned(), off });
-                }
-                let is_called = |node: &&BuiltNode| is_named(node) || is_labelled(node);
-                if let (Some(attribute), Some(node)) = (attribute, built.nodes.iter().find(is_called)) {
-                    return Err(self.lacks_attribute(node, attribute));
-                }
-                let names =
-                    of_kind().flat_map(|node| [Some(node.name.to_string()), node.label.as_deref().map(str::to_owned)]);
-                let nearest = did_you_mean(name, names.flatten());
-                Err(PoseError::NoNode { what, name: name.to_owned(), nearest })
-            }
-            _ => {
-                // Nodes of one name are told apart by their uids.
-                let first = &found[0].name;
-                let is_one_name = found.iter().all(|node| node.name == *first);
-                let called = |node: &&BuiltNode| match is_one_name {
-                    true => node.uid.to_string(),
-                    false => node.name.to_string(),
-                };
-                let names: Vec<String> = found.iter().map(called).collect();
-                let off = off_at(self.rig(), name).map_or_else(String::new, |off| format!(" ({off})"));
-                Err(PoseError::Ambiguous { name: name.to_owned(), candidates: names.join(", "), off })
-            }
+            [] => Err(self.not_found(built, query)),
+            _ => Err(self.ambiguous(name, &found)),
         }
     }
+
+    /// Nodes of the kind that a query asks for: those of that name, else of that label, else of that uid, else those that a
+    /// reference in its text form finds.
+    fn candidates<'a>(&self, built: &'a BuiltRig, query: NodeQuery) -> Result<Vec<&'a BuiltNode>, PoseError> {
+        let name = query.name;
+        let of_kind = move || built.nodes.iter().filter(move |node| query.is_of_kind(node));
+        let mut found: Vec<&BuiltNode> = of_kind().filter(|node| query.is_named(node)).collect();
+        if found.is_empty() {
+            found = of_kind().filter(|node| query.is_labelled(node)).collect();
+        }
+        if found.is_empty()
+            && let Some(node) = name.parse::<Uid>().ok().and_then(|uid| built.node(uid))
+        {
+            found.extend(query.is_of_kind(node).then_some(node));
+        }
+        if !found.is_empty() || !name.starts_with('@') {
+            return Ok(found);
+        }
+        let processor = self.processor().ok_or(PoseError::NotBuilt)?;
+        let uids = processor.builder().find(self.rig(), name)?;
+        let named: Vec<&BuiltNode> = uids.iter().filter_map(|uid| built.node(*uid)).collect();
+        found = named.iter().copied().filter(|node| query.is_of_kind(node)).collect();
+        if found.is_empty() && !named.is_empty() {
+            let labels: BTreeSet<&str> = named.iter().filter_map(|node| node.label.as_deref()).collect();
+            let there = |label: &&&str| of_kind().any(|node| node.label.as_deref() == Some(**label));
+            let labels: Vec<&str> = labels.iter().filter(there).copied().collect();
+            let nearest = match labels[..] {
+                [] => String::new(),
+                _ => format!("; write {}", listed(&labels, "or")),
+            };
+            return Err(PoseError::OtherKind { what: query.kind_name(), name: name.to_owned(), nearest });
+        }
+        Ok(found)
+    }
+
+    /// Error of a query that finds no node.
+    fn not_found(&self, built: &BuiltRig, query: NodeQuery) -> PoseError {
+        let name = query.name;
+        if let Some(off) = self.processor().and_then(|processor| processor.builder().off_named(name)) {
+            return PoseError::Off { name: name.to_owned(), off };
+        }
+        let is_called = |node: &&BuiltNode| query.is_named(node) || query.is_labelled(node);
+        if let (Some(attribute), Some(node)) = (query.attribute, built.nodes.iter().find(is_called)) {
+            return self.lacks_attribute(node, attribute);
+        }
+        let of_kind = built.nodes.iter().filter(|node| query.is_of_kind(node));
+        let names = of_kind.flat_map(|node| [Some(node.name.to_string()), node.label.as_deref().map(str::to_owned)]);
+        let nearest = did_you_mean(name, names.flatten());
+        PoseError::NoNode { what: query.kind_name(), name: name.to_owned(), nearest }
+    }
+
+    /// Error of a name that finds several nodes. Nodes of one name are told apart by their uids.
+    fn ambiguous(&self, name: &str, found: &[&BuiltNode]) -> PoseError {
+        let is_one_name = found.iter().all(|node| node.name == found[0].name);
+        let called = |node: &&BuiltNode| match is_one_name {
+            true => node.uid.to_string(),
+            false => node.name.to_string(),
+        };
+        let names: Vec<String> = found.iter().map(called).collect();
+        let off = off_at(self.rig(), name).map_or_else(String::new, |off| format!(" ({off})"));
+        PoseError::Ambiguous { name: name.to_owned(), candidates: names.join(", "), off }
+    }
+}
+
+/// Name of a node in a pose, and the attribute that is written.
+#[derive(Clone, Copy)]
+struct NodeQuery<'a> {
+    name: &'a str,
+    /// Attribute of a node of any kind; `None` for a channel of a control.
+    attribute: Option<&'a str>,
+}
+
+impl NodeQuery<'_> {
+    /// Kind of node, in words.
+    fn kind_name(&self) -> &'static str {
+        if self.attribute.is_some() { "node" } else { "control" }
+    }
+
+    fn is_of_kind(&self, node: &BuiltNode) -> bool {
+        match self.attribute {
+            Some(_) => !node.attributes.is_empty(),
+            None => node.kind == NodeType::Control,
+        }
+    }
+
+    fn is_named(&self, node: &BuiltNode) -> bool {
+        *node.name == *self.name
+    }
+
+    fn is_labelled(&self, node: &BuiltNode) -> bool {
+        node.label.as_deref() == Some(self.name)
+    }
+}
+
+/// True if a node is the goal of a limb that follows inverse kinematics, or a forward control of one that does not; `None`
+/// if no switch concerns the node.
+fn is_in_effect(built: &BuiltRig, state: &RigState, node: Uid) -> Option<bool> {
+    // The goal of a foot is a node of its own, which the control carries.
+    let carrier = |goal: Uid| {
+        let mut at = built.nodes.iter().position(|node| node.uid == goal);
+        while let Some(node) = at.map(|at| &built.nodes[at]).filter(|node| node.kind != NodeType::Control) {
+            at = node.parent;
+        }
+        at.map(|at| built.nodes[at].uid)
+    };
+    let mut of = built.switches.iter().filter_map(|switch| match &switch.matching {
+        Matching::IkFk { fk, goal, .. } => {
+            let is_goal = carrier(*goal) == Some(node);
+            let on = state.attribute(switch.control, &switch.attribute).unwrap_or_default() >= 0.5;
+            (is_goal || fk.contains(&node)).then_some(on == is_goal)
+        }
+        Matching::Space { .. } => None,
+    });
+    of.next_back()
 }

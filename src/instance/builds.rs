@@ -26,7 +26,7 @@ use crate::{
     solve::program::{CompileOptions, ExposedNode, Keep, ProgramCache, ProgramError, RigProgram},
 };
 
-/// A template with what its commands make of it.
+/// Template with the results of its commands, compiled.
 #[derive(Debug)]
 pub struct BuiltTemplate {
     /// The template's rig. What got another name since the template was built first has its first uid.

@@ -82,12 +82,13 @@ impl NextVersion {
         }
     }
 
-    /// Indices of the built nodes that are described otherwise than in a version, if this is the way from that one.
+    /// Indices of the built nodes whose description differs from that in the version `from`; `None` if the exchange begins
+    /// at another version.
     pub fn described_since(&self, from: &Arc<BuiltTemplate>) -> Option<&Arc<[usize]>> {
         (self.from.as_ptr() == Arc::as_ptr(from)).then_some(&self.described)
     }
 
-    /// True if it is known that every pose of the version before means the same in this one.
+    /// True if every pose of the former version is known to mean the same in the next one.
     pub fn holds_poses(&self, from: &BuiltTemplate, to: &BuiltTemplate) -> bool {
         [(&from.whole, &to.whole), (&from.lean, &to.lean)].into_iter().any(|(from, to)| {
             Arc::ptr_eq(from, to) || self.exchange(from, to).is_some_and(|exchange| exchange.keeper.is_none())

@@ -181,8 +181,8 @@ impl Trs {
         self.translation + self.rotation * (self.scale * point)
     }
 
-    /// The transform that gives this one when `parent` is multiplied by it. Along an axis on which the parent's scale
-    /// is zero, the value is taken unchanged.
+    /// Transform relative to `parent`: `parent` times the result is `self`. Along an axis on which the parent's scale is
+    /// zero, the value is taken unchanged.
     pub fn relative_to(&self, parent: &Self) -> Self {
         let back = parent.rotation.inverse();
         let divided = |a: f32, by: f32| if by == 0.0 { a } else { a / by };

@@ -163,7 +163,7 @@ pub struct Face {
 impl Face {
     /// Returns `true` if an analysis of `rest` with these settings would be the same.
     fn serves(&self, rest: &Arc<Model>, settings: &AutoSettings) -> bool {
-        Arc::ptr_eq(&self.rest, rest) && self.settings.same_head(settings)
+        Arc::ptr_eq(&self.rest, rest) && self.settings.is_same_head(settings)
     }
 }
 

@@ -5,14 +5,14 @@
 
 mod canvas;
 mod changes;
-mod paintable;
+mod paintable_joints;
 
 use bevy::prelude::*;
 
 pub use self::{
     canvas::{CanvasJob, CanvasUse, PaintCanvas},
     changes::{WeightChange, WeightChangeAnswer, WeightChangeError, WeightChangeJob, WeightChangeRequest},
-    paintable::{PaintableError, PaintableJoint, locks, opposite_of, paintable, row_edit, stroke_edit},
+    paintable_joints::{PaintableError, PaintableJoint, locks, opposite_of, paintable, row_edit, stroke_edit},
 };
 use super::{RigSystems, configure_sets, landing::ResultHeld};
 

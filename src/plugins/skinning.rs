@@ -153,7 +153,7 @@ pub struct BoundSkin {
     pub skin: Arc<SkinData>,
     /// Report of the computation.
     pub report: SkinningReport,
-    /// Lengths by which half joints have to leave a bend so that the mesh keeps its volume.
+    /// Lengths by which half joints leave a bend to keep the volume of the mesh.
     pub pushes: Vec<FittedPush>,
 }
 
@@ -329,7 +329,8 @@ fn bindings(rig: &Rig, mesh: &RigMesh, parts: &[(MeshPart, PartBinding)]) -> Vec
     carried.chain(objects.chain(pieces).copied()).collect()
 }
 
-/// Joint of each object of a mesh that holds all of its points, if one does: a helmet's head, a sword's hand.
+/// Joint that holds all points of an object, for each object of a mesh: the head for a helmet, the hand for a sword. `None`
+/// for an object that several joints hold.
 pub fn held_objects(mesh: &RigMesh, skin: &SkinData) -> Vec<Option<Uid>> {
     let holder = |object: usize| {
         let mut holder = None;

@@ -80,7 +80,7 @@ impl BuildScope<'_> {
         }
     }
 
-    /// Nodes that references stand for, each of them below the one before.
+    /// Nodes of a chain that references stand for, from the top down.
     ///
     /// # Errors
     /// See [`BuildScope::resolve`]; fewer than `least`, or nodes that do not stand below one another.

@@ -69,7 +69,8 @@ struct Command {
     runs: u32,
 }
 
-/// Builds one rig, and keeps what it takes to build it again where something changed.
+/// Builder of one rig. It keeps all values that commands read and wrote, so that a later build runs only commands whose
+/// inputs changed.
 pub struct Builder {
     modules: Arc<Modules>,
     range: BuildRange,

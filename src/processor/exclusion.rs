@@ -117,7 +117,7 @@ impl Exclusions {
 }
 
 impl CommandExclusion {
-    /// True if its own switches decide, not what it refers to.
+    /// True if a switch of the command itself is off, and not only a node that the command refers to.
     pub fn is_own(&self) -> bool {
         matches!(self.reason, SkipReason::Own(_))
     }

@@ -142,24 +142,36 @@ fn hundredth() -> f32 {
     0.01
 }
 
+/// Parameter and label of an element, borrowed as the element is; `None` for elements that edit nothing.
+macro_rules! binding {
+    ($element:expr) => {
+        match $element {
+            FormElement::Text(FormBinding { param, label })
+            | FormElement::Check(FormBinding { param, label })
+            | FormElement::Vector(FormBinding { param, label })
+            | FormElement::Limits(FormBinding { param, label })
+            | FormElement::Color(FormBinding { param, label })
+            | FormElement::Node(FormBinding { param, label })
+            | FormElement::Curve(FormBinding { param, label })
+            | FormElement::Amount(FormBinding { param, label })
+            | FormElement::List(FormBinding { param, label })
+            | FormElement::Menu { param, label, .. }
+            | FormElement::Slider { param, label, .. }
+            | FormElement::Number { param, label, .. } => Some((param, label)),
+            FormElement::Frame { .. } | FormElement::Separator | FormElement::Comment(_) => None,
+        }
+    };
+}
+
 impl FormElement {
     /// The parameter that it edits, and its label as written; `None` for frames, separators and comments.
     pub fn bound(&self) -> Option<(&str, &str)> {
-        match self {
-            Self::Text(bound)
-            | Self::Check(bound)
-            | Self::Vector(bound)
-            | Self::Limits(bound)
-            | Self::Color(bound)
-            | Self::Node(bound)
-            | Self::Curve(bound)
-            | Self::Amount(bound)
-            | Self::List(bound) => Some((&bound.param, &bound.label)),
-            Self::Menu { param, label, .. } | Self::Slider { param, label, .. } | Self::Number { param, label, .. } => {
-                Some((param, label))
-            }
-            Self::Frame { .. } | Self::Separator | Self::Comment(_) => None,
-        }
+        binding!(self).map(|(param, label)| (param.as_str(), label.as_str()))
+    }
+
+    /// Parameter and label of an element that edits one, to change them.
+    fn binding_mut(&mut self) -> Option<(&mut String, &mut String)> {
+        binding!(self)
     }
 
     /// Label beside the element: as written, or the last name of the parameter's path with blanks.

@@ -58,7 +58,7 @@ impl std::fmt::Display for ClipNote {
 pub struct KeysSetAside {
     /// Name of the clip.
     pub clip_name: String,
-    /// The node, the number of its keys, and the node that may take them.
+    /// Node that is gone, the number of its keys, and the node to which they may be given.
     #[serde(flatten)]
     pub keys: OrphanedKeys,
 }
@@ -94,7 +94,7 @@ impl ClipReport {
     }
 }
 
-/// Version of a rig, with what its commands build and a program of that.
+/// Version of a rig, with the result of its commands and the compiled program.
 #[derive(Debug, Clone, Copy)]
 pub struct RigVersion<'a> {
     /// The document.

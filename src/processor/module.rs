@@ -207,8 +207,8 @@ pub struct Modules {
     pub deadline: Option<Deadline>,
 }
 
-/// Limits of what the commands of one rig may make, so that a few tags that name everything, and what they made
-/// themselves, do not fill the memory. A character has some hundreds of nodes.
+/// Limits of the work and the results of the commands of one rig. Without limits, a few tags that refer to everything,
+/// created nodes included, would fill the memory. A character has some hundreds of nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BuildLimits {
     /// The most nodes and constraints together.

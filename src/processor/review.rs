@@ -14,7 +14,7 @@ use crate::rig::{
     Field, Rig, RigEdit, SourceError, TagData, TagKind, Uid, fields,
     reference::{GroupScope, references_in},
     same_place,
-    template::{self, Explicit, PartOrigin},
+    template::{self, ExplicitText, PartOrigin},
 };
 
 /// Largest number of failing commands that a review looks for, and of runs for further faults of theirs.
@@ -212,14 +212,14 @@ fn unknown_groups(rig: &Rig, params: &str) -> Vec<ModuleError> {
 /// The text of a template, in which the places of problems are looked up.
 pub struct SourceText<'a> {
     /// The text without shorthand, in which every declaration has its uid.
-    explicit: &'a Explicit<'a>,
+    explicit: &'a ExplicitText<'a>,
     fields: Vec<Field<'a>>,
     of_source: OnceCell<Vec<Field<'a>>>,
 }
 
 impl<'a> SourceText<'a> {
     /// Scans a text once, for any number of problems.
-    pub fn new(explicit: &'a Explicit<'a>) -> Self {
+    pub fn new(explicit: &'a ExplicitText<'a>) -> Self {
         Self { explicit, fields: fields(&explicit.text), of_source: OnceCell::new() }
     }
 
@@ -298,7 +298,7 @@ impl<'a> SourceText<'a> {
         }
     }
 
-    /// The place where a joint, group or tag with that uid is declared, or of its field of that name, if it has one.
+    /// Error at the declaration of the joint, group or tag with that uid, at the named field if the declaration has it.
     pub fn locate_declared(&self, uid: Uid, field: &str, message: String) -> SourceError {
         let Some(declared) = declaration(&self.explicit.text, &self.fields, uid) else { return self.at(0, message) };
         let named = self.fields.iter().find(|other| other.bracket == declared.bracket && other.name == field);

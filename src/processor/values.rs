@@ -6,7 +6,7 @@ use super::{
 };
 use crate::rig::{SourceError, fields, ron_text, with_field};
 
-/// Values of a command's parameters, those that it leaves out, too.
+/// Values of all parameters of a command, defaults of omitted parameters included.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterValues {
     complete: String,
@@ -20,7 +20,7 @@ impl ParameterValues {
         place_of(&self.complete, path).map(|place| &self.complete[place])
     }
 
-    /// True if the value is the one that the module has for tags that leave it out.
+    /// True if the value is the module's default, which holds for tags that leave the parameter out.
     pub fn is_default(&self, path: &str) -> bool {
         self.get(path) == place_of(&self.default, path).map(|place| &self.default[place])
     }
@@ -70,8 +70,8 @@ impl ModuleInfo {
         Ok(text)
     }
 
-    /// The parameters as they are written, but for one that gets the value which it has where tags leave it out. A whole
-    /// parameter is left out then.
+    /// Parameters as they are written, with the value at `path` put back to the module's default. A path that names a whole
+    /// parameter takes the parameter out of the text.
     ///
     /// # Errors
     /// A path that names nothing.

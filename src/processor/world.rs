@@ -175,7 +175,7 @@ pub(super) struct World {
     by_command: HashMap<Uid, u32>,
     /// The place of each command in the list, [`NOWHERE`] if it is not there.
     pub places: Vec<u32>,
-    /// Nodes that each command can create, in the order in which it first did.
+    /// Nodes that each command has created in any build, in the order of their first creation.
     pub created: Vec<Vec<NodeId>>,
     /// The joint that carries each command.
     pub bearers: Vec<Uid>,
@@ -367,7 +367,7 @@ impl World {
         }
     }
 
-    /// Commands that read the transform, in the rig's space, of one of the nodes or of one that may stand below them.
+    /// Commands that read the rig-space transform of one of the nodes, or of a node that may stand below one of them.
     pub fn global_readers(&mut self, nodes: Vec<NodeId>) -> Vec<u32> {
         let mut readers = Vec::new();
         // Parents differ from place to place, so that two nodes may each stand below the other somewhere.

@@ -55,7 +55,8 @@ pub struct RigClip {
     pub markers: Vec<Marker>,
     /// Layers from the bottom to the top; the first one is the base.
     pub layers: Vec<ClipLayer>,
-    /// Names of animated nodes that the rig did not have when the clip came to it, by which other nodes are offered.
+    /// Names of animated nodes that the rig lacked when the clip came to it. Nodes with these names are offered for their
+    /// keys.
     #[serde(default, skip_serializing_if = "NodeNames::is_empty")]
     pub names: NodeNames,
 }

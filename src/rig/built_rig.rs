@@ -14,7 +14,7 @@ pub struct BuiltRig {
     pub nodes: Vec<BuiltNode>,
     /// Constraints that drive the nodes, in the order of creation: constraints on one node run in this order.
     pub constraints: Vec<BuiltConstraint>,
-    /// Switches whose nodes can be matched, so that setting a switch moves none of them.
+    /// Switches with matching: a matched change of a switch leaves the nodes of a limb or space in their places.
     pub switches: Vec<Arc<SwitchData>>,
     /// Declared inputs, outside of the rig.
     pub inputs: Vec<BuiltInput>,
@@ -135,7 +135,7 @@ pub enum NodeType {
     Control,
 }
 
-/// Name of the attribute that hides its node, and keeps it from being picked, below one half.
+/// Name of the attribute of visibility: a node whose value is below one half is neither drawn nor picked.
 pub const VISIBLE: &str = "visible";
 
 /// Appearance of a control and its free channels.

@@ -63,7 +63,7 @@ pub struct RigAbout {
     pub description: String,
     /// File name of a picture beside the template.
     pub preview: Option<String>,
-    /// Places that others hang on, but for those of the rig's parts.
+    /// Places for parts of other templates, without the sockets of the rig's own parts.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sockets: Vec<HeaderSocket>,
     /// Values that uses of the rig as a part may set.

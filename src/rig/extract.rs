@@ -14,7 +14,7 @@ use super::{
 pub struct Extraction {
     /// The rig of their own.
     pub rig: Rig,
-    /// References to joints, commands and features that are not among them, a sentence each.
+    /// References to joints, commands and features outside of the extracted rig, a sentence each.
     pub left: Vec<String>,
 }
 

@@ -48,7 +48,7 @@ pub struct CombinedFeature {
 pub struct FeatureSwitch {
     /// The secondary name.
     pub name: String,
-    /// The choice that it is one of; empty if it stands for itself.
+    /// Choice to which the part belongs, of whose parts one is on at most; empty for a switch of its own.
     pub choice: String,
     /// State of the part's tags.
     pub state: FeatureState,
@@ -192,7 +192,7 @@ pub fn set_feature(rig: &Rig, key: &FeatureKey, on: bool) -> Result<Vec<RigEdit>
     Ok(enabling(rig, feature.tags.iter().map(|tag| (*tag, on && !unchosen.contains(tag)))))
 }
 
-/// The edits that turn one part of a combined feature on or off and leave the others, but those of the same choice,
+/// Edits that turn one part of a combined feature on or off. Other parts stay as they are, except those of the same choice,
 /// which are turned off.
 ///
 /// # Errors

@@ -86,7 +86,7 @@ impl PartNeeds {
     }
 }
 
-/// Name by which the options of a rig's template call one of its tags, and no other.
+/// Unique name of a tag for the options of its template.
 pub fn tag_name(rig: &Rig, tag: Uid) -> String {
     PartInstance::default().name_of_tag(rig, tag)
 }

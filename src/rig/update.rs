@@ -31,7 +31,7 @@ use order::merged_order;
 pub use change::{Change, ChangeKind};
 pub use choices::{Choices, Take};
 pub use edits::{clip_edits, edits_between, pose_edits};
-pub use parts::{MergedParts, RefittedTemplate, TemplateWithParts, merge_parts};
+pub use parts::{FieldChange, MergedParts, RefittedTemplate, TemplateWithParts, merge_parts};
 pub use same_parts::{moved_part, same_parts, with_whole_parts};
 
 /// An update.
@@ -41,7 +41,7 @@ pub struct Update {
     pub rig: Rig,
     /// Changes, header first, then groups, joints in the order of the file, and poses.
     pub changes: Vec<Change>,
-    /// Uids that things of the file have here, by those that they have there: what got another name keeps its first uid.
+    /// Uids of joints, groups and tags in the rig by their uids in the file: after a change of names, the rig's uid stays.
     pub identities: HashMap<Uid, Uid>,
 }
 

@@ -14,8 +14,8 @@ pub struct IterationSettings {
     pub tolerance: f32,
     /// The greatest number of passes.
     pub iterations: u32,
-    /// Direction in which a chain bends that is straight and in line with its goal, which no pass would otherwise bend;
-    /// any length, rig space. Zero: a direction that depends on the chain only.
+    /// Direction of the bend of a chain that is straight and in line with its goal, which no pass would bend otherwise; any
+    /// length, rig space. Zero: a direction that depends on the chain only.
     pub bend: Vec3,
 }
 

@@ -135,7 +135,7 @@ impl ProgramNode {
         self.pose != Pose::NONE
     }
 
-    /// Returns `true` if the node's transform relative to its parent is its base with its pose offset, and nothing else.
+    /// True if base and pose offset alone make the node's transform relative to its parent.
     pub fn is_plain(&self) -> bool {
         self.is_posable() && !self.is_driven && self.freedom.is_none()
     }

@@ -27,7 +27,7 @@ use self::{body::Body, contacts::Contacts, figure::Figure, touches::Touches};
 pub use self::{
     contacts::Stance,
     measure::{FootReport, HandReport, measure_feet, measure_hands},
-    touches::{Touch, TouchedThing},
+    touches::{Touch, TouchTarget},
 };
 use super::{
     matching::MatchError,
@@ -106,7 +106,7 @@ pub struct RetargetedMotion {
     pub touches: Vec<Touch>,
     /// Labels of mapped joints that no control moves.
     pub unmoved: Vec<String>,
-    /// Control that has the travel over the ground, if that was wanted and there is one.
+    /// Control that carries the travel over the ground; `None` if the settings ask for none or the rig has no such control.
     pub root: Option<Uid>,
     /// Remarks, a sentence each.
     pub notes: Vec<String>,

@@ -102,8 +102,8 @@ pub fn multiply(parent: &Trs, child: &Trs) -> Trs {
     }
 }
 
-/// `transform` relative to `parent`, so that [`multiply`] gives it back for any scales that are not zero. Where an axis
-/// of `parent` is scaled to zero, the translation is zero and the factor one.
+/// `transform` relative to `parent`: [`multiply`] of `parent` and the result is `transform`, for scales that are not zero.
+/// Along an axis on which `parent` is scaled to zero, the translation is zero and the factor one.
 ///
 /// A constraint keeps its offset so: `relative(target, driven)` when it is built, and `multiply(target, offset)` each
 /// frame.

@@ -1,13 +1,13 @@
 //! Clips: edits with exact inverses, what animators do with keys, files, playback, and motion that survives changes.
 
 mod app;
-mod captured;
 mod files;
 pub mod keep;
 mod keys;
 mod layers;
+mod motion_capture;
 mod random;
-mod reduced;
+mod reduction;
 mod root_motion;
 mod sampler;
 mod switch_range;

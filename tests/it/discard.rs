@@ -248,8 +248,8 @@ fn files_that_are_read_can_be_stopped() {
     let head = format!("HIERARCHY\nROOT a\n{{\nOFFSET 0 0 0\n{channels}\nEnd Site\n{{\nOFFSET 0 1 0\n}}\n}}\n");
     let lines = "0 0 0 0 0 0\n".repeat(20_000);
     std::fs::write(&path, format!("{head}MOTION\nFrames: 20000\nFrame Time: 0.01\n{lines}")).unwrap();
-    let is_read = |world: &World| world.resource::<ClipImport>().what().is_some();
+    let is_read = |world: &World| world.resource::<ClipImport>().name().is_some();
     assert!(is_stopped(&mut frames, ImportRequest(path), StoppableWork::Motion, is_read));
-    let is_opened = |world: &World| world.resource::<LoadJob>().what().is_some();
+    let is_opened = |world: &World| world.resource::<LoadJob>().name().is_some();
     assert!(is_stopped(&mut frames, OpenRequest::Bundled, StoppableWork::Opening, is_opened));
 }

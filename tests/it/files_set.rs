@@ -1,9 +1,10 @@
 //! Saving files that belong together: whatever fails, the old ones or the finished ones are there, and nothing else changes.
 
+mod other_disks;
+
 use std::{
     collections::{BTreeMap, BTreeSet},
-    ffi::OsString,
-    fs, io,
+    fs,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -11,8 +12,8 @@ use std::{
 use glam::Vec3;
 use rigsmith::{
     files::{
-        Disk, DiskFile, Entry, FaultyDisk, FileSet, MeshShape, MeshToSave, ProjectToSave, RealDisk, SaveError,
-        StoreError, is_temp_name, load_model, load_project, remove_stale_temps, save_set, store_model, store_project,
+        Disk, FaultyDisk, FileSet, MeshShape, MeshToSave, ProjectToSave, RealDisk, SaveError, StoreError, is_temp_name,
+        load_model, load_project, save_set, store_model, store_project,
     },
     mesh::{
         gltf::GltfWriteSettings,
@@ -23,7 +24,7 @@ use rigsmith::{
 };
 use tempfile::TempDir;
 
-use crate::{disks::as_on_the_disk, files_faults::plans};
+use crate::files_faults::plans;
 
 /// A set of each kind that Rigsmith saves, in versions that can be told apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -376,76 +377,6 @@ fn companions_are_as_private_as_their_main_file() {
         for name in names(folder.path()).difference(&before) {
             assert_eq!(mode(&folder.path().join(name)), 0o600, "{name}");
         }
-    }
-}
-
-/// A disk that carries out nothing as the real one does unless it is passed on here.
-struct PassThroughDisk {
-    hard_links: bool,
-    /// True if what is read back has changed on the way.
-    decays: bool,
-}
-
-struct DecayingFile(Box<dyn DiskFile>);
-
-impl DiskFile for DecayingFile {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut bytes = bytes.to_vec();
-        bytes.iter_mut().skip(17).take(1).for_each(|byte| *byte ^= 1);
-        self.0.write(&bytes)
-    }
-    fn keep_permissions(&mut self, of: &Path) -> io::Result<()> {
-        self.0.keep_permissions(of)
-    }
-    fn sync(&mut self) -> io::Result<()> {
-        self.0.sync()
-    }
-    fn reads_back(&mut self, bytes: &[u8]) -> io::Result<bool> {
-        self.0.reads_back(bytes)
-    }
-}
-
-impl Disk for PassThroughDisk {
-    as_on_the_disk!();
-    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
-        let file = RealDisk.create(path)?;
-        Ok(if self.decays { Box::new(DecayingFile(file)) } else { file })
-    }
-    fn hard_link(&self, existing: &Path, path: &Path) -> io::Result<()> {
-        if self.hard_links { RealDisk.hard_link(existing, path) } else { Err(io::ErrorKind::Unsupported.into()) }
-    }
-}
-
-#[test]
-fn a_set_is_saved_where_there_are_neither_hard_links_nor_locks() {
-    for kind in Kind::ALL {
-        let folder = furnished();
-        for version in [1, 2, 5] {
-            kind.save(&PassThroughDisk { hard_links: false, decays: false }, folder.path(), version).unwrap();
-            assert_eq!(kind.load(folder.path()), Ok(version));
-            assert_eq!(names(folder.path()), expected(kind, version));
-        }
-        // A temporary file of today may be that of a living process.
-        let temp = folder.path().join(".rigsmith-0123456700000000.tmp");
-        fs::write(&temp, "half").unwrap();
-        let disk = PassThroughDisk { hard_links: false, decays: false };
-        assert_eq!(remove_stale_temps(&disk, folder.path()).unwrap(), 0);
-        let long_ago = std::time::SystemTime::now() - std::time::Duration::from_secs(4000);
-        fs::File::options().write(true).open(&temp).unwrap().set_modified(long_ago).unwrap();
-        assert_eq!(remove_stale_temps(&disk, folder.path()).unwrap(), 1);
-    }
-}
-
-#[test]
-fn a_disk_that_returns_other_bytes_replaces_nothing() {
-    for kind in Kind::ALL {
-        let folder = furnished();
-        kind.save(&RealDisk, folder.path(), 1).unwrap();
-        let before = names(folder.path());
-        let error =
-            kind.save(&PassThroughDisk { hard_links: true, decays: true }, folder.path(), 2).unwrap_err().to_string();
-        assert!(error.contains("other bytes") && error.contains("unchanged"), "{error}");
-        assert_eq!((kind.load(folder.path()), names(folder.path())), (Ok(1), before));
     }
 }
 

@@ -96,7 +96,7 @@ fn check_model(model: Model, path: &Path, template: &str, hinges: &[Hinge]) {
     let ask = |request: &mut FitRequest| request.template = FitTemplate::Choose;
     let report = bench.fit(ask, &mut |_| ()).unwrap();
     assert_eq!(report.template, template, "{}: {}", path.display(), report.choice);
-    check(&path.display().to_string(), bench.rig(), hinges, report.fit.forward, report.fit.symmetric());
+    check(&path.display().to_string(), bench.rig(), hinges, report.fit.forward, report.fit.is_symmetric());
 }
 
 #[test]

@@ -174,10 +174,10 @@ impl Studio {
         while quiet < 5 {
             self.desk.frame();
             let world = self.world();
-            let busy = world.resource::<LoadJob>().what().is_some()
-                || world.resource::<SaveJob>().what().is_some()
+            let busy = world.resource::<LoadJob>().name().is_some()
+                || world.resource::<SaveJob>().name().is_some()
                 || world.resource::<Recovery>().is_looking()
-                || world.resource::<LibraryJobs>().what().is_some()
+                || world.resource::<LibraryJobs>().name().is_some()
                 || world.resource::<TemplateSave>().is_writing()
                 || world.resource::<TemplateLibrary>().is_listing();
             quiet = if busy { 0 } else { quiet + 1 };

@@ -359,16 +359,19 @@ fn called(text: &str, name: &str) -> String {
 #[test]
 fn a_part_with_another_name_is_the_same_part() {
     let part = PART.replace("    joints: [", "    sockets: [(name: \"tip\", joint: \"bone_3\")],\n    joints: [");
+    let part = part.replace("(name: \"size\"", "(name: \"size by name\"");
     // A part of one's own hangs on the one that is called otherwise.
     let own = "        (part: \"finger.rig.ron\", name: \"nail\", socket: \"index.tip\", prefix: \"n_\"),\n    ],\n)\n";
     let mine = mine().replace("    ],\n)\n", own);
-    let file = called(BASE, "pointer").replace("prefix: \"a_\",", "prefix: \"a_\", count: 4,");
+    let fields = "prefix: \"a_\", count: 4, options: {\"size by name\": 0.25},";
+    let file = called(BASE, "pointer").replace("prefix: \"a_\",", fields);
     let folder = folder(&file, &mine);
     fs::write(folder.path().join("finger.rig.ron"), part).unwrap();
     let before = load(&folder.path().join("mine.rig.ron"));
     let (text, said) = updated(folder.path(), &["--keep-base"]);
     assert!(said.contains("renamed  part index to pointer?") && !said.contains("index name"), "{said}");
     assert!(said.contains("count: nothing to 4") && !said.contains("conflict"), "{said}");
+    assert!(said.contains("options.size by name: nothing to 0.25"), "no change of the name: {said}");
     assert!(text.contains("name: \"pointer\"") && text.contains(CHANGES.trim()), "{text}");
     assert!(text.contains("socket: \"pointer.tip\"") && text.contains("// The finger."), "{text}");
     assert!(!text.contains("label: \"a_"), "the part stays a part: {text}");

@@ -11,29 +11,14 @@ use rigsmith::{
 };
 
 use super::{
-    part_instances::{FINGER, hand, load},
+    part_instances::{hand, load},
+    saved_text::Desk,
     template_text::{Dice, apply, plain, without_blanks},
 };
 
-/// A folder with a part and a template that uses it.
-struct Desk {
-    folder: tempfile::TempDir,
-}
-
 impl Desk {
-    fn new(text: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("finger.rig.ron"), FINGER).unwrap();
-        fs::write(folder.path().join("hand.rig.ron"), text).unwrap();
-        Self { folder }
-    }
-
-    fn path(&self) -> std::path::PathBuf {
-        self.folder.path().join("hand.rig.ron")
-    }
-
     /// Saves a rig over the template; the text, which must say the rig with its parts.
-    fn saved(&self, rig: &Rig) -> String {
+    fn saved_parts(&self, rig: &Rig) -> String {
         let path = self.path();
         assert_eq!(store_rig_over(&RealDisk, &path, rig, &[&path]).unwrap(), Vec::<String>::new());
         assert_eq!(text_of_rig(load(&path)), text_of_rig(rig.clone()));
@@ -204,7 +189,7 @@ fn one_change_of_a_part_is_one_line() {
             let desk = Desk::new(&text);
             let mut rig = load(&desk.path());
             made(&mut rig);
-            let saved = desk.saved(&rig);
+            let saved = desk.saved_parts(&rig);
             let (added, gone) = (lines_beyond(&saved, &text), lines_beyond(&text, &saved));
             assert!(
                 added.iter().any(|added| added.contains(line)) && gone.len() <= 1,
@@ -213,10 +198,10 @@ fn one_change_of_a_part_is_one_line() {
             assert_eq!(added.len(), 1, "{what}: {added:#?}");
             assert!(added.iter().all(|line| !line.contains("finger 0") && !line.contains("finger 2")), "{added:?}");
             // Saved again, nothing changes; and what the part says again is no change any more.
-            assert_eq!(desk.saved(&rig), saved, "{what}");
+            assert_eq!(desk.saved_parts(&rig), saved, "{what}");
             let first = load(&Desk::new(&text).path());
             if what != "a tag less" {
-                assert_eq!(desk.saved(&first), text, "{what}");
+                assert_eq!(desk.saved_parts(&first), text, "{what}");
             }
         }
     }
@@ -230,29 +215,29 @@ fn a_change_that_is_there_is_changed() {
     let desk = Desk::new(&text);
     let mut rig = load(&desk.path());
     set_params(&mut rig, "f0_bone_2", "0.9", "0.8");
-    assert_eq!(desk.saved(&rig), text.replace("0.9", "0.8"));
+    assert_eq!(desk.saved_parts(&rig), text.replace("0.9", "0.8"));
     let last = joint(&rig, "f0_bone_3");
     let mut rest = rig.joint(last).unwrap().data.rest;
     rest.translation.y = 0.06;
     apply(&mut rig, RigEdit::SetRest(last, rest));
-    assert_eq!(desk.saved(&rig), text.replace("0.9", "0.8").replace("(0, 0.05, 0)", "(0.0, 0.06, 0.0)"));
+    assert_eq!(desk.saved_parts(&rig), text.replace("0.9", "0.8").replace("(0, 0.05, 0)", "(0.0, 0.06, 0.0)"));
     // A feature that is off goes on again in the list of those that are off, and another goes there.
     let base = joint(&rig, "f0_bone_1");
     let mut feature = rig.joint(base).unwrap().data.tags[0].clone();
     feature.enabled = true;
     apply(&mut rig, RigEdit::SetTag(base, Box::new(feature.clone())));
-    assert!(!desk.saved(&rig).contains("off:"));
+    assert!(!desk.saved_parts(&rig).contains("off:"));
     let other = joint(&rig, "f1_bone_1");
     let mut feature = rig.joint(other).unwrap().data.tags[0].clone();
     feature.enabled = false;
     apply(&mut rig, RigEdit::SetTag(other, Box::new(feature)));
-    assert!(desk.saved(&rig).contains("prefix: \"f1_\", off: [\"fk\"]"));
+    assert!(desk.saved_parts(&rig).contains("prefix: \"f1_\", off: [\"fk\"]"));
     // The tag that the change adds is changed, and taken away.
     change_tag(&mut rig, "f0_bone_3", "null", |tag| tag.enabled = false);
-    assert!(desk.saved(&rig).contains("enabled: false"));
+    assert!(desk.saved_parts(&rig).contains("enabled: false"));
     let tag = rig.joint(last).unwrap().data.tags[0].uid;
     apply(&mut rig, RigEdit::RemoveTag(last, tag));
-    let saved = desk.saved(&rig);
+    let saved = desk.saved_parts(&rig);
     assert!(!saved.contains("nail") && saved.contains("(joint: \"bone_3\", translation: (0.0, 0.06, 0.0))"), "{saved}");
 }
 
@@ -263,7 +248,7 @@ fn another_name_of_the_templates_own_joint_goes_on_in_its_parts() {
     let mut rig = load(&desk.path());
     let middle = joint(&rig, "b");
     apply(&mut rig, RigEdit::SetLabel(middle, Some("elbow".into())));
-    let saved = desk.saved(&rig);
+    let saved = desk.saved_parts(&rig);
     assert!(
         saved.contains("onto: [\"a\", \"elbow\", \"c\"]") && saved.contains("parent: \"elbow\", prefix"),
         "{saved}"
@@ -274,7 +259,7 @@ fn another_name_of_the_templates_own_joint_goes_on_in_its_parts() {
         RigEdit::AddTag { joint: middle, tag: Box::new(null(9, "(creation: (name: \"mark\"))")), index: usize::MAX },
     );
     apply(&mut rig, RigEdit::AddTag { joint: middle, tag: Box::new(null(8, "()")), index: 0 });
-    desk.saved(&rig);
+    desk.saved_parts(&rig);
 }
 
 #[test]
@@ -317,10 +302,10 @@ fn any_mixture_of_changes_is_saved_and_read_again() {
             };
             apply(&mut rig, edit);
             if step % 4 == 3 {
-                desk.saved(&rig);
+                desk.saved_parts(&rig);
             }
         }
-        desk.saved(&rig);
+        desk.saved_parts(&rig);
     }
 }
 

@@ -100,19 +100,19 @@ fn ends_of_lines_and_the_byte_order_mark_stay() {
 }
 
 /// A folder with the part of a finger, and a template that uses it.
-struct Desk {
+pub(super) struct Desk {
     folder: tempfile::TempDir,
 }
 
 impl Desk {
-    fn new(text: &str) -> Self {
+    pub(super) fn new(text: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("finger.rig.ron"), FINGER).unwrap();
         fs::write(folder.path().join("hand.rig.ron"), text).unwrap();
         Self { folder }
     }
 
-    fn path(&self) -> PathBuf {
+    pub(super) fn path(&self) -> PathBuf {
         self.folder.path().join("hand.rig.ron")
     }
 

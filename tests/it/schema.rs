@@ -77,9 +77,8 @@ fn every_component_of_the_table_is_registered() {
     }
 }
 
-/// Every component that inspectors and remote tools can name is in the table.
-#[test]
-fn every_registered_component_is_told() {
+/// An app with the plugins of a game.
+fn app_of_a_game() -> App {
     let mut app = App::new();
     app.add_plugins((
         MinimalPlugins,
@@ -88,6 +87,13 @@ fn every_registered_component_is_told() {
         RigPlugins,
         RigInstancePlugin::default(),
     ));
+    app
+}
+
+/// Every component that inspectors and remote tools can name is in the table.
+#[test]
+fn every_registered_component_is_told() {
+    let app = app_of_a_game();
     let registry = app.world().resource::<AppTypeRegistry>().read();
     let names = reflected_components();
     let registered = registry.iter().filter(|of| of.data::<ReflectComponent>().is_some());
@@ -305,14 +311,7 @@ fn nulls_follow_the_kind_of_their_joint() {
 #[test]
 fn instances_below_a_rig_stay_out_of_its_document() {
     let (_, template) = template();
-    let mut app = App::new();
-    app.add_plugins((
-        MinimalPlugins,
-        AssetPlugin::default(),
-        TransformPlugin,
-        RigPlugins,
-        RigInstancePlugin::default(),
-    ));
+    let mut app = app_of_a_game();
     app.finish();
     app.cleanup();
     let host = app.world_mut().spawn(template.rig().as_ref().clone()).id();

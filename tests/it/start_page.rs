@@ -109,8 +109,8 @@ impl Page {
         while quiet < 5 {
             self.frame();
             let world = self.world();
-            let busy = world.resource::<LoadJob>().what().is_some()
-                || world.resource::<SaveJob>().what().is_some()
+            let busy = world.resource::<LoadJob>().name().is_some()
+                || world.resource::<SaveJob>().name().is_some()
                 || world.resource::<Recovery>().is_looking();
             quiet = if busy { 0 } else { quiet + 1 };
             assert!(start.elapsed() < HANG, "something never ends");

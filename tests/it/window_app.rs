@@ -85,7 +85,7 @@ impl AppBench {
     /// True while a file is being read or written.
     pub fn has_file_jobs(&self) -> bool {
         let world = self.app.world();
-        world.resource::<LoadJob>().what().is_some() || world.resource::<SaveJob>().what().is_some()
+        world.resource::<LoadJob>().name().is_some() || world.resource::<SaveJob>().name().is_some()
     }
 }
 

@@ -67,7 +67,7 @@ impl Default for AutoSettings {
 
 impl AutoSettings {
     /// Returns `true` if an analysis for `other` serves these settings, too.
-    pub fn same_head(&self, other: &Self) -> bool {
+    pub fn is_same_head(&self, other: &Self) -> bool {
         (self.up, self.forward, self.whole, self.groups) == (other.up, other.forward, other.whole, other.groups)
     }
 }

@@ -162,7 +162,7 @@ impl DepthMap {
     }
 
     /// Returns `true` if a triangle covers the pixel nearest to a place.
-    pub fn covered(&self, place: Vec2) -> bool {
+    pub fn is_covered(&self, place: Vec2) -> bool {
         let at = self.frame.pixels(place).round();
         at.x >= 0.0 && at.y >= 0.0 && self.at(at.x as usize, at.y as usize).is_some()
     }

@@ -166,30 +166,84 @@ pub(super) fn limbs(joints: &[TemplateJoint]) -> Option<TemplateLimbs> {
     let (low, high) = positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
     let size = (high - low).max_element();
     let mirror = mirrored(&positions, size);
-    let symmetric = mirror.iter().any(Option::is_some);
-    let central =
-        |j: usize| if symmetric { positions[j].x.abs() < ON_PLANE * size && mirror[j].is_none() } else { true };
-    let mut limbs = Vec::new();
-    let mut trunk = vec![root];
-    if symmetric {
+    let (trunk, mut limbs) = if mirror.iter().any(Option::is_some) {
+        let (positions, parents, children) = (&positions, &parents, &children);
+        let tree =
+            JointTree { joints, positions, parents, children, order: &order, below: &below, mirror: &mirror, size };
+        tree.body_limbs(root, [low.y, high.y])
+    } else {
+        // A hand: the joint with the most chains becomes the root, and the wrist another chain.
+        let busiest = order.iter().copied().max_by_key(|&j| (children[j].len(), std::cmp::Reverse(j))).unwrap_or(root);
+        let attach = if children[busiest].len() > 1 { busiest } else { root };
+        reroot(attach, &mut parents, &mut children);
+        (order, below) = ordered(attach, &parents, &children, &positions);
         let segment = |j: usize| parents[j].map_or(0.0, |p| positions[j].distance(positions[p]));
-        let head = head_joint(joints, &order, &central, &parents, root);
+        let mut limbs = Vec::new();
+        for &child in &children[attach] {
+            let chain = longest_chain(child, &children, &below, &positions);
+            let beyond = chain.last().map_or(0.0, |&j| segment(j) * 0.8);
+            let stem = chain.contains(&root);
+            limbs.push(Limb { kind: LimbKind::Free, joints: chain, attach, partner: None, stem, beyond });
+        }
+        (vec![attach], limbs)
+    };
+    for a in 0..limbs.len() {
+        let other = mirror[limbs[a].joints[0]];
+        limbs[a].partner = limbs.iter().position(|l| Some(l.joints[0]) == other);
+    }
+    Some(TemplateLimbs { positions, parents, order, trunk, limbs, mirror, size })
+}
+
+/// Joints of a template with a plane of symmetry.
+struct JointTree<'a> {
+    joints: &'a [TemplateJoint<'a>],
+    positions: &'a [Vec3],
+    parents: &'a [Option<usize>],
+    children: &'a [Vec<usize>],
+    /// Parents before children.
+    order: &'a [usize],
+    /// Length of the longest chain below each joint.
+    below: &'a [f32],
+    /// The mirrored joint of each joint on a side.
+    mirror: &'a [Option<usize>],
+    /// Largest side of the template.
+    size: f32,
+}
+
+impl JointTree<'_> {
+    /// Distance of a joint from its parent.
+    fn segment(&self, j: usize) -> f32 {
+        self.parents[j].map_or(0.0, |p| self.positions[j].distance(self.positions[p]))
+    }
+
+    /// True for joints on the plane of symmetry.
+    fn is_central(&self, j: usize) -> bool {
+        self.positions[j].x.abs() < ON_PLANE * self.size && self.mirror[j].is_none()
+    }
+
+    /// Trunk from the root upwards, and the limbs of a body: the head, and what hangs on the trunk. `heights` are the lowest
+    /// and the highest place of a joint.
+    fn body_limbs(&self, root: usize, heights: [f32; 2]) -> (Vec<usize>, Vec<Limb>) {
+        let (size, parents, children) = (self.size, self.parents, self.children);
+        let mut limbs = Vec::new();
+        let head = head_joint(self.joints, self.order, &|j| self.is_central(j), parents, root);
         let mut path = vec![head];
         while let Some(parent) = parents[path[path.len() - 1]] {
             path.push(parent);
         }
         path.reverse();
         // The trunk ends where the last pair of limbs is carried.
-        let carries = |j: usize| children[j].iter().any(|&c| !central(c) && below[c] + segment(c) > LIMB_LENGTH * size);
+        let is_limb = |c: usize| !self.is_central(c) && self.below[c] + self.segment(c) > LIMB_LENGTH * size;
+        let carries = |j: usize| children[j].iter().any(|&c| is_limb(c));
         let from = path.iter().position(|&j| j == root).unwrap_or(0);
         let last = (from..path.len()).rev().find(|&i| carries(path[i])).unwrap_or(from);
-        trunk = path[from..=last].to_vec();
+        let trunk = path[from..=last].to_vec();
         let head_joints = path[last + 1..].to_vec();
         if !head_joints.is_empty() {
             // A snout or a beak has joints of its own.
-            let snout = order.iter().filter(|&&j| parents[j] == Some(head) && central(j));
-            let snout = snout.map(|&j| below[j] + segment(j)).fold(0.0, f32::max);
-            let beyond = if snout > 0.0 { snout } else { (0.085 * size).max(segment(head) * 0.8) };
+            let snout = self.order.iter().filter(|&&j| parents[j] == Some(head) && self.is_central(j));
+            let snout = snout.map(|&j| self.below[j] + self.segment(j)).fold(0.0, f32::max);
+            let beyond = if snout > 0.0 { snout } else { (0.085 * size).max(self.segment(head) * 0.8) };
             limbs.push(Limb {
                 kind: LimbKind::Head,
                 joints: head_joints,
@@ -200,64 +254,39 @@ pub(super) fn limbs(joints: &[TemplateJoint]) -> Option<TemplateLimbs> {
             });
         }
         for &attach in &trunk {
-            for &child in &children[attach] {
-                if trunk.contains(&child) || path.contains(&child) {
-                    continue;
-                }
-                let length = below[child] + segment(child);
-                let chain = longest_chain(child, &children, &below, &positions);
-                if central(child) {
-                    if length > LIMB_LENGTH * size || joints[child].label.contains("tail") {
-                        let beyond = chain.last().map_or(0.0, |&j| segment(j));
-                        limbs.push(Limb {
-                            kind: LimbKind::Tail,
-                            joints: chain,
-                            attach,
-                            partner: None,
-                            stem: false,
-                            beyond,
-                        });
-                    }
-                } else if length > LIMB_LENGTH * size {
-                    let end = chain[chain.len() - 1];
-                    let lowest = chain.iter().map(|&j| positions[j].y).fold(f32::INFINITY, f32::min);
-                    let winged = chain.iter().any(|&j| joints[j].label.contains("wing"));
-                    let kind = match (winged, lowest < low.y + 0.12 * (high.y - low.y)) {
-                        (true, _) => LimbKind::Wing,
-                        (_, true) => LimbKind::Leg,
-                        _ => LimbKind::Arm,
-                    };
-                    limbs.push(Limb {
-                        kind,
-                        joints: chain,
-                        attach,
-                        partner: None,
-                        stem: false,
-                        beyond: segment(end) * 0.9,
-                    });
-                }
+            let hanging = children[attach].iter().filter(|child| !trunk.contains(child) && !path.contains(child));
+            limbs.extend(hanging.filter_map(|&child| self.hanging_limb(attach, child, heights)));
+        }
+        (trunk, limbs)
+    }
+
+    /// Limb that begins with `child` below the joint `attach` of the trunk; `None` for a short chain that is no tail.
+    fn hanging_limb(&self, attach: usize, child: usize, [low, high]: [f32; 2]) -> Option<Limb> {
+        let (joints, positions) = (self.joints, self.positions);
+        let length = self.below[child] + self.segment(child);
+        let chain = longest_chain(child, self.children, self.below, positions);
+        let is_long = length > LIMB_LENGTH * self.size;
+        let end = chain[chain.len() - 1];
+        let (kind, beyond) = if self.is_central(child) {
+            if !is_long && !joints[child].label.contains("tail") {
+                return None;
             }
-        }
-    } else {
-        // A hand: the joint with the most chains becomes the root, and the wrist another chain.
-        let busiest = order.iter().copied().max_by_key(|&j| (children[j].len(), std::cmp::Reverse(j))).unwrap_or(root);
-        let attach = if children[busiest].len() > 1 { busiest } else { root };
-        reroot(attach, &mut parents, &mut children);
-        (order, below) = ordered(attach, &parents, &children, &positions);
-        trunk = vec![attach];
-        let segment = |j: usize| parents[j].map_or(0.0, |p| positions[j].distance(positions[p]));
-        for &child in &children[attach] {
-            let chain = longest_chain(child, &children, &below, &positions);
-            let beyond = chain.last().map_or(0.0, |&j| segment(j) * 0.8);
-            let stem = chain.contains(&root);
-            limbs.push(Limb { kind: LimbKind::Free, joints: chain, attach, partner: None, stem, beyond });
-        }
+            (LimbKind::Tail, self.segment(end))
+        } else {
+            if !is_long {
+                return None;
+            }
+            let lowest = chain.iter().map(|&j| positions[j].y).fold(f32::INFINITY, f32::min);
+            let is_winged = chain.iter().any(|&j| joints[j].label.contains("wing"));
+            let kind = match (is_winged, lowest < low + 0.12 * (high - low)) {
+                (true, _) => LimbKind::Wing,
+                (_, true) => LimbKind::Leg,
+                _ => LimbKind::Arm,
+            };
+            (kind, self.segment(end) * 0.9)
+        };
+        Some(Limb { kind, joints: chain, attach, partner: None, stem: false, beyond })
     }
-    for a in 0..limbs.len() {
-        let other = mirror[limbs[a].joints[0]];
-        limbs[a].partner = limbs.iter().position(|l| Some(l.joints[0]) == other);
-    }
-    Some(TemplateLimbs { positions, parents, order, trunk, limbs, mirror, size })
 }
 
 /// The joint at the other side of the plane `x = 0` for each joint that has one.

@@ -45,7 +45,7 @@ impl FittedSkeleton {
     }
 
     /// True if mesh and pose have a plane of symmetry, or left and right were made alike as asked.
-    pub fn symmetric(&self) -> bool {
+    pub fn is_symmetric(&self) -> bool {
         self.symmetry.is_some()
     }
 }

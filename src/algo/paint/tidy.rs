@@ -29,8 +29,8 @@ pub enum PruneError {
     Influences,
 }
 
-/// Weights whose free influences are scaled so that those of each point sum to one. Points in order stay to the bit; points
-/// without influences stay without.
+/// Weights with the free influences of each point scaled until all influences of the point sum to one. Points whose
+/// influences do so already stay to the bit; points without influences stay without.
 pub fn normalised(weights: &Weights, locked: &[bool]) -> Weights {
     let rules = RowRules { locked, most: usize::MAX };
     changed(weights, |row| if is_tidy(&row) { row } else { rules.normalised(&row) })

@@ -44,7 +44,7 @@ impl Bones {
         self.homes.is_at_home(self.segments[bone as usize].joint, island)
     }
 
-    /// The bones without those of slots, for what is bound without regard to its part.
+    /// Bones without those of slots, for islands that are bound without regard to body parts.
     pub fn without_slots(&self) -> Vec<BoneSegment> {
         self.segments.iter().filter(|segment| !self.homes.is_slot(segment.joint)).copied().collect()
     }

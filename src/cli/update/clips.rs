@@ -1,4 +1,4 @@
-//! Clips of a rig that go with it to a new version of its template.
+//! Clips of a rig in an update to a new version of its template.
 
 use std::{
     path::{Path, PathBuf},

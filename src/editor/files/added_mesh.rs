@@ -1,4 +1,4 @@
-//! Meshes that come to the open rig, which stays as it is.
+//! Meshes that are added to the open rig.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use super::{
     open::LoadedDocument,
 };
 use crate::{
-    editor::{camera::FrameWhenReady, counted::counted, notice::Notice, settings::EditorSettings},
+    editor::{camera::FrameWhenReady, counts::counted, notice::Notice, settings::EditorSettings},
     files::{FileKind, journal::Origin},
     plugins::surface::SkinOf,
     rig::Rig,

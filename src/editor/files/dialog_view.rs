@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         panel::{EditorOverlay, Requests},
         panels::timeline::{import::MOTION_FILES, map_file::MAP_FILES},
         recovery, style,

@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     algo::face::expression::{ExpressionSet, vrm_mixes},
-    editor::counted::counted,
+    editor::counts::counted,
     files::{
         DocumentBase, FileKind, LoadError, RealDisk, StoreError, TemplateOrigin, is_template_of, load_animation,
         load_model, load_packed_clips, load_rig_text, load_skin, load_template, stem, store_animation, store_avatar,
@@ -84,7 +84,7 @@ pub(super) fn takes_preset(path: &Path) -> bool {
 
 /// Exports the format given by the path's extension.
 pub(super) fn export(world: &mut World, path: PathBuf) {
-    if world.resource::<SaveJob>().what().is_some() {
+    if world.resource::<SaveJob>().name().is_some() {
         world.resource_mut::<SaveJob>().queue(Purpose::Export, path, None);
         return;
     }

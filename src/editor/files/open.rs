@@ -20,8 +20,8 @@ use super::{
 };
 use crate::{
     editor::{
-        ActiveRig, camera::FrameWhenReady, counted::counted, notice::Notice, recovery::Recovery,
-        render_errors::watched, settings::EditorSettings,
+        ActiveRig, camera::FrameWhenReady, counts::counted, notice::Notice, recovery::Recovery, render_errors::watched,
+        settings::EditorSettings,
     },
     files::{
         Disk, FileKind, LoadedMesh, MeshState, MeshToSave, ProjectNote, RealDisk,
@@ -70,7 +70,7 @@ struct Job {
 
 impl LoadJob {
     /// Name of the document that is being opened.
-    pub fn what(&self) -> Option<&str> {
+    pub fn name(&self) -> Option<&str> {
         self.job.as_ref().map(|job| job.name.as_str())
     }
 

@@ -54,7 +54,7 @@ pub struct SaveJob {
 
 impl SaveJob {
     /// Name of the file that is being saved.
-    pub fn what(&self) -> Option<&str> {
+    pub fn name(&self) -> Option<&str> {
         self.job.as_ref().map(|job| job.name.as_str())
     }
 

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         notice::Notice,
         panels::timeline::{TimelineAction, own_motion::own_file},
     },

@@ -10,7 +10,7 @@ use crate::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
-        counted::counted,
+        counts::counted,
         library::ChosenTemplate,
         panel::{Requests, ViewportPainter},
         tools::region::{ChosenFaces, RegionSkeleton, RegionTool},

@@ -57,7 +57,7 @@ pub struct LibraryFolder {
 pub struct LibraryListing {
     /// The folders.
     pub folders: Vec<LibraryFolder>,
-    /// Number of the listing, which tells whether it is another one.
+    /// Number of the listing; every further listing has another number.
     pub number: u64,
 }
 
@@ -128,7 +128,7 @@ pub(super) fn list(
     mut commands: Commands,
 ) {
     let library = library.bypass_change_detection();
-    let is_saving = saving.what().is_some();
+    let is_saving = saving.name().is_some();
     let is_saved = std::mem::replace(&mut library.was_saving, is_saving) && !is_saving;
     let is_asked = requests.read().count() > 0;
     let is_other = landed.read().count() > 0 || is_saved;

@@ -29,7 +29,7 @@ const MOST_PIXELS: u32 = 4096;
 
 /// Request for the pictures of templates that are seen.
 #[derive(Message, Debug, Clone)]
-pub struct WantPictures(pub Vec<Arc<ListedTemplate>>);
+pub struct PictureRequest(pub Vec<Arc<ListedTemplate>>);
 
 /// Picture of a template.
 #[derive(Debug, Clone)]
@@ -68,7 +68,7 @@ impl LibraryPictures {
 
 /// Draws the pictures that are asked for.
 pub(super) fn draw(
-    mut requests: MessageReader<WantPictures>,
+    mut requests: MessageReader<PictureRequest>,
     mut pictures: ResMut<LibraryPictures>,
     folders: Res<LibraryFolders>,
     mut commands: Commands,

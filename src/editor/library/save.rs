@@ -15,7 +15,7 @@ use super::{
 use crate::{
     editor::{
         ActiveRig,
-        counted::counted,
+        counts::counted,
         files::{ExportRequest, OpenDocument, loading::settled},
         notice::Notice,
     },

@@ -17,7 +17,7 @@ use super::{
 use crate::{
     editor::{
         ActiveRig,
-        counted::counted,
+        counts::counted,
         files::{
             OpenDocument,
             loading::{replacing, settled},
@@ -136,7 +136,7 @@ enum Ready {
 
 impl LibraryJobs {
     /// Name of the template that is being read.
-    pub fn what(&self) -> Option<String> {
+    pub fn name(&self) -> Option<String> {
         let running = self.job.as_ref().filter(|job| matches!(job.work, Work::Runs(_)));
         running.map(|job| job.request.place.stem())
     }

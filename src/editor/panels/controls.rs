@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     editor::{
-        counted::built_commands,
+        counts::built_commands,
         panel::{EditorPanel, Requests},
     },
     plugins::{

@@ -9,7 +9,7 @@ use super::displayed_rig::{DisplayedRig, Stamp};
 use crate::{
     editor::{
         actions::{Action, ActionRequest},
-        counted::counted,
+        counts::counted,
         help::describe,
         keys::KeyBindings,
         onion::{ONION_COUNTS, OnionSkin, OnionStep},

@@ -20,7 +20,7 @@ use crate::{
         bones::{FaceBoneKind, Region},
     },
     editor::{
-        counted::counted,
+        counts::counted,
         notice::Notice,
         panel::{EditorPanel, Requests},
     },
@@ -147,6 +147,16 @@ struct FaceData {
     pictures: thumbnail::Pictures,
 }
 
+/// Mesh whose face the panel shows, in its rig.
+#[derive(Clone, Copy)]
+struct FaceTarget<'a, 'w> {
+    world: &'a World,
+    shown: &'a DisplayedRig<'w>,
+    entity: Entity,
+    /// Uid of the mesh in the document.
+    mesh: Uid,
+}
+
 impl EditorPanel for FacePanel {
     fn title(&self) -> &'static str {
         "Face"
@@ -162,9 +172,10 @@ impl EditorPanel for FacePanel {
         };
         self.renew(&shown, (entity, mesh.uid), world.get::<Face>(entity));
         ScrollArea::vertical().id_salt("face").auto_shrink(false).show(ui, |ui| {
-            self.place(ui, world, &shown, (entity, mesh.uid), requests);
+            let target = FaceTarget { world, shown: &shown, entity, mesh: mesh.uid };
+            self.place(ui, &target, requests);
             ui.add_space(4.0);
-            self.options(ui, world, &shown, (entity, mesh.uid), requests);
+            self.options(ui, &target, requests);
             let Some(drawn) = self.shown.as_mut().filter(|drawn| !drawn.known.bones.is_empty()) else {
                 return;
             };
@@ -228,14 +239,8 @@ impl FacePanel {
     }
 
     /// Draws the button; while a job runs, its progress and a button that cancels it.
-    fn place(
-        &mut self,
-        ui: &mut Ui,
-        world: &World,
-        shown: &DisplayedRig,
-        (entity, mesh): (Entity, Uid),
-        requests: &mut Requests,
-    ) {
+    fn place(&mut self, ui: &mut Ui, of: &FaceTarget, requests: &mut Requests) {
+        let FaceTarget { world, shown, entity, mesh } = *of;
         let size = egui::vec2(ui.available_width(), 34.0);
         let was_placing = std::mem::replace(&mut self.is_placing, world.get::<FaceJob>(entity).is_some());
         if let Some(job) = world.get::<FaceJob>(entity) {
@@ -278,14 +283,8 @@ impl FacePanel {
     }
 
     /// Draws the settings, folded by default, with the merge history.
-    fn options(
-        &mut self,
-        ui: &mut Ui,
-        world: &World,
-        shown: &DisplayedRig,
-        (entity, mesh): (Entity, Uid),
-        requests: &mut Requests,
-    ) {
+    fn options(&mut self, ui: &mut Ui, of: &FaceTarget, requests: &mut Requests) {
+        let FaceTarget { world, shown, entity, mesh } = *of;
         CollapsingHeader::new("Settings").show(ui, |ui| {
             fields::labelled(ui, "Seed", |ui| {
                 let field = ui.add(DragValue::new(&mut self.settings.seed).speed(0.1));

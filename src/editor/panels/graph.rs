@@ -57,7 +57,7 @@ use super::{
 use crate::{
     editor::{
         actions::ActionRequest,
-        counted::counted,
+        counts::counted,
         library::DraggedModule,
         notice::Notice,
         panel::{EditorPanel, Requests},

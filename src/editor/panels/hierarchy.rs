@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         library::{DraggedTemplate, goes_onto_both},
         notice::Notice,
         panel::{EditorPanel, Requests},

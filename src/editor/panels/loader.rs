@@ -52,7 +52,7 @@ impl EditorPanel for LoaderPanel {
             if let Some(listed) = self.tiles.show(ui, world, wanted, requests) {
                 requests.set(ChosenTemplate(Some(listed.place.clone())));
             }
-            if let Some(what) = world.get_resource::<LibraryJobs>().and_then(LibraryJobs::what) {
+            if let Some(what) = world.get_resource::<LibraryJobs>().and_then(LibraryJobs::name) {
                 ui.weak(format!("Reading {what} …"));
             }
             match chosen.as_ref().and_then(|place| library.listing().find(place)) {

@@ -8,7 +8,7 @@ use bevy_egui::egui::{self, Color32, Label, Rect, RichText, ScrollArea, Sense, U
 use super::list::{self, List};
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         dock::ShowPanel,
         notice::{EditNotice, Notice, Severity},
         panel::{EditorPanel, Requests},

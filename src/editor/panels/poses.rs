@@ -25,7 +25,7 @@ use crate::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
-        counted::counted,
+        counts::counted,
         notice::Notice,
         panel::{EditorPanel, Requests},
         style,

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         mode::Mode,
         panel::{EditorPanel, Requests},
         settings::EditorSettings,

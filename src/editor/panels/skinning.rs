@@ -21,7 +21,7 @@ use crate::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
-        counted::counted,
+        counts::counted,
         notice::{Notice, Severity},
         panel::{EditorPanel, Requests},
     },

@@ -31,7 +31,7 @@ use super::{
 };
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         dock::ShowPanel,
         notice::Notice,
         panel::{EditorPanel, Requests},
@@ -269,69 +269,16 @@ impl TagsPanel {
         let frame = egui::Frame::group(ui.style()).inner_margin(4.0).outer_margin(egui::Margin::symmetric(0, 1));
         let card = frame.show(ui, |ui| {
             ui.set_width(ui.available_width());
-            ui.horizontal(|ui| {
-                let handle = ui.add(egui::Label::new(RichText::new("☰").weak()).sense(Sense::drag()));
-                handle.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, format!("Drag {}", entry.title())));
-                if handle.drag_started() {
-                    let commands = if entry.module().is_some() { entry.uids() } else { Vec::new() };
-                    DragAndDrop::set_payload(ui.ctx(), DraggedCard { place: number, commands });
-                }
-                handle.on_hover_cursor(CursorIcon::Grab);
-                let is_open = self.open.contains(&tag);
-                let title = entry.title();
-                if list::symbol_button(ui, if is_open { "⏷" } else { "⏵" }, &format!("Values of {title}")) {
-                    if is_open {
-                        self.open.remove(&tag)
-                    } else {
-                        self.open.insert(tag)
-                    };
-                }
-                // The menu takes its room first; in narrow panels the title is cut.
-                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    let menu = ui.menu_button("…", |ui| card_menu(ui, shown, entries, number));
-                    let said = format!("Menu of {title}");
-                    menu.response.widget_info(move || WidgetInfo::labeled(WidgetType::Button, true, &said));
-                    let chosen = menu.inner.flatten();
-                    ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                        let state_width = if entry.module().is_some() { 40.0 } else { 0.0 };
-                        let clicked = ui.scope(|ui| {
-                            ui.set_max_width((ui.available_width() - state_width).max(30.0));
-                            ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Truncate);
-                            enabled(ui, shown, entry)
-                        });
-                        request = clicked.inner.or(chosen);
-                        state_of(ui, world, shown, entry);
-                    });
-                });
-            });
-            let summary = entry.summary();
-            if !self.open.contains(&tag) {
-                if !summary.is_empty() {
-                    ui.add(egui::Label::new(RichText::new(summary).small().weak()).truncate());
-                }
+            request = self.card_head(ui, world, shown, entries, (number, entry));
+            if self.open.contains(&tag) {
+                let (edit, is_shown) = self.card_values(ui, world, shown, modules, (entry, reveals));
+                request = request.take().or(edit);
+                is_field_shown = is_shown;
                 return;
             }
-            let Some(name) = entry.module() else {
-                request = request.take().or(feature_fields(ui, entry));
-                return;
-            };
-            let builder = world.get::<Processor>(shown.entity).map(Processor::builder);
-            match modules.get(name) {
-                Some(module) => {
-                    ui.weak(module.doc);
-                    let failed = failure(world, shown, entry);
-                    if let Some(reason) = failed.and_then(reason) {
-                        ui.colored_label(ui.visuals().error_fg_color, reason);
-                    }
-                    let fault = failed.and_then(|status| Fault::of(status, reveals));
-                    let edit = self.values.show(ui, shown, builder, module, entry, fault.as_ref());
-                    is_field_shown = fault.is_some_and(|fault| fault.is_shown());
-                    request = request.take().or(edit.map(CardRequest::Value));
-                }
-                None => {
-                    let reason = format!("There is no module \"{name}\".");
-                    ui.colored_label(ui.visuals().error_fg_color, reason);
-                }
+            let summary = entry.summary();
+            if !summary.is_empty() {
+                ui.add(egui::Label::new(RichText::new(summary).small().weak()).truncate());
             }
         });
         if reveals && !is_field_shown {
@@ -342,6 +289,81 @@ impl TagsPanel {
             request = request.or(moved(entries, dragged.place, number));
         }
         request
+    }
+
+    /// Draws the first line of a card: its handle, fold, title, state and menu.
+    fn card_head(
+        &mut self,
+        ui: &mut Ui,
+        world: &World,
+        shown: &DisplayedRig,
+        entries: &[Entry],
+        (number, entry): (usize, &Entry),
+    ) -> Option<CardRequest> {
+        let tag = entry.first.uid;
+        let mut request = None;
+        ui.horizontal(|ui| {
+            let handle = ui.add(egui::Label::new(RichText::new("☰").weak()).sense(Sense::drag()));
+            handle.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, format!("Drag {}", entry.title())));
+            if handle.drag_started() {
+                let commands = if entry.module().is_some() { entry.uids() } else { Vec::new() };
+                DragAndDrop::set_payload(ui.ctx(), DraggedCard { place: number, commands });
+            }
+            handle.on_hover_cursor(CursorIcon::Grab);
+            let is_open = self.open.contains(&tag);
+            let title = entry.title();
+            if list::symbol_button(ui, if is_open { "⏷" } else { "⏵" }, &format!("Values of {title}")) {
+                if is_open {
+                    self.open.remove(&tag)
+                } else {
+                    self.open.insert(tag)
+                };
+            }
+            // The menu takes its room first; in narrow panels the title is cut.
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let menu = ui.menu_button("…", |ui| card_menu(ui, shown, entries, number));
+                let said = format!("Menu of {title}");
+                menu.response.widget_info(move || WidgetInfo::labeled(WidgetType::Button, true, &said));
+                let chosen = menu.inner.flatten();
+                ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                    let state_width = if entry.module().is_some() { 40.0 } else { 0.0 };
+                    let clicked = ui.scope(|ui| {
+                        ui.set_max_width((ui.available_width() - state_width).max(30.0));
+                        ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Truncate);
+                        enabled(ui, shown, entry)
+                    });
+                    request = clicked.inner.or(chosen);
+                    state_of(ui, world, shown, entry);
+                });
+            });
+        });
+        request
+    }
+
+    /// Draws the values of an open card. Returns what was asked for, and true if the field at fault is on the screen.
+    fn card_values(
+        &mut self,
+        ui: &mut Ui,
+        world: &World,
+        shown: &DisplayedRig,
+        modules: &Modules,
+        (entry, reveals): (&Entry, bool),
+    ) -> (Option<CardRequest>, bool) {
+        let Some(name) = entry.module() else { return (feature_fields(ui, entry), false) };
+        let Some(module) = modules.get(name) else {
+            let reason = format!("There is no module \"{name}\".");
+            ui.colored_label(ui.visuals().error_fg_color, reason);
+            return (None, false);
+        };
+        ui.weak(module.doc);
+        let failed = failure(world, shown, entry);
+        if let Some(reason) = failed.and_then(reason) {
+            ui.colored_label(ui.visuals().error_fg_color, reason);
+        }
+        let fault = failed.and_then(|status| Fault::of(status, reveals));
+        let builder = world.get::<Processor>(shown.entity).map(Processor::builder);
+        let edit = self.values.show(ui, shown, builder, module, entry, fault.as_ref());
+        (edit.map(CardRequest::Value), fault.is_some_and(|fault| fault.is_shown()))
     }
 }
 

@@ -21,10 +21,10 @@ mod marks;
 mod mask;
 mod menu;
 pub mod motion_options;
+mod orphaned_keys;
 pub(in crate::editor) mod own_motion;
 mod row;
 mod ruler;
-mod set_aside;
 mod sheet;
 mod shown_pose;
 mod state;
@@ -131,7 +131,7 @@ impl EditorPanel for TimelinePanel {
             && let Some(draft) = import.draft().filter(|draft| draft.rig == shown.entity)
         {
             self.gesture = None;
-            return joint_table::show(ui, draft, &shown, import.what().is_some(), requests);
+            return joint_table::show(ui, draft, &shown, import.name().is_some(), requests);
         }
         let (Some(open), Some(timeline)) = (open, world.get_resource::<Timeline>()) else {
             self.gesture = None;

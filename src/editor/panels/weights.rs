@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         notice::Notice,
         panel::{EditorPanel, Requests},
         tools::paint::brush::BrushPlugin,

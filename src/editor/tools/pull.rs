@@ -17,7 +17,7 @@ use crate::{
     editor::{
         actions::{Action, ActionRequest},
         building::use_controls,
-        counted::counted,
+        counts::counted,
         mode::Mode,
         notice::{Notice, StatusLine},
         pointer::{PointerAct, ViewportPointer},

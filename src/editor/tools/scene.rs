@@ -7,7 +7,7 @@ use bevy::{
 };
 
 use crate::{
-    editor::{ActiveRig, camera::ViewportSight, counted::counted},
+    editor::{ActiveRig, camera::ViewportSight, counts::counted},
     plugins::{
         animation::ClipPlayer,
         commands::BuildResult,

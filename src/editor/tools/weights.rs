@@ -8,7 +8,7 @@ use super::{
     scene::{EditedRig, Scene},
 };
 use crate::{
-    editor::{counted::counted, mode::Mode, notice::StatusLine},
+    editor::{counts::counted, mode::Mode, notice::StatusLine},
     plugins::display::{MeshDisplay, WeightColors},
     rig::Uid,
 };

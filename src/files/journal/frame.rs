@@ -5,7 +5,7 @@ use crate::rig::skin::content_hash;
 
 /// First bytes of every journal.
 pub(super) const MAGIC: [u8; 8] = *b"RIGJRNL\0";
-/// Format that this version writes, and the highest one that it reads.
+/// Number of the journal format that Rigsmith writes, which is also the highest number that it reads.
 ///
 /// A later format has to mix its number into the checksums, so that they reveal the format where the prelude is
 /// damaged.

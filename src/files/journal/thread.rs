@@ -36,7 +36,7 @@ pub(super) struct Writer {
     pub session: u64,
     pub places: JournalPlaces,
     pub content: Content,
-    /// Path of the former journal that this one replaces.
+    /// Path of the former journal, which the new journal replaces.
     pub replaces: Option<PathBuf>,
 }
 

@@ -46,8 +46,7 @@ pub struct JournalStart {
     pub origin: Origin,
     /// Present rig; `None` if a project file holds exactly this rig, or the rig is empty and has no uid.
     pub rig: Option<Rig>,
-    /// Text with anything else that the caller needs after a crash, such as the meshes that are open; returned
-    /// unchanged.
+    /// Text of the caller for the time after a crash, such as the paths of the open meshes. Recovery returns it unchanged.
     pub context: String,
     /// The rig that a project file holds, where `rig` is `None`. It is not written; a journal that knows it can fold, see
     /// [`MOST_CHANGES`](super::MOST_CHANGES).

@@ -1,4 +1,4 @@
-//! Versions of a template in which the part instances that are one have one uid.
+//! Versions of a template with equal uids for the part instances that correspond to each other.
 
 use std::{collections::BTreeMap, path::Path};
 

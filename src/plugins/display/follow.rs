@@ -407,7 +407,7 @@ pub(super) fn assign_materials(
         let displayed = displayed.bypass_change_detection();
         displayed.fresh = false;
         for shown in &mut displayed.surface.pieces {
-            let look = match (shown.painted(), display.shading, shown.material) {
+            let look = match (shown.is_painted(), display.shading, shown.material) {
                 (true, ..) => Look::Painted,
                 (_, Shading::Shaded, Some(material)) => Look::Material(material),
                 _ => Look::Clay,

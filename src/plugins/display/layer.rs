@@ -286,7 +286,7 @@ impl Layer {
 
 impl ShownPiece {
     /// Returns `true` if the piece shows weights.
-    pub fn painted(&self) -> bool {
+    pub fn is_painted(&self) -> bool {
         self.key.colors != WeightColors::Off
     }
 

@@ -51,7 +51,7 @@ impl EntityIndex {
         self.0.get(&entity).copied()
     }
 
-    /// Uid of an entity that represents a part of this kind of this rig.
+    /// Uid of the joint, group, tag or node that an entity represents; `None` for an entity of another kind or another rig.
     pub fn uid_of(&self, entity: Entity, rig: Entity, part: EntityPart) -> Option<Uid> {
         self.get(entity).filter(|indexed| indexed.rig == rig && indexed.part == part).map(|indexed| indexed.uid)
     }

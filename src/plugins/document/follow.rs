@@ -18,7 +18,7 @@ use crate::{
             Null, Tag, TagOf,
         },
     },
-    rig::{NodeKind, PoseOffset, RestTransform, Rig, TagKind, Uid},
+    rig::{NodeKind, PoseOffset, RestTransform, Rig, RigJoint, TagKind, Uid},
 };
 
 type FollowedRig<'a> = (
@@ -43,73 +43,20 @@ pub(in crate::plugins) fn follow_rigs(
     for (rig_entity, rig, mut joints, mut groups, show_rest, is_running, name, uid) in &mut rigs {
         let rig: &Rig = &rig;
         let known = joints.bypass_change_detection();
-        // A name or uid that other code gave to the rig, and that this plugin has not written, waits for its adoption.
-        if known.rig_name.as_ref() != Some(&rig.about().name) {
-            if known.rig_name.is_some() || name.is_none() {
-                commands.entity(rig_entity).try_insert(Name::new(rig.about().name.clone()));
-            }
-            known.rig_name = Some(rig.about().name.clone());
-        }
-        if known.rig_uid != Some(rig.uid()) {
-            if known.rig_uid.is_some() || uid.is_none() {
-                commands.entity(rig_entity).try_insert(rig.uid());
-            }
-            known.rig_uid = Some(rig.uid());
-        }
+        describe_rig(&mut commands, rig_entity, rig, known, (name.is_none(), uid.is_none()));
         let is_posed = !show_rest.is_some_and(|show_rest| show_rest.0);
         if known.follow(rig) {
             follow_pose(known, rig, is_posed, is_running, &mut places);
             continue;
         }
         follow_groups(&mut commands, rig_entity, rig, groups.bypass_change_detection(), &mut index);
-        let mut is_other = false;
-        let mut gone: Vec<(Uid, Entity)> = (known.joints.iter())
-            .filter(|(uid, _)| rig.joint(**uid).is_none())
-            .map(|(uid, mirrored)| (*uid, mirrored.entity))
-            .collect();
-        gone.sort_unstable();
-        for (uid, entity) in gone {
-            index.remove(entity);
-            if let Ok(mut entity) = commands.get_entity(entity) {
-                // Remaining children get another parent after the build, so they must not be despawned with this
-                // entity.
-                entity.detach_all_children().try_despawn();
-            }
-            known.joints.remove(&uid);
-            known.posed.remove(&uid);
-            is_other = true;
-        }
+        let mut is_other = remove_gone_joints(&mut commands, rig, known, &mut index);
         for joint in rig.walk() {
             let data = &joint.data;
             let offset = rig.offset(data.uid).filter(|_| is_posed);
             let Some(mirrored) = known.joints.get_mut(&data.uid) else {
-                let posed = offset.copied().unwrap_or_default().on(&data.rest);
-                let parent = joint.parent.and_then(|parent| known.get(parent)).unwrap_or(rig_entity);
-                let bundle = (Joint, data.uid, data.rest, posed, NodeOf(rig_entity), ChildOf(parent));
-                let mut entity = commands.spawn(bundle);
-                if data.kind == NodeKind::Null {
-                    entity.insert(Null);
-                }
-                let entity = entity.id();
-                let mut mirrored = MirroredJoint {
-                    entity,
-                    label: None,
-                    group: None,
-                    rest: data.rest,
-                    parent: Some(parent),
-                    kind: data.kind,
-                    tags: Vec::new(),
-                };
-                describe(
-                    &mut commands,
-                    &mut mirrored,
-                    data.label.as_deref(),
-                    data.group,
-                    groups.bypass_change_detection(),
-                );
-                index.insert(entity, rig_entity, data.uid, EntityPart::Joint);
-                known.joints.insert(data.uid, mirrored);
-                known.set_posed(data.uid, offset);
+                let groups = groups.bypass_change_detection();
+                spawn_joint(&mut commands, rig_entity, joint, offset, known, groups, &mut index);
                 is_other = true;
                 continue;
             };
@@ -145,6 +92,82 @@ pub(in crate::plugins) fn follow_rigs(
             joints.set_changed();
         }
     }
+}
+
+/// Writes name and uid of a rig to its entity. A name or uid that other code gave to the rig, and that this plugin has not
+/// written, waits for its adoption.
+fn describe_rig(
+    commands: &mut Commands,
+    rig_entity: Entity,
+    rig: &Rig,
+    known: &mut JointEntities,
+    (lacks_name, lacks_uid): (bool, bool),
+) {
+    if known.rig_name.as_ref() != Some(&rig.about().name) {
+        if known.rig_name.is_some() || lacks_name {
+            commands.entity(rig_entity).try_insert(Name::new(rig.about().name.clone()));
+        }
+        known.rig_name = Some(rig.about().name.clone());
+    }
+    if known.rig_uid != Some(rig.uid()) {
+        if known.rig_uid.is_some() || lacks_uid {
+            commands.entity(rig_entity).try_insert(rig.uid());
+        }
+        known.rig_uid = Some(rig.uid());
+    }
+}
+
+/// Despawns the entities of joints that the document has no more; true if there were any.
+fn remove_gone_joints(commands: &mut Commands, rig: &Rig, known: &mut JointEntities, index: &mut EntityIndex) -> bool {
+    let mut gone: Vec<(Uid, Entity)> = (known.joints.iter())
+        .filter(|(uid, _)| rig.joint(**uid).is_none())
+        .map(|(uid, mirrored)| (*uid, mirrored.entity))
+        .collect();
+    gone.sort_unstable();
+    for (uid, entity) in &gone {
+        index.remove(*entity);
+        if let Ok(mut entity) = commands.get_entity(*entity) {
+            // Remaining children get another parent after the build, so they must not be despawned with this entity.
+            entity.detach_all_children().try_despawn();
+        }
+        known.joints.remove(uid);
+        known.posed.remove(uid);
+    }
+    !gone.is_empty()
+}
+
+/// Spawns the entity of a joint, below that of its parent in the document.
+fn spawn_joint(
+    commands: &mut Commands,
+    rig_entity: Entity,
+    joint: &RigJoint,
+    offset: Option<&PoseOffset>,
+    known: &mut JointEntities,
+    groups: &GroupEntities,
+    index: &mut EntityIndex,
+) {
+    let data = &joint.data;
+    let posed = offset.copied().unwrap_or_default().on(&data.rest);
+    let parent = joint.parent.and_then(|parent| known.get(parent)).unwrap_or(rig_entity);
+    let bundle = (Joint, data.uid, data.rest, posed, NodeOf(rig_entity), ChildOf(parent));
+    let mut entity = commands.spawn(bundle);
+    if data.kind == NodeKind::Null {
+        entity.insert(Null);
+    }
+    let entity = entity.id();
+    let mut mirrored = MirroredJoint {
+        entity,
+        label: None,
+        group: None,
+        rest: data.rest,
+        parent: Some(parent),
+        kind: data.kind,
+        tags: Vec::new(),
+    };
+    describe(commands, &mut mirrored, data.label.as_deref(), data.group, groups);
+    index.insert(entity, rig_entity, data.uid, EntityPart::Joint);
+    known.joints.insert(data.uid, mirrored);
+    known.set_posed(data.uid, offset);
 }
 
 /// Writes the transforms of joints that the document poses otherwise than before.

@@ -42,7 +42,7 @@ pub struct PlacedBone {
     pub label: String,
     /// Marks a bone that a person made, or has moved, renamed, locked, retagged or given a child.
     pub touched: bool,
-    /// The bone above, by its number among the face's, if it is a facial one.
+    /// Number of the facial bone above; `None` below a joint that is no facial bone.
     pub carrier: Option<usize>,
 }
 

@@ -73,7 +73,7 @@ pub fn triangles_held(triangles: &[[u32; 3]], weights: &Weights, is_wanted: impl
     numbers(triangles, |corners| corners.iter().map(share).sum::<f32>() > HELD * 3.0)
 }
 
-/// Numbers of the triangles of a mesh that its weights bind to joints of the rig and to those below them; none without
+/// Numbers of the triangles that the weights of a mesh bind to the joints or to descendants of the joints; empty without
 /// weights.
 pub fn triangles_of_joints(mesh: &RigMesh, rig: &Rig, joints: &[Uid]) -> Vec<u32> {
     let Some(skin) = rig.skin(mesh.uid) else { return Vec::new() };

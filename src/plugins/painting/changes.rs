@@ -7,7 +7,7 @@ use bevy::{
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
 };
 
-use super::paintable::locks;
+use super::paintable_joints::locks;
 use crate::{
     algo::{
         paint::{PruneError, PruneSettings, keep_locked, normalised, pruned},

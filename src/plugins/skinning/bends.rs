@@ -41,7 +41,7 @@ pub(super) struct TriedBend {
     is_fitted: bool,
 }
 
-/// The length by which a half joint has to leave a bend so that a mesh keeps its volume.
+/// Length by which a half joint leaves a bend to keep the volume of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FittedPush {
     /// The command that makes the half joint.

@@ -47,8 +47,8 @@ pub struct CommandCounts {
 }
 
 impl Builder {
-    /// Numbers of commands in effect, of all that a build carries out, and of those that it passes over. A reference to
-    /// something that is off is known from the first run on.
+    /// Numbers of commands: those in effect, those that a whole build carries out, and those that it passes over. References
+    /// to something that is off are known from the first run on.
     pub fn counts(&self) -> CommandCounts {
         let cursor = self.cursor();
         let mut counts = CommandCounts::default();

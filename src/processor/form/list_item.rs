@@ -5,7 +5,7 @@ use bevy::reflect::{TypeInfo, enums::EnumInfo};
 use super::{FormBinding, FormElement, TypeAt, type_at};
 use crate::{processor::ModuleInfo, rig::with_field};
 
-/// Elements that edit one item of a list, and the item that is added to one.
+/// Elements for one item of a list, and the item that a person adds to the list.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ListItem {
     /// Elements of an item: a single one without a parameter for a plain value, else one for each field of the item.
@@ -50,27 +50,6 @@ impl ListItem {
             bound
         };
         self.elements.iter().map(row).collect()
-    }
-}
-
-impl FormElement {
-    /// Parameter and label of an element that edits one.
-    fn binding_mut(&mut self) -> Option<(&mut String, &mut String)> {
-        match self {
-            Self::Text(bound)
-            | Self::Check(bound)
-            | Self::Vector(bound)
-            | Self::Limits(bound)
-            | Self::Color(bound)
-            | Self::Node(bound)
-            | Self::Curve(bound)
-            | Self::Amount(bound)
-            | Self::List(bound) => Some((&mut bound.param, &mut bound.label)),
-            Self::Menu { param, label, .. } | Self::Slider { param, label, .. } | Self::Number { param, label, .. } => {
-                Some((param, label))
-            }
-            Self::Frame { .. } | Self::Separator | Self::Comment(_) => None,
-        }
     }
 }
 

@@ -32,9 +32,9 @@ pub(in crate::processor) struct Trace {
     pub made: u32,
     /// First gap of a list that the command goes through.
     pub partial: Option<Gap>,
-    /// The parameter that was read last as if it were left out, because what it means is off.
+    /// Parameter that the command read as left out because the node that it refers to is off; the last one of several.
     pub optional_off: Option<(String, Exclusion)>,
-    /// The nearest node that is built above what it cannot do without.
+    /// Nearest built node above the node that the command needs and that is off.
     pub above: Option<NodeId>,
 }
 

@@ -42,8 +42,8 @@ const LOW: f32 = 0.3;
 const ASIDE: f32 = 0.01;
 
 impl FourLegs {
-    /// Skeleton that stands along Y or Z on two pairs of legs, one of them below the other in the hierarchy; `None` for any
-    /// other one.
+    /// Skeleton with Y or Z up that stands on two pairs of legs, one pair below the other in the hierarchy; `None` for other
+    /// skeletons.
     pub fn find(joints: &[SkeletonJoint]) -> Option<Self> {
         [[Vec3::Y, Vec3::X], [Vec3::Y, Vec3::Z], [Vec3::Z, Vec3::X], [Vec3::Z, Vec3::Y]]
             .into_iter()

@@ -205,8 +205,8 @@ pub fn by_names(joints: &[SkeletonJoint]) -> HumanJoints {
     by_names_and(joints, &BTreeMap::new())
 }
 
-/// Joints that stand for bones, by their names and by what is known of bones that have no such names. Empty if both together
-/// say nothing.
+/// Joints that stand for the bones of a human, found by their names; `known` has the joints of further bones. Empty if
+/// neither names nor `known` give a skeleton.
 pub fn by_names_and(joints: &[SkeletonJoint], known: &BTreeMap<HumanBone, usize>) -> HumanJoints {
     let mut named = named_bones(joints);
     for (bone, joint) in known {

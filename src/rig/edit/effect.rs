@@ -1,4 +1,4 @@
-//! Effects of edits, by which others decide whether an edit concerns them.
+//! Effects of edits: the joints and tags that an edit adds, the size of its weights, and whether it concerns motion alone.
 
 use std::collections::HashSet;
 

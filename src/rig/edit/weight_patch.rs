@@ -241,7 +241,7 @@ pub fn weight_edit(mesh: Uid, before: &SkinData, after: SkinData) -> Option<RigE
     }
 }
 
-/// Joint numbers of the list after joints were added to it at the end, for those that it did not have.
+/// Numbers of `joints` in the list of a skin, and the joints that the list lacks, whose numbers follow behind its end.
 pub fn joint_numbers(skin: &SkinData, joints: &[(Uid, Option<Uid>)]) -> (Vec<u32>, Vec<(Uid, Option<Uid>)>) {
     let known: BTreeMap<Uid, u32> =
         skin.joints.iter().rev().zip((0..skin.joints.len() as u32).rev()).map(|(a, b)| (*a, b)).collect();

@@ -65,7 +65,7 @@ impl SkinJoint {
     }
 }
 
-/// The mesh that weights were made for, so that they can be transferred to a changed one.
+/// Copy of the mesh that weights were made for. Weights are transferred from it to a changed mesh.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SkinMesh {
     /// Positions of the weighted points.

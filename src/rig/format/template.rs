@@ -39,11 +39,11 @@ pub(crate) use file_marks::FileMarks;
 pub(crate) use moved_text::{with_changes_on_lines, with_part_files, with_part_uids, with_rig_uid};
 pub(in crate::rig) use read::read_text;
 pub use read::{read_header, read_template, survey_template, text_of};
-pub use shorthand::{Explicit, explicit};
+pub use shorthand::{ExplicitText, explicit};
 pub use text_patch::write_template_over;
 pub(crate) use text_patch::{
-    PartRigs, says_the_same, unsaid_parts, with_instance_fields, with_instances, with_instances_of, without_instances,
-    write_changes_over, write_own_over, write_short_template,
+    PartRigs, differing_parts, says_the_same, with_instance_fields, with_instances, with_instances_of,
+    without_instances, write_changes_over, write_own_over, write_short_template,
 };
 pub use tidy::{UidStyle, format_template};
 pub use write::write_template;
@@ -176,7 +176,7 @@ pub struct Template {
     pub options: Vec<PartOption>,
     /// Parts that have not been put into the rig yet: see [`Template::with_parts`].
     pub parts: Vec<PartInstance>,
-    /// Joints of the rig that hang on what its parts bring; empty once these are in the rig.
+    /// Joints of the rig whose parents come from parts; empty once the parts are in the rig.
     pub hung: Vec<HungJoint>,
     /// Parts that have been put into the rig.
     pub instances: Vec<PartInstance>,

@@ -25,7 +25,7 @@ use glam::Vec3;
 
 use error::quoted;
 
-/// Version of the format that is written, and the highest one that is read.
+/// Number of the format that Rigsmith writes, which is also the highest number that it reads.
 pub const VERSION: u32 = 1;
 
 /// Skeleton in the form of a `.rig` file.
@@ -79,7 +79,7 @@ pub fn parse(bytes: &[u8]) -> Result<RigText, RigTextError> {
     connect(rows)
 }
 
-/// False if the first bytes of a file show that it is no `.rig` text, so that [`parse`] refuses them like the whole file.
+/// False if the first bytes of a file cannot begin a `.rig` text: [`parse`] refuses these bytes as it would refuse the file.
 pub fn may_begin_with(bytes: &[u8]) -> bool {
     let text = match std::str::from_utf8(bytes) {
         Ok(text) => text.strip_prefix('\u{FEFF}').unwrap_or(text),

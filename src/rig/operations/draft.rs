@@ -21,7 +21,7 @@ pub struct Draft<'a> {
 pub struct Outcome {
     /// The edits, in the order they were applied.
     pub edits: Vec<RigEdit>,
-    /// The edits that take them back, in the order to apply them.
+    /// Inverses of the edits, in the order in which undo applies them.
     pub inverses: Vec<RigEdit>,
     /// The joints to select afterwards; `None` keeps the selection.
     pub selected: Option<Vec<Uid>>,

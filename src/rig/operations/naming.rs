@@ -43,8 +43,8 @@ pub(super) struct ChainName {
 }
 
 impl ChainName {
-    /// Names a chain by the joint that it hangs on and by where it goes. `positions` are the places of its joints,
-    /// `parent` the joint above. The names are those of a character that stands upright and looks along +Z.
+    /// Name of a chain by the joint that carries it and by its direction. `positions` are the places of the chain's joints,
+    /// `parent` is the joint above. The names are those of a character that stands upright and looks along +Z.
     pub fn new(rig: &Rig, positions: &[Vec3], parent: Option<Uid>, plane: Option<&MirrorPlane>) -> Self {
         let upper = parent.and_then(|parent| rig.joint(parent));
         let known = upper.and_then(|joint| joint.data.label.as_deref()).and_then(Place::of);

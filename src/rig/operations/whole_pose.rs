@@ -29,12 +29,12 @@ impl WholePose {
         Self { offsets: rig.pose().clone(), values: rig.attribute_values().clone() }
     }
 
-    /// Nodes that are not at rest, or that have an attribute that was set.
+    /// Nodes with an offset from rest or with a value of an attribute.
     pub fn nodes(&self) -> BTreeSet<Uid> {
         self.offsets.keys().chain(self.values.keys()).copied().collect()
     }
 
-    /// Pose between this one (share 0) and another one (share 1): rotations turn along the shorter way, and choices change
+    /// Pose between `self` (share 0) and `other` (share 1): rotations turn along the shorter way, and choices change
     /// in the middle. Both ends are exact.
     pub fn towards(&self, other: &Self, share: f32, built: Option<&BuiltRig>) -> Self {
         if share <= 0.0 {
@@ -104,8 +104,8 @@ impl WholePose {
         nodes.iter().filter_map(|node| pairs.get(node).copied()).collect()
     }
 
-    /// Operation that brings nodes, or all of them, from the pose that is shown (`self`) to another one. Nodes that are in
-    /// the same pose in both are left alone.
+    /// Operation that changes the shown pose (`self`) of some nodes, or of all nodes, to another pose. Nodes with the same
+    /// offset in both poses are left alone.
     pub fn change_to(&self, other: &Self, nodes: Option<&BTreeSet<Uid>>, name: &'static str) -> Operation {
         let is_meant = |node: &Uid| nodes.is_none_or(|nodes| nodes.contains(node));
         let all: BTreeSet<Uid> = self.nodes().into_iter().chain(other.nodes()).filter(is_meant).collect();

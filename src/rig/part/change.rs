@@ -41,7 +41,7 @@ pub struct PartChange {
     pub rotation: Option<Quat>,
     /// Other scale factors of the joint.
     pub scale: Option<[f32; 3]>,
-    /// Tags that the joint has besides, each with the uid that it has in the rig.
+    /// Tags that the joint has beyond those of the part, with their uids in the rig.
     pub tags: Vec<TagData>,
 }
 

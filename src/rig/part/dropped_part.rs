@@ -11,7 +11,7 @@ use crate::rig::{EditError, Rig, RigEdit, Uid, label::mirrored_label};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DroppedPart {
-    /// Identity of the instance, from which those of what the part brings follow.
+    /// Identity of the instance. The uids of the joints and tags that the part brings follow from it.
     pub uid: Uid,
     /// File of the part, as a template names it.
     pub part: String,

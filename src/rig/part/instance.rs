@@ -29,7 +29,7 @@ use crate::rig::{
 /// eight times, would bring billions.
 pub(in crate::rig) const MOST_BROUGHT: usize = 50_000;
 
-/// A template that others use, with what it lets them vary.
+/// Template that other templates use as a part, with the places and numbers that each use may choose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
     /// Joints and tags.
@@ -38,9 +38,9 @@ pub struct Part {
     pub chains: Vec<PartChain>,
     /// Places that other parts hang on.
     pub sockets: Vec<PartSocket>,
-    /// Values that its uses may set.
+    /// Values that uses of the part may set.
     pub options: Vec<PartOption>,
-    /// Text of its file, if it has one.
+    /// Text of the part's file; `None` for a part without a file.
     pub source: Option<Arc<PartSource>>,
 }
 
@@ -89,7 +89,7 @@ impl From<Template> for Part {
 /// A part in a template.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PartInstance {
-    /// Identity, from which those of what comes of it follow.
+    /// Identity of the instance. The uids of the joints and tags that the instance brings follow from it.
     pub uid: Uid,
     /// File of the part, relative to that of the template.
     pub part: String,
@@ -132,7 +132,7 @@ pub(super) const ATTRIBUTE: &str = "attribute";
 
 /// Notes and faults of a part that was put into a rig.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct PutPart {
+pub struct PartReport {
     /// Notes, a sentence each.
     pub notes: Vec<String>,
     /// Options and changes of the instance that do not fit the part; changes with their number.
@@ -163,7 +163,7 @@ impl PartInstance {
         fitted: &Rig,
         mirror: MirrorParams,
         socket: Option<&PartSocket>,
-    ) -> Result<PutPart, PartError> {
+    ) -> Result<PartReport, PartError> {
         let (options, errors) = self.option_changes(part, mirror);
         let mut faults: Vec<(Option<usize>, PartError)> =
             errors.into_iter().map(|error| (None, PartError::from(error))).collect();
@@ -184,7 +184,7 @@ impl PartInstance {
             faults.extend(done.err().map(|error| (number, error)));
         }
         let notes = draft.finish().notes.into_iter().map(|note| format!("part {}: {note}", self.title())).collect();
-        Ok(PutPart { notes, faults })
+        Ok(PartReport { notes, faults })
     }
 
     /// Puts the joints and the tags of the part into a rig; returns the joints there.

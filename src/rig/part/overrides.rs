@@ -9,7 +9,7 @@ use crate::rig::{
     },
 };
 
-/// One thing that an instance changes of its part.
+/// Difference between an instance and its part.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PartOverride {
     /// Changed thing: `joint LABEL`, `tag MODULE/NAME`, `feature NAME` or `option NAME`.

@@ -24,8 +24,8 @@ pub(super) struct PlacedCopy<'a> {
 }
 
 impl PlacedCopy<'_> {
-    /// A version with the uids, names and places that it has as this copy, among the joints that it hangs on. What is not of
-    /// the copy is as in the rig, so that no comparison finds it changed.
+    /// Version of the template with the uids, names and places that its joints and tags have in this copy, below the joints
+    /// of the host. Everything else is as in the host's rig, so that a comparison finds changes of the copy alone.
     pub fn place(&self, version: &Rig) -> Rig {
         let mut out = Rig::new(self.rig.uid(), "");
         out.about = self.rig.about().clone();

@@ -21,6 +21,9 @@ use crate::rig::{
 /// Fields that say where a part is. A part is in one place, so that these are decided together.
 const PLACE: [&str; 4] = ["onto", "adds", "parent", "socket"];
 
+/// Name of the field with the name of an instance.
+const NAME: &str = "name";
+
 /// A version of a template, with what its parts bring.
 #[derive(Debug, Clone)]
 pub struct TemplateWithParts {
@@ -38,9 +41,18 @@ pub struct MergedParts {
     /// Instances that all versions have, with the fields that they have then. Joints are named by their uids.
     pub instances: Vec<PartInstance>,
     /// Changes of fields.
-    pub changes: Vec<Change>,
+    pub changes: Vec<FieldChange>,
     /// True if a field differs between two versions.
     pub differs: bool,
+}
+
+/// Change of a field of a part instance.
+#[derive(Debug, Clone)]
+pub struct FieldChange {
+    /// The change as it is listed.
+    pub change: Change,
+    /// True for the name of the instance.
+    pub is_name: bool,
 }
 
 /// A version of a template whose part instances have other fields.
@@ -125,7 +137,7 @@ impl Sides<'_> {
         let prefix = |a: &PartInstance| (!a.prefix.is_empty()).then(|| quoted(&a.prefix));
         let mut list: Vec<Field<PartInstance>> = vec![
             field("part", |a: &PartInstance| Some(quoted(&a.part)), |a, b| a.part.clone_from(&b.part)),
-            field("name", name, |a: &mut PartInstance, b: &PartInstance| a.name.clone_from(&b.name)),
+            field(NAME, name, |a: &mut PartInstance, b: &PartInstance| a.name.clone_from(&b.name)),
             field("onto", onto, |a: &mut PartInstance, b: &PartInstance| a.onto.clone_from(&b.onto)),
             field("adds", move |a: &PartInstance| flag(a.adds), |a, b| a.adds = b.adds),
             field("parent", parent, |a: &mut PartInstance, b: &PartInstance| a.parent.clone_from(&b.parent)),
@@ -169,7 +181,12 @@ impl Sides<'_> {
     }
 
     /// The instance after the update.
-    fn merged(&self, fields: &[Field<PartInstance>], choices: &Choices, changes: &mut Vec<Change>) -> PartInstance {
+    fn merged(
+        &self,
+        fields: &[Field<PartInstance>],
+        choices: &Choices,
+        changes: &mut Vec<FieldChange>,
+    ) -> PartInstance {
         let Self { base, now, file } = *self;
         let is_moved_by_both = place(now) != place(file)
             && base.is_none_or(|base| place(base) != place(now) && place(base) != place(file));
@@ -186,7 +203,7 @@ impl Sides<'_> {
             if !conflict || choices.of(now.uid, Some(&name)) == Take::Theirs {
                 (field.take)(&mut merged, file);
             }
-            changes.push(Change {
+            let change = Change {
                 kind: ChangeKind::Changed,
                 uid: now.uid,
                 joint: None,
@@ -195,7 +212,8 @@ impl Sides<'_> {
                 from: mine,
                 to: theirs,
                 conflict,
-            });
+            };
+            changes.push(FieldChange { change, is_name: field.name == NAME });
         }
         // Places that are chosen from both sides may be none.
         let is_onto = !merged.onto.is_empty();

@@ -1,4 +1,5 @@
-//! Part instances of two versions that are one, though their uids differ, and those that one version alone has.
+//! Part instances of two versions of a template: pairs that correspond to each other though their uids differ, and
+//! instances that one version alone has.
 //!
 //! A uid that is left out follows from the file of the part and from the name, or else from the joints that the part goes onto.
 //! So another file or other joints make another uid, and what was posed and changed of the part would be lost with it.
@@ -8,9 +9,10 @@ use std::collections::{BTreeMap, HashSet};
 use super::{Change, ChangeKind, TemplateWithParts};
 use crate::rig::{Uid, format::template::quoted, part::PartInstance};
 
-/// Uids in `own` of instances of `other` that have another uid there, by those that they have there. Each has one counterpart
-/// alone: by its name, by its joints, by its part and the place where that stands, or by its part with prefix and side, in this
-/// order. Where both uids are written, they are two.
+/// Pairs of instances with different uids: the uid in `other`, and the uid of the corresponding instance in `own`. Instances
+/// correspond by their names, by their joints, by their part and the place where it stands, or by their part with prefix and
+/// side, in this order, and each has one counterpart at most. Instances whose uids are written in both files do not
+/// correspond.
 pub fn same_parts(own: &[PartInstance], other: &[PartInstance]) -> BTreeMap<Uid, Uid> {
     let is_in = |list: &[PartInstance], uid: Uid| list.iter().any(|part| part.uid == uid);
     let mut gone: Vec<&PartInstance> = own.iter().filter(|part| !is_in(other, part.uid)).collect();
@@ -88,7 +90,8 @@ pub fn moved_part(uid: Uid, from: &PartInstance, to: &PartInstance) -> Option<Ch
     })
 }
 
-/// The changes with one for each part instance that one of two versions alone has, in place of those of all that it brings.
+/// Changes in which a part instance that one version alone has is a single change, in place of one change for each joint and
+/// tag that the instance brings.
 pub fn with_whole_parts(mut changes: Vec<Change>, [from, to]: [&TemplateWithParts; 2]) -> Vec<Change> {
     for (of, other, kind) in [(from, to, ChangeKind::Removed), (to, from, ChangeKind::Added)] {
         for (instance, fitted) in &of.fitted {

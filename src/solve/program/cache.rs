@@ -44,7 +44,7 @@ impl ProgramCache {
         Ok(program)
     }
 
-    /// Takes note of a program that was compiled elsewhere, so that it is shared by equal content, too.
+    /// Adds a program that was compiled elsewhere; later requests with equal content share it.
     pub fn adopt(&mut self, program: &Arc<RigProgram>) {
         let known = self.programs.entry(program.hash()).or_default();
         if known.strong_count() == 0 {

@@ -90,7 +90,7 @@ pub(super) struct Place<T> {
 }
 
 impl<T: Real> Place<T> {
-    /// Maps a transform relative to this one to the parent space of this one.
+    /// Maps `local`, a transform relative to `self`, to the space in which `self` is given.
     #[inline(always)]
     pub fn place(&self, local: &Self) -> Self {
         Self {

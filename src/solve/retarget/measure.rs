@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::{Stance, Touch, TouchedThing};
+use super::{Stance, Touch, TouchTarget};
 use crate::{
     rig::{
         Rig,
@@ -99,7 +99,7 @@ pub fn measure_hands(
         return report;
     }
     let mut state = RigState::new(program.clone());
-    for touch in touches.iter().filter(|touch| touch.thing == TouchedThing::World) {
+    for touch in touches.iter().filter(|touch| touch.thing == TouchTarget::World) {
         let side = if touch.left { BodySide::Left } else { BodySide::Right };
         let hand = bones.get(&HumanBone::Limb(side, LimbBone::Hand)).and_then(|joints| globals.get(*joints.first()?));
         let Some((uid, _)) = hand else { continue };

@@ -24,7 +24,7 @@ const BLOCK: usize = 32;
 pub(super) struct TrackReach {
     /// Greatest way of a joint for one unit of the track, a degree for rotations.
     pub most: f32,
-    /// Places among those of [`Player::each`] that the track moves.
+    /// Indices of the places that the track moves, in the list that [`Player::each`] hands over.
     pub places: BTreeSet<usize>,
 }
 

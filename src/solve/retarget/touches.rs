@@ -35,13 +35,13 @@ pub struct Touch {
     /// First and last second.
     pub span: [f32; 2],
     /// Thing that is touched.
-    pub thing: TouchedThing,
+    pub thing: TouchTarget,
 }
 
 /// Thing that a hand touches.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum TouchedThing {
+pub enum TouchTarget {
     /// Thing that stands still in the world, such as a rail or the ground.
     World,
     /// The other hand, or something that both hands hold.
@@ -58,7 +58,7 @@ pub enum TouchedThing {
     RightThigh,
 }
 
-impl TouchedThing {
+impl TouchTarget {
     /// Parts of the body, with the distance in lengths of a leg within which a wrist touches them.
     const PARTS: [(Self, f32); 5] =
         [(Self::Head, 0.35), (Self::Chest, 0.4), (Self::Hips, 0.35), (Self::LeftThigh, 0.16), (Self::RightThigh, 0.16)];
@@ -93,7 +93,7 @@ struct Hold {
     side: BodySide,
     from: usize,
     to: usize,
-    thing: TouchedThing,
+    thing: TouchTarget,
 }
 
 /// Touches of both hands.
@@ -119,14 +119,14 @@ impl Touches {
         for arm in arms(body) {
             let wrist = wrists.of(arm);
             let mut own: Vec<Hold> = Vec::new();
-            let mut add = |thing: TouchedThing, spans: Vec<(usize, usize)>| {
+            let mut add = |thing: TouchTarget, spans: Vec<(usize, usize)>| {
                 own.extend(spans.into_iter().map(|(from, to)| Hold { side: arm.side, from, to, thing }));
             };
-            add(TouchedThing::OtherHand, together.clone());
-            for (part, near) in TouchedThing::PARTS {
+            add(TouchTarget::OtherHand, together.clone());
+            for (part, near) in TouchTarget::PARTS {
                 add(part, wrists.at_part(&wrist, part, near));
             }
-            add(TouchedThing::World, wrists.in_world(&wrist));
+            add(TouchTarget::World, wrists.in_world(&wrist));
             // Of touches at the same time the first kind counts; `own` is in the order of the kinds.
             let apart = (APART * rate).round() as usize;
             let mut kept: Vec<Hold> = Vec::new();
@@ -215,12 +215,12 @@ impl Wrists<'_> {
     }
 
     /// Spans in which a wrist keeps its place at a part of the body and moves with it.
-    fn at_part(&self, wrist: &[Vec3], part: TouchedThing, near: f32) -> Vec<(usize, usize)> {
+    fn at_part(&self, wrist: &[Vec3], part: TouchTarget, near: f32) -> Vec<(usize, usize)> {
         let Some([joint, _]) = part.joints(self.body) else { return Vec::new() };
         let relative = self.relative(wrist, joint);
         let knee = match part {
-            TouchedThing::LeftThigh => self.body.source.limb(BodySide::Left, LimbBone::LowerLeg),
-            TouchedThing::RightThigh => self.body.source.limb(BodySide::Right, LimbBone::LowerLeg),
+            TouchTarget::LeftThigh => self.body.source.limb(BodySide::Left, LimbBone::LowerLeg),
+            TouchTarget::RightThigh => self.body.source.limb(BodySide::Right, LimbBone::LowerLeg),
             _ => None,
         };
         let distance = |at: usize| {
@@ -283,12 +283,12 @@ impl Hold {
         let wrist = |at: usize| poses[at][arm.target[2]].translation;
         let frames = self.from..=self.to;
         match self.thing {
-            TouchedThing::World => {
+            TouchTarget::World => {
                 let places: Vec<Vec3> = frames.clone().map(wrist).collect();
                 let place = mean(&places);
                 frames.for_each(|at| corrections[at] = place - wrist(at));
             }
-            TouchedThing::OtherHand => {
+            TouchTarget::OtherHand => {
                 let Some(other) = arms(body).find(|other| other.side != arm.side) else { return };
                 for at in frames {
                     // Each hand makes half of the way.

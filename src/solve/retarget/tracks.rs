@@ -22,7 +22,7 @@ pub(super) struct KeyedTracks {
     pub values: Vec<(Uid, String, f32)>,
     /// Attributes frame by frame.
     pub numbers: Vec<(Uid, String, Vec<f32>)>,
-    /// Control that has the travel, if one was to get it.
+    /// Control that carries the travel over the ground; `None` if no control was to carry it.
     pub root: Option<Uid>,
 }
 

@@ -36,7 +36,7 @@ fn no_use_of_a_template_discards_steps_that_were_undone_while_it_was_read() {
         assert_eq!(studio.desk.steps(), (steps + 1, steps), "{act:?}: the step can be redone");
         let is_warning = |told: &&String| told.contains("would lose the steps that were undone");
         assert_eq!(studio.desk.told().iter().filter(is_warning).count(), 1, "{act:?}: told once");
-        assert!(studio.world().resource::<LibraryJobs>().what().is_none(), "{act:?}: nothing is read any more");
+        assert!(studio.world().resource::<LibraryJobs>().name().is_none(), "{act:?}: nothing is read any more");
 
         // Redone, the template is put onto the rig as it is then.
         studio.change(Change::Redo);

@@ -17,7 +17,7 @@ use rigsmith::{
     },
     prelude::*,
     rig::{
-        AttributeKind, JointData, Matching, PoseOffset, RestTransform,
+        AttributeKind, BuiltRig, JointData, Matching, PoseOffset, RestTransform,
         animation::{Key as ClipKey, Property, RigClip, Track, TrackTarget},
         operations::{MirrorPlane, WholePose},
         project::{Project, ProjectRig, read_project, write_project},
@@ -284,9 +284,8 @@ fn selections_are_stored_recalled_and_kept_in_the_project() {
     assert_eq!((desk.selected(), desk.rig().selection_sets()[0].nodes.len()), (&[left][..], 2));
 }
 
-/// The bundled biped, with the menu of the control of its left hand.
-#[test]
-fn the_menu_of_a_control_switches_kinematics_without_a_jump() {
+/// The window with the bundled biped, built, in Pose mode.
+fn built_biped() -> (Desk, Arc<BuiltRig>) {
     let mut desk = Desk::with(Sheet::Window, egui::vec2(900.0, 700.0));
     let (entity, rig) = (desk.rig, crate::bench::shipped("biped"));
     desk.app.world_mut().entity_mut(entity).insert(rig);
@@ -294,6 +293,14 @@ fn the_menu_of_a_control_switches_kinematics_without_a_jump() {
     desk.app.insert_resource(Mode::Pose);
     desk.frames(4);
     let built = Arc::clone(&desk.app.world().get::<BuildResult>(entity).unwrap().0);
+    (desk, built)
+}
+
+/// The bundled biped, with the menu of the control of its left hand.
+#[test]
+fn the_menu_of_a_control_switches_kinematics_without_a_jump() {
+    let (mut desk, built) = built_biped();
+    let entity = desk.rig;
     let hand = built.find_label("hand_l").unwrap().uid;
     let switch = built.switches.iter().find(|switch| match &switch.matching {
         Matching::IkFk { joints, .. } => joints.contains(&hand),
@@ -336,13 +343,8 @@ fn the_menu_of_a_control_switches_kinematics_without_a_jump() {
 /// The control of the left hand in a posed biped, whose spaces are at other places than at rest.
 #[test]
 fn the_menu_of_a_control_changes_its_space_without_a_jump() {
-    let mut desk = Desk::with(Sheet::Window, egui::vec2(900.0, 700.0));
-    let (entity, rig) = (desk.rig, crate::bench::shipped("biped"));
-    desk.app.world_mut().entity_mut(entity).insert(rig);
-    desk.app.world_mut().write_message(BuildRequest { rig: entity, step: BuildStep::All });
-    desk.app.insert_resource(Mode::Pose);
-    desk.frames(4);
-    let built = Arc::clone(&desk.app.world().get::<BuildResult>(entity).unwrap().0);
+    let (mut desk, built) = built_biped();
+    let entity = desk.rig;
     let hand = built.nodes.iter().find(|node| *node.name == *"hand_ik_l").expect("the control").uid;
     let is_of_hand = |switch: &Matching| matches!(switch, Matching::Space { control } if *control == hand);
     let switch = built.switches.iter().find(|switch| is_of_hand(&switch.matching)).expect("spaces").clone();

@@ -171,9 +171,9 @@ impl Walk {
         while quiet < 2 {
             self.desk.frame();
             let world = self.desk.app.world();
-            let is_busy = world.resource::<LibraryJobs>().what().is_some()
-                || world.resource::<LoadJob>().what().is_some()
-                || world.resource::<SaveJob>().what().is_some()
+            let is_busy = world.resource::<LibraryJobs>().name().is_some()
+                || world.resource::<LoadJob>().name().is_some()
+                || world.resource::<SaveJob>().name().is_some()
                 || world.resource::<Recovery>().is_looking()
                 || world.resource::<TemplateLibrary>().is_listing()
                 || running(world).is_some()

@@ -14,7 +14,7 @@ use rigsmith::{
             motion::{Motion, MotionChannel, MotionJoint},
         },
     },
-    solve::retarget::{Touch, TouchedThing, measure_hands},
+    solve::retarget::{Touch, TouchTarget, measure_hands},
 };
 
 use super::{PlayedRig, RetargetSettings, motion, shipped, test_data};
@@ -120,7 +120,7 @@ fn both(motion: &Motion) -> [PlayedRig; 2] {
     })
 }
 
-fn near(touch: &Touch, thing: TouchedThing) -> bool {
+fn near(touch: &Touch, thing: TouchTarget) -> bool {
     touch.thing == thing && (touch.span[0] - 1.0).abs() < 0.2 && (touch.span[1] - 3.0).abs() < 0.2
 }
 
@@ -159,7 +159,7 @@ fn a_hand_on_a_rail_stays_there_while_the_body_sways() {
     );
     let [locked, free] = both(&motion);
     let [touch] = &locked.done.touches[..] else { panic!("{:?}", locked.done.touches) };
-    assert!(touch.left && near(touch, TouchedThing::World), "{touch:?}");
+    assert!(touch.left && near(touch, TouchTarget::World), "{touch:?}");
     assert!(free.done.touches.is_empty());
     let slides = [&locked, &free].map(|played| {
         let places: Vec<Vec3> = played.globals(&times(), &["hand_l"]).iter().map(|pose| pose[0].translation).collect();
@@ -208,7 +208,7 @@ fn hands_that_hold_one_another_stay_together() {
     );
     let [locked, free] = both(&motion);
     let touches = &locked.done.touches;
-    assert!(touches.len() == 2 && touches.iter().all(|touch| near(touch, TouchedThing::OtherHand)), "{touches:?}");
+    assert!(touches.len() == 2 && touches.iter().all(|touch| near(touch, TouchTarget::OtherHand)), "{touches:?}");
     assert!(touches[0].left && !touches[1].left);
     // As far apart as in the source, by the ratio of the legs.
     let leg = |of: [&str; 3]| {
@@ -233,7 +233,7 @@ fn a_hand_on_the_hip_moves_with_the_hips() {
     });
     let [locked, free] = both(&motion);
     let [touch] = &locked.done.touches[..] else { panic!("{:?}", locked.done.touches) };
-    assert!(touch.left && near(touch, TouchedThing::Hips), "{touch:?}");
+    assert!(touch.left && near(touch, TouchTarget::Hips), "{touch:?}");
     let slides = [&locked, &free].map(|played| {
         let poses = played.globals(&times(), &["hips", "hand_l"]);
         let own = |pose: &Vec<Trs>| pose[0].rotation.inverse() * (pose[1].translation - pose[0].translation);

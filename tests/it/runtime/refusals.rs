@@ -100,16 +100,10 @@ fn what_is_missing_is_named() {
             rig.constrain(constraint);
         }),
         ("driven node", vec![Uid(9).to_string()], |rig| {
-            let Constraint::Transform { targets, .. } = point(rig, "a", vec![target(rig, "b", 1.0)]) else { panic!() };
-            rig.constrain(Constraint::Transform {
-                driven: Uid(9),
-                targets,
-                translate: [true; 3],
-                rotate: [false; 3],
-                scale: [false; 3],
-                weight: Scalar::Value(1.0),
-                keep_pose: false,
-            });
+            let mut constraint = point(rig, "a", vec![target(rig, "b", 1.0)]);
+            let Constraint::Transform { driven, .. } = &mut constraint else { panic!() };
+            *driven = Uid(9);
+            rig.constrain(constraint);
         }),
         ("attribute", vec!["\"wait\"".to_owned(), "\"weight\"".to_owned()], |rig| {
             let node = rig.uid("a");

@@ -353,8 +353,8 @@ impl Booth {
         let pictures = world.resource::<LibraryPictures>();
         let is_drawing = library.listing().templates().any(|listed| pictures.is_wanted(listed));
         let is_open = world.contains_resource::<ActiveRig>();
-        let work = world.resource::<LoadJob>().what().is_some()
-            || world.resource::<SaveJob>().what().is_some()
+        let work = world.resource::<LoadJob>().name().is_some()
+            || world.resource::<SaveJob>().name().is_some()
             || world.resource::<Recovery>().is_looking()
             || library.is_listing()
             // There are always those that come with Rigsmith.

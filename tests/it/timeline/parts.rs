@@ -325,7 +325,7 @@ pub(super) fn accept(desk: &mut Desk) {
     desk.click("Import motion");
     desk.frames(2);
     crate::bench::wait(desk, "the clip", Desk::frame, |desk| {
-        desk.app.world().resource::<ClipImport>().what().is_none() && !desk.rig().clips().is_empty()
+        desk.app.world().resource::<ClipImport>().name().is_none() && !desk.rig().clips().is_empty()
     });
     desk.frames(3);
 }

@@ -15,7 +15,7 @@ const ROUNDS: usize = 100;
 pub(crate) struct PartRule {
     /// Share of the bones.
     pub share: f64,
-    /// Marks parts that each side has on its own; other parts cross the middle.
+    /// True for parts that stand on both sides of the face, such as cheeks; false for parts that cross the middle.
     pub lateral: bool,
     /// Largest number of bones.
     pub most: usize,

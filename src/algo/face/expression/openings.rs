@@ -92,7 +92,7 @@ impl OpeningLines {
     }
 
     /// Returns `true` if a point is too near to the mouth's line to tell its side by position.
-    pub fn near_mouth_line(&self, point: Vec3) -> bool {
+    pub fn is_near_mouth_line(&self, point: Vec3) -> bool {
         let place = self.mouth.place(point * self.scale);
         self.lips_part && place.beyond <= 0.0 && place.above.abs() < 0.04
     }

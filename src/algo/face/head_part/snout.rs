@@ -43,8 +43,8 @@ pub(super) fn cut(body: &Body) -> Option<Cut> {
     Some(Cut { away, reach, tip, plane: (center, toward) })
 }
 
-/// Height of a quadruped's middle at its front end (+z) above that at its back, as a share of its height: a head is
-/// carried higher than a rump or a tail. `None` if the body does not stand on legs, or is upright.
+/// Height of the middle of a quadruped's front end (+z) above the middle of its back end, as a share of the body's height:
+/// a head is carried higher than a rump or a tail. `None` if the body does not stand on legs, or is upright.
 pub fn carriage(body: &Body) -> Option<f32> {
     let size = body.size();
     if size.is_nan() || size.min_element() <= 0.0 || body.is_biped() || !body.stands(None) {

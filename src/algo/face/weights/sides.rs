@@ -95,7 +95,7 @@ impl Sides {
     }
 
     /// Returns `true` if two bones lie across an opening from each other.
-    pub fn apart(&self, a: usize, b: usize) -> bool {
+    pub fn are_apart(&self, a: usize, b: usize) -> bool {
         let across = |o: usize| {
             matches!((self.bones[a][o], self.bones[b][o]), (Rim::Upper, Rim::Lower) | (Rim::Lower, Rim::Upper))
         };

@@ -174,7 +174,7 @@ fn spacings(face: &Face, sides: &Sides, bones: &[usize]) -> Vec<f32> {
             let at = face.bones[bone].position;
             let mut near: Vec<f32> = bones
                 .iter()
-                .filter(|&&b| b != bone && !sides.apart(b, bone))
+                .filter(|&&b| b != bone && !sides.are_apart(b, bone))
                 .map(|&b| face.bones[b].position.distance(at))
                 .filter(|&d| d > 1e-4 * face.map.scale)
                 .collect();

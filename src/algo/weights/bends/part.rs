@@ -1,4 +1,4 @@
-//! Flesh around one joint that bends, and how it moves.
+//! Flesh around a joint that bends, and the motion of that flesh.
 
 use glam::{Affine3A, Mat3A, Quat, Vec3, Vec3A};
 

@@ -12,7 +12,7 @@ use super::{
     wires::{Spots, box_pins},
 };
 use crate::{
-    editor::{counted::counted, panels::process, style},
+    editor::{counts::counted, panels::process, style},
     processor::{CommandState, CommandStatus},
 };
 

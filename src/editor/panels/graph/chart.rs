@@ -16,7 +16,7 @@ pub struct GraphChart {
     pub commands: Vec<(Uid, Rect)>,
     /// Frames, open and folded.
     pub frames: Vec<ChartFrame>,
-    /// Ends of the wires that are shown, from what is read to what reads it.
+    /// Ends of each wire on the screen: at the command that is read, then at the command that reads it.
     pub wires: Vec<[Pos2; 2]>,
 }
 

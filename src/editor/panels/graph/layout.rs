@@ -2,12 +2,12 @@
 //! whole has about the shape of a panel.
 //!
 //! Within a frame a node stands right of everything there that it depends on, and sweeps sort each column by the mean place
-//! of the neighbours (`inside`). Frames stand in columns by the depth of their dependencies, too, and the columns are
+//! of the neighbours (`frame_layout`). Frames stand in columns by the depth of their dependencies, too, and the columns are
 //! broken into rows (`packing`). A frame that is folded is one node. Nodes that are in no frame share a block without a
 //! title. The time grows with the number of nodes and edges, but for the sorting of columns; the same graph always gives
 //! the same places.
 
-mod inside;
+mod frame_layout;
 mod packing;
 
 use std::collections::BTreeMap;
@@ -72,7 +72,7 @@ pub fn lay_out(nodes: &[LayoutNode], edges: &[(usize, usize)]) -> Vec<[f32; 2]> 
     let mut inner = Vec::with_capacity(members.len());
     for (members, edges) in members.iter().zip(&within) {
         let sizes: Vec<[f32; 2]> = members.iter().map(|node| nodes[*node].size).collect();
-        let (places, size) = inside::columns(&sizes, edges);
+        let (places, size) = frame_layout::columns(&sizes, edges);
         let is_framed = members.iter().any(|node| nodes[*node].frame.is_some() && !nodes[*node].is_folded);
         let corner = if is_framed { CORNER } else { [0.0; 2] };
         let margin = if is_framed { MARGIN } else { 0.0 };

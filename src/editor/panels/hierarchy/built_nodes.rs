@@ -35,7 +35,7 @@ pub(super) struct BuiltTree {
 /// Nodes that are asked for.
 #[derive(Clone, Copy)]
 pub(super) struct WantedNodes<'a> {
-    /// Words that each of them has to contain.
+    /// Words that the name of a listed node contains.
     pub filter: &'a str,
     /// True for a list in place of a tree.
     pub is_flat: bool,

@@ -8,7 +8,7 @@ use bevy_egui::egui::{
 use super::{DraggedJoints, HierarchyPanel, Tree, menu, obstacle, reparent, row_tags, rows::Row, select, tops};
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         library::{DraggedModule, DraggedTemplate, LibraryAct, LibraryRequest, attach, dropping},
         panel::Requests,
         panels::{

@@ -26,7 +26,7 @@ pub fn rows(rig: &Rig, folded: &HashSet<Uid>, filter: &str) -> Vec<Row> {
     if words.is_empty() { unfolded(rig, folded) } else { matching(rig, &words) }
 }
 
-/// The joints that match a filter as a list, without their hierarchy, in the order in which it has them.
+/// Flat list of the joints that match a filter, in the order of the hierarchy.
 pub fn flat_rows(rig: &Rig, filter: &str) -> Vec<Row> {
     let found = matching(rig, &words(filter)).into_iter().filter(|row| row.matches);
     found.map(|row| Row { depth: 0, parent: false, ..row }).collect()

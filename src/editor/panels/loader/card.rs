@@ -9,7 +9,7 @@ use bevy_egui::egui::{
 
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         library::{LibraryAct, LibraryAction, LibraryListing, LibraryRequest, PartSides, obstacle, partners},
         panel::Requests,
         panels::displayed_rig::DisplayedRig,

@@ -11,8 +11,8 @@ use bevy_egui::egui::{
 use crate::{
     editor::{
         library::{
-            DraggedTemplate, LibraryListing, LibraryPictures, ListTemplates, TemplateLibrary, TemplatePicture,
-            WantPictures,
+            DraggedTemplate, LibraryListing, LibraryPictures, ListTemplates, PictureRequest, TemplateLibrary,
+            TemplatePicture,
         },
         panel::Requests,
         panels::list,
@@ -99,7 +99,7 @@ impl Tiles {
             });
         });
         if !missing.is_empty() {
-            requests.send(WantPictures(missing));
+            requests.send(PictureRequest(missing));
         }
         clicked
     }

@@ -9,7 +9,7 @@ use super::{SkinningParts, SkinningResults};
 use crate::{
     algo::weights::IdleReason,
     editor::{
-        counted::counted,
+        counts::counted,
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,

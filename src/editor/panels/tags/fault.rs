@@ -50,7 +50,7 @@ impl<'a> Fault<'a> {
         is_within(self.parameter, value)
     }
 
-    /// Marks a field if it is that of the parameter, and scrolls to it where that is wanted.
+    /// Marks the field of the parameter at fault, and scrolls to the field if a person asked for it.
     pub fn mark(&self, ui: &Ui, field: &Response, path: &str, label: &str) {
         if !self.concerns(path) {
             return;

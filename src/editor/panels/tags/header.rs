@@ -7,7 +7,7 @@ use bevy_egui::egui::{Button, Label, Response, RichText, TextWrapMode, Ui};
 
 use super::{TagsPanel, library, send};
 use crate::{
-    editor::{counted::counted, panel::Requests, panels::displayed_rig::DisplayedRig},
+    editor::{counts::counted, panel::Requests, panels::displayed_rig::DisplayedRig},
     processor::Modules,
     rig::{
         TagKind,

@@ -4,7 +4,7 @@ use bevy_egui::egui::{Label, RichText, Ui};
 
 use super::values::Subject;
 use crate::{
-    editor::{counted::counted, panels::list, style},
+    editor::{counts::counted, panels::list, style},
     processor::FindError,
     rig::Uid,
 };

@@ -235,7 +235,7 @@ pub fn obstacle(world: &World, action: TimelineAction) -> Option<&'static str> {
         TimelineAction::AutoKey | TimelineAction::Stretch => return None,
         TimelineAction::NewClip => return rig.is_empty().then_some("there are no joints"),
         TimelineAction::Import | TimelineAction::ImportOwn => {
-            let is_busy = world.get_resource::<ClipImport>().is_some_and(|import| import.what().is_some());
+            let is_busy = world.get_resource::<ClipImport>().is_some_and(|import| import.name().is_some());
             let is_own = action == TimelineAction::ImportOwn;
             return match (rig.is_empty(), is_busy) {
                 (true, _) => Some("there are no joints"),

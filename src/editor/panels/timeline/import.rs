@@ -21,7 +21,7 @@ use super::{
 use crate::{
     editor::{
         ActiveRig,
-        counted::counted,
+        counts::counted,
         dock::ShowPanel,
         files::dialog::{Dialog, Question},
         notice::Notice,
@@ -110,7 +110,7 @@ enum ReadMotion {
 
 impl ClipImport {
     /// Name of the file that is being read.
-    pub fn what(&self) -> Option<&str> {
+    pub fn name(&self) -> Option<&str> {
         self.job.as_ref().filter(|job| matches!(job.work, Work::Runs(_))).map(|job| job.name.as_str())
     }
 
@@ -188,7 +188,7 @@ pub(super) fn start(mut requests: MessageReader<ImportRequest>, mut commands: Co
 fn begin(world: &mut World, path: &Path) {
     let Some(entity) = world.get_resource::<ActiveRig>().map(|active| active.0) else { return };
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    if world.get_resource::<ClipImport>().is_some_and(|import| import.what().is_some()) {
+    if world.get_resource::<ClipImport>().is_some_and(|import| import.name().is_some()) {
         world.write_message(Notice::info(format!("{name} has to wait: another file is being read. Import it then.")));
         return;
     }
@@ -227,7 +227,7 @@ pub(super) fn change_map(mut requests: MessageReader<MapRequest>, mut commands: 
 
 fn answer(world: &mut World, request: &MapRequest) {
     let mut import = world.resource_mut::<ClipImport>();
-    if import.what().is_some() {
+    if import.name().is_some() {
         return;
     }
     match request {

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,

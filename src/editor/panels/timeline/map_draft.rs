@@ -1,4 +1,4 @@
-//! Motion of another skeleton that waits until people have seen which joints it goes to.
+//! Motion of another skeleton that waits until a person has accepted the map of joints.
 
 use std::{collections::BTreeSet, sync::Arc};
 

@@ -8,7 +8,7 @@ use bevy::prelude::*;
 use super::import::{ClipImport, MapDraft};
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         files::{
             ask_path,
             dialog::{Dialog, Purpose, Question},

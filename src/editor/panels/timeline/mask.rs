@@ -4,7 +4,7 @@ use bevy_egui::egui::{Button, Ui, WidgetInfo, WidgetType};
 
 use super::row::RowContext;
 use crate::{
-    editor::counted::counted,
+    editor::counts::counted,
     rig::{Uid, animation::ClipLayer},
 };
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bevy_egui::egui::{Checkbox, DragValue, Key, Ui};
 
 use crate::{
-    editor::counted::counted,
+    editor::counts::counted,
     rig::{
         BuiltRig, Rig,
         animation::{joint_map::JointMap, motion::Motion},

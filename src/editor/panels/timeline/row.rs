@@ -10,13 +10,13 @@ use super::{
     TimelinePanel,
     bar::entry,
     colors::KeyColors,
-    mask, set_aside,
+    mask, orphaned_keys,
     sheet::Row,
     state::{OpenClip, Timeline, TimelineRequest, add},
 };
 use crate::{
     editor::{
-        counted::counted,
+        counts::counted,
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
@@ -62,7 +62,7 @@ pub(super) fn show(
         Row::Aside => {
             let text = format!("Set aside ({})", panel.sheet.orphans.len());
             header(&mut panel.choice.aside, ui, cell, &text);
-            set_aside::give_all(ui, rect, split, &panel.sheet.orphans, context, requests);
+            orphaned_keys::give_all(ui, rect, split, &panel.sheet.orphans, context, requests);
         }
         Row::Layer(number) => {
             if let Some(layer) = context.open.clip.layers.get(number) {
@@ -80,7 +80,7 @@ pub(super) fn show(
         Row::Track(number, track) => self::track(panel, ui, cell, (number, track), context, requests),
         Row::Orphan(number) => {
             if let Some(orphan) = panel.sheet.orphans.get(number) {
-                set_aside::orphan(ui, rect, split, orphan, context, requests);
+                orphaned_keys::orphan(ui, rect, split, orphan, context, requests);
             }
         }
     }

@@ -9,7 +9,7 @@ use super::in_area;
 use crate::{
     editor::{
         actions::{Action, ActionRequest},
-        counted::counted,
+        counts::counted,
         notice::Notice,
         panel::Requests,
         panels::{

@@ -6,7 +6,7 @@ use super::{Adoption, EntityWrite, sorting::RigWrites};
 use crate::rig::{RigAbout, RigEdit};
 
 impl Adoption<'_, '_, '_, '_, '_, '_> {
-    /// Adopts another name of the rig, also one that was spawned together with it, and restores its uid.
+    /// Adopts a name that was written to the rig's entity, also at its spawn, and restores the uid of the document.
     pub fn rig_written(&mut self, writes: &RigWrites) {
         let entity = self.trial.rig_entity;
         let Some(view) = self.views.get(entity).ok().filter(|_| writes.is_rig_written) else { return };

@@ -17,7 +17,7 @@ use super::{
     comment_placement::take_placement,
     file::{FaceFile, JointFile, TagFile, TemplateFile, known_names},
     header::complete,
-    shorthand::{Explicit, explicit},
+    shorthand::{ExplicitText, explicit},
     write::{feature_summaries, needs_summary},
 };
 use crate::rig::{
@@ -58,7 +58,7 @@ pub(in crate::rig) fn read_text(source: &str, first_line: usize) -> Result<Templ
     read.map_err(|error| SourceError::cut_short(source).unwrap_or(error))
 }
 
-fn read_explicit(explicit: &Explicit, first_line: usize) -> Result<Template, SourceError> {
+fn read_explicit(explicit: &ExplicitText, first_line: usize) -> Result<Template, SourceError> {
     let (text, mut notes) = (&*explicit.text, Vec::new());
     let fields = scan::fields(text);
     let known = TEMPLATE.readable(text, &fields, first_line, &mut notes)?;
@@ -72,7 +72,7 @@ fn read_explicit(explicit: &Explicit, first_line: usize) -> Result<Template, Sou
 }
 
 /// A template with the places in the source of what is checked later.
-fn in_text(explicit: &Explicit, mut template: Template) -> Template {
+fn in_text(explicit: &ExplicitText, mut template: Template) -> Template {
     let parts = template.parts.iter_mut().map(|part| &mut part.offset);
     for offset in parts.chain(template.sockets.iter_mut().map(|socket| &mut socket.offset)) {
         *offset = explicit.in_source(*offset);
@@ -251,55 +251,9 @@ fn add_joints(
                 format!("joint {uid} is in the local group {group}, which is not in the file; add it under `groups`"),
             ));
         }
-        let (x, y, z, w) = joint.rotation;
-        let mut rest = RestTransform {
-            translation: <[f32; 3]>::from(joint.translation).into(),
-            rotation: Quat::from_xyzw(x, y, z, w),
-            scale: Vec3::from(<[f32; 3]>::from(joint.scale)),
-        };
-        if !rest.is_valid() {
-            let finite = |v: Vec3| v.is_finite();
-            let wrong = match (finite(rest.translation), finite(rest.scale)) {
-                (false, _) => "translation",
-                (true, false) => "scale",
-                (true, true) => "rotation",
-            };
-            faults.push(places.error(uid, 0, wrong, format!(
-                "joint {uid} has a transform that is not finite or whose rotation is not of length 1; correct the numbers"
-            )));
-            rest = RestTransform::default();
-        }
-        let mut tags = Vec::with_capacity(joint.tags.len());
-        for tag in joint.tags {
-            let mut tag = tag_from(tag);
-            if !seen.insert(tag.uid) {
-                faults.push(places.used_twice(tag.uid));
-                continue;
-            }
-            if let TagKind::Command { feature, .. } = &mut tag.kind
-                && let Some(missing) = feature.take_if(|feature| !features.contains(feature))
-                && !places.is_left_out(missing)
-            {
-                faults.push(places.error(
-                    tag.uid,
-                    0,
-                    "feature",
-                    format!(
-                        "tag {} is in the feature {missing}, which is not in the file; add it or leave the field out",
-                        tag.uid
-                    ),
-                ));
-            }
-            tags.push(tag);
-        }
-        let mut placed = joint.face.map(|FaceFile { part, label, at }| {
-            let position = Vec3::from(<[f32; 3]>::from(at));
-            FacePlacement { part, label, position }
-        });
-        if placed.take_if(|placed| !placed.position.is_finite()).is_some() {
-            let message = format!("joint {uid} was placed at a position that is not finite; correct the numbers");
-            faults.push(places.error(uid, 0, "face", message));
-        }
+        let rest = rest_of(&joint, places, faults);
+        let mut tags = tags_of(joint.tags, &features, places, seen, faults);
+        let placed = placement_of(uid, joint.face, places, faults);
         let face = placed.or_else(|| take_placement(format, &mut tags));
         order.push(uid);
         children.entry(joint.parent).or_default().push(uid);
@@ -318,9 +272,91 @@ fn add_joints(
             }),
         );
     }
+    insert_joints(rig, &order, &children, data, places, faults);
+}
+
+/// Rest transform of a joint; the identity, with a fault, where the numbers of the file are no transform.
+fn rest_of(joint: &JointFile, places: &Places, faults: &mut Vec<SourceError>) -> RestTransform {
+    let (uid, (x, y, z, w)) = (joint.uid, joint.rotation);
+    let rest = RestTransform {
+        translation: <[f32; 3]>::from(joint.translation).into(),
+        rotation: Quat::from_xyzw(x, y, z, w),
+        scale: Vec3::from(<[f32; 3]>::from(joint.scale)),
+    };
+    if rest.is_valid() {
+        return rest;
+    }
+    let wrong = match (rest.translation.is_finite(), rest.scale.is_finite()) {
+        (false, _) => "translation",
+        (true, false) => "scale",
+        (true, true) => "rotation",
+    };
+    let message = format!(
+        "joint {uid} has a transform that is not finite or whose rotation is not of length 1; correct the numbers"
+    );
+    faults.push(places.error(uid, 0, wrong, message));
+    RestTransform::default()
+}
+
+/// Tags of a joint, without those whose uids stand before, and without features that the file lacks.
+fn tags_of(
+    tags: Vec<TagFile>,
+    features: &HashSet<Uid>,
+    places: &Places,
+    seen: &mut HashSet<Uid>,
+    faults: &mut Vec<SourceError>,
+) -> Vec<TagData> {
+    let mut kept = Vec::with_capacity(tags.len());
+    for tag in tags {
+        let mut tag = tag_from(tag);
+        if !seen.insert(tag.uid) {
+            faults.push(places.used_twice(tag.uid));
+            continue;
+        }
+        if let TagKind::Command { feature, .. } = &mut tag.kind
+            && let Some(missing) = feature.take_if(|feature| !features.contains(feature))
+            && !places.is_left_out(missing)
+        {
+            let message = format!(
+                "tag {} is in the feature {missing}, which is not in the file; add it or leave the field out",
+                tag.uid
+            );
+            faults.push(places.error(tag.uid, 0, "feature", message));
+        }
+        kept.push(tag);
+    }
+    kept
+}
+
+/// Placement of a facial bone; none, with a fault, at a position that is not finite.
+fn placement_of(
+    uid: Uid,
+    face: Option<FaceFile>,
+    places: &Places,
+    faults: &mut Vec<SourceError>,
+) -> Option<FacePlacement> {
+    let FaceFile { part, label, at } = face?;
+    let position = Vec3::from(<[f32; 3]>::from(at));
+    if position.is_finite() {
+        return Some(FacePlacement { part, label, position });
+    }
+    let message = format!("joint {uid} was placed at a position that is not finite; correct the numbers");
+    faults.push(places.error(uid, 0, "face", message));
+    None
+}
+
+/// Puts joints into a rig, parents first, whatever their order in the file. `children` lists the joints below each joint,
+/// and those without a parent.
+fn insert_joints(
+    rig: &mut Rig,
+    order: &[Uid],
+    children: &HashMap<Option<Uid>, Vec<Uid>>,
+    mut data: HashMap<Uid, Box<JointData>>,
+    places: &Places,
+    faults: &mut Vec<SourceError>,
+) {
     // A table that grows is there twice for a moment.
     rig.joints.reserve(order.len());
-    // Parents first, whatever the order in the file.
     let mut stack: Vec<(Option<Uid>, Uid)> = Vec::new();
     let push = |stack: &mut Vec<_>, parent: Option<Uid>| {
         stack.extend(children.get(&parent).into_iter().flatten().rev().map(|child| (parent, *child)));

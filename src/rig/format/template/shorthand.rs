@@ -34,7 +34,7 @@ pub(super) const FIRST_FORMAT: u32 = 2;
 pub(in crate::rig::format) const TAG_FIELDS: [&str; 4] = ["uid", "enabled", "comment", "feature"];
 
 /// Text of a template without shorthand, with the place in its source of everything in it.
-pub struct Explicit<'a> {
+pub struct ExplicitText<'a> {
     source: &'a str,
     /// The text.
     pub text: Cow<'a, str>,
@@ -53,7 +53,7 @@ struct Piece {
     is_copy: bool,
 }
 
-impl<'a> Explicit<'a> {
+impl<'a> ExplicitText<'a> {
     /// Source of the text.
     pub fn source(&self) -> &'a str {
         self.source
@@ -83,9 +83,9 @@ impl<'a> Explicit<'a> {
 }
 
 /// The text of a template without shorthand. A text of format 1, and one whose brackets do not match, is itself.
-pub fn explicit(source: &str) -> Explicit<'_> {
+pub fn explicit(source: &str) -> ExplicitText<'_> {
     let (text, parents) = (Cow::Borrowed(source), BTreeMap::new());
-    let unchanged = Explicit { source, text, pieces: Vec::new(), faults: Vec::new(), parents };
+    let unchanged = ExplicitText { source, text, pieces: Vec::new(), faults: Vec::new(), parents };
     let Some(declared) = Declarations::find(source).filter(|declared| declared.format() >= FIRST_FORMAT) else {
         return unchanged;
     };
@@ -95,7 +95,7 @@ pub fn explicit(source: &str) -> Explicit<'_> {
     faults.extend(declared.faults);
     faults.sort_by_key(|fault| fault.offset);
     if changes.is_empty() {
-        return Explicit { faults, ..unchanged };
+        return ExplicitText { faults, ..unchanged };
     }
     changes.sort_by_key(|change| (change.range.start, change.range.end));
     let (mut text, mut pieces) = (String::with_capacity(source.len() * 2), Vec::new());
@@ -109,7 +109,7 @@ pub fn explicit(source: &str) -> Explicit<'_> {
     }
     pieces.push(Piece { start: text.len(), source: at, is_copy: true });
     text.push_str(&source[at..]);
-    Explicit { source, text: Cow::Owned(text), pieces, faults, parents }
+    ExplicitText { source, text: Cow::Owned(text), pieces, faults, parents }
 }
 
 /// Text in place of a range of the source.

@@ -1,7 +1,7 @@
 //! Saving over a text: only what changed is written, so that comments, blank lines, the order and the style of what a
 //! person wrote stay, and one changed value is one changed line.
 
-mod fresh;
+mod insertions;
 mod labels;
 mod lists;
 mod order;
@@ -26,11 +26,11 @@ use crate::rig::{
     },
     reference::{RigNameIndex, bind_names, given_name, refresh_names, without_uids},
 };
-use fresh::{NamesInUse, is_short, settled};
+use insertions::{NamesInUse, is_short, settled};
 use labels::header_labels;
 use order::reordered;
 pub(crate) use parts::{
-    PartRigs, unsaid_parts, with_instance_fields, with_instances, with_instances_of, without_instances,
+    PartRigs, differing_parts, with_instance_fields, with_instances, with_instances_of, without_instances,
     write_changes_over, write_own_over,
 };
 use patch::Patch;

@@ -261,7 +261,7 @@ impl Skin<'_> {
         for (index, &point) in self.points.iter().enumerate().filter(|(index, _)| thinned[*index]) {
             let Some(mut sample) = self.sample(index, point) else { continue };
             // Where lips touch, only the skin's own weights tell the upper from the lower one.
-            if opening_lines.near_mouth_line(point) {
+            if opening_lines.is_near_mouth_line(point) {
                 match lower_share[index] {
                     share if share > 0.8 => sample.mark.known.upper_lip = Some(false),
                     share if share < 0.2 => sample.mark.known.upper_lip = Some(true),

@@ -376,7 +376,7 @@ impl PartInstance {
 }
 
 impl Template {
-    /// The template with its parts, each of which `part` gives.
+    /// Template with its parts in the rig; `part` reads a part by its name.
     ///
     /// # Errors
     /// A part that cannot be had or does not fit, with its place in `source`, the text of the template.
@@ -393,9 +393,9 @@ impl Template {
         }
     }
 
-    /// The template with those of its parts that can be had and fit, and all that is wrong with its instances, as
-    /// [`with_parts`](Self::with_parts) tells the first. What a part lacks that another should have brought is no fault of its
-    /// own.
+    /// Template with the parts that can be read and that fit, and all faults of its instances;
+    /// [`with_parts`](Self::with_parts) returns the first of these faults. A part that lacks only what a faulty part should
+    /// have brought has no fault of its own.
     pub fn survey_parts<E: fmt::Display + From<PartError>>(
         mut self,
         source: &str,

@@ -6,7 +6,7 @@ use super::{
     super::{
         Template,
         file::{TemplateFile, known_names},
-        shorthand::{Explicit, explicit},
+        shorthand::{ExplicitText, explicit},
     },
     Places, TEMPLATE, build, in_text, text_of,
 };
@@ -61,7 +61,7 @@ pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec
 }
 
 /// All faults of a text, those of its shorthand too, in the order of the source.
-fn in_source(explicit: &Explicit, faults: Vec<SourceError>) -> Vec<SourceError> {
+fn in_source(explicit: &ExplicitText, faults: Vec<SourceError>) -> Vec<SourceError> {
     let mut all: Vec<SourceError> = faults.into_iter().map(|fault| explicit.fault(fault)).collect();
     let source = explicit.source();
     // An element that cannot be read says nothing of its names.

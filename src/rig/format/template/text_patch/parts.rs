@@ -3,8 +3,8 @@
 mod change;
 mod fields;
 mod instance;
-mod own;
-mod unsaid;
+mod own_joints;
+mod part_differences;
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
@@ -27,9 +27,9 @@ pub(super) use change::short_tag;
 use change::{FieldChange, JointDiff, TagDiff, Words};
 pub(crate) use fields::{with_instance_fields, with_instances_of};
 pub(crate) use instance::{with_instances, without_instances};
-pub(crate) use own::write_own_over;
-use own::{added_tags, instance_labels};
-pub(crate) use unsaid::unsaid_parts;
+pub(crate) use own_joints::write_own_over;
+use own_joints::{added_tags, instance_labels};
+pub(crate) use part_differences::differing_parts;
 
 /// Rigs of a template with parts, from which its text is changed.
 pub(crate) struct PartRigs<'a> {

@@ -130,8 +130,8 @@ impl<'d, 'a> Patch<'d, 'a> {
         }
     }
 
-    /// Takes elements out of the list that is the value of a field, and puts others behind its last one, each on one line. An
-    /// empty list goes with its field.
+    /// Takes elements out of the list of a field, and adds others behind the last element, each on a line of its own. A list
+    /// that becomes empty goes with its field.
     pub fn exchange(&mut self, node: NodeId, field: &str, gone: &[usize], fresh: &[String]) {
         let Some(list) = self.tree.field(node, field).map(|item| item.value) else {
             if !fresh.is_empty() {

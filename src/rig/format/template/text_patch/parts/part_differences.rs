@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-use super::{super::said_with_parts, own::things_of};
+use super::{super::said_with_parts, own_joints::things_of};
 use crate::rig::{JointData, Rig, TagData, Uid, part::PartInstance};
 
 /// Numbers of the part instances that bring something which is otherwise in a rig than in another one, or not there, and of those
 /// that hang on their sockets. `own` is what the template has besides its parts.
-pub(crate) fn unsaid_parts(said: &Rig, rig: &Rig, own: &Rig, parts: &[(PartInstance, Rig)]) -> Vec<usize> {
+pub(crate) fn differing_parts(said: &Rig, rig: &Rig, own: &Rig, parts: &[(PartInstance, Rig)]) -> Vec<usize> {
     let (Some(said), Some(rig)) = (said_with_parts(said, own), said_with_parts(rig, own)) else { return Vec::new() };
     let mut of: BTreeMap<Uid, BTreeSet<usize>> = BTreeMap::new();
     for (number, (instance, part)) in parts.iter().enumerate() {

@@ -6,7 +6,7 @@ use bevy_egui::egui::{
 
 use super::{colors::KeyColors, row::RowContext};
 use crate::{
-    editor::{counted::counted, panel::Requests, panels::list},
+    editor::{counts::counted, panel::Requests, panels::list},
     plugins::document::EditRequest,
     rig::{
         Uid,
