@@ -6,7 +6,7 @@
 use super::{Disk, PartFiles, TemplateVersion, same_parts::with_same_parts, template_text, update_template};
 use crate::rig::{
     Rig,
-    part::PartInstance,
+    part::have_same_fields,
     update::{Choices, Update, edits_between},
 };
 
@@ -29,7 +29,7 @@ pub fn update_document(
     file: &TemplateVersion,
     choices: &Choices,
 ) -> Option<DocumentUpdate> {
-    if base.has_same_instances(file) {
+    if have_same_fields(base.parts(), file.parts()) {
         return None;
     }
     let now = base.saying(document)?;
@@ -44,12 +44,6 @@ pub fn update_document(
 }
 
 impl TemplateVersion {
-    /// True if both versions have the same part instances, whatever these change of their parts.
-    fn has_same_instances(&self, other: &Self) -> bool {
-        let fields = |part: &PartInstance| PartInstance { changes: Vec::new(), offset: 0, ..part.clone() };
-        self.parts().iter().map(fields).eq(other.parts().iter().map(fields))
-    }
-
     /// The version whose text is changed so that it says what a rig is. `None` where that needs parts to be written out.
     fn saying(&self, rig: &Rig) -> Option<Self> {
         let reader = || PartFiles::known(&self.found, self.modules.clone());
