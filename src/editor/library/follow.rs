@@ -7,6 +7,7 @@ use bevy::prelude::*;
 use super::work::LOAD;
 use crate::{
     editor::{files::OpenDocument, notice::Notice},
+    files::TemplateBase,
     instance::RigSource,
     plugins::{
         document::{Change, EditRefusal, EditReport, EditRequest},
@@ -46,7 +47,7 @@ pub(super) struct PendingLoad {
 #[derive(Clone, Default)]
 struct FollowState {
     template: Option<PathBuf>,
-    base: Option<Arc<Rig>>,
+    base: Option<TemplateBase>,
     source: Option<RigSource>,
 }
 
@@ -86,7 +87,7 @@ fn cross(world: &mut World, rig: Entity, commit: &Commit) {
     let step = commit.step();
     if let Commit::Done(_) = commit {
         let Some(pending) = loads.pending.take_if(|pending| pending.rig == rig) else { return };
-        let after = FollowState { template: pending.template, base: Some(pending.base), source: None };
+        let after = FollowState { template: pending.template, base: Some(pending.base.into()), source: None };
         loads.fit = pending.mesh.map(|mesh| (rig, mesh, step.clone()));
         // There is one document at a time.
         loads.steps.retain(|known| known.rig == rig);
@@ -117,7 +118,7 @@ fn cross(world: &mut World, rig: Entity, commit: &Commit) {
 fn settle(world: &mut World, rig: Entity) {
     let mut loads = world.resource_mut::<LoadSteps>();
     let Some(pending) = loads.pending.take_if(|pending| pending.rig == rig) else { return };
-    set(world, rig, FollowState { template: pending.template, base: Some(pending.base), source: None });
+    set(world, rig, FollowState { template: pending.template, base: Some(pending.base.into()), source: None });
     world.write_message(Notice::done(pending.told));
     if let Some(mesh) = pending.mesh {
         world.write_message(FitRequest::new(mesh));

@@ -3,11 +3,18 @@
 //! A document is written as changes of the version that it took over last, and is then a version like the two others. So
 //! documents and files are updated in one way.
 
-use super::{Disk, PartFiles, TemplateVersion, same_parts::with_same_parts, template_text, update_template};
-use crate::rig::{
-    Rig,
-    part::have_same_fields,
-    update::{Choices, Update, edits_between},
+use super::{
+    Disk, PartFiles, TemplateVersion,
+    same_parts::{with_same_parts, with_uids_of},
+    template_text, update_template,
+};
+use crate::{
+    files::DocumentBase,
+    rig::{
+        Rig,
+        part::have_same_fields,
+        update::{Choices, Update, edits_between, update_with},
+    },
 };
 
 /// An update of a document.
@@ -41,6 +48,22 @@ pub fn update_document(
     update.rig = rig;
     let base = with_same_parts(disk, Some(base), &now, file).file.unwrap_or_else(|| file.clone());
     Some(DocumentUpdate { update, base })
+}
+
+/// The update of a document to the content of `file`, where of the base no more is known than its rig and its part instances.
+/// Part instances that have another uid in the file, because their names or joints are others there, are the same ones. `None`
+/// where the instances have the uids that they have in the document: the rigs tell all then.
+pub fn update_with_known_parts(
+    disk: &dyn Disk,
+    base: DocumentBase,
+    document: &Rig,
+    file: &TemplateVersion,
+    choices: &Choices,
+) -> Option<DocumentUpdate> {
+    let (renewed, moved) = with_uids_of(disk, base.parts, file)?;
+    let mut update = update_with(base.rig, document, renewed.rig(), choices);
+    update.changes.splice(..0, moved);
+    Some(DocumentUpdate { update, base: renewed })
 }
 
 impl TemplateVersion {
