@@ -14,10 +14,7 @@ use crate::{
         fit::{FitAnswer, FitRequest},
         history::RigHistory,
     },
-    rig::{
-        Rig,
-        step::{Commit, Step},
-    },
+    rig::step::{Commit, Step},
 };
 
 /// Steps that loaded templates.
@@ -36,7 +33,7 @@ pub(super) struct PendingLoad {
     /// File of the template; `None` for one that comes with Rigsmith.
     pub template: Option<PathBuf>,
     /// The template as it was read.
-    pub base: Arc<Rig>,
+    pub base: TemplateBase,
     /// Mesh that the skeleton goes into.
     pub mesh: Option<Entity>,
     /// Notice that is told once the step is made.
@@ -87,7 +84,7 @@ fn cross(world: &mut World, rig: Entity, commit: &Commit) {
     let step = commit.step();
     if let Commit::Done(_) = commit {
         let Some(pending) = loads.pending.take_if(|pending| pending.rig == rig) else { return };
-        let after = FollowState { template: pending.template, base: Some(pending.base.into()), source: None };
+        let after = FollowState { template: pending.template, base: Some(pending.base), source: None };
         loads.fit = pending.mesh.map(|mesh| (rig, mesh, step.clone()));
         // There is one document at a time.
         loads.steps.retain(|known| known.rig == rig);
@@ -118,7 +115,7 @@ fn cross(world: &mut World, rig: Entity, commit: &Commit) {
 fn settle(world: &mut World, rig: Entity) {
     let mut loads = world.resource_mut::<LoadSteps>();
     let Some(pending) = loads.pending.take_if(|pending| pending.rig == rig) else { return };
-    set(world, rig, FollowState { template: pending.template, base: Some(pending.base.into()), source: None });
+    set(world, rig, FollowState { template: pending.template, base: Some(pending.base), source: None });
     world.write_message(Notice::done(pending.told));
     if let Some(mesh) = pending.mesh {
         world.write_message(FitRequest::new(mesh));
