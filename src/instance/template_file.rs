@@ -90,9 +90,10 @@ impl BaseVersion {
 
     /// The version that a project keeps of the template in a file.
     pub fn kept(base: &TemplateBase, file: &Path) -> Self {
-        let content = || FileContent::Kept(base.clone(), file.to_owned());
-        let has_text = base.text.is_some();
-        let file = has_text.then(|| Arc::new(TemplateFile::of_content(content(), OnceLock::new())));
+        let file = base.text.is_some().then(|| {
+            let content = FileContent::Kept(base.clone(), file.to_owned());
+            Arc::new(TemplateFile::of_content(content, OnceLock::new()))
+        });
         Self { rig: base.rig.clone(), file }
     }
 
