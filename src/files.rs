@@ -82,6 +82,7 @@ pub use store::{
 pub use template_origin::{TemplateOrigin, has_parts, store_rig_from};
 pub(crate) use template_text::template_text;
 pub use template_update::{
-    DocumentUpdate, TemplateUpdate, TemplateVersion, base_text, diff_templates, update_document, update_template,
+    DocumentUpdate, TemplateBase, TemplateUpdate, TemplateVersion, base_text, diff_templates, update_document,
+    update_template, update_with_known_parts,
 };
 pub use watch::{FileWatch, LOOK, TemplateWatch};

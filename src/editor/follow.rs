@@ -68,7 +68,7 @@ fn follow(
             // Recovered work has come from the file too, and nobody knows how the file was then.
             let is_as_opened = history.last().is_none();
             let source = match &document.base {
-                Some(base) => source.with_base(base.clone()),
+                Some(base) => source.with_kept_base(base, template),
                 None if is_as_opened => source.with_base(Arc::new(rig.clone())),
                 None => source.of_first_version(),
             };

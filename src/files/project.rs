@@ -13,7 +13,7 @@ pub use note::ProjectNote;
 pub use open::load_project;
 pub use save::{ProjectFiles, project_files, store_project};
 
-use super::LoadError;
+use super::{LoadError, TemplateBase};
 use crate::{
     mesh::model::Model,
     rig::{
@@ -53,7 +53,7 @@ pub struct ProjectTemplate {
     /// File of the template, which may be missing.
     pub path: PathBuf,
     /// The version of the template that the rig took over last.
-    pub base: Arc<Rig>,
+    pub base: TemplateBase,
 }
 
 /// A mesh of a project and its geometry: a [`MeshShape`] to save, or a [`MeshState`] as it was loaded.

@@ -4,6 +4,7 @@
 mod document;
 mod part_files;
 mod same_parts;
+mod template_base;
 
 use std::{
     collections::BTreeMap,
@@ -30,10 +31,11 @@ use crate::{
         },
     },
 };
-pub use document::{DocumentUpdate, update_document};
+pub use document::{DocumentUpdate, update_document, update_with_known_parts};
 use part_files::Sides;
 pub(super) use same_parts::with_known_uids;
 use same_parts::with_same_parts;
+pub use template_base::TemplateBase;
 
 /// A version of a template: its file, and the rig with its parts.
 #[derive(Debug, Clone)]

@@ -21,7 +21,7 @@ use crate::{
     processor::Modules,
     rig::{
         Rig, SourceError, Uid,
-        part::PartSocket,
+        part::{PartInstance, PartSocket},
         template::{PartOrigin, Template, text_of},
     },
 };
@@ -33,6 +33,8 @@ const BYTE_ORDER_MARK: &str = "\u{FEFF}";
 pub struct RigTemplate {
     rig: Arc<Rig>,
     sockets: Arc<[PartSocket]>,
+    /// Part instances that the text has.
+    instances: Arc<[PartInstance]>,
     /// Origins of the commands that came of parts.
     origins: Arc<BTreeMap<Uid, PartOrigin>>,
     /// The text that the rig was read from; empty for a rig that was made by code.
@@ -66,6 +68,7 @@ impl RigTemplate {
         Self {
             rig: Arc::new(rig),
             sockets: Arc::from([]),
+            instances: Arc::from([]),
             origins: Arc::default(),
             text: Arc::from(""),
             has_mark: false,
@@ -87,13 +90,13 @@ impl RigTemplate {
     /// # Errors
     /// See [`PartFiles::complete`].
     pub fn read_with_parts(content: &[u8], path: &Path, files: &mut PartFiles) -> Result<Self, SourceError> {
-        let Template { rig, sockets, origins, .. } = files.complete(path, content)?;
+        let Template { rig, sockets, instances, origins, .. } = files.complete(path, content)?;
         let (found, modules) = (files.found.clone(), files.modules().clone());
         let parts = Arc::new(TemplateParts { path: path.to_owned(), found, modules });
         let text = Arc::from(text_of(content)?);
         let has_mark = content.starts_with(BYTE_ORDER_MARK.as_bytes());
-        let (rig, sockets, origins) = (Arc::new(rig), sockets.into(), Arc::new(origins));
-        Ok(Self { rig, sockets, origins, text, has_mark, is_of_text: true, parts })
+        let (rig, sockets, instances) = (Arc::new(rig), sockets.into(), instances.into());
+        Ok(Self { rig, sockets, instances, origins: Arc::new(origins), text, has_mark, is_of_text: true, parts })
     }
 
     /// The rig.
@@ -104,6 +107,11 @@ impl RigTemplate {
     /// Places that other things hang on: those of the template itself and of its parts.
     pub fn sockets(&self) -> &Arc<[PartSocket]> {
         &self.sockets
+    }
+
+    /// Part instances that the text has, in its order.
+    pub fn instances(&self) -> &Arc<[PartInstance]> {
+        &self.instances
     }
 
     /// Origins of the commands that came of parts, with their places in the text.

@@ -19,7 +19,7 @@ use crate::{
     processor::{BuildError, Builder, Modules, SourceText},
     rig::{
         BuiltRig, NodeType, Rig, Uid,
-        part::PartSocket,
+        part::{PartInstance, PartSocket, have_same_fields},
         template,
         update::{Change, Take, update, with_identities},
     },
@@ -43,6 +43,8 @@ pub struct BuiltTemplate {
     pub sockets: Arc<[PartSocket]>,
     /// Places that other things hang on, as the file has them.
     file_sockets: Arc<[PartSocket]>,
+    /// Part instances, as the file has them.
+    instances: Arc<[PartInstance]>,
     /// Programs with joints and some nodes, for instances with [`ExposedNodes`](super::ExposedNodes).
     some: Mutex<Vec<(Vec<ExposedNode>, Arc<RigProgram>)>>,
     /// Differences from the build before.
@@ -55,15 +57,39 @@ pub struct BuiltTemplate {
     pub(super) file: Option<Arc<TemplateFile>>,
 }
 
-#[cfg(feature = "remote")]
 impl BuiltTemplate {
-    /// True if it was built from that rig of a file.
-    pub(crate) fn is_of(&self, file: &Rig) -> bool {
-        *self.source == *file
+    /// True if it was built from that content of a file.
+    #[cfg(feature = "remote")]
+    pub(crate) fn is_of(&self, template: &RigTemplate) -> bool {
+        self.has_build_of(template) && have_same_fields(&self.instances, template.instances())
     }
-}
 
-impl BuiltTemplate {
+    /// True if the content of a file gives the same build. Its part instances may have other fields, as the sides of parts that
+    /// are the same on both.
+    fn has_build_of(&self, template: &RigTemplate) -> bool {
+        self.source == *template.rig() && self.file_sockets == *template.sockets()
+    }
+
+    /// The next version of the template, whose content gives the same build.
+    fn with_content(self: &Arc<Self>, template: &RigTemplate, file: Option<Arc<TemplateFile>>) -> Arc<Self> {
+        let some = self.some.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        Arc::new(Self {
+            rig: self.rig.clone(),
+            source: self.source.clone(),
+            built: self.built.clone(),
+            whole: self.whole.clone(),
+            lean: self.lean.clone(),
+            sockets: self.sockets.clone(),
+            file_sockets: self.file_sockets.clone(),
+            instances: template.instances().clone(),
+            some: Mutex::new(some),
+            changes: Arc::from([]),
+            ran: Arc::from([]),
+            way: Some(NextVersion::between(self, &self.built, std::iter::empty())),
+            file,
+        })
+    }
+
     /// Program with joints, and those nodes besides. It is compiled once.
     ///
     /// # Errors
@@ -320,9 +346,10 @@ impl TemplateBuild {
 
     fn built(&mut self, template: &RigTemplate) -> Result<Arc<BuiltTemplate>, TemplateError> {
         let source = template.rig();
-        let is_same = |good: &&Arc<BuiltTemplate>| good.source == *source && good.file_sockets == *template.sockets();
-        if let Some(good) = self.good.as_ref().filter(is_same) {
-            return Ok(good.clone());
+        if let Some(good) = self.good.as_ref().filter(|good| good.has_build_of(template)) {
+            // Rigs with documents take over the fields of part instances, whatever comes of these.
+            let is_same = have_same_fields(&good.instances, template.instances());
+            return Ok(if is_same { good.clone() } else { good.with_content(template, self.file_of(template)) });
         }
         let mut identities = HashMap::new();
         let (rig, changes) = match &self.good {
@@ -370,11 +397,28 @@ impl TemplateBuild {
             NextVersion::between(good, &built, [(&good.whole, &whole), (&good.lean, &lean)].into_iter().chain(pairs))
         });
         let some = Mutex::new(some);
+        let (instances, file) = (template.instances().clone(), self.file_of(template));
+        Ok(Arc::new(BuiltTemplate {
+            rig,
+            source,
+            built,
+            whole,
+            lean,
+            sockets,
+            file_sockets,
+            instances,
+            some,
+            changes,
+            ran,
+            way,
+            file,
+        }))
+    }
+
+    /// The file of a template; `None` if it was made by code, or is in another file.
+    fn file_of(&self, template: &RigTemplate) -> Option<Arc<TemplateFile>> {
         let is_of_file = self.file.as_deref().is_some_and(|file| file == template.file());
-        let file = is_of_file.then(|| Arc::new(TemplateFile::of(template.clone())));
-        let template =
-            BuiltTemplate { rig, source, built, whole, lean, sockets, file_sockets, some, changes, ran, way, file };
-        Ok(Arc::new(template))
+        is_of_file.then(|| Arc::new(TemplateFile::of(template.clone())))
     }
 
     /// A socket whose joint has the uid that it got first.

@@ -1,6 +1,6 @@
 //! Rigs with documents of their own, which follow their templates by three-way updates.
 
-use std::sync::Arc;
+use std::{path::Path, sync::Arc};
 
 use bevy::{ecs::entity::EntityHashSet, prelude::*};
 
@@ -9,7 +9,7 @@ use super::{
     template_file::BaseVersion,
 };
 use crate::{
-    files::DocumentBase,
+    files::{DocumentBase, TemplateBase},
     plugins::{
         commands::{BuildFailure, BuildRequest, BuildResult, BuildStep, RigModules},
         document::{Change, EditRefusal, EditReport, EditRequest},
@@ -108,6 +108,12 @@ impl RigSource {
         self
     }
 
+    /// The rig has come from this version of the template in a file, as a project keeps it.
+    pub fn with_kept_base(mut self, base: &TemplateBase, file: &Path) -> Self {
+        self.base = Some(BaseVersion::kept(base, file));
+        self
+    }
+
     /// The rig has come from the template as it is when it is seen first.
     pub fn of_first_version(mut self) -> Self {
         self.is_first = true;
@@ -135,6 +141,11 @@ impl RigSource {
     /// The version of the template that was accepted last; `None` until it is loaded, or if nobody knows.
     pub fn base(&self) -> Option<&Arc<Rig>> {
         self.base.as_ref().map(|base| &base.rig)
+    }
+
+    /// The version of the template that was accepted last, as a project keeps it.
+    pub fn base_to_keep(&self) -> Option<TemplateBase> {
+        self.base.as_ref().map(BaseVersion::to_keep)
     }
 
     /// The version of the template that was accepted last, for a save over its file: with the uids that its part instances have

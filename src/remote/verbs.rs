@@ -381,7 +381,7 @@ fn renew(world: &mut World, params: UpdateParams) -> Result<StartedCall, CallErr
     }
     let template = source.template.clone();
     let before = world.resource::<RigTemplates>().built(&template).cloned();
-    let is_known = before.as_ref().is_some_and(|before| before.is_of(file.rig()));
+    let is_known = before.as_ref().is_some_and(|before| before.is_of(&file));
     if is_known && world.get::<UpdateOffer>(entity).is_none() {
         return Ok(StartedCall::Answered(json!({"changes": [], "ran": [], "poses": [], "clips": []})));
     }

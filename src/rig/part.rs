@@ -25,7 +25,7 @@ pub use dropped_part::DroppedPart;
 pub(crate) use dropped_part::without_dropped;
 pub use error::PartError;
 pub(in crate::rig) use instance::{MOST_BROUGHT, switch_name};
-pub use instance::{MirrorParams, Part, PartInstance};
+pub use instance::{MirrorParams, Part, PartInstance, have_same_fields};
 pub use option::{OptionError, OptionForm, PartOption};
 pub use overrides::PartOverride;
 pub(in crate::rig) use resize::MOST_JOINTS;

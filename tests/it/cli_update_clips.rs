@@ -105,7 +105,7 @@ fn clips_of_a_project_move_the_joints_as_before() {
     flip_all(&mut next);
     fs::write(at("biped.rig.ron"), write_template(&first)).unwrap();
     fs::write(at("next.rig.ron"), write_template(&next)).unwrap();
-    let followed = ProjectTemplate { rig: mine.uid(), path: at("biped.rig.ron"), base: Arc::new(first) };
+    let followed = ProjectTemplate { rig: mine.uid(), path: at("biped.rig.ron"), base: Arc::new(first).into() };
     let rigs = vec![mine.clone()];
     let project = ProjectToSave { name: "shot".into(), rigs, templates: vec![followed], ..Default::default() };
     store_project(&RealDisk, &at("shot.rigsmith.ron"), &project).unwrap();

@@ -222,13 +222,47 @@ fn a_save_of_the_window_itself_is_no_news() {
     assert_eq!(window.height("b"), 0.9);
 }
 
+/// A hand with the part of the tests of parts.
+const HAND: &str = r#"(
+    format: 2,
+    name: "hand",
+    joints: [(label: "palm", tags: [control()])],
+    parts: [
+        (part: "finger.rig.ron", name: "index", parent: "palm", translation: (0, 0.1, 0), prefix: "a_"),
+    ],
+)
+"#;
+
+#[test]
+fn a_project_remembers_the_parts_of_the_version_that_its_rig_follows() {
+    let mut window = Window::of(HAND);
+    window.raise("a_bone_3", 0.7);
+    let joint = window.joint("a_bone_3");
+    let project = window.file.with_file_name("hand.rigsmith.ron");
+    window.send(ActionRequest(Action::Save));
+    window.send(DialogAnswer(Answer::Path(project.clone())));
+    window.until("the project", |_| project.exists());
+    window.settle();
+    // Somebody calls the part otherwise, and makes it longer; the project is opened again.
+    window.save("name: \"index\"", "name: \"pointer\", count: 4");
+    let before = window.rig();
+    window.send(OpenRequest::File(project));
+    window.until("the opened project", |window| window.rig() != before && window.source().is_some());
+    window.until("the offer", |window| window.offer().is_some());
+    let changes: Vec<String> =
+        window.offer().into_iter().flat_map(|offer| offer.changes.iter()).map(|c| c.to_string()).collect();
+    assert!(changes.iter().any(|change| change.contains("count: nothing to 4")), "{changes:?}");
+    assert!(!changes.iter().any(|change| change.contains("conflict")), "{changes:?}");
+    window.send(OfferAnswer::Take(Take::Mine));
+    window.until("the update", |window| window.data().find_label("a_bone_4").is_some());
+    // The part is the same one, with what was changed of it.
+    assert_eq!((window.joint("a_bone_4"), window.data().len()), (joint, 5));
+    assert_eq!(window.height("a_bone_4"), 0.7);
+}
+
 #[test]
 fn fields_of_parts_that_the_file_changed_are_there_after_the_next_save() {
-    let part =
-        "(part: \"finger.rig.ron\", name: \"index\", parent: \"palm\", translation: (0, 0.1, 0), prefix: \"a_\")";
-    let mut window = Window::of(&format!(
-        "(\n    format: 2,\n    name: \"hand\",\n    joints: [(label: \"palm\", tags: [control()])],\n    parts: [\n        {part},\n    ],\n)\n"
-    ));
+    let mut window = Window::of(HAND);
     window.raise("a_bone_1", 0.7);
     window.save("prefix: \"a_\"", "prefix: \"b_\", count: 5");
     window.until("the offer", |window| window.offer().is_some());

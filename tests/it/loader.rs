@@ -284,6 +284,31 @@ fn a_template_is_loaded_with_poses_and_keys_kept_and_taken_back_whole() {
 }
 
 #[test]
+fn a_part_that_has_another_name_in_a_newer_version_keeps_its_joints() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let doll = |name: &str| {
+        let part = format!("(part: \"limb.rig.ron\", name: \"{name}\", parent: \"hips\")");
+        format!("(format: 2, name: \"doll\", joints: [(label: \"hips\", tags: [control(size: 0.5)])], parts: [{part}])")
+    };
+    let [old, new] = [studio.man().with_file_name("doll.rig.ron"), studio.site.join("doll.rig.ron")];
+    fs::write(old.with_file_name("limb.rig.ron"), LIMB).unwrap();
+    fs::write(new.with_file_name("limb.rig.ron"), LIMB.replace("(0, -0.3, 0)", "(0, -0.5, 0)")).unwrap();
+    fs::write(&old, doll("arm")).unwrap();
+    fs::write(&new, doll("wing")).unwrap();
+    studio.open(OpenRequest::File(old));
+    studio.desk.until("the followed file", |desk| {
+        desk.app.world().get::<RigSource>(desk.rig).is_some_and(|source| !source.taken_over().parts.is_empty())
+    });
+    let lower = studio.joint("lower_l");
+    let bent = PoseOffset { rotation: Quat::from_rotation_z(0.5), ..PoseOffset::IDENTITY };
+    studio.desk.edit(Operation::Pose(vec![(lower, bent)]));
+    studio.act(TemplatePlace::File(new), LibraryAct::Load { keep: true });
+    assert_eq!((studio.height("lower_l"), studio.joint("lower_l")), (-0.5, lower), "{:?}", studio.desk.told());
+    assert!(studio.desk.rig().pose().contains_key(&lower), "the pose stays");
+    assert_eq!(studio.desk.rig().len(), 3);
+}
+
+#[test]
 fn stages_go_forwards_and_backwards_at_any_time() {
     let mut studio = Studio::new(LoaderPanel::default());
     let before = studio.text();

@@ -174,6 +174,8 @@ mod pose;
 mod prerequisites;
 mod processor;
 mod project;
+#[cfg(feature = "cli")]
+mod project_parts;
 mod random;
 mod references;
 #[cfg(feature = "remote")]

@@ -211,14 +211,14 @@ fn mistakes_are_named_with_their_place() {
 #[test]
 fn a_newer_format_opens_and_says_what_it_does_not_know() {
     let text = FROZEN
-        .replacen("format: 1,", "format: 7, lights: [(x: 1)],", 1)
+        .replacen("format: 1,", "format: 8, lights: [(x: 1)],", 1)
         .replacen("mode: \"Pose\"", "fog: 0.5, mode: \"Pose\"", 1)
         .replacen("skins: [", "muscles: [], skins: [", 1)
         .replacen("format: 1,", "format: 5, meaning: 42,", 1);
     let read = read_project(text.as_bytes()).unwrap();
     assert_eq!(read.project, frozen());
     let told = read.notes.join("\n");
-    for part in ["project has format 7", "`lights`", "`fog`", "`muscles`", "template has format 5"] {
+    for part in ["project has format 8", "`lights`", "`fog`", "`muscles`", "template has format 5"] {
         assert!(told.contains(part), "{part}: {told}");
     }
     let line = place(&text, "meaning: 42").0;
@@ -284,6 +284,23 @@ fn the_frozen_file_of_format_6_keeps_cuts_of_faces() {
         project.rigs[0].rig.apply(&inverse).unwrap();
     }
     assert_eq!(write_project(&project), text);
+}
+
+#[test]
+fn the_frozen_file_of_format_7_keeps_texts_of_templates_with_parts() {
+    let text = include_str!("../frozen/format-7.rigsmith.ron");
+    let read = read_project(text.as_bytes()).unwrap();
+    assert_eq!(read.notes, Vec::<String>::new());
+    let mut project = read.project;
+    let kept = project.templates[0].text.clone().unwrap();
+    assert!(kept.starts_with("(\n    format: 2,") && kept.contains("\n        // The tail.\n"), "{kept}");
+    assert_eq!(write_project(&project), text);
+    // Marks of strings in the text are no marks of the project.
+    project.templates[0].text = Some("(name: r##\"a\"##) // \"#".to_owned());
+    assert_eq!(read_project(write_project(&project).as_bytes()).unwrap().project, project);
+    // Without the text the file is of the format before.
+    project.templates[0].text = None;
+    assert_eq!(write_project(&project), include_str!("../frozen/format-6.rigsmith.ron"));
 }
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
@@ -411,7 +428,8 @@ fn the_template_that_a_rig_follows_is_kept_with_its_version() {
     let folder = Folder::new();
     let mut project = cube(&folder.mesh());
     let file = folder.mesh().with_file_name("t.rig.ron");
-    let followed = ProjectTemplate { rig: project.rigs[0].uid(), path: file, base: Arc::new(template.base.clone()) };
+    let followed =
+        ProjectTemplate { rig: project.rigs[0].uid(), path: file, base: Arc::new(template.base.clone()).into() };
     project.templates = vec![followed.clone()];
     folder.save(&project);
     assert_eq!(folder.load().templates, [followed]);

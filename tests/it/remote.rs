@@ -241,6 +241,31 @@ fn a_conflict_is_decided_by_the_call() {
 }
 
 #[test]
+fn a_field_of_a_part_that_changes_nothing_of_the_rig_is_taken_over() {
+    let mut remote = Remote::new();
+    let part = r#"(format: 2, name: "link", kind: "part", joints: [(label: "tip", tags: [control])])"#;
+    let hand = r#"(
+        format: 2,
+        name: "hand",
+        joints: [(label: "palm", tags: [control])],
+        parts: [(part: "link.rig.ron", name: "index", parent: "palm")],
+    )"#;
+    fs::write(remote.file("link.rig.ron"), part).unwrap();
+    fs::write(remote.file("t.rig.ron"), hand).unwrap();
+    let rig = remote.load();
+    let text = remote.text(&rig);
+    let sided = hand.replace("parent: \"palm\"", "parent: \"palm\", mirror: true");
+    fs::write(remote.file("t.rig.ron"), sided).unwrap();
+    for dry_run in [true, false] {
+        let updated = remote.call("rig.template.update", json!({"rig": rig, "dry_run": dry_run}));
+        assert_eq!(updated["changes"][0]["field"], json!("part index mirror"), "{updated}");
+    }
+    assert_eq!(remote.text(&rig), text);
+    assert!(remote.base.get::<RigSource>(entity(&rig)).unwrap().taken_over().parts[0].mirror);
+    assert_eq!(remote.call("rig.template.update", json!({"rig": rig}))["changes"], json!([]));
+}
+
+#[test]
 fn the_schema_names_every_method_and_its_parameters() {
     let mut remote = Remote::new();
     let rig = remote.load();

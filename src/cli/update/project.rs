@@ -8,8 +8,9 @@ use super::{UpdateArgs, clips, limits, tell_update, version};
 use crate::{
     cli::{Failure, Report, report::counted},
     files::{
-        DocumentUpdate, FileKind, LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave, ProjectTemplate,
-        ProjectToSave, RealDisk, TemplateVersion, is_same_file, store_project, update_document,
+        DocumentBase, DocumentUpdate, FileKind, LoadedMesh, LoadedProject, MeshShape, MeshState, MeshToSave,
+        ProjectTemplate, ProjectToSave, RealDisk, TemplateBase, TemplateVersion, is_same_file, store_project,
+        update_document, update_with_known_parts,
     },
     processor::{BuildError, Builder, keep_clips},
     rig::{
@@ -40,13 +41,18 @@ pub(super) fn run(args: &UpdateArgs) -> Result<Report, Failure> {
     }
     let given = args.base.as_ref().map(|base| version(base, &mut report)).transpose()?;
     let known = project.templates.iter().position(|template| template.rig == now.uid());
-    let of_project = known.map(|at| project.templates[at].base.clone());
-    let base: Option<&Rig> = given.as_ref().map(TemplateVersion::rig).or(of_project.as_deref());
+    let of_project = known.map(|at| project.templates[at].clone());
+    let kept = of_project.as_ref().map(|template| &*template.base.rig);
+    let base: Option<&Rig> = given.as_ref().map(TemplateVersion::rig).or(kept);
     let source = args.base.as_ref().or(known.map(|_| &args.rig));
     report.set("base", source.map(|path| path.display().to_string()));
     let choices: Choices = args.side().into();
-    // A base that is known with its parts tells their fields.
-    let of_parts = given.as_ref().and_then(|base| update_document(&RealDisk, base, &now, &file, &choices));
+    let of_parts = match (&given, &of_project) {
+        // A base that is known with its parts tells their fields.
+        (Some(base), _) => update_document(&RealDisk, base, &now, &file, &choices),
+        (None, Some(template)) => update_from_kept(template, &now, &file, &choices),
+        (None, None) => None,
+    };
     let (mut updated, taken_over) = match of_parts {
         Some(DocumentUpdate { update, base }) => (update, Some(base)),
         None => (update_with(base, &now, file.rig(), &choices), None),
@@ -59,8 +65,9 @@ pub(super) fn run(args: &UpdateArgs) -> Result<Report, Failure> {
     }
     let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) else { return Ok(report) };
     exchange(&mut project.rigs[number], &updated.rig).map_err(refused)?;
-    let taken_over = taken_over.as_ref().map_or_else(|| file.rig(), TemplateVersion::rig);
-    let base = Arc::new(with_identities(taken_over, &updated.identities));
+    let taken_over = taken_over.as_ref().unwrap_or(&file);
+    let rig = Arc::new(with_identities(taken_over.rig(), &updated.identities));
+    let base = TemplateBase { rig, text: taken_over.text_with_parts() };
     // A template that is called by its name has no file that could be followed.
     let path = Some(&args.from).filter(|from| FileKind::of(from) == Some(FileKind::Template));
     match (known, path) {
@@ -78,6 +85,24 @@ pub(super) fn run(args: &UpdateArgs) -> Result<Report, Failure> {
     report.line(format!("wrote {}", output.display()));
     clips::store(&clips, &mut report)?;
     Ok(report)
+}
+
+/// The update from the version that the project keeps; `None` where its part instances are those of the file.
+fn update_from_kept(
+    template: &ProjectTemplate,
+    now: &Rig,
+    file: &TemplateVersion,
+    choices: &Choices,
+) -> Option<DocumentUpdate> {
+    let ProjectTemplate { path, base, .. } = template;
+    match base.version(&RealDisk, path) {
+        Some(version) => update_document(&RealDisk, &version, now, file, choices),
+        None => {
+            let parts = base.parts();
+            let known = DocumentBase { rig: Some(&base.rig), parts: &parts };
+            update_with_known_parts(&RealDisk, known, now, file, choices)
+        }
+    }
 }
 
 /// Number of the rig that follows the template, else of the first.

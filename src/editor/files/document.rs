@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use super::{super::notice::Notice, active, file_name};
 use crate::{
     files::{
-        Disk, MeshToSave, RealDisk,
+        Disk, MeshToSave, RealDisk, TemplateBase,
         journal::{Journal, JournalPlaces, journal_beside},
     },
     plugins::{
         history::RigHistory,
         surface::{RigMesh, RigMeshes},
     },
-    rig::{Rig, Uid, step::Step},
+    rig::{Uid, step::Step},
 };
 
 /// Component of the edited rig with its file and journal.
@@ -28,7 +28,7 @@ pub struct OpenDocument {
     /// The template that was opened; its text is what a template is saved over.
     pub(in crate::editor) template: Option<PathBuf>,
     /// The version of the template that a project's rig took over last.
-    pub(in crate::editor) base: Option<Arc<Rig>>,
+    pub(in crate::editor) base: Option<TemplateBase>,
     pub(super) saved: SavedAt,
     pub(super) journal: Journal,
     /// Meshes of the project that were not found; they are saved again unchanged.

@@ -98,7 +98,7 @@ pub(super) fn export(world: &mut World, path: PathBuf) {
     let Some(modules) = world.get_resource::<RigModules>().map(|modules| modules.0.clone()) else { return };
     let document = world.get::<OpenDocument>(rig);
     let template = document.and_then(|document| document.template.clone());
-    let base = document.and_then(|document| document.base.as_ref());
+    let base = document.and_then(|document| document.base.as_ref()).map(|base| &base.rig);
     let source = world.get::<RigSource>(rig);
     let base = source.and_then(RigSource::base).or(base).cloned();
     let parts = source.map_or_else(Vec::new, |source| source.taken_over().parts.to_vec());

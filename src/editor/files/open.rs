@@ -24,7 +24,7 @@ use crate::{
         settings::EditorSettings,
     },
     files::{
-        Disk, FileKind, LoadedMesh, MeshState, MeshToSave, ProjectNote, RealDisk,
+        Disk, FileKind, LoadedMesh, MeshState, MeshToSave, ProjectNote, RealDisk, TemplateBase,
         journal::{
             Journal, JournalStart, Origin, PendingJournal, RecoveredJournal, RestoredRig, ResumedJournal, file_hash,
             journal_beside, pending_journal,
@@ -104,7 +104,7 @@ pub(in crate::editor) struct LoadedDocument {
     pub view: Option<ProjectView>,
     pub project: Option<std::path::PathBuf>,
     /// Template that the rig of a project follows, and the version that it took over last.
-    pub followed: Option<(std::path::PathBuf, Arc<Rig>)>,
+    pub followed: Option<(std::path::PathBuf, TemplateBase)>,
     pub origin: Origin,
     pub notes: Vec<String>,
     /// Facts that people should look after.

@@ -209,8 +209,8 @@ pub(in crate::editor) fn snapshot(world: &mut World, rig: Entity) -> Option<(Pro
     }
     open.extend(document.missing.iter().cloned());
     let name = document.name.clone();
-    let base = world.get::<RigSource>(rig).and_then(RigSource::base).or(document.base.as_ref());
-    let followed = document.template.clone().zip(base.cloned());
+    let base = world.get::<RigSource>(rig).and_then(RigSource::base_to_keep).or_else(|| document.base.clone());
+    let followed = document.template.clone().zip(base);
     let templates = followed.map(|(path, base)| ProjectTemplate { rig: data.uid(), path, base }).into_iter().collect();
     let names = animated_names(world, &data);
     Some((ProjectToSave { name, rigs: vec![data], meshes: open, templates, view, journal: None, names }, bundled))
@@ -319,7 +319,7 @@ fn follow(world: &mut World, rig: Entity, path: PathBuf, saved: Arc<Rig>) -> Opt
     let mut document = world.get_mut::<OpenDocument>(rig)?;
     let Some(template) = &document.template else {
         let name = file_name(&path);
-        (document.template, document.base) = (Some(path), Some(saved));
+        (document.template, document.base) = (Some(path), Some(saved.into()));
         return Some(name);
     };
     // Another template may have been loaded meanwhile; what was saved is no base of that.

@@ -7,16 +7,14 @@ use bevy::prelude::*;
 use super::work::LOAD;
 use crate::{
     editor::{files::OpenDocument, notice::Notice},
+    files::TemplateBase,
     instance::RigSource,
     plugins::{
         document::{Change, EditRefusal, EditReport, EditRequest},
         fit::{FitAnswer, FitRequest},
         history::RigHistory,
     },
-    rig::{
-        Rig,
-        step::{Commit, Step},
-    },
+    rig::step::{Commit, Step},
 };
 
 /// Steps that loaded templates.
@@ -35,7 +33,7 @@ pub(super) struct PendingLoad {
     /// File of the template; `None` for one that comes with Rigsmith.
     pub template: Option<PathBuf>,
     /// The template as it was read.
-    pub base: Arc<Rig>,
+    pub base: TemplateBase,
     /// Mesh that the skeleton goes into.
     pub mesh: Option<Entity>,
     /// Notice that is told once the step is made.
@@ -46,7 +44,7 @@ pub(super) struct PendingLoad {
 #[derive(Clone, Default)]
 struct FollowState {
     template: Option<PathBuf>,
-    base: Option<Arc<Rig>>,
+    base: Option<TemplateBase>,
     source: Option<RigSource>,
 }
 

@@ -25,7 +25,11 @@ use crate::{
         notice::Notice,
         panels::joint_name,
     },
-    files::{LibraryError, RealDisk, SearchPaths, SiteError, TemplatePlace, read_listed},
+    files::{
+        DocumentBase, DocumentUpdate, LibraryError, RealDisk, SearchPaths, SiteError, TemplateBase, TemplatePlace,
+        TemplateVersion, read_listed, update_with_known_parts,
+    },
+    instance::RigSource,
     plugins::{
         commands::RigModules,
         document::EditRequest,
@@ -37,9 +41,9 @@ use crate::{
     rig::{
         EditError, Rig, RigEdit, Uid,
         operations::{Operation, TagOperation},
-        part::{Part, PartError},
+        part::{Part, PartError, PartInstance},
         template::Template,
-        update::{Take, clip_edits, edits_between, pose_edits, update, with_identities},
+        update::{Take, Update, clip_edits, edits_between, pose_edits, update, with_identities},
     },
 };
 
@@ -129,7 +133,7 @@ enum Work {
 /// Finished work.
 enum Ready {
     /// Edits that put a template in place of the rig, and what the rig has then come from.
-    Load { edits: Vec<RigEdit>, base: Arc<Rig>, notes: Vec<String> },
+    Load { edits: Vec<RigEdit>, base: TemplateBase, notes: Vec<String> },
     /// An operation, and what is to be said about it.
     Operation(Box<Operation>, Option<String>),
 }
@@ -164,6 +168,8 @@ struct Snapshot {
     stroke: Vec<Uid>,
     /// True to put parts onto both sides.
     both: bool,
+    /// The template that the rig follows, and the part instances that it has of that.
+    followed: Option<(Uid, Vec<PartInstance>)>,
 }
 
 /// Starts the next request.
@@ -202,6 +208,10 @@ fn begin(world: &mut World, request: LibraryRequest) {
         beside: world.get::<OpenDocument>(rig).and_then(own_folder),
         stroke: added_by(history.last().map(Arc::as_ref)),
         both: PartSides::are_both(world),
+        followed: world.get::<RigSource>(rig).and_then(|source| {
+            let template = source.base()?.uid();
+            Some((template, source.taken_over().parts.to_vec()))
+        }),
     };
     let (landing, asked) = (Landing::asked(history), request.clone());
     let work = Work::Runs(AsyncComputeTaskPool::get().spawn(async move { snapshot.run(&asked) }));
@@ -214,7 +224,9 @@ impl Snapshot {
         let site = self.folders.read()?;
         let template = read_listed(&RealDisk, &request.place, &site)?;
         let operation = match &request.act {
-            LibraryAct::Load { keep } | LibraryAct::Fit { keep } => return self.loaded(template, *keep),
+            LibraryAct::Load { keep } | LibraryAct::Fit { keep } => {
+                return self.loaded(&request.place, template, *keep);
+            }
             LibraryAct::Drop { joint } if template.rig.about().kind == "part" => {
                 return Ok(self.part(&request.place, template, &site, &[*joint], &[])?);
             }
@@ -253,27 +265,44 @@ impl Snapshot {
 
     /// Edits that put a template in place of the rig. Where poses and keys are kept, things of the rig that the template has,
     /// too, stay the same things, and poses and keys mean the same as before.
-    fn loaded(self, template: Template, keep: bool) -> Result<Ready, WorkError> {
+    fn loaded(self, place: &TemplatePlace, template: Template, keep: bool) -> Result<Ready, WorkError> {
         let now = &self.rig;
         if !keep {
             let mut edits: Vec<RigEdit> = now.clips().iter().map(|clip| RigEdit::RemoveClip(clip.uid)).collect();
             edits.extend(replacing(now, &template.rig, 1.0));
-            return Ok(Ready::Load { edits, base: Arc::new(template.rig), notes: template.notes });
+            return Ok(Ready::Load { edits, base: Arc::new(template.rig).into(), notes: template.notes });
         }
         // Stored poses are a person's: a base without them lets them stay.
         let mut base = now.clone();
         for pose in now.stored_poses() {
             base.apply(&RigEdit::RemoveStoredPose(pose.uid))?;
         }
-        let mut updated = update(Some(&base), now, &template.rig, Take::Theirs);
+        let (mut updated, base) = self.updated(&base, place, &template);
         let mut notes = template.notes;
         notes.extend(keep_poses(now, &mut updated.rig, &self.modules)?.iter().map(ToString::to_string));
         notes.extend(keep_clips(now, &mut updated.rig, &self.modules)?.lines());
         let mut edits = edits_between(now, &updated.rig)?;
         edits.extend(pose_edits(now, &updated.rig));
         edits.extend(clip_edits(now, &updated.rig)?);
-        let base = Arc::new(with_identities(&template.rig, &updated.identities));
         Ok(Ready::Load { edits, base, notes })
+    }
+
+    /// The update that makes the rig the template, and the version that it has come from then. Part instances that have another
+    /// name in another version of the template that the rig follows are the same ones.
+    fn updated(&self, base: &Rig, place: &TemplatePlace, template: &Template) -> (Update, TemplateBase) {
+        let of_parts = self.followed.as_ref().filter(|(uid, _)| *uid == template.rig.uid()).and_then(|(_, parts)| {
+            let version = TemplateVersion::read(&RealDisk, place.path()?).ok()?;
+            let known = DocumentBase { rig: Some(base), parts };
+            update_with_known_parts(&RealDisk, known, &self.rig, &version, &Take::Theirs.into())
+        });
+        let (updated, taken) = match of_parts {
+            Some(DocumentUpdate { update, base }) => (update, Some(base)),
+            None => (update(Some(base), &self.rig, &template.rig, Take::Theirs), None),
+        };
+        let rig = taken.as_ref().map_or(&template.rig, TemplateVersion::rig);
+        let rig = Arc::new(with_identities(rig, &updated.identities));
+        let text = taken.as_ref().and_then(TemplateVersion::text_with_parts);
+        (updated, TemplateBase { rig, text })
     }
 }
 
@@ -354,7 +383,7 @@ fn put(world: &mut World, rig: Entity, request: LibraryRequest, mut landing: Lan
         world.write_message(Notice::info(note).quiet());
     }
     let template = request.place.path().map(std::path::Path::to_path_buf);
-    let joints = counted(base.len(), "joint", "joints");
+    let joints = counted(base.rig.len(), "joint", "joints");
     let told = format!("Loaded {name}: {joints}; Ctrl+Z takes it back");
     world.resource_mut::<LoadSteps>().pending = Some(PendingLoad { rig, template, base, mesh, told });
     world.write_message(EditRequest::operation(rig, Operation::Named { name: LOAD, edits }));

@@ -12,7 +12,7 @@ use super::{
 use crate::{
     algo::transfer::{TransferMesh, TransferSettings, transfer_weights},
     files::{
-        Disk, LoadError,
+        Disk, LoadError, TemplateBase,
         atomic::folder_of,
         load::{load_hashed_skin, load_project_file},
         load_model,
@@ -42,7 +42,8 @@ pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadE
     let mut notes: Vec<ProjectNote> = read.notes.into_iter().map(ProjectNote::File).collect();
     let templates = templates.into_iter().filter_map(|template| {
         let file = template_file(disk, path, &template.path, &mut notes)?;
-        Some(ProjectTemplate { rig: template.rig, path: file, base: Arc::new(template.base) })
+        let base = TemplateBase { rig: Arc::new(template.base), text: template.text.map(Arc::from) };
+        Some(ProjectTemplate { rig: template.rig, path: file, base })
     });
     let templates = templates.collect();
     let (mut rigs, skins): (Vec<Rig>, Vec<Vec<SkinReference>>) =

@@ -7,7 +7,7 @@ use super::{
     path::{Place, is_of_site, place, reference},
 };
 use crate::{
-    files::{Disk, FileSet, StoreError, save_set, stem, verify},
+    files::{Disk, FileSet, StoreError, TemplateBase, save_set, stem, verify},
     rig::{
         Rig, SkinData,
         project::{self, MeshReference, Project, ProjectRig, SkinReference, TemplateReference, write_project},
@@ -94,7 +94,13 @@ pub fn project_files(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> R
                  copy it into that folder, or name its folder as one of templates (RIGSMITH_TEMPLATES)"
             ));
         }
-        TemplateReference { rig: template.rig, path: named, base: (*template.base).clone() }
+        let TemplateBase { rig: base, text } = &template.base;
+        TemplateReference {
+            rig: template.rig,
+            path: named,
+            base: (**base).clone(),
+            text: text.as_deref().map(str::to_owned),
+        }
     });
     let templates = templates.collect();
     let (name, view, journal) = (project.name.clone(), project.view.clone(), project.journal.clone());

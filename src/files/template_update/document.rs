@@ -3,11 +3,18 @@
 //! A document is written as changes of the version that it took over last, and is then a version like the two others. So
 //! documents and files are updated in one way.
 
-use super::{Disk, PartFiles, TemplateVersion, same_parts::with_same_parts, template_text, update_template};
-use crate::rig::{
-    Rig,
-    part::PartInstance,
-    update::{Choices, Update, edits_between},
+use super::{
+    Disk, PartFiles, TemplateVersion,
+    same_parts::{with_same_parts, with_uids_of},
+    template_text, update_template,
+};
+use crate::{
+    files::DocumentBase,
+    rig::{
+        Rig,
+        part::have_same_fields,
+        update::{Choices, Update, edits_between, update_with},
+    },
 };
 
 /// An update of a document.
@@ -29,7 +36,7 @@ pub fn update_document(
     file: &TemplateVersion,
     choices: &Choices,
 ) -> Option<DocumentUpdate> {
-    if base.has_same_instances(file) {
+    if have_same_fields(base.parts(), file.parts()) {
         return None;
     }
     let now = base.saying(document)?;
@@ -43,13 +50,23 @@ pub fn update_document(
     Some(DocumentUpdate { update, base })
 }
 
-impl TemplateVersion {
-    /// True if both versions have the same part instances, whatever these change of their parts.
-    fn has_same_instances(&self, other: &Self) -> bool {
-        let fields = |part: &PartInstance| PartInstance { changes: Vec::new(), offset: 0, ..part.clone() };
-        self.parts().iter().map(fields).eq(other.parts().iter().map(fields))
-    }
+/// The update of a document to the content of `file`, where of the base no more is known than its rig and its part instances.
+/// Part instances that have another uid in the file, because their names or joints are others there, are the same ones. `None`
+/// where the instances have the uids that they have in the document: the rigs tell all then.
+pub fn update_with_known_parts(
+    disk: &dyn Disk,
+    base: DocumentBase,
+    document: &Rig,
+    file: &TemplateVersion,
+    choices: &Choices,
+) -> Option<DocumentUpdate> {
+    let (renewed, moved) = with_uids_of(disk, base.parts, file)?;
+    let mut update = update_with(base.rig, document, renewed.rig(), choices);
+    update.changes.splice(..0, moved);
+    Some(DocumentUpdate { update, base: renewed })
+}
 
+impl TemplateVersion {
     /// The version whose text is changed so that it says what a rig is. `None` where that needs parts to be written out.
     fn saying(&self, rig: &Rig) -> Option<Self> {
         let reader = || PartFiles::known(&self.found, self.modules.clone());

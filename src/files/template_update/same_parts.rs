@@ -54,6 +54,25 @@ pub(super) fn with_same_parts(
     SameParts { base, file: renewed, moved }
 }
 
+/// The version of a template in which the part instances that are those of `known` have their uids, and those that are called
+/// otherwise. `None` where no other uid has to be given.
+pub(super) fn with_uids_of(
+    disk: &dyn Disk,
+    known: &[PartInstance],
+    file: &TemplateVersion,
+) -> Option<(TemplateVersion, Vec<Change>)> {
+    let uids = same_parts(known, file.parts());
+    if uids.is_empty() {
+        return None;
+    }
+    let moved = file.parts().iter().filter_map(|part| {
+        let uid = *uids.get(&part.uid)?;
+        moved_part(uid, known.iter().find(|known| known.uid == uid)?, part)
+    });
+    let moved = moved.collect();
+    Some((file.with_part_uids(disk, &uids)?, moved))
+}
+
 /// The text of a template's file, in which the part instances that are those of `known` have their uids; `None` where no
 /// other one has to be written.
 pub(in crate::files) fn with_known_uids(

@@ -21,8 +21,8 @@ use crate::rig::{Rig, Uid, animation::NodeNames};
 ///
 /// Format 2 adds values of attributes, and poses of nodes that are not joints; format 3 adds clips, and the templates that rigs
 /// follow; format 4 adds parts that were dropped onto joints, and selection sets; format 5 adds places in the graph; format 6 adds cuts
-/// of faces. A project is written in the first format that can hold it.
-pub const FORMAT: u32 = 6;
+/// of faces; format 7 adds texts of templates with parts. A project is written in the first format that can hold it.
+pub const FORMAT: u32 = 7;
 
 /// Largest size in bytes of a project that is read.
 pub const MAX_BYTES: usize = 64 << 20;
@@ -83,6 +83,8 @@ pub struct TemplateReference {
     pub path: String,
     /// The version of the template that the rig took over last, with what its parts brought: base of the next update.
     pub base: Rig,
+    /// Text of that version, in which part instances have the uids that they have in the rig; for templates with parts.
+    pub text: Option<String>,
 }
 
 /// Reference to the weights of a mesh: a `.skin` file beside the project.

@@ -463,6 +463,12 @@ fn unknown_chain(name: &str, chains: &[PartChain]) -> PartError {
     }
 }
 
+/// True if two templates have the same part instances in the same order, whatever these change of their parts.
+pub fn have_same_fields(a: &[PartInstance], b: &[PartInstance]) -> bool {
+    let fields = |part: &PartInstance| PartInstance { changes: Vec::new(), offset: 0, ..part.clone() };
+    a.iter().map(fields).eq(b.iter().map(fields))
+}
+
 fn labelled(rig: &Rig, label: &str) -> Result<Uid, PartError> {
     rig.find_label(label).ok_or_else(|| {
         let known: Vec<&str> = rig.walk().filter_map(|joint| joint.data.label.as_deref()).collect();

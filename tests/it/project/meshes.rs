@@ -228,6 +228,7 @@ fn templates_outside_of_the_folder_are_not_followed() {
     let file = folder.0.path().join("t.rig.ron");
     fs::write(&file, "(format: 1)").unwrap();
     let base = Arc::new(read_project(FOLLOWS.as_bytes()).unwrap().project.templates[0].base.clone());
+    let base = base.into();
     project.templates = vec![ProjectTemplate { rig: project.rigs[0].uid(), path: file.clone(), base }];
     let told = folder.save(&project);
     assert!(told.len() == 1 && told[0].contains("RIGSMITH_TEMPLATES"), "{told:?}");

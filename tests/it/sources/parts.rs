@@ -88,33 +88,59 @@ fn undoing_an_update_of_a_part_brings_the_former_instance_back() {
 /// Merges a change of a part instance's fields in the window and by the command line, and compares the documents.
 #[cfg(feature = "cli")]
 fn check_merge(field: &str, change: impl Fn(&str) -> String) {
+    let base = hand();
+    merged_on_both_ways(field, [crate::part_fields::PART, &base, &change(&base)], resized, "relative_size: 0.9");
+}
+
+/// The hand with a finger, without the reference to it.
+#[cfg(feature = "cli")]
+fn hand() -> String {
+    let reference = ", tags: [parent(targets: \"@command control/a_base role:control\")]";
+    let base = crate::part_fields::BASE.replace(reference, "");
+    assert_ne!(base, crate::part_fields::BASE);
+    base
+}
+
+/// Another size of the last control of the finger.
+#[cfg(feature = "cli")]
+fn resized(rig: &Rig) -> RigEdit {
+    let (joint, tag) = control_of(rig, "a_bone_3");
+    RigEdit::SetTag(joint, Box::new(tag))
+}
+
+/// Merges a file into a document in which a person has changed the part, in the window and by the command line, and compares
+/// the documents, both of which have the text of what is kept. Returns the document.
+#[cfg(feature = "cli")]
+fn merged_on_both_ways(
+    field: &str,
+    [part, base, file]: [&str; 3],
+    own: impl Fn(&Rig) -> RigEdit,
+    kept: &str,
+) -> Studio {
     use crate::{cli_outputs::rigsmith, part_fields};
 
-    let reference = ", tags: [parent(targets: \"@command control/a_base role:control\")]";
-    let base = part_fields::BASE.replace(reference, "");
-    let file = change(&base);
-    assert!(base != part_fields::BASE && file != base, "{field}");
-    let mut studio = Studio::with_part(true, &base, ("finger.rig.ron", part_fields::PART));
-    // What a person changed of the part.
-    let (joint, tag) = control_of(studio.base.rig(), "a_bone_3");
-    studio.base.apply(RigEdit::SetTag(joint, Box::new(tag)));
-    let mine = studio.document_over("mine.rig.ron", &base);
-    assert!(mine.contains("relative_size: 0.9"), "{field}: {mine}");
+    assert_ne!(file, base, "{field}");
+    let mut studio = Studio::with_part(true, base, ("finger.rig.ron", part));
+    let edit = own(studio.base.rig());
+    studio.base.apply(edit);
+    let mine = studio.document_over("mine.rig.ron", base);
+    assert!(mine.contains(kept), "{field}: {mine}");
     let folder = studio.file.parent().unwrap().to_owned();
-    fs::write(folder.join("base.rig.ron"), &base).unwrap();
-    fs::write(folder.join("file.rig.ron"), &file).unwrap();
+    fs::write(folder.join("base.rig.ron"), base).unwrap();
+    fs::write(folder.join("file.rig.ron"), file).unwrap();
     let (code, said) = rigsmith(&folder, &part_fields::UPDATE);
     assert_eq!(code, 0, "{field}: {said}");
     let told = fs::read_to_string(folder.join("out.rig.ron")).unwrap();
     let known = studio.source().taken_over().parts.to_vec();
-    studio.save(&file);
+    studio.save(file);
     studio.until(field, |world, rig| {
         world.get::<RigSource>(rig).is_some_and(|source| source.taken_over().parts != known.as_slice())
     });
     assert_eq!(studio.instance_report().failed, Vec::<String>::new(), "{field}");
     // The document says what the command line has written, to the byte.
     assert_eq!(studio.document_over("again.rig.ron", &told), told, "{field}");
-    assert!(told.contains("relative_size: 0.9") && told != mine, "{field}: {told}");
+    assert!(told.contains(kept) && told != mine, "{field}: {told}");
+    studio
 }
 
 /// Replaces the prefix of the part by fields.
@@ -133,6 +159,53 @@ fn a_count_is_merged_as_by_the_command_line() {
 #[test]
 fn a_prefix_is_merged_as_by_the_command_line() {
     check_merge("prefix", with_fields("prefix: \"b_\","));
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn a_side_is_merged_as_by_the_command_line() {
+    // The finger is the same on both sides: nothing of the rig differs but the field.
+    check_merge("side", with_fields("prefix: \"a_\", mirror: true,"));
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn a_side_that_is_taken_back_is_merged_as_by_the_command_line() {
+    let (base, part) = (hand(), crate::part_fields::PART);
+    let sided = with_fields("prefix: \"a_\", mirror: true,")(&base);
+    merged_on_both_ways("no side", [part, &sided, &base], resized, "relative_size: 0.9");
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn a_joint_that_a_person_moved_stays_there_on_both_sides() {
+    let bone = "(label: \"bone_2\", parent: \"bone_1\", translation: (0, 1, 0)";
+    let part = crate::part_fields::PART.replace(bone, &bone.replace("(0, 1, 0)", "(0.25, 1, 0)"));
+    assert_ne!(part, crate::part_fields::PART);
+    let moved = |rig: &Rig| {
+        let joint = rig.joint(rig.find_label("a_bone_3").unwrap()).unwrap();
+        let mut rest = joint.data.rest;
+        rest.translation = Vec3::new(0.5, 1.5, 0.0);
+        RigEdit::SetRest(joint.data.uid, rest)
+    };
+    let base = hand();
+    let sided = with_fields("prefix: \"a_\", mirror: true,")(&base);
+    let mut studio = merged_on_both_ways("side", [&part, &base, &sided], moved, "translation: (0.5, 1.5, ");
+    let place =
+        |studio: &Studio, label: &str| studio.base.rig().joint(studio.joint(label)).unwrap().data.rest.translation;
+    let places = |studio: &Studio| [place(studio, "a_bone_2"), place(studio, "a_bone_3")];
+    assert_eq!(places(&studio), [Vec3::new(-0.25, 1.0, 0.0), Vec3::new(0.5, 1.5, 0.0)]);
+    // Taken back in the file, the side is the first one again.
+    studio.save(&base);
+    studio.until("the first side", |world, rig| {
+        world.get::<RigSource>(rig).is_some_and(|source| source.taken_over().parts.iter().all(|part| !part.mirror))
+    });
+    assert_eq!(studio.instance_report().failed, Vec::<String>::new());
+    assert_eq!(places(&studio), [Vec3::new(0.25, 1.0, 0.0), Vec3::new(0.5, 1.5, 0.0)]);
+    // Undo brings the other side back.
+    studio.base.change(Change::Undo);
+    assert_eq!(places(&studio), [Vec3::new(-0.25, 1.0, 0.0), Vec3::new(0.5, 1.5, 0.0)]);
+    assert!(studio.source().taken_over().parts.iter().all(|part| part.mirror));
 }
 
 #[cfg(feature = "cli")]

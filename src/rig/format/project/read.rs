@@ -50,6 +50,8 @@ struct TemplateFile {
     /// The base is read separately, as a template from the text.
     #[serde(rename = "base")]
     _base: IgnoredAny,
+    #[serde(default)]
+    text: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -158,7 +160,9 @@ fn read_templates(
 ) -> Result<Vec<TemplateReference>, SourceError> {
     let mut found: Vec<TemplateReference> = Vec::with_capacity(files.len());
     let mut bases = Templates { text: places.text, line: 1, counted: 0 };
-    for (TemplateFile { rig, path, .. }, element) in files.into_iter().zip(places.elements(places.top("templates"))) {
+    for (TemplateFile { rig, path, text, .. }, element) in
+        files.into_iter().zip(places.elements(places.top("templates")))
+    {
         if !rigs.iter().any(|known| known.rig.uid() == rig) {
             let message = format!("the template is of the rig {rig}, which is not in the file; correct it");
             return Err(places.error(element, "rig", message));
@@ -168,7 +172,7 @@ fn read_templates(
             return Err(places.error(element, "rig", message));
         }
         let base = bases.read(places.within(element, "base").map(|field| &places.fields[field]), notes)?;
-        found.push(TemplateReference { rig, path, base });
+        found.push(TemplateReference { rig, path, base, text });
     }
     Ok(found)
 }
@@ -337,7 +341,7 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
     match (field.depth, path) {
         (1, ["", "", ""]) => Some(&["format", "name", "meshes", "rigs", "templates", "view", "journal"]),
         (3, ["meshes", "", ""]) => Some(&["uid", "rig", "path", "hash", "nodes"]),
-        (3, ["templates", "", ""]) => Some(&["rig", "path", "base"]),
+        (3, ["templates", "", ""]) => Some(&["rig", "path", "base", "text"]),
         (3, ["rigs", "", ""]) => Some(&["rig", "skins", "pose", "values", "poses", "clips", "parts", "sets", "faces"]),
         (5, ["skins", "rigs", ""]) => Some(&["mesh", "path", "hash", "at_rest"]),
         (5, ["sets", "rigs", ""]) => Some(&["name", "nodes"]),

@@ -24,7 +24,8 @@ pub fn write_project(project: &Project) -> String {
 
 fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
     let of_rigs = project.rigs.iter().map(|entry| needed_format(&entry.rig)).max().unwrap_or(1);
-    let of_content = if project.templates.is_empty() { of_rigs } else { of_rigs.max(3) };
+    let of_templates = project.templates.iter().map(|template| if template.text.is_some() { 7 } else { 3 }).max();
+    let of_content = of_rigs.max(of_templates.unwrap_or(1));
     let format = if project.view.graph.is_empty() { of_content } else { of_content.max(5) };
     writeln!(out, "(\n    format: {format},\n    name: {},", quoted(&project.name))?;
     writeln!(out, "    meshes: [")?;
@@ -47,13 +48,16 @@ fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
     writeln!(out, "    ],")?;
     if !project.templates.is_empty() {
         writeln!(out, "    templates: [")?;
-        for TemplateReference { rig, path, base } in &project.templates {
+        for TemplateReference { rig, path, base, text } in &project.templates {
             write!(
                 out,
                 "        (\n            rig: \"{rig}\",\n            path: {},\n            base: ",
                 quoted(path)
             )?;
             write_indented(out, &write_without_poses(base), "            ");
+            if let Some(text) = text {
+                write!(out, ",\n            text: {}", raw(text))?;
+            }
             writeln!(out, ",\n        ),")?;
         }
         writeln!(out, "    ],")?;
@@ -63,6 +67,14 @@ fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
         writeln!(out, "    journal: (file: {}, last: {}),", quoted(&journal.file), journal.last)?;
     }
     writeln!(out, ")")
+}
+
+/// A text without escapes, so that its lines are lines of the file.
+fn raw(text: &str) -> String {
+    let behind_quotes = text.split('"').skip(1);
+    let hashes = behind_quotes.map(|rest| rest.bytes().take_while(|byte| *byte == b'#').count() + 1).max();
+    let hashes = "#".repeat(hashes.unwrap_or(1));
+    format!("r{hashes}\"{text}\"{hashes}")
 }
 
 fn write_rig(out: &mut String, entry: &ProjectRig, known: &NodeNames) -> std::fmt::Result {
