@@ -378,7 +378,7 @@ fn exported(
     Ok(baked)
 }
 
-/// Ratio of numbers of keys before and after a reduction.
+/// Ratio of numbers of keys or bytes before and after a reduction.
 fn reduction(before: usize, after: usize) -> f32 {
     before as f32 / after.max(1) as f32
 }

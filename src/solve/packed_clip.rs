@@ -25,7 +25,7 @@ use super::{
     bake_clip::{BakeError, BakedNode, part_of, sample_nodes},
     curve_fit::{fit_lines, sampled},
     program::RigProgram,
-    reduction::{SampledNode, SampledSkeleton, SampledTrack, fit_within},
+    reduction::{FittedCurve, SampledNode, SampledSkeleton, SampledTrack, fit_within},
 };
 use crate::{
     mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Trs},
@@ -194,7 +194,7 @@ impl PackedClip {
             let for_lines: Vec<f32> = tolerance.iter().map(|most| most * LINES).collect();
             let least = tolerance.iter().copied().fold(f32::MAX, f32::min).max(0.1 * track.tolerance);
             let ends = fit_lines(&track.property, times, &track.values, &for_lines);
-            let keys: Vec<(u32, [f32; 4])> = ends.into_iter().map(|end| (end as u32, track.values[end])).collect();
+            let keys: Vec<(u32, [f32; 4])> = ends.iter().map(|end| (*end as u32, track.values[*end])).collect();
             let mut packed = PackedTrack::new(&track.property, &keys, (1.0 - LINES) * least);
             if packed.len() > 1
                 && let Some(steps) = Steps::new(&track.property, &track.values, least)
@@ -204,7 +204,8 @@ impl PackedClip {
             let keys = packed.keys(&track.property);
             let line = |(frame, value): (u32, [f32; 4])| Key { time: times[frame as usize], value, ease: Ease::Linear };
             let values = sampled(&track.property, times, keys.into_iter().map(line).collect());
-            (packed, values)
+            let frames = if matches!(packed, PackedTrack::Steps(_)) { Vec::new() } else { ends };
+            FittedCurve { curve: packed, values, frames }
         };
         let exact = |track: &SampledTrack| {
             let keys: Vec<(u32, [f32; 4])> = (0..).zip(track.values.iter().copied()).collect();

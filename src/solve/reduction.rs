@@ -2,7 +2,9 @@
 //!
 //! The error of a key matters by what hangs below its node: a tenth of a degree moves a head by nothing and a hand,
 //! seen from the hips, by two millimetres. So tracks are fitted with a tolerance by their reach, the motion is played,
-//! and where a joint is too far off, the tracks that move it are fitted more closely around those frames, until none is.
+//! and where a joint is too far off, the tracks that move it are fitted more closely around those frames. A closer fit has its
+//! keys elsewhere from there on, which may put other frames off, so in the end tracks keep the keys that they have and get more
+//! at frames that are off: that ends, and only there costs keys.
 
 use bevy::math::{Quat, Vec3};
 use rayon::prelude::*;
@@ -17,11 +19,13 @@ use crate::{
 };
 
 /// Most rounds of fitting.
-const ROUNDS: usize = 16;
+const ROUNDS: usize = 48;
 /// Round from which all tracks are fitted more closely, not only those that move what is off.
 const TOGETHER: usize = 9;
-/// Round from which tracks keep all keys around frames that are still off.
-const LAST_RESORT: usize = 12;
+/// Round from which tracks keep their keys, and those that move what is off get a key there.
+const PINNED: usize = 12;
+/// Round from which all tracks get a key where something is off.
+const ALL_PINNED: usize = 32;
 /// Frames on both sides of a frame that is off at which tracks are fitted more closely.
 const AROUND: usize = 6;
 
@@ -82,7 +86,9 @@ pub fn reduce_tracks(
     let fit = |track: &SampledTrack, tolerance: &[f32]| {
         let keys = curves.fit(&track.property, times, &track.values, tolerance);
         let values = sampled(&track.property, times, keys.clone());
-        (keys, values)
+        let frame = |key: &Key| times.binary_search_by(|time| time.total_cmp(&key.time)).ok();
+        let frames = keys.iter().filter_map(frame).collect();
+        FittedCurve { curve: keys, values, frames }
     };
     fit_within(tracks, measure, fit).unwrap_or_else(|| all_keys(times, tracks))
 }
@@ -96,12 +102,21 @@ fn linear_key((time, value): (&f32, &[f32; 4])) -> Key {
     Key { time: *time, value: *value, ease: Ease::Linear }
 }
 
+/// Curve of a track within a tolerance.
+pub(super) struct FittedCurve<K> {
+    pub curve: K,
+    /// Values of the curve, one a frame.
+    pub values: Vec<[f32; 4]>,
+    /// Frames of its keys; none of a curve with a value for each frame.
+    pub frames: Vec<usize>,
+}
+
 /// Curves of tracks with which the motion stays within its bounds, as [`reduce_tracks`] finds them; `fit` gives a curve within
-/// tolerances, one a frame, and its values. `None` if no curves do.
+/// tolerances, one a frame, which has a key where the tolerance is zero. `None` if no curves do.
 pub(super) fn fit_within<K: Send>(
     tracks: &[SampledTrack],
     measure: impl Fn(&[Vec<[f32; 4]>]) -> Vec<FrameErrors>,
-    fit: impl Fn(&SampledTrack, &[f32]) -> (K, Vec<[f32; 4]>) + Sync,
+    fit: impl Fn(&SampledTrack, &[f32]) -> FittedCurve<K> + Sync,
 ) -> Option<Vec<K>> {
     let mut shares: Vec<Vec<f32>> = tracks.iter().map(|track| vec![1.0; track.values.len()]).collect();
     for round in 0..ROUNDS {
@@ -109,34 +124,47 @@ pub(super) fn fit_within<K: Send>(
             let tolerance: Vec<f32> = shares.iter().map(|share| share * track.tolerance).collect();
             fit(track, &tolerance)
         };
-        let (curves, values): (Vec<K>, Vec<_>) = tracks.par_iter().zip(&shares).map(fitted).unzip();
+        let fitted: Vec<FittedCurve<K>> = tracks.par_iter().zip(&shares).map(fitted).collect();
+        let (mut curves, mut values, mut frames) = (Vec::new(), Vec::new(), Vec::new());
+        for found in fitted {
+            curves.push(found.curve);
+            values.push(found.values);
+            frames.push(found.frames);
+        }
         let errors = measure(&values);
         if errors.iter().all(|errors| errors.worst <= 1.0) {
             return Some(curves);
         }
-        shares.par_iter_mut().enumerate().for_each(|(track, shares)| {
+        shares.par_iter_mut().zip(&frames).enumerate().for_each(|(track, (shares, frames))| {
             let own = |errors: &FrameErrors| match errors.of_tracks.get(track) {
-                Some(own) if round < TOGETHER => *own,
+                Some(own) if round < TOGETHER || (PINNED..ALL_PINNED).contains(&round) => *own,
                 _ => errors.worst,
             };
             let errors: Vec<f32> = errors.iter().map(own).collect();
-            tighten(shares, &errors, round >= LAST_RESORT);
+            if round < PINNED { tighten(shares, &errors) } else { pin(shares, frames, &errors) }
         });
     }
     None
 }
 
 /// Lowers the shares of the tolerance around frames that are off.
-fn tighten(shares: &mut [f32], errors: &[f32], is_last: bool) {
+fn tighten(shares: &mut [f32], errors: &[f32]) {
     let before = shares.to_vec();
-    for (frame, error) in errors.iter().enumerate() {
-        if *error <= 1.0 {
-            continue;
-        }
-        let factor = if is_last { 0.0 } else { (0.97 / error).max(0.5) };
+    for (frame, error) in errors.iter().enumerate().filter(|(_, error)| **error > 1.0) {
+        let factor = (0.97 / error).max(0.5);
         for near in frame.saturating_sub(AROUND)..(frame + AROUND + 1).min(shares.len()) {
             shares[near] = shares[near].min(before[near] * factor);
         }
+    }
+}
+
+/// Takes the tolerance from the frames of keys, which stay where they are, and from frames that are off.
+fn pin(shares: &mut [f32], keys: &[usize], errors: &[f32]) {
+    for key in keys {
+        shares[*key] = 0.0;
+    }
+    for (share, _) in shares.iter_mut().zip(errors).filter(|(_, error)| **error > 1.0) {
+        *share = 0.0;
     }
 }
 

@@ -20,6 +20,9 @@ pub use self::shape::by_shape;
 /// Fewest joints of a file that numbers all of its nodes.
 const FEWEST_NUMBERED: usize = 8;
 
+/// Share of the lower leg by which the ball of a foot is away from the ankle, at least.
+const LEAST_FOOT: f32 = 0.1;
+
 /// Side of a bone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum BodySide {
@@ -231,6 +234,7 @@ pub fn named_bones(joints: &[SkeletonJoint]) -> BTreeMap<HumanBone, usize> {
         }
     }
     name_arms(joints, &mut named);
+    name_feet(joints, &mut named);
     if !named.contains_key(&HumanBone::Head)
         && let Some(head) = end_of_spine(joints, &named)
     {
@@ -276,6 +280,23 @@ fn name_arms(joints: &[SkeletonJoint], named: &mut BTreeMap<HumanBone, usize>) {
                 named.insert(hand, at);
             }
             names::ArmWord::Shoulder | names::ArmWord::Wrist => {}
+        }
+    }
+}
+
+/// Names the joints of feet that are called ankle and foot, as SMPL has them: an ankle that carries a foot at some distance
+/// is the foot, and what is called so its ball, unless another joint is called toes.
+fn name_feet(joints: &[SkeletonJoint], named: &mut BTreeMap<HumanBone, usize>) {
+    for (at, joint) in joints.iter().enumerate() {
+        let Some(side) = names::ankle_side_of(&joint.name) else { continue };
+        let [lower, foot, toes] =
+            [LimbBone::LowerLeg, LimbBone::Foot, LimbBone::Toes].map(|bone| HumanBone::Limb(side, bone));
+        let (Some(knee), Some(ball)) = (named.get(&lower).copied(), named.get(&foot).copied()) else { continue };
+        let way = |from: usize, to: usize| joints[from].position.distance(joints[to].position);
+        let is_ball = joints[ball].parent == Some(at) && way(at, ball) > LEAST_FOOT * way(knee, at);
+        if is_ball && !named.contains_key(&toes) {
+            named.insert(foot, at);
+            named.insert(toes, ball);
         }
     }
 }

@@ -35,6 +35,13 @@ fn packed_clips_are_written_and_read() {
     let facts = &answer["packed"][0];
     assert_eq!((&facts["name"], &facts["frames"]), (&"walker".into(), &19.into()), "{answer}");
     assert!(facts["reduction"].as_f64().unwrap() > 4.0, "{answer}");
+    // The answer as a whole tells the reduction of the file, and its motion that of the keys.
+    for name in ["bytes_before", "bytes_after", "reduction"] {
+        assert_eq!(answer[name], facts[name], "{name}: {answer}");
+    }
+    let keys = &answer["motions"][0];
+    let of_keys = keys["keys_before"].as_f64().unwrap() / keys["keys_after"].as_f64().unwrap();
+    assert!((keys["reduction"].as_f64().unwrap() - of_keys).abs() < 1e-3, "{answer}");
     let [packed_length, length] = ["walk.rigclip", "walk.glb"].map(|name| fs::metadata(path(name)).unwrap().len());
     assert!(2 * packed_length < length, "{packed_length} of {length}");
 

@@ -107,9 +107,25 @@ fn bones_of_old_and_of_nameless_files_are_found() {
         ["femur", "tibia", "foot", "toes"],
         ["l", "r"],
     );
+    let motive = sided(
+        ["Hip", "Ab", "Chest", "Chest2", "Neck", "Head"],
+        ["Shoulder", "UArm", "FArm", "Hand"],
+        ["Thigh", "Shin", "Foot", "Toe"],
+        ["L", "R"],
+    );
+    // The foot of SMPL is the ball, and its ankle carries it.
+    let smpl = |prefix: &str| {
+        let body = ["Pelvis", "Spine1", "Spine2", "Spine3", "Neck", "Head"];
+        let names =
+            sided(body, ["Collar", "Shoulder", "Elbow", "Wrist"], ["Hip", "Knee", "Ankle", "Foot"], ["L_", "R_"]);
+        names.iter().map(|name| format!("{prefix}{name}")).collect::<Vec<String>>()
+    };
     let nameless: Vec<String> = (0..JOINTS.len()).map(|at| format!("b{at}")).collect();
     check(&figure(&old, true), FoundBy::Names, "old names");
     check(&figure(&asf, true), FoundBy::Names, "names of ASF");
+    check(&figure(&motive, true), FoundBy::Names, "names of Motive");
+    check(&figure(&smpl(""), true), FoundBy::Names, "names of SMPL");
+    check(&figure(&smpl("m_avg_"), true), FoundBy::Names, "names of SMPL in its FBX files");
     // The last joint is the head if a bone begins there, else the one before, whose bone is as long as a head.
     check(&figure(&nameless, true), FoundBy::Shape, "a shape with ends");
     check(&figure(&nameless, false), FoundBy::Shape, "a shape with a joint above the head");

@@ -1,11 +1,20 @@
 //! Reduction of keys: how many are left, and how far joints are off at every frame.
 
-use std::sync::Arc;
+use std::{
+    cell::{Cell, RefCell},
+    sync::Arc,
+};
 
-use rigsmith::rig::{
-    Rig,
-    animation::{Ease, Key, Track, TrackTarget, motion::Motion},
-    operations::KeyTolerance,
+use rigsmith::{
+    rig::{
+        Rig,
+        animation::{Ease, Key, Property, Track, TrackTarget, motion::Motion},
+        operations::KeyTolerance,
+    },
+    solve::{
+        curve_fit::sampled,
+        reduction::{CurveKind, FrameErrors, SampledTrack, reduce_tracks},
+    },
 };
 
 use super::{MotionTarget, PlayedRig, RetargetSettings, joints::strip, motion, shipped, test_data};
@@ -98,4 +107,51 @@ fn controls_stay_within_half_a_millimetre() {
     let (reduced, exact, off) = check(&shipped("biped"), &motion, &RetargetSettings::default());
     assert!(off <= 0.52e-3 * reduced.height / 1.7, "{off}");
     assert!(reduced.done.keys[1] < exact.done.keys[1], "{:?} {:?}", reduced.done.keys, exact.done.keys);
+}
+
+/// Frames that are off through a closer fit of others cost a key each, not the keys of all frames.
+#[test]
+fn frames_that_are_off_again_and_again_get_keys() {
+    const FRAMES: usize = 400;
+    const ROUNDS: usize = 20;
+    let times: Vec<f32> = (0..FRAMES).map(|frame| frame as f32 / 30.0).collect();
+    let values: Vec<[f32; 4]> = times.iter().map(|time| [(3.0 * time).sin(), 0.0, 0.0, 0.0]).collect();
+    let property = Property::Attribute("x".to_owned());
+    let track = SampledTrack { property: property.clone(), values: values.clone(), tolerance: 0.05 };
+    let (calls, off) = (Cell::new(0), RefCell::new(Vec::new()));
+    let keys = reduce_tracks(&times, &[track], CurveKind::Linear, |found| {
+        // Another frame is off in each round.
+        let round = calls.replace(calls.get() + 1);
+        let is_off = |frame: &usize| found[0][*frame] != values[*frame];
+        let worst = (40 + 13 * round..FRAMES).find(is_off).filter(|_| round < ROUNDS);
+        off.borrow_mut().extend(worst);
+        let of = |frame: usize| if worst == Some(frame) { 2.0 } else { 0.0 };
+        (0..FRAMES).map(|frame| FrameErrors { worst: of(frame), of_tracks: vec![of(frame)] }).collect()
+    });
+    assert_eq!((calls.get(), off.borrow().len()), (ROUNDS + 1, ROUNDS));
+    let keys = &keys[0];
+    println!("{} keys of {FRAMES}", keys.len());
+    assert!(3 * keys.len() < FRAMES, "{}", keys.len());
+    // The last ones have keys.
+    for frame in &off.borrow()[ROUNDS - 6..] {
+        assert!(keys.iter().any(|key| key.time == times[*frame]), "frame {frame} has no key");
+    }
+    for (found, wanted) in sampled(&property, &times, keys.clone()).iter().zip(&values) {
+        assert!((found[0] - wanted[0]).abs() <= 0.0501, "{found:?} {wanted:?}");
+    }
+}
+
+/// A larger tolerance does not bring back the keys of all frames.
+#[test]
+fn every_tolerance_leaves_few_keys() {
+    let Some(data) = test_data() else { return };
+    let motion = motion(&data, "cmu_01_01");
+    for share in [1.2, 2.0, 4.0] {
+        let tolerance = KeyTolerance::captured().scaled(share);
+        let settings = RetargetSettings { tolerance, frame_rate: Some(30.0), ..RetargetSettings::default() };
+        let played = PlayedRig::new(shipped("biped"), &motion, &settings);
+        let [before, after] = played.done.keys;
+        println!("within {:.1} mm: {after} keys of {before}", 0.5 * share);
+        assert!(3 * after <= before, "within {:.1} mm {after} keys of {before} are left", 0.5 * share);
+    }
 }

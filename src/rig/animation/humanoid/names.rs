@@ -1,14 +1,25 @@
 //! Names that skeletons give to the bones of a human.
 //!
 //! Known are the names of Mixamo (`mixamorig:LeftUpLeg`), Unreal (`thigh_l`), VRM (`J_Bip_L_UpperLeg`, `leftUpperLeg`), CMU
-//! (`LeftUpLeg`, `LHipJoint`; `LeftHip`, `LeftKnee`; `lfemur`, `ltibia`), MakeHuman (`upperleg01.L`, `UpLeg_L`), Rigify (`DEF-thigh.L`), Biped (`Bip01 L Thigh`) and the
+//! (`LeftUpLeg`, `LHipJoint`; `LeftHip`, `LeftKnee`; `lfemur`, `ltibia`), MakeHuman (`upperleg01.L`, `UpLeg_L`), Rigify
+//! (`DEF-thigh.L`), Biped (`Bip01 L Thigh`), SMPL (`L_Knee`, `m_avg_L_Knee`), Motive (`LThigh`, `LUArm`) and the
 //! templates of this crate (`thigh_l`).
 
 use super::{BodySide, Finger, HeadBone, HumanBone, LimbBone};
 
 /// Beginnings of names that say which tool made the skeleton.
-const PREFIXES: [&[&str]; 8] =
-    [&["j", "bip"], &["mixamorig"], &["def"], &["org"], &["bip", "1"], &["bip", "01"], &["bip", "001"], &["bip"]];
+const PREFIXES: [&[&str]; 10] = [
+    &["j", "bip"],
+    &["mixamorig"],
+    &["def"],
+    &["org"],
+    &["bip", "1"],
+    &["bip", "01"],
+    &["bip", "001"],
+    &["bip"],
+    &["m", "avg"],
+    &["f", "avg"],
+];
 
 /// Words that the names of CMU's ASF files glue to the letter of their side: `lfemur`.
 const GLUED: [&str; 9] = ["clavicle", "humerus", "radius", "wrist", "hand", "femur", "tibia", "foot", "toes"];
@@ -26,7 +37,20 @@ fn own_words(name: &str) -> Vec<String> {
             }
         }
     }
-    words
+    motive_arm(&words).map_or(words, |arm| arm.to_vec())
+}
+
+/// Words of an arm's bone in the motions of Motive, which glues its first letter to that of the side: `LUArm`, `RFArm`.
+fn motive_arm(words: &[String]) -> Option<[String; 2]> {
+    let [glued, arm] = words else { return None };
+    let words = match (glued.as_str(), arm.as_str()) {
+        ("lu", "arm") => ["l", "upperarm"],
+        ("lf", "arm") => ["l", "forearm"],
+        ("ru", "arm") => ["r", "upperarm"],
+        ("rf", "arm") => ["r", "forearm"],
+        _ => return None,
+    };
+    Some(words.map(str::to_owned))
 }
 
 /// Name before the number behind its last underscore, and that number: `LeftUpLeg_058`.
@@ -116,6 +140,13 @@ pub(super) fn arm_word_of(name: &str) -> Option<(BodySide, ArmWord)> {
         _ => return None,
     };
     Some((side?, word))
+}
+
+/// Side of a joint that is called ankle.
+pub(super) fn ankle_side_of(name: &str) -> Option<BodySide> {
+    let words = own_words(name);
+    let (words, side) = unglued(without_side(&words));
+    side.filter(|_| words == ["ankle"])
 }
 
 /// Bone of the head that a name means.
