@@ -103,7 +103,7 @@ fn entries(ui: &mut Ui, world: &World, open: &OpenMenu, requests: &mut Requests)
     ui.strong(name_of(document, built, node));
     let mut is_chosen = false;
     if let (Some(built), Some(runtime)) = (built, runtime) {
-        is_chosen |= switches(ui, world, built, runtime.state(), open, requests);
+        is_chosen |= switches(ui, world, built, runtime.state(), (rig, node), requests);
     }
     ui.separator();
     let mut entry = |ui: &mut Ui, text: &str, why_not: Option<&str>| {
@@ -154,19 +154,19 @@ fn entries(ui: &mut Ui, world: &World, open: &OpenMenu, requests: &mut Requests)
     is_chosen
 }
 
-/// Draws the switches that concern a node, each with its values, for the pose and over the range of the open clip; true if one
-/// was thrown.
-fn switches(
+/// Draws the switches that concern a node of a rig, each with its values, for the pose and over the range of the open clip; true
+/// if one was thrown.
+pub(super) fn switches(
     ui: &mut Ui,
     world: &World,
     built: &BuiltRig,
     state: &RigState,
-    open: &OpenMenu,
+    (rig, node): (Entity, Uid),
     requests: &mut Requests,
 ) -> bool {
     let mut is_thrown = false;
-    let clip = OpenClip::of(world).filter(|clip| clip.entity == open.rig).zip(world.get_resource::<Timeline>());
-    for switch in built.switches.iter().filter(|switch| concerns(built, switch, open.node)) {
+    let clip = OpenClip::of(world).filter(|clip| clip.entity == rig).zip(world.get_resource::<Timeline>());
+    for switch in built.switches.iter().filter(|switch| concerns(built, switch, node)) {
         let Some(node) = built.node(switch.control) else { continue };
         let value = state.attribute(switch.control, &switch.attribute).unwrap_or_default();
         let title = match switch.matching {
@@ -182,7 +182,7 @@ fn switches(
                     is_thrown = true;
                     if !is_on {
                         let (control, attribute) = (switch.control, switch.attribute.to_string());
-                        requests.send(SwitchRequest { rig: open.rig, control, attribute, value: number as f32 });
+                        requests.send(SwitchRequest { rig, control, attribute, value: number as f32 });
                     }
                 }
             }

@@ -21,6 +21,7 @@ mod marks;
 mod mask;
 mod menu;
 pub mod motion_options;
+mod node_menu;
 pub(in crate::editor) mod own_motion;
 mod row;
 mod ruler;
@@ -29,6 +30,7 @@ mod sheet;
 mod shown_pose;
 mod state;
 mod switches;
+mod tolerance;
 
 use bevy::{prelude::*, window::RequestRedraw};
 use bevy_egui::egui::{Rangef, Rect, Sense, Stroke, Ui, UiBuilder, WidgetInfo, WidgetType, pos2, vec2};
@@ -40,6 +42,7 @@ pub use self::{
     axis::TimeAxis,
     marks::{Bucket, Mark, MarkKind, buckets},
     state::{OpenClip, Timeline, TimelineRequest},
+    tolerance::ReductionTolerance,
 };
 pub(super) use self::{
     area::preview,
