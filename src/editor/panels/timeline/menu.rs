@@ -17,7 +17,7 @@ const GROUPS: [&[TimelineAction]; 6] = [
 ];
 
 /// Draws the menu while it is open.
-pub(super) fn show(response: &Response, world: &World, requests: &mut Requests) {
+pub(in crate::editor::panels) fn show(response: &Response, world: &World, requests: &mut Requests) {
     // Fields are clicked without the menu being closed; entries close it.
     let menu = Popup::context_menu(response).close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     menu.show(|ui| entries(ui, world, requests));
