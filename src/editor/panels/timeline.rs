@@ -243,7 +243,7 @@ impl TimelinePanel {
 pub(super) fn tell_hover(ui: &Ui, is_pointed: &mut bool, world: &World, requests: &mut Requests) {
     let is_over = OpenClip::of(world).is_some() && ui.rect_contains_pointer(ui.max_rect());
     // Of two panels in sight the one that the pointer has left may tell last.
-    let is_lost = is_over && !world.get_resource::<Timeline>().is_some_and(|timeline| timeline.hovered);
+    let is_lost = is_over && world.get_resource::<Timeline>().is_none_or(|timeline| !timeline.hovered);
     if is_over != *is_pointed || is_lost {
         *is_pointed = is_over;
         requests.send(TimelineRequest::Hover(is_over));

@@ -115,7 +115,7 @@ struct Walk {
     wrong: Vec<String>,
     /// Deeds that made a step.
     made: BTreeSet<String>,
-    /// What the Loader shows before each deed.
+    /// State of the Loader before each deed.
     shelf: Option<Shelf>,
     folder: tempfile::TempDir,
 }
@@ -209,7 +209,7 @@ impl Walk {
         }
     }
 
-    /// Selects an arm, and opens the clip; what a deed left of the Loader is none of the next one's.
+    /// Selects an arm, and opens the clip; a deed leaves nothing of the Loader's state to the next one.
     fn ready(&mut self) {
         if let Some(Shelf { chosen, draft }) = &self.shelf {
             self.desk.app.insert_resource(ChosenTemplate(Some(chosen.clone()))).insert_resource(draft.clone());

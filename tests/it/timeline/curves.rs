@@ -84,7 +84,7 @@ fn a_tangent_turns_on_both_sides_or_one() {
     assert_eq!(bytes(&desk), before);
 }
 
-/// What deletes joints elsewhere deletes keys over the curves, too, and a right click has the menu of keys.
+/// Keys that delete joints elsewhere delete keys over the curves, too, and a right click has the menu of keys.
 #[test]
 fn the_curves_have_the_keys_and_the_menu_of_the_timeline() {
     let (mut desk, left) = open();
