@@ -7,6 +7,7 @@ pub mod actions;
 pub mod app;
 pub mod building;
 pub mod camera;
+pub mod clicks;
 pub mod counts;
 pub mod dock;
 pub mod files;

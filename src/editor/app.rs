@@ -143,7 +143,8 @@ impl Plugin for EditorPlugin {
             ReportPlugin,
             FilesPlugin,
             super::building::BuildingPlugin,
-            (super::fitting::FittingPlugin, super::mesh_watch::MeshWatchPlugin, super::typing::TypingPlugin),
+            (super::fitting::FittingPlugin, super::mesh_watch::MeshWatchPlugin),
+            (super::typing::TypingPlugin, super::clicks::ClicksPlugin),
             (super::follow::FollowPlugin, super::folder_watch::FolderWatchPlugin),
             super::render_errors::RenderErrorsPlugin,
         ))
@@ -158,7 +159,7 @@ impl Plugin for EditorPlugin {
         .add_systems(Startup, (spawn_interface, say_adapter))
         .add_systems(
             PreUpdate,
-            drop_old_modifiers.after(EguiPreUpdateSet::ProcessInput).before(EguiPreUpdateSet::BeginPass),
+            drop_old_modifiers.after(EguiPreUpdateSet::ProcessInput).before(super::clicks::hold_back),
         )
         .add_systems(Last, keep_drawing);
         #[cfg(feature = "remote")]

@@ -56,6 +56,7 @@ const POINTER: &[(&str, &str)] = &[
     ("Graph: drag selected nodes", "move them on the grid; the project keeps their places"),
     ("Graph: point at a node or box", "draw its wires in full, as those of selected ones; others fade"),
     ("Graph: drag from an output to an input", "refer to what the command makes (with Shift besides what is there)"),
+    ("Timeline: right click on a node", "its switches, for the pose and over the selected keys"),
     ("Graph: right click on a wire", "remove its reference, or insert a command"),
     ("Graph: right drag, wheel, Ctrl + wheel", "pan, pan, zoom"),
 ];

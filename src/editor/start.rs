@@ -99,7 +99,7 @@ impl StartPage {
 }
 
 /// Name of the page's area on the screen.
-pub(super) fn page_id() -> egui::Id {
+pub fn page_id() -> egui::Id {
     egui::Id::new("start page")
 }
 

@@ -38,6 +38,8 @@ mod cli_streams;
 mod cli_templates;
 #[cfg(feature = "cli")]
 mod cli_update_clips;
+#[cfg(feature = "editor")]
+mod clicks;
 mod clip_files;
 mod commands;
 mod control_sizes;

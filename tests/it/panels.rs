@@ -7,6 +7,7 @@ mod groups;
 mod hierarchy;
 mod notices;
 mod posing;
+mod process;
 mod skinning;
 mod tag_lists;
 mod tag_values;

@@ -6,6 +6,7 @@
 
 mod booth;
 mod cases;
+mod lists;
 mod overlays;
 mod picture;
 mod queries;
@@ -118,6 +119,11 @@ fn the_panel_of_a_face() {
 #[test]
 fn the_panel_of_a_newer_template() {
     check("updater");
+}
+
+#[test]
+fn lists_in_the_cards_of_commands() {
+    check("lists");
 }
 
 #[test]

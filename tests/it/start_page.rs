@@ -31,7 +31,7 @@ use rigsmith::{
         recovery::Recovery,
         screen::{HiddenMeshes, ScreenPlugin},
         settings::{EditorSettings, SettingsFolder, SettingsPlugin},
-        start::{BonePicture, RecentFiles, RecentProblem, StartPage, StartPictures, StartPlugin, Tour, TourStep},
+        start::{self, BonePicture, RecentFiles, RecentProblem, StartPage, StartPictures, StartPlugin, Tour, TourStep},
         style::WindowTheme,
     },
     headless::headless_app,

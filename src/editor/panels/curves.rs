@@ -20,7 +20,8 @@ use super::{
     displayed_rig::DisplayedRig,
     fields, list,
     timeline::{
-        KeyColors, Markers, OpenClip, TimeAxis, Timeline, lines, navigate, paint_playhead, ruler_height, show_ruler,
+        KeyColors, Markers, OpenClip, TimeAxis, Timeline, lines, navigate, paint_playhead, ruler_height, show_key_menu,
+        show_ruler, tell_hover,
     },
 };
 use crate::{
@@ -42,6 +43,8 @@ pub struct CurvesPanel {
     values: Option<[f32; 2]>,
     /// Visible values during a drag.
     held: Option<[f32; 2]>,
+    /// True if the pointer was last told to be over the panel.
+    is_pointed: bool,
 }
 
 /// Places of times and values on the screen.
@@ -87,6 +90,7 @@ impl EditorPanel for CurvesPanel {
         let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
+        tell_hover(ui, &mut self.is_pointed, world, requests);
         let (Some(open), Some(timeline)) = (OpenClip::of(world), world.get_resource::<Timeline>()) else {
             self.gesture = None;
             return list::nothing(ui, "No clip is open: choose or make one in the Timeline.");
@@ -114,6 +118,7 @@ impl EditorPanel for CurvesPanel {
         let response = ui.interact(area, ui.id().with("curves"), Sense::click_and_drag());
         response.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, "Curves of the selected tracks"));
         edit::gestures(&mut self.gesture, ui, &response, &plot, &all, &open, timeline, requests);
+        show_key_menu(&response, world, requests);
         self.held = self.gesture.as_ref().map(|_| plot.values);
         self.zoom(ui, area, &plot, requests);
         let painter = ui.painter_at(area);

@@ -16,24 +16,32 @@ use crate::{
     editor::{
         ActiveRig,
         actions::{Action, ActionRequest},
+        camera::ViewportSight,
         mode::Mode,
         panel::{Requests, ViewportPainter},
+        pointer::ViewportArea,
+        tools::select::REACH,
     },
     plugins::{
         commands::BuildResult,
         controls::SwitchRequest,
         document::{EditRequest, HoveredNode, Selection},
-        picking::{Pick, PickRequest},
+        picking::{HoverRequest, Pick, PickRequest},
         runtime::RigRuntime,
     },
     rig::{BuiltRig, Matching, Rig, SwitchData, Uid, operations::Operation},
     solve::program::RigState,
 };
 
+/// Largest distance of the pointer from a click that it has not left, in points.
+const STILL: f32 = 4.0;
+
 /// Menu of the node that was clicked last.
 #[derive(Default)]
 pub(super) struct NodeMenu {
     open: Option<OpenMenu>,
+    /// Rig and place of a click from which the pointer has moved on; the node there is known in the next frame.
+    sought: Option<(Entity, Pos2)>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -56,13 +64,17 @@ impl ViewportPainter for NodeMenu {
         let ctx = ui.ctx().clone();
         if let Some(at) = clicked(&ctx, area) {
             let is_mode = world.get_resource::<Mode>().is_none_or(|mode| matches!(mode, Mode::Select | Mode::Pose));
-            let hovered = world.get::<HoveredNode>(active).and_then(|hovered| hovered.0);
-            self.open = hovered.filter(|_| is_mode).map(|node| OpenMenu { rig: active, node, at, age: 0 });
-            if let Some(open) = self.open
-                && !world.get::<Selection>(active).is_some_and(|selection| selection.0.contains(&open.node))
-            {
-                requests.send(PickRequest { rig: active, what: Pick::Joints(vec![open.node]), add: false });
+            (self.open, self.sought) = (None, None);
+            match request_under(world, active, at, area) {
+                _ if !is_mode => {}
+                Some(request) => {
+                    requests.send(request);
+                    self.sought = Some((active, at));
+                }
+                None => self.begin(world, active, at, requests),
             }
+        } else if let Some((_, at)) = self.sought.take().filter(|(rig, _)| *rig == active) {
+            self.begin(world, active, at, requests);
         }
         let Some(open) = &mut self.open else { return };
         open.age += 1;
@@ -85,6 +97,29 @@ impl ViewportPainter for NodeMenu {
     }
 }
 
+impl NodeMenu {
+    /// Opens the menu of the node under the pointer, if there is one.
+    fn begin(&mut self, world: &World, rig: Entity, at: Pos2, requests: &mut Requests) {
+        let hovered = world.get::<HoveredNode>(rig).and_then(|hovered| hovered.0);
+        self.open = hovered.map(|node| OpenMenu { rig, node, at, age: 0 });
+        if let Some(open) = self.open
+            && !world.get::<Selection>(rig).is_some_and(|selection| selection.0.contains(&open.node))
+        {
+            requests.send(PickRequest { rig, what: Pick::Joints(vec![open.node]), add: false });
+        }
+    }
+}
+
+/// Request for the node under a click, where the pointer has moved on within the same slow frame; `None` while it is still there.
+fn request_under(world: &World, rig: Entity, at: Pos2, area: Rect) -> Option<HoverRequest> {
+    let pointer = world.get_resource::<ViewportArea>()?.pointer;
+    let sight = world.get_resource::<ViewportSight>()?.0?;
+    let at = Vec2::new(at.x - area.min.x, at.y - area.min.y);
+    let is_there = pointer.is_some_and(|pointer| pointer.distance(at) <= STILL);
+    let what = Some((sight.plane, sight.point(at), REACH * sight.pixel));
+    (!is_there).then_some(HoverRequest { rig, what })
+}
+
 /// Place of a right click in the viewport that was no drag.
 fn clicked(ctx: &egui::Context, area: Rect) -> Option<Pos2> {
     let (is_clicked, at) = ctx.input(|input| (input.pointer.secondary_clicked(), input.pointer.interact_pos()));
@@ -103,7 +138,7 @@ fn entries(ui: &mut Ui, world: &World, open: &OpenMenu, requests: &mut Requests)
     ui.strong(name_of(document, built, node));
     let mut is_chosen = false;
     if let (Some(built), Some(runtime)) = (built, runtime) {
-        is_chosen |= switches(ui, world, built, runtime.state(), open, requests);
+        is_chosen |= switches(ui, world, built, runtime.state(), (rig, node), requests);
     }
     ui.separator();
     let mut entry = |ui: &mut Ui, text: &str, why_not: Option<&str>| {
@@ -154,19 +189,19 @@ fn entries(ui: &mut Ui, world: &World, open: &OpenMenu, requests: &mut Requests)
     is_chosen
 }
 
-/// Draws the switches that concern a node, each with its values, for the pose and over the range of the open clip; true if one
-/// was thrown.
-fn switches(
+/// Draws the switches that concern a node of a rig, each with its values, for the pose and over the range of the open clip; true
+/// if one was thrown.
+pub(super) fn switches(
     ui: &mut Ui,
     world: &World,
     built: &BuiltRig,
     state: &RigState,
-    open: &OpenMenu,
+    (rig, node): (Entity, Uid),
     requests: &mut Requests,
 ) -> bool {
     let mut is_thrown = false;
-    let clip = OpenClip::of(world).filter(|clip| clip.entity == open.rig).zip(world.get_resource::<Timeline>());
-    for switch in built.switches.iter().filter(|switch| concerns(built, switch, open.node)) {
+    let clip = OpenClip::of(world).filter(|clip| clip.entity == rig).zip(world.get_resource::<Timeline>());
+    for switch in built.switches.iter().filter(|switch| concerns(built, switch, node)) {
         let Some(node) = built.node(switch.control) else { continue };
         let value = state.attribute(switch.control, &switch.attribute).unwrap_or_default();
         let title = match switch.matching {
@@ -182,7 +217,7 @@ fn switches(
                     is_thrown = true;
                     if !is_on {
                         let (control, attribute) = (switch.control, switch.attribute.to_string());
-                        requests.send(SwitchRequest { rig: open.rig, control, attribute, value: number as f32 });
+                        requests.send(SwitchRequest { rig, control, attribute, value: number as f32 });
                     }
                 }
             }

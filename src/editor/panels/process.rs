@@ -27,6 +27,9 @@ use crate::{
     rig::{BuiltNode, TagKind, Uid},
 };
 
+/// Least width with which stage and steps stand in one line, and the choices and the search in another.
+const TWO_LINES: f32 = 600.0;
+
 /// The panel.
 #[derive(Default)]
 pub struct ProcessPanel {
@@ -78,8 +81,7 @@ impl EditorPanel for ProcessPanel {
         };
         let builder = processor.builder();
         self.refresh(&shown, processor.last_changed(), builder);
-        stages(ui, &shown, world.get::<RigStage>(shown.entity), requests);
-        self.steps(ui, &shown, processor.follows(), builder, requests);
+        self.head(ui, &shown, (world.get::<RigStage>(shown.entity), processor.follows()), builder, requests);
         self.find();
         let reveal = (self.follow && self.cursor != builder.cursor())
             .then(|| self.shown.iter().position(|row| *row + 1 >= builder.cursor()))
@@ -151,68 +153,96 @@ impl ProcessPanel {
         self.filtered = Some(self.filter.clone());
     }
 
-    fn steps(&mut self, ui: &mut Ui, shown: &DisplayedRig, follows: bool, builder: &Builder, requests: &mut Requests) {
+    /// Draws everything above the list: two lines where there is width, so that a low panel has room for commands.
+    fn head(
+        &mut self,
+        ui: &mut Ui,
+        shown: &DisplayedRig,
+        (stage, follows): (Option<&RigStage>, bool),
+        builder: &Builder,
+        requests: &mut Requests,
+    ) {
+        let filter = ("Filter commands", "Words of joint, module and state");
+        if ui.available_width() < TWO_LINES {
+            ui.horizontal(|ui| stages(ui, shown, stage, requests));
+            ui.horizontal_wrapped(|ui| self.steps(ui, shown, builder, requests));
+            ui.horizontal_wrapped(|ui| self.choices(ui, shown, follows, requests));
+            return list::search_bar(ui, filter.0, filter.1, &mut self.filter, |_| {});
+        }
+        ui.horizontal(|ui| {
+            stages(ui, shown, stage, requests);
+            ui.separator();
+            self.steps(ui, shown, builder, requests);
+        });
+        ui.horizontal(|ui| {
+            self.choices(ui, shown, follows, requests);
+            list::search_bar(ui, filter.0, filter.1, &mut self.filter, |_| {});
+        });
+    }
+
+    /// Draws the steps of the build, and how far it is.
+    fn steps(&self, ui: &mut Ui, shown: &DisplayedRig, builder: &Builder, requests: &mut Requests) {
         let (done, total) = (builder.cursor(), builder.len());
         let mut ask = |step: BuildStep| requests.send(BuildRequest { rig: shown.entity, step });
-        ui.horizontal_wrapped(|ui| {
-            ui.spacing_mut().item_spacing.x = 3.0;
-            let steps = [
-                ("⏮", "Roll all back", BuildStep::RollBack, done > 0),
-                ("⏪", "Roll the last joint back", BuildStep::JointBack, done > 0),
-                ("⏴", "Take the last command back", BuildStep::Back, done > 0),
-                ("⏵", "Carry out the next command", BuildStep::Forward, done < total),
-                ("⏩", "Carry out the next joint", BuildStep::JointForward, done < total),
-                ("⏭", "Run to the next breakpoint, or to the end", BuildStep::Run, done < total),
-            ];
-            for (symbol, tip, step, enabled) in steps {
-                ui.add_enabled_ui(enabled, |ui| {
-                    if list::symbol_button(ui, symbol, tip) {
-                        ask(step);
-                    }
-                });
-            }
-            let counts = builder.counts();
-            ui.label(format!("{} of {}", counts.built, counts.all))
-                .on_hover_text("Commands that are in effect, of those that a build carries out");
-            if counts.off > 0 {
-                ui.weak(format!("{} off", counts.off)).on_hover_text(
-                    "Commands that the build passes over: their tag, feature or group is off, or what they refer to",
-                );
-            }
-            if !self.ran.is_empty() {
-                let ran = format!("{} ran", self.ran.len());
-                ui.label(RichText::new(ran).color(style::accent(ui.visuals())))
-                    .on_hover_text("Commands that the last change made run again; the others keep what they built");
-            }
-            let micros: f32 = self.rows.iter().filter_map(|row| Some(row.status.as_ref()?.micros)).sum();
-            // As wide for any time, so that nothing moves while commands run.
-            let size = vec2(62.0, ui.spacing().interact_size.y);
-            ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
-                ui.set_min_width(size.x);
-                ui.weak(format!("{:.1} ms", micros / 1000.0))
-                    .on_hover_text("Time of the last run of each command, together");
+        ui.spacing_mut().item_spacing.x = 3.0;
+        let steps = [
+            ("⏮", "Roll all back", BuildStep::RollBack, done > 0),
+            ("⏪", "Roll the last joint back", BuildStep::JointBack, done > 0),
+            ("⏴", "Take the last command back", BuildStep::Back, done > 0),
+            ("⏵", "Carry out the next command", BuildStep::Forward, done < total),
+            ("⏩", "Carry out the next joint", BuildStep::JointForward, done < total),
+            ("⏭", "Run to the next breakpoint, or to the end", BuildStep::Run, done < total),
+        ];
+        for (symbol, tip, step, enabled) in steps {
+            ui.add_enabled_ui(enabled, |ui| {
+                if list::symbol_button(ui, symbol, tip) {
+                    ask(step);
+                }
             });
-        });
-        ui.horizontal_wrapped(|ui| {
-            let mut live = follows;
-            if ui.checkbox(&mut live, "Live").on_hover_text("Edits rebuild what depends on them at once").clicked() {
-                ask(BuildStep::Follow(live));
-            }
-            ui.checkbox(&mut self.follow, "Follow").on_hover_text("Scrolls to the command that was carried out last");
-            let selected = &shown.selection.0;
-            let tip = "Only commands of the selected joints and of those below them";
-            let field = ui.add_enabled(
-                self.in_range || !selected.is_empty(),
-                egui::Checkbox::new(&mut self.in_range, "Selection only"),
+        }
+        let counts = builder.counts();
+        ui.label(format!("{} of {}", counts.built, counts.all))
+            .on_hover_text("Commands that are in effect, of those that a build carries out");
+        if counts.off > 0 {
+            ui.weak(format!("{} off", counts.off)).on_hover_text(
+                "Commands that the build passes over: their tag, feature or group is off, or what they refer to",
             );
-            if field.on_hover_text(tip).clicked() {
-                ask(BuildStep::Range(match self.in_range {
-                    true => BuildRange::Hierarchy(selected.iter().copied().collect()),
-                    false => BuildRange::Rig,
-                }));
-            }
+        }
+        if !self.ran.is_empty() {
+            let ran = format!("{} ran", self.ran.len());
+            ui.label(RichText::new(ran).color(style::accent(ui.visuals())))
+                .on_hover_text("Commands that the last change made run again; the others keep what they built");
+        }
+        let micros: f32 = self.rows.iter().filter_map(|row| Some(row.status.as_ref()?.micros)).sum();
+        // As wide for any time, so that nothing moves while commands run.
+        let size = vec2(62.0, ui.spacing().interact_size.y);
+        ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+            ui.set_min_width(size.x);
+            ui.weak(format!("{:.1} ms", micros / 1000.0))
+                .on_hover_text("Time of the last run of each command, together");
         });
-        list::search_bar(ui, "Filter commands", "Words of joint, module and state", &mut self.filter, |_| {});
+    }
+
+    /// Draws what edits rebuild, what the list follows, and which joints are built.
+    fn choices(&mut self, ui: &mut Ui, shown: &DisplayedRig, follows: bool, requests: &mut Requests) {
+        let mut ask = |step: BuildStep| requests.send(BuildRequest { rig: shown.entity, step });
+        let mut live = follows;
+        if ui.checkbox(&mut live, "Live").on_hover_text("Edits rebuild what depends on them at once").clicked() {
+            ask(BuildStep::Follow(live));
+        }
+        ui.checkbox(&mut self.follow, "Follow").on_hover_text("Scrolls to the command that was carried out last");
+        let selected = &shown.selection.0;
+        let tip = "Only commands of the selected joints and of those below them";
+        let field = ui.add_enabled(
+            self.in_range || !selected.is_empty(),
+            egui::Checkbox::new(&mut self.in_range, "Selection only"),
+        );
+        if field.on_hover_text(tip).clicked() {
+            ask(BuildStep::Range(match self.in_range {
+                true => BuildRange::Hierarchy(selected.iter().copied().collect()),
+                false => BuildRange::Rig,
+            }));
+        }
     }
 
     fn row(&self, ui: &mut Ui, rect: Rect, number: usize, cursor: usize) -> Option<Click> {
@@ -309,25 +339,23 @@ fn made_by(world: &World, shown: &DisplayedRig, command: Uid) -> Vec<Uid> {
 
 /// Stage of the rig, and the choice of another.
 fn stages(ui: &mut Ui, shown: &DisplayedRig, now: Option<&RigStage>, requests: &mut Requests) {
-    ui.horizontal(|ui| {
-        let label = ui.label("Stage");
-        let name = now.map_or("not built", |stage| stage.name());
-        let combo = egui::ComboBox::from_id_salt("stage").selected_text(name).show_ui(ui, |ui| {
-            for stage in RigStage::ALL {
-                let tip = match stage {
-                    RigStage::Skeleton => "The joints in their pose; no command is in effect",
-                    RigStage::Edit => "The joints at rest, to be edited; no command runs",
-                    RigStage::Built => "All commands are in effect, and follow every edit",
-                    RigStage::Deleted => "No joints; another stage, or Ctrl+Z, brings them back",
-                };
-                let is_now = now == Some(&stage);
-                if ui.selectable_label(is_now, stage.name()).on_hover_text(tip).clicked() && !is_now {
-                    requests.send(StageRequest { rig: shown.entity, stage });
-                }
+    let label = ui.label("Stage");
+    let name = now.map_or("not built", |stage| stage.name());
+    let combo = egui::ComboBox::from_id_salt("stage").selected_text(name).show_ui(ui, |ui| {
+        for stage in RigStage::ALL {
+            let tip = match stage {
+                RigStage::Skeleton => "The joints in their pose; no command is in effect",
+                RigStage::Edit => "The joints at rest, to be edited; no command runs",
+                RigStage::Built => "All commands are in effect, and follow every edit",
+                RigStage::Deleted => "No joints; another stage, or Ctrl+Z, brings them back",
+            };
+            let is_now = now == Some(&stage);
+            if ui.selectable_label(is_now, stage.name()).on_hover_text(tip).clicked() && !is_now {
+                requests.send(StageRequest { rig: shown.entity, stage });
             }
-        });
-        combo.response.labelled_by(label.id);
+        }
     });
+    combo.response.labelled_by(label.id);
 }
 
 /// Module of a command, with the name that it gives.

@@ -21,6 +21,7 @@ mod marks;
 mod mask;
 mod menu;
 pub mod motion_options;
+mod node_menu;
 mod orphaned_keys;
 pub(in crate::editor) mod own_motion;
 mod row;
@@ -29,6 +30,7 @@ mod sheet;
 mod shown_pose;
 mod state;
 mod switches;
+mod tolerance;
 
 use bevy::{prelude::*, window::RequestRedraw};
 use bevy_egui::egui::{Rangef, Rect, Sense, Stroke, Ui, UiBuilder, WidgetInfo, WidgetType, pos2, vec2};
@@ -40,11 +42,13 @@ pub use self::{
     axis::TimeAxis,
     marks::{Bucket, Mark, MarkKind, buckets},
     state::{OpenClip, Timeline, TimelineRequest},
+    tolerance::ReductionTolerance,
 };
 pub(super) use self::{
     area::preview,
     colors::KeyColors,
     drag::KeyDrag,
+    menu::show as show_key_menu,
     ruler::{Markers, height as ruler_height, lines, paint_playhead, show as show_ruler},
     state::{add as add_keys, contains as contains_keys},
 };
@@ -121,11 +125,7 @@ impl EditorPanel for TimelinePanel {
             return list::nothing(ui, "No rig is open.");
         };
         let open = OpenClip::of(world);
-        let is_pointed = open.is_some() && ui.rect_contains_pointer(ui.max_rect());
-        if is_pointed != self.is_pointed {
-            self.is_pointed = is_pointed;
-            requests.send(TimelineRequest::Hover(is_pointed));
-        }
+        tell_hover(ui, &mut self.is_pointed, world, requests);
         self.bar.show(ui, world, &shown, requests);
         if let Some(import) = world.get_resource::<import::ClipImport>()
             && let Some(draft) = import.draft().filter(|draft| draft.rig == shown.entity)
@@ -235,6 +235,18 @@ impl TimelinePanel {
             area::paint(&painter, place, axis, (&self.sheet, row), selected, &colors);
         }
         ruler::paint_playhead(ui, area, axis, open);
+    }
+}
+
+/// Tells whether the pointer is over a panel of keys, which then takes the keys that delete and select. `is_pointed` is what the
+/// panel has told last.
+pub(super) fn tell_hover(ui: &Ui, is_pointed: &mut bool, world: &World, requests: &mut Requests) {
+    let is_over = OpenClip::of(world).is_some() && ui.rect_contains_pointer(ui.max_rect());
+    // Of two panels in sight the one that the pointer has left may tell last.
+    let is_lost = is_over && world.get_resource::<Timeline>().is_none_or(|timeline| !timeline.hovered);
+    if is_over != *is_pointed || is_lost {
+        *is_pointed = is_over;
+        requests.send(TimelineRequest::Hover(is_over));
     }
 }
 

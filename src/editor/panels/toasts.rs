@@ -1,7 +1,8 @@
 //! Toasts: recent notices, in the viewport's lower right corner, or the lower left one where a window is in the way.
 //!
 //! Toasts are areas of their own, so a click on one never reaches the viewport below, and they cost a frame only when
-//! one of them expires: the window sleeps until then. They keep clear of windows and bars, and are below dialogs.
+//! one of them expires: the window sleeps until then. They keep clear of windows, bars and the start page, beside which they are
+//! flat and wide, and are below dialogs.
 
 use std::time::Duration;
 
@@ -19,7 +20,7 @@ use crate::editor::{
     notice::{Notice, Severity},
     panel::{EditorOverlay, Requests},
     pointer::ViewportArea,
-    start,
+    start::{self, StartPage},
 };
 
 /// Plugin that wakes the window when a toast expires.
@@ -136,8 +137,7 @@ impl EditorOverlay for Toasts {
         self.follow(book, now);
         self.shown.retain(|toast| toast.until > now);
         let window = ctx.content_rect();
-        let area = viewport(world).map_or(window, |area| area.intersect(window));
-        let width = (area.width() - 16.0).clamp(140.0, 340.0);
+        let (areas, width) = room(ctx, world, window);
         let mut taken = self.windows(ctx);
         let mut closed = None;
         for toast in self.shown.iter_mut().rev() {
@@ -145,7 +145,7 @@ impl EditorOverlay for Toasts {
             let height = ctx.memory(|memory| memory.area_rect(id)).map_or(HEIGHT, |rect| rect.height());
             let size = egui::vec2(width, height);
             // Without room the notice is in the log alone.
-            let Some(place) = free_place(area, size, &taken) else { continue };
+            let Some(place) = areas.iter().find_map(|area| free_place(*area, size, &taken)) else { continue };
             let shown = Area::new(id)
                 .order(Order::Middle)
                 .pivot(Align2::RIGHT_BOTTOM)
@@ -183,9 +183,9 @@ impl EditorOverlay for Toasts {
 }
 
 impl Toasts {
-    /// Rectangles of the windows and bars on the screen. The start page is none of them: what goes wrong on it is told over it.
+    /// Rectangles of the windows and bars on the screen.
     fn windows(&self, ctx: &egui::Context) -> Vec<Rect> {
-        let own: Vec<Id> = self.shown.iter().map(|toast| area_id(toast.id)).chain([start::page_id()]).collect();
+        let own: Vec<Id> = self.shown.iter().map(|toast| area_id(toast.id)).collect();
         ctx.memory(|memory| {
             let layers = memory.areas().visible_layer_ids().into_iter();
             let layers = layers.filter(|layer| layer.order == Order::Middle && !own.contains(&layer.id));
@@ -196,6 +196,20 @@ impl Toasts {
 
 fn area_id(toast: u64) -> Id {
     Id::new(("toast", toast))
+}
+
+/// Areas for toasts, the best first, and the width of a toast: the viewport, or the strips below and above the start page, which
+/// leaves the viewport no room.
+fn room(ctx: &egui::Context, world: &World, window: Rect) -> ([Rect; 2], f32) {
+    if world.get_resource::<StartPage>().is_some_and(StartPage::is_shown) {
+        let page = ctx.memory(|memory| memory.area_rect(start::page_id()));
+        let below = page.map_or(window, |page| window.with_min_y(page.bottom()));
+        // Two stand side by side where both have room for a sentence in a line.
+        let width = ((window.width() - 24.0) / 2.0).clamp(480.0, 620.0);
+        return ([below, window], width.min((window.width() - 16.0).max(140.0)));
+    }
+    let area = viewport(world).map_or(window, |area| area.intersect(window));
+    ([area; 2], (area.width() - 16.0).clamp(140.0, 340.0))
 }
 
 /// The lowest free place on the right of an area, or on its left.

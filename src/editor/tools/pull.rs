@@ -204,7 +204,7 @@ fn drag(
                     }
                     (None, Some(sight)) if !dragged => {
                         let pick = select::click_or_control(&scene, &controls, rig, &sight, held.at);
-                        let hovered = hovered.get(rig.entity).ok();
+                        let hovered = hovered.get(rig.entity).ok().and_then(|hovered| hovered.0);
                         picks.write(select::clicked(rig, pick, pointer.held, count, hovered));
                     }
                     _ => {}

@@ -10,7 +10,7 @@ use super::{
     scene::{EditedRig, Scene, joints},
 };
 use crate::{
-    algo::picking::in_box,
+    algo::picking::{candidates_at, in_box},
     editor::{
         mode::Mode,
         notice::StatusLine,
@@ -58,6 +58,8 @@ pub struct SelectTool {
 pub const REACH: f32 = 8.0;
 /// Largest distance of a click beside the mesh from the joint it picks, in pixels.
 const BESIDE: f32 = 24.0;
+/// Largest distance of a click from where the highlighted node was looked for, in pixels.
+const BESIDE_HOVER: f32 = 4.0;
 
 /// Outlines of controls, as far as they are drawn.
 #[derive(SystemParam)]
@@ -164,7 +166,15 @@ pub(super) fn select(
                     }
                     None => {
                         let pick = click_or_control(&scene, &controls, &rig, &sight, press);
-                        clicked(&rig, pick, pointer.held, count, hovered.get(rig.entity).ok())
+                        // The node that is highlighted lies under the last frame's pointer, which may have come from elsewhere.
+                        let is_known = tool.asked.is_some_and(|(of, seen, at)| {
+                            of == rig.entity && seen == sight && at.distance(press) <= BESIDE_HOVER
+                        });
+                        let under = match is_known {
+                            true => hovered.get(rig.entity).ok().and_then(|hovered| hovered.0),
+                            false => node_under(&scene, &controls, &rig, &sight, press),
+                        };
+                        clicked(&rig, pick, pointer.held, count, under)
                     }
                 };
                 picks.write(request);
@@ -190,13 +200,27 @@ pub(super) fn select(
     }
 }
 
+/// The node that a first click at a pixel picks.
+fn node_under(scene: &Scene, controls: &DrawnControls, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<Uid> {
+    if let Some(control) = controls.at(rig, sight, at) {
+        return Some(control);
+    }
+    let posed = scene.posed(rig);
+    let places: Vec<Vec3> = posed.iter().map(|(_, place)| *place).collect();
+    let ray = sight.ray(at);
+    let hit = rig.surface.as_ref().and_then(|surface| surface.ready()).and_then(|surface| surface.closest(&ray));
+    let hit = hit.map(|hit| ray.at(hit.distance));
+    let found = candidates_at(hit, &sight.plane, sight.point(at), &places, REACH * sight.pixel);
+    found.first().map(|number| posed[*number].0)
+}
+
 /// The request of a click with what it meets; of a double click, with the hierarchy of the active joint.
 pub(super) fn clicked(
     rig: &EditedRig,
     pick: Option<Pick>,
     held: ModifierKeys,
     count: u8,
-    hovered: Option<&HoveredNode>,
+    hovered: Option<Uid>,
 ) -> PickRequest {
     let request = |what, add| PickRequest { rig: rig.entity, what, add };
     let selected = &rig.selection.0;
@@ -215,7 +239,7 @@ pub(super) fn clicked(
             request(Pick::None, false)
         };
     };
-    match hovered.and_then(|hovered| hovered.0) {
+    match hovered {
         Some(joint) if held.control && selected.contains(&joint) => {
             request(Pick::Joints(selected.iter().copied().filter(|other| *other != joint).collect()), false)
         }

@@ -241,7 +241,8 @@ pub(super) fn drag(
                     let pick = match (drag.grabbed, scene.sight()) {
                         (Some(_), Some(sight)) => {
                             let pick = select::click(&scene, rig, &sight, pointer.at);
-                            Some(select::clicked(rig, pick, pointer.held, count, hovered.get(rig.entity).ok()))
+                            let hovered = hovered.get(rig.entity).ok().and_then(|hovered| hovered.0);
+                            Some(select::clicked(rig, pick, pointer.held, count, hovered))
                         }
                         _ => clicked(&scene, rig, pointer.at, pointer.held),
                     };

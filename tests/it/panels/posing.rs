@@ -7,8 +7,10 @@ use bevy_egui::egui::{self, Key, Pos2};
 use rigsmith::{
     editor::{
         actions::{Action, ActionRequest},
+        camera::ViewportSight,
         mode::Mode,
         panels::{poses::PosesPanel, selection_sets::SelectionSetsPanel, timeline::TimelineRequest},
+        pointer::ViewportArea,
     },
     plugins::{
         commands::{BuildRequest, BuildResult, BuildStep},
@@ -338,6 +340,22 @@ fn the_menu_of_a_control_switches_kinematics_without_a_jump() {
     desk.key(Key::Escape);
     desk.frames(2);
     assert!(desk.look("Reset pose").is_none());
+}
+
+/// The pointer has gone to another joint by the end of the slow frame in which it clicked.
+#[test]
+fn the_menu_is_that_of_the_joint_under_the_click() {
+    let mut desk = Desk::with(Sheet::Window, egui::vec2(800.0, 800.0));
+    let [low, high] = desk.chain(&["low", "high"])[..] else { panic!() };
+    let sight = crate::viewport_app::front();
+    let [here, there] = [low, high].map(|joint| sight.project(desk.rig().position(joint)).unwrap());
+    let area = ViewportArea { size: Vec2::splat(800.0), scale: 1.0, pointer: Some(there), ..default() };
+    desk.app.insert_resource(ViewportSight(Some(sight))).insert_resource(area).insert_resource(Mode::Pose);
+    let rig = desk.rig;
+    desk.app.world_mut().entity_mut(rig).insert(HoveredNode(Some(high)));
+    desk.secondary_click_at(Pos2::new(here.x, here.y));
+    assert_eq!(desk.selected(), [low]);
+    assert!(desk.look("Reset pose").is_some(), "{:?}", desk.seen);
 }
 
 /// The control of the left hand in a posed biped, whose spaces are at other places than at rest.

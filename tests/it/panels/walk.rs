@@ -1,9 +1,10 @@
 //! A walk over every action and over all widgets of the panels, as far as clicks lead: each changes the document by one step that
 //! undo takes back to the last value, or leaves it alone.
 //!
-//! The panel of the Loader is not walked: it writes files, and its own tests do and undo what it asks for. Its actions, and those on
-//! meshes, are in `with_mesh`.
+//! The Loader writes files; the walk over it, whose files lie in the test's folder, is in `of_library`, and the walks over actions
+//! and panels of meshes are in `with_mesh`.
 
+mod of_library;
 mod with_mesh;
 
 use std::{
@@ -23,7 +24,9 @@ use rigsmith::{
             dialog::{Answer, Dialog, DialogAnswer, Question},
         },
         fitting::FittingPlugin,
-        library::{LibraryAction, LibraryFolders, LibraryJobs, TemplateLibrary},
+        library::{
+            ChosenTemplate, LibraryAction, LibraryFolders, LibraryJobs, TemplateDraft, TemplateLibrary, TemplateSave,
+        },
         mode::Mode,
         onion::OnionSkin,
         panel::EditorPanel,
@@ -35,6 +38,7 @@ use rigsmith::{
             graph::GraphPanel,
             hierarchy::HierarchyPanel,
             history::HistoryPanel,
+            loader::LoaderPanel,
             local_groups::GroupsPanel,
             log::LogPanel,
             poses::PosesPanel,
@@ -51,8 +55,12 @@ use rigsmith::{
         running_work::running,
         tools::{ToolsPlugin, paint::brush::PaintBrush},
     },
-    files::SearchPaths,
-    plugins::{fit::FitJob, history::RigHistory},
+    files::{SearchPaths, TemplatePlace},
+    plugins::{
+        fit::FitJob,
+        history::RigHistory,
+        stage::{RigStage, StageRequest},
+    },
     prelude::*,
     rig::{
         JointData, RestTransform, SelectionSet, TagKind,
@@ -107,7 +115,15 @@ struct Walk {
     wrong: Vec<String>,
     /// Deeds that made a step.
     made: BTreeSet<String>,
+    /// State of the Loader before each deed.
+    shelf: Option<Shelf>,
     folder: tempfile::TempDir,
+}
+
+/// A template that is chosen in the Loader, and the choices of the form in which the rig is written.
+struct Shelf {
+    chosen: TemplatePlace,
+    draft: TemplateDraft,
 }
 
 impl Walk {
@@ -119,7 +135,7 @@ impl Walk {
         app.finish();
         app.cleanup();
         let desk = Desk::of(app, Entity::PLACEHOLDER, Sheet::Panel(panel), size);
-        let mut walk = Self { desk, size, wrong: Vec::new(), made: BTreeSet::new(), folder };
+        let mut walk = Self { desk, size, wrong: Vec::new(), made: BTreeSet::new(), shelf: None, folder };
         walk.desk.until("a document", |desk| desk.app.world().contains_resource::<ActiveRig>());
         walk.desk.app.world_mut().write_message(OpenRequest::Empty);
         walk.rest();
@@ -176,6 +192,7 @@ impl Walk {
                 || world.resource::<SaveJob>().name().is_some()
                 || world.resource::<Recovery>().is_looking()
                 || world.resource::<TemplateLibrary>().is_listing()
+                || world.resource::<TemplateSave>().is_writing()
                 || running(world).is_some()
                 || is_fitting(world);
             // Work that other tests left in the system's folder for temporary files is none of ours.
@@ -192,8 +209,14 @@ impl Walk {
         }
     }
 
-    /// Selects an arm, and opens the clip.
+    /// Selects an arm, and opens the clip; a deed leaves nothing of the Loader's state to the next one.
     fn ready(&mut self) {
+        if let Some(Shelf { chosen, draft }) = &self.shelf {
+            self.desk.app.insert_resource(ChosenTemplate(Some(chosen.clone()))).insert_resource(draft.clone());
+            let stage = StageRequest { rig: self.desk.rig, stage: RigStage::Built };
+            self.desk.app.world_mut().write_message(stage);
+            self.rest();
+        }
         if self.desk.selected() != &JOINTS[1..2] {
             self.desk.select(&[JOINTS[1]]);
         }
@@ -338,7 +361,9 @@ fn all_that_panels_do_is_taken_back_by_undo() {
 #[test]
 fn panels_change_nothing_themselves() {
     let mut count = 0;
-    for (name, panel, size) in panels() {
+    let loader: Box<dyn EditorPanel> = Box::new(LoaderPanel::default());
+    let loader = ("Loader", loader, egui::vec2(360.0, 2000.0));
+    for (name, panel, size) in panels().into_iter().chain([loader]) {
         let mut walk = Walk::new(panel, size);
         walk.ready();
         let state = |walk: &Walk| {

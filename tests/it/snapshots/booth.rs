@@ -69,6 +69,8 @@ pub struct Frame {
 pub enum Step {
     /// Clicks the first widget whose name begins so.
     Click(&'static str),
+    /// Clicks it with the right button.
+    Menu(&'static str),
     /// Types into the field that has the keyboard.
     Type(&'static str),
 }
@@ -141,23 +143,17 @@ impl Canvas {
     /// Queues the input of a step for the next frames; an error if what is to be clicked is not there.
     fn queue(&mut self, step: Step, seen: &[Widget]) -> Result<(), StepError> {
         match step {
-            Step::Click(name) => {
-                let found = seen.iter().find(|widget| widget.label.starts_with(name));
-                self.queue_click(found.ok_or(StepError(name))?.rect.center());
-            }
+            Step::Click(name) => self.queue_click(named(seen, name)?, egui::PointerButton::Primary),
+            Step::Menu(name) => self.queue_click(named(seen, name)?, egui::PointerButton::Secondary),
             Step::Type(text) => self.events.push_back(vec![egui::Event::Text(text.to_owned())]),
         }
         Ok(())
     }
 
-    fn queue_click(&mut self, pos: Pos2) {
-        let button = |pressed| egui::Event::PointerButton {
-            pos,
-            button: egui::PointerButton::Primary,
-            pressed,
-            modifiers: egui::Modifiers::NONE,
-        };
-        let frames = [egui::Event::PointerMoved(pos), button(true), button(false), egui::Event::PointerGone];
+    fn queue_click(&mut self, pos: Pos2, button: egui::PointerButton) {
+        let modifiers = egui::Modifiers::NONE;
+        let turned = |pressed| egui::Event::PointerButton { pos, button, pressed, modifiers };
+        let frames = [egui::Event::PointerMoved(pos), turned(true), turned(false), egui::Event::PointerGone];
         self.events.extend(frames.map(|event| vec![event]));
     }
 
@@ -189,6 +185,12 @@ impl Canvas {
         let picture = raster::draw(&self.textures, &primitives, output.pixels_per_point, size, ground);
         Shot { picture, missed: Vec::new(), widgets: widgets(&nodes), texts }
     }
+}
+
+/// Middle of the first widget whose name begins so.
+fn named(seen: &[Widget], name: &'static str) -> Result<Pos2, StepError> {
+    let found = seen.iter().find(|widget| widget.label.starts_with(name));
+    found.map(|widget| widget.rect.center()).ok_or(StepError(name))
 }
 
 /// Takes the durations of commands out of texts: they differ from run to run.
@@ -394,7 +396,7 @@ impl Booth {
         if matches!(subject, Subject::Window) && !steps.is_empty() {
             // A click beside a menu closes it.
             let [width, height] = frame.size.map(f32::from);
-            self.canvas.queue_click(egui::pos2(0.5 * width, 0.7 * height));
+            self.canvas.queue_click(egui::pos2(0.5 * width, 0.7 * height), egui::PointerButton::Primary);
             self.rest(&mut None, subject, frame);
         }
         shot

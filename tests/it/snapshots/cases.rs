@@ -14,7 +14,7 @@ use rigsmith::editor::{
 
 use super::{
     booth::{Booth, Frame, Step},
-    overlays,
+    lists, overlays,
     queries::Asked,
     states,
 };
@@ -50,12 +50,13 @@ pub struct Group {
     pub cases: fn() -> Vec<Case>,
 }
 
-pub const GROUPS: [Group; 6] = [
+pub const GROUPS: [Group; 7] = [
     Group { name: "empty", booth: states::empty, cases: empty },
     Group { name: "typical", booth: states::typical, cases: typical },
     Group { name: "extreme", booth: states::extreme, cases: extreme },
     Group { name: "face", booth: states::head, cases: face },
     Group { name: "updater", booth: states::followed, cases: updater },
+    Group { name: "lists", booth: lists::booth, cases: lists::cases },
     Group { name: "overlays", booth: states::empty, cases: overlays::cases },
 ];
 
@@ -152,8 +153,14 @@ fn empty() -> Vec<Case> {
 }
 
 /// A panel in another state than it begins in.
-fn varied(name: &str, variant: &str, height: u16, before: fn(&mut Booth), steps: &'static [Step]) -> Case {
+pub fn varied(name: &str, variant: &str, height: u16, before: fn(&mut Booth), steps: &'static [Step]) -> Case {
     let case = panel(found(name), DARK, [252, height], ALL);
+    Case { name: format!("{name}_{variant}"), before, steps, ..case }
+}
+
+/// A panel below the viewport with room for a menu, in another state than it begins in.
+fn wide(name: &str, variant: &str, before: fn(&mut Booth), steps: &'static [Step]) -> Case {
+    let case = panel(found(name), DARK, [777, 600], ALL);
     Case { name: format!("{name}_{variant}"), before, steps, ..case }
 }
 
@@ -179,6 +186,9 @@ fn typical() -> Vec<Case> {
         varied("properties", "posing", 440, states::pose_mode, &[]),
         varied("loader", "part", 900, states::choose_part, &[]),
         varied("loader", "save", 1100, states::as_it_is, &[Step::Click("Save as template")]),
+        wide("timeline", "menu", states::as_it_is, &[Step::Click("Menu of the clip")]),
+        // Its key is the last change of the document that the pictures are of.
+        wide("timeline", "row_menu", states::key_hand, &[Step::Menu("hand_ik_l")]),
     ]);
     cases
 }

@@ -10,7 +10,7 @@ use rigsmith::{
         library::{ChosenTemplate, ListTemplates, TemplateLibrary},
         mode::Mode,
         notice::Notice,
-        panels::timeline::TimelineRequest,
+        panels::timeline::{TimelineAction, TimelineRequest},
         tools::paint::SelectedPoints,
     },
     mesh::model::{Model, Weights},
@@ -126,6 +126,15 @@ pub fn select_control(booth: &mut Booth) {
     let built = booth.world().get::<BuildResult>(booth.entity()).expect("the rig is built").0.clone();
     let control = built.switches.first().map(|switch| switch.control).expect("the biped has switches");
     booth.select(&[control]);
+}
+
+/// Sets keys of the control of the left hand.
+pub fn key_hand(booth: &mut Booth) {
+    let built = booth.world().get::<BuildResult>(booth.entity()).expect("the rig is built").0.clone();
+    let hand = built.nodes.iter().find(|node| *node.name == *"hand_ik_l").expect("the biped has the control");
+    booth.app.insert_resource(Mode::Select);
+    booth.select(&[hand.uid]);
+    booth.send(ActionRequest(Action::Timeline(TimelineAction::Key)));
 }
 
 /// Nothing but what is shown already.

@@ -173,6 +173,33 @@ fn toasts_keep_clear_of_windows() {
     assert!(low.len() >= 3 && low.iter().any(|bottom| *bottom > 640.0), "{low:?}");
 }
 
+/// Toasts that a person reads beside the start page lie on none of its choices, in windows of all sizes.
+#[test]
+fn toasts_keep_clear_of_the_start_page() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    assert!(page.is_shown());
+    for (width, height) in [(1280.0, 720.0), (1024.0, 600.0), (560.0, 640.0), (1920.0, 1080.0)] {
+        page.desk.resize(width, height);
+        for text in ["There is nothing to undo.", "hero.glb was not opened: line 12, column 7: expected a number."] {
+            page.desk.app.world_mut().write_message(Notice::error(text));
+        }
+        page.desk.frames(5);
+        let start = page.desk.ctx.memory(|memory| memory.area_rect(start::page_id())).expect("the page is shown");
+        let crosses = page.desk.seen.iter().filter(|seen| seen.label == "Close");
+        let toasts: Vec<egui::Rect> = crosses.map(|cross| cross.rect).collect();
+        assert!(!toasts.is_empty(), "{width} x {height}: nothing is told");
+        let window = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(width, height));
+        for shown in page.desk.seen.iter().filter(|seen| seen.label.starts_with("Show in")) {
+            let is_beside = !start.intersects(shown.rect) && window.contains_rect(shown.rect);
+            assert!(is_beside, "{width} x {height}: {:?} lies on {start:?}", shown.rect);
+        }
+        for tile in page.desk.seen.iter().filter(|seen| seen.label.starts_with("Template ")) {
+            assert!(toasts.iter().all(|toast| !tile.rect.intersects(*toast)), "{width} x {height}: {}", tile.label);
+        }
+    }
+}
+
 #[test]
 fn looks_are_kept_and_keys_that_are_bound_twice_are_told() {
     let folder = folder();

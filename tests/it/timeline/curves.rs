@@ -84,6 +84,26 @@ fn a_tangent_turns_on_both_sides_or_one() {
     assert_eq!(bytes(&desk), before);
 }
 
+/// Keys that delete joints elsewhere delete keys over the curves, too, and a right click has the menu of keys.
+#[test]
+fn the_curves_have_the_keys_and_the_menu_of_the_timeline() {
+    let (mut desk, left) = open();
+    desk.move_to(place(&desk, 1.5, 0.9));
+    desk.frames(2);
+    assert!(timeline(&desk).hovered);
+    desk.move_to(Pos2::new(2000.0, 2000.0));
+    desk.frames(2);
+    assert!(!timeline(&desk).hovered);
+    ask(&mut desk, TimelineRequest::Select([(moved(left), vec![0.0])].into()));
+    desk.secondary_click_at(place(&desk, 1.0, 0.5));
+    let wanted: KeyTimes = [(moved(left), vec![1.0])].into();
+    assert_eq!(timeline(&desk).keys, wanted, "a right click selects the key under it");
+    let steps = desk.steps().1;
+    desk.click("Delete keys");
+    desk.frames(3);
+    assert_eq!((keys(&desk, left).len(), desk.steps().1), (2, steps + 1));
+}
+
 #[test]
 fn tangents_of_turns_are_slopes_of_their_angles() {
     let node = Uid(5);

@@ -2,7 +2,7 @@
 
 use rigsmith::{
     plugins::commands::{BuildRequest, BuildResult, BuildStep},
-    rig::NodeType,
+    rig::{AttributeKind, Matching, NodeType},
 };
 
 use super::*;
@@ -56,6 +56,49 @@ fn keys_are_reduced_by_the_size_of_the_rig() {
         act(&mut desk, TimelineAction::ReduceClip);
         assert_eq!(count(&desk), left, "a unit of {unit}");
     }
+}
+
+/// The menu has what a reduction may change, which reductions of tracks follow as well.
+#[test]
+fn keys_are_reduced_within_the_tolerance_that_is_chosen() {
+    let (mut desk, [hips, ..]) = opened();
+    desk.resize(900.0, 640.0);
+    let [moved, turn] =
+        [Property::Translation, Property::Rotation].map(|property| TrackTarget { node: hips, property });
+    let times = [0.0_f32, 1.0, 2.0];
+    // The middle key moves by 4 mm and turns by half a degree, on a rig that is larger than a human.
+    let middle = |time: f32| if time == 1.0 { 1.0 } else { 0.0 };
+    let places = times.map(|time| Key::vector(time, Vec3::Y * (0.004 * middle(time)))).to_vec();
+    let turns = times.map(|time| Key::rotation(time, Quat::from_rotation_x(0.5_f32.to_radians() * middle(time))));
+    let change = KeyOperation::Set(vec![(moved.clone(), places), (turn.clone(), turns.to_vec())]);
+    desk.edit(Operation::Clips(ClipOperation::Keys { clip: CLIP, layer: BASE, change }));
+    let counts = |desk: &Desk| [&moved, &turn].map(|target| clip(desk).layers[0].tracks[target].keys.len());
+    let (before, steps) = (bytes(&desk), desk.steps());
+    assert_eq!((timeline(&desk).tolerance.millimetres, timeline(&desk).tolerance.degrees), (0.05, 0.01));
+    act(&mut desk, TimelineAction::ReduceClip);
+    assert_eq!(counts(&desk), [3, 3]);
+    undo(&mut desk);
+    for (field, text, left) in [("Tolerance in millimetres", "5", [1, 3]), ("Tolerance in degrees", "1", [1, 1])] {
+        desk.click("Menu of the clip");
+        desk.frames(2);
+        desk.click(field);
+        desk.type_text(text);
+        desk.key(KeyboardKey::Enter);
+        desk.frames(3);
+        assert_eq!((bytes(&desk), desk.steps().1), (before.clone(), steps.1), "a choice is no step");
+        desk.click("Reduce keys of the whole clip");
+        desk.frames(3);
+        assert_eq!(counts(&desk), left, "{field}");
+        assert!(desk.look(field).is_none(), "the menu is closed");
+        undo(&mut desk);
+    }
+    let keys: KeyTimes = [(moved.clone(), vec![1.0]), (turn.clone(), vec![1.0])].into();
+    ask(&mut desk, TimelineRequest::Select(keys));
+    desk.secondary_click_at(at(&desk, "hips", 1.5));
+    assert!(desk.look("Tolerance in degrees").is_some(), "{:?}", desk.seen);
+    desk.click("Reduce keys of tracks");
+    desk.frames(3);
+    assert_eq!(counts(&desk), [1, 1]);
 }
 
 #[test]
@@ -155,6 +198,57 @@ fn biped() -> (Desk, impl Fn(&Desk, &str) -> Uid) {
     desk.edit(Operation::Edits(vec![RigEdit::AddClip(Box::new(clip), 0)]));
     ask(&mut desk, TimelineRequest::Open(Some(CLIP)));
     (desk, named)
+}
+
+/// A right click on the row of a control offers what its menu in the viewport does, over the selected keys.
+#[test]
+fn the_row_of_a_control_has_its_switches_over_the_selected_keys() {
+    let (mut desk, named) = biped();
+    desk.resize(900.0, 700.0);
+    let hand = named(&desk, "hand_ik_l");
+    let built = Arc::clone(&desk.app.world().get::<BuildResult>(desk.rig).unwrap().0);
+    let is_of_hand = |matching: &Matching| matches!(matching, Matching::Space { control } if *control == hand);
+    let spaces = built.switches.iter().find(|switch| is_of_hand(&switch.matching)).expect("spaces");
+    let attributes = &built.node(spaces.control).unwrap().attributes;
+    let attribute = attributes.iter().find(|known| known.name == spaces.attribute).expect("the attribute");
+    let AttributeKind::Choice(names) = &attribute.kind else { panic!("{attribute:?}") };
+
+    let target = TrackTarget { node: hand, property: Property::Translation };
+    ask(&mut desk, TimelineRequest::Select([(target, vec![0.8, 2.0])].into()));
+    desk.select(&[]);
+    desk.secondary_click("hand_ik_l");
+    assert_eq!(desk.selected(), [hand], "a right click selects");
+    let over = |desk: &Desk, value: &str| {
+        let wanted = format!("{value}, frames 24 to 60").to_lowercase();
+        let found = desk.seen.iter().find(|seen| seen.label.to_lowercase() == wanted);
+        found.unwrap_or_else(|| panic!("no {wanted} in {:?}", desk.seen)).label.clone()
+    };
+    let entries = ["FK", names[1].as_str()].map(|value| over(&desk, value));
+    desk.key(KeyboardKey::Escape);
+    desk.frames(2);
+    let throw = |desk: &mut Desk, entry: &str| {
+        desk.secondary_click("hand_ik_l");
+        desk.click(entry);
+        desk.frames(4);
+        assert!(desk.look("Select its keys").is_none(), "the menu is closed");
+    };
+    for entry in &entries {
+        let told = desk.told().len();
+        assert!(desk.is_one_step(entry, bytes, |desk| throw(desk, entry)), "{entry}: {:?}", desk.told());
+        let said = desk.told()[told..].join("\n");
+        assert!(said.contains("all joints move as before"), "{entry}: {said}");
+    }
+    throw(&mut desk, &entries[0]);
+    let settings = named(&desk, "arm_settings_l");
+    let switch = TrackTarget { node: settings, property: Property::Attribute("ik_fk".into()) };
+    let at = |desk: &Desk, time: f32| clip(desk).value(&switch, time).map(|value| value[0]);
+    assert_eq!((at(&desk, 0.5), at(&desk, 0.9), at(&desk, 2.0)), (Some(1.0), Some(0.0), Some(0.0)));
+    desk.secondary_click("hand_ik_l");
+    desk.click("Select its keys");
+    desk.frames(3);
+    let keys: usize =
+        clip(&desk).layers[0].tracks.iter().filter(|(key, _)| key.node == hand).map(|(_, t)| t.keys.len()).sum();
+    assert!(keys > 2 && selected(&desk) == keys, "{} of {keys}", selected(&desk));
 }
 
 #[test]

@@ -232,6 +232,20 @@ fn a_key_after_a_click_is_for_what_was_clicked() {
     assert_eq!(hand.base.place_tool().settings.volume, Some(1));
 }
 
+/// The pointer comes from another joint and goes on to a third place within the frame of the click.
+#[test]
+fn a_click_with_control_takes_out_the_joint_under_the_press() {
+    let (mut hand, joints) = Hand::with_joints(Mode::Select);
+    let [a, b] = [joints[0], joints[5]];
+    let [at_a, at_b] = [hand.base.pixel(a), hand.base.pixel(b)];
+    hand.frame(&[To(at_a), Down, Up]);
+    hand.frame(&[To(at_b), Press("Ctrl"), Down, Up]);
+    assert_eq!(hand.base.selected(), [a, b]);
+    hand.frame(&[To(at_b + Vec2::new(1.0, 0.0))]);
+    hand.frame(&[To(at_a), Down, Up, To(at_b)]);
+    assert_eq!(hand.base.selected(), [b], "the pointer came from the other one, and goes back there");
+}
+
 #[test]
 fn leaving_the_mode_of_a_stroke_is_told_once_its_chain_is_there() {
     let is_told = |bench: &RigBench, part: &str| {

@@ -131,15 +131,21 @@ pub(super) fn gestures(
             requests.send(TimelineRequest::Select(keys));
         }
     }
-    if response.clicked()
+    let is_menu = response.secondary_clicked();
+    if (response.clicked() || is_menu)
         && let Some(at) = response.interact_pointer_pos()
-    {
         // The curves stay those of the selected keys: an empty click deselects nothing.
-        if let Some(Hit::Key(curve, key)) = hit(at, plot, all, &timeline.keys) {
-            let mut keys = if held.shift || held.command { timeline.keys.clone() } else { KeyTimes::new() };
-            add_keys(&mut keys, &one(curve, key));
-            requests.send(TimelineRequest::Select(keys));
+        && let Some(Hit::Key(curve, key)) = hit(at, plot, all, &timeline.keys)
+    {
+        let own = one(curve, key);
+        // The menu of a selected key is that of all of them.
+        if is_menu && contains_keys(&timeline.keys, &own) {
+            return;
         }
+        let is_more = !is_menu && (held.shift || held.command);
+        let mut keys = if is_more { timeline.keys.clone() } else { KeyTimes::new() };
+        add_keys(&mut keys, &own);
+        requests.send(TimelineRequest::Select(keys));
     }
 }
 

@@ -2,11 +2,16 @@
 //! why.
 
 use bevy::prelude::*;
-use bevy_egui::egui::{Button, ComboBox, RichText, Sense, Ui, WidgetInfo, WidgetType, vec2};
+use bevy_egui::egui::{
+    Button, ComboBox, PopupCloseBehavior, RichText, Sense, Ui, WidgetInfo, WidgetType,
+    containers::menu::{MenuButton, MenuConfig},
+    vec2,
+};
 
 use super::{
     action::{TimelineAction, obstacle},
     state::{OpenClip, Timeline, TimelineRequest, frames},
+    tolerance,
 };
 use crate::{
     editor::{
@@ -183,7 +188,9 @@ impl Bar {
     }
 
     fn menu(&mut self, ui: &mut Ui, world: &World, open: Option<&OpenClip>, requests: &mut Requests) {
-        let menu = ui.menu_button("…", |ui| {
+        // Fields are clicked without the menu being closed; entries close it.
+        let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+        let (menu, _) = MenuButton::new("…").config(config).ui(ui, |ui| {
             entry(ui, world, TimelineAction::NewClip, requests);
             let rename = ui.add_enabled(open.is_some(), Button::new("Rename clip"));
             if rename.on_disabled_hover_text("no clip is open").clicked()
@@ -204,6 +211,9 @@ impl Bar {
             ui.separator();
             entry(ui, world, TimelineAction::BakeClip, requests);
             entry(ui, world, TimelineAction::ReduceClip, requests);
+            if let Some(timeline) = world.get_resource::<Timeline>() {
+                tolerance::fields(ui, timeline, requests);
+            }
             entry(ui, world, TimelineAction::Longer, requests);
             entry(ui, world, TimelineAction::Shorter, requests);
             let mut is_stretched = world.get_resource::<Timeline>().is_some_and(|timeline| timeline.stretch);
@@ -213,8 +223,8 @@ impl Bar {
                 ui.close();
             }
         });
-        menu.response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, "Menu of the clip"));
-        menu.response.on_hover_text("Make, rename, copy, delete and import clips");
+        menu.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, "Menu of the clip"));
+        menu.on_hover_text("Make, rename, copy, delete and import clips");
     }
 
     /// The frame of the playhead, the range and the frame rate.

@@ -27,7 +27,7 @@ use crate::{
     rig::{
         Rig, Uid, UidSource,
         animation::{ClipAbout, LayerMode, Marker, RigClip},
-        operations::{ClipOperation, KeyClipboard, KeyEase, KeyOperation, KeyTimes, KeyTolerance, Operation},
+        operations::{ClipOperation, KeyClipboard, KeyEase, KeyOperation, KeyTimes, Operation},
     },
 };
 
@@ -65,6 +65,7 @@ fn answer(world: &mut World, request: TimelineRequest) {
             }
         }
         TimelineRequest::Select(keys) => world.resource_mut::<Timeline>().select(keys),
+        TimelineRequest::Tolerance(tolerance) => world.resource_mut::<Timeline>().tolerance = tolerance,
         TimelineRequest::Hover(is_over) => world.resource_mut::<Timeline>().hovered = is_over,
     }
 }
@@ -221,11 +222,11 @@ fn edit(world: &World, open: &OpenClip, action: TimelineAction) -> Option<Operat
         }
         TimelineAction::Reduce => {
             let targets = timeline.keys.keys().cloned().collect();
-            on_layer(KeyOperation::Reduce { targets, tolerance: KeyTolerance::for_rig(open.rig) })
+            on_layer(KeyOperation::Reduce { targets, tolerance: timeline.tolerance.of_keys(open.rig) })
         }
         TimelineAction::BakeClip => Some(Operation::Clips(ClipOperation::Bake(clip))),
         TimelineAction::ReduceClip => {
-            Some(Operation::Clips(ClipOperation::Reduce { clip, tolerance: KeyTolerance::for_rig(open.rig) }))
+            Some(Operation::Clips(ClipOperation::Reduce { clip, tolerance: timeline.tolerance.of_keys(open.rig) }))
         }
         TimelineAction::Longer => retimed(open.clip, 2.0),
         TimelineAction::Shorter => retimed(open.clip, 0.5),

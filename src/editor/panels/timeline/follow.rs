@@ -27,7 +27,8 @@ pub(super) fn follow_playback(
 ) {
     let active = active.map(|active| active.0);
     if timeline.rig != active {
-        *timeline = Timeline { rig: active, auto_key: timeline.auto_key, ..Timeline::default() };
+        let Timeline { auto_key, tolerance, .. } = *timeline;
+        *timeline = Timeline { rig: active, auto_key, tolerance, ..Timeline::default() };
     }
     let Some((entity, (rig, history))) = active.and_then(|entity| Some((entity, rigs.get(entity).ok()?))) else {
         reports.clear();

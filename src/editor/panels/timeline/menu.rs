@@ -1,9 +1,9 @@
 //! Context menu of the keys.
 
 use bevy::prelude::*;
-use bevy_egui::egui::{Response, Ui};
+use bevy_egui::egui::{Popup, PopupCloseBehavior, Response, Ui};
 
-use super::{action::TimelineAction, bar::entry};
+use super::{action::TimelineAction, bar::entry, state::Timeline, tolerance};
 use crate::editor::panel::Requests;
 
 /// Entries of the menu, group by group.
@@ -17,8 +17,10 @@ const GROUPS: [&[TimelineAction]; 6] = [
 ];
 
 /// Draws the menu while it is open.
-pub(super) fn show(response: &Response, world: &World, requests: &mut Requests) {
-    response.context_menu(|ui| entries(ui, world, requests));
+pub(in crate::editor::panels) fn show(response: &Response, world: &World, requests: &mut Requests) {
+    // Fields are clicked without the menu being closed; entries close it.
+    let menu = Popup::context_menu(response).close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+    menu.show(|ui| entries(ui, world, requests));
 }
 
 fn entries(ui: &mut Ui, world: &World, requests: &mut Requests) {
@@ -29,6 +31,11 @@ fn entries(ui: &mut Ui, world: &World, requests: &mut Requests) {
         }
         for action in group {
             entry(ui, world, *action, requests);
+            if *action == TimelineAction::Reduce
+                && let Some(timeline) = world.get_resource::<Timeline>()
+            {
+                tolerance::fields(ui, timeline, requests);
+            }
         }
     }
 }

@@ -10,7 +10,7 @@ use super::{
     TimelinePanel,
     bar::entry,
     colors::KeyColors,
-    mask, orphaned_keys,
+    mask, node_menu, orphaned_keys,
     sheet::Row,
     state::{OpenClip, Timeline, TimelineRequest, add},
 };
@@ -157,8 +157,13 @@ fn node(
             (false, false) => vec![node.uid],
         };
         requests.send(PickRequest { rig: context.open.entity, what: Pick::Joints(joints), add: false });
+    } else if response.secondary_clicked() && !is_selected {
+        requests.send(PickRequest { rig: context.open.entity, what: Pick::Joints(vec![node.uid]), add: false });
     }
-    response.on_hover_text("A click selects the node, a double click its keys");
+    let tip = "A click selects the node, a double click its keys; a right click offers its switches";
+    node_menu::show(&response.on_hover_text(tip), (node.uid, node.name.as_str()), context, requests, |requests| {
+        requests.send(TimelineRequest::Select(panel.sheet.keys_within(Row::Node(number), FOREVER)));
+    });
     if fold.clicked() {
         let uid = node.uid;
         if is_open {

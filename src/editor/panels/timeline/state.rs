@@ -5,6 +5,7 @@ use std::{collections::BTreeSet, sync::Arc};
 
 use bevy::prelude::*;
 
+use super::tolerance::ReductionTolerance;
 use crate::{
     editor::ActiveRig,
     plugins::animation::ClipPlayer,
@@ -38,6 +39,8 @@ pub struct Timeline {
     pub auto_key: bool,
     /// True to stretch keys and markers with the range and the frame rate.
     pub stretch: bool,
+    /// Largest differences that a reduction of keys may leave.
+    pub tolerance: ReductionTolerance,
     /// Selected keys, times rising.
     pub keys: KeyTimes,
     /// Number of changes of the selected keys.
@@ -65,6 +68,7 @@ impl Default for Timeline {
             span: [0.0, 1.0],
             auto_key: false,
             stretch: false,
+            tolerance: ReductionTolerance::default(),
             keys: KeyTimes::new(),
             changes: 0,
             copied: None,
@@ -88,6 +92,8 @@ pub enum TimelineRequest {
     Show([f32; 2]),
     /// Selects keys in place of the selected ones.
     Select(KeyTimes),
+    /// Sets what a reduction of keys may change.
+    Tolerance(ReductionTolerance),
     /// Tells whether the pointer is over the timeline.
     Hover(bool),
 }

@@ -48,13 +48,15 @@ impl KeyTolerance {
         Self { distance: self.distance * (height / 1.7).max(1e-6), ..self }
     }
 
-    /// Usual tolerance for a rig of any size and units, by the longest edge of the box around its joints at rest.
-    pub fn for_rig(rig: &Rig) -> Self {
+    /// Tolerance for a rig of another size or in other units than a human in metres, by the longest edge of the box around
+    /// its joints at rest.
+    #[must_use]
+    pub fn for_rig(self, rig: &Rig) -> Self {
         let globals = rig.rest_globals();
         let places = || globals.iter().map(|(_, at)| at.translation);
         let extent = places().reduce(Vec3::max).zip(places().reduce(Vec3::min));
         let size = extent.map_or(0.0, |(most, least)| (most - least).max_element());
-        if size > 0.0 { Self::default().for_height(size) } else { Self::default() }
+        if size > 0.0 { self.for_height(size) } else { self }
     }
 
     /// Keys that are needed for a track to stay within the tolerance.

@@ -1,32 +1,12 @@
 //! Actions of the Loader and those on meshes, and the panels of meshes: a mesh with weights is open, and a template of a folder
-//! is chosen. The Loader itself is not crawled over, for it writes files.
+//! is chosen.
 
-use std::fs;
+use rigsmith::{mesh::model::Weights, rig::SkinData};
 
-use rigsmith::{
-    editor::library::{ChosenTemplate, ListTemplates},
-    files::TemplatePlace,
-    mesh::model::Weights,
-    plugins::stage::{RigStage, StageRequest},
-    rig::SkinData,
-};
-
-use super::*;
+use super::{of_library::choose, *};
 use crate::gestures::boxes;
 
 const MESH: Uid = Uid(0xA1_0003);
-
-const LIMB: &str = r#"(
-    format: 2,
-    name: "limb",
-    version: "1.0.0",
-    kind: "prop",
-    joints: [
-        (label: "upper", translation: (0, 1, 0), tags: [control(size: 0.5)]),
-        (label: "lower", parent: "upper", translation: (0, -0.3, 0), tags: [null()]),
-    ],
-)
-"#;
 
 /// The walked app with a mesh that is bound to the joints.
 fn with_mesh(panel: Box<dyn EditorPanel>, size: egui::Vec2) -> Walk {
@@ -42,27 +22,10 @@ fn with_mesh(panel: Box<dyn EditorPanel>, size: egui::Vec2) -> Walk {
     walk
 }
 
-/// Chooses a template of a folder, as a click on its tile does.
-fn choose(walk: &mut Walk) {
-    let site = walk.folder.path().join("site");
-    fs::create_dir_all(&site).unwrap();
-    let file = site.join("limb.rig.ron");
-    fs::write(&file, LIMB).unwrap();
-    let world = walk.desk.app.world_mut();
-    world.insert_resource(LibraryFolders(Some(SearchPaths { folders: vec![site] })));
-    world.write_message(ListTemplates);
-    let place = TemplatePlace::File(file);
-    walk.desk.until("the listed template", |desk| {
-        desk.app.world().resource::<TemplateLibrary>().listing().find(&place).is_some()
-    });
-    walk.desk.app.insert_resource(ChosenTemplate(Some(place)));
-    walk.rest();
-}
-
 #[test]
 fn actions_of_the_loader_and_on_meshes_are_taken_back_by_undo() {
     let mut walk = with_mesh(Box::new(HierarchyPanel::default()), egui::vec2(360.0, 600.0));
-    choose(&mut walk);
+    choose(&mut walk, "prop");
     for action in Action::all() {
         if OF_FILES.contains(&action) {
             continue;
