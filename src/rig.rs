@@ -25,6 +25,7 @@ mod pose;
 pub mod proportion;
 pub mod reference;
 mod remap;
+mod rest_checkpoints;
 mod revision;
 mod selection_set;
 pub mod shapes;

@@ -14,6 +14,7 @@ use crate::{
         SelectionSet, StoredPose, TagData, Uid,
         animation::RigClip,
         part::{DroppedPart, HeaderSocket, PartOption},
+        rest_checkpoints::RestCheckpoints,
     },
 };
 
@@ -46,6 +47,7 @@ pub struct Rig {
     pub(super) face_cuts: BTreeMap<Uid, FaceCut>,
     /// Renewed by each edit of anything but pose, values, stored poses, clips, selection sets and cuts of faces.
     pub(super) revision: Revision,
+    pub(super) checkpoints: RestCheckpoints,
 }
 
 /// Header of a template, for people.
@@ -233,13 +235,6 @@ impl Rig {
         self.joints.values().filter_map(|joint| joint.data.label.as_deref())
     }
 
-    /// Transform of a joint from its own space to the rig's, at rest. Identity for an unknown joint.
-    pub fn rest_global(&self, uid: Uid) -> Affine3 {
-        let Some(joint) = self.joints.get(&uid) else { return Affine3::IDENTITY };
-        let own = joint.data.rest.affine();
-        self.ancestors(uid).fold(own, |global, ancestor| ancestor.data.rest.affine() * global)
-    }
-
     /// Position of a joint in the rig's space, at rest.
     pub fn position(&self, uid: Uid) -> Vec3 {
         self.rest_global(uid).translation
@@ -293,6 +288,7 @@ impl Rig {
             list.sort_by_key(|uid| places.get(uid).copied().unwrap_or(usize::MAX));
         }
         self.revision = Revision::default();
+        self.checkpoints.clear();
         self.tags.clear();
         self.joints.clear();
         self.roots = children.remove(&None).unwrap_or_default();

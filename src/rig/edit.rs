@@ -258,8 +258,9 @@ impl Rig {
                 if !rest.is_valid() {
                     return Err(EditError::BadTransform(*uid));
                 }
-                let joint = self.joint_mut(*uid)?;
-                RigEdit::SetRest(*uid, std::mem::replace(&mut joint.data.rest, *rest))
+                let before = std::mem::replace(&mut self.joint_mut(*uid)?.data.rest, *rest);
+                self.forget_checkpoints(*uid);
+                RigEdit::SetRest(*uid, before)
             }
             RigEdit::SetParent { joint, parent, index } => self.set_parent(*joint, *parent, *index)?,
             RigEdit::SetLabel(uid, label) => {
@@ -436,6 +437,7 @@ impl Rig {
         if !self.joints.get(&uid).ok_or(EditError::NoJoint(uid))?.children.is_empty() {
             return Err(EditError::HasChildren(uid));
         }
+        self.forget_checkpoints(uid);
         let (parent, index) = self.detach(uid)?;
         let joint = self.joints.remove(&uid).ok_or(EditError::NoJoint(uid))?;
         for tag in &joint.data.tags {
@@ -461,6 +463,7 @@ impl Rig {
         let siblings = self.siblings_mut(parent)?;
         siblings.insert(index.min(siblings.len()), uid);
         self.joint_mut(uid)?.parent = parent;
+        self.forget_checkpoints(uid);
         Ok(RigEdit::SetParent { joint: uid, parent: old_parent, index: old_index })
     }
 }

@@ -155,7 +155,7 @@ impl Rig {
     /// posed mesh below `joint` rests at the mapped position. Exactly the identity for `None` and if no joint above is
     /// posed.
     pub fn rest_from_pose(&self, joint: Option<Uid>) -> Affine3 {
-        let Some(joint) = joint else { return Affine3::IDENTITY };
+        let Some(joint) = joint.filter(|_| !self.pose.is_empty()) else { return Affine3::IDENTITY };
         let is_posed = self.pose.contains_key(&joint)
             || self.ancestors(joint).any(|above| self.pose.contains_key(&above.data.uid));
         if is_posed { self.rest_global(joint) * self.posed_global(joint).inverse() } else { Affine3::IDENTITY }

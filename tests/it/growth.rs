@@ -198,3 +198,45 @@ fn moves_of_whole_chains_are_followed_once() {
         assert!(pair[0] > 0 && pair[1] as f64 <= GROWTH * pair[0] as f64, "{visits:?}");
     }
 }
+
+/// Transforms of joints at the end of a chain are the same whatever was looked at before: a copy of a rig has looked at nothing.
+#[test]
+fn transforms_of_long_chains_follow_edits() {
+    use rigsmith::rig::{JointData, RestTransform, RigEdit, Uid};
+
+    let mut rig = chain(330, |_| vec![]);
+    let joint = |rig: &Rig, number: usize| rig.find_label(&format!("j{number}")).unwrap();
+    let compare = |rig: &Rig, what: &str| {
+        let fresh = rig.clone();
+        for (uid, global) in rig.rest_globals() {
+            assert_eq!(rig.rest_global(uid), fresh.rest_global(uid), "{what}: {uid}");
+            let there = rig.rest_global(uid).translation;
+            assert!(there.distance(global.translation) < 0.01, "{what}: {uid}: {there} {global:?}");
+        }
+    };
+    compare(&rig, "as it is");
+    let rest = |number: usize| RestTransform {
+        rotation: glam::Quat::from_rotation_z(0.01 * number as f32),
+        ..RestTransform::from_translation(glam::Vec3::new(0.02, 0.1, 0.01))
+    };
+    for number in [329, 320, 257, 256, 192, 130, 64, 63, 1, 0] {
+        let edit = RigEdit::SetRest(joint(&rig, number), rest(number));
+        let back = rig.apply(&edit).unwrap();
+        compare(&rig, "a joint is turned");
+        rig.apply(&back).unwrap();
+        compare(&rig, "a joint is turned back");
+        rig.apply(&edit).unwrap();
+    }
+    let (from, to) = (joint(&rig, 200), joint(&rig, 50));
+    let back = rig.apply(&RigEdit::SetParent { joint: from, parent: Some(to), index: 0 }).unwrap();
+    compare(&rig, "another parent");
+    rig.apply(&back).unwrap();
+    compare(&rig, "the former parent");
+    let back = rig.apply(&RigEdit::RemoveJoint(joint(&rig, 329))).unwrap();
+    let tip = joint(&rig, 328);
+    let added = JointData { uid: Uid(0xabcd), rest: rest(7), ..JointData::default() };
+    rig.apply(&RigEdit::AddJoint { joint: Box::new(added), parent: Some(tip), index: 0 }).unwrap();
+    compare(&rig, "another joint at the end");
+    rig.apply(&back).unwrap();
+    compare(&rig, "both joints at the end");
+}

@@ -25,7 +25,7 @@ pub(super) fn orient(draft: &mut Draft, joints: &[Uid], along: Axis) -> Result<(
     let mut order: Vec<(usize, Uid)> = Vec::with_capacity(joints.len());
     for &joint in joints {
         draft.rig().joint(joint).ok_or(EditError::NoJoint(joint))?;
-        order.push((draft.rig().ancestors(joint).count(), joint));
+        order.push((draft.rig().root_and_depth(joint).1, joint));
     }
     order.sort_by_key(|(depth, _)| *depth);
     for (_, joint) in order {

@@ -341,6 +341,7 @@ impl PartInstance {
             input.name = mirrored_label(&input.name).unwrap_or_else(|| input.name.clone());
             input.rest = RestTransform::from_affine(&plane.mirrored_affine(&input.rest.affine()));
         }
+        part.checkpoints.clear();
         for uid in order {
             let Some(joint) = part.joints.get_mut(&uid) else { continue };
             if self.mirror {
