@@ -18,6 +18,7 @@ mod group;
 mod input;
 mod joint;
 pub mod label;
+mod label_index;
 pub mod nearest;
 pub mod operations;
 pub mod part;

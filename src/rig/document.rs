@@ -13,6 +13,7 @@ use crate::{
         AttributeValues, FaceCut, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint,
         SelectionSet, StoredPose, TagData, Uid,
         animation::RigClip,
+        label_index::LabelIndex,
         part::{DroppedPart, HeaderSocket, PartOption},
         rest_checkpoints::RestCheckpoints,
     },
@@ -48,6 +49,7 @@ pub struct Rig {
     /// Renewed by each edit of anything but pose, values, stored poses, clips, selection sets and cuts of faces.
     pub(super) revision: Revision,
     pub(super) checkpoints: RestCheckpoints,
+    pub(super) label_index: LabelIndex,
 }
 
 /// Header of a template, for people.
@@ -230,11 +232,6 @@ impl Rig {
         self.walk().find(|joint| joint.data.label.as_deref() == Some(label)).map(|joint| joint.data.uid)
     }
 
-    /// Labels of the joints, in no order.
-    pub(super) fn labels(&self) -> impl Iterator<Item = &str> {
-        self.joints.values().filter_map(|joint| joint.data.label.as_deref())
-    }
-
     /// Position of a joint in the rig's space, at rest.
     pub fn position(&self, uid: Uid) -> Vec3 {
         self.rest_global(uid).translation
@@ -289,6 +286,7 @@ impl Rig {
         }
         self.revision = Revision::default();
         self.checkpoints.clear();
+        self.label_index.clear();
         self.tags.clear();
         self.joints.clear();
         self.roots = children.remove(&None).unwrap_or_default();

@@ -264,8 +264,9 @@ impl Rig {
             }
             RigEdit::SetParent { joint, parent, index } => self.set_parent(*joint, *parent, *index)?,
             RigEdit::SetLabel(uid, label) => {
-                let joint = self.joint_mut(*uid)?;
-                RigEdit::SetLabel(*uid, std::mem::replace(&mut joint.data.label, label.clone()))
+                let before = std::mem::replace(&mut self.joint_mut(*uid)?.data.label, label.clone());
+                self.label_index.change(before.as_deref(), label.as_deref());
+                RigEdit::SetLabel(*uid, before)
             }
             RigEdit::SetGroup(uid, group) => {
                 self.check_group(*group)?;
@@ -422,6 +423,7 @@ impl Rig {
         let siblings = self.siblings_mut(parent)?;
         siblings.insert(index.min(siblings.len()), data.uid);
         self.tags.extend(data.tags.iter().map(|tag| (tag.uid, data.uid)));
+        self.label_index.change(None, data.label.as_deref());
         let data = JointData { tags, ..data.clone() };
         let uid = data.uid;
         self.joints.insert(uid, RigJoint { data, parent, children: Vec::new() });
@@ -443,6 +445,7 @@ impl Rig {
         for tag in &joint.data.tags {
             self.tags.remove(&tag.uid);
         }
+        self.label_index.change(joint.data.label.as_deref(), None);
         let back = RigEdit::AddJoint { joint: Box::new(joint.data), parent, index };
         Ok(match self.pose.remove(&uid) {
             Some(offset) => RigEdit::Batch(vec![back, RigEdit::SetOffset(uid, Some(offset))]),

@@ -240,3 +240,59 @@ fn transforms_of_long_chains_follow_edits() {
     rig.apply(&back).unwrap();
     compare(&rig, "both joints at the end");
 }
+
+/// Joints get the names and places that they get in a copy of the rig, for which nothing is known yet.
+#[test]
+fn names_of_placed_joints_follow_edits() {
+    use rigsmith::rig::{
+        Uid, UidSource,
+        operations::{MirrorPlane, Operation},
+    };
+
+    for plane in [None, Some(MirrorPlane::sagittal(1.0))] {
+        let mut rig = Rig::new(Uid(1), "drawn");
+        let mut uids = UidSource::seeded(5);
+        let (mut seed, mut active, mut labels) = (7_u32, None, Vec::new());
+        for step in 0..400 {
+            let mut random = |below: u32| {
+                seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (seed >> 16) % below
+            };
+            let all: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
+            let any = all.get(random(100) as usize * all.len() / 100).copied();
+            let kind = if step < 130 { 9 } else { random(20) };
+            let operation = match (kind, any) {
+                (0, Some(joint)) => Operation::Delete { joints: vec![joint], keep_children: true },
+                (1, Some(joint)) => Operation::Labels(vec![(joint, format!("arm{}_l_{}", random(4), random(3)))]),
+                (2, Some(joint)) => Operation::Labels(vec![(joint, "joint+2_1".to_owned())]),
+                _ => {
+                    // Above the last joint, on the middle or on one side; sometimes a chain of its own.
+                    let across = [0.0, 0.0, 0.0, 0.5, -0.5][random(5) as usize];
+                    let position = glam::Vec3::new(across, 0.01 * step as f32, 0.1 * random(3) as f32);
+                    let parent = match kind {
+                        3 => None,
+                        4 => any,
+                        _ => active,
+                    };
+                    Operation::Place { position, parent }
+                }
+            };
+            let (mut fresh, mut fresh_uids) = (rig.clone(), uids.clone());
+            let expected = operation.run(&mut fresh, &mut fresh_uids, plane);
+            let outcome = operation.run(&mut rig, &mut uids, plane);
+            assert_eq!(outcome, expected, "step {step}");
+            assert_eq!(rig, fresh, "step {step}");
+            let Ok(outcome) = outcome else { continue };
+            if let (Operation::Place { .. }, Some(selected)) = (&operation, &outcome.selected) {
+                active = selected.last().copied();
+                labels.extend(active.and_then(|joint| rig.joint(joint)?.data.label.clone()));
+            }
+            if kind == 5 {
+                outcome.inverses.iter().for_each(|edit| drop(rig.apply(edit).unwrap()));
+            }
+            active = active.filter(|joint| rig.joint(*joint).is_some());
+        }
+        assert!(rig.len() > 100, "{}", rig.len());
+        assert!(labels.iter().any(|label| label.contains("_l_")) && labels.iter().any(|label| !label.contains("_l_")));
+    }
+}

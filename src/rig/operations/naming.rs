@@ -5,36 +5,17 @@ use std::collections::BTreeSet;
 use bevy::math::Vec3;
 
 use super::{Draft, MirrorPlane};
-use crate::rig::{EditError, Rig, RigEdit, Uid, label::mirrored_label};
+use crate::rig::{
+    EditError, Rig, RigEdit, Uid,
+    label::mirrored_label,
+    label_index::{ChainPlace, ChainSides},
+};
 
 /// Least share of a chain's extent that its rise or fall has to be, to be a chain that goes up or down.
 const STEEP: f32 = 0.6;
 
 /// Place along the trunk, from 0 at its start to 1 at its end, below which legs begin; arms begin above it.
 const HIP: f32 = 0.35;
-
-/// Highest number of a label from which a chain goes on.
-const HIGHEST: u32 = 1_000_000;
-
-/// A label of a drawn joint, taken apart: the chain's name with its side, and the place in the chain from 1.
-struct Place<'a> {
-    chain: &'a str,
-    number: u32,
-}
-
-impl<'a> Place<'a> {
-    fn of(label: &'a str) -> Option<Self> {
-        let (chain, number) = label.rsplit_once('_')?;
-        let number = number.parse().ok().filter(|number| (1..=HIGHEST).contains(number))?;
-        (!chain.is_empty()).then_some(Self { chain, number })
-    }
-
-    /// The chain's name without its side.
-    fn base(&self) -> &'a str {
-        let sideless = self.chain.strip_suffix("_l").or_else(|| self.chain.strip_suffix("_r"));
-        sideless.unwrap_or(self.chain)
-    }
-}
 
 /// The name of a chain that is drawn, and the place of its first joint.
 pub(super) struct ChainName {
@@ -47,7 +28,7 @@ impl ChainName {
     /// `parent` is the joint above. The names are those of a character that stands upright and looks along +Z.
     pub fn new(rig: &Rig, positions: &[Vec3], parent: Option<Uid>, plane: Option<&MirrorPlane>) -> Self {
         let upper = parent.and_then(|parent| rig.joint(parent));
-        let known = upper.and_then(|joint| joint.data.label.as_deref()).and_then(Place::of);
+        let known = upper.and_then(|joint| joint.data.label.as_deref()).and_then(ChainPlace::of);
         if let (Some(place), Some(joint)) = (&known, upper)
             && joint.children.is_empty()
             && stays_on_side(place.chain, positions, rig.position(joint.data.uid), plane)
@@ -57,13 +38,12 @@ impl ChainName {
         let base = base(rig, positions, parent, known.as_ref(), plane);
         // With a plane of symmetry the name has to be free on both sides.
         let side = positions.last().map_or("", |last| side_ending(*last, plane));
-        let number_of = |place: Place| {
-            let is_here = plane.is_some() || place.chain == place.base() || place.chain.ends_with(side);
-            let number = place.base().strip_prefix(base).filter(|_| is_here)?;
-            if number.is_empty() { Some(1) } else { number.parse().ok() }
+        let sides = match side {
+            "_l" if plane.is_none() => ChainSides::Left,
+            "_r" if plane.is_none() => ChainSides::Right,
+            _ => ChainSides::All,
         };
-        let taken: BTreeSet<u32> = rig.labels().filter_map(Place::of).filter_map(number_of).collect();
-        let number = (1..).find(|number| !taken.contains(number)).unwrap_or(1);
+        let number = rig.free_chain_number(base, sides);
         Self { base: if number == 1 { base.to_owned() } else { format!("{base}{number}") }, first: 1 }
     }
 
@@ -76,16 +56,13 @@ impl ChainName {
     pub fn joint(&self, rig: &Rig, place: usize, position: Vec3, plane: Option<&MirrorPlane>) -> String {
         let side = side_ending(position, plane);
         let name = |number: u32| format!("{}{side}_{number}", self.base);
-        let is_free = |name: &String, is_taken: &dyn Fn(&str) -> bool| {
-            !is_taken(name) && (plane.is_none() || !is_taken(&partner_name(name)))
-        };
+        let is_free = |name: &str| !rig.has_label(name) && (plane.is_none() || !rig.has_label(&partner_name(name)));
         let first = self.first + place as u32;
         let own = name(first);
-        if is_free(&own, &|name| rig.labels().any(|label| label == name)) {
+        if is_free(&own) {
             return own;
         }
-        let labels: BTreeSet<&str> = rig.labels().collect();
-        (first + 1..).map(name).find(|name| is_free(name, &|name| labels.contains(name))).unwrap_or(own)
+        (first + 1..).map(name).find(|name| is_free(name)).unwrap_or(own)
     }
 }
 
@@ -117,7 +94,7 @@ fn base(
     rig: &Rig,
     positions: &[Vec3],
     parent: Option<Uid>,
-    known: Option<&Place>,
+    known: Option<&ChainPlace>,
     plane: Option<&MirrorPlane>,
 ) -> &'static str {
     let (Some(&first), Some(&last)) = (positions.first(), positions.last()) else { return "joint" };
@@ -132,7 +109,7 @@ fn base(
             (_, true) => "arm",
         };
     };
-    match known.map(Place::base) {
+    match known.map(ChainPlace::base) {
         Some(base) if base.contains("arm") => return "finger",
         Some(base) if base.contains("leg") => return "toe",
         _ => {}
@@ -148,8 +125,8 @@ fn base(
     let share = way.normalize_or_zero();
     let trunk = Trunk::new(rig, parent);
     match is_beside {
-        false if trunk.is_lower(parent) && share.y < STEEP => "tail",
-        false if trunk.is_lower(parent) => "spine",
+        false if trunk.is_lower() && share.y < STEEP => "tail",
+        false if trunk.is_lower() => "spine",
         false => "neck",
         // A spine that lies: four legs.
         true if trunk.lies() && share.y < -STEEP && trunk.is_in_front(first) => "front_leg",
@@ -164,33 +141,31 @@ fn base(
 
 /// The joints from a joint up to its root, and those that continue them: a spine.
 struct Trunk {
-    joints: Vec<Uid>,
     start: Vec3,
     end: Vec3,
+    /// Number of joints above the joint.
+    above: usize,
+    /// Number of all joints.
+    count: usize,
 }
 
 impl Trunk {
     fn new(rig: &Rig, joint: Uid) -> Self {
-        let mut chain: Vec<Uid> = rig.ancestors(joint).map(|above| above.data.uid).collect();
-        chain.reverse();
-        chain.push(joint);
-        let mut next = joint;
+        let (root, above) = rig.root_and_depth(joint);
+        let (mut last, mut count) = (joint, above + 1);
         // Downwards along first children, which were drawn first.
-        while let Some(&child) = rig.children(Some(next)).first() {
+        while let Some(&child) = rig.children(Some(last)).first() {
             if rig.joint(child).is_some_and(|joint| joint.data.mirror.is_some()) {
                 break;
             }
-            chain.push(child);
-            next = child;
+            (last, count) = (child, count + 1);
         }
-        let place = |joint: Option<&Uid>| joint.map_or(Vec3::ZERO, |joint| rig.position(*joint));
-        let (start, end) = (place(chain.first()), place(chain.last()));
-        Self { joints: chain, start, end }
+        Self { start: rig.position(root), end: rig.position(last), above, count }
     }
 
-    /// True for the joints of the lower half.
-    fn is_lower(&self, joint: Uid) -> bool {
-        self.joints.iter().position(|one| *one == joint).is_some_and(|number| 2 * number < self.joints.len())
+    /// True if the joint is one of the lower half.
+    fn is_lower(&self) -> bool {
+        2 * self.above < self.count
     }
 
     /// Place of a point along the trunk, from 0 at its start to 1 at its end; `None` for a trunk of one joint.
@@ -215,7 +190,7 @@ pub(super) fn number_inserted(draft: &mut Draft, joint: Uid, child: Uid) -> Resu
     let rig = draft.rig();
     let label = |joint: Uid| rig.joint(joint).and_then(|joint| joint.data.label.clone());
     let Some(first) = label(child) else { return Ok(()) };
-    let Some(Place { chain, number }) = Place::of(&first) else { return Ok(()) };
+    let Some(ChainPlace { chain, number }) = ChainPlace::of(&first) else { return Ok(()) };
     let mut names = vec![(joint, first.clone())];
     let (mut at, mut number) = (child, number);
     loop {

@@ -342,6 +342,7 @@ impl PartInstance {
             input.rest = RestTransform::from_affine(&plane.mirrored_affine(&input.rest.affine()));
         }
         part.checkpoints.clear();
+        part.label_index.clear();
         for uid in order {
             let Some(joint) = part.joints.get_mut(&uid) else { continue };
             if self.mirror {
