@@ -194,7 +194,7 @@ impl Workbench {
     /// Carries out gestures and returns an answer for each. Where the time of [`Workbench::set_limits`] is over,
     /// the last answer is [`GestureAnswer::out_of_time`], and the gestures behind it are left out.
     pub fn gestures(&mut self, gestures: Vec<Gesture>) -> Vec<GestureAnswer> {
-        self.app.world_mut().entity_mut(self.rig).insert(GestureScript::new(gestures));
+        self.app.world_mut().entity_mut(self.rig).insert(GestureScript::unwatched(gestures));
         loop {
             self.app.update();
             let Some(script) = self.app.world().get::<GestureScript>(self.rig) else { return Vec::new() };

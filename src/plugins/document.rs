@@ -59,6 +59,7 @@ impl Plugin for DocumentPlugin {
             .add_message::<EditRequest>()
             .add_message::<EditReport>()
             .add_message::<EditRefusal>()
+            .add_message::<PlaceReport>()
             .add_systems(
                 Update,
                 (
@@ -93,6 +94,9 @@ pub struct EditRequest {
 pub enum Change {
     /// Runs an operation as one new step of the history.
     Do(Operation),
+    /// Places a joint at a position of the rig's space, at rest, below the joint that is active when the request is carried
+    /// out, or as a root; answered by a [`PlaceReport`], too.
+    Place(Vec3),
     /// Undoes the last step.
     Undo,
     /// Redoes the last undone step.
@@ -135,6 +139,15 @@ impl EditReport {
     }
 }
 
+/// Answer to a [`Change::Place`].
+#[derive(Message, Debug, Clone)]
+pub struct PlaceReport {
+    /// The rig.
+    pub rig: Entity,
+    /// Number of joints that were added, with those of the other side; or the reason of the refusal.
+    pub added: Result<usize, ChangeError>,
+}
+
 /// Message that a change was refused; the rig stays as it was.
 #[derive(Message, Debug, Clone)]
 pub struct EditRefusal {
@@ -152,6 +165,7 @@ fn apply_edits(
     mut uids: ResMut<UidSource>,
     mut edited: MessageWriter<EditReport>,
     mut refused: MessageWriter<EditRefusal>,
+    mut placed: MessageWriter<PlaceReport>,
 ) {
     let of_entities = std::mem::take(&mut entity_edits.bypass_change_detection().0).into_iter().map(|(rig, edits)| {
         let operation = Operation::Named { name: "Edit entities", edits };
@@ -163,6 +177,14 @@ fn apply_edits(
         let Ok((mut document, mut selection, mut history, symmetry, auto_key, built)) = rigs.get_mut(rig) else {
             refused.write(EditRefusal { rig, reason: ChangeError::NoRig(rig) });
             continue;
+        };
+        let operation;
+        let (change, joints) = match change {
+            Change::Place(position) => {
+                operation = Change::Do(Operation::Place { position: *position, parent: selection.active() });
+                (&operation, Some(document.len()))
+            }
+            change => (change, None),
         };
         // The selection is written only where it changes.
         let mut selected = selection.clone();
@@ -211,6 +233,8 @@ fn apply_edits(
                     .map(previewed)
                     .map_err(ChangeError::from)
             }
+            // A joint to place has become an operation.
+            Change::Place(_) => continue,
             Change::Commit | Change::CancelPreview if !history.is_previewing() => continue,
             Change::Commit => {
                 let Some(step) = history.commit_preview(&mut selected) else { continue };
@@ -222,6 +246,10 @@ fn apply_edits(
             }
         };
         selection.set_if_neq(selected);
+        if let Some(before) = joints {
+            let added = result.as_ref().map(|_| document.len().saturating_sub(before)).map_err(ChangeError::clone);
+            placed.write(PlaceReport { rig, added });
+        }
         match result {
             Ok(message) => {
                 edited.write(message);

@@ -38,6 +38,7 @@ mod cli_streams;
 mod cli_templates;
 #[cfg(feature = "cli")]
 mod cli_update_clips;
+mod click_runs;
 #[cfg(feature = "editor")]
 mod clicks;
 mod clip_files;

@@ -1,29 +1,33 @@
-//! Execution of gestures, one a frame, and their answers.
+//! Execution of gestures, one a frame or clicks in runs.
 
 use std::collections::VecDeque;
 
 use bevy::{ecs::system::SystemParam, prelude::*};
 
-use super::{Gesture, error::GestureError};
+use super::{
+    Gesture,
+    answers::Answers,
+    click_run::{self, ClickedRig},
+    error::GestureError,
+};
 use crate::{
     algo::{
-        placement::{PlaceSettings, Placement},
-        stroke::{ChainChoice, StrokeNote, StrokeSettings},
+        placement::PlaceSettings,
+        stroke::{ChainChoice, StrokeSettings},
         view::{View, ViewPlane},
     },
     plugins::{
-        document::{Change, EditRefusal, EditReport, EditRequest, Selection, Symmetry},
-        fit::{FIT_AROUND, FitAnswer, FitPart, FitRequest, FitTemplate},
+        document::{Change, EditRequest, Selection, Symmetry},
+        fit::{FitMarkers, FitPart, FitRequest, FitTemplate, FittedRig},
         limits::{Limit, RigLimits},
-        picking::{Pick, PickAnswer, PickRequest},
-        placement::{PlaceAnswer, PlaceRequest},
-        stroke::{StrokeDone, StrokeParent, StrokeRequest, StrokeResult},
-        surface::{RigMeshes, RigSurface, SkinOf},
+        picking::{Pick, PickRequest},
+        placement::PlaceRequest,
+        stroke::{StrokeParent, StrokeRequest},
+        surface::{RigMeshes, RigSurface},
     },
     rig::{
         Rig, Uid,
         operations::{MirrorPlane, Operation},
-        step::Commit,
     },
 };
 
@@ -37,12 +41,19 @@ const PARTS: &str = "parts/";
 #[reflect(Component, Default, from_reflect = false)]
 pub struct GestureScript {
     #[reflect(ignore)]
-    waiting: VecDeque<Gesture>,
+    pub(super) waiting: VecDeque<Gesture>,
     /// Answers, one for each finished gesture, in order.
     pub answers: Vec<GestureAnswer>,
     #[reflect(ignore)]
-    state: UserState,
-    pending: bool,
+    pub(super) state: UserState,
+    pub(super) pending: bool,
+    /// True if clicks that follow one another are carried out in one frame.
+    pub(super) is_unwatched: bool,
+    /// Indices of the answers of a run of clicks whose joints are requested.
+    #[reflect(ignore)]
+    pub(super) placing: VecDeque<usize>,
+    /// Number of refusals of joints of a run that are answered, and still to be read.
+    pub(super) refused_places: usize,
 }
 
 /// Answer to a gesture.
@@ -64,12 +75,12 @@ pub struct GestureAnswer {
 }
 
 /// State of the simulated user between gestures.
-struct UserState {
-    view: View,
-    place: PlaceSettings,
+pub(super) struct UserState {
+    pub(super) view: View,
+    pub(super) place: PlaceSettings,
     recentre: bool,
     reach: Option<f32>,
-    joints_before: usize,
+    pub(super) joints_before: usize,
 }
 
 impl Default for UserState {
@@ -78,10 +89,31 @@ impl Default for UserState {
     }
 }
 
+impl UserState {
+    /// Takes over a setting of the view or of placing; false for any other gesture.
+    pub(super) fn take_setting(&mut self, gesture: &Gesture) -> bool {
+        match gesture {
+            Gesture::View(view) => self.view = *view,
+            Gesture::Depth(depth) => self.place.depth = *depth,
+            Gesture::Volume(number) => self.place.volume = (*number > 0).then_some(*number),
+            Gesture::Recentre(on) => self.recentre = *on,
+            Gesture::Reach(reach) => self.reach = Some(*reach),
+            _ => return false,
+        }
+        true
+    }
+}
+
 impl GestureScript {
     /// A script of these gestures.
     pub fn new(gestures: impl IntoIterator<Item = Gesture>) -> Self {
         Self { waiting: gestures.into_iter().collect(), ..Self::default() }
+    }
+
+    /// A script of these gestures in an app without a window: clicks that follow one another are carried out in one frame. The
+    /// result is that of [`GestureScript::new`].
+    pub fn unwatched(gestures: impl IntoIterator<Item = Gesture>) -> Self {
+        Self { is_unwatched: true, ..Self::new(gestures) }
     }
 
     /// Adds gestures at the end.
@@ -105,19 +137,8 @@ pub(super) struct Requests<'w> {
     fits: MessageWriter<'w, FitRequest>,
 }
 
-/// Readers of the answers.
-#[derive(SystemParam)]
-pub(super) struct Answers<'w, 's> {
-    edited: MessageReader<'w, 's, EditReport>,
-    refused: MessageReader<'w, 's, EditRefusal>,
-    picked: MessageReader<'w, 's, PickAnswer>,
-    placed: MessageReader<'w, 's, PlaceAnswer>,
-    drawn: MessageReader<'w, 's, StrokeDone>,
-    fitted: MessageReader<'w, 's, FitAnswer>,
-    meshes: Query<'w, 's, &'static SkinOf>,
-}
-
-type ScriptedRig<'a> = (
+/// Components of a rig with a script.
+pub(super) type ScriptedRig<'a> = (
     Entity,
     &'a mut GestureScript,
     &'a Rig,
@@ -125,6 +146,7 @@ type ScriptedRig<'a> = (
     &'a mut Symmetry,
     Option<&'a RigSurface>,
     Option<&'a RigMeshes>,
+    (Has<FittedRig>, Has<FitMarkers>),
 );
 
 /// Reads the answers to the last gesture of each script and carries out the next one.
@@ -135,30 +157,21 @@ pub(super) fn run_scripts(
     limits: Res<RigLimits>,
 ) {
     answers.collect(&mut scripts);
-    for (entity, mut script, rig, selection, mut symmetry, surface, meshes) in &mut scripts {
+    for (entity, mut script, rig, selection, mut symmetry, surface, meshes, is_fitted) in &mut scripts {
         if script.pending
             || script.waiting.is_empty()
             || (meshes.is_some() && surface.and_then(RigSurface::ready).is_none())
         {
             continue;
         }
-        script.state.joints_before = rig.len();
-        let Some(gesture) = script.waiting.pop_front() else { continue };
-        let number = script.answers.len() + 1;
-        let name = format!("{gesture:?}");
-        let name = name.split(['(', ' ', '{']).next().unwrap_or_default().to_owned();
-        script.answers.push(GestureAnswer { number, gesture: name, done: true, ..Default::default() });
-        if let Err(error) = limits.check(Limit::Gestures, number, LIST, "the list") {
-            // What is behind it is too much as well.
-            script.waiting.clear();
-            script.fail(&error.into());
-            continue;
-        }
-        if let Err(error) = limits.check_gesture(LIST, number, &gesture) {
-            script.fail(&error.into());
-            continue;
-        }
         let bounds = surface.map_or([Vec3::splat(-0.5), Vec3::splat(0.5)], RigSurface::bounds);
+        // Joints of a fit follow each edit.
+        if is_fitted == (false, false) && click_run::is_due(&script, rig, surface) {
+            let clicked = ClickedRig { entity, rig, selection, surface, bounds };
+            click_run::carry_out(&mut script, &clicked, &mut requests.edits, &limits);
+            continue;
+        }
+        let Some(gesture) = script.begin_next(rig.len(), &limits) else { continue };
         let mesh = meshes.and_then(|meshes| meshes.iter().next());
         let (state, symmetry) = (&mut script.state, &mut symmetry);
         let mut act = GestureRun { entity, mesh, rig, selection, bounds, state, symmetry };
@@ -170,115 +183,27 @@ pub(super) fn run_scripts(
 }
 
 impl GestureScript {
-    fn fail(&mut self, error: &GestureError) {
-        if let Some(answer) = self.answers.last_mut() {
-            answer.done = false;
-            answer.message = error.to_string();
+    /// Takes the next gesture of the script of a rig with so many joints, and begins its answer; `None` where the list or the
+    /// gesture is too long.
+    pub(super) fn begin_next(&mut self, joints: usize, limits: &RigLimits) -> Option<Gesture> {
+        self.state.joints_before = joints;
+        let gesture = self.waiting.pop_front()?;
+        let number = self.answers.len() + 1;
+        let name = format!("{gesture:?}");
+        let name = name.split(['(', ' ', '{']).next().unwrap_or_default().to_owned();
+        self.answers.push(GestureAnswer { number, gesture: name, done: true, ..Default::default() });
+        if let Err(error) = limits.check(Limit::Gestures, number, LIST, "the list") {
+            // What is behind it is too much as well.
+            self.waiting.clear();
+            self.fail(&error.into());
+            return None;
         }
+        if let Err(error) = limits.check_gesture(LIST, number, &gesture) {
+            self.fail(&error.into());
+            return None;
+        }
+        Some(gesture)
     }
-
-    fn say(&mut self, message: String) {
-        if let Some(answer) = self.answers.last_mut() {
-            answer.message = message;
-        }
-    }
-}
-
-impl Answers<'_, '_> {
-    fn collect(&mut self, scripts: &mut Query<ScriptedRig>) {
-        for PickAnswer { rig: entity, joints } in self.picked.read() {
-            let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
-            match joints.as_slice() {
-                _ if !script.pending => continue,
-                [] => script.fail(&GestureError::NothingToPick),
-                [joint] => script.say(format!("selected {}", name_of(rig, *joint))),
-                joints => script.say(format!("selected {} joints", joints.len())),
-            }
-            script.pending = false;
-        }
-        for PlaceAnswer { rig: entity, placement, refusal, .. } in self.placed.read() {
-            let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
-            script.note_added(rig);
-            match placement {
-                Placement::Nothing => {
-                    script.fail(&refusal.map_or(GestureError::NothingThere, GestureError::from));
-                }
-                Placement::Single { position } => {
-                    script.say(format!("placed a joint on the surface at {}", point(*position)));
-                }
-                Placement::Between { position, volumes, volume, .. } => {
-                    let volumes = match volume {
-                        None if *volumes > 1 => format!(", spanning {volumes} volumes (Volume(1) takes the near one)"),
-                        Some(number) if *volumes > 1 => format!(", in volume {number} of {volumes}"),
-                        _ => String::new(),
-                    };
-                    script.say(format!("placed a joint at {}{volumes}", point(*position)));
-                }
-            }
-            script.pending = false;
-        }
-        for StrokeDone { rig: entity, result } in self.drawn.read() {
-            let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
-            script.note_added(rig);
-            match result {
-                StrokeResult::Nothing(why) => script.fail(&why.clone().into()),
-                StrokeResult::Inserted { child } => {
-                    script.say(format!("put a joint into the bone that ends at {}", name_of(rig, *child)));
-                }
-                StrokeResult::Erased(joints) => script.say(format!("deleted {} joints", joints.len())),
-                StrokeResult::Chain { chain, parent, .. } => {
-                    let on = parent.map_or("as a root".to_owned(), |parent| format!("below {}", name_of(rig, parent)));
-                    let notes: String = chain.notes.iter().map(|note| format!("; {}", heard(note))).collect();
-                    script.say(format!("drew a chain of {} joints {on}{notes}", chain.joints.len()));
-                }
-            }
-            script.pending = false;
-        }
-        for FitAnswer { mesh, result } in self.fitted.read() {
-            let Ok(SkinOf(rig)) = self.meshes.get(*mesh) else { continue };
-            let Ok((_, mut script, ..)) = scripts.get_mut(*rig) else { continue };
-            // The edit of a fit answers for it.
-            if let Err(failure) = result {
-                script.fail(&failure.clone().into());
-                script.pending = false;
-            }
-        }
-        // Joints around a moved one are fitted again by themselves, in answer to no gesture.
-        let follows =
-            |edited: &EditReport| edited.name == FIT_AROUND && matches!(edited.committed, Some(Commit::Done(_)));
-        let own = |edited: &&EditReport| !edited.preview && !follows(edited);
-        for EditReport { rig: entity, name, .. } in self.edited.read().filter(own) {
-            let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
-            if script.pending {
-                script.note_added(rig);
-                script.say(format!("{}: {} joints now", within_sentence(name), rig.len()));
-                script.pending = false;
-            }
-        }
-        for EditRefusal { rig: entity, reason } in self.refused.read() {
-            let Ok((_, mut script, ..)) = scripts.get_mut(*entity) else { continue };
-            script.fail(&reason.clone().into());
-            script.pending = false;
-        }
-    }
-}
-
-impl GestureScript {
-    fn note_added(&mut self, rig: &Rig) {
-        let before = self.state.joints_before;
-        if let Some(answer) = self.answers.last_mut() {
-            answer.joints_added = rig.len().saturating_sub(before);
-        }
-    }
-}
-
-fn name_of(rig: &Rig, joint: Uid) -> String {
-    let label = rig.joint(joint).and_then(|joint| joint.data.label.clone());
-    label.map_or_else(|| format!("joint {joint}"), |label| format!("\"{label}\""))
-}
-
-fn point(position: Vec3) -> String {
-    format!("({:.4}, {:.4}, {:.4})", position.x, position.y, position.z)
 }
 
 /// Execution of one gesture.
@@ -315,15 +240,13 @@ impl GestureRun<'_, '_> {
 
     /// Sends the requests of a gesture; returns `true` if it has to wait for an answer.
     fn make(&mut self, gesture: Gesture, requests: &mut Requests) -> Result<bool, GestureError> {
+        if self.state.take_setting(&gesture) {
+            return Ok(false);
+        }
         let rig = self.entity;
         let mut operation = None;
         let mut pick = None;
         match gesture {
-            Gesture::View(view) => self.state.view = view,
-            Gesture::Depth(depth) => self.state.place.depth = depth,
-            Gesture::Volume(number) => self.state.place.volume = (number > 0).then_some(number),
-            Gesture::Recentre(on) => self.state.recentre = on,
-            Gesture::Reach(reach) => self.state.reach = Some(reach),
             Gesture::Mirror(on) => {
                 let height = self.bounds[1].y - self.bounds[0].y;
                 self.symmetry.0 = on.then(|| MirrorPlane::sagittal(height));
@@ -461,21 +384,6 @@ impl GestureRun<'_, '_> {
             Gesture::Lock(locked) => Operation::Lock(joints, locked),
             _ => return Err(GestureError::NoOperation),
         })
-    }
-}
-
-/// The title of a step in the middle of a sentence; names in it keep their letters.
-fn within_sentence(title: &str) -> String {
-    let mut letters = title.chars();
-    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
-}
-
-fn heard(note: &StrokeNote) -> String {
-    match note {
-        StrokeNote::EndMoved { start: true } => "its start lies beside the mesh and was moved onto it".to_owned(),
-        StrokeNote::EndMoved { start: false } => "its end lies beside the mesh and was moved onto it".to_owned(),
-        StrokeNote::VolumeChosen { volume, of } => format!("in volume {volume} of {of} (Volume(n) takes another)"),
-        StrokeNote::JointsLeftOut { count } => format!("{count} joints fell into a gap of the mesh and were left out"),
     }
 }
 

@@ -1,0 +1,173 @@
+//! Answers to gestures: what people read of the edits, picks and strokes that gestures became.
+
+use bevy::{ecs::system::SystemParam, prelude::*};
+
+use super::{
+    error::GestureError,
+    script::{GestureScript, ScriptedRig},
+};
+use crate::{
+    algo::{placement::Placement, stroke::StrokeNote},
+    plugins::{
+        document::{EditRefusal, EditReport, PlaceReport},
+        fit::{FIT_AROUND, FitAnswer},
+        picking::PickAnswer,
+        placement::{PlaceAnswer, PlaceRefusal},
+        stroke::{StrokeDone, StrokeResult},
+        surface::SkinOf,
+    },
+    rig::{Rig, Uid, step::Commit},
+};
+
+/// Readers of the answers.
+#[derive(SystemParam)]
+pub(super) struct Answers<'w, 's> {
+    edited: MessageReader<'w, 's, EditReport>,
+    refused: MessageReader<'w, 's, EditRefusal>,
+    picked: MessageReader<'w, 's, PickAnswer>,
+    placed: MessageReader<'w, 's, PlaceAnswer>,
+    reported: MessageReader<'w, 's, PlaceReport>,
+    drawn: MessageReader<'w, 's, StrokeDone>,
+    fitted: MessageReader<'w, 's, FitAnswer>,
+    meshes: Query<'w, 's, &'static SkinOf>,
+}
+
+impl Answers<'_, '_> {
+    /// Reads the answers to the last gestures of scripts.
+    pub(super) fn collect(&mut self, scripts: &mut Query<ScriptedRig>) {
+        for PickAnswer { rig: entity, joints } in self.picked.read() {
+            let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
+            match joints.as_slice() {
+                _ if !script.pending => continue,
+                [] => script.fail(&GestureError::NothingToPick),
+                [joint] => script.say(format!("selected {}", name_of(rig, *joint))),
+                joints => script.say(format!("selected {} joints", joints.len())),
+            }
+            script.pending = false;
+        }
+        for PlaceAnswer { rig: entity, placement, refusal, .. } in self.placed.read() {
+            let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
+            script.note_added(rig);
+            script.tell_placement(placement, *refusal);
+            script.pending = false;
+        }
+        for PlaceReport { rig: entity, added } in self.reported.read() {
+            if let Ok((_, mut script, ..)) = scripts.get_mut(*entity) {
+                script.take_report(added);
+            }
+        }
+        for StrokeDone { rig: entity, result } in self.drawn.read() {
+            let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
+            script.note_added(rig);
+            match result {
+                StrokeResult::Nothing(why) => script.fail(&why.clone().into()),
+                StrokeResult::Inserted { child } => {
+                    script.say(format!("put a joint into the bone that ends at {}", name_of(rig, *child)));
+                }
+                StrokeResult::Erased(joints) => script.say(format!("deleted {} joints", joints.len())),
+                StrokeResult::Chain { chain, parent, .. } => {
+                    let on = parent.map_or("as a root".to_owned(), |parent| format!("below {}", name_of(rig, parent)));
+                    let notes: String = chain.notes.iter().map(|note| format!("; {}", heard(note))).collect();
+                    script.say(format!("drew a chain of {} joints {on}{notes}", chain.joints.len()));
+                }
+            }
+            script.pending = false;
+        }
+        for FitAnswer { mesh, result } in self.fitted.read() {
+            let Ok(SkinOf(rig)) = self.meshes.get(*mesh) else { continue };
+            let Ok((_, mut script, ..)) = scripts.get_mut(*rig) else { continue };
+            // The edit of a fit answers for it.
+            if let Err(failure) = result {
+                script.fail(&failure.clone().into());
+                script.pending = false;
+            }
+        }
+        // Joints around a moved one are fitted again by themselves, in answer to no gesture.
+        let follows =
+            |edited: &EditReport| edited.name == FIT_AROUND && matches!(edited.committed, Some(Commit::Done(_)));
+        let own = |edited: &&EditReport| !edited.preview && !follows(edited);
+        for EditReport { rig: entity, name, .. } in self.edited.read().filter(own) {
+            let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
+            if script.pending {
+                script.note_added(rig);
+                script.say(format!("{}: {} joints now", within_sentence(name), rig.len()));
+                script.pending = false;
+            }
+        }
+        for EditRefusal { rig: entity, reason } in self.refused.read() {
+            let Ok((_, mut script, ..)) = scripts.get_mut(*entity) else { continue };
+            if script.refused_places > 0 {
+                script.refused_places -= 1;
+                continue;
+            }
+            script.fail(&reason.clone().into());
+            script.pending = false;
+        }
+    }
+}
+
+impl GestureScript {
+    pub(super) fn fail(&mut self, error: &GestureError) {
+        if let Some(answer) = self.answers.last_mut() {
+            answer.done = false;
+            answer.message = error.to_string();
+        }
+    }
+
+    fn say(&mut self, message: String) {
+        if let Some(answer) = self.answers.last_mut() {
+            answer.message = message;
+        }
+    }
+
+    /// Answers a click.
+    pub(super) fn tell_placement(&mut self, placement: &Placement, refusal: Option<PlaceRefusal>) {
+        match placement {
+            Placement::Nothing => {
+                self.fail(&refusal.map_or(GestureError::NothingThere, GestureError::from));
+            }
+            Placement::Single { position } => {
+                self.say(format!("placed a joint on the surface at {}", point(*position)));
+            }
+            Placement::Between { position, volumes, volume, .. } => {
+                let volumes = match volume {
+                    None if *volumes > 1 => format!(", spanning {volumes} volumes (Volume(1) takes the near one)"),
+                    Some(number) if *volumes > 1 => format!(", in volume {number} of {volumes}"),
+                    _ => String::new(),
+                };
+                self.say(format!("placed a joint at {}{volumes}", point(*position)));
+            }
+        }
+    }
+
+    fn note_added(&mut self, rig: &Rig) {
+        let before = self.state.joints_before;
+        if let Some(answer) = self.answers.last_mut() {
+            answer.joints_added = rig.len().saturating_sub(before);
+        }
+    }
+}
+
+fn name_of(rig: &Rig, joint: Uid) -> String {
+    let label = rig.joint(joint).and_then(|joint| joint.data.label.clone());
+    label.map_or_else(|| format!("joint {joint}"), |label| format!("\"{label}\""))
+}
+
+fn point(position: Vec3) -> String {
+    format!("({:.4}, {:.4}, {:.4})", position.x, position.y, position.z)
+}
+
+/// The title of a step in the middle of a sentence; names in it keep their letters.
+fn within_sentence(title: &str) -> String {
+    let mut letters = title.chars();
+    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
+}
+
+fn heard(note: &StrokeNote) -> String {
+    match note {
+        StrokeNote::EndMoved { start: true } => "its start lies beside the mesh and was moved onto it".to_owned(),
+        StrokeNote::EndMoved { start: false } => "its end lies beside the mesh and was moved onto it".to_owned(),
+        StrokeNote::VolumeChosen { volume, of } => format!("in volume {volume} of {of} (Volume(n) takes another)"),
+        StrokeNote::JointsLeftOut { count } => format!("{count} joints fell into a gap of the mesh and were left out"),
+    }
+}

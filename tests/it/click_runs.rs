@@ -1,0 +1,141 @@
+//! Clicks of lists that nobody watches: the same result as one a frame, and work in proportion to the length of the list.
+
+use bevy::prelude::*;
+use rigsmith::{
+    headless::Workbench,
+    plugins::{
+        gesture::{Gesture, GestureAnswer, GestureScript, read_gestures},
+        history::RigHistory,
+    },
+    prelude::Selection,
+    rig::{Rig, Uid},
+};
+
+use crate::gestures::boxes;
+
+/// Largest growth for twice the length.
+const GROWTH: f64 = 2.3;
+
+/// A box, and another one beside it with a gap.
+const BOXES: [[[f32; 3]; 2]; 2] = [[[-1.0, 0.0, -0.5], [1.0, 2.0, 0.5]], [[-1.0, 0.0, 1.0], [1.0, 1.0, 2.0]]];
+
+fn bench() -> Workbench {
+    let mut bench = Workbench::new(7, "test");
+    bench.open(boxes(&BOXES), false).unwrap();
+    bench
+}
+
+/// Carries out gestures one a frame, as in a window.
+fn watched(bench: &mut Workbench, gestures: Vec<Gesture>) -> Vec<GestureAnswer> {
+    let rig = bench.rig_entity();
+    let app = bench.app_mut();
+    app.world_mut().entity_mut(rig).insert(GestureScript::new(gestures));
+    for _ in 0..10_000 {
+        app.update();
+        let script = app.world().get::<GestureScript>(rig).unwrap();
+        if script.is_done() {
+            return script.answers.clone();
+        }
+    }
+    panic!("the gestures do not end");
+}
+
+fn steps(bench: &mut Workbench) -> (Vec<String>, usize, Vec<Uid>) {
+    let rig = bench.rig_entity();
+    let world = bench.app_mut().world();
+    let (names, done) = world.get::<RigHistory>(rig).unwrap().steps();
+    let names = names.into_iter().map(str::to_owned).collect();
+    (names, done, world.get::<Selection>(rig).unwrap().0.clone())
+}
+
+#[track_caller]
+fn check(script: &str, prepare: impl Fn(&mut Workbench)) -> Vec<GestureAnswer> {
+    let gestures = read_gestures(script.as_bytes()).unwrap();
+    let (mut one, mut many) = (bench(), bench());
+    prepare(&mut one);
+    prepare(&mut many);
+    let answers = watched(&mut one, gestures.clone());
+    assert_eq!(many.gestures(gestures), answers);
+    assert_eq!(many.rig(), one.rig());
+    assert_eq!(steps(&mut many), steps(&mut one));
+    // Entities follow the document in both.
+    for bench in [&mut one, &mut many] {
+        let count = bench.rig().len();
+        let world = bench.app_mut().world_mut();
+        assert_eq!(world.query::<&rigsmith::plugins::document::Joint>().iter(world).count(), count);
+    }
+    answers
+}
+
+#[test]
+fn runs_of_clicks_give_what_clicks_one_a_frame_give() {
+    let answers = check(
+        "[Click((0.0, 0.2)), Click((0.0, 0.6)), Click((5.0, 5.0)), Depth(0.1), Click((0.4, 0.8)), Volume(2), \
+         Click((0.5, 0.9)), Volume(0), View(Left), Click((0.1, 1.0)), Reach(0.2), Undo, Click((0.2, 1.1)), \
+         Label(\"tip\"), View(Front), Click((0.1, 1.2)), Click((0.0, 1.3)), Click((-0.3, 1.4)), Deselect, \
+         Click((0.0, 0.3)), Undo, Undo, Redo, Mirror(true), Click((0.5, 1.0)), Click((0.6, 1.1)), Click((0.0, 0.1)), \
+         Mirror(false), SelectLabel(\"tip\"), Click((0.3, 1.5)), Click((0.35, 1.6)), Rotate(10.0), Click((0.2, 1.7))]",
+        |_| {},
+    );
+    assert!(answers.iter().filter(|answer| answer.gesture == "Click" && !answer.done).count() == 1, "{answers:?}");
+    assert!(answers.iter().any(|answer| answer.joints_added == 2), "{answers:?}");
+}
+
+#[test]
+fn refused_clicks_of_a_run_say_why() {
+    let select = |bench: &mut Workbench| {
+        let rig = bench.rig_entity();
+        bench.app_mut().world_mut().get_mut::<Selection>(rig).unwrap().0 = vec![Uid(99)];
+    };
+    let script = "[Click((0.0, 0.2)), Click((9.0, 9.0)), Click((0.0, 0.6)), Deselect, Click((0.0, 0.6)), Lock(true)]";
+    let answers = check(script, select);
+    let done: Vec<bool> = answers.iter().map(|answer| answer.done).collect();
+    assert_eq!(done, [false, false, false, true, true, true]);
+    assert!(answers[0].message.contains("there is no joint"), "{answers:?}");
+    assert!(answers[1].message.contains("meets nothing"), "{answers:?}");
+    assert_eq!(answers[2].message, answers[0].message);
+}
+
+#[test]
+fn long_runs_give_what_clicks_one_a_frame_give() {
+    let clicks: Vec<String> = (0..300).map(|number| format!("{:?}", click(number, 3))).collect();
+    let answers = check(&format!("[{}]", clicks.join(", ")), |_| {});
+    assert!(answers.iter().all(|answer| answer.done && answer.joints_added == 1));
+}
+
+/// Click on the box; each `side`-th lies in the middle, the others beside it.
+fn click(number: usize, side: usize) -> Gesture {
+    let across = if number.is_multiple_of(side) { 0.0 } else { 0.05 + 0.009 * (number * 37 % 100) as f32 };
+    Gesture::Click((across, 0.1 + 0.018 * (number * 61 % 100) as f32))
+}
+
+/// Joints of the rigs that entities had to follow, over all frames.
+#[derive(Resource, Default)]
+struct FollowedJoints(u64);
+
+fn count_followed(mut followed: ResMut<FollowedJoints>, rigs: Query<&Rig, Changed<Rig>>) {
+    followed.0 += rigs.iter().map(|rig| rig.len() as u64).sum::<u64>();
+}
+
+/// Joints that clicks visit, and joints that entities follow.
+fn work(count: usize, side: usize) -> [u64; 2] {
+    let mut bench = bench();
+    bench.app_mut().init_resource::<FollowedJoints>().add_systems(Last, count_followed);
+    let answers = bench.gestures((0..count).map(|number| click(number, side)).collect());
+    assert!(answers.len() == count && answers.iter().all(|answer| answer.done));
+    assert_eq!(bench.rig().len(), count);
+    [bench.rig().visits(), bench.app_mut().world().resource::<FollowedJoints>().0]
+}
+
+#[test]
+fn clicks_take_work_in_proportion_to_their_number() {
+    // A chain, and chains that begin anew with each other joint.
+    for side in [usize::MAX, 2] {
+        let works: Vec<[u64; 2]> = [1000, 2000, 4000].into_iter().map(|count| work(count, side)).collect();
+        for pair in works.windows(2) {
+            for (less, more) in pair[0].into_iter().zip(pair[1]) {
+                assert!(less > 0 && more as f64 <= GROWTH * less as f64, "every {side}th in the middle: {works:?}");
+            }
+        }
+    }
+}
