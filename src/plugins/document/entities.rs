@@ -192,6 +192,8 @@ fn is_of(revision: Option<&Revision>, rig: &Rig) -> bool {
 #[reflect(Component, Debug, Clone, Default)]
 pub struct TagEntities {
     pub(super) tags: HashMap<Uid, MirroredTag>,
+    /// Entities of other code that became tags since the entities followed the document last.
+    pub(super) adopted: HashMap<Uid, Entity>,
 }
 
 /// Entity of a tag and the values last written to it.

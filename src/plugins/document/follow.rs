@@ -304,6 +304,8 @@ pub(in crate::plugins) fn follow_tags(
         }
         // Entities of all tags are spawned first, because a command may refer to a feature further down.
         let mut fresh: HashMap<Uid, Entity> = HashMap::new();
+        let mut adopted = std::mem::take(&mut known.adopted);
+        adopted.retain(|uid, entity| known.get(*uid) == Some(*entity));
         for joint in rig.walk() {
             for tag in &joint.data.tags {
                 if known.get(tag.uid).is_some() {
@@ -332,9 +334,11 @@ pub(in crate::plugins) fn follow_tags(
                     // Removing and inserting each tag in turn puts the tags into the document's order.
                     commands.entity(entity).try_remove::<TagOf>().try_insert(TagOf(bearer));
                 }
-                // With the entity of a feature went the relation of its commands.
+                // With the entity of a feature went the relation of its commands. One that came with the feature's entity
+                // says itself what it is in.
                 if let TagKind::Command { feature: Some(feature), .. } = &tag.kind
-                    && let Some(entity_of) = fresh.get(feature)
+                    && let Some(entity_of) =
+                        fresh.get(feature).or_else(|| adopted.get(feature).filter(|_| !adopted.contains_key(&tag.uid)))
                 {
                     commands.entity(entity).try_insert(InFeature(*entity_of));
                 }

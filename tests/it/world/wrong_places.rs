@@ -443,3 +443,27 @@ fn a_deleted_feature_makes_no_edit_of_its_own() {
         assert_eq!((feature_of(&stage, COMMAND), stage.steps()), (Some(OTHER_FEATURE), before.1 + 1));
     }
 }
+
+/// A feature that other code spawns under the uid of one that the document deleted takes over its commands.
+#[test]
+fn a_feature_spawned_under_the_uid_of_a_deleted_one_gets_its_commands() {
+    let mut stage = chain();
+    let commands = [COMMAND, OTHER_COMMAND].map(|uid| tag(&stage, uid));
+    let bearer = stage.node(Uid(1)).unwrap();
+    stage.change(Change::Do(Operation::Edits(vec![RigEdit::RemoveTag(Uid(1), FEATURE)])));
+    stage.frames(3);
+    assert!(commands.iter().all(|command| stage.get::<InFeature>(*command).is_none()));
+
+    // One more command of the same frame says itself that it is in the feature.
+    let world = stage.app.world_mut();
+    let back = world.spawn((feature("back"), FEATURE, TagOf(bearer))).id();
+    let fresh = world.spawn((null(), Uid(0xF00), InFeature(back), TagOf(bearer))).id();
+    stage.frames(3);
+    assert_eq!(refusals_later(&mut stage), NONE);
+    assert_eq!(tag(&stage, FEATURE), back);
+    for command in [commands[0], commands[1], fresh] {
+        assert_eq!(stage.get::<InFeature>(command), Some(&InFeature(back)));
+    }
+    let found = [COMMAND, OTHER_COMMAND, Uid(0xF00)].map(|uid| feature_of(&stage, uid));
+    assert_eq!(found, [Some(FEATURE); 3]);
+}

@@ -110,6 +110,7 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         self.commands.entity(entity).try_insert(uid);
         self.index.insert(entity, self.trial.rig_entity, uid, EntityPart::Tag);
         self.tags.tags.insert(uid, MirroredTag { entity, joint, data });
+        self.tags.adopted.insert(uid, entity);
         if let Some(mirrored) = self.joints.joints.get_mut(&joint) {
             mirrored.tags.insert(before.min(mirrored.tags.len()), uid);
         }
