@@ -1,6 +1,6 @@
 //! Index of labels: which are in use, and which numbers the chains of a name leave free.
 //!
-//! The index is made when a name is looked for the first time, and edits keep it up to date from then on, so that naming a
+//! The index is made when a name is looked up for the first time, and edits keep it up to date from then on, so that naming a
 //! drawn joint takes no look at all labels.
 
 use std::{
