@@ -202,6 +202,9 @@ fn build_rigs(
 ) {
     let mut changed: Vec<(Entity, Vec<RigEdit>, bool)> = Vec::new();
     for message in edited.read() {
+        if !rigs.get(message.rig).is_ok_and(|(_, processor, ..)| processor.is_some()) {
+            continue;
+        }
         let at = changed.iter().position(|(rig, ..)| *rig == message.rig).unwrap_or_else(|| {
             changed.push((message.rig, Vec::new(), true));
             changed.len() - 1
