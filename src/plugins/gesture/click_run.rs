@@ -42,11 +42,8 @@ pub(super) fn is_due(script: &GestureScript, rig: &Rig, surface: Option<&RigSurf
 
 /// True for gestures that a run may have: clicks, and settings of the view and of placing.
 fn is_quick(gesture: &Gesture) -> bool {
-    match gesture {
-        Gesture::Click(_) | Gesture::View(_) | Gesture::Depth(_) | Gesture::Volume(_) => true,
-        Gesture::Recentre(_) | Gesture::Reach(_) => true,
-        _ => false,
-    }
+    use Gesture::{Click, Depth, Reach, Recentre, View, Volume};
+    matches!(gesture, Click(_) | View(_) | Depth(_) | Volume(_) | Recentre(_) | Reach(_))
 }
 
 /// Requests the joints of the clicks at the front of a script.
