@@ -296,3 +296,23 @@ fn names_of_placed_joints_follow_edits() {
         assert!(labels.iter().any(|label| label.contains("_l_")) && labels.iter().any(|label| !label.contains("_l_")));
     }
 }
+
+/// Joints that are visited to delete a chain, from its end to its root.
+fn visited_to_delete(count: usize) -> u64 {
+    use rigsmith::rig::{UidSource, operations::Operation};
+
+    let mut rig = chain(count, |_| vec![]);
+    let (root, before) = (rig.roots()[0], rig.visits());
+    let deletion = Operation::Delete { joints: vec![root], keep_children: false };
+    deletion.run(&mut rig, &mut UidSource::seeded(1), None).unwrap();
+    assert!(rig.is_empty());
+    rig.visits() - before
+}
+
+#[test]
+fn chains_are_deleted_in_proportion_to_their_length() {
+    let visits: Vec<u64> = [300, 600, 1200].into_iter().map(visited_to_delete).collect();
+    for pair in visits.windows(2) {
+        assert!(pair[0] > 0 && pair[1] as f64 <= GROWTH * pair[0] as f64, "{visits:?}");
+    }
+}

@@ -23,8 +23,7 @@ pub(super) fn delete(draft: &mut Draft, joints: &[Uid], keep_children: bool) -> 
     }
     // Children are deleted before parents. A hierarchy lists parents first, and a joint may be listed before its own
     // ancestor, so the order is by depth.
-    let mut by_depth: Vec<(usize, Uid)> =
-        doomed.iter().map(|uid| (draft.rig().ancestors(*uid).count(), *uid)).collect();
+    let mut by_depth: Vec<(usize, Uid)> = doomed.iter().map(|uid| (draft.rig().root_and_depth(*uid).1, *uid)).collect();
     by_depth.sort_by_key(|(depth, _)| std::cmp::Reverse(*depth));
     for (_, joint) in by_depth {
         if keep_children {

@@ -26,7 +26,7 @@ pub(super) fn place_at(draft: &mut Draft, to: &[(Uid, Vec3)], with_children: boo
 pub(super) fn rest(draft: &mut Draft, to: &[(Uid, RestTransform)], with_children: bool) -> Result<(), OperationError> {
     let listed: HashSet<Uid> = to.iter().map(|(joint, _)| *joint).collect();
     let mut to = to.to_vec();
-    to.sort_by_key(|(joint, _)| draft.rig().ancestors(*joint).count());
+    to.sort_by_cached_key(|(joint, _)| draft.rig().root_and_depth(*joint).1);
     for (joint, rest) in to {
         let set = |draft: &mut Draft| draft.apply(RigEdit::SetRest(joint, rest));
         if with_children {
@@ -92,7 +92,7 @@ fn set_globals(draft: &mut Draft, mut targets: Vec<(Uid, Affine3)>, with_childre
             }
         }
     }
-    targets.sort_by_key(|(joint, _)| draft.rig().ancestors(*joint).count());
+    targets.sort_by_cached_key(|(joint, _)| draft.rig().root_and_depth(*joint).1);
     set_globals_of(draft, &targets, with_children)
 }
 
