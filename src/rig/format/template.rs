@@ -45,7 +45,7 @@ pub(crate) use text_patch::{
     PartRigs, says_the_same, unsaid_parts, with_instance_fields, with_instances, with_instances_of, without_instances,
     write_changes_over, write_own_over, write_short_template,
 };
-pub use tidy::{UidStyle, format_template};
+pub use tidy::{UidStyle, format_template, format_with_parts};
 pub use write::write_template;
 pub(in crate::rig) use write::{
     option_text, quaternion, quoted, rotation_text, socket_text, vector, write_without_poses,

@@ -14,9 +14,8 @@ use crate::rig::{
     SourceError,
     format::{
         scan::{self, Field, elements_around},
-        source::ron_options,
+        source::{ron_options, unknown_name},
     },
-    nearest::nearest,
     template::quoted,
 };
 
@@ -41,15 +40,8 @@ pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec
     // In a file of a newer format they are notes.
     let unknown = if matches!(readable, Cow::Borrowed(_)) { TEMPLATE.unknown(&fields) } else { Vec::new() };
     for field in &unknown {
-        let near = nearest(field.name, known_names(&fields, field).into_iter().flatten(), 3);
-        let remedy = match near.is_empty() {
-            true => "remove it or correct its name".to_owned(),
-            false => format!(
-                "did you mean {}?",
-                near.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" or ")
-            ),
-        };
-        let message = format!("there is no field `{}` here; {remedy}", field.name);
+        let known = known_names(&fields, field).unwrap_or_default();
+        let message = unknown_name("field", field.name, known);
         faults.push(SourceError::at(text, field.start, message));
     }
     let mut survey = Survey { text, fields: &fields, blank: Vec::new(), left_out: Vec::new(), stand_ins: Vec::new() };
