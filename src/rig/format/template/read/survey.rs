@@ -13,6 +13,7 @@ use super::{
 use crate::rig::{
     SourceError,
     format::{
+        commas::with_missing_commas,
         scan::{self, Field, elements_around},
         source::{ron_options, unknown_name},
     },
@@ -32,6 +33,27 @@ pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec
     if let Some(fault) = SourceError::cut_short(source) {
         return Err(vec![fault]);
     }
+    let first = survey(source);
+    if matches!(&first, Ok((_, faults)) if faults.is_empty()) {
+        return first;
+    }
+    let (whole, lacking) = with_missing_commas(source);
+    if lacking.is_empty() {
+        return first;
+    }
+    let all = |mut faults: Vec<SourceError>| {
+        faults.extend(lacking);
+        faults.sort_by_key(|fault| fault.offset);
+        faults
+    };
+    match survey(&whole) {
+        Ok((template, faults)) => Ok((template, all(faults))),
+        Err(faults) => Err(all(faults)),
+    }
+}
+
+/// Reads a text as far as it goes, see [`survey_template`].
+fn survey(source: &str) -> Result<(Template, Vec<SourceError>), Vec<SourceError>> {
     let explicit = explicit(source);
     let (text, mut notes, mut faults) = (&*explicit.text, Vec::new(), Vec::new());
     let fields = scan::fields(text);
