@@ -15,7 +15,7 @@ const SHOWN: usize = 24;
 
 /// The text with the missing commas between fields and elements, each in place of a blank, so that all else stays where it is;
 /// and the places where they are missing. Commas for which there is no blank are not told. Texts that can be read lack none.
-pub(crate) fn with_missing_commas(text: &str) -> (Cow<'_, str>, Vec<SourceError>) {
+pub fn with_missing_commas(text: &str) -> (Cow<'_, str>, Vec<SourceError>) {
     let (mut faults, mut blanks) = (Vec::new(), Vec::new());
     let mut place = TextPlace::start(text);
     let mut open: Vec<&str> = Vec::new();

@@ -35,10 +35,10 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
+pub use super::commas::with_missing_commas;
 pub(crate) use file_marks::FileMarks;
 pub(crate) use moved_text::{with_changes_on_lines, with_part_files, with_part_uids, with_rig_uid};
 pub(in crate::rig) use read::read_text;
-pub(crate) use super::commas::with_missing_commas;
 pub use read::{read_header, read_template, survey_template, text_of};
 pub use shorthand::{Explicit, explicit};
 pub use text_patch::write_template_over;
