@@ -132,7 +132,7 @@ fn fields_and_values_that_do_not_exist_are_told_with_the_nearest() {
         ("shap: \"cube\"", "there is no field `shap` here; did you mean `shape`"),
         ("axes: rigg", "there is no value `rigg` here; did you mean `rig`?"),
         ("creation: (nmae: \"x\")", "there is no field `nmae` here; did you mean `name`?"),
-        ("qqqq: 1", "there is no field `qqqq` here; remove it or correct its name; known are `at`, `parent`, "),
+        ("qqqq: 1", "there is no field `qqqq` here; remove it or correct its name: known are `at`, `parent`, "),
     ] {
         let rig = read(&format!("(format: 2, name: \"x\", joints: [(label: \"a\", tags: [control({params})])])"));
         let told = format!("{:?}", review(&rig, &modules));

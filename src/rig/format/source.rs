@@ -71,7 +71,7 @@ pub(crate) fn unknown_name(what: &str, name: &str, known: &[&str]) -> String {
     let near = nearest(name, known, 3);
     let remedy = match (near.is_empty(), known.len()) {
         (false, _) => format!("did you mean {}?", near.iter().map(quoted).collect::<Vec<_>>().join(" or ")),
-        (true, 1..=MOST_LISTED) => format!("remove it or correct its name; known are `{}`", known.join("`, `")),
+        (true, 1..=MOST_LISTED) => format!("remove it or correct its name: known are `{}`", known.join("`, `")),
         (true, _) => "remove it or correct its name".to_owned(),
     };
     format!("there is no {what} `{name}` here; {remedy}")
