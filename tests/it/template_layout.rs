@@ -126,6 +126,15 @@ fn names_beside_uids_that_mean_something_else_are_brought_up_to_date() {
 }
 
 #[test]
+fn a_comment_without_a_place_is_told_where_the_source_has_it() {
+    let text = HOST.replace("label: \"base\"", "label /* odd */ : \"base\"");
+    let told = [UidStyle::Kept, UidStyle::Written, UidStyle::Derived]
+        .map(|uids| format_template(&text, uids).expect_err("no place between a name and its colon"));
+    assert_eq!(text[told[0].offset..].split_inclusive("*/").next(), Some("/* odd */"), "{}", told[0]);
+    assert!(told.iter().all(|error| *error == told[0]), "{told:?}");
+}
+
+#[test]
 fn fields_and_values_that_do_not_exist_are_told_with_the_nearest() {
     let modules = Arc::new(modules::all());
     for (params, wanted) in [

@@ -66,7 +66,9 @@ pub fn format_with_parts(source: &str, uids: UidStyle, whole: Option<&Rig>) -> R
         fingerprint(comparable(rig))
     };
     let before = said(rig);
-    let text = laid_out(written.as_deref().unwrap_or(source))?;
+    // A comment without a place is told with its place in the source.
+    let text =
+        laid_out(written.as_deref().unwrap_or(source)).map_err(|error| laid_out(source).err().unwrap_or(error))?;
     match read_text(&text, 1).is_ok_and(|after| said(after.rig) == before) {
         true => Ok(text),
         false => Err(SourceError::at(source, 0, "formatted, the template would say something else; it stays as it is")),
