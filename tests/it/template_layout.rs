@@ -130,7 +130,7 @@ fn a_comment_without_a_place_is_told_where_the_source_has_it() {
     let text = HOST.replace("label: \"base\"", "label /* odd */ : \"base\"");
     let told = [UidStyle::Kept, UidStyle::Written, UidStyle::Derived]
         .map(|uids| format_template(&text, uids).expect_err("no place between a name and its colon"));
-    assert_eq!(text[told[0].offset..].split_inclusive("*/").next(), Some("/* odd */"), "{}", told[0]);
+    assert!(text[told[0].offset..].trim_start().starts_with("/* odd */"), "{}", told[0]);
     assert!(told.iter().all(|error| *error == told[0]), "{told:?}");
 }
 
