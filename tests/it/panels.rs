@@ -8,6 +8,7 @@ mod hierarchy;
 mod notices;
 mod posing;
 mod skinning;
+mod stepping;
 mod tag_lists;
 mod tag_values;
 mod tags;
