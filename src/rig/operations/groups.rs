@@ -5,8 +5,8 @@ use crate::rig::{
     reference::{GroupScope, map_references, map_uids, refresh_names},
 };
 
-/// Edits that put the joints of a local group into another one, let references mean that one, too, and remove the first. Empty
-/// where one of the two is not there, or both are the same.
+/// Edits that put the joints of a local group into another one, let references mean that one, too, and remove the first.
+/// Empty where one of the two is not there, or both are the same.
 pub fn merged_groups(rig: &Rig, group: Uid, into: Uid) -> Vec<RigEdit> {
     if group == into || rig.group(group).is_none() || rig.group(into).is_none() {
         return Vec::new();
