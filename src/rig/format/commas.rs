@@ -14,7 +14,8 @@ const MOST: usize = 100;
 const SHOWN: usize = 24;
 
 /// The text with the missing commas between fields and elements, each in place of a blank, so that all else stays where it
-/// is; and the places where they are missing. Commas for which there is no blank are not told. Texts that can be read lack none.
+/// is; and the places where they are missing. Commas for which there is no blank are not told.
+/// Texts that can be read lack none.
 pub fn with_missing_commas(text: &str) -> (Cow<'_, str>, Vec<SourceError>) {
     let (mut faults, mut blanks) = (Vec::new(), Vec::new());
     let mut place = TextPlace::start(text);
