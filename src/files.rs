@@ -38,6 +38,7 @@ mod shapes;
 mod similar_parts;
 mod site;
 mod store;
+mod template_layout;
 mod template_origin;
 mod template_text;
 mod template_update;
@@ -79,6 +80,7 @@ pub use store::{
     DocumentBase, StoreError, is_template_of, store_animation, store_avatar, store_document_over, store_model,
     store_packed_clips, store_rig, store_rig_over, store_skin,
 };
+pub use template_layout::format_template_file;
 pub use template_origin::{TemplateOrigin, has_parts, store_rig_from};
 pub(crate) use template_text::template_text;
 pub use template_update::{

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::{Failure, Report};
 use crate::{
-    files::{FileKind, LoadError, RealDisk, read_capped, save_atomic},
+    files::{FileKind, LoadError, RealDisk, format_template_file, read_capped, save_atomic},
     rig::template::{self, UidStyle},
 };
 
@@ -72,7 +72,7 @@ fn format(path: &Path, style: UidStyle) -> Result<(String, String), Failure> {
     }
     let bytes =
         read_capped(&RealDisk, path, template::MAX_BYTES as u64).map_err(|error| Failure::Input(Box::new(error)))?;
-    let formatted = template::text_of(&bytes).and_then(|text| template::format_template(text, style));
+    let formatted = template::text_of(&bytes).and_then(|text| format_template_file(&RealDisk, path, text, style));
     let all = String::from_utf8_lossy(&bytes).into_owned();
     match formatted {
         Ok(after) => Ok((all, after)),

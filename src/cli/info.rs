@@ -84,7 +84,10 @@ fn describe_template(report: &mut Report, path: &Path) -> Result<(), Failure> {
     report.set("parts", template.instances.iter().map(|part| part.part.clone()).collect::<Vec<_>>());
     report.set("overrides", template.instances.iter().flat_map(overrides).collect::<Vec<_>>());
     for socket in &template.sockets {
-        report.line(format!("socket {} on {}", socket.name, socket.label));
+        // Parts give their joints other labels than their files do.
+        let joint = socket.joint.and_then(|joint| template.rig.joint(joint));
+        let label = joint.and_then(|joint| joint.data.label.as_ref()).unwrap_or(&socket.label);
+        report.line(format!("socket {} on {label}", socket.name));
     }
     report.set("sockets", template.sockets.iter().map(|socket| socket.name.clone()).collect::<Vec<_>>());
     if about.kind == "part" {

@@ -26,6 +26,8 @@ enum KindArg {
     Limb,
     /// Joints in pairs, left and right, in groups, with limits
     Sides,
+    /// A figure of parts: a trunk of its own, with arms, legs and a neck that come with Rigsmith
+    Figure,
 }
 
 pub(super) fn run(args: &NewArgs) -> Result<Report, Failure> {
@@ -33,6 +35,7 @@ pub(super) fn run(args: &NewArgs) -> Result<Report, Failure> {
         KindArg::Chain => include_str!("../../assets/start/chain.rig.ron"),
         KindArg::Limb => include_str!("../../assets/start/limb.rig.ron"),
         KindArg::Sides => include_str!("../../assets/start/sides.rig.ron"),
+        KindArg::Figure => include_str!("../../assets/start/figure.rig.ron"),
     };
     let path = &args.output;
     if FileKind::of(path) != Some(FileKind::Template) {

@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, fmt::Write as _, io::Write, path::Path, process::ExitCode, sync::OnceLock};
 
-use miette::{Diagnostic, NamedSource, SourceSpan};
+use miette::{Diagnostic, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
 use serde_json::{Map, Value};
 
 use super::{
@@ -120,9 +120,33 @@ struct InSource {
     message: String,
     what: String,
     #[source_code]
-    code: NamedSource<String>,
+    code: FileText,
     #[label("{what}")]
     place: SourceSpan,
+}
+
+/// Text of a file. Its columns count characters, as those of errors do; a plain text has columns of bytes.
+#[derive(Debug)]
+struct FileText {
+    name: String,
+    text: String,
+}
+
+impl SourceCode for FileText {
+    fn read_span<'a>(
+        &'a self,
+        span: &SourceSpan,
+        lines_before: usize,
+        lines_after: usize,
+    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
+        let read = self.text.read_span(span, lines_before, lines_after)?;
+        let place = *read.span();
+        let before = self.text.get(..place.offset()).unwrap_or_default();
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let column = before[line_start..].chars().count();
+        let (name, data) = (self.name.clone(), read.data());
+        Ok(Box::new(MietteSpanContents::new_named(name, data, place, read.line(), column, read.line_count())))
+    }
 }
 
 /// Notes within the limits of their number and length.
@@ -293,7 +317,7 @@ fn show(error: &(dyn std::error::Error + 'static)) -> bool {
         let report = miette::Report::new(InSource {
             message,
             what,
-            code: NamedSource::new(path.display().to_string(), text.clone()),
+            code: FileText { name: path.display().to_string(), text: text.clone() },
             place: SourceSpan::from(offset),
         });
         // The report is coloured by escapes of its own, which have to reach the terminal.

@@ -5,6 +5,7 @@
 
 pub mod animation;
 pub mod bvh;
+pub(super) mod commas;
 pub(super) mod layout;
 mod poses;
 pub mod project;

@@ -7,6 +7,7 @@
 mod clips;
 mod draft;
 mod frame;
+mod groups;
 mod hierarchy;
 mod leftovers;
 mod merge;
@@ -26,6 +27,7 @@ use bevy::math::{Affine3, Quat, Vec3};
 
 pub use clips::{ClipOperation, KeyClipboard, KeyEase, KeyOperation, KeyTimes, KeyTolerance};
 pub use draft::{Draft, Outcome};
+pub use groups::merged_groups;
 pub use orient::Axis;
 pub use place::settle;
 pub use symmetry::MirrorPlane;

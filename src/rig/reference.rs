@@ -56,7 +56,7 @@ pub use index::RigNameIndex;
 pub use names::{NameKind, NameScope, Names, RigNames, label_text};
 pub use params::{
     BadReference, FoundReference, bind_known_names, bind_names, given_names, map_references, map_unions,
-    nearest_to_gone, references_in, refresh_names, without_uids, written_as,
+    nearest_to_gone, references_in, refresh_names, with_uids, without_uids, written_as,
 };
 pub(in crate::rig) use params::{given_name, map_text_fields, map_uids};
 

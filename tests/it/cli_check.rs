@@ -285,3 +285,48 @@ fn joints_with_one_label_are_told_each() {
         assert_eq!(place, (2 + number / 2, column), "{problem}");
     }
 }
+
+/// The place above the lines of the source is that of the sentence, whatever the letters before it.
+#[test]
+fn columns_count_characters() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "(\n    format: 2,\n    name: \"Käferfüße ☃\" oops: 1,\n)\n";
+    fs::write(folder.path().join("x.rig.ron"), text).unwrap();
+    let answer = rigsmith(folder.path(), &["build", "x.rig.ron"]);
+    assert_eq!(answer.code, 1, "{}", answer.err);
+    let (_, rest) = answer.err.split_once("line 3, column ").unwrap_or_else(|| panic!("{}", answer.err));
+    let column = rest.split(':').next().unwrap();
+    assert!(answer.err.contains(&format!("x.rig.ron:3:{column}]")), "{}", answer.err);
+}
+
+/// A missing comma is told, and nothing that only follows from it.
+#[test]
+fn missing_commas_are_told_alone_and_hide_no_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = r#"(
+    format: 2,
+    name: "x"
+    joints: [ // Expected comma before `joints`
+        (label: "a" tags: [control()]), // Expected comma before `tags`
+        (
+            label: "b",
+            parent: "a",
+            translation: (0 1, 0), // Expected comma before `1`
+            tags: [control() null()], // Expected comma before `null`
+        ),
+        (
+            label: "c",
+            parent: "b",
+            translation: (0, 1, 0),
+            tags: [control(shape: "circle" size: -1.0)], // Expected comma before `size` // size: is -1
+        ),
+    ]
+    groups: [ // Expected comma before `groups`
+        (name: "g")
+        (name: "h"), // Expected comma before `(`
+    ],
+)"#;
+    tells_what_it_says(folder.path(), "x.rig.ron", text);
+    let answer = rigsmith(folder.path(), &["build", "x.rig.ron"]);
+    assert!(answer.code == 1 && answer.err.contains("Expected comma before `joints`"), "{}", answer.err);
+}

@@ -37,7 +37,7 @@ fn builds(rig: &Rig) {
 #[test]
 fn new_templates_build_and_take_no_others_place() {
     let folder = tempfile::tempdir().unwrap();
-    for kind in ["chain", "limb", "sides"] {
+    for kind in ["chain", "limb", "sides", "figure"] {
         let name = format!("{kind}.rig.ron");
         assert_eq!(rigsmith(folder.path(), &["new", kind, "-o", &name]).0, 0);
         builds(&rig(folder.path(), &name));
@@ -51,8 +51,8 @@ fn new_templates_build_and_take_no_others_place() {
     let (code, listed) = json(folder.path(), &["list"]);
     let templates = listed["templates"].as_array().unwrap();
     let counts: Vec<u64> = templates.iter().map(|one| one["joint_count"].as_u64().unwrap()).collect();
-    assert_eq!((code, counts), (0, vec![3, 4, 3]));
-    assert_eq!(templates[1]["features"].as_array().unwrap().len(), 2);
+    assert_eq!((code, counts), (0, vec![3, 52, 4, 3]));
+    assert_eq!(templates[2]["features"].as_array().unwrap().len(), 2);
 }
 
 #[test]
@@ -356,7 +356,8 @@ fn overrides_sockets_and_options_are_listed() {
     fs::write(folder.path().join("arm.rig.ron"), part).unwrap();
     let whole = "(format: 2, name: \"man\", joints: [(label: \"body\")], parts: [(part: \"arm.rig.ron\", name: \"left\", parent: \"body\", \
                  options: {\"size\": 0.7}, off: [\"fk\"], changes: [(tag: \"control/arm\", params: (shape: \"star\")), \
-                 (joint: \"arm\", translation: (1, 0, 0))])])";
+                 (joint: \"arm\", translation: (1, 0, 0))]), \
+                 (part: \"arm.rig.ron\", name: \"right\", parent: \"body\", prefix: \"r_\", mirror: true)])";
     fs::write(folder.path().join("man.rig.ron"), whole).unwrap();
     let (code, said) = rigsmith(folder.path(), &["info", "man.rig.ron"]);
     assert_eq!(code, 0, "{said}");
@@ -366,6 +367,7 @@ fn overrides_sockets_and_options_are_listed() {
         "tag control/arm: shape = \"star\"",
         "joint arm: translation = (1.0, 0.0, 0.0)",
         "socket left.hand on arm",
+        "socket right.hand on r_arm",
     ] {
         assert!(said.contains(line), "{line}: {said}");
     }

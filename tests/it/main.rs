@@ -209,6 +209,7 @@ mod tags;
 mod template;
 #[cfg(feature = "cli")]
 mod template_copies;
+mod template_layout;
 mod template_text;
 mod three_strokes;
 #[cfg(feature = "editor")]

@@ -9,6 +9,7 @@ mod notices;
 mod posing;
 mod process;
 mod skinning;
+mod stepping;
 mod tag_lists;
 mod tag_values;
 mod tags;

@@ -139,6 +139,7 @@ fn mistakes_are_named_with_their_place_and_what_to_do() {
             "2 commands are called \"control\"; write control#UID with one of \"#00000000000000c0\"",
         ),
         ("@command control/hand_x", 9, "did you mean \"control/hand_l\" or \"control/hand_r\"?"),
+        ("@command control/lable", 9, "did you mean \"control/label\"?"),
         ("@joints group:arm_r", 14, "there is no local group \"arm_r\"; did you mean \"arm_l\"?"),
         ("@joints label:girp", 14, "did you mean \"grip\"?"),
         ("@joints type:jiont", 13, "no type of node; did you mean \"joint\""),

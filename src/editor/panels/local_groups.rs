@@ -12,14 +12,17 @@ use super::{
     list,
 };
 use crate::{
-    editor::panel::{EditorPanel, Requests},
+    editor::{
+        notice::Notice,
+        panel::{EditorPanel, Requests},
+    },
     plugins::{
         document::{Change, EditRequest},
         picking::{Pick, PickRequest},
     },
     rig::{
         GroupData, Rig, RigEdit, Uid,
-        operations::{Operation, TagOperation, TagScope},
+        operations::{Operation, TagOperation, TagScope, merged_groups},
     },
 };
 
@@ -89,6 +92,8 @@ enum RowRequest {
     Edits(Vec<RigEdit>),
     Preview(Vec<RigEdit>),
     Operation(Operation),
+    /// A name that another group has.
+    Taken(String),
     Select,
 }
 
@@ -130,6 +135,9 @@ impl EditorPanel for GroupsPanel {
                     Some(RowRequest::Operation(operation)) => {
                         requests.send(EditRequest::operation(shown.entity, operation));
                     }
+                    Some(RowRequest::Taken(name)) => requests.send(Notice::warning(format!(
+                        "Another group is called \"{name}\"; give this one another name, or merge the two by its menu."
+                    ))),
                     Some(RowRequest::Select) => {
                         let what = Pick::Joints(self.of(group.uid).to_vec());
                         requests.send(PickRequest { rig: shown.entity, what, add: false });
@@ -247,7 +255,7 @@ impl GroupsPanel {
                 request = request.take().or(menu.inner.flatten());
                 ui.weak(format!("{}", joints.len()));
                 ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                    self.name(ui, group, &mut request)
+                    self.name(ui, group, shown, &mut request)
                 });
             });
         });
@@ -255,7 +263,7 @@ impl GroupsPanel {
     }
 
     /// The name; a double click edits it.
-    fn name(&mut self, ui: &mut Ui, group: &GroupData, request: &mut Option<RowRequest>) {
+    fn name(&mut self, ui: &mut Ui, group: &GroupData, shown: &DisplayedRig, request: &mut Option<RowRequest>) {
         let Some((_, text)) = self.renamed.as_mut().filter(|(uid, _)| *uid == group.uid) else {
             let text = egui::RichText::new(&group.name).color(color(group.color));
             let label = ui.add(egui::Label::new(text).truncate().sense(egui::Sense::click()));
@@ -275,7 +283,11 @@ impl GroupsPanel {
             self.renamed = None;
             let dropped = ui.input(|input| input.key_pressed(Key::Escape));
             if !dropped && !name.is_empty() && name != group.name {
-                *request = Some(RowRequest::Edits(vec![RigEdit::SetLocalGroup(GroupData { name, ..group.clone() })]));
+                // Files and people call groups by their names.
+                *request = Some(match shown.rig.groups().iter().any(|other| other.name == name) {
+                    true => RowRequest::Taken(name),
+                    false => RowRequest::Edits(vec![RigEdit::SetLocalGroup(GroupData { name, ..group.clone() })]),
+                });
             }
         } else if !field.has_focus() {
             field.request_focus();
@@ -306,10 +318,8 @@ fn menu(ui: &mut Ui, group: &GroupData, shown: &DisplayedRig, selected: &[Uid], 
     ui.menu_button("Merge into", |ui| {
         for other in shown.rig.groups().iter().filter(|other| other.uid != group.uid) {
             item(ui, &other.name, true, &|| {
-                let mut edits: Vec<RigEdit> =
-                    joints.iter().map(|joint| RigEdit::SetGroup(*joint, Some(other.uid))).collect();
-                edits.push(RigEdit::RemoveLocalGroup(group.uid));
-                RowRequest::Edits(edits)
+                let edits = merged_groups(&shown.rig, group.uid, other.uid);
+                RowRequest::Operation(Operation::Named { name: "Merge groups", edits })
             });
         }
     });

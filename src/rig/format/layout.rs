@@ -104,9 +104,9 @@ impl<'t, 'a> Layout<'t, 'a> {
         self.out
             .push_str(&tree.text[node.range.start..node.inside.min(node.range.end)].replace(char::is_whitespace, ""));
         let inner = indent + INDENT;
-        let mut at = node.inside;
+        let (mut at, mut late) = (node.inside, "");
         for (number, item) in node.items.iter().enumerate() {
-            self.gap(&tree.text[at..item.start], inner, number > 0);
+            self.gap_behind(late, &tree.text[at..item.start], inner, number > 0);
             let value = tree.node(item.value);
             if let Some(key) = item.key {
                 self.out.push_str(key);
@@ -115,16 +115,11 @@ impl<'t, 'a> Layout<'t, 'a> {
             let column = inner + item.key.map_or(0, |key| key.chars().count() + 2);
             self.value(item.value, inner, column);
             self.out.push(',');
-            // A comment before the comma goes behind it.
             let end = if item.has_comma { item.end - 1 } else { item.end };
-            let late = tree.text[value.range.end..end].trim();
-            if !late.is_empty() {
-                self.out.push(' ');
-                self.out.push_str(late);
-            }
+            late = &tree.text[value.range.end..end];
             at = item.end;
         }
-        self.gap(&tree.text[at..close], inner, !node.items.is_empty());
+        self.gap_behind(late, &tree.text[at..close], inner, !node.items.is_empty());
         let blanks = self.out.trim_end_matches(' ').len();
         self.out.truncate(blanks);
         while self.out.ends_with("\n\n") {
@@ -172,6 +167,22 @@ impl<'t, 'a> Layout<'t, 'a> {
             self.flat(item.value);
         }
         self.out.push_str(&tree.text[node.range.end - 1..node.range.end]);
+    }
+
+    /// Writes what stands between two items, see [`gap`](Self::gap): comments of `late`, before the comma, go behind it.
+    fn gap_behind(&mut self, late: &str, after: &str, indent: usize, follows: bool) {
+        let comments = late.trim();
+        if comments.is_empty() {
+            return self.gap(after, indent, follows);
+        }
+        let rest = after.trim_start_matches([' ', '\t']);
+        let ends_line = late.trim_end_matches([' ', '\t']).ends_with('\n');
+        let between = match ends_line {
+            _ if rest.is_empty() || rest.starts_with(['\r', '\n']) => "",
+            true => "\n",
+            false => " ",
+        };
+        self.gap(&format!("{comments}{between}{rest}"), indent, follows);
     }
 
     /// Writes the comments and blank lines between two items, and begins the next line. A comment on the line of the item
@@ -260,8 +271,19 @@ fn breaks(text: &str) -> Vec<usize> {
 /// Comments of a text with their places, without blanks around their lines.
 fn comments(text: &str) -> Vec<(usize, String)> {
     let all = gaps(text).filter(|(_, gap)| gap.contains('/'));
-    let lines = all.flat_map(|(at, gap)| gap.lines().map(move |line| (at, line.trim().to_owned())));
-    lines.filter(|(_, line)| !line.is_empty()).collect()
+    all.flat_map(|(at, gap)| gap.lines().flat_map(pieces).map(move |piece| (at, piece.to_owned()))).collect()
+}
+
+/// Comments of a line, or pieces of one over several lines.
+fn pieces(line: &str) -> Vec<&str> {
+    let (mut rest, mut found) = (line.trim(), Vec::new());
+    while !rest.is_empty() {
+        let end = if rest.starts_with("//") { None } else { rest.find("*/").map(|at| at + 2) };
+        let (piece, behind) = rest.split_at(end.unwrap_or(rest.len()));
+        found.push(piece.trim());
+        rest = behind.trim();
+    }
+    found
 }
 
 /// Text between tokens, without commas, with its place.
@@ -303,6 +325,16 @@ mod tests {
             )
         );
         assert_eq!(laid_out(&out).unwrap(), out);
+    }
+
+    #[test]
+    fn comments_before_a_comma_go_behind_it() {
+        let text = "(a: 1 /* x */, // y\n b: 2 // z\n , // w\n c: 3 /* s */, /* t */\n)";
+        let wanted = "(\n    a: 1, /* x */ // y\n    b: 2, // z\n    // w\n    c: 3, /* s */ /* t */\n)\n";
+        assert_eq!(laid_out(text).unwrap(), wanted);
+        assert_eq!(laid_out(wanted).unwrap(), wanted, "the identity on its own text");
+        let over_lines = laid_out("(a: [1 /* p\n q */ , 2, // r\n ])").unwrap();
+        assert_eq!(laid_out(&over_lines).unwrap(), over_lines);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use ron::{Options, extensions::Extensions};
 use serde::{Serialize, de::DeserializeOwned};
 
 use super::scan::cut_short;
+use crate::rig::nearest::nearest;
 
 /// Error in a text file, with its place.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -44,23 +45,36 @@ impl SourceError {
         if let Some(fault) = Self::cut_short(text) {
             return fault;
         }
-        let hint = match &error.code {
-            ron::Error::NoSuchStructField { .. } | ron::Error::NoSuchEnumVariant { .. } => {
-                "; remove it or correct its name"
-            }
-            ron::Error::MissingStructField { .. } => "; add it",
-            ron::Error::DuplicateStructField { .. } => "; keep one of the two",
-            ron::Error::Eof => "; the file is cut short: take a backup",
-            _ => "",
-        };
         let message = match &error.code {
             ron::Error::ExceededRecursionLimit => {
                 "brackets are nested too deeply for a file of this kind; close some of them".to_owned()
             }
-            code => format!("{code}{hint}"),
+            ron::Error::NoSuchStructField { expected, found, .. } => unknown_name("field", found, expected),
+            ron::Error::NoSuchEnumVariant { expected, found, .. } => unknown_name("value", found, expected),
+            ron::Error::MissingStructField { field, .. } => format!("the field `{field}` is missing; add it"),
+            ron::Error::DuplicateStructField { field, .. } => {
+                format!("the field `{field}` is there twice; keep one of the two")
+            }
+            ron::Error::Eof => format!("{}; the file is cut short: take a backup", error.code),
+            code => code.to_string(),
         };
         Self::at(text, byte_offset(text, error.span.start), message)
     }
+}
+
+/// Largest number of names that are listed where none is near.
+const MOST_LISTED: usize = 24;
+
+/// Sentence about a name where only those of `known` may stand: with the nearest of these, or with all of a few.
+pub(crate) fn unknown_name(what: &str, name: &str, known: &[&str]) -> String {
+    let quoted = |name: &String| format!("`{name}`");
+    let near = nearest(name, known, 3);
+    let remedy = match (near.is_empty(), known.len()) {
+        (false, _) => format!("did you mean {}?", near.iter().map(quoted).collect::<Vec<_>>().join(" or ")),
+        (true, 1..=MOST_LISTED) => format!("remove it or correct its name: known are `{}`", known.join("`, `")),
+        (true, _) => "remove it or correct its name".to_owned(),
+    };
+    format!("there is no {what} `{name}` here; {remedy}")
 }
 
 /// Place in a text that goes on from error to error: many errors in the order of the text take one pass over it.

@@ -35,6 +35,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
+pub use super::commas::with_missing_commas;
 pub(crate) use file_marks::FileMarks;
 pub(crate) use moved_text::{with_changes_on_lines, with_part_files, with_part_uids, with_rig_uid};
 pub(in crate::rig) use read::read_text;
@@ -45,7 +46,7 @@ pub(crate) use text_patch::{
     PartRigs, differing_parts, says_the_same, with_instance_fields, with_instances, with_instances_of,
     without_instances, write_changes_over, write_own_over, write_short_template,
 };
-pub use tidy::{UidStyle, format_template};
+pub use tidy::{UidStyle, format_template, format_with_parts};
 pub use write::write_template;
 pub(in crate::rig) use write::{
     option_text, quaternion, quoted, rotation_text, socket_text, vector, write_without_poses,

@@ -42,7 +42,14 @@ impl DroppedPart {
 impl PartInstance {
     /// Uid that follows from the part and the joints that it goes onto, for an instance without a name.
     pub(in crate::rig) fn uid_from_joints(part: &str, onto: &[String]) -> Uid {
-        Uid::derived(["part instance", part, &onto.join(" ")])
+        Self::derived_uid(part, "", onto)
+    }
+
+    /// Uid of an instance that has none of its own: it follows from the part and the name, or else from the joints that the part
+    /// goes onto.
+    pub(in crate::rig) fn derived_uid(part: &str, name: &str, onto: &[String]) -> Uid {
+        let onto = onto.join(" ");
+        Uid::derived(["part instance", part, if name.is_empty() { onto.as_str() } else { name }])
     }
 
     /// Uids of the tags that the fitted part brings, and of the joints that it adds.

@@ -109,7 +109,9 @@ impl Names for Rig {
             NameKind::Input => self.inputs().iter().map(|input| Cow::Borrowed(input.name.as_str())).collect(),
             NameKind::Joint => labels().collect(),
             NameKind::Label => labels().chain(commands(self).filter_map(|(_, tag)| given_label(tag))).collect(),
-            NameKind::Command => commands(self).filter_map(|(joint, tag)| command_name(joint, tag)).collect(),
+            NameKind::Command => commands(self)
+                .flat_map(|(joint, tag)| command_name(joint, tag).into_iter().chain(command_by_given_name(tag)))
+                .collect(),
         }
     }
 }
@@ -197,6 +199,13 @@ fn command_name<'a>(joint: &'a RigJoint, tag: &'a TagData) -> Option<Cow<'a, str
         Some(label) => Cow::Owned(format!("{module}/{label}")),
         None => Cow::Borrowed(module),
     })
+}
+
+/// Name of a command by that which it gives its nodes.
+fn command_by_given_name(tag: &TagData) -> Option<Cow<'static, str>> {
+    // The module of a name ends at the first `/`.
+    let module = module(tag).filter(|module| !module.contains('/'))?;
+    Some(Cow::Owned(format!("{module}/{}", given_name(tag)?)))
 }
 
 pub(super) fn given_label(tag: &TagData) -> Option<Cow<'_, str>> {

@@ -103,6 +103,21 @@ pub fn bind_names<'a>(params: &'a str, names: &dyn Names) -> (Cow<'a, str>, Vec<
     (bound, bad)
 }
 
+/// The parameters with the uid beside every name, as [`bind_names`] gives it, while names that mean that object stay as they
+/// are written.
+pub fn with_uids<'a>(params: &'a str, names: &dyn Names) -> Cow<'a, str> {
+    let means_it = |place: &NamedUid, text: &str| {
+        let name = unquoted(&text[place.name.clone()]);
+        !place.has_uid
+            || name.is_some_and(|name| names.find(NameScope::default(), place.kind, &name).contains(&place.uid))
+    };
+    rewritten(params, literals(params), |text| {
+        let mut places = Vec::new();
+        read_with(text, Some(names), &mut places).ok()?;
+        renamed_unless(text, &places, names, means_it)
+    })
+}
+
 /// The parameters with the uid beside every name that exactly one object has. Other names stay alone, and so do texts that
 /// are no references.
 pub fn bind_known_names<'a>(params: &'a str, names: &dyn Names) -> Cow<'a, str> {
@@ -138,7 +153,7 @@ impl Names for PartialNames<'_> {
 }
 
 /// The parameters with names alone in place of the uids that `leave_out` chooses, in every reference that [`bind_names`]
-/// gives the same uids again.
+/// gives the same uids again. A name that stands beside its uid stays if it can.
 pub fn without_uids<'a>(params: &'a str, names: &dyn Names, leave_out: impl Fn(Uid) -> bool) -> Cow<'a, str> {
     rewritten(params, literals(params), |text| {
         let mut places = Vec::new();
@@ -153,7 +168,8 @@ pub fn without_uids<'a>(params: &'a str, names: &dyn Names, leave_out: impl Fn(U
             let end = hash + 1 + place.uid.to_string().len();
             let written = text.get(hash + 1..end).and_then(|digits| digits.parse().ok());
             let is_its = |name: &String| names.find(NameScope::default(), place.kind, name) == [place.uid];
-            if let Some(name) = names.names_of(place.kind, place.uid).into_iter().find(is_its)
+            let beside_it = unquoted(&text[place.name.clone()]);
+            if let Some(name) = beside_it.into_iter().chain(names.names_of(place.kind, place.uid)).find(is_its)
                 && written == Some(place.uid)
             {
                 out.push_str(&text[at..place.name.start]);
@@ -301,13 +317,23 @@ fn rewritten(
 
 /// The text with current names at these places, and a uid beside each.
 fn renamed(text: &str, places: &[NamedUid], names: &dyn Names) -> Option<String> {
+    renamed_unless(text, places, names, |_, _| false)
+}
+
+/// The text with current names at these places, but for those whose name stays, and a uid beside each.
+fn renamed_unless(
+    text: &str,
+    places: &[NamedUid],
+    names: &dyn Names,
+    stays: impl Fn(&NamedUid, &str) -> bool,
+) -> Option<String> {
     let mut places: Vec<&NamedUid> = places.iter().collect();
     places.sort_unstable_by_key(|place| place.name.start);
     let mut out = String::with_capacity(text.len());
     let mut at = 0;
     for place in places {
         out.push_str(&text[at..place.name.start]);
-        match names.name_of(place.kind, place.uid) {
+        match names.name_of(place.kind, place.uid).filter(|_| !stays(place, text)) {
             Some(name) => out.push_str(&name_text(&name)),
             None => out.push_str(&text[place.name.clone()]),
         }

@@ -1,8 +1,15 @@
 //! Local groups: made and reset by the selection, by hierarchies and for the whole rig.
 
-use rigsmith::editor::panels::local_groups::GroupsPanel;
+use bevy_egui::egui::Key;
+use rigsmith::{
+    editor::panels::local_groups::GroupsPanel,
+    rig::operations::{Operation, merged_groups},
+};
 
-use super::desk::Desk;
+use super::{
+    desk::Desk,
+    tag_values::{add_command, params_of},
+};
 
 /// Names of the groups of all joints.
 fn groups(desk: &Desk) -> Vec<String> {
@@ -57,4 +64,52 @@ fn groups_are_made_and_reset_by_selection_hierarchy_and_all() {
     assert_eq!((names, desk.steps().1), (vec!["all"], steps + 6));
     desk.undo(6);
     assert_eq!(*desk.rig(), before);
+}
+
+/// A desk with two joints in groups of those names.
+fn grouped(names: [&str; 2]) -> Desk {
+    let mut desk = Desk::new(GroupsPanel::default());
+    let joints = desk.chain(&["hips", "spine"]);
+    for (joint, name) in joints.iter().zip(names) {
+        desk.edit(Operation::Group { joints: vec![*joint], name: name.to_owned(), color: None });
+    }
+    desk.frames(3);
+    desk
+}
+
+#[test]
+fn a_group_takes_no_name_of_another() {
+    let mut desk = grouped(["arm", "armx"]);
+    let steps = desk.steps().0;
+    let type_behind = |desk: &mut Desk, text: &str| {
+        desk.double_click("arm");
+        desk.frames(2);
+        desk.type_text(text);
+        desk.key(Key::Enter);
+        desk.frames(3);
+    };
+    type_behind(&mut desk, "x");
+    assert_eq!((groups(&desk), desk.steps().0), (["arm", "armx"].map(String::from).to_vec(), steps));
+    assert!(desk.told().iter().any(|told| told.contains("called \"armx\"")), "{:?}", desk.told());
+    type_behind(&mut desk, "y");
+    assert_eq!((groups(&desk), desk.steps().0), (["army", "armx"].map(String::from).to_vec(), steps + 1));
+}
+
+#[test]
+fn commands_that_name_a_group_name_the_one_that_it_was_merged_into() {
+    let mut desk = grouped(["arm", "leg"]);
+    let [arm, leg] = [0, 1].map(|at| desk.rig().groups()[at].uid);
+    let hips = desk.rig().walk().next().unwrap().data.uid;
+    let tag = add_command(&mut desk, hips, "null", &format!("(at: \"@joints group:arm#{arm}\")"));
+    let other = add_command(&mut desk, hips, "null", &format!("(at: \"@joints group:leg#{leg}\")"));
+    let (before, steps) = (desk.rig().clone(), desk.steps().0);
+    let edits = merged_groups(desk.rig(), arm, leg);
+    assert_eq!(edits.len(), 3, "a joint, a command and the group: {edits:?}");
+    desk.edit(Operation::Named { name: "Merge groups", edits });
+    assert_eq!((groups(&desk), desk.rig().groups().len()), (vec!["leg".to_owned(); 2], 1));
+    assert_eq!(params_of(&desk, tag), params_of(&desk, other));
+    assert_eq!(desk.steps().0, steps + 1);
+    desk.undo(1);
+    assert_eq!(*desk.rig(), before);
+    assert!(merged_groups(&before, arm, arm).is_empty() && merged_groups(&before, hips, leg).is_empty());
 }

@@ -23,6 +23,7 @@ use super::{
 use crate::rig::{
     FacePlacement, GROUP_COLORS, GroupData, JointData, RestTransform, Rig, RigAbout, RigEdit, SourceError, TagData,
     TagKind, Uid,
+    format::commas::with_missing_commas,
     format::poses::add_poses,
     format::scan::{self, Field},
     format::source::{parse_ron, ron_options, utf8},
@@ -55,7 +56,11 @@ pub(in crate::rig) fn read_text(source: &str, first_line: usize) -> Result<Templ
         Some(fault) => Err(fault.clone()),
         None => read_explicit(&explicit, first_line).map_err(|error| explicit.fault(error)),
     };
-    read.map_err(|error| SourceError::cut_short(source).unwrap_or(error))
+    read.map_err(|error| {
+        // What follows from a missing comma is no fault of its own.
+        let lacking = || with_missing_commas(source).1.into_iter().next();
+        SourceError::cut_short(source).or_else(lacking).unwrap_or(error)
+    })
 }
 
 fn read_explicit(explicit: &ExplicitText, first_line: usize) -> Result<Template, SourceError> {

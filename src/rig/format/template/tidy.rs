@@ -19,7 +19,8 @@ use crate::rig::{
         template::quoted,
         tree::{Item, NodeId, Tree},
     },
-    reference::{NameKind, RigNameIndex, bind_names, without_uids},
+    part::PartInstance,
+    reference::{NameKind, RigNameIndex, with_uids, without_uids},
 };
 
 /// Treatment of uids when a template is formatted.
@@ -28,9 +29,10 @@ pub enum UidStyle {
     /// Uids as they are.
     #[default]
     Kept,
-    /// Uids of everything, and of every reference.
+    /// Uids of everything but what parts bring, and beside the names in references.
     Written,
-    /// A uid that follows from names is left out, beside names in references, too, unless the template has parts.
+    /// A uid that follows from names is left out, beside names in references, too, unless the template has parts: what these
+    /// bring may have the same names, see [`format_with_parts`].
     Derived,
 }
 
@@ -40,10 +42,23 @@ pub enum UidStyle {
 /// # Errors
 /// What keeps the text from being read as a template, and comments for which there is no place in the layout.
 pub fn format_template(source: &str, uids: UidStyle) -> Result<String, SourceError> {
+    format_with_parts(source, uids, None)
+}
+
+/// The text of a template in its layout, as [`format_template`] gives it. `whole` is the template with its parts: with it,
+/// [`UidStyle::Derived`] leaves out uids beside names that nothing else has there, either.
+///
+/// # Errors
+/// See [`format_template`].
+pub fn format_with_parts(source: &str, uids: UidStyle, whole: Option<&Rig>) -> Result<String, SourceError> {
     let Template { rig, parts, .. } = read_text(source, 1)?;
+    let named = match uids {
+        UidStyle::Derived if !parts.is_empty() => whole,
+        _ => Some(&rig),
+    };
     let written = match uids {
         UidStyle::Kept => None,
-        style => Declarations::find(source).map(|declared| Uids::new(&declared, &rig, style, !parts.is_empty()).text()),
+        style => Declarations::find(source).map(|declared| Uids::new(&declared, named, &parts, style).text()),
     };
     // Names that parts bring are bound once those are there. Of large templates, one rig or one tree is held at a time.
     let said = |mut rig: Rig| {
@@ -51,7 +66,9 @@ pub fn format_template(source: &str, uids: UidStyle) -> Result<String, SourceErr
         fingerprint(comparable(rig))
     };
     let before = said(rig);
-    let text = laid_out(written.as_deref().unwrap_or(source))?;
+    // A comment without a place is told with its place in the source.
+    let text =
+        laid_out(written.as_deref().unwrap_or(source)).map_err(|error| laid_out(source).err().unwrap_or(error))?;
     match read_text(&text, 1).is_ok_and(|after| said(after.rig) == before) {
         true => Ok(text),
         false => Err(SourceError::at(source, 0, "formatted, the template would say something else; it stays as it is")),
@@ -84,9 +101,10 @@ impl Write for HashedText {
 
 struct Uids<'d, 'a> {
     declared: &'d Declarations<'a>,
-    names: RigNameIndex<'d>,
+    /// Names of all that references may mean; `None` if that is not known.
+    names: Option<RigNameIndex<'d>>,
+    parts: &'d [PartInstance],
     style: UidStyle,
-    has_parts: bool,
     called: NameIndex<'d, 'a>,
     by_uid: HashMap<Uid, &'d Declaration>,
     /// Uids that the text will not have.
@@ -95,12 +113,12 @@ struct Uids<'d, 'a> {
 }
 
 impl<'d, 'a> Uids<'d, 'a> {
-    fn new(declared: &'d Declarations<'a>, rig: &'d Rig, style: UidStyle, has_parts: bool) -> Self {
+    fn new(declared: &'d Declarations<'a>, named: Option<&'d Rig>, parts: &'d [PartInstance], style: UidStyle) -> Self {
         let follows = |one: &&Declaration| !one.is_written || one.derived == Some(one.uid);
         let derived = declared.all().filter(follows).map(|one| one.uid).collect();
         let (called, patch) = (NameIndex::new(declared), Patch::new(&declared.tree));
         let by_uid = declared.all().map(|one| (one.uid, one)).collect();
-        Self { declared, called, by_uid, names: RigNameIndex::new(rig), style, has_parts, derived, patch }
+        Self { declared, called, by_uid, names: named.map(RigNameIndex::new), parts, style, derived, patch }
     }
 
     fn text(mut self) -> String {
@@ -122,6 +140,7 @@ impl<'d, 'a> Uids<'d, 'a> {
                 self.parameters(tag.node);
             }
         }
+        self.instances();
         self.patch.text()
     }
 
@@ -138,6 +157,19 @@ impl<'d, 'a> Uids<'d, 'a> {
                 self.patch.set_or_remove(one.node, "uid", None);
             }
             _ => {}
+        }
+    }
+
+    /// Uids of part instances.
+    fn instances(&mut self) {
+        let tree = self.tree();
+        for (item, part) in tree.elements(tree.root(), "parts").iter().zip(self.parts) {
+            let is_derived = part.uid == PartInstance::derived_uid(&part.part, &part.name, &part.onto);
+            match (self.style, tree.field(item.value, "uid").is_some()) {
+                (UidStyle::Written, false) => self.patch.put_first(item.value, &format!("uid: \"{}\"", part.uid)),
+                (UidStyle::Derived, true) if is_derived => self.patch.set_or_remove(item.value, "uid", None),
+                _ => {}
+            }
         }
     }
 
@@ -177,6 +209,8 @@ impl<'d, 'a> Uids<'d, 'a> {
     /// References in the parameters of a command.
     fn parameters(&mut self, tag: NodeId) {
         let tree = self.tree();
+        // A name alone may be that of something that a part brings, too.
+        let Some(names) = &self.names else { return };
         let mut open: Vec<NodeId> = match TagForm::of(tree, tag) {
             Some(TagForm::Command) => tree.field(tag, "params").map(|params| params.value).into_iter().collect(),
             Some(TagForm::Short(_)) => {
@@ -192,10 +226,8 @@ impl<'d, 'a> Uids<'d, 'a> {
                 continue;
             }
             let text = match self.style {
-                UidStyle::Written => bind_names(written, &self.names).0,
-                // A name alone may be that of something that a part brings, too.
-                UidStyle::Derived if self.has_parts => continue,
-                UidStyle::Derived => without_uids(written, &self.names, |uid| self.derived.contains(&uid)),
+                UidStyle::Written => with_uids(written, names),
+                UidStyle::Derived => without_uids(written, names, |uid| self.derived.contains(&uid)),
                 UidStyle::Kept => continue,
             };
             if text != written {

@@ -151,9 +151,7 @@ pub(super) fn instances(places: &Places, parts: Vec<PartFile>, faults: &mut Vec<
     for file in parts {
         let offset = offsets.next().unwrap_or_default();
         let mut fault = |message: String| faults.push(SourceError::at(places.text, offset, message));
-        let onto = file.onto.join(" ");
-        let title = if file.name.is_empty() { onto.as_str() } else { &file.name };
-        let uid = file.uid.unwrap_or_else(|| Uid::derived(["part instance", file.part.as_str(), title]));
+        let uid = file.uid.unwrap_or_else(|| PartInstance::derived_uid(&file.part, &file.name, &file.onto));
         if !seen.insert(uid) {
             fault(format!("two uses of \"{}\" are called the same; give each a `name`", file.part));
             continue;

@@ -13,10 +13,10 @@ use super::{
 use crate::rig::{
     SourceError,
     format::{
+        commas::with_missing_commas,
         scan::{self, Field, elements_around},
-        source::ron_options,
+        source::{ron_options, unknown_name},
     },
-    nearest::nearest,
     template::quoted,
 };
 
@@ -33,6 +33,27 @@ pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec
     if let Some(fault) = SourceError::cut_short(source) {
         return Err(vec![fault]);
     }
+    let first = survey(source);
+    if matches!(&first, Ok((_, faults)) if faults.is_empty()) {
+        return first;
+    }
+    let (whole, lacking) = with_missing_commas(source);
+    if lacking.is_empty() {
+        return first;
+    }
+    let all = |mut faults: Vec<SourceError>| {
+        faults.extend(lacking);
+        faults.sort_by_key(|fault| fault.offset);
+        faults
+    };
+    match survey(&whole) {
+        Ok((template, faults)) => Ok((template, all(faults))),
+        Err(faults) => Err(all(faults)),
+    }
+}
+
+/// Reads a text as far as it goes, see [`survey_template`].
+fn survey(source: &str) -> Result<(Template, Vec<SourceError>), Vec<SourceError>> {
     let explicit = explicit(source);
     let (text, mut notes, mut faults) = (&*explicit.text, Vec::new(), Vec::new());
     let fields = scan::fields(text);
@@ -41,15 +62,8 @@ pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec
     // In a file of a newer format they are notes.
     let unknown = if matches!(readable, Cow::Borrowed(_)) { TEMPLATE.unknown(&fields) } else { Vec::new() };
     for field in &unknown {
-        let near = nearest(field.name, known_names(&fields, field).into_iter().flatten(), 3);
-        let remedy = match near.is_empty() {
-            true => "remove it or correct its name".to_owned(),
-            false => format!(
-                "did you mean {}?",
-                near.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" or ")
-            ),
-        };
-        let message = format!("there is no field `{}` here; {remedy}", field.name);
+        let known = known_names(&fields, field).unwrap_or_default();
+        let message = unknown_name("field", field.name, known);
         faults.push(SourceError::at(text, field.start, message));
     }
     let mut survey = Survey { text, fields: &fields, blank: Vec::new(), left_out: Vec::new(), stand_ins: Vec::new() };
