@@ -288,8 +288,8 @@ pub type OpenWindow<'a> = &'a dyn Fn(WindowRequest) -> Result<ExitCode, WindowEr
 pub fn main(window: OpenWindow) -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        // Help and version are results; only wrong usage is reported as JSON.
-        Err(error) if error.use_stderr() && std::env::args().any(|argument| argument == "--json") => {
+        // Help and version are results; only wrong usage is reported as JSON. Names of files may be no Unicode.
+        Err(error) if error.use_stderr() && std::env::args_os().any(|argument| argument == "--json") => {
             return report::finish(Err(Failure::Usage(error.to_string().trim_end().to_owned())), true, "");
         }
         Err(error) => {

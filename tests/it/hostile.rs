@@ -3,6 +3,8 @@
 //!
 //! The cases are made here; those of the test data are replayed beside them.
 
+mod memory;
+
 use std::{
     fmt::Write as _,
     fs,

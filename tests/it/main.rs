@@ -22,6 +22,8 @@ mod cli_face;
 mod cli_face_parts;
 #[cfg(feature = "cli")]
 mod cli_limits;
+#[cfg(all(feature = "cli", unix))]
+mod cli_names;
 #[cfg(feature = "cli")]
 mod cli_outputs;
 #[cfg(feature = "cli")]

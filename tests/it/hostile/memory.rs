@@ -1,0 +1,136 @@
+//! Memory of commands on formats other than meshes and templates: weights, clips, projects, lists of gestures, and the
+//! meshes of fits and faces.
+
+use std::{f64::consts::PI, fmt::Write as _, fs, path::Path};
+
+use super::{json_answer, memory_allowance, skeleton};
+
+/// A ball of quads: `count` rings of `count` points.
+fn ball(count: usize) -> String {
+    let mut text = String::new();
+    for ring in 0..=count {
+        for at in 0..count {
+            let (down, around) = (PI * ring as f64 / count as f64, 2.0 * PI * at as f64 / count as f64);
+            let (radius, height) = (down.sin(), down.cos());
+            let _ = writeln!(text, "v {:.4} {height:.4} {:.4}", radius * around.cos(), radius * around.sin());
+        }
+    }
+    let point = |ring: usize, at: usize| ring * count + at % count + 1;
+    for ring in 0..count {
+        for at in 0..count {
+            let [a, b] = [point(ring, at), point(ring, at + 1)];
+            let [c, d] = [point(ring + 1, at + 1), point(ring + 1, at)];
+            let _ = writeln!(text, "f {a} {b} {c} {d}");
+        }
+    }
+    text
+}
+
+/// A clip with one track of many keys, of the joint that [`template`] has.
+fn long_clip(keys: usize) -> String {
+    let key = |number: usize| format!("(t: {:.3}, v: (0, 0, {}))", number as f64 / 1000.0, number % 7);
+    let keys: Vec<String> = (0..keys).map(key).collect();
+    format!(
+        "(format: 1, rig: \"0000000000000099\", rig_name: \"n\", clips: [(uid: \"00000000c11b0001\", name: \"c\", \
+         frame_rate: 30.0, range: (0.0, 10.0), layers: [(uid: \"00000000c11b0002\", name: \"Base\", tracks: [(node: \
+         \"0000000000001001\", property: Translation, keys: [{}])])])])",
+        keys.join(", ")
+    )
+}
+
+fn template() -> String {
+    "(format: 2, name: \"n\", joints: [(uid: \"0000000000001001\", label: \"j\", translation: (0, 0.1, 0))])".to_owned()
+}
+
+/// A project whose rig is a chain of joints.
+fn project(joints: usize) -> String {
+    let joint = |number: usize| {
+        let uid = |number: usize| format!("\"{:016x}\"", 0x1001 + number);
+        let parent = number.checked_sub(1).map(|above| format!("parent: {}, ", uid(above))).unwrap_or_default();
+        format!("(uid: {}, label: \"j{number}\", {parent}translation: (0.0, 0.1, 0.0)),\n", uid(number))
+    };
+    let list: String = (0..joints).map(joint).collect();
+    format!(
+        "(format: 6, name: \"long\", meshes: [], rigs: [(rig: (format: 1, uid: \"00000000000000a0\", name: \"chain\", \
+         version: \"\", kind: \"\", author: \"\", description: \"\", joint_count: {joints}, features: [], groups: [], \
+         joints: [\n{list}]), skins: [], pose: [], poses: [], parts: [], faces: [])], templates: [], \
+         view: (mode: \"\", shading: \"\", switches: {{}}, graph: {{}}))"
+    )
+}
+
+/// A stroke of many points, and clicks all over the ball.
+fn gestures() -> [(&'static str, String); 2] {
+    let point = |number: usize, side: usize| {
+        let [x, y] = [number % side, number / side].map(|at| at as f64 / side as f64 - 0.5);
+        format!("({x:.3}, {y:.3})")
+    };
+    let stroke: Vec<String> = (0..20_000).map(|number| point(number, 200)).collect();
+    let clicks: Vec<String> = (0..400).map(|number| format!("Click({})", point(number, 20))).collect();
+    [
+        ("stroke.ron", format!("[Stroke(points: [{}], joints: 5)]", stroke.join(", "))),
+        ("clicks.ron", format!("[{}]", clicks.join(", "))),
+    ]
+}
+
+/// Runs commands, of which each ends with a result, within the memory that the files before it allow.
+fn check(folder: &Path, cases: &[(&[&str], &[&str])]) {
+    for (files, args) in cases {
+        let size: u64 = files.iter().map(|file| fs::metadata(folder.join(file)).unwrap().len()).sum();
+        let (ended, answer) = json_answer(folder, args);
+        assert_eq!(ended.code, Some(0), "{args:?}: {answer:.600}");
+        let allowance = memory_allowance(size);
+        assert!(ended.memory <= allowance, "{args:?}: {} KiB of {}", ended.memory >> 10, allowance >> 10);
+    }
+}
+
+#[test]
+fn weights_clips_and_projects_stay_within_their_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: String| fs::write(folder.path().join(name), text).unwrap();
+    write("two.rig", skeleton(2, true));
+    write("ball.obj", ball(100));
+    write("box.obj", crate::cli::BOX.to_owned());
+    write("j.rig.ron", template());
+    write("long.anim.ron", long_clip(50_000));
+    write("chain.rigsmith.ron", project(3_000));
+    let (clip, weights, shot) = ("long.anim.ron", "ball.skin", "chain.rigsmith.ron");
+    check(
+        folder.path(),
+        &[
+            (&["ball.obj"], &["skin", "two.rig", "ball.obj", "-o", weights]),
+            (&[weights], &["info", weights]),
+            (&[weights], &["check", weights]),
+            (&["ball.obj", weights], &["skin", "two.rig", "ball.obj", "--weights-from", weights, "-o", "a.glb"]),
+            (&["box.obj", weights], &["skin", "two.rig", "box.obj", "--weights-from", weights, "-o", "b.glb"]),
+            (&[clip], &["info", clip]),
+            (&[clip], &["check", clip]),
+            (&[clip], &["animate", "j.rig.ron", clip, "-o", "c.anim.ron"]),
+            (&[clip], &["animate", "j.rig.ron", clip, "-o", "c.glb"]),
+            (&[clip], &["animate", "j.rig.ron", clip, "-o", "c.rigclip"]),
+            (&[shot], &["info", shot]),
+            (&[shot], &["check", shot]),
+            (&[shot], &["pose", shot, "-o", "posed.rig.ron"]),
+        ],
+    );
+}
+
+#[test]
+fn sketches_fits_and_faces_stay_within_their_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("ball.obj"), ball(100)).unwrap();
+    for (name, text) in gestures() {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models");
+    fs::copy(models.join("biped.obj"), folder.path().join("body.obj")).unwrap();
+    check(
+        folder.path(),
+        &[
+            (&["ball.obj", "stroke.ron"], &["sketch", "ball.obj", "stroke.ron", "-o", "a.rig.ron"]),
+            (&["ball.obj", "stroke.ron"], &["sketch", "ball.obj", "stroke.ron", "-o", "a.glb"]),
+            (&["ball.obj", "clicks.ron"], &["sketch", "ball.obj", "clicks.ron", "-o", "b.glb"]),
+            (&["ball.obj"], &["face", "ball.obj", "--whole", "-o", "c.glb"]),
+            (&["body.obj"], &["fit", "body.obj", "--template", "biped", "-o", "d.rig.ron"]),
+        ],
+    );
+}
