@@ -133,8 +133,7 @@ impl Plugin for EditorPlugin {
         .add_plugins((
             (super::tools::ToolsPlugin, super::actions::ActionsPlugin),
             SettingsPlugin,
-            KeysPlugin,
-            PointerPlugin,
+            (KeysPlugin, PointerPlugin),
             DockPlugin,
             CameraPlugin,
             ScreenPlugin,
