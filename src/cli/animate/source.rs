@@ -5,7 +5,7 @@ use std::{collections::HashMap, path::Path, sync::Arc};
 use serde_json::{Map, Value, json};
 
 use super::{
-    AnimateArgs,
+    AnimateArgs, bake_settings,
     choice::{Choice, ClipFileError, GivenMap, check_rate},
     size_of, tolerance,
 };
@@ -209,8 +209,8 @@ fn on_joints(args: &AnimateArgs, clip: &RigClip, rig: &Rig, whole: &Workbench) -
     let nodes: Vec<BakedNode> = rig.walk().map(node).collect();
     let size = size_of(rig.rest_globals().iter().map(|(_, at)| at.translation.into()));
     let program = whole.runtime()?.state().program();
-    let rate = args.fps.unwrap_or(clip.frame_rate);
-    let baked = spinning("baking", || bake_clip(program, clip, &nodes, rate, &tolerance(args, size)))
+    let settings = bake_settings(args.fps.unwrap_or(clip.frame_rate), tolerance(args, size));
+    let baked = spinning("baking", || bake_clip(program, clip, &nodes, &settings))
         .map_err(|source| ClipFileError::Bake { clip: clip.name.clone(), source })?;
     let joints: Vec<Option<Uid>> = places.into_iter().map(Some).collect();
     Ok(rig_clip(rig, &clip.name, &baked, &joints))
