@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Bytes of memory that a block takes, about, while it is reduced to keys.
-const BLOCK_BYTES: usize = 16 << 20;
+const BLOCK_BYTES: usize = 12 << 20;
 /// Bytes of a frame of a part that moves: its value, that of its curve, and what of its tolerance is left and used.
 const PART_BYTES: usize = 48;
 /// Bytes of a frame of a node: its place.
