@@ -403,3 +403,25 @@ fn describe_map(map: &JointMap, motion: &Motion, rig: &Rig, report: &mut Report)
         ("unmapped_target".to_owned(), to.into()),
     ])
 }
+
+#[cfg(test)]
+mod tests {
+    use bevy::diagnostic::FrameCount;
+
+    use super::*;
+
+    #[test]
+    fn clips_of_a_file_take_one_frame_of_the_app() {
+        let mut bench = limits::empty_workbench("n");
+        let frames = |bench: &mut Workbench| bench.app_mut().world().resource::<FrameCount>().0;
+        let clip = |number: u64| {
+            let text = number.to_string();
+            let uid = |kind: &str| Uid::derived([kind, text.as_str()]);
+            RigClip::new(uid("clip"), uid("layer"), "walk")
+        };
+        let before = frames(&mut bench);
+        let Ok(added) = add_all(&mut bench, (0..300).map(clip).collect()) else { panic!("no clip is refused") };
+        assert_eq!(frames(&mut bench) - before, 1);
+        assert_eq!((added.len(), added[299].name.as_str()), (300, "walk 300"));
+    }
+}
