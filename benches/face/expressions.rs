@@ -144,8 +144,8 @@ pub fn print_bake(name: &str, bench: &Workbench, bones: usize) -> Result<(), Box
         let matrix = |joint| Affine3A::from(rig.posed_global(joint)) * Affine3A::from(rig.rest_global(joint)).inverse();
         let matrices: Vec<Affine3A> = skin.joints.iter().map(|joint| matrix(*joint)).collect();
         skin_points(rest, &weights, &matrices, &mut posed);
-        for ((posed, rest), offset) in posed.iter().zip(rest).zip(&shape.offsets) {
-            let distance = (*posed - *rest).distance(*offset);
+        for ((posed, rest), point) in posed.iter().zip(rest).zip(0..) {
+            let distance = (*posed - *rest).distance(shape.offset(point));
             if distance > furthest {
                 (furthest, worst) = (distance, shape.name.as_str());
             }

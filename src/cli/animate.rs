@@ -33,7 +33,7 @@ use crate::{
         skeleton_preset::{SkeletonPreset, apply_preset},
     },
     solve::{
-        bake_clip::{BakedNode, bake_clip},
+        bake_clip::{BakeSettings, BakedNode, bake_clip},
         retarget::{MotionTarget, RetargetError},
     },
 };
@@ -345,7 +345,7 @@ fn exported(
     for clip in clips {
         limits::check_time("baking the clips")?;
         let rate = args.fps.unwrap_or(clip.frame_rate);
-        let done = bake_clip(program, clip, &nodes, rate, &tolerance)
+        let done = bake_clip(program, clip, &nodes, &bake_settings(rate, tolerance))
             .map_err(|error| Failure::Input(format!("clip \"{}\": {error}", clip.name).into()))?;
         let keys: usize = done.channels.iter().map(|channel| channel.times.len()).sum();
         report.line(format!(
@@ -392,6 +392,11 @@ fn size_of(places: impl Iterator<Item = Vec3A> + Clone) -> f32 {
 /// Tolerance of baking for a figure of a size; the usual one is for humans in metres.
 fn tolerance(args: &AnimateArgs, size: f32) -> KeyTolerance {
     KeyTolerance::default().scaled(args.tolerance.map_or(1.0, |most| most / 0.05)).for_height(size)
+}
+
+/// Manner of baking at a rate, within the limit of this process.
+fn bake_settings(rate: f32, tolerance: KeyTolerance) -> BakeSettings {
+    BakeSettings { rate, tolerance, most: limits::chosen().get(limits::Limit::Baked) }
 }
 
 /// Gives the model the names and axes of another program.

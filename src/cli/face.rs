@@ -24,7 +24,7 @@ use crate::{
         bones::FaceBoneKind,
         expression::{ExpressionSet, MAX_STRENGTH},
     },
-    files::{FileKind, RealDisk, load_shapes, stem, store_model, store_rig},
+    files::{FileKind, RealDisk, load_shapes, stem, store_model, store_owned_model, store_rig},
     headless::Workbench,
     mesh::{
         model::{Channel, ChannelTarget, Clip, Interpolation, Model, Morph},
@@ -169,7 +169,7 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
         }
         OutputKind::Character => {
             let fit = fitted.as_ref().map(|shapes| (&**shapes, placed.points[0]));
-            write_character(args, &bench, &shapes, fit, &mut report)?;
+            write_character(args, &bench, shapes, fit, &mut report)?;
         }
         OutputKind::Picture => picture(args, &bench, &mut report)?,
     }
@@ -214,28 +214,34 @@ fn bake_arkit(
 fn write_character(
     args: &FaceArgs,
     bench: &Workbench,
-    shapes: &[FaceShape],
+    shapes: Vec<FaceShape>,
     fit: Option<(&Shapes, usize)>,
     report: &mut Report,
 ) -> Result<(), Failure> {
     let mut model = bench.character();
-    add_morphs(&mut model, shapes);
+    add_morphs(&mut model, &shapes);
+    drop(shapes);
     model.clips.extend(clips(bench.rig()));
     pose(&mut model.nodes, bench.rig());
     let settings = args.export.settings();
     let meta = args.vrm.meta(bench.rig(), &args.output)?;
-    let is_avatar = meta.is_some();
+    // Another pose, and clips of ARKit of the same names, would be measured.
+    let is_plain = args.expression.is_empty() && !args.arkit && meta.is_none();
+    let mut plain_model = None;
     match meta {
         Some(meta) => {
             let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
             draft.store(&mut model, meta, &args.output, &settings, report)?;
         }
-        None => report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?),
+        None if is_plain => {
+            report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);
+            plain_model = Some(model);
+        }
+        None => report.notes(spinning("writing", || store_owned_model(&RealDisk, &args.output, model, &settings))?),
     }
-    // Another pose, and clips of ARKit of the same names, would be measured.
-    let is_plain = args.expression.is_empty() && !args.arkit && !is_avatar;
     let placed_face = bench.placed_face().filter(|_| is_plain);
-    if let (Some((shapes, points)), Some(mesh), Some(face)) = (fit, bench.mesh(), placed_face) {
+    if let (Some(model), Some((shapes, points)), Some(mesh), Some(face)) = (plain_model, fit, bench.mesh(), placed_face)
+    {
         let head: Vec<usize> = (0..points).map(|point| face.analysis.mesh_point(point)).collect();
         let rest = &mesh.rest.points;
         let error = spinning("reading back", || fit_error::fit_error(&args.output, &model, rest, shapes, &head))?;
@@ -322,10 +328,9 @@ fn tell_kept_morphs(bench: &Workbench, shapes: &[FaceShape], report: &mut Report
 /// Adds shapes as morph targets to the objects that they move. Targets that an object has already stay as they are.
 fn add_morphs(model: &mut Model, shapes: &[FaceShape]) {
     for object in 0..model.objects.len() {
-        let offset = |shape: &FaceShape, point: u32| shape.offsets.get(point as usize).copied().unwrap_or_default();
         let mut parts: Vec<_> = model.parts.iter_mut().filter(|part| part.object == object).collect();
         let moves = |shape: &FaceShape| {
-            parts.iter().flat_map(|part| &part.vertices).any(|point| offset(shape, *point) != Vec3::ZERO)
+            parts.iter().flat_map(|part| &part.vertices).any(|point| shape.offset(*point) != Vec3::ZERO)
         };
         if !shapes.iter().any(moves) {
             continue;
@@ -333,7 +338,11 @@ fn add_morphs(model: &mut Model, shapes: &[FaceShape]) {
         let object = &mut model.objects[object];
         for shape in shapes.iter().filter(|shape| !object.morph_names.contains(&shape.name)).collect::<Vec<_>>() {
             for part in &mut parts {
-                let positions = part.vertices.iter().map(|point| offset(shape, *point)).collect();
+                let mut positions: Vec<Vec3> = part.vertices.iter().map(|point| shape.offset(*point)).collect();
+                // A part that stays where it is has no list of zeros.
+                if positions.iter().all(|offset| *offset == Vec3::ZERO) {
+                    positions = Vec::new();
+                }
                 part.morphs.push(Morph { positions, ..Morph::default() });
             }
             object.morph_names.push(shape.name.clone());

@@ -107,6 +107,11 @@ pub(super) fn check_project(path: &Path, project: &LoadedProject) -> Result<(), 
     })
 }
 
+/// Refuses more frames than pass for springs.
+pub(super) fn check_frames(path: &Path, count: u32) -> Result<(), LimitError> {
+    chosen().check_frames(&path.display().to_string(), count)
+}
+
 /// Refuses a list with more gestures than are taken, or with a stroke of more points.
 pub(super) fn check_gestures(path: &Path, gestures: &[Gesture]) -> Result<(), LimitError> {
     chosen().check_gestures(&path.display().to_string(), gestures)

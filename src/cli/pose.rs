@@ -109,7 +109,7 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     let inputs: Vec<&Path> =
         [Some(&args.rig), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
     args.in_place.check(&inputs, args.output.as_deref(), &[])?;
-    let writes = parsed(&args.steps)?;
+    let writes = parsed(&args.steps, &args.rig)?;
     if args.mesh.is_some() && (kind == Some(Some(FileKind::Template)) || kind.is_none()) {
         return Err(Failure::Usage(
             "--mesh is for a character or a picture; write one with -o NAME.glb or .png".to_owned(),
@@ -143,8 +143,9 @@ fn is_png(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"))
 }
 
-/// Parsed values of `--set`.
-pub(super) fn parsed(steps: &PoseSteps) -> Result<Vec<ControlWrite>, Failure> {
+/// Parsed values of `--set` for the rig of a file; refuses more frames than are taken before anything is built.
+pub(super) fn parsed(steps: &PoseSteps, rig: &Path) -> Result<Vec<ControlWrite>, Failure> {
+    limits::check_frames(rig, steps.frames)?;
     steps.set.iter().map(|text| Ok(text.parse::<ControlWrite>()?)).collect()
 }
 

@@ -162,7 +162,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
     let mut state = None;
     let is_built = args.build || !args.steps.is_empty();
     if is_built {
-        let writes = pose::parsed(&args.steps)?;
+        let writes = pose::parsed(&args.steps, &args.file)?;
         if scene.rig.walk().all(|joint| joint.data.tags.is_empty()) {
             report.notes.push("the file has no commands, so nothing is built and there are no controls".to_owned());
         }

@@ -28,8 +28,21 @@ use crate::{
     solve::packed_clip::PackedSkeleton,
 };
 
+/// Counts of points and triangles of a model.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ModelCounts {
+    points: usize,
+    triangles: usize,
+}
+
+/// Counts that a model has after it is written and read.
+pub(super) fn counts_of(model: &Model) -> ModelCounts {
+    let triangles = model.parts.iter().map(|part| part.triangles.len()).sum();
+    ModelCounts { points: model.points.len(), triangles }
+}
+
 /// Reads back a model before it is saved, and compares the counts of its content.
-pub(super) fn model(set: &FileSet, model: &Model) -> Result<(), StoreError> {
+pub(super) fn model(set: &FileSet, written: ModelCounts) -> Result<(), StoreError> {
     let path = set.path();
     let is_obj = FileKind::of(path) == Some(FileKind::Obj);
     let read = || {
@@ -48,11 +61,11 @@ pub(super) fn model(set: &FileSet, model: &Model) -> Result<(), StoreError> {
         true => Ok(()),
         false => Err(StoreError::Lost { path: path.into(), what, written, read }),
     };
-    let triangles = |model: &Model| model.parts.iter().map(|part| part.triangles.len()).sum::<usize>();
+    let read = counts_of(&back);
     if is_obj {
-        same("points", model.points.len(), back.points.len())?;
+        same("points", written.points, read.points)?;
     }
-    same("triangles", triangles(model), triangles(&back))?;
+    same("triangles", written.triangles, read.triangles)?;
     same("finite points", back.points.len(), back.points.iter().filter(|point| point.is_finite()).count())
 }
 

@@ -23,7 +23,7 @@ use crate::{
     mesh::model::Model,
     processor::BuildLimits,
     rig::{Rig, animation::motion::Motion, text::RigText},
-    solve::packed_clip::PackedSkeleton,
+    solve::{bake_clip::MOST_TRANSFORMS, packed_clip::PackedSkeleton},
 };
 
 /// Limit that can be set.
@@ -57,13 +57,17 @@ pub enum Limit {
     Message,
     /// Bytes of the unpacked clips of a file, beyond [`UNPACKED_FOR_A_BYTE`] for each byte of the file.
     Unpacked,
+    /// Frames that pass for springs.
+    Frames,
+    /// Transforms of a clip that is baked: one for each frame and node.
+    Baked,
 }
 
 /// Bytes of unpacked clips that are taken for each byte of their file.
 pub const UNPACKED_FOR_A_BYTE: u64 = 12;
 
 /// Name, value and meaning of each limit, in the order of [`Limit`].
-const LIMITS: [(Limit, &str, u64, &str); 14] = [
+const LIMITS: [(Limit, &str, u64, &str); 16] = [
     (Limit::Joints, "joints", 500_000, "joints of a rig"),
     (Limit::Nodes, "nodes", 16_384, "nodes and constraints that the commands of a rig make"),
     (Limit::Attributes, "attributes", 1_024, "attributes of one node"),
@@ -78,6 +82,8 @@ const LIMITS: [(Limit, &str, u64, &str); 14] = [
     (Limit::Notes, "notes", 200, "notes of one command"),
     (Limit::Message, "message", 1_500, "characters of one note or error"),
     (Limit::Unpacked, "unpacked", 40_000_000, "bytes of the unpacked clips of a file, beyond 12 for each of its bytes"),
+    (Limit::Frames, "frames", 1_000_000, "frames of a sixtieth of a second that pass for springs"),
+    (Limit::Baked, "baked", MOST_TRANSFORMS, "transforms of a baked clip, one for each frame and node"),
 ];
 
 impl Limit {
@@ -243,6 +249,14 @@ impl RigLimits {
         let for_file = UNPACKED_FOR_A_BYTE.saturating_mul(packed.to_bytes().len() as u64);
         let limit = self.get(Limit::Unpacked).saturating_add(for_file);
         self.check_against(limit, Limit::Unpacked, count, file, "the motion")
+    }
+
+    /// Refuses more frames than pass for springs.
+    ///
+    /// # Errors
+    /// [`LimitError`].
+    pub fn check_frames(&self, file: &str, count: u32) -> Result<(), LimitError> {
+        self.check_against(self.get(Limit::Frames), Limit::Frames, u64::from(count), file, "the pose")
     }
 
     /// Refuses a skeleton of a text with more joints than are taken.

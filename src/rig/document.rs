@@ -41,6 +41,8 @@ pub struct Rig {
     pub(super) values: AttributeValues,
     pub(super) poses: Vec<StoredPose>,
     pub(super) clips: Vec<RigClip>,
+    /// Uids of all clips and layers, so that a clip is added without a search among the others.
+    pub(super) clip_uids: HashSet<Uid>,
     /// Parts that were dropped onto joints, and that the rig's file may not have yet.
     pub(super) dropped: Vec<DroppedPart>,
     pub(super) sets: Vec<SelectionSet>,
@@ -174,7 +176,7 @@ impl Rig {
             || self.group(uid).is_some()
             || self.input(uid).is_some()
             || self.stored_pose(uid).is_some()
-            || self.clips.iter().any(|clip| clip.uid == uid || clip.layer(uid).is_some())
+            || self.clip_uids.contains(&uid)
     }
 
     /// The number of joints.

@@ -1,43 +1,102 @@
 //! Clips baked into transforms of nodes, for files that have neither controls nor constraints.
 
+mod blocks;
+
 use std::sync::Arc;
 
-use super::{
-    program::{RigProgram, RigState},
-    reduction::{SampledNode, reduce_skeleton},
-};
+use super::program::{RigProgram, RigState};
 use crate::{
     mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Trs},
     rig::{
         Uid,
-        animation::{Key, Property, RigClip, SampledPose, TrackTarget, clip_extras::ClipExtras, file_clip::channel_of},
+        animation::{
+            Property, RigClip, SampledPose, TrackTarget,
+            clip_extras::{ClipExtras, MAX_MARKERS},
+            file_clip::channel_of,
+        },
         operations::KeyTolerance,
     },
 };
 
-/// Most frames of a baked clip.
-const MOST_FRAMES: usize = 1_000_000;
+pub(super) use blocks::{JoinedKeys, PlayedClip, reduced_keys};
 
-/// Most transforms of a baked clip: one for each frame and node.
-pub const MOST_TRANSFORMS: usize = 8 << 20;
+/// Most frames of a baked clip.
+const MOST_FRAMES: u64 = 1_000_000;
+
+/// Most transforms of a baked clip where nobody sets another limit: one for each frame and node.
+pub const MOST_TRANSFORMS: u64 = 8 << 20;
+
+/// Manner of baking a clip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BakeSettings {
+    /// Frames a second.
+    pub rate: f32,
+    /// Differences that the removal of keys may leave.
+    pub tolerance: KeyTolerance,
+    /// Most transforms: one for each frame and node.
+    pub most: u64,
+}
+
+impl BakeSettings {
+    /// Baking at a rate, of up to [`MOST_TRANSFORMS`].
+    pub fn new(rate: f32, tolerance: KeyTolerance) -> Self {
+        Self { rate, tolerance, most: MOST_TRANSFORMS }
+    }
+}
 
 /// Reason for not baking a clip.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum BakeError {
-    /// More frames than there is memory for.
+    /// More frames than any clip has.
     #[error(
-        "the clip has {frames} frames at {rate} frames a second, and no more than {most} are baked for {nodes} nodes; \
-         shorten its range, or bake fewer frames a second"
+        "the clip has {frames} frames at {rate} frames a second, and no more than {highest} are baked; shorten its range, \
+         or bake fewer frames a second",
+        highest = MOST_FRAMES
     )]
     TooLong {
         /// Number of frames.
         frames: u64,
         /// Frames a second.
         rate: f32,
-        /// Largest number of frames.
-        most: usize,
+    },
+    /// More transforms than the limit.
+    #[error(
+        "the clip has {frames} frames at {rate} frames a second, which are {transforms} transforms of {nodes} nodes, and \
+         no more than {most} are baked; shorten its range, bake fewer frames a second, or raise the limit: --limit \
+         baked={transforms}"
+    )]
+    TooMuch {
+        /// Number of frames.
+        frames: u64,
+        /// Frames a second.
+        rate: f32,
         /// Number of nodes.
-        nodes: usize,
+        nodes: u64,
+        /// Number of transforms: one for each frame and node.
+        transforms: u64,
+        /// Value of the limit.
+        most: u64,
+    },
+    /// More markers than a file of animations holds.
+    #[error(
+        "the clip has {count} markers, and no more than {highest} are read from a file of animations; delete some, or \
+         split the clip",
+        highest = MAX_MARKERS
+    )]
+    Markers {
+        /// Number of markers.
+        count: usize,
+    },
+    /// Names that a packed clip does not hold.
+    #[error(
+        "the names of the clip and its markers take {bytes} bytes, and a packed clip holds no more than {most}; shorten \
+         them, or delete markers"
+    )]
+    Names {
+        /// Bytes of the names.
+        bytes: usize,
+        /// Largest number of bytes.
+        most: usize,
     },
 }
 
@@ -77,16 +136,17 @@ pub fn strike(state: &mut RigState, pose: &SampledPose) {
 ///
 /// Time starts at zero with the clip. Takes some tens of microseconds a frame for a character.
 ///
+/// A clip that does not move for long takes little memory, and a long one no more than some blocks of its frames.
+///
 /// # Errors
-/// A clip with more frames than there is memory for: see [`MOST_TRANSFORMS`].
+/// A clip with more frames or transforms than [`BakeSettings`] allows, or with more markers than files hold.
 pub fn bake_clip(
     program: &Arc<RigProgram>,
     clip: &RigClip,
     nodes: &[BakedNode],
-    rate: f32,
-    tolerance: &KeyTolerance,
+    settings: &BakeSettings,
 ) -> Result<Clip, BakeError> {
-    let (times, sampled) = sample_nodes(program, clip, nodes, rate)?;
+    let times = frame_times(clip, nodes.len(), settings)?;
     let properties = [Property::Translation, Property::Rotation, Property::Scale];
     let channel = |at: usize, property: &Property| {
         let base = plain_base(program, nodes, at)?;
@@ -95,20 +155,24 @@ pub fn bake_clip(
         if clip.layers.iter().any(|layer| layer.tracks.contains_key(&track)) {
             return channel_of(clip, node, property, &base, target);
         }
-        let key = Key { value: part_of(&base, property), ..Key::number(0.0, 0.0) };
-        Some(keyed_channel(target, property.width(), &[key]))
+        Some(constant_channel(target, &part_of(&base, property)[..property.width()]))
     };
     let mut direct: Vec<[Option<Channel>; 3]> =
         (0..nodes.len()).map(|at| std::array::from_fn(|part| channel(at, &properties[part]))).collect();
     let fixed: Vec<[bool; 3]> = direct.iter().map(|parts| std::array::from_fn(|part| parts[part].is_some())).collect();
-    let keys = reduce_skeleton(&times, &sampled, &fixed, tolerance);
-    let extras = Some(ClipExtras::of(clip, rate).written());
+    // Nothing is played where all parts have their keys already.
+    let keys: Vec<[JoinedKeys; 3]> = if fixed.as_flattened().iter().all(|is_fixed| *is_fixed) {
+        vec![Default::default(); nodes.len()]
+    } else {
+        reduced_keys(PlayedClip::new(program, clip, nodes, &times), &fixed, &settings.tolerance)
+    };
+    let extras = Some(ClipExtras::of(clip, settings.rate).written());
     let mut baked = Clip { name: clip.name.clone(), extras, ..Clip::default() };
     for (at, (node, mut keys)) in nodes.iter().zip(keys).enumerate() {
         for (part, property) in properties.iter().enumerate() {
             let kept = direct[at][part].take();
             let channel = kept.unwrap_or_else(|| {
-                keyed_channel(channel_target(at, property), property.width(), &std::mem::take(&mut keys[part]))
+                std::mem::take(&mut keys[part]).channel(channel_target(at, property), property.width())
             });
             if !is_at_rest(&channel, &part_of(&node.rest, property)) {
                 baked.channels.push(channel);
@@ -119,44 +183,27 @@ pub fn bake_clip(
     Ok(baked)
 }
 
-/// Transforms of nodes relative to their parents, frame by frame, with the times of the frames.
-pub(super) fn sample_nodes(
-    program: &Arc<RigProgram>,
-    clip: &RigClip,
-    nodes: &[BakedNode],
-    rate: f32,
-) -> Result<(Vec<f32>, Vec<SampledNode>), BakeError> {
-    let mut state = RigState::new(program.clone());
-    let last = (clip.duration() * rate + 1e-3).floor().max(0.0);
-    let most = MOST_FRAMES.min(MOST_TRANSFORMS / nodes.len().max(1));
-    if last >= most as f32 {
-        return Err(BakeError::TooLong { frames: (last as u64).saturating_add(1), rate, most, nodes: nodes.len() });
+/// Seconds of the frames of a clip from its start.
+pub(super) fn frame_times(clip: &RigClip, nodes: usize, settings: &BakeSettings) -> Result<Vec<f32>, BakeError> {
+    let BakeSettings { rate, most, .. } = *settings;
+    if clip.markers.len() > MAX_MARKERS {
+        return Err(BakeError::Markers { count: clip.markers.len() });
     }
-    let count = last as usize;
-    let mut times: Vec<f32> = (0..=count).map(|frame| frame as f32 / rate).collect();
+    let last = (clip.duration() * rate + 1e-3).floor().max(0.0) as u64;
+    let (frames, nodes) = (last.saturating_add(1), nodes as u64);
+    if last >= MOST_FRAMES {
+        return Err(BakeError::TooLong { frames, rate });
+    }
+    let transforms = frames.saturating_mul(nodes);
+    if transforms > most {
+        return Err(BakeError::TooMuch { frames, rate, nodes, transforms, most });
+    }
+    let mut times: Vec<f32> = (0..frames).map(|frame| frame as f32 / rate).collect();
     // The end lies between frames where the rate is not the clip's own.
     if clip.duration() - times.last().copied().unwrap_or_default() > 1e-4 {
         times.push(clip.duration());
     }
-    let mut locals: Vec<Vec<Trs>> = vec![Vec::with_capacity(times.len()); nodes.len()];
-    for time in &times {
-        strike(&mut state, &clip.sample(clip.range[0] + time));
-        let globals: Vec<Option<Trs>> = nodes.iter().map(|node| state.global(node.uid)).collect();
-        for (at, node) in nodes.iter().enumerate() {
-            let local = match (globals[at], node.parent) {
-                (Some(global), None) => global,
-                (Some(global), Some(parent)) => globals[parent].map_or(node.rest, |parent| global.relative_to(&parent)),
-                (None, _) => node.rest,
-            };
-            locals[at].push(local);
-        }
-    }
-    let sampled = nodes
-        .iter()
-        .zip(locals)
-        .map(|(node, locals)| SampledNode { parent: node.parent, locals: same_side(locals, node.rest.rotation) })
-        .collect();
-    Ok((times, sampled))
+    Ok(times)
 }
 
 fn channel_target(at: usize, property: &Property) -> ChannelTarget {
@@ -176,22 +223,9 @@ pub(super) fn part_of(trs: &Trs, property: &Property) -> [f32; 4] {
     }
 }
 
-/// Transforms whose first rotation lies on the side of that at rest.
-fn same_side(mut locals: Vec<Trs>, rest: glam::Quat) -> Vec<Trs> {
-    if let Some(first) = locals.first_mut().filter(|first| first.rotation.dot(rest) < 0.0) {
-        first.rotation = -first.rotation;
-    }
-    locals
-}
-
-/// Channel of linear keys.
-fn keyed_channel(target: ChannelTarget, width: usize, keys: &[Key]) -> Channel {
-    Channel {
-        target,
-        interpolation: Interpolation::Linear,
-        times: keys.iter().map(|key| key.time).collect(),
-        values: keys.iter().flat_map(|key| key.value[..width].iter().copied()).collect(),
-    }
+/// Channel of one key.
+fn constant_channel(target: ChannelTarget, value: &[f32]) -> Channel {
+    Channel { target, interpolation: Interpolation::Linear, times: vec![0.0], values: value.to_vec() }
 }
 
 /// Rest transform of a node that nothing but its own keys moves, relative to the same parent in the rig and in the file.

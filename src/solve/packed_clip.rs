@@ -7,6 +7,7 @@
 //! every frame.
 
 mod bits;
+mod long;
 mod skeleton;
 mod steps;
 mod track;
@@ -22,10 +23,10 @@ use self::{
     track::{PackedTrack, REST},
 };
 use super::{
-    bake_clip::{BakeError, BakedNode, part_of, sample_nodes},
+    bake_clip::{BakeError, BakeSettings, BakedNode, PlayedClip, frame_times, part_of},
     curve_fit::{fit_lines, sampled},
     program::RigProgram,
-    reduction::{FittedCurve, SampledNode, SampledSkeleton, SampledTrack, fit_within},
+    reduction::{FittedCurve, RestingPart, SampledNode, SampledSkeleton, SampledTrack, fit_within},
 };
 use crate::{
     mesh::model::{Channel, ChannelTarget, Clip, Interpolation, Trs},
@@ -103,17 +104,21 @@ pub enum PackedClipError {
 /// tolerance at every frame.
 ///
 /// # Errors
-/// A clip with more frames than there is memory for.
+/// A clip with more frames or transforms than [`BakeSettings`] allows, or with more markers or longer names than are read back.
 pub fn pack_clip(
     program: &Arc<RigProgram>,
     clip: &RigClip,
     nodes: &[BakedNode],
-    rate: f32,
-    tolerance: &KeyTolerance,
+    settings: &BakeSettings,
 ) -> Result<PackedClip, BakeError> {
-    let (times, sampled) = sample_nodes(program, clip, nodes, rate)?;
-    let rests: Vec<Trs> = nodes.iter().map(|node| node.rest).collect();
+    let times = frame_times(clip, nodes.len(), settings)?;
+    let BakeSettings { rate, tolerance, .. } = settings;
+    let (rate, rests) = (*rate, nodes.iter().map(|node| node.rest).collect::<Vec<Trs>>());
     let extras = ClipExtras::of(clip, rate).written().to_string();
+    let longest = extras.len().max(clip.name.len());
+    if longest > MOST_TEXT {
+        return Err(BakeError::Names { bytes: longest, most: MOST_TEXT });
+    }
     let about = PackedClip {
         name: clip.name.clone(),
         extras,
@@ -123,17 +128,24 @@ pub fn pack_clip(
         node_count: 0,
         tracks: Vec::new(),
     };
-    Ok(about.packed(&times, &sampled, &rests, tolerance))
+    let play = || PlayedClip::new(program, clip, nodes, &times);
+    let mut played = play();
+    let sampled = played.next_block().map(|(_, sampled)| sampled).unwrap_or_default();
+    if played.is_over() {
+        return Ok(about.packed(&times, sampled, &rests, tolerance));
+    }
+    drop(sampled);
+    Ok(about.with_tracks(&rests, long::packed_tracks(play, &times, nodes.len(), tolerance)))
 }
 
 /// Packs the motion of a skeleton of its own, whose joints are within the tolerance at every frame.
 pub fn pack_motion(motion: &Motion, tolerance: &KeyTolerance) -> PackedClip {
     let rests: Vec<Trs> = motion.joints.iter().map(|joint| joint.rest).collect();
     let mut sampled: Vec<SampledNode> =
-        motion.joints.iter().map(|joint| SampledNode { parent: joint.parent, locals: Vec::new() }).collect();
+        motion.joints.iter().map(|joint| SampledNode::new(joint.parent, None)).collect();
     for frame in 0..motion.frames() {
         for (node, local) in sampled.iter_mut().zip(motion.locals(frame)) {
-            node.locals.push(local);
+            node.push(local);
         }
     }
     let rate = 1.0 / motion.frame_time;
@@ -150,7 +162,7 @@ pub fn pack_motion(motion: &Motion, tolerance: &KeyTolerance) -> PackedClip {
     };
     let times: Vec<f32> = (0..frames).map(|frame| about.time(frame)).collect();
     about.duration = times.last().copied().unwrap_or_default();
-    about.packed(&times, &sampled, &rests, tolerance)
+    about.packed(&times, sampled, &rests, tolerance)
 }
 
 impl PackedClip {
@@ -184,12 +196,11 @@ impl PackedClip {
         if frame + 1 >= self.frames { self.duration } else { frame as f32 / self.rate }
     }
 
-    fn packed(mut self, times: &[f32], nodes: &[SampledNode], rests: &[Trs], tolerance: &KeyTolerance) -> Self {
-        self.node_count = nodes.len() as u32;
+    fn packed(self, times: &[f32], nodes: Vec<SampledNode>, rests: &[Trs], tolerance: &KeyTolerance) -> Self {
         if times.is_empty() {
-            return self;
+            return self.with_tracks(rests, Vec::new());
         }
-        let skeleton = SampledSkeleton::new(times.len(), nodes, &vec![[false; 3]; nodes.len()], tolerance);
+        let skeleton = SampledSkeleton::new(times.len(), nodes, &vec![[false; 3]; rests.len()], tolerance);
         let fit = |track: &SampledTrack, tolerance: &[f32]| {
             let for_lines: Vec<f32> = tolerance.iter().map(|most| most * LINES).collect();
             let least = tolerance.iter().copied().fold(f32::MAX, f32::min).max(0.1 * track.tolerance);
@@ -213,12 +224,21 @@ impl PackedClip {
         };
         let found = fit_within(&skeleton.tracks, |samples| skeleton.errors(samples), fit)
             .unwrap_or_else(|| skeleton.tracks.iter().map(exact).collect());
-        for ((node, part), track) in skeleton.owners.iter().zip(found) {
-            let rest = part_of(&rests[*node], &PARTS[*part]);
+        let resting =
+            |RestingPart { node, part, value, .. }: &RestingPart| ((*node, *part), PackedTrack::Constant(*value));
+        let tracks = skeleton.owners.iter().copied().zip(found).chain(skeleton.resting.iter().map(resting)).collect();
+        self.with_tracks(rests, tracks)
+    }
+
+    /// The clip with tracks of nodes, by node and part; those that stay at rest are left out.
+    fn with_tracks(mut self, rests: &[Trs], tracks: Vec<((usize, usize), PackedTrack)>) -> Self {
+        self.node_count = rests.len() as u32;
+        for ((node, part), track) in tracks {
+            let rest = part_of(&rests[node], &PARTS[part]);
             let is_rest =
                 track.constant().is_some_and(|value| value.iter().zip(&rest).all(|(a, b)| (a - b).abs() < 1e-6));
             if !is_rest {
-                self.tracks.push(NodeTrack { node: *node as u32, part: *part as u8, track });
+                self.tracks.push(NodeTrack { node: node as u32, part: part as u8, track });
             }
         }
         self.tracks.sort_by_key(|own| (own.node, own.part));

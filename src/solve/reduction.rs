@@ -188,38 +188,157 @@ pub fn track_tolerance(property: &Property, reach: f32, tolerance: &KeyTolerance
     }
 }
 
+/// Part of a transform, frame by frame: a translation, rotation or scale. A part that does not change is one value.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SampledPart(Vec<[f32; 4]>);
+
+impl SampledPart {
+    /// Part with a value for each frame, or with one for all.
+    pub(super) fn new(values: Vec<[f32; 4]>) -> Self {
+        Self(values)
+    }
+
+    /// Value at a frame.
+    fn at(&self, frame: usize) -> [f32; 4] {
+        match &self.0[..] {
+            [only] => *only,
+            values => values.get(frame).copied().unwrap_or_default(),
+        }
+    }
+
+    /// Adds a value behind those of `frames` frames.
+    fn push(&mut self, frames: usize, value: [f32; 4]) {
+        match self.0.first().copied() {
+            Some(first) if self.0.len() == 1 && first == value => return,
+            Some(first) => self.0.resize(frames, first),
+            None => {}
+        }
+        self.0.push(value);
+    }
+
+    fn is_moving(&self) -> bool {
+        self.0.len() > 1
+    }
+}
+
 /// Node of a skeleton with its transforms relative to the parent, frame by frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SampledNode {
     /// Place of the parent among the nodes, before the node's own.
     pub parent: Option<usize>,
-    /// Transforms relative to the parent.
-    pub locals: Vec<Trs>,
+    /// Translation, rotation and scale relative to the parent.
+    parts: [SampledPart; 3],
+    /// Rotation at the last frame.
+    turn: Option<Quat>,
+    frames: usize,
+}
+
+impl SampledNode {
+    /// Node without any frame. The first rotation lies on the side of `turn`, if there is one.
+    pub fn new(parent: Option<usize>, turn: Option<Quat>) -> Self {
+        Self { parent, parts: Default::default(), turn, frames: 0 }
+    }
+
+    /// Adds a frame; rotations each lie on the side of the one before.
+    pub fn push(&mut self, local: Trs) {
+        let is_across = self.turn.is_some_and(|turn| local.rotation.dot(turn) < 0.0);
+        let rotation = if is_across { -local.rotation } else { local.rotation };
+        self.turn = Some(rotation);
+        for (part, numbers) in self.parts.iter_mut().zip(numbers_of(&Trs { rotation, ..local })) {
+            part.push(self.frames, numbers);
+        }
+        self.frames += 1;
+    }
+
+    /// Rotation at the last frame.
+    pub fn turn(&self) -> Option<Quat> {
+        self.turn
+    }
+
+    /// Count of parts that change.
+    pub fn moving_parts(&self) -> usize {
+        self.parts.iter().filter(|part| part.is_moving()).count()
+    }
+
+    fn local(&self, frame: usize) -> Trs {
+        transform_of(self.parts.each_ref().map(|part| part.at(frame)))
+    }
+}
+
+/// Translation, rotation and scale of a transform.
+fn numbers_of(local: &Trs) -> [[f32; 4]; 3] {
+    let vector = |v: Vec3| [v.x, v.y, v.z, 0.0];
+    [vector(local.translation), local.rotation.to_array(), vector(local.scale)]
+}
+
+fn transform_of([[x, y, z, _], rotation, [across, up, along, _]]: [[f32; 4]; 3]) -> Trs {
+    Trs { translation: Vec3::new(x, y, z), rotation: Quat::from_array(rotation), scale: Vec3::new(across, up, along) }
+}
+
+/// Keys of a part of a node.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ReducedPart {
+    /// Linear keys; none for a part that is played as it is.
+    pub keys: Vec<Key>,
+    /// Largest difference of a value: degrees for rotations.
+    pub tolerance: f32,
 }
 
 /// Linear keys of the transforms of a skeleton's nodes: translation, rotation and scale. Joints are within the tolerance of
 /// where they were at every frame. `fixed` marks what is played as it is, and gets no keys.
 pub fn reduce_skeleton(
     times: &[f32],
-    nodes: &[SampledNode],
+    nodes: Vec<SampledNode>,
     fixed: &[[bool; 3]],
     tolerance: &KeyTolerance,
-) -> Vec<[Vec<Key>; 3]> {
+) -> Vec<[ReducedPart; 3]> {
+    let mut reduced: Vec<[ReducedPart; 3]> = vec![Default::default(); nodes.len()];
+    let Some(start) = times.first() else { return reduced };
     let skeleton = SampledSkeleton::new(times.len(), nodes, fixed, tolerance);
     let found = reduce_tracks(times, &skeleton.tracks, CurveKind::Linear, |samples| skeleton.errors(samples));
-    let mut keys: Vec<[Vec<Key>; 3]> = vec![Default::default(); nodes.len()];
-    for ((at, part), found) in skeleton.owners.iter().zip(found) {
-        keys[*at][*part] = found;
+    for (((at, part), track), keys) in skeleton.owners.iter().zip(&skeleton.tracks).zip(found) {
+        reduced[*at][*part] = ReducedPart { keys, tolerance: track.tolerance };
     }
-    keys
+    for RestingPart { node, part, value, tolerance } in &skeleton.resting {
+        reduced[*node][*part] = ReducedPart { keys: vec![linear_key((start, value))], tolerance: *tolerance };
+    }
+    reduced
+}
+
+/// True if nodes whose parts have other values are within the tolerance of where they were at every frame.
+pub(super) fn are_near(
+    nodes: &[SampledNode],
+    frames: usize,
+    values: &[[SampledPart; 3]],
+    tolerance: &KeyTolerance,
+) -> bool {
+    (0..frames).into_par_iter().all(|frame| {
+        let wanted = places(nodes, |at| nodes[at].local(frame));
+        let found = places(nodes, |at| transform_of(values[at].each_ref().map(|part| part.at(frame))));
+        errors_of(&found, &wanted, tolerance).iter().all(|error| *error <= 1.0)
+    })
+}
+
+/// Part of a node that does not change.
+pub(super) struct RestingPart {
+    pub node: usize,
+    /// Place of the part in a transform.
+    pub part: usize,
+    pub value: [f32; 4],
+    /// Largest difference of the value.
+    pub tolerance: f32,
 }
 
 /// Tracks of a skeleton, with where they put its nodes.
 pub(super) struct SampledSkeleton<'a> {
-    nodes: &'a [SampledNode],
+    /// Nodes, whose values are in the tracks where they have any.
+    nodes: Vec<SampledNode>,
     tolerance: &'a KeyTolerance,
     truth: Vec<Vec<JointPlace>>,
+    /// Parts that change.
     pub tracks: Vec<SampledTrack>,
+    /// Parts that do not.
+    pub resting: Vec<RestingPart>,
     /// Node and part of the transform of each track.
     pub owners: Vec<(usize, usize)>,
     track_of: Vec<[Option<usize>; 3]>,
@@ -227,29 +346,30 @@ pub(super) struct SampledSkeleton<'a> {
 
 impl<'a> SampledSkeleton<'a> {
     /// Skeleton of so many frames. `fixed` marks what is played as it is.
-    pub fn new(frames: usize, nodes: &'a [SampledNode], fixed: &[[bool; 3]], tolerance: &'a KeyTolerance) -> Self {
+    pub fn new(frames: usize, nodes: Vec<SampledNode>, fixed: &[[bool; 3]], tolerance: &'a KeyTolerance) -> Self {
         let properties = [Property::Translation, Property::Rotation, Property::Scale];
         let truth: Vec<Vec<JointPlace>> =
-            (0..frames).into_par_iter().map(|frame| places(nodes, |at| nodes[at].locals[frame])).collect();
-        let reaches = reaches(nodes, &truth);
-        let mut skeleton = Self {
-            nodes,
-            tolerance,
-            truth,
-            tracks: Vec::new(),
-            owners: Vec::new(),
-            track_of: vec![[None; 3]; nodes.len()],
-        };
-        for (at, node) in nodes.iter().enumerate() {
+            (0..frames).into_par_iter().map(|frame| places(&nodes, |at| nodes[at].local(frame))).collect();
+        let reaches = reaches(&nodes, &truth);
+        let track_of = vec![[None; 3]; nodes.len()];
+        let (tracks, resting, owners) = (Vec::new(), Vec::new(), Vec::new());
+        let mut skeleton = Self { nodes, tolerance, truth, tracks, resting, owners, track_of };
+        for (at, reach) in reaches.into_iter().enumerate() {
             for (part, property) in properties.iter().enumerate().filter(|(part, _)| !fixed[at][*part]) {
                 let reach = match property {
-                    Property::Rotation => reaches[at] * 1.0_f32.to_radians(),
-                    Property::Scale => reaches[at],
+                    Property::Rotation => reach * 1.0_f32.to_radians(),
+                    Property::Scale => reach,
                     Property::Translation | Property::Attribute(_) => 1.0,
                 };
                 let tolerance = track_tolerance(property, reach, tolerance);
+                let sampled = &mut skeleton.nodes[at].parts[part];
+                if !sampled.is_moving() {
+                    let value = sampled.at(0);
+                    skeleton.resting.push(RestingPart { node: at, part, value, tolerance });
+                    continue;
+                }
+                let values = std::mem::take(&mut sampled.0);
                 skeleton.track_of[at][part] = Some(skeleton.tracks.len());
-                let values = values(&node.locals, part);
                 skeleton.tracks.push(SampledTrack { property: property.clone(), values, tolerance });
                 skeleton.owners.push((at, part));
             }
@@ -261,7 +381,7 @@ impl<'a> SampledSkeleton<'a> {
     pub fn errors(&self, samples: &[Vec<[f32; 4]>]) -> Vec<FrameErrors> {
         let at_frame = |frame: usize| {
             let local = |at: usize| {
-                let mut local = self.nodes[at].locals[frame];
+                let mut local = self.nodes[at].local(frame);
                 let value = |part: usize| self.track_of[at][part].map(|track: usize| samples[track][frame]);
                 if let Some([x, y, z, _]) = value(0) {
                     local.translation = Vec3::new(x, y, z);
@@ -274,7 +394,7 @@ impl<'a> SampledSkeleton<'a> {
                 }
                 local
             };
-            let mut errors = errors_of(&places(self.nodes, local), &self.truth[frame], self.tolerance);
+            let mut errors = errors_of(&places(&self.nodes, local), &self.truth[frame], self.tolerance);
             let worst = errors.iter().copied().fold(0.0, f32::max);
             // A node moves those below it.
             for (at, node) in self.nodes.iter().enumerate().rev() {
@@ -286,21 +406,6 @@ impl<'a> SampledSkeleton<'a> {
         };
         (0..self.truth.len()).into_par_iter().map(at_frame).collect()
     }
-}
-
-/// Values of a part of transforms; rotations each lie on the side of the one before.
-fn values(locals: &[Trs], part: usize) -> Vec<[f32; 4]> {
-    let vector = |v: Vec3| [v.x, v.y, v.z, 0.0];
-    let mut last = locals.first().map_or(Quat::IDENTITY, |local| local.rotation);
-    let value = |local: &Trs| match part {
-        0 => vector(local.translation),
-        1 => {
-            last = if local.rotation.dot(last) < 0.0 { -local.rotation } else { local.rotation };
-            last.to_array()
-        }
-        _ => vector(local.scale),
-    };
-    locals.iter().map(value).collect()
 }
 
 fn places(nodes: &[SampledNode], local: impl Fn(usize) -> Trs) -> Vec<JointPlace> {

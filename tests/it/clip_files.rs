@@ -22,7 +22,7 @@ use rigsmith::{
         operations::KeyTolerance,
     },
     solve::{
-        bake_clip::{BakedNode, bake_clip},
+        bake_clip::{BakeSettings, BakedNode, bake_clip},
         program::{CompileOptions, RigProgram},
     },
 };
@@ -101,7 +101,8 @@ fn written(rig: &Rig, model: &Model, joints: &[Uid], clip: &RigClip) -> Vec<u8> 
     let program = Arc::new(RigProgram::compile(&built, &CompileOptions::default()).unwrap());
     let node = |(uid, node): (&Uid, &Node)| BakedNode { uid: *uid, parent: node.parent, rest: node.rest };
     let nodes: Vec<BakedNode> = joints.iter().zip(&model.nodes).map(node).collect();
-    let baked = bake_clip(&program, clip, &nodes, clip.frame_rate, &KeyTolerance::default()).unwrap();
+    let settings = BakeSettings::new(clip.frame_rate, KeyTolerance::default());
+    let baked = bake_clip(&program, clip, &nodes, &settings).unwrap();
     let settings = GltfWriteSettings { all_joints: true, ..GltfWriteSettings::default() };
     write_glb(&Model { clips: vec![baked], ..model.clone() }, &settings).unwrap()
 }

@@ -3,6 +3,7 @@
 //!
 //! The cases are made here; those of the test data are replayed beside them.
 
+mod clips;
 mod memory;
 
 use std::{

@@ -20,7 +20,7 @@ use rigsmith::{
         operations::KeyTolerance,
     },
     solve::{
-        bake_clip::BakedNode,
+        bake_clip::{BakeSettings, BakedNode},
         packed_clip::{PackedClip, PackedClipError, PackedSkeleton, pack_clip, pack_motion},
         program::{CompileOptions, RigProgram},
         retarget::{RetargetSettings, retarget},
@@ -276,7 +276,7 @@ fn captured_motion_takes_a_twentieth() {
         rest: joint.data.rest.into(),
     };
     let nodes: Vec<BakedNode> = joints.iter().map(node).collect();
-    let packed = pack_clip(&program, &clip, &nodes, 30.0, &KeyTolerance::captured()).unwrap();
+    let packed = pack_clip(&program, &clip, &nodes, &BakeSettings::new(30.0, KeyTolerance::captured())).unwrap();
     let bytes = packed.to_bytes().len();
     let ratio = whole(nodes.len(), packed.frames()) as f32 / bytes as f32;
     println!("the biped's {} joints at 30 frames a second: {bytes} bytes, {ratio:.1} : 1", nodes.len());

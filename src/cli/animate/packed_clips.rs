@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::{AnimateArgs, reduction, size_of, tolerance};
+use super::{AnimateArgs, bake_settings, reduction, size_of, tolerance};
 use crate::{
     cli::{Failure, Report, limits, progress::spinning, report::counted},
     files::{RealDisk, store_packed_clips},
@@ -28,7 +28,8 @@ pub(super) fn store(
     for clip in clips {
         limits::check_time("packing the clips")?;
         let rate = args.fps.unwrap_or(clip.frame_rate);
-        let done = spinning("packing", || pack_clip(program, clip, &nodes, rate, &tolerance))
+        let settings = bake_settings(rate, tolerance);
+        let done = spinning("packing", || pack_clip(program, clip, &nodes, &settings))
             .map_err(|error| Failure::Input(format!("clip \"{}\": {error}", clip.name).into()))?;
         // Without packing, each joint had a translation, a rotation and a scale of four bytes a number at each frame.
         let (before, after) = (done.frames() * nodes.len() * 10 * 4, done.to_bytes().len());

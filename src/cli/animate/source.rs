@@ -1,11 +1,11 @@
 //! Files of motion: clips of rigs, motion capture, and the animations of models, as clips of the rig.
 
-use std::{path::Path, sync::Arc};
+use std::{collections::HashMap, path::Path, sync::Arc};
 
 use serde_json::{Map, Value, json};
 
 use super::{
-    AnimateArgs,
+    AnimateArgs, bake_settings,
     choice::{Choice, ClipFileError, GivenMap, check_rate},
     size_of, tolerance,
 };
@@ -128,6 +128,7 @@ impl ClipCollector<'_> {
         if bound.clips.is_empty() {
             return Err(ClipFileError::Empty { path: path.to_owned() }.into());
         }
+        let mut taken = Vec::new();
         for mut clip in bound.clips {
             if !self.choice.takes(&clip.name) {
                 continue;
@@ -147,8 +148,9 @@ impl ClipCollector<'_> {
             }
             clip.looped |= self.args.looped;
             clip.frame_rate = self.args.fps.unwrap_or(clip.frame_rate);
-            self.added.push(add(bench, clip)?);
+            taken.push(clip);
         }
+        self.added.extend(add_all(bench, taken)?);
         Ok(())
     }
 
@@ -198,25 +200,29 @@ const SHOWN: usize = 12;
 /// A clip of a rig with commands, baked onto its joints alone; `None` if no joint moves.
 fn on_joints(args: &AnimateArgs, clip: &RigClip, rig: &Rig, whole: &Workbench) -> Result<Option<RigClip>, Failure> {
     let places: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
+    let place_of: HashMap<Uid, usize> = places.iter().copied().zip(0..).collect();
     let node = |joint: &crate::rig::RigJoint| BakedNode {
         uid: joint.data.uid,
-        parent: joint.parent.and_then(|parent| places.iter().position(|uid| *uid == parent)),
+        parent: joint.parent.and_then(|parent| place_of.get(&parent).copied()),
         rest: joint.data.rest.into(),
     };
     let nodes: Vec<BakedNode> = rig.walk().map(node).collect();
     let size = size_of(rig.rest_globals().iter().map(|(_, at)| at.translation.into()));
     let program = whole.runtime()?.state().program();
-    let rate = args.fps.unwrap_or(clip.frame_rate);
-    let baked = spinning("baking", || bake_clip(program, clip, &nodes, rate, &tolerance(args, size)))
+    let settings = bake_settings(args.fps.unwrap_or(clip.frame_rate), tolerance(args, size));
+    let baked = spinning("baking", || bake_clip(program, clip, &nodes, &settings))
         .map_err(|source| ClipFileError::Bake { clip: clip.name.clone(), source })?;
     let joints: Vec<Option<Uid>> = places.into_iter().map(Some).collect();
     Ok(rig_clip(rig, &clip.name, &baked, &joints))
 }
 
-/// Adds a clip to the document; returns it as the document has it.
-fn add(bench: &mut Workbench, clip: RigClip) -> Result<RigClip, Failure> {
-    bench.operate(Operation::Clips(ClipOperation::Add(Box::new(clip.clone()))))?;
-    Ok(bench.rig().clips().last().cloned().unwrap_or(clip))
+/// Adds the clips of a file to the document in one step; returns them as the document has them.
+fn add_all(bench: &mut Workbench, clips: Vec<RigClip>) -> Result<Vec<RigClip>, Failure> {
+    let before = bench.rig().clips().len();
+    if !clips.is_empty() {
+        bench.operate(Operation::Clips(ClipOperation::AddAll(clips)))?;
+    }
+    Ok(bench.rig().clips()[before..].to_vec())
 }
 
 /// Motion of models and of motion capture.
@@ -233,6 +239,7 @@ impl ClipCollector<'_> {
         let has_keys = self.onto == MotionTarget::Joints && args.map.is_none() && args.map_out.is_none();
         let own = has_keys.then(|| own_joints(model, bench.rig())).flatten();
         let before = self.added.len();
+        let mut taken = Vec::new();
         let mut is_any_left_out = false;
         for (number, clip) in model.clips.iter().enumerate() {
             let name = if clip.name.trim().is_empty() { stem(path) } else { clip.name.trim().to_owned() };
@@ -257,7 +264,9 @@ impl ClipCollector<'_> {
             clip.name = name;
             clip.looped |= args.looped;
             clip.frame_rate = args.fps.unwrap_or(clip.frame_rate);
-            let clip = add(bench, clip)?;
+            taken.push(clip);
+        }
+        for clip in add_all(bench, taken)? {
             let keys = clip.key_count();
             report.line(format!("\"{}\" has its keys on the joints of the rig", clip.name));
             self.told.push(Map::from_iter([
@@ -332,7 +341,7 @@ impl ClipCollector<'_> {
                 .notes
                 .push(format!("no control turns {}: they keep their places at the joints above", unmoved.join(", ")));
         }
-        let clip = add(bench, clip)?;
+        let clip = add_all(bench, vec![clip.clone()])?.pop().unwrap_or(clip);
         let program = Arc::clone(bench.runtime()?.state().program());
         let feet = measure_feet(bench.rig(), &program, &clip, &map.target, &stances);
         let hands = measure_hands(bench.rig(), &program, &clip, &map.target, &touches);
@@ -393,4 +402,26 @@ fn describe_map(map: &JointMap, motion: &Motion, rig: &Rig, report: &mut Report)
         ("unmapped_source".to_owned(), from.into()),
         ("unmapped_target".to_owned(), to.into()),
     ])
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::diagnostic::FrameCount;
+
+    use super::*;
+
+    #[test]
+    fn clips_of_a_file_take_one_frame_of_the_app() {
+        let mut bench = limits::empty_workbench("n");
+        let frames = |bench: &mut Workbench| bench.app_mut().world().resource::<FrameCount>().0;
+        let clip = |number: u64| {
+            let text = number.to_string();
+            let uid = |kind: &str| Uid::derived([kind, text.as_str()]);
+            RigClip::new(uid("clip"), uid("layer"), "walk")
+        };
+        let before = frames(&mut bench);
+        let Ok(added) = add_all(&mut bench, (0..300).map(clip).collect()) else { panic!("no clip is refused") };
+        assert_eq!(frames(&mut bench) - before, 1);
+        assert_eq!((added.len(), added[299].name.as_str()), (300, "walk 300"));
+    }
 }

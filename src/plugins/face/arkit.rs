@@ -30,10 +30,17 @@ const STILL: f32 = 1e-4;
 pub struct FaceShape {
     /// Name in ARKit, or that of a unit and its side.
     pub name: String,
-    /// Displacement of each point of the mesh, in the mesh's space and unit.
-    pub offsets: Vec<Vec3>,
+    /// Displacements of the points of the mesh that move, in the mesh's space and unit, by rising index of the point.
+    pub offsets: Vec<(u32, Vec3)>,
     /// Pose of the facial joints.
     pub pose: BTreeMap<Uid, PoseOffset>,
+}
+
+impl FaceShape {
+    /// Displacement of a point of the mesh; zero for one that does not move.
+    pub fn offset(&self, point: u32) -> Vec3 {
+        self.offsets.binary_search_by_key(&point, |(point, _)| *point).map_or(Vec3::ZERO, |at| self.offsets[at].1)
+    }
 }
 
 /// The blend shapes of ARKit for which the set has units, in the order of the units, without those of the tongue on a face that
@@ -125,6 +132,7 @@ fn baked(
                 *slot = analysis.to_mesh() * offset;
             }
         }
+        let offsets = (0..).zip(offsets).filter(|(_, offset)| *offset != Vec3::ZERO).collect();
         let posed = face.joint_poses(analysis, &own);
         let pose = face.bones.iter().zip(&posed).filter_map(|(bone, pose)| {
             let offset = Frame::of(rig, bone.uid, analysis).offset(pose);

@@ -15,7 +15,7 @@ const MEMBER: &str = "rigsmith";
 /// Frame rates that are believed.
 const RATES: std::ops::RangeInclusive<f64> = 0.01..=10_000.0;
 /// Most markers that are read from one animation.
-const MAX_MARKERS: usize = 10_000;
+pub const MAX_MARKERS: usize = 10_000;
 
 /// Facts of a clip in the extras of an animation.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -27,13 +27,18 @@ impl Rig {
         let mut clip = clip.clone();
         clip.layers.iter_mut().for_each(settle);
         let uid = clip.uid;
+        self.clip_uids.extend(uids_of(&clip));
         self.clips.insert(index.min(self.clips.len()), clip);
         Ok(RigEdit::RemoveClip(uid))
     }
 
     pub(super) fn remove_clip(&mut self, uid: Uid) -> Result<RigEdit, EditError> {
         let index = self.clips.iter().position(|clip| clip.uid == uid).ok_or(EditError::NoClip(uid))?;
-        Ok(RigEdit::AddClip(Box::new(self.clips.remove(index)), index))
+        let clip = self.clips.remove(index);
+        for uid in uids_of(&clip) {
+            self.clip_uids.remove(&uid);
+        }
+        Ok(RigEdit::AddClip(Box::new(clip), index))
     }
 
     pub(super) fn set_clip_about(&mut self, uid: Uid, about: &ClipAbout) -> Result<RigEdit, EditError> {
@@ -49,13 +54,16 @@ impl Rig {
         let uid = layer.uid;
         let layers = &mut self.clip_mut(clip)?.layers;
         layers.insert(index.min(layers.len()), layer);
+        self.clip_uids.insert(uid);
         Ok(RigEdit::RemoveLayer { clip, layer: uid })
     }
 
     pub(super) fn remove_layer(&mut self, clip: Uid, layer: Uid) -> Result<RigEdit, EditError> {
         let layers = &mut self.clip_mut(clip)?.layers;
         let index = layers.iter().position(|known| known.uid == layer).ok_or(EditError::NoLayer(clip, layer))?;
-        Ok(RigEdit::AddLayer { clip, layer: Box::new(layers.remove(index)), index })
+        let removed = layers.remove(index);
+        self.clip_uids.remove(&layer);
+        Ok(RigEdit::AddLayer { clip, layer: Box::new(removed), index })
     }
 
     pub(super) fn set_layer(&mut self, clip: Uid, layer: Uid, about: &LayerAbout) -> Result<RigEdit, EditError> {
@@ -86,6 +94,11 @@ impl Rig {
         let removed = inserted.iter().map(|key| key.time).collect();
         Ok(RigEdit::SetKeys { clip, layer, target: target.clone(), removed, inserted: taken })
     }
+}
+
+/// Uids of a clip and of its layers.
+fn uids_of(clip: &RigClip) -> impl Iterator<Item = Uid> {
+    std::iter::once(clip.uid).chain(clip.layers.iter().map(|layer| layer.uid))
 }
 
 /// Layer in its stored form: without tracks that have no keys.

@@ -7,7 +7,10 @@ mod pose;
 mod reduce;
 mod time;
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{BTreeMap, HashMap, HashSet},
+    sync::Arc,
+};
 
 use super::{Draft, OperationError};
 use crate::rig::{
@@ -38,6 +41,8 @@ pub enum ClipOperation {
     },
     /// Adds a clip, from a file for example. A name or uid that is taken gets another one.
     Add(Box<RigClip>),
+    /// Adds clips, those of a file for example, as [`ClipOperation::Add`] adds each.
+    AddAll(Vec<RigClip>),
     /// Renames a clip.
     Rename(Uid, String),
     /// Sets name, frame rate, range, loop and markers of a clip.
@@ -215,6 +220,7 @@ impl ClipOperation {
         match self {
             Self::Create { .. } => "Create clip",
             Self::Add(_) => "Add clip",
+            Self::AddAll(_) => "Add clips",
             Self::Rename(..) => "Rename clip",
             Self::About(..) => "Set clip",
             Self::Delete(_) => "Delete clip",
@@ -252,7 +258,8 @@ pub(super) fn run(draft: &mut Draft, operation: &ClipOperation) -> Result<(), Op
             let clip = RigClip { frame_rate: *frame_rate, range: *range, ..RigClip::new(uid, layer, name) };
             Ok(draft.apply(RigEdit::AddClip(Box::new(clip), usize::MAX))?)
         }
-        ClipOperation::Add(clip) => add(draft, clip),
+        ClipOperation::Add(clip) => add_all(draft, std::slice::from_ref(&**clip)),
+        ClipOperation::AddAll(clips) => add_all(draft, clips),
         ClipOperation::Rename(clip, name) => {
             let name = free_name(draft, Some(*clip), name)?.to_owned();
             let about = find(draft, *clip)?.about();
@@ -315,18 +322,30 @@ fn on_all_keys(
     layers.into_iter().try_for_each(|(layer, targets)| keys::run(draft, clip, layer, &change(targets)))
 }
 
-fn add(draft: &mut Draft, clip: &RigClip) -> Result<(), OperationError> {
-    let mut clip = clip.clone();
-    for uid in std::iter::once(&mut clip.uid).chain(clip.layers.iter_mut().map(|layer| &mut layer.uid)) {
-        if draft.rig().is_taken(*uid) {
-            *uid = draft.next_uid();
+fn add_all(draft: &mut Draft, clips: &[RigClip]) -> Result<(), OperationError> {
+    let mut names: HashSet<String> = draft.rig().clips().iter().map(|clip| clip.name.clone()).collect();
+    // Number to try next for each name, so that clips named alike need no search from 2 on.
+    let mut numbers: HashMap<String, u64> = HashMap::new();
+    for clip in clips {
+        let mut clip = clip.clone();
+        for uid in std::iter::once(&mut clip.uid).chain(clip.layers.iter_mut().map(|layer| &mut layer.uid)) {
+            if draft.rig().is_taken(*uid) {
+                *uid = draft.next_uid();
+            }
         }
+        let name = if clip.name.trim().is_empty() { "clip".to_owned() } else { clip.name.trim().to_owned() };
+        clip.name.clone_from(&name);
+        if names.contains(&name) {
+            let number = numbers.entry(name.clone()).or_insert(2);
+            while names.contains(&clip.name) {
+                clip.name = format!("{name} {number}");
+                *number += 1;
+            }
+        }
+        names.insert(clip.name.clone());
+        draft.apply(RigEdit::AddClip(Box::new(clip), usize::MAX))?;
     }
-    let name = if clip.name.trim().is_empty() { "clip".to_owned() } else { clip.name.trim().to_owned() };
-    let is_taken = |name: &str| draft.rig().clips().iter().any(|known| known.name == name);
-    let numbered = (2..).map(|number| format!("{name} {number}"));
-    clip.name = std::iter::once(name.clone()).chain(numbered).find(|name| !is_taken(name)).unwrap_or(name);
-    Ok(draft.apply(RigEdit::AddClip(Box::new(clip), usize::MAX))?)
+    Ok(())
 }
 
 fn set_about(draft: &mut Draft, clip: Uid, about: ClipAbout) -> Result<(), OperationError> {

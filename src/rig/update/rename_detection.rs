@@ -250,6 +250,7 @@ pub(super) fn with_uids(rig: &Rig, uids: HashMap<Uid, Uid>) -> Rig {
     out.inputs.iter_mut().for_each(|input| input.uid = get(input.uid));
     out.about.sockets.iter_mut().for_each(|socket| socket.joint = get(socket.joint));
     out.clips = rig.clips().iter().map(|clip| clip.with_nodes(get)).collect();
+    out.clip_uids.clone_from(&rig.clip_uids);
     out.set_joints(joints.collect(), |parent| {
         let own = parent.map(|parent| before.get(&parent).copied().unwrap_or(parent));
         rig.children(own).iter().map(|child| get(*child)).collect()

@@ -81,6 +81,7 @@ fn wrong_inputs_are_refused_and_write_nothing() {
         (vec![crane, "--mesh", "block.obj", "-o", "block.obj"], 2, "block.obj"),
         (vec![crane, "--frames", "-1"], 2, "-1"),
         (vec![crane, "--frames", "many"], 2, "many"),
+        (vec![crane, "--frames", "1000001"], 1, "--limit frames=1000001"),
         (vec![crane, "--mesh", "gone.obj", "-o", "out.glb"], 1, "gone.obj"),
         (vec!["gone.rig.ron"], 1, "gone.rig.ron"),
         (vec!["broken.rig.ron", "-o", "out.glb"], 1, "controll"),

@@ -73,7 +73,7 @@ fn gestures() -> [(&'static str, String); 2] {
 }
 
 /// Runs commands, of which each ends with a result, within the memory that the files before it allow.
-fn check(folder: &Path, cases: &[(&[&str], &[&str])]) {
+pub(super) fn check(folder: &Path, cases: &[(&[&str], &[&str])]) {
     for (files, args) in cases {
         let size: u64 = files.iter().map(|file| fs::metadata(folder.join(file)).unwrap().len()).sum();
         let (ended, answer) = json_answer(folder, args);

@@ -21,6 +21,7 @@ use rigsmith::{
         template::read_template,
     },
     solve::{
+        bake_clip::BakeSettings,
         packed_clip::{PackedSkeleton, pack_clip},
         program::{CompileOptions, RigProgram},
     },
@@ -182,7 +183,7 @@ fn packed_clips_play_on_an_instance() {
     clip.layers[0].tracks.insert(target, Arc::new(Track { keys }));
     let mut packed = PackedSkeleton::of(&rig, &built);
     let nodes = packed.baked_nodes();
-    packed.clips.push(pack_clip(&program, &clip, &nodes, 30.0, &KeyTolerance::default()).unwrap());
+    packed.clips.push(pack_clip(&program, &clip, &nodes, &BakeSettings::new(30.0, KeyTolerance::default())).unwrap());
     fs::write(folder.path().join("rise.rigclip"), packed.to_bytes()).unwrap();
 
     let path = saved(folder.path(), &bare);

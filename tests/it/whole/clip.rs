@@ -12,6 +12,7 @@ use rigsmith::{
         BuiltRig, Rig, RigEdit, Uid,
         animation::{
             ClipSampler, RigClip, SampleCursor,
+            clip_extras::MAX_MARKERS,
             file_clip::{own_joints, rig_clips},
         },
         bake::baked,
@@ -21,7 +22,7 @@ use rigsmith::{
         template::write_template,
     },
     solve::{
-        bake_clip::{BakeError, BakedNode, MOST_TRANSFORMS, bake_clip},
+        bake_clip::{BakeError, BakeSettings, BakedNode, MOST_TRANSFORMS, bake_clip},
         program::{CompileOptions, RigProgram},
     },
 };
@@ -104,12 +105,19 @@ fn exported(rig: &Rig, built: &BuiltRig, clip: &RigClip, is_ordinary: bool) {
     let skeleton = baked(rig, built);
     let node = |(uid, node): (Uid, &Node)| BakedNode { uid, parent: node.parent, rest: node.rest };
     let nodes: Vec<BakedNode> = skeleton.walk().map(|joint| joint.data.uid).zip(&model.nodes).map(node).collect();
-    let done = match bake_clip(&Arc::new(program), clip, &nodes, clip.frame_rate, &KeyTolerance::default()) {
+    let settings = BakeSettings::new(clip.frame_rate, KeyTolerance::default());
+    let done = match bake_clip(&Arc::new(program), clip, &nodes, &settings) {
         Ok(done) => done,
         Err(error) => {
             promises::error(&error);
-            let BakeError::TooLong { frames, nodes, .. } = error;
-            assert!(frames.saturating_mul(nodes as u64) > MOST_TRANSFORMS as u64 || frames > 1_000_000, "{error}");
+            match error {
+                BakeError::TooLong { frames, .. } => assert!(frames > 1_000_000, "{error}"),
+                BakeError::TooMuch { frames, nodes, .. } => {
+                    assert!(frames.saturating_mul(nodes) > MOST_TRANSFORMS, "{error}");
+                }
+                BakeError::Markers { count } => assert!(count > MAX_MARKERS, "{error}"),
+                BakeError::Names { .. } => panic!("it is no packed clip: {error}"),
+            }
             return;
         }
     };

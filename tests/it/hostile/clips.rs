@@ -1,0 +1,123 @@
+//! Clips of few bytes that would become many transforms, clips in great number, and more markers and frames than are taken.
+
+use std::{collections::HashSet, fs, path::Path, sync::Arc};
+
+use rigsmith::{
+    files::{RealDisk, load_model, load_packed_clips, load_template},
+    mesh::model::ChannelTarget,
+    modules,
+    processor::Builder,
+    rig::{
+        NodeType, Rig, Uid, UidSource,
+        animation::RigClip,
+        operations::{ClipOperation, Operation},
+    },
+};
+
+use super::{json_answer, memory::check, memory_allowance};
+use crate::cli::explained;
+
+fn asset(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets").join(name)
+}
+
+/// A clip of two keys that moves the hips of the biped for so many seconds, at 60 frames a second.
+fn long_clip(seconds: u32) -> String {
+    let rig = load_template(&RealDisk, &asset("templates/biped.rig.ron")).unwrap().rig;
+    let built = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
+    let mut controls = built.nodes.iter().filter(|node| node.kind == NodeType::Control);
+    let hips = controls.find(|node| node.name.contains("hips")).expect("the biped has a control of its hips");
+    format!(
+        "(format: 1, rig: \"{}\", rig_name: \"biped\", clips: [(uid: \"00000000c11b0001\", name: \"slow\", frame_rate: \
+         60.0, range: (0.0, {seconds}.0), layers: [(uid: \"00000000c11b0002\", name: \"Base\", tracks: [(node: \"{}\", \
+         property: Translation, keys: [(t: 0.0, v: (0, 0, 0)), (t: {seconds}.0, v: (0, -0.1, 0.1))])])])])",
+        rig.uid(),
+        hips.uid
+    )
+}
+
+#[test]
+fn clips_of_many_frames_are_baked_within_their_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let clip = "slow.anim.ron";
+    fs::write(folder.path().join(clip), long_clip(240)).unwrap();
+    check(
+        folder.path(),
+        &[
+            (&[clip], &["animate", "biped", clip, "-o", "slow.glb"]),
+            (&[clip], &["animate", "biped", clip, "-o", "slow.rigclip"]),
+        ],
+    );
+    // Both files have the whole motion.
+    let whole = load_model(&RealDisk, &folder.path().join("slow.glb")).unwrap();
+    let packed = load_packed_clips(&RealDisk, &folder.path().join("slow.rigclip")).unwrap().model("slow");
+    for model in [&whole, &packed] {
+        let hips = model.nodes.iter().position(|node| node.name == "hips").unwrap();
+        let is_way = |target: ChannelTarget| target == ChannelTarget::Translation(hips);
+        let way = model.clips[0].channels.iter().find(|channel| is_way(channel.target)).expect("the hips move");
+        assert!(way.times.is_sorted_by(|a, b| a < b), "{:?}", way.times);
+        assert!((way.times.last().unwrap() - 240.0).abs() < 1e-2, "{:?}", way.times);
+        // A straight way needs few keys, though the clip has 14,401 frames.
+        assert!(way.times.len() < 2_000, "{} keys", way.times.len());
+        let moved: f32 =
+            (0..3).map(|axis| way.values[way.values.len() - 3 + axis] - way.values[axis]).map(|d| d * d).sum();
+        assert!(moved.sqrt() > 0.05, "{moved}");
+    }
+}
+
+#[test]
+fn transforms_and_markers_beyond_their_limits_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = long_clip(10);
+    fs::write(folder.path().join("slow.anim.ron"), &text).unwrap();
+    let marker = |number: usize| format!("(time: {:.3}, name: \"m{number}\")", number as f64 / 1000.0);
+    let markers: Vec<String> = (0..10_001).map(marker).collect();
+    let marked = text.replacen("layers:", &format!("markers: [{}], layers:", markers.join(", ")), 1);
+    fs::write(folder.path().join("marked.anim.ron"), marked).unwrap();
+    for output in ["out.glb", "out.rigclip"] {
+        let cases: [(&[&str], &[&str]); 2] = [
+            (&["slow.anim.ron", "--limit", "baked=1000"], &["slow", "601 frames", "--limit baked="]),
+            (&["marked.anim.ron"], &["slow", "10001 markers", "10000"]),
+        ];
+        for (args, wanted) in cases {
+            let (ended, answer) = json_answer(folder.path(), &[&["animate", "biped"], args, &["-o", output]].concat());
+            assert_eq!(ended.code, Some(1), "{args:?}: {answer:.600}");
+            let told = explained(&answer);
+            assert!(wanted.iter().all(|part| told.contains(part)), "{args:?}: {told}");
+            assert!(!folder.path().join(output).exists(), "{args:?}");
+        }
+    }
+}
+
+/// 20,000 clips of one name and one uid get names and uids of their own.
+#[test]
+fn many_clips_alike_are_added_in_one_step() {
+    let mut rig = Rig::new(Uid::derived(["many clips"]), "n");
+    let mut uids = UidSource::seeded(7);
+    let one = RigClip::new(Uid::derived(["clip"]), Uid::derived(["layer"]), "walk");
+    let add = Operation::Clips(ClipOperation::AddAll(vec![one; 20_000]));
+    let outcome = add.run(&mut rig, &mut uids, None).unwrap();
+    assert_eq!(outcome.edits.len(), 20_000);
+    let names: HashSet<&str> = rig.clips().iter().map(|clip| clip.name.as_str()).collect();
+    assert_eq!(names.len(), 20_000);
+    assert!(names.contains("walk") && names.contains("walk 2") && names.contains("walk 20000"));
+    let own = |clip: &RigClip| [clip.uid, clip.layers[0].uid];
+    assert_eq!(rig.clips().iter().flat_map(own).collect::<HashSet<Uid>>().len(), 40_000);
+    // A layer and a clip that are gone leave their uids.
+    let [clip, layer] = own(&rig.clips()[3]);
+    assert!(rig.is_taken(clip) && rig.is_taken(layer));
+    Operation::Clips(ClipOperation::DeleteLayer { clip, layer }).run(&mut rig, &mut uids, None).unwrap();
+    assert!(rig.is_taken(clip) && !rig.is_taken(layer));
+    Operation::Clips(ClipOperation::Delete(clip)).run(&mut rig, &mut uids, None).unwrap();
+    assert!(!rig.is_taken(clip));
+}
+
+#[test]
+fn shapes_of_faces_stay_within_their_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(asset("models/head.obj"), folder.path().join("head.obj")).unwrap();
+    let (ended, answer) = json_answer(folder.path(), &["face", "head.obj", "--arkit", "-o", "head.glb"]);
+    assert_eq!(ended.code, Some(0), "{answer:.600}");
+    let allowance = memory_allowance(fs::metadata(folder.path().join("head.obj")).unwrap().len());
+    assert!(ended.memory <= allowance, "{} KiB of {}", ended.memory >> 10, allowance >> 10);
+}
