@@ -1,15 +1,16 @@
 //! Curves panel: values of the selected tracks over time, with keys and tangents that are dragged.
 //!
 //! Time is that of the [timeline](super::timeline): the same clip, layer, playhead, span and selected keys. A drag moves keys in
-//! time or in value, whichever way it goes first; tangents turn on both sides of a key, with Alt on one.
+//! time or in value, whichever way it goes first; tangents turn on both sides of a key, with Alt on one. A drag beside the keys
+//! selects those in a box.
 
 pub mod curve;
 mod edit;
 
 use bevy::prelude::*;
 use bevy_egui::egui::{
-    Align2, FontId, Painter, Pos2, Rangef, Rect, Sense, Shape, Stroke, Ui, UiBuilder, WidgetInfo, WidgetType, pos2,
-    vec2,
+    Align2, FontId, Painter, Pos2, Rangef, Rect, Sense, Shape, Stroke, StrokeKind, Ui, UiBuilder, WidgetInfo,
+    WidgetType, pos2, vec2,
 };
 
 use self::{
@@ -90,7 +91,7 @@ impl EditorPanel for CurvesPanel {
         let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
-        tell_hover(ui, &mut self.is_pointed, world, requests);
+        tell_hover(ui, self.title(), &mut self.is_pointed, world, requests);
         let (Some(open), Some(timeline)) = (OpenClip::of(world), world.get_resource::<Timeline>()) else {
             self.gesture = None;
             return list::nothing(ui, "No clip is open: choose or make one in the Timeline.");
@@ -126,6 +127,11 @@ impl EditorPanel for CurvesPanel {
         let colors = KeyColors::of(ui.visuals());
         for curve in &all {
             paint(&painter, curve, &plot, timeline, &colors);
+        }
+        if let Some(Gesture::Box(corners)) = &self.gesture {
+            let chosen = Rect::from_two_pos(corners[0], corners[1]);
+            painter.rect_filled(chosen, 0.0, colors.accent.gamma_multiply(0.12));
+            painter.rect_stroke(chosen, 0.0, Stroke::new(1.0, colors.accent), StrokeKind::Inside);
         }
         paint_playhead(ui, area, &axis, &open);
         ui.advance_cursor_after_rect(rect);
