@@ -38,7 +38,7 @@ use rigsmith::{
             poses::PosesPanel,
             process::ProcessPanel,
             properties::PropertiesPanel,
-            skinning::{SkinningClaims, SkinningPanel, SkinningParts, SkinningResults},
+            skinning::{SkinningClaims, SkinningPanel, SkinningParts, SkinningResults, SkinningSettings},
             toasts::Toasts,
         },
     },
