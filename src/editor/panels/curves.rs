@@ -9,7 +9,7 @@ mod edit;
 
 use bevy::prelude::*;
 use bevy_egui::egui::{
-    Align2, FontId, Painter, Pos2, Rangef, Rect, Sense, Shape, Stroke, StrokeKind, Ui, UiBuilder, WidgetInfo,
+    Align2, Color32, FontId, Painter, Pos2, Rangef, Rect, Sense, Shape, Stroke, StrokeKind, Ui, UiBuilder, WidgetInfo,
     WidgetType, pos2, vec2,
 };
 
@@ -26,7 +26,10 @@ use super::{
     },
 };
 use crate::{
-    editor::panel::{EditorPanel, Requests},
+    editor::{
+        panel::{EditorPanel, Requests},
+        style,
+    },
     rig::{Uid, animation::TrackTarget},
 };
 
@@ -126,7 +129,8 @@ impl EditorPanel for CurvesPanel {
         grid(ui, &painter, area, &plot, &open);
         let colors = KeyColors::of(ui.visuals());
         for curve in &all {
-            paint(&painter, curve, &plot, timeline, &colors);
+            let color = style::readable(ui.visuals(), curve.color);
+            paint(&painter, (curve, color), &plot, timeline, &colors);
         }
         if let Some(Gesture::Box(corners)) = &self.gesture {
             let chosen = Rect::from_two_pos(corners[0], corners[1]);
@@ -183,7 +187,7 @@ impl CurvesPanel {
             let room = ((rect.bottom() - ui.cursor().top()) / height).floor().max(0.0) as usize;
             for curve in all.iter().take(room) {
                 let (row, _) = ui.allocate_exact_size(vec2(rect.width(), height), Sense::hover());
-                list::line(ui, row, &curve.name, curve.color);
+                list::line(ui, row, &curve.name, style::readable(ui.visuals(), curve.color));
             }
         });
     }
@@ -235,9 +239,9 @@ fn grid(ui: &Ui, painter: &Painter, area: Rect, plot: &Plot, open: &OpenClip) {
     }
 }
 
-fn paint(painter: &Painter, curve: &Curve, plot: &Plot, timeline: &Timeline, colors: &KeyColors) {
+fn paint(painter: &Painter, (curve, line): (&Curve, Color32), plot: &Plot, timeline: &Timeline, colors: &KeyColors) {
     let points = curve.points.iter().map(|(time, value)| plot.at(*time, *value)).collect();
-    painter.add(Shape::line(points, Stroke::new(1.5, curve.color)));
+    painter.add(Shape::line(points, Stroke::new(1.5, line)));
     let selected = timeline.keys.get(&curve.target);
     for key in &curve.keys {
         let at = plot.at(key.key.time, key.value);
@@ -248,7 +252,7 @@ fn paint(painter: &Painter, curve: &Curve, plot: &Plot, timeline: &Timeline, col
                 painter.circle_filled(end, 3.0, colors.quiet);
             }
         }
-        let color = if is_selected { colors.accent } else { curve.color };
+        let color = if is_selected { colors.accent } else { line };
         painter.add(Shape::convex_polygon(
             [(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)].map(|(x, y)| at + vec2(x, y) * 4.0).to_vec(),
             color,

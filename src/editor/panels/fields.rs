@@ -12,7 +12,7 @@ use bevy_egui::egui::{
 
 use super::list;
 use crate::{
-    editor::{notice::Notice, panel::Requests},
+    editor::{notice::Notice, panel::Requests, style},
     rig::proportion::{ProportionError, Quantity},
 };
 
@@ -246,7 +246,7 @@ impl Numbers {
             ui.spacing_mut().item_spacing.x = 3.0;
             let width = if narrow { ui.available_width() } else { ((ui.available_width() - 6.0) / 3.0).floor() };
             for (axis, (letter, color)) in AXES.into_iter().enumerate() {
-                let prefix = RichText::new(format!("{letter} ")).color(color);
+                let prefix = RichText::new(format!("{letter} ")).color(style::readable(ui.visuals(), color));
                 let said = format!("{name} {letter}");
                 if let Some(edit) = self.field(ui, &said, prefix, shown[axis], look, vec2(width, height)) {
                     edited = Some((axis, edit));

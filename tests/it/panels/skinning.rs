@@ -68,8 +68,13 @@ fn wrong_numbers_of_the_settings_are_told() {
     for (field, text, words) in wrong {
         type_into(&mut desk, field, text);
         assert_eq!(settings(&desk), before, "{field} {text}");
-        let last =
-            desk.app.world().resource::<LogBook>().entries().next_back().map(|last| (last.notice.text.clone(), last.times));
+        let last = desk
+            .app
+            .world()
+            .resource::<LogBook>()
+            .entries()
+            .next_back()
+            .map(|last| (last.notice.text.clone(), last.times));
         assert_eq!(last, Some((words.to_owned(), 1)));
     }
     type_into(&mut desk, "Voxels", "64");
