@@ -57,6 +57,9 @@ const POINTER: &[(&str, &str)] = &[
     ("Graph: point at a node or box", "draw its wires in full, as those of selected ones; others fade"),
     ("Graph: drag from an output to an input", "refer to what the command makes (with Shift besides what is there)"),
     ("Timeline: right click on a node", "its switches, for the pose and over the selected keys"),
+    ("Timeline: right click on other rows", "what can be done with their keys"),
+    ("Curves: click a key, or drag a box", "select keys (with Shift or Ctrl more)"),
+    ("Curves: drag a key, or a tangent's end", "time or value, whichever comes first; slope (with Alt on one side)"),
     ("Graph: right click on a wire", "remove its reference, or insert a command"),
     ("Graph: right drag, wheel, Ctrl + wheel", "pan, pan, zoom"),
 ];
@@ -192,7 +195,7 @@ impl EditorOverlay for HelpPage {
         // Escape in place of a key keeps the page.
         let is_for_key = std::mem::replace(&mut self.was_waiting, waiting.is_some()) || waiting.is_some();
         let mut is_open = true;
-        let room = ctx.content_rect().size() - egui::vec2(48.0, 140.0);
+        let room = ctx.content_rect().size() - egui::vec2(48.0, 164.0);
         egui::Window::new("Help")
             .id(page_id())
             .open(&mut is_open)
@@ -208,7 +211,16 @@ impl EditorOverlay for HelpPage {
                 });
                 let file = world.get_resource::<SettingsFile>().and_then(SettingsFile::path);
                 let place = file.map_or_else(|| "the settings file".to_owned(), |file| file.display().to_string());
-                ui.weak(format!("Keys are bound in {place}."));
+                ui.horizontal_wrapped(|ui| {
+                    ui.weak(format!("Click an action to give it another key. Keys are kept in {place}."));
+                    let keys = world.get_resource::<KeyBindings>();
+                    let is_other = keys.is_some_and(|keys| *keys != KeyBindings::default());
+                    let usual = ui.add_enabled(is_other, egui::Button::new("Usual keys").small());
+                    let usual = usual.on_hover_text("Gives all actions the keys that they have at first");
+                    if usual.on_disabled_hover_text("All actions have their usual keys").clicked() {
+                        requests.set(KeyBindings::default());
+                    }
+                });
             });
         if !is_open || !is_for_key && ctx.input(|input| input.key_pressed(egui::Key::Escape)) {
             requests.set(HelpShown(false));
@@ -249,7 +261,7 @@ impl HelpPage {
         if list.is_empty() {
             return;
         }
-        ui.strong("Pointer, in the viewport");
+        ui.strong("Pointer");
         egui::Grid::new("pointer").num_columns(2).striped(true).show(ui, |ui| {
             for (what, does) in list {
                 ui.colored_label(style::accent(ui.visuals()), *what);

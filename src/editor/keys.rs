@@ -315,7 +315,7 @@ fn press_keys(
         return;
     }
     let typing = contexts.iter_mut().any(|mut context| context.get_mut().egui_wants_keyboard_input());
-    let is_over_timeline = timeline.is_some_and(|timeline| timeline.hovered);
+    let is_over_timeline = timeline.is_some_and(|timeline| timeline.hovered.is_some());
     let is_over_graph = graph.is_some_and(|graph| graph.hovered);
     let is_asked = dialog.is_some_and(|dialog| dialog.question().is_some());
     for (number, input) in keys.read().enumerate() {

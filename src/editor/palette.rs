@@ -1,4 +1,5 @@
-//! Command palette: every action by words, with its key, and the reason if it can do nothing at present; and every panel.
+//! Command palette: every action by words, with its key, and the reason if it can do nothing at present; and every panel. A key
+//! whose action can do nothing tells the same reason.
 
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Key, RichText, TextEdit, WidgetInfo, WidgetType};
@@ -12,6 +13,7 @@ use super::{
     keys::KeyBindings,
     library,
     mode::Mode,
+    notice::Notice,
     panel::{EditorOverlay, PanelApp, PanelTitles, Requests},
     panels::{graph, timeline},
     style,
@@ -22,7 +24,9 @@ use super::{
     },
 };
 use crate::{
-    plugins::{commands::Processor, document::Selection, fit::FittedRig, history::RigHistory, surface::RigMeshes},
+    plugins::{
+        RigSystems, commands::Processor, document::Selection, fit::FittedRig, history::RigHistory, surface::RigMeshes,
+    },
     rig::{Rig, TagKind},
 };
 
@@ -34,8 +38,9 @@ impl Plugin for PalettePlugin {
         app.init_resource::<PaletteShown>()
             .add_message::<ActionRequest>()
             .add_message::<ShowPanel>()
+            .add_message::<Notice>()
             .add_overlay(Palette::default())
-            .add_systems(Update, toggle_palette.after(attend));
+            .add_systems(Update, (toggle_palette, tell_obstacles.before(RigSystems::Script)).after(attend));
     }
 }
 
@@ -50,6 +55,33 @@ fn toggle_palette(mut actions: MessageReader<ActionRequest>, mut shown: ResMut<P
             Action::Cancel if shown.0 => shown.0 = false,
             _ => {}
         }
+    }
+}
+
+/// True for actions that say nothing themselves where they can do nothing.
+fn is_silent(action: Action) -> bool {
+    matches!(
+        action,
+        Action::Build
+            | Action::RollBack
+            | Action::StepForward
+            | Action::StepBack
+            | Action::XRay
+            | Action::Wireframe
+            | Action::Meshes
+            | Action::Deforming
+            | Action::OnionSkin
+    )
+}
+
+/// Tells why an action can do nothing, for keys and buttons that are not greyed.
+fn tell_obstacles(mut actions: MessageReader<ActionRequest>, mut commands: Commands) {
+    for action in actions.read().map(|request| request.0).filter(|action| is_silent(*action)) {
+        commands.queue(move |world: &mut World| {
+            if let Some(why_not) = obstacle(world, action) {
+                world.write_message(Notice::info(format!("{}: {why_not}.", describe(action))));
+            }
+        });
     }
 }
 

@@ -216,6 +216,28 @@ pub fn accent(visuals: &Visuals) -> Color32 {
     visuals.hyperlink_color
 }
 
+/// Least contrast of letters and symbols with their ground.
+pub const LEAST_CONTRAST: f32 = 3.0;
+
+/// A colour for letters and symbols on panels and fields: as it is where it stands out there, else nearer to white or black.
+pub fn readable(visuals: &Visuals, color: Color32) -> Color32 {
+    let end = if visuals.dark_mode { Color32::WHITE } else { Color32::BLACK };
+    let grounds = [visuals.panel_fill, visuals.widgets.inactive.weak_bg_fill];
+    let stands_out = |color: &Color32| grounds.iter().all(|ground| contrast(*color, *ground) >= LEAST_CONTRAST);
+    (0..=20).map(|step| color.lerp_to_gamma(end, step as f32 * 0.05)).find(stands_out).unwrap_or(end)
+}
+
+/// Contrast of two opaque colours, from 1 of equal ones to 21 of black and white, as the Web Content Accessibility Guidelines 2
+/// define it.
+pub fn contrast(one: Color32, other: Color32) -> f32 {
+    let luminance = |color: Color32| {
+        let linear = egui::Rgba::from(color);
+        0.2126 * linear.r() + 0.7152 * linear.g() + 0.0722 * linear.b()
+    };
+    let (one, other) = (luminance(one) + 0.05, luminance(other) + 0.05);
+    one.max(other) / one.min(other)
+}
+
 /// Colour of obstacles.
 pub fn obstacle(visuals: &Visuals) -> Color32 {
     visuals.warn_fg_color

@@ -141,13 +141,19 @@ pub struct ToolPointer {
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PointerOwner(pub Option<Tool>);
 
-/// Marks that the pointer is over a handle of a gizmo, so that a press belongs to the gizmo. Written by gizmos.
-#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct GizmoHover(pub bool);
+/// Share of gizmos in the pointer. Written by gizmos before presses are routed.
+#[derive(Resource, Debug, Clone, PartialEq, Eq, Default)]
+pub struct GizmoHover {
+    /// Marks that the pointer is over a handle, so that its movements belong to the gizmo.
+    pub is_over: bool,
+    /// Presses of this frame in their order, `true` for those on a handle or on a joint that follows the pointer.
+    pub presses: Vec<bool>,
+}
 
-/// Marks that a press in this frame is on a joint or control that a drag pulls. Written before the press is routed.
-#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct PullHover(pub bool);
+/// Presses of this frame in their order, `true` for those on a joint or control that a drag pulls. Written before presses are
+/// routed.
+#[derive(Resource, Debug, Clone, PartialEq, Eq, Default)]
+pub struct PullHover(pub Vec<bool>);
 
 /// Turns an undo during a drag, or before a drawing is accepted, into a cancel: the drag is dropped and the last step stays.
 /// Runs after keys are read and before actions are carried out.
@@ -174,20 +180,27 @@ fn route(
     mut owner: ResMut<PointerOwner>,
     mut routed: MessageWriter<ToolPointer>,
 ) {
+    let free = |is_gizmo: bool| match is_gizmo {
+        _ if region.is_open() => Tool::Region,
+        true => Tool::Gizmo,
+        false => Tool::of(*mode),
+    };
+    // A slow frame has several presses, each at a place of its own.
+    let (mut on_gizmos, mut on_nodes) = (gizmo.presses.iter(), pull.0.iter());
     for pointer in pointers.read() {
-        let free = match gizmo.0 {
-            _ if region.is_open() => Tool::Region,
-            true => Tool::Gizmo,
-            false => Tool::of(*mode),
+        let tool = match pointer.act {
+            PointerAct::Pressed => {
+                let [is_gizmo, is_pull] = [on_gizmos.next(), on_nodes.next()].map(|found| found.is_some_and(|on| *on));
+                let tool = match free(is_gizmo) {
+                    Tool::Select if is_pull => Tool::Pull,
+                    other => other,
+                };
+                owner.0 = Some(tool);
+                tool
+            }
+            PointerAct::Released { .. } => owner.0.take().unwrap_or_else(|| free(gizmo.is_over)),
+            _ => owner.0.unwrap_or_else(|| free(gizmo.is_over)),
         };
-        let pressed = if pull.0 && free == Tool::Select { Tool::Pull } else { free };
-        let tool = owner.0.unwrap_or(free);
-        match pointer.act {
-            PointerAct::Pressed => owner.0 = Some(pressed),
-            PointerAct::Released { .. } => owner.0 = None,
-            _ => {}
-        }
-        let tool = if pointer.act == PointerAct::Pressed { pressed } else { tool };
         routed.write(ToolPointer { tool, pointer: *pointer });
     }
 }

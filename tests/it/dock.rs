@@ -129,6 +129,17 @@ fn all_tabs_of_the_usual_layout_lie_in_their_bars() {
     }
 }
 
+/// The bar of the viewport's tab is none of its picture.
+#[test]
+fn the_viewport_has_two_fifths_of_a_large_window() {
+    for size in [[1920.0, 1080.0], [3840.0, 2160.0]] {
+        let frames = Frames::new(size);
+        let area = frames.layout().area("Viewport").expect("the viewport always stays");
+        let share = area.width() * (area.height() - 24.0) / (size[0] * size[1]);
+        assert!(share >= 0.4, "{share} of {size:?}");
+    }
+}
+
 #[test]
 fn each_panel_is_reached_with_one_click_on_its_tab() {
     let mut frames = Frames::new(USUAL);

@@ -312,10 +312,10 @@ fn actions_are_in_the_palette_with_their_keys_and_obstacles() {
     assert_eq!(over_timeline(Action::Undo), Action::Undo);
     desk.move_to(at(&desk, "All keys", 1.0));
     desk.frames(2);
-    assert!(timeline(&desk).hovered);
+    assert_eq!(timeline(&desk).hovered, Some("Timeline"));
     desk.move_to(Pos2::new(2000.0, 2000.0));
     desk.frames(2);
-    assert!(!timeline(&desk).hovered);
+    assert_eq!(timeline(&desk).hovered, None);
 }
 
 #[test]

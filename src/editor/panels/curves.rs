@@ -1,15 +1,16 @@
 //! Curves panel: values of the selected tracks over time, with keys and tangents that are dragged.
 //!
 //! Time is that of the [timeline](super::timeline): the same clip, layer, playhead, span and selected keys. A drag moves keys in
-//! time or in value, whichever way it goes first; tangents turn on both sides of a key, with Alt on one.
+//! time or in value, whichever way it goes first; tangents turn on both sides of a key, with Alt on one. A drag beside the keys
+//! selects those in a box.
 
 pub mod curve;
 mod edit;
 
 use bevy::prelude::*;
 use bevy_egui::egui::{
-    Align2, FontId, Painter, Pos2, Rangef, Rect, Sense, Shape, Stroke, Ui, UiBuilder, WidgetInfo, WidgetType, pos2,
-    vec2,
+    Align2, Color32, FontId, Painter, Pos2, Rangef, Rect, Sense, Shape, Stroke, StrokeKind, Ui, UiBuilder, WidgetInfo,
+    WidgetType, pos2, vec2,
 };
 
 use self::{
@@ -25,7 +26,10 @@ use super::{
     },
 };
 use crate::{
-    editor::panel::{EditorPanel, Requests},
+    editor::{
+        panel::{EditorPanel, Requests},
+        style,
+    },
     rig::{Uid, animation::TrackTarget},
 };
 
@@ -90,7 +94,7 @@ impl EditorPanel for CurvesPanel {
         let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
-        tell_hover(ui, &mut self.is_pointed, world, requests);
+        tell_hover(ui, self.title(), &mut self.is_pointed, world, requests);
         let (Some(open), Some(timeline)) = (OpenClip::of(world), world.get_resource::<Timeline>()) else {
             self.gesture = None;
             return list::nothing(ui, "No clip is open: choose or make one in the Timeline.");
@@ -125,7 +129,13 @@ impl EditorPanel for CurvesPanel {
         grid(ui, &painter, area, &plot, &open);
         let colors = KeyColors::of(ui.visuals());
         for curve in &all {
-            paint(&painter, curve, &plot, timeline, &colors);
+            let color = style::readable(ui.visuals(), curve.color);
+            paint(&painter, (curve, color), &plot, timeline, &colors);
+        }
+        if let Some(Gesture::Box(corners)) = &self.gesture {
+            let chosen = Rect::from_two_pos(corners[0], corners[1]);
+            painter.rect_filled(chosen, 0.0, colors.accent.gamma_multiply(0.12));
+            painter.rect_stroke(chosen, 0.0, Stroke::new(1.0, colors.accent), StrokeKind::Inside);
         }
         paint_playhead(ui, area, &axis, &open);
         ui.advance_cursor_after_rect(rect);
@@ -177,7 +187,7 @@ impl CurvesPanel {
             let room = ((rect.bottom() - ui.cursor().top()) / height).floor().max(0.0) as usize;
             for curve in all.iter().take(room) {
                 let (row, _) = ui.allocate_exact_size(vec2(rect.width(), height), Sense::hover());
-                list::line(ui, row, &curve.name, curve.color);
+                list::line(ui, row, &curve.name, style::readable(ui.visuals(), curve.color));
             }
         });
     }
@@ -229,9 +239,9 @@ fn grid(ui: &Ui, painter: &Painter, area: Rect, plot: &Plot, open: &OpenClip) {
     }
 }
 
-fn paint(painter: &Painter, curve: &Curve, plot: &Plot, timeline: &Timeline, colors: &KeyColors) {
+fn paint(painter: &Painter, (curve, line): (&Curve, Color32), plot: &Plot, timeline: &Timeline, colors: &KeyColors) {
     let points = curve.points.iter().map(|(time, value)| plot.at(*time, *value)).collect();
-    painter.add(Shape::line(points, Stroke::new(1.5, curve.color)));
+    painter.add(Shape::line(points, Stroke::new(1.5, line)));
     let selected = timeline.keys.get(&curve.target);
     for key in &curve.keys {
         let at = plot.at(key.key.time, key.value);
@@ -242,7 +252,7 @@ fn paint(painter: &Painter, curve: &Curve, plot: &Plot, timeline: &Timeline, col
                 painter.circle_filled(end, 3.0, colors.quiet);
             }
         }
-        let color = if is_selected { colors.accent } else { curve.color };
+        let color = if is_selected { colors.accent } else { line };
         painter.add(Shape::convex_polygon(
             [(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)].map(|(x, y)| at + vec2(x, y) * 4.0).to_vec(),
             color,

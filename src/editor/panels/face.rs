@@ -11,7 +11,8 @@ use bevy_egui::egui::{self, Button, CollapsingHeader, DragValue, ProgressBar, Ri
 
 use super::{
     displayed_rig::{DisplayedRig, Stamp},
-    fields, list,
+    fields::{self, TypedText},
+    list,
     log::LogSystems,
 };
 use crate::{
@@ -123,6 +124,9 @@ fn summary(report: &FaceReport) -> String {
     format!("{} in {sum:.0} ms{kept}{fitted}.", counted(skin, "facial bone", "facial bones"))
 }
 
+/// Largest seed that people type: beyond it not every whole number is one of its kind.
+const MOST_SEED: f64 = 9_007_199_254_740_992.0;
+
 /// Numbers of bones of the facial skin that people choose from.
 const DENSITIES: RangeInclusive<usize> = 4..=150;
 
@@ -132,7 +136,7 @@ pub struct FacePanel {
     settings: AutoSettings,
     shown: Option<FaceData>,
     /// Strengths while a slider is dragged.
-    held: Option<BTreeMap<String, f32>>,
+    held: Option<expressions::HeldStrengths>,
     /// A face was being placed in the last frame.
     is_placing: bool,
 }
@@ -287,8 +291,11 @@ impl FacePanel {
         let FaceTarget { world, shown, entity, mesh } = *of;
         CollapsingHeader::new("Settings").show(ui, |ui| {
             fields::labelled(ui, "Seed", |ui| {
-                let field = ui.add(DragValue::new(&mut self.settings.seed).speed(0.1));
+                let typed = TypedText::default();
+                let field = DragValue::new(&mut self.settings.seed).speed(0.1).update_while_editing(false);
+                let field = ui.add(field.custom_parser(typed.reader(0.0..=MOST_SEED, "")));
                 fields::named(ui, field.id, "Seed");
+                typed.tell(&field, "Seed", requests);
                 field.on_hover_text("The same seed gives the same bones");
             });
             ui.checkbox(&mut self.settings.symmetric, "Symmetric").on_hover_text("Pairs of bones on both sides");

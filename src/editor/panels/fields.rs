@@ -1,6 +1,6 @@
 //! Fields of forms: a name and a value, numbers that are dragged or typed, and "mixed" where joints differ.
 
-use std::cell::Cell;
+use std::{cell::Cell, ops::RangeInclusive};
 
 use bevy_egui::egui::{
     self, Align, Color32, DragValue, Id, Key, Layout, Rect, Response, RichText, Sense, Slider, SliderClamping,
@@ -12,7 +12,7 @@ use bevy_egui::egui::{
 
 use super::list;
 use crate::{
-    editor::{notice::Notice, panel::Requests},
+    editor::{notice::Notice, panel::Requests, style},
     rig::proportion::{ProportionError, Quantity},
 };
 
@@ -131,9 +131,56 @@ enum NumberError {
     /// The number is no weight.
     #[error("{0} is no weight; write one from 0 to 1")]
     NoWeight(f32),
+    /// The number lies beyond the ends of its field.
+    #[error("{number} is none of its numbers; write one from {low} to {high}")]
+    Outside {
+        /// The number.
+        number: f64,
+        /// Least number of the field.
+        low: f64,
+        /// Largest number of the field.
+        high: f64,
+    },
     /// The number makes no sense on the rig.
     #[error(transparent)]
     Proportion(#[from] ProportionError),
+}
+
+/// Text that was typed into a field of egui's own and not taken. By itself such a field drops wrong texts, and cuts off numbers
+/// beyond its ends, without a word.
+#[derive(Default)]
+pub(super) struct TypedText(Cell<Option<NumberError>>);
+
+impl TypedText {
+    /// Reader of the texts of a field with two ends and a unit. The field must not be updated while a text is typed.
+    pub fn reader(&self, ends: RangeInclusive<f64>, suffix: &'static str) -> impl Fn(&str) -> Option<f64> {
+        move |text| {
+            let number = parse(text, suffix);
+            let refused = match number {
+                Some(number) if ends.contains(&number) => None,
+                Some(number) => Some(NumberError::Outside { number, low: *ends.start(), high: *ends.end() }),
+                None => Some(NumberError::NoNumber(text.trim().to_owned())),
+            };
+            let is_taken = refused.is_none();
+            self.0.set(refused);
+            number.filter(|_| is_taken)
+        }
+    }
+
+    /// Sends a notice if the text of a field was not taken.
+    pub fn tell(self, field: &Response, said: &str, requests: &mut Requests) {
+        let Some(reason) = self.0.into_inner() else { return };
+        // egui reads a text when its field is left, and once more in the next pass.
+        let (id, now) = (field.id.with("refused"), field.ctx.cumulative_pass_nr());
+        let last = field.ctx.data_mut(|data| {
+            let last = data.get_temp::<u64>(id);
+            data.insert_temp(id, now);
+            last
+        });
+        if last.is_none_or(|last| now > last + 1) {
+            requests.send(Notice::warning(format!("{said} stays as it was: {reason}.")));
+        }
+    }
 }
 
 /// The number that is being dragged.
@@ -199,7 +246,7 @@ impl Numbers {
             ui.spacing_mut().item_spacing.x = 3.0;
             let width = if narrow { ui.available_width() } else { ((ui.available_width() - 6.0) / 3.0).floor() };
             for (axis, (letter, color)) in AXES.into_iter().enumerate() {
-                let prefix = RichText::new(format!("{letter} ")).color(color);
+                let prefix = RichText::new(format!("{letter} ")).color(style::readable(ui.visuals(), color));
                 let said = format!("{name} {letter}");
                 if let Some(edit) = self.field(ui, &said, prefix, shown[axis], look, vec2(width, height)) {
                     edited = Some((axis, edit));

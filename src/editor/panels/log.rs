@@ -12,6 +12,7 @@ use crate::{
         dock::ShowPanel,
         notice::{EditNotice, Notice, Severity},
         panel::{EditorPanel, Requests},
+        style,
     },
     plugins::{
         controls::SwitchedOver,
@@ -378,7 +379,7 @@ pub(super) fn severity_symbol(ui: &Ui, severity: Severity) -> (&'static str, Col
     let visuals = ui.visuals();
     match severity {
         Severity::Info => ("ℹ", visuals.hyperlink_color),
-        Severity::Done => ("✔", Color32::from_rgb(92, 184, 92)),
+        Severity::Done => ("✔", style::readable(visuals, Color32::from_rgb(92, 184, 92))),
         Severity::Warning => ("⚠", visuals.warn_fg_color),
         Severity::Error => ("✖", visuals.error_fg_color),
     }

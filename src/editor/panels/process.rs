@@ -384,7 +384,7 @@ pub(super) fn state_word(status: Option<&CommandStatus>) -> &'static str {
 /// Colour of the state of a command.
 pub(super) fn color(visuals: &Visuals, status: Option<&CommandStatus>) -> Color32 {
     match status.map(|status| status.state) {
-        Some(CommandState::Done) => Color32::from_rgb(96, 176, 96),
+        Some(CommandState::Done) => style::readable(visuals, Color32::from_rgb(96, 176, 96)),
         Some(CommandState::Skipped) => visuals.warn_fg_color,
         Some(CommandState::Failed) => visuals.error_fg_color,
         Some(CommandState::Pending) | None => visuals.weak_text_color(),

@@ -13,7 +13,8 @@ pub use parts::SkinningParts;
 
 use super::{
     displayed_rig::{DisplayedRig, joint_name},
-    fields, list,
+    fields::{self, TypedText},
+    list,
     log::LogSystems,
 };
 use crate::{
@@ -268,14 +269,19 @@ fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
         });
         fields::labelled(ui, "Smoothing", |ui| {
             ui.spacing_mut().slider_width = (ui.available_width() - 52.0).max(30.0);
+            let typed = TypedText::default();
             let slider = Slider::new(&mut next.0.smoothing, 0.25..=4.0).logarithmic(true).max_decimals(2);
+            let slider = slider.update_while_editing(false).custom_parser(typed.reader(0.25..=4.0, ""));
             let field = ui.add(slider).on_hover_text("Width of the blend between joints: 1 is usual, less is stiffer");
             fields::named(ui, field.id, "Smoothing");
+            typed.tell(&field, "Smoothing", requests);
         });
         fields::labelled(ui, "Influences", |ui| {
+            let typed = TypedText::default();
             let field = DragValue::new(&mut next.0.max_influences).range(1..=16).speed(0.05);
-            let field = ui.add(field);
+            let field = ui.add(field.update_while_editing(false).custom_parser(typed.reader(1.0..=16.0, "")));
             fields::named(ui, field.id, "Influences");
+            typed.tell(&field, "Influences", requests);
             field.on_hover_text("The largest number of joints that move one point; many games allow 4");
         });
         fields::labelled(ui, "Parts", |ui| {
@@ -284,9 +290,12 @@ fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
                 .on_hover_text("Parts that one joint holds (helmets, swords, eyes) move as one; off: they bend");
         });
         fields::labelled(ui, "Voxels", |ui| {
+            let typed = TypedText::default();
             let field = DragValue::new(&mut next.0.voxel_resolution).range(32..=1024).speed(2.0);
-            let field = ui.add(field).on_hover_text("Voxels along the longest side, where voxels are used");
+            let field = ui.add(field.update_while_editing(false).custom_parser(typed.reader(32.0..=1024.0, "")));
             fields::named(ui, field.id, "Voxels");
+            typed.tell(&field, "Voxels", requests);
+            field.on_hover_text("Voxels along the longest side, where voxels are used");
         });
         if next.0 != WeightSettings::default() && ui.button("Defaults").clicked() {
             next = SkinningSettings::default();

@@ -94,7 +94,7 @@ impl Plugin for TimelinePlugin {
                     .after(RigSystems::Gesture)
                     .before(RigSystems::Edits),
             )
-            .add_systems(Last, (follow::follow_playback, follow::remember_names).chain());
+            .add_systems(Last, (follow::follow_playback, follow::remember_names, follow::forget_hover).chain());
     }
 }
 
@@ -125,7 +125,7 @@ impl EditorPanel for TimelinePanel {
             return list::nothing(ui, "No rig is open.");
         };
         let open = OpenClip::of(world);
-        tell_hover(ui, &mut self.is_pointed, world, requests);
+        tell_hover(ui, self.title(), &mut self.is_pointed, world, requests);
         self.bar.show(ui, world, &shown, requests);
         if let Some(import) = world.get_resource::<import::ClipImport>()
             && let Some(draft) = import.draft().filter(|draft| draft.rig == shown.entity)
@@ -240,13 +240,12 @@ impl TimelinePanel {
 
 /// Tells whether the pointer is over a panel of keys, which then takes the keys that delete and select. `is_pointed` is what the
 /// panel has told last.
-pub(super) fn tell_hover(ui: &Ui, is_pointed: &mut bool, world: &World, requests: &mut Requests) {
+pub(super) fn tell_hover(ui: &Ui, panel: &'static str, is_pointed: &mut bool, world: &World, requests: &mut Requests) {
     let is_over = OpenClip::of(world).is_some() && ui.rect_contains_pointer(ui.max_rect());
-    // Of two panels in sight the one that the pointer has left may tell last.
-    let is_lost = is_over && world.get_resource::<Timeline>().is_none_or(|timeline| !timeline.hovered);
-    if is_over != *is_pointed || is_lost {
+    let is_known = world.get_resource::<Timeline>().is_some_and(|timeline| timeline.hovered == Some(panel));
+    if is_over != *is_pointed || is_over && !is_known {
         *is_pointed = is_over;
-        requests.send(TimelineRequest::Hover(is_over));
+        requests.send(TimelineRequest::Hover(panel, is_over));
     }
 }
 

@@ -10,7 +10,7 @@ use super::{
     gizmo::{Delta, GizmoDrag, GizmoFrame, Handle},
     pose::PosedJoint,
     scene::{EditedRig, Scene, joints},
-    select::{self, DrawnControls},
+    select::{self, ClickedSelection, DrawnControls, SelectTool},
     transform,
 };
 use crate::{
@@ -38,6 +38,7 @@ pub struct PullPlugin;
 impl Plugin for PullPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<PullTool>()
+            .init_resource::<SelectTool>()
             .init_resource::<ControlsInUse>()
             .add_systems(Update, aim.after(use_controls).before(ToolSystems::Route))
             .add_systems(Update, drag.in_set(ToolSystems::Tools).after(transform::drag).before(select::select));
@@ -47,8 +48,8 @@ impl Plugin for PullPlugin {
 /// State of the pull tool.
 #[derive(Resource, Debug, Default)]
 pub struct PullTool {
-    /// Joint or control under the last press.
-    aim: Option<Uid>,
+    /// Places of the presses of a frame, with the joints or controls there.
+    aims: Vec<(Vec2, Uid)>,
     held: Option<NodePress>,
     /// Marks that the banner describes a drag.
     has_banner: bool,
@@ -101,10 +102,13 @@ fn aim(
     mut hover: ResMut<PullHover>,
 ) {
     let presses = pointers.read().filter(|pointer| pointer.act == PointerAct::Pressed).map(|pointer| pointer.at);
-    let Some(at) = presses.last() else { return };
-    let found = (*mode == Mode::Pose).then(|| node_at(&scene, &controls, at)).flatten();
-    tool.aim = found;
-    hover.set_if_neq(PullHover(found.is_some()));
+    let aim = |at: Vec2| (*mode == Mode::Pose).then(|| node_at(&scene, &controls, at)).flatten();
+    let found: Vec<(Vec2, Option<Uid>)> = presses.map(|at| (at, aim(at))).collect();
+    if found.is_empty() {
+        return;
+    }
+    hover.set_if_neq(PullHover(found.iter().map(|(_, node)| node.is_some()).collect()));
+    tool.aims = found.into_iter().filter_map(|(at, node)| Some((at, node?))).collect();
 }
 
 /// The control whose outline is at a pixel, or else the joint there.
@@ -137,7 +141,7 @@ fn drag(
     mut actions: MessageReader<ActionRequest>,
     mut edited: MessageReader<EditReport>,
     (scene, controls): (Scene, DrawnControls),
-    hovered: Query<&HoveredNode>,
+    (hover, hovered): (Res<SelectTool>, Query<&HoveredNode>),
     mut tool: ResMut<PullTool>,
     mut status: ResMut<StatusLine>,
     mut edits: MessageWriter<EditRequest>,
@@ -155,14 +159,15 @@ fn drag(
         }
         tool.held = None;
     }
-    let mut preview = None;
+    let (mut preview, mut clicks) = (None, ClickedSelection::default());
     for ToolPointer { tool: who, pointer } in pointers.read() {
         if *who != Tool::Pull {
             continue;
         }
         match pointer.act {
             PointerAct::Pressed => {
-                let pressed = tool.aim.take().zip(rig.as_ref());
+                let aim = tool.aims.iter().find(|(at, _)| *at == pointer.at).map(|(_, node)| *node);
+                let pressed = aim.zip(rig.as_ref());
                 tool.held = pressed.map(|(node, rig)| NodePress {
                     rig: rig.entity,
                     node,
@@ -204,8 +209,8 @@ fn drag(
                     }
                     (None, Some(sight)) if !dragged => {
                         let pick = select::click_or_control(&scene, &controls, rig, &sight, held.at);
-                        let hovered = hovered.get(rig.entity).ok().and_then(|hovered| hovered.0);
-                        picks.write(select::clicked(rig, pick, pointer.held, count, hovered));
+                        let under = hover.node_of_click(&hovered, &scene, &controls, rig, &sight, held.at);
+                        picks.write(clicks.request(rig, pick, pointer.held, count, under));
                     }
                     _ => {}
                 }

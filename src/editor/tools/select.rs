@@ -54,6 +54,28 @@ pub struct SelectTool {
     asked: Option<(Entity, Sight, Vec2)>,
 }
 
+impl SelectTool {
+    /// The node that a click at a pixel picks: the highlighted one, where the pointer rested there before. Else that one lies
+    /// under another place, from where the pointer has come within the frame.
+    pub(super) fn node_of_click(
+        &self,
+        hovered: &Query<&HoveredNode>,
+        scene: &Scene,
+        controls: &DrawnControls,
+        rig: &EditedRig,
+        sight: &Sight,
+        at: Vec2,
+    ) -> Option<Uid> {
+        let is_there = |(of, seen, place): (Entity, Sight, Vec2)| {
+            of == rig.entity && seen == *sight && place.distance(at) <= BESIDE_HOVER
+        };
+        match self.asked.is_some_and(is_there) {
+            true => hovered.get(rig.entity).ok().and_then(|hovered| hovered.0),
+            false => node_under(scene, controls, rig, sight, at),
+        }
+    }
+}
+
 /// Largest distance of clicks at the same spot, in pixels.
 pub const REACH: f32 = 8.0;
 /// Largest distance of a click beside the mesh from the joint it picks, in pixels.
@@ -143,6 +165,7 @@ pub(super) fn select(
     // The box is all that is shown; the pointer's position does not count as a change.
     let band = shown.band;
     let tool = shown.bypass_change_detection();
+    let mut clicks = ClickedSelection::default();
     for ToolPointer { tool: who, pointer } in pointers.read() {
         if *who != Tool::Select {
             tool.pointer = None;
@@ -166,15 +189,8 @@ pub(super) fn select(
                     }
                     None => {
                         let pick = click_or_control(&scene, &controls, &rig, &sight, press);
-                        // The node that is highlighted lies under the last frame's pointer, which may have come from elsewhere.
-                        let is_known = tool.asked.is_some_and(|(of, seen, at)| {
-                            of == rig.entity && seen == sight && at.distance(press) <= BESIDE_HOVER
-                        });
-                        let under = match is_known {
-                            true => hovered.get(rig.entity).ok().and_then(|hovered| hovered.0),
-                            false => node_under(&scene, &controls, &rig, &sight, press),
-                        };
-                        clicked(&rig, pick, pointer.held, count, under)
+                        let under = tool.node_of_click(&hovered, &scene, &controls, &rig, &sight, press);
+                        clicks.request(&rig, pick, pointer.held, count, under)
                     }
                 };
                 picks.write(request);
@@ -183,7 +199,7 @@ pub(super) fn select(
         }
     }
     // The mode may have been changed by a key, under a resting pointer.
-    let resting = area.pointer.filter(|_| Tool::of(*mode) == Tool::Select && !gizmo.0);
+    let resting = area.pointer.filter(|_| Tool::of(*mode) == Tool::Select && !gizmo.is_over);
     let at = tool.pointer.or(resting).filter(|_| tool.press.is_none());
     let asked = at.map(|at| (rig.entity, sight, at));
     if asked != tool.asked {
@@ -214,23 +230,58 @@ fn node_under(scene: &Scene, controls: &DrawnControls, rig: &EditedRig, sight: &
     found.first().map(|number| posed[*number].0)
 }
 
-/// The request of a click with what it meets; of a double click, with the hierarchy of the active joint.
-pub(super) fn clicked(
+/// The selection as the clicks of a frame leave it. Requests are answered later in the frame, but the next click of a slow frame
+/// has to know what the one before it picks.
+#[derive(Debug, Default)]
+pub(super) struct ClickedSelection(Option<Vec<Uid>>);
+
+impl ClickedSelection {
+    /// The selected nodes, the active one last.
+    pub(super) fn nodes<'a>(&'a self, rig: &'a EditedRig) -> &'a [Uid] {
+        self.0.as_deref().unwrap_or(&rig.selection.0)
+    }
+
+    /// Takes over the request of a click, which picks the node `under` where it names none.
+    pub(super) fn follow(&mut self, rig: &EditedRig, request: &PickRequest, under: Option<Uid>) {
+        let found = match &request.what {
+            Pick::Joints(nodes) => nodes.as_slice(),
+            Pick::Click { .. } => under.as_slice(),
+            Pick::Box { .. } | Pick::All | Pick::None => &[],
+        };
+        let before = if request.add { self.nodes(rig) } else { &[] };
+        let kept = before.iter().filter(|node| !found.contains(*node));
+        let after: Vec<Uid> = kept.chain(found).copied().collect();
+        self.0 = Some(after);
+    }
+
+    /// The request of a click with what it meets; of a double click, with the hierarchy of the active joint. `under` is the node
+    /// that the click picks.
+    pub(super) fn request(
+        &mut self,
+        rig: &EditedRig,
+        pick: Option<Pick>,
+        held: ModifierKeys,
+        count: u8,
+        under: Option<Uid>,
+    ) -> PickRequest {
+        let request = clicked(rig, self.nodes(rig), pick, held, count, under);
+        self.follow(rig, &request, under);
+        request
+    }
+}
+
+fn clicked(
     rig: &EditedRig,
+    selected: &[Uid],
     pick: Option<Pick>,
     held: ModifierKeys,
     count: u8,
-    hovered: Option<Uid>,
+    under: Option<Uid>,
 ) -> PickRequest {
     let request = |what, add| PickRequest { rig: rig.entity, what, add };
-    let selected = &rig.selection.0;
-    if count > 1
-        && let Some(active) = rig.selection.active().filter(|active| rig.rig.joint(*active).is_some())
-    {
-        // The whole hierarchy, the joint itself last: it stays the active one.
-        let mut below: Vec<Uid> = rig.rig.hierarchy(active).map(|joint| joint.data.uid).collect();
-        below.reverse();
-        return request(Pick::Joints(below), held.shift || held.control);
+    let active = selected.last().copied().filter(|active| count > 1 && rig.rig.joint(*active).is_some());
+    if let Some(active) = active {
+        return request(Pick::Joints(hierarchy_below(rig, active)), held.shift || held.control);
     }
     let Some(pick) = pick else {
         return if held.shift || held.control {
@@ -239,12 +290,19 @@ pub(super) fn clicked(
             request(Pick::None, false)
         };
     };
-    match hovered {
+    match under {
         Some(joint) if held.control && selected.contains(&joint) => {
             request(Pick::Joints(selected.iter().copied().filter(|other| *other != joint).collect()), false)
         }
         _ => request(pick, held.shift || held.control),
     }
+}
+
+/// A joint with all below, itself last: as a selection, it stays the active one.
+pub(super) fn hierarchy_below(rig: &EditedRig, joint: Uid) -> Vec<Uid> {
+    let mut below: Vec<Uid> = rig.rig.hierarchy(joint).map(|joint| joint.data.uid).collect();
+    below.reverse();
+    below
 }
 
 /// The request of a box with the controls in it, or with its joints if there are none.

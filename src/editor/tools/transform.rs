@@ -18,7 +18,7 @@ use super::{
     pose::PosedJoint,
     pull::{Way, joint_at, pulls_by_others},
     scene::{EditedRig, Scene, joints},
-    select::{self, REACH},
+    select::{self, ClickedSelection, DrawnControls, REACH, SelectTool},
 };
 use crate::{
     editor::{
@@ -30,6 +30,7 @@ use crate::{
         settings::{EditorSettings, GizmoSpace},
     },
     plugins::{
+        controls::ControlsInUse,
         document::{Change, EditReport, EditRequest, HoveredNode},
         picking::{Pick, PickRequest},
     },
@@ -46,6 +47,8 @@ pub struct TransformPlugin;
 impl Plugin for TransformPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<GizmoTool>()
+            .init_resource::<SelectTool>()
+            .init_resource::<ControlsInUse>()
             .init_resource::<PoseMoves>()
             .init_resource::<EditorSettings>()
             .add_message::<RequestRedraw>()
@@ -71,8 +74,8 @@ pub struct GizmoTool {
     /// The handle under the pointer.
     pub hovered: Option<Handle>,
     pointer: Option<Vec2>,
-    /// Joint under the last press in Move mode, where no handle is.
-    grabbed: Option<Uid>,
+    /// Places of the presses of a frame in Move mode, with the joints there, where no handle is.
+    grabs: Vec<(Vec2, Uid)>,
     drag: Option<Drag>,
     /// Marks that the banner describes a drag.
     has_banner: bool,
@@ -135,7 +138,7 @@ pub fn edits_rest(mode: Mode) -> bool {
     matches!(mode, Mode::Move | Mode::Rotate | Mode::Scale)
 }
 
-/// Updates [`GizmoHover`] for the presses of this frame.
+/// Updates [`GizmoHover`] for the pointer and the presses of this frame.
 fn hover(
     mut pointers: MessageReader<ViewportPointer>,
     mode: Res<Mode>,
@@ -149,43 +152,54 @@ fn hover(
     if pointers.is_empty() {
         return;
     }
-    let mut press = None;
+    let mut presses = Vec::new();
     let mut last = tool.pointer;
     for pointer in pointers.read() {
         last = (pointer.act != PointerAct::Left).then_some(pointer.at);
-        if pointer.act == PointerAct::Pressed && press.is_none() {
-            press = Some(pointer.at);
+        if pointer.act == PointerAct::Pressed {
+            presses.push(pointer.at);
         }
     }
     if tool.pointer != last {
         tool.pointer = last;
     }
-    if tool.drag.is_some() || owner.0.is_some() && press.is_none() {
+    if presses.is_empty() && (tool.drag.is_some() || owner.0.is_some()) {
         return;
     }
-    let aim = GizmoTarget::new(*mode, settings.gizmo_space, moves.0, &scene);
-    let found = aim.zip(scene.sight()).zip(press.or(last));
-    let handle = found.and_then(|((aim, sight), at)| {
-        let handle = handle_at(&aim.frame.shapes(aim.parts, &sight), at)?;
-        // Rings that are seen from the side run through the joint, which is pulled there; so does the middle of a control, which
-        // moves nothing while its limb turns forwards.
-        let yields = match handle {
-            Handle::Ring(_) => *mode == Mode::Pose,
-            Handle::MoveView => *mode == Mode::Pose && !moves.0 && pulls_by_others(&scene, &sight, at),
-            _ => false,
-        };
-        let is_joint = yields && sight.project(aim.frame.origin).is_some_and(|middle| middle.distance(at) <= REACH);
-        (!is_joint).then_some(handle)
-    });
-    if tool.hovered != handle {
-        tool.hovered = handle;
+    let handle = |at: Vec2| handle_of_press(&scene, *mode, settings.gizmo_space, moves.0, at);
+    let is_grabbing = *mode == Mode::Move;
+    let grabbed = |at: Vec2| joint_at(&scene, &scene.rig()?, &scene.sight()?, at).filter(|_| is_grabbing);
+    let (mut hovered, mut grabs) = (last.filter(|_| presses.is_empty()).and_then(handle), Vec::new());
+    let mut taken = GizmoHover { is_over: hovered.is_some(), presses: Vec::with_capacity(presses.len()) };
+    for at in presses {
+        hovered = handle(at);
+        let joint = if hovered.is_none() { grabbed(at) } else { None };
+        grabs.extend(joint.map(|joint| (at, joint)));
+        taken.is_over = hovered.is_some() || joint.is_some();
+        taken.presses.push(taken.is_over);
     }
-    let grabbed = press.filter(|_| handle.is_none() && *mode == Mode::Move);
-    let grabbed = grabbed.and_then(|at| joint_at(&scene, &scene.rig()?, &scene.sight()?, at));
-    if tool.grabbed != grabbed {
-        tool.grabbed = grabbed;
+    if tool.drag.is_none() && tool.hovered != hovered {
+        tool.hovered = hovered;
     }
-    hover.set_if_neq(GizmoHover(handle.is_some() || grabbed.is_some()));
+    if tool.grabs != grabs {
+        tool.grabs = grabs;
+    }
+    hover.set_if_neq(taken);
+}
+
+/// The handle that a press at a pixel takes.
+fn handle_of_press(scene: &Scene, mode: Mode, space: GizmoSpace, moves: bool, at: Vec2) -> Option<Handle> {
+    let (aim, sight) = (GizmoTarget::new(mode, space, moves, scene)?, scene.sight()?);
+    let handle = handle_at(&aim.frame.shapes(aim.parts, &sight), at)?;
+    // Rings that are seen from the side run through the joint, which is pulled there; so does the middle of a control, which
+    // moves nothing while its limb turns forwards.
+    let yields = match handle {
+        Handle::Ring(_) => mode == Mode::Pose,
+        Handle::MoveView => mode == Mode::Pose && !moves && pulls_by_others(scene, &sight, at),
+        _ => false,
+    };
+    let is_joint = yields && sight.project(aim.frame.origin).is_some_and(|middle| middle.distance(at) <= REACH);
+    (!is_joint).then_some(handle)
 }
 
 pub(super) fn drag(
@@ -193,7 +207,8 @@ pub(super) fn drag(
     mut actions: MessageReader<ActionRequest>,
     mut edited: MessageReader<EditReport>,
     (mode, settings, moves): (Res<Mode>, Res<EditorSettings>, Res<PoseMoves>),
-    (scene, hovered): (Scene, Query<&HoveredNode>),
+    (scene, controls): (Scene, DrawnControls),
+    (hover, hovered): (Res<SelectTool>, Query<&HoveredNode>),
     mut tool: ResMut<GizmoTool>,
     mut status: ResMut<StatusLine>,
     mut edits: MessageWriter<EditRequest>,
@@ -209,14 +224,15 @@ pub(super) fn drag(
         edits.write(EditRequest { rig: drag.rig, change: Change::CancelPreview });
         tool.drag = None;
     }
-    let mut preview = None;
+    let (mut preview, mut clicks) = (None, ClickedSelection::default());
     for ToolPointer { tool: who, pointer } in pointers.read() {
         if *who != Tool::Gizmo {
             continue;
         }
         match pointer.act {
             PointerAct::Pressed => {
-                tool.drag = match tool.grabbed.take() {
+                let grabbed = tool.grabs.iter().find(|(at, _)| *at == pointer.at).map(|(_, joint)| *joint);
+                tool.drag = match grabbed {
                     Some(joint) => grab(&scene, joint, pointer.at),
                     None => press(&scene, *mode, settings.gizmo_space, moves.0, pointer.at),
                 };
@@ -238,13 +254,15 @@ pub(super) fn drag(
                     edits.write(EditRequest { rig: drag.rig, change: drag.preview(settings.move_children) });
                     Change::Commit
                 } else {
-                    let pick = match (drag.grabbed, scene.sight()) {
-                        (Some(_), Some(sight)) => {
-                            let pick = select::click(&scene, rig, &sight, pointer.at);
-                            let hovered = hovered.get(rig.entity).ok().and_then(|hovered| hovered.0);
-                            Some(select::clicked(rig, pick, pointer.held, count, hovered))
-                        }
-                        _ => clicked(&scene, rig, pointer.at, pointer.held),
+                    let Some(sight) = scene.sight() else { continue };
+                    let at = drag.gizmo.press();
+                    let pick = if drag.grabbed.is_some() {
+                        let pick = select::click(&scene, rig, &sight, at);
+                        let under = hover.node_of_click(&hovered, &scene, &controls, rig, &sight, at);
+                        Some(clicks.request(rig, pick, pointer.held, count, under))
+                    } else {
+                        let pick = clicked(&scene, rig, clicks.nodes(rig), at, pointer.held, count);
+                        pick.inspect(|pick| clicks.follow(rig, pick, None))
                     };
                     picks.write_batch(pick);
                     Change::CancelPreview
@@ -333,19 +351,29 @@ pub(super) fn step(rig: &EditedRig) -> f32 {
     height * MOVE_STEP
 }
 
-/// The pick of a click on a handle: a joint at that pixel.
-fn clicked(scene: &Scene, rig: &EditedRig, at: Vec2, held: ModifierKeys) -> Option<PickRequest> {
+/// The pick of a click on a handle: a joint at that pixel; of a double click, all that hangs below the active joint there.
+fn clicked(
+    scene: &Scene,
+    rig: &EditedRig,
+    selected: &[Uid],
+    at: Vec2,
+    held: ModifierKeys,
+    count: u8,
+) -> Option<PickRequest> {
     let sight = scene.sight()?;
+    let active = selected.last().copied();
     let near = scene.posed(rig).into_iter().filter_map(|(joint, place)| {
         let distance = sight.project(place)?.distance(at);
-        (distance <= REACH && rig.selection.active() != Some(joint)).then_some((joint, distance))
+        (distance <= REACH && (count > 1 || active != Some(joint))).then_some((joint, distance))
     });
     let (joint, _) = near.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let selected = &rig.selection.0;
-    let (what, add) = if held.control && selected.contains(&joint) {
+    let is_added = held.shift || held.control;
+    let (what, add) = if count > 1 && active == Some(joint) {
+        (select::hierarchy_below(rig, joint), is_added)
+    } else if held.control && selected.contains(&joint) {
         (selected.iter().copied().filter(|other| *other != joint).collect(), false)
     } else {
-        (vec![joint], held.shift || held.control)
+        (vec![joint], is_added)
     };
     Some(PickRequest { rig: rig.entity, what: Pick::Joints(what), add })
 }

@@ -21,6 +21,8 @@ use crate::mesh::model::MaterialSet;
 
 /// Largest opacity of see-through surfaces.
 const XRAY_OPACITY: f32 = 0.36;
+/// Light of see-through surfaces themselves, so that dark ones are seen, too.
+const XRAY_GLOW: f32 = 0.2;
 
 /// An image used by a material, with its sampler.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -66,11 +68,14 @@ pub(super) fn painted() -> StandardMaterial {
     }
 }
 
-/// The see-through variant of a material.
+/// The see-through variant of a material. Its light is added to that of all behind it, because a sum does not depend on the order
+/// of the triangles: those of one mesh are not drawn from far to near, and blending would show that as patches.
 pub(super) fn xray(mut material: StandardMaterial) -> StandardMaterial {
     let opacity = material.base_color.alpha() * XRAY_OPACITY;
     material.base_color.set_alpha(opacity);
-    material.alpha_mode = AlphaMode::Blend;
+    material.alpha_mode = AlphaMode::Add;
+    material.emissive = LinearRgba::rgb(XRAY_GLOW, XRAY_GLOW, XRAY_GLOW);
+    material.emissive_texture = None;
     material.double_sided = true;
     material.cull_mode = None;
     material

@@ -108,6 +108,39 @@ fn a_click_makes_a_face_that_sliders_pose() {
     desk.click("Reset");
     desk.frames(4);
     assert!(desk.rig().pose().is_empty(), "back at rest");
+
+    // Escape drops the drag: the face and the slider go back, and no step is made.
+    let steps = desk.steps();
+    desk.time += 1.0;
+    desk.press(at(0.02));
+    desk.move_to(at(0.3));
+    desk.move_to(at(0.6));
+    desk.frames(4);
+    assert!(!desk.rig().pose().is_empty(), "a drag is seen");
+    desk.key(egui::Key::Escape);
+    desk.move_to(at(0.7));
+    desk.release(at(0.7));
+    desk.frames(4);
+    assert!(desk.rig().pose().is_empty() && strengths(&desk).0.is_empty(), "{:?}", strengths(&desk));
+    assert_eq!(desk.steps(), steps);
+
+    // What is typed is one step, and what is no strength is told.
+    let type_in = |desk: &mut Desk, text: &str| {
+        desk.time += 1.0;
+        desk.click_at(number.center());
+        desk.frames(2);
+        desk.type_text(text);
+        desk.key(egui::Key::Enter);
+        desk.frames(4);
+    };
+    for (text, words) in [("much", "is no number"), ("70", "is none of its numbers")] {
+        type_in(&mut desk, text);
+        assert!(desk.told().last().is_some_and(|told| told.contains(words)), "{text}: {:?}", desk.told());
+        assert_eq!(desk.steps(), steps, "{text}");
+    }
+    type_in(&mut desk, "0.75");
+    assert_eq!(strengths(&desk).0.get("happiness"), Some(&0.75));
+    assert_eq!(desk.steps(), (steps.0 + 1, steps.1 + 1));
 }
 
 /// A face that is opened from a file has the density that it was placed with, and is placed again with it.

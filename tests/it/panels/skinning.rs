@@ -47,6 +47,43 @@ fn skinning_says_why_not_runs_once_and_can_be_cancelled() {
 }
 
 #[test]
+fn wrong_numbers_of_the_settings_are_told() {
+    let mut desk = Desk::new(SkinningPanel::default());
+    desk.click("Settings");
+    // The header unfolds over some frames.
+    desk.frames(40);
+    let settings = |desk: &Desk| desk.app.world().resource::<SkinningSettings>().0.clone();
+    let type_into = |desk: &mut Desk, field: &str, text: &str| {
+        desk.click(field);
+        desk.type_text(text);
+        desk.key(Key::Enter);
+        desk.frames(3);
+    };
+    let before = settings(&desk);
+    let wrong = [
+        ("Voxels", "5000", "Voxels stays as it was: 5000 is none of its numbers; write one from 32 to 1024."),
+        ("Voxels", "many", "Voxels stays as it was: \"many\" is no number; write one such as 1.5 or -20."),
+        ("Influences", "0", "Influences stays as it was: 0 is none of its numbers; write one from 1 to 16."),
+    ];
+    for (field, text, words) in wrong {
+        type_into(&mut desk, field, text);
+        assert_eq!(settings(&desk), before, "{field} {text}");
+        let last = desk
+            .app
+            .world()
+            .resource::<LogBook>()
+            .entries()
+            .next_back()
+            .map(|last| (last.notice.text.clone(), last.times));
+        assert_eq!(last, Some((words.to_owned(), 1)));
+    }
+    type_into(&mut desk, "Voxels", "64");
+    type_into(&mut desk, "Influences", "3");
+    assert_eq!((settings(&desk).voxel_resolution, settings(&desk).max_influences), (64, 3));
+    assert_eq!(desk.told().len(), wrong.len());
+}
+
+#[test]
 fn parts_tell_what_holds_them_and_keep_to_choices() {
     let mut desk = Desk::new(SkinningPanel::default());
     desk.resize(320.0, 900.0);

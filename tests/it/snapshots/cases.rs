@@ -190,6 +190,9 @@ fn typical() -> Vec<Case> {
         // Its key is the last change of the document that the pictures are of.
         wide("timeline", "row_menu", states::key_hand, &[Step::Menu("hand_ik_l")]),
     ]);
+    // The menu of keys is higher than the panel.
+    let menu = wide("timeline", "keys_menu", states::as_it_is, &[Step::Menu("All keys")]);
+    cases.push(Case { frame: Frame { size: [menu.frame.size[0], 760], ..menu.frame }, ..menu });
     cases
 }
 

@@ -115,6 +115,54 @@ fn the_palette_says_why_an_action_can_do_nothing() {
 }
 
 #[test]
+fn a_key_whose_action_can_do_nothing_tells_the_reason_of_the_palette() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    page.send(ActionRequest(Action::Cancel));
+    let is_told =
+        |page: &Page, text: &str| page.world().resource::<LogBook>().entries().any(|entry| entry.notice.text == text);
+    let actions = [
+        Action::Build,
+        Action::RollBack,
+        Action::StepForward,
+        Action::StepBack,
+        Action::XRay,
+        Action::Wireframe,
+        Action::Meshes,
+        Action::Deforming,
+        Action::OnionSkin,
+    ];
+    for action in actions {
+        let why = palette::obstacle(page.world(), action).unwrap_or_else(|| panic!("{action:?} can do something"));
+        page.send(ActionRequest(action));
+        assert!(is_told(&page, &format!("{}: {why}.", help::describe(action))), "{action:?} is silent");
+    }
+    // What can be done needs no word.
+    page.send(OpenRequest::Bundled);
+    let count = page.world().resource::<LogBook>().next_number();
+    page.send(ActionRequest(Action::XRay));
+    page.send(ActionRequest(Action::Meshes));
+    assert_eq!(page.world().resource::<LogBook>().next_number(), count);
+}
+
+#[test]
+fn the_help_gives_all_actions_their_usual_keys_again() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    page.send(ActionRequest(Action::Cancel));
+    page.send(ActionRequest(Action::Help));
+    assert!(!page.desk.find("Usual keys").enabled, "nothing was bound");
+    let mut keys = KeyBindings::default();
+    keys.bind(Chord::try_from("J".to_owned()).unwrap(), Action::Fit);
+    keys.bind(Chord::try_from("F".to_owned()).unwrap(), Action::Skin);
+    page.desk.app.insert_resource(keys);
+    page.settle();
+    page.click("Usual keys");
+    assert_eq!(*page.world().resource::<KeyBindings>(), KeyBindings::default());
+    assert!(page.world().resource::<HelpShown>().0, "the page stays");
+}
+
+#[test]
 fn the_palette_brings_panels_forward() {
     let folder = folder();
     let mut page = Page::open(folder.path(), None);

@@ -90,10 +90,10 @@ fn the_curves_have_the_keys_and_the_menu_of_the_timeline() {
     let (mut desk, left) = open();
     desk.move_to(place(&desk, 1.5, 0.9));
     desk.frames(2);
-    assert!(timeline(&desk).hovered);
+    assert_eq!(timeline(&desk).hovered, Some("Curves"));
     desk.move_to(Pos2::new(2000.0, 2000.0));
     desk.frames(2);
-    assert!(!timeline(&desk).hovered);
+    assert_eq!(timeline(&desk).hovered, None);
     ask(&mut desk, TimelineRequest::Select([(moved(left), vec![0.0])].into()));
     desk.secondary_click_at(place(&desk, 1.0, 0.5));
     let wanted: KeyTimes = [(moved(left), vec![1.0])].into();
@@ -102,6 +102,50 @@ fn the_curves_have_the_keys_and_the_menu_of_the_timeline() {
     desk.click("Delete keys");
     desk.frames(3);
     assert_eq!((keys(&desk, left).len(), desk.steps().1), (2, steps + 1));
+}
+
+#[test]
+fn a_box_selects_the_keys_of_the_curves_in_it() {
+    let (mut desk, left) = open();
+    let steps = desk.steps();
+    let chosen = |desk: &Desk| timeline(desk).keys.get(&moved(left)).cloned().unwrap_or_default();
+    // From above on the left and from below on the right; the keys of X and Z lie below both.
+    desk.drag(place(&desk, 0.7, 1.05), place(&desk, 2.05, 0.3));
+    assert_eq!(chosen(&desk), [1.0, 2.0]);
+    desk.drag(place(&desk, 1.4, 0.2), place(&desk, 0.7, 0.7));
+    assert_eq!(chosen(&desk), [1.0]);
+    desk.hold(Modifiers::SHIFT);
+    desk.drag(place(&desk, 0.4, 0.1), place(&desk, -0.05, -0.08));
+    assert_eq!(chosen(&desk), [0.0, 1.0], "with Shift more");
+    desk.hold(Modifiers::NONE);
+    desk.drag(place(&desk, 0.3, 0.6), place(&desk, 0.6, 0.9));
+    assert_eq!(chosen(&desk), [0.0, 1.0], "an empty box leaves the curves as they are");
+    // Escape drops a box.
+    desk.time += 1.0;
+    desk.press(place(&desk, 1.4, 0.2));
+    desk.move_to(place(&desk, 0.7, 0.7));
+    desk.key(KeyboardKey::Escape);
+    desk.release(place(&desk, 0.7, 0.7));
+    desk.frames(3);
+    assert_eq!(chosen(&desk), [0.0, 1.0]);
+    assert_eq!(desk.steps(), steps, "a selection is no step");
+}
+
+/// Keys that stand too close together to be dragged one by one are in a box all the same.
+#[test]
+fn a_box_selects_keys_that_stand_close_together() {
+    let (mut desk, left) = open();
+    let dense: Vec<Key> =
+        (0..=200).map(|step| step as f32 * 0.01).map(|time| Key::vector(time, Vec3::Y * time)).collect();
+    let wanted = dense.iter().filter(|key| key.time > 0.495 && key.time < 1.005).count();
+    let set = KeyOperation::Set(vec![(moved(left), dense)]);
+    desk.edit(Operation::Clips(ClipOperation::Keys { clip: CLIP, layer: BASE, change: set }));
+    ask(&mut desk, TimelineRequest::Select([(moved(left), vec![0.0])].into()));
+    // The curve rises to 2 within the same height, so that the box is as high as the panel.
+    let rect = desk.find("Curves of the selected tracks").rect;
+    let place = |desk: &Desk, time: f32, y: f32| egui::pos2(place(desk, time, 0.0).x, y);
+    desk.drag(place(&desk, 0.495, rect.top() + 4.0), place(&desk, 1.005, rect.bottom() - 4.0));
+    assert_eq!(timeline(&desk).keys[&moved(left)].len(), wanted);
 }
 
 #[test]

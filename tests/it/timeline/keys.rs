@@ -1,6 +1,6 @@
 //! Keys by hand: selected, dragged, scaled, set, and set with each pose.
 
-use rigsmith::plugins::history::RigHistory;
+use rigsmith::{editor::dock::Layout, plugins::history::RigHistory};
 
 use super::*;
 
@@ -131,6 +131,56 @@ fn keys_are_scaled_about_the_playhead() {
     act(&mut desk, TimelineAction::Copy);
     act(&mut desk, TimelineAction::Paste);
     assert_eq!(frames(&times(&desk, left)), [0.0, 7.65, 15.0, 30.0, 45.0, 60.0]);
+}
+
+#[test]
+fn rows_of_tracks_and_of_all_keys_have_the_menu_of_keys() {
+    let (mut desk, [_, left, right]) = opened();
+    let before = bytes(&desk);
+    desk.click("Unfold arm_l");
+    desk.frames(2);
+    desk.secondary_click("arm_l rotation");
+    desk.frames(2);
+    let wanted: KeyTimes = [(turned(left), times(&desk, left))].into();
+    assert_eq!(timeline(&desk).keys, wanted, "a right click selects the keys of the row");
+    desk.click("Delete keys");
+    desk.frames(3);
+    assert!(times(&desk, left).is_empty() && times(&desk, right).len() == 4);
+    undo(&mut desk);
+    assert_eq!(bytes(&desk), before);
+    desk.secondary_click("All keys");
+    desk.frames(2);
+    assert_eq!(selected(&desk), 8);
+    desk.click("Delete keys");
+    desk.frames(3);
+    assert!(times(&desk, left).is_empty() && times(&desk, right).is_empty());
+    undo(&mut desk);
+    assert_eq!(bytes(&desk), before);
+    // Of more keys than those of the row, the menu is that of all of them.
+    act(&mut desk, TimelineAction::SelectAll);
+    desk.secondary_click("arm_l rotation");
+    desk.frames(2);
+    assert_eq!(selected(&desk), 8);
+}
+
+/// A command hides the panel, or another one comes forward, while the pointer rests.
+#[test]
+fn a_hidden_panel_takes_no_keys() {
+    let (mut desk, _) = opened();
+    desk.app.init_resource::<Layout>();
+    let layout = |desk: &mut Desk, change: &dyn Fn(&mut Layout)| {
+        change(&mut desk.app.world_mut().resource_mut::<Layout>());
+        desk.frames(2);
+    };
+    desk.move_to(at(&desk, "All keys", 1.0));
+    desk.frames(2);
+    assert_eq!(timeline(&desk).hovered, Some("Timeline"));
+    layout(&mut desk, &|layout| layout.toggle("Timeline"));
+    assert_eq!(timeline(&desk).hovered, None);
+    layout(&mut desk, &|layout| layout.bring_forward("Timeline"));
+    assert_eq!(timeline(&desk).hovered, Some("Timeline"));
+    layout(&mut desk, &|layout| layout.bring_forward("Curves"));
+    assert_eq!(timeline(&desk).hovered, None);
 }
 
 #[test]

@@ -235,15 +235,79 @@ fn a_key_after_a_click_is_for_what_was_clicked() {
 /// The pointer comes from another joint and goes on to a third place within the frame of the click.
 #[test]
 fn a_click_with_control_takes_out_the_joint_under_the_press() {
-    let (mut hand, joints) = Hand::with_joints(Mode::Select);
-    let [a, b] = [joints[0], joints[5]];
-    let [at_a, at_b] = [hand.base.pixel(a), hand.base.pixel(b)];
-    hand.frame(&[To(at_a), Down, Up]);
-    hand.frame(&[To(at_b), Press("Ctrl"), Down, Up]);
-    assert_eq!(hand.base.selected(), [a, b]);
-    hand.frame(&[To(at_b + Vec2::new(1.0, 0.0))]);
-    hand.frame(&[To(at_a), Down, Up, To(at_b)]);
-    assert_eq!(hand.base.selected(), [b], "the pointer came from the other one, and goes back there");
+    for mode in [Mode::Select, Mode::Move, Mode::Pose] {
+        let (mut hand, joints) = Hand::with_joints(mode);
+        let [a, b] = [joints[0], joints[5]];
+        let [at_a, at_b] = [hand.base.pixel(a), hand.base.pixel(b)];
+        hand.frame(&[To(at_a), Down, Up]);
+        hand.frame(&[To(at_b), Press("Ctrl"), Down, Up]);
+        assert_eq!(hand.base.selected(), [a, b], "{mode:?}");
+        hand.frame(&[To(at_b + Vec2::new(1.0, 0.0))]);
+        hand.frame(&[To(at_a), Down, Up, To(at_b)]);
+        assert_eq!(hand.base.selected(), [b], "{mode:?}: the pointer came from the other one, and goes back there");
+    }
+}
+
+#[test]
+fn a_double_click_within_a_frame_selects_the_hierarchy() {
+    for mode in [Mode::Select, Mode::Move, Mode::Pose] {
+        let (mut hand, joints) = Hand::with_joints(mode);
+        let shoulder = hand.base.pixel(joints[3]);
+        hand.frame(&[To(shoulder), Down, Up, Down, Up]);
+        let mut below = hand.base.selected();
+        assert_eq!(below.last(), Some(&joints[3]), "{mode:?}: it stays the active one");
+        below.sort();
+        let mut wanted = joints[3..].to_vec();
+        wanted.sort();
+        assert_eq!(below, wanted, "{mode:?}");
+    }
+}
+
+/// The handle of a gizmo lies over the joint that the first click selected.
+#[test]
+fn a_double_click_over_two_frames_selects_the_hierarchy_in_every_mode() {
+    for mode in [Mode::Select, Mode::Move, Mode::Rotate, Mode::Scale, Mode::Pose] {
+        let (mut bench, joints) = RigBench::with_body(mode).with_joints();
+        let shoulder = bench.pixel(joints[3]);
+        bench.click(PLAIN, shoulder);
+        assert_eq!(bench.selected(), [joints[3]], "{mode:?}");
+        let again = PointerAct::Released { dragged: false, count: 2 };
+        bench.point(PLAIN, &[(shoulder, PointerAct::Pressed), (shoulder, again)]);
+        assert_eq!(bench.selected().len(), joints[3..].len(), "{mode:?}");
+        assert_eq!(bench.selected().last(), Some(&joints[3]), "{mode:?}");
+    }
+}
+
+/// One press is on a handle of the gizmo, the other one on a joint beside it.
+#[test]
+fn each_press_of_a_frame_belongs_to_what_lies_under_it() {
+    for (mode, is_handle_first) in [(Mode::Move, true), (Mode::Move, false), (Mode::Pose, true)] {
+        let (mut hand, joints) = Hand::with_joints(mode);
+        let [a, b] = [joints[0], joints[5]];
+        let [at_a, at_b] = [hand.base.pixel(a), hand.base.pixel(b)];
+        hand.frame(&[To(at_a), Down, Up]);
+        assert_eq!(hand.base.selected(), [a], "{mode:?}");
+        hand.frame(&[To(at_a + Vec2::new(1.0, 0.0))]);
+        let [first, last] = if is_handle_first { [at_a, at_b] } else { [at_b, at_a] };
+        hand.frame(&[To(first), Down, Up, To(last), Down, Up]);
+        let wanted = if is_handle_first { b } else { a };
+        assert_eq!(hand.base.selected(), [wanted], "{mode:?}, the handle first: {is_handle_first}");
+    }
+}
+
+/// The joint of the second click is no more selected, and that of the third one is.
+#[test]
+fn clicks_with_control_in_one_frame_add_up() {
+    for mode in [Mode::Select, Mode::Move, Mode::Pose] {
+        let (mut hand, joints) = Hand::with_joints(mode);
+        let nodes = [joints[0], joints[3], joints[5]];
+        let [a, b, c] = nodes.map(|joint| hand.base.pixel(joint));
+        hand.base.select(&nodes);
+        hand.frame(&[Press("Ctrl"), To(a), Down, Up, To(b), Down, Up]);
+        assert_eq!(hand.base.selected(), [nodes[2]], "{mode:?}");
+        hand.frame(&[To(a), Down, Up, To(c), Down, Up]);
+        assert_eq!(hand.base.selected(), [nodes[0]], "{mode:?}");
+    }
 }
 
 #[test]

@@ -39,6 +39,22 @@ pub struct Curve {
     pub keys: Vec<CurveKey>,
 }
 
+impl Curve {
+    /// Value at a visible time: that of a key there, or else on the line between the points beside it.
+    pub fn value_at(&self, time: f32) -> Option<f32> {
+        if let Some(key) = self.keys.iter().find(|key| key.key.time == time) {
+            return Some(key.value);
+        }
+        let next = self.points.partition_point(|(at, _)| *at < time);
+        let (end, value) = *self.points.get(next)?;
+        if end == time {
+            return Some(value);
+        }
+        let (start, before) = *self.points.get(next.checked_sub(1)?)?;
+        Some(before + (value - before) * ((time - start) / (end - start)))
+    }
+}
+
 /// Key on a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CurveKey {

@@ -1,6 +1,6 @@
 //! Gestures on curves: keys in time or in value, and tangents. A drag previews one operation, and the release makes it one step.
 
-use bevy_egui::egui::{Key as KeyboardKey, PointerButton, Pos2, Response, Ui};
+use bevy_egui::egui::{Key as KeyboardKey, PointerButton, Pos2, Rect, Response, Ui};
 
 use super::{
     Plot,
@@ -29,6 +29,8 @@ pub(super) enum Gesture {
     Value(ValueDrag),
     /// Tangent of a key.
     Tangent(TangentDrag),
+    /// A box that selects keys, between two opposite corners.
+    Box([Pos2; 2]),
     /// Time and values that are panned.
     Pan,
 }
@@ -108,6 +110,10 @@ pub(super) fn gestures(
             Some(Gesture::Time(drag)) => drag.to(open.clip, plot.axis.time(at.x), held.alt).then(|| drag.shown.clone()),
             Some(Gesture::Value(drag)) => drag.to(plot.value(at.y)).then(|| drag.shown.clone()),
             Some(Gesture::Tangent(drag)) => drag.to(plot, at, held.alt).then(|| drag.shown.clone()),
+            Some(Gesture::Box(corners)) => {
+                corners[1] = at;
+                None
+            }
             None => None,
         };
         if let Some(shown) = shown {
@@ -122,6 +128,17 @@ pub(super) fn gestures(
             Gesture::Time(drag) => (drag.shown.is_some(), Some(drag.moved)),
             Gesture::Value(drag) => (drag.shown.is_some(), None),
             Gesture::Tangent(drag) => (drag.shown.is_some(), None),
+            Gesture::Box(_) if was_dropped => return,
+            Gesture::Box([from, to]) => {
+                let found = within(Rect::from_two_pos(from, to), plot, all, open);
+                // The curves stay those of the selected keys: an empty box deselects nothing.
+                if !found.is_empty() {
+                    let mut keys = if held.shift || held.command { timeline.keys.clone() } else { KeyTimes::new() };
+                    add_keys(&mut keys, &found);
+                    requests.send(TimelineRequest::Select(keys));
+                }
+                return;
+            }
             Gesture::Pan => return,
         };
         let is_moved = is_moved && !was_dropped;
@@ -149,6 +166,21 @@ pub(super) fn gestures(
     }
 }
 
+/// Keys of the curves in a box on the screen, those that stand close together as well.
+fn within(area: Rect, plot: &Plot, all: &[Curve], open: &OpenClip) -> KeyTimes {
+    let mut found = KeyTimes::new();
+    for curve in all {
+        let Some(track) = open.layer.and_then(|layer| layer.tracks.get(&curve.target)) else { continue };
+        let is_inside = |time: &f32| curve.value_at(*time).is_some_and(|value| area.contains(plot.at(*time, value)));
+        let times: Vec<f32> = track.keys.iter().map(|key| key.time).filter(is_inside).collect();
+        if !times.is_empty() {
+            let own: KeyTimes = [(curve.target.clone(), times)].into();
+            add_keys(&mut found, &own);
+        }
+    }
+    found
+}
+
 fn one(curve: &Curve, key: &CurveKey) -> KeyTimes {
     [(curve.target.clone(), vec![key.key.time])].into()
 }
@@ -169,7 +201,8 @@ fn begin(
     if !response.dragged_by(PointerButton::Primary) {
         return None;
     }
-    match hit(press, plot, all, &timeline.keys)? {
+    let Some(hit) = hit(press, plot, all, &timeline.keys) else { return Some(Gesture::Box([press, at])) };
+    match hit {
         Hit::Tangent(curve, key, side) => Some(Gesture::Tangent(TangentDrag {
             target: curve.target.clone(),
             axis: curve.axis,

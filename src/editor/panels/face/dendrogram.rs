@@ -2,9 +2,12 @@
 
 use bevy_egui::egui::{self, Color32, Pos2, Rect, RichText, Sense, Stroke, Ui, WidgetInfo, WidgetType, vec2};
 
-use crate::algo::{
-    face::{auto::FaceAnalysis, grouping::HeadGroup},
-    linkage::Dendrogram,
+use crate::{
+    algo::{
+        face::{auto::FaceAnalysis, grouping::HeadGroup},
+        linkage::Dendrogram,
+    },
+    editor::style,
 };
 
 /// Number of drawn leaves; each stands for the subtree below it.
@@ -70,7 +73,7 @@ fn key(ui: &mut Ui) {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.label(RichText::new("Front to back:").small().weak());
         for (group, name) in [(HeadGroup::Face, "face"), (HeadGroup::Middle, "middle"), (HeadGroup::Back, "back")] {
-            ui.label(RichText::new(format!("⏺ {name}")).small().color(color(group)));
+            ui.label(RichText::new(format!("⏺ {name}")).small().color(style::readable(ui.visuals(), color(group))));
         }
         ui.label(RichText::new("- - cut").small().color(ui.visuals().warn_fg_color));
     });
@@ -89,7 +92,7 @@ fn draw(ui: &Ui, area: Rect, tree: &Dendrogram, analysis: &FaceAnalysis, level: 
     for branch in &branches {
         let Some((first, second)) = branch.children else { continue };
         for child in [first, second].map(|child| &branches[child]) {
-            let stroke = Stroke::new(1.5, color(child.group));
+            let stroke = Stroke::new(1.5, style::readable(ui.visuals(), color(child.group)));
             let corner = Pos2::new(x(child), level(branch.height));
             ui.painter().line_segment([Pos2::new(x(branch), level(branch.height)), corner], stroke);
             ui.painter().line_segment([corner, Pos2::new(x(child), level(child.height))], stroke);

@@ -8,9 +8,13 @@ use bevy_egui::egui::{self, CollapsingHeader, Slider, Ui, vec2};
 use super::{set, thumbnail::Pictures};
 use crate::{
     algo::face::expression::{Expression, MAX_STRENGTH},
-    editor::{panel::Requests, panels::fields::named},
+    editor::{
+        panel::Requests,
+        panels::fields::{TypedText, named},
+    },
     plugins::{
-        face::{ExpressRequest, Expressions, Face},
+        document::{Change, EditRequest},
+        face::{ExpressRequest, Expressions, Face, FacePreparation},
         surface::RigMesh,
     },
     rig::{FaceBonePart, Rig},
@@ -21,18 +25,26 @@ const VISEME: &str = "viseme_";
 /// Side of a picture in points.
 const SIDE: f32 = 56.0;
 
+/// Strengths while a slider is dragged.
+pub(super) struct HeldStrengths {
+    /// Strengths at the press, to which Escape leads back.
+    start: BTreeMap<String, f32>,
+    /// Strengths that are previewed.
+    shown: BTreeMap<String, f32>,
+}
+
 pub(super) fn show(
     ui: &mut Ui,
     world: &World,
     rig: (Entity, &Rig),
     (entity, mesh): (Entity, &RigMesh),
-    (pictures, held): (&mut Pictures, &mut Option<BTreeMap<String, f32>>),
+    (pictures, held): (&mut Pictures, &mut Option<HeldStrengths>),
     requests: &mut Requests,
 ) {
     let set = set(world);
     let current = world.get::<Expressions>(entity).map(|shown| shown.0.clone()).unwrap_or_default();
     // While a slider is dragged, the last request may not be shown yet.
-    let before = held.clone().unwrap_or(current);
+    let before = held.as_ref().map_or(current, |held| held.shown.clone());
     let mut next = before.clone();
     let mut dragging = false;
     let mut let_go = false;
@@ -60,7 +72,7 @@ pub(super) fn show(
             ui.vertical(|ui| {
                 ui.add_space(6.0);
                 ui.label(capital(&expression.name));
-                let (drag, done) = strength(ui, &expression.name, &mut next);
+                let (drag, done) = strength(ui, &expression.name, &mut next, requests);
                 dragging |= drag;
                 let_go |= done;
             });
@@ -68,7 +80,7 @@ pub(super) fn show(
     }
     let mut row = |ui: &mut Ui, name: &str, words: &str, hint: String| {
         ui.label(capital(&words.replace('_', " "))).on_hover_text(hint);
-        let (drag, done) = strength(ui, name, &mut next);
+        let (drag, done) = strength(ui, name, &mut next, requests);
         dragging |= drag;
         let_go |= done;
     };
@@ -94,25 +106,41 @@ pub(super) fn show(
         }
     });
     next.retain(|_, strength| *strength > 0.0);
-    if next != before || let_go {
+    let dropped = held.take_if(|_| ui.input(|input| input.key_pressed(egui::Key::Escape)));
+    if let Some(HeldStrengths { start, .. }) = dropped {
+        requests.send(EditRequest { rig: rig.0, change: Change::CancelPreview });
+        // What waits for the face to be prepared would be shown yet.
+        if world.get::<FacePreparation>(entity).is_some() {
+            requests.send(ExpressRequest { mesh: entity, strengths: start, preview: false });
+        }
+    } else if next != before || let_go {
         let preview = dragging && !let_go;
-        *held = preview.then(|| next.clone());
+        let start = held.take().map_or(before, |held| held.start);
+        *held = preview.then(|| HeldStrengths { start, shown: next.clone() });
         requests.send(ExpressRequest { mesh: entity, strengths: next, preview });
     }
 }
 
 /// Draws a slider; returns whether it is dragged, and whether it was released or typed into.
-fn strength(ui: &mut Ui, name: &str, strengths: &mut BTreeMap<String, f32>) -> (bool, bool) {
-    let mut value = strengths.get(name).copied().unwrap_or(0.0);
+fn strength(ui: &mut Ui, name: &str, strengths: &mut BTreeMap<String, f32>, requests: &mut Requests) -> (bool, bool) {
+    let before = strengths.get(name).copied().unwrap_or(0.0);
+    let mut value = before;
     ui.spacing_mut().slider_width = (ui.available_width() - 56.0).max(40.0);
-    let slider = ui.push_id(name, |ui| ui.add(Slider::new(&mut value, 0.0..=MAX_STRENGTH).max_decimals(2))).inner;
-    named(ui, slider.id, &format!("Strength of {}", name.replace('_', " ")));
-    if slider.changed() {
+    let typed = TypedText::default();
+    let slider = Slider::new(&mut value, 0.0..=MAX_STRENGTH).max_decimals(2).update_while_editing(false);
+    let slider = slider.custom_parser(typed.reader(0.0..=f64::from(MAX_STRENGTH), ""));
+    let slider = ui.push_id(name, |ui| ui.add(slider)).inner;
+    let said = format!("Strength of {}", name.replace('_', " "));
+    named(ui, slider.id, &said);
+    typed.tell(&slider, &said, requests);
+    // The field of the number changes with each letter, its number when the field is left.
+    let is_other = value != before;
+    if is_other {
         strengths.insert(name.to_owned(), value);
     }
     let held = slider.dragged() || slider.is_pointer_button_down_on();
-    let typed = slider.changed() && !held && !slider.drag_stopped();
-    (held, slider.drag_stopped() || typed)
+    let is_typed = is_other && !held && !slider.drag_stopped();
+    (held, slider.drag_stopped() || is_typed)
 }
 
 fn capital(name: &str) -> String {

@@ -66,7 +66,13 @@ fn answer(world: &mut World, request: TimelineRequest) {
         }
         TimelineRequest::Select(keys) => world.resource_mut::<Timeline>().select(keys),
         TimelineRequest::Tolerance(tolerance) => world.resource_mut::<Timeline>().tolerance = tolerance,
-        TimelineRequest::Hover(is_over) => world.resource_mut::<Timeline>().hovered = is_over,
+        TimelineRequest::Hover(panel, is_over) => {
+            let mut timeline = world.resource_mut::<Timeline>();
+            // Of two panels in sight the one that the pointer has left may tell last.
+            if is_over || timeline.hovered == Some(panel) {
+                timeline.hovered = is_over.then_some(panel);
+            }
+        }
     }
 }
 

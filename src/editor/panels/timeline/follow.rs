@@ -5,7 +5,7 @@ use bevy::{prelude::*, window::RequestRedraw};
 
 use super::state::{Timeline, layer_of};
 use crate::{
-    editor::ActiveRig,
+    editor::{ActiveRig, dock::Layout},
     plugins::{
         animation::{AutoKey, ClipPlayer},
         commands::BuildResult,
@@ -114,4 +114,12 @@ pub(super) fn remember_names(
     let names = NodeNames::of(rig, built.as_deref().map(|built| &*built.0));
     timeline.names.extend(&names);
     timeline.named = Some(rig.revision().clone());
+}
+
+/// Forgets the pointer over a panel that is hidden or behind another one, which cannot tell that the pointer has left it.
+pub(super) fn forget_hover(layout: Option<Res<Layout>>, mut timeline: ResMut<Timeline>) {
+    let Some((panel, layout)) = timeline.hovered.zip(layout) else { return };
+    if !layout.is_forward(panel) {
+        timeline.hovered = None;
+    }
 }

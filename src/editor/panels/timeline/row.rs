@@ -12,7 +12,7 @@ use super::{
     colors::KeyColors,
     mask, node_menu, orphaned_keys,
     sheet::Row,
-    state::{OpenClip, Timeline, TimelineRequest, add},
+    state::{OpenClip, Timeline, TimelineRequest, add, contains},
 };
 use crate::{
     editor::{
@@ -72,9 +72,11 @@ pub(super) fn show(
         Row::All => {
             let all = cell.with_min_x(cell.left() + 18.0);
             let response = name(ui, all, "All keys", false, ui.id().with("all keys"));
-            if response.on_hover_text("A click selects all keys of the layer").clicked() {
+            let response = response.on_hover_text("A click selects all keys of the layer");
+            if response.clicked() {
                 requests.send(TimelineRequest::Select(panel.sheet.keys_within(row, FOREVER)));
             }
+            key_menu(panel, &response, row, context, requests);
         }
         Row::Node(number) => node(panel, ui, cell, number, context, requests),
         Row::Track(number, track) => self::track(panel, ui, cell, (number, track), context, requests),
@@ -191,7 +193,8 @@ fn track(
     response.widget_info(|| WidgetInfo::labeled(WidgetType::SelectableLabel, true, &said));
     hover(ui, cell, &response);
     list::line(ui, cell, &found.name, ui.visuals().weak_text_color());
-    if response.on_hover_text("A click selects its keys").clicked() {
+    let response = response.on_hover_text("A click selects its keys");
+    if response.clicked() {
         let mut keys = if ui.input(|input| input.modifiers.shift || input.modifiers.command) {
             context.timeline.keys.clone()
         } else {
@@ -200,6 +203,18 @@ fn track(
         add(&mut keys, &panel.sheet.keys_within(Row::Track(number, track), FOREVER));
         requests.send(TimelineRequest::Select(keys));
     }
+    key_menu(panel, &response, Row::Track(number, track), context, requests);
+}
+
+/// The menu of keys at the name of a row. A right click selects the keys of the row, unless all of them are selected.
+fn key_menu(panel: &TimelinePanel, response: &Response, row: Row, context: &RowContext, requests: &mut Requests) {
+    if response.secondary_clicked() {
+        let own = panel.sheet.keys_within(row, FOREVER);
+        if !contains(&context.timeline.keys, &own) {
+            requests.send(TimelineRequest::Select(own));
+        }
+    }
+    super::menu::show(response, context.world, requests);
 }
 
 fn layer(

@@ -47,8 +47,8 @@ pub struct Timeline {
     pub changes: u64,
     /// Copied keys.
     pub copied: Option<Arc<KeyClipboard>>,
-    /// True while the pointer is over the timeline, which then takes the keys that delete and select.
-    pub hovered: bool,
+    /// Title of the panel of keys that the pointer is over, which then takes the keys that delete and select.
+    pub hovered: Option<&'static str>,
     /// Names of all nodes that the rig has or had, for keys of nodes that are gone.
     pub names: NodeNames,
     /// State of the rig that the names were taken from last.
@@ -72,7 +72,7 @@ impl Default for Timeline {
             keys: KeyTimes::new(),
             changes: 0,
             copied: None,
-            hovered: false,
+            hovered: None,
             names: NodeNames::default(),
             named: None,
         }
@@ -94,8 +94,8 @@ pub enum TimelineRequest {
     Select(KeyTimes),
     /// Sets what a reduction of keys may change.
     Tolerance(ReductionTolerance),
-    /// Tells whether the pointer is over the timeline.
-    Hover(bool),
+    /// Tells whether the pointer is over the panel of keys with that title.
+    Hover(&'static str, bool),
 }
 
 impl Timeline {

@@ -4,7 +4,7 @@ use bevy_egui::egui::{DragValue, Ui};
 
 use super::state::{Timeline, TimelineRequest};
 use crate::{
-    editor::panel::Requests,
+    editor::{panel::Requests, panels::fields::TypedText},
     rig::{Rig, operations::KeyTolerance},
 };
 
@@ -40,17 +40,23 @@ pub(super) fn fields(ui: &mut Ui, timeline: &Timeline, requests: &mut Requests) 
     let mut now = timeline.tolerance;
     ui.horizontal(|ui| {
         ui.weak("Reduce within");
+        let typed = [TypedText::default(), TypedText::default()];
         let distance = DragValue::new(&mut now.millimetres).range(0.0..=1000.0).speed(0.005).suffix(" mm");
+        let distance = distance.custom_parser(typed[0].reader(0.0..=1000.0, "mm"));
         let angle = DragValue::new(&mut now.degrees).range(0.0..=180.0).speed(0.005).suffix("°");
+        let angle = angle.custom_parser(typed[1].reader(0.0..=180.0, "°"));
         let by_distance = "Largest distance that a reduction may leave, in millimetres on a figure of human size; larger \
                            and smaller rigs in proportion, scales and attributes with it";
         let by_angle = "Largest angle that a reduction may leave, in degrees";
-        for (field, said, tip) in
-            [(distance, "Tolerance in millimetres", by_distance), (angle, "Tolerance in degrees", by_angle)]
-        {
+        let fields = [(distance, "Tolerance in millimetres", by_distance), (angle, "Tolerance in degrees", by_angle)];
+        let drawn = fields.map(|(field, said, tip)| {
             let field = field.max_decimals(4).update_while_editing(false);
             let response = ui.push_id(said, |ui| ui.add(field)).inner.on_hover_text(tip);
             ui.ctx().accesskit_node_builder(response.id, |node| node.set_label(said));
+            (response, said)
+        });
+        for (typed, (response, said)) in typed.into_iter().zip(drawn) {
+            typed.tell(&response, said, requests);
         }
     });
     if now != timeline.tolerance {

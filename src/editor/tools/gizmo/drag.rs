@@ -102,6 +102,11 @@ impl GizmoDrag {
         self.delta
     }
 
+    /// Pixel of the press.
+    pub fn press(&self) -> Vec2 {
+        self.press
+    }
+
     /// Last result of the drag.
     pub fn delta(&self) -> Delta {
         self.delta
