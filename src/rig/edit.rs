@@ -401,7 +401,8 @@ impl Rig {
     fn detach(&mut self, uid: Uid) -> Result<(Option<Uid>, usize), EditError> {
         let parent = self.joints.get(&uid).ok_or(EditError::NoJoint(uid))?.parent;
         let siblings = self.siblings_mut(parent)?;
-        let index = siblings.iter().position(|s| *s == uid).ok_or(EditError::NoJoint(uid))?;
+        // Undo takes the last ones away first.
+        let index = siblings.iter().rposition(|s| *s == uid).ok_or(EditError::NoJoint(uid))?;
         siblings.remove(index);
         Ok((parent, index))
     }
@@ -462,11 +463,11 @@ impl Rig {
                 return Err(EditError::Cycle { joint: uid, parent: above });
             }
         }
+        self.forget_checkpoints(uid);
         let (old_parent, old_index) = self.detach(uid)?;
         let siblings = self.siblings_mut(parent)?;
         siblings.insert(index.min(siblings.len()), uid);
         self.joint_mut(uid)?.parent = parent;
-        self.forget_checkpoints(uid);
         Ok(RigEdit::SetParent { joint: uid, parent: old_parent, index: old_index })
     }
 }
