@@ -24,8 +24,8 @@ pub use self::{
     weight_patch::{PatchFault, WeightPatch, joint_numbers, weight_edit},
 };
 use crate::rig::{
-    FaceCut, FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput,
-    RigJoint, SelectionSet, StoredPose, TagData, Uid,
+    FaceCut, FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Rig, RigInput, RigJoint,
+    SelectionSet, StoredPose, TagData, Uid,
     animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
     document::{RigAbout, SkinData},
     part::DroppedPart,
@@ -249,7 +249,7 @@ impl Rig {
     /// Applies an edit and returns its exact inverse, order of siblings included.
     pub fn apply(&mut self, edit: &RigEdit) -> Result<RigEdit, EditError> {
         if !edit.is_of_motion() {
-            self.revision = Revision::default();
+            self.begin_edit(edit);
         }
         Ok(match edit {
             RigEdit::AddJoint { joint, parent, index } => self.add_joint(joint, *parent, *index)?,
