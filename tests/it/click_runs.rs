@@ -5,6 +5,7 @@ use bevy::prelude::*;
 use rigsmith::{
     headless::Workbench,
     plugins::{
+        document::JointEntities,
         gesture::{Gesture, GestureAnswer, GestureScript, read_gestures},
         history::RigHistory,
     },
@@ -187,4 +188,31 @@ fn undone_lists_take_work_in_proportion_to_their_length() {
     let undone = |count: usize| [named_clicks(count), vec![Gesture::Undo; 2 * count]].concat();
     let works: Vec<[u64; 2]> = [1000, 2000, 4000].into_iter().map(|count| work(undone(count), 0)).collect();
     check_growth("undone", &works);
+}
+
+/// Strokes through the upper half of the first box, each a chain of five joints below the one before.
+fn strokes(count: usize) -> Vec<Gesture> {
+    let stroke = |number: usize| {
+        let (across, up) = (0.05 + 0.004 * (number * 37 % 100) as f32, 1.05 + 0.004 * (number * 61 % 100) as f32);
+        let points = (0..8).map(|at| (across + 0.05 * at as f32, up + 0.06 * at as f32)).collect();
+        Gesture::Stroke { points, threshold: None, joints: Some(5) }
+    };
+    (0..count).map(stroke).collect()
+}
+
+/// Joints that strokes visit, and joints at which entities look to follow them.
+fn work_of_strokes(count: usize) -> [u64; 2] {
+    let mut bench = bench();
+    let answers = bench.gestures(strokes(count));
+    assert!(answers.len() == count && answers.iter().all(|answer| answer.done), "{answers:?}");
+    assert!(bench.rig().len() > 3 * count, "{} joints", bench.rig().len());
+    let rig = bench.rig_entity();
+    let followed = bench.app_mut().world().get::<JointEntities>(rig).unwrap().visits();
+    [bench.rig().visits(), followed]
+}
+
+#[test]
+fn strokes_are_followed_in_proportion_to_their_number() {
+    let works: Vec<[u64; 2]> = [100, 200, 400].into_iter().map(work_of_strokes).collect();
+    check_growth("strokes", &works);
 }
