@@ -143,7 +143,8 @@ impl EditReport {
     }
 }
 
-/// Answer to a [`Change::Place`], [`Change::LabelActive`], [`Change::Undo`] or [`Change::Redo`], in the order of the requests.
+/// Answer to a [`Change::Place`], [`Change::LabelActive`], [`Change::Undo`] or [`Change::Redo`], in the order of the
+/// requests.
 #[derive(Message, Debug, Clone)]
 pub struct ChangeReport {
     /// The rig.
@@ -293,7 +294,8 @@ fn has_report(change: &Change) -> bool {
     matches!(change, Change::Place(_) | Change::LabelActive(_) | Change::Undo | Change::Redo)
 }
 
-/// Operation of a change that is about the active joint; `None` for all other changes, and to name a joint where none is active.
+/// Operation of a change that is about the active joint; `None` for all other changes, and to name a joint where none is
+/// active.
 fn on_active(change: &Change, active: Option<Uid>) -> Option<Operation> {
     match change {
         Change::Place(position) => Some(Operation::Place { position: *position, parent: active }),
@@ -302,8 +304,8 @@ fn on_active(change: &Change, active: Option<Uid>) -> Option<Operation> {
     }
 }
 
-/// An operation that deletes joints, as one on the built rig, so that nothing of what was made for them stays. Lists of edits
-/// say themselves what goes, but for those that writes to entities made.
+/// An operation that deletes joints, as one on the built rig, so that nothing of what was made for them stays. Lists of
+/// edits say themselves what goes, but for those that writes to entities made.
 fn of_built<'o>(
     operation: Cow<'o, Operation>,
     built: Option<&BuildResult>,

@@ -2,7 +2,8 @@
 //!
 //! With them a look at the end of a chain takes a walk of bounded length, so that work on a chain that grows joint by joint
 //! grows with its length. Joints with at most 64 others above them are below no checkpoint; their transforms are plain
-//! products. Which joints are checkpoints follows from the hierarchy alone, so that results never depend on what was looked at.
+//! products. Which joints are checkpoints follows from the hierarchy alone, so that results never depend on what was looked
+//! at.
 
 use std::{
     collections::{BTreeSet, HashMap},
@@ -157,8 +158,8 @@ impl Rig {
         }
     }
 
-    /// Forgets the checkpoints whose depth or transform an edit of a joint changes: the joint and those below it. An edit that
-    /// moves the joint to another parent comes after.
+    /// Forgets the checkpoints whose depth or transform an edit of a joint changes: the joint and those below it. An edit
+    /// that moves the joint to another parent comes after.
     ///
     /// Where many joints are below it, all checkpoints go that are not nearer to their roots than the joint. So those above
     /// stay, and joints that are changed in the order of their depth take a walk of bounded length each.

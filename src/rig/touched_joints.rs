@@ -70,8 +70,8 @@ impl fmt::Debug for TouchedJoints {
 }
 
 impl Rig {
-    /// Makes a revision for an edit that is about to be tried, and logs the edit. One that is refused touches nothing, which does
-    /// no harm.
+    /// Makes a revision for an edit that is about to be tried, and logs the edit. One that is refused touches nothing, which
+    /// does no harm.
     pub(super) fn begin_edit(&mut self, edit: &RigEdit) {
         let before = std::mem::take(&mut self.revision);
         let log = &mut self.touched.0;

@@ -1,5 +1,5 @@
-//! Clicks, names and undone steps of lists that nobody watches: the same result as one a frame, and work in proportion to the
-//! length of the list.
+//! Clicks, names and undone steps of lists that nobody watches: the same result as one a frame, and work in proportion to
+//! the length of the list.
 
 use bevy::prelude::*;
 use rigsmith::{

@@ -265,8 +265,9 @@ fn park(commands: &mut Commands, known: &mut BuiltEntities, nodes: &[BuiltNode])
     }
 }
 
-/// Despawns parked nodes that no build can bring back: their commands, or the joints that they were made for, are deleted, and
-/// neither undo nor redo restores them. Both leave the history only where steps do, so nothing is searched at other times.
+/// Despawns parked nodes that no build can bring back: their commands, or the joints that they were made for, are deleted,
+/// and neither undo nor redo restores them. Both leave the history only where steps do, so nothing is searched at other
+/// times.
 pub(super) fn despawn_parked(
     mut commands: Commands,
     mut rigs: Query<(Entity, &Rig, Ref<RigHistory>, &mut BuiltEntities)>,

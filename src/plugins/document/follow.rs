@@ -160,8 +160,8 @@ fn describe_rig(
     }
 }
 
-/// Despawns the entities of joints that the document has no more; true if there were any. They are among the `touched` joints,
-/// if these are known.
+/// Despawns the entities of joints that the document has no more; true if there were any. They are among the `touched`
+/// joints, if these are known.
 fn remove_gone_joints(
     commands: &mut Commands,
     rig: &Rig,

@@ -1,9 +1,9 @@
 //! Runs of clicks: clicks, names and undone steps that follow one another, carried out in one frame.
 //!
-//! Nobody watches the gestures of a command. Between two clicks on a mesh at rest nothing happens that the second one depends on
-//! but the joint of the first, so that entities have to follow the document once for all of them; names and undone steps depend
-//! on nothing else. A run has at most as many gestures as the rig has joints: frames cost what the joints of the rig cost, and a
-//! list takes time in proportion to its length.
+//! Nobody watches the gestures of a command. Between two clicks on a mesh at rest nothing happens that the second one
+//! depends on but the joint of the first, so that entities have to follow the document once for all of them; names and
+//! undone steps depend on nothing else. A run has at most as many gestures as the rig has joints: frames cost what the
+//! joints of the rig cost, and a list takes time in proportion to its length.
 
 use bevy::prelude::*;
 
@@ -49,7 +49,7 @@ impl RunState {
             }
             Gesture::Label(_) | Gesture::Undo | Gesture::Redo => true,
             Gesture::Click(_) => !self.has_steps,
-            // A selection that is cleared at once is a pick, which ends the cycle of clicks at one spot; an edit ends it, too.
+            // A selection that is cleared at once is a pick, which ends the cycle of clicks at one spot, as edits do.
             Gesture::Deselect => self.has_changes,
             _ => false,
         }

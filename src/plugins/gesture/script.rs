@@ -110,8 +110,8 @@ impl GestureScript {
         Self { waiting: gestures.into_iter().collect(), ..Self::default() }
     }
 
-    /// A script of these gestures in an app without a window: clicks, labels, undone and redone steps that follow one another are
-    /// carried out in one frame. The result is that of [`GestureScript::new`].
+    /// A script of these gestures in an app without a window: clicks, labels, undone and redone steps that follow one
+    /// another are carried out in one frame. The result is that of [`GestureScript::new`].
     pub fn unwatched(gestures: impl IntoIterator<Item = Gesture>) -> Self {
         Self { is_unwatched: true, ..Self::new(gestures) }
     }
@@ -183,8 +183,8 @@ pub(super) fn run_scripts(
 }
 
 impl GestureScript {
-    /// Takes the next gesture of the script of a rig with so many joints, and begins its answer; `None` where the list or the
-    /// gesture is too long.
+    /// Takes the next gesture of the script of a rig with so many joints, and begins its answer; `None` where the list or
+    /// the gesture is too long.
     pub(super) fn begin_next(&mut self, joints: usize, limits: &RigLimits) -> Option<Gesture> {
         self.state.joints_before = joints;
         let gesture = self.waiting.pop_front()?;

@@ -75,8 +75,8 @@ pub(super) fn about(
     set_globals(draft, targets, with_children)
 }
 
-/// True if one of the `listed` joints stands above a joint. `known` keeps the answers for the joints on the way up, so that a way
-/// that joints share is walked once.
+/// True if one of the `listed` joints stands above a joint. `known` keeps the answers for the joints on the way up, so that
+/// a way that joints share is walked once.
 fn is_below(rig: &Rig, joint: Uid, listed: &HashSet<Uid>, known: &mut HashMap<Uid, bool>) -> bool {
     let (mut way, mut at) = (Vec::new(), joint);
     let is_below = loop {
