@@ -34,6 +34,7 @@ pub mod skeleton_preset;
 pub mod step;
 mod tag;
 mod template_copy;
+mod touched_joints;
 mod uid;
 pub mod update;
 pub mod version;

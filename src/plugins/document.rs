@@ -31,7 +31,7 @@ pub use super::{
     selection::{HoveredNode, Selection},
 };
 use crate::rig::{
-    Rig, RigEdit, UidSource,
+    Rig, RigEdit, Uid, UidSource,
     feature::FeatureKinds,
     operations::{MirrorPlane, Operation},
     step::Commit,
@@ -59,7 +59,7 @@ impl Plugin for DocumentPlugin {
             .add_message::<EditRequest>()
             .add_message::<EditReport>()
             .add_message::<EditRefusal>()
-            .add_message::<PlaceReport>()
+            .add_message::<ChangeReport>()
             .add_systems(
                 Update,
                 (
@@ -95,11 +95,15 @@ pub enum Change {
     /// Runs an operation as one new step of the history.
     Do(Operation),
     /// Places a joint at a position of the rig's space, at rest, below the joint that is active when the request is carried
-    /// out, or as a root; answered by a [`PlaceReport`], too.
+    /// out, or as a root; answered by a [`ChangeReport`], too.
     Place(Vec3),
-    /// Undoes the last step.
+    /// Names the joint that is active when the request is carried out; answered by a [`ChangeReport`], too.
+    LabelActive(String),
+    /// Selects the listed joints, the active one last. It is no edit: nothing answers, and undo passes over it.
+    Select(Vec<Uid>),
+    /// Undoes the last step; answered by a [`ChangeReport`], too.
     Undo,
-    /// Redoes the last undone step.
+    /// Redoes the last undone step; answered by a [`ChangeReport`], too.
     Redo,
     /// Previews an operation while a drag lasts: the rig changes, history and journal do not. The next preview starts
     /// from the rig as it was before this one; any other change reverts it first.
@@ -139,13 +143,25 @@ impl EditReport {
     }
 }
 
-/// Answer to a [`Change::Place`].
+/// Answer to a [`Change::Place`], [`Change::LabelActive`], [`Change::Undo`] or [`Change::Redo`], in the order of the
+/// requests.
 #[derive(Message, Debug, Clone)]
-pub struct PlaceReport {
+pub struct ChangeReport {
     /// The rig.
     pub rig: Entity,
-    /// Number of joints that were added, with those of the other side; or the reason of the refusal.
-    pub added: Result<usize, ChangeError>,
+    /// Step that was made, undone or redone; or the reason of the refusal.
+    pub step: Result<ReportedStep, ChangeError>,
+}
+
+/// Effect of a change that was carried out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReportedStep {
+    /// Short name of the step.
+    pub name: Cow<'static, str>,
+    /// Number of joints that it added, with those of the other side.
+    pub added: usize,
+    /// Number of joints that the rig has after it.
+    pub joints: usize,
 }
 
 /// Message that a change was refused; the rig stays as it was.
@@ -165,7 +181,7 @@ fn apply_edits(
     mut uids: ResMut<UidSource>,
     mut edited: MessageWriter<EditReport>,
     mut refused: MessageWriter<EditRefusal>,
-    mut placed: MessageWriter<PlaceReport>,
+    mut reported: MessageWriter<ChangeReport>,
 ) {
     let of_entities = std::mem::take(&mut entity_edits.bypass_change_detection().0).into_iter().map(|(rig, edits)| {
         let operation = Operation::Named { name: "Edit entities", edits };
@@ -178,14 +194,20 @@ fn apply_edits(
             refused.write(EditRefusal { rig, reason: ChangeError::NoRig(rig) });
             continue;
         };
+        let is_reported = has_report(change);
+        let before = document.len();
         let operation;
-        let (change, joints) = match change {
-            Change::Place(position) => {
-                operation = Change::Do(Operation::Place { position: *position, parent: selection.active() });
-                (&operation, Some(document.len()))
+        let change = match on_active(change, selection.active()) {
+            Some(bound) => {
+                operation = Change::Do(bound);
+                &operation
             }
-            change => (change, None),
+            None => change,
         };
+        if let Change::Select(joints) = change {
+            selection.set_if_neq(Selection(joints.clone()));
+            continue;
+        }
         // The selection is written only where it changes.
         let mut selected = selection.clone();
         let done = |name, committed| EditReport { rig, name, committed, preview: false, notes: Vec::new() };
@@ -233,8 +255,9 @@ fn apply_edits(
                     .map(previewed)
                     .map_err(ChangeError::from)
             }
-            // A joint to place has become an operation.
-            Change::Place(_) => continue,
+            Change::LabelActive(_) => Err(ChangeError::NoActive),
+            // A joint to place has become an operation, and joints to select are selected.
+            Change::Place(_) | Change::Select(_) => continue,
             Change::Commit | Change::CancelPreview if !history.is_previewing() => continue,
             Change::Commit => {
                 let Some(step) = history.commit_preview(&mut selected) else { continue };
@@ -246,9 +269,14 @@ fn apply_edits(
             }
         };
         selection.set_if_neq(selected);
-        if let Some(before) = joints {
-            let added = result.as_ref().map(|_| document.len().saturating_sub(before)).map_err(ChangeError::clone);
-            placed.write(PlaceReport { rig, added });
+        if is_reported {
+            let joints = document.len();
+            let step = result.as_ref().map(|done| ReportedStep {
+                name: done.name.clone(),
+                added: joints.saturating_sub(before),
+                joints,
+            });
+            reported.write(ChangeReport { rig, step: step.map_err(ChangeError::clone) });
         }
         match result {
             Ok(message) => {
@@ -261,8 +289,23 @@ fn apply_edits(
     }
 }
 
-/// An operation that deletes joints, as one on the built rig, so that nothing of what was made for them stays. Lists of edits
-/// say themselves what goes, but for those that writes to entities made.
+/// True for changes that a [`ChangeReport`] answers.
+fn has_report(change: &Change) -> bool {
+    matches!(change, Change::Place(_) | Change::LabelActive(_) | Change::Undo | Change::Redo)
+}
+
+/// Operation of a change that is about the active joint; `None` for all other changes, and to name a joint where none is
+/// active.
+fn on_active(change: &Change, active: Option<Uid>) -> Option<Operation> {
+    match change {
+        Change::Place(position) => Some(Operation::Place { position: *position, parent: active }),
+        Change::LabelActive(label) => Some(Operation::Labels(vec![(active?, label.clone())])),
+        _ => None,
+    }
+}
+
+/// An operation that deletes joints, as one on the built rig, so that nothing of what was made for them stays. Lists of
+/// edits say themselves what goes, but for those that writes to entities made.
 fn of_built<'o>(
     operation: Cow<'o, Operation>,
     built: Option<&BuildResult>,

@@ -1,7 +1,7 @@
 //! Lists of gestures: clicks and strokes as data.
 //!
 //! A [`GestureScript`] on a rig drives the same requests that a window sends, one gesture a frame, and keeps an answer
-//! for each. Clicks that nobody watches come several a frame. The command line, tests and tutorials use it; a script can do
+//! for each. Clicks, labels and undone steps that nobody watches come several a frame. The command line, tests and tutorials use it; a script can do
 //! nothing that a person could not.
 
 mod answers;

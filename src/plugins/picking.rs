@@ -130,12 +130,16 @@ pub fn posed_joints(
     joints: &Query<&GlobalTransform>,
 ) -> Vec<(Uid, Vec3)> {
     let to_rig: Affine3A = place.affine().inverse();
-    let rest = rig.rest_globals().into_iter();
-    rest.map(|(uid, rest)| {
-        let posed = entities.get(uid).and_then(|entity| joints.get(entity).ok());
-        (uid, posed.map_or(rest.translation, |posed| to_rig.transform_point3(posed.translation())))
+    let posed = |uid: Uid| {
+        let posed = joints.get(entities.get(uid)?).ok()?;
+        Some(to_rig.transform_point3(posed.translation()))
+    };
+    let all = rig.walk().map(|joint| Some((joint.data.uid, posed(joint.data.uid)?)));
+    all.collect::<Option<Vec<_>>>().unwrap_or_else(|| {
+        // Entities of joints that were added in this frame come later.
+        let rest = rig.rest_globals().into_iter();
+        rest.map(|(uid, rest)| (uid, posed(uid).unwrap_or(rest.translation))).collect()
     })
-    .collect()
 }
 
 /// The last click, which the next one at the same spot continues.

@@ -16,6 +16,7 @@ use crate::{
         label_index::LabelIndex,
         part::{DroppedPart, HeaderSocket, PartOption},
         rest_checkpoints::RestCheckpoints,
+        touched_joints::TouchedJoints,
     },
 };
 
@@ -52,6 +53,7 @@ pub struct Rig {
     pub(super) revision: Revision,
     pub(super) checkpoints: RestCheckpoints,
     pub(super) label_index: LabelIndex,
+    pub(super) touched: TouchedJoints,
 }
 
 /// Header of a template, for people.
@@ -155,6 +157,11 @@ impl Rig {
         let joint = self.joints.get(self.tags.get(&uid)?)?;
         let tag = joint.data.tags.iter().find(|tag| tag.uid == uid)?;
         Some((joint, tag))
+    }
+
+    /// True if a joint carries a tag.
+    pub fn has_tags(&self) -> bool {
+        !self.tags.is_empty()
     }
 
     /// Disables tags of a scratch copy, in time linear in the tags of their joints. It is no edit: a document that people

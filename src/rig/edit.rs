@@ -24,8 +24,8 @@ pub use self::{
     weight_patch::{PatchFault, WeightPatch, joint_numbers, weight_edit},
 };
 use crate::rig::{
-    FaceCut, FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Revision, Rig, RigInput,
-    RigJoint, SelectionSet, StoredPose, TagData, Uid,
+    FaceCut, FacePlacement, GroupData, JointData, NodeKind, PoseOffset, RestTransform, Rig, RigInput, RigJoint,
+    SelectionSet, StoredPose, TagData, Uid,
     animation::{ClipAbout, ClipFault, ClipLayer, Key, KeyFault, LayerAbout, RigClip, TrackTarget},
     document::{RigAbout, SkinData},
     part::DroppedPart,
@@ -249,7 +249,7 @@ impl Rig {
     /// Applies an edit and returns its exact inverse, order of siblings included.
     pub fn apply(&mut self, edit: &RigEdit) -> Result<RigEdit, EditError> {
         if !edit.is_of_motion() {
-            self.revision = Revision::default();
+            self.begin_edit(edit);
         }
         Ok(match edit {
             RigEdit::AddJoint { joint, parent, index } => self.add_joint(joint, *parent, *index)?,
@@ -401,7 +401,8 @@ impl Rig {
     fn detach(&mut self, uid: Uid) -> Result<(Option<Uid>, usize), EditError> {
         let parent = self.joints.get(&uid).ok_or(EditError::NoJoint(uid))?.parent;
         let siblings = self.siblings_mut(parent)?;
-        let index = siblings.iter().position(|s| *s == uid).ok_or(EditError::NoJoint(uid))?;
+        // Undo takes the last ones away first.
+        let index = siblings.iter().rposition(|s| *s == uid).ok_or(EditError::NoJoint(uid))?;
         siblings.remove(index);
         Ok((parent, index))
     }
@@ -462,11 +463,11 @@ impl Rig {
                 return Err(EditError::Cycle { joint: uid, parent: above });
             }
         }
+        self.forget_checkpoints(uid);
         let (old_parent, old_index) = self.detach(uid)?;
         let siblings = self.siblings_mut(parent)?;
         siblings.insert(index.min(siblings.len()), uid);
         self.joint_mut(uid)?.parent = parent;
-        self.forget_checkpoints(uid);
         Ok(RigEdit::SetParent { joint: uid, parent: old_parent, index: old_index })
     }
 }

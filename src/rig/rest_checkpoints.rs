@@ -2,10 +2,11 @@
 //!
 //! With them a look at the end of a chain takes a walk of bounded length, so that work on a chain that grows joint by joint
 //! grows with its length. Joints with at most 64 others above them are below no checkpoint; their transforms are plain
-//! products. Which joints are checkpoints follows from the hierarchy alone, so that results never depend on what was looked at.
+//! products. Which joints are checkpoints follows from the hierarchy alone, so that results never depend on what was looked
+//! at.
 
 use std::{
-    collections::HashMap,
+    collections::{BTreeSet, HashMap},
     fmt,
     sync::{
         Mutex, MutexGuard, PoisonError,
@@ -23,7 +24,7 @@ const STRIDE: usize = 64;
 /// Checkpoints of a rig. They follow from its joints and are no content: any two compare as equal, and a clone has none.
 #[derive(Default)]
 pub(super) struct RestCheckpoints {
-    known: Mutex<HashMap<Uid, Checkpoint>>,
+    known: Mutex<KnownCheckpoints>,
     /// Number of joints that were visited.
     visits: AtomicU64,
 }
@@ -38,6 +39,39 @@ struct Checkpoint {
     global: Affine3,
 }
 
+/// Checkpoints that were looked at.
+#[derive(Default)]
+struct KnownCheckpoints {
+    of_joints: HashMap<Uid, Checkpoint>,
+    /// The joints, each behind the number of joints above it.
+    by_depth: BTreeSet<(usize, Uid)>,
+}
+
+impl KnownCheckpoints {
+    fn insert(&mut self, joint: Uid, checkpoint: Checkpoint) {
+        self.by_depth.insert((checkpoint.depth, joint));
+        self.of_joints.insert(joint, checkpoint);
+    }
+
+    fn remove(&mut self, joint: Uid) {
+        if let Some(checkpoint) = self.of_joints.remove(&joint) {
+            self.by_depth.remove(&(checkpoint.depth, joint));
+        }
+    }
+
+    /// Removes the checkpoints that have so many joints above them, or more.
+    fn remove_from(&mut self, depth: usize) {
+        for (_, joint) in self.by_depth.split_off(&(depth, Uid(0))) {
+            self.of_joints.remove(&joint);
+        }
+    }
+
+    fn clear(&mut self) {
+        self.of_joints.clear();
+        self.by_depth.clear();
+    }
+}
+
 /// Joints above a joint, up to a checkpoint or to the root.
 struct WayUp<'r> {
     checkpoint: Option<Checkpoint>,
@@ -46,11 +80,11 @@ struct WayUp<'r> {
 }
 
 impl RestCheckpoints {
-    fn lock(&self) -> MutexGuard<'_, HashMap<Uid, Checkpoint>> {
+    fn lock(&self) -> MutexGuard<'_, KnownCheckpoints> {
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn known_mut(&mut self) -> &mut HashMap<Uid, Checkpoint> {
+    fn known_mut(&mut self) -> &mut KnownCheckpoints {
         self.known.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -124,19 +158,24 @@ impl Rig {
         }
     }
 
-    /// Forgets the checkpoints whose depth or transform an edit of a joint changes: the joint and those below it.
+    /// Forgets the checkpoints whose depth or transform an edit of a joint changes: the joint and those below it. An edit
+    /// that moves the joint to another parent comes after.
+    ///
+    /// Where many joints are below it, all checkpoints go that are not nearer to their roots than the joint. So those above
+    /// stay, and joints that are changed in the order of their depth take a walk of bounded length each.
     pub(super) fn forget_checkpoints(&mut self, top: Uid) {
-        if self.checkpoints.known_mut().is_empty() {
+        if self.checkpoints.known_mut().of_joints.is_empty() {
             return;
         }
         let below: Vec<Uid> = self.hierarchy(top).take(STRIDE + 1).map(|joint| joint.data.uid).collect();
         if below.len() > STRIDE {
-            self.checkpoints.clear();
+            let (_, depth) = self.root_and_depth(top);
+            self.checkpoints.known_mut().remove_from(depth);
             return;
         }
         let known = self.checkpoints.known_mut();
         for joint in below {
-            known.remove(&joint);
+            known.remove(joint);
         }
     }
 
@@ -147,7 +186,7 @@ impl Rig {
         let mut last: Option<Checkpoint> = None;
         let mut next = joint.parent;
         while let Some(above) = next.and_then(|uid| self.joint(uid)) {
-            last = known.get(&above.data.uid).copied();
+            last = known.of_joints.get(&above.data.uid).copied();
             if last.is_some() {
                 break;
             }

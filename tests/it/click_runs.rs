@@ -1,9 +1,11 @@
-//! Clicks of lists that nobody watches: the same result as one a frame, and work in proportion to the length of the list.
+//! Clicks, names and undone steps of lists that nobody watches: the same result as one a frame, and work in proportion to
+//! the length of the list.
 
 use bevy::prelude::*;
 use rigsmith::{
     headless::Workbench,
     plugins::{
+        document::JointEntities,
         gesture::{Gesture, GestureAnswer, GestureScript, read_gestures},
         history::RigHistory,
     },
@@ -97,6 +99,25 @@ fn refused_clicks_of_a_run_say_why() {
 }
 
 #[test]
+fn runs_of_names_and_undone_steps_give_what_they_give_one_a_frame() {
+    let answers = check(
+        "[Label(\"none\"), Undo, Redo, Click((0.0, 0.2)), Label(\"hip\"), Click((0.0, 0.6)), Label(\"\"), Deselect, \
+         Label(\"x\"), Click((0.3, 0.4)), Label(\"other\"), Undo, Undo, Redo, Label(\"again\"), Click((0.1, 0.5)), \
+         Undo, Undo, Undo, Undo, Undo, Undo, Undo, Undo, Undo, Redo, Redo, Deselect, Redo, Redo, Redo, \
+         Select((0.0, 0.2)), Deselect, Select((0.0, 0.2)), Select((0.0, 0.2)), Rotate(10.0), Undo, Label(\"last\"), \
+         Click((0.1, 0.9)), Deselect, Deselect, Select((0.0, 0.2)), Delete, Undo, Undo, Undo, Label(\"first\")]",
+        |_| {},
+    );
+    let told = |number: usize| (answers[number].done, answers[number].message.as_str());
+    assert_eq!(told(0), (false, "no joint is selected; select one first"));
+    assert_eq!(told(1), (false, "there is nothing to undo"));
+    assert_eq!(told(2), (false, "there is nothing to redo"));
+    assert_eq!(told(4), (true, "rename joints: 1 joints now"));
+    assert_eq!(told(8), told(0));
+    assert!(answers.iter().any(|answer| answer.gesture == "Redo" && answer.joints_added == 1), "{answers:?}");
+}
+
+#[test]
 fn long_runs_give_what_clicks_one_a_frame_give() {
     let clicks: Vec<String> = (0..300).map(|number| format!("{:?}", click(number, 3))).collect();
     let answers = check(&format!("[{}]", clicks.join(", ")), |_| {});
@@ -117,25 +138,81 @@ fn count_followed(mut followed: ResMut<FollowedJoints>, rigs: Query<&Rig, Change
     followed.0 += rigs.iter().map(|rig| rig.len() as u64).sum::<u64>();
 }
 
-/// Joints that clicks visit, and joints that entities follow.
-fn work(count: usize, side: usize) -> [u64; 2] {
+/// Joints that gestures visit, and joints that entities follow. The rig has so many `joints` at the end.
+fn work(gestures: Vec<Gesture>, joints: usize) -> [u64; 2] {
     let mut bench = bench();
     bench.app_mut().init_resource::<FollowedJoints>().add_systems(Last, count_followed);
-    let answers = bench.gestures((0..count).map(|number| click(number, side)).collect());
+    let count = gestures.len();
+    let answers = bench.gestures(gestures);
     assert!(answers.len() == count && answers.iter().all(|answer| answer.done));
-    assert_eq!(bench.rig().len(), count);
+    assert_eq!(bench.rig().len(), joints);
     [bench.rig().visits(), bench.app_mut().world().resource::<FollowedJoints>().0]
+}
+
+#[track_caller]
+fn check_growth(name: &str, works: &[[u64; 2]]) {
+    for pair in works.windows(2) {
+        for (less, more) in pair[0].into_iter().zip(pair[1]) {
+            assert!(less > 0 && more as f64 <= GROWTH * less as f64, "{name}: {works:?}");
+        }
+    }
 }
 
 #[test]
 fn clicks_take_work_in_proportion_to_their_number() {
     // A chain, and chains that begin anew with each other joint.
     for side in [usize::MAX, 2] {
-        let works: Vec<[u64; 2]> = [1000, 2000, 4000].into_iter().map(|count| work(count, side)).collect();
-        for pair in works.windows(2) {
-            for (less, more) in pair[0].into_iter().zip(pair[1]) {
-                assert!(less > 0 && more as f64 <= GROWTH * less as f64, "every {side}th in the middle: {works:?}");
-            }
-        }
+        let clicks = |count: usize| -> Vec<Gesture> { (0..count).map(|number| click(number, side)).collect() };
+        let works: Vec<[u64; 2]> = [1000, 2000, 4000].into_iter().map(|count| work(clicks(count), count)).collect();
+        check_growth(&format!("every {side}th in the middle"), &works);
     }
+}
+
+/// Clicks, each with a name of its own, in chains of two.
+fn named_clicks(count: usize) -> Vec<Gesture> {
+    let named = |number: usize| [click(number, 3), Gesture::Label(format!("name{number}"))];
+    (0..count)
+        .flat_map(|number| named(number).into_iter().chain((!number.is_multiple_of(2)).then_some(Gesture::Deselect)))
+        .collect()
+}
+
+#[test]
+fn mixed_lists_take_work_in_proportion_to_their_length() {
+    let works: Vec<[u64; 2]> = [1000, 2000, 4000].into_iter().map(|count| work(named_clicks(count), count)).collect();
+    check_growth("names", &works);
+}
+
+#[test]
+fn undone_lists_take_work_in_proportion_to_their_length() {
+    // A click and a name are a step each.
+    let undone = |count: usize| [named_clicks(count), vec![Gesture::Undo; 2 * count]].concat();
+    let works: Vec<[u64; 2]> = [1000, 2000, 4000].into_iter().map(|count| work(undone(count), 0)).collect();
+    check_growth("undone", &works);
+}
+
+/// Strokes through the upper half of the first box, each a chain of five joints below the one before.
+fn strokes(count: usize) -> Vec<Gesture> {
+    let stroke = |number: usize| {
+        let (across, up) = (0.05 + 0.004 * (number * 37 % 100) as f32, 1.05 + 0.004 * (number * 61 % 100) as f32);
+        let points = (0..8).map(|at| (across + 0.05 * at as f32, up + 0.06 * at as f32)).collect();
+        Gesture::Stroke { points, threshold: None, joints: Some(5) }
+    };
+    (0..count).map(stroke).collect()
+}
+
+/// Joints that strokes visit, and joints at which entities look to follow them.
+fn work_of_strokes(count: usize) -> [u64; 2] {
+    let mut bench = bench();
+    let answers = bench.gestures(strokes(count));
+    assert!(answers.len() == count && answers.iter().all(|answer| answer.done), "{answers:?}");
+    assert!(bench.rig().len() > 3 * count, "{} joints", bench.rig().len());
+    let rig = bench.rig_entity();
+    let followed = bench.app_mut().world().get::<JointEntities>(rig).unwrap().visits();
+    [bench.rig().visits(), followed]
+}
+
+#[test]
+fn strokes_are_followed_in_proportion_to_their_number() {
+    let works: Vec<[u64; 2]> = [100, 200, 400].into_iter().map(work_of_strokes).collect();
+    check_growth("strokes", &works);
 }

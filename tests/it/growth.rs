@@ -316,3 +316,34 @@ fn chains_are_deleted_in_proportion_to_their_length() {
         assert!(pair[0] > 0 && pair[1] as f64 <= GROWTH * pair[0] as f64, "{visits:?}");
     }
 }
+
+/// Joints that are visited to move all joints of a chain, and to undo that.
+fn visited_to_move(count: usize, with_children: bool) -> u64 {
+    use rigsmith::rig::{Uid, UidSource, operations::Operation};
+
+    let mut rig = chain(count, |_| vec![]);
+    let (copy, before) = (rig.clone(), rig.visits());
+    let beside = glam::Vec3::new(0.3, 0.0, 0.2);
+    let to: Vec<(Uid, glam::Vec3)> =
+        rig.rest_globals().into_iter().map(|(joint, global)| (joint, global.translation + beside)).collect();
+    let outcome =
+        Operation::Move { to: to.clone(), with_children }.run(&mut rig, &mut UidSource::seeded(1), None).unwrap();
+    for (joint, place) in to {
+        let there = rig.rest_global(joint).translation;
+        assert!(there.distance(place) < 0.01, "{joint}: {there} instead of {place}");
+    }
+    outcome.inverses.iter().for_each(|edit| drop(rig.apply(edit).unwrap()));
+    assert_eq!(rig, copy);
+    rig.visits() - before
+}
+
+#[test]
+fn whole_chains_are_moved_in_proportion_to_their_length() {
+    for with_children in [false, true] {
+        let visits: Vec<u64> =
+            [300, 600, 1200].into_iter().map(|count| visited_to_move(count, with_children)).collect();
+        for pair in visits.windows(2) {
+            assert!(pair[0] > 0 && pair[1] as f64 <= GROWTH * pair[0] as f64, "{with_children}: {visits:?}");
+        }
+    }
+}

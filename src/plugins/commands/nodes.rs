@@ -20,7 +20,7 @@ use crate::{
             Attributes, Control, CreatedBy, CreatedRole, InGroup, Joint, NodeLabel, NodeLayer, NodeOf, Null, ParkedNode,
         },
     },
-    rig::{BuiltNode, NodeType, RestTransform, Rig, Uid},
+    rig::{BuiltNode, NodeType, RestTransform, Rig, RigJoint, Uid},
 };
 
 type FollowedNodes<'a> = (
@@ -50,6 +50,17 @@ pub(super) fn follow_nodes(
         }
         let nodes = built.as_ref().map_or(&[][..], |built| &built.0.nodes);
         let known = known.bypass_change_detection();
+        // Without a build, joints stand below their parents in the document.
+        let touched = if built.is_none() && known.is_empty() { joints.touched_of_all(rig) } else { None };
+        if let Some(touched) = touched {
+            let mut writer = Writer { commands: &mut commands, rig: rig_entity, tags, groups };
+            joints.count(touched.len());
+            for joint in touched.into_iter().filter_map(|uid| rig.joint(uid)) {
+                writer.place_unbuilt(joints, joint, &parents);
+            }
+            continue;
+        }
+        joints.count(rig.len());
         park(&mut commands, known, nodes);
         let mut writer = Writer { commands: &mut commands, rig: rig_entity, tags, groups };
         for node in nodes {
@@ -109,8 +120,7 @@ pub(super) fn follow_nodes(
         }
         let built_uids: HashSet<Uid> = nodes.iter().map(|node| node.uid).collect();
         for joint in rig.walk().filter(|joint| !built_uids.contains(&joint.data.uid)) {
-            let parent = joint.parent.and_then(|parent| joints.get(parent)).unwrap_or(rig_entity);
-            writer.place_joint(joints, joint.data.uid, parent, &parents);
+            writer.place_unbuilt(joints, joint, &parents);
         }
         let mut gone: Vec<Uid> = known.joints.keys().filter(|uid| !built_uids.contains(*uid)).copied().collect();
         gone.sort_unstable();
@@ -120,15 +130,63 @@ pub(super) fn follow_nodes(
     }
 }
 
+/// Entities of a rig below which joints may stand in another order than in the document.
+#[derive(Debug, Clone)]
+pub(super) enum Unsorted {
+    /// The entities that bear joints, all of them.
+    All,
+    /// The listed ones.
+    Below(BTreeSet<Entity>),
+}
+
+impl Unsorted {
+    /// Adds entities below which joints may stand in another order.
+    fn add(&mut self, bearers: impl IntoIterator<Item = Entity>) {
+        if let Self::Below(known) = self {
+            known.extend(bearers);
+        }
+    }
+}
+
+impl Default for Unsorted {
+    fn default() -> Self {
+        Self::Below(BTreeSet::new())
+    }
+}
+
 /// Rigs whose joints may stand in another order than in the document: the document or the build changed, or somebody
 /// wrote the parent of a node.
 pub(super) fn unsorted_rigs(
     edited: Query<(Entity, &Rig, &JointEntities), Changed<Rig>>,
-    rebuilt: Query<Entity, (With<Rig>, Or<(Changed<BuildResult>, Changed<Children>)>)>,
-    nodes: Query<&NodeOf, Changed<Children>>,
-) -> BTreeSet<Entity> {
-    let edited = edited.iter().filter(|(_, rig, joints)| !joints.follow(rig)).map(|(entity, ..)| entity);
-    edited.chain(&rebuilt).chain(nodes.iter().map(|of| of.0)).collect()
+    rebuilt: Query<Entity, (With<Rig>, Changed<BuildResult>)>,
+    of_rigs: Query<Entity, (With<Rig>, Changed<Children>)>,
+    of_nodes: Query<(Entity, &NodeOf), Changed<Children>>,
+    built: Query<(Has<BuildResult>, Option<&BuiltEntities>), With<Rig>>,
+    parents: Query<&ChildOf>,
+) -> BTreeMap<Entity, Unsorted> {
+    let mut rigs: BTreeMap<Entity, Unsorted> = rebuilt.iter().map(|rig| (rig, Unsorted::All)).collect();
+    for rig in &of_rigs {
+        rigs.entry(rig).or_default().add([rig]);
+    }
+    for (bearer, of) in &of_nodes {
+        rigs.entry(of.0).or_default().add([bearer]);
+    }
+    for (rig_entity, rig, joints) in edited.iter().filter(|(_, rig, joints)| !joints.follow(rig)) {
+        let parent = |uid: &Uid| parents.get(joints.get(*uid)?).ok().map(ChildOf::parent);
+        match joints.touched_of_all(rig) {
+            Some(touched) => rigs.entry(rig_entity).or_default().add(touched.iter().filter_map(parent)),
+            None => {
+                rigs.insert(rig_entity, Unsorted::All);
+            }
+        }
+    }
+    for (rig, unsorted) in &mut rigs {
+        // Joints of several parents in the document may stand below one node that a build created.
+        if built.get(*rig).is_ok_and(|(is_built, known)| is_built || known.is_some_and(|known| !known.is_empty())) {
+            *unsorted = Unsorted::All;
+        }
+    }
+    rigs
 }
 
 /// Notes that the entities of a rig follow its document, after all systems that write them.
@@ -143,19 +201,38 @@ pub(super) fn note_revisions(mut rigs: Query<(&Rig, &mut JointEntities)>) {
 /// Puts the joints below each node into the order that the document gives them. Created nodes keep their places among
 /// them.
 pub(super) fn order_siblings(
-    In(unsorted): In<BTreeSet<Entity>>,
-    rigs: Query<(&Rig, &JointEntities)>,
+    In(unsorted): In<BTreeMap<Entity, Unsorted>>,
+    mut rigs: Query<(&Rig, &mut JointEntities)>,
+    index: Res<EntityIndex>,
     parents: Query<&ChildOf>,
     mut lists: Query<&mut Children>,
 ) {
-    for (rig, joints) in unsorted.into_iter().filter_map(|rig| rigs.get(rig).ok()) {
+    for (rig_entity, unsorted) in unsorted {
+        let Ok((rig, mut joints)) = rigs.get_mut(rig_entity) else { continue };
+        let joints = joints.bypass_change_detection();
         let mut ranks: EntityHashMap<usize> = EntityHashMap::default();
-        let mut bearers: BTreeSet<Entity> = BTreeSet::new();
-        for (rank, joint) in rig.walk().enumerate() {
-            let Some(entity) = joints.get(joint.data.uid) else { continue };
-            ranks.insert(entity, rank);
-            bearers.extend(parents.get(entity).map(ChildOf::parent));
-        }
+        let bearers = match unsorted {
+            Unsorted::Below(bearers) => {
+                for bearer in &bearers {
+                    let joint = index.uid_of(*bearer, rig_entity, EntityPart::Joint);
+                    if joint.is_some() || *bearer == rig_entity {
+                        let children = rig.children(joint).iter().enumerate();
+                        ranks.extend(children.filter_map(|(rank, child)| Some((joints.get(*child)?, rank))));
+                    }
+                }
+                bearers
+            }
+            Unsorted::All => {
+                let mut bearers: BTreeSet<Entity> = BTreeSet::new();
+                for (rank, joint) in rig.walk().enumerate() {
+                    let Some(entity) = joints.get(joint.data.uid) else { continue };
+                    ranks.insert(entity, rank);
+                    bearers.extend(parents.get(entity).map(ChildOf::parent));
+                }
+                bearers
+            }
+        };
+        joints.count(ranks.len());
         for bearer in bearers {
             let Ok(mut children) = lists.get_mut(bearer) else { continue };
             let mut order: Vec<Entity> = children.iter().filter(|child| ranks.contains_key(child)).collect();
@@ -188,8 +265,9 @@ fn park(commands: &mut Commands, known: &mut BuiltEntities, nodes: &[BuiltNode])
     }
 }
 
-/// Despawns parked nodes that no build can bring back: their commands, or the joints that they were made for, are deleted, and
-/// neither undo nor redo restores them. Both leave the history only where steps do, so nothing is searched at other times.
+/// Despawns parked nodes that no build can bring back: their commands, or the joints that they were made for, are deleted,
+/// and neither undo nor redo restores them. Both leave the history only where steps do, so nothing is searched at other
+/// times.
 pub(super) fn despawn_parked(
     mut commands: Commands,
     mut rigs: Query<(Entity, &Rig, Ref<RigHistory>, &mut BuiltEntities)>,
@@ -246,6 +324,17 @@ impl Writer<'_, '_, '_> {
             mirrored.parent = Some(parent);
             self.commands.entity(mirrored.entity).try_insert(ChildOf(parent));
         }
+    }
+
+    /// Puts a joint that is not built below its parent in the document.
+    fn place_unbuilt(
+        &mut self,
+        joints: &mut JointEntities,
+        joint: &RigJoint,
+        parents: &Query<&ChildOf, Allow<Disabled>>,
+    ) {
+        let parent = joint.parent.and_then(|parent| joints.get(parent)).unwrap_or(self.rig);
+        self.place_joint(joints, joint.data.uid, parent, parents);
     }
 
     /// Writes the components of a created node that differ from `before`; all of them without `before`.

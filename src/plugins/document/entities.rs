@@ -5,7 +5,7 @@
 //! by other code; a different value in the document still has to be written to the entity.
 
 use std::{
-    collections::{BTreeMap, HashMap, HashSet},
+    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
     sync::Arc,
 };
 
@@ -113,6 +113,10 @@ pub struct JointEntities {
     of_joints: Option<Revision>,
     /// Revision that the entities of tags follow.
     of_tags: Option<Revision>,
+    /// True if a joint's entity lacked a component that had to be written, so that all joints have to be looked at again.
+    pub(super) is_behind: bool,
+    /// Number of joints that were looked at.
+    visits: u64,
 }
 
 /// Entity of a joint and the values last written to it.
@@ -133,6 +137,26 @@ impl JointEntities {
     /// The entity of a joint.
     pub fn get(&self, joint: Uid) -> Option<Entity> {
         self.joints.get(&joint).map(|mirrored| mirrored.entity)
+    }
+
+    /// Number of joints that were looked at so far, so that entities follow the document; for tests of growth.
+    pub fn visits(&self) -> u64 {
+        self.visits
+    }
+
+    /// Counts joints that are looked at.
+    pub(in crate::plugins) fn count(&mut self, joints: usize) {
+        self.visits += joints as u64;
+    }
+
+    /// Joints that edits touched since their entities followed the document; `None` if all have to be looked at.
+    pub(super) fn touched(&self, rig: &Rig) -> Option<BTreeSet<Uid>> {
+        rig.touched_since(self.of_joints.as_ref().filter(|_| !self.is_behind)?)
+    }
+
+    /// Joints that edits touched since all entities followed the document; `None` if all have to be looked at.
+    pub(in crate::plugins) fn touched_of_all(&self, rig: &Rig) -> Option<BTreeSet<Uid>> {
+        rig.touched_since(self.revision.as_ref()?)
     }
 
     /// True if the entities of joints, tags, groups and created nodes follow the document in everything but its pose.
@@ -271,6 +295,11 @@ impl MirroredConstraint {
 }
 
 impl BuiltEntities {
+    /// True if no build has given a node, or anything to a joint.
+    pub(in crate::plugins) fn is_empty(&self) -> bool {
+        self.nodes.is_empty() && self.joints.is_empty()
+    }
+
     /// The entity of a created node that is part of the rig at present.
     pub fn get(&self, node: Uid) -> Option<Entity> {
         self.nodes.get(&node).filter(|mirrored| !mirrored.is_parked).map(|mirrored| mirrored.entity)

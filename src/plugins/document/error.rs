@@ -19,6 +19,9 @@ pub enum ChangeError {
     /// The history has no undone step.
     #[error("there is nothing to redo")]
     NothingToRedo,
+    /// The change is about the active joint, and none is selected.
+    #[error("no joint is selected; select one first")]
+    NoActive,
     /// The rig refuses the operation.
     #[error(transparent)]
     Operation(#[from] OperationError),

@@ -1,6 +1,6 @@
 //! Entities of joints, groups and tags follow the document: a component is written only where its value changed.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
 
@@ -49,49 +49,92 @@ pub(in crate::plugins) fn follow_rigs(
             follow_pose(known, rig, is_posed, is_running, &mut places);
             continue;
         }
-        follow_groups(&mut commands, rig_entity, rig, groups.bypass_change_detection(), &mut index);
-        let mut is_other = remove_gone_joints(&mut commands, rig, known, &mut index);
-        for joint in rig.walk() {
-            let data = &joint.data;
-            let offset = rig.offset(data.uid).filter(|_| is_posed);
-            let Some(mirrored) = known.joints.get_mut(&data.uid) else {
-                let groups = groups.bypass_change_detection();
+        let groups = groups.bypass_change_detection();
+        follow_groups(&mut commands, rig_entity, rig, groups, &mut index);
+        let touched = known.touched(rig);
+        let mut is_other = remove_gone_joints(&mut commands, rig, known, touched.as_ref(), &mut index);
+        let due: Vec<&RigJoint> = match &touched {
+            Some(touched) => parents_first(rig, touched),
+            None => rig.walk().collect(),
+        };
+        known.count(due.len());
+        known.is_behind = false;
+        for joint in due {
+            let offset = rig.offset(joint.data.uid).filter(|_| is_posed);
+            if known.joints.contains_key(&joint.data.uid) {
+                follow_joint(&mut commands, joint, offset, known, groups, is_running, &mut places);
+            } else {
                 spawn_joint(&mut commands, rig_entity, joint, offset, known, groups, &mut index);
                 is_other = true;
-                continue;
-            };
-            let entity = mirrored.entity;
-            let old_rest = std::mem::replace(&mut mirrored.rest, data.rest);
-            if mirrored.kind != data.kind {
-                mirrored.kind = data.kind;
-                write_kind(&mut commands, entity, data.kind);
             }
-            describe(&mut commands, mirrored, data.label.as_deref(), data.group, groups.bypass_change_detection());
-            let is_posed_otherwise = known.posed.get(&data.uid) != offset;
-            let Ok((mut pose, mut rest)) = places.get_mut(entity) else { continue };
-            // A rest pose that was written and undone in one frame is still on the entity.
-            if !is_posed_otherwise && old_rest == data.rest && *rest == data.rest {
-                continue;
-            }
-            rest.set_if_neq(data.rest);
-            // The program of a running rig writes the transforms of all its nodes.
-            if !is_running {
-                let before = known.posed.get(&data.uid).copied().unwrap_or_default();
-                // Motion that an animation or a game has put on the joint stays on it, unless the document sets a new
-                // pose.
-                let offset_now = match offset {
-                    _ if !is_posed_otherwise && *pose != before.on(&old_rest) => PoseOffset::between(&old_rest, &pose),
-                    offset => offset.copied().unwrap_or_default(),
-                };
-                pose.set_if_neq(offset_now.on(&data.rest));
-            }
-            known.set_posed(data.uid, offset);
+        }
+        if touched.is_some() {
+            // The pose of the other joints, which is no matter of revisions.
+            follow_pose(known, rig, is_posed, is_running, &mut places);
         }
         known.note_joints(rig);
         if is_other {
             joints.set_changed();
         }
     }
+}
+
+/// The listed joints of a document, each behind its parent if that is listed, too.
+fn parents_first<'r>(rig: &'r Rig, listed: &BTreeSet<Uid>) -> Vec<&'r RigJoint> {
+    let mut order = Vec::with_capacity(listed.len());
+    let mut seen: HashSet<Uid> = HashSet::new();
+    for uid in listed {
+        let first = order.len();
+        let mut at = rig.joint(*uid);
+        while let Some(joint) = at.filter(|joint| listed.contains(&joint.data.uid) && seen.insert(joint.data.uid)) {
+            order.push(joint);
+            at = joint.parent.and_then(|parent| rig.joint(parent));
+        }
+        order[first..].reverse();
+    }
+    order
+}
+
+/// Writes the components of a joint's entity where the document differs from the last written values.
+fn follow_joint(
+    commands: &mut Commands,
+    joint: &RigJoint,
+    offset: Option<&PoseOffset>,
+    known: &mut JointEntities,
+    groups: &GroupEntities,
+    is_running: bool,
+    places: &mut Query<(&mut Transform, &mut RestTransform), With<Joint>>,
+) {
+    let data = &joint.data;
+    let Some(mirrored) = known.joints.get_mut(&data.uid) else { return };
+    let entity = mirrored.entity;
+    let old_rest = std::mem::replace(&mut mirrored.rest, data.rest);
+    if mirrored.kind != data.kind {
+        mirrored.kind = data.kind;
+        write_kind(commands, entity, data.kind);
+    }
+    describe(commands, mirrored, data.label.as_deref(), data.group, groups);
+    let is_posed_otherwise = known.posed.get(&data.uid) != offset;
+    let Ok((mut pose, mut rest)) = places.get_mut(entity) else {
+        known.is_behind = true;
+        return;
+    };
+    // A rest pose that was written and undone in one frame is still on the entity.
+    if !is_posed_otherwise && old_rest == data.rest && *rest == data.rest {
+        return;
+    }
+    rest.set_if_neq(data.rest);
+    // The program of a running rig writes the transforms of all its nodes.
+    if !is_running {
+        let before = known.posed.get(&data.uid).copied().unwrap_or_default();
+        // Motion that an animation or a game has put on the joint stays on it, unless the document sets a new pose.
+        let offset_now = match offset {
+            _ if !is_posed_otherwise && *pose != before.on(&old_rest) => PoseOffset::between(&old_rest, &pose),
+            offset => offset.copied().unwrap_or_default(),
+        };
+        pose.set_if_neq(offset_now.on(&data.rest));
+    }
+    known.set_posed(data.uid, offset);
 }
 
 /// Writes name and uid of a rig to its entity. A name or uid that other code gave to the rig, and that this plugin has not
@@ -117,12 +160,22 @@ fn describe_rig(
     }
 }
 
-/// Despawns the entities of joints that the document has no more; true if there were any.
-fn remove_gone_joints(commands: &mut Commands, rig: &Rig, known: &mut JointEntities, index: &mut EntityIndex) -> bool {
-    let mut gone: Vec<(Uid, Entity)> = (known.joints.iter())
-        .filter(|(uid, _)| rig.joint(**uid).is_none())
-        .map(|(uid, mirrored)| (*uid, mirrored.entity))
-        .collect();
+/// Despawns the entities of joints that the document has no more; true if there were any. They are among the `touched`
+/// joints, if these are known.
+fn remove_gone_joints(
+    commands: &mut Commands,
+    rig: &Rig,
+    known: &mut JointEntities,
+    touched: Option<&BTreeSet<Uid>>,
+    index: &mut EntityIndex,
+) -> bool {
+    let is_gone = |uid: &Uid| rig.joint(*uid).is_none();
+    let mut gone: Vec<(Uid, Entity)> = match touched {
+        Some(touched) => {
+            touched.iter().copied().filter(is_gone).filter_map(|uid| Some((uid, known.get(uid)?))).collect()
+        }
+        None => known.joints.keys().copied().filter(is_gone).filter_map(|uid| Some((uid, known.get(uid)?))).collect(),
+    };
     gone.sort_unstable();
     for (uid, entity) in &gone {
         index.remove(*entity);
@@ -294,6 +347,10 @@ pub(in crate::plugins) fn follow_tags(
             continue;
         }
         joints.note_tags(rig);
+        if !rig.has_tags() && known.tags.is_empty() && known.adopted.is_empty() {
+            continue;
+        }
+        joints.count(rig.len());
         let mut gone: Vec<Uid> = known.tags.keys().filter(|uid| rig.find_tag(**uid).is_none()).copied().collect();
         gone.sort_unstable();
         for uid in gone {

@@ -9,7 +9,7 @@ use super::{
 use crate::{
     algo::{placement::Placement, stroke::StrokeNote},
     plugins::{
-        document::{EditRefusal, EditReport, PlaceReport},
+        document::{ChangeReport, EditRefusal, EditReport},
         fit::{FIT_AROUND, FitAnswer},
         picking::PickAnswer,
         placement::{PlaceAnswer, PlaceRefusal},
@@ -26,7 +26,7 @@ pub(super) struct Answers<'w, 's> {
     refused: MessageReader<'w, 's, EditRefusal>,
     picked: MessageReader<'w, 's, PickAnswer>,
     placed: MessageReader<'w, 's, PlaceAnswer>,
-    reported: MessageReader<'w, 's, PlaceReport>,
+    reported: MessageReader<'w, 's, ChangeReport>,
     drawn: MessageReader<'w, 's, StrokeDone>,
     fitted: MessageReader<'w, 's, FitAnswer>,
     meshes: Query<'w, 's, &'static SkinOf>,
@@ -51,9 +51,9 @@ impl Answers<'_, '_> {
             script.tell_placement(placement, *refusal);
             script.pending = false;
         }
-        for PlaceReport { rig: entity, added } in self.reported.read() {
+        for ChangeReport { rig: entity, step } in self.reported.read() {
             if let Ok((_, mut script, ..)) = scripts.get_mut(*entity) {
-                script.take_report(added);
+                script.take_report(step);
             }
         }
         for StrokeDone { rig: entity, result } in self.drawn.read() {
@@ -90,14 +90,14 @@ impl Answers<'_, '_> {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
             if script.pending {
                 script.note_added(rig);
-                script.say(format!("{}: {} joints now", within_sentence(name), rig.len()));
+                script.say(told_step(name, rig.len()));
                 script.pending = false;
             }
         }
         for EditRefusal { rig: entity, reason } in self.refused.read() {
             let Ok((_, mut script, ..)) = scripts.get_mut(*entity) else { continue };
-            if script.refused_places > 0 {
-                script.refused_places -= 1;
+            if script.refused_changes > 0 {
+                script.refused_changes -= 1;
                 continue;
             }
             script.fail(&reason.clone().into());
@@ -155,6 +155,11 @@ fn name_of(rig: &Rig, joint: Uid) -> String {
 
 fn point(position: Vec3) -> String {
     format!("({:.4}, {:.4}, {:.4})", position.x, position.y, position.z)
+}
+
+/// Sentence about a step, and the number of joints of the rig after it.
+pub(super) fn told_step(name: &str, joints: usize) -> String {
+    format!("{}: {joints} joints now", within_sentence(name))
 }
 
 /// The title of a step in the middle of a sentence; names in it keep their letters.

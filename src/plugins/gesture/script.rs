@@ -1,4 +1,4 @@
-//! Execution of gestures, one a frame or clicks in runs.
+//! Execution of gestures, one a frame or in runs.
 
 use std::collections::VecDeque;
 
@@ -7,7 +7,7 @@ use bevy::{ecs::system::SystemParam, prelude::*};
 use super::{
     Gesture,
     answers::Answers,
-    click_run::{self, ClickedRig},
+    click_run::{self, RunRig},
     error::GestureError,
 };
 use crate::{
@@ -47,13 +47,13 @@ pub struct GestureScript {
     #[reflect(ignore)]
     pub(super) state: UserState,
     pub(super) pending: bool,
-    /// True if clicks that follow one another are carried out in one frame.
+    /// True if gestures that follow one another are carried out in one frame where they can be.
     pub(super) is_unwatched: bool,
-    /// Indices of the answers of a run of clicks whose joints are requested.
+    /// Indices of the answers of a run whose changes are requested.
     #[reflect(ignore)]
-    pub(super) placing: VecDeque<usize>,
-    /// Number of refusals of joints of a run that are answered, and still to be read.
-    pub(super) refused_places: usize,
+    pub(super) requested: VecDeque<usize>,
+    /// Number of refusals of changes of a run that are answered, and still to be read.
+    pub(super) refused_changes: usize,
 }
 
 /// Answer to a gesture.
@@ -110,8 +110,8 @@ impl GestureScript {
         Self { waiting: gestures.into_iter().collect(), ..Self::default() }
     }
 
-    /// A script of these gestures in an app without a window: clicks that follow one another are carried out in one frame. The
-    /// result is that of [`GestureScript::new`].
+    /// A script of these gestures in an app without a window: clicks, labels, undone and redone steps that follow one
+    /// another are carried out in one frame. The result is that of [`GestureScript::new`].
     pub fn unwatched(gestures: impl IntoIterator<Item = Gesture>) -> Self {
         Self { is_unwatched: true, ..Self::new(gestures) }
     }
@@ -167,8 +167,8 @@ pub(super) fn run_scripts(
         let bounds = surface.map_or([Vec3::splat(-0.5), Vec3::splat(0.5)], RigSurface::bounds);
         // Joints of a fit follow each edit.
         if is_fitted == (false, false) && click_run::is_due(&script, rig, surface) {
-            let clicked = ClickedRig { entity, rig, selection, surface, bounds };
-            click_run::carry_out(&mut script, &clicked, &mut requests.edits, &limits);
+            let run = RunRig { entity, rig, selection, surface, bounds };
+            click_run::carry_out(&mut script, &run, &mut requests.edits, &limits);
             continue;
         }
         let Some(gesture) = script.begin_next(rig.len(), &limits) else { continue };
@@ -183,8 +183,8 @@ pub(super) fn run_scripts(
 }
 
 impl GestureScript {
-    /// Takes the next gesture of the script of a rig with so many joints, and begins its answer; `None` where the list or the
-    /// gesture is too long.
+    /// Takes the next gesture of the script of a rig with so many joints, and begins its answer; `None` where the list or
+    /// the gesture is too long.
     pub(super) fn begin_next(&mut self, joints: usize, limits: &RigLimits) -> Option<Gesture> {
         self.state.joints_before = joints;
         let gesture = self.waiting.pop_front()?;

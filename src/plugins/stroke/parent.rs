@@ -4,7 +4,7 @@
 //! a leg one after the other expects the leg on the pelvis, not on the hand that the last stroke left selected:
 //! [`StrokeParent::Natural`] is the rule for that.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use bevy::prelude::*;
 
@@ -116,19 +116,17 @@ pub fn nearest_parent(rig: &Rig, symmetry: Option<MirrorPlane>, joints: &[(Uid, 
     } else {
         candidates.extend(joints.iter().copied().filter(|(joint, _)| !central(*joint) && forks(*joint)));
     }
-    let place = |joint: Uid| candidates.iter().find(|(uid, _)| *uid == joint).map(|(_, place)| *place);
+    let parent_of = |joint: Uid| rig.joint(joint).and_then(|joint| joint.parent);
+    let places: HashMap<Uid, Vec3> = candidates.iter().copied().collect();
+    let parents: HashSet<Uid> = candidates.iter().filter_map(|(joint, _)| parent_of(*joint)).collect();
     let mut best: Option<(f32, Uid)> = None;
     for &(joint, foot) in &candidates {
-        let parent = rig.joint(joint).and_then(|joint| joint.parent);
-        let bone = parent.and_then(|parent| Some((parent, place(parent)?)));
+        let bone = parent_of(joint).and_then(|parent| Some((parent, *places.get(&parent)?)));
         let (distance, owner) = match bone {
             Some((parent, head)) => {
                 let along = foot - head;
                 let t = (start - head).dot(along) / along.length_squared().max(f32::MIN_POSITIVE);
-                let is_tip = !candidates
-                    .iter()
-                    .any(|(other, _)| rig.joint(*other).is_some_and(|other| other.parent == Some(joint)));
-                let share = if is_tip { 0.75 } else { 0.5 };
+                let share = if parents.contains(&joint) { 0.5 } else { 0.75 };
                 (start.distance(head + along * t.clamp(0.0, 1.0)), if t > share { joint } else { parent })
             }
             None => (start.distance(foot), joint),

@@ -3,6 +3,8 @@
 //! Planning changes nothing and is one function, shared by preview and request, so that a preview shows exactly the
 //! result.
 
+use std::collections::HashMap;
+
 use bevy::prelude::*;
 
 use super::{FoundChain, ParentReason, StrokeFailure, StrokeRequest, StrokeResult, StrokeTips, stroke_parent};
@@ -124,13 +126,22 @@ pub fn stroke_kind(request: &StrokeRequest, rig: &Rig, posed: &[(Uid, Vec3)]) ->
 
 /// Joints on the view plane, each with its parent's index; joints behind the camera have no finite position.
 fn projected(rig: &Rig, posed: &[(Uid, Vec3)], plane: &ViewPlane) -> Vec<(Vec2, Option<usize>)> {
-    let numbers: std::collections::HashMap<Uid, usize> =
-        posed.iter().enumerate().map(|(n, (uid, _))| (*uid, n)).collect();
-    let project = |(uid, position): &(Uid, Vec3)| {
-        let parent = rig.joint(*uid).and_then(|joint| joint.parent).and_then(|parent| numbers.get(&parent).copied());
+    // In the order of the hierarchy a parent is the joint before, or one above that; in any other order it is looked up.
+    let mut above: Vec<(Uid, usize)> = Vec::new();
+    let mut numbers: Option<HashMap<Uid, usize>> = None;
+    let project = |(number, (uid, position)): (usize, &(Uid, Vec3))| {
+        let parent = rig.joint(*uid).and_then(|joint| joint.parent).and_then(|parent| {
+            while above.last().is_some_and(|(last, _)| *last != parent) {
+                above.pop();
+            }
+            let listed = || posed.iter().zip(0..).map(|((uid, _), number)| (*uid, number)).collect();
+            let found = above.last().map(|(_, number)| *number);
+            found.or_else(|| numbers.get_or_insert_with(listed).get(&parent).copied())
+        });
+        above.push((*uid, number));
         (plane.project(*position).unwrap_or(Vec2::NAN), parent)
     };
-    posed.iter().map(project).collect()
+    posed.iter().enumerate().map(project).collect()
 }
 
 /// Number of the ray's entry/exit pair that holds a point (or comes nearest to it), counted from one.

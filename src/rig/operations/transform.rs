@@ -1,11 +1,11 @@
 //! Moving, rotating and scaling the rest pose.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use bevy::math::{Affine3, Vec3};
 
 use super::{Draft, OperationError};
-use crate::rig::{RestTransform, RigEdit, Uid};
+use crate::rig::{RestTransform, Rig, RigEdit, Uid};
 
 /// Moves joints to positions in the rig's space.
 pub(super) fn place_at(draft: &mut Draft, to: &[(Uid, Vec3)], with_children: bool) -> Result<(), OperationError> {
@@ -61,10 +61,10 @@ pub(super) fn about(
 ) -> Result<(), OperationError> {
     let listed: HashSet<Uid> = joints.iter().copied().collect();
     let mut targets = Vec::with_capacity(joints.len());
+    let mut carried = HashMap::new();
     for &joint in joints {
         draft.position(joint)?;
-        let carried = with_children && draft.rig().ancestors(joint).any(|above| listed.contains(&above.data.uid));
-        if carried {
+        if with_children && is_below(draft.rig(), joint, &listed, &mut carried) {
             continue;
         }
         let global = draft.rig().rest_global(joint);
@@ -73,6 +73,25 @@ pub(super) fn about(
         targets.push((joint, turned));
     }
     set_globals(draft, targets, with_children)
+}
+
+/// True if one of the `listed` joints stands above a joint. `known` keeps the answers for the joints on the way up, so that
+/// a way that joints share is walked once.
+fn is_below(rig: &Rig, joint: Uid, listed: &HashSet<Uid>, known: &mut HashMap<Uid, bool>) -> bool {
+    let (mut way, mut at) = (Vec::new(), joint);
+    let is_below = loop {
+        if let Some(found) = known.get(&at) {
+            break *found;
+        }
+        way.push(at);
+        match rig.joint(at).and_then(|joint| joint.parent) {
+            None => break false,
+            Some(parent) if listed.contains(&parent) => break true,
+            Some(parent) => at = parent,
+        }
+    };
+    known.extend(way.into_iter().map(|joint| (joint, is_below)));
+    is_below
 }
 
 /// Sets transforms in the rig's space, parents first, and mirrors them to partners that are not in the list.

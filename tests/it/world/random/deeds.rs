@@ -62,8 +62,8 @@ fn put_on(entity: &mut EntityWorldMut, number: usize, other: Entity) {
     };
 }
 
-/// One random deed: its name, and whether the app has taken it up.
-pub(super) fn step(stage: &mut RigBench, random: &mut Random) -> (String, bool) {
+/// One random deed, of a build only where the rig may be built: its name, and whether the app has taken it up.
+pub(super) fn step(stage: &mut RigBench, random: &mut Random, may_build: bool) -> (String, bool) {
     let (other_rig, other_joint, other_group) = stage.neighbour();
     let rig = stage.rig().clone();
     let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
@@ -172,7 +172,7 @@ pub(super) fn step(stage: &mut RigBench, random: &mut Random) -> (String, bool) 
         }
         (19, ..) => stage.change(Change::Undo),
         (20, ..) => stage.change(Change::Redo),
-        (21, ..) => {
+        (21, ..) if may_build => {
             let steps = [BuildStep::All, BuildStep::RollBack, BuildStep::Forward, BuildStep::Back, BuildStep::Restart];
             stage.step(steps[number % 5].clone());
         }
