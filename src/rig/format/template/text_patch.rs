@@ -8,6 +8,8 @@ mod order;
 mod parts;
 pub(super) mod patch;
 
+use std::sync::Arc;
+
 use bevy::math::{Quat, Vec3};
 
 use super::{
@@ -88,7 +90,7 @@ fn said_with_parts(rig: &Rig, own: &Rig) -> Option<Rig> {
     let mut read = comparable(read_text(&write_template(rig), 1).ok()?.rig);
     read.groups.sort_by_key(|group| place(group.uid));
     read.inputs.sort_by_key(|input| place(input.uid));
-    let brothers = read.joints.values_mut().map(|joint| &mut joint.children);
+    let brothers = read.joints.values_mut().map(|joint| &mut Arc::make_mut(joint).children);
     for list in brothers.chain([&mut read.roots]) {
         list.sort_by_key(|joint| place(*joint));
     }
@@ -100,8 +102,8 @@ fn said_with_parts(rig: &Rig, own: &Rig) -> Option<Rig> {
 pub(super) fn comparable(mut rig: Rig) -> Rig {
     rig.about.sockets.sort_by(|a, b| a.name.cmp(&b.name));
     rig.about.options.sort_by(|a, b| a.name.cmp(&b.name));
-    for joint in rig.joints.values_mut() {
-        for tag in &mut joint.data.tags {
+    for joint in rig.joints.values_mut().filter(|joint| !joint.data.tags.is_empty()) {
+        for tag in &mut Arc::make_mut(joint).data.tags {
             if let TagKind::Command { params, .. } = &mut tag.kind {
                 *params = canonical(params);
             }
