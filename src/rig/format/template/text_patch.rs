@@ -8,7 +8,7 @@ mod order;
 mod parts;
 pub(super) mod patch;
 
-use std::sync::Arc;
+use std::{collections::HashMap, sync::Arc};
 
 use bevy::math::{Quat, Vec3};
 
@@ -139,6 +139,12 @@ fn canonical(params: &str) -> String {
     out
 }
 
+/// The brother before each joint that has one: nobody is looked for among thousands of brothers.
+fn elder_brothers(rig: &Rig) -> HashMap<Uid, Uid> {
+    let families = std::iter::once(rig.roots()).chain(rig.walk().map(|joint| joint.children.as_slice()));
+    families.flat_map(|brothers| brothers.windows(2)).map(|pair| (pair[1], pair[0])).collect()
+}
+
 struct Rewriter<'d, 'a> {
     rig: &'d Rig,
     before: &'d Rig,
@@ -260,11 +266,8 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         let wanted: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
         let text = |uid: Uid| rig.joint(uid).map(|joint| self.new_joint(joint)).unwrap_or_default();
         // A joint comes behind its elder brother, or else behind its parent.
-        let behind = |uid: Uid| {
-            let joint = rig.joint(uid)?;
-            let place = rig.children(joint.parent).iter().position(|child| *child == uid)?;
-            place.checked_sub(1).map(|elder| rig.children(joint.parent)[elder]).or(joint.parent)
-        };
+        let elders = elder_brothers(rig);
+        let behind = |uid: Uid| elders.get(&uid).copied().or_else(|| rig.joint(uid)?.parent);
         patch.list(tree.root(), "joints", &declared.joints, &wanted, Some(&behind), text);
         self.patch = patch;
     }
