@@ -4,7 +4,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use serde_json::Value;
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
@@ -121,11 +120,13 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     let mut bench = limits::workbench(rig);
     let held = run_steps(&mut bench, &args.steps, &writes)?;
     report.notes(held);
-    let nodes = bench.nodes()?;
-    let error = nodes.iter().map(|node| node.entity.translation.distance(node.program.translation)).fold(0.0, f32::max);
-    let count = counted(nodes.len(), "node", "nodes");
-    report.line(format!("{count}; entities and program differ by {error:e} at most"));
-    report.set("nodes", Value::Array(nodes.iter().map(|node| node.json()).collect()));
+    let (mut nodes, mut error) = (0, 0.0_f32);
+    let told = bench.iter_nodes()?.inspect(|node| {
+        nodes += 1;
+        error = error.max(node.entity.translation.distance(node.program.translation));
+    });
+    report.set_list("nodes", told);
+    report.line(format!("{}; entities and program differ by {error:e} at most", counted(nodes, "node", "nodes")));
     report.set("error", error);
     if let Some(output) = &args.output {
         if is_picture {
