@@ -128,7 +128,10 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
                 draft.store(&mut model, meta, output, &settings, report)?;
                 Vec::new()
             }
-            None => store_model(&RealDisk, output, &model, &settings)?,
+            None => {
+                drop(bench);
+                store_model(&RealDisk, output, &model, &settings)?
+            }
         }
     };
     report.notes(notes);

@@ -132,7 +132,7 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
         if is_picture {
             picture(args, own_mesh, output, &bench, &mut report)?;
         } else {
-            write(args, own_mesh, output, &mut bench, &mut report)?;
+            write(args, own_mesh, output, bench, &mut report)?;
         }
         report.line(format!("wrote {}", output.display()));
         report.set("output", output.display().to_string());
@@ -225,7 +225,7 @@ fn write(
     args: &PoseArgs,
     own_mesh: Option<RigMesh>,
     output: &Output,
-    bench: &mut Workbench,
+    mut bench: Workbench,
     report: &mut Report,
 ) -> Result<(), Failure> {
     if FileKind::of(output) == Some(FileKind::Template) {
@@ -241,15 +241,18 @@ fn write(
             }
         }
         let has_commands = bench.rig().walk().any(|joint| !joint.data.tags.is_empty());
+        drop(bench);
         report.notes(build::store_built(output, &args.rig, skeleton, has_commands)?);
         return Ok(());
     }
     let (model, settings) = match own_mesh {
         Some(mesh) => {
-            build::character_with(bench, MeshSource::Open(Box::new(mesh)), &args.weights, &args.export, report)?
+            build::character_with(&mut bench, MeshSource::Open(Box::new(mesh)), &args.weights, &args.export, report)?
         }
-        None => build::character_of(bench, args.mesh.as_deref(), &args.weights, &args.export, report)?,
+        None => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, report)?,
     };
+    // What is written is read back, which takes as much memory again.
+    drop(bench);
     report.notes(store_model(&RealDisk, output, &model, &settings)?);
     Ok(())
 }
