@@ -145,11 +145,15 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     if args.is_undecided(updated.conflicts(), &mut report) {
         return Ok(report);
     }
+    let keeps_base = args.keep_base || is_beside;
+    // The versions are as large as what is written, which is read back.
+    drop((base, now));
+    let file = keeps_base.then_some(file);
     if let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) {
         report.notes(update.store(&RealDisk, output)?);
         report.line(format!("wrote {}", output.display()));
         clips::store(&clips, &mut report)?;
-        if args.keep_base || is_beside {
+        if let Some(file) = file {
             let base = companion(output);
             save_atomic(&RealDisk, &base, base_text(&RealDisk, &file, output).as_bytes()).map_err(StoreError::from)?;
             report.line(format!("wrote {}", base.display()));

@@ -52,7 +52,10 @@ fn written_over(rig: &Rig, source: &str) -> Option<String> {
     let declared = Declarations::find(source)?;
     let mut rewriter = Rewriter::new(rig, &before, &declared);
     header_labels(&mut rewriter.patch, &declared.tree, &before, rig);
-    said(rig, rewriter.text())
+    let text = rewriter.text();
+    // What was changed makes room for what is read to compare it.
+    drop((declared, before));
+    said(rig, text)
 }
 
 /// The text of a rig's template as people write it: tags of the short form, names where they are enough, and no uid that follows
