@@ -14,7 +14,7 @@ use super::{
     switches::SwitchArgs,
 };
 use crate::{
-    files::{FileKind, LoadedMesh, MeshState, RealDisk, store_model},
+    files::{FileKind, LoadedMesh, MeshState, RealDisk, store_owned_model},
     headless::{
         Workbench,
         posing::{ControlWrite, HeldValue, PoseError},
@@ -253,7 +253,7 @@ fn write(
     };
     // What is written is read back, which takes as much memory again.
     drop(bench);
-    report.notes(store_model(&RealDisk, output, &model, &settings)?);
+    report.notes(store_owned_model(&RealDisk, output, model, &settings)?);
     Ok(())
 }
 

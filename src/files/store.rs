@@ -12,7 +12,7 @@ use super::{
     template_origin::moved_text,
     template_text::{TemplateText, template_text},
     template_update::with_known_uids,
-    verify,
+    verify::{self, ModelCounts},
 };
 use crate::{
     mesh::{
@@ -178,6 +178,37 @@ pub fn store_model(
     model: &Model,
     settings: &GltfWriteSettings,
 ) -> Result<Vec<String>, StoreError> {
+    let (set, notes) = model_set(disk, path, model, settings)?;
+    verify::model(&set, ModelCounts::of(model))?;
+    save_set(disk, &set)?;
+    Ok(notes)
+}
+
+/// Saves a model as [`store_model`] does, and drops it before what is written is read back.
+///
+/// # Errors
+/// Those of [`store_model`].
+pub(crate) fn store_owned_model(
+    disk: &dyn Disk,
+    path: &Path,
+    model: Model,
+    settings: &GltfWriteSettings,
+) -> Result<Vec<String>, StoreError> {
+    let (set, notes) = model_set(disk, path, &model, settings)?;
+    let counts = ModelCounts::of(&model);
+    drop(model);
+    verify::model(&set, counts)?;
+    save_set(disk, &set)?;
+    Ok(notes)
+}
+
+/// Files of a model, and notes about content that the format cannot keep.
+fn model_set(
+    disk: &dyn Disk,
+    path: &Path,
+    model: &Model,
+    settings: &GltfWriteSettings,
+) -> Result<(FileSet, Vec<String>), StoreError> {
     let gltf_error = |source| StoreError::Gltf { path: path.into(), source };
     let nothing = |what| Err(StoreError::Nothing { path: path.into(), what });
     let kind = FileKind::of(path);
@@ -213,9 +244,7 @@ pub fn store_model(
         }
         _ => return Err(StoreError::Kind { path: path.into(), wanted: "a model is saved as .glb, .gltf or .obj" }),
     }
-    verify::model(&set, model)?;
-    save_set(disk, &set)?;
-    Ok(notes)
+    Ok((set, notes))
 }
 
 /// Saves an avatar as `.vrm`, after reading back what is to be written.
@@ -235,7 +264,7 @@ pub fn store_avatar(
     let mut set = FileSet::new(path);
     let bytes = write_vrm(model, avatar, settings);
     set.finish(bytes.map_err(|source| StoreError::Gltf { path: path.into(), source })?);
-    verify::model(&set, model)?;
+    verify::model(&set, ModelCounts::of(model))?;
     verify::avatar(&set, avatar)?;
     Ok(save_set(disk, &set)?)
 }

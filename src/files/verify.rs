@@ -28,8 +28,22 @@ use crate::{
     solve::packed_clip::PackedSkeleton,
 };
 
-/// Reads back a model before it is saved, and compares the counts of its content.
-pub(super) fn model(set: &FileSet, model: &Model) -> Result<(), StoreError> {
+/// Counts of the content of a model.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ModelCounts {
+    points: usize,
+    triangles: usize,
+}
+
+impl ModelCounts {
+    pub fn of(model: &Model) -> Self {
+        let triangles = model.parts.iter().map(|part| part.triangles.len()).sum();
+        Self { points: model.points.len(), triangles }
+    }
+}
+
+/// Reads back a model before it is saved, and compares the counts of its content with those that it had.
+pub(super) fn model(set: &FileSet, written: ModelCounts) -> Result<(), StoreError> {
     let path = set.path();
     let is_obj = FileKind::of(path) == Some(FileKind::Obj);
     let read = || {
@@ -48,11 +62,10 @@ pub(super) fn model(set: &FileSet, model: &Model) -> Result<(), StoreError> {
         true => Ok(()),
         false => Err(StoreError::Lost { path: path.into(), what, written, read }),
     };
-    let triangles = |model: &Model| model.parts.iter().map(|part| part.triangles.len()).sum::<usize>();
     if is_obj {
-        same("points", model.points.len(), back.points.len())?;
+        same("points", written.points, back.points.len())?;
     }
-    same("triangles", triangles(model), triangles(&back))?;
+    same("triangles", written.triangles, ModelCounts::of(&back).triangles)?;
     same("finite points", back.points.len(), back.points.iter().filter(|point| point.is_finite()).count())
 }
 
