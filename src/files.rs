@@ -76,11 +76,11 @@ pub use project::{
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
 pub use site::{SITE_FILE, SearchPaths, SiteError, TEMPLATES_VARIABLE};
+pub(crate) use store::store_owned_model;
 pub use store::{
     DocumentBase, StoreError, is_template_of, store_animation, store_avatar, store_document_over, store_model,
     store_packed_clips, store_rig, store_rig_over, store_skin,
 };
-pub(crate) use store::store_owned_model;
 pub use template_layout::format_template_file;
 pub use template_origin::{TemplateOrigin, has_parts, store_rig_from};
 pub(crate) use template_text::template_text;
