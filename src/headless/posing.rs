@@ -364,7 +364,7 @@ impl Workbench {
         Ok(self.iter_nodes()?.collect())
     }
 
-    /// [`nodes`](Self::nodes), one after the other.
+    /// Nodes as in [`nodes`](Self::nodes), made one after the other.
     ///
     /// # Errors
     /// If the rig is not built or cannot run.

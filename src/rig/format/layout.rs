@@ -288,7 +288,7 @@ fn pieces(line: &str) -> Vec<&str> {
 
 /// Text between tokens, without commas, with its place.
 fn gaps(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    let (mut tokens, mut next) = (tokens(text), Some(0));
+    let (mut tokens, mut next) = (tokens(text), Some(0_usize));
     std::iter::from_fn(move || {
         let at = next.take()?;
         let Some(token) = tokens.next() else { return Some((at, &text[at..])) };
