@@ -5,6 +5,7 @@
 
 mod held_values;
 mod node_lookup;
+mod posed_node;
 pub mod posing;
 mod reloading;
 

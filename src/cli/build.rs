@@ -21,7 +21,7 @@ use super::{
     vrm::AvatarDraft,
 };
 use crate::{
-    files::{FileKind, RealDisk, StoreError, has_parts, store_model, store_rig, store_rig_over},
+    files::{FileKind, RealDisk, StoreError, has_parts, store_owned_model, store_rig, store_rig_over},
     headless::{Workbench, posing::PoseError},
     mesh::{
         gltf::GltfWriteSettings,
@@ -115,7 +115,7 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
         mark_joints(&mut model, &baked(&rig, &built));
         drop((rig, built));
         let settings = GltfWriteSettings { all_joints: true, ..args.export.settings() };
-        store_model(&RealDisk, output, &model, &settings)?
+        store_owned_model(&RealDisk, output, model, &settings)?
     } else {
         drop(built);
         let mut bench = limits::workbench(rig);
@@ -128,7 +128,10 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
                 draft.store(&mut model, meta, output, &settings, report)?;
                 Vec::new()
             }
-            None => store_model(&RealDisk, output, &model, &settings)?,
+            None => {
+                drop(bench);
+                store_owned_model(&RealDisk, output, model, &settings)?
+            }
         }
     };
     report.notes(notes);

@@ -112,20 +112,20 @@ pub(super) fn merge(args: &MergeArgs) -> Result<Report, Failure> {
     args.in_place.check(&inputs, Some(&args.output), &[])?;
     let mut report = Report::default();
     let rigs = args.rigs.iter().map(|path| load(path, &mut report)).collect::<Result<Vec<_>, _>>()?;
-    let Some((first, others)) = rigs.split_first() else { return Ok(report) };
-    let mut rig = first.clone();
     let parents = parents(&args.parent, &args.rigs[1..])?;
-    let mut uids = uids_of(&rigs);
-    for (other, parent) in others.iter().zip(parents) {
+    let (mut uids, count) = (uids_of(&rigs), rigs.len());
+    let mut rigs = rigs.into_iter();
+    let Some(mut rig) = rigs.next() else { return Ok(report) };
+    for (other, parent) in rigs.zip(parents) {
         let parent = parent.map(|label| joint(&rig, label)).transpose()?;
-        let operation = Operation::Merge { other: Arc::new(other.clone()), parent };
+        let operation = Operation::Merge { other: Arc::new(other), parent };
         limits::check_time("merging the rigs")?;
         run(&mut rig, &operation, &mut uids, &mut report)?;
     }
     limits::check_time("merging the rigs")?;
-    write(&args.output, &rig, &[&args.rigs[0]], &mut report)?;
     let joints = counted(rig.len(), "joint", "joints");
-    report.line(format!("{joints} of {}", counted(rigs.len(), "rig", "rigs")));
+    write(&args.output, rig, &[&args.rigs[0]], &mut report)?;
+    report.line(format!("{joints} of {}", counted(count, "rig", "rigs")));
     Ok(report)
 }
 
@@ -183,8 +183,8 @@ pub(super) fn inject(args: &InjectArgs) -> Result<Report, Failure> {
     let left = (size.saturating_sub(joints.len()), joints.len().saturating_sub(size));
     let operation = Operation::Tags(TagOperation::Drop { part: Arc::new(part), joints, bindings: Default::default() });
     run(&mut rig, &operation, &mut uids, &mut report)?;
-    write(&args.output, &rig, &[&args.rig], &mut report)?;
     let tags = count(&rig) - before;
+    write(&args.output, rig, &[&args.rig], &mut report)?;
     report.line(format!("{} injected", counted(tags, "tag", "tags")));
     report.set("tags", tags);
     report.set("joints_left", json!({ "template": left.0, "rig": left.1 }));
@@ -225,10 +225,11 @@ fn run(rig: &mut Rig, operation: &Operation, uids: &mut UidSource, report: &mut 
     Ok(())
 }
 
-fn write(output: &Path, rig: &Rig, sources: &[&Path], report: &mut Report) -> Result<(), Failure> {
+fn write(output: &Path, rig: Rig, sources: &[&Path], report: &mut Report) -> Result<(), Failure> {
+    let joints = rig.len();
     report.notes(store_rig_over(&RealDisk, output, rig, sources)?);
     report.line(format!("wrote {}", output.display()));
-    report.set("joints", rig.len());
+    report.set("joints", joints);
     Ok(())
 }
 

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, limits, progress::spinning, skin::load_rig};
 use crate::{
-    files::{FileKind, RealDisk, stem, store_model, store_rig, store_rig_over},
+    files::{FileKind, RealDisk, stem, store_model, store_owned_model, store_rig, store_rig_over},
     mesh::{gltf::GltfWriteSettings, model::Model},
     rig::{
         BuiltRig, Rig, UidSource,
@@ -64,7 +64,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
             let mut model = skeleton_model(&rig, None);
             mark_joints(&mut model, &rig);
             drop(rig);
-            store_model(&RealDisk, &args.output, &model, &settings)?
+            store_owned_model(&RealDisk, &args.output, model, &settings)?
         }
         (_, Some(Vrm)) => {
             return Err(Failure::Usage(format!(

@@ -4,7 +4,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use serde_json::Value;
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
@@ -15,7 +14,7 @@ use super::{
     switches::SwitchArgs,
 };
 use crate::{
-    files::{FileKind, LoadedMesh, MeshState, RealDisk, store_model},
+    files::{FileKind, LoadedMesh, MeshState, RealDisk, store_owned_model},
     headless::{
         Workbench,
         posing::{ControlWrite, HeldValue, PoseError},
@@ -121,17 +120,19 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     let mut bench = limits::workbench(rig);
     let held = run_steps(&mut bench, &args.steps, &writes)?;
     report.notes(held);
-    let nodes = bench.nodes()?;
-    let error = nodes.iter().map(|node| node.entity.translation.distance(node.program.translation)).fold(0.0, f32::max);
-    let count = counted(nodes.len(), "node", "nodes");
-    report.line(format!("{count}; entities and program differ by {error:e} at most"));
-    report.set("nodes", Value::Array(nodes.iter().map(|node| node.json()).collect()));
+    let (mut nodes, mut error) = (0, 0.0_f32);
+    let told = bench.iter_nodes()?.inspect(|node| {
+        nodes += 1;
+        error = error.max(node.entity.translation.distance(node.program.translation));
+    });
+    report.set_list("nodes", told);
+    report.line(format!("{}; entities and program differ by {error:e} at most", counted(nodes, "node", "nodes")));
     report.set("error", error);
     if let Some(output) = &args.output {
         if is_picture {
             picture(args, own_mesh, output, &bench, &mut report)?;
         } else {
-            write(args, own_mesh, output, &mut bench, &mut report)?;
+            write(args, own_mesh, output, bench, &mut report)?;
         }
         report.line(format!("wrote {}", output.display()));
         report.set("output", output.display().to_string());
@@ -225,7 +226,7 @@ fn write(
     args: &PoseArgs,
     own_mesh: Option<RigMesh>,
     output: &Output,
-    bench: &mut Workbench,
+    mut bench: Workbench,
     report: &mut Report,
 ) -> Result<(), Failure> {
     if FileKind::of(output) == Some(FileKind::Template) {
@@ -241,16 +242,19 @@ fn write(
             }
         }
         let has_commands = bench.rig().walk().any(|joint| !joint.data.tags.is_empty());
+        drop(bench);
         report.notes(build::store_built(output, &args.rig, skeleton, has_commands)?);
         return Ok(());
     }
     let (model, settings) = match own_mesh {
         Some(mesh) => {
-            build::character_with(bench, MeshSource::Open(Box::new(mesh)), &args.weights, &args.export, report)?
+            build::character_with(&mut bench, MeshSource::Open(Box::new(mesh)), &args.weights, &args.export, report)?
         }
-        None => build::character_of(bench, args.mesh.as_deref(), &args.weights, &args.export, report)?,
+        None => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, report)?,
     };
-    report.notes(store_model(&RealDisk, output, &model, &settings)?);
+    // What is written is read back, which takes as much memory again.
+    drop(bench);
+    report.notes(store_owned_model(&RealDisk, output, model, &settings)?);
     Ok(())
 }
 

@@ -1,8 +1,11 @@
 //! Results of commands, for people and for programs.
 
-use std::{borrow::Cow, fmt::Write as _, io::Write, path::Path, process::ExitCode, sync::OnceLock};
+use std::{
+    borrow::Cow, collections::BTreeMap, fmt::Write as _, io::Write, path::Path, process::ExitCode, sync::OnceLock,
+};
 
 use miette::{Diagnostic, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
+use serde::Serialize;
 use serde_json::{Map, Value};
 
 use super::{
@@ -37,6 +40,8 @@ pub(super) struct Report {
     pub notes: Vec<String>,
     /// Result for programs.
     pub json: Map<String, Value>,
+    /// Lists for programs, by their keys in `json`, as the text of their JSON.
+    lists: BTreeMap<String, String>,
     /// Marks a result that reports a fault of the input.
     pub at_fault: bool,
     /// Fault of the input, for programs.
@@ -52,6 +57,21 @@ impl Report {
     /// Adds a value for programs.
     pub fn set(&mut self, key: &str, value: impl Into<Value>) {
         self.json.insert(key.to_owned(), value.into());
+    }
+
+    /// Adds a list for programs, if they are who the result is for. It is kept as text: the values of a list of thousands
+    /// of things take ten times as much memory.
+    pub fn set_list(&mut self, key: &str, items: impl IntoIterator<Item = impl Serialize>) {
+        let is_wanted = is_json();
+        let mut text = "[".to_owned();
+        // Items are gone through in any case: the caller may look at them, too.
+        for item in items.into_iter().filter(|_| is_wanted) {
+            text.push_str(if text.len() > 1 { "," } else { "" });
+            text.push_str(serde_json::to_string(&item).as_deref().unwrap_or("null"));
+        }
+        text.push(']');
+        self.json.insert(key.to_owned(), Value::Null);
+        self.lists.insert(key.to_owned(), text);
     }
 
     /// Adds warnings.
@@ -168,7 +188,7 @@ fn told_notes(mut notes: Vec<String>) -> Vec<String> {
 /// or full is a failure: exit code 1 at least.
 pub(super) fn finish(result: Result<Report, Failure>, json: bool, subject: &str) -> ExitCode {
     let mut is_told = true;
-    let (code, answer) = match result {
+    let (code, answer, lists) = match result {
         Ok(mut report) => {
             report.notes = told_notes(report.notes);
             let code = u8::from(report.at_fault);
@@ -186,7 +206,7 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool, subject: &str)
             if !report.notes.is_empty() {
                 answer.insert("notes".to_owned(), report.notes.into());
             }
-            (code, answer)
+            (code, answer, report.lists)
         }
         Err(Failure::Usage(message)) => {
             if !json {
@@ -195,16 +215,16 @@ pub(super) fn finish(result: Result<Report, Failure>, json: bool, subject: &str)
                     one_line(&limits::message(&message))
                 ));
             }
-            (2, failed(&of_usage(&message)))
+            (2, failed(&of_usage(&message)), BTreeMap::new())
         }
         Err(Failure::Input(error)) => {
             if !json {
                 is_told = show(error.as_ref());
             }
-            (1, failed(&Explanation::of_error(error.as_ref(), subject)))
+            (1, failed(&Explanation::of_error(error.as_ref(), subject)), BTreeMap::new())
         }
     };
-    is_told &= !json || print_json(&Value::Object(answer));
+    is_told &= !json || print_answer(&answer, &lists);
     ExitCode::from(if is_told { code } else { code.max(1) })
 }
 
@@ -220,12 +240,33 @@ pub(super) fn print_json(value: &Value) -> bool {
     writeln!(out, "{}", json_line(value)).is_ok() && out.flush().is_ok()
 }
 
+/// Prints an answer as one line of JSON, with `lists` as the values of their keys; `false` if standard output is closed or
+/// full.
+fn print_answer(answer: &Map<String, Value>, lists: &BTreeMap<String, String>) -> bool {
+    let mut out = std::io::stdout().lock();
+    let mut start = "{";
+    let is_printed = answer.iter().all(|(key, value)| {
+        let value = lists.get(key).map_or_else(|| json_line(value).into(), |list| escaped(list));
+        let key = json_line(&Value::from(key.as_str()));
+        write!(out, "{}{key}:{value}", std::mem::replace(&mut start, ",")).is_ok()
+    });
+    is_printed && writeln!(out, "}}").is_ok() && out.flush().is_ok()
+}
+
 /// JSON of a value without what a terminal obeys: such characters stand in strings only, where JSON has escapes for
 /// them.
 fn json_line(value: &Value) -> String {
     let text = value.to_string();
-    if !has_obeyed(&text) {
-        return text;
+    if let Cow::Owned(line) = escaped(&text) {
+        return line;
+    }
+    text
+}
+
+/// Text of JSON without what a terminal obeys.
+fn escaped(text: &str) -> Cow<'_, str> {
+    if !has_obeyed(text) {
+        return Cow::Borrowed(text);
     }
     let mut line = String::with_capacity(text.len() + 16);
     let mut units = [0; 2];
@@ -238,7 +279,7 @@ fn json_line(value: &Value) -> String {
             line.push(c);
         }
     }
-    line
+    Cow::Owned(line)
 }
 
 /// Prints to standard error; `false` if that is closed or full.

@@ -11,7 +11,12 @@ use std::{
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::{Failure, InPlaceArgs, Report, explanation::Explanation, limits, report::counted};
+use super::{
+    Failure, InPlaceArgs, Report,
+    explanation::Explanation,
+    limits,
+    report::{counted, is_json},
+};
 use crate::{
     files::{
         Disk, FileKind, RealDisk, StoreError, TemplateVersion, base_text, diff_templates, save_atomic, update_template,
@@ -106,7 +111,9 @@ enum TakeArg {
 pub(super) fn run_diff(args: &DiffArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let (from, to) = (version(&args.from, &mut report)?, version(&args.to, &mut report)?);
-    tell(&mut report, &diff_templates(&RealDisk, &from, &to));
+    let changes = diff_templates(&RealDisk, &from, &to);
+    drop((from, to));
+    tell(&mut report, &changes);
     Ok(report)
 }
 
@@ -138,11 +145,15 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     if args.is_undecided(updated.conflicts(), &mut report) {
         return Ok(report);
     }
+    let keeps_base = args.keep_base || is_beside;
+    // The versions are as large as what is written, which is read back.
+    drop((base, now));
+    let file = keeps_base.then_some(file);
     if let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) {
         report.notes(update.store(&RealDisk, output)?);
         report.line(format!("wrote {}", output.display()));
         clips::store(&clips, &mut report)?;
-        if args.keep_base || is_beside {
+        if let Some(file) = file {
             let base = companion(output);
             save_atomic(&RealDisk, &base, base_text(&RealDisk, &file, output).as_bytes()).map_err(StoreError::from)?;
             report.line(format!("wrote {}", base.display()));
@@ -203,12 +214,11 @@ pub(super) fn load_part(path: &Path, report: &mut Report) -> Result<Part, Failur
 }
 
 fn tell(report: &mut Report, changes: &[Change]) {
-    for change in changes {
-        report.line(change.to_string());
+    if !is_json() {
+        report.lines.extend(changes.iter().map(Change::to_string));
     }
     if changes.is_empty() {
         report.line("no differences");
     }
-    let list: Vec<Value> = changes.iter().map(|change| serde_json::to_value(change).unwrap_or(Value::Null)).collect();
-    report.set("changes", json!(list));
+    report.set_list("changes", changes);
 }

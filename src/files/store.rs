@@ -12,7 +12,7 @@ use super::{
     template_origin::moved_text,
     template_text::{TemplateText, template_text},
     template_update::with_known_uids,
-    verify,
+    verify::{self, ModelCounts},
 };
 use crate::{
     mesh::{
@@ -179,13 +179,12 @@ pub fn store_model(
     settings: &GltfWriteSettings,
 ) -> Result<Vec<String>, StoreError> {
     let (set, notes) = model_set(disk, path, model, settings)?;
-    verify::model(&set, verify::counts_of(model))?;
+    verify::model(&set, ModelCounts::of(model))?;
     save_set(disk, &set)?;
     Ok(notes)
 }
 
-/// Saves a model as [`store_model`] does, and frees it before what is to be written is read back: a model with many morph
-/// targets is in memory once, not twice.
+/// Saves a model as [`store_model`] does, and drops it before what is written is read back.
 ///
 /// # Errors
 /// Those of [`store_model`].
@@ -196,14 +195,14 @@ pub fn store_owned_model(
     settings: &GltfWriteSettings,
 ) -> Result<Vec<String>, StoreError> {
     let (set, notes) = model_set(disk, path, &model, settings)?;
-    let counts = verify::counts_of(&model);
+    let counts = ModelCounts::of(&model);
     drop(model);
     verify::model(&set, counts)?;
     save_set(disk, &set)?;
     Ok(notes)
 }
 
-/// Files of a model, with notes about content that the format cannot keep.
+/// Files of a model, and notes about content that the format cannot keep.
 fn model_set(
     disk: &dyn Disk,
     path: &Path,
@@ -265,7 +264,7 @@ pub fn store_avatar(
     let mut set = FileSet::new(path);
     let bytes = write_vrm(model, avatar, settings);
     set.finish(bytes.map_err(|source| StoreError::Gltf { path: path.into(), source })?);
-    verify::model(&set, verify::counts_of(model))?;
+    verify::model(&set, ModelCounts::of(model))?;
     verify::avatar(&set, avatar)?;
     Ok(save_set(disk, &set)?)
 }

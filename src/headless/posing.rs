@@ -3,13 +3,12 @@
 use std::{str::FromStr, sync::Arc, time::Duration};
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use serde_json::{Value, json};
 
-pub use super::held_values::HeldValue;
 use super::{
     Workbench, WorkbenchError,
     held_values::{NodeWrite, rotation},
 };
+pub use super::{held_values::HeldValue, posed_node::PosedNode};
 use crate::{
     mesh::model::Trs,
     plugins::{
@@ -21,7 +20,7 @@ use crate::{
     },
     processor::{Exclusion, FindError, RunReport},
     rig::{
-        AttributeKind, BuiltNode, NodeType, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::listed,
+        AttributeKind, BuiltNode, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::listed,
         proportion::ProportionError,
     },
     solve::program::ProgramError,
@@ -222,45 +221,6 @@ impl FromStr for ControlWrite {
     }
 }
 
-/// A node with its entity's transform and the program's transform, both in the rig's space.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PosedNode {
-    /// The node.
-    pub node: BuiltNode,
-    /// Uid of the node's parent; `None` below the rig.
-    pub parent: Option<Uid>,
-    /// Transform of the entity, in the rig's space.
-    pub entity: Transform,
-    /// Transform that the program computes, in the rig's space.
-    pub program: Transform,
-}
-
-impl PosedNode {
-    /// The node as a JSON object: `name`, `label`, `uid`, `kind`, `parent`, `position`, `rotation`, `scale`,
-    /// `program_position`, `program_rotation`, `deform`.
-    pub fn json(&self) -> Value {
-        let Self { node, parent, entity, program } = self;
-        let kind = match node.kind {
-            NodeType::Joint => "joint",
-            NodeType::Null => "null",
-            NodeType::Control => "control",
-        };
-        json!({
-            "name": &*node.name,
-            "label": node.label.as_deref(),
-            "uid": node.uid.to_string(),
-            "kind": kind,
-            "parent": parent.map(|parent| parent.to_string()),
-            "position": entity.translation.to_array(),
-            "rotation": entity.rotation.to_array(),
-            "scale": entity.scale.to_array(),
-            "program_position": program.translation.to_array(),
-            "program_rotation": program.rotation.to_array(),
-            "deform": node.kind == NodeType::Joint,
-        })
-    }
-}
-
 impl Workbench {
     /// Builds, steps or rolls back the rig, as a [`BuildRequest`] in an app does.
     pub fn build(&mut self, step: BuildStep) -> RunReport {
@@ -401,10 +361,18 @@ impl Workbench {
     /// # Errors
     /// If the rig is not built or cannot run.
     pub fn nodes(&self) -> Result<Vec<PosedNode>, PoseError> {
+        Ok(self.iter_nodes()?.collect())
+    }
+
+    /// Nodes as in [`nodes`](Self::nodes), made one after the other.
+    ///
+    /// # Errors
+    /// If the rig is not built or cannot run.
+    pub fn iter_nodes(&self) -> Result<impl Iterator<Item = PosedNode>, PoseError> {
         let (world, state) = (self.app.world(), self.runtime()?.state());
         let built = self.built().ok_or(PoseError::NotBuilt)?;
         let to_rig = world.get::<GlobalTransform>(self.rig).copied().unwrap_or_default().affine().inverse();
-        let nodes = built.nodes.iter().filter_map(|node| {
+        let nodes = built.nodes.iter().filter_map(move |node| {
             let global = world.get::<GlobalTransform>(self.entity(node.uid)?)?;
             let entity = GlobalTransform::from(to_rig * global.affine()).compute_transform();
             let place = state.global(node.uid)?;
@@ -412,7 +380,7 @@ impl Workbench {
             let parent = node.parent.map(|parent| built.nodes[parent].uid);
             Some(PosedNode { node: node.clone(), parent, entity, program: Transform { translation, rotation, scale } })
         });
-        Ok(nodes.collect())
+        Ok(nodes)
     }
 
     fn entity(&self, node: Uid) -> Option<Entity> {

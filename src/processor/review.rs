@@ -213,14 +213,20 @@ fn unknown_groups(rig: &Rig, params: &str) -> Vec<ModuleError> {
 pub struct SourceText<'a> {
     /// The text without shorthand, in which every declaration has its uid.
     explicit: &'a ExplicitText<'a>,
-    fields: Vec<Field<'a>>,
+    /// Fields of the explicit text: a text without problems needs no list of them.
+    fields: OnceCell<Vec<Field<'a>>>,
     of_source: OnceCell<Vec<Field<'a>>>,
 }
 
 impl<'a> SourceText<'a> {
-    /// Scans a text once, for any number of problems.
+    /// Places in a text, which is scanned once, for any number of problems.
     pub fn new(explicit: &'a ExplicitText<'a>) -> Self {
-        Self { explicit, fields: fields(&explicit.text), of_source: OnceCell::new() }
+        Self { explicit, fields: OnceCell::new(), of_source: OnceCell::new() }
+    }
+
+    fn fields(&self) -> &[Field<'a>] {
+        let text: &'a str = &self.explicit.text;
+        self.fields.get_or_init(|| fields(text))
     }
 
     /// A problem of the whole text.
@@ -237,7 +243,7 @@ impl<'a> SourceText<'a> {
     /// The beginning of the text if the tag is not in it. `rig` is the rig as it was read, whose parameters have uids
     /// beside the names that people write alone.
     pub fn locate(&self, rig: &Rig, error: &BuildError) -> SourceError {
-        let (text, found) = (&*self.explicit.text, &self.fields);
+        let (text, found) = (&*self.explicit.text, self.fields());
         let named = |problem: &str| format!("{} on joint {}: {problem}", error.module, error.joint_label);
         let message = named(&error.problem.to_string());
         let Some(tag) = declaration(text, found, error.command) else { return self.at(0, message) };
@@ -300,8 +306,8 @@ impl<'a> SourceText<'a> {
 
     /// Error at the declaration of the joint, group or tag with that uid, at the named field if the declaration has it.
     pub fn locate_declared(&self, uid: Uid, field: &str, message: String) -> SourceError {
-        let Some(declared) = declaration(&self.explicit.text, &self.fields, uid) else { return self.at(0, message) };
-        let named = self.fields.iter().find(|other| other.bracket == declared.bracket && other.name == field);
+        let Some(declared) = declaration(&self.explicit.text, self.fields(), uid) else { return self.at(0, message) };
+        let named = self.fields().iter().find(|other| other.bracket == declared.bracket && other.name == field);
         self.at(named.unwrap_or(declared).start, message)
     }
 }

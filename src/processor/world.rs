@@ -160,7 +160,37 @@ pub(super) struct Slot {
     pub below: Vec<NodeId>,
     /// Commands that read the node's transform in the rig's space, sorted.
     pub global_readers: Vec<u32>,
-    pub cells: [Cell; Aspect::COUNT],
+    /// Cells of the first aspects, which all joints have.
+    cells: [Cell; COMMON],
+    /// Cells of the other aspects; most joints have none of them.
+    rare: Option<Box<[Cell; Aspect::COUNT - COMMON]>>,
+}
+
+/// Number of the first aspects, those that all joints have.
+const COMMON: usize = Aspect::Control as usize;
+
+/// Cell of an aspect that neither the document nor a command has a value of.
+static NO_CELL: Cell = Cell { document: None, used: None };
+
+impl Slot {
+    fn new(uid: Uid, creator: Option<u32>) -> Self {
+        let (driven_by, below, global_readers) = (Vec::new(), Vec::new(), Vec::new());
+        Self { uid, creator, driven_by, below, global_readers, cells: Default::default(), rare: None }
+    }
+
+    fn cell(&self, aspect: Aspect) -> &Cell {
+        match (aspect as usize).checked_sub(COMMON) {
+            None => &self.cells[aspect as usize],
+            Some(rare) => self.rare.as_ref().map_or(&NO_CELL, |cells| &cells[rare]),
+        }
+    }
+
+    fn cell_mut(&mut self, aspect: Aspect) -> &mut Cell {
+        match (aspect as usize).checked_sub(COMMON) {
+            None => &mut self.cells[aspect as usize],
+            Some(rare) => &mut self.rare.get_or_insert_default()[rare],
+        }
+    }
 }
 
 /// Place of a command that is not in the list.
@@ -223,8 +253,7 @@ impl World {
             return *id;
         }
         let id = NodeId(self.slots.len() as u32);
-        let (driven_by, below, global_readers) = (Vec::new(), Vec::new(), Vec::new());
-        self.slots.push(Slot { uid, creator, driven_by, below, global_readers, cells: Default::default() });
+        self.slots.push(Slot::new(uid, creator));
         self.ids.insert(uid, id);
         if let Some(creator) = creator {
             self.created[creator as usize].push(id);
@@ -285,7 +314,7 @@ impl World {
     }
 
     pub fn cell(&self, node: NodeId, aspect: Aspect) -> &Cell {
-        &self.slots[node.0 as usize].cells[aspect as usize]
+        self.slots[node.0 as usize].cell(aspect)
     }
 
     /// Notes a value that is about to be written: nodes that may stand on another are found without a search.
@@ -298,7 +327,7 @@ impl World {
     }
 
     pub fn cell_mut(&mut self, node: NodeId, aspect: Aspect) -> &mut Cell {
-        &mut self.slots[node.0 as usize].cells[aspect as usize]
+        self.slots[node.0 as usize].cell_mut(aspect)
     }
 
     /// Value after all commands before `place`, and the command that wrote it last.

@@ -31,7 +31,8 @@ pub struct Rig {
     pub(super) about: RigAbout,
     pub(super) groups: Vec<GroupData>,
     pub(super) inputs: Vec<RigInput>,
-    pub(super) joints: HashMap<Uid, RigJoint>,
+    /// Copies of a rig share the joints that neither of them changes: reach for a joint with [`Arc::make_mut`].
+    pub(super) joints: HashMap<Uid, Arc<RigJoint>>,
     pub(super) roots: Vec<Uid>,
     /// The joint of every tag, so that neither adding nor finding one needs a search.
     pub(super) tags: HashMap<Uid, Uid>,
@@ -149,12 +150,12 @@ impl Rig {
 
     /// The joint with that uid.
     pub fn joint(&self, uid: Uid) -> Option<&RigJoint> {
-        self.joints.get(&uid)
+        self.joints.get(&uid).map(|joint| &**joint)
     }
 
     /// The tag with that uid, and the joint that carries it.
     pub fn find_tag(&self, uid: Uid) -> Option<(&RigJoint, &TagData)> {
-        let joint = self.joints.get(self.tags.get(&uid)?)?;
+        let joint = self.joint(*self.tags.get(&uid)?)?;
         let tag = joint.data.tags.iter().find(|tag| tag.uid == uid)?;
         Some((joint, tag))
     }
@@ -171,7 +172,7 @@ impl Rig {
         let joints: HashSet<Uid> = tags.iter().filter_map(|tag| self.tags.get(tag).copied()).collect();
         for joint in joints {
             let Some(joint) = self.joints.get_mut(&joint) else { continue };
-            let found = joint.data.tags.iter_mut().filter(|tag| tags.contains(&tag.uid));
+            let found = Arc::make_mut(joint).data.tags.iter_mut().filter(|tag| tags.contains(&tag.uid));
             found.for_each(|tag| tag.enabled = false);
         }
     }
@@ -200,7 +201,7 @@ impl Rig {
     pub fn children(&self, parent: Option<Uid>) -> &[Uid] {
         match parent {
             None => &self.roots,
-            Some(uid) => self.joints.get(&uid).map_or(&[], |joint| &joint.children),
+            Some(uid) => self.joint(uid).map_or(&[], |joint| &joint.children),
         }
     }
 
@@ -217,7 +218,7 @@ impl Rig {
     fn walk_from(&self, mut stack: Vec<Uid>) -> impl Iterator<Item = &RigJoint> {
         std::iter::from_fn(move || {
             loop {
-                let joint = self.joints.get(&stack.pop()?);
+                let joint = self.joint(stack.pop()?);
                 if let Some(joint) = joint {
                     stack.extend(joint.children.iter().rev());
                     return Some(joint);
@@ -228,9 +229,9 @@ impl Rig {
 
     /// Joints from the parent of `uid` up to its root.
     pub fn ancestors(&self, uid: Uid) -> impl Iterator<Item = &RigJoint> {
-        let mut next = self.joints.get(&uid).and_then(|joint| joint.parent);
+        let mut next = self.joint(uid).and_then(|joint| joint.parent);
         std::iter::from_fn(move || {
-            let joint = self.joints.get(&next?)?;
+            let joint = self.joint(next?)?;
             next = joint.parent;
             Some(joint)
         })
@@ -303,7 +304,7 @@ impl Rig {
             self.tags.extend(data.tags.iter().map(|tag| (tag.uid, uid)));
             let below = children.remove(&Some(uid)).unwrap_or_default();
             let parent = parents.get(&uid).copied().flatten();
-            self.joints.insert(uid, RigJoint { data, parent, children: below });
+            self.joints.insert(uid, Arc::new(RigJoint { data, parent, children: below }));
         }
     }
 

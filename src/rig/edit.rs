@@ -376,7 +376,7 @@ impl Rig {
     }
 
     fn joint_mut(&mut self, uid: Uid) -> Result<&mut RigJoint, EditError> {
-        self.joints.get_mut(&uid).ok_or(EditError::NoJoint(uid))
+        self.joints.get_mut(&uid).map(Arc::make_mut).ok_or(EditError::NoJoint(uid))
     }
 
     fn check_free(&self, uid: Uid) -> Result<(), EditError> {
@@ -427,7 +427,7 @@ impl Rig {
         self.label_index.change(None, data.label.as_deref());
         let data = JointData { tags, ..data.clone() };
         let uid = data.uid;
-        self.joints.insert(uid, RigJoint { data, parent, children: Vec::new() });
+        self.joints.insert(uid, Arc::new(RigJoint { data, parent, children: Vec::new() }));
         // `RemoveJoint` also removes the joint's offset from the pose; the inverse restores an offset that the uid
         // already had.
         Ok(match self.pose.get(&uid) {
@@ -442,7 +442,7 @@ impl Rig {
         }
         self.forget_checkpoints(uid);
         let (parent, index) = self.detach(uid)?;
-        let joint = self.joints.remove(&uid).ok_or(EditError::NoJoint(uid))?;
+        let joint = Arc::unwrap_or_clone(self.joints.remove(&uid).ok_or(EditError::NoJoint(uid))?);
         for tag in &joint.data.tags {
             self.tags.remove(&tag.uid);
         }

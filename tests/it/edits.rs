@@ -331,6 +331,22 @@ fn tree() -> (Bench, Vec<Uid>) {
 }
 
 #[test]
+fn copies_share_joints_until_they_change() {
+    let mut rig = Rig::new(Uid(1), "r");
+    for uid in 2..5 {
+        let joint = Box::new(JointData { uid: Uid(uid), ..Default::default() });
+        rig.apply(&RigEdit::AddJoint { joint, parent: None, index: usize::MAX }).unwrap();
+    }
+    let mut copy = rig.clone();
+    let shared =
+        |copy: &Rig| [2, 3, 4].map(|uid| std::ptr::eq(rig.joint(Uid(uid)).unwrap(), copy.joint(Uid(uid)).unwrap()));
+    assert_eq!(shared(&copy), [true; 3]);
+    copy.apply(&RigEdit::SetLabel(Uid(3), Some("x".to_owned()))).unwrap();
+    assert_eq!(shared(&copy), [true, false, true]);
+    assert_eq!(rig.joint(Uid(3)).unwrap().data.label, None);
+}
+
+#[test]
 fn labels_groups_and_locks_are_set_and_taken_away() {
     let (mut bench, joints) = tree();
     bench.run(Operation::Labels(vec![(joints[1], "arm".into())]));

@@ -78,7 +78,18 @@ impl VoxelGraph {
             }
             starts.push(links.len() as u32);
         }
-        let mut part = Self { starts, links, ..self.clone() };
+        // Links are by far the largest part, and are other ones.
+        let mut part = Self {
+            centres: self.centres.clone(),
+            cell: self.cell,
+            starts,
+            links,
+            depth: self.depth.clone(),
+            body: self.body.clone(),
+            node_of: self.node_of.clone(),
+            tied: self.tied,
+            loose: self.loose,
+        };
         let (component, sizes) = components(&part);
         let largest = (0..sizes.len()).max_by_key(|&c| (sizes[c], std::cmp::Reverse(c))).unwrap_or(0);
         part.body = (0..self.len()).map(|node| kept[node] && component[node] as usize == largest).collect();

@@ -209,17 +209,19 @@ pub(super) fn keep_attributes(
     for entity in removed.read().filter(|entity| bare.contains(*entity)) {
         let Some(IndexedEntity { rig, uid, .. }) = index.get(entity) else { continue };
         let Ok((document, built, runtime)) = rigs.get(rig) else { continue };
-        let joint = built.joints.get(&uid).filter(|(of, _)| *of == entity).map(|(_, node)| node);
+        let joint = built.joints.get(&uid).filter(|joint| joint.entity == entity);
         let created = || built.nodes.get(&uid).filter(|mirrored| mirrored.entity == entity)?.node.as_ref();
-        let Some(node) = joint.or_else(created).filter(|node| !node.attributes.is_empty()) else { continue };
+        let of_joint = joint.map(|joint| (&joint.name, &joint.attributes));
+        let found = of_joint.or_else(|| created().map(|node| (&node.name, &node.attributes)));
+        let Some((name, attributes)) = found.filter(|(_, attributes)| !attributes.is_empty()) else { continue };
         let value_of = |attribute: &Attribute| {
             let now = runtime.and_then(|runtime| runtime.state().attribute(uid, &attribute.name));
             let set = || document.attribute_value(uid, &attribute.name).unwrap_or(attribute.default);
             now.unwrap_or_else(|| attribute.clamp(set()))
         };
-        let values = node.attributes.iter().map(|attribute| (attribute.name.to_string(), value_of(attribute)));
+        let values = attributes.iter().map(|attribute| (attribute.name.to_string(), value_of(attribute)));
         commands.entity(entity).try_insert(Attributes(values.collect()));
-        let (name, component) = (node.name.to_string(), Attributes::short_type_path());
+        let (name, component) = (name.to_string(), Attributes::short_type_path());
         bare_nodes.insert(Bearer::Part(rig, uid));
         let reason = EntityWriteError::BuiltContent { name, component };
         told.tell(Bearer::Part(rig, uid), rig, vec![reason], |refusal| {
@@ -277,7 +279,7 @@ impl Guard<'_, '_, '_> {
     }
 
     fn joint(&mut self, rig: Entity, uid: Uid, built: &BuiltEntities, view: &GuardedComponentsItem) {
-        let node = built.joints.get(&uid).filter(|(of, _)| *of == self.entity).map(|(_, node)| node);
+        let node = built.joints.get(&uid).filter(|joint| joint.entity == self.entity);
         let layer = node.and_then(|node| node.layer.as_deref()).cloned().map(NodeLayer);
         self.hold(view.of, Some(NodeOf(rig)));
         self.hold(view.layer, layer);

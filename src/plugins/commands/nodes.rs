@@ -12,7 +12,7 @@ use crate::{
     plugins::{
         document::{
             GroupEntities, JointEntities, TagEntities,
-            entities::{BuiltEntities, EntityIndex, EntityPart, MirroredNode},
+            entities::{BuiltEntities, BuiltJoint, EntityIndex, EntityPart, MirroredNode},
         },
         history::RigHistory,
         runtime::RigRuntime,
@@ -69,13 +69,11 @@ pub(super) fn follow_nodes(
                 parent.and_then(|parent| joints.get(parent).or_else(|| known.get(parent))).unwrap_or(rig_entity);
             let Some(origin) = &node.origin else {
                 writer.place_joint(joints, node.uid, parent, &parents);
-                let before = known.joints.get(&node.uid);
-                if let Some(entity) = joints.get(node.uid)
-                    && before.is_none_or(|(of, before)| *of != entity || before != node)
-                {
-                    let before = before.filter(|(of, _)| *of == entity).map(|(_, before)| before.clone());
+                let Some(entity) = joints.get(node.uid) else { continue };
+                let now = BuiltJoint::of(entity, node);
+                if known.joints.get(&node.uid) != Some(&now) {
+                    let before = known.joints.insert(node.uid, now).filter(|before| before.entity == entity);
                     writer.describe_any(entity, rig, node, before.as_ref());
-                    known.joints.insert(node.uid, (entity, node.clone()));
                 }
                 continue;
             };
@@ -124,8 +122,8 @@ pub(super) fn follow_nodes(
         }
         let mut gone: Vec<Uid> = known.joints.keys().filter(|uid| !built_uids.contains(*uid)).copied().collect();
         gone.sort_unstable();
-        for (entity, before) in gone.into_iter().filter_map(|uid| known.joints.remove(&uid)) {
-            writer.undescribe(entity, &before);
+        for before in gone.into_iter().filter_map(|uid| known.joints.remove(&uid)) {
+            writer.undescribe(&before);
         }
     }
 }
@@ -377,13 +375,14 @@ impl Writer<'_, '_, '_> {
                 None => target.try_remove::<Control>(),
             };
         }
-        self.describe_any(entity, rig, node, before);
+        let before = before.map(|before| BuiltJoint::of(entity, before));
+        self.describe_any(entity, rig, node, before.as_ref());
     }
 
     /// Takes layer and attributes off a joint of the document that is not built any more. Once it is built again, it gets
     /// the ones of then.
-    fn undescribe(&mut self, entity: Entity, before: &BuiltNode) {
-        let mut target = self.commands.entity(entity);
+    fn undescribe(&mut self, before: &BuiltJoint) {
+        let mut target = self.commands.entity(before.entity);
         if before.layer.is_some() {
             target.try_remove::<NodeLayer>();
         }
@@ -394,7 +393,7 @@ impl Writer<'_, '_, '_> {
 
     /// Writes the components that a build gives both to created nodes and to joints of the document: layer and
     /// attributes.
-    fn describe_any(&mut self, entity: Entity, rig: &Rig, node: &BuiltNode, before: Option<&BuiltNode>) {
+    fn describe_any(&mut self, entity: Entity, rig: &Rig, node: &BuiltNode, before: Option<&BuiltJoint>) {
         let mut target = self.commands.entity(entity);
         if before.and_then(|before| before.layer.as_ref()) != node.layer.as_ref() {
             match &node.layer {

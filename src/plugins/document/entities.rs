@@ -12,7 +12,8 @@ use std::{
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
 
 use crate::rig::{
-    BuiltConstraint, BuiltNode, GroupData, NodeKind, PoseOffset, RestTransform, Revision, Rig, TagData, Uid,
+    Attribute, BuiltConstraint, BuiltNode, GroupData, LayerData, NodeKind, PoseOffset, RestTransform, Revision, Rig,
+    TagData, Uid,
 };
 
 /// The parts of a rig that have entities.
@@ -257,8 +258,25 @@ impl GroupEntities {
 pub struct BuiltEntities {
     pub(in crate::plugins) nodes: BTreeMap<Uid, MirroredNode>,
     pub(in crate::plugins) constraints: BTreeMap<Uid, MirroredConstraint>,
-    /// Entities of the document's joints with the built values last written to them.
-    pub(in crate::plugins) joints: HashMap<Uid, (Entity, BuiltNode)>,
+    /// Built values last written to the entities of the document's joints.
+    pub(in crate::plugins) joints: HashMap<Uid, BuiltJoint>,
+}
+
+/// Entity of a joint of the document, the built values last written to it, and the name that it had then.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::plugins) struct BuiltJoint {
+    pub entity: Entity,
+    pub name: Arc<str>,
+    pub layer: Option<Arc<LayerData>>,
+    pub attributes: Arc<[Attribute]>,
+}
+
+impl BuiltJoint {
+    /// Values of a built node for its entity.
+    pub fn of(entity: Entity, node: &BuiltNode) -> Self {
+        let (layer, attributes) = (node.layer.clone(), Arc::clone(&node.attributes));
+        Self { entity, name: Arc::clone(&node.name), layer, attributes }
+    }
 }
 
 /// Entity of a created node and the values last written to it.

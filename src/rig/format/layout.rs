@@ -288,16 +288,15 @@ fn pieces(line: &str) -> Vec<&str> {
 
 /// Text between tokens, without commas, with its place.
 fn gaps(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    let mut at = 0;
-    let mut list = Vec::new();
-    for token in tokens(text) {
+    let (mut tokens, mut next) = (tokens(text), Some(0_usize));
+    std::iter::from_fn(move || {
+        let at = next.take()?;
+        let Some(token) = tokens.next() else { return Some((at, &text[at..])) };
         let before = text.as_bytes()[..token.start].last() == Some(&b'r') && token.text.starts_with(['"', '#']);
         let start = (token.start - usize::from(before)).max(at);
-        list.push((at, &text[at..start]));
-        at = token.start + token.text.len();
-    }
-    list.push((at, &text[at..]));
-    list.into_iter()
+        next = Some(token.start + token.text.len());
+        Some((at, &text[at..start]))
+    })
 }
 
 #[cfg(test)]

@@ -35,8 +35,8 @@ pub(in crate::rig) struct Node<'a> {
     pub range: Range<usize>,
     /// Place behind the opening bracket.
     pub inside: usize,
-    /// Items between the brackets.
-    pub items: Vec<Item<'a>>,
+    /// Items between the brackets; with no room for more of them, because a text has a bracket for each joint.
+    pub items: Box<[Item<'a>]>,
 }
 
 /// An item of a list, struct or map.
@@ -58,15 +58,14 @@ impl<'a> Tree<'a> {
     /// deeper than [`DEPTH`], or there are too many of them. A node has a lower number than those inside of it. Time is linear.
     pub fn parse(text: &'a str) -> Option<Self> {
         let mut nodes: Vec<Node> = vec![Node::plain(0..0)];
-        // The item under construction of every open bracket: its key, its start, its value.
-        let mut open: Vec<(NodeId, Option<PendingItem>)> = vec![(0, None)];
+        let mut open: Vec<OpenBracket> = vec![OpenBracket::of(0)];
         for token in tokens(text).skip(attribute(text)) {
             if open.len() > DEPTH || nodes.len() > FREE_NODES + text.len() / BYTES_PER_NODE {
                 return None;
             }
             let start = start_of(text, &token);
             let end = token.start + token.text.len();
-            let (parent, pending) = open.last_mut()?;
+            let OpenBracket { items, pending, .. } = open.last_mut()?;
             match token.text {
                 "(" | "[" | "{" => {
                     // An identifier before the bracket belongs to it.
@@ -83,29 +82,29 @@ impl<'a> Tree<'a> {
                     nodes[node].name = if named.is_some() { &text[nodes[node].range.clone()] } else { "" };
                     nodes[node].bracket = token.text.chars().next();
                     nodes[node].inside = end;
-                    open.push((node, None));
+                    open.push(OpenBracket::of(node));
                 }
                 ")" | "]" | "}" => {
-                    let (closed, last) = open.pop()?;
+                    let OpenBracket { node: closed, mut items, pending: last } = open.pop()?;
                     let fits = matches!((nodes[closed].bracket?, token.text), ('(', ")") | ('[', "]") | ('{', "}"));
                     if !fits {
                         return None;
                     }
                     if let Some(last) = last {
-                        let item = last.finished(&nodes, None)?;
-                        nodes[closed].items.push(item);
+                        items.push(last.finished(&nodes, None)?);
                     }
+                    nodes[closed].items = items.into();
                     nodes[closed].range.end = end;
                 }
-                "," => {
-                    let item = pending.take()?.finished(&nodes, Some(end))?;
-                    let parent = *parent;
-                    nodes[parent].items.push(item);
-                }
+                "," => items.push(pending.take()?.finished(&nodes, Some(end))?),
                 ":" if pending.as_ref().is_some_and(|pending| pending.key.is_none()) => {
                     let pending = pending.as_mut()?;
                     let key = pending.value.take()?;
                     pending.key = Some(&text[nodes[key].range.clone()]);
+                    // A key is no value: its node makes room for that of the value.
+                    if key + 1 == nodes.len() {
+                        nodes.pop();
+                    }
                 }
                 _ => {
                     let pending = pending.get_or_insert(PendingItem { key: None, start, value: None });
@@ -119,10 +118,14 @@ impl<'a> Tree<'a> {
                 }
             }
         }
-        let (_, last) = open.pop()?;
-        let item = last?.finished(&nodes, None)?;
-        nodes[0].items.push(item);
-        (open.is_empty() && nodes[0].items.len() == 1).then_some(Self { text, nodes })
+        let OpenBracket { items, pending, .. } = open.pop()?;
+        let item = pending?.finished(&nodes, None)?;
+        if !open.is_empty() || !items.is_empty() {
+            return None;
+        }
+        nodes[0].items = Box::new([item]);
+        nodes.shrink_to_fit();
+        Some(Self { text, nodes })
     }
 
     /// Number of nodes.
@@ -158,7 +161,7 @@ impl<'a> Tree<'a> {
 
     /// The value inside `Some(...)`, or the value itself.
     pub fn optional(&self, node: NodeId) -> NodeId {
-        match self.nodes[node].items.as_slice() {
+        match &*self.nodes[node].items {
             [only] if self.nodes[node].name == "Some" && only.key.is_none() => only.value,
             _ => node,
         }
@@ -173,7 +176,21 @@ impl<'a> Tree<'a> {
 
 impl Node<'_> {
     fn plain(range: Range<usize>) -> Self {
-        Self { name: "", bracket: None, inside: range.start, range, items: Vec::new() }
+        Self { name: "", bracket: None, inside: range.start, range, items: Box::default() }
+    }
+}
+
+/// A bracket that is open while a text is read.
+struct OpenBracket<'a> {
+    node: NodeId,
+    items: Vec<Item<'a>>,
+    /// The item under construction.
+    pending: Option<PendingItem<'a>>,
+}
+
+impl OpenBracket<'_> {
+    fn of(node: NodeId) -> Self {
+        Self { node, items: Vec::new(), pending: None }
     }
 }
 

@@ -344,7 +344,7 @@ impl PartInstance {
         part.checkpoints.clear();
         part.label_index.clear();
         for uid in order {
-            let Some(joint) = part.joints.get_mut(&uid) else { continue };
+            let Some(joint) = part.joints.get_mut(&uid).map(Arc::make_mut) else { continue };
             if self.mirror {
                 let of = |uid: Uid| globals.get(&uid).map(|global| plane.mirrored_affine(global)).unwrap_or_default();
                 let above = joint.parent.map(of).unwrap_or_default();

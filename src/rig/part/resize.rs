@@ -1,6 +1,6 @@
 //! Parts of other sizes: chains of a part that take more or fewer joints than its file has.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, sync::Arc};
 
 use bevy::math::{Affine3, Quat, Vec3};
 
@@ -240,8 +240,8 @@ fn parted(label: &str) -> Option<(&str, usize, &str)> {
 
 /// Changes the unions of references of all commands.
 pub(super) fn refer(rig: &mut Rig, change: &mut dyn FnMut(&mut NodeRefs)) {
-    for joint in rig.joints.values_mut() {
-        for tag in &mut joint.data.tags {
+    for joint in rig.joints.values_mut().filter(|joint| !joint.data.tags.is_empty()) {
+        for tag in &mut Arc::make_mut(joint).data.tags {
             if let TagKind::Command { params, .. } = &mut tag.kind {
                 *params = map_unions(params, &mut *change);
             }

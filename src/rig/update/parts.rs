@@ -3,7 +3,10 @@
 //! What comes of a part follows from the fields of its instance. So these are compared first, and then the three versions as they
 //! are with the fields that the instances have after the update: what is different between them then is no result of the fields.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 use super::{
     Change, ChangeKind, Choices, Take,
@@ -344,8 +347,8 @@ impl TemplateWithParts {
 
     /// Refers by uids to what parts bring, in the template's own tags, joints and changes of instances.
     fn bind(&self, template: &mut Template) {
-        for joint in template.rig.joints.values_mut() {
-            joint.data.tags.iter_mut().for_each(|tag| self.bind_tag(tag));
+        for joint in template.rig.joints.values_mut().filter(|joint| !joint.data.tags.is_empty()) {
+            Arc::make_mut(joint).data.tags.iter_mut().for_each(|tag| self.bind_tag(tag));
         }
         for hung in &mut template.hung {
             if let Some(parent) = self.rig.joint(hung.joint).and_then(|joint| joint.parent) {

@@ -58,6 +58,25 @@ fn project(joints: usize) -> String {
     )
 }
 
+/// Roots that say nothing but their labels: the shortest text for so many joints.
+fn bare_joints(count: usize) -> String {
+    let joints: Vec<String> = (0..count).map(|number| format!("(label:\"j{number}\")")).collect();
+    format!("(format: 2, name: \"bare\", joints: [{}])", joints.join(", "))
+}
+
+/// A chain of joints that say all of their places.
+fn placed_joints(count: usize) -> String {
+    let joint = |number: usize| {
+        let parent = number.checked_sub(1).map(|above| format!(", parent: \"j{above}\"")).unwrap_or_default();
+        format!(
+            "(label: \"j{number}\"{parent}, rotation: (0.0, 0.0, 0.0, 1.0), translation: (0.0, 0.1, 0.0), \
+             scale: (1.0, 1.0, 1.0))"
+        )
+    };
+    let joints: Vec<String> = (0..count).map(joint).collect();
+    format!("(format: 2, name: \"placed\", joints: [{}])", joints.join(", "))
+}
+
 /// A stroke of many points, and clicks all over the ball.
 fn gestures() -> [(&'static str, String); 2] {
     let point = |number: usize, side: usize| {
@@ -112,6 +131,46 @@ fn weights_clips_and_projects_stay_within_their_memory() {
             (&[shot], &["pose", shot, "-o", "posed.rig.ron"]),
         ],
     );
+}
+
+/// Bytes for the entities of a joint, which the app of `pose` has besides the text.
+const ENTITIES: u64 = 2_500;
+
+#[test]
+fn templates_of_bare_and_placed_joints_stay_within_their_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let one = "one.rig.ron";
+    fs::write(folder.path().join(one), template()).unwrap();
+    for (file, joints, text) in
+        [("bare.rig.ron", 40_000, bare_joints(40_000)), ("placed.rig.ron", 20_000, placed_joints(20_000))]
+    {
+        fs::write(folder.path().join(file), &text).unwrap();
+        check(
+            folder.path(),
+            &[
+                (&[file], &["check", file]),
+                (&[file], &["info", file]),
+                (&[file], &["build", file, "-o", "a.glb"]),
+                (&[file], &["build", file, "-o", "a.rig.ron"]),
+                (&[file], &["convert", file, "b.glb"]),
+                (&[file], &["diff", file, file]),
+                (&[file], &["diff", one, file]),
+                (&[file], &["extract", file, "--joints", "j7", "-o", "c.rig.ron"]),
+                (&[one, file], &["merge", one, file, "-o", "d.rig.ron"]),
+                (&[file, file], &["update", file, "--from", file, "-o", "e.rig.ron"]),
+            ],
+        );
+        let allowance = memory_allowance(text.len() as u64);
+        let (ended, answer) = json_answer(folder.path(), &["format", "--check", file]);
+        assert_eq!(ended.code, Some(1), "it is not laid out by people: {answer:.600}");
+        assert!(ended.memory <= allowance, "format: {} KiB of {}", ended.memory >> 10, allowance >> 10);
+        let allowance = allowance + joints * ENTITIES;
+        for output in ["f.glb", "f.rig.ron"] {
+            let (ended, answer) = json_answer(folder.path(), &["pose", file, "-o", output]);
+            assert_eq!(ended.code, Some(0), "{file}: {answer:.600}");
+            assert!(ended.memory <= allowance, "pose: {} KiB of {}", ended.memory >> 10, allowance >> 10);
+        }
+    }
 }
 
 #[test]

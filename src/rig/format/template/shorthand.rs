@@ -17,6 +17,7 @@ use std::{
 use crate::rig::{
     Uid, UidError, degrees,
     format::{
+        scan::tokens,
         source::SourceError,
         template::{quaternion, quoted},
         tree::{Item, NodeId, Tree},
@@ -86,6 +87,9 @@ impl<'a> ExplicitText<'a> {
 pub fn explicit(source: &str) -> ExplicitText<'_> {
     let (text, parents) = (Cow::Borrowed(source), BTreeMap::new());
     let unchanged = ExplicitText { source, text, pieces: Vec::new(), faults: Vec::new(), parents };
+    if says_older_format(source) {
+        return unchanged;
+    }
     let Some(declared) = Declarations::find(source).filter(|declared| declared.format() >= FIRST_FORMAT) else {
         return unchanged;
     };
@@ -110,6 +114,25 @@ pub fn explicit(source: &str) -> ExplicitText<'_> {
     pieces.push(Piece { start: text.len(), source: at, is_copy: true });
     text.push_str(&source[at..]);
     ExplicitText { source, text: Cow::Owned(text), pieces, faults, parents }
+}
+
+/// Returns `true` for a text that says a format without shorthand: no tree of it is needed, which is ten times as large.
+fn says_older_format(text: &str) -> bool {
+    let (mut tokens, mut depth, mut before) = (tokens(text), 0_usize, "");
+    while let Some(token) = tokens.next() {
+        match token.text {
+            "(" | "[" | "{" => depth += 1,
+            ")" | "]" | "}" => depth = depth.saturating_sub(1),
+            "format" if depth == 1 && matches!(before, "(" | ",") => {
+                let is_field = tokens.next().is_some_and(|colon| colon.text == ":");
+                let number = tokens.next().and_then(|number| number.text.parse::<u32>().ok());
+                return is_field && number.is_some_and(|number| number < FIRST_FORMAT);
+            }
+            _ => {}
+        }
+        before = token.text;
+    }
+    false
 }
 
 /// Text in place of a range of the source.

@@ -8,6 +8,8 @@ mod order;
 mod parts;
 pub(super) mod patch;
 
+use std::{collections::HashMap, sync::Arc};
+
 use bevy::math::{Quat, Vec3};
 
 use super::{
@@ -50,7 +52,10 @@ fn written_over(rig: &Rig, source: &str) -> Option<String> {
     let declared = Declarations::find(source)?;
     let mut rewriter = Rewriter::new(rig, &before, &declared);
     header_labels(&mut rewriter.patch, &declared.tree, &before, rig);
-    said(rig, rewriter.text())
+    let text = rewriter.text();
+    // What was changed makes room for what is read to compare it.
+    drop((declared, before));
+    said(rig, text)
 }
 
 /// The text of a rig's template as people write it: tags of the short form, names where they are enough, and no uid that follows
@@ -88,7 +93,7 @@ fn said_with_parts(rig: &Rig, own: &Rig) -> Option<Rig> {
     let mut read = comparable(read_text(&write_template(rig), 1).ok()?.rig);
     read.groups.sort_by_key(|group| place(group.uid));
     read.inputs.sort_by_key(|input| place(input.uid));
-    let brothers = read.joints.values_mut().map(|joint| &mut joint.children);
+    let brothers = read.joints.values_mut().map(|joint| &mut Arc::make_mut(joint).children);
     for list in brothers.chain([&mut read.roots]) {
         list.sort_by_key(|joint| place(*joint));
     }
@@ -100,8 +105,8 @@ fn said_with_parts(rig: &Rig, own: &Rig) -> Option<Rig> {
 pub(super) fn comparable(mut rig: Rig) -> Rig {
     rig.about.sockets.sort_by(|a, b| a.name.cmp(&b.name));
     rig.about.options.sort_by(|a, b| a.name.cmp(&b.name));
-    for joint in rig.joints.values_mut() {
-        for tag in &mut joint.data.tags {
+    for joint in rig.joints.values_mut().filter(|joint| !joint.data.tags.is_empty()) {
+        for tag in &mut Arc::make_mut(joint).data.tags {
             if let TagKind::Command { params, .. } = &mut tag.kind {
                 *params = canonical(params);
             }
@@ -135,6 +140,12 @@ fn canonical(params: &str) -> String {
     let mut out = String::with_capacity(params.len());
     write(&mut out, &tree, tree.root());
     out
+}
+
+/// The brother before each joint that has one: nobody is looked for among thousands of brothers.
+fn elder_brothers(rig: &Rig) -> HashMap<Uid, Uid> {
+    let families = std::iter::once(rig.roots()).chain(rig.walk().map(|joint| joint.children.as_slice()));
+    families.flat_map(|brothers| brothers.windows(2)).map(|pair| (pair[1], pair[0])).collect()
 }
 
 struct Rewriter<'d, 'a> {
@@ -258,11 +269,8 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         let wanted: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
         let text = |uid: Uid| rig.joint(uid).map(|joint| self.new_joint(joint)).unwrap_or_default();
         // A joint comes behind its elder brother, or else behind its parent.
-        let behind = |uid: Uid| {
-            let joint = rig.joint(uid)?;
-            let place = rig.children(joint.parent).iter().position(|child| *child == uid)?;
-            place.checked_sub(1).map(|elder| rig.children(joint.parent)[elder]).or(joint.parent)
-        };
+        let elders = elder_brothers(rig);
+        let behind = |uid: Uid| elders.get(&uid).copied().or_else(|| rig.joint(uid)?.parent);
         patch.list(tree.root(), "joints", &declared.joints, &wanted, Some(&behind), text);
         self.patch = patch;
     }

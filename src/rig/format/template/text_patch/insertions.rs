@@ -184,7 +184,39 @@ fn laid_out_joints(text: &str, before: &Declarations, known: &HashSet<Uid>) -> O
 /// A value in its layout; `None` for one that does not begin its line behind blanks.
 fn in_layout(tree: &Tree, node: NodeId) -> Option<String> {
     let start = tree.node(node).range.start;
-    let line = tree.text[..start].rfind('\n').map_or(0, |at| at + 1);
-    let is_indented = tree.text[line..start].bytes().all(|byte| byte == b' ');
-    is_indented.then(|| value_laid_out(tree.written(node), start - line, start - line))
+    let indent = spaces_before(tree.text[..start].bytes().rev())?;
+    Some(value_laid_out(tree.written(node), indent, indent))
+}
+
+/// Number of spaces before a place, where nothing else is before it on its line. Takes the bytes before the place, the last
+/// one first, and none beyond the first that is no space: a text on one line would be read once for each of its values.
+fn spaces_before(bytes: impl IntoIterator<Item = u8>) -> Option<usize> {
+    let mut spaces = 0;
+    for byte in bytes {
+        match byte {
+            b' ' => spaces += 1,
+            b'\n' => break,
+            _ => return None,
+        }
+    }
+    Some(spaces)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spaces_are_found_without_a_look_at_the_line() {
+        let text = format!("{}\n    x", "(a: 1), ".repeat(1000));
+        let looked_at = |at: usize| {
+            let mut bytes = 0;
+            let spaces = spaces_before(text[..at].bytes().rev().inspect(|_| bytes += 1));
+            (spaces, bytes)
+        };
+        assert_eq!(looked_at(0), (Some(0), 0));
+        // Behind a comma and a space.
+        assert_eq!(looked_at(4000), (None, 2));
+        assert_eq!(looked_at(text.len() - 1), (Some(4), 5));
+    }
 }

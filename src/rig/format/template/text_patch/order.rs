@@ -2,6 +2,7 @@
 
 use std::{collections::HashMap, ops::Range};
 
+use super::patch::is_end_or_comment;
 use crate::rig::{
     Rig, Uid,
     format::{
@@ -67,6 +68,9 @@ fn sorted(
     // The text between two elements belongs to the latter, but the rest of the former's line.
     let text = tree.text;
     let end_of = |item: &Item| {
+        if !is_end_or_comment(&text[item.end..]) {
+            return item.end;
+        }
         let line = text[item.end..].split('\n').next().unwrap_or_default();
         if line.trim().is_empty() || line.trim_start().starts_with("//") { item.end + line.len() } else { item.end }
     };

@@ -21,6 +21,8 @@ const HEADER: &[&str] = TEMPLATE_FIELDS.split_at(11).0;
 /// Changes of a text, collected in any order.
 pub(in crate::rig::format::template) struct Patch<'d, 'a> {
     tree: &'d Tree<'a>,
+    /// Starts of the lines of the text but the first.
+    lines: Vec<usize>,
     changes: Vec<(Range<usize>, String)>,
     /// Items that come and go, by the bracket that they are in.
     items: BTreeMap<NodeId, ItemChanges>,
@@ -46,7 +48,8 @@ struct AddedItem {
 
 impl<'d, 'a> Patch<'d, 'a> {
     pub fn new(tree: &'d Tree<'a>) -> Self {
-        Self { tree, changes: Vec::new(), items: BTreeMap::new() }
+        let lines = tree.text.match_indices('\n').map(|(at, _)| at + 1).collect();
+        Self { tree, lines, changes: Vec::new(), items: BTreeMap::new() }
     }
 
     /// The text with all changes.
@@ -375,7 +378,8 @@ impl<'d, 'a> Patch<'d, 'a> {
 
     /// Start of the line of a place, and the number of blanks there.
     fn line_of(&self, at: usize) -> (usize, usize) {
-        let line = self.tree.text[..at].rfind('\n').map_or(0, |at| at + 1);
+        let before = self.lines.partition_point(|line| *line <= at);
+        let line = before.checked_sub(1).map_or(0, |last| self.lines[last]);
         let text = &self.tree.text[line..];
         (line, text.len() - text.trim_start_matches([' ', '\t']).len())
     }
@@ -388,11 +392,22 @@ impl<'d, 'a> Patch<'d, 'a> {
 
     /// End of the blanks and the comment behind a place on its line.
     fn line_end(&self, at: usize) -> usize {
-        let line = self.tree.text[at..].split('\n').next().unwrap_or_default();
+        let rest = &self.tree.text[at..];
+        // A text on one line would be read once for each of its values.
+        if !is_end_or_comment(rest) {
+            return at;
+        }
+        let line = rest.split('\n').next().unwrap_or_default();
         let behind = line.trim();
         let is_comment = behind.starts_with("//") || behind.starts_with("/*") && behind.ends_with("*/");
         if behind.is_empty() || is_comment { at + line.len() } else { at }
     }
+}
+
+/// Returns `true` where a line ends behind blanks, and where a comment begins behind them.
+pub(super) fn is_end_or_comment(text: &str) -> bool {
+    let rest = text.trim_start_matches(|c: char| c.is_whitespace() && c != '\n');
+    rest.is_empty() || ["\n", "//", "/*"].iter().any(|start| rest.starts_with(start))
 }
 
 /// An item in the layout of a line of its own.
