@@ -76,7 +76,6 @@ pub use project::{
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
 pub use site::{SITE_FILE, SearchPaths, SiteError, TEMPLATES_VARIABLE};
-pub(crate) use store::store_owned_model;
 pub use store::{
     DocumentBase, StoreError, is_template_of, store_animation, store_avatar, store_document_over, store_model,
     store_owned_model, store_packed_clips, store_rig, store_rig_over, store_skin,
