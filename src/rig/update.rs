@@ -16,6 +16,7 @@ mod order;
 mod parts;
 mod rename_detection;
 mod same_parts;
+mod tags;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -23,9 +24,7 @@ use super::{
     GroupData, JointData, Rig, RigInput, StoredPose, TagData, Uid, document::circles, template_copy::TemplateCopy,
 };
 use copies::{PlacedCopy, is_host};
-use fields::{
-    Field, about_fields, group_fields, input_fields, joint_fields, joint_title, pose_fields, tag_fields, tag_title,
-};
+use fields::{Field, about_fields, group_fields, input_fields, joint_fields, joint_title, pose_fields};
 use order::merged_order;
 
 pub use change::{Change, ChangeKind};
@@ -228,8 +227,14 @@ impl Merge<'_> {
                 Fate::Absent => {}
                 Fate::Removed => removed.push(uid),
                 Fate::Added((mut data, parent)) => {
-                    // The tags come one by one, as far as they have not moved here from elsewhere.
-                    data.tags.retain(|tag| now.find_tag(tag.uid).is_none() && self.placed.insert(tag.uid));
+                    // Tags that are on another joint now come from there, with what was changed of them.
+                    for tag in std::mem::take(&mut data.tags) {
+                        if now.find_tag(tag.uid).is_some() {
+                            data.tags.extend(self.tag(uid, &title, tag.uid));
+                        } else if self.placed.insert(tag.uid) {
+                            data.tags.push(tag);
+                        }
+                    }
                     joints.insert(uid, (data, parent));
                 }
                 Fate::Kept((mut data, parent)) => {
@@ -248,7 +253,9 @@ impl Merge<'_> {
         }
         for uid in removed.into_iter().filter(|uid| needed.contains(uid)) {
             if let Some(joint) = now.joint(uid) {
-                joints.insert(uid, (joint.data.clone(), joint.parent));
+                let mut data = joint.data.clone();
+                data.tags.retain(|tag| self.placed.insert(tag.uid));
+                joints.insert(uid, (data, joint.parent));
                 self.changes
                     .retain(|change| !(change.uid == uid && change.kind == ChangeKind::Removed && !change.conflict));
             }
@@ -321,23 +328,7 @@ impl Merge<'_> {
         let lists = [on(base), on(Some(now)), on(Some(file))];
         let mut kept: BTreeMap<Uid, TagData> = BTreeMap::new();
         for uid in all(&lists) {
-            let of = |rig: &Rig| rig.find_tag(uid).filter(|(on, _)| on.data.uid == joint).map(|(_, tag)| tag.clone());
-            let (was, is, theirs) = (base.and_then(of), of(now), of(file));
-            let Some(name) = is.as_ref().or(theirs.as_ref()).or(was.as_ref()).map(tag_title) else { continue };
-            let named = ChangeSubject { uid, joint: Some(title), tag: Some(&name), prefix: "" };
-            let fate = match is {
-                // Most tags of most updates: their parameters need not be read.
-                Some(tag) if theirs.as_ref() == Some(&tag) => Fate::Kept(tag),
-                _ => {
-                    let fields = tag_fields(&[&was, &is, &theirs].map(Option::as_ref), now, file);
-                    self.fate(&fields, (was.as_ref(), is.as_ref(), theirs.as_ref()), &named)
-                }
-            };
-            if let Fate::Kept(tag) | Fate::Added(tag) = fate
-                && self.placed.insert(uid)
-            {
-                kept.insert(uid, tag);
-            }
+            kept.extend(self.tag(joint, title, uid).map(|tag| (uid, tag)));
         }
         let order = merged_order(base.is_some().then_some(&lists[0]), &lists[1], &lists[2]);
         order.into_iter().filter_map(|uid| kept.remove(&uid)).collect()
