@@ -16,6 +16,7 @@ mod order;
 mod parts;
 mod rename_detection;
 mod same_parts;
+mod shown_values;
 mod tags;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -26,6 +27,7 @@ use super::{
 use copies::{PlacedCopy, is_host};
 use fields::{Field, about_fields, group_fields, input_fields, joint_fields, joint_title, pose_fields};
 use order::merged_order;
+use shown_values::shown_values;
 
 pub use change::{Change, ChangeKind};
 pub use choices::{Choices, Take};
@@ -311,7 +313,8 @@ impl Merge<'_> {
             told.conflict = true;
             return;
         }
-        let [from, to] = [mine, theirs].map(|parent| parent.map(|uid| joint_title(self.now, self.file, uid)));
+        let titles = [mine, theirs].map(|parent| parent.map(|uid| joint_title(self.now, self.file, uid)));
+        let [from, to] = shown_values("parent", titles, self.now, self.file);
         let label = self.now.joint(uid).and_then(|joint| joint.data.label.clone());
         let title = label.unwrap_or_else(|| uid.to_string());
         let named = ChangeSubject { uid, joint: Some(&title), tag: None, prefix: "" };
@@ -400,14 +403,8 @@ impl Merge<'_> {
             let conflict = was.as_ref() != Some(&mine) && !is_close_to_base(now);
             let name = format!("{}{}", named.prefix, field.name);
             let take = self.choices.of(named.uid, Some(&name));
-            let told = Change {
-                kind: ChangeKind::Changed,
-                field: Some(name),
-                from: mine,
-                to: theirs,
-                conflict,
-                ..named.change()
-            };
+            let [from, to] = shown_values(&field.name, [mine, theirs], self.now, self.file);
+            let told = Change { kind: ChangeKind::Changed, field: Some(name), from, to, conflict, ..named.change() };
             if conflict || !is_renamed || !matches!(field.name.as_str(), "label" | "name" | "switch") {
                 self.changes.push(told);
             }

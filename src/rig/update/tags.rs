@@ -4,6 +4,7 @@ use super::{
     Change, ChangeKind, ChangeSubject, Fate, Merge,
     choices::Take,
     fields::{joint_title, tag_fields, tag_title},
+    shown_values::shown_values,
 };
 use crate::rig::{Rig, TagData, Uid};
 
@@ -24,7 +25,8 @@ impl Merge<'_> {
         let name = is.as_ref().or(theirs.as_ref()).or(was.as_ref()).map(tag_title)?;
         let named = ChangeSubject { uid, joint: Some(title), tag: Some(&name), prefix: "" };
         if let Some(place) = place.filter(|place| place.is_told) {
-            let [from, to] = [place.now, place.file].map(|joint| Some(joint_title(now, file, joint)));
+            let titles = [place.now, place.file].map(|joint| Some(joint_title(now, file, joint)));
+            let [from, to] = shown_values("joint", titles, now, file);
             let field = Some("joint".to_owned());
             let conflict = place.is_conflict;
             self.changes.push(Change { kind: ChangeKind::Moved, field, from, to, conflict, ..named.change() });
