@@ -19,6 +19,7 @@ mod input;
 mod joint;
 pub mod label;
 mod label_index;
+mod moved_nodes;
 pub mod nearest;
 pub mod operations;
 pub mod part;
@@ -40,6 +41,7 @@ pub mod update;
 pub mod version;
 pub mod vrm;
 
+pub(crate) use built_rig::created_uid;
 pub use built_rig::{
     Attribute, AttributeKind, BuiltConstraint, BuiltInput, BuiltNode, BuiltRig, Channels, ControlData, LayerData,
     LayerDisplay, Limits, Matching, NodeType, Origin, SwitchData, VISIBLE,
@@ -60,6 +62,7 @@ pub(crate) use format::{
 pub use group::{GROUP_COLORS, GroupData};
 pub use input::RigInput;
 pub use joint::{FaceBonePart, FacePlacement, JointData, NodeKind, RestTransform, RigJoint, degrees};
+pub use moved_nodes::{MovedNodes, MovedTags};
 pub use pose::{AttributeValues, PoseOffset, StoredPose};
 pub use reference::{NodeRef, NodeRefs};
 pub use revision::Revision;

@@ -18,7 +18,7 @@ use crate::{
         schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer},
     },
     processor::PoseNote,
-    rig::{AttributeValues, BuiltNode, PoseOffset, RestTransform, Uid},
+    rig::{AttributeValues, BuiltNode, MovedNodes, PoseOffset, RestTransform, Uid},
     solve::{
         keep_pose::KeptPose,
         program::{ProgramError, RigProgram, RigState},
@@ -228,6 +228,7 @@ fn exchange(
     for (entity, runtime, mut running) in query.iter_mut(world) {
         let Some(DueInstance { built, program: to, .. }) = wanted.get(&entity) else { continue };
         let before = std::mem::replace(&mut running.0, built.clone());
+        let earlier = before.clone();
         let known =
             descriptions.iter().find(|known| Arc::ptr_eq(&known.from, &before) && Arc::ptr_eq(&known.to, built));
         let described = known.map(|known| known.nodes.clone()).unwrap_or_else(|| {
@@ -247,7 +248,10 @@ fn exchange(
         let known = exchanges.iter().position(|known| known.is_between(from, to));
         let number = known.unwrap_or_else(|| {
             let prepared = built.way.as_ref().and_then(|way| way.exchange(from, to)).cloned();
-            exchanges.push(prepared.unwrap_or_else(|| Arc::new(Exchange::between(from, to))));
+            exchanges.push(prepared.unwrap_or_else(|| {
+                let versions = ((&*earlier.rig, &*earlier.built), (&*built.rig, &*built.built));
+                Arc::new(Exchange::between(from, to, &Arc::new(MovedNodes::between(versions.0, versions.1))))
+            }));
             exchanges.len() - 1
         });
         let is_other = exchanges[number].is_other;
@@ -261,13 +265,19 @@ fn exchange(
         steps.push(Step { entity, runtime, program: to, exchange: number, kept: None, held: Vec::new() });
     }
     steps.par_iter_mut().for_each(|Step { runtime, program, exchange, kept, held, .. }| {
-        let Exchange { carry, keeper, .. } = &*exchanges[*exchange];
+        let Exchange { carry, keeper, moved, .. } = &*exchanges[*exchange];
+        let mut carried_values = AttributeValues::new();
         if let Some(keeper) = keeper {
             let (offsets, values) = pose_of(runtime.state());
-            *kept = Some(keeper.keep(&offsets, &values))
-                .filter(|kept| kept.offsets != offsets || !kept.deviations.is_empty());
-            let nodes = kept.iter().flat_map(|kept| kept.offsets.keys()).copied();
-            *held = nodes.filter(|node| !offsets.contains_key(node)).collect();
+            let ([staying, carried], [values, settings]) = (moved.split_offsets(&offsets), moved.split_values(&values));
+            carried_values = settings;
+            let mut pose = keeper.keep(&staying, &values);
+            *held = pose.offsets.keys().filter(|node| !offsets.contains_key(*node)).copied().collect();
+            pose.offsets.extend(carried);
+            *kept = Some(pose).filter(|kept| kept.offsets != offsets || !kept.deviations.is_empty());
+            if kept.is_none() {
+                held.clear();
+            }
         }
         // Where nodes and entities stay as they are, the run marks the instances of which something is another.
         let changed = if carry.is_aligned() { runtime.bypass_change_detection() } else { &mut **runtime };
@@ -276,6 +286,13 @@ fn exchange(
             let Some(kept) = kept else { break };
             let offset = kept.offsets.get(&program.nodes()[slot].uid).copied().unwrap_or_default();
             runtime.state_mut().set_offset_at(slot, offset);
+        }
+        for (node, values) in &carried_values {
+            for (name, value) in values {
+                if let Some(slot) = program.attribute(*node, name) {
+                    runtime.state_mut().set_attribute_at(slot, *value);
+                }
+            }
         }
     });
     let mut held: EntityHashMap<Vec<Uid>> = EntityHashMap::default();

@@ -85,7 +85,7 @@ impl BuiltTemplate {
             some: Mutex::new(some),
             changes: Arc::from([]),
             ran: Arc::from([]),
-            way: Some(NextVersion::between(self, &self.built, std::iter::empty())),
+            way: Some(NextVersion::between(self, (&*self.rig, &*self.built), std::iter::empty())),
             file,
         })
     }
@@ -394,7 +394,8 @@ impl TemplateBuild {
         }
         let way = self.good.as_ref().map(|good| {
             let pairs = pairs.iter().map(|(before, now)| (before, now));
-            NextVersion::between(good, &built, [(&good.whole, &whole), (&good.lean, &lean)].into_iter().chain(pairs))
+            let programs = [(&good.whole, &whole), (&good.lean, &lean)].into_iter().chain(pairs);
+            NextVersion::between(good, (&*rig, &*built), programs)
         });
         let some = Mutex::new(some);
         let (instances, file) = (template.instances().clone(), self.file_of(template));

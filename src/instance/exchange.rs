@@ -8,7 +8,7 @@ use std::{
 
 use super::BuiltTemplate;
 use crate::{
-    rig::{BuiltNode, BuiltRig, Uid},
+    rig::{BuiltNode, BuiltRig, MovedNodes, Rig, Uid},
     solve::{
         keep_pose::PoseKeeper,
         program::{Carry, ProgramNode, RigProgram},
@@ -26,11 +26,14 @@ pub(super) struct Exchange {
     pub keeper: Option<PoseKeeper>,
     /// True if the nodes are not the same, in the same places.
     pub is_other: bool,
+    /// Nodes that go on under another uid.
+    pub moved: Arc<MovedNodes>,
 }
 
 impl Exchange {
-    pub fn between(from: &Arc<RigProgram>, to: &Arc<RigProgram>) -> Self {
+    pub fn between(from: &Arc<RigProgram>, to: &Arc<RigProgram>, moved: &Arc<MovedNodes>) -> Self {
         Self {
+            moved: moved.clone(),
             carry: Carry::between(from, to),
             keeper: Some(PoseKeeper::between(from, to)).filter(|keeper| !keeper.is_idle()),
             is_other: !has_same_nodes(from, to),
@@ -68,17 +71,18 @@ impl NextVersion {
     /// are left out.
     pub fn between<'p>(
         from: &Arc<BuiltTemplate>,
-        built: &BuiltRig,
+        (rig, built): (&Rig, &BuiltRig),
         programs: impl IntoIterator<Item = (&'p Arc<RigProgram>, &'p Arc<RigProgram>)>,
     ) -> Self {
         let is_run = |(before, now): &(&Arc<RigProgram>, &Arc<RigProgram>)| {
             !Arc::ptr_eq(before, now) && Arc::strong_count(before) > 1
         };
         let exchanges = programs.into_iter().filter(is_run);
+        let moved = Arc::new(MovedNodes::between((&*from.rig, &*from.built), (rig, built)));
         Self {
             from: Arc::downgrade(from),
             described: described_otherwise(&from.built, built).into(),
-            exchanges: exchanges.map(|(before, now)| Arc::new(Exchange::between(before, now))).collect(),
+            exchanges: exchanges.map(|(before, now)| Arc::new(Exchange::between(before, now, &moved))).collect(),
         }
     }
 

@@ -6,6 +6,7 @@
 //! entities makes an edit. Both go through [`RigHistory`] in one system, the only one that changes a rig.
 
 mod adopt;
+mod carry;
 pub(in crate::plugins) mod entities;
 mod error;
 pub(in crate::plugins) mod follow;
@@ -22,7 +23,7 @@ pub use self::{
 use super::{
     RigSystems,
     animation::AutoKey,
-    commands::BuildResult,
+    commands::{BuildResult, RigModules},
     configure_sets,
     history::{RecordedOperation, RigHistory, joint_name},
 };
@@ -178,7 +179,7 @@ fn apply_edits(
     mut requests: MessageReader<EditRequest>,
     mut entity_edits: ResMut<adopt::EntityEdits>,
     mut rigs: Query<(&mut Rig, &mut Selection, &mut RigHistory, &Symmetry, Option<&AutoKey>, Option<&BuildResult>)>,
-    mut uids: ResMut<UidSource>,
+    (mut uids, modules): (ResMut<UidSource>, Option<Res<RigModules>>),
     mut edited: MessageWriter<EditReport>,
     mut refused: MessageWriter<EditRefusal>,
     mut reported: MessageWriter<ChangeReport>,
@@ -226,15 +227,11 @@ fn apply_edits(
         let result = match change {
             Change::Do(operation) => {
                 let title = titled(operation, &document, built);
+                let operation = of_built(keyed(operation), built, is_of_entities);
+                let known = (built, modules.as_deref());
+                let operation = carry::carried(operation, &history.settled(&document), known, &uids, plane);
                 history
-                    .edit_as(
-                        title,
-                        &mut document,
-                        &mut selected,
-                        &mut uids,
-                        plane,
-                        &of_built(keyed(operation), built, is_of_entities),
-                    )
+                    .edit_as(title, &mut document, &mut selected, &mut uids, plane, &operation)
                     .map(recorded)
                     .map_err(ChangeError::from)
             }

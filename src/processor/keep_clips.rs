@@ -5,10 +5,14 @@ use std::{
     sync::Arc,
 };
 
-use super::{Modules, keep_poses::built_program};
+use super::{
+    Modules,
+    keep_moved::{carry_tracks, clip_without},
+    keep_poses::built_program,
+};
 use crate::{
     rig::{
-        BuiltRig, EditError, PoseOffset, Rig, RigEdit, Uid,
+        BuiltRig, EditError, MovedNodes, PoseOffset, Rig, RigEdit, Uid,
         animation::{
             Ease, Key, LayerMode, NodeNames, OrphanedKeys, Property, RigClip, SampledPose, Track, TrackTarget,
             keys_set_aside,
@@ -115,16 +119,22 @@ pub struct KeptClips {
 }
 
 /// Re-expresses clips of one version of a rig for another one, so that the joints move as they did: at every key, and at the
-/// frames between keys, which get keys where they are needed. Keys of nodes that are gone stay in the clips and are listed.
+/// frames between keys, which get keys where they are needed. Keys of nodes that are gone stay in the clips and are listed;
+/// those of nodes whose command moved to another joint go along, as they are.
 ///
 /// Clips stay as they are where nothing moved what they mean; others take some milliseconds for each key and frame.
 pub fn clips_between(clips: &[RigClip], from: RigVersion<'_>, to: RigVersion<'_>) -> KeptClips {
     let keeper = PoseKeeper::between(from.program, to.program);
     let (was, is) = (NodeNames::of(from.rig, Some(from.built)), NodeNames::of(to.rig, Some(to.built)));
+    let moved = MovedNodes::between((from.rig, from.built), (to.rig, to.built));
     let mut done = KeptClips::default();
     for clip in clips {
         let is_moved = !keeper.is_idle() && clip.key_count() > 0;
-        let next = if is_moved { kept(clip, &keeper, &mut done.report.notes) } else { clip.clone() };
+        let mut next = if moved.is_empty() { clip.clone() } else { clip_without(clip, &moved) };
+        if is_moved {
+            next = kept(&next, &keeper, &mut done.report.notes);
+        }
+        carry_tracks(&mut next, clip, &moved);
         let gone = keys_set_aside(&next, &was, &is);
         let named = gone.into_iter().map(|keys| KeysSetAside { clip_name: clip.name.clone(), keys });
         done.report.set_aside.extend(named);

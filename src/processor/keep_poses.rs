@@ -5,9 +5,9 @@ use std::{
     sync::Arc,
 };
 
-use super::{Builder, Modules};
+use super::{Builder, Modules, keep_moved::carry_pose};
 use crate::{
-    rig::{AttributeValues, BuiltRig, EditError, PoseOffset, Rig, RigEdit, StoredPose, Uid},
+    rig::{AttributeValues, BuiltRig, EditError, MovedNodes, MovedTags, PoseOffset, Rig, RigEdit, StoredPose, Uid},
     solve::{
         keep_pose::{Deviation, PoseKeeper},
         program::{CompileOptions, RigProgram},
@@ -37,7 +37,8 @@ impl std::fmt::Display for PoseNote {
 }
 
 /// Re-expresses the current pose and the stored poses of `after`, as far as they are those of `before`, so that the joints
-/// stand as they did: see [`PoseKeeper`]. Returns what could not be held.
+/// stand as they did: see [`PoseKeeper`]. Returns what could not be held. What is stored of nodes whose command moved to
+/// another joint goes along, as it is.
 ///
 /// Poses stay as they are where nothing moved what they mean, or where one of the two rigs cannot be built. Builds both rigs
 /// if there are poses: some tens of milliseconds for a character.
@@ -53,10 +54,14 @@ pub fn keep_poses(before: &Rig, after: &mut Rig, modules: &Arc<Modules>) -> Resu
     };
     let stored: Vec<StoredPose> = after.stored_poses().iter().filter(is_kept).cloned().collect();
     let is_posed = !after.pose().is_empty() && is_part(after.pose(), before.pose());
-    if stored.is_empty() && !is_posed {
+    if stored.is_empty() && !is_posed && MovedTags::between(before, after).is_empty() {
         return Ok(Vec::new());
     }
-    let (Some(from), Some(to)) = (program(before, modules), program(after, modules)) else { return Ok(Vec::new()) };
+    let (Some((was_built, from)), Some((built, to))) = (built_program(before, modules), built_program(after, modules))
+    else {
+        return Ok(Vec::new());
+    };
+    let moved = MovedNodes::between((before, &was_built), (&*after, &built));
     let keeper = PoseKeeper::between(&from, &to);
     let mut notes = Vec::new();
     let mut note = |pose: Option<&str>, deviations: Vec<Deviation>| {
@@ -64,8 +69,10 @@ pub fn keep_poses(before: &Rig, after: &mut Rig, modules: &Arc<Modules>) -> Resu
         notes.extend(deviations.into_iter().map(named));
     };
     let kept_of = |was: &Offsets, now: &Offsets, values: &AttributeValues| {
-        let mut kept = keeper.keep(was, values);
+        let [was, carried] = moved.split_offsets(was);
+        let mut kept = keeper.keep(&was, &moved.split_values(values)[0]);
         kept.offsets.retain(|node, _| now.contains_key(node) || to.node(*node).is_some());
+        kept.offsets.extend(carried);
         kept
     };
     if is_posed {
@@ -79,12 +86,15 @@ pub fn keep_poses(before: &Rig, after: &mut Rig, modules: &Arc<Modules>) -> Resu
         }
         note(None, kept.deviations);
     }
+    carry_pose(after, &moved)?;
     for mut pose in stored {
         let Some(was) = before.stored_pose(pose.uid) else { continue };
         let kept = kept_of(&was.offsets, &pose.offsets, &pose.values);
         note(Some(&pose.name), kept.deviations);
-        if kept.offsets != pose.offsets {
-            pose.offsets = kept.offsets;
+        let [mut values, carried] = moved.split_values(&pose.values);
+        values.extend(carried);
+        if kept.offsets != pose.offsets || values != pose.values {
+            (pose.offsets, pose.values) = (kept.offsets, values);
             after.apply(&RigEdit::SetStoredPose(Box::new(pose)))?;
         }
     }
@@ -96,10 +106,6 @@ type Offsets = BTreeMap<Uid, PoseOffset>;
 /// True if all of a pose is in another one.
 fn is_part(pose: &Offsets, of: &Offsets) -> bool {
     pose.iter().all(|(node, offset)| of.get(node) == Some(offset))
-}
-
-fn program(rig: &Rig, modules: &Arc<Modules>) -> Option<Arc<RigProgram>> {
-    built_program(rig, modules).map(|(_, program)| program)
 }
 
 /// A rig as its commands build it, and the program with all of its nodes.

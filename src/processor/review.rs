@@ -12,7 +12,7 @@ use super::{
 };
 use crate::rig::{
     Field, Rig, RigEdit, SourceError, TagData, TagKind, Uid, fields,
-    reference::{GroupScope, references_in},
+    reference::{GroupScope, RigNameIndex, references_in, without_uids},
     same_place,
     template::{self, ExplicitText, PartOrigin},
 };
@@ -47,7 +47,21 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
     problems.extend(problems_behind(rig, &problems, &repaired, &mut builder));
     let places: HashMap<Uid, usize> = order.into_iter().enumerate().map(|(place, tag)| (tag, place)).collect();
     problems.sort_by_key(|error| places.get(&error.command).copied());
+    show_names_alone(rig, &mut problems);
     problems
+}
+
+/// Leaves out the uids of references in problems where the names beside them mean the same things.
+fn show_names_alone(rig: &Rig, problems: &mut [BuildError]) {
+    let names = OnceCell::new();
+    for error in problems {
+        let BuildProblem::Module(ModuleError::Reference { reference, .. }) = &mut error.problem else { continue };
+        if reference.contains('#') {
+            let quoted = format!("{reference:?}");
+            let short = without_uids(&quoted, names.get_or_init(|| RigNameIndex::new(rig)), |_| true);
+            *reference = ron::from_str(&short).unwrap_or_else(|_| reference.clone());
+        }
+    }
 }
 
 /// Problems of commands that are found without running them, and these commands with their readable parameters.

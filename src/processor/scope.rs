@@ -6,8 +6,8 @@ mod trace;
 
 use std::sync::Arc;
 
+use trace::world_children;
 pub(super) use trace::{Read, Trace};
-use trace::{created_uid, world_children};
 
 use super::{
     Creation, ModuleError,
@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     mesh::model::Trs,
-    rig::{Attribute, Constraint, ControlData, Dependency, LayerData, NodeType, Origin, SwitchData, Uid},
+    rig::{Attribute, Constraint, ControlData, Dependency, LayerData, NodeType, Origin, SwitchData, Uid, created_uid},
 };
 
 /// The side of the body that a node is on.

@@ -4,7 +4,7 @@ use std::{collections::HashMap, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Constraint, Uid};
+use super::{Constraint, Uid, mix};
 use crate::mesh::model::Trs;
 
 /// Nodes, constraints and switches of a built rig. Transforms are in the rig's space or relative to a parent.
@@ -110,6 +110,24 @@ pub struct Origin {
     pub subject: Uid,
     /// Number of the node among those with the same command, role and subject.
     pub number: u32,
+}
+
+impl Origin {
+    /// Uid of the node: the same for the same command, role, subject and number.
+    pub fn uid(&self) -> Uid {
+        created_uid(self.command, &self.role, self.subject, self.number)
+    }
+}
+
+/// The identity of a created node: the same for the same command, role, subject and number.
+pub(crate) fn created_uid(command: Uid, role: &str, subject: Uid, number: u32) -> Uid {
+    let mut hash = mix(command.0 ^ 0x5249_4753_4d49_5448);
+    for byte in role.bytes() {
+        hash = mix(hash ^ u64::from(byte));
+    }
+    hash = mix(hash ^ subject.0);
+    hash = mix(hash ^ u64::from(number));
+    Uid(hash.max(1))
 }
 
 /// A constraint with its identity.

@@ -8,6 +8,7 @@ mod clips;
 mod effect;
 mod header;
 mod inputs;
+mod moves;
 mod poses;
 mod skin_weights;
 mod skins;
@@ -159,6 +160,17 @@ pub enum RigEdit {
     SetWeights(Uid, Box<WeightPatch>),
     /// Sets the cut of a mesh's face; `None` sets the defaults.
     SetFaceCut(Uid, Option<FaceCut>),
+    /// Moves a tag to a joint, its own or another, as the `index`-th of its tags; the tag stays the same one.
+    MoveTag {
+        /// The tag.
+        tag: Uid,
+        /// Joint that gets the tag.
+        joint: Uid,
+        /// Index of the tag there.
+        index: usize,
+    },
+    /// Gives what is stored of each node (offset, attribute values, stored poses, keys) to the other one of its pair.
+    ExchangeNodes(Vec<(Uid, Uid)>),
 }
 
 /// Error of applying an edit. The rig is unchanged.
@@ -350,6 +362,8 @@ impl Rig {
             RigEdit::SetSelectionSets(sets) => self.set_selection_sets(sets),
             RigEdit::SetFaceCut(mesh, cut) => self.set_face_cut(*mesh, *cut),
             RigEdit::SetWeights(mesh, patch) => self.set_weights(*mesh, patch)?,
+            RigEdit::MoveTag { tag, joint, index } => self.move_tag(*tag, *joint, *index)?,
+            RigEdit::ExchangeNodes(pairs) => self.exchange_nodes(pairs),
             RigEdit::SetDroppedParts(parts) => {
                 RigEdit::SetDroppedParts(std::mem::replace(&mut self.dropped, parts.clone()))
             }

@@ -189,6 +189,14 @@ pub enum Operation {
         /// The built rig before the operation.
         built: Arc<BuiltRig>,
     },
+    /// Runs an operation that moves commands to other joints, and gives what is stored of the nodes that they made to those
+    /// that they make there, all as one step. What is stored of those already stays.
+    Carried {
+        /// The operation.
+        operation: Box<Operation>,
+        /// Nodes before and after the operation.
+        nodes: Vec<(Uid, Uid)>,
+    },
     /// Changes tags.
     Tags(TagOperation),
     /// Puts another rig's joints, groups and tags into this one.
@@ -263,7 +271,9 @@ impl Operation {
             Self::RenamePose(..) => "Rename pose",
             Self::DeletePose(..) => "Delete pose",
             Self::Clips(operation) => operation.name(),
-            Self::Keyed { operation, .. } | Self::Built { operation, .. } => operation.name(),
+            Self::Keyed { operation, .. } | Self::Built { operation, .. } | Self::Carried { operation, .. } => {
+                operation.name()
+            }
             Self::Tags(operation) => operation.name(),
             Self::Merge { .. } => "Merge rig",
             Self::Edits(edits) => match edits[..] {
@@ -348,6 +358,10 @@ impl Operation {
             Self::Clips(operation) => clips::run(draft, operation),
             Self::Keyed { operation, clip, layer, time } => clips::keyed(draft, operation, (*clip, *layer, *time)),
             Self::Built { operation, built } => leftovers::run_built(draft, operation, built),
+            Self::Carried { operation, nodes } => {
+                operation.run_in(draft)?;
+                carry_nodes(draft, nodes)
+            }
             Self::Tags(operation) => tags::run(draft, operation),
             Self::Merge { other, parent } => merge::merge(draft, other, *parent),
             Self::Edits(edits) | Self::Named { edits, .. } => {
@@ -355,6 +369,14 @@ impl Operation {
             }
         }
     }
+}
+
+/// Gives what is stored of nodes to others of which nothing is stored.
+fn carry_nodes(draft: &mut Draft, nodes: &[(Uid, Uid)]) -> Result<(), OperationError> {
+    let rig = draft.rig();
+    let pairs: Vec<(Uid, Uid)> =
+        nodes.iter().copied().filter(|(was, is)| rig.has_stored(*was) && !rig.has_stored(*is)).collect();
+    if pairs.is_empty() { Ok(()) } else { Ok(draft.apply(RigEdit::ExchangeNodes(pairs))?) }
 }
 
 fn label_joint(draft: &mut Draft, joint: Uid, label: &str) -> Result<(), OperationError> {

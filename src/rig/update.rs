@@ -16,6 +16,8 @@ mod order;
 mod parts;
 mod rename_detection;
 mod same_parts;
+mod shown_values;
+mod tags;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -23,10 +25,9 @@ use super::{
     GroupData, JointData, Rig, RigInput, StoredPose, TagData, Uid, document::circles, template_copy::TemplateCopy,
 };
 use copies::{PlacedCopy, is_host};
-use fields::{
-    Field, about_fields, group_fields, input_fields, joint_fields, joint_title, pose_fields, tag_fields, tag_title,
-};
+use fields::{Field, about_fields, group_fields, input_fields, joint_fields, joint_title, pose_fields};
 use order::merged_order;
+use shown_values::shown_values;
 
 pub use change::{Change, ChangeKind};
 pub use choices::{Choices, Take};
@@ -228,8 +229,14 @@ impl Merge<'_> {
                 Fate::Absent => {}
                 Fate::Removed => removed.push(uid),
                 Fate::Added((mut data, parent)) => {
-                    // The tags come one by one, as far as they have not moved here from elsewhere.
-                    data.tags.retain(|tag| now.find_tag(tag.uid).is_none() && self.placed.insert(tag.uid));
+                    // Tags that are on another joint now come from there, with what was changed of them.
+                    for tag in std::mem::take(&mut data.tags) {
+                        if now.find_tag(tag.uid).is_some() {
+                            data.tags.extend(self.tag(uid, &title, tag.uid));
+                        } else if self.placed.insert(tag.uid) {
+                            data.tags.push(tag);
+                        }
+                    }
                     joints.insert(uid, (data, parent));
                 }
                 Fate::Kept((mut data, parent)) => {
@@ -248,7 +255,9 @@ impl Merge<'_> {
         }
         for uid in removed.into_iter().filter(|uid| needed.contains(uid)) {
             if let Some(joint) = now.joint(uid) {
-                joints.insert(uid, (joint.data.clone(), joint.parent));
+                let mut data = joint.data.clone();
+                data.tags.retain(|tag| self.placed.insert(tag.uid));
+                joints.insert(uid, (data, joint.parent));
                 self.changes
                     .retain(|change| !(change.uid == uid && change.kind == ChangeKind::Removed && !change.conflict));
             }
@@ -304,7 +313,8 @@ impl Merge<'_> {
             told.conflict = true;
             return;
         }
-        let [from, to] = [mine, theirs].map(|parent| parent.map(|uid| joint_title(self.now, self.file, uid)));
+        let titles = [mine, theirs].map(|parent| parent.map(|uid| joint_title(self.now, self.file, uid)));
+        let [from, to] = shown_values("parent", titles, self.now, self.file);
         let label = self.now.joint(uid).and_then(|joint| joint.data.label.clone());
         let title = label.unwrap_or_else(|| uid.to_string());
         let named = ChangeSubject { uid, joint: Some(&title), tag: None, prefix: "" };
@@ -321,23 +331,7 @@ impl Merge<'_> {
         let lists = [on(base), on(Some(now)), on(Some(file))];
         let mut kept: BTreeMap<Uid, TagData> = BTreeMap::new();
         for uid in all(&lists) {
-            let of = |rig: &Rig| rig.find_tag(uid).filter(|(on, _)| on.data.uid == joint).map(|(_, tag)| tag.clone());
-            let (was, is, theirs) = (base.and_then(of), of(now), of(file));
-            let Some(name) = is.as_ref().or(theirs.as_ref()).or(was.as_ref()).map(tag_title) else { continue };
-            let named = ChangeSubject { uid, joint: Some(title), tag: Some(&name), prefix: "" };
-            let fate = match is {
-                // Most tags of most updates: their parameters need not be read.
-                Some(tag) if theirs.as_ref() == Some(&tag) => Fate::Kept(tag),
-                _ => {
-                    let fields = tag_fields(&[&was, &is, &theirs].map(Option::as_ref), now, file);
-                    self.fate(&fields, (was.as_ref(), is.as_ref(), theirs.as_ref()), &named)
-                }
-            };
-            if let Fate::Kept(tag) | Fate::Added(tag) = fate
-                && self.placed.insert(uid)
-            {
-                kept.insert(uid, tag);
-            }
+            kept.extend(self.tag(joint, title, uid).map(|tag| (uid, tag)));
         }
         let order = merged_order(base.is_some().then_some(&lists[0]), &lists[1], &lists[2]);
         order.into_iter().filter_map(|uid| kept.remove(&uid)).collect()
@@ -409,14 +403,8 @@ impl Merge<'_> {
             let conflict = was.as_ref() != Some(&mine) && !is_close_to_base(now);
             let name = format!("{}{}", named.prefix, field.name);
             let take = self.choices.of(named.uid, Some(&name));
-            let told = Change {
-                kind: ChangeKind::Changed,
-                field: Some(name),
-                from: mine,
-                to: theirs,
-                conflict,
-                ..named.change()
-            };
+            let [from, to] = shown_values(&field.name, [mine, theirs], self.now, self.file);
+            let told = Change { kind: ChangeKind::Changed, field: Some(name), from, to, conflict, ..named.change() };
             if conflict || !is_renamed || !matches!(field.name.as_str(), "label" | "name" | "switch") {
                 self.changes.push(told);
             }

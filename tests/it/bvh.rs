@@ -411,3 +411,55 @@ fn bones_are_found_by_the_names_of_many_programs() {
         assert_eq!(bone.to_string().parse(), Ok(bone));
     }
 }
+
+/// A human whose left arm has no names.
+#[test]
+fn an_arm_without_names_is_found_by_its_chain() {
+    let joints = |hair: f32| -> Vec<SkeletonJoint> {
+        let mut list: Vec<SkeletonJoint> = Vec::new();
+        let mut add = |name: &str, parent: Option<usize>, [x, y, z]: [f32; 3]| {
+            let position = bevy::math::Vec3::new(x, y, z);
+            list.push(SkeletonJoint { name: name.into(), parent, position, ..SkeletonJoint::default() });
+            list.len() - 1
+        };
+        let hips = add("Hips", None, [0.0, 1.0, 0.0]);
+        let chest = add("Spine", Some(hips), [0.0, 1.4, 0.0]);
+        let head = add("Head", Some(chest), [0.0, 1.6, 0.0]);
+        add("", Some(head), [0.0, 1.8, 0.0]);
+        // Hair hangs on the left, too.
+        let lock = add("", Some(chest), [0.05, 1.5, -0.1]);
+        let lock = add("", Some(lock), [0.05, 1.5 - hair, -0.1]);
+        add("", Some(lock), [0.05, 1.5 - 2.0 * hair, -0.1]);
+        for (side, sign) in [("Left", 1.0), ("Right", -1.0)] {
+            let mut at = hips;
+            for (name, place) in [("UpLeg", [0.1, 0.95, 0.0]), ("Leg", [0.1, 0.5, 0.0]), ("Foot", [0.1, 0.1, 0.0])] {
+                at = add(&format!("{side}{name}"), Some(at), [sign * place[0], place[1], place[2]]);
+            }
+            let mut at = chest;
+            for (name, along) in [("Shoulder", 0.05), ("Arm", 0.2), ("ForeArm", 0.5), ("Hand", 0.75)] {
+                let name = if side == "Left" { String::new() } else { format!("{side}{name}") };
+                at = add(&name, Some(at), [sign * along, 1.4, 0.0]);
+            }
+        }
+        list
+    };
+    let arm = [LimbBone::UpperArm, LimbBone::LowerArm, LimbBone::Hand];
+    let check = |list: &[SkeletonJoint]| {
+        let found = by_names(list);
+        for (bone, along) in arm.into_iter().zip([0.2, 0.5, 0.75]) {
+            let joints = &found[&HumanBone::Limb(BodySide::Left, bone)];
+            assert_eq!(list[joints[0]].position.x, along, "{bone:?}: {joints:?}");
+            assert!(list[found[&HumanBone::Limb(BodySide::Right, bone)][0]].position.x < 0.0);
+        }
+    };
+    check(&joints(0.05));
+    // Without either arm's names, the leg tells how long an arm is.
+    let mut nameless = joints(0.05);
+    nameless.iter_mut().filter(|joint| joint.position.x < -0.1).for_each(|joint| joint.name.clear());
+    nameless.iter_mut().filter(|joint| joint.name == "RightShoulder").for_each(|joint| joint.name.clear());
+    check(&nameless);
+    // A chain of another length is no arm.
+    let mut short = joints(0.05);
+    short.iter_mut().filter(|joint| joint.position.x > 0.15).for_each(|joint| joint.position.x = 0.15);
+    assert!(!by_names(&short).contains_key(&HumanBone::Limb(BodySide::Left, LimbBone::UpperArm)));
+}

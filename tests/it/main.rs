@@ -156,6 +156,7 @@ mod model_files;
 mod models;
 mod modules_nodes;
 mod modules_rigs;
+mod moved_tags;
 mod mutate;
 mod obj;
 mod obj_materials;

@@ -13,7 +13,7 @@ use rigsmith::{
     modules,
     processor::review,
     rig::{
-        Rig,
+        Rig, Uid,
         template::{UidStyle, format_template, read_template},
     },
 };
@@ -114,6 +114,33 @@ fn a_part_whose_uid_is_written_takes_another_name_and_stays_the_same() {
     assert_ne!(hand(&renamed(HOST)), before);
     // A uid that does not follow from the name stays.
     assert!(formatted(&path, &renamed(&written), UidStyle::Derived).contains("(uid: \""), "{written}");
+}
+
+#[test]
+fn tags_that_changes_of_a_part_add_have_uids_that_can_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("host.rig.ron");
+    let tags = "null(creation: (name: \"grip\")), Feature(kind: \"generic\", name: \"More\"), null(feature: \"More\")";
+    let changes = format!("changes: [(joint: \"hand_l\", tags: [{tags}])]");
+    let text = HOST.replace("parent: \"base\"),", &format!("parent: \"base\", {changes}),"));
+    let plainly_laid_out = formatted(&path, &text, UidStyle::Kept);
+    let before = plain(loaded(&path, &text));
+    let written = formatted(&path, &text, UidStyle::Written);
+    let added = &written[written.find("changes:").unwrap()..];
+    assert_eq!(added.matches("uid: \"").count(), 3, "{written}");
+    assert_eq!(plain(loaded(&path, &written)), before);
+    assert_eq!(formatted(&path, &written, UidStyle::Written), written);
+    // Another name of a tag is another uid, unless it is written.
+    let tags = |text: &str| {
+        let rig = loaded(&path, &text.replace("\"grip\"", "\"handle\""));
+        let hand = rig.joint(rig.find_label("hand_l").unwrap()).unwrap();
+        hand.data.tags.iter().map(|tag| tag.uid).collect::<Vec<Uid>>()
+    };
+    let rig = loaded(&path, &text);
+    let own: Vec<Uid> =
+        rig.joint(rig.find_label("hand_l").unwrap()).unwrap().data.tags.iter().map(|tag| tag.uid).collect();
+    assert!(tags(&written) == own && tags(&text) != own, "{own:?}");
+    assert_eq!(formatted(&path, &written, UidStyle::Derived), plainly_laid_out);
 }
 
 #[test]

@@ -267,3 +267,30 @@ fn poses_of_joints_that_go_go_with_them() {
     apply(&mut now, RigEdit::Batch(edits));
     assert_eq!(now, updated);
 }
+
+#[test]
+fn values_show_uids_only_where_names_do_not_identify() {
+    let text = |parent: &str, node: &str, more: &str| {
+        read(&format!(
+            "(format: 2, name: \"names\", joints: [(label: \"a\"), (label: \"b\"), {more}(label: \"c\", parent: \"{parent}\", \
+             tags: [null(parent: \"@joint {node}\")])])"
+        ))
+    };
+    let told = |base: &Rig, file: &Rig| changes(Some(base), base, file);
+    assert_eq!(
+        told(&text("a", "a", ""), &text("b", "b", "")),
+        ["Changed c parent a b", "Changed c null params.parent \"@joint a\" \"@joint b\""]
+    );
+    // Two of one label are told apart by their uids.
+    let twin = "(uid: \"00000000000000b2\", label: \"b\"), ";
+    let b = text("a", "a", "").find_label("b").unwrap();
+    let [from, to] = [text("a", "a", twin), text(&b.to_string(), &format!("b#{b}"), twin)];
+    assert_eq!(
+        told(&from, &to),
+        [format!("Changed c parent a b#{b}"), format!("Changed c null params.parent \"@joint a\" \"@joint b#{b}\"")]
+    );
+    // The same name for other things says nothing.
+    let other = text("00000000000000b2", "b#00000000000000b2", twin);
+    let lines = told(&to, &other);
+    assert_eq!(lines[0], format!("Changed c parent b#{b} b#00000000000000b2"), "{lines:?}");
+}

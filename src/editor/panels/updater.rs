@@ -92,7 +92,7 @@ fn values(change: &Change) -> [String; 2] {
     let [mine, theirs] = match change.kind {
         ChangeKind::Added => ["deleted", "changed"],
         ChangeKind::Removed => ["changed", "deleted"],
-        ChangeKind::Changed | ChangeKind::Renamed => ["nothing", "nothing"],
+        ChangeKind::Changed | ChangeKind::Renamed | ChangeKind::Moved => ["nothing", "nothing"],
     };
     [change.from.clone().unwrap_or_else(|| mine.to_owned()), change.to.clone().unwrap_or_else(|| theirs.to_owned())]
 }
@@ -167,6 +167,7 @@ impl UpdaterPanel {
                     ChangeKind::Removed => "removed".to_owned(),
                     ChangeKind::Changed => format!("{mine} ➡ {theirs}"),
                     ChangeKind::Renamed => format!("renamed {mine} ➡ {theirs}"),
+                    ChangeKind::Moved => format!("moved {mine} ➡ {theirs}"),
                 };
                 told(ui, lower, &text, quiet);
             }

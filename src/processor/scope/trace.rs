@@ -9,7 +9,7 @@ use crate::{
         resolve::{self, Asker, Resolution},
         world::{Aspect, NodeId, Value, World, bits, same},
     },
-    rig::{Uid, mix, reference::NodeRefs},
+    rig::reference::NodeRefs,
 };
 
 /// Read of a command, with what it found.
@@ -62,15 +62,4 @@ pub(super) fn world_children(world: &World, node: NodeId, place: u32) -> Vec<Nod
     let mut children: Vec<NodeId> = world.slots[node.0 as usize].below.iter().copied().filter(is_child).collect();
     resolve::sort(world, &mut children, place);
     children
-}
-
-/// The identity of a created node: the same for the same command, role, subject and number.
-pub(super) fn created_uid(command: Uid, role: &str, subject: Uid, number: u32) -> Uid {
-    let mut hash = mix(command.0 ^ 0x5249_4753_4d49_5448);
-    for byte in role.bytes() {
-        hash = mix(hash ^ u64::from(byte));
-    }
-    hash = mix(hash ^ subject.0);
-    hash = mix(hash ^ u64::from(number));
-    Uid(hash.max(1))
 }

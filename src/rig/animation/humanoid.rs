@@ -215,6 +215,8 @@ pub fn by_names_and(joints: &[SkeletonJoint], known: &BTreeMap<HumanBone, usize>
     for (bone, joint) in known {
         named.entry(*bone).or_insert(*joint);
     }
+    let arms = shape::unnamed_arms(joints, &named);
+    named.extend(arms);
     complete(joints, &named)
 }
 

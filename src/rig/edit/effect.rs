@@ -46,7 +46,7 @@ impl RigEdit {
             Self::AddStoredPose(..) | Self::RemoveStoredPose(..) | Self::SetStoredPose(..) => true,
             Self::AddClip(..) | Self::RemoveClip(..) | Self::SetClipAbout(..) => true,
             Self::AddLayer { .. } | Self::RemoveLayer { .. } | Self::SetLayer { .. } | Self::SetKeys { .. } => true,
-            Self::SetSelectionSets(..) | Self::SetFaceCut(..) => true,
+            Self::SetSelectionSets(..) | Self::SetFaceCut(..) | Self::ExchangeNodes(..) => true,
             Self::Batch(edits) => edits.iter().all(Self::is_of_motion),
             _ => false,
         }

@@ -431,11 +431,10 @@ fn relocate(draft: &mut Draft, tags: &[Uid], joint: Uid, before: Option<Uid>) ->
     if wanted == old {
         return Ok(());
     }
-    let mut taken = Vec::with_capacity(moved.len());
     for &tag in &moved {
-        let (from, data) = found(draft, tag)?;
-        draft.apply(RigEdit::RemoveTag(from, tag))?;
-        taken.push(data);
+        let mut others = order(draft)?.into_iter().filter(|other| *other != tag);
+        let index = others.position(|other| Some(other) == next).unwrap_or(usize::MAX);
+        draft.apply(RigEdit::MoveTag { tag, joint, index })?;
     }
-    taken.into_iter().enumerate().try_for_each(|(number, tag)| add(draft, joint, tag, place + number))
+    Ok(())
 }

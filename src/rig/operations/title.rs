@@ -26,7 +26,9 @@ impl Operation {
             Self::Lock(joints, false) => ("Unlock", joints.clone()),
             Self::Pose(offsets) => ("Pose", first_of(offsets)),
             Self::ResetPose(joints) => ("Reset", joints.clone()),
-            Self::Keyed { operation, .. } | Self::Built { operation, .. } => return operation.title(name_of),
+            Self::Keyed { operation, .. } | Self::Built { operation, .. } | Self::Carried { operation, .. } => {
+                return operation.title(name_of);
+            }
             Self::Edits(edits) | Self::Named { edits, .. } => return attribute(edits, name_of, self.name()),
             _ => return self.name().into(),
         };

@@ -18,6 +18,8 @@ pub enum ChangeKind {
     Changed,
     /// Thing with another name that is the same otherwise.
     Renamed,
+    /// Tag that is on another joint.
+    Moved,
 }
 
 /// One change of an update.
@@ -55,6 +57,14 @@ impl fmt::Display for Change {
             (ChangeKind::Removed, true) => write!(f, "conflict {what}: changed here, deleted there"),
             (ChangeKind::Changed, false) => write!(f, "changed  {what}: {from} to {to}"),
             (ChangeKind::Changed, true) => write!(f, "conflict {what}: {from} here, {to} there"),
+            (ChangeKind::Moved, is_conflict) => {
+                // The joint that it is told of is one of the two.
+                let tag = self.tag.as_deref().unwrap_or_default();
+                match is_conflict {
+                    false => write!(f, "moved    {tag}: from {from} to {to}"),
+                    true => write!(f, "conflict {tag}: on {from} here, on {to} there"),
+                }
+            }
             (ChangeKind::Renamed, _) => {
                 // A joint or tag is told by its name, a group or an input by what it is, too.
                 let kind = self.field.as_deref().and_then(|field| field.split_once(' ')).map(|(kind, _)| kind);

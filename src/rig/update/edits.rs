@@ -3,15 +3,28 @@
 use std::collections::{BTreeSet, HashMap};
 
 use crate::rig::{
-    EditError, Rig, RigEdit, RigJoint, TagData, Uid,
+    EditError, Rig, RigEdit, RigJoint, Uid,
     animation::{Key, RigClip, Track, TrackTarget},
 };
 
-/// The edits after which the current pose of `from` is that of `to`.
+/// The edits after which the current pose and the attribute values of `from` are those of `to`.
 pub fn pose_edits(from: &Rig, to: &Rig) -> Vec<RigEdit> {
     let nodes: BTreeSet<Uid> = from.pose().keys().chain(to.pose().keys()).copied().collect();
     let is_other = |node: &Uid| from.offset(*node) != to.offset(*node);
-    nodes.into_iter().filter(is_other).map(|node| RigEdit::SetOffset(node, to.offset(node).copied())).collect()
+    let offsets = nodes.into_iter().filter(is_other).map(|node| RigEdit::SetOffset(node, to.offset(node).copied()));
+    let mut edits: Vec<RigEdit> = offsets.collect();
+    let [was, is] = [from, to].map(Rig::attribute_values);
+    for node in was.keys().chain(is.keys().filter(|node| !was.contains_key(*node))) {
+        let [was, is] = [was, is].map(|values| values.get(node));
+        let names: BTreeSet<&String> = was.into_iter().chain(is).flat_map(|values| values.keys()).collect();
+        for name in names {
+            let [was, is] = [was, is].map(|values| values.and_then(|values| values.get(name)).copied());
+            if was != is {
+                edits.push(RigEdit::SetAttributeValue(*node, name.clone(), is));
+            }
+        }
+    }
+    edits
 }
 
 /// The edits after which the clips of `from` are those of `to`; keys that both have are not touched.
@@ -119,11 +132,10 @@ impl Steps {
         Ok(())
     }
 
-    /// Takes away the tags that are gone, or on another joint.
+    /// Takes away the tags that are gone.
     fn leaving_tags(&mut self, to: &Rig) -> Result<(), EditError> {
-        let stays = |joint: Uid, tag: Uid| to.find_tag(tag).is_some_and(|(on, _)| on.data.uid == joint);
         let all = self.rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag.uid)));
-        let leaving: Vec<_> = all.filter(|(joint, tag)| !stays(*joint, *tag)).collect();
+        let leaving: Vec<_> = all.filter(|(_, tag)| to.find_tag(*tag).is_none()).collect();
         leaving.into_iter().try_for_each(|(joint, tag)| self.apply(RigEdit::RemoveTag(joint, tag)))
     }
 
@@ -140,7 +152,10 @@ impl Steps {
             let (uid, parent) = (joint.data.uid, joint.parent);
             let index = places.get(&uid).copied().unwrap_or(usize::MAX);
             let Some(own) = self.rig.joint(uid) else {
-                self.apply(RigEdit::AddJoint { joint: Box::new(joint.data.clone()), parent, index })?;
+                // Tags that come from other joints move there.
+                let mut joint = Box::new(joint.data.clone());
+                joint.tags.retain(|tag| self.rig.find_tag(tag.uid).is_none());
+                self.apply(RigEdit::AddJoint { joint, parent, index })?;
                 continue;
             };
             let is_there = own.parent == parent && self.rig.children(parent).get(index) == Some(&uid);
@@ -183,18 +198,18 @@ impl Steps {
         for joint in to.walk() {
             let uid = joint.data.uid;
             for (index, tag) in joint.data.tags.iter().enumerate() {
-                let own = self.rig.joint(uid).map_or(&[][..], |own| own.data.tags.as_slice());
-                let place = own.iter().position(|own| own.uid == tag.uid);
-                let is_same = place.is_some_and(|place| own[place] == *tag);
-                let add = || RigEdit::AddTag { joint: uid, tag: Box::new(TagData::clone(tag)), index };
-                match place {
-                    None => self.apply(add())?,
-                    Some(place) if place != index => {
-                        self.apply(RigEdit::RemoveTag(uid, tag.uid))?;
-                        self.apply(add())?;
-                    }
-                    Some(_) if !is_same => self.apply(RigEdit::SetTag(uid, Box::new(tag.clone())))?,
-                    Some(_) => {}
+                let Some((bearer, own)) = self.rig.find_tag(tag.uid) else {
+                    self.apply(RigEdit::AddTag { joint: uid, tag: Box::new(tag.clone()), index })?;
+                    continue;
+                };
+                let is_there =
+                    bearer.data.uid == uid && bearer.data.tags.get(index).is_some_and(|at| at.uid == tag.uid);
+                let is_same = own == tag;
+                if !is_there {
+                    self.apply(RigEdit::MoveTag { tag: tag.uid, joint: uid, index })?;
+                }
+                if !is_same {
+                    self.apply(RigEdit::SetTag(uid, Box::new(tag.clone())))?;
                 }
             }
         }

@@ -1,9 +1,15 @@
-//! Random edits of an animated character: keys of nodes that live are as they were set, and undo brings back the first bytes.
+//! Random edits of an animated character, reloads of its template and updates of its parts: keys of nodes that live are as they
+//! were set, and undo brings back the first bytes.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use bevy::math::{Quat, Vec3};
 use rigsmith::{
+    files::{BUNDLED_PARTS, PartFiles},
     modules,
     plugins::{document::Selection, history::RigHistory},
     processor::Builder,
@@ -12,7 +18,7 @@ use rigsmith::{
         animation::{Key, NodeNames, Property, TrackTarget, orphaned_keys},
         operations::{ClipOperation, KeyOperation, Operation},
         project::{Project, ProjectRig, write_project},
-        update::{Take, clip_edits, edits_between, update},
+        update::{Take, clip_edits, edits_between, pose_edits, update},
     },
 };
 
@@ -31,12 +37,61 @@ fn bytes(rig: &Rig) -> String {
     write_project(&Project { rigs: vec![ProjectRig { rig: rig.clone(), skins: Vec::new() }], ..Default::default() })
 }
 
+/// Versions of the biped's file, and the one that was taken over last.
+struct TemplateVersions {
+    rigs: Vec<Rig>,
+    base: usize,
+    reloads: usize,
+}
+
+impl TemplateVersions {
+    /// The biped as it is, with changed files of parts, and with a changed file of its own.
+    fn new() -> Self {
+        let text = include_str!("../../../assets/templates/biped.rig.ron");
+        let with_part = |part: &str, was: &str, is: &str| {
+            let (_, content) = BUNDLED_PARTS.iter().find(|(name, _)| *name == part).unwrap();
+            let changed = content.replacen(was, is, 1);
+            assert_ne!(changed, *content, "{part} has no {was}");
+            let files: BTreeMap<PathBuf, Option<Vec<u8>>> = [(PathBuf::from(part), Some(changed.into_bytes()))].into();
+            PartFiles::given(&files).complete(Path::new("biped.rig.ron"), text.as_bytes()).unwrap().rig
+        };
+        let plain =
+            PartFiles::given(&BTreeMap::new()).complete(Path::new("biped.rig.ron"), text.as_bytes()).unwrap().rig;
+        let mut moved = plain.clone();
+        let (tag, joint) = (plain.walk().find_map(|joint| joint.data.tags.first()).unwrap().uid, plain.roots()[0]);
+        let other = *plain.children(Some(joint)).first().unwrap();
+        moved.apply(&RigEdit::MoveTag { tag, joint: other, index: 0 }).unwrap();
+        moved.apply(&RigEdit::SetLabel(other, Some("of another version".into()))).unwrap();
+        let rigs = vec![
+            with_part("parts/arm.rig.ron", "relative_size: 0.6", "relative_size: 0.7"),
+            with_part("parts/leg.rig.ron", "translation: (0, 0.427641, 0)", "translation: (0, 0.43, 0)"),
+            moved,
+            plain,
+        ];
+        assert!(rigs[..3].iter().all(|version| *version != rigs[3]));
+        Self { base: rigs.len() - 1, rigs, reloads: 0 }
+    }
+
+    /// The edits of a reload of another version, as instances and the window carry them out.
+    fn reload(&mut self, rig: &Rig, random: &mut Random) -> Vec<RigEdit> {
+        let next = (self.base + 1 + random.below(self.rigs.len() - 1)) % self.rigs.len();
+        let take = if random.chance(2) { Take::Mine } else { Take::Theirs };
+        let updated = update(Some(&self.rigs[self.base]), rig, &self.rigs[next], take).rig;
+        let mut edits = edits_between(rig, &updated).unwrap();
+        edits.extend(pose_edits(rig, &updated));
+        edits.extend(clip_edits(rig, &updated).unwrap());
+        self.base = next;
+        self.reloads += usize::from(!edits.is_empty());
+        edits
+    }
+}
+
 /// A change of the rig that is no change of its keys.
-fn deed(rig: &Rig, random: &mut Random) -> Operation {
+fn deed(rig: &Rig, random: &mut Random, versions: &mut TemplateVersions) -> Operation {
     let joints: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).collect();
     let (one, other) = (random.pick(&joints), random.pick(&joints));
     let edits = |edits| Operation::Named { name: "deed", edits };
-    match random.below(8) {
+    match random.below(9) {
         0 => Operation::Labels(vec![(one, format!("joint {}", random.below(1000)))]),
         1 => edits(vec![RigEdit::SetParent { joint: one, parent: Some(other), index: random.below(3) }]),
         2 => {
@@ -56,6 +111,7 @@ fn deed(rig: &Rig, random: &mut Random) -> Operation {
             edits(off.take(1).collect())
         }
         6 if random.chance(6) && joints.len() > 20 => Operation::Delete { joints: vec![one], keep_children: true },
+        8 => edits(versions.reload(rig, random)),
         // An update to a version with another place of a joint, another name, or a command of a part that says something else.
         _ => {
             let mut file = rig.clone();
@@ -138,6 +194,7 @@ fn keys_live_through_random_deeds_and_undo_brings_back_the_first_bytes() {
     let mut undone: Vec<ExpectedKeys> = Vec::new();
     let (mut built, mut orphaned) = (0, 0);
     let mut known = NodeNames::default();
+    let mut versions = TemplateVersions::new();
     for step in 0..steps {
         let now = expected.last().unwrap().clone();
         match random.below(10) {
@@ -151,7 +208,10 @@ fn keys_live_through_random_deeds_and_undo_brings_back_the_first_bytes() {
             }
             kind => {
                 let mut next = now.clone();
-                let operation = if kind < 6 { change(&mut random, &rig, &mut next) } else { deed(&rig, &mut random) };
+                let operation = match kind {
+                    kind if kind < 6 => change(&mut random, &rig, &mut next),
+                    _ => deed(&rig, &mut random, &mut versions),
+                };
                 // A refused operation changes nothing, and one without effect is no step.
                 let done = history.edit(&mut rig, &mut selection, &mut uids, None, &operation);
                 if done.is_ok_and(|recorded| recorded.step.is_some()) {
@@ -176,6 +236,7 @@ fn keys_live_through_random_deeds_and_undo_brings_back_the_first_bytes() {
         }
     }
     assert!(built > 0 && expected.len() > steps / 10, "{built} builds, {} steps in effect", expected.len());
+    assert!(versions.reloads > steps / 100, "{} reloads that change something", versions.reloads);
     assert!(orphaned > 0, "commands that are off leave keys of their nodes");
     while history.steps().1 > 0 {
         history.undo(&mut rig, &mut selection).unwrap().unwrap();

@@ -1,5 +1,7 @@
 //! Tails and other chains that swing.
 
+use rigsmith::files::PartFiles;
+
 use super::*;
 
 /// Lets time pass.
@@ -98,4 +100,42 @@ fn the_tail_follows_a_curve() {
     // Off the curve nothing of it is left.
     stage.set("tail_1", "curve", 0.0);
     stage.check_rest("tail off its curve");
+}
+
+/// The part `spring_chain` with options, beside two joints at places.
+fn chain_beside(places: [Vec3; 2], options: &str) -> Stage {
+    let joint = |label: &str, at: Vec3| format!("(label: \"{label}\", translation: ({}, {}, {}))", at.x, at.y, at.z);
+    let text = format!(
+        "(format: 2, name: \"t\", joints: [(label: \"head\", translation: (0, 1, 0)), {}, {}], parts: [\
+         (part: \"parts/spring_chain.rig.ron\", name: \"hair\", parent: \"head\", adds: true, options: {{{options}}})])",
+        joint("ball", places[0]),
+        joint("far", places[1]),
+    );
+    let template = PartFiles::given(&BTreeMap::new()).complete(Path::new("t.rig.ron"), text.as_bytes()).unwrap();
+    assert_eq!(template.notes, [""; 0]);
+    let mut stage = Stage::new(template.rig);
+    wait(&mut stage, 0.5);
+    stage
+}
+
+#[test]
+fn colliders_of_a_spring_chain_keep_it_out() {
+    let tip = chain_beside([Vec3::ZERO, Vec3::X], "").place("chain_5");
+    let (aside, radius) = (Vec3::new(0.0, 0.0, 0.03), 0.08);
+    let ball = tip + aside;
+    let away = |stage: &Stage| stage.place("chain_5").distance(ball);
+    let free = chain_beside([ball, Vec3::X], "");
+    assert!(away(&free) < 0.5 * radius, "nothing keeps it out: {}", away(&free));
+    let kept = chain_beside([ball, Vec3::X], "\"colliders\": \"@joint ball\", \"radii\": [0.08]");
+    assert!(away(&kept) > 0.99 * radius && away(&kept) < 1.5 * radius, "the tip lies on the ball: {}", away(&kept));
+    let free_root = free.place("chain_1").distance(kept.place("chain_1"));
+    assert!(free_root < 1e-5, "the root stays: {free_root}");
+
+    // A body from joint to joint, whose ends are out of reach.
+    let ends = [ball - 0.5 * Vec3::X, ball + 0.5 * Vec3::X];
+    let line = "\"colliders\": \"@joint ball\", \"radii\": [0.08]";
+    let off_axis = |stage: &Stage| (stage.place("chain_5") - ball).reject_from(Vec3::X).length();
+    assert!(off_axis(&chain_beside(ends, line)) < 0.5 * radius, "a ball at one end touches nothing");
+    let kept = chain_beside(ends, &format!("{line}, \"collider_ends\": \"@joint far\""));
+    assert!(off_axis(&kept) > 0.97 * radius, "{}", off_axis(&kept));
 }

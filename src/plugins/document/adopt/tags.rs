@@ -168,11 +168,10 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             return;
         }
         let target = above.and_then(|above| self.uid_of(above, EntityPart::Joint));
-        let data = self.rig().find_tag(uid).map(|(_, tag)| tag.clone());
-        let is_taken = match (target, data) {
-            (Some(target), Some(data)) if self.rig().joint(target).is_some() => {
-                let add = RigEdit::AddTag { joint: target, tag: Box::new(data), index: usize::MAX };
-                self.trial.edit(EntityWrite::TagJoint, vec![RigEdit::RemoveTag(joint, uid), add])
+        let is_taken = match target {
+            Some(target) if self.rig().joint(target).is_some() => {
+                let moved = RigEdit::MoveTag { tag: uid, joint: target, index: usize::MAX };
+                self.trial.edit(EntityWrite::TagJoint, vec![moved])
             }
             _ => {
                 self.trial.refuse(EntityWriteError::TagJoint(uid));
@@ -223,9 +222,10 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             let mut edits = Vec::new();
             let mut now = known;
             for (at, tag) in told.iter().enumerate() {
-                let Some((_, data)) = self.rig().find_tag(*tag).filter(|_| now[at] != *tag) else { continue };
-                edits.push(RigEdit::RemoveTag(uid, *tag));
-                edits.push(RigEdit::AddTag { joint: uid, tag: Box::new(data.clone()), index: at });
+                if now[at] == *tag {
+                    continue;
+                }
+                edits.push(RigEdit::MoveTag { tag: *tag, joint: uid, index: at });
                 now.retain(|other| other != tag);
                 now.insert(at, *tag);
             }

@@ -17,8 +17,7 @@ const HEAD: f32 = 0.085;
 /// `up` and `forward` are the directions of the figure; left is on the left of a figure that faces forward.
 pub fn by_shape(joints: &[SkeletonJoint], up: Vec3, forward: Vec3) -> HumanJoints {
     let left = up.cross(forward);
-    let is_end = |joint: &usize| !joints.iter().any(|other| other.parent == Some(*joint));
-    let ends: Vec<usize> = (0..joints.len()).filter(is_end).collect();
+    let ends = ends(joints);
     let height = |joint: usize| joints[joint].position.dot(up);
     let aside = |joint: usize| joints[joint].position.dot(left);
     let Some(top) = ends.iter().copied().max_by(|a, b| height(*a).total_cmp(&height(*b))) else {
@@ -60,6 +59,74 @@ pub fn by_shape(joints: &[SkeletonJoint], up: Vec3, forward: Vec3) -> HumanJoint
     }
     named.insert(HumanBone::Head, head_of(joints, &named, top, height(top) - height(left_foot)));
     complete(joints, &named)
+}
+
+/// Length of an arm in proportion to the leg of its side.
+const ARM: f32 = 0.7;
+/// Largest difference of an arm's length from what the leg lets expect, and from the other arm's, as a share.
+const UNLIKE: [f32; 2] = [0.4, 0.25];
+
+/// Bones of arms that no name tells beside legs and a head that names tell: of the chains on the side that branch off between
+/// hips and head, the one whose length is most like the other arm's, or else like what the leg lets expect.
+pub(super) fn unnamed_arms(joints: &[SkeletonJoint], named: &BTreeMap<HumanBone, usize>) -> Vec<(HumanBone, usize)> {
+    let at = |side, bone| named.get(&HumanBone::Limb(side, bone)).copied();
+    let place = |joint: usize| joints[joint].position;
+    let legs = BodySide::BOTH.map(|side| at(side, LimbBone::UpperLeg));
+    let ([Some(left), Some(right)], Some(head)) = (legs, named.get(&HumanBone::Head).copied()) else {
+        return Vec::new();
+    };
+    let Some(fork) = common_ancestor(joints, left, right).filter(|fork| is_above(joints, *fork, head)) else {
+        return Vec::new();
+    };
+    let mut trunk = path(joints, head, Some(fork));
+    trunk.pop();
+    let (across, middle) = (place(left) - place(right), (place(left) + place(right)) / 2.0);
+    let chain_length =
+        |bones: [usize; 3]| place(bones[0]).distance(place(bones[1])) + place(bones[1]).distance(place(bones[2]));
+    let length = |side, bones: [LimbBone; 3]| {
+        let [upper, lower, end] = bones.map(|bone| at(side, bone));
+        Some(chain_length([upper?, lower?, end?]))
+    };
+    let arm = [LimbBone::UpperArm, LimbBone::LowerArm, LimbBone::Hand];
+    let leg = [LimbBone::UpperLeg, LimbBone::LowerLeg, LimbBone::Foot];
+    let mut found = Vec::new();
+    for (side, other, sign) in [(BodySide::Left, BodySide::Right, 1.0), (BodySide::Right, BodySide::Left, -1.0)] {
+        if arm.iter().any(|bone| at(side, *bone).is_some()) {
+            continue;
+        }
+        let of_other = length(other, arm).map(|length| (length, UNLIKE[1]));
+        let Some((wanted, most)) = of_other.or_else(|| Some((length(side, leg)? * ARM, UNLIKE[0]))) else { continue };
+        let is_of_other_bone = |joint: &usize| {
+            let is_of_arm = |bone: &HumanBone| match bone {
+                HumanBone::Limb(of, LimbBone::Shoulder) | HumanBone::Finger(of, ..) => *of == side,
+                _ => false,
+            };
+            named.iter().any(|(bone, known)| known == joint && !is_of_arm(bone))
+        };
+        let chains = ends(joints).into_iter().filter_map(|end| {
+            let branch = ancestors(joints, end).find(|at| trunk.contains(at))?;
+            let chain = path(joints, end, Some(branch));
+            let chain = Some(bends(joints, &chain)).filter(|_| !chain.iter().any(&is_of_other_bone))?;
+            let [upper, lower, hand, ..] = chain[limb_start(joints, &chain)?..] else { return None };
+            let bones = [upper, lower, hand];
+            let unlike = (chain_length(bones) / wanted - 1.0).abs();
+            let is_arm = unlike <= most && (place(hand) - middle).dot(across) * sign > 0.0;
+            is_arm.then_some((unlike, bones))
+        });
+        if let Some((_, bones)) = chains.min_by(|(a, _), (b, _)| a.total_cmp(b)) {
+            found.extend(arm.into_iter().map(|bone| HumanBone::Limb(side, bone)).zip(bones));
+        }
+    }
+    found
+}
+
+/// Joints without children.
+fn ends(joints: &[SkeletonJoint]) -> Vec<usize> {
+    let mut is_end = vec![true; joints.len()];
+    for parent in joints.iter().filter_map(|joint| joint.parent) {
+        is_end[parent] = false;
+    }
+    (0..joints.len()).filter(|joint| is_end[*joint]).collect()
 }
 
 /// Joint of the head: the last one of the trunk, or the one before if the last one is the end of the head. `tall` is the height

@@ -32,6 +32,7 @@ use crate::rig::{
     reference::{RigNameIndex, bind_names, refresh_names},
 };
 
+pub(super) use parts::derived_tag_uids;
 pub use survey::survey_template;
 
 const TEMPLATE: Format = Format { what: "template", number: FORMAT, known: known_names };

@@ -8,7 +8,7 @@ use std::{
 
 use super::{
     Template,
-    read::{bind_references, read_text},
+    read::{bind_references, derived_tag_uids, read_text},
     shorthand::{Declaration, Declarations, NameError, NameIndex, TAG_FIELDS, TagForm, feature_name},
     text_patch::{comparable, patch::Patch},
 };
@@ -19,7 +19,7 @@ use crate::rig::{
         template::quoted,
         tree::{Item, NodeId, Tree},
     },
-    part::PartInstance,
+    part::{PartChange, PartInstance},
     reference::{NameKind, RigNameIndex, with_uids, without_uids},
 };
 
@@ -29,7 +29,7 @@ pub enum UidStyle {
     /// Uids as they are.
     #[default]
     Kept,
-    /// Uids of everything but what parts bring, and beside the names in references.
+    /// Uids of everything but what parts bring, also of tags that changes of parts add, and beside the names in references.
     Written,
     /// A uid that follows from names is left out, beside names in references, too, unless the template has parts: what these
     /// bring may have the same names, see [`format_with_parts`].
@@ -168,6 +168,26 @@ impl<'d, 'a> Uids<'d, 'a> {
             match (self.style, tree.field(item.value, "uid").is_some()) {
                 (UidStyle::Written, false) => self.patch.put_first(item.value, &format!("uid: \"{}\"", part.uid)),
                 (UidStyle::Derived, true) if is_derived => self.patch.set_or_remove(item.value, "uid", None),
+                _ => {}
+            }
+            for (change, known) in tree.elements(item.value, "changes").iter().zip(&part.changes) {
+                self.added_tags(part, change.value, known);
+            }
+        }
+    }
+
+    /// Uids of the tags that a change of a part instance adds to a joint.
+    fn added_tags(&mut self, part: &PartInstance, change: NodeId, known: &PartChange) {
+        let tree = self.tree();
+        let (Some(joint), Some(list)) = (&known.joint, tree.field(change, "tags")) else { return };
+        let derived = derived_tag_uids(part, joint, tree.written(list.value));
+        let tags = tree.elements(change, "tags").iter().zip(&known.tags).zip(derived);
+        for ((item, tag), derived) in tags {
+            match (self.style, tree.field(item.value, "uid").is_some()) {
+                (UidStyle::Written, false) => self.patch.put_first(item.value, &format!("uid: \"{}\"", tag.uid)),
+                (UidStyle::Derived, true) if derived == Some(tag.uid) => {
+                    self.patch.set_or_remove(item.value, "uid", None);
+                }
                 _ => {}
             }
         }

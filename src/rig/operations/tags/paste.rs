@@ -80,7 +80,19 @@ pub(super) fn paste(
         joints_and_groups(draft, set, &mut remap);
         match what {
             PasteWhat::Values => paste_values(draft, set, remap, mirrored)?,
-            PasteWhat::Tags | PasteWhat::Both => paste_tags(draft, set, remap, mirrored, what)?,
+            PasteWhat::Tags => paste_tags(draft, set, remap, mirrored, |tag| {
+                if let TagKind::Command { params, .. } = &mut tag.kind {
+                    *params = "()".to_owned();
+                }
+            })?,
+            PasteWhat::Both => {
+                // Tags that were cut are the same ones again where they come back.
+                if !mirrored && clipboard.rig == draft.rig().uid() {
+                    let cut = set.iter().flat_map(|(joint, _)| &joint.tags).map(|tag| tag.uid);
+                    remap.uids.extend(cut.filter(|tag| !draft.rig().is_taken(*tag)).map(|tag| (tag, tag)));
+                }
+                paste_tags(draft, set, remap, mirrored, |_| {})?;
+            }
         }
     }
     Ok(())
@@ -152,16 +164,19 @@ fn joints_and_groups(draft: &Draft, pairs: &[Pair], remap: &mut Remap) {
     }
 }
 
+/// Adds copies of tags, each changed by `change`. A tag that `remap` maps to itself keeps its uid.
 fn paste_tags(
     draft: &mut Draft,
     pairs: &[Pair],
     mut remap: Remap,
     mirrored: bool,
-    what: PasteWhat,
+    change: impl Fn(&mut TagData),
 ) -> Result<(), OperationError> {
     for tag in pairs.iter().flat_map(|(joint, _)| &joint.tags) {
-        let uid = draft.next_uid();
-        remap.uids.insert(tag.uid, uid);
+        if remap.get(tag.uid) != Some(tag.uid) {
+            let uid = draft.next_uid();
+            remap.uids.insert(tag.uid, uid);
+        }
     }
     let mut pasted = Vec::new();
     for (joint, target) in pairs {
@@ -170,11 +185,7 @@ fn paste_tags(
             if mirrored {
                 mirror_names(&mut copy);
             }
-            if what == PasteWhat::Tags
-                && let TagKind::Command { params, .. } = &mut copy.kind
-            {
-                *params = "()".to_owned();
-            }
+            change(&mut copy);
             pasted.push(copy.uid);
             add(draft, *target, copy, usize::MAX)?;
         }

@@ -14,6 +14,7 @@ use super::{
     super::{
         FORMAT, PartOrigin, Template,
         file::{ChainFile, OptionFile, OptionTargetFile, PartChangeFile, PartFile, SocketFile},
+        quoted,
         shorthand::Declarations,
     },
     Places, bind_references, read_text,
@@ -316,6 +317,15 @@ fn added_tags(instance: Uid, joint: &str, tags: &RawValue) -> Result<Vec<TagData
         }
     }
     Ok(tags)
+}
+
+/// Uids that tags which an instance adds to a joint get where none is written, by their places in the text of their list;
+/// `None` where nothing identifies one.
+pub fn derived_tag_uids(instance: &PartInstance, joint: &str, tags: &str) -> Vec<Option<Uid>> {
+    let text = format!("(format: {FORMAT}, name: \"part\", joints: [(label: {}, tags: {tags})])", quoted(joint));
+    let declared = Declarations::find(&text);
+    let tags = declared.iter().flat_map(|declared| declared.tags.iter().flatten());
+    tags.map(|tag| tag.derived.map(|uid| instance.uid_of(uid))).collect()
 }
 
 /// A rotation written as three angles in degrees, or as a quaternion.
