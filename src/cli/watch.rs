@@ -113,7 +113,9 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
             }
             last_error = error;
             if !is_heard || args.count.is_some_and(|count| builds >= count) {
-                return Ok(Report { at_fault: !is_heard, ..Report::default() });
+                let mut report = Report::default();
+                report.at_fault = !is_heard;
+                return Ok(report);
             }
         }
         news = watch.next();
