@@ -8,7 +8,7 @@ use glam::Vec3;
 
 use super::{
     align::{self, Similarity},
-    chain,
+    chain, level,
     limbs::{LimbKind, TemplateLimbs},
     tree::Tree,
     volume::VoxelGraph,
@@ -147,6 +147,11 @@ pub(super) fn assign(
     for hypothesis in hypotheses {
         if kept.len() < KEPT && !kept.iter().any(|k| same(k, &hypothesis)) {
             kept.push(hypothesis);
+        }
+    }
+    for hypothesis in &mut kept {
+        if let Some(turn) = level::level(template, &trees[hypothesis.tree], hypothesis, directions) {
+            hypothesis.alignment = hypothesis.alignment.turned(turn, &hypothesis.pairs);
         }
     }
     kept
