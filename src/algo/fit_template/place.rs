@@ -93,6 +93,7 @@ pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, h
             places[joint] = Some(beyond_line(line, along, root, whole));
         }
         work.hold_bends(limb, line, &lengths, &mut places);
+        work.keep_over_foot(limb, line, &lengths, &mut places);
     }
     Placement { places: follow(template, &stretch, &places), reasons, strain, along: along_limb }
 }
@@ -278,6 +279,31 @@ impl Work<'_> {
             let side = (side - way * side.dot(way) / way.length_squared().max(1e-12)).normalize_or_zero();
             let shaped = a + way * share + side * (out.length() / chord.length().max(1e-9) * way.length());
             places[here] = Some(c.lerp(shaped, ((near - HIDDEN) / (1.0 - HIDDEN)).sqrt() * SHAPED));
+        }
+    }
+
+    /// Moves the joints of an animal's leg that the trunk hides over the part of the leg that hangs free: as far from the plane
+    /// of symmetry as that tells, and as the template has them.
+    fn keep_over_foot(&self, limb: &Limb, line: &CentreLine, lengths: &[f32], places: &mut [Option<Vec3>]) {
+        let Some(attach) = places[limb.attach].filter(|_| limb.kind == LimbKind::Leg && !self.template.is_upright())
+        else {
+            return;
+        };
+        let turn = self.hypothesis.alignment.rotation;
+        let (left, up) = (turn * Vec3::X, turn * Vec3::Y);
+        let of = |joint: usize| self.template.positions[joint].x - self.template.positions[limb.attach].x;
+        let below = of(limb.joints[limb.joints.len() / 2]);
+        let free = |share: f32| line.at(line.free * share);
+        let hangs = (free(LEG) - free(1.0 - LEG)).normalize_or_zero().dot(up);
+        if below.abs() < 1e-6 || hangs < HANGS {
+            return;
+        }
+        let wide = (free(LEG) - attach).dot(left) / below;
+        for (&joint, length) in limb.joints.iter().zip(lengths).filter(|(_, length)| **length > LEG * line.free) {
+            let hidden = ((length / line.free - LEG) / (1.0 - LEG)).min(1.0);
+            if let Some(place) = &mut places[joint] {
+                *place += left * (wide * of(joint) - (*place - attach).dot(left)) * hidden;
+            }
         }
     }
 
