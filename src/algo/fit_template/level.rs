@@ -27,7 +27,7 @@ pub(super) fn level(
     hypothesis: &Hypothesis,
     directions: &Directions,
 ) -> Option<Quat> {
-    if template.is_upright() {
+    if !template.is_on_fours() {
         return None;
     }
     let turn = hypothesis.alignment.rotation;
