@@ -329,6 +329,16 @@ impl Ring {
     }
 }
 
+/// Node at the middle of the volume, unless the volume bends around it: unlike any choice among nodes it hardly moves when the
+/// mesh is given otherwise.
+fn middle_of_volume(graph: &VoxelGraph, body: &[u32]) -> Option<u32> {
+    let sum: glam::DVec3 = body.iter().map(|&n| graph.centres[n as usize].as_dvec3()).sum();
+    let middle = (sum / body.len().max(1) as f64).as_vec3();
+    let away = |n: u32| graph.centres[n as usize].distance_squared(middle);
+    let nearest = body.iter().copied().min_by(|&a, &b| away(a).total_cmp(&away(b)).then(a.cmp(&b)))?;
+    (away(nearest).sqrt() <= graph.cell).then_some(nearest)
+}
+
 /// Nodes that may be the centre of the body: the one with the least mean distance to all of the volume and, where that
 /// is elsewhere (a large head), the middle of the longest way through the volume.
 pub(super) fn centres(graph: &VoxelGraph) -> Vec<u32> {
@@ -342,6 +352,7 @@ pub(super) fn centres(graph: &VoxelGraph) -> Vec<u32> {
     let fields: Vec<Vec<u32>> = samples.par_iter().map(|&s| graph.distances(&[(s, 0)])).collect();
     let sum = |n: u32| fields.iter().map(|f| u64::from(f[n as usize].min(1 << 24))).sum::<u64>();
     let mean = body.iter().copied().min_by_key(|&n| (sum(n), n)).unwrap_or(0);
+    let mean = middle_of_volume(graph, &body).unwrap_or(mean);
 
     let furthest = |field: &[u32]| {
         let key = |n: u32| (field[n as usize], std::cmp::Reverse(n));
