@@ -352,7 +352,6 @@ pub(super) fn centres(graph: &VoxelGraph) -> Vec<u32> {
     let fields: Vec<Vec<u32>> = samples.par_iter().map(|&s| graph.distances(&[(s, 0)])).collect();
     let sum = |n: u32| fields.iter().map(|f| u64::from(f[n as usize].min(1 << 24))).sum::<u64>();
     let mean = body.iter().copied().min_by_key(|&n| (sum(n), n)).unwrap_or(0);
-    let mean = middle_of_volume(graph, &body).unwrap_or(mean);
 
     let furthest = |field: &[u32]| {
         let key = |n: u32| (field[n as usize], std::cmp::Reverse(n));
@@ -371,6 +370,7 @@ pub(super) fn centres(graph: &VoxelGraph) -> Vec<u32> {
     };
     let middle = body.iter().copied().min_by_key(|&n| (worst(n), n)).unwrap_or(mean);
     let reach = from_first[second as usize].max(1);
+    let mean = middle_of_volume(graph, &body).unwrap_or(mean);
     let apart = graph.centres[middle as usize].distance(graph.centres[mean as usize]);
     if apart > APART * graph.length(reach) { vec![mean, middle] } else { vec![mean] }
 }
