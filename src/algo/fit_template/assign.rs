@@ -137,7 +137,7 @@ pub(super) fn assign(
         found.truncate(if free { TRIED_FREE } else { TRIED });
         found.iter().flat_map(|(cost, chosen)| search.sided(*cost, chosen)).collect::<Vec<Hypothesis>>()
     };
-    let mut hypotheses: Vec<Hypothesis> = trees.iter().enumerate().flat_map(of_tree).collect();
+    let mut hypotheses: Vec<Hypothesis> = trees.iter().enumerate().filter(|(_, tree)| tree.suits(template)).flat_map(of_tree).collect();
     hypotheses.sort_by(|a, b| {
         a.cost.total_cmp(&b.cost).then_with(|| a.tree.cmp(&b.tree)).then_with(|| a.leaves.cmp(&b.leaves))
     });
