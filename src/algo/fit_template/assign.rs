@@ -4,6 +4,8 @@
 //! the skeleton and through the volume, do not change with the pose, so they choose the branches; then the rest pose
 //! chooses sides and the front. The best few assignments are kept as hypotheses.
 
+mod front;
+
 use glam::Vec3;
 
 use super::{
@@ -48,13 +50,6 @@ const RIGID: f32 = 6.0;
 const SIDED: f32 = 1.2;
 /// Weight of that alignment in the confidence in a figure, which may be posed.
 pub(super) const POSED: f32 = 0.8;
-/// Penalty of feet that point backwards, for a step of one, and the share of a leg's length that is its foot.
-const TOES: f32 = 0.2;
-const FOOT: f32 = 0.2;
-/// Penalty of limbs that all end in another order along the front than the template's, and the distance, as a share of the
-/// template's size, from which on two of them have an order.
-const DISORDER: f32 = 0.6;
-const BEFORE: f32 = 0.1;
 /// Penalty of a tail or an arm that is thicker than the head, for a factor of e.
 const THICKER: f32 = 0.12;
 /// Thickness that the trunk may have, as a factor of the head's.
@@ -137,7 +132,8 @@ pub(super) fn assign(
         found.truncate(if free { TRIED_FREE } else { TRIED });
         found.iter().flat_map(|(cost, chosen)| search.sided(*cost, chosen)).collect::<Vec<Hypothesis>>()
     };
-    let mut hypotheses: Vec<Hypothesis> = trees.iter().enumerate().filter(|(_, tree)| tree.suits(template)).flat_map(of_tree).collect();
+    let mut hypotheses: Vec<Hypothesis> =
+        trees.iter().enumerate().filter(|(_, tree)| tree.suits(template)).flat_map(of_tree).collect();
     hypotheses.sort_by(|a, b| {
         a.cost.total_cmp(&b.cost).then_with(|| a.tree.cmp(&b.tree)).then_with(|| a.leaves.cmp(&b.leaves))
     });
@@ -390,42 +386,6 @@ impl Search<'_> {
             .collect()
     }
 
-    /// How much less the ends of legs lead forward than the template's do, in the mean: toes and paws tell the front.
-    fn backward_feet(&self, leaves: &[Option<usize>], forward: Vec3) -> f32 {
-        let template = self.template;
-        let (mut sum, mut count) = (0.0, 0.0);
-        for (limb, leaf) in template.limbs.iter().zip(leaves) {
-            let Some(line) = leaf.filter(|_| limb.kind == LimbKind::Leg).map(|leaf| &self.tree.lines[leaf]) else {
-                continue;
-            };
-            let rest = FOOT * (template.length(limb.attach, limb.joints[limb.joints.len() - 1]) + limb.beyond);
-            let wanted = (template.tip(limb) - template.place_on(limb, rest)).normalize_or_zero().z;
-            let found = (line.at(0.0) - line.at(FOOT * line.free)).normalize_or_zero().dot(forward);
-            sum += (wanted - found).max(0.0);
-            count += 1.0;
-        }
-        sum / f32::max(count, 1.0)
-    }
-
-    /// Share of the pairs of limbs of which the one that ends before the other in the template ends behind it: a head behind the
-    /// hind legs, a tail before the forelegs.
-    fn disorder(&self, leaves: &[Option<usize>], forward: Vec3, scale: f32) -> f32 {
-        let template = self.template;
-        let ends: Vec<(f32, f32)> =
-            self.ends(leaves).iter().map(|(rest, end, _)| (rest.z * scale, end.dot(forward))).collect();
-        let (mut sum, mut count) = (0.0, 0.0);
-        for (at, a) in ends.iter().enumerate() {
-            for b in ends.iter().skip(at + 1) {
-                let (rest, found) = (a.0 - b.0, a.1 - b.1);
-                if rest.abs() > BEFORE * template.size * scale {
-                    sum += (-found / rest).clamp(0.0, 1.0);
-                    count += 1.0;
-                }
-            }
-        }
-        sum / f32::max(count, 1.0)
-    }
-
     fn aligned(&self, cost: f32, leaves: Vec<Option<usize>>) -> Option<Hypothesis> {
         let template = self.template;
         // The scale between ways, as for the cost.
@@ -511,8 +471,7 @@ impl Search<'_> {
             cost += NO_IMAGE * sum / f32::max(count, 1.0);
         }
         if !template.is_upright() {
-            cost += TOES * self.backward_feet(&leaves, forward);
-            cost += DISORDER * self.disorder(&leaves, forward, alignment.scale);
+            cost += self.backwards(&leaves, forward, alignment.scale);
         }
         for marker in self.markers {
             if let Some(leaf) = leaves[marker.limb] {

@@ -380,9 +380,8 @@ pub(super) fn centres(graph: &VoxelGraph) -> Vec<Centre> {
     };
     let middle = body.iter().copied().min_by_key(|&n| (worst(n), n)).unwrap_or(mean);
     let reach = from_first[second as usize].max(1);
-    let is_apart = |a: u32, b: u32| {
-        graph.centres[a as usize].distance(graph.centres[b as usize]) > APART * graph.length(reach)
-    };
+    let is_apart =
+        |a: u32, b: u32| graph.centres[a as usize].distance(graph.centres[b as usize]) > APART * graph.length(reach);
     let of_volume = middle_of_volume(graph, &body);
     let lying = of_volume.unwrap_or(mean);
     let all = [
