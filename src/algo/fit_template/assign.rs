@@ -50,6 +50,8 @@ const RIGID: f32 = 6.0;
 const SIDED: f32 = 1.2;
 /// Weight of that alignment in the confidence in a figure, which may be posed.
 pub(super) const POSED: f32 = 0.8;
+/// Penalty of a centre of branches other than the middle of the volume, for animals.
+const OTHER_CENTRE: f32 = 0.1;
 /// Penalty of a tail or an arm that is thicker than the head, for a factor of e.
 const THICKER: f32 = 0.12;
 /// Thickness that the trunk may have, as a factor of the head's.
@@ -134,8 +136,9 @@ pub(super) fn assign(
     };
     let mut hypotheses: Vec<Hypothesis> =
         trees.iter().enumerate().filter(|(_, tree)| tree.suits(template)).flat_map(of_tree).collect();
+    let rank = |h: &Hypothesis| h.cost + if trees[h.tree].is_usual(template) { 0.0 } else { OTHER_CENTRE };
     hypotheses.sort_by(|a, b| {
-        a.cost.total_cmp(&b.cost).then_with(|| a.tree.cmp(&b.tree)).then_with(|| a.leaves.cmp(&b.leaves))
+        rank(a).total_cmp(&rank(b)).then_with(|| a.tree.cmp(&b.tree)).then_with(|| a.leaves.cmp(&b.leaves))
     });
     // Two centres may give the same assignment.
     let end = |h: &Hypothesis, limb: usize| h.leaves[limb].map(|l| trees[h.tree].lines[l].at(0.0));

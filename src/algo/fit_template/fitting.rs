@@ -236,7 +236,8 @@ impl<'a> Fit<'a> {
             _ => vec![None; places.len()],
         };
         let with_body = body.as_ref().map(|b| (b, near.as_slice()));
-        let mut trusted = confidence::joints(&placement, with_body, best, &analysis.voxels, &analysis.graph, &places);
+        let mut trusted =
+            confidence::joints(&self.template, &placement, with_body, best, &analysis.voxels, &analysis.graph, &places);
         if body.is_some() {
             confidence::doubt_folded(&self.template, tree, best, &places, &mut trusted);
         } else {

@@ -22,9 +22,17 @@ pub(super) struct Tree {
 impl Tree {
     /// True if a template is tried with it.
     pub(super) fn suits(&self, template: &TemplateLimbs) -> bool {
-        let is_lying = !template.is_upright() && template.count(LimbKind::Leg) > 0;
-        if is_lying { self.centre.is_lying } else { self.centre.is_upright }
+        is_lying(template) || self.centre.is_upright
     }
+
+    /// True if most figures of a template have their trunk there.
+    pub(super) fn is_usual(&self, template: &TemplateLimbs) -> bool {
+        !is_lying(template) || self.centre.is_lying
+    }
+}
+
+fn is_lying(template: &TemplateLimbs) -> bool {
+    !template.is_upright() && template.count(LimbKind::Leg) > 0
 }
 
 /// The trees of a volume, one for each place that may be its centre.

@@ -14,9 +14,10 @@ const DISORDER: f32 = 0.6;
 const BEFORE: f32 = 0.1;
 
 impl Search<'_> {
-    /// The penalty of a front that feet and the order of limbs contradict.
+    /// The penalty of a front that the order of limbs contradicts, and feet more than the opposite one: hooves point nowhere.
     pub(super) fn backwards(&self, leaves: &[Option<usize>], forward: Vec3, scale: f32) -> f32 {
-        TOES * self.backward_feet(leaves, forward) + DISORDER * self.disorder(leaves, forward, scale)
+        let feet = self.backward_feet(leaves, forward) - self.backward_feet(leaves, -forward);
+        TOES * feet.max(0.0) + DISORDER * self.disorder(leaves, forward, scale)
     }
 
     /// How much less the ends of legs lead forward than the template's do, in the mean: toes and paws tell the front.
