@@ -24,6 +24,7 @@ mod confidence;
 mod eigen;
 mod fitting;
 mod human;
+mod level;
 mod limbs;
 mod line;
 mod markers;

@@ -4,11 +4,13 @@
 //! the skeleton and through the volume, do not change with the pose, so they choose the branches; then the rest pose
 //! chooses sides and the front. The best few assignments are kept as hypotheses.
 
+mod front;
+
 use glam::Vec3;
 
 use super::{
     align::{self, Similarity},
-    chain,
+    chain, level,
     limbs::{LimbKind, TemplateLimbs},
     tree::Tree,
     volume::VoxelGraph,
@@ -48,6 +50,8 @@ const RIGID: f32 = 6.0;
 const SIDED: f32 = 1.2;
 /// Weight of that alignment in the confidence in a figure, which may be posed.
 pub(super) const POSED: f32 = 0.8;
+/// Penalty of a centre of branches other than the middle of the volume, for animals.
+const OTHER_CENTRE: f32 = 0.1;
 /// Penalty of a tail or an arm that is thicker than the head, for a factor of e.
 const THICKER: f32 = 0.12;
 /// Thickness that the trunk may have, as a factor of the head's.
@@ -130,9 +134,11 @@ pub(super) fn assign(
         found.truncate(if free { TRIED_FREE } else { TRIED });
         found.iter().flat_map(|(cost, chosen)| search.sided(*cost, chosen)).collect::<Vec<Hypothesis>>()
     };
-    let mut hypotheses: Vec<Hypothesis> = trees.iter().enumerate().flat_map(of_tree).collect();
+    let mut hypotheses: Vec<Hypothesis> =
+        trees.iter().enumerate().filter(|(_, tree)| tree.suits(template)).flat_map(of_tree).collect();
+    let rank = |h: &Hypothesis| h.cost + if trees[h.tree].is_usual(template) { 0.0 } else { OTHER_CENTRE };
     hypotheses.sort_by(|a, b| {
-        a.cost.total_cmp(&b.cost).then_with(|| a.tree.cmp(&b.tree)).then_with(|| a.leaves.cmp(&b.leaves))
+        rank(a).total_cmp(&rank(b)).then_with(|| a.tree.cmp(&b.tree)).then_with(|| a.leaves.cmp(&b.leaves))
     });
     // Two centres may give the same assignment.
     let end = |h: &Hypothesis, limb: usize| h.leaves[limb].map(|l| trees[h.tree].lines[l].at(0.0));
@@ -147,6 +153,11 @@ pub(super) fn assign(
     for hypothesis in hypotheses {
         if kept.len() < KEPT && !kept.iter().any(|k| same(k, &hypothesis)) {
             kept.push(hypothesis);
+        }
+    }
+    for hypothesis in &mut kept {
+        if let Some(turn) = level::level(template, &trees[hypothesis.tree], hypothesis, directions) {
+            hypothesis.alignment = hypothesis.alignment.turned(turn, &hypothesis.pairs);
         }
     }
     kept
@@ -461,6 +472,9 @@ impl Search<'_> {
                 }
             }
             cost += NO_IMAGE * sum / f32::max(count, 1.0);
+        }
+        if !template.is_upright() {
+            cost += self.backwards(&leaves, forward, alignment.scale);
         }
         for marker in self.markers {
             if let Some(leaf) = leaves[marker.limb] {

@@ -329,9 +329,29 @@ impl Ring {
     }
 }
 
+/// Node at the middle of the volume, unless the volume bends around it: unlike any choice among nodes it hardly moves when the
+/// mesh is given otherwise.
+fn middle_of_volume(graph: &VoxelGraph, body: &[u32]) -> Option<u32> {
+    let sum: glam::DVec3 = body.iter().map(|&n| graph.centres[n as usize].as_dvec3()).sum();
+    let middle = (sum / body.len().max(1) as f64).as_vec3();
+    let away = |n: u32| graph.centres[n as usize].distance_squared(middle);
+    let nearest = body.iter().copied().min_by(|&a, &b| away(a).total_cmp(&away(b)).then(a.cmp(&b)))?;
+    (away(nearest).sqrt() <= graph.cell).then_some(nearest)
+}
+
+/// Node that may be the centre of the body.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Centre {
+    pub(super) node: u32,
+    /// True if it is tried for animals whose trunk lies across their legs, and for all others.
+    pub(super) is_lying: bool,
+    pub(super) is_upright: bool,
+}
+
 /// Nodes that may be the centre of the body: the one with the least mean distance to all of the volume and, where that
-/// is elsewhere (a large head), the middle of the longest way through the volume.
-pub(super) fn centres(graph: &VoxelGraph) -> Vec<u32> {
+/// is elsewhere (a large head), the middle of the longest way through the volume. An animal has its trunk about the middle of its
+/// volume instead.
+pub(super) fn centres(graph: &VoxelGraph) -> Vec<Centre> {
     let body: Vec<u32> = (0..graph.len() as u32).filter(|&n| graph.body[n as usize]).collect();
     if body.is_empty() {
         return vec![];
@@ -360,6 +380,14 @@ pub(super) fn centres(graph: &VoxelGraph) -> Vec<u32> {
     };
     let middle = body.iter().copied().min_by_key(|&n| (worst(n), n)).unwrap_or(mean);
     let reach = from_first[second as usize].max(1);
-    let apart = graph.centres[middle as usize].distance(graph.centres[mean as usize]);
-    if apart > APART * graph.length(reach) { vec![mean, middle] } else { vec![mean] }
+    let is_apart =
+        |a: u32, b: u32| graph.centres[a as usize].distance(graph.centres[b as usize]) > APART * graph.length(reach);
+    let of_volume = middle_of_volume(graph, &body);
+    let lying = of_volume.unwrap_or(mean);
+    let all = [
+        Centre { node: mean, is_upright: true, is_lying: of_volume.is_none() },
+        Centre { node: middle, is_upright: is_apart(middle, mean), is_lying: is_apart(middle, lying) },
+        Centre { node: lying, is_upright: false, is_lying: of_volume.is_some() },
+    ];
+    all.into_iter().filter(|centre| centre.is_upright || centre.is_lying).collect()
 }

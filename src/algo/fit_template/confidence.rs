@@ -24,6 +24,10 @@ const HALF_STRAIN: f32 = 0.6;
 /// that fades.
 const ROOTED: f32 = 0.63;
 const FREE: f32 = 0.2;
+/// Confidence in the head and the tail of an animal, whose lengths vary most, as a share of that in its legs.
+const STEM: f32 = 0.87;
+/// Confidence in the spine of an animal between the ends of its trunk, in a figure without doubt.
+const BETWEEN: f32 = 0.9;
 
 fn trust(value: f32, half: f32) -> f32 {
     let q = value / half;
@@ -32,6 +36,7 @@ fn trust(value: f32, half: f32) -> f32 {
 
 /// Confidence of each joint with its reason.
 pub(super) fn joints(
+    template: &TemplateLimbs,
     placement: &Placement,
     body: Option<(&FittedBody, &[Option<f32>])>,
     best: &Hypothesis,
@@ -46,6 +51,18 @@ pub(super) fn joints(
             let cell = voxels.cell_at(voxels.to_grid(place + d * reach));
             cell.is_some_and(|c| voxels.solid_index(c).is_some())
         })
+    };
+    let ends = [template.trunk.first(), template.trunk.last()];
+    let of = |kinds: &[LimbKind]| -> Vec<usize> {
+        let limbs = template.limbs.iter().filter(|limb| template.is_on_fours() && kinds.contains(&limb.kind));
+        limbs.flat_map(|limb| limb.joints.iter().copied()).collect()
+    };
+    let (heads, stems) = (of(&[LimbKind::Head]), of(&[LimbKind::Head, LimbKind::Tail]));
+    // An animal's trunk is placed over its legs and under its back: what lies between its ends, and the neck before them, is right
+    // where the assignment is.
+    let is_between = |joint: usize| {
+        template.is_on_fours()
+            && (heads.contains(&joint) || template.trunk.contains(&joint) && !ends.contains(&Some(&joint)))
     };
     (0..places.len())
         .map(|joint| {
@@ -63,8 +80,10 @@ pub(super) fn joints(
                         FitReason::CentreLine => {
                             let free = ((ROOTED - placement.along[joint]) / FREE).clamp(0.0, 1.0);
                             let free = if graph.tied > 0 { 0.0 } else { free };
-                            (0.76 + 0.19 * free) * bevy::math::ops::powf(doubt, 1.0 - 0.5 * free)
+                            let own = if stems.contains(&joint) { STEM } else { 1.0 };
+                            own * (0.76 + 0.19 * free) * bevy::math::ops::powf(doubt, 1.0 - 0.5 * free)
                         }
+                        _ if is_between(joint) => BETWEEN * doubt,
                         _ => 0.52 * doubt,
                     };
                     (confidence, placement.reasons[joint])

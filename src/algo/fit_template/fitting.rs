@@ -236,7 +236,8 @@ impl<'a> Fit<'a> {
             _ => vec![None; places.len()],
         };
         let with_body = body.as_ref().map(|b| (b, near.as_slice()));
-        let mut trusted = confidence::joints(&placement, with_body, best, &analysis.voxels, &analysis.graph, &places);
+        let mut trusted =
+            confidence::joints(&self.template, &placement, with_body, best, &analysis.voxels, &analysis.graph, &places);
         if body.is_some() {
             confidence::doubt_folded(&self.template, tree, best, &places, &mut trusted);
         } else {
@@ -376,8 +377,10 @@ impl<'a> Fit<'a> {
     fn make_symmetric(&self, places: &mut [Vec3]) -> (Option<(Vec3, Vec3)>, bool) {
         let analysis = self.analysis;
         let of_mesh = analysis.mirror.filter(|plane| plane.is_of(&self.template, places));
-        let found = symmetry::find(&self.template, places, &analysis.graph, &analysis.voxels)
-            .or_else(|| of_mesh.map(|plane| (plane.point, plane.normal)));
+        // Joints on the two sides are never quite alike: where the mesh has a plane of symmetry, theirs would be tilted.
+        let found = of_mesh
+            .map(|plane| (plane.point, plane.normal))
+            .or_else(|| symmetry::find(&self.template, places, &analysis.graph, &analysis.voxels));
         let plane = match self.settings.symmetry {
             FitSymmetry::Off => None,
             FitSymmetry::Auto => found,

@@ -82,6 +82,21 @@ impl TemplateLimbs {
         self.positions[end] + direction * limb.beyond
     }
 
+    /// The place at a length from the end of a limb's flesh along its chain; beyond the limb, its joint of the trunk.
+    pub(super) fn place_on(&self, limb: &Limb, length: f32) -> Vec3 {
+        let (mut place, mut left) = (self.tip(limb), length);
+        for &joint in limb.joints.iter().rev().chain(std::iter::once(&limb.attach)) {
+            let next = self.positions[joint];
+            let step = place.distance(next);
+            if left <= step {
+                return place.lerp(next, if step > 0.0 { left / step } else { 0.0 });
+            }
+            left -= step;
+            place = next;
+        }
+        place
+    }
+
     /// Index in the limb of the joint that turns it in the trunk: a shoulder or a hip.
     pub(super) fn ball_joint(&self, limb: &Limb) -> Option<usize> {
         let whole = self.length(limb.attach, limb.joints[limb.joints.len() - 1]);
@@ -103,6 +118,11 @@ impl TemplateLimbs {
         let (Some(&first), Some(&last)) = (trunk.first(), trunk.last()) else { return false };
         let along = (self.positions[last] - self.positions[first]).normalize_or_zero();
         first != last && along.y > UPRIGHT
+    }
+
+    /// True if the trunk lies across four legs or more.
+    pub(super) fn is_on_fours(&self) -> bool {
+        !self.is_upright() && self.count(LimbKind::Leg) >= 4
     }
 
     /// Number of limbs of a kind.

@@ -1,5 +1,7 @@
 //! Placement: the template's joints on the centre lines of their branches and in the sections of the trunk.
 
+mod trunk;
+
 use glam::{Quat, Vec3};
 
 use super::{
@@ -93,6 +95,7 @@ pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, h
             places[joint] = Some(beyond_line(line, along, root, whole));
         }
         work.hold_bends(limb, line, &lengths, &mut places);
+        work.keep_over_foot(limb, line, &lengths, &mut places);
     }
     Placement { places: follow(template, &stretch, &places), reasons, strain, along: along_limb }
 }
@@ -265,7 +268,7 @@ impl Work<'_> {
         for (joints, length) in limb.joints.windows(3).zip(lengths.iter().skip(1)) {
             let near = length / line.free.max(1e-9);
             let [before, here, after] = [joints[0], joints[1], joints[2]];
-            if !(HIDDEN..=1.0).contains(&near) {
+            if near < HIDDEN {
                 continue;
             }
             let (Some(a), Some(c), Some(b)) = (places[before], places[here], places[after]) else { continue };
@@ -277,7 +280,32 @@ impl Work<'_> {
             let side = self.stretch.turn(out);
             let side = (side - way * side.dot(way) / way.length_squared().max(1e-12)).normalize_or_zero();
             let shaped = a + way * share + side * (out.length() / chord.length().max(1e-9) * way.length());
-            places[here] = Some(c.lerp(shaped, ((near - HIDDEN) / (1.0 - HIDDEN)).sqrt() * SHAPED));
+            places[here] = Some(c.lerp(shaped, ((near - HIDDEN) / (1.0 - HIDDEN)).min(1.0).sqrt() * SHAPED));
+        }
+    }
+
+    /// Moves the joints of an animal's leg that the trunk hides over the part of the leg that hangs free: as far from the plane
+    /// of symmetry as that tells, and as the template has them.
+    fn keep_over_foot(&self, limb: &Limb, line: &CentreLine, lengths: &[f32], places: &mut [Option<Vec3>]) {
+        let Some(attach) = places[limb.attach].filter(|_| limb.kind == LimbKind::Leg && !self.template.is_upright())
+        else {
+            return;
+        };
+        let turn = self.hypothesis.alignment.rotation;
+        let (left, up) = (turn * Vec3::X, turn * Vec3::Y);
+        let of = |joint: usize| self.template.positions[joint].x - self.template.positions[limb.attach].x;
+        let below = of(limb.joints[limb.joints.len() / 2]);
+        let free = |share: f32| line.at(line.free * share);
+        let hangs = (free(LEG) - free(1.0 - LEG)).normalize_or_zero().dot(up);
+        if below.abs() < 1e-6 || hangs < HANGS {
+            return;
+        }
+        let wide = (free(LEG) - attach).dot(left) / below;
+        for (&joint, length) in limb.joints.iter().zip(lengths).filter(|(_, length)| **length > LEG * line.free) {
+            let hidden = ((length / line.free - LEG) / (1.0 - LEG)).min(1.0);
+            if let Some(place) = &mut places[joint] {
+                *place += left * (wide * of(joint) - (*place - attach).dot(left)) * hidden;
+            }
         }
     }
 
@@ -364,6 +392,7 @@ impl Work<'_> {
                         let away = template.positions[joint] - template.positions[limb.joints[ball]];
                         (self.ball_place(limb.kind, line) + turn * away * balls).dot(along)
                     }
+                    None if template.is_on_fours() => self.over_legs(limb, line, joint, place).dot(along),
                     None => line.at(line.free).dot(along),
                 };
                 sum += wanted - place.dot(along);
@@ -388,11 +417,21 @@ impl Work<'_> {
         let left = self.hypothesis.alignment.rotation * Vec3::X;
         let up = self.hypothesis.alignment.rotation * if upright { Vec3::Z } else { Vec3::Y };
         let across = (up - along * along.dot(up)).normalize_or_zero();
+        if template.is_on_fours() {
+            return self.under_back(&places, along, left, across);
+        }
         places.iter().map(|&place| self.in_section(place, along, left, across, upright)).collect()
     }
 
     /// Moves a place of the trunk across it, to where the spine is in its section.
     fn in_section(&self, place: Vec3, along: Vec3, left: Vec3, across: Vec3, upright: bool) -> Vec3 {
+        let Some((low, high, centroid)) = self.section(place, along, left, across) else { return place };
+        let depth = if upright || high <= low { centroid.dot(across) } else { low + SPINE_HEIGHT * (high - low) };
+        place + left * centroid.dot(left) + across * depth
+    }
+
+    /// The section of the trunk at a place: how far it reaches from there across the trunk, at its middle, and its centroid.
+    fn section(&self, place: Vec3, along: Vec3, left: Vec3, across: Vec3) -> Option<(f32, f32, Vec3)> {
         let branches = &self.tree.branches;
         let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
         let (mut sum, mut count) = (Vec3::ZERO, 0);
@@ -411,12 +450,7 @@ impl Work<'_> {
                 }
             }
         }
-        if count < 8 {
-            return place;
-        }
-        let centroid = sum / count as f32;
-        let depth = if upright || high <= low { centroid.dot(across) } else { low + SPINE_HEIGHT * (high - low) };
-        place + left * centroid.dot(left) + across * depth
+        (count >= 8).then(|| (low, high, sum / count as f32))
     }
 }
 

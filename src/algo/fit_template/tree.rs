@@ -1,7 +1,8 @@
 //! Trees: the branches of a volume as seen from one centre, with their centre lines.
 
 use super::{
-    branches::{self, Branches},
+    branches::{self, Branches, Centre},
+    limbs::{LimbKind, TemplateLimbs},
     line::CentreLine,
     volume::VoxelGraph,
 };
@@ -15,6 +16,23 @@ pub(super) struct Tree {
     pub(super) has_forks: bool,
     /// Largest depth of the arc with the centre, in cells.
     pub(super) trunk_thickness: f32,
+    centre: Centre,
+}
+
+impl Tree {
+    /// True if a template is tried with it.
+    pub(super) fn suits(&self, template: &TemplateLimbs) -> bool {
+        is_lying(template) || self.centre.is_upright
+    }
+
+    /// True if most figures of a template have their trunk there.
+    pub(super) fn is_usual(&self, template: &TemplateLimbs) -> bool {
+        !is_lying(template) || self.centre.is_lying
+    }
+}
+
+fn is_lying(template: &TemplateLimbs) -> bool {
+    !template.is_upright() && template.count(LimbKind::Leg) > 0
 }
 
 /// The trees of a volume, one for each place that may be its centre.
@@ -22,13 +40,13 @@ pub(super) fn trees(graph: &VoxelGraph) -> Vec<Tree> {
     branches::centres(graph)
         .into_iter()
         .map(|centre| {
-            let branches = branches::branches(graph, centre);
+            let branches = branches::branches(graph, centre.node);
             let lines = (0..branches.arcs.len()).map(|arc| CentreLine::new(graph, &branches, arc)).collect();
             let has_forks = !branches.bearers.is_empty();
             let roots = branches.arcs.iter().filter(|arc| arc.parent.is_none());
             let depths = roots.flat_map(|arc| arc.slices.iter().map(|s| s.depth));
             let trunk_thickness = depths.fold(1.0, f32::max);
-            Tree { branches, lines, has_forks, trunk_thickness }
+            Tree { branches, lines, has_forks, trunk_thickness, centre }
         })
         .collect()
 }

@@ -1,0 +1,75 @@
+//! Level: how an animal on all fours stands, from its plane of symmetry and the ends of its legs.
+//!
+//! The alignment of a template's joints with centre lines tips to and fro with the proportions of legs, neck and tail. What
+//! stands on four feet shows its directions: left across the plane of symmetry, and the ground through the ends of its legs.
+
+use glam::{Mat3, Quat, Vec3};
+
+use super::{
+    assign::{Directions, Hypothesis},
+    limbs::{LimbKind, TemplateLimbs},
+    tree::Tree,
+};
+
+/// Cosine of the angle between the left direction of an alignment and the normal of the plane of symmetry above which they
+/// are one.
+const SAME_LEFT: f32 = 0.9;
+/// Cosine of the angle from the alignment above which the ends of legs tell the ground.
+const STANDS: f32 = 0.8;
+/// Distance between front and hind feet, as a share of the template's in the alignment's scale, above which they tell the
+/// ground.
+const APART: f32 = 0.4;
+
+/// The turn of an animal on all fours; `None` for other templates, and where its legs are raised.
+pub(super) fn level(
+    template: &TemplateLimbs,
+    tree: &Tree,
+    hypothesis: &Hypothesis,
+    directions: &Directions,
+) -> Option<Quat> {
+    if !template.is_on_fours() {
+        return None;
+    }
+    let turn = hypothesis.alignment.rotation;
+    let (rest, way) = way_of_feet(template, tree, hypothesis)?;
+    if way.length() < APART * hypothesis.alignment.scale * rest.length() {
+        return None;
+    }
+    let left = turn * Vec3::X;
+    let left = match directions.mirror {
+        Some((_, normal)) if left.dot(normal).abs() > SAME_LEFT => normal * left.dot(normal).signum(),
+        _ => left,
+    };
+    let without = |way: Vec3, axis: Vec3| way - axis * way.dot(axis);
+    let (left, way) = match directions.up {
+        Some(up) => (without(left, up).try_normalize()?, without(way, up)),
+        None => (left, way),
+    };
+    let along = without(way, left).try_normalize()?;
+    let rest = without(rest, Vec3::X).try_normalize()?;
+    let to = Mat3::from_cols(left, along, left.cross(along));
+    let from = Mat3::from_cols(Vec3::X, rest, Vec3::X.cross(rest));
+    let level = Quat::from_mat3(&(to * from.transpose())).normalize();
+    ((level * Vec3::Y).dot(turn * Vec3::Y) > STANDS).then_some(level)
+}
+
+/// The way from the hind feet to the front feet, in the template and in the mesh.
+fn way_of_feet(template: &TemplateLimbs, tree: &Tree, hypothesis: &Hypothesis) -> Option<(Vec3, Vec3)> {
+    let feet: Vec<(Vec3, Vec3)> = template
+        .limbs
+        .iter()
+        .zip(&hypothesis.leaves)
+        .filter(|(limb, _)| limb.kind == LimbKind::Leg)
+        .filter_map(|(limb, leaf)| Some((template.tip(limb), tree.lines[(*leaf)?].at(0.0))))
+        .collect();
+    let middle = feet.iter().map(|foot| foot.0.z).sum::<f32>() / feet.len().max(1) as f32;
+    let mean = |is_front: bool| {
+        let own = feet.iter().filter(|foot| (foot.0.z > middle) == is_front);
+        let (rest, place, count) =
+            own.fold((Vec3::ZERO, Vec3::ZERO, 0.0), |sum, foot| (sum.0 + foot.0, sum.1 + foot.1, sum.2 + 1.0));
+        // One foot alone of a pair steps aside.
+        (count > 1.0).then(|| (rest / count, place / count))
+    };
+    let (front, hind) = (mean(true)?, mean(false)?);
+    Some((front.0 - hind.0, front.1 - hind.1))
+}
