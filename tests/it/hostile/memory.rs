@@ -145,26 +145,30 @@ fn templates_of_bare_and_placed_joints_stay_within_their_memory() {
         [("bare.rig.ron", 40_000, bare_joints(40_000)), ("placed.rig.ron", 20_000, placed_joints(20_000))]
     {
         fs::write(folder.path().join(file), &text).unwrap();
-        check(
-            folder.path(),
-            &[
-                (&[file], &["check", file]),
-                (&[file], &["info", file]),
-                (&[file], &["build", file, "-o", "a.glb"]),
-                (&[file], &["build", file, "-o", "a.rig.ron"]),
-                (&[file], &["convert", file, "b.glb"]),
-                (&[file], &["diff", file, file]),
-                (&[file], &["diff", one, file]),
-                (&[file], &["extract", file, "--joints", "j7", "-o", "c.rig.ron"]),
-                (&[one, file], &["merge", one, file, "-o", "d.rig.ron"]),
-                (&[file, file], &["update", file, "--from", file, "-o", "e.rig.ron"]),
-            ],
-        );
-        let allowance = memory_allowance(text.len() as u64);
+        let cases: [(&[&str], &[&str]); 10] = [
+            (&[file], &["check", file]),
+            (&[file], &["info", file]),
+            (&[file], &["build", file, "-o", "a.glb"]),
+            (&[file], &["build", file, "-o", "a.rig.ron"]),
+            (&[file], &["convert", file, "b.glb"]),
+            (&[file], &["diff", file, file]),
+            (&[file], &["diff", one, file]),
+            (&[file], &["extract", file, "--joints", "j7", "-o", "c.rig.ron"]),
+            (&[one, file], &["merge", one, file, "-o", "d.rig.ron"]),
+            (&[file, file], &["update", file, "--from", file, "-o", "e.rig.ron"]),
+        ];
+        for (files, args) in cases {
+            let size: u64 = files.iter().map(|file| fs::metadata(folder.path().join(file)).unwrap().len()).sum();
+            let allowance = memory_allowance(size) + joints * ENTITIES;
+            let (ended, answer) = json_answer(folder.path(), args);
+            assert_eq!(ended.code, Some(0), "{args:?}: {answer:.600}");
+            println!("{args:?}: {} KiB of {}", ended.memory >> 10, allowance >> 10);
+            assert!(ended.memory <= allowance, "{args:?}: {} KiB of {}", ended.memory >> 10, allowance >> 10);
+        }
+        let allowance = memory_allowance(text.len() as u64) + joints * ENTITIES;
         let (ended, answer) = json_answer(folder.path(), &["format", "--check", file]);
         assert_eq!(ended.code, Some(1), "it is not laid out by people: {answer:.600}");
         assert!(ended.memory <= allowance, "format: {} KiB of {}", ended.memory >> 10, allowance >> 10);
-        let allowance = allowance + joints * ENTITIES;
         for output in ["f.glb", "f.rig.ron"] {
             let (ended, answer) = json_answer(folder.path(), &["pose", file, "-o", output]);
             assert_eq!(ended.code, Some(0), "{file}: {answer:.600}");

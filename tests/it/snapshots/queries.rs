@@ -114,7 +114,13 @@ fn unnamed(widgets: &[Widget]) -> Vec<String> {
         number.role == accesskit::Role::SpinButton
             && widgets.iter().any(|other| other.role == accesskit::Role::Slider && has_name(other) && is_beside(other))
     };
-    let lacks = |widget: &&Widget| widget.is_clickable && !has_name(widget) && !is_of_slider(widget);
+    // The area of an open menu takes clicks, so that they meet nothing below it.
+    let is_menu = |area: &Widget| {
+        let is_within = |other: &Widget| area.rect.contains_rect(other.rect) && other.is_clickable && has_name(other);
+        area.role == accesskit::Role::Unknown && widgets.iter().any(is_within)
+    };
+    let lacks =
+        |widget: &&Widget| widget.is_clickable && !has_name(widget) && !is_of_slider(widget) && !is_menu(widget);
     let told = |widget: &Widget| {
         format!("{:?} {:?} at {} can be clicked and has no name", widget.role, widget.value, place(widget.rect))
     };

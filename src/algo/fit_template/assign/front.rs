@@ -20,7 +20,7 @@ impl Search<'_> {
         TOES * feet.max(0.0) + DISORDER * self.disorder(leaves, forward, scale)
     }
 
-    /// How much less the ends of legs lead forward than the template's do, in the mean: toes and paws tell the front.
+    /// Lack of the ends of legs in leading forward as the template's do, in the mean: toes and paws tell the front.
     fn backward_feet(&self, leaves: &[Option<usize>], forward: Vec3) -> f32 {
         let template = self.template;
         let (mut sum, mut count) = (0.0, 0.0);
