@@ -89,7 +89,7 @@ fn joints_are_where_they_should_be() {
         ("gltf_skinned/RobotExpressive.glb", 4.45),
         ("characters/Mage.glb", 3.3),
         ("creatures/fox-fox.glb", 3.85),
-        ("creatures/fox-dog.glb", 5.0),
+        ("creatures/fox-dog.glb", 4.3),
         ("creatures/bird-eagle.glb", 12.0),
     ]
     .into();
