@@ -146,6 +146,25 @@ fn a_key_whose_action_can_do_nothing_tells_the_reason_of_the_palette() {
 }
 
 #[test]
+fn the_help_gives_all_actions_their_usual_keys_again() {
+    let folder = folder();
+    let mut page = Page::open(folder.path(), None);
+    page.send(ActionRequest(Action::Cancel));
+    page.send(ActionRequest(Action::Help));
+    assert!(!page.desk.find("Usual keys").enabled, "nothing was bound");
+    let mut keys = KeyBindings::default();
+    keys.bind(Chord::try_from("J".to_owned()).unwrap(), Action::Fit);
+    keys.bind(Chord::try_from("F".to_owned()).unwrap(), Action::Skin);
+    page.desk.app.insert_resource(keys);
+    page.settle();
+    // The page takes some frames to its size.
+    page.settle();
+    page.click("Usual keys");
+    assert_eq!(*page.world().resource::<KeyBindings>(), KeyBindings::default());
+    assert!(page.world().resource::<HelpShown>().0, "the page stays");
+}
+
+#[test]
 fn the_palette_brings_panels_forward() {
     let folder = folder();
     let mut page = Page::open(folder.path(), None);
