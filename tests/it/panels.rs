@@ -5,6 +5,7 @@ mod face;
 mod features;
 mod groups;
 mod hierarchy;
+mod looks;
 mod notices;
 mod posing;
 mod process;
@@ -19,7 +20,7 @@ mod weights;
 use std::collections::HashSet;
 
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Color32, Key, Modifiers, Pos2};
+use bevy_egui::egui::{self, Key, Modifiers, Pos2};
 use rigsmith::{
     editor::{
         actions::{Action, ActionRequest},
@@ -41,7 +42,6 @@ use rigsmith::{
             skinning::{SkinningClaims, SkinningPanel, SkinningParts, SkinningResults, SkinningSettings},
             toasts::Toasts,
         },
-        style::{self, LEAST_CONTRAST, Look, WindowTheme, contrast, readable},
     },
     plugins::{
         commands::{BuildRequest, BuildResult, BuildStep},
@@ -56,34 +56,6 @@ use rigsmith::{
 
 use crate::gestures::boxes;
 use desk::{Desk, Sheet};
-
-#[test]
-fn coloured_letters_stand_out_in_every_look() {
-    let colors =
-        [(230, 96, 96), (120, 190, 80), (90, 150, 240), (92, 184, 92), (214, 178, 92), (0, 0, 0), (255, 255, 255)];
-    assert!((contrast(Color32::BLACK, Color32::WHITE) - 21.0).abs() < 0.01);
-    for (theme, high_contrast) in
-        [WindowTheme::Dark, WindowTheme::Light].into_iter().flat_map(|theme| [(theme, false), (theme, true)])
-    {
-        let ctx = egui::Context::default();
-        style::apply(&ctx, Look { theme, high_contrast });
-        let style = ctx.global_style();
-        let visuals = &style.visuals;
-        for (red, green, blue) in colors {
-            let color = Color32::from_rgb(red, green, blue);
-            let shown = readable(visuals, color);
-            for ground in [visuals.panel_fill, visuals.widgets.inactive.weak_bg_fill] {
-                let found = contrast(shown, ground);
-                assert!(found >= LEAST_CONTRAST, "{theme:?}: {color:?} as {shown:?} on {ground:?}: {found}");
-            }
-            let stands_out = contrast(color, visuals.widgets.inactive.weak_bg_fill) >= LEAST_CONTRAST;
-            assert!(
-                !stands_out || theme == WindowTheme::Light || shown == color,
-                "{color:?} is as it was on dark ground"
-            );
-        }
-    }
-}
 
 #[test]
 fn a_field_is_one_step() {

@@ -20,7 +20,7 @@ use super::textures::{TextureBudget, TextureError, decode};
 use crate::mesh::model::MaterialSet;
 
 /// Largest opacity of see-through surfaces.
-const XRAY_OPACITY: f32 = 0.36;
+const XRAY_OPACITY: f32 = 0.14;
 /// Light of see-through surfaces themselves, so that dark ones are seen, too.
 const XRAY_GLOW: f32 = 0.2;
 
