@@ -115,7 +115,7 @@ fn faults_of_the_structure_hide_no_others() {
                 control(at: "@joint qq"), // there is no joint "qq"
                 (x: 1), // there is no field `x` // Expected
                 half_joint(share: 3.0), // share: is 3
-                Feature(kind: 3, name: "f"), // Expected string
+                Feature(kind: 3, name: "f"), // Expected string; write a text in quotation marks
             ],
         ),
         (

@@ -26,7 +26,7 @@ fn sources(folder: &str) -> Vec<(PathBuf, String)> {
 }
 
 /// Code with comments and the insides of strings and characters blanked, so that words in them do not count.
-fn code(text: &str) -> String {
+pub fn code(text: &str) -> String {
     let chars: Vec<char> = text.chars().collect();
     let mut out = String::with_capacity(text.len());
     let mut at = 0;

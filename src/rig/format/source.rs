@@ -56,10 +56,27 @@ impl SourceError {
                 format!("the field `{field}` is there twice; keep one of the two")
             }
             ron::Error::Eof => format!("{}; the file is cut short: take a backup", error.code),
-            code => code.to_string(),
+            code => match remedy(code) {
+                Some(remedy) => format!("{code}; {remedy}"),
+                None => code.to_string(),
+            },
         };
         Self::at(text, byte_offset(text, error.span.start), message)
     }
+}
+
+/// Advice for a value of a wrong kind; `None` for other errors.
+fn remedy(error: &ron::Error) -> Option<&'static str> {
+    Some(match error {
+        ron::Error::IntegerOutOfBounds => "write a whole number that fits here; counts have no sign",
+        ron::Error::ExpectedInteger => "write a whole number, such as 2",
+        ron::Error::ExpectedFloat => "write a number, such as 0.5",
+        ron::Error::ExpectedBoolean => "write true or false",
+        ron::Error::ExpectedString => "write a text in quotation marks",
+        ron::Error::ExpectedArray => "write a list in square brackets",
+        ron::Error::ExpectedStructLike => "write fields or numbers in round brackets",
+        _ => return None,
+    })
 }
 
 /// Largest number of names that are listed where none is near.
