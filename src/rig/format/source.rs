@@ -3,7 +3,7 @@
 use ron::{Options, extensions::Extensions};
 use serde::{Serialize, de::DeserializeOwned};
 
-use super::scan::cut_short;
+use super::scan::{BracketFault, bracket_fault};
 use crate::rig::nearest::nearest;
 
 /// Error in a text file, with its place.
@@ -34,15 +34,31 @@ impl SourceError {
         }
     }
 
-    /// Fault of a text that is cut short; `None` for others.
-    pub(crate) fn cut_short(text: &str) -> Option<Self> {
-        let message = "the file is cut short: nothing closes what begins here; take a backup, or close it";
-        cut_short(text).map(|at| Self::at(text, at, message))
+    /// Fault of the brackets of a text; `None` where each is closed by one of its kind.
+    pub(crate) fn of_brackets(text: &str) -> Option<Self> {
+        let shown = |at: usize| text[at..].chars().next().unwrap_or_default();
+        Some(match bracket_fault(text)? {
+            BracketFault::Open(at) => {
+                let message = "the file is cut short: nothing closes what begins here; take a backup, or close it";
+                Self::at(text, at, message)
+            }
+            BracketFault::Crossed { at, wanted } => {
+                let closing = shown(at);
+                let message = format!(
+                    "`{closing}` stands where `{wanted}` closes the last open bracket; write `{wanted}` before it, or \
+                     remove one of the two brackets"
+                );
+                Self::at(text, at, message)
+            }
+            BracketFault::Surplus(at) => {
+                Self::at(text, at, format!("`{}` closes nothing; remove it, or open it before", shown(at)))
+            }
+        })
     }
 
     /// An error of the RON reader, with its remedy.
     pub(crate) fn from_ron(text: &str, error: &ron::error::SpannedError) -> Self {
-        if let Some(fault) = Self::cut_short(text) {
+        if let Some(fault) = Self::of_brackets(text) {
             return fault;
         }
         let message = match &error.code {
