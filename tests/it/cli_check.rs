@@ -363,3 +363,17 @@ fn wrong_brackets_are_told_alone() {
         assert!(answer.code == 1 && answer.err.contains(&place), "{}", answer.err);
     }
 }
+
+#[test]
+fn a_folder_is_told_as_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let answer = rigsmith(folder.path(), &["check", "."]);
+    assert!(
+        answer.code == 1 && answer.out.contains("this is a folder; give the files in it"),
+        "{}{}",
+        answer.out,
+        answer.err
+    );
+    let answer = rigsmith(folder.path(), &["info", "."]);
+    assert!(answer.code == 2 && answer.err.contains("`.` is a folder"), "{}{}", answer.out, answer.err);
+}

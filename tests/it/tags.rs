@@ -277,7 +277,7 @@ fn a_part_is_dropped_onto_a_chain_until_either_list_ends() {
     assert_eq!(desk.refusal(drop_on(&[ARM_L])), needs(1).into());
     assert_eq!(desk.refusal(drop_on(&[ARM_L, HAND_L])), needs(2).into());
     assert!(desk.rig == before, "a refused part changes nothing");
-    assert!(needs(2).to_string().contains("needs 3 joints, from the first on upper, lower, end; 2 are selected"));
+    assert!(needs(2).to_string().contains("needs 3 joints, from the first on upper, lower, end; it gets 2:"));
 
     // A joint that is left out is found by its label, if the rig has it; the last joint's own tags are extras.
     desk.rig.apply(&RigEdit::SetLabel(HIPS, Some("end".into()))).unwrap();

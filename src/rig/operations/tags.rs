@@ -174,8 +174,8 @@ pub enum TagError {
     NoMirror,
     /// Fewer joints than a part needs.
     #[error(
-        "the part \"{part}\" needs {} joints, from the first on {}; {given} are selected: select the rest of the chain, or \
-         add joints",
+        "the part \"{part}\" needs {} joints, from the first on {}; it gets {given}: select or name the rest of the \
+         chain, or add joints",
         joints.len(),
         joints.join(", ")
     )]
