@@ -36,6 +36,8 @@ impl Workbench {
         let here = || node.label.as_deref().and_then(|label| off_at(self.rig(), label));
         let off = match off {
             Some(off) => format!("; one of that name is not built: {off}"),
+            // A similar name is likely what is meant.
+            None if known.ends_with('?') => String::new(),
             None => here().map_or_else(String::new, |off| format!("; {off} there")),
         };
         PoseError::NoAttribute { node: node.name.to_string(), attribute: attribute.to_owned(), known: known + &off }
