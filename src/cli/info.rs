@@ -45,6 +45,9 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         Some(FileKind::Bvh) => describe_motion(&mut report, path)?,
         Some(FileKind::PackedClips) => describe_packed_clips(&mut report, path)?,
         Some(FileKind::Gestures) => describe_gestures(&mut report, path)?,
+        None if path.is_dir() => {
+            return Err(Failure::Usage(format!("`{}` is a folder; give a file in it", path.display())));
+        }
         None => {
             let message = format!(
                 "`{}`: Rigsmith knows .obj, .gltf, .glb, .vrm, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .rigclip, .bvh, .skin and .ron",

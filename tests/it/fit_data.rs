@@ -4,9 +4,9 @@
 //! tuning.
 
 mod decimate;
-mod known_joints;
 mod limbs;
 mod shapes;
+mod true_joints;
 mod turns;
 mod variants;
 
@@ -23,7 +23,7 @@ use rigsmith::{
 };
 
 use self::{
-    known_joints::{Figure, HUMAN, figures, held_back, is_finger, template_joints},
+    true_joints::{Figure, HUMAN, figures, held_back, is_finger, template_joints},
     variants::{subdivided, with_specks},
 };
 use crate::{

@@ -49,12 +49,16 @@ use crate::{
 
 /// Notices and actions of a window.
 #[derive(Resource, Default)]
-struct Told {
+struct WindowMessages {
     notices: Vec<String>,
     actions: Vec<Action>,
 }
 
-fn collect(mut told: ResMut<Told>, mut notices: MessageReader<Notice>, mut actions: MessageReader<ActionRequest>) {
+fn collect(
+    mut told: ResMut<WindowMessages>,
+    mut notices: MessageReader<Notice>,
+    mut actions: MessageReader<ActionRequest>,
+) {
     told.notices.extend(notices.read().map(|notice| notice.text.clone()));
     told.actions.extend(actions.read().map(|action| action.0));
 }
@@ -78,7 +82,9 @@ struct Window {
 impl Window {
     fn new(model: Model) -> Self {
         let mut app = headless_app(1);
-        app.add_plugins((ToolsPlugin, FittingPlugin, HeldPlugin)).init_resource::<Told>().add_systems(Last, collect);
+        app.add_plugins((ToolsPlugin, FittingPlugin, HeldPlugin))
+            .init_resource::<WindowMessages>()
+            .add_systems(Last, collect);
         let mut app = strict_app(app);
         let rig = app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
         app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(front())));
@@ -113,8 +119,8 @@ impl Window {
         }
     }
 
-    fn told(&self) -> &Told {
-        self.world().resource::<Told>()
+    fn told(&self) -> &WindowMessages {
+        self.world().resource::<WindowMessages>()
     }
 
     #[track_caller]

@@ -143,6 +143,7 @@ mod keep_pose;
 mod key_bindings;
 mod kmeans;
 mod layout;
+mod layout_names;
 mod leg_strokes;
 mod linkage;
 #[cfg(feature = "editor")]

@@ -13,7 +13,7 @@ use rigsmith::{
     rig::{
         PoseOffset, Rig, RigEdit, StoredPose, Uid,
         animation::{Key, Property, RigClip, TrackTarget},
-        operations::{Operation, PasteTo, PasteWhat, TagClipboard, TagOperation},
+        operations::{Operation, PasteContent, PasteTo, TagClipboard, TagOperation},
         update::{Change as TemplateChange, ChangeKind, Take, clip_edits, diff, edits_between, pose_edits, update},
     },
 };
@@ -234,7 +234,7 @@ fn the_window_takes_poses_and_keys_along() {
     let clipboard = Arc::new(TagClipboard::copy_tags(&before, &tags).unwrap());
     bench.edit(Operation::Tags(TagOperation::Cut(clipboard.clone())));
     assert!(bench.rig().find_tag(TAG).is_none());
-    let paste = TagOperation::Paste { clipboard, what: PasteWhat::Both, to: PasteTo::Joints(vec![b]) };
+    let paste = TagOperation::Paste { clipboard, what: PasteContent::Both, to: PasteTo::Joints(vec![b]) };
     bench.edit(Operation::Tags(paste.clone()));
     assert_eq!(bench.rig().find_tag(TAG).unwrap().0.data.uid, b);
     check_carried(&before, bench.rig());

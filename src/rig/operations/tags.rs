@@ -13,7 +13,7 @@ pub use clipboard::{CopiedIdentifiers, CopiedJoint, TagClipboard, TagScope};
 pub use insert::Rewiring;
 pub use part::PartOrder;
 pub(in crate::rig) use part::drop_part;
-pub use paste::{PasteTo, PasteWhat};
+pub use paste::{PasteContent, PasteTo};
 
 use super::{Draft, OperationError};
 use crate::rig::{
@@ -88,7 +88,7 @@ pub enum TagOperation {
         /// The copied tags, from this rig or another.
         clipboard: Arc<TagClipboard>,
         /// Tags, values or both.
-        what: PasteWhat,
+        what: PasteContent,
         /// Target joints.
         to: PasteTo,
     },
@@ -174,8 +174,8 @@ pub enum TagError {
     NoMirror,
     /// Fewer joints than a part needs.
     #[error(
-        "the part \"{part}\" needs {} joints, from the first on {}; {given} are selected: select the rest of the chain, or \
-         add joints",
+        "the part \"{part}\" needs {} joints, from the first on {}; it gets {given}: select or name the rest of the \
+         chain, or add joints",
         joints.len(),
         joints.join(", ")
     )]

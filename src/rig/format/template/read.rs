@@ -58,9 +58,9 @@ pub(in crate::rig) fn read_text(source: &str, first_line: usize) -> Result<Templ
         None => read_explicit(&explicit, first_line).map_err(|error| explicit.fault(error)),
     };
     read.map_err(|error| {
-        // What follows from a missing comma is no fault of its own.
+        // What follows from a wrong bracket or a missing comma is no fault of its own.
         let lacking = || with_missing_commas(source).1.into_iter().next();
-        SourceError::cut_short(source).or_else(lacking).unwrap_or(error)
+        SourceError::of_brackets(source).or_else(lacking).unwrap_or(error)
     })
 }
 
