@@ -273,11 +273,15 @@ impl FacePanel {
         }
         fields::labelled(ui, "Bones", |ui| {
             ui.spacing_mut().slider_width = (ui.available_width() - 52.0).max(30.0);
-            let slider = ui.add(Slider::new(&mut self.settings.bones, DENSITIES).logarithmic(true));
+            let typed = TypedText::default();
+            let slider = Slider::new(&mut self.settings.bones, DENSITIES).logarithmic(true).update_while_editing(false);
+            let ends = *DENSITIES.start() as f64..=*DENSITIES.end() as f64;
+            let slider = fields::typed_field(ui, "Bones", slider.custom_parser(typed.whole_reader(ends, "")));
             let slider = slider.on_hover_text("Density: bones of the facial skin");
-            fields::named(ui, slider.id, "Bones");
+            let is_dropped = typed.is_refused() || ui.input(|input| input.key_pressed(egui::Key::Escape));
+            typed.tell(&slider, "Bones", requests);
             // Releasing the slider is enough: an existing face is placed again with the new density, in one step with it.
-            let is_released = slider.drag_stopped() || slider.lost_focus();
+            let is_released = slider.drag_stopped() || slider.lost_focus() && !is_dropped;
             if is_released && again {
                 requests.send(FaceRequest { mesh: entity, settings: self.settings.clone(), fit: None });
             } else if is_released {
@@ -293,8 +297,8 @@ impl FacePanel {
             fields::labelled(ui, "Seed", |ui| {
                 let typed = TypedText::default();
                 let field = DragValue::new(&mut self.settings.seed).speed(0.1).update_while_editing(false);
-                let field = ui.add(field.custom_parser(typed.reader(0.0..=MOST_SEED, "")));
-                fields::named(ui, field.id, "Seed");
+                let field = field.custom_parser(typed.whole_reader(0.0..=MOST_SEED, ""));
+                let field = fields::typed_field(ui, "Seed", field);
                 typed.tell(&field, "Seed", requests);
                 field.on_hover_text("The same seed gives the same bones");
             });
@@ -308,7 +312,7 @@ impl FacePanel {
         });
         let Some(face) = world.get::<Face>(entity) else { return };
         CollapsingHeader::new("Grouping").show(ui, |ui| {
-            if dendrogram::show(ui, &face.analysis, &mut self.settings.groups) {
+            if dendrogram::show(ui, &face.analysis, &mut self.settings.groups, requests) {
                 self.keep_cut(shown, mesh, requests);
             }
         });

@@ -17,7 +17,7 @@ use rigsmith::{
     rig::FaceCut,
 };
 
-use super::desk::{Desk, Sheet};
+use super::desk::{Desk, Sheet, ShownWidget};
 
 /// The panel, tall enough for all of it, and the bundled head.
 fn with_head() -> (Desk, Entity) {
@@ -172,6 +172,36 @@ fn the_density_is_that_of_the_opened_face() {
     desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
     desk.frames(4);
     assert_eq!((desk.rig().face_cut(Uid(99)), number_of_bones(&desk)), (None, 40.0));
+}
+
+#[test]
+fn a_number_of_bones_that_cannot_be_is_told() {
+    let (mut desk, mesh) = with_head();
+    let number = |desk: &Desk| {
+        let row = written(desk, "Bones").expect("the density").center().y;
+        let is_it = |seen: &&ShownWidget| seen.rect.y_range().contains(row) && seen.value.parse::<f32>().is_ok();
+        desk.seen.iter().find(is_it).expect("its number").clone()
+    };
+    let type_in = |desk: &mut Desk, text: &str| {
+        desk.time += 1.0;
+        desk.click_at(number(desk).rect.center());
+        desk.frames(2);
+        desk.type_text(text);
+        desk.key(egui::Key::Enter);
+        desk.frames(4);
+    };
+    for (text, words) in [
+        ("900", "900 is none of its numbers; write one from 4 to 150"),
+        ("12.5", "12.5 is no whole number; write one such as 3"),
+        ("some", "\"some\" is no number; write one such as 1.5 or -20"),
+    ] {
+        type_in(&mut desk, text);
+        assert_eq!(desk.told().pop(), Some(format!("Bones stays as it was: {words}.")));
+        assert_eq!((number(&desk).value.as_str(), desk.rig().face_cut(Uid(99))), ("40", None), "{text}");
+    }
+    type_in(&mut desk, "24");
+    assert_eq!(desk.rig().face_cut(Uid(99)), Some(FaceCut { bones: 24, groups: None }));
+    assert!(desk.app.world().get::<FaceJob>(mesh).is_none(), "there is no face yet that is placed again");
 }
 
 #[test]
