@@ -14,6 +14,7 @@ use super::{
     fields::{self, TypedText},
     list,
     log::LogSystems,
+    weights::meshes::choose,
 };
 use crate::{
     algo::face::{
@@ -133,6 +134,8 @@ const DENSITIES: RangeInclusive<usize> = 4..=150;
 /// The panel.
 #[derive(Default)]
 pub struct FacePanel {
+    /// Mesh whose face is shown; without a choice, the first one with a face.
+    chosen: Option<Uid>,
     settings: AutoSettings,
     shown: Option<FaceData>,
     /// Strengths while a slider is dragged.
@@ -170,8 +173,8 @@ impl EditorPanel for FacePanel {
         let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
-        let first = world.get::<RigMeshes>(shown.entity).and_then(|meshes| meshes.iter().next());
-        let Some((entity, mesh)) = first.and_then(|entity| Some((entity, world.get::<RigMesh>(entity)?))) else {
+        let meshes = world.get::<RigMeshes>(shown.entity).map(|meshes| meshes.iter().collect()).unwrap_or_default();
+        let Some((entity, mesh)) = self.mesh(ui, world, &shown, meshes) else {
             return list::nothing(ui, "Open a head, or a character with one, to place a face in it.");
         };
         self.renew(&shown, (entity, mesh.uid), world.get::<Face>(entity));
@@ -201,6 +204,34 @@ impl EditorPanel for FacePanel {
 }
 
 impl FacePanel {
+    /// The mesh that was chosen, else the first one with a face, else the first one; draws the choice where there are several.
+    fn mesh<'w>(
+        &mut self,
+        ui: &mut Ui,
+        world: &'w World,
+        shown: &DisplayedRig,
+        meshes: Vec<Entity>,
+    ) -> Option<(Entity, &'w RigMesh)> {
+        let meshes: Vec<(Entity, &RigMesh)> =
+            meshes.into_iter().filter_map(|entity| Some((entity, world.get::<RigMesh>(entity)?))).collect();
+        let has_face = |entity: Entity, mesh: &RigMesh| {
+            world.get::<Face>(entity).is_some() || shown.rig.face_cut(mesh.uid).is_some()
+        };
+        let chosen = meshes.iter().find(|(_, mesh)| Some(mesh.uid) == self.chosen);
+        let first = || meshes.iter().find(|(entity, mesh)| has_face(*entity, mesh)).or_else(|| meshes.first());
+        let (mut entity, mut mesh) = *chosen.or_else(first)?;
+        if meshes.len() > 1 {
+            let mut next = mesh.uid;
+            choose(ui, "Mesh", meshes.iter().map(|(_, mesh)| *mesh), &mut next);
+            if let Some(other) = meshes.iter().find(|(_, mesh)| mesh.uid == next).filter(|_| next != mesh.uid) {
+                (entity, mesh) = *other;
+                self.chosen = Some(next);
+                (self.held, self.is_placing) = (None, false);
+            }
+        }
+        Some((entity, mesh))
+    }
+
     /// Reads the rig's face again if the rig has changed. The settings go on from the face of a mesh that is shown anew, and
     /// follow the density and grouping of the document.
     fn renew(&mut self, shown: &DisplayedRig, (mesh, uid): (Entity, Uid), face: Option<&Face>) {
