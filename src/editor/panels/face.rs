@@ -173,7 +173,8 @@ impl EditorPanel for FacePanel {
         let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
-        let meshes = world.get::<RigMeshes>(shown.entity).map(|meshes| meshes.iter().collect()).unwrap_or_default();
+        let meshes = world.get::<RigMeshes>(shown.entity);
+        let meshes: Vec<Entity> = meshes.map(|meshes| meshes.iter().collect()).unwrap_or_default();
         let Some((entity, mesh)) = self.mesh(ui, world, &shown, meshes) else {
             return list::nothing(ui, "Open a head, or a character with one, to place a face in it.");
         };
