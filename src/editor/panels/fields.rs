@@ -132,7 +132,7 @@ enum NumberError {
     #[error("{0} is no weight; write one from 0 to 1")]
     NoWeight(f32),
     /// The number lies beyond the ends of its field.
-    #[error("{number} is none of its numbers; write one {}", ends(.low, .high))]
+    #[error("{number} is none of its numbers; write one {}", ends(low, high))]
     Outside {
         /// The number.
         number: f64,

@@ -23,7 +23,7 @@ pub(super) enum ClickWish {
     Pick(PickRequest),
     /// Click on the mesh, a joint or a control.
     Click {
-        /// What the click meets.
+        /// Pick of what the click meets; `None` beside all.
         pick: Option<Pick>,
         held: ModifierKeys,
         /// Number of clicks in a row.

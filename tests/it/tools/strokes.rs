@@ -55,14 +55,15 @@ fn what_is_previewed_is_what_is_taken() {
 #[derive(Resource, Default)]
 struct Told(Vec<String>);
 
+fn keep(mut notices: MessageReader<Notice>, mut told: ResMut<Told>) {
+    told.0.extend(notices.read().map(|notice| notice.text.clone()));
+}
+
 /// The bar under a preview takes whole texts, and tells numbers that it does not take.
 #[test]
 fn wrong_numbers_of_the_bar_are_told() {
     let mut bench = RigBench::with_body(Mode::Stroke);
     bench.preview(&ARM);
-    let keep = |mut notices: MessageReader<Notice>, mut told: ResMut<Told>| {
-        told.0.extend(notices.read().map(|notice| notice.text.clone()));
-    };
     bench.app.init_resource::<Told>().add_systems(Last, keep);
     bench.frames(3);
     let RigBench { app, rig } = bench;

@@ -115,8 +115,8 @@ fn rate(ui: &mut Ui, chosen: &mut Option<f32>, requests: &mut Requests) -> bool 
         .on_hover_text("The clip has a frame rate of its own; without, it has that of the file, but at most 60");
     *chosen = is_own.then(|| chosen.unwrap_or(FIRST_RATE));
     let Some(rate) = chosen else { return false };
-    let number = DragValue::new(rate).range(1.0..=1000.0).speed(0.2).max_decimals(3).update_while_editing(false);
     let (typed, said) = (TypedText::default(), "Frames a second of the clip");
+    let number = DragValue::new(rate).range(1.0..=1000.0).speed(0.2).max_decimals(3).update_while_editing(false);
     let field = typed_field(ui, said, number.custom_parser(typed.reader(1.0..=1000.0, "")));
     let field = field.on_hover_text("Frames a second that the clip gets");
     typed.tell(&field, said, requests);
