@@ -22,9 +22,10 @@ use crate::{
     algo::face::expression::{ExpressionSet, vrm_mixes},
     editor::counts::counted,
     files::{
-        DocumentBase, FileKind, LoadError, RealDisk, StoreError, TemplateOrigin, is_template_of, load_animation,
-        load_model, load_packed_clips, load_rig_text, load_skin, load_template, stem, store_animation, store_avatar,
-        store_document_over, store_model, store_packed_clips, store_rig_from, store_skin,
+        Disk, DocumentBase, FileKind, LoadError, RealDisk, StopSign, StoppableDisk, StoreError, TemplateOrigin,
+        is_template_of, load_animation, load_model, load_packed_clips, load_rig_text, load_skin, load_template, stem,
+        store_animation, store_avatar, store_document_over, store_model, store_packed_clips, store_rig_from,
+        store_skin,
     },
     instance::RigSource,
     mesh::{gltf::GltfWriteSettings, model::Model},
@@ -105,10 +106,13 @@ pub(super) fn export(world: &mut World, path: PathBuf) {
     let options = world.get_resource::<ExportOptions>().cloned().unwrap_or_default();
     let FaceExpressions(expressions) = world.get_resource().cloned().unwrap_or_default();
     let names = animated_names(world, &data);
+    let sign = StopSign::default();
+    let heeded = sign.clone();
     let task = spawn(move || {
+        let disk = StoppableDisk::new(&RealDisk, heeded);
         let (built, base) = (built.as_deref(), DocumentBase { rig: base.as_deref(), parts: &parts });
         let (mesh, expressions, names) = (mesh.as_ref(), &*expressions, &names);
-        let source = ExportSource { rig: &data, built, modules: &modules, expressions, mesh, base, names };
+        let source = ExportSource { disk: &disk, rig: &data, built, modules: &modules, expressions, mesh, base, names };
         let mut notes = source.write(&path, template.as_deref(), &options)?;
         if more > 0 {
             notes.push(format!("only the first mesh was exported; {more} more are open"));
@@ -121,11 +125,12 @@ pub(super) fn export(world: &mut World, path: PathBuf) {
         let template = is_followed.then(|| (path, Arc::new(data)));
         Ok(SavedContent::Export { checked, notes, template })
     });
-    world.resource_mut::<SaveJob>().begin(Job { name, rig, step, task, then: None });
+    world.resource_mut::<SaveJob>().begin(Job { name, rig, step, task, sign, then: None });
 }
 
 /// Document that is exported.
 struct ExportSource<'a> {
+    disk: &'a dyn Disk,
     rig: &'a Rig,
     built: Option<&'a BuiltRig>,
     modules: &'a Arc<Modules>,
@@ -157,19 +162,19 @@ impl ExportSource<'_> {
                 // Without weights no joint deforms, and none would be written.
                 let is_bare = mesh.is_none_or(|mesh| rig.skin(mesh.uid).is_none());
                 let settings = GltfWriteSettings { all_joints: is_bare, ..default() };
-                notes.extend(store_model(&RealDisk, path, &model, &settings)?);
+                notes.extend(store_model(self.disk, path, &model, &settings)?);
                 Ok(notes)
             }
             Some(FileKind::Animation) if rig.clips().is_empty() => Err(WriteError::NoClips),
             Some(FileKind::Animation) => {
                 let mut clips = rig.clips().to_vec();
                 clips.iter_mut().for_each(|clip| clip.names.extend(self.names));
-                store_animation(&RealDisk, path, rig, self.built, &clips)?;
+                store_animation(self.disk, path, rig, self.built, &clips)?;
                 Ok(Vec::new())
             }
             Some(FileKind::PackedClips) if rig.clips().is_empty() => Err(WriteError::NoClips),
             Some(FileKind::PackedClips) => {
-                store_packed_clips(&RealDisk, path, &packed_clips(rig, self.built, self.modules)?)?;
+                store_packed_clips(self.disk, path, &packed_clips(rig, self.built, self.modules)?)?;
                 Ok(Vec::new())
             }
             Some(FileKind::Template | FileKind::RigText) => {
@@ -183,7 +188,7 @@ impl ExportSource<'_> {
                 let joints = SkinJoint::list(rig, skin);
                 let file = SkinFile::new(joints, skin.weights.clone(), &mesh.rest.points, &mesh.triangles, true);
                 let file = file?;
-                store_skin(&RealDisk, path, &file)?;
+                store_skin(self.disk, path, &file)?;
                 Ok(Vec::new())
             }
             _ => Err(WriteError::Ending),
@@ -193,11 +198,11 @@ impl ExportSource<'_> {
     /// Saves the rig over its template. One that is in no file yet keeps the parts of the template of Rigsmith that it was made
     /// from, by a fit for example.
     fn store_rig(&self, path: &Path, sources: &[&Path]) -> Result<Vec<String>, StoreError> {
-        let is_known = sources.iter().any(|source| is_template_of(&RealDisk, source, self.rig.uid()));
+        let is_known = sources.iter().any(|source| is_template_of(self.disk, source, self.rig.uid()));
         let is_first = FileKind::of(path) == Some(FileKind::Template) && !is_known;
         match is_first.then(|| TemplateOrigin::of(self.rig)).flatten() {
-            Some(origin) => store_rig_from(&RealDisk, path, self.rig, &origin),
-            None => store_document_over(&RealDisk, path, self.rig, self.base, sources),
+            Some(origin) => store_rig_from(self.disk, path, self.rig, &origin),
+            None => store_document_over(self.disk, path, self.rig, self.base, sources),
         }
     }
 
@@ -246,7 +251,7 @@ impl ExportSource<'_> {
         let made = make_avatar(&mut model, &source, meta, &recipes)?;
         // Bones of the human are written whether skin hangs on them or not.
         let settings = GltfWriteSettings { all_joints: true, ..default() };
-        store_avatar(&RealDisk, path, &model, &made.avatar, &settings)?;
+        store_avatar(self.disk, path, &model, &made.avatar, &settings)?;
         Ok(made.notes)
     }
 }

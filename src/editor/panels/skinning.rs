@@ -272,15 +272,15 @@ fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
             let typed = TypedText::default();
             let slider = Slider::new(&mut next.0.smoothing, 0.25..=4.0).logarithmic(true).max_decimals(2);
             let slider = slider.update_while_editing(false).custom_parser(typed.reader(0.25..=4.0, ""));
-            let field = ui.add(slider).on_hover_text("Width of the blend between joints: 1 is usual, less is stiffer");
-            fields::named(ui, field.id, "Smoothing");
+            let field = fields::typed_field(ui, "Smoothing", slider);
+            let field = field.on_hover_text("Width of the blend between joints: 1 is usual, less is stiffer");
             typed.tell(&field, "Smoothing", requests);
         });
         fields::labelled(ui, "Influences", |ui| {
             let typed = TypedText::default();
             let field = DragValue::new(&mut next.0.max_influences).range(1..=16).speed(0.05);
-            let field = ui.add(field.update_while_editing(false).custom_parser(typed.reader(1.0..=16.0, "")));
-            fields::named(ui, field.id, "Influences");
+            let field = field.update_while_editing(false).custom_parser(typed.whole_reader(1.0..=16.0, ""));
+            let field = fields::typed_field(ui, "Influences", field);
             typed.tell(&field, "Influences", requests);
             field.on_hover_text("The largest number of joints that move one point; many games allow 4");
         });
@@ -292,8 +292,8 @@ fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
         fields::labelled(ui, "Voxels", |ui| {
             let typed = TypedText::default();
             let field = DragValue::new(&mut next.0.voxel_resolution).range(32..=1024).speed(2.0);
-            let field = ui.add(field.update_while_editing(false).custom_parser(typed.reader(32.0..=1024.0, "")));
-            fields::named(ui, field.id, "Voxels");
+            let field = field.update_while_editing(false).custom_parser(typed.whole_reader(32.0..=1024.0, ""));
+            let field = fields::typed_field(ui, "Voxels", field);
             typed.tell(&field, "Voxels", requests);
             field.on_hover_text("Voxels along the longest side, where voxels are used");
         });

@@ -63,6 +63,7 @@ fn wrong_numbers_of_the_settings_are_told() {
     let wrong = [
         ("Voxels", "5000", "Voxels stays as it was: 5000 is none of its numbers; write one from 32 to 1024."),
         ("Voxels", "many", "Voxels stays as it was: \"many\" is no number; write one such as 1.5 or -20."),
+        ("Influences", "2.5", "Influences stays as it was: 2.5 is no whole number; write one such as 3."),
         ("Influences", "0", "Influences stays as it was: 0 is none of its numbers; write one from 1 to 16."),
     ];
     for (field, text, words) in wrong {
@@ -77,6 +78,12 @@ fn wrong_numbers_of_the_settings_are_told() {
             .map(|last| (last.notice.text.clone(), last.times));
         assert_eq!(last, Some((words.to_owned(), 1)));
     }
+    // Escape leaves a text behind, for good.
+    desk.click("Voxels");
+    desk.type_text("48");
+    desk.key(Key::Escape);
+    desk.frames(3);
+    assert_eq!(settings(&desk), before);
     type_into(&mut desk, "Voxels", "64");
     type_into(&mut desk, "Influences", "3");
     assert_eq!((settings(&desk).voxel_resolution, settings(&desk).max_influences), (64, 3));
