@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use bevy::math::Vec3A;
 use clap::{Args, ValueEnum};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs, build, limits, positive, progress::spinning,
@@ -301,7 +301,14 @@ fn describe(clips: &[RigClip], report: &mut Report) {
             counted(clip.key_count(), "key", "keys")
         ));
     }
-    report.set("clips", clips.iter().map(clip).collect::<Vec<_>>());
+    let told: Vec<Value> = clips.iter().map(clip).collect();
+    // A single clip is told without a list, too.
+    if let [only] = &told[..] {
+        for field in ["seconds", "tracks"] {
+            report.set(field, only[field].clone());
+        }
+    }
+    report.set("clips", told);
 }
 
 /// Character of the rig's own file, with its mesh and weights; `None` if the rig is no model or has no mesh, or if

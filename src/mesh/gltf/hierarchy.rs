@@ -59,12 +59,15 @@ impl Hierarchy {
                 needed[parent] = true;
             }
         }
+        // A file of motion alone has a skeleton, of which some joints may be still.
+        let is_motion_alone = document.skins.is_empty() && document.nodes.iter().all(|entry| entry.mesh.is_none());
         let (mut kept, mut carrier) = (vec![None; count], vec![None; count]);
         let mut next = 0;
         for &node in &order {
             if let Some(parent) = parents[node] {
                 visible[node] |= visible[parent];
                 moves[node] |= moves[parent];
+                needed[node] |= is_motion_alone && needed[parent] && !document.nodes[node].camera;
             }
             if needed[node] {
                 kept[node] = Some(next);
