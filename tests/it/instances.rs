@@ -5,6 +5,7 @@ mod faces;
 mod file_clips;
 mod kept_clips;
 mod meshes;
+mod moved_tags;
 mod reloads;
 mod saves;
 mod work;
