@@ -180,8 +180,8 @@ fn each_field_of_an_instance_is_taken_over() {
         assert_ne!(file, BASE, "{name}");
         let folder = folder(&file, &mine());
         let (text, said) = updated(folder.path(), &[]);
-        assert!(said.contains(&format!("part index {field}")), "{name}: {said}");
-        assert!(!said.contains('#'), "{name}: labels identify, so that no uid is told: {said}");
+        let is_told = said.contains(&format!("part index {field}"));
+        assert!(is_told && !said.contains('#'), "{name}, by labels that identify: {said}");
         assert!(text.contains(written) && text.contains(CHANGES.trim()), "{name}: {text}");
         let (_, said) = rigsmith(folder.path(), &["diff", "file.rig.ron", "out.rig.ron"]);
         assert!(said.lines().count() == 1 && said.contains("relative_size"), "{name}: {said}");
@@ -455,6 +455,8 @@ fn parts_that_could_be_several_are_none_of_them() {
     let of = |part: &PartInstance| PartInstance { onto: Vec::new(), ..part.clone() };
     assert_eq!(uids(&[&of(&one)], &[&of(&other)]), [(other.uid, one.uid)], "another name in one place");
     assert!(uids(&[&of(&one)], &[&of(&moved)]).is_empty(), "another name in another place");
+    let with = |part: &PartInstance| PartInstance { prefix: "r_".to_owned(), ..of(part) };
+    assert_eq!(uids(&[&with(&one)], &[&with(&moved)]), [(moved.uid, one.uid)], "with one prefix");
     assert!(uids(&[&of(&one), &of(&named("third"))], &[&of(&other)]).is_empty(), "two in one place");
 }
 
