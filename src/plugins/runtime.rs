@@ -111,6 +111,8 @@ pub struct RigRuntime {
     /// Pose offsets of the document that were last passed on.
     posed: BTreeMap<Uid, PoseOffset>,
     valued: AttributeValues,
+    /// True if a document says what the pose and the attribute values are.
+    is_of_document: bool,
     /// True if a control has changed since the last run.
     is_due: bool,
     /// True if the next run writes all entities.
@@ -137,6 +139,7 @@ impl RigRuntime {
             unknown_writes: Vec::new(),
             posed: BTreeMap::new(),
             valued: AttributeValues::new(),
+            is_of_document: false,
             all_due: mode == InstanceMode::Hierarchy,
             state: RigState::with_memory(program, memory),
             mode,
@@ -218,6 +221,7 @@ impl RigRuntime {
     /// Passes on the pose and the attribute values of a document where they differ from the last ones; the rest pose if
     /// `is_posed` is false.
     pub(super) fn pose_from(&mut self, rig: &Rig, is_posed: bool) {
+        self.is_of_document = true;
         let none = BTreeMap::new();
         let pose = if is_posed { rig.pose() } else { &none };
         if self.posed != *pose {
@@ -265,6 +269,7 @@ impl RigRuntime {
         let known = |node: &Uid| before.state.program().node(*node).is_some();
         self.posed = before.posed.iter().filter(|(node, _)| known(node)).map(|(node, at)| (*node, *at)).collect();
         self.valued = before.valued.iter().filter(|(node, _)| known(node)).map(|(n, v)| (*n, v.clone())).collect();
+        self.is_of_document = before.is_of_document;
         self.world = before.world;
         for (slot, from) in carry.nodes().iter().enumerate() {
             let Some((from, entity)) = from.and_then(|from| Some((from, before.entity(from)?))) else { continue };

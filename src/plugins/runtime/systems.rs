@@ -136,6 +136,7 @@ fn gather(
         values,
         driven_writes,
         unknown_writes,
+        is_of_document,
         ..
     } = runtime;
     for (slot, entity) in controls.iter() {
@@ -178,6 +179,11 @@ fn gather(
                 continue;
             };
             found += 1;
+            if values[slot].is_nan() && !*is_of_document && value.is_finite() {
+                // What a game gives to a node of an instance counts from its first value on.
+                state.set_attribute_at(slot, value);
+                *attributes_due = true;
+            }
             if !values[slot].is_nan() && value != values[slot] {
                 if !state.set_attribute_at(slot, value) {
                     driven_writes.push((*entity, slot as u32));
