@@ -29,7 +29,7 @@ use crate::{
         part::PartInstance,
         project,
         skin::{SkinError, SkinFile},
-        template::{self, write_template},
+        template::{self, UidStyle, write_template},
         text::{self, RigTextError},
     },
     solve::packed_clip::PackedSkeleton,
@@ -402,6 +402,21 @@ pub(super) fn save_template(disk: &dyn Disk, path: &Path, text: &str) -> Result<
     }
     verify::template(path, text.as_bytes())?;
     Ok(save_atomic(disk, path, text.as_bytes())?)
+}
+
+/// Saves a rig that had no file as a template that people go on to write: tags of the short form and names where they are
+/// enough, in the layout. Another kind of file, and a rig that such a text cannot say, is saved as by [`store_rig`]. Returns
+/// notes, a sentence each.
+///
+/// # Errors
+/// [`StoreError`]; the former file is unchanged.
+pub fn store_short_rig(disk: &dyn Disk, path: &Path, rig: &Rig) -> Result<Vec<String>, StoreError> {
+    let is_template = FileKind::of(path) == Some(FileKind::Template);
+    let short = if is_template { template::write_short_template(rig) } else { None };
+    let Some(text) = short else { return store_rig(disk, path, rig) };
+    let text = template::format_template(&text, UidStyle::Kept).unwrap_or(text);
+    save_template(disk, path, &text)?;
+    Ok(Vec::new())
 }
 
 /// Saves a rig as `.rig.ron`, or its skeleton as `.rig`. Returns notes about content that the format could not keep, a

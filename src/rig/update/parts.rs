@@ -11,6 +11,7 @@ use std::{
 use super::{
     Change, ChangeKind, Choices, Take,
     fields::{Field, field, joint_title},
+    shown_values::shown_values,
 };
 use crate::rig::{
     Rig, TagData, TagKind, Uid,
@@ -88,7 +89,7 @@ pub fn merge_parts(
         let sides = Sides { base: was.as_ref(), now: &mine, file: &theirs };
         let fields = sides.fields(&now.rig, &file.rig);
         merged.differs |= fields.iter().any(|field| sides.differ(field));
-        let instance = sides.merged(&fields, choices, &mut merged.changes);
+        let instance = sides.merged(&fields, choices, [&now.rig, &file.rig], &mut merged.changes);
         merged.instances.push(instance);
     }
     merged
@@ -183,11 +184,12 @@ impl Sides<'_> {
         list
     }
 
-    /// The instance after the update.
+    /// The instance after the update. Values are told with the names that identify in the `rigs`, now and of the file.
     fn merged(
         &self,
         fields: &[Field<PartInstance>],
         choices: &Choices,
+        rigs: [&Rig; 2],
         changes: &mut Vec<FieldChange>,
     ) -> PartInstance {
         let Self { base, now, file } = *self;
@@ -206,14 +208,15 @@ impl Sides<'_> {
             if !conflict || choices.of(now.uid, Some(&name)) == Take::Theirs {
                 (field.take)(&mut merged, file);
             }
+            let [from, to] = shown_values(&field.name, [mine, theirs], rigs[0], rigs[1]);
             let change = Change {
                 kind: ChangeKind::Changed,
                 uid: now.uid,
                 joint: None,
                 tag: None,
                 field: Some(name),
-                from: mine,
-                to: theirs,
+                from,
+                to,
                 conflict,
             };
             changes.push(FieldChange { change, is_name: field.name == NAME });

@@ -10,15 +10,15 @@ use super::{Change, ChangeKind, TemplateWithParts};
 use crate::rig::{Uid, format::template::quoted, part::PartInstance};
 
 /// Pairs of instances with different uids: the uid in `other`, and the uid of the corresponding instance in `own`. Instances
-/// correspond by their names, by their joints, by their part and the place where it stands, or by their part with prefix and
-/// side, in this order, and each has one counterpart at most. Instances whose uids are written in both files do not
-/// correspond.
+/// correspond by their names, by their joints, by their part and the place where it stands, by their part and side if they have
+/// no names, or by their part, side and a prefix that is not empty, in this order, and each has one counterpart at most.
+/// Instances whose uids are written in both files do not correspond.
 pub fn same_parts(own: &[PartInstance], other: &[PartInstance]) -> BTreeMap<Uid, Uid> {
     let is_in = |list: &[PartInstance], uid: Uid| list.iter().any(|part| part.uid == uid);
     let mut gone: Vec<&PartInstance> = own.iter().filter(|part| !is_in(other, part.uid)).collect();
     let mut come: Vec<&PartInstance> = other.iter().filter(|part| !is_in(own, part.uid)).collect();
-    let rules: [fn(&PartInstance, &PartInstance) -> bool; 4] =
-        [have_one_name, have_one_place, stand_in_one_place, are_of_one_kind];
+    let rules: [fn(&PartInstance, &PartInstance) -> bool; 5] =
+        [have_one_name, have_one_place, stand_in_one_place, are_of_one_kind, have_one_prefix];
     let mut same = BTreeMap::new();
     for rule in rules {
         let are_one = |old: &PartInstance, new: &PartInstance| rule(old, new) && (is_derived(old) || is_derived(new));
@@ -55,6 +55,11 @@ fn stand_in_one_place(old: &PartInstance, new: &PartInstance) -> bool {
 
 fn are_of_one_kind(old: &PartInstance, new: &PartInstance) -> bool {
     old.part == new.part && are_alike(old, new)
+}
+
+/// True for one part whose joints have the same labels, whatever it is called and wherever it hangs.
+fn have_one_prefix(old: &PartInstance, new: &PartInstance) -> bool {
+    !old.prefix.is_empty() && (&old.part, &old.prefix, old.mirror) == (&new.part, &new.prefix, new.mirror)
 }
 
 /// True for two without names, with one prefix and on one side.

@@ -20,7 +20,13 @@ pub(super) fn shown_values(field: &str, values: [Option<String>; 2], now: &Rig, 
 }
 
 fn shown(field: &str, value: &str, names: &NamesOfBoth, rigs: [&Rig; 2]) -> String {
+    let joint_alone = |joint: &str| name_alone(joint, |name| names.find(NameScope::default(), NameKind::Joint, name));
     let kind = match field {
+        // A label with a comma keeps its uid.
+        "onto" => {
+            let joints = value.strip_prefix('[').and_then(|list| list.strip_suffix(']')).unwrap_or(value);
+            return format!("[{}]", joints.split(", ").map(joint_alone).collect::<Vec<_>>().join(", "));
+        }
         "parent" | "mirror" | "joint" => NameKind::Joint,
         "group" => NameKind::Group,
         "feature" => return name_alone(value, |name| features(rigs, name)),
