@@ -18,7 +18,7 @@ use super::{
     report::counted, skin, vrm::AvatarDraft,
 };
 use crate::{
-    files::{FileKind, RealDisk, store_animation, store_model},
+    files::{FileKind, RealDisk, store_animation, store_owned_model},
     headless::{Workbench, posing::PoseError},
     mesh::{
         gltf::GltfWriteSettings,

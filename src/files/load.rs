@@ -233,10 +233,7 @@ pub(super) fn surviving<T: Send>(
 
 /// Runs a reader on this thread, so that a panic in a dependency becomes an error. Memory that was let go of before serves it, while
 /// a thread of its own has a heap of its own.
-pub(super) fn surviving_here<T>(
-    path: &Path,
-    read: impl FnOnce() -> Result<T, LoadError>,
-) -> Result<T, LoadError> {
+pub(super) fn surviving_here<T>(path: &Path, read: impl FnOnce() -> Result<T, LoadError>) -> Result<T, LoadError> {
     catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(LoadError::Broken { path: path.into() }))
 }
 

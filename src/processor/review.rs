@@ -188,13 +188,7 @@ fn with_params(rig: &Rig, running: &Rig, repaired: &Repair) -> Option<Rig> {
 }
 
 /// Problems of a command that are found without running it: in its module, its parameters, or the groups that these name.
-fn survey_before_run(
-    rig: &Rig,
-    names: &RigNameIndex,
-    modules: &Modules,
-    module: &str,
-    params: &str,
-) -> SurveyedParams {
+fn survey_before_run(rig: &Rig, names: &RigNameIndex, modules: &Modules, module: &str, params: &str) -> SurveyedParams {
     let mut survey = survey_params(names, modules, module, params);
     if modules.get(module).is_some() {
         survey.problems.extend(unknown_groups(rig, params).into_iter().map(BuildProblem::Module));
