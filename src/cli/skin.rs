@@ -175,6 +175,7 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
         })?;
         joints.push(uid);
     }
+    drop(labelled);
     let mesh = bench.mesh().ok_or_else(|| Failure::Input("no mesh is open".into()))?;
     let (points, triangles): (Arc<_>, _) = (mesh.rest.clone(), mesh.triangles.clone());
     let weights = if file.fits(&points.points, &triangles) {
