@@ -18,7 +18,7 @@ use super::{
     report::counted, skin, vrm::AvatarDraft,
 };
 use crate::{
-    files::{FileKind, RealDisk, store_animation, store_model},
+    files::{FileKind, RealDisk, store_animation, store_owned_model},
     headless::{Workbench, posing::PoseError},
     mesh::{
         gltf::GltfWriteSettings,
@@ -184,8 +184,8 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
         model.clips = spinning("baking", || exported(args, &bench, &model, &clips, &mut report))?;
         dress(args, &mut model, &mut report);
         match draft {
-            Some((draft, meta)) => draft.store(&mut model, meta, &args.output, &settings, &mut report)?,
-            None => report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?),
+            Some((draft, meta)) => draft.store(model, meta, &args.output, &settings, &mut report)?,
+            None => report.notes(spinning("writing", || store_owned_model(&RealDisk, &args.output, model, &settings))?),
         }
     }
     report.line(format!("wrote {}", args.output.display()));

@@ -125,7 +125,7 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
         match meta {
             Some(meta) => {
                 let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
-                draft.store(&mut model, meta, output, &settings, report)?;
+                draft.store(model, meta, output, &settings, report)?;
                 Vec::new()
             }
             None => {

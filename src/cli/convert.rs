@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, limits, progress::spinning, skin::load_rig};
 use crate::{
-    files::{FileKind, RealDisk, stem, store_model, store_owned_model, store_rig, store_rig_over},
+    files::{FileKind, RealDisk, stem, store_owned_model, store_rig, store_rig_over},
     mesh::{gltf::GltfWriteSettings, model::Model},
     rig::{
         BuiltRig, Rig, UidSource,
@@ -38,7 +38,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
             report.notes(model.notes.iter().cloned());
             // Points without weights in the input stay unmoved in the only way that glTF offers: bound to the root.
             let settings = GltfWriteSettings { bind_unweighted: true, ..args.export.settings() };
-            spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?
+            spinning("writing", || store_owned_model(&RealDisk, &args.output, model, &settings))?
         }
         (Some(Gltf | Glb | Vrm), Some(RigText | Template)) => {
             let model = limits::load_model(&args.input)?;

@@ -231,7 +231,7 @@ fn write_character(
     match meta {
         Some(meta) => {
             let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
-            draft.store(&mut model, meta, &args.output, &settings, report)?;
+            draft.store(model, meta, &args.output, &settings, report)?;
         }
         None if is_plain => {
             report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);

@@ -187,7 +187,7 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
         match args.vrm.meta(bench.rig(), &args.output)? {
             Some(meta) => {
                 let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
-                draft.store(&mut model, meta, &args.output, &settings, &mut report)?;
+                draft.store(model, meta, &args.output, &settings, &mut report)?;
             }
             None => report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?),
         }

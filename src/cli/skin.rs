@@ -149,8 +149,9 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
     let file = load_skin(&RealDisk, path)?;
     let rig = bench.rig();
     let mut joints = Vec::with_capacity(file.joints().len());
+    let labelled = rig.joints_by_label();
     let found = |joint: &SkinJoint| {
-        let by_label = || rig.find_label(&joint.label).filter(|_| !joint.label.is_empty());
+        let by_label = || labelled.get(joint.label.as_str()).copied().filter(|_| !joint.label.is_empty());
         Some(Uid(joint.uid)).filter(|uid| rig.joint(*uid).is_some()).or_else(by_label)
     };
     // A joint that a command created is not in the document: its weights go to the joint that it was made for.
@@ -174,6 +175,7 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
         })?;
         joints.push(uid);
     }
+    drop(labelled);
     let mesh = bench.mesh().ok_or_else(|| Failure::Input("no mesh is open".into()))?;
     let (points, triangles): (Arc<_>, _) = (mesh.rest.clone(), mesh.triangles.clone());
     let weights = if file.fits(&points.points, &triangles) {

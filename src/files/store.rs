@@ -247,14 +247,15 @@ fn model_set(
     Ok((set, notes))
 }
 
-/// Saves an avatar as `.vrm`, after reading back what is to be written.
+/// Saves an avatar as `.vrm`, after reading back what is to be written. A model that is handed over, not lent, is dropped before:
+/// reading back takes as much memory as the model.
 ///
 /// # Errors
 /// [`StoreError`]; the former file is unchanged.
 pub fn store_avatar(
     disk: &dyn Disk,
     path: &Path,
-    model: &Model,
+    model: impl Borrow<Model>,
     avatar: &Avatar,
     settings: &GltfWriteSettings,
 ) -> Result<(), StoreError> {
@@ -262,9 +263,11 @@ pub fn store_avatar(
         return Err(StoreError::Kind { path: path.into(), wanted: "an avatar is saved as .vrm" });
     }
     let mut set = FileSet::new(path);
-    let bytes = write_vrm(model, avatar, settings);
+    let bytes = write_vrm(model.borrow(), avatar, settings);
     set.finish(bytes.map_err(|source| StoreError::Gltf { path: path.into(), source })?);
-    verify::model(&set, ModelCounts::of(model))?;
+    let counts = ModelCounts::of(model.borrow());
+    drop(model);
+    verify::model(&set, counts)?;
     verify::avatar(&set, avatar)?;
     Ok(save_set(disk, &set)?)
 }

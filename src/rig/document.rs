@@ -242,6 +242,17 @@ impl Rig {
         self.walk().find(|joint| joint.data.label.as_deref() == Some(label)).map(|joint| joint.data.uid)
     }
 
+    /// The joint that [`Rig::find_label`] finds for each label: for many look-ups while the rig stays as it is.
+    pub fn joints_by_label(&self) -> HashMap<&str, Uid> {
+        let mut joints = HashMap::with_capacity(self.joints.len());
+        for joint in self.walk() {
+            if let Some(label) = joint.data.label.as_deref() {
+                joints.entry(label).or_insert(joint.data.uid);
+            }
+        }
+        joints
+    }
+
     /// Position of a joint in the rig's space, at rest.
     pub fn position(&self, uid: Uid) -> Vec3 {
         self.rest_global(uid).translation

@@ -223,6 +223,7 @@ mod tools;
 mod transfer;
 #[cfg(feature = "editor")]
 mod typing;
+mod unknown_names;
 mod update;
 #[cfg(feature = "editor")]
 mod updater;

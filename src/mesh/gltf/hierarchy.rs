@@ -99,7 +99,7 @@ impl Hierarchy {
     /// The model's nodes.
     pub(super) fn kept_nodes(&self, source: &Source) -> Result<Vec<Node>, GltfError> {
         let Source { document, budget, .. } = source;
-        let mut nodes = Vec::new();
+        let mut nodes = Vec::with_capacity(self.kept.iter().flatten().count());
         for &node in self.order.iter().filter(|&&node| self.kept[node].is_some()) {
             let entry = &document.nodes[node];
             let extras = entry.at.map.get("extras");

@@ -1,6 +1,10 @@
 //! Index of the names in a rig, for many look-ups while the rig stays as it is.
 
-use std::{borrow::Cow, cell::OnceCell, collections::HashMap};
+use std::{
+    borrow::Cow,
+    cell::{Cell, OnceCell},
+    collections::HashMap,
+};
 
 use super::{
     GroupScope, NameKind, NameScope, Names,
@@ -8,12 +12,19 @@ use super::{
 };
 use crate::rig::{Rig, Uid};
 
-/// Names of a rig, sorted when one is first looked up: [`Names`] of the rig itself walk through it for each name.
+/// Number of names that are compared with unknown ones for suggestions, by one index: each unknown name is compared with all.
+pub const MOST_COMPARED: usize = 200_000;
+
+/// Names of a rig, sorted when one is first looked up: [`Names`] of the rig itself walk through it for each name. An index
+/// that has listed [`MOST_COMPARED`] names for suggestions lists none any more, so that thousands of unknown names cost no more
+/// than a few.
 pub struct RigNameIndex<'a> {
     rig: &'a Rig,
     joints: OnceCell<HashMap<String, Vec<Uid>>>,
     bearers: OnceCell<HashMap<String, Vec<(Option<Uid>, Uid)>>>,
     commands: OnceCell<CommandNames>,
+    /// Number of names that were listed for suggestions.
+    compared: Cell<usize>,
 }
 
 /// Commands by their names.
@@ -28,7 +39,8 @@ struct CommandNames {
 impl<'a> RigNameIndex<'a> {
     /// Index of a rig.
     pub fn new(rig: &'a Rig) -> Self {
-        Self { rig, joints: OnceCell::new(), bearers: OnceCell::new(), commands: OnceCell::new() }
+        let (joints, bearers, commands) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
+        Self { rig, joints, bearers, commands, compared: Cell::new(0) }
     }
 
     fn joints(&self, label: &str) -> &[Uid] {
@@ -113,6 +125,11 @@ impl Names for RigNameIndex<'_> {
     }
 
     fn all(&self, scope: NameScope, kind: NameKind) -> Vec<Cow<'_, str>> {
-        self.rig.all(scope, kind)
+        if self.compared.get() >= MOST_COMPARED {
+            return Vec::new();
+        }
+        let all = self.rig.all(scope, kind);
+        self.compared.set(self.compared.get() + all.len());
+        all
     }
 }

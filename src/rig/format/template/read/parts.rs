@@ -39,15 +39,19 @@ pub(super) fn chains(
     notes: &mut Vec<String>,
 ) -> Vec<PartChain> {
     let mut known: Vec<PartChain> = Vec::with_capacity(chains.len() + branches.len());
+    if chains.is_empty() && branches.is_empty() {
+        return known;
+    }
+    let by_label = rig.joints_by_label();
+    let mut names: HashSet<String> = HashSet::new();
+    // Joints of chains and of branches.
+    let mut taken: [HashSet<Uid>; 2] = Default::default();
     let files = chains.into_iter().map(|file| (file, false)).chain(branches.into_iter().map(|file| (file, true)));
     for (ChainFile { name, joints: labels, min, max }, is_fan) in files {
-        let joints: Vec<Uid> = labels.iter().filter_map(|label| rig.find_label(label)).collect();
+        let joints: Vec<Uid> = labels.iter().filter_map(|label| by_label.get(label.as_str()).copied()).collect();
         let (min, max) = (min.unwrap_or(1), max.unwrap_or(MOST_JOINTS));
         let parent = |joint: Uid| rig.joint(joint).and_then(|joint| joint.parent);
-        let is_taken = |chain: &PartChain| {
-            let shares = chain.joints.iter().any(|of| joints.contains(of));
-            chain.name == name || (shares && chain.is_fan == is_fan)
-        };
+        let of_kind = &mut taken[usize::from(is_fan)];
         let fault = if joints.len() != labels.len() || joints.len() < 2 {
             "it needs two joints or more, all of them in the file".to_owned()
         } else if !is_fan && joints.windows(2).any(|pair| parent(pair[1]) != Some(pair[0])) {
@@ -56,9 +60,11 @@ pub(super) fn chains(
             "all of its joints must hang on one joint".to_owned()
         } else if !(1..=joints.len()).contains(&min) || !(joints.len()..=MOST_JOINTS).contains(&max) {
             format!("`min` is 1 to {0}, and `max` {0} to {MOST_JOINTS}, for its {0} joints", joints.len())
-        } else if known.iter().any(is_taken) {
+        } else if names.contains(&name) || joints.iter().any(|joint| of_kind.contains(joint)) {
             "another has its name or one of its joints".to_owned()
         } else {
+            names.insert(name.clone());
+            of_kind.extend(&joints);
             known.push(PartChain { name, joints, min, max, is_fan });
             continue;
         };
