@@ -11,7 +11,7 @@ use std::{
 use super::{
     Change, ChangeKind, Choices, Take,
     fields::{Field, field, joint_title},
-    shown_values::shown_values,
+    shown_values::{NamesOfBoth, shown_values},
 };
 use crate::rig::{
     Rig, TagData, TagKind, Uid,
@@ -78,6 +78,7 @@ pub fn merge_parts(
     choices: &Choices,
 ) -> MergedParts {
     let mut merged = MergedParts::default();
+    let names = NamesOfBoth::new(&now.rig, &file.rig);
     for instance in &now.template.parts {
         let Some(theirs) = file.by_uids(instance.uid) else { continue };
         let was = base.and_then(|base| base.by_uids(instance.uid));
@@ -89,7 +90,7 @@ pub fn merge_parts(
         let sides = Sides { base: was.as_ref(), now: &mine, file: &theirs };
         let fields = sides.fields(&now.rig, &file.rig);
         merged.differs |= fields.iter().any(|field| sides.differ(field));
-        let instance = sides.merged(&fields, choices, [&now.rig, &file.rig], &mut merged.changes);
+        let instance = sides.merged(&fields, choices, &names, &mut merged.changes);
         merged.instances.push(instance);
     }
     merged
@@ -184,12 +185,12 @@ impl Sides<'_> {
         list
     }
 
-    /// The instance after the update. Values are told with the names that identify in the `rigs`, now and of the file.
+    /// The instance after the update. Values are told with the `names` that identify now and in the file.
     fn merged(
         &self,
         fields: &[Field<PartInstance>],
         choices: &Choices,
-        rigs: [&Rig; 2],
+        names: &NamesOfBoth,
         changes: &mut Vec<FieldChange>,
     ) -> PartInstance {
         let Self { base, now, file } = *self;
@@ -208,7 +209,7 @@ impl Sides<'_> {
             if !conflict || choices.of(now.uid, Some(&name)) == Take::Theirs {
                 (field.take)(&mut merged, file);
             }
-            let [from, to] = shown_values(&field.name, [mine, theirs], rigs[0], rigs[1]);
+            let [from, to] = shown_values(&field.name, [mine, theirs], names);
             let change = Change {
                 kind: ChangeKind::Changed,
                 uid: now.uid,
