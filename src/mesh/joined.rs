@@ -6,9 +6,9 @@ use super::{
 };
 
 impl Model {
-    /// Appends the meshes of a model that has the same nodes: objects, points, materials, bind poses, weights and clips. Equal bind
-    /// poses are shared; clips of one name stay two. The name and the nodes stay; a node that is a joint in one of the models is
-    /// one in the result.
+    /// Appends the meshes of a model that has the same nodes: objects, points, materials, bind poses, weights and clips.
+    /// Equal bind poses are shared; clips of one name stay two. The name and the nodes stay; a node that is a joint in one
+    /// of the models is one in the result.
     ///
     /// Both models together have less than 2^32 points. Linear in their size.
     pub fn append(&mut self, other: Self) {
