@@ -103,7 +103,7 @@ fn all_meshes_are_in_one_exported_file() {
     for name in ["both.glb", "both.gltf"] {
         let path = window.export(name);
         let model = load_model(&RealDisk, &path).expect("a model");
-        let wanted = [("body", 0.0, &labels[0]), ("coat", 10.0, &labels[1])]
+        let wanted = [("body", 0.0_f32, &labels[0]), ("coat", 10.0, &labels[1])]
             .map(|(name, x, label)| (name.to_owned(), name.to_owned(), x, vec![label.clone()]));
         assert_eq!(objects(&model), wanted, "{name}");
         assert_eq!(model.skins.len(), 1, "both have one bind pose");
