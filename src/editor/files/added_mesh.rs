@@ -60,11 +60,13 @@ pub(super) fn add(world: &mut World, name: &str, mut opened: LoadedDocument) {
         (false, _) => format!("Added {name} with its weights"),
         (true, true) => format!("Added {name}"),
         (true, false) if is_lost => {
-            format!("Added {name} without its weights, which are for joints of other names: Skin binds all meshes")
+            format!(
+                "Added {name} without its weights, which are for joints of other names: the Skinning panel binds it"
+            )
         }
-        (true, false) => format!("Added {name}: Skin binds all meshes"),
+        (true, false) => format!("Added {name}: the Skinning panel binds it"),
     };
-    land(world, entity, opened, Notice::done(told));
+    land(world, entity, opened, Notice::done(told).at("Skinning"));
     if !edits.is_empty() {
         let operation = Operation::Named { name: "Add mesh", edits };
         world.write_message(EditRequest::operation(entity, operation));

@@ -226,7 +226,8 @@ impl ExportSource<'_> {
         let is_loose = |mesh: &RigMesh| !is_bound(mesh) && mesh.file.objects.iter().any(|object| object.node.is_none());
         let names: Vec<&str> =
             self.meshes.iter().filter(|mesh| is_loose(mesh)).map(|mesh| mesh.file.name.as_str()).collect();
-        let note = || format!("joints do not move {}, without weights; Skin binds all meshes", listed(&names, "and"));
+        let note =
+            || format!("joints do not move {}, without weights; the Skinning panel binds it", listed(&names, "and"));
         (!names.is_empty()).then(note).into_iter().collect()
     }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use rigsmith::{
-    editor::files::RemoveMeshRequest,
+    editor::{files::RemoveMeshRequest, next_step::next_step},
     mesh::model::{Model, Weights},
     rig::SkinData,
 };
@@ -87,6 +87,8 @@ fn all_meshes_are_in_one_exported_file() {
     let folder = folder();
     let (mut window, [body, coat]) = dressed(folder.path());
     window.bind(body.0, body.1);
+    let next = next_step(window.world()).expect("a next step");
+    assert!(next.starts_with("coat has no weights yet"), "{next}");
     let path = window.export("half.glb");
     let loose = "joints do not move \"coat\", without weights";
     assert!(window.notices.include(Severity::Warning, loose), "{:?}", window.notices.list);
@@ -96,6 +98,7 @@ fn all_meshes_are_in_one_exported_file() {
     assert_eq!(skins.len(), 2, "a mesh without weights is there, too");
 
     window.bind(coat.0, coat.1);
+    assert!(next_step(window.world()).is_some_and(|next| !next.contains("coat")));
     let labels: Vec<String> = [body.1, coat.1]
         .iter()
         .map(|joint| window.rig().joint(*joint).and_then(|joint| joint.data.label.clone()).expect("a label"))
@@ -133,7 +136,9 @@ fn all_meshes_are_in_one_exported_file() {
 fn added_meshes_are_saved_recovered_and_removed() {
     let folder = folder();
     let (mut window, [_, coat]) = dressed(folder.path());
-    assert!(window.is_unsaved() && window.notices.include(Severity::Done, "Added coat.obj: Skin binds all meshes"));
+    assert!(
+        window.is_unsaved() && window.notices.include(Severity::Done, "Added coat.obj: the Skinning panel binds it")
+    );
     window.bind(coat.0, coat.1);
     let project = window.save_as("dressed.rigsmith.ron");
     assert!(!window.is_unsaved(), "{:?}", window.notices.list);
