@@ -26,6 +26,7 @@ mod new;
 mod outputs;
 mod pose;
 mod progress;
+mod project_meshes;
 #[cfg(feature = "remote")]
 mod remote;
 #[cfg(feature = "render")]

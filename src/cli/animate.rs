@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs, build, limits, positive, progress::spinning,
-    report::counted, skin, vrm::AvatarDraft,
+    project_meshes::own_meshes, report::counted, skin, vrm::AvatarDraft,
 };
 use crate::{
     files::{FileKind, RealDisk, store_animation, store_owned_model},
@@ -24,7 +24,7 @@ use crate::{
         gltf::GltfWriteSettings,
         model::{Clip, Model, Node},
     },
-    plugins::commands::BuildStep,
+    plugins::{commands::BuildStep, surface::RigMesh},
     rig::{
         BuiltRig, Rig, RigEdit, Uid,
         animation::RigClip,
@@ -50,8 +50,8 @@ pub(super) struct AnimateArgs {
     /// A clip to take from the files, by its name or its number from 1; may be repeated; all, if left out
     #[arg(long = "clip", value_name = "NAME")]
     chosen: Vec<String>,
-    /// A mesh to bind to the rig, for .glb, .vrm and .png; a rig that is a .glb, .gltf or .vrm keeps its own mesh and
-    /// weights in a .glb or .vrm
+    /// A mesh to bind to the rig, for .glb, .vrm and .png; a rig that is a .glb, .gltf, .vrm or project keeps its own meshes
+    /// and weights in a .glb or .vrm
     #[arg(long)]
     mesh: Option<PathBuf>,
     /// A map of joints for motion of another skeleton: a RON list of pairs of names, [("LeftUpLeg", "thigh_l"), ...];
@@ -143,7 +143,7 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     }
     check(args, is_picture)?;
     let mut report = Report::default();
-    let mut rig = read(args, &mut report)?;
+    let (mut rig, mut own) = read(args, &mut report)?;
     let meta = args.vrm.meta(&rig, &args.output)?;
     let is_motion = args.clips.iter().any(|clip| is_motion(clip));
     let has_commands = rig.walk().any(|joint| !joint.data.tags.is_empty());
@@ -178,7 +178,14 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
             Some(model) => {
                 (model, GltfWriteSettings { all_joints: true, bind_unweighted: true, ..args.export.settings() })
             }
-            None => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?,
+            None => match own.len() {
+                0 => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?,
+                1 => {
+                    let mesh = build::MeshSource::Open(Box::new(own.swap_remove(0)));
+                    build::character_with(&mut bench, mesh, &args.weights, &args.export, &mut report)?
+                }
+                _ => build::posed_meshes(&bench, &own, &args.export)?,
+            },
         };
         let draft = meta.map(|meta| (AvatarDraft::new(bench.rig(), bench.built(), &mut model), meta));
         model.clips = spinning("baking", || exported(args, &bench, &model, &clips, &mut report))?;
@@ -253,20 +260,27 @@ fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
     InPlaceArgs::default().check(&inputs, Some(&args.output), &further)
 }
 
-fn read(args: &AnimateArgs, report: &mut Report) -> Result<Rig, Failure> {
+/// The rig, and the meshes that it has in a project where they are to be written.
+fn read(args: &AnimateArgs, report: &mut Report) -> Result<(Rig, Vec<RigMesh>), Failure> {
     match FileKind::of(&args.rig) {
         Some(FileKind::Project) => {}
-        Some(_) => return skin::load_rig(&args.rig, report),
+        Some(_) => return Ok((skin::load_rig(&args.rig, report)?, Vec::new())),
         None => {
             let template = limits::load_template(&args.rig)?;
             report.notes(template.notes);
-            return Ok(template.rig);
+            return Ok((template.rig, Vec::new()));
         }
     }
     let mut project = limits::load_project(&args.rig)?;
+    let is_character = args.mesh.is_none() && FileKind::of(&args.output).is_some_and(FileKind::is_gltf);
+    if is_character {
+        limits::refuse_outside(&project)?;
+    }
     report.notes(project.notes);
     let empty = || Failure::Input(format!("`{}` has no rig to animate", args.rig.display()).into());
-    (!project.rigs.is_empty()).then(|| project.rigs.swap_remove(0)).ok_or_else(empty)
+    let rig = (!project.rigs.is_empty()).then(|| project.rigs.swap_remove(0)).ok_or_else(empty)?;
+    let own = if is_character { own_meshes(project.meshes, &rig, report) } else { Vec::new() };
+    Ok((rig, own))
 }
 
 /// The rig with its joints alone, as it is before any command.

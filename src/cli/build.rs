@@ -32,7 +32,13 @@ use crate::{
         surface::RigMesh,
     },
     processor::{Builder, CommandState, RunReport},
-    rig::{BuiltRig, Rig, Uid, bake::baked, character::mark_joints, operations::Operation, update::edits_between},
+    rig::{
+        BuiltRig, Rig, Uid,
+        bake::baked,
+        character::{Character, character, mark_joints},
+        operations::Operation,
+        update::edits_between,
+    },
     solve::program::{CompileOptions, RigProgram},
 };
 
@@ -305,6 +311,26 @@ pub(super) fn posed_character(
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let joints: Vec<Uid> = baked(bench.rig(), built).walk().map(|joint| joint.data.uid).collect();
     let mut model = own.character();
+    pose(&mut model, &joints, built, &posed);
+    Ok((model, export.settings()))
+}
+
+/// Built skeleton of a workbench as posed, with meshes that have weights in its rig, and the settings for writing it.
+pub(super) fn posed_meshes(
+    bench: &Workbench,
+    meshes: &[RigMesh],
+    export: &ExportArgs,
+) -> Result<(Model, GltfWriteSettings), Failure> {
+    let posed = bench.posed_nodes()?;
+    let (rig, built) = (bench.rig(), bench.built().ok_or(PoseError::NotBuilt)?);
+    let joints: Vec<Uid> = baked(rig, built).walk().map(|joint| joint.data.uid).collect();
+    let model_of = |mesh: &RigMesh| {
+        let skin = rig.skin(mesh.uid).map(Arc::as_ref);
+        character(&Character { rig, built: Some(built), file: &mesh.file, rest: &mesh.rest, nodes: &mesh.nodes, skin })
+    };
+    let mut models = meshes.iter().map(model_of);
+    let Some(mut model) = models.next() else { return posed_skeleton(bench, export) };
+    models.for_each(|more| model.append(more));
     pose(&mut model, &joints, built, &posed);
     Ok((model, export.settings()))
 }

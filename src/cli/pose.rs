@@ -9,12 +9,13 @@ use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
     build::{self, MeshSource},
     limits,
+    project_meshes::own_meshes,
     report::counted,
     skin,
     switches::SwitchArgs,
 };
 use crate::{
-    files::{FileKind, LoadedMesh, MeshState, RealDisk, store_owned_model},
+    files::{FileKind, RealDisk, store_owned_model},
     headless::{
         Workbench,
         posing::{ControlWrite, HeldValue, PoseError},
@@ -115,7 +116,7 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
         ));
     }
     let mut report = Report::default();
-    let (mut rig, own_mesh) = read(args, &mut report)?;
+    let (mut rig, own) = read(args, &mut report)?;
     args.steps.parts.apply(&mut rig)?;
     let mut bench = limits::workbench(rig);
     let held = run_steps(&mut bench, &args.steps, &writes)?;
@@ -130,9 +131,9 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     report.set("error", error);
     if let Some(output) = &args.output {
         if is_picture {
-            picture(args, own_mesh, output, &bench, &mut report)?;
+            picture(args, own, output, &bench, &mut report)?;
         } else {
-            write(args, own_mesh, output, bench, &mut report)?;
+            write(args, own, output, bench, &mut report)?;
         }
         report.line(format!("wrote {}", output.display()));
         report.set("output", output.display().to_string());
@@ -173,9 +174,9 @@ pub(super) fn run_steps(
     Ok(held)
 }
 
-/// The rig, and the mesh that it has in a project.
-fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Option<RigMesh>), Failure> {
-    let mut own_mesh = None;
+/// The rig, and the meshes that it has in a project.
+fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Vec<RigMesh>), Failure> {
+    let mut own = Vec::new();
     let mut rig = if FileKind::of(&args.rig) == Some(FileKind::Project) {
         let mut project = limits::load_project(&args.rig)?;
         if args.mesh.is_none() {
@@ -191,17 +192,15 @@ fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Option<RigMesh>), 
                 .notes
                 .push(format!("the rig \"{}\" of the project is left out: the first one is posed", other.about().name));
         }
-        for LoadedMesh { uid, nodes, shape, .. } in project.meshes.into_iter().filter(|mesh| mesh.rig == rig.uid()) {
-            // The notes mention a missing mesh already.
-            let MeshState::Open { model, .. } = shape else { continue };
-            if own_mesh.is_some() {
-                report.notes.push(format!("the mesh \"{}\" is left out: the rig's first one is posed", model.name));
-                continue;
+        let mut told = Report::default();
+        own = own_meshes(project.meshes, &rig, &mut told);
+        match args.mesh {
+            Some(_) if !own.is_empty() => {
+                own.clear();
+                report.notes.push("--mesh stands in for the mesh of the project".to_owned());
             }
-            own_mesh = Some(RigMesh::new(uid, *model, nodes.to_vec()));
-        }
-        if args.mesh.is_some() && own_mesh.take().is_some() {
-            report.notes.push("--mesh stands in for the mesh of the project".to_owned());
+            Some(_) => {}
+            None => report.notes(told.notes),
         }
         rig
     } else {
@@ -218,13 +217,13 @@ fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Option<RigMesh>), 
         let applied = Operation::ApplyPose(stored).run(&mut rig, &mut uids, None);
         applied.map_err(|error| Failure::Input(Box::new(error)))?;
     }
-    Ok((rig, own_mesh))
+    Ok((rig, own))
 }
 
 /// Writes the character, or the skeleton, in the pose of the entities.
 fn write(
     args: &PoseArgs,
-    own_mesh: Option<RigMesh>,
+    mut own: Vec<RigMesh>,
     output: &Output,
     mut bench: Workbench,
     report: &mut Report,
@@ -246,11 +245,13 @@ fn write(
         report.notes(build::store_built(output, &args.rig, skeleton, has_commands)?);
         return Ok(());
     }
-    let (model, settings) = match own_mesh {
-        Some(mesh) => {
-            build::character_with(&mut bench, MeshSource::Open(Box::new(mesh)), &args.weights, &args.export, report)?
+    let (model, settings) = match own.len() {
+        0 => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, report)?,
+        1 => {
+            let mesh = MeshSource::Open(Box::new(own.swap_remove(0)));
+            build::character_with(&mut bench, mesh, &args.weights, &args.export, report)?
         }
-        None => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, report)?,
+        _ => build::posed_meshes(&bench, &own, &args.export)?,
     };
     // What is written is read back, which takes as much memory again.
     drop(bench);
@@ -261,12 +262,15 @@ fn write(
 #[cfg(feature = "render")]
 fn picture(
     args: &PoseArgs,
-    own_mesh: Option<RigMesh>,
+    own: Vec<RigMesh>,
     output: &Output,
     bench: &Workbench,
     report: &mut Report,
 ) -> Result<(), Failure> {
-    let mesh = match (own_mesh, &args.mesh) {
+    let mut own = own.into_iter();
+    let first = own.next();
+    report.notes.extend(own.map(|mesh| format!("the mesh \"{}\" is not drawn: `render` draws all", mesh.file.name)));
+    let mesh = match (first, &args.mesh) {
         (Some(mesh), _) => Some(MeshSource::Open(Box::new(mesh))),
         (None, Some(path)) => {
             let model = limits::load_model(path)?;
@@ -279,7 +283,7 @@ fn picture(
 }
 
 #[cfg(not(feature = "render"))]
-fn picture(_: &PoseArgs, _: Option<RigMesh>, output: &Output, _: &Workbench, _: &mut Report) -> Result<(), Failure> {
+fn picture(_: &PoseArgs, _: Vec<RigMesh>, output: &Output, _: &Workbench, _: &mut Report) -> Result<(), Failure> {
     let reason = format!("cannot draw `{}`: this program was built without pictures", output.display());
     Err(Failure::Usage(reason))
 }

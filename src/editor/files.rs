@@ -52,7 +52,7 @@ use super::{
 use crate::{
     files::{FileKind, RealDisk, journal::Origin, remove_stale_temps},
     plugins::{RigSystems, journal::JournalTrouble},
-    rig::Rig,
+    rig::{Rig, Uid},
 };
 
 /// Plugin that opens, saves and exports files.
@@ -69,6 +69,7 @@ impl Plugin for FilesPlugin {
             .add_message::<ImportRequest>()
             .add_message::<MapRequest>()
             .add_message::<ExportRequest>()
+            .add_message::<RemoveMeshRequest>()
             .add_message::<WindowCloseRequested>()
             .add_message::<FileDragAndDrop>()
             .init_resource::<LoadJob>()
@@ -119,6 +120,10 @@ pub struct DocumentLanded {
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct ExportRequest(pub PathBuf);
 
+/// Request to remove a mesh, by its uid, from the open rig; its file stays.
+#[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RemoveMeshRequest(pub Uid);
+
 /// Action that follows once unsaved changes are saved or discarded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FollowUp {
@@ -152,11 +157,12 @@ type Inbox<'w, 's> = (
     MessageReader<'w, 's, FileDragAndDrop>,
     MessageReader<'w, 's, JournalTrouble>,
     MessageReader<'w, 's, ExportRequest>,
+    MessageReader<'w, 's, RemoveMeshRequest>,
 );
 
 /// Handles all file actions before this frame's edits, so that the saved state and the journal's count agree.
 pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, 'static>>) {
-    let Ok((mut opens, mut actions, mut answers, mut closes, mut drops, mut troubles, mut exports)) =
+    let Ok((mut opens, mut actions, mut answers, mut closes, mut drops, mut troubles, mut exports, mut removals)) =
         inbox.get_mut(world)
     else {
         return;
@@ -171,6 +177,7 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
     }));
     let troubles: Vec<JournalTrouble> = troubles.read().cloned().collect();
     let exports: Vec<PathBuf> = exports.read().map(|request| request.0.clone()).collect();
+    let removals: Vec<Uid> = removals.read().map(|request| request.0).collect();
     for trouble in troubles {
         world.write_message(match trouble.reason {
             Some(reason) => Notice::warning(reason.to_string()),
@@ -188,6 +195,9 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
     }
     for path in exports {
         save::to(world, Purpose::Export, path, None);
+    }
+    for mesh in removals {
+        added_mesh::remove(world, mesh);
     }
     for action in actions {
         act(world, action);
@@ -236,6 +246,7 @@ fn act(world: &mut World, action: Action) {
     match action {
         Action::New => request_open(world, OpenRequest::Empty),
         Action::Open => world.resource_mut::<Dialog>().ask(Question::Open),
+        Action::AddMesh => world.resource_mut::<Dialog>().ask(Question::Mesh),
         Action::Save => save(world, None),
         Action::SaveAs => ask_path(world, Purpose::Save, None),
         Action::Export => ask_path(world, Purpose::Export, None),
@@ -271,6 +282,17 @@ fn request_open(world: &mut World, request: OpenRequest) {
         }
     }
     after_asking(world, FollowUp::Open(request));
+}
+
+/// Reads a mesh to put it beside those of the open rig.
+fn request_mesh(world: &mut World, path: PathBuf) {
+    if !added_mesh::is_mesh_file(&path) {
+        let name = file_name(&path);
+        world.write_message(Notice::error(format!("{name} is no mesh; choose an .obj, .gltf, .glb or .vrm")));
+        return;
+    }
+    open::start(world, OpenRequest::File(path));
+    world.resource_mut::<LoadJob>().add_to_open();
 }
 
 fn has_joints(world: &World) -> bool {
@@ -329,6 +351,7 @@ fn dialog_answered(world: &mut World, question: Question, answer: Answer) {
         (Question::Unsaved { then, .. }, Answer::Discard) => proceed(world, then),
         (Question::Unsaved { then: FollowUp::Land, .. }, _) => open::drop_held(world),
         (Question::Open, Answer::Path(path)) => request_open(world, OpenRequest::File(path)),
+        (Question::Mesh, Answer::Path(path)) => request_mesh(world, path),
         (Question::Motion, Answer::Path(path)) => {
             world.write_message(ImportRequest(path));
         }

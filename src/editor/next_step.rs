@@ -9,7 +9,7 @@ use super::{
     keys::KeyBindings,
     mode::Mode,
     panels::{
-        skinning::is_held,
+        skinning::{is_held, mesh_name},
         timeline::{OpenClip, Timeline, TimelineAction},
     },
 };
@@ -63,6 +63,13 @@ pub fn next_step(world: &World) -> Option<String> {
             if let Some(builder) = builder.filter(|builder| has_commands && builder.cursor() < builder.len()) {
                 return Some(format!("Built {}: {} builds all.", built_commands(builder), key(Action::Build)));
             }
+            let mut models = meshes.iter().filter_map(|mesh| world.get::<RigMesh>(*mesh));
+            if let Some(loose) = models.find(|mesh| is_skinned && is_loose(rig, mesh)) {
+                let name = mesh_name(loose);
+                return Some(format!(
+                    "{name} has no weights yet: the Skinning panel binds it, alone or with all meshes."
+                ));
+            }
             match rig.clips() {
                 _ if !no_mesh && !is_skinned => {}
                 [] => {}
@@ -88,6 +95,11 @@ pub fn next_step(world: &World) -> Option<String> {
             }
         }
     })
+}
+
+/// True for a mesh without weights that hangs on no joint either, so that nothing moves it.
+fn is_loose(rig: &Rig, mesh: &RigMesh) -> bool {
+    rig.skin(mesh.uid).is_none() && mesh.file.objects.iter().any(|object| object.node.is_none())
 }
 
 /// The next step with the open clip.

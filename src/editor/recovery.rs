@@ -1,7 +1,10 @@
 //! Recovery of unsaved work after a crash: found when the window opens, or when its project is opened, and offered to
 //! the user.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use bevy::{
     prelude::*,
@@ -32,7 +35,7 @@ use crate::{
         load_model, read_capped, stem,
     },
     plugins::surface::RigMesh,
-    rig::Rig,
+    rig::{Rig, Uid},
 };
 
 /// Largest number of gaps and skipped changes that are listed one by one.
@@ -159,8 +162,9 @@ fn restore(journal: &Path) -> Result<LoadedFile, OpenError> {
             (opened, Some(base))
         }
         // A long journal starts from a rig of its own; everything else is still as the project file says.
-        _ => (as_opened(&recovered).unwrap_or_else(|| with_meshes(&recovered)), None),
+        _ => (as_opened(&recovered).unwrap_or_else(|| without_meshes(&recovered)), None),
     };
+    add_meshes(&recovered, &mut opened);
     let restored = recovered.restore(basis, base);
     tell_losses(&recovered, &restored, basis, &mut opened);
     opened.pending = None;
@@ -226,16 +230,28 @@ fn tell_losses(recovered: &RecoveredJournal, restored: &RestoredRig, basis: Basi
     }
 }
 
-/// An empty rig with the meshes that were open, if they can be opened again.
-fn with_meshes(recovered: &RecoveredJournal) -> LoadedDocument {
-    let context: Context = ron::from_str(recovered.context()).unwrap_or_default();
+/// Name and meshes of the document, as the journal has them.
+fn context_of(recovered: &RecoveredJournal) -> Context {
+    ron::from_str(recovered.context()).unwrap_or_default()
+}
+
+/// An empty rig under the name of the document.
+fn without_meshes(recovered: &RecoveredJournal) -> LoadedDocument {
+    let context = context_of(recovered);
     let name = match (context.name.is_empty(), recovered.origin().path()) {
         (false, _) => context.name,
         (true, Some(path)) => stem(path),
         (true, None) => "recovered".to_owned(),
     };
-    let mut opened = LoadedDocument::named(name, Rig::default());
-    for mesh in context.meshes {
+    LoadedDocument::named(name, Rig::default())
+}
+
+/// Adds the meshes that were open and are not in the document, as in a project that was not saved with them, if they can be
+/// opened again.
+fn add_meshes(recovered: &RecoveredJournal, opened: &mut LoadedDocument) {
+    let mut known: BTreeSet<Uid> = opened.missing.iter().map(|mesh| mesh.uid).collect();
+    known.extend(opened.meshes.iter().map(|(mesh, _)| mesh.uid));
+    for mesh in context_of(recovered).meshes.into_iter().filter(|mesh| !known.contains(&mesh.uid)) {
         let model = match &mesh.source {
             MeshSource::Bundled(name) => BundledModel::named(name).and_then(BundledModel::read),
             MeshSource::File(path) => load_model(&RealDisk, path).map_err(OpenError::from),
@@ -251,5 +267,4 @@ fn with_meshes(recovered: &RecoveredJournal) -> LoadedDocument {
                 .push(format!("a mesh of the project is not there: {error}; the rig was recovered without it")),
         }
     }
-    opened
 }

@@ -66,6 +66,8 @@ struct Job {
     confirmed: Option<Arc<Step>>,
     /// True if nobody has been asked yet about changes that would be lost.
     asks: bool,
+    /// True for a mesh that comes to the open rig, whatever that has.
+    adds: bool,
 }
 
 impl LoadJob {
@@ -83,6 +85,13 @@ impl LoadJob {
     pub(super) fn ask_later(&mut self) {
         if let Some(job) = &mut self.job {
             job.asks = true;
+        }
+    }
+
+    /// Has the mesh that is being opened put beside those of the open rig.
+    pub(super) fn add_to_open(&mut self) {
+        if let Some(job) = &mut self.job {
+            job.adds = true;
         }
     }
 }
@@ -205,7 +214,7 @@ pub(super) fn start(world: &mut World, request: OpenRequest) {
 pub(in crate::editor) fn begin(world: &mut World, name: String, task: Task<Result<LoadedFile, OpenError>>) {
     let confirmed = active(world).and_then(|rig| last_step(world, rig));
     let mut loading = world.resource_mut::<LoadJob>();
-    loading.job = Some(Job { name, task, confirmed, asks: false });
+    loading.job = Some(Job { name, task, confirmed, asks: false, adds: false });
     loading.held = None;
 }
 
@@ -323,7 +332,7 @@ pub(super) fn poll(world: &mut World) {
     let mut loading = world.resource_mut::<LoadJob>();
     let Some(job) = &mut loading.bypass_change_detection().job else { return };
     let Some(result) = check_ready(&mut job.task) else { return };
-    let Some(Job { name, confirmed, asks, .. }) = loading.job.take() else { return };
+    let Some(Job { name, confirmed, asks, adds, .. }) = loading.job.take() else { return };
     match result {
         Err(error) => {
             world.write_message(Notice::error(format!("Could not open {name}: {error}")));
@@ -332,6 +341,7 @@ pub(super) fn poll(world: &mut World) {
             }
         }
         Ok(LoadedFile::Template(opened)) if template::has_mesh(world) => template::consider(world, *opened),
+        Ok(LoadedFile::Document(opened)) if adds && active(world).is_some() => added_mesh::add(world, &name, *opened),
         Ok(LoadedFile::Document(opened)) if added_mesh::is_alone(&opened) && added_mesh::is_awaited(world) => {
             added_mesh::put(world, &name, *opened);
         }

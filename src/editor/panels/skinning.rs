@@ -47,6 +47,7 @@ impl Plugin for SkinningPanelPlugin {
             .init_resource::<SkinningClaims>()
             .add_message::<ActionRequest>()
             .add_message::<CancelSkinning>()
+            .add_message::<SkinMesh>()
             .add_message::<Notice>()
             .add_message::<BindAnswer>()
             .add_message::<ResultHeld>()
@@ -70,13 +71,18 @@ impl SkinningResults {
     }
 }
 
+/// Request to compute the weights of one mesh; the others keep theirs.
+#[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SkinMesh(pub Entity);
+
 /// Request to cancel all computations for the active rig; the weights stay unchanged.
 #[derive(Message, Debug, Clone, Copy)]
 pub struct CancelSkinning;
 
-/// Requests weights for every mesh, or sends a notice with the obstacle.
+/// Requests weights for every mesh or for single ones, or sends a notice with the obstacle.
 fn skin(
     mut actions: MessageReader<ActionRequest>,
+    mut singles: MessageReader<SkinMesh>,
     active: Option<Res<ActiveRig>>,
     rigs: Query<(&Rig, Option<&RigMeshes>)>,
     jobs: Query<&SkinningJob>,
@@ -84,7 +90,9 @@ fn skin(
     (settings, parts, claims): (Res<SkinningSettings>, Res<SkinningParts>, Res<SkinningClaims>),
     mut commands: Commands,
 ) {
-    if !actions.read().any(|request| request.0 == Action::Skin) {
+    let is_for_all = actions.read().any(|request| request.0 == Action::Skin);
+    let singles: Vec<Entity> = singles.read().map(|request| request.0).collect();
+    if !is_for_all && singles.is_empty() {
         return;
     }
     let Some((rig, meshes)) = active.and_then(|active| rigs.get(active.0).ok()) else { return };
@@ -99,7 +107,7 @@ fn skin(
         commands.write_message(Notice::warning(obstacle));
         return;
     }
-    for mesh in meshes {
+    for mesh in meshes.into_iter().filter(|mesh| is_for_all || singles.contains(mesh)) {
         let parts = models.get(mesh).map(|model| parts.of(model.uid)).unwrap_or_default();
         let claims = claims.0.iter().copied().collect();
         commands.write_message(BindRequest { mesh, settings: settings.0.clone(), parts, claims });
@@ -166,7 +174,7 @@ fn is_cancelled(error: &SkinningError) -> bool {
 }
 
 /// Name of a mesh for people.
-pub(super) fn mesh_name(mesh: &RigMesh) -> &str {
+pub(in crate::editor) fn mesh_name(mesh: &RigMesh) -> &str {
     if mesh.file.name.is_empty() { "The mesh" } else { &mesh.file.name }
 }
 
@@ -213,8 +221,14 @@ impl EditorPanel for SkinningPanel {
             skin_button(ui, &shown, meshes.len(), &running, requests);
             ui.add_space(4.0);
             settings(ui, world, requests);
+            let is_alone = meshes.len() == 1;
             for entity in meshes {
                 ui.add_space(6.0);
+                if let Some(mesh) = world.get::<RigMesh>(entity) {
+                    ui.separator();
+                    let can_skin = (!is_alone).then_some(running.is_empty() && !shown.rig.is_empty());
+                    title(ui, (entity, mesh), can_skin, requests);
+                }
                 self.mesh(ui, world, entity, &shown);
                 if let Some(mesh) = world.get::<RigMesh>(entity) {
                     parts::show(ui, world, mesh, &shown, &mut self.held, requests);
@@ -249,6 +263,25 @@ fn skin_button(ui: &mut Ui, shown: &DisplayedRig, meshes: usize, running: &[&Ski
     if !running.iter().all(|job| job.waits()) {
         ui.ctx().request_repaint_after_secs(0.1);
     }
+}
+
+/// Draws the name of a mesh and, beside other meshes, a button that binds it alone.
+fn title(ui: &mut Ui, (entity, mesh): (Entity, &RigMesh), can_skin: Option<bool>, requests: &mut Requests) {
+    let name = mesh_name(mesh);
+    let Some(can) = can_skin else {
+        ui.strong(name);
+        return;
+    };
+    ui.horizontal_wrapped(|ui| {
+        ui.strong(name);
+        let button = ui.add_enabled(can, Button::new("Skin it alone").small());
+        let button = button.on_hover_text("Compute the weights of this mesh; the others keep theirs");
+        let said = format!("Skin {name} alone");
+        button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, can, &said));
+        if button.clicked() {
+            requests.send(SkinMesh(entity));
+        }
+    });
 }
 
 /// Draws the settings of the computation, folded by default.
@@ -310,8 +343,6 @@ impl SkinningPanel {
     /// Draws the coverage of one mesh, and the sources of its points' weights.
     fn mesh(&mut self, ui: &mut Ui, world: &World, entity: Entity, shown: &DisplayedRig) {
         let Some(mesh) = world.get::<RigMesh>(entity) else { return };
-        ui.separator();
-        ui.strong(mesh_name(mesh));
         let points = mesh.rest.points.len();
         let Some(skin) = shown.rig.skin(mesh.uid) else {
             ui.weak(format!("Not skinned ({})", counted(points, "point", "points")));

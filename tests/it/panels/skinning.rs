@@ -164,3 +164,26 @@ fn rigid_parts_and_idle_joints_have_a_choice_each() {
     desk.frames(2);
     assert!(desk.app.world().resource::<SkinningClaims>().0.is_empty());
 }
+
+/// Weights that were painted on a body are not lost to a coat that comes later.
+#[test]
+fn one_of_several_meshes_is_skinned_alone() {
+    let mut desk = Desk::new(SkinningPanel::default());
+    desk.chain(&["a", "b"]);
+    let spawn = |desk: &mut Desk, uid: u64, name: &str| {
+        let model =
+            rigsmith::mesh::model::Model { name: name.to_owned(), ..boxes(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]) };
+        let mesh = (RigMesh::new(Uid(uid), model, Vec::new()), SkinOf(desk.rig));
+        desk.app.world_mut().spawn(mesh).id()
+    };
+    spawn(&mut desk, 98, "body");
+    let coat = spawn(&mut desk, 99, "coat");
+    desk.frames(2);
+    desk.click("Skin coat alone");
+    wait(&mut desk, coat);
+    let bound: Vec<Uid> = desk.rig().skins().map(|(mesh, _)| mesh).collect();
+    assert_eq!(bound, [Uid(99)], "{:?}", desk.told());
+    desk.app.world_mut().entity_mut(coat).despawn();
+    desk.frames(2);
+    assert!(desk.look("Skin body alone").is_none(), "the only mesh has the common button");
+}
