@@ -77,6 +77,7 @@ mod face;
 mod face_arkit;
 mod face_bones;
 mod face_expressions;
+mod face_eyes;
 mod face_fit;
 mod face_grouping;
 mod face_landmarks;
