@@ -94,9 +94,15 @@ fn round_things_beside_the_eyes_are_none() {
 fn earrings_are_no_eyes() {
     let (points, triangles) = heads::bundled();
     let whole = analysed(&(points.clone(), triangles.clone()));
-    let is_eye = |point: u32| matches!(whole.shells.kind(point as usize), ShellKind::LeftEye | ShellKind::RightEye);
-    let bare: Vec<[u32; 3]> = triangles.into_iter().filter(|corners| !is_eye(corners[0])).collect();
-    let mesh = (points, bare);
+    let is_eye = |point: usize| matches!(whole.shells.kind(point), ShellKind::LeftEye | ShellKind::RightEye);
+    let kept: Vec<usize> = (0..points.len()).filter(|point| !is_eye(*point)).collect();
+    let mut numbers = vec![0_u32; points.len()];
+    for (number, point) in kept.iter().enumerate() {
+        numbers[*point] = number as u32;
+    }
+    let skin = triangles.into_iter().filter(|corners| !is_eye(corners[0] as usize));
+    let bare: Vec<[u32; 3]> = skin.map(|corners| corners.map(|corner| numbers[corner as usize])).collect();
+    let mesh: heads::Mesh = (kept.iter().map(|point| points[*point]).collect(), bare);
     for radius in [0.008, 0.014] {
         let dressed = with_pair(&mesh, Vec3::new(0.095, 0.13, 0.0), |mesh, at| add_ball(mesh, at, radius));
         let found = analysed(&dressed);
