@@ -1,11 +1,11 @@
-//! Weights of parts other than skin: eyeballs, teeth, tongue, lashes.
+//! Weights of parts other than skin: eyeballs, teeth, tongue, lashes, hair on the face.
 
 use std::collections::BTreeMap;
 
 use glam::Vec3;
 
 use super::{
-    Face, HEAD, NECK, Row,
+    Face, HEAD, NECK, Row, facial_hair,
     sides::{Rim, Sides},
     smooth,
 };
@@ -37,7 +37,7 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
         }
     }
     for members in outside {
-        if !lashes(face, sides, members, rows) {
+        if !lashes(face, sides, members, rows) && !facial_hair::rows(face, sides, members, rows) {
             for &v in members {
                 let neck = face.neck_share(face.places[v]);
                 rows[v] = vec![(HEAD, 1.0 - neck), (NECK, neck)];
@@ -46,7 +46,7 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
     }
 }
 
-/// Returns `true` for a shell whose middle lies behind the lips.
+/// Returns `true` for a shell whose middle lies behind the lips, and that does not lie on the skin.
 fn in_mouth(face: &Face, members: &[usize]) -> bool {
     if !face.map.trusted {
         return false;
@@ -55,7 +55,8 @@ fn in_mouth(face: &Face, members: &[usize]) -> bool {
     let (half, p) = face.map.fold(middle);
     let corner = half.lip_corner();
     let e = face.map.scale;
-    p.x < 1.3 * corner.x && (p.y - corner.y).abs() < 0.4 * e && p.z < half.lip_line()[0].z + 0.02 * e
+    let is_behind = p.x < 1.3 * corner.x && (p.y - corner.y).abs() < 0.4 * e && p.z < half.lip_line()[0].z + 0.02 * e;
+    is_behind && !facial_hair::is_on_skin(face, members)
 }
 
 /// A shell in the mouth: a row of teeth, a tooth, the tongue, or a bag around them.
