@@ -1,6 +1,7 @@
 //! `rigsmith face`: bones, weights and expressions for a head mesh.
 
 mod fit_error;
+mod loose_parts;
 mod morphs;
 
 use std::{
@@ -149,6 +150,7 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     let placed = bench.face(settings, shapes, &mut |_: FaceStep, part| progress.at(part))?;
     drop(progress);
     describe(&mut report, &placed);
+    loose_parts::describe(&mut report, &bench, &placed);
     tell_mended(&mut report, &spinning("measuring units", || bench.mended_shares()));
     if !args.expression.is_empty() {
         express(args, &mut bench, &mut report)?;

@@ -279,6 +279,49 @@ fn hair_on_the_face_rides_along() {
     }
 }
 
+/// Names of loose parts and what they follow, as the command tells them.
+fn told_parts(mesh: &Path) -> Vec<(String, String)> {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = mesh.display().to_string();
+    let args = ["face", &mesh, "--bones", "12", "-o", "face.rig.ron"];
+    let answer = rigsmith(folder.path(), &[&args[..], &["--json"]].concat());
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    let text = |value: &serde_json::Value| value.as_str().unwrap().to_owned();
+    let told: Vec<(String, String)> = answer.json()["parts"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|part| (text(&part["part"]), text(&part["follows"])))
+        .collect();
+    let lines = rigsmith(folder.path(), &args).out;
+    for (part, joint) in &told {
+        let is_told = |line: &str| line.starts_with(&format!("following {joint}: ")) && line.contains(part.as_str());
+        assert!(lines.lines().any(is_told), "{part} follows {joint} in {lines}");
+    }
+    told
+}
+
+/// Loose parts of a head are told with the joints that they follow, by the names of their objects.
+#[test]
+fn what_loose_parts_follow_is_told() {
+    let own = |list: &[(&str, &str)]| -> Vec<(String, String)> {
+        list.iter().map(|(part, joint)| ((*part).to_owned(), (*joint).to_owned())).collect()
+    };
+    let bundled = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/head.obj");
+    assert_eq!(told_parts(&bundled), own(&[("eyes", "eye_l"), ("eyes", "eye_r")]));
+    let Some(data) = test_data() else { return };
+    let mut told = told_parts(&data.join("bodies/female_young/full.obj"));
+    told.sort();
+    let expected = [
+        ("helper-l-eye", "eye_l"),
+        ("helper-lower-teeth", "jaw"),
+        ("helper-r-eye", "eye_r"),
+        ("helper-tongue", "tongue"),
+        ("helper-upper-teeth", "head"),
+    ];
+    assert_eq!(told, own(&expected));
+}
+
 /// Furthest way down of some points.
 fn lowered(points: &[Moved]) -> f32 {
     points.iter().map(|[rest, moved]| rest.y - moved.y).fold(0.0, f32::max)
