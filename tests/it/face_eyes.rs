@@ -35,7 +35,7 @@ fn add_ball((points, triangles): &mut heads::Mesh, center: Vec3, radius: f32) {
 }
 
 /// Adds a box with eight corners.
-fn add_bar((points, triangles): &mut heads::Mesh, center: Vec3, size: Vec3) {
+pub fn add_bar((points, triangles): &mut heads::Mesh, center: Vec3, size: Vec3) {
     let first = points.len() as u32;
     for corner in 0..8_u32 {
         let side = |bit: u32| if corner & bit == 0 { -0.5 } else { 0.5 };

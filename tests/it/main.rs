@@ -82,6 +82,7 @@ mod face_fit;
 mod face_grouping;
 mod face_landmarks;
 mod face_symmetry;
+mod face_teeth;
 mod face_units;
 mod files;
 mod files_faults;
