@@ -17,7 +17,7 @@ use crate::{
     },
 };
 
-/// What parts follow that ride along with the skin under them.
+/// Name of the skin, in the place of a joint, for parts that ride along with it.
 const SKIN: &str = "skin";
 /// Least share of facial bones in a part that rides along with the skin.
 const LEAST: f32 = 0.02;
