@@ -20,8 +20,8 @@ const LARGEST: f32 = 0.2;
 const ROUND: f32 = 0.12;
 /// Least number of points of a ball; a sphere runs through any four.
 const FEWEST: usize = 8;
-/// Least extent of a ball, or of a part of one, as a share of its largest. A sphere runs through the corners of any bar, too,
-/// such as the temple of a pair of glasses.
+/// Least extent of a ball, or of a part of one, as a share of its largest. A sphere runs through the corners of any bar,
+/// too, such as the temple of a pair of glasses.
 const FLATTEST: f32 = 0.18;
 /// Largest distance of two eyes, in radii. Human eyes are 5 apart; beads and earrings are small and far from each other.
 const APART: f32 = 16.0;

@@ -35,8 +35,8 @@ pub(crate) fn is_on_skin(face: &Face, members: &[usize]) -> bool {
     2 * on > all
 }
 
-/// Fills the rows of a shell that stands on the skin below the eyes with the weights of that skin; returns `false` for a shell
-/// of another kind.
+/// Fills the rows of a shell that stands on the skin below the eyes with the weights of that skin; returns `false` for a
+/// shell of another kind.
 pub(crate) fn rows(face: &Face, sides: &Sides, members: &[usize], rows: &mut [Row]) -> bool {
     if !face.map.trusted {
         return false;

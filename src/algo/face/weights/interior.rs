@@ -87,8 +87,8 @@ impl<'a> MouthPart<'a> {
 
     /// True for a part that belongs to the jaw, by the parts that it faces; `None` if it faces none.
     ///
-    /// They and the part itself are split in two by height, so that a tooth does not fall to the other jaw because its own gum
-    /// is above it.
+    /// They and the part itself are split in two by height, so that a tooth does not fall to the other jaw because its own
+    /// gum is above it.
     fn is_lower(&self, all: &[Self], face: &Face) -> Option<bool> {
         let e = face.map.scale;
         let facing = all.iter().filter(|other| self.faces(other, e));
