@@ -93,7 +93,8 @@ impl JointNames {
         labels.map(|label| self.find("--claim", label)).collect()
     }
 
-    fn of(&self, uid: Uid) -> String {
+    /// Name of a joint; its uid if it has none.
+    pub fn of(&self, uid: Uid) -> String {
         self.joints.get(&uid).map_or_else(|| uid.to_string(), |at| self.list[*at].1.clone())
     }
 }
@@ -250,7 +251,7 @@ fn named_once(names: &JointNames, joints: &[&IdleJoint]) -> Vec<String> {
 }
 
 /// The first of some names, and the number of the others.
-fn shortened(names: impl ExactSizeIterator<Item = String>) -> String {
+pub(super) fn shortened(names: impl ExactSizeIterator<Item = String>) -> String {
     let rest = names.len().saturating_sub(LISTED);
     let listed = names.take(LISTED).collect::<Vec<String>>().join(", ");
     if rest > 0 { format!("{listed} and {rest} more") } else { listed }
