@@ -66,6 +66,8 @@ pub struct JointFit {
 pub enum FitReason {
     /// A person put it there.
     Marker,
+    /// A person put its partner on the other side there.
+    Partner,
     /// The body model lies on the surface around it.
     Surface,
     /// The centre line of the limb.
@@ -86,6 +88,7 @@ impl fmt::Display for FitReason {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match self {
             Self::Marker => "placed by hand",
+            Self::Partner => "the mirror image of its partner, which was placed by hand",
             Self::Surface => "the surface around it agrees with the body model",
             Self::CentreLine => "on the centre line of its limb",
             Self::Proportion => "by the template's proportions",
@@ -146,6 +149,11 @@ pub enum FitNote {
 }
 
 impl FitNote {
+    /// True for notes that say what may be wrong, or what was left out; the others say how the fit was found.
+    pub fn is_warning(&self) -> bool {
+        !matches!(self, Self::BodyModel | Self::MadeSymmetric | Self::Tied(_))
+    }
+
     /// True for notes about directions that contradict the mesh.
     pub(super) fn is_of_direction(&self) -> bool {
         matches!(self, Self::OtherUp(_) | Self::OtherForward(_))

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::{
-    algo::fit_template::{FitError, FittedSkeleton, JointFit},
+    algo::fit_template::{FitError, FitNote, FittedSkeleton, JointFit},
     plugins::limits::{LimitError, OutOfTime},
     rig::{EditError, Uid, operations::OperationError},
 };
@@ -26,6 +26,16 @@ pub struct FitReport {
 impl FitReport {
     /// Confidence below which a joint is doubtful.
     pub const DOUBTFUL: f32 = 0.5;
+
+    /// Notes that say what may be wrong, or what was left out; equal ones are told once.
+    pub fn warnings(&self) -> impl Iterator<Item = &FitNote> {
+        let notes = &self.fit.notes;
+        notes
+            .iter()
+            .enumerate()
+            .filter(|(at, note)| note.is_warning() && !notes[..*at].contains(*note))
+            .map(|(_, note)| note)
+    }
 
     /// Joints that the fit is not sure of.
     pub fn doubtful(&self) -> impl Iterator<Item = Uid> + '_ {

@@ -189,6 +189,8 @@ impl Work {
             places: report.fit.joints.iter().map(|joint| Some(joint.position)).collect(),
             report,
             markers,
+            request: self.request,
+            has_own_template: self.from.is_empty(),
             analysis: Arc::new(analysis),
             settings,
             template: template.clone(),
