@@ -378,7 +378,8 @@ fn describe(report: &mut Report, fitted: &FitReport) {
 
 #[cfg(feature = "render")]
 fn picture(args: &FitArgs, bench: &Workbench, fitted: &FitReport) -> Result<(), Failure> {
-    super::render::picture_of_fit(bench, fitted, &args.output)
+    let is_part = !args.objects.is_empty() || !args.regions.is_empty();
+    super::render::picture_of_fit(bench, fitted, is_part, &args.output)
 }
 
 #[cfg(not(feature = "render"))]

@@ -5,7 +5,7 @@
 
 mod decimate;
 mod limbs;
-mod shapes;
+pub mod shapes;
 mod true_joints;
 mod turns;
 mod variants;

@@ -83,6 +83,18 @@ pub enum FitFailure {
         /// Label of the joint.
         label: String,
     },
+    /// The mesh shows none of the templates that the fit may choose.
+    #[error(
+        "the mesh shows no figure: it has {limbs} of the most similar template, \"{template}\" (confidence {confidence:.2}); choose the template yourself to fit it all the same"
+    )]
+    NoFigure {
+        /// Name of the most similar template.
+        template: String,
+        /// Limbs that the template has and that the mesh shows, in words.
+        limbs: String,
+        /// Confidence in the fit that was left.
+        confidence: f32,
+    },
     /// No triangle of the mesh is in the region.
     #[error("no face of the mesh is in the region; choose faces, or joints that the mesh has weights of")]
     EmptyRegion,

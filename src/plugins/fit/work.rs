@@ -22,6 +22,8 @@ use crate::{
 const CENTRE: f32 = 0.003;
 /// Difference of the penalties of a part's two sides below which the side is uncertain.
 const SAME_SIDE: f32 = 0.03;
+/// Confidence below which a mesh shows no figure, where the choice of the template is left to the fit.
+const SHOWN: f32 = 0.2;
 /// Kind of templates that are parts.
 const PART: &str = "part";
 
@@ -179,6 +181,10 @@ impl Work {
             FitExtent::Part(part) => part.rig.about().name.clone(),
             FitExtent::Skeleton | FitExtent::Joints => template.about().name.clone(),
         };
+        let is_guess = self.from.is_empty() && matches!(self.request.template, FitTemplate::Choose);
+        if is_guess && self.request.markers.is_empty() && fit.confidence < SHOWN {
+            return Err(FitFailure::NoFigure { template: name, limbs: choice, confidence: fit.confidence });
+        }
         let joints = uids.iter().copied().zip(labels).collect();
         let report = Arc::new(FitReport { template: name, choice, joints, fit, time: begin.elapsed() });
         let markers: BTreeMap<Uid, Vec3> =
