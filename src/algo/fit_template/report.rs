@@ -155,7 +155,7 @@ impl FitNote {
     }
 
     /// True for notes about directions that contradict the mesh.
-    pub(super) fn is_of_direction(&self) -> bool {
+    pub fn is_of_direction(&self) -> bool {
         matches!(self, Self::OtherUp(_) | Self::OtherForward(_))
     }
 }
@@ -213,7 +213,7 @@ impl fmt::Display for FitNote {
                 f.write_str("the front is uncertain: give the forward axis if the skeleton faces backwards")
             }
             Self::UncertainSide => f.write_str(
-                "the side of the part is uncertain: give a marker for a joint of its thumb if it is the other one",
+                "the side of the part is uncertain: give a marker for one of its joints if it is the other one",
             ),
             Self::MadeSymmetric => f.write_str("left and right were made alike"),
             Self::ForcedSymmetric(pairs) => {

@@ -7,7 +7,8 @@ use bevy::prelude::*;
 use super::{
     FinishedFit, FitFailure, FitPart, FitParts, FitReport, FitRequest, FitTemplate, FitTemplates, FittedRig,
     fitted_rig::FitExtent,
-    part::{AddedPart, only, sides, with_hierarchies},
+    part::{AddedPart, named_side, only, sides, with_hierarchies},
+    region::middle,
 };
 use crate::{
     algo::fit_template::{
@@ -24,6 +25,8 @@ const CENTRE: f32 = 0.003;
 const SAME_SIDE: f32 = 0.03;
 /// Confidence below which a mesh shows no figure, where the choice of the template is left to the fit.
 const SHOWN: f32 = 0.2;
+/// Distance of a region from the middle of the mesh, as a share of its width, from which on it lies on a side.
+const ASIDE: f32 = 0.05;
 /// Kind of templates that are parts.
 const PART: &str = "part";
 
@@ -167,6 +170,13 @@ impl Work {
         let cost = |fit: &FittedSkeleton| fit.hypotheses.first().map_or(f32::INFINITY, |best| best.cost);
         found.sort_by(|a, b| cost(&a.2).total_cmp(&cost(&b.2)));
         let is_close = matches!(&found[..], [first, second, ..] if cost(&second.2) - cost(&first.2) < SAME_SIDE);
+        if is_close {
+            let side = self.side_of_region(region.as_deref());
+            let is_of_side = |at: usize| side != 0 && named_side(&candidates[at].template) == Some(side);
+            if !is_of_side(found[0].0) && is_of_side(found[1].0) {
+                found.swap(0, 1);
+            }
+        }
         let Some((at, settings, mut fit)) = found.into_iter().next() else {
             return Err(refused.unwrap_or(FitFailure::NoTemplate));
         };
@@ -210,6 +220,24 @@ impl Work {
         };
         let target = fitted.target(&self.modules)?;
         Ok(FinishedFit { fitted, target })
+    }
+
+    /// Side of the mesh on which a region lies, in the directions of the request or of most files: 1 left, -1 right, 0 neither.
+    fn side_of_region(&self, region: Option<&[u32]>) -> i32 {
+        let (points, triangles) = (&self.mesh.rest.points, &self.mesh.triangles);
+        let (up, forward) = (self.request.up.unwrap_or(Vec3::Y), self.request.forward.unwrap_or(Vec3::Z));
+        let left = up.cross(forward).normalize_or(Vec3::X);
+        let along = points.iter().filter(|point| point.is_finite()).map(|point| point.dot(left));
+        let (low, high) = along.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
+        let corners = region.into_iter().flatten().filter_map(|at| triangles.get(*at as usize));
+        let middles = corners.filter_map(|corners| middle(points, corners)).filter(|middle| middle.is_finite());
+        let (sum, count) = middles.fold((0.0f32, 0usize), |(sum, count), middle| (sum + middle.dot(left), count + 1));
+        let aside = sum / count.max(1) as f32 - 0.5 * (low + high);
+        match count > 0 && aside.abs() > ASIDE * (high - low) {
+            true if aside > 0.0 => 1,
+            true => -1,
+            false => 0,
+        }
     }
 
     /// Place of the joint that a part or chosen joints hang on.
