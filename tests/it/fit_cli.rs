@@ -96,6 +96,20 @@ fn a_part_is_fitted_into_what_a_bone_moves() {
     assert!(unknown.code == 1 && unknown.err.contains("Tail_Base"), "names the bones: {}", unknown.err);
 }
 
+/// An arm without its hand shows no side: that of the body on which it is.
+#[test]
+fn an_arm_is_of_the_side_on_which_it_is() {
+    let (folder, body) = (tempfile::tempdir().unwrap(), body());
+    for (region, ending) in [("0.2,0.5,-0.5,1.0,1.6,0.6", "_l"), ("-0.2,0.5,-0.5,-1.0,1.6,0.6", "_r")] {
+        let args = ["fit", &body, "--template", "parts/arm", "--region", region, "-o", "arm.rig.ron"];
+        let fitted = rigsmith(folder.path(), &args);
+        assert_eq!(fitted.code, 0, "{}", fitted.err);
+        let arm = template(&folder.path().join("arm.rig.ron"));
+        let labels: Vec<_> = arm.walk().filter_map(|joint| joint.data.label.clone()).collect();
+        assert!(labels.iter().any(|label| label == &format!("forearm{ending}")), "{region}: {labels:?}");
+    }
+}
+
 /// A wing shows one branch, whatever feathers the part has: they go along with its bones.
 #[test]
 fn a_wing_is_fitted_into_what_a_bone_moves() {
