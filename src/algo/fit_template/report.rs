@@ -124,6 +124,8 @@ pub enum FitNote {
     Sheets(usize),
     /// Objects that hang on a bone and were left out: a hat, a weapon.
     Gear(usize),
+    /// Objects beside the largest one that were left out: armour, clothes, weapons.
+    Beside(usize),
     /// Branches that no limb of the template took: hair, clothes, weapons.
     UnusedBranches(usize),
     /// A limb of the template without a branch in the mesh.
@@ -202,6 +204,11 @@ impl fmt::Display for FitNote {
             Self::Gear(count) => {
                 let objects = counted(*count, "object that hangs on a bone was", "objects that hang on a bone were");
                 write!(f, "{objects} left out; name objects to fit to others")
+            }
+            Self::Beside(count) => {
+                let objects =
+                    counted(*count, "object beside the largest one was", "objects beside the largest one were");
+                write!(f, "{objects} left out, with which no figure shows for sure; name objects to fit to others")
             }
             Self::UnusedBranches(count) => {
                 let branches = counted(*count, "branch of the mesh belongs", "branches of the mesh belong");
