@@ -115,7 +115,7 @@ fn corrections(ui: &mut egui::Ui, rig: Entity, fitted: &FittedRig, world: &World
     });
 }
 
-/// Another template in place of the one that was fitted, and the other front.
+/// Widgets that begin the fit anew: another template in place of the one that was fitted, and the other front.
 fn choice(ui: &mut egui::Ui, rig: Entity, fitted: &FittedRig, requests: &mut Requests) {
     ui.horizontal(|ui| {
         if fitted.has_own_template {
