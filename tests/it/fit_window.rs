@@ -1,5 +1,6 @@
 //! Fits in the window: keys, the bar, the pointer, undo and redo, without a display.
 
+mod again;
 mod regions;
 
 use std::{
@@ -41,7 +42,7 @@ use rigsmith::{
     test_app::strict_app,
 };
 
-use super::panels::desk::{Desk, Sheet};
+use super::panels::desk::{Desk, Sheet, ShownWidget};
 use crate::{
     bench::{begin_drag, new_clip, undo_meanwhile},
     viewport_app::{CONTROL, MESH, PLAIN, SHIFT, front},
