@@ -18,7 +18,7 @@ mod template;
 mod view;
 
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
 };
 
@@ -51,7 +51,7 @@ use super::{
 };
 use crate::{
     files::{FileKind, RealDisk, journal::Origin, remove_stale_temps},
-    plugins::{RigSystems, journal::JournalTrouble},
+    plugins::{RigSystems, document::EditReport, journal::JournalTrouble},
     rig::{Rig, Uid},
 };
 
@@ -70,6 +70,7 @@ impl Plugin for FilesPlugin {
             .add_message::<MapRequest>()
             .add_message::<ExportRequest>()
             .add_message::<RemoveMeshRequest>()
+            .add_message::<EditReport>()
             .add_message::<WindowCloseRequested>()
             .add_message::<FileDragAndDrop>()
             .init_resource::<LoadJob>()
@@ -158,12 +159,23 @@ type Inbox<'w, 's> = (
     MessageReader<'w, 's, JournalTrouble>,
     MessageReader<'w, 's, ExportRequest>,
     MessageReader<'w, 's, RemoveMeshRequest>,
+    MessageReader<'w, 's, EditReport>,
 );
 
 /// Handles all file actions before this frame's edits, so that the saved state and the journal's count agree.
 pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, 'static>>) {
-    let Ok((mut opens, mut actions, mut answers, mut closes, mut drops, mut troubles, mut exports, mut removals)) =
-        inbox.get_mut(world)
+    let open = active(world);
+    let Ok((
+        mut opens,
+        mut actions,
+        mut answers,
+        mut closes,
+        mut drops,
+        mut troubles,
+        mut exports,
+        mut removals,
+        mut reports,
+    )) = inbox.get_mut(world)
     else {
         return;
     };
@@ -178,6 +190,12 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
     let troubles: Vec<JournalTrouble> = troubles.read().cloned().collect();
     let exports: Vec<PathBuf> = exports.read().map(|request| request.0.clone()).collect();
     let removals: Vec<Uid> = removals.read().map(|request| request.0).collect();
+    let mut changed_meshes: BTreeMap<Uid, bool> = BTreeMap::new();
+    for EditReport { committed, .. } in reports.read().filter(|report| Some(report.rig) == open) {
+        let edits = committed.iter().flat_map(|committed| committed.effect().0);
+        edits.for_each(|edit| edit.mesh_changes(&mut changed_meshes));
+    }
+    added_mesh::follow(world, &changed_meshes);
     for trouble in troubles {
         world.write_message(match trouble.reason {
             Some(reason) => Notice::warning(reason.to_string()),
