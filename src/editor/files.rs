@@ -10,8 +10,10 @@ mod clips;
 pub mod dialog;
 mod dialog_view;
 mod document;
+mod dropped;
 mod error;
 mod export;
+mod load_job;
 mod open;
 mod save;
 mod template;
@@ -32,7 +34,7 @@ pub use self::{
     bundle::{BODY, BUNDLED_MODELS, BundledModel, HEAD},
     document::{MeshSource, OpenDocument, StateFolder},
     export::ExportOptions,
-    open::LoadJob,
+    load_job::LoadJob,
     save::SaveJob,
 };
 use self::{
@@ -100,6 +102,14 @@ pub enum OpenRequest {
     Empty,
     /// A mesh, a template or a project.
     File(PathBuf),
+    /// Several files as one document: the first as if it were alone, and once it is there, the others one after the other,
+    /// meshes beside those that are open.
+    Files {
+        /// File that is opened first.
+        first: PathBuf,
+        /// Files that come to it, in order.
+        others: Vec<PathBuf>,
+    },
 }
 
 impl OpenRequest {
@@ -183,10 +193,11 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
     let mut actions: Vec<Action> = actions.read().map(|request| request.0).collect();
     let answers: Vec<Answer> = answers.read().map(|answer| answer.0.clone()).collect();
     actions.extend(closes.read().map(|_| Action::Quit));
-    opens.extend(drops.read().filter_map(|drop| match drop {
-        FileDragAndDrop::DroppedFile { path_buf, .. } => Some(OpenRequest::File(path_buf.clone())),
+    let dropped = drops.read().filter_map(|drop| match drop {
+        FileDragAndDrop::DroppedFile { path_buf, .. } => Some(path_buf.clone()),
         _ => None,
-    }));
+    });
+    let dropped: Vec<PathBuf> = dropped.collect();
     let troubles: Vec<JournalTrouble> = troubles.read().cloned().collect();
     let exports: Vec<PathBuf> = exports.read().map(|request| request.0.clone()).collect();
     let removals: Vec<Uid> = removals.read().map(|request| request.0).collect();
@@ -196,6 +207,7 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
         edits.for_each(|edit| edit.mesh_changes(&mut changed_meshes));
     }
     added_mesh::follow(world, &changed_meshes);
+    opens.extend(dropped::requests(world, dropped));
     for trouble in troubles {
         world.write_message(match trouble.reason {
             Some(reason) => Notice::warning(reason.to_string()),
@@ -222,6 +234,7 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
     }
     save::poll(world);
     open::poll(world);
+    dropped::open_next(world);
     recovery::poll(world);
     document::watch_places(world);
     show_title(world);
@@ -275,7 +288,7 @@ fn act(world: &mut World, action: Action) {
 
 /// Opens a document; asks about unsaved changes first if it would replace the open one.
 fn request_open(world: &mut World, request: OpenRequest) {
-    if let OpenRequest::File(path) = &request {
+    if let OpenRequest::File(path) | OpenRequest::Files { first: path, .. } = &request {
         if matches!(FileKind::of(path), Some(FileKind::Bvh | FileKind::PackedClips | FileKind::Animation))
             && has_joints(world)
         {

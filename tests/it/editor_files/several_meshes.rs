@@ -31,6 +31,15 @@ impl Window {
         self.answer(Answer::Path(path.to_owned()));
     }
 
+    /// Drops files on the window, together.
+    fn drop_files(&mut self, paths: &[&Path]) {
+        for path in paths {
+            let dropped = FileDragAndDrop::DroppedFile { window: Entity::PLACEHOLDER, path_buf: (*path).to_owned() };
+            self.base.app.world_mut().write_message(dropped);
+        }
+        self.settle();
+    }
+
     /// Names and uids of the open meshes, by name.
     fn meshes(&self) -> Vec<(String, Uid)> {
         let meshes = self.world().get::<RigMeshes>(self.base.open_rig());
@@ -130,6 +139,45 @@ fn all_meshes_are_in_one_exported_file() {
     window.export("one.skin");
     let told = "a .skin file is of one mesh, \"body\": the weights of \"coat\" are not in it";
     assert!(window.notices.include(Severity::Warning, told), "{:?}", window.notices.list);
+}
+
+#[test]
+fn files_that_are_dropped_together_are_one_document() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let (body, coat) = (write_mesh(folder.path(), "body", 0.0), write_mesh(folder.path(), "coat", 10.0));
+    let mut window = Window::new(folder.path());
+    let names = |window: &Window| -> Vec<String> { window.meshes().into_iter().map(|(name, _)| name).collect() };
+    // People drop all files of a mesh, the textures first.
+    window.drop_files(&[&at("body.png"), &at("body.mtl"), &body, &coat]);
+    assert_eq!(names(&window), ["body", "coat"], "{:?}", window.notices.list);
+    assert!(window.notices.list.iter().all(|notice| notice.severity != Severity::Error), "{:?}", window.notices.list);
+    assert!(title(window.world()).starts_with("body"), "the first one is the document");
+    window.change(Change::Undo);
+    assert_eq!(names(&window), ["body"], "the other one came to it as a step");
+
+    window.place(0.5);
+    let before = (window.rig(), window.meshes());
+    window.drop_files(&[&coat, &body]);
+    assert!(matches!(window.question(), Some(Question::Unsaved { .. })), "{:?}", window.notices.list);
+    window.answer(Answer::Cancel);
+    assert_eq!((window.rig(), window.meshes()), before, "nothing comes to the document that stays");
+    window.drop_files(&[&coat, &body]);
+    window.answer(Answer::Discard);
+    assert_eq!((names(&window), window.rig().len()), (vec!["body".to_owned(), "coat".to_owned()], 0));
+    assert!(title(window.world()).starts_with("coat"));
+
+    let project = window.save_as("dressed.rigsmith.ron");
+    let before = window.meshes();
+    std::fs::write(at("broken.glb"), b"hello").expect("written");
+    window.drop_files(&[&at("broken.glb"), &body]);
+    assert!(window.notices.include(Severity::Error, "broken.glb"), "{:?}", window.notices.list);
+    let told = "The files beside broken.glb were not opened, either";
+    assert!(window.notices.include(Severity::Info, told), "{:?}", window.notices.list);
+    assert_eq!(window.meshes(), before);
+    // A mesh that is dropped with a project comes to it.
+    window.drop_files(&[&write_mesh(folder.path(), "hat", 20.0), &project]);
+    assert_eq!(names(&window), ["body", "coat", "hat"], "{:?}", window.notices.list);
 }
 
 /// A window that goes on with the work on a project that a crash left.
