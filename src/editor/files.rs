@@ -10,9 +10,9 @@ mod clips;
 pub mod dialog;
 mod dialog_view;
 mod document;
-mod dropped;
 mod error;
 mod export;
+mod file_drop;
 mod load_job;
 mod open;
 mod save;
@@ -207,7 +207,7 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
         edits.for_each(|edit| edit.mesh_changes(&mut changed_meshes));
     }
     added_mesh::follow(world, &changed_meshes);
-    opens.extend(dropped::requests(world, dropped));
+    opens.extend(file_drop::requests(world, dropped));
     for trouble in troubles {
         world.write_message(match trouble.reason {
             Some(reason) => Notice::warning(reason.to_string()),
@@ -234,7 +234,7 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
     }
     save::poll(world);
     open::poll(world);
-    dropped::open_next(world);
+    file_drop::open_next(world);
     recovery::poll(world);
     document::watch_places(world);
     show_title(world);
