@@ -171,9 +171,9 @@ pub enum RigEdit {
     },
     /// Gives what is stored of each node (offset, attribute values, stored poses, keys) to the other one of its pair.
     ExchangeNodes(Vec<(Uid, Uid)>),
-    /// Has a mesh come to the rig. The rig names meshes and has none, so whoever shows it follows.
+    /// Tells that a mesh comes to the rig. The rig names meshes and holds none, so whoever shows them follows.
     AddMesh(Uid),
-    /// Has a mesh leave the rig; its weights are [`RigEdit::SetSkin`]'s.
+    /// Tells that a mesh leaves the rig; its weights are [`RigEdit::SetSkin`]'s.
     RemoveMesh(Uid),
 }
 
