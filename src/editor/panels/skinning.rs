@@ -113,7 +113,7 @@ fn skin(
     let models_of = |mesh: &Entity| models.get(*mesh).ok();
     let (bare, bound): (Vec<Entity>, Vec<Entity>) =
         meshes.iter().copied().partition(|mesh| models_of(mesh).is_some_and(|model| needs_weights(rig, built, model)));
-    let asked = match is_for_all {
+    let asked: Vec<Entity> = match is_for_all {
         false => meshes.into_iter().filter(|mesh| singles.contains(mesh)).collect(),
         true if bare.is_empty() || bound.is_empty() => meshes,
         true => {
