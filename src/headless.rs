@@ -56,7 +56,7 @@ pub fn headless_app(seed: u64) -> App {
     app
 }
 
-/// App without a window, with the plugins of rigs, one rig and its meshes. Binding, fits, faces and gestures work on the mesh that
+/// App without a window, with the plugins of rigs, one rig and its meshes. Binding, fits and faces work on the mesh that
 /// was opened last.
 pub struct Workbench {
     app: App,
@@ -442,8 +442,8 @@ impl Workbench {
         self.app.world().get::<BuildResult>(self.rig).map(|built| &*built.0)
     }
 
-    /// Meshes with the rig's joints (the built ones if the rig is built) and weights, for export: several as one model, which
-    /// has the name of the first.
+    /// Meshes with the rig's joints (the built ones if the rig is built) and weights, for export: several as one model,
+    /// which has the name of the first.
     pub fn character(&self) -> Model {
         let (rig, built) = (self.rig(), self.built());
         let model_of = |mesh: &RigMesh| {

@@ -45,7 +45,8 @@ pub(super) fn bind(
     Ok(())
 }
 
-/// Adds what was told of one of several meshes: lines and notes with its name, and an entry of the list `meshes` for programs.
+/// Adds what was told of one of several meshes: lines and notes with its name, and an entry of the list `meshes` for
+/// programs.
 pub(super) fn add_of_mesh(report: &mut Report, name: &str, told: Report) {
     report.lines.extend(told.lines.iter().map(|line| format!("{name}: {line}")));
     report.notes.extend(told.notes.iter().map(|note| format!("{name}: {note}")));

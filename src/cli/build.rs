@@ -230,8 +230,8 @@ fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, ex
     }
 }
 
-/// Built skeleton of a workbench as posed, with the meshes of files skinned to it, and the settings for writing it. Binding a mesh
-/// may change commands: the rig is built, and posed, as it is afterwards.
+/// Built skeleton of a workbench as posed, with the meshes of files skinned to it, and the settings for writing it.
+/// Binding a mesh may change commands: the rig is built, and posed, as it is afterwards.
 pub(super) fn character_of(
     bench: &mut Workbench,
     meshes: &[PathBuf],
@@ -337,7 +337,8 @@ pub(super) fn bound_meshes(
     Ok(own)
 }
 
-/// Built skeleton of a workbench as posed, with the meshes that are bound to it in another one, and the settings for writing it.
+/// Built skeleton of a workbench as posed, with the meshes that are bound to it in another one, and the settings for
+/// writing it.
 pub(super) fn posed_character(
     bench: &Workbench,
     own: &Workbench,

@@ -30,8 +30,8 @@ use crate::{
 pub(super) struct SkinArgs {
     /// The skeleton: .rig.ron, .rig, or a .glb, .gltf or .vrm that has one
     rig: PathBuf,
-    /// The mesh: .obj, .gltf, .glb or .vrm; several become one character, such as a body and its clothes. A skeleton in it is
-    /// left aside
+    /// The mesh: .obj, .gltf, .glb or .vrm; several become one character, such as a body and its clothes. A skeleton in
+    /// it is left aside
     #[arg(required = true, value_name = "MESH")]
     pub meshes: Vec<PathBuf>,
     /// Output file: .glb or .gltf, or only the weights as .skin

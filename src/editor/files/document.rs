@@ -138,7 +138,8 @@ pub(in crate::editor) struct ContextMesh {
     pub uid: Uid,
     pub source: MeshSource,
     pub nodes: Vec<Uid>,
-    /// Marks a mesh that was not in the document when this was written. Changes of the journal that name the mesh count more.
+    /// Marks a mesh that was not in the document when this was written. Changes of the journal that name the mesh count
+    /// more.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_set_aside: bool,
 }

@@ -1,5 +1,5 @@
-//! Skinning panel: a button that computes weights, and a report of the results. Beside meshes without weights, those that have
-//! some keep them.
+//! Skinning panel: a button that computes weights, and a report of the results. Beside meshes without weights, those that
+//! have some keep them.
 
 mod findings;
 mod parts;
@@ -80,8 +80,8 @@ pub struct SkinMesh(pub Entity);
 #[derive(Message, Debug, Clone, Copy)]
 pub struct CancelSkinning;
 
-/// Requests weights for the meshes that have none, for every mesh if that is none or each of them, or for single ones; or sends
-/// a notice with the obstacle.
+/// Requests weights for the meshes that have none, for every mesh if that is none or each of them, or for single ones; or
+/// sends a notice with the obstacle.
 fn skin(
     mut actions: MessageReader<ActionRequest>,
     mut singles: MessageReader<SkinMesh>,

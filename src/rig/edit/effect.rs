@@ -1,5 +1,5 @@
-//! Effects of edits: the joints and tags that an edit adds, the meshes that come and go, the size of its weights, and whether
-//! it concerns motion alone.
+//! Effects of edits: the joints and tags that an edit adds, the meshes that come and go, the size of its weights, and
+//! whether it concerns motion alone.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -53,8 +53,8 @@ impl RigEdit {
         }
     }
 
-    /// True if the edit changes nothing but pose, attribute values, stored poses, clips, selection sets, cuts of faces or meshes,
-    /// which no command reads.
+    /// True if the edit changes nothing but pose, attribute values, stored poses, clips, selection sets, cuts of faces or
+    /// meshes, which no command reads.
     pub fn is_of_motion(&self) -> bool {
         match self {
             Self::SetOffset(..) | Self::SetAttributeValue(..) => true,
