@@ -128,7 +128,7 @@ impl Command {
         match self {
             Self::Edit(args) => args.file.as_deref(),
             Self::Sketch(args) => Some(&args.gestures),
-            Self::Skin(args) => Some(&args.mesh),
+            Self::Skin(args) => args.meshes.first().map(PathBuf::as_path),
             Self::Fit(args) => Some(&args.mesh),
             Self::Face(args) => Some(&args.mesh),
             Self::Convert(args) => Some(&args.input),

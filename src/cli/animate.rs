@@ -50,10 +50,10 @@ pub(super) struct AnimateArgs {
     /// A clip to take from the files, by its name or its number from 1; may be repeated; all, if left out
     #[arg(long = "clip", value_name = "NAME")]
     chosen: Vec<String>,
-    /// A mesh to bind to the rig, for .glb, .vrm and .png; a rig that is a .glb, .gltf, .vrm or project keeps its own meshes
-    /// and weights in a .glb or .vrm
-    #[arg(long)]
-    mesh: Option<PathBuf>,
+    /// A mesh to bind to the rig, for .glb, .vrm and .png; may be repeated, for all meshes of one character; a rig that is a
+    /// .glb, .gltf, .vrm or project keeps its own meshes and weights in a .glb or .vrm
+    #[arg(long = "mesh", value_name = "MESH")]
+    meshes: Vec<PathBuf>,
     /// A map of joints for motion of another skeleton: a RON list of pairs of names, [("LeftUpLeg", "thigh_l"), ...];
     /// it wins over what is guessed, and "" beside a joint lets it move nothing
     #[arg(long, value_name = "FILE")]
@@ -179,10 +179,10 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
                 (model, GltfWriteSettings { all_joints: true, bind_unweighted: true, ..args.export.settings() })
             }
             None => match own.len() {
-                0 => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?,
+                0 => build::character_of(&mut bench, &args.meshes, &args.weights, &args.export, &mut report)?,
                 1 => {
                     let mesh = build::MeshSource::Open(Box::new(own.swap_remove(0)));
-                    build::character_with(&mut bench, mesh, &args.weights, &args.export, &mut report)?
+                    build::character_with(&mut bench, vec![mesh], &args.weights, &args.export, &mut report)?
                 }
                 _ => build::posed_meshes(&bench, &own, &args.export)?,
             },
@@ -225,7 +225,7 @@ fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
             format!("cannot write `{}`; give .glb, .gltf, .vrm, .anim.ron, .rigclip or .png", args.output.display());
         return Err(Failure::Usage(text));
     }
-    if args.mesh.is_some() && (is_packed || kind == Some(FileKind::Animation)) {
+    if !args.meshes.is_empty() && (is_packed || kind == Some(FileKind::Animation)) {
         return Err(Failure::Usage("--mesh is for a character; write one with -o NAME.glb".to_owned()));
     }
     let is_known = |clip: &PathBuf| is_motion(clip) || FileKind::of(clip) == Some(FileKind::Animation);
@@ -254,7 +254,7 @@ fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
         let text = "--map-out is for one file of motion; give one .bvh, .glb, .gltf, .vrm or .rigclip";
         return Err(Failure::Usage(text.to_owned()));
     }
-    let inputs = [Some(&args.rig), args.mesh.as_ref(), args.map.as_ref()].into_iter().flatten().chain(&args.clips);
+    let inputs = std::iter::once(&args.rig).chain(&args.meshes).chain(&args.map).chain(&args.clips);
     let inputs: Vec<&Path> = inputs.map(PathBuf::as_path).collect();
     let further: Vec<(&str, &Path)> = args.map_out.iter().map(|path| ("--map-out", path.as_path())).collect();
     InPlaceArgs::default().check(&inputs, Some(&args.output), &further)
@@ -272,7 +272,7 @@ fn read(args: &AnimateArgs, report: &mut Report) -> Result<(Rig, Vec<RigMesh>), 
         }
     }
     let mut project = limits::load_project(&args.rig)?;
-    let is_character = args.mesh.is_none() && FileKind::of(&args.output).is_some_and(FileKind::is_gltf);
+    let is_character = args.meshes.is_empty() && FileKind::of(&args.output).is_some_and(FileKind::is_gltf);
     if is_character {
         limits::refuse_outside(&project)?;
     }
@@ -328,7 +328,7 @@ fn describe(clips: &[RigClip], report: &mut Report) {
 /// Character of the rig's own file, with its mesh and weights; `None` if the rig is no model or has no mesh, or if
 /// another mesh is given.
 fn own_character(args: &AnimateArgs, bench: &Workbench, report: &mut Report) -> Result<Option<Model>, Failure> {
-    if args.mesh.is_some() || !FileKind::of(&args.rig).is_some_and(FileKind::is_gltf) {
+    if !args.meshes.is_empty() || !FileKind::of(&args.rig).is_some_and(FileKind::is_gltf) {
         return Ok(None);
     }
     let model = limits::load_model(&args.rig)?;

@@ -45,6 +45,19 @@ pub(super) fn bind(
     Ok(())
 }
 
+/// Adds what was told of one of several meshes: lines and notes with its name, and an entry of the list `meshes` for
+/// programs.
+pub(super) fn add_of_mesh(report: &mut Report, name: &str, told: Report) {
+    report.lines.extend(told.lines.iter().map(|line| format!("{name}: {line}")));
+    report.notes.extend(told.notes.iter().map(|note| format!("{name}: {note}")));
+    let mut entry = told.json;
+    entry.insert("mesh".to_owned(), name.into());
+    let list = report.json.entry("meshes").or_insert_with(|| Value::Array(Vec::new()));
+    if let Value::Array(list) = list {
+        list.push(Value::Object(entry));
+    }
+}
+
 /// Labels of the joints that can hold skin, and the names of those without a label.
 pub(super) struct JointNames {
     list: Vec<(Uid, String)>,

@@ -57,9 +57,9 @@ impl PoseSteps {
 pub(super) struct PoseArgs {
     /// The rig: a .rig.ron, or a project (.rigsmith.ron), whose pose is kept
     pub rig: PathBuf,
-    /// A mesh to bind to what is built
-    #[arg(long)]
-    mesh: Option<PathBuf>,
+    /// A mesh to bind to what is built; may be repeated, for all meshes of one character
+    #[arg(long = "mesh", value_name = "MESH")]
+    meshes: Vec<PathBuf>,
     #[command(flatten)]
     steps: PoseSteps,
     /// A stored pose of a project to begin with
@@ -106,11 +106,10 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
                       which they are blended: write a .png";
         return Err(Failure::Usage(reason.to_owned()));
     }
-    let inputs: Vec<&Path> =
-        [Some(&args.rig), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+    let inputs: Vec<&Path> = std::iter::once(&args.rig).chain(&args.meshes).map(PathBuf::as_path).collect();
     args.in_place.check(&inputs, args.output.as_deref(), &[])?;
     let writes = parsed(&args.steps, &args.rig)?;
-    if args.mesh.is_some() && (kind == Some(Some(FileKind::Template)) || kind.is_none()) {
+    if !args.meshes.is_empty() && (kind == Some(Some(FileKind::Template)) || kind.is_none()) {
         return Err(Failure::Usage(
             "--mesh is for a character or a picture; write one with -o NAME.glb or .png".to_owned(),
         ));
@@ -179,7 +178,7 @@ fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Vec<RigMesh>), Fai
     let mut own = Vec::new();
     let mut rig = if FileKind::of(&args.rig) == Some(FileKind::Project) {
         let mut project = limits::load_project(&args.rig)?;
-        if args.mesh.is_none() {
+        if args.meshes.is_empty() {
             limits::refuse_outside(&project)?;
         }
         report.notes(project.notes);
@@ -194,13 +193,11 @@ fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Vec<RigMesh>), Fai
         }
         let mut told = Report::default();
         own = own_meshes(project.meshes, &rig, &mut told);
-        match args.mesh {
-            Some(_) if !own.is_empty() => {
-                own.clear();
-                report.notes.push("--mesh stands in for the mesh of the project".to_owned());
-            }
-            Some(_) => {}
-            None => report.notes(told.notes),
+        if args.meshes.is_empty() {
+            report.notes(told.notes);
+        } else if !own.is_empty() {
+            own.clear();
+            report.notes.push("--mesh stands in for the mesh of the project".to_owned());
         }
         rig
     } else {
@@ -246,10 +243,10 @@ fn write(
         return Ok(());
     }
     let (model, settings) = match own.len() {
-        0 => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, report)?,
+        0 => build::character_of(&mut bench, &args.meshes, &args.weights, &args.export, report)?,
         1 => {
             let mesh = MeshSource::Open(Box::new(own.swap_remove(0)));
-            build::character_with(&mut bench, mesh, &args.weights, &args.export, report)?
+            build::character_with(&mut bench, vec![mesh], &args.weights, &args.export, report)?
         }
         _ => build::posed_meshes(&bench, &own, &args.export)?,
     };
@@ -267,19 +264,11 @@ fn picture(
     bench: &Workbench,
     report: &mut Report,
 ) -> Result<(), Failure> {
-    let mut own = own.into_iter();
-    let first = own.next();
-    report.notes.extend(own.map(|mesh| format!("the mesh \"{}\" is not drawn: `render` draws all", mesh.file.name)));
-    let mesh = match (first, &args.mesh) {
-        (Some(mesh), _) => Some(MeshSource::Open(Box::new(mesh))),
-        (None, Some(path)) => {
-            let model = limits::load_model(path)?;
-            report.notes(model.notes.iter().cloned());
-            Some(MeshSource::Model(Box::new(model)))
-        }
-        (None, None) => None,
+    let meshes = match own.is_empty() {
+        true => build::loaded(&args.meshes, report)?,
+        false => own.into_iter().map(|mesh| MeshSource::Open(Box::new(mesh))).collect(),
     };
-    super::render::picture_of(bench, mesh, &args.weights, args.deform, output, report)
+    super::render::picture_of(bench, meshes, &args.weights, args.deform, output, report)
 }
 
 #[cfg(not(feature = "render"))]

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{
     ArgumentError, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
-    build::MeshSource,
+    build::{MeshSource, open_all},
     device_selection, limits,
     pose::{self, PoseSteps},
     progress::spinning,
@@ -230,10 +230,10 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Draws a rig as it stands on a workbench, with a mesh skinned to its built joints if there is one.
+/// Draws a rig as it stands on a workbench, with meshes skinned to its built joints.
 pub(super) fn picture_of(
     posed: &Workbench,
-    mesh: Option<MeshSource>,
+    meshes: Vec<MeshSource>,
     weights: &WeightArgs,
     deform: DeformArgs,
     output: &Path,
@@ -241,11 +241,8 @@ pub(super) fn picture_of(
 ) -> Result<(), Failure> {
     let mut bench = limits::workbench(posed.posed_document()?);
     bench.build(BuildStep::All);
-    let mut meshes = Vec::new();
-    if let Some(mesh) = mesh {
-        mesh.open(&mut bench, weights, report)?;
-        meshes.extend(bench.mesh().cloned());
-    }
+    open_all(meshes, &mut bench, weights, report)?;
+    let meshes: Vec<RigMesh> = bench.meshes().cloned().collect();
     let state = Some(posed.runtime()?.state().clone());
     let settings = PictureSettings { build: true, state, deform: deform.deform(), ..PictureSettings::default() };
     let picture = |error| Failure::Input(Box::new(error));

@@ -9,7 +9,7 @@ use super::{
     keys::KeyBindings,
     mode::Mode,
     panels::{
-        skinning::{is_held, mesh_name},
+        skinning::{is_held, mesh_name, needs_weights},
         timeline::{OpenClip, Timeline, TimelineAction},
     },
 };
@@ -64,10 +64,10 @@ pub fn next_step(world: &World) -> Option<String> {
                 return Some(format!("Built {}: {} builds all.", built_commands(builder), key(Action::Build)));
             }
             let mut models = meshes.iter().filter_map(|mesh| world.get::<RigMesh>(*mesh));
-            if let Some(loose) = models.find(|mesh| is_skinned && is_loose(rig, mesh)) {
-                let name = mesh_name(loose);
+            if let Some(bare) = models.find(|mesh| is_skinned && needs_weights(rig, built, mesh)) {
+                let (name, skin) = (mesh_name(bare), key(Action::Skin));
                 return Some(format!(
-                    "{name} has no weights yet: the Skinning panel binds it, alone or with all meshes."
+                    "{name} has no weights yet: {skin} skins what has none, the rest keeps its weights."
                 ));
             }
             match rig.clips() {
@@ -95,11 +95,6 @@ pub fn next_step(world: &World) -> Option<String> {
             }
         }
     })
-}
-
-/// True for a mesh without weights that hangs on no joint either, so that nothing moves it.
-fn is_loose(rig: &Rig, mesh: &RigMesh) -> bool {
-    rig.skin(mesh.uid).is_none() && mesh.file.objects.iter().any(|object| object.node.is_none())
 }
 
 /// The next step with the open clip.

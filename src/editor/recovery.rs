@@ -2,7 +2,7 @@
 //! the user.
 
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
 };
 
@@ -167,11 +167,27 @@ fn restore(journal: &Path) -> Result<LoadedFile, OpenError> {
     add_meshes(&recovered, &mut opened);
     let restored = recovered.restore(basis, base);
     tell_losses(&recovered, &restored, basis, &mut opened);
+    set_removed_aside(&recovered, &restored, &mut opened);
     opened.pending = None;
     opened.origin = recovered.origin().clone();
     opened.rig = restored.replayed.rig.clone();
     opened.work = Some(Box::new(Work { recovered, restored, journal: journal.to_owned() }));
     Ok(document(opened))
+}
+
+/// Sets the meshes aside that were not in the document when the work ended, for undo and redo.
+fn set_removed_aside(recovered: &RecoveredJournal, restored: &RestoredRig, opened: &mut LoadedDocument) {
+    let listed = context_of(recovered).meshes;
+    let mut is_there: BTreeMap<Uid, bool> = listed.iter().map(|mesh| (mesh.uid, !mesh.is_set_aside)).collect();
+    let skipped: BTreeSet<usize> = restored.skipped.iter().map(|skipped| skipped.change).collect();
+    let made = if restored.replayed.refused.is_some() { restored.replayed.applied } else { usize::MAX };
+    for (number, committed) in recovered.changes().iter().enumerate().take(made) {
+        if !skipped.contains(&number) {
+            committed.effect().0.iter().for_each(|edit| edit.mesh_changes(&mut is_there));
+        }
+    }
+    let meshes = std::mem::take(&mut opened.meshes).into_iter();
+    (opened.meshes, opened.set_aside) = meshes.partition(|(mesh, _)| is_there.get(&mesh.uid).copied().unwrap_or(true));
 }
 
 /// The project from which the work started, if its file is as it was then.

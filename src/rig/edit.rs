@@ -171,6 +171,10 @@ pub enum RigEdit {
     },
     /// Gives what is stored of each node (offset, attribute values, stored poses, keys) to the other one of its pair.
     ExchangeNodes(Vec<(Uid, Uid)>),
+    /// Tells that a mesh comes to the rig. The rig names meshes and holds none, so whoever shows them follows.
+    AddMesh(Uid),
+    /// Tells that a mesh leaves the rig; its weights are [`RigEdit::SetSkin`]'s.
+    RemoveMesh(Uid),
 }
 
 /// Error of applying an edit. The rig is unchanged.
@@ -364,6 +368,8 @@ impl Rig {
             RigEdit::SetWeights(mesh, patch) => self.set_weights(*mesh, patch)?,
             RigEdit::MoveTag { tag, joint, index } => self.move_tag(*tag, *joint, *index)?,
             RigEdit::ExchangeNodes(pairs) => self.exchange_nodes(pairs),
+            RigEdit::AddMesh(mesh) => RigEdit::RemoveMesh(*mesh),
+            RigEdit::RemoveMesh(mesh) => RigEdit::AddMesh(*mesh),
             RigEdit::SetDroppedParts(parts) => {
                 RigEdit::SetDroppedParts(std::mem::replace(&mut self.dropped, parts.clone()))
             }

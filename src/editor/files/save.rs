@@ -16,7 +16,7 @@ use super::{
     FollowUp, active, after_asking,
     bundle::{BODY, BundledModel},
     dialog::Purpose,
-    document::{Context, ContextMesh, MeshSource, OpenDocument, SavedAt, last_step, meshes, places},
+    document::{MeshSource, OpenDocument, SavedAt, context, last_step, meshes, places},
     error::WriteError,
     export, file_name,
     open::spawn,
@@ -368,15 +368,7 @@ fn saved(world: &mut World, rig: Entity, step: Option<Arc<Step>>, mark: SaveMark
         }
     }
     let places = places(world, Some(mark.path.clone()));
-    let context = Context {
-        name: stem(&mark.path),
-        meshes: meshes(world, rig)
-            .into_iter()
-            .filter_map(|(_, mesh, source)| {
-                Some(ContextMesh { uid: mesh.uid, source: source?.clone(), nodes: mesh.nodes.to_vec() })
-            })
-            .collect(),
-    };
+    let context = context(world, rig, stem(&mark.path));
     world.resource_mut::<EditorSettings>().remember(mark.path.clone());
     let Some(mut document) = world.get_mut::<OpenDocument>(rig) else { return };
     document.saved = SavedAt::Step(step);

@@ -1,4 +1,5 @@
-//! Skinning panel: a button that computes weights for every mesh, and a report of the results.
+//! Skinning panel: a button that computes weights, and a report of the results. Beside meshes without weights, those that
+//! have some keep them.
 
 mod findings;
 mod parts;
@@ -79,12 +80,13 @@ pub struct SkinMesh(pub Entity);
 #[derive(Message, Debug, Clone, Copy)]
 pub struct CancelSkinning;
 
-/// Requests weights for every mesh or for single ones, or sends a notice with the obstacle.
+/// Requests weights for the meshes that have none, for every mesh if that is none or each of them, or for single ones; or
+/// sends a notice with the obstacle.
 fn skin(
     mut actions: MessageReader<ActionRequest>,
     mut singles: MessageReader<SkinMesh>,
     active: Option<Res<ActiveRig>>,
-    rigs: Query<(&Rig, Option<&RigMeshes>)>,
+    rigs: Query<(&Rig, Option<&RigMeshes>, Option<&BuildResult>)>,
     jobs: Query<&SkinningJob>,
     models: Query<&RigMesh>,
     (settings, parts, claims): (Res<SkinningSettings>, Res<SkinningParts>, Res<SkinningClaims>),
@@ -95,7 +97,7 @@ fn skin(
     if !is_for_all && singles.is_empty() {
         return;
     }
-    let Some((rig, meshes)) = active.and_then(|active| rigs.get(active.0).ok()) else { return };
+    let Some((rig, meshes, built)) = active.and_then(|active| rigs.get(active.0).ok()) else { return };
     let meshes: Vec<Entity> = meshes.iter().flat_map(|meshes| meshes.iter()).collect();
     if let Some(progress) = meshes.iter().find_map(|mesh| jobs.get(*mesh).ok()).map(SkinningJob::progress) {
         let percent = (progress * 100.0) as u32;
@@ -107,7 +109,22 @@ fn skin(
         commands.write_message(Notice::warning(obstacle));
         return;
     }
-    for mesh in meshes.into_iter().filter(|mesh| is_for_all || singles.contains(mesh)) {
+    let built = built.map(|built| &*built.0);
+    let models_of = |mesh: &Entity| models.get(*mesh).ok();
+    let (bare, bound): (Vec<Entity>, Vec<Entity>) =
+        meshes.iter().copied().partition(|mesh| models_of(mesh).is_some_and(|model| needs_weights(rig, built, model)));
+    let asked: Vec<Entity> = match is_for_all {
+        false => meshes.into_iter().filter(|mesh| singles.contains(mesh)).collect(),
+        true if bare.is_empty() || bound.is_empty() => meshes,
+        true => {
+            let kept: Vec<&str> = bound.iter().filter_map(models_of).map(mesh_name).collect();
+            let keep = if kept.len() == 1 { "keeps its" } else { "keep their" };
+            let text = format!("{} {keep} weights. Skin again computes those of all meshes.", kept.join(", "));
+            commands.write_message(Notice::info(text).at(TITLE));
+            bare
+        }
+    };
+    for mesh in asked {
         let parts = models.get(mesh).map(|model| parts.of(model.uid)).unwrap_or_default();
         let claims = claims.0.iter().copied().collect();
         commands.write_message(BindRequest { mesh, settings: settings.0.clone(), parts, claims });
@@ -246,7 +263,8 @@ fn skin_button(ui: &mut Ui, shown: &DisplayedRig, meshes: usize, running: &[&Ski
         let obstacle = obstacle(&shown.rig, meshes);
         let button = Button::new(RichText::new("Skin").size(16.0).strong());
         let response = ui.add_enabled_ui(obstacle.is_none(), |ui| ui.add_sized(size, button)).inner;
-        let response = response.on_hover_text("Compute weights of all meshes in the background");
+        let response =
+            response.on_hover_text("Compute weights in the background: of the meshes that have none, else of all");
         if response.clicked() {
             requests.send(ActionRequest(Action::Skin));
         }
@@ -392,6 +410,14 @@ impl SkinningPanel {
         self.counted.retain(|(uid, known, _)| *uid != mesh && known.strong_count() > 0);
         self.counted.push((mesh, std::sync::Arc::downgrade(skin), count));
         count
+    }
+}
+
+/// True for a mesh that nothing moves: without weights for joints that the rig has, and with objects that hang on no joint.
+pub(in crate::editor) fn needs_weights(rig: &Rig, built: Option<&BuiltRig>, mesh: &RigMesh) -> bool {
+    match rig.skin(mesh.uid) {
+        Some(skin) => skin.weights.is_empty() || !is_held(rig, built, skin),
+        None => mesh.file.objects.iter().any(|object| object.node.is_none()),
     }
 }
 

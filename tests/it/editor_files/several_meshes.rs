@@ -31,6 +31,15 @@ impl Window {
         self.answer(Answer::Path(path.to_owned()));
     }
 
+    /// Drops files on the window, together.
+    fn drop_files(&mut self, paths: &[&Path]) {
+        for path in paths {
+            let dropped = FileDragAndDrop::DroppedFile { window: Entity::PLACEHOLDER, path_buf: (*path).to_owned() };
+            self.base.app.world_mut().write_message(dropped);
+        }
+        self.settle();
+    }
+
     /// Names and uids of the open meshes, by name.
     fn meshes(&self) -> Vec<(String, Uid)> {
         let meshes = self.world().get::<RigMeshes>(self.base.open_rig());
@@ -133,6 +142,97 @@ fn all_meshes_are_in_one_exported_file() {
 }
 
 #[test]
+fn files_that_are_dropped_together_are_one_document() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let (body, coat) = (write_mesh(folder.path(), "body", 0.0), write_mesh(folder.path(), "coat", 10.0));
+    let mut window = Window::new(folder.path());
+    let names = |window: &Window| -> Vec<String> { window.meshes().into_iter().map(|(name, _)| name).collect() };
+    // People drop all files of a mesh, the textures first.
+    window.drop_files(&[&at("body.png"), &at("body.mtl"), &body, &coat]);
+    assert_eq!(names(&window), ["body", "coat"], "{:?}", window.notices.list);
+    assert!(window.notices.list.iter().all(|notice| notice.severity != Severity::Error), "{:?}", window.notices.list);
+    assert!(title(window.world()).starts_with("body"), "the first one is the document");
+    window.change(Change::Undo);
+    assert_eq!(names(&window), ["body"], "the other one came to it as a step");
+
+    window.place(0.5);
+    let before = (window.rig(), window.meshes());
+    window.drop_files(&[&coat, &body]);
+    assert!(matches!(window.question(), Some(Question::Unsaved { .. })), "{:?}", window.notices.list);
+    window.answer(Answer::Cancel);
+    assert_eq!((window.rig(), window.meshes()), before, "nothing comes to the document that stays");
+    window.drop_files(&[&coat, &body]);
+    window.answer(Answer::Discard);
+    assert_eq!((names(&window), window.rig().len()), (vec!["body".to_owned(), "coat".to_owned()], 0));
+    assert!(title(window.world()).starts_with("coat"));
+
+    let project = window.save_as("dressed.rigsmith.ron");
+    let before = window.meshes();
+    std::fs::write(at("broken.glb"), b"hello").expect("written");
+    window.drop_files(&[&at("broken.glb"), &body]);
+    assert!(window.notices.include(Severity::Error, "broken.glb"), "{:?}", window.notices.list);
+    let told = "The files beside broken.glb were not opened, either";
+    assert!(window.notices.include(Severity::Info, told), "{:?}", window.notices.list);
+    assert_eq!(window.meshes(), before);
+    // A mesh that is dropped with a project comes to it.
+    window.drop_files(&[&write_mesh(folder.path(), "hat", 20.0), &project]);
+    assert_eq!(names(&window), ["body", "coat", "hat"], "{:?}", window.notices.list);
+}
+
+/// A window that goes on with the work on a project that a crash left.
+fn recovered(folder: &Path, project: &Path) -> Window {
+    let mut window = Window::new(folder);
+    window.open_file(project);
+    let Some(Question::Recover(list)) = window.question() else {
+        panic!("nothing is offered beside the project: {:?}", window.notices.list)
+    };
+    let ours = list.iter().find(|pending| pending.path.starts_with(folder)).expect("our work is offered");
+    let ours = ours.path.clone();
+    window.answer(Answer::Recover(ours));
+    window
+}
+
+#[test]
+fn meshes_come_and_go_as_steps() {
+    let folder = folder();
+    let (mut window, [body, coat]) = dressed(folder.path());
+    let alone = (window.rig(), vec![window.meshes()[0].clone()]);
+    window.change(Change::Undo);
+    assert_eq!((window.rig(), window.meshes()), alone, "undo takes the added mesh away");
+    window.change(Change::Redo);
+    assert_eq!(window.meshes().len(), 2);
+    window.bind(body.0, body.1);
+    window.bind(coat.0, coat.1);
+    let project = window.save_as("dressed.rigsmith.ron");
+    let both = (window.rig(), window.meshes());
+    window.send(RemoveMeshRequest(coat.0));
+    let one = (window.rig(), window.meshes());
+    assert_eq!((one.0.skins().count(), one.1.len()), (1, 1));
+    window.change(Change::Undo);
+    assert_eq!((window.rig(), window.meshes()), both, "undo brings the mesh back with its weights");
+    assert!(!window.is_unsaved(), "as it was saved");
+    window.change(Change::Redo);
+    assert!((window.rig(), window.meshes()) == one && window.is_unsaved());
+
+    // A removed mesh is away after a crash, too, and undo brings it back there.
+    crash(window);
+    let mut window = recovered(folder.path(), &project);
+    assert_eq!((window.rig(), window.meshes()), one, "{:?}", window.notices.list);
+    window.change(Change::Undo);
+    assert_eq!((window.rig(), window.meshes()), both, "{:?}", window.notices.list);
+    window.change(Change::Redo);
+    window.act(Action::Save);
+    assert!(!window.is_unsaved(), "{:?}", window.notices.list);
+    // The file does not have the mesh, which an undo after the save brings back.
+    window.change(Change::Undo);
+    assert_eq!((window.rig(), window.meshes()), both);
+    crash(window);
+    let window = recovered(folder.path(), &project);
+    assert_eq!((window.rig(), window.meshes()), both, "{:?}", window.notices.list);
+}
+
+#[test]
 fn added_meshes_are_saved_recovered_and_removed() {
     let folder = folder();
     let (mut window, [_, coat]) = dressed(folder.path());
@@ -148,14 +248,7 @@ fn added_meshes_are_saved_recovered_and_removed() {
     let (rig, meshes) = (window.rig(), window.meshes());
     assert_eq!(meshes.len(), 3);
     crash(window);
-    let mut window = Window::new(folder.path());
-    window.open_file(&project);
-    let Some(Question::Recover(list)) = window.question() else {
-        panic!("nothing is offered beside the project: {:?}", window.notices.list)
-    };
-    let ours = list.iter().find(|pending| pending.path.starts_with(folder.path())).expect("our work is offered");
-    let ours = ours.path.clone();
-    window.answer(Answer::Recover(ours));
+    let mut window = recovered(folder.path(), &project);
     assert_eq!((window.rig(), window.meshes()), (rig, meshes), "{:?}", window.notices.list);
 
     // What is removed takes its weights along.
@@ -190,7 +283,7 @@ fn added_meshes_keep_their_weights_for_joints_of_the_same_names() {
     let (_, skin) = rig.skins().next().expect("weights");
     assert_eq!((rig.len(), skin.joints.clone()), (2, joints));
     other.change(Change::Undo);
-    assert_eq!(other.rig(), before, "its weights are one step");
+    assert_eq!((other.rig(), other.meshes().len()), (before.clone(), 1), "it comes with its weights as one step");
 
     // Weights for joints of other names would be for nothing.
     let joint = before.roots()[0];

@@ -165,19 +165,49 @@ fn rigid_parts_and_idle_joints_have_a_choice_each() {
     assert!(desk.app.world().resource::<SkinningClaims>().0.is_empty());
 }
 
-/// Weights that were painted on a body are not lost to a coat that comes later.
+/// Spawns a box as a mesh of that name.
+fn spawn_named(desk: &mut Desk, uid: u64, name: &str) -> Entity {
+    let model =
+        rigsmith::mesh::model::Model { name: name.to_owned(), ..boxes(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]) };
+    let mesh = (RigMesh::new(Uid(uid), model, Vec::new()), SkinOf(desk.rig));
+    desk.app.world_mut().spawn(mesh).id()
+}
+
+/// Weights that were painted on a body are not lost to the skinning of a coat that comes later.
+#[test]
+fn meshes_with_weights_keep_them_where_another_has_none() {
+    let mut desk = Desk::new(SkinningPanel::default());
+    let joints = desk.chain(&["a", "b"]);
+    let body = spawn_named(&mut desk, 98, "body");
+    let points = desk.app.world().get::<RigMesh>(body).unwrap().rest.points.len();
+    let mut weights = rigsmith::mesh::model::Weights::default();
+    (0..points).for_each(|_| weights.push([(0, 1.0)]));
+    let painted = rigsmith::rig::SkinData { joints: vec![joints[1]], weights, at_rest: true, ..default() };
+    desk.edit(Operation::Edits(vec![RigEdit::SetSkin(Uid(98), Some(std::sync::Arc::new(painted.clone())))]));
+    let coat = spawn_named(&mut desk, 99, "coat");
+    desk.frames(2);
+    let next = rigsmith::editor::next_step::next_step(desk.app.world()).unwrap();
+    assert!(next.contains("coat has no weights yet"), "{next}");
+    desk.app.world_mut().write_message(ActionRequest(Action::Skin));
+    desk.frames(2);
+    wait(&mut desk, coat);
+    assert!(desk.rig().skin(Uid(99)).is_some(), "{:?}", desk.told());
+    assert_eq!(desk.rig().skin(Uid(98)).map(|skin| &**skin), Some(&painted));
+    assert!(desk.told().iter().any(|told| told.starts_with("body keeps its weights.")), "{:?}", desk.told());
+    // With weights everywhere, all are computed.
+    desk.app.world_mut().write_message(ActionRequest(Action::Skin));
+    desk.frames(2);
+    wait(&mut desk, body);
+    wait(&mut desk, coat);
+    assert_ne!(desk.rig().skin(Uid(98)).map(|skin| &**skin), Some(&painted), "{:?}", desk.told());
+}
+
 #[test]
 fn one_of_several_meshes_is_skinned_alone() {
     let mut desk = Desk::new(SkinningPanel::default());
     desk.chain(&["a", "b"]);
-    let spawn = |desk: &mut Desk, uid: u64, name: &str| {
-        let model =
-            rigsmith::mesh::model::Model { name: name.to_owned(), ..boxes(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]) };
-        let mesh = (RigMesh::new(Uid(uid), model, Vec::new()), SkinOf(desk.rig));
-        desk.app.world_mut().spawn(mesh).id()
-    };
-    spawn(&mut desk, 98, "body");
-    let coat = spawn(&mut desk, 99, "coat");
+    spawn_named(&mut desk, 98, "body");
+    let coat = spawn_named(&mut desk, 99, "coat");
     desk.frames(2);
     desk.click("Skin coat alone");
     wait(&mut desk, coat);
