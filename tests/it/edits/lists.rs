@@ -9,7 +9,7 @@ fn lists_with_uids_find_their_items_after_each_edit() {
     let group =
         |number: u64| GroupData { uid: Uid(number), name: format!("g{number}"), color: [0.5; 3], enabled: true };
     let pose = |number: u64| StoredPose { uid: Uid(number), name: format!("p{number}"), ..StoredPose::default() };
-    let input = |number: u64| RigInput { uid: Uid(number), name: format!("i{number}"), rest: RestTransform::IDENTITY };
+    let input = |number: u64| RigInput { uid: Uid(number), name: format!("i{number}"), rest: RestTransform::default() };
     let check = |rig: &Rig, places: [&[u64]; 3]| {
         let groups: Vec<u64> = rig.groups().iter().map(|group| group.uid.0).collect();
         let poses: Vec<u64> = rig.stored_poses().iter().map(|pose| pose.uid.0).collect();
