@@ -179,9 +179,9 @@ pub struct ReportedStep {
 /// Chain that was drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReportedChain {
-    /// Joint that its first joint hangs on; `None` for a root.
+    /// Joint that the first joint hangs on; `None` for a root.
     pub parent: Option<Uid>,
-    /// Its last joint.
+    /// Last joint of the chain.
     pub tip: Option<Uid>,
 }
 
