@@ -14,7 +14,7 @@ fn lists_with_uids_find_their_items_after_each_edit() {
         let groups: Vec<u64> = rig.groups().iter().map(|group| group.uid.0).collect();
         let poses: Vec<u64> = rig.stored_poses().iter().map(|pose| pose.uid.0).collect();
         let inputs: Vec<u64> = rig.inputs().iter().map(|input| input.uid.0).collect();
-        assert_eq!([&groups[..], &poses, &inputs], places);
+        assert_eq!([&groups[..], &poses[..], &inputs[..]], places);
         for number in 1..50 {
             let uid = Uid(number);
             assert_eq!(rig.group(uid).map(|group| group.uid), groups.contains(&number).then_some(uid));

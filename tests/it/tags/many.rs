@@ -33,7 +33,7 @@ fn tags_at_once_are_bound_as_one_by_one() {
         "(at: \"@command ik_handle + @command control/grip_l\")",
     ] {
         let (mut at_once, mut one_by_one) = (body(), body());
-        let uids = UidSource::new(1);
+        let uids = UidSource::seeded(1);
         add(&joints, params).run(&mut at_once, &mut uids.clone(), None).unwrap();
         let mut uids = uids.clone();
         for joint in joints {
@@ -46,13 +46,13 @@ fn tags_at_once_are_bound_as_one_by_one() {
     // A name that the first of the tags makes ambiguous is refused for the second.
     let mut rig = body();
     let before = rig.clone();
-    let added = add(&[ARM_L, ARM_R], "(at: \"@command control\")").run(&mut rig, &mut UidSource::new(1), None);
+    let added = add(&[ARM_L, ARM_R], "(at: \"@command control\")").run(&mut rig, &mut UidSource::seeded(1), None);
     assert!(added.is_ok());
     let mut rig = before.clone();
     let kind =
         TagKind::Command { module: "control".into(), params: "(at: \"@command control\")".into(), feature: None };
     let twice = TagOperation::Add { joints: vec![ARM_L, ARM_R], kind, index: None };
-    let refused = Operation::Tags(twice).run(&mut rig, &mut UidSource::new(1), None);
+    let refused = Operation::Tags(twice).run(&mut rig, &mut UidSource::seeded(1), None);
     assert!(refused.is_err());
     assert_eq!(rig, before);
 }
