@@ -1,5 +1,5 @@
-//! Clicks, strokes, names and undone steps of lists that nobody watches: the same result as one a frame, and work in proportion to
-//! the length of the list.
+//! Clicks, strokes, names and undone steps of lists that nobody watches: the same result as one a frame, and work in
+//! proportion to the length of the list.
 
 use bevy::prelude::*;
 use rigsmith::{
@@ -235,6 +235,25 @@ fn runs_of_strokes_give_what_strokes_one_a_frame_give() {
     assert!([2, 4, 5].iter().all(|number| told(*number).contains("joints below \"")), "{answers:?}");
     assert!(!answers[6].done, "{answers:?}");
     assert!(told(8).contains("as a root") && told(10).contains("below \"tip\""), "{answers:?}");
+}
+
+#[test]
+fn runs_of_strokes_without_a_number_of_joints_give_what_strokes_one_a_frame_give() {
+    let answers = check(
+        "[Recentre(false), Stroke(points: [(-0.8, 1.2), (-0.2, 1.2)], joints: 3), Deselect, \
+         Stroke(points: [(-0.8, 1.8), (0.8, 1.8)], threshold: 0.01), \
+         Stroke(points: [(-0.65, 1.1), (-0.65, 1.3)]), \
+         Stroke(points: [(-0.5, 1.05), (-0.45, 1.95)], threshold: 0.05), \
+         Stroke(points: [(-0.2, 1.2), (0.0, 1.3), (0.2, 1.25)], threshold: 0.02), \
+         Stroke(points: [(0.3, 1.3), (0.4, 1.6), (0.7, 1.3)], threshold: 0.02), \
+         Stroke(points: [(0.35, 1.05), (0.6, 1.05)], threshold: 0.02), Deselect, \
+         Stroke(points: [(-0.4, 1.1), (-0.4, 1.28)]), Stroke(points: [(0.9, 1.1), (0.9, 1.3)], threshold: 0.02), \
+         Stroke(points: [(-0.9, 1.15), (0.9, 1.25), (-0.9, 1.2), (0.9, 1.3), (-0.9, 1.25), (0.9, 1.35), (-0.9, 1.3)]), \
+         Stroke(points: [(-0.9, 1.5), (0.9, 1.5)]), Undo]",
+        |_| {},
+    );
+    let told = |words: &str| answers.iter().any(|answer| answer.message.starts_with(words));
+    assert!(told("drew a chain") && told("put a joint") && told("deleted"), "{answers:?}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //!
 //! Nobody watches the gestures of a command. Between two clicks on a mesh at rest nothing happens that the second one
 //! depends on but the joint of the first, so that entities have to follow the document once for all of them; names and
-//! undone steps depend on nothing else, and a stroke of a given number of joints only on the joint on which it starts. A run
+//! undone steps depend on nothing else, and a stroke that is surely a chain only on the joint on which it starts. A run
 //! has at most as many gestures as the rig has joints: frames cost what the joints of the rig cost, and a list takes time in
 //! proportion to its length.
 
@@ -83,7 +83,7 @@ impl RunState {
             }
             // The answer to a stroke names the joint that its chain hangs on.
             Gesture::Label(_) | Gesture::Undo | Gesture::Redo => self.strokes == 0,
-            Gesture::Click(_) | Gesture::Stroke { joints: Some(_), .. } => !self.has_steps,
+            Gesture::Click(_) | Gesture::Stroke { .. } => !self.has_steps,
             // A selection that is cleared at once is a pick, which ends the cycle of clicks at one spot, as edits do.
             Gesture::Deselect => self.has_changes,
             _ => false,
@@ -107,19 +107,23 @@ pub(super) fn carry_out(
     edits: &mut MessageWriter<EditRequest>,
     limits: &RigLimits,
 ) -> bool {
-    let mut joints = RunJoints::default();
+    let mut joints = RunJoints::new(run);
     let mut has_begun = false;
     let mut state = RunState::default();
     for _ in 0..run.rig.len().max(LEAST) {
         let Some(gesture) = script.waiting.front().filter(|gesture| state.takes(gesture)) else { break };
         let mut start = None;
-        if let Gesture::Stroke { points, .. } = gesture {
+        if let Gesture::Stroke { points, joints: count, .. } = gesture {
             let (plane, size) = (script.state.plane(run.bounds), (run.bounds[1] - run.bounds[0]).max_element());
             let reach = script.state.reach(run.bounds);
-            start = run.can_go_on(state.strokes).then(|| joints.start(run.rig, &plane, size, reach, points)).flatten();
-            if start.is_none() {
+            if !run.can_go_on(state.strokes) {
                 break;
             }
+            let Some(found) = joints.start(run.rig, &plane, size, reach, points) else { break };
+            if count.is_none() && !joints.is_chain(run.rig, &plane, size, reach, points, found) {
+                break;
+            }
+            start = Some(found);
         }
         has_begun = true;
         let Some(gesture) = script.begin_next(run.rig.len(), limits) else { continue };

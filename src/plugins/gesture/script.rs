@@ -147,8 +147,8 @@ impl GestureScript {
         Self { waiting: gestures.into_iter().collect(), ..Self::default() }
     }
 
-    /// A script of these gestures in an app without a window: clicks, strokes of a given number of joints, labels, undone and
-    /// redone steps that follow one another are carried out in one frame. The result is that of [`GestureScript::new`].
+    /// A script of these gestures in an app without a window: clicks, strokes, labels, undone and redone steps that
+    /// follow one another are carried out in one frame. The result is that of [`GestureScript::new`].
     pub fn unwatched(gestures: impl IntoIterator<Item = Gesture>) -> Self {
         Self { is_unwatched: true, ..Self::new(gestures) }
     }
