@@ -182,7 +182,7 @@ impl RunJoints {
 struct Bones {
     /// True if the bones that the rig had before the run are among them.
     is_listed: bool,
-    /// Both ends of bones of about one length, by the exponent of that.
+    /// Ends of bones of about one length, by the exponent of that.
     by_length: BTreeMap<u32, Vec<[Vec3; 2]>>,
 }
 
