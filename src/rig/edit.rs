@@ -321,20 +321,20 @@ impl Rig {
             RigEdit::AddLocalGroup(group, index) => {
                 self.check_free(group.uid)?;
                 check_color(group)?;
-                self.groups.insert((*index).min(self.groups.len()), group.clone());
+                self.groups.insert(*index, group.clone());
                 RigEdit::RemoveLocalGroup(group.uid)
             }
             RigEdit::RemoveLocalGroup(uid) => {
-                let index = self.groups.iter().position(|g| g.uid == *uid).ok_or(EditError::NoGroup(*uid))?;
-                if self.joints.values().any(|joint| joint.data.group == Some(*uid)) {
+                if self.groups.has(*uid) && self.joints.values().any(|joint| joint.data.group == Some(*uid)) {
                     return Err(EditError::GroupInUse(*uid));
                 }
-                RigEdit::AddLocalGroup(self.groups.remove(index), index)
+                let (index, group) = self.groups.remove(*uid).ok_or(EditError::NoGroup(*uid))?;
+                RigEdit::AddLocalGroup(group, index)
             }
             RigEdit::SetLocalGroup(group) => {
                 check_color(group)?;
-                let old = self.groups.iter_mut().find(|g| g.uid == group.uid).ok_or(EditError::NoGroup(group.uid))?;
-                RigEdit::SetLocalGroup(std::mem::replace(old, group.clone()))
+                let old = self.groups.replace(group.clone()).ok_or(EditError::NoGroup(group.uid))?;
+                RigEdit::SetLocalGroup(old)
             }
             RigEdit::SetAbout(about) => self.set_about(about)?,
             RigEdit::SetSkin(mesh, skin) => self.set_skin(*mesh, skin.as_ref())?,

@@ -1,5 +1,6 @@
 //! Editing a rig: every edit has its exact inverse, every operation is done as a whole or not at all.
 
+mod lists;
 mod skeleton;
 mod tag_params;
 

@@ -2,6 +2,7 @@
 
 mod clipboard;
 mod features;
+mod many;
 
 use std::{path::Path, sync::Arc};
 

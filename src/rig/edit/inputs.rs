@@ -7,7 +7,6 @@ use crate::rig::{Rig, RigEdit, RigInput, Uid};
 
 impl Rig {
     pub(super) fn set_inputs(&mut self, inputs: &[RigInput]) -> Result<RigEdit, EditError> {
-        let own: HashSet<Uid> = self.inputs.iter().map(|input| input.uid).collect();
         // The first and the last input with each name are two where several have it.
         let mut bearers: HashMap<&str, [Uid; 2]> = HashMap::with_capacity(inputs.len());
         for RigInput { uid, name, .. } in inputs {
@@ -15,7 +14,7 @@ impl Rig {
         }
         let mut seen = HashSet::with_capacity(inputs.len());
         for input in inputs {
-            let is_own = own.contains(&input.uid);
+            let is_own = self.inputs.has(input.uid);
             if !seen.insert(input.uid) || !is_own && self.is_taken(input.uid) {
                 return Err(EditError::UidInUse(input.uid));
             }
@@ -27,6 +26,6 @@ impl Rig {
                 return Err(EditError::BadInput(input.name.clone()));
             }
         }
-        Ok(RigEdit::SetInputs(std::mem::replace(&mut self.inputs, inputs.to_vec())))
+        Ok(RigEdit::SetInputs(self.inputs.replace_all(inputs.to_vec())))
     }
 }

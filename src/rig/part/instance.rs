@@ -334,12 +334,14 @@ impl PartInstance {
         let globals: HashMap<Uid, _> = part.rest_globals().into_iter().collect();
         let order: Vec<Uid> = part.walk().map(|joint| joint.data.uid).collect();
         let prefixed = |name: &str| format!("{}{name}", self.prefix);
-        for group in part.groups.iter_mut().filter(|_| self.mirror) {
-            group.name = mirrored_label(&group.name).unwrap_or_else(|| group.name.clone());
-        }
-        for input in part.inputs.iter_mut().filter(|_| self.mirror) {
-            input.name = mirrored_label(&input.name).unwrap_or_else(|| input.name.clone());
-            input.rest = RestTransform::from_affine(&plane.mirrored_affine(&input.rest.affine()));
+        if self.mirror {
+            part.groups.change_each(|group| {
+                group.name = mirrored_label(&group.name).unwrap_or_else(|| group.name.clone());
+            });
+            part.inputs.change_each(|input| {
+                input.name = mirrored_label(&input.name).unwrap_or_else(|| input.name.clone());
+                input.rest = RestTransform::from_affine(&plane.mirrored_affine(&input.rest.affine()));
+            });
         }
         part.checkpoints.clear();
         part.label_index.clear();

@@ -20,6 +20,8 @@ pub const MOST_COMPARED: usize = 200_000;
 /// than a few.
 pub struct RigNameIndex<'a> {
     rig: &'a Rig,
+    groups: OnceCell<HashMap<&'a str, Vec<Uid>>>,
+    inputs: OnceCell<HashMap<&'a str, Vec<Uid>>>,
     joints: OnceCell<HashMap<String, Vec<Uid>>>,
     bearers: OnceCell<HashMap<String, Vec<(Option<Uid>, Uid)>>>,
     commands: OnceCell<CommandNames>,
@@ -39,8 +41,19 @@ struct CommandNames {
 impl<'a> RigNameIndex<'a> {
     /// Index of a rig.
     pub fn new(rig: &'a Rig) -> Self {
+        let (groups, inputs) = (OnceCell::new(), OnceCell::new());
         let (joints, bearers, commands) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
-        Self { rig, joints, bearers, commands, compared: Cell::new(0) }
+        Self { rig, groups, inputs, joints, bearers, commands, compared: Cell::new(0) }
+    }
+
+    fn groups(&self, name: &str) -> &[Uid] {
+        let named = || by_name(self.rig.groups().iter().map(|group| (group.name.as_str(), group.uid)));
+        self.groups.get_or_init(named).get(name).map_or(&[], Vec::as_slice)
+    }
+
+    fn inputs(&self, name: &str) -> &[Uid] {
+        let named = || by_name(self.rig.inputs().iter().map(|input| (input.name.as_str(), input.uid)));
+        self.inputs.get_or_init(named).get(name).map_or(&[], Vec::as_slice)
     }
 
     fn joints(&self, label: &str) -> &[Uid] {
@@ -106,6 +119,15 @@ impl<'a> RigNameIndex<'a> {
     }
 }
 
+/// Uids by name, in their order.
+fn by_name<'a>(named: impl Iterator<Item = (&'a str, Uid)>) -> HashMap<&'a str, Vec<Uid>> {
+    let mut found: HashMap<&str, Vec<Uid>> = HashMap::new();
+    for (name, uid) in named {
+        found.entry(name).or_default().push(uid);
+    }
+    found
+}
+
 impl Names for RigNameIndex<'_> {
     fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>> {
         self.rig.name_of(kind, uid)
@@ -120,7 +142,9 @@ impl Names for RigNameIndex<'_> {
             NameKind::Joint => self.joints(name).to_vec(),
             NameKind::Label => self.bearer(scope.group, name).into_iter().collect(),
             NameKind::Command => self.commands(name),
-            NameKind::Rig | NameKind::Group | NameKind::Input => self.rig.find(scope, kind, name),
+            NameKind::Group => self.groups(name).to_vec(),
+            NameKind::Input => self.inputs(name).to_vec(),
+            NameKind::Rig => self.rig.find(scope, kind, name),
         }
     }
 

@@ -126,6 +126,7 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
         ..RigAbout::default()
     };
     let mut seen = HashSet::new();
+    let mut groups = Vec::with_capacity(file.groups.len());
     for (number, group) in file.groups.into_iter().enumerate() {
         if !seen.insert(group.uid) {
             faults.push(places.used_twice(group.uid));
@@ -137,9 +138,10 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
             faults.push(places.error(group.uid, 0, "color", message));
             color = [0.5; 3];
         }
-        rig.groups.push(GroupData { uid: group.uid, name: group.name, color, enabled: group.enabled });
+        groups.push(GroupData { uid: group.uid, name: group.name, color, enabled: group.enabled });
     }
-    rig.inputs = inputs::inputs(places, file.inputs, &mut seen, faults);
+    rig.groups = groups.into_iter().collect();
+    rig.inputs = inputs::inputs(places, file.inputs, &mut seen, faults).into_iter().collect();
     let (format, count) = (file.format, file.joints.len());
     let instances = parts::instances(places, file.parts, faults);
     if let Some(claimed) = file.joint_count.filter(|claimed| *claimed != count && instances.is_empty()) {
