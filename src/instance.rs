@@ -176,13 +176,8 @@ impl Plugin for RigInstancePlugin {
             UpdateInstances,
             (bodies::land_bodies, bodies::give_bodies, bodies::bind_bodies).chain().after(apply::update_instances),
         );
+        skins::add(app);
         app.add_systems(
-            UpdateInstances,
-            (skins::bind_skins.run_if(skins::is_due), file_nodes::fit_skins.run_if(file_nodes::fit_is_due))
-                .chain()
-                .after(apply::update_instances),
-        )
-        .add_systems(
             UpdateInstances,
             faces::express.after(clips::give_clips).after(bodies::bind_bodies).after(file_nodes::fit_skins),
         )
@@ -195,8 +190,6 @@ impl Plugin for RigInstancePlugin {
                 // Cameras have transforms, too; these are those of files' nodes and of rigs alone.
                 .ambiguous_with_all(),
         );
-        #[cfg(feature = "draw")]
-        app.add_systems(UpdateInstances, skins::share_meshes.after(apply::update_instances).before(skins::bind_skins));
         app.add_observer(apply::leave);
     }
 }

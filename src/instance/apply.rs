@@ -15,7 +15,7 @@ use crate::{
     plugins::{
         animation::{PlayedClip, RigClips},
         runtime::{ControlPose, InstanceMode, RigNodes, RigRuntime, furnish_instance, spawn_instance},
-        schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer},
+        schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer, NodeOf},
     },
     processor::PoseNote,
     rig::{AttributeValues, BuiltNode, MovedNodes, PoseOffset, RestTransform, Uid},
@@ -135,7 +135,7 @@ pub(super) fn update_instances(world: &mut World) {
     }
     let (fresh, going): (Vec<DueInstance>, Vec<DueInstance>) = due.into_iter().partition(|due| due.is_fresh);
     for DueInstance { entity, built, program, mode, .. } in &fresh {
-        world.entity_mut(*entity).despawn_related::<RigNodes>();
+        despawn_nodes(world, *entity);
         spawn_instance(world, *entity, program, *mode);
         describe(world, *entity, &built.built.nodes);
         world.entity_mut(*entity).insert(RunningTemplate(built.clone()));
@@ -380,13 +380,26 @@ fn set<C: Component + PartialEq>(entity: &mut EntityWorldMut, wanted: Option<C>)
     };
 }
 
+/// Despawns the nodes of an instance. What others hung on them stays, on the instance.
+fn despawn_nodes(world: &mut World, instance: Entity) {
+    let nodes: Vec<Entity> = world.get::<RigNodes>(instance).map(|nodes| nodes.iter().collect()).unwrap_or_default();
+    let is_hung = |child: &Entity| world.get::<NodeOf>(*child).is_none_or(|of| of.0 != instance);
+    let children = nodes.iter().filter_map(|node| world.get::<Children>(*node));
+    let hung: Vec<Entity> = children.flat_map(|children| children.iter()).filter(is_hung).collect();
+    for child in hung {
+        world.entity_mut(child).insert(ChildOf(instance));
+    }
+    world.entity_mut(instance).despawn_related::<RigNodes>();
+}
+
 /// Despawns the nodes of an entity that is no instance any more.
 pub(super) fn leave(removed: On<Remove, RigInstance>, mut commands: Commands) {
     if let Ok(mut entity) = commands.get_entity(removed.entity) {
         entity.queue_silenced(|mut entity: EntityWorldMut| {
             // Replacing the component is no leaving.
             if !entity.contains::<RigInstance>() {
-                entity.despawn_related::<RigNodes>();
+                let instance = entity.id();
+                entity.world_scope(|world| despawn_nodes(world, instance));
                 entity.remove::<(RigRuntime, RunningTemplate)>();
             }
         });
