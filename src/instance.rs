@@ -233,7 +233,7 @@ pub struct RigBuilt {
 pub struct RigUpdated {
     /// The instance.
     pub entity: Entity,
-    /// Differences of the template.
+    /// Differences from the template, or the version of it, that the instance had.
     pub changes: Arc<[Change]>,
     /// Tags of the commands that ran again.
     pub ran: Arc<[Uid]>,
@@ -303,6 +303,18 @@ impl RigTemplates {
     /// The built template of an asset; `None` until it is built.
     pub fn built(&self, template: &Handle<RigTemplate>) -> Option<&Arc<BuiltTemplate>> {
         self.built.get(&template.id())
+    }
+
+    /// Number of templates that are built. Those of which nobody has a handle are forgotten.
+    pub fn count(&self) -> usize {
+        self.built.len()
+    }
+
+    /// Forgets a template, and ends the watch of its file.
+    fn forget(&mut self, id: AssetId<RigTemplate>) {
+        self.own.remove(&id);
+        self.built.remove(&id);
+        self.builds.send(Work::Forget { id });
     }
 
     /// Sends templates that were changed by code, or loaded, to be built.
@@ -446,12 +458,9 @@ fn follow_assets(
                     templates.follow(*id, template, &modules);
                 }
             }
-            AssetEvent::Removed { id } => {
-                templates.own.remove(id);
-                templates.built.remove(id);
-                templates.builds.send(Work::Forget { id: *id });
-            }
-            AssetEvent::LoadedWithDependencies { .. } | AssetEvent::Unused { .. } => {}
+            // A template that never became an asset is told as unused alone.
+            AssetEvent::Removed { id } | AssetEvent::Unused { id } => templates.forget(*id),
+            AssetEvent::LoadedWithDependencies { .. } => {}
         }
     }
 }

@@ -18,7 +18,10 @@ use crate::{
         schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer, NodeOf},
     },
     processor::PoseNote,
-    rig::{AttributeValues, BuiltNode, MovedNodes, PoseOffset, RestTransform, Uid},
+    rig::{
+        AttributeValues, BuiltNode, MovedNodes, PoseOffset, RestTransform, Uid,
+        update::{Change, Take, update},
+    },
     solve::{
         keep_pose::KeptPose,
         program::{ProgramError, RigProgram, RigState},
@@ -37,10 +40,20 @@ pub(super) fn take_outcomes(
         let id = outcome.id;
         match outcome.result {
             Ok(built) => {
-                if let Some(template) = outcome.template {
-                    templates.own.insert(id, template.clone());
-                    // A handle without users has nowhere to put it.
-                    let _ = assets.insert(id, template);
+                let is_used = match outcome.template {
+                    Some(template) => {
+                        let is_used = assets.insert(id, template.clone()).is_ok();
+                        if is_used {
+                            templates.own.insert(id, template);
+                        }
+                        is_used
+                    }
+                    None => assets.contains(id),
+                };
+                // The last handle is gone, or the asset was removed, while the thread built.
+                if !is_used {
+                    templates.forget(id);
+                    continue;
                 }
                 templates.built.insert(id, built);
                 templates.is_fresh = true;
@@ -73,6 +86,8 @@ struct DueInstance {
     is_fresh: bool,
     /// True if its template is another version than the one it runs.
     is_other: bool,
+    /// The version that it runs.
+    before: Option<Arc<BuiltTemplate>>,
     /// Clips of the instance for that version.
     clips: Option<UpdatedClips>,
 }
@@ -123,8 +138,8 @@ pub(super) fn update_instances(world: &mut World) {
         });
         let runs_other = runtime.is_none_or(|runtime| !Arc::ptr_eq(runtime.state().program(), &program));
         if is_fresh || is_other || runs_other {
-            let (built, mode) = (built.clone(), *mode);
-            due.push(DueInstance { entity, built, program, mode, is_fresh, is_other, clips: updated });
+            let (built, mode, before) = (built.clone(), *mode, running.map(|running| running.0.clone()));
+            due.push(DueInstance { entity, built, program, mode, is_fresh, is_other, before, clips: updated });
         }
     }
     jobs.tidy();
@@ -163,15 +178,38 @@ pub(super) fn update_instances(world: &mut World) {
     for DueInstance { entity, .. } in fresh {
         world.trigger(RigBuilt { entity });
     }
-    for DueInstance { entity, built, clips, .. } in going.into_iter().filter(|due| due.is_other) {
+    let mut known = Vec::new();
+    for DueInstance { entity, built, before, clips, .. } in going.into_iter().filter(|due| due.is_other) {
         let deviations = kept.remove(&entity).map(|kept| kept.deviations).unwrap_or_default();
         let poses = deviations.into_iter().map(|deviation| PoseNote { pose: None, deviation }).collect();
         let clips = clips.map(|clips| clips.report).unwrap_or_default();
-        world.trigger(RigUpdated { entity, changes: built.changes.clone(), ran: built.ran.clone(), poses, clips });
+        let changes = before.map_or_else(|| built.changes.clone(), |before| changes_since(&before, &built, &mut known));
+        world.trigger(RigUpdated { entity, changes, ran: built.ran.clone(), poses, clips });
     }
     for (entity, error) in failed {
         world.trigger(RigFailed { entity, error });
     }
+}
+
+/// Differences between two builds that do not follow each other.
+struct KnownChanges {
+    from: Arc<BuiltTemplate>,
+    to: Arc<BuiltTemplate>,
+    changes: Arc<[Change]>,
+}
+
+/// Differences of a build from the one that an instance ran: the build before it, an older one, or one of another template.
+fn changes_since(from: &Arc<BuiltTemplate>, to: &Arc<BuiltTemplate>, known: &mut Vec<KnownChanges>) -> Arc<[Change]> {
+    if to.way.as_ref().is_some_and(|way| way.described_since(from).is_some()) {
+        return to.changes.clone();
+    }
+    let is_it = |known: &&KnownChanges| Arc::ptr_eq(&known.from, from) && Arc::ptr_eq(&known.to, to);
+    if let Some(known) = known.iter().find(is_it) {
+        return known.changes.clone();
+    }
+    let changes: Arc<[Change]> = update(Some(&from.rig), &from.rig, &to.rig, Take::Theirs).changes.into();
+    known.push(KnownChanges { from: from.clone(), to: to.clone(), changes: changes.clone() });
+    changes
 }
 
 /// Gives an instance its clips for the version of its template that it goes on with.

@@ -1,0 +1,100 @@
+//! Users of templates: instances that come and go, take another template, and hang on one another.
+
+use std::path::Path;
+
+use bevy::{ecs::system::RunSystemOnce, prelude::*};
+use rigsmith::{
+    instance::{RigInstance, RigTemplate, RigTemplates, TemplateFiles},
+    plugins::runtime::{ControlPose, InstanceMode},
+};
+
+use super::{AppBench, TWO, saved};
+
+fn opened(game: &mut AppBench, file: &Path) -> Handle<RigTemplate> {
+    let file = file.to_owned();
+    game.app.world_mut().run_system_once(move |files: TemplateFiles| files.open(file.clone())).unwrap()
+}
+
+fn added(game: &mut AppBench, text: &str) -> Handle<RigTemplate> {
+    let template = RigTemplate::read(text.as_bytes()).unwrap();
+    game.app.world_mut().resource_mut::<Assets<RigTemplate>>().add(template)
+}
+
+#[test]
+fn a_template_that_nobody_uses_is_forgotten() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = saved(folder.path(), TWO);
+    let mut game = AppBench::live_game();
+    let count = |game: &AppBench| game.app.world().resource::<RigTemplates>().count();
+    let handle = opened(&mut game, &file);
+    let early = game.app.world_mut().spawn(RigInstance(handle)).id();
+    game.app.world_mut().despawn(early);
+    // Templates are built one after the other, so the one of before is there, too.
+    let instance = game.open(&file, InstanceMode::Direct);
+    game.frames(3);
+    assert_eq!(count(&game), 1, "its instance was despawned while it was built");
+    let handle = added(&mut game, TWO);
+    game.frames(2);
+    drop(handle);
+    let other = game.open(&file, InstanceMode::Direct);
+    game.frames(3);
+    assert_eq!(count(&game), 2, "it was dropped while it was built");
+    game.app.world_mut().despawn(instance);
+    game.app.world_mut().despawn(other);
+    game.frames(3);
+    assert_eq!(count(&game), 0);
+    assert_eq!(game.instance_report().failed.len(), 0);
+}
+
+#[test]
+fn another_template_is_told_with_its_differences() {
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let mut game = AppBench::still_game();
+        let first = added(&mut game, TWO);
+        let higher = "parent: \"a\", translation: (0, 0.7, 0)";
+        let second = added(&mut game, &TWO.replace("parent: \"a\", translation: (0, 0.5, 0)", higher));
+        let instance = game.spawn(first.clone(), mode);
+        let end = game.node(instance, "a_end");
+        game.app.world_mut().entity_mut(instance).insert(RigInstance(second));
+        game.until("the other template", |told| told.updated.len() == 1);
+        assert_eq!(game.instance_report().updated, [1], "{mode:?}");
+        assert_eq!(game.node(instance, "a_end"), end, "{mode:?}: what both have stays");
+        game.app.update();
+        let place = game.app.world().get::<GlobalTransform>(end).unwrap().translation();
+        assert!(place.distance(Vec3::new(0.0, 1.7, 0.0)) < 1e-6, "{mode:?} {place}");
+        game.app.world_mut().entity_mut(instance).insert(RigInstance(first));
+        game.until("the way back", |told| told.updated.len() == 2);
+        assert_eq!(game.instance_report().updated, [1, 1], "{mode:?}");
+    }
+}
+
+#[test]
+fn an_instance_rides_on_a_joint_of_another() {
+    let modes = [InstanceMode::Hierarchy, InstanceMode::Direct];
+    for (horse_mode, mode) in modes.into_iter().flat_map(|horse| modes.map(|rider| (horse, rider))) {
+        let mut game = AppBench::still_game();
+        let template = added(&mut game, TWO);
+        let horse = game.spawn(template.clone(), horse_mode);
+        let (control, saddle) = (game.node(horse, "ctl_a"), game.node(horse, "a_end"));
+        let rider = game.spawn(template, mode);
+        let seat = Transform::from_xyz(0.0, 0.25, 1.0);
+        game.app.world_mut().entity_mut(rider).insert((seat, ChildOf(saddle)));
+        let end = game.node(rider, "a_end");
+        for angle in [0.0, 0.5, 1.0] {
+            let turned = Quat::from_rotation_z(angle);
+            let world = game.app.world_mut();
+            match horse_mode {
+                InstanceMode::Hierarchy => world.get_mut::<Transform>(control).unwrap().rotation = turned,
+                InstanceMode::Direct => world.get_mut::<ControlPose>(control).unwrap().rotation = turned,
+            }
+            game.frames(3);
+            let place = |node: Entity| *game.app.world().get::<GlobalTransform>(node).unwrap();
+            let wanted = place(saddle).transform_point(seat.translation + Vec3::new(0.0, 1.5, 0.0));
+            let at = place(end).translation();
+            assert!(at.distance(wanted) < 1e-5, "{mode:?} on {horse_mode:?}: {at} {wanted}");
+        }
+        let (place, wanted) =
+            (game.app.world().get::<GlobalTransform>(saddle).unwrap().translation(), 1.0 + 0.5 * 1f32.cos());
+        assert!((place.y - wanted).abs() < 1e-5, "the horse has moved: {place}");
+    }
+}
