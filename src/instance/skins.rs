@@ -49,17 +49,23 @@ struct OwnJoints {
     joints: Vec<Entity>,
 }
 
-/// True if the nodes of an instance may be others than those that a skinned mesh follows.
+/// Entities that were put below others, without the nodes of rigs.
+type MovedEntities<'w, 's> = Query<'w, 's, (), (Changed<ChildOf>, Without<NodeOf>)>;
+
+/// True if a skinned mesh may follow nodes that are not those of the instance above it any more.
 fn release_is_due(
     bound: Query<(), With<OwnJoints>>,
     instances: Query<(), Changed<RunningTemplate>>,
     left: RemovedComponents<RunningTemplate>,
+    moved: MovedEntities,
+    freed: RemovedComponents<ChildOf>,
 ) -> bool {
-    !bound.is_empty() && (!instances.is_empty() || !left.is_empty())
+    let is_other = !instances.is_empty() || !left.is_empty() || !moved.is_empty() || !freed.is_empty();
+    is_other && !bound.is_empty()
 }
 
 /// Gives skinned meshes their own joints back where their instance has other nodes now, in another mode or of another template,
-/// or is none any more. Those below an instance are bound again.
+/// is none any more, or is not above them. Those below an instance are bound again.
 fn release_skins(
     mut skins: Query<(Entity, &mut SkinnedMesh, &BoundTo, &OwnJoints, Option<&LoadedSkin>)>,
     instances: Query<(Ref<RunningTemplate>, &RigRuntime), With<RigInstance>>,
@@ -71,6 +77,7 @@ fn release_skins(
     for (mesh, mut skin, BoundTo(instance), before, loaded) in &mut skins {
         let is_held = match instances.get(*instance) {
             Err(_) => false,
+            Ok(_) if !parents.iter_ancestors(mesh).any(|above| above == *instance) => false,
             Ok((template, _)) if !template.is_changed() => true,
             Ok((template, runtime)) => skin.joints.iter().zip(&before.joints).all(|(joint, before)| {
                 let is_node = own.get(*joint).is_ok_and(|own| own.0 == *instance);
@@ -113,12 +120,14 @@ fn slot_of(
     uid.and_then(|uid| program.node(*uid)).or_else(by_name)
 }
 
-/// True if a mesh is new, or an instance has other nodes.
+/// True if a mesh without an instance may be below one.
 fn is_due(
-    skins: Query<(), (Added<SkinnedMesh>, Without<BoundTo>)>,
+    skins: Query<(), (With<SkinnedMesh>, Without<BoundTo>)>,
+    added: Query<(), (Added<SkinnedMesh>, Without<BoundTo>)>,
     instances: Query<(), Changed<RunningTemplate>>,
+    moved: MovedEntities,
 ) -> bool {
-    !skins.is_empty() || !instances.is_empty()
+    !skins.is_empty() && (!added.is_empty() || !instances.is_empty() || !moved.is_empty())
 }
 
 /// Lets the nodes of instances move the skinned meshes below them: a joint of the mesh is replaced by the node with its uid, or
@@ -189,28 +198,43 @@ fn bind_skins(
 #[require(Visibility)]
 pub struct SharedMesh(pub Entity);
 
-/// Instance that has its pieces of a shared mesh.
+/// Pieces of a shared mesh that an instance has.
 #[cfg(feature = "draw")]
 #[derive(Component)]
-struct HasPieces;
+struct SharedPieces {
+    of: Entity,
+    pieces: Vec<Entity>,
+}
 
-/// Gives instances their pieces of shared meshes, once these are there.
+/// Gives instances their pieces of shared meshes, once these are there, and takes away what they do not share any more.
 #[cfg(feature = "draw")]
 fn share_meshes(
-    sharing: Query<(Entity, &SharedMesh), (With<RigInstance>, Without<HasPieces>)>,
+    sharing: Query<(Entity, &SharedMesh, Option<&SharedPieces>), With<RigInstance>>,
+    left: Query<(Entity, &SharedPieces), Or<(Without<SharedMesh>, Without<RigInstance>)>>,
     children: Query<&Children>,
-    pieces: Query<(&Mesh3d, &MeshMaterial3d<StandardMaterial>, &SkinnedMesh)>,
+    drawn: Query<(&Mesh3d, &MeshMaterial3d<StandardMaterial>, &SkinnedMesh)>,
     mut commands: Commands,
 ) {
-    for (instance, SharedMesh(of)) in &sharing {
+    for (instance, SharedPieces { pieces, .. }) in &left {
+        pieces.iter().for_each(|piece| commands.entity(*piece).try_despawn());
+        commands.entity(instance).try_remove::<SharedPieces>();
+    }
+    for (instance, SharedMesh(of), had) in &sharing {
+        if had.is_some_and(|had| had.of == *of) {
+            continue;
+        }
         let below = std::iter::once(*of).chain(children.iter_descendants(*of));
-        let mut is_there = false;
-        for (mesh, material, skin) in below.filter_map(|piece| pieces.get(piece).ok()) {
-            is_there = true;
-            commands.spawn((mesh.clone(), material.clone(), skin.clone(), Transform::default(), ChildOf(instance)));
+        let mut pieces = Vec::new();
+        for (mesh, material, skin) in below.filter_map(|piece| drawn.get(piece).ok()) {
+            let piece = (mesh.clone(), material.clone(), skin.clone(), Transform::default(), ChildOf(instance));
+            pieces.push(commands.spawn(piece).id());
         }
-        if is_there {
-            commands.entity(instance).try_insert(HasPieces);
+        // The former mesh is shown until there is another one.
+        if pieces.is_empty() {
+            continue;
         }
+        let former = had.into_iter().flat_map(|had| &had.pieces);
+        former.for_each(|piece| commands.entity(*piece).try_despawn());
+        commands.entity(instance).try_insert(SharedPieces { of: *of, pieces });
     }
 }

@@ -231,3 +231,28 @@ fn a_loaded_mesh_follows_whatever_becomes_of_its_instance() {
         check_bound(&mut game, instance, &loaded, Some("a_end"));
     }
 }
+
+#[test]
+fn a_loaded_mesh_follows_the_instance_that_it_is_put_below() {
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut game = game();
+        let first = game.open(&saved(folder.path(), TWO), mode);
+        let template = game.app.world().get::<RigInstance>(first).unwrap().0.clone();
+        let second = game.spawn(template, mode);
+        // Loaded elsewhere.
+        let other = game.app.world_mut().spawn(Transform::default()).id();
+        let loaded = Loaded::below(&mut game, other, None);
+        game.frames(2);
+        let joints = |game: &AppBench| game.app.world().get::<SkinnedMesh>(loaded.mesh).unwrap().joints.clone();
+        assert_eq!(joints(&game), loaded.nodes);
+        for instance in [first, second] {
+            game.app.world_mut().entity_mut(loaded.scene).insert(ChildOf(instance));
+            check_bound(&mut game, instance, &loaded, None);
+        }
+        game.app.world_mut().entity_mut(loaded.scene).remove::<ChildOf>();
+        game.frames(3);
+        assert_eq!(joints(&game), loaded.nodes, "{mode:?}");
+        check_at_rest(&game, &loaded);
+    }
+}

@@ -62,9 +62,17 @@ fn another_template_is_told_with_its_differences() {
         game.app.update();
         let place = game.app.world().get::<GlobalTransform>(end).unwrap().translation();
         assert!(place.distance(Vec3::new(0.0, 1.7, 0.0)) < 1e-6, "{mode:?} {place}");
-        game.app.world_mut().entity_mut(instance).insert(RigInstance(first));
+        game.app.world_mut().entity_mut(instance).insert(RigInstance(first.clone()));
         game.until("the way back", |told| told.updated.len() == 2);
         assert_eq!(game.instance_report().updated, [1, 1], "{mode:?}");
+        // An asset that is removed leaves the instance as it is, until it is there again.
+        game.app.world_mut().resource_mut::<Assets<RigTemplate>>().remove(&first);
+        game.frames(3);
+        assert_eq!(game.node(instance, "a_end"), end, "{mode:?}");
+        let changed = RigTemplate::read(TWO.replace("(1, 1, 0)", "(2, 1, 0)").as_bytes()).unwrap();
+        game.app.world_mut().resource_mut::<Assets<RigTemplate>>().insert(first.id(), changed).unwrap();
+        game.until("the asset again", |told| told.updated.len() == 3);
+        assert_eq!(game.instance_report().updated, [1, 1, 1], "{mode:?}");
     }
 }
 
@@ -97,4 +105,53 @@ fn an_instance_rides_on_a_joint_of_another() {
             (game.app.world().get::<GlobalTransform>(saddle).unwrap().translation(), 1.0 + 0.5 * 1f32.cos());
         assert!((place.y - wanted).abs() < 1e-5, "the horse has moved: {place}");
     }
+}
+
+/// A mesh that is drawn in some pieces, moved by some joints.
+#[cfg(feature = "draw")]
+fn drawn(game: &mut AppBench, joints: &[Entity], pieces: usize) -> Entity {
+    use bevy::mesh::skinning::SkinnedMesh;
+
+    let world = game.app.world_mut();
+    let of = world.spawn(Transform::default()).id();
+    for _ in 0..pieces {
+        let skin = SkinnedMesh { inverse_bindposes: Handle::default(), joints: joints.to_vec() };
+        let material = MeshMaterial3d::<StandardMaterial>(Handle::default());
+        world.spawn((Mesh3d(Handle::default()), material, skin, ChildOf(of)));
+    }
+    of
+}
+
+#[cfg(feature = "draw")]
+#[test]
+fn an_instance_shows_the_shared_mesh_that_it_has_now() {
+    use bevy::mesh::skinning::SkinnedMesh;
+    use rigsmith::instance::SharedMesh;
+
+    let mut game = AppBench::still_game();
+    let template = added(&mut game, TWO);
+    let tailor = game.spawn(template.clone(), InstanceMode::Direct);
+    let joints = ["a", "b_end"].map(|name| game.node(tailor, name));
+    let (plain, armour) = (drawn(&mut game, &joints, 1), drawn(&mut game, &joints, 2));
+    let instance = game.spawn(template, InstanceMode::Direct);
+    let shown = |game: &mut AppBench| -> Vec<Vec<Entity>> {
+        game.frames(3);
+        let world = game.app.world();
+        let children = world.get::<Children>(instance).map(|children| children.to_vec()).unwrap_or_default();
+        let skins = children.into_iter().filter_map(|child| world.get::<SkinnedMesh>(child));
+        skins.map(|skin| skin.joints.clone()).collect()
+    };
+    let own = |game: &mut AppBench| ["a", "b_end"].map(|name| game.node(instance, name)).to_vec();
+    for (of, pieces) in [(plain, 1), (armour, 2), (plain, 1)] {
+        game.app.world_mut().entity_mut(instance).insert(SharedMesh(of));
+        assert_eq!(shown(&mut game), vec![own(&mut game); pieces]);
+    }
+    // Another mode has other nodes.
+    let former = own(&mut game);
+    game.app.world_mut().entity_mut(instance).insert(InstanceMode::Hierarchy);
+    game.until("the other mode", |told| told.built == 3);
+    assert_eq!(shown(&mut game), [own(&mut game)]);
+    assert_ne!(own(&mut game), former);
+    game.app.world_mut().entity_mut(instance).remove::<SharedMesh>();
+    assert!(shown(&mut game).is_empty());
 }
