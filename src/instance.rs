@@ -60,7 +60,7 @@ use std::{
 
 use bevy::{
     app::{AnimationSystems, MainScheduleOrder},
-    asset::{AssetId, AssetLoadFailedEvent, AssetPlugin, io::file::FileAssetReader},
+    asset::{AssetId, AssetPlugin, io::file::FileAssetReader},
     ecs::{schedule::ScheduleLabel, system::SystemParam},
     prelude::*,
 };
@@ -148,6 +148,7 @@ impl Plugin for RigInstancePlugin {
                 is_live: self.live,
                 root,
                 built: HashMap::new(),
+                failed: HashMap::new(),
                 own: HashMap::new(),
                 is_fresh: false,
             })
@@ -156,7 +157,7 @@ impl Plugin for RigInstancePlugin {
         app.add_systems(
             UpdateInstances,
             (
-                (follow_assets, follow_failures, watch_files).chain(),
+                (apply::tell_known_failures, follow_assets, apply::follow_failures, watch_files).chain(),
                 apply::take_outcomes,
                 apply::update_instances.run_if(apply::is_due),
                 (
@@ -294,6 +295,8 @@ pub struct RigTemplates {
     /// Folder of the asset server's files.
     root: Option<PathBuf>,
     built: HashMap<AssetId<RigTemplate>, Arc<BuiltTemplate>>,
+    /// Reasons for which templates have no build.
+    failed: HashMap<AssetId<RigTemplate>, TemplateError>,
     /// Templates that the thread has built before they became assets.
     own: HashMap<AssetId<RigTemplate>, RigTemplate>,
     is_fresh: bool,
@@ -314,6 +317,7 @@ impl RigTemplates {
     fn forget(&mut self, id: AssetId<RigTemplate>) {
         self.own.remove(&id);
         self.built.remove(&id);
+        self.failed.remove(&id);
         self.builds.send(Work::Forget { id });
     }
 
@@ -461,16 +465,6 @@ fn follow_assets(
             // A template that never became an asset is told as unused alone.
             AssetEvent::Removed { id } | AssetEvent::Unused { id } => templates.forget(*id),
             AssetEvent::LoadedWithDependencies { .. } => {}
-        }
-    }
-}
-
-/// Tells instances whose template the asset server cannot load.
-fn follow_failures(mut failed: MessageReader<AssetLoadFailedEvent<RigTemplate>>, users: Users, mut commands: Commands) {
-    for AssetLoadFailedEvent { id, error, .. } in failed.read() {
-        let error = TemplateError::Load(error.to_string());
-        for entity in users.of(*id) {
-            commands.trigger(RigFailed { entity, error: error.clone() });
         }
     }
 }

@@ -2,11 +2,16 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use bevy::{ecs::entity::EntityHashMap, prelude::*, transform::components::TransformTreeChanged};
+use bevy::{
+    asset::{AssetId, AssetLoadFailedEvent},
+    ecs::entity::EntityHashMap,
+    prelude::*,
+    transform::components::TransformTreeChanged,
+};
 use rayon::prelude::*;
 
 use super::{
-    BuiltTemplate, ExposedNodes, RigBuilt, RigFailed, RigInstance, RigTemplate, RigTemplates, RigUpdated,
+    BuiltTemplate, ExposedNodes, RigBuilt, RigFailed, RigInstance, RigSource, RigTemplate, RigTemplates, RigUpdated,
     RunningTemplate, TemplateError, Users,
     clip_updates::{ClipJobs, ClipOrigin, UpdatedClips},
     exchange::{Exchange, described_otherwise},
@@ -56,13 +61,56 @@ pub(super) fn take_outcomes(
                     continue;
                 }
                 templates.built.insert(id, built);
+                templates.failed.remove(&id);
                 templates.is_fresh = true;
             }
             Err(error) => {
+                templates.note_failure(id, &error);
                 for entity in users.of(id) {
                     commands.trigger(RigFailed { entity, error: error.clone() });
                 }
             }
+        }
+    }
+}
+
+/// Tells instances whose template the asset server cannot load.
+pub(super) fn follow_failures(
+    mut failed: MessageReader<AssetLoadFailedEvent<RigTemplate>>,
+    mut templates: ResMut<RigTemplates>,
+    users: Users,
+    mut commands: Commands,
+) {
+    for AssetLoadFailedEvent { id, error, .. } in failed.read() {
+        let error = TemplateError::Load(error.to_string());
+        templates.note_failure(*id, &error);
+        for entity in users.of(*id) {
+            commands.trigger(RigFailed { entity, error: error.clone() });
+        }
+    }
+}
+
+/// Tells instances of templates that are known to have no build: their failure was told before the instances came.
+pub(super) fn tell_known_failures(
+    instances: Query<(Entity, &RigInstance), Changed<RigInstance>>,
+    sources: Query<(Entity, &RigSource), Added<RigSource>>,
+    templates: Res<RigTemplates>,
+    mut commands: Commands,
+) {
+    let instances = instances.iter().map(|(entity, instance)| (entity, instance.0.id()));
+    let sources = sources.iter().map(|(entity, source)| (entity, source.template.id()));
+    for (entity, id) in instances.chain(sources) {
+        if let Some(error) = templates.failed.get(&id) {
+            commands.trigger(RigFailed { entity, error: error.clone() });
+        }
+    }
+}
+
+impl RigTemplates {
+    /// Keeps the reason for which a template has no build, for those who ask for it later.
+    fn note_failure(&mut self, id: AssetId<RigTemplate>, error: &TemplateError) {
+        if !self.built.contains_key(&id) {
+            self.failed.insert(id, error.clone());
         }
     }
 }

@@ -47,6 +47,35 @@ fn a_template_that_nobody_uses_is_forgotten() {
 }
 
 #[test]
+fn an_instance_that_comes_to_a_template_that_failed_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut game = AppBench::still_game();
+    let broken = opened(&mut game, &saved(folder.path(), &TWO[..TWO.len() / 2]));
+    let none = game.app.world().resource::<AssetServer>().load::<RigTemplate>("none.rig.ron");
+    let mut count = 0;
+    let mut failing = |game: &mut AppBench, template: &Handle<RigTemplate>| {
+        let instance = game.app.world_mut().spawn(RigInstance(template.clone())).id();
+        count += 1;
+        game.until("the failure", |told| told.failed.len() == count);
+        game.frames(2);
+        assert_eq!(game.instance_report().failed.len(), count, "it is told once: {:?}", game.instance_report());
+        instance
+    };
+    for template in [&broken, &none] {
+        failing(&mut game, template);
+        failing(&mut game, template);
+    }
+    let first = failing(&mut game, &broken);
+    let told = &game.instance_report().failed;
+    assert_eq!(told[0], told[4]);
+    // A good content is there for all, and for those who come later.
+    game.offer(first, TWO.as_bytes());
+    game.until("the good content", |told| told.built == 3);
+    game.spawn(broken, InstanceMode::Direct);
+    assert_eq!(game.instance_report().failed.len(), 5);
+}
+
+#[test]
 fn another_template_is_told_with_its_differences() {
     for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
         let mut game = AppBench::still_game();
