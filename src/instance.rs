@@ -197,6 +197,7 @@ impl Plugin for RigInstancePlugin {
 
 /// Makes an entity a character of a template. Its nodes are spawned when the template is loaded and built, as
 /// [`InstanceMode`] says; [`RigBuilt`] tells it. Taking the component off despawns them; another mode spawns others, unposed.
+/// What a game hung on a node that is despawned stays, on the instance.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Eq)]
 #[reflect(Component)]
 #[require(InstanceMode, Transform)]
@@ -244,7 +245,8 @@ pub struct RigUpdated {
     pub clips: Arc<ClipReport>,
 }
 
-/// The template of an instance was not taken over; the instance goes on as it was.
+/// The template of an instance was not taken over; the instance goes on as it was. An instance that comes later, to a template
+/// that has never been built, is told the reason, too.
 #[derive(EntityEvent, Debug, Clone)]
 pub struct RigFailed {
     /// The instance.
