@@ -2,8 +2,8 @@
 //!
 //! A thread listens on the loopback interface and nowhere else. Before the body of a request is looked at, its method, its host,
 //! its origin, its token and its length are checked, and a request that arrives slowly is cut off. Calls are handed to the
-//! main world one at a time, which carries them out between two frames: edits are steps of the history, builds are build requests, and
-//! templates are read and saved in the folders that the app allows. `rpc.discover` describes all methods.
+//! main world, one at a time, which carries them out between two frames: edits are steps of the history, builds are build
+//! requests, and templates are read and saved in the folders that the app allows. `rpc.discover` describes all methods.
 //!
 //! ```no_run
 //! use bevy::prelude::*;
