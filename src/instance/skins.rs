@@ -9,6 +9,8 @@ use super::{
     RigInstance, RunningTemplate, UpdateInstances, apply,
     file_nodes::{self, FileRest, FollowedNode, LoadedSkin, file_rests},
 };
+#[cfg(feature = "draw")]
+use crate::plugins::display::DisplayPiece;
 use crate::{
     plugins::{runtime::RigRuntime, schema::NodeOf},
     rig::{BuiltNode, Uid},
@@ -29,6 +31,12 @@ pub struct SkinBound {
     /// Names of joints that the instance does not have. They hang on the nearest joint above them that it has.
     pub unknown: Vec<String>,
 }
+
+/// Filter for skinned meshes that no instance moves. Pieces of a drawn mesh have the joints that they are drawn with.
+#[cfg(feature = "draw")]
+type Unbound = (Without<BoundTo>, Without<DisplayPiece>);
+#[cfg(not(feature = "draw"))]
+type Unbound = Without<BoundTo>;
 
 /// Adds the systems that let the nodes of instances move skinned meshes.
 pub(super) fn add(app: &mut App) {
@@ -122,8 +130,8 @@ fn slot_of(
 
 /// True if a mesh without an instance may be below one.
 fn is_due(
-    skins: Query<(), (With<SkinnedMesh>, Without<BoundTo>)>,
-    added: Query<(), (Added<SkinnedMesh>, Without<BoundTo>)>,
+    skins: Query<(), (With<SkinnedMesh>, Unbound)>,
+    added: Query<(), (Added<SkinnedMesh>, Unbound)>,
     instances: Query<(), Changed<RunningTemplate>>,
     moved: MovedEntities,
 ) -> bool {
@@ -133,7 +141,7 @@ fn is_due(
 /// Lets the nodes of instances move the skinned meshes below them: a joint of the mesh is replaced by the node with its uid, or
 /// with its name as label.
 fn bind_skins(
-    mut skins: Query<(Entity, &mut SkinnedMesh), Without<BoundTo>>,
+    mut skins: Query<(Entity, &mut SkinnedMesh), Unbound>,
     parents: Query<&ChildOf>,
     instances: Query<(&RunningTemplate, &RigRuntime), With<RigInstance>>,
     joints: Query<(Option<&Uid>, Option<&Name>)>,
