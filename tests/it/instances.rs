@@ -8,6 +8,7 @@ mod meshes;
 mod moved_tags;
 mod reloads;
 mod saves;
+mod users;
 mod work;
 
 use std::{

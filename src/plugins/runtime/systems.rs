@@ -6,7 +6,9 @@ use bevy::{
 };
 use rayon::prelude::*;
 
-use super::{ControlPose, DrivenMorphs, InstanceMode, NodeOf, NodeSlot, RigRuntime, spawn::transform};
+use super::{
+    ControlPose, DrivenMorphs, InstanceMode, NodeOf, NodeSlot, RigRuntime, inputs::WorldPlaces, spawn::transform,
+};
 use crate::{
     mesh::model::Trs,
     plugins::schema::Attributes,
@@ -44,12 +46,12 @@ pub(super) fn note_controls(
 }
 
 /// Tells springs how their rigs have moved in the world since the last run.
-pub(super) fn feel_motion(mut rigs: Query<(Entity, &mut RigRuntime)>, places: TransformHelper) {
+pub(super) fn feel_motion(mut rigs: Query<(Entity, &mut RigRuntime)>, places: WorldPlaces) {
     for (entity, mut runtime) in &mut rigs {
         if !runtime.state.program().has_springs() {
             continue;
         }
-        let Ok(world) = places.compute_global_transform(entity) else { continue };
+        let Some(world) = places.of(entity) else { continue };
         let (now, runtime) = (world.affine(), runtime.bypass_change_detection());
         match runtime.world.replace(now) {
             Some(before) if before != now => {
