@@ -59,12 +59,12 @@ pub(super) struct FaceArgs {
     /// Take the whole mesh for a head, even if it looks like a body
     #[arg(long)]
     whole: bool,
-    /// An expression, or one of the units that they are made of, by its own name or that of ARKit, with a strength from
-    /// 0 to 1.5; may be repeated
+    /// An expression such as happiness or wink, or one of the units that expressions are made of, by its own name or that of
+    /// ARKit, such as jawOpen, with a strength from 0 to 1.5; may be repeated
     #[arg(long, value_name = "NAME=STRENGTH", value_parser = strength)]
     expression: Vec<(String, f32)>,
     /// Move the bones to fit shapes: a .glb with morph targets, a folder of .obj files, or a .json beside its .f32. Each
-    /// shape is kept as a stored pose
+    /// shape is kept as a stored pose; a vertex then follows at most as many joints as --influences says
     #[arg(long, value_name = "SHAPES")]
     fit: Option<PathBuf>,
     /// Add the blend shapes of ARKit, baked from the bones: 52, or 51 on a face without a tongue of its own. As morph
