@@ -7,7 +7,7 @@
 //! - Tools of a viewport: [`PickRequest`], [`PlaceRequest`], [`StrokeRequest`] and lists of [`Gesture`]s, whose rays and
 //!   views are in the rig's space; [`BindRequest`] for weights.
 //!
-//! Lengths have the unit of the mesh, angles are radians in code and degrees in files, poses are relative to rest.
+//! Lengths have the unit of the mesh, angles are radians in code and degrees in templates, poses are relative to rest.
 
 pub use crate::{
     algo::{
