@@ -100,11 +100,12 @@ use crate::{
 /// them; it adds what it needs of both otherwise.
 #[derive(Debug, Clone)]
 pub struct RigInstancePlugin {
-    /// Files of templates are watched, and what is saved is taken over at once.
+    /// True if files of templates are watched, so that instances go on with what is saved.
     pub live: bool,
     /// Time between two looks at a watched file; with many files it is longer.
     pub look: Duration,
-    /// Time that a file which cannot be read as a template is waited for before it is told: it may be half written.
+    /// Time for which a file that cannot be read as a template may stay so before [`RigFailed`] tells it: it may be half
+    /// written.
     pub patience: Duration,
 }
 
@@ -203,9 +204,9 @@ impl Plugin for RigInstancePlugin {
 #[require(InstanceMode, Transform)]
 pub struct RigInstance(pub Handle<RigTemplate>);
 
-/// Nodes that an instance in [`InstanceMode::Direct`] has as entities besides its joints and sockets, and poses besides the joints
-/// that stored poses move. Without this component it has all controls; instances with the same nodes share a program. A node that
-/// the template does not have is told ([`RigFailed`]), and the instance has all controls then.
+/// Nodes besides joints and sockets that an instance in [`InstanceMode::Direct`] has as entities, and that can be posed. Without
+/// this component these are all controls, and also where the template lacks one of the nodes, which [`RigFailed`] tells. Joints
+/// that stored poses move can be posed in any case. Instances with the same nodes share a program.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Eq, Default)]
 #[reflect(Component)]
 pub struct ExposedNodes(pub Vec<ExposedNode>);

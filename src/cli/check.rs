@@ -38,7 +38,7 @@ use crate::{
 /// Arguments of `rigsmith check`.
 #[derive(Args, Debug)]
 pub(super) struct CheckArgs {
-    /// The files
+    /// The files: meshes, templates, projects, clips, motion, weights or lists of gestures
     #[arg(required = true)]
     pub files: Vec<PathBuf>,
 }

@@ -14,6 +14,9 @@ use crate::{
     },
 };
 
+/// Commands that give a mesh a skeleton.
+const SKELETON_MAKERS: &str = "`rigsmith fit` puts one into it, `rigsmith sketch` draws one";
+
 /// Arguments of `rigsmith convert`.
 #[derive(Args, Debug)]
 pub(super) struct ConvertArgs {
@@ -43,8 +46,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
         (Some(Gltf | Glb | Vrm), Some(RigText | Template)) => {
             let model = limits::load_model(&args.input)?;
             if model.nodes.is_empty() {
-                let message =
-                    format!("`{}` has no skeleton to convert; sketch one into it first", args.input.display());
+                let message = format!("`{}` has no skeleton to convert; {SKELETON_MAKERS}", args.input.display());
                 return Err(Failure::Input(message.into()));
             }
             let mut uids = UidSource::seeded(SEED);
@@ -65,6 +67,13 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
             mark_joints(&mut model, &rig);
             drop(rig);
             store_owned_model(&RealDisk, &args.output, model, &settings)?
+        }
+        (Some(Obj), Some(RigText | Template)) => {
+            return Err(Failure::Usage(format!(
+                "cannot make `{}` of `{}`, because an .obj has no skeleton; {SKELETON_MAKERS}",
+                args.output.display(),
+                args.input.display()
+            )));
         }
         (_, Some(Vrm)) => {
             return Err(Failure::Usage(format!(

@@ -59,12 +59,12 @@ pub(super) struct FaceArgs {
     /// Take the whole mesh for a head, even if it looks like a body
     #[arg(long)]
     whole: bool,
-    /// An expression, or one of the units that they are made of, by its own name or that of ARKit, with a strength from
-    /// 0 to 1.5; may be repeated
+    /// An expression such as happiness or wink, or one of the units that expressions are made of, by its own name or that of
+    /// ARKit, such as jawOpen, with a strength from 0 to 1.5; may be repeated
     #[arg(long, value_name = "NAME=STRENGTH", value_parser = strength)]
     expression: Vec<(String, f32)>,
     /// Move the bones to fit shapes: a .glb with morph targets, a folder of .obj files, or a .json beside its .f32. Each
-    /// shape is kept as a stored pose
+    /// shape is kept as a stored pose; a vertex then follows at most as many joints as --influences says
     #[arg(long, value_name = "SHAPES")]
     fit: Option<PathBuf>,
     /// Add the blend shapes of ARKit, baked from the bones: 52, or 51 on a face without a tongue of its own. As morph
@@ -302,12 +302,12 @@ fn store_expression(args: &FaceArgs, bench: &mut Workbench, report: &mut Report)
 fn tell_mended(report: &mut Report, shares: &BTreeMap<String, f32>) {
     let percent = |share: f32| (f64::from(share) * 1000.0).round() / 10.0;
     let percent: BTreeMap<&str, f64> = shares.iter().map(|(unit, share)| (unit.as_str(), percent(*share))).collect();
-    let named: Vec<String> =
-        percent.iter().filter(|(_, taken)| **taken > 0.0).map(|(unit, taken)| format!("{unit} {taken} %")).collect();
-    report.line(match named.as_slice() {
-        [] => "mending of folds takes nothing of any unit".to_owned(),
-        named => format!("mending of folds takes of {}", named.join(", ")),
-    });
+    let (weakened, most) = percent
+        .values()
+        .filter(|taken| **taken > 0.0)
+        .fold((0_usize, 0.0_f64), |(count, most), taken| (count + 1, most.max(*taken)));
+    let units = counted(percent.len(), "unit", "units");
+    report.line(format!("mending of folds weakens {weakened} of {units}, by {most} % at most; --json lists them"));
     report.set("mended_percent", json!(percent));
 }
 
@@ -420,7 +420,7 @@ fn describe(report: &mut Report, placed: &FaceReport) {
     }
     let milliseconds = |time: &std::time::Duration| time.as_secs_f64() * 1000.0;
     let sum: f64 = placed.times.iter().map(|(_, time)| milliseconds(time)).sum();
-    report.line(format!("{sum:.0} ms"));
+    report.line(format!("placed in {sum:.0} ms"));
     report
         .set("groups", json!({ "face": face, "middle": middle, "back": back, "cut": placed.cut, "mask": placed.mask }));
     report.set("points", json!({ "head": head, "mesh": all }));

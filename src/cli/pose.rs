@@ -32,9 +32,9 @@ pub(super) struct PoseSteps {
     /// CONTROL is a name, a label or a reference (@...); may be repeated
     #[arg(long = "set", value_name = "NODE.CHANNEL=VALUE", allow_hyphen_values = true)]
     pub set: Vec<String>,
-    /// Throws a switch without a jump: NAME=ik, fk or the name of a space; NAME is a local group, a control or a joint of
-    /// the limb; the pose that --set makes is kept, and what --set says of controls that the switch moves holds
-    /// afterwards, too; may be repeated
+    /// Throws a switch without a jump: NAME=ik, NAME=fk or NAME=SPACE, the name of a space. NAME is a local group, a control
+    /// or a joint of the limb. Switches come after --set and keep the pose that it makes; controls that a switch moves
+    /// still get the values that --set gives them. May be repeated
     #[arg(long = "switch", value_name = "NAME=VALUE")]
     pub switches: Vec<String>,
     /// Frames of a sixtieth of a second that pass afterwards, for springs
@@ -126,7 +126,8 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
         error = error.max(node.entity.translation.distance(node.program.translation));
     });
     report.set_list("nodes", told);
-    report.line(format!("{}; entities and program differ by {error:e} at most", counted(nodes, "node", "nodes")));
+    let nodes = counted(nodes, "node", "nodes");
+    report.line(format!("posed {nodes}; an app shows them within about {error:.0e} units of the computed places"));
     report.set("error", error);
     if let Some(output) = &args.output {
         if is_picture {

@@ -34,7 +34,7 @@ use crate::{
 /// Arguments of `rigsmith watch`.
 #[derive(Args, Debug)]
 pub(super) struct WatchArgs {
-    /// The template, `.rig.ron`; it is waited for where it is not there yet, or broken
+    /// The template, `.rig.ron`. A file that is not there yet, or that cannot be built, is waited for
     pub template: PathBuf,
     /// A mesh to bind to what is built. When it is saved, joints stay, and its weights are transferred
     #[arg(long)]

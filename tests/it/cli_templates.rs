@@ -397,6 +397,7 @@ fn the_version_that_was_taken_over_is_the_base_of_the_next_update() {
     // Nobody knows the base: every difference is a conflict.
     let (code, told) = json(folder.path(), &["update", "mine.rig.ron", "--from", "v2.rig.ron", "-o", "out.rig.ron"]);
     assert_eq!((code, &told["conflicts"]), (1, &Value::from(2)), "{told}");
+    assert!(told["error"]["do"].as_str().unwrap().contains("--base"), "{told}");
     let first =
         ["update", "mine.rig.ron", "--from", "v2.rig.ron", "--base", "v1.rig.ron", "--keep-base", "-o", "out.rig.ron"];
     assert_eq!(rigsmith(folder.path(), &first).0, 0);
