@@ -219,8 +219,8 @@ fn idle_lines(names: &JointNames, idle: &[IdleJoint], claims: &[Uid]) -> Vec<Str
         idle.iter().filter(is_one).collect()
     };
     let kinds = [
-        ("outside", "hold no skin, outside of the mesh"),
-        ("no_surface", "hold no skin, all of it belongs to other joints"),
+        ("outside", "hold no skin, outside of the mesh (--claim lets them)"),
+        ("no_surface", "hold no skin, all of it belongs to other joints (--claim lets those beside the body)"),
         ("slot", "hold no skin, carry or steer things by their names (--claim lets them)"),
         ("not_deforming", "hold no skin, do not deform"),
         ("locked", "hold no skin, locked without weights"),
