@@ -27,7 +27,7 @@ use crate::rig::{
     },
     part::{
         MOST_BROUGHT, MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption,
-        PartSocket, Shortfall, unpaired_sides,
+        PartSocket, PartTargets, Shortfall, unpaired_sides,
     },
 };
 
@@ -374,8 +374,9 @@ impl PartInstance {
     /// changes.
     fn origins(&self, part: &Part, fitted: &Rig, places: &[(usize, Option<usize>)]) -> Vec<(Uid, PartOrigin)> {
         let changes = self.changes.iter().zip(places).filter(|(change, _)| change.params.is_some());
+        let targets = PartTargets::new(self, fitted);
         let changed: HashMap<Uid, usize> = changes
-            .filter_map(|(change, place)| Some((self.find_tag(fitted, change.tag.as_deref()?).ok()?, place.1?)))
+            .filter_map(|(change, place)| Some((targets.find_tag(change.tag.as_deref()?).ok()?, place.1?)))
             .collect();
         let title: Arc<str> = self.title().into();
         let tags = fitted.walk().flat_map(|joint| &joint.data.tags);
