@@ -195,6 +195,7 @@ mod retarget;
 mod rig_limits;
 mod rig_text;
 mod runtime;
+mod same_parts;
 mod saved_text;
 mod schema;
 mod sided_values;
