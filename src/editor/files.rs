@@ -141,7 +141,7 @@ pub enum FollowUp {
 pub(super) mod loading {
     pub(in crate::editor) use super::{
         bundle::{BundledModel, describe as describe_bundled, template as bundled_template},
-        document::{Context, ContextMesh, MeshSource, places},
+        document::{Context, MeshSource, places},
         error::{OpenError, WriteError},
         open::{LoadedDocument, LoadedFile, Work, begin, document, hash_of, project, spawn},
         save::{place_bundled, settled, snapshot},

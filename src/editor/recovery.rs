@@ -18,8 +18,8 @@ use super::{
         FollowUp, LoadJob, after_asking,
         dialog::{Answer, Dialog, Question},
         loading::{
-            BundledModel, Context, ContextMesh, LoadedDocument, LoadedFile, MeshSource, OpenError, Work, begin,
-            describe_bundled, document, hash_of, places, project, spawn,
+            BundledModel, Context, LoadedDocument, LoadedFile, MeshSource, OpenError, Work, begin, describe_bundled,
+            document, hash_of, places, project, spawn,
         },
     },
     notice::Notice,
@@ -164,17 +164,15 @@ fn restore(journal: &Path) -> Result<LoadedFile, OpenError> {
         // A long journal starts from a rig of its own; everything else is still as the project file says.
         _ => (as_opened(&recovered).unwrap_or_else(|| without_meshes(&recovered)), None),
     };
+    add_meshes(&recovered, &mut opened);
     let restored = recovered.restore(basis, base);
-    let Context { meshes, removed, .. } = context_of(&recovered);
-    // The project's file may still have them.
-    opened.meshes.retain(|(mesh, _)| !removed.contains(&mesh.uid));
-    opened.missing.retain(|mesh| !removed.contains(&mesh.uid));
-    opened.removed = removed;
-    add_meshes(meshes, &restored.replayed.rig, &mut opened);
     tell_losses(&recovered, &restored, basis, &mut opened);
     opened.pending = None;
     opened.origin = recovered.origin().clone();
     opened.rig = restored.replayed.rig.clone();
+    let rig = opened.rig.uid();
+    opened.missing.iter_mut().for_each(|mesh| mesh.rig = rig);
+    tell_misfits(&mut opened);
     opened.work = Some(Box::new(Work { recovered, restored, journal: journal.to_owned() }));
     Ok(document(opened))
 }
@@ -235,6 +233,20 @@ fn tell_losses(recovered: &RecoveredJournal, restored: &RestoredRig, basis: Basi
     }
 }
 
+/// Adds warnings about weights that are of another number of points than their mesh, whose file has changed.
+fn tell_misfits(opened: &mut LoadedDocument) {
+    for (mesh, _) in &opened.meshes {
+        let (bound, points) = (opened.rig.skin(mesh.uid).map(|skin| skin.weights.len()), mesh.rest.points.len());
+        if bound.is_some_and(|bound| bound != points) {
+            opened.warnings.push(format!(
+                "the mesh {:?} has changed since it was bound: it has {points} points now, for which its weights are not \
+                 made; put the former file back and recover again, or bind it anew",
+                mesh.file.name
+            ));
+        }
+    }
+}
+
 /// Name and meshes of the document, as the journal has them.
 fn context_of(recovered: &RecoveredJournal) -> Context {
     ron::from_str(recovered.context()).unwrap_or_default()
@@ -252,11 +264,11 @@ fn without_meshes(recovered: &RecoveredJournal) -> LoadedDocument {
 }
 
 /// Adds the meshes that were open and are not in the document, as in a project that was not saved with them, if they can be
-/// opened again. Others are kept as missing, so that a save goes on to name their files.
-fn add_meshes(meshes: Vec<ContextMesh>, rig: &Rig, opened: &mut LoadedDocument) {
+/// opened again.
+fn add_meshes(recovered: &RecoveredJournal, opened: &mut LoadedDocument) {
     let mut known: BTreeSet<Uid> = opened.missing.iter().map(|mesh| mesh.uid).collect();
     known.extend(opened.meshes.iter().map(|(mesh, _)| mesh.uid));
-    for mesh in meshes.into_iter().filter(|mesh| !known.contains(&mesh.uid)) {
+    for mesh in context_of(recovered).meshes.into_iter().filter(|mesh| !known.contains(&mesh.uid)) {
         let model = match &mesh.source {
             MeshSource::Bundled(name) => BundledModel::named(name).and_then(BundledModel::read),
             MeshSource::File(path) => load_model(&RealDisk, path).map_err(OpenError::from),
@@ -265,14 +277,6 @@ fn add_meshes(meshes: Vec<ContextMesh>, rig: &Rig, opened: &mut LoadedDocument) 
             Ok(model) => {
                 // A file with another number of nodes is not the one whose nodes became joints.
                 let nodes = if mesh.nodes.len() == model.nodes.len() { mesh.nodes } else { Vec::new() };
-                let (bound, points) = (rig.skin(mesh.uid).map(|skin| skin.weights.len()), model.points.len());
-                if bound.is_some_and(|bound| bound != points) {
-                    opened.warnings.push(format!(
-                        "the mesh {:?} has changed since it was bound: it has {points} points now, for which its \
-                         weights are not made; put the former file back and recover again, or bind it anew",
-                        model.name
-                    ));
-                }
                 opened.meshes.push((RigMesh::new(mesh.uid, model, nodes), mesh.source));
             }
             Err(error) => {
@@ -280,10 +284,10 @@ fn add_meshes(meshes: Vec<ContextMesh>, rig: &Rig, opened: &mut LoadedDocument) 
                     "a mesh of the project is not there: {error}; the rig was recovered without it; to keep its weights, \
                      put the file back and recover again before you save"
                 ));
+                // A save goes on to name its file.
                 if let MeshSource::File(path) = mesh.source {
-                    // No project has read the mesh: it has no hash.
                     let shape = MeshShape::Missing { hash: 0, skin: None };
-                    let (rig, nodes) = (rig.uid(), mesh.nodes.into());
+                    let (rig, nodes) = (opened.rig.uid(), mesh.nodes.into());
                     opened.missing.push(MeshToSave { uid: mesh.uid, rig, path, nodes, shape });
                 }
             }

@@ -138,6 +138,7 @@ mod hostile;
 mod influences;
 mod inputs;
 mod instances;
+mod joined_weights;
 mod journal;
 mod journal_kill;
 mod keep_pose;

@@ -10,7 +10,7 @@ use bevy::prelude::*;
 
 use super::{
     DocumentLanded, active,
-    document::{Context, OpenDocument, SavedAt, meshes},
+    document::{Context, ContextMesh, OpenDocument, SavedAt, meshes},
     open::LoadedDocument,
 };
 use crate::{
@@ -79,9 +79,6 @@ pub(super) fn remove(world: &mut World, uid: Uid) {
     let found = meshes(world, rig).into_iter().find(|(_, mesh, _)| mesh.uid == uid);
     let Some((mesh, name)) = found.map(|(entity, mesh, _)| (entity, mesh.file.name.clone())) else { return };
     world.despawn(mesh);
-    if let Some(mut document) = world.get_mut::<OpenDocument>(rig) {
-        document.removed.insert(uid);
-    }
     note_meshes(world, rig);
     if world.get::<Rig>(rig).is_some_and(|rig| rig.skin(uid).is_some()) {
         let operation = Operation::Named { name: "Remove mesh", edits: vec![RigEdit::SetSkin(uid, None)] };
@@ -166,10 +163,13 @@ fn land(world: &mut World, entity: Entity, opened: LoadedDocument, told: Notice)
 
 /// Notes the meshes of the open rig in its journal; no file has them yet.
 fn note_meshes(world: &mut World, entity: Entity) {
-    let Some(document) = world.get::<OpenDocument>(entity) else { return };
-    let context = Context::of(world, entity, &document.name);
-    document.journal.context(context.text());
+    let listed = meshes(world, entity).into_iter().filter_map(|(_, mesh, source)| {
+        Some(ContextMesh { uid: mesh.uid, source: source?.clone(), nodes: mesh.nodes.to_vec() })
+    });
+    let listed: Vec<ContextMesh> = listed.collect();
     if let Some(mut document) = world.get_mut::<OpenDocument>(entity) {
+        let context = Context { name: document.name.clone(), meshes: listed };
+        document.journal.context(context.text());
         document.saved = SavedAt::Nowhere;
     }
 }

@@ -1,6 +1,6 @@
 //! The open document: its name, its file, its saved state and its journal.
 
-use std::{collections::BTreeSet, path::PathBuf, sync::Arc, time::Duration};
+use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use bevy::{prelude::*, tasks::IoTaskPool};
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{super::notice::Notice, active, file_name};
 use crate::{
     files::{
-        Disk, MeshShape, MeshToSave, RealDisk, TemplateBase,
+        Disk, MeshToSave, RealDisk, TemplateBase,
         journal::{Journal, JournalPlaces, journal_beside},
     },
     plugins::{
@@ -33,8 +33,6 @@ pub struct OpenDocument {
     pub(super) journal: Journal,
     /// Meshes of the project that were not found; they are saved again unchanged.
     pub(super) missing: Vec<MeshToSave>,
-    /// Meshes that were removed, which a project file from before still has.
-    pub(super) removed: BTreeSet<Uid>,
     /// Marks that the place of the journal is known, and that a notice was sent if it is not the usual one.
     pub(super) is_placed: bool,
 }
@@ -124,14 +122,12 @@ pub(super) fn meshes(world: &World, rig: Entity) -> Vec<(Entity, &RigMesh, Optio
     meshes
 }
 
-/// Context stored in the journal besides the rig: the open meshes, and those that were removed.
+/// Context stored in the journal besides the rig: the open meshes.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub(in crate::editor) struct Context {
     pub name: String,
     pub meshes: Vec<ContextMesh>,
-    /// Meshes that were removed, which a project file from before still has.
-    pub removed: BTreeSet<Uid>,
 }
 
 /// An open mesh.
@@ -143,29 +139,6 @@ pub(in crate::editor) struct ContextMesh {
 }
 
 impl Context {
-    /// The open meshes of a document, and those that were removed from it, under its name.
-    pub fn of(world: &World, rig: Entity, name: &str) -> Self {
-        let listed = meshes(world, rig).into_iter().filter_map(|(_, mesh, source)| {
-            Some(ContextMesh { uid: mesh.uid, source: source?.clone(), nodes: mesh.nodes.to_vec() })
-        });
-        let document = world.get::<OpenDocument>(rig);
-        let missing: &[MeshToSave] = document.map_or(&[], |document| &document.missing[..]);
-        let removed = document.map(|document| document.removed.clone()).unwrap_or_default();
-        Self::new(name, listed.collect(), missing, removed)
-    }
-
-    /// Context of a document under a name, with its open meshes, those that were not found, and those that were removed.
-    pub fn new(name: &str, mut meshes: Vec<ContextMesh>, missing: &[MeshToSave], removed: BTreeSet<Uid>) -> Self {
-        // The others are in the project's file.
-        let unnamed = missing.iter().filter(|mesh| matches!(mesh.shape, MeshShape::Missing { hash: 0, .. }));
-        meshes.extend(unnamed.map(|mesh| ContextMesh {
-            uid: mesh.uid,
-            source: MeshSource::File(mesh.path.clone()),
-            nodes: mesh.nodes.to_vec(),
-        }));
-        Self { name: name.to_owned(), meshes, removed }
-    }
-
     pub fn text(&self) -> String {
         ron::to_string(self).unwrap_or_default()
     }

@@ -1,6 +1,6 @@
 //! Opening in the background; the open document stays until the next one is complete.
 
-use std::{collections::BTreeSet, path::Path, sync::Arc};
+use std::{path::Path, sync::Arc};
 
 use bevy::{
     prelude::*,
@@ -110,8 +110,6 @@ pub(in crate::editor) struct LoadedDocument {
     pub rig: Rig,
     pub meshes: Vec<(RigMesh, MeshSource)>,
     pub missing: Vec<MeshToSave>,
-    /// Meshes that were removed before a crash.
-    pub removed: BTreeSet<Uid>,
     pub view: Option<ProjectView>,
     pub project: Option<std::path::PathBuf>,
     /// Template that the rig of a project follows, and the version that it took over last.
@@ -140,7 +138,6 @@ impl LoadedDocument {
             rig,
             meshes: Vec::new(),
             missing: Vec::new(),
-            removed: BTreeSet::new(),
             view: None,
             project: None,
             followed: None,
@@ -382,7 +379,6 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
         rig,
         meshes,
         missing,
-        removed,
         view: kept,
         project,
         followed,
@@ -402,12 +398,13 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
         world.resource_mut::<EditorSettings>().remember(path.to_owned());
     }
     let clips = if matches!(origin, Origin::Mesh { .. }) { rig.clips().len() } else { 0 };
-    let listed = |(mesh, source): &(RigMesh, MeshSource)| ContextMesh {
-        uid: mesh.uid,
-        source: source.clone(),
-        nodes: mesh.nodes.to_vec(),
+    let context = Context {
+        name: title.clone(),
+        meshes: meshes
+            .iter()
+            .map(|(mesh, source)| ContextMesh { uid: mesh.uid, source: source.clone(), nodes: mesh.nodes.to_vec() })
+            .collect(),
     };
-    let context = Context::new(&title, meshes.iter().map(listed).collect(), &missing, removed.clone());
     world.write_message(DocumentLanded { origin: origin.clone() });
     // A journal left by a crash beside the project stays there until a person decides about it.
     let places = places(world, project.clone().filter(|_| pending.is_none()));
@@ -435,9 +432,8 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     };
     let sink = watched(journal.clone());
     let saved = if is_recovered { SavedAt::Nowhere } else { SavedAt::Step(None) };
-    let is_placed = false;
     let document =
-        OpenDocument { name: title.clone(), project, template, base, saved, journal, missing, removed, is_placed };
+        OpenDocument { name: title.clone(), project, template, base, saved, journal, missing, is_placed: false };
     let entity = world.spawn((bundle, sink, document)).id();
     for (mesh, source) in meshes {
         world.spawn((mesh, source, SkinOf(entity)));

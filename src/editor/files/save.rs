@@ -1,7 +1,7 @@
 //! Saving and exporting, in the background, from a snapshot of the document.
 
 use std::{
-    collections::{BTreeSet, VecDeque},
+    collections::VecDeque,
     path::{Path, PathBuf},
     sync::Arc,
     time::Duration,
@@ -16,7 +16,7 @@ use super::{
     FollowUp, active, after_asking,
     bundle::{BODY, BundledModel},
     dialog::Purpose,
-    document::{Context, MeshSource, OpenDocument, SavedAt, last_step, meshes, places},
+    document::{Context, ContextMesh, MeshSource, OpenDocument, SavedAt, last_step, meshes, places},
     error::WriteError,
     export, file_name,
     open::spawn,
@@ -104,8 +104,6 @@ pub(super) enum SavedContent {
         mark: SaveMark,
         notes: Vec<String>,
         bundled: Option<PathBuf>,
-        /// Open meshes of the snapshot.
-        open: BTreeSet<Uid>,
     },
     /// Export; `template` is the rig and its file, if that is the template that was opened, or the first one of a rig that
     /// has come from none.
@@ -269,9 +267,7 @@ fn store(
         debug!("the save is not noted in the journal: {reason}");
     }
     save_set(disk, &files.set)?;
-    let is_open = |mesh: &&MeshToSave| matches!(mesh.shape, MeshShape::Open { .. });
-    let open = project.meshes.iter().filter(is_open).map(|mesh| mesh.uid).collect();
-    Ok(SavedContent::Project { mark, notes: files.notes, bundled, open })
+    Ok(SavedContent::Project { mark, notes: files.notes, bundled })
 }
 
 /// Copies a bundled mesh beside a project, so that the project can refer to it.
@@ -303,8 +299,8 @@ pub(super) fn poll(world: &mut World) {
     let next = saving.waiting.pop_front();
     let is_done = result.is_ok();
     match result {
-        Ok(SavedContent::Project { mark, notes, bundled, open }) => {
-            saved(world, rig, step, mark, (bundled, &open));
+        Ok(SavedContent::Project { mark, notes, bundled }) => {
+            saved(world, rig, step, mark, bundled);
             world.write_message(Notice::done(format!("Saved {name}")));
             tell(world, notes);
         }
@@ -359,14 +355,8 @@ fn tell(world: &mut World, notes: Vec<String>) {
     }
 }
 
-/// The project is saved with some meshes, of which one may be `bundled`: the journal starts again from this state.
-fn saved(
-    world: &mut World,
-    rig: Entity,
-    step: Option<Arc<Step>>,
-    mark: SaveMark,
-    (bundled, with): (Option<PathBuf>, &BTreeSet<Uid>),
-) {
+/// The project is saved: the journal starts again from this state.
+fn saved(world: &mut World, rig: Entity, step: Option<Arc<Step>>, mark: SaveMark, bundled: Option<PathBuf>) {
     let open: Vec<Entity> = meshes(world, rig).into_iter().map(|(entity, ..)| entity).collect();
     if let Some(path) = bundled {
         for entity in open {
@@ -378,12 +368,18 @@ fn saved(
         }
     }
     let places = places(world, Some(mark.path.clone()));
-    let context = Context::of(world, rig, &stem(&mark.path));
-    let are_saved = meshes(world, rig).into_iter().map(|(_, mesh, _)| mesh.uid).eq(with.iter().copied());
+    let context = Context {
+        name: stem(&mark.path),
+        meshes: meshes(world, rig)
+            .into_iter()
+            .filter_map(|(_, mesh, source)| {
+                Some(ContextMesh { uid: mesh.uid, source: source?.clone(), nodes: mesh.nodes.to_vec() })
+            })
+            .collect(),
+    };
     world.resource_mut::<EditorSettings>().remember(mark.path.clone());
     let Some(mut document) = world.get_mut::<OpenDocument>(rig) else { return };
-    // A mesh that was added or removed while the file was written is not saved with the step.
-    document.saved = if are_saved { SavedAt::Step(step) } else { SavedAt::Nowhere };
+    document.saved = SavedAt::Step(step);
     document.name = stem(&mark.path);
     document.project = Some(mark.path.clone());
     document.journal.saved(mark, places);

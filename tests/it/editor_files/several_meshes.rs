@@ -31,17 +31,6 @@ impl Window {
         self.answer(Answer::Path(path.to_owned()));
     }
 
-    /// Opens a project and recovers the work that is beside it.
-    fn recover(&mut self, project: &Path) {
-        self.open_file(project);
-        let Some(Question::Recover(list)) = self.question() else {
-            panic!("nothing is offered beside the project: {:?}", self.notices.list)
-        };
-        let ours = list.iter().find(|pending| pending.path.starts_with(&self.folder));
-        let ours = ours.expect("our work is offered").path.clone();
-        self.answer(Answer::Recover(ours));
-    }
-
     /// Names and uids of the open meshes, by name.
     fn meshes(&self) -> Vec<(String, Uid)> {
         let meshes = self.world().get::<RigMeshes>(self.base.open_rig());
@@ -160,7 +149,13 @@ fn added_meshes_are_saved_recovered_and_removed() {
     assert_eq!(meshes.len(), 3);
     crash(window);
     let mut window = Window::new(folder.path());
-    window.recover(&project);
+    window.open_file(&project);
+    let Some(Question::Recover(list)) = window.question() else {
+        panic!("nothing is offered beside the project: {:?}", window.notices.list)
+    };
+    let ours = list.iter().find(|pending| pending.path.starts_with(folder.path())).expect("our work is offered");
+    let ours = ours.path.clone();
+    window.answer(Answer::Recover(ours));
     assert_eq!((window.rig(), window.meshes()), (rig, meshes), "{:?}", window.notices.list);
 
     // What is removed takes its weights along.
@@ -172,84 +167,6 @@ fn added_meshes_are_saved_recovered_and_removed() {
     let mut other = Window::new(folder.path());
     other.open_file(&project);
     assert_eq!((other.rig(), other.meshes()), (window.rig(), window.meshes()), "{:?}", other.notices.list);
-}
-
-#[test]
-fn recovery_leaves_out_what_was_removed_and_keeps_what_has_gone() {
-    let folder = folder();
-    let (mut window, [_, coat]) = dressed(folder.path());
-    window.bind(coat.0, coat.1);
-    let project = window.save_as("dressed.rigsmith.ron");
-    window.send(RemoveMeshRequest(coat.0));
-    let (hat, away) = (write_mesh(folder.path(), "hat", 20.0), folder.path().join("away"));
-    window.add_mesh(&hat);
-    window.place(1.5);
-    let meshes = window.meshes();
-    let names = |meshes: &[(String, Uid)]| meshes.iter().map(|(name, _)| name.clone()).collect::<Vec<String>>();
-    assert_eq!(names(&meshes), ["body", "hat"]);
-    crash(window);
-    std::fs::rename(&hat, &away).expect("moved away");
-
-    let mut window = Window::new(folder.path());
-    window.recover(&project);
-    assert_eq!(names(&window.meshes()), ["body"], "the project's file has the coat, too: {:?}", window.notices.list);
-    let told = "put the file back and recover again before you save";
-    assert!(window.notices.include(Severity::Warning, told), "{:?}", window.notices.list);
-    // What was removed stays so through another crash.
-    window.place(1.6);
-    crash(window);
-    let mut window = Window::new(folder.path());
-    window.recover(&project);
-    assert_eq!(names(&window.meshes()), ["body"], "{:?}", window.notices.list);
-    window.act(Action::Save);
-
-    std::fs::rename(&away, &hat).expect("moved back");
-    let mut other = Window::new(folder.path());
-    other.open_file(&project);
-    assert_eq!(other.meshes(), meshes, "the project still names the mesh: {:?}", other.notices.list);
-}
-
-#[test]
-fn a_mesh_that_changed_before_the_recovery_is_told() {
-    let folder = folder();
-    let (mut window, [_, (_, joint)]) = dressed(folder.path());
-    let project = window.save_as("dressed.rigsmith.ron");
-    let hat = write_mesh(folder.path(), "hat", 20.0);
-    window.add_mesh(&hat);
-    let found = window.meshes().into_iter().find(|(name, _)| name == "hat").expect("a hat").1;
-    window.bind(found, joint);
-    crash(window);
-    std::fs::write(&hat, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("written");
-    let mut window = Window::new(folder.path());
-    window.recover(&project);
-    let told = "has changed since it was bound: it has 3 points now";
-    assert!(window.notices.include(Severity::Warning, told), "{:?}", window.notices.list);
-}
-
-/// Weights of a mesh that has lost or got points stay with that mesh.
-#[test]
-fn joined_models_keep_their_points_weights_apart() {
-    let model = |points: usize, rows: &[(u32, f32)]| {
-        let mut weights = Weights::default();
-        rows.iter().for_each(|row| weights.push([*row]));
-        Model { points: vec![Vec3::ZERO; points], weights: Some(weights), ..default() }
-    };
-    let next = [(7, 1.0), (8, 0.5)];
-    for rows in [0, 1, 2, 3] {
-        let own: Vec<(u32, f32)> = (0..rows).map(|row| (row, 0.25)).collect();
-        for more in [1, 2] {
-            let mut joined = model(2, &own);
-            joined.append(model(2, &next[..more]));
-            joined.append(model(1, &[(9, 1.0)]));
-            let weights = joined.weights.as_ref().expect("weights");
-            assert_eq!((joined.points.len(), weights.len()), (5, 5));
-            let of = |point: usize| weights.of(point).collect::<Vec<_>>();
-            assert_eq!((0..2).flat_map(of).collect::<Vec<_>>(), own[..own.len().min(2)], "{rows} rows for 2 points");
-            assert_eq!((2..4).flat_map(of).collect::<Vec<_>>(), next[..more]);
-            assert_eq!(of(4), [(9, 1.0)]);
-            assert_eq!([weights.joints.len(), weights.values.len()], [weights.starts[5] as usize; 2]);
-        }
-    }
 }
 
 #[test]
