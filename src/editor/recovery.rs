@@ -27,7 +27,7 @@ use super::{
 };
 use crate::{
     files::{
-        Disk, FileKind, RealDisk,
+        Disk, FileKind, MeshShape, MeshToSave, RealDisk,
         journal::{
             Basis, Condition, MAX_JOURNAL, Origin, PendingJournal, RecordKind, RecoveredJournal, RestoredRig,
             journal_beside, pending_journal, pending_journals, project_beside, recover,
@@ -171,6 +171,9 @@ fn restore(journal: &Path) -> Result<LoadedFile, OpenError> {
     opened.pending = None;
     opened.origin = recovered.origin().clone();
     opened.rig = restored.replayed.rig.clone();
+    let rig = opened.rig.uid();
+    opened.missing.iter_mut().for_each(|mesh| mesh.rig = rig);
+    tell_misfits(&mut opened);
     opened.work = Some(Box::new(Work { recovered, restored, journal: journal.to_owned() }));
     Ok(document(opened))
 }
@@ -246,6 +249,20 @@ fn tell_losses(recovered: &RecoveredJournal, restored: &RestoredRig, basis: Basi
     }
 }
 
+/// Adds warnings about weights that are of another number of points than their mesh, whose file has changed.
+fn tell_misfits(opened: &mut LoadedDocument) {
+    for (mesh, _) in &opened.meshes {
+        let (bound, points) = (opened.rig.skin(mesh.uid).map(|skin| skin.weights.len()), mesh.rest.points.len());
+        if bound.is_some_and(|bound| bound != points) {
+            opened.warnings.push(format!(
+                "the mesh {:?} has changed since it was bound: it has {points} points now, for which its weights are not \
+                 made; put the former file back and recover again, or bind it anew",
+                mesh.file.name
+            ));
+        }
+    }
+}
+
 /// Name and meshes of the document, as the journal has them.
 fn context_of(recovered: &RecoveredJournal) -> Context {
     ron::from_str(recovered.context()).unwrap_or_default()
@@ -278,9 +295,18 @@ fn add_meshes(recovered: &RecoveredJournal, opened: &mut LoadedDocument) {
                 let nodes = if mesh.nodes.len() == model.nodes.len() { mesh.nodes } else { Vec::new() };
                 opened.meshes.push((RigMesh::new(mesh.uid, model, nodes), mesh.source));
             }
-            Err(error) => opened
-                .warnings
-                .push(format!("a mesh of the project is not there: {error}; the rig was recovered without it")),
+            Err(error) => {
+                opened.warnings.push(format!(
+                    "a mesh of the project is not there: {error}; the rig was recovered without it; to keep its weights, \
+                     put the file back and recover again before you save"
+                ));
+                // A save goes on to name its file.
+                if let MeshSource::File(path) = mesh.source {
+                    let shape = MeshShape::Missing { hash: 0, skin: None };
+                    let (rig, nodes) = (opened.rig.uid(), mesh.nodes.into());
+                    opened.missing.push(MeshToSave { uid: mesh.uid, rig, path, nodes, shape });
+                }
+            }
         }
     }
 }

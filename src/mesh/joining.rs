@@ -51,21 +51,26 @@ fn place_of(skins: &mut Vec<SkinBinding>, skin: SkinBinding) -> usize {
     })
 }
 
-/// Appends the influences of `added` points to those of `points` points. Points of a model without weights have none.
+/// Appends the influences of `added` points to those of `points` points. Points of a model without weights have none, and
+/// influences of points that a model does not have are left out.
 fn append_weights(weights: &mut Option<Weights>, points: usize, other: Option<Weights>, added: usize) {
     if weights.is_none() && other.is_none() {
         return;
     }
-    let weights = weights.get_or_insert_with(|| without_influences(points));
-    let other = other.unwrap_or_else(|| without_influences(added));
+    let weights = weights.get_or_insert_with(Weights::default);
+    fit_to_points(weights, points);
+    let mut other = other.unwrap_or_default();
+    fit_to_points(&mut other, added);
     let first = weights.joints.len() as u32;
-    // Weights without points may have no start at all.
-    weights.starts.resize(points + 1, first);
     weights.starts.extend(other.starts.iter().skip(1).map(|start| first + start));
     weights.joints.extend(other.joints);
     weights.values.extend(other.values);
 }
 
-fn without_influences(points: usize) -> Weights {
-    Weights { starts: vec![0; points + 1], ..Weights::default() }
+/// Gives weights one row for each point. Weights of a mesh whose file has changed may have more, fewer or none.
+fn fit_to_points(weights: &mut Weights, points: usize) {
+    let end = weights.starts.get(points).or(weights.starts.last()).copied().unwrap_or(0);
+    weights.starts.resize(points + 1, end);
+    weights.joints.truncate(end as usize);
+    weights.values.truncate(end as usize);
 }

@@ -5,6 +5,7 @@ mod exporting;
 mod failures;
 mod joint_maps;
 mod journals;
+mod lost_meshes;
 mod several_meshes;
 mod views;
 

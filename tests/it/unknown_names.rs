@@ -2,6 +2,8 @@
 //! so does the work of finding similar names.
 
 use rigsmith::rig::{
+    Rig, Uid,
+    part::{Part, PartChange, PartInstance},
     reference::MOST_COMPARED,
     template::{read_template, survey_template},
 };
@@ -37,6 +39,36 @@ fn unknown_names_are_compared_with_a_bounded_number_of_others() {
             assert!(similar > 0 && (similar - 1) * count <= MOST_COMPARED, "{similar} of {count}");
             assert!(count > 20 || similar == count, "{similar} of {count}");
         }
+    }
+}
+
+/// An instance may change everything in its part: each change finds its own, and unknown ones are compared within the budget.
+#[test]
+fn changes_of_thousands_of_tags_and_joints_find_their_own() {
+    for count in [20, 2_000] {
+        let joint = |number: usize| format!("(label: \"joint_{number}\", {})", null(&format!("@joint joint_{number}")));
+        let part = Part::from(read_template(template((0..count).map(joint)).as_bytes()).unwrap());
+        let of_number = |number: usize| {
+            ["", "x"].into_iter().flat_map(move |end| {
+                let tag = Some(format!("null/joint_{number}{end}"));
+                let joint = Some(format!("joint_{number}{end}"));
+                [
+                    PartChange { tag, enabled: Some(false), ..PartChange::default() },
+                    PartChange { joint, locked: Some(true), ..PartChange::default() },
+                ]
+            })
+        };
+        let changes = (0..count).flat_map(of_number).collect();
+        let instance = PartInstance { uid: Uid(7), changes, ..PartInstance::default() };
+        let fitted = instance.fitted(&part, &|_, _| None).unwrap();
+        let mut rig = Rig::new(Uid(1), "host");
+        let report = instance.put_into(&mut rig, &part, &fitted, &|_, _| None, None).unwrap();
+        let is_changed = rig.walk().map(|joint| joint.data.locked && joint.data.tags.iter().all(|tag| !tag.enabled));
+        assert_eq!(is_changed.filter(|is_changed| *is_changed).count(), count);
+        assert_eq!(report.faults.len(), 2 * count);
+        let similar = report.faults.iter().filter(|(_, fault)| fault.to_string().contains("did you mean")).count();
+        assert!(similar > 0 && (similar - 1) * count <= MOST_COMPARED, "{similar} of {count}");
+        assert!(count > 20 || similar == 2 * count, "{similar} of {count}");
     }
 }
 

@@ -8,6 +8,7 @@ mod facial_hair;
 mod interior;
 mod sides;
 mod skin;
+mod skin_columns;
 mod symmetry;
 
 use glam::Vec3;

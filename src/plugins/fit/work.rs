@@ -1,6 +1,10 @@
 //! Work of a fit in its task: the choice of a template, the fit, and the report.
 
-use std::{collections::BTreeMap, sync::Arc, time::Instant};
+use std::{
+    collections::{BTreeMap, HashSet},
+    sync::Arc,
+    time::Instant,
+};
 
 use bevy::prelude::*;
 
@@ -333,11 +337,17 @@ impl Work {
 /// the object is too small for a figure that the others lie on.
 fn largest_object(mesh: &RigMesh) -> Option<(Vec<u32>, usize)> {
     let others = mesh.rest.objects.len().checked_sub(1).filter(|others| *others > 0)?;
-    let gear = mesh.file.gear();
-    let own = |number: usize| mesh.rest.triangles_of(|object| object == number);
-    let figures = (0..=others).filter(|number| !gear.contains(number)).map(own);
+    let mut counts = vec![0_usize; others + 1];
+    for part in &mesh.rest.parts {
+        if let Some(count) = counts.get_mut(part.object) {
+            *count += part.triangles.len();
+        }
+    }
+    let gear: HashSet<usize> = mesh.file.gear().into_iter().collect();
+    let figures = (0..=others).filter(|number| !gear.contains(number));
     // Of objects that are equally large, the first one.
-    let largest = figures.reduce(|best, next| if next.len() > best.len() { next } else { best })?;
+    let largest = figures.reduce(|best, next| if counts[next] > counts[best] { next } else { best })?;
+    let largest = mesh.rest.triangles_of(|object| object == largest);
     let extent = |corners: &mut dyn Iterator<Item = u32>| {
         let places =
             corners.filter_map(|corner| mesh.rest.points.get(corner as usize)).filter(|place| place.is_finite());

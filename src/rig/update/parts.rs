@@ -19,7 +19,7 @@ use crate::rig::{
         template::{Template, quaternion, quoted, vector},
         tree::{Tree, with_field},
     },
-    part::{PartChange, PartInstance},
+    part::{PartChange, PartInstance, PartTargets},
 };
 
 /// Fields that say where a part is. A part is in one place, so that these are decided together.
@@ -360,7 +360,9 @@ impl TemplateWithParts {
             }
         }
         for (part, (instance, fitted)) in template.parts.iter_mut().zip(&self.fitted) {
-            part.changes.iter_mut().for_each(|change| self.bind_change(change, instance, fitted));
+            let targets = PartTargets::new(instance, fitted);
+            let joints: Vec<Uid> = fitted.walk().map(|joint| joint.data.uid).collect();
+            part.changes.iter_mut().for_each(|change| self.bind_change(change, instance, &targets, &joints));
         }
     }
 
@@ -371,9 +373,10 @@ impl TemplateWithParts {
         }
     }
 
-    fn bind_change(&self, change: &mut PartChange, instance: &PartInstance, fitted: &Rig) {
+    /// Refers by uids in a change of an instance whose part has these `joints`.
+    fn bind_change(&self, change: &mut PartChange, instance: &PartInstance, targets: &PartTargets, joints: &[Uid]) {
         change.tags.iter_mut().for_each(|tag| self.bind_tag(tag));
-        if let Some(tag) = change.tag.as_ref().and_then(|name| instance.find_tag(fitted, name).ok()) {
+        if let Some(tag) = change.tag.as_ref().and_then(|name| targets.find_tag(name).ok()) {
             if let Some(params) = &mut change.params
                 && let Some((_, bound)) = self.rig.find_tag(instance.uid_of(tag))
                 && let TagKind::Command { params: bound, .. } = &bound.kind
@@ -382,9 +385,9 @@ impl TemplateWithParts {
             }
             change.tag = Some(tag.to_string());
         }
-        let place = change.joint.as_ref().and_then(|label| instance.find_joint(fitted, label).ok());
-        if let Some(joint) = place.and_then(|place| fitted.walk().nth(place)) {
-            change.joint = Some(joint.data.uid.to_string());
+        let place = change.joint.as_ref().and_then(|label| targets.find_joint(label).ok());
+        if let Some(joint) = place.and_then(|place| joints.get(place)) {
+            change.joint = Some(joint.to_string());
         }
     }
 }

@@ -7,6 +7,7 @@ use glam::Vec3;
 use super::{
     Face, HEAD, NECK, Row, facial_hair,
     sides::{Rim, Sides},
+    skin_columns::SkinColumns,
     smooth,
 };
 use crate::algo::face::{bones::map::line_distance, shells::ShellKind};
@@ -22,9 +23,10 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
             ShellKind::Inside | ShellKind::Tongue => members.entry(shell[v]).or_default().push(v),
         }
     }
+    let (skin, outer) = (SkinColumns::new(face, |_| face.map.trusted), facial_hair::outer_skin(face));
     let is_tongue = |members: &[usize]| members.first().is_some_and(|&v| kinds[v] == ShellKind::Tongue);
     let (inside, outside): (Vec<_>, Vec<_>) =
-        members.values().partition(|members| is_tongue(members) || in_mouth(face, members));
+        members.values().partition(|members| is_tongue(members) || in_mouth(face, &outer, members));
     let inside: Vec<MouthPart> = inside.into_iter().map(|members| MouthPart::new(face, members)).collect();
     let ends = inside.iter().filter(|part| is_tongue(part.members)).map(|part| [part.low.z, part.high.z]);
     let ends = ends.reduce(|[back, front], [low, high]| [back.min(low), front.max(high)]);
@@ -37,7 +39,7 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
         }
     }
     for members in outside {
-        if !lashes(face, sides, members, rows) && !facial_hair::rows(face, sides, members, rows) {
+        if !lashes(face, sides, &skin, members, rows) && !facial_hair::rows(face, sides, &outer, members, rows) {
             for &v in members {
                 let neck = face.neck_share(face.places[v]);
                 rows[v] = vec![(HEAD, 1.0 - neck), (NECK, neck)];
@@ -47,7 +49,7 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
 }
 
 /// Returns `true` for a shell whose middle lies behind the lips, and that does not lie on the skin.
-fn in_mouth(face: &Face, members: &[usize]) -> bool {
+fn in_mouth(face: &Face, outer: &SkinColumns, members: &[usize]) -> bool {
     if !face.map.trusted {
         return false;
     }
@@ -56,7 +58,7 @@ fn in_mouth(face: &Face, members: &[usize]) -> bool {
     let corner = half.lip_corner();
     let e = face.map.scale;
     let is_behind = p.x < 1.3 * corner.x && (p.y - corner.y).abs() < 0.4 * e && p.z < half.lip_line()[0].z + 0.02 * e;
-    is_behind && !facial_hair::is_on_skin(face, members)
+    is_behind && !facial_hair::is_on_skin(face, outer, members)
 }
 
 /// A shell in the mouth: a row of teeth, a tooth, the tongue, or a bag around them.
@@ -188,7 +190,7 @@ fn mouth(face: &Face, part: &MouthPart, all: &[MouthPart], rows: &mut [Row]) {
 
 /// Fills the rows of lashes, brows and the like that lie on the skin with the weights of the nearest skin; returns
 /// `false` for a shell of another kind.
-fn lashes(face: &Face, sides: &Sides, members: &[usize], rows: &mut [Row]) -> bool {
+fn lashes(face: &Face, sides: &Sides, skin: &SkinColumns, members: &[usize], rows: &mut [Row]) -> bool {
     if !face.map.trusted {
         return false;
     }
@@ -202,9 +204,7 @@ fn lashes(face: &Face, sides: &Sides, members: &[usize], rows: &mut [Row]) -> bo
     let low = members.iter().fold(Vec3::INFINITY, |a, &v| a.min(face.places[v]));
     let high = members.iter().fold(Vec3::NEG_INFINITY, |a, &v| a.max(face.places[v]));
     let margin = Vec3::splat(0.12 * e);
-    let skin: Vec<usize> = (0..face.places.len())
-        .filter(|&v| face.mask[v] && (face.places[v].cmpge(low - margin) & face.places[v].cmple(high + margin)).all())
-        .collect();
+    let skin: Vec<usize> = skin.within(low - margin, high + margin).collect();
     let nearest = |v: usize, rim: Option<(usize, Rim)>| {
         skin.iter()
             .copied()

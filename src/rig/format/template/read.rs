@@ -2,6 +2,7 @@
 
 mod hung_joints;
 mod inputs;
+mod instance_places;
 mod parts;
 mod survey;
 

@@ -178,19 +178,20 @@ impl NameError {
 }
 
 /// Things of a text by the names that refer to them.
-pub(super) struct NameIndex<'d, 'a> {
-    declared: &'d Declarations<'a>,
+pub(super) struct NameIndex<'d> {
     groups: ByName<'d>,
     joints: ByName<'d>,
     features: ByName<'d>,
+    /// Features of each joint by their names, `None` for several of one name; joints are told by their first tag.
+    of_joints: HashMap<NodeId, HashMap<String, Option<Uid>>>,
     /// Number of names that unknown ones were compared with.
     compared: Cell<usize>,
 }
 
 type ByName<'d> = HashMap<Cow<'d, str>, Vec<Uid>>;
 
-impl<'d, 'a> NameIndex<'d, 'a> {
-    pub fn new(declared: &'d Declarations<'a>) -> Self {
+impl<'d> NameIndex<'d> {
+    pub fn new(declared: &'d Declarations) -> Self {
         fn by_name<'d>(named: impl Iterator<Item = (Cow<'d, str>, Uid)>) -> ByName<'d> {
             let mut called = ByName::new();
             for (name, uid) in named {
@@ -199,12 +200,23 @@ impl<'d, 'a> NameIndex<'d, 'a> {
             called
         }
         let named = |one: &'d Declaration| Some((Cow::Borrowed(one.name.as_deref()?), one.uid));
-        let feature = |tag: &Declaration| Some((Cow::Owned(feature_name(&declared.tree, tag.node)?), tag.uid));
+        let (mut of_joints, mut features) = (HashMap::new(), ByName::new());
+        for tags in &declared.tags {
+            let mut own: HashMap<String, Option<Uid>> = HashMap::new();
+            for tag in tags {
+                let Some(name) = feature_name(&declared.tree, tag.node) else { continue };
+                own.entry(name.clone()).and_modify(|only| *only = None).or_insert(Some(tag.uid));
+                features.entry(Cow::Owned(name)).or_default().push(tag.uid);
+            }
+            if let Some(first) = tags.first().filter(|_| !own.is_empty()) {
+                of_joints.insert(first.node, own);
+            }
+        }
         Self {
-            declared,
             groups: by_name(declared.groups.iter().filter_map(named)),
             joints: by_name(declared.joints.iter().filter_map(named)),
-            features: by_name(declared.tags.iter().flatten().filter_map(feature)),
+            features,
+            of_joints,
             compared: Cell::new(0),
         }
     }
@@ -224,10 +236,9 @@ impl<'d, 'a> NameIndex<'d, 'a> {
     /// # Errors
     /// As [`find`](Self::find).
     pub fn feature(&self, name: &str, own: &[Declaration]) -> Result<Uid, NameError> {
-        let tree = &self.declared.tree;
-        let mut of_joint = own.iter().filter(|tag| feature_name(tree, tag.node).as_deref() == Some(name));
-        match (of_joint.next(), of_joint.next()) {
-            (Some(tag), None) => Ok(tag.uid),
+        let of_joint = own.first().and_then(|first| self.of_joints.get(&first.node));
+        match of_joint.and_then(|features| features.get(name)) {
+            Some(Some(uid)) => Ok(*uid),
             _ => self.found(&self.features, name, "feature"),
         }
     }
@@ -256,7 +267,7 @@ impl<'d, 'a> NameIndex<'d, 'a> {
 
 struct Writer<'d, 'a> {
     declared: &'d Declarations<'a>,
-    called: NameIndex<'d, 'a>,
+    called: NameIndex<'d>,
     changes: Vec<Change>,
     faults: Vec<SourceError>,
     parents: BTreeMap<Uid, String>,

@@ -17,17 +17,16 @@ use super::{
         quoted,
         shorthand::Declarations,
     },
-    Places, bind_references, read_text,
+    Places, bind_references,
+    instance_places::InstancePlaces,
+    read_text,
 };
 use crate::rig::{
     RestTransform, Rig, RigEdit, SourceError, TagData, TagKind, Uid, degrees,
-    format::{
-        scan::{Field, fields},
-        source::ron_text,
-    },
+    format::{scan::Field, source::ron_text},
     part::{
         MOST_BROUGHT, MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption,
-        PartSocket, Shortfall, unpaired_sides,
+        PartSocket, PartTargets, Shortfall, unpaired_sides,
     },
 };
 
@@ -343,39 +342,14 @@ fn rotation_of(text: &str) -> Result<Quat, PartChangeError> {
     Ok(Quat::from_xyzw(x, y, z, w))
 }
 
-/// Places in a template's text of its part instances and of their changes.
-struct InstancePlaces<'a> {
-    fields: Vec<Field<'a>>,
-}
-
-impl InstancePlaces<'_> {
-    /// Places of the changes of the instance at a place, each with its parameters if it has any.
-    fn changes(&self, instance: usize) -> Vec<(usize, Option<usize>)> {
-        let fields = &self.fields;
-        let list = fields.iter().find(|field| field.start == instance).and_then(|instance| {
-            fields.iter().position(|field| field.bracket == instance.bracket && field.name == "changes")
-        });
-        let is_subject =
-            |field: &&Field| field.parent == list && list.is_some() && matches!(field.name, "tag" | "joint");
-        let params = |subject: &Field| {
-            fields
-                .iter()
-                .find(|field| field.bracket == subject.bracket && field.name == "params")
-                .map(|field| field.start)
-        };
-        let mut subjects: Vec<&Field> = fields.iter().filter(is_subject).collect();
-        subjects.dedup_by_key(|subject| subject.bracket);
-        subjects.into_iter().map(|subject| (subject.start, params(subject))).collect()
-    }
-}
-
 impl PartInstance {
     /// Origins of the commands that come of the instance; `fitted` is what comes of the part, and `places` are those of the
     /// changes.
     fn origins(&self, part: &Part, fitted: &Rig, places: &[(usize, Option<usize>)]) -> Vec<(Uid, PartOrigin)> {
         let changes = self.changes.iter().zip(places).filter(|(change, _)| change.params.is_some());
+        let targets = PartTargets::new(self, fitted);
         let changed: HashMap<Uid, usize> = changes
-            .filter_map(|(change, place)| Some((self.find_tag(fitted, change.tag.as_deref()?).ok()?, place.1?)))
+            .filter_map(|(change, place)| Some((targets.find_tag(change.tag.as_deref()?).ok()?, place.1?)))
             .collect();
         let title: Arc<str> = self.title().into();
         let tags = fitted.walk().flat_map(|joint| &joint.data.tags);
@@ -421,7 +395,7 @@ impl Template {
         let hung = std::mem::take(&mut self.hung);
         let mut waiting = hung.clone();
         let (mut faults, mut shortfall, mut brings) = (Vec::new(), Shortfall::default(), 0);
-        let places = InstancePlaces { fields: fields(source) };
+        let places = InstancePlaces::new(source);
         for instance in std::mem::take(&mut self.parts) {
             let message = |error: &dyn fmt::Display| format!("part \"{}\": {error}", instance.title());
             let found = part(&instance.part).and_then(|part| {
