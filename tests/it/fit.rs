@@ -181,9 +181,10 @@ fn a_moved_joint_takes_its_partner_along() {
     assert!(left.distance(image(right)) < 0.006, "{left} and {right}");
     assert!(at(&after, "forearm_l").distance(at(&before, "forearm_l")) < 0.02, "arms stay");
 
-    let (before, after, _) = moved(FitSymmetry::Off, Vec3::new(0.0, 0.04, 0.0));
-    let went = at(&after, "shin_r").distance(at(&before, "shin_r"));
-    assert!(went < 0.02, "fitted apart, the right knee went {went}");
+    // The model of bodies has legs of one length, so that the other knee follows on its own leg.
+    let (_, after, to) = moved(FitSymmetry::Off, Vec3::new(0.0, 0.04, 0.0));
+    let off = at(&after, "shin_r").distance(image(to));
+    assert!(off > 0.006, "fitted apart, the right knee is {off} off the image of the left one");
 
     let (before, after, _) = moved(FitSymmetry::Auto, Vec3::new(0.35, 0.0, 0.0));
     let went = at(&after, "shin_r").distance(at(&before, "shin_r"));

@@ -205,11 +205,11 @@ fn skin_on_fitted_joints_is_as_good() {
     }
 }
 
-/// A joint that is put where it belongs takes its neighbours along: the error of the limb gets smaller, by half in the mean.
+/// A joint that is put where it belongs takes its neighbours along: the error of the limb halves.
 #[test]
 fn one_drag_mends_a_limb() {
     let Some(all) = all() else { return };
-    let mut shares = Vec::new();
+    let mut count = 0;
     for fitted in all.iter().filter(|fitted| fitted.figure.name.contains('.')) {
         let rig = bundled_characters().into_iter().find(|rig| rig.about().name == fitted.figure.template).unwrap();
         let joints = template_joints(&rig);
@@ -242,12 +242,10 @@ fn one_drag_mends_a_limb() {
         let (was, is) = (limb(&fitted.fit), limb(&again));
         println!("{}: {label} put right: the limb is {is:.1} off, before {was:.1}", fitted.figure.name);
         assert!(again.joints[at].position.distance(place) < 1e-3 * fitted.fit.height);
-        assert!(is < 0.75 * was, "{}: {label}: {was} to {is}", fitted.figure.name);
-        shares.push(is / was);
+        assert!(is < 0.5 * was, "{}: {label}: {was} to {is}", fitted.figure.name);
+        count += 1;
     }
-    println!("of the error is left: {shares:.2?}, {:.2} in the mean", mean(shares.iter().copied()));
-    assert!(shares.len() >= 2, "{} drags", shares.len());
-    assert!(mean(shares.iter().copied()) < 0.55, "{shares:?}");
+    assert!(count >= 2, "{count} drags");
 }
 
 /// The held-back body and one other figure, given in other ways: turned, scaled, in another order, decimated, subdivided,

@@ -53,9 +53,9 @@ fn what_is_previewed_is_what_is_taken() {
 
 /// Texts of the notices so far.
 #[derive(Resource, Default)]
-struct Told(Vec<String>);
+struct NoticeTexts(Vec<String>);
 
-fn keep(mut notices: MessageReader<Notice>, mut told: ResMut<Told>) {
+fn keep(mut notices: MessageReader<Notice>, mut told: ResMut<NoticeTexts>) {
     told.0.extend(notices.read().map(|notice| notice.text.clone()));
 }
 
@@ -64,7 +64,7 @@ fn keep(mut notices: MessageReader<Notice>, mut told: ResMut<Told>) {
 fn wrong_numbers_of_the_bar_are_told() {
     let mut bench = RigBench::with_body(Mode::Stroke);
     bench.preview(&ARM);
-    bench.app.init_resource::<Told>().add_systems(Last, keep);
+    bench.app.init_resource::<NoticeTexts>().add_systems(Last, keep);
     bench.frames(3);
     let RigBench { app, rig } = bench;
     let mut desk = Desk::of(app, rig, Sheet::Window, egui::vec2(900.0, 500.0));
@@ -74,12 +74,12 @@ fn wrong_numbers_of_the_bar_are_told() {
         other => panic!("{other:?}"),
     };
     let type_in = |desk: &mut Desk, text: &str| {
-        desk.app.insert_resource(Told::default());
+        desk.app.insert_resource(NoticeTexts::default());
         desk.click("Number of joints");
         desk.type_text(text);
         desk.key(egui::Key::Enter);
         desk.frames(2);
-        desk.app.world().resource::<Told>().0.clone()
+        desk.app.world().resource::<NoticeTexts>().0.clone()
     };
     let before = choice(&desk);
     for (text, words) in [
