@@ -28,10 +28,6 @@ const STIFF_LIDS: f32 = 0.02;
 const GUARDS: usize = 6;
 /// Rounds in which bones of lids are moved one after the other.
 const LID_ROUNDS: usize = 40;
-/// Stiffness of bones of lips that are moved apart.
-const STIFF_LIPS: f32 = 0.02;
-/// Rounds in which the bounds of lips are met one after the other.
-const LIP_ROUNDS: usize = 40;
 /// Mobility of the lower lid beside that of the upper one.
 const LOWER_LID: f32 = 0.25;
 
@@ -40,11 +36,8 @@ const LOWER_LID: f32 = 0.25;
 struct PoseProblems {
     /// Corners of the triangles that flip.
     folded: Vec<[u32; 3]>,
-    /// Points of lips where some of them are too near to each other, and the missing distances: negative where they are far
-    /// enough apart.
-    lips: Vec<(FacingPoints, f32)>,
-    /// Number of points of lips that are too near to each other.
-    crossed: usize,
+    /// Points of lips that are too near to each other, and the missing distance.
+    crossed: Vec<(FacingPoints, f32)>,
     /// Points of the lids of an eye where some of them are too near or too far, and the missing distances: negative where they
     /// are too far, zero where they are right.
     lids: Vec<(FacingPoints, f32)>,
@@ -54,7 +47,7 @@ struct PoseProblems {
 
 impl PoseProblems {
     fn count(&self) -> usize {
-        self.folded.len() + self.crossed + self.lids_off
+        self.folded.len() + self.crossed.len() + self.lids_off
     }
 }
 
@@ -70,18 +63,6 @@ impl Repair {
     /// The outcome for a pose that needs none.
     pub(super) fn none(mix: &Mix) -> Self {
         Self { folded: Vec::new(), taken: vec![[0.0; 2]; mix.strengths.len()] }
-    }
-}
-
-/// Heights that are added to the movements of bones to keep lips and lids apart.
-struct Apart {
-    lips: Vec<f32>,
-    lids: Vec<f32>,
-}
-
-impl Apart {
-    fn heights(&self) -> impl Iterator<Item = f32> + '_ {
-        self.lips.iter().zip(&self.lids).map(|(lips, lids)| lips + lids)
     }
 }
 
@@ -126,7 +107,7 @@ impl FittedFace {
     pub(super) fn repair(&self, poses: &mut [BonePose], mix: &Mix, opening_lines: &OpeningLines) -> Repair {
         let is_alike = is_alike(mix);
         let solved: Vec<Vec3> = poses.iter().map(|pose| pose.translation).collect();
-        let mut apart = Apart { lips: vec![0.0; poses.len()], lids: vec![0.0; poses.len()] };
+        let mut apart = vec![0.0; poses.len()];
         let mut repair = Repair::none(mix);
         if self.moving.triangles.is_empty() && self.moving.apart.is_empty() {
             return repair;
@@ -144,30 +125,36 @@ impl FittedFace {
                 break;
             }
             self.relax(poses, &problems.folded, share);
-            let mut changes: Vec<Vec3> = (poses.iter().zip(&solved).zip(apart.heights()))
-                .map(|((pose, solved), apart)| pose.translation - *solved - Vec3::Y * apart)
+            let mut changes: Vec<Vec3> = (poses.iter().zip(&solved).zip(&apart))
+                .map(|((pose, solved), apart)| pose.translation - *solved - Vec3::Y * *apart)
                 .collect();
-            self.move_apart(&problems, &mut apart, is_alike);
+            self.part(&problems.crossed, &mut apart);
+            self.close(&problems.lids, &mut apart);
             if is_alike {
+                self.widen_alike(&mut apart);
                 self.even_out(&mut changes);
             }
             let bounds = &used.get_or_insert_with(|| self.used_units(mix, opening_lines, is_alike)).bounds;
-            for (bone, (change, apart)) in changes.into_iter().zip(apart.heights()).enumerate() {
+            for (bone, change) in changes.into_iter().enumerate() {
                 let change = change.clamp_length_max(bounds[bone]);
                 taken[bone] = change.length();
-                poses[bone].translation = limited(solved[bone] + change + Vec3::Y * apart, &self.landmarks);
+                poses[bone].translation = limited(solved[bone] + change + Vec3::Y * apart[bone], &self.landmarks);
             }
             posed.update(self.matrices(poses));
         }
         // Whatever folds, lips and lids do not cross.
         for _ in 0..GUARDS {
             let problems = self.problems(&posed, [0.0; 2]);
-            if problems.lips.is_empty() && problems.lids.is_empty() {
+            if problems.crossed.is_empty() && problems.lids.is_empty() {
                 break;
             }
-            let before: Vec<f32> = apart.heights().collect();
-            self.move_apart(&problems, &mut apart, is_alike);
-            for (pose, (apart, before)) in poses.iter_mut().zip(apart.heights().zip(before)) {
+            let before = apart.clone();
+            self.part(&problems.crossed, &mut apart);
+            self.close(&problems.lids, &mut apart);
+            if is_alike {
+                self.widen_alike(&mut apart);
+            }
+            for (pose, (apart, before)) in poses.iter_mut().zip(apart.iter().zip(before)) {
                 pose.translation = limited(pose.translation + Vec3::Y * (apart - before), &self.landmarks);
             }
             posed.update(self.matrices(poses));
@@ -244,7 +231,6 @@ impl FittedFace {
         let mut problems = PoseProblems { folded: posed.folded().collect(), ..PoseProblems::default() };
         let mut eyes = [Vec::new(), Vec::new()];
         let mut off = [0; 2];
-        let mut lips = Vec::new();
         for facing in &self.moving.apart {
             let gap = |points: &[Vec3]| points[facing.above as usize].y - points[facing.below as usize].y;
             let (rest, now) = (gap(&self.moving.points), gap(&posed.points));
@@ -252,8 +238,9 @@ impl FittedFace {
             let least = |share: f32| if rest > slack { share * rest } else { rest - slack };
             let Some(eye) = facing.eye else {
                 let missing = least(CLOSED) - now;
-                problems.crossed += usize::from(missing > 0.0);
-                lips.push((*facing, missing));
+                if missing > 0.0 {
+                    problems.crossed.push((*facing, missing));
+                }
                 continue;
             };
             let open = 1.0 - closed[eye] * (1.0 - CLOSED_LIDS);
@@ -261,9 +248,6 @@ impl FittedFace {
             let missing = now.clamp(least(CROSSED_LIDS), most) - now;
             off[eye] += usize::from(missing.abs() > 0.25 * slack);
             eyes[eye].push((*facing, missing));
-        }
-        if problems.crossed > 0 {
-            problems.lips = lips;
         }
         let with_faults = eyes.into_iter().zip(off).filter(|(_, off)| *off > 0);
         problems.lids = with_faults.flat_map(|(lids, _)| lids).collect();
@@ -295,41 +279,26 @@ impl FittedFace {
         shares
     }
 
-    /// Moves lips and lids that are too near apart, and lids that are too far nearer; in a mix that is alike on both sides, alike.
-    fn move_apart(&self, problems: &PoseProblems, apart: &mut Apart, is_alike: bool) {
-        self.part(&problems.lips, &mut apart.lips);
-        self.close(&problems.lids, &mut apart.lids);
-        if is_alike {
-            self.widen_alike(&mut apart.lips);
-            self.widen_alike(&mut apart.lids);
-        }
-    }
-
-    /// Changes the heights of bones to the least ones that bring all lips apart by the missing distances: the quadratic programme
-    /// of least movement under a bound for each pair, one bound after the other (Hildreth's method). Neighbouring pairs ask for
-    /// about the same movement, which counts once, and pairs with nearly equal influences are not moved apart at any price.
-    fn part(&self, lips: &[(FacingPoints, f32)], heights: &mut [f32]) {
-        let bounds = lips.iter().map(|(facing, missing)| {
-            let shares: Vec<(usize, f32)> =
-                self.shares(facing, 1.0).into_iter().map(|(bone, [share, _])| (bone, share)).collect();
-            let square: f32 = shares.iter().map(|(_, share)| share * share).sum();
-            let known: f32 = shares.iter().map(|(bone, share)| share * heights[*bone]).sum();
-            (shares, square, missing + known)
-        });
-        let bounds: Vec<(Vec<(usize, f32)>, f32, f32)> = bounds.collect();
-        for (bone, _) in bounds.iter().flat_map(|(shares, ..)| shares) {
-            heights[*bone] = 0.0;
-        }
-        let mut pulls = vec![0.0_f32; bounds.len()];
-        for _ in 0..LIP_ROUNDS {
-            for ((shares, square, least), pull) in bounds.iter().zip(&mut pulls) {
-                let now: f32 = shares.iter().map(|(bone, share)| share * heights[*bone]).sum();
-                let next = (*pull + (least - now - STIFF_LIPS * *pull) / (square + STIFF_LIPS)).max(0.0);
-                for (bone, share) in shares {
-                    heights[*bone] += share * (next - *pull);
-                }
-                *pull = next;
+    /// Adds to the heights of bones what brings lips apart by the missing distance, with the least movement of bones.
+    fn part(&self, crossed: &[(FacingPoints, f32)], apart: &mut [f32]) {
+        let mut more = vec![0.0_f32; apart.len()];
+        for (facing, missing) in crossed {
+            let shares = self.shares(facing, 1.0);
+            let square: f32 = shares.values().map(|[share, _]| share * share).sum();
+            // Points with equal influences cannot be moved apart.
+            if square < 0.01 {
+                continue;
             }
+            for (bone, [share, _]) in shares {
+                let asked = missing * share / square;
+                // Neighbouring pairs ask for about the same movement, which counts once.
+                if asked.abs() > more[bone].abs() {
+                    more[bone] = asked;
+                }
+            }
+        }
+        for (apart, more) in apart.iter_mut().zip(more) {
+            *apart += more;
         }
     }
 
