@@ -190,7 +190,9 @@ fn set_removed_aside(recovered: &RecoveredJournal, restored: &RestoredRig, opene
         }
     }
     let meshes = std::mem::take(&mut opened.meshes).into_iter();
-    (opened.meshes, opened.set_aside) = meshes.partition(|(mesh, _)| is_there.get(&mesh.uid).copied().unwrap_or(true));
+    let stays = |mesh: Uid| is_there.get(&mesh).copied().unwrap_or(true);
+    (opened.meshes, opened.set_aside) = meshes.partition(|(mesh, _)| stays(mesh.uid));
+    opened.missing.retain(|mesh| stays(mesh.uid));
 }
 
 /// The project from which the work started, if its file is as it was then.

@@ -398,7 +398,7 @@ fn hostile_calls_are_refused_and_change_nothing() {
         // Links in the folder that lead out of it, one of them in the place of the file that was loaded.
         fs::remove_file(remote.file("t.rig.ron")).unwrap();
         let secret = remote.folder.path().join("secret.rig.ron");
-        ["link.rig.ron", "t.rig.ron"].map(|name| std::os::unix::fs::symlink(&secret, remote.file(name)).unwrap());
+        ["link.rig.ron", "t.rig.ron"].iter().for_each(|name| std::os::unix::fs::symlink(&secret, remote.file(name)).unwrap());
         for (method, params) in [
             ("rig.template.load", json!({"path": "link.rig.ron"})),
             ("rig.template.save", json!({"rig": rig, "path": "link.rig.ron"})),
