@@ -375,9 +375,8 @@ fn hostile_calls_are_refused_and_change_nothing() {
     remote.call("rig.edit", json!({"rig": rig, "edits": [{"SetLabel": [tip, "tip"]}]}));
     let before = remote.text(&rig);
     let files = |remote: &Remote| -> Vec<(String, Vec<u8>)> {
-        let list =
-            |folder: &Path| -> Vec<_> { fs::read_dir(folder).unwrap().map(|file| file.unwrap().path()).collect() };
-        let all = list(remote.folder.path()).into_iter().chain(list(&remote.folder.path().join("allowed")));
+        let list = |folder: &Path| fs::read_dir(folder).unwrap().map(|file| file.unwrap().path());
+        let all = list(remote.folder.path()).chain(list(&remote.folder.path().join("allowed")));
         let mut all: Vec<_> = all
             .filter(|path| path.is_file())
             .map(|path| (path.display().to_string(), fs::read(&path).unwrap()))
@@ -398,7 +397,8 @@ fn hostile_calls_are_refused_and_change_nothing() {
         // Links in the folder that lead out of it, one of them in the place of the file that was loaded.
         fs::remove_file(remote.file("t.rig.ron")).unwrap();
         let secret = remote.folder.path().join("secret.rig.ron");
-        ["link.rig.ron", "t.rig.ron"].iter().for_each(|name| std::os::unix::fs::symlink(&secret, remote.file(name)).unwrap());
+        let link = |name: &str| std::os::unix::fs::symlink(&secret, remote.file(name));
+        link("link.rig.ron").and_then(|()| link("t.rig.ron")).unwrap();
         for (method, params) in [
             ("rig.template.load", json!({"path": "link.rig.ron"})),
             ("rig.template.save", json!({"rig": rig, "path": "link.rig.ron"})),
