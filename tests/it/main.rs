@@ -24,6 +24,7 @@ mod cli_face_parts;
 mod cli_limits;
 #[cfg(all(feature = "cli", unix))]
 mod cli_names;
+mod cli_numbers;
 #[cfg(feature = "cli")]
 mod cli_outputs;
 #[cfg(feature = "cli")]
