@@ -163,6 +163,7 @@ mod modules_nodes;
 mod modules_rigs;
 mod moved_tags;
 mod mutate;
+mod new_templates;
 mod obj;
 mod obj_materials;
 mod obj_torture;
