@@ -139,6 +139,40 @@ fn exchanged_programs_run_what_differs() {
     assert!(moved.len() < 40, "{} nodes moved", moved.len());
 }
 
+/// A number that was equal to others, and one that becomes so, is a number like any other: what reads it runs, and nothing else.
+#[test]
+fn numbers_that_others_have_too_change_alone() {
+    let rig = crate::bench::shipped("biped");
+    let mut built: BuiltRig = (*Arc::new(Builder::build(&rig, &Arc::new(modules::all())).unwrap())).clone();
+    let is_soft = |constraint: &Constraint| matches!(constraint, Constraint::TwoBone { soft: Scalar::Value(_), .. });
+    let limbs: Vec<usize> =
+        (0..built.constraints.len()).filter(|at| is_soft(&built.constraints[*at].constraint)).collect();
+    assert!(limbs.len() > 3, "{limbs:?}");
+    let options = CompileOptions::default();
+    let mut cache = ProgramCache::default();
+    let mut state = RigState::new(cache.get(&built, &options).unwrap());
+    for slot in (0..state.program().nodes().len()).step_by(7) {
+        state.set_offset_at(slot, PoseOffset::from_rotation(Quat::from_rotation_y(0.03 * (slot % 11) as f32)));
+    }
+    state.evaluate(0.0);
+    for (at, value) in limbs.iter().flat_map(|at| [0.05, 0.25, 0.0, 0.05].map(|value| (*at, value))) {
+        let mut other = (*built.constraints[at].constraint).clone();
+        if let Constraint::TwoBone { soft, .. } = &mut other {
+            *soft = Scalar::Value(value);
+        }
+        built.constraints[at].constraint = Arc::new(other);
+        let program = cache.get(&built, &options).unwrap();
+        let carry = Carry::between(state.program(), &program);
+        assert_eq!(carry.operations_of_registers(&program), Some(1), "constraint {at}: {value}");
+        let mut fresh = RigState::new(Arc::clone(&program));
+        fresh.carry_over(&state);
+        fresh.evaluate(0.0);
+        state.exchange(&program, &carry);
+        state.evaluate(0.0);
+        assert!(bits(&state) == bits(&fresh), "constraint {at}: {value}");
+    }
+}
+
 /// Bits of the results of an instance.
 fn bits(state: &RigState) -> (Vec<[u32; 10]>, Vec<u32>) {
     let of = |trs: &Trs| {

@@ -1,6 +1,6 @@
 //! Motion that goes on through a rebuild: inputs and springs of one instance for another program.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use super::{Memory, RigState, mark, partial::PartialRun};
 use crate::{
@@ -149,6 +149,14 @@ impl Carry {
     /// Number of operations that an instance which remembers results only, and is up to date, runs after the exchange.
     pub fn operations_of_results(&self, to: &RigProgram) -> usize {
         self.partial.as_ref().map_or(to.ops.len(), |run| run.ops.len())
+    }
+
+    /// Number of operations that an instance which remembers all registers, and is up to date, runs after the exchange whatever
+    /// they give; those that read a changed result follow. `None` where all operations run.
+    pub fn operations_of_registers(&self, to: &RigProgram) -> Option<usize> {
+        let changes = self.changes.as_ref()?;
+        let readers = changes.registers(to).flat_map(|register| to.layout.readers.get(register));
+        Some(changes.ops.iter().chain(readers).collect::<BTreeSet<_>>().len())
     }
 
     /// True if an instance that remembers all registers runs only what differs between the programs.
