@@ -230,7 +230,9 @@ pub(super) fn update_instances(world: &mut World) {
     let (as_before, same_clips): (Arc<[PoseNote]>, Arc<ClipReport>) = Default::default();
     for DueInstance { entity, built, before, clips, .. } in going.into_iter().filter(|due| due.is_other) {
         let deviations = kept.remove(&entity).map(|kept| kept.deviations).filter(|deviations| !deviations.is_empty());
-        let noted = |list: Vec<Deviation>| list.into_iter().map(|deviation| PoseNote { pose: None, deviation }).collect();
+        let noted = |list: Vec<Deviation>| -> Arc<[PoseNote]> {
+            list.into_iter().map(|deviation| PoseNote { pose: None, deviation }).collect()
+        };
         let poses = deviations.map_or_else(|| as_before.clone(), noted);
         let clips = clips.map_or_else(|| same_clips.clone(), |clips| clips.report);
         let changes = before.map_or_else(|| built.changes.clone(), |before| changes_since(&before, &built, &mut known));
