@@ -214,6 +214,7 @@ pub(super) fn extract(args: &ExtractArgs) -> Result<Report, Failure> {
     report.notes(store_rig(&RealDisk, &args.output, &out)?);
     report.notes.extend(left.iter().cloned());
     report.line(format!("wrote {}: {}", args.output.display(), counted(out.len(), "joint", "joints")));
+    report.set("output", args.output.display().to_string());
     report.set("joints", out.len());
     report.set("left", Value::from(left));
     Ok(report)
@@ -229,6 +230,7 @@ fn write(output: &Path, rig: Rig, sources: &[&Path], report: &mut Report) -> Res
     let joints = rig.len();
     report.notes(store_rig_over(&RealDisk, output, rig, sources)?);
     report.line(format!("wrote {}", output.display()));
+    report.set("output", output.display().to_string());
     report.set("joints", joints);
     Ok(())
 }

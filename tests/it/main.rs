@@ -38,6 +38,7 @@ mod cli_skin;
 #[cfg(all(feature = "cli", target_os = "linux"))]
 mod cli_streams;
 #[cfg(feature = "cli")]
+mod cli_template_answers;
 mod cli_templates;
 #[cfg(feature = "cli")]
 mod cli_update_clips;
