@@ -25,6 +25,9 @@ pub struct Carry {
     ranges: Vec<u32>,
     /// Differences of two programs of one layout; `None` for programs of different layouts.
     changes: Option<Changes>,
+    /// True if operations compute the results of all nodes, in the same registers, so that an instance that runs all of them
+    /// compares the results with those of before.
+    has_results: bool,
     /// Run of instances that remember results only and are up to date; `None` where all operations have to run.
     partial: Option<Arc<PartialRun>>,
 }
@@ -70,6 +73,18 @@ impl Changes {
         let numbers = self.n.iter().map(move |at| transforms + *at as usize);
         self.x.iter().map(|at| *at as usize).chain(numbers)
     }
+}
+
+/// True if operations compute the transforms of all nodes.
+fn computes_all_nodes(program: &RigProgram) -> bool {
+    // The first register is the rig's space.
+    let mut is_computed = vec![false; program.nodes.len() + 1];
+    for register in (0..program.ops.len()).flat_map(|op| program.layout.written_by(op)) {
+        if let Some(known) = is_computed.get_mut(register) {
+            *known = true;
+        }
+    }
+    is_computed.iter().skip(1).all(|known| *known)
 }
 
 impl Carry {
@@ -128,7 +143,20 @@ impl Carry {
             None
         };
         let partial = partial.map(Arc::new);
-        Self { nodes, attributes, is_aligned, inputs, springs, is_in_place, bounds, ranges, changes, partial }
+        let has_results = is_in_place && changes.is_none() && computes_all_nodes(to);
+        Self {
+            nodes,
+            attributes,
+            is_aligned,
+            inputs,
+            springs,
+            is_in_place,
+            bounds,
+            ranges,
+            changes,
+            has_results,
+            partial,
+        }
     }
 
     /// Slot, for each node slot of the new program, of the same node in the old one.
@@ -195,7 +223,13 @@ impl RigState {
         let settable = program.attributes.iter().enumerate().filter(|(_, attribute)| attribute.is_settable);
         if self.memory == Memory::Whole {
             let (x, n) = (self.x[inputs.clone()].to_vec(), self.n[..program.attributes.len()].to_vec());
+            self.has_results = carry.has_results && (self.has_results || !self.all_dirty);
+            let nodes = 1..=program.nodes.len();
+            let results = if self.has_results { self.x[nodes.clone()].to_vec() } else { Vec::new() };
             self.x.clone_from(&program.x);
+            if self.has_results {
+                self.x[nodes].copy_from_slice(&results);
+            }
             self.n.clone_from(&program.n);
             self.x[inputs].copy_from_slice(&x);
             settable.for_each(|(slot, _)| self.n[slot] = n[slot]);
