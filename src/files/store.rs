@@ -409,8 +409,8 @@ pub(super) fn save_template(disk: &dyn Disk, path: &Path, text: &str) -> Result<
 
 /// Saves a rig as `.rig.ron`, as people go on to write it (tags of the short form, names where they are enough, in the layout), or
 /// its skeleton as `.rig`. A rig that such a text cannot say, and one that is too large for people to read, is written in full.
-/// Returns notes about content that the format could not keep, a sentence each. A rig that is handed over, not lent, is dropped as soon as its text is written: reading the text back takes as
-/// much memory as the rig.
+/// Returns notes about content that the format could not keep, a sentence each. A rig that is handed over, not lent, is dropped
+/// as soon as its text is written: reading the text back takes as much memory as the rig.
 pub fn store_rig(disk: &dyn Disk, path: &Path, rig: impl Borrow<Rig>) -> Result<Vec<String>, StoreError> {
     match FileKind::of(path) {
         Some(FileKind::Template) => {
