@@ -44,6 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             ("size of one control", "biped.rig.ron", "size: 0.573", "size: 0.6"),
             ("size in a part of both hands", "parts/hand.rig.ron", "relative_size: 0.35", "relative_size: 0.36"),
             ("stretch of the thumbs", "parts/hand.rig.ron", "weight: \"ik\"", "weight: \"ik\", max_stretch: 1.4"),
+            ("softness of the thumbs", "parts/hand.rig.ron", "weight: \"ik\"", "weight: \"ik\", soft: 0.1"),
         ] {
             for file in ["biped.rig.ron", "parts/hand.rig.ron"] {
                 fs::copy(templates.join(file), folder.join(file))?;

@@ -80,11 +80,11 @@ pub use site::{SITE_FILE, SearchPaths, SiteError, TEMPLATES_VARIABLE};
 pub use stoppable_disk::{StopSign, StoppableDisk};
 pub use store::{
     DocumentBase, StoreError, is_template_of, store_animation, store_avatar, store_document_over, store_model,
-    store_owned_model, store_packed_clips, store_rig, store_rig_over, store_short_rig, store_skin,
+    store_owned_model, store_packed_clips, store_rig, store_rig_over, store_skin,
 };
 pub use template_layout::format_template_file;
 pub use template_origin::{TemplateOrigin, has_parts, store_rig_from};
-pub(crate) use template_text::template_text;
+pub(crate) use template_text::{new_template_text, template_text};
 pub use template_update::{
     DocumentUpdate, TemplateBase, TemplateUpdate, TemplateVersion, base_text, diff_templates, update_document,
     update_template, update_with_known_parts,

@@ -14,7 +14,7 @@ use super::{
     update::{load, load_part},
 };
 use crate::{
-    files::{RealDisk, stem, store_rig_over, store_short_rig},
+    files::{RealDisk, stem, store_rig, store_rig_over},
     rig::{
         Rig, RigAbout, RigEdit, Uid, UidSource,
         extract::{self, Extraction},
@@ -211,9 +211,10 @@ pub(super) fn extract(args: &ExtractArgs) -> Result<Report, Failure> {
         let joints = out.walk().map(|joint| joint.data.uid).collect();
         orient(&mut out, joints, along, &mut uids, &mut report)?;
     }
-    report.notes(store_short_rig(&RealDisk, &args.output, &out)?);
+    report.notes(store_rig(&RealDisk, &args.output, &out)?);
     report.notes.extend(left.iter().cloned());
     report.line(format!("wrote {}: {}", args.output.display(), counted(out.len(), "joint", "joints")));
+    report.set("output", args.output.display().to_string());
     report.set("joints", out.len());
     report.set("left", Value::from(left));
     Ok(report)
@@ -229,6 +230,7 @@ fn write(output: &Path, rig: Rig, sources: &[&Path], report: &mut Report) -> Res
     let joints = rig.len();
     report.notes(store_rig_over(&RealDisk, output, rig, sources)?);
     report.line(format!("wrote {}", output.display()));
+    report.set("output", output.display().to_string());
     report.set("joints", joints);
     Ok(())
 }

@@ -5,13 +5,12 @@ use std::path::Path;
 use super::{Failure, Report, WindowError, binding::bind, limits, report::counted};
 use crate::{
     algo::weights::WeightSettings,
-    files::{ReadError, RealDisk, read_capped, save_atomic},
+    files::{ReadError, RealDisk, new_template_text, read_capped, save_atomic},
     mesh::{
         gltf::{GltfWriteSettings, write_glb},
         obj::{ObjSettings, read_model},
     },
     plugins::gesture::read_gestures,
-    rig::template::write_template,
 };
 
 const MESH: &[u8] = include_bytes!("../../assets/models/biped.obj");
@@ -40,7 +39,7 @@ pub(super) fn run(reason: Option<&WindowError>) -> Result<Report, Failure> {
         counted(strokes, "gesture", "gestures"),
         counted(faces, "face", "faces")
     ));
-    let template = write_template(bench.rig());
+    let template = new_template_text(bench.rig());
     save_new(Path::new("biped.rig.ron"), template.as_bytes(), "the template", &mut report)?;
     bind(&mut bench, WeightSettings::default(), &[], Vec::new(), &mut report)?;
     let glb = write_glb(&bench.character(), &GltfWriteSettings::default());

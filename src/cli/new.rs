@@ -53,5 +53,6 @@ pub(super) fn run(args: &NewArgs) -> Result<Report, Failure> {
         "wrote {}; `rigsmith check` tells whether it is right, `rigsmith build` builds it",
         path.display()
     ));
+    report.set("output", path.display().to_string());
     Ok(report)
 }

@@ -15,6 +15,7 @@ use super::{
 use crate::{
     files::{LoadError, LoadShapesError, StoreError},
     headless::WorkbenchError,
+    rig::format::json::json_text,
 };
 
 /// True if the command answers in JSON; set once, before the command runs.
@@ -67,7 +68,7 @@ impl Report {
         // Items are gone through in any case: the caller may look at them, too.
         for item in items.into_iter().filter(|_| is_wanted) {
             text.push_str(if text.len() > 1 { "," } else { "" });
-            text.push_str(serde_json::to_string(&item).as_deref().unwrap_or("null"));
+            text.push_str(json_text(&item).as_deref().unwrap_or("null"));
         }
         text.push(']');
         self.json.insert(key.to_owned(), Value::Null);
@@ -256,7 +257,7 @@ fn print_answer(answer: &Map<String, Value>, lists: &BTreeMap<String, String>) -
 /// JSON of a value without what a terminal obeys: such characters stand in strings only, where JSON has escapes for
 /// them.
 fn json_line(value: &Value) -> String {
-    let text = value.to_string();
+    let text = json_text(value).unwrap_or_else(|_| value.to_string());
     if let Cow::Owned(line) = escaped(&text) {
         return line;
     }

@@ -161,6 +161,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     if let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) {
         report.notes(update.store(&RealDisk, output)?);
         report.line(format!("wrote {}", output.display()));
+        report.set("output", output.display().to_string());
         clips::store(&clips, &mut report)?;
         if let Some(file) = file {
             let base = companion(output);

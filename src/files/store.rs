@@ -10,7 +10,7 @@ use super::{
     kept_lists::with_kept_lists,
     read_capped, save_atomic, save_set, stem,
     template_origin::moved_text,
-    template_text::{TemplateText, template_text},
+    template_text::{TemplateText, new_template_text, template_text},
     template_update::with_known_uids,
     verify::{self, ModelCounts},
 };
@@ -29,7 +29,7 @@ use crate::{
         part::PartInstance,
         project,
         skin::{SkinError, SkinFile},
-        template::{self, UidStyle, write_template},
+        template,
         text::{self, RigTextError},
     },
     solve::packed_clip::PackedSkeleton,
@@ -407,28 +407,14 @@ pub(super) fn save_template(disk: &dyn Disk, path: &Path, text: &str) -> Result<
     Ok(save_atomic(disk, path, text.as_bytes())?)
 }
 
-/// Saves a rig that had no file as a template that people go on to write: tags of the short form and names where they are
-/// enough, in the layout. Another kind of file, and a rig that such a text cannot say, is saved as by [`store_rig`]. Returns
-/// notes, a sentence each.
-///
-/// # Errors
-/// [`StoreError`]; the former file is unchanged.
-pub fn store_short_rig(disk: &dyn Disk, path: &Path, rig: &Rig) -> Result<Vec<String>, StoreError> {
-    let is_template = FileKind::of(path) == Some(FileKind::Template);
-    let short = if is_template { template::write_short_template(rig) } else { None };
-    let Some(text) = short else { return store_rig(disk, path, rig) };
-    let text = template::format_template(&text, UidStyle::Kept).unwrap_or(text);
-    save_template(disk, path, &text)?;
-    Ok(Vec::new())
-}
-
-/// Saves a rig as `.rig.ron`, or its skeleton as `.rig`. Returns notes about content that the format could not keep, a
-/// sentence each. A rig that is handed over, not lent, is dropped as soon as its text is written: reading the text back takes as
-/// much memory as the rig.
+/// Saves a rig as `.rig.ron`, as people go on to write it (tags of the short form, names where they are enough, in the layout), or
+/// its skeleton as `.rig`. A rig that such a text cannot say, and one that is too large for people to read, is written in full.
+/// Returns notes about content that the format could not keep, a sentence each. A rig that is handed over, not lent, is dropped
+/// as soon as its text is written: reading the text back takes as much memory as the rig.
 pub fn store_rig(disk: &dyn Disk, path: &Path, rig: impl Borrow<Rig>) -> Result<Vec<String>, StoreError> {
     match FileKind::of(path) {
         Some(FileKind::Template) => {
-            let text = write_template(rig.borrow());
+            let text = new_template_text(rig.borrow());
             drop(rig);
             save_template(disk, path, &text)?;
             Ok(Vec::new())

@@ -10,7 +10,7 @@ use crate::rig::{
     Rig, TagData, TagKind, Uid,
     nearest::listed,
     part::{DroppedPart, PartChange, PartInstance, without_dropped},
-    template::{self, FileMarks, PartRigs, Template, write_template},
+    template::{self, FileMarks, PartRigs, Template, UidStyle, write_template},
 };
 
 /// Makes a reader of parts.
@@ -69,10 +69,24 @@ fn plain_text(rig: &Rig, source: Option<(&Path, &str)>, target: &Path, reader: P
 
 /// The text of a rig's template that takes nothing but its form from the former text: one that people write is like that.
 fn written_anew(rig: &Rig, former: Option<&str>) -> String {
-    let header = former.and_then(|text| template::read_header(text.as_bytes()).ok());
-    let is_of_people = header.is_some_and(|header| header.format >= template::FORMAT);
+    let Some(former) = former else { return new_template_text(rig) };
+    let is_of_people = template::read_header(former.as_bytes()).is_ok_and(|header| header.format >= template::FORMAT);
     let short = if is_of_people { template::write_short_template(rig) } else { None };
     short.unwrap_or_else(|| write_template(rig))
+}
+
+/// Most joints and tags of a template whose text somebody reads. The short form takes several times as long to write.
+const MOST_READ: usize = 2000;
+
+/// The text of the template of a rig that had no file, as people go on to write it: tags of the short form and names where they
+/// are enough, in the layout. A rig that such a text cannot say, and one with more than 2000 joints and tags, is written in full.
+pub(crate) fn new_template_text(rig: &Rig) -> String {
+    let size: usize = rig.walk().map(|joint| 1 + joint.data.tags.len()).sum();
+    let short = if size <= MOST_READ { template::write_short_template(rig) } else { None };
+    let Some(text) = short else { return write_template(rig) };
+    // Names in the stead of uids may say something else where several things have one name.
+    let mut laid_out = [UidStyle::Derived, UidStyle::Kept].into_iter();
+    laid_out.find_map(|style| template::format_template(&text, style).ok()).unwrap_or(text)
 }
 
 /// True if a text at that path says what the rig is.

@@ -22,13 +22,13 @@ use crate::{
         runtime::{ControlPose, InstanceMode, RigNodes, RigRuntime, furnish_instance, spawn_instance},
         schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer, NodeOf},
     },
-    processor::PoseNote,
+    processor::{ClipReport, PoseNote},
     rig::{
         AttributeValues, BuiltNode, MovedNodes, PoseOffset, RestTransform, Uid,
         update::{Change, Take, update},
     },
     solve::{
-        keep_pose::KeptPose,
+        keep_pose::{Deviation, KeptPose},
         program::{ProgramError, RigProgram, RigState},
     },
 };
@@ -227,10 +227,14 @@ pub(super) fn update_instances(world: &mut World) {
         world.trigger(RigBuilt { entity });
     }
     let mut known = Vec::new();
+    let (as_before, same_clips): (Arc<[PoseNote]>, Arc<ClipReport>) = Default::default();
     for DueInstance { entity, built, before, clips, .. } in going.into_iter().filter(|due| due.is_other) {
-        let deviations = kept.remove(&entity).map(|kept| kept.deviations).unwrap_or_default();
-        let poses = deviations.into_iter().map(|deviation| PoseNote { pose: None, deviation }).collect();
-        let clips = clips.map(|clips| clips.report).unwrap_or_default();
+        let deviations = kept.remove(&entity).map(|kept| kept.deviations).filter(|deviations| !deviations.is_empty());
+        let noted = |list: Vec<Deviation>| -> Arc<[PoseNote]> {
+            list.into_iter().map(|deviation| PoseNote { pose: None, deviation }).collect()
+        };
+        let poses = deviations.map_or_else(|| as_before.clone(), noted);
+        let clips = clips.map_or_else(|| same_clips.clone(), |clips| clips.report);
         let changes = before.map_or_else(|| built.changes.clone(), |before| changes_since(&before, &built, &mut known));
         world.trigger(RigUpdated { entity, changes, ran: built.ran.clone(), poses, clips });
     }

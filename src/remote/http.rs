@@ -11,6 +11,7 @@ use std::{
 use bevy::log::warn;
 
 use super::{Call, Gate, error::HttpRefusal, rpc};
+use crate::rig::format::json::json_text;
 
 /// Largest length of the head of a request, in bytes.
 pub(super) const MAX_HEAD: usize = 16 << 10;
@@ -78,7 +79,7 @@ fn converse(stream: TcpStream, gate: &Gate, calls: &Sender<Call>) {
         Ok(body) => ("200 OK", rpc::answer(&body, gate, calls), true),
         Err(refusal) => (refusal.status(), rpc::refused(refusal), false),
     };
-    let body = answer.to_string();
+    let body = json_text(&answer).unwrap_or_else(|_| answer.to_string());
     let head = format!(
         "HTTP/1.1 {status}\r\nContent-Type: application/json\r\nContent-Length: {}\r\nCache-Control: no-store\r\n\
          X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n",

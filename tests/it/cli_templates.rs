@@ -228,6 +228,8 @@ fn a_watched_template_is_built_at_every_save_and_no_broken_one_is_taken_over() {
     let ran = |told: &Value| told["ran"].as_array().unwrap().len();
     let first = watch.next();
     assert_eq!((ran(&first), first["commands"].as_u64()), (3, Some(3)), "{first}");
+    let took = ["build_ms", "total_ms"].map(|key| first[key].as_f64().unwrap_or_else(|| panic!("{key}: {first}")));
+    assert!(0.0 < took[0] && took[0] <= took[1], "{first}");
     let first_bytes = glb();
     // One parameter: one command; another file in its place, as most programs save.
     save_whole(&at("a.rig.ron"), text.replace("square", "cube"));

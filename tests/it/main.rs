@@ -24,6 +24,7 @@ mod cli_face_parts;
 mod cli_limits;
 #[cfg(all(feature = "cli", unix))]
 mod cli_names;
+mod cli_numbers;
 #[cfg(feature = "cli")]
 mod cli_outputs;
 #[cfg(feature = "cli")]
@@ -37,6 +38,7 @@ mod cli_skin;
 #[cfg(all(feature = "cli", target_os = "linux"))]
 mod cli_streams;
 #[cfg(feature = "cli")]
+mod cli_template_answers;
 mod cli_templates;
 #[cfg(feature = "cli")]
 mod cli_update_clips;
@@ -162,6 +164,7 @@ mod modules_nodes;
 mod modules_rigs;
 mod moved_tags;
 mod mutate;
+mod new_templates;
 mod obj;
 mod obj_materials;
 mod obj_torture;

@@ -80,7 +80,6 @@ pub(super) struct Graph<'a> {
     outside: HashMap<Uid, X>,
     exposed: Vec<bool>,
     all: bool,
-    numbers: HashMap<u32, N>,
     scalars: HashMap<ScalarKey, N>,
     /// Last values that constraints gave a driven attribute.
     driven: HashMap<(usize, usize), N>,
@@ -127,7 +126,6 @@ impl<'a> Graph<'a> {
             outside: HashMap::default(),
             exposed,
             all: matches!(keep, Keep::All),
-            numbers: HashMap::default(),
             scalars: HashMap::default(),
             driven: HashMap::default(),
             morph_terms: Vec::new(),
@@ -184,16 +182,6 @@ impl<'a> Graph<'a> {
     pub fn new_n(&mut self, value: f32) -> N {
         self.n.push(value);
         N(self.n.len() as u32 - 1)
-    }
-
-    /// The register of a number that never changes.
-    pub fn constant(&mut self, value: f32) -> N {
-        if let Some(register) = self.numbers.get(&value.to_bits()) {
-            return *register;
-        }
-        let register = self.new_n(value);
-        self.numbers.insert(value.to_bits(), register);
-        register
     }
 
     /// Returns `true` if people and animation may pose the node.
@@ -397,7 +385,9 @@ impl<'a> Graph<'a> {
     /// Register of a number that a constraint reads.
     pub fn scalar(&mut self, constraint: usize, scalar: &Scalar) -> Result<N, ProgramError> {
         let node = match scalar {
-            Scalar::Value(value) if value.is_finite() => return Ok(self.constant(*value)),
+            // Every number has a register of its own, so that the layout of a program does not depend on which of them are
+            // equal: an instance that goes on with another number runs what reads it.
+            Scalar::Value(value) if value.is_finite() => return Ok(self.new_n(*value)),
             Scalar::Value(_) => {
                 return Err(ProgramError::NotFinite { place: NumberPlace::Constraint(self.text(constraint)) });
             }
@@ -409,7 +399,7 @@ impl<'a> Graph<'a> {
             return Ok(*register);
         }
         let register = match scalar {
-            Scalar::Value(value) => self.constant(*value),
+            Scalar::Value(value) => self.new_n(*value),
             Scalar::Attribute { name, factor, add, .. } => {
                 let number = self.attribute_number(constraint, at, name)?;
                 let input = self.nodes[at].attributes[number];

@@ -78,6 +78,9 @@ pub struct RigState {
     dirty: Vec<u64>,
     /// Marks that all operations have to run.
     all_dirty: bool,
+    /// True if the registers of nodes hold the results of the last evaluation although all operations have to run, so that it
+    /// can be told which nodes move.
+    has_results: bool,
     /// Marks that any operation has to run.
     any_dirty: bool,
     /// Run that is enough while no operation has to run for another reason; only with [`Memory::Results`].
@@ -114,6 +117,7 @@ impl RigState {
             n: program.n[..numbers].to_vec(),
             dirty: vec![0; operations.div_ceil(64)],
             all_dirty: true,
+            has_results: false,
             any_dirty: true,
             partial: None,
             moved: vec![0; nodes.div_ceil(64)],
@@ -324,6 +328,7 @@ impl RigState {
     fn settle(&mut self) {
         self.any_dirty = false;
         self.all_dirty = false;
+        self.has_results = false;
         self.partial = None;
         self.frame = None;
     }
@@ -341,8 +346,13 @@ impl RigState {
         let certain: u32 = dirty.iter().map(|word| word.count_ones()).sum();
         if self.all_dirty || certain as usize * FULL > program.ops.len() {
             dirty.fill(0);
-            moved.fill(u64::MAX);
             let tables = &program.tables;
+            if self.has_results {
+                let registers = SingleRegisters::<true> { x, n, poses, changed: false, moved };
+                let mut machine = Machine { tables, registers, springs, scratch, dt, frame };
+                return program.ops.iter().for_each(|op| machine.run(op));
+            }
+            moved.fill(u64::MAX);
             let registers = SingleRegisters::<false> { x, n, poses, changed: false, moved: &mut [] };
             let mut machine = Machine { tables, registers, springs, scratch, dt, frame };
             program.ops.iter().for_each(|op| machine.run(op));

@@ -10,7 +10,7 @@ use rigsmith::{
         schema::{Attributes, Control, CreatedRole, NodeLabel, NodeLayer, NodeOf},
     },
     rig::RestTransform,
-    solve::program::{ExposedNode, RigProgram},
+    solve::program::{Carry, ExposedNode, RigProgram},
 };
 
 use super::{AppBench, TWO, saved};
@@ -105,7 +105,9 @@ fn a_size_of_a_control_writes_that_control_alone() {
 
 #[test]
 fn a_program_is_compiled_once_for_all_instances_and_poses_stay_unread() {
-    for mode in [InstanceMode::Direct, InstanceMode::Hierarchy] {
+    let modes = [InstanceMode::Direct, InstanceMode::Hierarchy];
+    // One parameter of the thumbs of a part, whose number is nobody else's, and one that others have, too.
+    for (mode, parameter) in modes.into_iter().flat_map(|mode| [(mode, "max_stretch: 1.4"), (mode, "soft: 0.1")]) {
         let folder = tempfile::tempdir().unwrap();
         let (mut game, text) = AppBench::counting(folder.path());
         let crowd = game.crowd(folder.path(), mode);
@@ -114,7 +116,7 @@ fn a_program_is_compiled_once_for_all_instances_and_poses_stay_unread() {
         let hand = folder.path().join("parts/hand.rig.ron");
         let part = fs::read_to_string(&hand).unwrap();
         assert!(part.contains("weight: \"ik\""));
-        fs::write(&hand, part.replacen("weight: \"ik\"", "weight: \"ik\", max_stretch: 1.4", 1)).unwrap();
+        fs::write(&hand, part.replacen("weight: \"ik\"", &format!("weight: \"ik\", {parameter}"), 1)).unwrap();
         let mut written = game.written_by(crowd[0], &text);
         // Joints without a hierarchy get their places: those of the two thumbs.
         if mode == InstanceMode::Direct {
@@ -125,6 +127,9 @@ fn a_program_is_compiled_once_for_all_instances_and_poses_stay_unread() {
         let template = game.template(crowd[0]).get();
         let shared = if mode == InstanceMode::Direct { &template.lean } else { &template.whole };
         assert!(!Arc::ptr_eq(shared, &before), "it is another program");
+        // Instances that remember everything run the two thumbs; a thousand of them have no time for more in a frame.
+        let operations = Carry::between(&before, shared).operations_of_registers(shared);
+        assert_eq!(operations, Some(2), "{mode:?}, {parameter}: of {}", shared.operations());
         assert!(crowd.iter().all(|instance| Arc::ptr_eq(game.program(*instance), shared)), "{mode:?}: one for all");
         assert!(crowd.iter().all(|instance| Arc::ptr_eq(game.template(*instance).get(), template)));
         for (instance, before) in crowd.iter().zip(places) {

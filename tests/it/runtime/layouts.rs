@@ -8,7 +8,7 @@ use rigsmith::{
     mesh::model::Trs,
     modules,
     processor::Builder,
-    rig::{BuiltRig, Channel, Collider, Constraint, NodeType, Output, PoseOffset, Scalar},
+    rig::{BuiltRig, Channel, Collider, Constraint, Limits, NodeType, Output, PoseOffset, Scalar, Uid},
     solve::program::{Carry, CompileOptions, LANES, Memory, ProgramCache, RigProgram, RigState},
 };
 
@@ -137,6 +137,76 @@ fn exchanged_programs_run_what_differs() {
     let moved: Vec<usize> = state.moved().collect();
     assert!(moved.contains(&finger), "{moved:?}");
     assert!(moved.len() < 40, "{} nodes moved", moved.len());
+}
+
+/// A number that was equal to others, and one that becomes so, is a number like any other: what reads it runs, and nothing else.
+#[test]
+fn numbers_that_others_have_too_change_alone() {
+    let rig = crate::bench::shipped("biped");
+    let mut built: BuiltRig = (*Arc::new(Builder::build(&rig, &Arc::new(modules::all())).unwrap())).clone();
+    let is_soft = |constraint: &Constraint| matches!(constraint, Constraint::TwoBone { soft: Scalar::Value(_), .. });
+    let limbs: Vec<usize> =
+        (0..built.constraints.len()).filter(|at| is_soft(&built.constraints[*at].constraint)).collect();
+    assert!(limbs.len() > 3, "{limbs:?}");
+    let options = CompileOptions::default();
+    let mut cache = ProgramCache::default();
+    let mut state = RigState::new(cache.get(&built, &options).unwrap());
+    for slot in (0..state.program().nodes().len()).step_by(7) {
+        state.set_offset_at(slot, PoseOffset::from_rotation(Quat::from_rotation_y(0.03 * (slot % 11) as f32)));
+    }
+    state.evaluate(0.0);
+    for (at, value) in limbs.iter().flat_map(|at| [0.05, 0.25, 0.0, 0.05].map(|value| (*at, value))) {
+        let mut other = (*built.constraints[at].constraint).clone();
+        if let Constraint::TwoBone { soft, .. } = &mut other {
+            *soft = Scalar::Value(value);
+        }
+        built.constraints[at].constraint = Arc::new(other);
+        let program = cache.get(&built, &options).unwrap();
+        let carry = Carry::between(state.program(), &program);
+        assert_eq!(carry.operations_of_registers(&program), Some(1), "constraint {at}: {value}");
+        let mut fresh = RigState::new(Arc::clone(&program));
+        fresh.carry_over(&state);
+        fresh.evaluate(0.0);
+        state.exchange(&program, &carry);
+        state.evaluate(0.0);
+        assert!(bits(&state) == bits(&fresh), "constraint {at}: {value}");
+    }
+}
+
+/// A program of another layout runs whole, and tells the nodes that move alone: the others stand where they stood.
+#[test]
+fn programs_of_other_layouts_tell_what_moves() {
+    let rig = crate::bench::shipped("biped");
+    let mut built: BuiltRig = (*Arc::new(Builder::build(&rig, &Arc::new(modules::all())).unwrap())).clone();
+    let options = CompileOptions::default();
+    let mut cache = ProgramCache::default();
+    let mut state = RigState::new(cache.get(&built, &options).unwrap());
+    for slot in (0..state.program().nodes().len()).step_by(7) {
+        state.set_offset_at(slot, PoseOffset::from_rotation(Quat::from_rotation_y(0.03 * (slot % 11) as f32)));
+    }
+    state.evaluate(0.0);
+    let finger = built.nodes.iter().find(|node| node.label.as_deref() == Some("index_03_l")).unwrap();
+    // The finger gets longer by one more constraint.
+    let least = finger.base.translation.length() + 0.01;
+    let limits = Limits { translate: [(Some(least), None); 3], ..Limits::default() };
+    let mut longer = built.constraints[0].clone();
+    (longer.uid, longer.constraint) = (Uid(77), Arc::new(Constraint::Limit { driven: finger.uid, limits }));
+    built.constraints.push(longer);
+    let program = cache.get(&built, &options).unwrap();
+    let carry = Carry::between(state.program(), &program);
+    assert!(!carry.is_partial());
+    let mut fresh = RigState::new(Arc::clone(&program));
+    fresh.carry_over(&state);
+    fresh.evaluate(0.0);
+    let before = state.globals().to_vec();
+    state.exchange(&program, &carry);
+    assert!(state.evaluate(0.0));
+    assert!(bits(&state) == bits(&fresh));
+    let moved: Vec<usize> = state.moved().collect();
+    let others: Vec<usize> = (0..before.len()).filter(|slot| before[*slot] != *state.global_at(*slot)).collect();
+    assert!(!others.is_empty() && others.iter().all(|slot| moved.contains(slot)), "{others:?}");
+    assert!(moved.len() < 40, "{} nodes move", moved.len());
+    assert_eq!(fresh.moved().count(), program.nodes().len(), "nobody knows where a fresh one stood");
 }
 
 /// Bits of the results of an instance.

@@ -1,4 +1,4 @@
-//! Scalars as keys: equal ones share a register.
+//! Scalars of attributes and channels as keys: equal ones share a register.
 
 use std::{
     mem::{Discriminant, discriminant},

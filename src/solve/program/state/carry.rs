@@ -1,6 +1,6 @@
 //! Motion that goes on through a rebuild: inputs and springs of one instance for another program.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use super::{Memory, RigState, mark, partial::PartialRun};
 use crate::{
@@ -25,6 +25,9 @@ pub struct Carry {
     ranges: Vec<u32>,
     /// Differences of two programs of one layout; `None` for programs of different layouts.
     changes: Option<Changes>,
+    /// True if operations compute the results of all nodes, in the same registers, so that an instance that runs all of them
+    /// compares the results with those of before.
+    has_results: bool,
     /// Run of instances that remember results only and are up to date; `None` where all operations have to run.
     partial: Option<Arc<PartialRun>>,
 }
@@ -70,6 +73,18 @@ impl Changes {
         let numbers = self.n.iter().map(move |at| transforms + *at as usize);
         self.x.iter().map(|at| *at as usize).chain(numbers)
     }
+}
+
+/// True if operations compute the transforms of all nodes.
+fn computes_all_nodes(program: &RigProgram) -> bool {
+    // The first register is the rig's space.
+    let mut is_computed = vec![false; program.nodes.len() + 1];
+    for register in (0..program.ops.len()).flat_map(|op| program.layout.written_by(op)) {
+        if let Some(known) = is_computed.get_mut(register) {
+            *known = true;
+        }
+    }
+    is_computed.iter().skip(1).all(|known| *known)
 }
 
 impl Carry {
@@ -128,7 +143,20 @@ impl Carry {
             None
         };
         let partial = partial.map(Arc::new);
-        Self { nodes, attributes, is_aligned, inputs, springs, is_in_place, bounds, ranges, changes, partial }
+        let has_results = is_in_place && changes.is_none() && computes_all_nodes(to);
+        Self {
+            nodes,
+            attributes,
+            is_aligned,
+            inputs,
+            springs,
+            is_in_place,
+            bounds,
+            ranges,
+            changes,
+            has_results,
+            partial,
+        }
     }
 
     /// Slot, for each node slot of the new program, of the same node in the old one.
@@ -149,6 +177,14 @@ impl Carry {
     /// Number of operations that an instance which remembers results only, and is up to date, runs after the exchange.
     pub fn operations_of_results(&self, to: &RigProgram) -> usize {
         self.partial.as_ref().map_or(to.ops.len(), |run| run.ops.len())
+    }
+
+    /// Number of operations that an instance which remembers all registers, and is up to date, runs after the exchange whatever
+    /// they give; those that read a changed result follow. `None` where all operations run.
+    pub fn operations_of_registers(&self, to: &RigProgram) -> Option<usize> {
+        let changes = self.changes.as_ref()?;
+        let readers = changes.registers(to).flat_map(|register| to.layout.readers.get(register));
+        Some(changes.ops.iter().chain(readers).collect::<BTreeSet<_>>().len())
     }
 
     /// True if an instance that remembers all registers runs only what differs between the programs.
@@ -187,7 +223,13 @@ impl RigState {
         let settable = program.attributes.iter().enumerate().filter(|(_, attribute)| attribute.is_settable);
         if self.memory == Memory::Whole {
             let (x, n) = (self.x[inputs.clone()].to_vec(), self.n[..program.attributes.len()].to_vec());
+            self.has_results = carry.has_results && (self.has_results || !self.all_dirty);
+            let nodes = 1..=program.nodes.len();
+            let results = if self.has_results { self.x[nodes.clone()].to_vec() } else { Vec::new() };
             self.x.clone_from(&program.x);
+            if self.has_results {
+                self.x[nodes].copy_from_slice(&results);
+            }
             self.n.clone_from(&program.n);
             self.x[inputs].copy_from_slice(&x);
             settable.for_each(|(slot, _)| self.n[slot] = n[slot]);
