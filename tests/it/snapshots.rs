@@ -17,10 +17,13 @@ mod states;
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
+use bevy::time::TimeUpdateStrategy;
 use bevy_egui::egui;
 use rigsmith::editor::{
+    panel::PanelTitles,
     panels::toasts::Toasts,
     style::{Look, WindowTheme},
 };
@@ -30,6 +33,8 @@ use cases::{Case, GROUPS, Group, PictureSubject};
 use picture::{Picture, Tolerance, write_sheets};
 use raster::{Blending, Scene, Textures};
 use renderer::{AT_ONCE, BevyRenderer};
+
+use crate::window_app::docked_app;
 
 /// Largest size of all pictures together in bytes.
 const MOST_BYTES: u64 = 6 << 20;
@@ -180,6 +185,24 @@ fn lists_in_the_cards_of_commands() {
 #[test]
 fn toasts_pages_and_questions() {
     check("overlays");
+}
+
+/// Who adds a panel gives it pictures without a document, with a usual and with an extreme one.
+#[test]
+fn each_panel_has_pictures_of_each_state() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    let time = TimeUpdateStrategy::ManualDuration(Duration::ZERO);
+    let app = docked_app(folder.path().join("state"), Vec::new(), time);
+    let panels: BTreeSet<&str> = app.world().resource::<PanelTitles>().0.iter().copied().collect();
+    for name in ["empty", "typical", "extreme"] {
+        let group = GROUPS.iter().find(|group| group.name == name).expect("a group of that name");
+        let title = |case: Case| match case.what {
+            PictureSubject::Panel(panel) => Some(panel().title()),
+            _ => None,
+        };
+        let seen: BTreeSet<&str> = (group.cases)().into_iter().filter_map(title).collect();
+        assert_eq!(seen, panels, "{name}");
+    }
 }
 
 /// The table is large, says each name once, and no stored picture is left over from a case that is gone.
