@@ -27,7 +27,7 @@ pub struct Scene {
     pub ground: Color32,
 }
 
-/// Space in which translucent colours are blended with those below.
+/// Space in which translucent colours are blended with those below, and pixels of textures with those beside them.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Blending {
     /// Values as they are stored: what egui's own painters do, and what the stored pictures show.
@@ -176,7 +176,7 @@ fn triangle_of(pixels: &mut [Color32], width: usize, [a, mut b, mut c]: [Corner;
                 ]
             };
             if !is_plain && let Some(texture) = texture {
-                let texel = sample(texture, mix(|corner| corner.uv.x), mix(|corner| corner.uv.y));
+                let texel = sample(texture, [mix(|corner| corner.uv.x), mix(|corner| corner.uv.y)], blending);
                 for (part, texel) in color.iter_mut().zip(texel) {
                     *part *= texel / 255.0;
                 }
@@ -211,7 +211,7 @@ fn gamma(light: f32) -> f32 {
 }
 
 /// Colour of a texture at a place, between its four nearest pixels.
-fn sample(texture: &ColorImage, u: f32, v: f32) -> [f32; 4] {
+fn sample(texture: &ColorImage, [u, v]: [f32; 2], blending: Blending) -> [f32; 4] {
     let [width, height] = texture.size;
     let (x, y) = (u * width as f32 - 0.5, v * height as f32 - 0.5);
     let (left, top) = (x.floor(), y.floor());
@@ -223,8 +223,12 @@ fn sample(texture: &ColorImage, u: f32, v: f32) -> [f32; 4] {
     };
     let corners = [pixel(0.0, 0.0), pixel(1.0, 0.0), pixel(0.0, 1.0), pixel(1.0, 1.0)];
     std::array::from_fn(|n| {
-        let upper = corners[0][n] * (1.0 - right_share) + corners[1][n] * right_share;
-        let lower = corners[2][n] * (1.0 - right_share) + corners[3][n] * right_share;
-        upper * (1.0 - lower_share) + lower * lower_share
+        // Alpha is a share in both spaces.
+        let is_light = blending == Blending::Linear && n < 3;
+        let values = corners.map(|corner| if is_light { light(corner[n]) } else { corner[n] });
+        let upper = values[0] * (1.0 - right_share) + values[1] * right_share;
+        let lower = values[2] * (1.0 - right_share) + values[3] * right_share;
+        let mixed = upper * (1.0 - lower_share) + lower * lower_share;
+        if is_light { gamma(mixed) } else { mixed }
     })
 }
