@@ -319,7 +319,7 @@ impl Walk {
         let size = self.size;
         self.ready();
         let names: Vec<String> = self.names().into_iter().map(|(name, _)| name).collect();
-        for name in names.into_iter().take(MOST_WIDGETS) {
+        for name in names.into_iter().take(MOST_WIDGETS / 2) {
             self.ready();
             let Some(at) = place(&self.desk, size, &name) else { continue };
             self.check(&format!("{panel}: {name} (drag)"), most, |desk| {
