@@ -187,7 +187,7 @@ fn toasts_pages_and_questions() {
     check("overlays");
 }
 
-/// Who adds a panel gives it pictures without a document, with a usual and with an extreme one.
+/// A panel that is added needs pictures without a document, with a usual and with an extreme one.
 #[test]
 fn each_panel_has_pictures_of_each_state() {
     let folder = tempfile::tempdir().expect("a folder for the test");
@@ -222,8 +222,8 @@ fn the_table_has_every_stored_picture() {
     assert!(bytes <= MOST_BYTES, "the pictures have {bytes} bytes, of which {MOST_BYTES} may be");
 }
 
-/// What Bevy's renderer draws is that which the rasteriser draws, in each look; other words, a lost texture and another colour
-/// of the ground are found.
+/// Bevy's renderer draws the same as the rasteriser, in each look; other words, a lost texture and another colour of the ground
+/// are found.
 #[test]
 fn differences_of_bevys_renderer_are_found_on_a_gpu() {
     let Some(mut renderer) = BevyRenderer::new() else { return };

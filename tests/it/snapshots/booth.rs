@@ -83,7 +83,7 @@ pub struct StepError(&'static str);
 /// A picture, and everything in it that can be asked for.
 pub struct Shot {
     pub picture: Picture,
-    /// What the picture is drawn from.
+    /// Triangles and textures of the picture.
     pub scene: Scene,
     /// Steps that could not be taken.
     pub missed: Vec<StepError>,

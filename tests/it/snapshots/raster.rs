@@ -92,7 +92,7 @@ pub fn draw(scene: &Scene, blending: Blending) -> Picture {
     Picture::new(width, height, rgb)
 }
 
-/// What the triangles of a mesh have in common.
+/// Texture, space and area that the triangles of a mesh have in common.
 #[derive(Clone, Copy)]
 struct Brush<'a> {
     texture: Option<&'a ColorImage>,

@@ -32,7 +32,7 @@ const SETTLE: usize = 4;
 
 /// Pictures that the renderer has returned, by their cameras.
 #[derive(Resource, Default)]
-struct Captured(BTreeMap<Entity, Image>);
+struct CapturedPictures(BTreeMap<Entity, Image>);
 
 /// An app without a window that draws scenes.
 pub struct BevyRenderer(App);
@@ -56,7 +56,7 @@ impl BevyRenderer {
         // The cameras get finished triangles; they need no interface of their own.
         app.insert_resource(EguiGlobalSettings { auto_create_primary_context: false, ..default() })
             .add_plugins((bevy_plugins(), EguiPlugin::default()))
-            .init_resource::<Captured>();
+            .init_resource::<CapturedPictures>();
         app.finish();
         app.cleanup();
         Some(Self(app))
@@ -72,18 +72,18 @@ impl BevyRenderer {
         for shutter in &shutters {
             let camera = shutter.camera;
             self.0.world_mut().spawn(Screenshot::image(shutter.target.clone())).observe(
-                move |shot: On<ScreenshotCaptured>, mut captured: ResMut<Captured>| {
+                move |shot: On<ScreenshotCaptured>, mut captured: ResMut<CapturedPictures>| {
                     captured.0.insert(camera, shot.image.clone());
                 },
             );
         }
         let started = Instant::now();
-        while self.0.world().resource::<Captured>().0.len() < shutters.len() {
+        while self.0.world().resource::<CapturedPictures>().0.len() < shutters.len() {
             assert!(started.elapsed() < HANG, "the renderer returns no pictures");
             self.frame(&shutters);
         }
         let world = self.0.world_mut();
-        let mut captured = std::mem::take(&mut world.resource_mut::<Captured>().0);
+        let mut captured = std::mem::take(&mut world.resource_mut::<CapturedPictures>().0);
         world.resource_mut::<EguiManagedTextures>().0.clear();
         let mut pictures = Vec::new();
         for shutter in shutters {

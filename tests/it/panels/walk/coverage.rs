@@ -1,4 +1,4 @@
-//! Nothing is left out of the walks: who adds an action or a panel has it walked over, or is told here.
+//! Completeness of the walks: an action or a panel that is added and not walked over is told here.
 
 use rigsmith::editor::{
     panel::PanelTitles,

@@ -75,7 +75,7 @@ fn all_that_panels_of_meshes_do_is_taken_back_by_undo() {
     }
 }
 
-/// Which meshes are open is part of what undo gives back, with their weights.
+/// Meshes that are removed come back with their weights.
 #[test]
 fn a_mesh_that_the_display_panel_removes_comes_back_by_undo() {
     let mut walk = with_mesh(Box::new(DisplayPanel::default()), egui::vec2(360.0, 2000.0));
