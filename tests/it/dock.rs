@@ -129,7 +129,7 @@ fn all_tabs_of_the_usual_layout_lie_in_their_bars() {
     }
 }
 
-/// Menus, tools, the status line and the panels in front: no word is cut off at a side, and none is smaller than those of tabs.
+/// Menus, tools, the status line and the panels in front: no word is cut off at a side, or smaller than those of tabs.
 #[test]
 fn all_words_of_the_window_can_be_read() {
     for size in [[1024.0, 600.0], USUAL, [3840.0, 2160.0]] {

@@ -222,8 +222,8 @@ fn the_table_has_every_stored_picture() {
     assert!(bytes <= MOST_BYTES, "the pictures have {bytes} bytes, of which {MOST_BYTES} may be");
 }
 
-/// Bevy's renderer draws the same as the rasteriser, in each look; other words, a lost texture and another colour of the ground
-/// are found.
+/// Bevy's renderer draws the same as the rasteriser, in each look; other words, a lost texture and another colour of the
+/// ground are found.
 #[test]
 fn differences_of_bevys_renderer_are_found_on_a_gpu() {
     let Some(mut renderer) = BevyRenderer::new() else { return };

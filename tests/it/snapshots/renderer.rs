@@ -1,7 +1,8 @@
-//! Scenes drawn by Bevy's renderer with the painter of the window, into images. It needs a graphics adapter, be it a software one.
+//! Scenes drawn by Bevy's renderer with the painter of the window, into images. It needs a graphics adapter, be it a
+//! software one.
 //!
-//! Bevy blends amounts of light where the stored pictures have blended values, so its pictures are held against those that the
-//! rasteriser draws with [`Blending::Linear`]: the same triangles, textures and cuts.
+//! Bevy blends amounts of light where the stored pictures have blended values, so its pictures are held against those that
+//! the rasteriser draws with [`Blending::Linear`]: the same triangles, textures and cuts.
 //!
 //! [`Blending::Linear`]: super::raster::Blending::Linear
 
