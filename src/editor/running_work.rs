@@ -5,18 +5,21 @@ use bevy::prelude::*;
 use super::{
     ActiveRig,
     files::{LoadJob, SaveJob, attend},
-    library::LibraryJobs,
+    library::{LibraryJobs, TemplateSave},
     notice::Notice,
     panels::timeline::import::ClipImport,
 };
-use crate::plugins::{face::FaceJob, painting::WeightChangeJob, skinning::SkinningJob, surface::RigMeshes};
+use crate::plugins::{RigSystems, face::FaceJob, painting::WeightChangeJob, skinning::SkinningJob, surface::RigMeshes};
 
 /// Plugin that carries out [`StopWork`].
 pub struct RunningWorkPlugin;
 
 impl Plugin for RunningWorkPlugin {
     fn build(&self, app: &mut App) {
-        app.add_message::<StopWork>().add_message::<Notice>().add_systems(Update, stop.after(attend));
+        // Work that has ended in the meantime is not gone on with.
+        app.add_message::<StopWork>()
+            .add_message::<Notice>()
+            .add_systems(Update, stop.after(attend).before(RigSystems::Edits));
     }
 }
 
@@ -25,7 +28,7 @@ impl Plugin for RunningWorkPlugin {
 pub enum StoppableWork {
     /// A document is being opened.
     Opening,
-    /// A document is being saved or exported.
+    /// A document is being saved or exported, or a template written with its picture.
     Saving,
     /// A template of the library is being read.
     Library,
@@ -54,7 +57,8 @@ pub fn running(world: &World) -> Option<(String, Option<StoppableWork>)> {
     if let Some(what) = world.get_resource::<LibraryJobs>().and_then(LibraryJobs::name) {
         return Some((format!("Reading {what}"), Some(StoppableWork::Library)));
     }
-    if let Some(what) = world.get_resource::<SaveJob>().and_then(SaveJob::name) {
+    let template = || world.get_resource::<TemplateSave>().and_then(TemplateSave::name);
+    if let Some(what) = world.get_resource::<SaveJob>().and_then(SaveJob::name).or_else(template) {
         return Some((format!("Saving {what}"), Some(StoppableWork::Saving)));
     }
     let meshes: Vec<Entity> = world.get::<RigMeshes>(rig?)?.iter().collect();
@@ -90,6 +94,9 @@ fn carry_out(world: &mut World, kind: StoppableWork) {
         }
         StoppableWork::Saving => {
             if let Some(saving) = world.get_resource::<SaveJob>() {
+                saving.stop();
+            }
+            if let Some(saving) = world.get_resource::<TemplateSave>() {
                 saving.stop();
             }
         }

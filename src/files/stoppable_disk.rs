@@ -29,13 +29,18 @@ impl StopSign {
         self.0.is_stopped.store(true, Ordering::Relaxed);
     }
 
+    /// True if saves are to stop.
+    pub fn is_given(&self) -> bool {
+        self.0.is_stopped.load(Ordering::Relaxed)
+    }
+
     /// True if a file was not created or written because of the wish.
     pub fn has_refused(&self) -> bool {
         self.0.has_refused.load(Ordering::Relaxed)
     }
 
     fn check(&self) -> io::Result<()> {
-        if !self.0.is_stopped.load(Ordering::Relaxed) {
+        if !self.is_given() {
             return Ok(());
         }
         self.0.has_refused.store(true, Ordering::Relaxed);

@@ -129,6 +129,23 @@ fn all_tabs_of_the_usual_layout_lie_in_their_bars() {
     }
 }
 
+/// Menus, tools, the status line and the panels in front: no word is cut off at a side, or smaller than those of tabs.
+#[test]
+fn all_words_of_the_window_can_be_read() {
+    for size in [[1024.0, 600.0], USUAL, [3840.0, 2160.0]] {
+        let frames = Frames::new(size);
+        for title in ["File", "Help", "Bones", "Hierarchy", "Log"] {
+            assert!(frames.find(title).is_some(), "{size:?}: {title} is not in sight");
+        }
+        for (word, rect, clip) in frames.words.iter().filter(|(_, rect, clip)| rect.intersects(*clip)) {
+            let is_whole = rect.left() >= clip.left() - 1.0 && rect.right() <= clip.right() + 1.0;
+            assert!(is_whole, "{size:?}: {word:?} is cut: {rect:?} in {clip:?}");
+            assert!(rect.right() <= size[0] && rect.bottom() <= size[1] + 1.0, "{size:?}: {word:?} at {rect:?}");
+            assert!(word.trim().is_empty() || rect.height() >= 9.0, "{size:?}: {word:?} is small: {rect:?}");
+        }
+    }
+}
+
 /// The bar of the viewport's tab is none of its picture.
 #[test]
 fn the_viewport_has_two_fifths_of_a_large_window() {

@@ -288,6 +288,7 @@ fn a_fit_waits_for_steps_that_were_undone_while_it_ran() {
         undo_meanwhile(&mut window.desk.app, rig, new_clip(step));
         window.desk.frames(3);
         assert!(window.rig().is_empty() && job(window) == Some(true));
+        assert!(window.desk.look("Cancel").is_none(), "no bar tells of a fit that runs");
     };
     // Esc drops it, and the step can be redone.
     waiting(&mut window, "wave");

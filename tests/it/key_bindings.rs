@@ -62,3 +62,19 @@ fn the_next_key_is_that_of_the_chosen_action() {
     assert_eq!(bindings(&app), now);
     assert_eq!(*app.world().resource::<ChosenKey>(), ChosenKey(None));
 }
+
+#[test]
+fn every_action_takes_another_key() {
+    let mut app = headless_app(1);
+    app.add_message::<KeyboardInput>().add_message::<WindowFocused>().add_plugins(KeysPlugin);
+    let mut app = strict_app(app);
+    for action in Action::all() {
+        app.insert_resource(ChosenKey(Some(action)));
+        let j = || Key::Character("j".into());
+        assert!(press(&mut app, KeyCode::KeyJ, j()).is_empty(), "{action:?}: the key is chosen, not used");
+        let bindings = app.world().resource::<KeyBindings>();
+        assert_eq!((bindings.keys(action).count(), bindings.action(&chord("J"))), (1, Some(action)));
+        assert!(bindings.doubles().is_empty(), "{action:?}");
+        assert_eq!(press(&mut app, KeyCode::KeyJ, j()), [action]);
+    }
+}

@@ -35,6 +35,7 @@ use rigsmith::{
         panels::{PanelsPlugin, hierarchy::HierarchyPanel, loader::LoaderPanel, tags::TagsPanel},
         recovery::Recovery,
         result_queue::HeldPlugin,
+        running_work::{RunningWorkPlugin, StopWork, StoppableWork, running},
     },
     files::{RealDisk, SearchPaths, TemplatePlace, load_template},
     headless::headless_app,
@@ -133,7 +134,14 @@ impl Studio {
         let mut app = headless_app(7);
         app.insert_resource(StateFolder(Some(folder.path().join("state"))))
             .insert_resource(LibraryFolders(Some(SearchPaths { folders: vec![site.clone()] })))
-            .add_plugins((FilesPlugin, FollowPlugin, PanelsPlugin, HeldPlugin, decline_foreign_offers))
+            .add_plugins((
+                FilesPlugin,
+                FollowPlugin,
+                PanelsPlugin,
+                HeldPlugin,
+                RunningWorkPlugin,
+                decline_foreign_offers,
+            ))
             .add_message::<AppExit>();
         let size = egui::vec2(620.0, 1400.0);
         let desk = Desk::of(strict_app(app), Entity::PLACEHOLDER, sheet, size);

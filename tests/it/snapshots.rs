@@ -11,22 +11,30 @@ mod overlays;
 mod picture;
 mod queries;
 mod raster;
+mod renderer;
 mod states;
 
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
+use bevy::time::TimeUpdateStrategy;
 use bevy_egui::egui;
 use rigsmith::editor::{
+    panel::PanelTitles,
     panels::toasts::Toasts,
     style::{Look, WindowTheme},
 };
 
 use booth::{Booth, Canvas, Frame, Shot, Subject};
 use cases::{Case, GROUPS, Group, PictureSubject};
-use picture::{Picture, write_sheets};
+use picture::{Picture, Tolerance, write_sheets};
+use raster::{Blending, Scene, Textures};
+use renderer::{AT_ONCE, BevyRenderer};
+
+use crate::window_app::docked_app;
 
 /// Largest size of all pictures together in bytes.
 const MOST_BYTES: u64 = 6 << 20;
@@ -47,24 +55,26 @@ fn check(name: &str) {
     let mut booth = (group.booth)();
     let mut captions = Canvas::new();
     let (mut wrong, mut cells) = (Vec::new(), Vec::new());
+    let mut bevy = Rendering { renderer: BevyRenderer::new(), waiting: Vec::new() };
     for case in (group.cases)() {
         let shot = take(&mut booth, &case);
         for problem in queries::problems(&shot, f32::from(case.frame.size[0]), case.asked) {
             wrong.push(format!("{name}/{}: {problem}", case.name));
         }
-        let picture = match case.kept {
-            Some([width, height]) => shot.picture.part(width, height),
-            None => shot.picture,
-        };
         let path = stored(name, &case.name);
+        let Shot { picture, scene, .. } = shot;
+        wrong.extend(bevy.add(&path, scene));
+        let picture = match case.kept {
+            Some([width, height]) => picture.part(width, height),
+            None => picture,
+        };
         match Picture::load(&path) {
             // A picture that nobody can tell from the stored one is no change.
             Some(known) if picture.difference(&known).is_none() => {}
             _ if update => picture.save(&path),
             None => wrong.push(format!("{name}/{}: there is no stored picture; {HOW}", case.name)),
             Some(known) => {
-                let file = path.file_name().expect("a file");
-                let seen = Path::new(env!("CARGO_TARGET_TMPDIR")).join("snapshots").join(file);
+                let seen = seen(&path);
                 picture.save(&seen);
                 let difference = picture.difference(&known).unwrap_or_default();
                 wrong.push(format!("{name}/{}: {difference}; see {}; {HOW}", case.name, seen.display()));
@@ -74,12 +84,58 @@ fn check(name: &str) {
             cells.push((captions.caption(&format!("{name}/{}", case.name), picture.width), picture));
         }
     }
+    wrong.extend(bevy.draw());
     if let Some(folder) = sheets {
         for sheet in write_sheets(&folder, name, &cells) {
             println!("{}", sheet.display());
         }
     }
     assert!(wrong.is_empty(), "{} problems:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+/// File for a picture that is not the stored one.
+fn seen(stored: &Path) -> PathBuf {
+    let file = stored.file_name().expect("a file");
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join("snapshots").join(file)
+}
+
+/// Scenes that wait for Bevy's renderer, with the files of their pictures.
+struct Rendering {
+    /// `None` without a graphics adapter.
+    renderer: Option<BevyRenderer>,
+    waiting: Vec<(PathBuf, Scene)>,
+}
+
+impl Rendering {
+    /// Adds a scene; the problems of those that were drawn in the meantime.
+    fn add(&mut self, stored: &Path, scene: Scene) -> Vec<String> {
+        if self.renderer.is_some() {
+            self.waiting.push((stored.to_owned(), scene));
+        }
+        if self.waiting.len() < AT_ONCE { Vec::new() } else { self.draw() }
+    }
+
+    /// Draws what waits; the pictures that are not like those of the rasteriser, a sentence each.
+    fn draw(&mut self) -> Vec<String> {
+        let (paths, scenes): (Vec<PathBuf>, Vec<Scene>) = std::mem::take(&mut self.waiting).into_iter().unzip();
+        let Some(renderer) = self.renderer.as_mut().filter(|_| !scenes.is_empty()) else { return Vec::new() };
+        let drawn = renderer.draw(&scenes);
+        let mut problems = Vec::new();
+        for ((path, scene), picture) in paths.iter().zip(&scenes).zip(drawn) {
+            let expected = raster::draw(scene, Blending::Linear);
+            let Some(difference) = picture.difference_beyond(Tolerance::RENDERED, &expected) else { continue };
+            let [by_bevy, by_raster] = ["bevy.png", "raster.png"].map(|end| seen(path).with_extension(end));
+            picture.save(&by_bevy);
+            expected.save(&by_raster);
+            problems.push(format!(
+                "{}: Bevy's renderer draws it otherwise: {difference}; see {} and {}",
+                path.file_stem().unwrap_or_default().display(),
+                by_bevy.display(),
+                by_raster.display()
+            ));
+        }
+        problems
+    }
 }
 
 /// Advice on how a picture is made.
@@ -131,6 +187,24 @@ fn toasts_pages_and_questions() {
     check("overlays");
 }
 
+/// A panel that is added needs pictures without a document, with a usual and with an extreme one.
+#[test]
+fn each_panel_has_pictures_of_each_state() {
+    let folder = tempfile::tempdir().expect("a folder for the test");
+    let time = TimeUpdateStrategy::ManualDuration(Duration::ZERO);
+    let app = docked_app(folder.path().join("state"), Vec::new(), time);
+    let panels: BTreeSet<&str> = app.world().resource::<PanelTitles>().0.iter().copied().collect();
+    for name in ["empty", "typical", "extreme"] {
+        let group = GROUPS.iter().find(|group| group.name == name).expect("a group of that name");
+        let title = |case: Case| match case.what {
+            PictureSubject::Panel(panel) => Some(panel().title()),
+            _ => None,
+        };
+        let seen: BTreeSet<&str> = (group.cases)().into_iter().filter_map(title).collect();
+        assert_eq!(seen, panels, "{name}");
+    }
+}
+
 /// The table is large, says each name once, and no stored picture is left over from a case that is gone.
 #[test]
 fn the_table_has_every_stored_picture() {
@@ -146,6 +220,40 @@ fn the_table_has_every_stored_picture() {
         bytes += std::fs::metadata(&path).expect("a picture").len();
     }
     assert!(bytes <= MOST_BYTES, "the pictures have {bytes} bytes, of which {MOST_BYTES} may be");
+}
+
+/// Bevy's renderer draws the same as the rasteriser, in each look; other words, a lost texture and another colour of the
+/// ground are found.
+#[test]
+fn differences_of_bevys_renderer_are_found_on_a_gpu() {
+    let Some(mut renderer) = BevyRenderer::new() else { return };
+    let mut canvas = Canvas::new();
+    let mut scene = |look: (&str, Look), words: &str| {
+        let frame = Frame { size: [240, 120], scale: 1.0, look: look.1 };
+        let shot = canvas.shoot(frame, |ui| {
+            egui::Frame::popup(ui.style()).show(ui, |ui| {
+                ui.label(words);
+                let _ = ui.button("Skin");
+            });
+        });
+        shot.scene
+    };
+    let looks = [cases::DARK, cases::LIGHT, cases::CONTRAST, cases::LIGHT_CONTRAST];
+    let scenes: Vec<Scene> = looks.into_iter().map(|look| scene(look, "Thirteen joints move no point")).collect();
+    let other = scene(cases::DARK, "Nothing is selected");
+    let bare = Scene { textures: Textures::default(), ..scenes[0].clone() };
+    let light = Scene { ground: egui::Color32::from_gray(90), ..scenes[0].clone() };
+    let all: Vec<Scene> = scenes.iter().chain([&other, &bare, &light]).cloned().collect();
+    let drawn = renderer.draw(&all);
+    let difference = |picture: &Picture, scene: &Scene| {
+        picture.difference_beyond(Tolerance::RENDERED, &raster::draw(scene, Blending::Linear))
+    };
+    for (picture, scene) in drawn.iter().zip(&scenes) {
+        assert_eq!(difference(picture, scene), None);
+    }
+    for (what, picture) in ["other words", "no texture", "another ground"].into_iter().zip(&drawn[scenes.len()..]) {
+        assert!(difference(picture, &scenes[0]).is_some(), "{what} look the same");
+    }
 }
 
 /// Faults that the comparison and the queries are there for are found: another letter, a field without a name, two buttons

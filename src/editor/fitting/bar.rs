@@ -42,7 +42,9 @@ impl ViewportPainter for FitBar {
     fn widgets(&mut self, ui: &mut egui::Ui, area: egui::Rect, world: &World, requests: &mut Requests) {
         let Some(active) = world.get_resource::<ActiveRig>() else { return };
         let meshes = world.get::<RigMeshes>(active.0);
-        let job = meshes.and_then(|meshes| meshes.iter().find_map(|mesh| world.get::<FitJob>(mesh)));
+        let running_job = |mesh| world.get::<FitJob>(mesh).filter(|job| !job.waits());
+        // The status line tells of a fit that is ready and waits.
+        let job = meshes.and_then(|meshes| meshes.iter().find_map(running_job));
         let fitted = world.get::<FittedRig>(active.0);
         let tool = world.get_resource::<RegionTool>();
         let faces = tool.and_then(|tool| tool.faces.as_ref()).filter(|faces| faces.rig == active.0);
@@ -72,9 +74,7 @@ fn running(ui: &mut egui::Ui, job: &FitJob, requests: &mut Requests) {
             requests.send(ActionRequest(Action::Cancel));
         }
     });
-    if !job.waits() {
-        ui.ctx().request_repaint_after_secs(0.1);
-    }
+    ui.ctx().request_repaint_after_secs(0.1);
 }
 
 fn corrections(ui: &mut egui::Ui, rig: Entity, fitted: &FittedRig, world: &World, requests: &mut Requests) {

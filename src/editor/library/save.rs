@@ -19,7 +19,7 @@ use crate::{
         files::{ExportRequest, OpenDocument, loading::settled},
         notice::Notice,
     },
-    files::{FileKind, RealDisk, SaveError, StoreError, save_atomic, stem, store_rig},
+    files::{Disk, FileKind, RealDisk, SaveError, StopSign, StoppableDisk, StoreError, save_atomic, stem, store_rig},
     instance::RigSource,
     plugins::{
         document::{Change, EditRequest},
@@ -119,6 +119,18 @@ impl TemplateSave {
     pub fn is_writing(&self) -> bool {
         self.job.is_some()
     }
+
+    /// Name of the file that is being written, with its picture.
+    pub(in crate::editor) fn name(&self) -> Option<&str> {
+        self.job.as_ref().map(|job| job.name.as_str())
+    }
+
+    /// Has the writing stopped; the template stays as it was, unless it is replaced already.
+    pub(in crate::editor) fn stop(&self) {
+        if let Some(job) = &self.job {
+            job.sign.stop();
+        }
+    }
 }
 
 struct Job {
@@ -126,6 +138,8 @@ struct Job {
     /// The rig whose header got the name of the picture for it.
     named: Option<(Entity, String)>,
     task: Task<Result<SaveProgress, SaveFailure>>,
+    /// Wish to stop.
+    sign: StopSign,
 }
 
 /// Finished part of the work.
@@ -156,10 +170,11 @@ fn begin(world: &mut World, SaveTemplate { path, replace, content }: SaveTemplat
     let Some(entity) = world.get_resource::<ActiveRig>().map(|active| active.0) else { return };
     let Some(rig) = settled(world, entity) else { return };
     let mut named = None;
+    let sign = StopSign::default();
+    let heeded = sign.clone();
     let task = match content {
-        TemplateContent::Joints(joints) => {
-            AsyncComputeTaskPool::get().spawn(async move { write_joints(&path, &rig, &joints) })
-        }
+        TemplateContent::Joints(joints) => AsyncComputeTaskPool::get()
+            .spawn(async move { write_joints(&StoppableDisk::new(&RealDisk, heeded), &path, &rig, &joints) }),
         TemplateContent::Rig { picture: false } => {
             world.write_message(ExportRequest(path));
             return;
@@ -180,12 +195,13 @@ fn begin(world: &mut World, SaveTemplate { path, replace, content }: SaveTemplat
                 named = Some((entity, file.clone()));
             }
             AsyncComputeTaskPool::get().spawn(async move {
-                save_atomic(&RealDisk, &path.with_file_name(file), &preview.png()?)?;
+                let disk = StoppableDisk::new(&RealDisk, heeded);
+                save_atomic(&disk, &path.with_file_name(file), &preview.png()?)?;
                 Ok(SaveProgress::Picture(path))
             })
         }
     };
-    world.resource_mut::<TemplateSave>().job = Some(Job { name, named, task });
+    world.resource_mut::<TemplateSave>().job = Some(Job { name, named, task, sign });
 }
 
 /// File of the template that is open. One that was only loaded onto the rig is another's.
@@ -231,9 +247,9 @@ fn refusal(world: &World, path: &Path, name: &str, may_replace: bool) -> Option<
         .then(|| format!("There is a file {name} already: tick Replace, or choose another name"))
 }
 
-fn write_joints(path: &Path, rig: &Rig, joints: &[Uid]) -> Result<SaveProgress, SaveFailure> {
+fn write_joints(disk: &dyn Disk, path: &Path, rig: &Rig, joints: &[Uid]) -> Result<SaveProgress, SaveFailure> {
     let Extraction { rig: out, left } = extract(rig, joints, &stem(path), None)?;
-    let mut notes = store_rig(&RealDisk, path, &out)?;
+    let mut notes = store_rig(disk, path, &out)?;
     notes.extend(left);
     Ok(SaveProgress::Joints(out.len(), notes))
 }
@@ -244,10 +260,11 @@ pub(super) fn go_on(mut save: ResMut<TemplateSave>, histories: Query<&RigHistory
     let Some(job) = &mut save.job else { return };
     commands.write_message(RequestRedraw);
     let Some(result) = check_ready(&mut job.task) else { return };
-    let Some(Job { name, named, .. }) = save.job.take() else { return };
-    match result {
-        Ok(SaveProgress::Picture(path)) => {
+    let Some(Job { name, named, sign, .. }) = save.job.take() else { return };
+    let failure = match result {
+        Ok(SaveProgress::Picture(path)) if !sign.is_given() => {
             commands.write_message(ExportRequest(path));
+            return;
         }
         Ok(SaveProgress::Joints(count, notes)) => {
             let joints = counted(count, "joint", "joints");
@@ -256,16 +273,22 @@ pub(super) fn go_on(mut save: ResMut<TemplateSave>, histories: Query<&RigHistory
                 commands.write_message(Notice::warning(note));
             }
             commands.write_message(ListTemplates);
+            return;
         }
-        Err(error) => {
-            commands.write_message(Notice::error(format!("Could not write {name}: {error}")));
-            // The header names no picture that is not there.
-            if let Some((rig, file)) = named
-                && histories.get(rig).ok().and_then(RigHistory::last).is_some_and(|step| names_picture(step, &file))
-            {
-                commands.write_message(EditRequest { rig, change: Change::Undo });
-            }
-        }
+        // The picture alone is no template.
+        Ok(SaveProgress::Picture(_)) => None,
+        Err(_) if sign.has_refused() => None,
+        Err(error) => Some(error),
+    };
+    commands.write_message(match failure {
+        Some(error) => Notice::error(format!("Could not write {name}: {error}")),
+        None => Notice::info(format!("{name} is not written: it was stopped")),
+    });
+    // The header names no picture that is not there.
+    if let Some((rig, file)) = named
+        && histories.get(rig).ok().and_then(RigHistory::last).is_some_and(|step| names_picture(step, &file))
+    {
+        commands.write_message(EditRequest { rig, change: Change::Undo });
     }
 }
 

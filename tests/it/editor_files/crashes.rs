@@ -22,6 +22,11 @@ fn a_crash_loses_nothing() {
     assert_eq!(window.rig(), rig, "{:?}", window.notices.list);
     assert_eq!(window.mesh().map(|mesh| mesh.rest.points.clone()), points);
     assert!(window.is_unsaved(), "recovered work is in no file");
+    let is_asked_again = match window.question() {
+        Some(Question::Recover(list)) => list.iter().any(|pending| pending.path.starts_with(folder.path())),
+        _ => false,
+    };
+    assert!(!is_asked_again, "what was recovered is offered once");
     window.change(Change::Redo);
     assert_eq!(window.rig().len(), rig.len() + 1, "what was undone can be done again");
     window.change(Change::Undo);

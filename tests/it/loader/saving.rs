@@ -109,6 +109,25 @@ fn a_picture_that_cannot_be_written_leaves_neither_a_file_nor_its_name() {
     assert_eq!((studio.desk.rig(), studio.desk.steps().1), (&before, done), "the header is as before");
 }
 
+/// Stop ends the work on a template whenever it comes, also between its picture and its file.
+#[test]
+fn a_template_that_is_being_written_can_be_stopped() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let path = studio.site.join("hero.rig.ron");
+    let (before, done) = (studio.text(), studio.desk.steps().1);
+    let request = SaveTemplate { path: path.clone(), replace: true, content: TemplateContent::Rig { picture: true } };
+    studio.desk.app.world_mut().write_message(request.clone());
+    studio.desk.frame();
+    let (words, kind) = running(studio.world()).expect("it is being written");
+    assert_eq!((words.as_str(), kind), ("Saving hero.rig.ron", Some(StoppableWork::Saving)));
+    studio.send(StopWork(StoppableWork::Saving));
+    assert!(studio.told("hero.rig.ron is not written: it was stopped"), "{:?}", studio.desk.told());
+    assert!(!path.exists() && running(studio.world()).is_none());
+    assert_eq!((studio.text(), studio.desk.steps().1), (before, done), "the header names no picture");
+    studio.send(request);
+    assert!(path.exists(), "the next one is written: {:?}", studio.desk.told());
+}
+
 #[test]
 fn a_picture_that_is_not_the_templates_is_replaced_only_if_that_was_said() {
     let mut studio = Studio::new(LoaderPanel::default());

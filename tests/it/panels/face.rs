@@ -50,6 +50,13 @@ fn number(desk: &Desk) -> ShownWidget {
     desk.seen.iter().find(is_it).expect("its number").clone()
 }
 
+/// Number of expressions of which the panel has drawn pictures.
+fn pictures(desk: &Desk) -> usize {
+    let textures = desk.ctx.tex_manager();
+    let textures = textures.read();
+    textures.allocated().filter(|(_, texture)| texture.name.starts_with("face ")).count()
+}
+
 fn wait(desk: &mut Desk, mesh: Entity) {
     desk.frame();
     crate::bench::wait(desk, "the face", Desk::frame, |desk| {
@@ -112,6 +119,8 @@ fn a_click_makes_a_face_that_sliders_pose() {
     assert_eq!(strengths(&desk), shown);
     assert!(!desk.rig().pose().is_empty());
     assert_eq!(desk.steps(), (2, 2), "showing what the document says is no edit");
+    let (reopened, head) = opened(Some(desk.rig().clone()));
+    assert_eq!(reopened.app.world().get::<Expressions>(head), Some(&shown), "an opened face has its strengths");
     desk.click("Reset");
     desk.frames(4);
     assert!(desk.rig().pose().is_empty(), "back at rest");
@@ -168,8 +177,9 @@ fn the_density_is_that_of_the_opened_face() {
     assert!((4..36).contains(&count), "{count} bones");
     assert_eq!(desk.rig().face_cut(Uid(99)), Some(FaceCut { bones: 24, groups: None }));
     assert_eq!(number_of_bones(&desk), 24.0, "the panel follows the document");
-    let (reopened, _) = opened(Some(desk.rig().clone()));
+    let (mut reopened, _) = opened(Some(desk.rig().clone()));
     assert_eq!(number_of_bones(&reopened), 24.0);
+    reopened.until("the pictures of an opened face", |desk| pictures(desk) == 6);
     // A document of an older version has only the bones.
     let mut older = desk.rig().clone();
     older.apply(&RigEdit::SetFaceCut(Uid(99), None)).unwrap();

@@ -36,7 +36,7 @@ use rigsmith::{
 use super::{
     picture::Picture,
     queries::{Text, Widget, texts, widgets},
-    raster::{self, Textures},
+    raster::{self, Blending, Scene, Textures},
 };
 use crate::{
     bench::{HANG, wait},
@@ -83,6 +83,8 @@ pub struct StepError(&'static str);
 /// A picture, and everything in it that can be asked for.
 pub struct Shot {
     pub picture: Picture,
+    /// Triangles and textures of the picture.
+    pub scene: Scene,
     /// Steps that could not be taken.
     pub missed: Vec<StepError>,
     pub widgets: Vec<Widget>,
@@ -182,8 +184,10 @@ impl Canvas {
         let texts = texts(&output.shapes);
         let primitives = self.ctx.tessellate(output.shapes, output.pixels_per_point);
         let size = frame.size.map(|side| (f32::from(side) * frame.scale).round() as usize);
-        let picture = raster::draw(&self.textures, &primitives, output.pixels_per_point, size, ground);
-        Shot { picture, missed: Vec::new(), widgets: widgets(&nodes), texts }
+        let textures = self.textures.clone();
+        let scene = Scene { textures, primitives, pixels_per_point: output.pixels_per_point, size, ground };
+        let picture = raster::draw(&scene, Blending::Gamma);
+        Shot { picture, scene, missed: Vec::new(), widgets: widgets(&nodes), texts }
     }
 }
 

@@ -15,11 +15,23 @@ pub struct Picture {
     rgb: Vec<u8>,
 }
 
-/// Distance of two colours from which on people see a difference: 0 for the same colour, 1 for black and white.
-const SEEN: f32 = 0.08;
-/// Share of pixels that may be seen to differ: less than a letter of a panel.
-const SHARE: f32 = 3e-5;
-/// Pixels that may be seen to differ in the smallest picture.
+/// Differences that count as none.
+#[derive(Clone, Copy)]
+pub struct Tolerance {
+    /// Distance of two colours from which on they differ: 0 for the same colour, 1 for black and white.
+    color: f32,
+    /// Share of pixels that may differ.
+    share: f32,
+}
+
+impl Tolerance {
+    /// Tolerance for stored pictures: people see no difference, and it is less than a letter of a panel.
+    pub const STORED: Self = Self { color: 0.08, share: 3e-5 };
+    /// Tolerance for another renderer, which rounds edges and textures in its own way: less than a line of text.
+    pub const RENDERED: Self = Self { color: 0.12, share: 2e-3 };
+}
+
+/// Pixels that may differ in the smallest picture.
 const FEW: usize = 3;
 
 impl Picture {
@@ -78,10 +90,10 @@ impl Picture {
 
     /// Number of pixels that another picture of the same size has neither there nor right beside: where a text stands between
     /// two rows of pixels, rounding decides.
-    fn unmatched(&self, other: &Self) -> usize {
+    fn unmatched(&self, other: &Self, color: f32) -> usize {
         let is_there = |x: usize, y: usize| {
             let own = self.pixel(x, y);
-            let is_near = |x: usize, y: usize| distance(&own, &other.pixel(x, y)) <= SEEN;
+            let is_near = |x: usize, y: usize| distance(&own, &other.pixel(x, y)) <= color;
             let (columns, rows) = (x.saturating_sub(1)..=(x + 1).min(self.width - 1), y.saturating_sub(1)..=y + 1);
             is_near(x, y) || rows.filter(|y| *y < self.height).any(|y| columns.clone().any(|x| is_near(x, y)))
         };
@@ -90,12 +102,17 @@ impl Picture {
 
     /// The reason why people would call two pictures different, if so.
     pub fn difference(&self, stored: &Self) -> Option<String> {
+        self.difference_beyond(Tolerance::STORED, stored)
+    }
+
+    /// The reason why two pictures are not alike within a tolerance, if so.
+    pub fn difference_beyond(&self, tolerance: Tolerance, stored: &Self) -> Option<String> {
         if (self.width, self.height) != (stored.width, stored.height) {
             let [now, then] = [self, stored].map(|picture| format!("{}x{}", picture.width, picture.height));
             return Some(format!("it is {now} now and was {then}"));
         }
-        let far = self.unmatched(stored).max(stored.unmatched(self));
-        let most = ((self.width * self.height) as f32 * SHARE).max(FEW as f32) as usize;
+        let far = self.unmatched(stored, tolerance.color).max(stored.unmatched(self, tolerance.color));
+        let most = ((self.width * self.height) as f32 * tolerance.share).max(FEW as f32) as usize;
         (far > most).then(|| format!("{far} pixels differ, of which {most} may"))
     }
 }

@@ -7,6 +7,7 @@ use super::{of_library::choose, *};
 use crate::gestures::boxes;
 
 const MESH: Uid = Uid(0xA1_0003);
+const COAT: Uid = Uid(0xA1_0004);
 
 /// The walked app with a mesh that is bound to the joints.
 fn with_mesh(panel: Box<dyn EditorPanel>, size: egui::Vec2) -> Walk {
@@ -72,4 +73,26 @@ fn all_that_panels_of_meshes_do_is_taken_back_by_undo() {
     for panel in ["Skinning: ", "Weights: "] {
         assert!(made.iter().any(|made| made.starts_with(panel)), "{panel}nothing made a step: {made:?}");
     }
+}
+
+/// Meshes that are removed come back with their weights.
+#[test]
+fn a_mesh_that_the_display_panel_removes_comes_back_by_undo() {
+    let mut walk = with_mesh(Box::new(DisplayPanel::default()), egui::vec2(360.0, 2000.0));
+    let mut model = boxes(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]);
+    model.name = "coat".to_owned();
+    let coat = RigMesh::new(COAT, model, Vec::new());
+    let rig = walk.desk.rig;
+    walk.desk.app.world_mut().spawn((coat, SkinOf(rig)));
+    walk.rest();
+    let meshes = |walk: &mut Walk| {
+        let world = walk.desk.app.world_mut();
+        let mut query = world.query::<&RigMesh>();
+        query.iter(world).map(|mesh| mesh.uid).collect::<BTreeSet<Uid>>()
+    };
+    walk.crawl("Display");
+    assert!(walk.wrong.is_empty(), "{} are wrong:\n{}", walk.wrong.len(), walk.wrong.join("\n"));
+    let removals = walk.made.iter().filter(|made| made.starts_with("Display: Remove ")).count();
+    assert_eq!(removals, 2, "{:?}, {:?}", walk.made, walk.desk.told());
+    assert_eq!(meshes(&mut walk), BTreeSet::from([MESH, COAT]));
 }

@@ -1,0 +1,55 @@
+//! Completeness of the walks: an action or a panel that is added and not walked over is told here.
+
+use rigsmith::editor::{
+    panel::PanelTitles,
+    panels::{graph::GraphAction, timeline::TimelineAction},
+    tools::paint::brush::BrushAction,
+};
+use serde::de::DeserializeOwned;
+
+use super::*;
+
+/// Names of all variants of an enum, which its reader tells of a name that is none.
+fn variants<T: DeserializeOwned>() -> BTreeSet<String> {
+    match ron::from_str::<T>("NoSuchVariant").map_err(|error| error.code) {
+        Err(ron::Error::NoSuchEnumVariant { expected, .. }) => expected.iter().map(|name| (*name).to_owned()).collect(),
+        Err(error) => panic!("{error}"),
+        Ok(_) => panic!("there is a variant of that name"),
+    }
+}
+
+/// Names of the variants of listed values.
+fn listed<T: std::fmt::Debug>(values: impl IntoIterator<Item = T>) -> BTreeSet<String> {
+    let name = |value: T| format!("{value:?}").split('(').next().unwrap_or_default().to_owned();
+    values.into_iter().map(name).collect()
+}
+
+/// The walks go over the list of all actions, so that list has to be whole.
+#[test]
+fn no_action_is_left_out() {
+    assert_eq!(listed(Action::all()), variants::<Action>());
+    assert_eq!(listed(Mode::ALL), variants::<Mode>());
+    assert_eq!(listed(TimelineAction::ALL), variants::<TimelineAction>());
+    assert_eq!(listed(GraphAction::ALL), variants::<GraphAction>());
+    assert_eq!(listed(LibraryAction::ALL), variants::<LibraryAction>());
+    assert_eq!(listed(BrushAction::ALL), variants::<BrushAction>());
+    let nested = Mode::ALL.len()
+        + TimelineAction::ALL.len()
+        + GraphAction::ALL.len()
+        + LibraryAction::ALL.len()
+        + BrushAction::ALL.len();
+    // Five variants of an action hold those of others.
+    assert_eq!(Action::all().len(), variants::<Action>().len() - 5 + nested, "each is listed once");
+}
+
+#[test]
+fn no_panel_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let app = docked_app(folder.path().join("state"), Vec::new(), TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+    let shown: BTreeSet<&str> = app.world().resource::<PanelTitles>().0.iter().copied().collect();
+    let walked: BTreeSet<&str> = panels().into_iter().map(|(title, ..)| title).chain([OF_LIBRARY]).collect();
+    assert_eq!(walked, shown);
+    for (title, panel, _) in panels() {
+        assert_eq!(panel.title(), title, "the panel of that title is walked over");
+    }
+}
