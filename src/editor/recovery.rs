@@ -257,9 +257,10 @@ fn tell_misfits(opened: &mut LoadedDocument) {
         let (bound, points) = (opened.rig.skin(mesh.uid).map(|skin| skin.weights.len()), mesh.rest.points.len());
         if bound.is_some_and(|bound| bound != points) {
             opened.warnings.push(format!(
-                "the mesh {:?} has changed since it was bound: it has {points} points now, for which its weights are not \
-                 made; put the former file back and recover again, or bind it anew",
-                mesh.file.name
+                "the mesh {:?} has changed since it was bound: it has {} now, for which its weights are not made; \
+                 put the former file back and recover again, or bind it anew",
+                mesh.file.name,
+                counted(points, "point", "points")
             ));
         }
     }

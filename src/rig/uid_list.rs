@@ -2,6 +2,7 @@
 
 use std::{
     collections::{HashMap, HashSet},
+    fmt,
     ops::Deref,
     sync::OnceLock,
 };
@@ -33,12 +34,19 @@ impl HasUid for StoredPose {
 }
 
 /// List of items with a uid each, of which no two have the same.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub(in crate::rig) struct UidList<T> {
     items: Vec<T>,
     uids: HashSet<Uid>,
     /// Place of each item, from the first look-up after a change within the list.
     places: OnceLock<HashMap<Uid, usize>>,
+}
+
+impl<T: fmt::Debug> fmt::Debug for UidList<T> {
+    /// Items alone: fingerprints of rigs are made of this text, and what items are found by has no order.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.items.fmt(f)
+    }
 }
 
 impl<T> Default for UidList<T> {

@@ -202,24 +202,22 @@ fn rigid_parts_hang_where_they_were() {
 #[test]
 fn objects_all_along_a_chain_hang_where_they_were() {
     const COUNT: usize = 60;
-    let mut model = Model { name: "chain".into(), ..Model::default() };
+    // A skin on the last joint, for which all are kept.
+    let mut model = rigged(COUNT, |_| vec![(COUNT as u32 - 1, 1.0)]);
     for number in 0..COUNT {
-        let scale = if number % 2 == 0 { 1.25 } else { 0.8 };
-        model.nodes.push(Node {
-            name: format!("n{number}"),
-            parent: number.checked_sub(1),
-            rest: Trs {
-                translation: Vec3::new(0.1, 0.2, 0.0),
-                rotation: glam::Quat::from_rotation_z(0.3),
-                scale: Vec3::splat(scale),
-            },
-            ..Node::default()
-        });
-        let first = 3 * number as u32;
+        let node = &mut model.nodes[number];
+        node.parent = number.checked_sub(1);
+        node.rest = Trs {
+            translation: Vec3::new(0.1, 0.2, 0.0),
+            rotation: glam::Quat::from_rotation_z(0.3),
+            scale: Vec3::splat(if number % 2 == 0 { 1.25 } else { 0.8 }),
+        };
+        let first = model.points.len() as u32;
         model.points.extend([0.0, 0.5, 1.0].map(|along| Vec3::new(along, along * along, 0.01 * number as f32)));
+        (0..3).for_each(|_| model.weights.as_mut().unwrap().push([]));
         model.objects.push(Object { name: format!("o{number}"), node: Some(number), ..Object::default() });
         model.parts.push(Part {
-            object: number,
+            object: number + 1,
             vertices: vec![first, first + 1, first + 2],
             triangles: vec![[0, 1, 2]],
             ..Part::default()
