@@ -2,7 +2,8 @@
 //!
 //! A chain depends on nothing but the joint on which its stroke starts. A grid on the view plane finds that joint without a
 //! look at all others. A stroke of a given number of joints is a chain, whatever it crosses. Any other is one unless it is a
-//! scribble, or straight and no longer than a bone that it crosses, see [`classify`](crate::algo::stroke::classify). Entities
+//! scribble, or straight and no longer than a bone that it crosses, see [`classify`](crate::algo::stroke::classify). With live
+//! mirroring the other side of each joint is among those on which a stroke may start. Entities
 //! of joints that were just added stand where their chains have them but for rounding: where that could decide anything, the
 //! stroke belongs to no run.
 
