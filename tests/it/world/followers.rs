@@ -43,11 +43,8 @@ fn visits(count: usize, is_tagged: bool) -> u64 {
     let joints = stage.chain(&places);
     assert_eq!(joints.len(), count);
     if is_tagged {
-        let tagged = |(joint, uid): (&Uid, u64)| RigEdit::AddTag {
-            joint: *joint,
-            tag: Box::new(null_tag(uid)),
-            index: 0,
-        };
+        let tagged =
+            |(joint, uid): (&Uid, u64)| RigEdit::AddTag { joint: *joint, tag: Box::new(null_tag(uid)), index: 0 };
         stage.apply_all(joints.iter().zip(0x7000..).map(tagged).collect());
         assert_tagged(&stage);
     }
