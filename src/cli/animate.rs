@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use bevy::math::Vec3A;
 use clap::{Args, ValueEnum};
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs, build, limits, positive, progress::spinning,
@@ -192,7 +192,11 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
         dress(args, &mut model, &mut report);
         match draft {
             Some((draft, meta)) => draft.store(model, meta, &args.output, &settings, &mut report)?,
-            None => report.notes(spinning("writing", || store_owned_model(&RealDisk, &args.output, model, &settings))?),
+            None => {
+                // What is written is read back, which takes as much memory again.
+                drop((bench, clips));
+                report.notes(spinning("writing", || store_owned_model(&RealDisk, &args.output, model, &settings))?);
+            }
         }
     }
     report.line(format!("wrote {}", args.output.display()));
@@ -292,37 +296,48 @@ fn without_commands(rig: &Rig) -> Result<Rig, Failure> {
     Ok(bare)
 }
 
+/// Clip as programs get it. Numbers are doubles, as all of a JSON value are.
+#[derive(Serialize)]
+struct ClipFields<'c> {
+    name: &'c str,
+    seconds: f64,
+    frame_rate: f64,
+    looped: bool,
+    markers: usize,
+    tracks: usize,
+    keys: usize,
+}
+
 fn describe(clips: &[RigClip], report: &mut Report) {
-    let clip = |clip: &RigClip| {
-        let tracks: usize = clip.layers.iter().map(|layer| layer.tracks.len()).sum();
-        json!({
-            "name": clip.name,
-            "seconds": clip.duration(),
-            "frame_rate": clip.frame_rate,
-            "looped": clip.looped,
-            "markers": clip.markers.len(),
-            "tracks": tracks,
-            "keys": clip.key_count(),
-        })
-    };
     for clip in clips {
-        let tracks: usize = clip.layers.iter().map(|layer| layer.tracks.len()).sum();
         report.line(format!(
             "clip \"{}\": {:.2} s, {}, {}",
             clip.name,
             clip.duration(),
-            counted(tracks, "track", "tracks"),
+            counted(track_count(clip), "track", "tracks"),
             counted(clip.key_count(), "key", "keys")
         ));
     }
-    let told: Vec<Value> = clips.iter().map(clip).collect();
     // A single clip is told without a list, too.
-    if let [only] = &told[..] {
-        for field in ["seconds", "tracks"] {
-            report.set(field, only[field].clone());
-        }
+    if let [only] = clips {
+        report.set("seconds", f64::from(only.duration()));
+        report.set("tracks", track_count(only));
     }
-    report.set("clips", told);
+    let told = clips.iter().map(|clip| ClipFields {
+        name: &clip.name,
+        seconds: f64::from(clip.duration()),
+        frame_rate: f64::from(clip.frame_rate),
+        looped: clip.looped,
+        markers: clip.markers.len(),
+        tracks: track_count(clip),
+        keys: clip.key_count(),
+    });
+    report.set_list("clips", told);
+}
+
+/// Number of tracks of all layers.
+fn track_count(clip: &RigClip) -> usize {
+    clip.layers.iter().map(|layer| layer.tracks.len()).sum()
 }
 
 /// Character of the rig's own file, with its mesh and weights; `None` if the rig is no model or has no mesh, or if
@@ -346,6 +361,16 @@ fn own_character(args: &AnimateArgs, bench: &Workbench, report: &mut Report) -> 
         ));
     }
     Ok((is_alike && !model.points.is_empty()).then_some(model))
+}
+
+/// Baked clip as programs get it. Numbers are doubles, as all of a JSON value are.
+#[derive(Serialize)]
+struct AnimationFields {
+    name: String,
+    channels: usize,
+    keys_before: usize,
+    keys_after: usize,
+    reduction: f64,
 }
 
 /// Clips baked for the nodes of an exported model.
@@ -378,16 +403,16 @@ fn exported(
         // Without the reduction, each channel had a key at each frame.
         let frames = (clip.duration() * rate + 1e-3).floor() as usize + 1;
         sums = [sums[0] + frames * done.channels.len(), sums[1] + keys];
-        facts.push(json!({
-            "name": done.name,
-            "channels": done.channels.len(),
-            "keys_before": frames * done.channels.len(),
-            "keys_after": keys,
-            "reduction": reduction(frames * done.channels.len(), keys),
-        }));
+        facts.push(AnimationFields {
+            name: done.name.clone(),
+            channels: done.channels.len(),
+            keys_before: frames * done.channels.len(),
+            keys_after: keys,
+            reduction: f64::from(reduction(frames * done.channels.len(), keys)),
+        });
         baked.push(done);
     }
-    report.set("animations", facts);
+    report.set_list("animations", facts);
     // What retargeting has told is about the clips on the rig.
     if !report.json.contains_key("motions") {
         report.set("keys_before", sums[0]);

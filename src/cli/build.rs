@@ -112,16 +112,9 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
     RigProgram::compile(&built, &CompileOptions::default()).map_err(PoseError::CannotRun)?;
     let Some(output) = &args.output else { return Ok(()) };
     let meta = args.vrm.meta(&rig, output)?;
-    let notes = if FileKind::of(output) == Some(FileKind::Template) {
-        let skeleton = baked(&rig, &built);
-        drop((rig, built));
-        store_built(output, &args.rig, skeleton, has_commands)?
-    } else if args.meshes.is_empty() && !has_commands && rig.pose().is_empty() && meta.is_none() {
-        let mut model = skeleton_model(&rig, Some(&built));
-        mark_joints(&mut model, &baked(&rig, &built));
-        drop((rig, built));
-        let settings = GltfWriteSettings { all_joints: true, ..args.export.settings() };
-        store_owned_model(&RealDisk, output, model, &settings)?
+    let is_plain = args.meshes.is_empty() && !has_commands && rig.pose().is_empty() && meta.is_none();
+    let notes = if is_plain || FileKind::of(output) == Some(FileKind::Template) {
+        store_at_rest(output, &args.rig, rig, built, &args.export, has_commands)?
     } else {
         drop(built);
         let mut bench = limits::workbench(rig);
@@ -143,6 +136,29 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
     report.line(format!("wrote {}", output.display()));
     report.set("output", output.display().to_string());
     Ok(())
+}
+
+/// Saves the built skeleton of a rig at rest, without a mesh, as a model or as a rig. Reading back what was written takes as
+/// much memory as the rig, which is dropped before.
+pub(super) fn store_at_rest(
+    output: &Path,
+    source: &Path,
+    rig: Rig,
+    built: BuiltRig,
+    export: &ExportArgs,
+    has_commands: bool,
+) -> Result<Vec<String>, StoreError> {
+    let skeleton = baked(&rig, &built);
+    if FileKind::of(output) == Some(FileKind::Template) {
+        drop((rig, built));
+        return store_built(output, source, skeleton, has_commands);
+    }
+    let mut model = skeleton_model(&rig, Some(&built));
+    drop((rig, built));
+    mark_joints(&mut model, &skeleton);
+    drop(skeleton);
+    let settings = GltfWriteSettings { all_joints: true, ..export.settings() };
+    store_owned_model(&RealDisk, output, model, &settings)
 }
 
 /// Note about a template whose parts a skeleton cannot have.

@@ -1,6 +1,8 @@
 //! `rigsmith pose`: the app on the command line. Builds a rig, writes the entities of its controls, and reports or
 //! exports the resulting transforms.
 
+mod rest;
+
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -18,7 +20,7 @@ use crate::{
     files::{FileKind, RealDisk, store_owned_model},
     headless::{
         Workbench,
-        posing::{ControlWrite, HeldValue, PoseError},
+        posing::{ControlWrite, HeldValue, PoseError, PosedNode},
     },
     plugins::{commands::BuildStep, surface::RigMesh},
     rig::{Rig, RigEdit, bake::baked, operations::Operation},
@@ -117,11 +119,30 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let (mut rig, own) = read(args, &mut report)?;
     args.steps.parts.apply(&mut rig)?;
-    let mut bench = limits::workbench(rig);
-    let held = run_steps(&mut bench, &args.steps, &writes)?;
-    report.notes(held);
+    if !is_picture && rest::is_at_rest(args, &own, &rig) {
+        rest::pose(args, rig, &mut report)?;
+    } else {
+        let mut bench = limits::workbench(rig);
+        let held = run_steps(&mut bench, &args.steps, &writes)?;
+        report.notes(held);
+        tell_nodes(&mut report, bench.iter_nodes()?);
+        match &args.output {
+            Some(output) if is_picture => picture(args, own, output, &bench, &mut report)?,
+            Some(output) => write(args, own, output, bench, &mut report)?,
+            None => {}
+        }
+    }
+    if let Some(output) = &args.output {
+        report.line(format!("wrote {}", output.display()));
+        report.set("output", output.display().to_string());
+    }
+    Ok(report)
+}
+
+/// Adds the nodes of a posed rig to a report, and how far entities are off the computed places.
+fn tell_nodes(report: &mut Report, posed: impl Iterator<Item = PosedNode>) {
     let (mut nodes, mut error) = (0, 0.0_f32);
-    let told = bench.iter_nodes()?.inspect(|node| {
+    let told = posed.inspect(|node| {
         nodes += 1;
         error = error.max(node.entity.translation.distance(node.program.translation));
     });
@@ -129,16 +150,6 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     let nodes = counted(nodes, "node", "nodes");
     report.line(format!("posed {nodes}; an app shows them within about {error:.0e} units of the computed places"));
     report.set("error", error);
-    if let Some(output) = &args.output {
-        if is_picture {
-            picture(args, own, output, &bench, &mut report)?;
-        } else {
-            write(args, own, output, bench, &mut report)?;
-        }
-        report.line(format!("wrote {}", output.display()));
-        report.set("output", output.display().to_string());
-    }
-    Ok(report)
 }
 
 fn is_png(path: &Path) -> bool {

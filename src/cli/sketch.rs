@@ -6,7 +6,8 @@ use std::{
 };
 
 use clap::Args;
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::Value;
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, WeightArgs,
@@ -115,23 +116,26 @@ fn save(
     Ok(())
 }
 
+/// Joint as programs get it. Numbers are doubles, as all of a JSON value are.
+#[derive(Serialize)]
+struct JointFields<'r> {
+    uid: String,
+    parent: Option<String>,
+    label: Option<&'r str>,
+    position: [f64; 3],
+}
+
 /// Adds a description of the rig for programs.
 pub(super) fn describe_rig(report: &mut Report, rig: &Rig) {
     if !is_json() {
         return;
     }
     let globals = rig.rest_globals();
-    let joints: Vec<Value> = rig
-        .walk()
-        .zip(&globals)
-        .map(|(joint, (uid, global))| {
-            json!({
-                "uid": uid.to_string(),
-                "parent": joint.parent.map(|parent| parent.to_string()),
-                "label": joint.data.label,
-                "position": global.translation.to_array(),
-            })
-        })
-        .collect();
-    report.set("joints", joints);
+    let joints = rig.walk().zip(&globals).map(|(joint, (uid, global))| JointFields {
+        uid: uid.to_string(),
+        parent: joint.parent.map(|parent| parent.to_string()),
+        label: joint.data.label.as_deref(),
+        position: global.translation.to_array().map(f64::from),
+    });
+    report.set_list("joints", joints);
 }

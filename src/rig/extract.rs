@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::{
     EditError, Rig, RigAbout, RigEdit, RigInput, TagData, TagKind, Uid, UidSource,
-    part::{HeaderSocket, PartInstance, PartOption},
+    part::{HeaderSocket, PartInstance, PartOption, PartTargets},
     reference::{NameKind, Names, references_in},
     remap::Remap,
 };
@@ -51,9 +51,10 @@ pub fn extract(rig: &Rig, joints: &[Uid], name: &str, uids: Option<&mut UidSourc
         out.apply(&RigEdit::AddLocalGroup(group, usize::MAX))?;
     }
     let mut left = Vec::new();
+    let nearest = nearest_above(rig, &chosen);
     for joint in &inside {
         let mut data = remap.joint(&joint.data);
-        let above = rig.ancestors(joint.data.uid).map(|above| above.data.uid).find(|above| chosen.contains(above));
+        let above = nearest.get(&joint.data.uid).copied();
         let parent = above.map(|above| remap.get(above).unwrap_or(above));
         if above != joint.parent {
             data.rest = out.local_rest(parent, &rig.rest_global(joint.data.uid));
@@ -98,7 +99,7 @@ pub fn extract(rig: &Rig, joints: &[Uid], name: &str, uids: Option<&mut UidSourc
     }
     let about = RigAbout {
         sockets: header_sockets(rig, &chosen, &remap),
-        options: rig.about().options.iter().filter(|option| can_set(&out, option)).cloned().collect(),
+        options: settable_options(rig, &out),
         ..out.about().clone()
     };
     if about != *out.about() {
@@ -117,10 +118,26 @@ fn header_sockets(rig: &Rig, chosen: &HashSet<Uid>, remap: &Remap) -> Vec<Header
     inside.map(here).collect()
 }
 
-/// True if a rig has all that an option sets.
-fn can_set(rig: &Rig, option: &PartOption) -> bool {
+/// Options of a rig of which an extracted one has all that they set.
+fn settable_options(rig: &Rig, extracted: &Rig) -> Vec<PartOption> {
     let plain = PartInstance::default();
-    option.sets.iter().all(|(tag, _)| plain.find_tag(rig, tag).is_ok())
+    let targets = PartTargets::new(&plain, extracted);
+    let is_settable = |option: &&PartOption| option.sets.iter().all(|(tag, _)| targets.find_tag(tag).is_ok());
+    rig.about().options.iter().filter(is_settable).cloned().collect()
+}
+
+/// The nearest chosen joint above each joint that has one above it.
+fn nearest_above(rig: &Rig, chosen: &HashSet<Uid>) -> HashMap<Uid, Uid> {
+    let mut nearest: HashMap<Uid, Uid> = HashMap::new();
+    // Parents come before their children, so one step is enough for each joint.
+    for joint in rig.walk() {
+        let above = joint.parent.filter(|parent| chosen.contains(parent));
+        let above = above.or_else(|| nearest.get(&joint.parent?).copied());
+        if let Some(above) = above {
+            nearest.insert(joint.data.uid, above);
+        }
+    }
+    nearest
 }
 
 /// Inputs that a tag refers to.

@@ -1,6 +1,7 @@
 //! `rigsmith pose` and `render --build`: the app on the command line, with the real binary, real files and exit codes.
 
 mod names;
+mod rest;
 mod several_meshes;
 
 use std::{collections::BTreeSet, fs, path::Path, sync::Arc};

@@ -11,7 +11,7 @@ use rigsmith::{
         stroke::StrokeTips,
     },
     prelude::Selection,
-    rig::{Rig, Uid},
+    rig::{Rig, Uid, template::read_template},
 };
 
 use crate::gestures::boxes;
@@ -201,12 +201,12 @@ fn strokes(count: usize) -> Vec<Gesture> {
     (0..count).map(stroke).collect()
 }
 
-/// Joints that strokes visit, and joints at which entities look to follow them.
-fn work_of_strokes(count: usize) -> [u64; 2] {
-    let mut bench = bench();
-    let answers = bench.gestures(strokes(count));
+/// Joints that strokes visit, and joints at which entities look to follow them. At least so many joints come for each stroke.
+fn work_of_strokes(mut bench: Workbench, gestures: Vec<Gesture>, least: usize) -> [u64; 2] {
+    let count = gestures.len();
+    let answers = bench.gestures(gestures);
     assert!(answers.len() == count && answers.iter().all(|answer| answer.done), "{answers:?}");
-    assert!(bench.rig().len() > 3 * count, "{} joints", bench.rig().len());
+    assert!(bench.rig().len() > least * (count - 1), "{} joints", bench.rig().len());
     let rig = bench.rig_entity();
     let followed = bench.app_mut().world().get::<JointEntities>(rig).unwrap().visits();
     [bench.rig().visits(), followed]
@@ -291,6 +291,55 @@ fn entities_follow_strokes_a_few_times() {
 
 #[test]
 fn strokes_are_followed_in_proportion_to_their_number() {
-    let works: Vec<[u64; 2]> = [100, 200, 400].into_iter().map(work_of_strokes).collect();
+    let works = [100, 200, 400].map(|count| work_of_strokes(bench(), strokes(count), 3));
     check_growth("strokes", &works);
+}
+
+#[test]
+fn mirrored_strokes_are_followed_in_proportion_to_their_number() {
+    let mirrored = |count: usize| [vec![Gesture::Mirror(true)], strokes(count)].concat();
+    let works = [100, 200, 400].map(|count| work_of_strokes(bench(), mirrored(count), 6));
+    check_growth("mirrored strokes", &works);
+}
+
+#[test]
+fn runs_of_mirrored_strokes_give_what_strokes_one_a_frame_give() {
+    let answers = check(
+        "[Mirror(true), Recentre(false), Stroke(points: [(0.0, 0.2), (0.0, 0.9)], joints: 3), \
+         Stroke(points: [(0.0, 0.9), (0.4, 1.1)], joints: 3), Stroke(points: [(0.4, 1.1), (0.8, 1.3)], joints: 3), \
+         Stroke(points: [(-0.4, 1.1), (-0.6, 0.6)], joints: 3), Click((0.5, 0.3)), \
+         Stroke(points: [(-0.5, 0.3), (-0.8, 0.2)], joints: 3), Deselect, \
+         Stroke(points: [(0.2, 1.6), (0.6, 1.8)], joints: 3), Stroke(points: [(-0.6, 1.8), (-0.8, 1.9)], joints: 3), \
+         Stroke(points: [(-0.2, 1.4), (0.2, 1.4)], joints: 3), Stroke(points: [(0.3, 0.5), (0.7, 0.7)]), \
+         Stroke(points: [(-0.8, 0.9), (-0.8, 1.1)]), View(Left), Stroke(points: [(0.2, 0.3), (0.3, 0.7)], joints: 2), \
+         View(Front), Click((0.0, 1.9)), Stroke(points: [(0.1, 1.9), (0.5, 1.9)], joints: 2), Undo, Mirror(false), \
+         Stroke(points: [(0.8, 1.3), (0.9, 1.6)], joints: 2)]",
+        |_| {},
+    );
+    // Both sides of the two joints behind the one on which a stroke starts.
+    assert!(answers.iter().any(|answer| answer.gesture == "Stroke" && answer.joints_added == 4), "{answers:?}");
+}
+
+/// A box with a rig that has a tag, which was not built.
+fn tagged_bench() -> Workbench {
+    let text = "(format: 2, name: \"tagged\", joints: [(label: \"hip\", translation: (0, 0.1, 0), \
+                tags: [Command(module: \"null\", params: (at: \"@this\"))])])";
+    let mut bench = Workbench::with_rig(7, read_template(text.as_bytes()).unwrap().rig);
+    bench.open(boxes(&BOXES), false).unwrap();
+    bench
+}
+
+#[test]
+fn strokes_on_rigs_with_tags_are_followed_in_proportion_to_their_number() {
+    let works = [100, 200, 400].map(|count| work_of_strokes(tagged_bench(), strokes(count), 3));
+    check_growth("tagged", &works);
+}
+
+#[test]
+fn runs_of_strokes_on_rigs_with_tags_give_what_strokes_one_a_frame_give() {
+    check(
+        "[Recentre(false), Stroke(points: [(0.0, 0.1), (0.0, 0.9)], joints: 3), Click((0.4, 0.3)), \
+         Stroke(points: [(0.0, 0.9), (0.4, 1.1)], joints: 3), Undo, Stroke(points: [(0.4, 0.3), (0.8, 1.3)], joints: 3)]",
+        |bench| *bench = tagged_bench(),
+    );
 }

@@ -347,3 +347,27 @@ fn whole_chains_are_moved_in_proportion_to_their_length() {
         }
     }
 }
+
+/// Joints of an extracted rig hang on the nearest of the chosen ones above them, wherever these stand.
+#[test]
+fn extracted_joints_hang_on_the_nearest_one_above() {
+    use rigsmith::rig::{Uid, extract::extract};
+
+    // A chain with a joint beside each of its joints.
+    let beside = |number: usize| joint(&format!("b{number}"), Some(&format!("j{number}")), &[]);
+    let along = |number: usize| {
+        joint(&format!("j{number}"), number.checked_sub(1).map(|above| format!("j{above}")).as_deref(), &[])
+    };
+    let rig = template(&(0..60).flat_map(|number| [along(number), beside(number)]).collect::<Vec<_>>());
+    for step in [1, 2, 7, 50] {
+        let chosen: Vec<Uid> = rig.walk().map(|joint| joint.data.uid).step_by(step).collect();
+        let out = extract(&rig, &chosen, "part", None).unwrap().rig;
+        assert_eq!(out.len(), chosen.len(), "every {step}th");
+        for uid in chosen.iter().copied() {
+            let above = rig.ancestors(uid).map(|above| above.data.uid).find(|above| chosen.contains(above));
+            assert_eq!(out.joint(uid).unwrap().parent, above, "every {step}th: {uid}");
+            let [there, was] = [&out, &rig].map(|rig| rig.rest_global(uid).translation);
+            assert!(there.distance(was) < 1e-3, "every {step}th: {uid}: {there} instead of {was}");
+        }
+    }
+}

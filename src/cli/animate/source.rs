@@ -123,6 +123,7 @@ impl ClipCollector<'_> {
             Some(whole) => read.onto(whole.rig(), whole.built()),
             None => read.onto(bench.rig(), bench.built()),
         };
+        drop(read);
         self.tell_missing(path, &bound, report);
         self.tell_unused(path, whole.is_some(), report);
         if bound.clips.is_empty() {

@@ -21,6 +21,13 @@ pub enum ChainParent {
         /// Number of the joint in its chain, from zero.
         joint: usize,
     },
+    /// Other side of a joint that such a request adds with live mirroring.
+    Partner {
+        /// Number of the request, as for [`ChainParent::Added`].
+        request: usize,
+        /// Number of the joint in its chain, from zero.
+        joint: usize,
+    },
 }
 
 /// Joints that requests of one frame placed and drew, by rig and request.
@@ -33,8 +40,15 @@ impl AddedChains {
         match parent {
             ChainParent::Active => active.filter(|joint| document.joint(*joint).is_some()),
             ChainParent::Joint(joint) => Some(joint),
-            ChainParent::Added { request, joint } => self.0.get(&rig)?.get(request)?.get(joint).copied(),
+            ChainParent::Added { request, joint } => self.added(rig, request, joint),
+            ChainParent::Partner { request, joint } => {
+                document.joint(self.added(rig, request, joint)?).and_then(|joint| joint.data.mirror)
+            }
         }
+    }
+
+    fn added(&self, rig: Entity, request: usize, joint: usize) -> Option<Uid> {
+        self.0.get(&rig)?.get(request)?.get(joint).copied()
     }
 
     /// Notes the joints of a request that places or draws some; `tip` is the last of them, or `None` if it was refused.

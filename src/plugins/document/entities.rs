@@ -116,6 +116,8 @@ pub struct JointEntities {
     of_tags: Option<Revision>,
     /// True if a joint's entity lacked a component that had to be written, so that all joints have to be looked at again.
     pub(super) is_behind: bool,
+    /// Tags of joints that are gone, until their entities follow.
+    pub(super) left_tags: Vec<Uid>,
     /// Number of joints that were looked at.
     visits: u64,
 }
@@ -168,6 +170,11 @@ impl JointEntities {
     /// True if the entities of tags have to follow the document, whose joints have entities already.
     pub(super) fn are_tags_due(&self, rig: &Rig) -> bool {
         is_of(self.of_joints.as_ref(), rig) && !is_of(self.of_tags.as_ref(), rig)
+    }
+
+    /// Joints that edits touched since the entities of tags followed the document; `None` if all have to be looked at.
+    pub(super) fn touched_of_tags(&self, rig: &Rig) -> Option<BTreeSet<Uid>> {
+        rig.touched_since(self.of_tags.as_ref()?)
     }
 
     pub(super) fn note_joints(&mut self, rig: &Rig) {

@@ -183,7 +183,7 @@ fn remove_gone_joints(
             // Remaining children get another parent after the build, so they must not be despawned with this entity.
             entity.detach_all_children().try_despawn();
         }
-        known.joints.remove(uid);
+        known.left_tags.extend(known.joints.remove(uid).into_iter().flat_map(|joint| joint.tags));
         known.posed.remove(uid);
     }
     !gone.is_empty()
@@ -346,12 +346,26 @@ pub(in crate::plugins) fn follow_tags(
         if !joints.are_tags_due(rig) {
             continue;
         }
+        // Tags that other code spawned may belong to any joint.
+        let touched = joints.touched_of_tags(rig).filter(|_| known.adopted.is_empty());
+        let left = std::mem::take(&mut joints.left_tags);
         joints.note_tags(rig);
         if !rig.has_tags() && known.tags.is_empty() && known.adopted.is_empty() {
             continue;
         }
-        joints.count(rig.len());
-        let mut gone: Vec<Uid> = known.tags.keys().filter(|uid| rig.find_tag(**uid).is_none()).copied().collect();
+        let mut due: Vec<&RigJoint> = match &touched {
+            Some(touched) => touched.iter().filter_map(|uid| rig.joint(*uid)).collect(),
+            None => rig.walk().collect(),
+        };
+        joints.count(due.len());
+        let is_gone = |uid: &Uid| rig.find_tag(*uid).is_none();
+        let mut gone: Vec<Uid> = match &touched {
+            Some(touched) => {
+                let before = touched.iter().filter_map(|uid| joints.joints.get(uid)).flat_map(|joint| &joint.tags);
+                before.copied().chain(left).filter(is_gone).collect()
+            }
+            None => known.tags.keys().copied().filter(is_gone).collect(),
+        };
         gone.sort_unstable();
         for uid in gone {
             if let Some(mirrored) = known.tags.remove(&uid) {
@@ -363,7 +377,8 @@ pub(in crate::plugins) fn follow_tags(
         let mut fresh: HashMap<Uid, Entity> = HashMap::new();
         let mut adopted = std::mem::take(&mut known.adopted);
         adopted.retain(|uid, entity| known.get(*uid) == Some(*entity));
-        for joint in rig.walk() {
+        let mut has_fresh_feature = false;
+        for joint in &due {
             for tag in &joint.data.tags {
                 if known.get(tag.uid).is_some() {
                     continue;
@@ -372,9 +387,15 @@ pub(in crate::plugins) fn follow_tags(
                 index.insert(entity, rig_entity, tag.uid, EntityPart::Tag);
                 known.insert_fresh(joint.data.uid, tag, entity);
                 fresh.insert(tag.uid, entity);
+                has_fresh_feature |= matches!(tag.kind, TagKind::Feature { .. });
             }
         }
-        for joint in rig.walk() {
+        if has_fresh_feature && touched.is_some() {
+            // Commands of any joint may be in it.
+            due = rig.walk().collect();
+            joints.count(due.len());
+        }
+        for joint in due {
             let data = &joint.data;
             let Some(mirrored) = joints.joints.get_mut(&data.uid) else { continue };
             let is_ordered = mirrored.tags.iter().copied().eq(data.tags.iter().map(|tag| tag.uid));

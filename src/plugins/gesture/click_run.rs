@@ -23,7 +23,7 @@ use crate::{
         stroke::has_few_triangles,
         surface::RigSurface,
     },
-    rig::Rig,
+    rig::{Rig, operations::MirrorPlane},
 };
 
 /// Number of gestures that a run may have on a rig of fewer joints.
@@ -39,6 +39,8 @@ pub(super) struct RunRig<'a> {
     pub bounds: [Vec3; 2],
     /// True if strokes depend on nothing but the mesh at rest and the joints on which they start.
     pub can_draw: bool,
+    /// Plane of live mirroring, the same for all gestures of the run.
+    pub symmetry: Option<MirrorPlane>,
 }
 
 impl RunRig<'_> {
@@ -119,7 +121,7 @@ pub(super) fn carry_out(
             if !run.can_go_on(state.strokes) {
                 break;
             }
-            let Some(found) = joints.start(run.rig, &plane, size, reach, points) else { break };
+            let Some(found) = joints.start(run, &plane, size, reach, points) else { break };
             if count.is_none() && !joints.is_chain(run.rig, &plane, size, reach, points, found) {
                 break;
             }
@@ -140,7 +142,7 @@ pub(super) fn carry_out(
                 (change, None)
             }
         };
-        joints.note(&change);
+        joints.note(&change, run.symmetry.as_ref());
         state.has_changes = true;
         if !matches!(change, Change::Select(_)) {
             script.requested.push_back(RequestedChange { answer: script.answers.len() - 1, chain });

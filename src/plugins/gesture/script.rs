@@ -17,6 +17,7 @@ use crate::{
         view::{View, ViewPlane},
     },
     plugins::{
+        commands::BuildResult,
         document::{Change, EditRequest, Selection, Symmetry},
         fit::{FitMarkers, FitPart, FitRequest, FitTemplate, FittedRig},
         limits::{Limit, RigLimits},
@@ -184,6 +185,7 @@ pub(super) type ScriptedRig<'a> = (
     Option<&'a RigSurface>,
     Option<&'a RigMeshes>,
     (Has<FittedRig>, Has<FitMarkers>),
+    Has<BuildResult>,
 );
 
 /// Reads the answers to the last gesture of each script and carries out the next one.
@@ -194,7 +196,7 @@ pub(super) fn run_scripts(
     limits: Res<RigLimits>,
 ) {
     answers.collect(&mut scripts);
-    for (entity, mut script, rig, selection, mut symmetry, surface, meshes, is_fitted) in &mut scripts {
+    for (entity, mut script, rig, selection, mut symmetry, surface, meshes, is_fitted, is_built) in &mut scripts {
         if script.pending
             || script.waiting.is_empty()
             || (meshes.is_some() && surface.and_then(RigSurface::ready).is_none())
@@ -206,10 +208,10 @@ pub(super) fn run_scripts(
         if is_fitted == (false, false) && click_run::is_due(&script, rig, surface) {
             let has_mesh = meshes.is_some() && surface.and_then(RigSurface::ready).is_some();
             let is_known = selection.active().is_none_or(|active| rig.joint(active).is_some());
-            // Commands and clips may move joints away from their rest.
-            let is_still = !rig.has_tags() && rig.clips().is_empty();
-            let can_draw = has_mesh && is_known && is_still && symmetry.0.is_none();
-            let run = RunRig { entity, rig, selection, surface, bounds, can_draw };
+            // Commands that were built, and clips, may move joints away from their rest.
+            let is_still = (!rig.has_tags() || !is_built) && rig.clips().is_empty();
+            let can_draw = has_mesh && is_known && is_still;
+            let run = RunRig { entity, rig, selection, surface, bounds, can_draw, symmetry: symmetry.0 };
             if click_run::carry_out(&mut script, &run, &mut requests.edits, &limits) {
                 continue;
             }

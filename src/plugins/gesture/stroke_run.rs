@@ -2,7 +2,8 @@
 //!
 //! A chain depends on nothing but the joint on which its stroke starts. A grid on the view plane finds that joint without a
 //! look at all others. A stroke of a given number of joints is a chain, whatever it crosses. Any other is one unless it is a
-//! scribble, or straight and no longer than a bone that it crosses, see [`classify`](crate::algo::stroke::classify). Entities
+//! scribble, or straight and no longer than a bone that it crosses, see [`classify`](crate::algo::stroke::classify). With live
+//! mirroring the other side of each joint is among those on which a stroke may start. Entities
 //! of joints that were just added stand where their chains have them but for rounding: where that could decide anything, the
 //! stroke belongs to no run.
 
@@ -23,7 +24,10 @@ use crate::{
         document::{ChainParent, Change},
         stroke::{StrokeFailure, StrokeRequest, followed_chain},
     },
-    rig::{Rig, Uid},
+    rig::{
+        Rig, Uid,
+        operations::{MirrorPlane, settle},
+    },
 };
 
 /// Largest difference, as a share of the model's size, between the place of a joint in its chain and that of its entity.
@@ -40,19 +44,47 @@ pub(super) enum StrokeStart {
     On(ChainParent),
 }
 
+/// Joint of a rig, or one that a run adds.
+struct RunJoint {
+    /// The joint, for chains that hang on it.
+    name: ChainParent,
+    place: JointPlace,
+}
+
+/// Position of a joint, and that of its other side; the same for a joint without one.
+#[derive(Clone, Copy)]
+struct JointPlace {
+    here: Vec3,
+    other: Vec3,
+}
+
+impl JointPlace {
+    /// Place of a joint of a rig.
+    fn of(rig: &Rig, joint: Uid, symmetry: Option<&MirrorPlane>) -> Self {
+        let here = rig.position(joint);
+        Self { here, other: partner(rig, joint, symmetry).map_or(here, |partner| rig.position(partner)) }
+    }
+}
+
+/// Other side of a joint with live mirroring; `None` for a joint without one.
+fn partner(rig: &Rig, joint: Uid, symmetry: Option<&MirrorPlane>) -> Option<Uid> {
+    symmetry?;
+    rig.joint(joint)?.data.mirror.filter(|partner| rig.joint(*partner).is_some())
+}
+
 /// Joints of a rig, and those that the requests of a run add to it.
 #[derive(Default)]
 pub(super) struct RunJoints {
-    joints: Vec<(ChainParent, Vec3)>,
+    joints: Vec<RunJoint>,
     /// True if the joints that the rig had before the run are among them.
     is_listed: bool,
     /// Number of requests that add joints.
     requests: usize,
     grid: Option<JointGrid>,
-    /// Position of the active joint.
-    active: Option<Vec3>,
-    /// Position of the joint on which the last stroke started.
-    start: Option<Vec3>,
+    /// Place of the active joint.
+    active: Option<JointPlace>,
+    /// Place of the joint on which the last stroke started.
+    start: Option<JointPlace>,
     bones: Bones,
 }
 
@@ -60,11 +92,12 @@ impl RunJoints {
     /// Joints of a run on a rig.
     pub(super) fn new(run: &RunRig) -> Self {
         let active = run.selection.active().filter(|_| run.can_draw);
-        Self { active: active.map(|joint| run.rig.position(joint)), ..Self::default() }
+        let place = |joint| JointPlace::of(run.rig, joint, run.symmetry.as_ref());
+        Self { active: active.map(place), ..Self::default() }
     }
 
-    /// Takes over the joints that a change adds.
-    pub(super) fn note(&mut self, change: &Change) {
+    /// Takes over the joints that a change adds, with live mirroring across a plane.
+    pub(super) fn note(&mut self, change: &Change, symmetry: Option<&MirrorPlane>) {
         let (positions, parent) = match change {
             Change::Place(position) => (std::slice::from_ref(position), self.active),
             Change::Draw { positions, parent: ChainParent::Active } => (positions.as_slice(), self.active),
@@ -75,15 +108,19 @@ impl RunJoints {
             }
             _ => return,
         };
-        let mut head = parent;
-        for position in positions {
-            self.bones.add(head, *position);
-            head = Some(*position);
+        let (mut above, request) = (parent, self.requests);
+        for (joint, (here, mirrored)) in settle(positions, symmetry).into_iter().enumerate() {
+            let place = JointPlace { here, other: mirrored.unwrap_or(here) };
+            self.bones.add(above.map(|above| above.here), here);
+            self.joints.push(RunJoint { name: ChainParent::Added { request, joint }, place });
+            if let Some(other) = mirrored {
+                self.bones.add(above.map(|above| above.other), other);
+                let place = JointPlace { here: other, other: here };
+                self.joints.push(RunJoint { name: ChainParent::Partner { request, joint }, place });
+            }
+            above = Some(place);
         }
-        self.active = head;
-        for (joint, position) in positions.iter().enumerate() {
-            self.joints.push((ChainParent::Added { request: self.requests, joint }, *position));
-        }
+        self.active = above;
         self.requests += 1;
     }
 
@@ -91,18 +128,14 @@ impl RunJoints {
     /// could decide it.
     pub(super) fn start(
         &mut self,
-        rig: &Rig,
+        RunRig { rig, symmetry, .. }: &RunRig,
         plane: &ViewPlane,
         size: f32,
         reach: f32,
         points: &[(f32, f32)],
     ) -> Option<StrokeStart> {
         let Some(point) = points.first().map(|point| Vec2::from(*point)) else { return Some(StrokeStart::Free) };
-        if !self.is_listed {
-            let listed = rig.rest_globals().into_iter();
-            self.joints.extend(listed.map(|(uid, global)| (ChainParent::Joint(uid), global.translation)));
-            self.is_listed = true;
-        }
+        self.list_joints(rig, symmetry.as_ref());
         self.start = None;
         let margin = MARGIN * size;
         let radius = reach + margin;
@@ -128,12 +161,28 @@ impl RunJoints {
         match nearest {
             None => Some(StrokeStart::Free),
             Some((distance, number)) if distance + margin <= reach && next - distance > 2.0 * margin => {
-                let (joint, position) = self.joints.get(number)?;
-                self.start = Some(*position);
-                Some(StrokeStart::On(*joint))
+                let joint = self.joints.get(number)?;
+                self.start = Some(joint.place);
+                Some(StrokeStart::On(joint.name))
             }
             Some(_) => None,
         }
+    }
+
+    /// Takes over the joints that the rig had before the run.
+    fn list_joints(&mut self, rig: &Rig, symmetry: Option<&MirrorPlane>) {
+        if self.is_listed {
+            return;
+        }
+        self.is_listed = true;
+        let globals = rig.rest_globals();
+        let places: HashMap<Uid, Vec3> = globals.iter().map(|(uid, global)| (*uid, global.translation)).collect();
+        let listed = globals.into_iter().map(|(uid, global)| {
+            let here = global.translation;
+            let other = partner(rig, uid, symmetry).and_then(|partner| places.get(&partner).copied()).unwrap_or(here);
+            RunJoint { name: ChainParent::Joint(uid), place: JointPlace { here, other } }
+        });
+        self.joints.extend(listed);
     }
 
     /// True if a stroke that starts there is a chain in any case, also without a given number of joints.
@@ -165,9 +214,9 @@ impl RunJoints {
             return;
         }
         self.bones.is_listed = true;
-        let place = |(joint, position): &(ChainParent, Vec3)| match joint {
-            ChainParent::Joint(uid) => Some((*uid, *position)),
-            ChainParent::Active | ChainParent::Added { .. } => None,
+        let place = |joint: &RunJoint| match joint.name {
+            ChainParent::Joint(uid) => Some((uid, joint.place.here)),
+            ChainParent::Active | ChainParent::Added { .. } | ChainParent::Partner { .. } => None,
         };
         let places: HashMap<Uid, Vec3> = self.joints.iter().filter_map(place).collect();
         for (uid, position) in self.joints.iter().filter_map(place) {
@@ -269,9 +318,9 @@ impl JointGrid {
     }
 
     /// Takes over the joints that were added since the last call.
-    fn follow(&mut self, joints: &[(ChainParent, Vec3)]) {
-        for (number, (_, position)) in joints.iter().enumerate().skip(self.count) {
-            if let Some(place) = self.plane.project(*position) {
+    fn follow(&mut self, joints: &[RunJoint]) {
+        for (number, joint) in joints.iter().enumerate().skip(self.count) {
+            if let Some(place) = self.plane.project(joint.place.here) {
                 let cell = self.cell_of(place);
                 self.cells.entry(cell).or_default().push((place, number));
             }
@@ -299,7 +348,7 @@ impl GestureScript {
         start: StrokeStart,
         run: &RunRig,
     ) -> Option<(Change, ChainAnswer)> {
-        let chain = match followed_chain(request, run.surface?, None) {
+        let chain = match followed_chain(request, run.surface?, run.symmetry) {
             Ok(chain) => chain,
             Err(error) => {
                 self.fail(&StrokeFailure::from(error).into());

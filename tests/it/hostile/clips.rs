@@ -65,6 +65,33 @@ fn clips_of_many_frames_are_baked_within_their_memory() {
     }
 }
 
+/// Clips of one key each: what a clip takes besides its keys counts.
+#[test]
+fn thousands_of_short_clips_stay_within_their_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = "(format: 2, name: \"n\", joints: [(uid: \"0000000000001001\", label: \"j\", translation: (0, 0.1, 0))])";
+    fs::write(folder.path().join("j.rig.ron"), rig).unwrap();
+    let one = |number: usize| {
+        format!(
+            "(uid: \"00000000c1{number:06x}\", name: \"c{number}\", frame_rate: 30.0, range: (0.0, 10.0), layers: [(uid: \
+             \"00000000c2{number:06x}\", name: \"Base\", tracks: [(node: \"0000000000001001\", property: Translation, \
+             keys: [(t: 0.0, v: (0, 0, 1))])])])"
+        )
+    };
+    let all: Vec<String> = (0..6_000).map(one).collect();
+    let text = format!("(format: 1, rig: \"0000000000000099\", rig_name: \"n\", clips: [{}])", all.join(", "));
+    let clips = "many.anim.ron";
+    fs::write(folder.path().join(clips), text).unwrap();
+    check(
+        folder.path(),
+        &[
+            (&[clips], &["animate", "j.rig.ron", clips, "-o", "out.anim.ron"]),
+            (&[clips], &["animate", "j.rig.ron", clips, "-o", "out.glb"]),
+            (&[clips], &["animate", "j.rig.ron", clips, "-o", "out.rigclip"]),
+        ],
+    );
+}
+
 #[test]
 fn transforms_and_markers_beyond_their_limits_are_told() {
     let folder = tempfile::tempdir().unwrap();

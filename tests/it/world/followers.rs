@@ -1,20 +1,53 @@
 //! Entities that follow a document: an edit costs what it touches, whatever the size of the rig.
 
 use bevy::prelude::*;
-use rigsmith::{plugins::document::JointEntities, prelude::*, rig::JointData};
+use rigsmith::{
+    plugins::{
+        document::{JointEntities, TagEntities},
+        schema::TagOf,
+    },
+    prelude::*,
+    rig::{JointData, TagData, TagKind},
+};
 
 use super::RigBench;
 
 /// Number of rounds of edits.
 const ROUNDS: usize = 20;
 
-/// Joints that are looked at when single joints of a chain are named, moved, joined by others and undone.
-fn visits(count: usize) -> u64 {
+/// A command without effect on joints.
+fn null_tag(uid: u64) -> TagData {
+    let kind = TagKind::Command { module: "null".to_owned(), params: "(at: \"@this\")".to_owned(), feature: None };
+    TagData { uid: Uid(uid), kind, enabled: true, comment: String::new() }
+}
+
+/// Entities of tags are those of the document's tags.
+#[track_caller]
+fn assert_tagged(stage: &RigBench) {
+    let known = stage.get::<TagEntities>(stage.rig).unwrap();
+    for joint in stage.rig().walk() {
+        for tag in &joint.data.tags {
+            let entity = known.get(tag.uid).unwrap();
+            let bearer = stage.get::<TagOf>(entity).map(|of| of.0);
+            assert_eq!(bearer, Some(stage.joint(joint.data.uid)), "tag {}", tag.uid);
+        }
+    }
+}
+
+/// Joints that are looked at when single joints of a chain, which all have a tag or none, are named, moved, joined by others
+/// and undone.
+fn visits(count: usize, is_tagged: bool) -> u64 {
     let mut stage = RigBench::new();
     stage.app.update();
     let places: Vec<[f32; 3]> = (0..count).map(|number| [0.0, 0.1 * number as f32, 0.0]).collect();
     let joints = stage.chain(&places);
     assert_eq!(joints.len(), count);
+    if is_tagged {
+        let tagged =
+            |(joint, uid): (&Uid, u64)| RigEdit::AddTag { joint: *joint, tag: Box::new(null_tag(uid)), index: 0 };
+        stage.apply_all(joints.iter().zip(0x7000..).map(tagged).collect());
+        assert_tagged(&stage);
+    }
     stage.frames(3);
     let looked_at = |stage: &RigBench| stage.get::<JointEntities>(stage.rig).unwrap().visits();
     let before = looked_at(&stage);
@@ -29,20 +62,36 @@ fn visits(count: usize) -> u64 {
         let added = *stage.rig().children(Some(joint)).last().unwrap();
         assert_eq!(stage.get::<ChildOf>(stage.joint(added)).map(ChildOf::parent), Some(entity));
         stage.frames(2);
-        if round.is_multiple_of(2) {
+        let is_even = round.is_multiple_of(2);
+        if is_tagged {
+            let tag = null_tag(0x9000 + round as u64);
+            let uid = tag.uid;
+            stage.apply(RigEdit::AddTag { joint: added, tag: Box::new(tag), index: 0 });
+            assert_tagged(&stage);
+            // The tag goes with its joint, or alone.
+            if is_even {
+                stage.apply(RigEdit::RemoveJoint(added));
+            } else {
+                stage.change(Change::Undo);
+            }
+            assert_eq!(stage.get::<TagEntities>(stage.rig).unwrap().get(uid), None);
+        } else if is_even {
             stage.change(Change::Undo);
-            assert_eq!(stage.find(added), None);
         }
+        assert_eq!(stage.find(added).is_none(), is_even);
     }
+    assert_tagged(&stage);
     assert_eq!(stage.rig().len(), count + ROUNDS / 2);
     looked_at(&stage) - before
 }
 
 #[test]
 fn edits_of_single_joints_are_followed_by_these_alone() {
-    let visits: Vec<u64> = [100, 200, 400].into_iter().map(visits).collect();
-    for more in &visits[1..] {
-        assert!(visits[0] > 0 && *more <= visits[0] + visits[0] / 10, "{visits:?}");
+    for is_tagged in [false, true] {
+        let visits = [100, 200, 400].map(|count| visits(count, is_tagged));
+        for more in &visits[1..] {
+            assert!(visits[0] > 0 && *more <= visits[0] + visits[0] / 10, "{is_tagged}: {visits:?}");
+        }
     }
 }
 

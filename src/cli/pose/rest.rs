@@ -1,0 +1,80 @@
+//! Rigs at rest: where nothing is written to a rig without commands, its nodes are told and saved without an app, whose
+//! entities take several times the memory.
+
+use std::sync::Arc;
+
+use bevy::prelude::{GlobalTransform, Transform, Vec3};
+
+use super::{PoseArgs, tell_nodes};
+use crate::{
+    cli::{Failure, Report, build, limits},
+    headless::posing::{PoseError, PosedNode},
+    plugins::surface::RigMesh,
+    processor::Builder,
+    rig::{BuiltRig, Rig},
+    solve::program::{CompileOptions, RigProgram, RigState},
+};
+
+/// True if the command asks for nothing but the rig, without meshes, and the rig has neither commands nor a pose. Unevenly
+/// scaled joints are left to an app, which corrects how Bevy shears what is below them.
+pub(super) fn is_at_rest(args: &PoseArgs, own: &[RigMesh], rig: &Rig) -> bool {
+    let steps = &args.steps;
+    let is_plain = steps.set.is_empty() && steps.switches.is_empty() && steps.frames == 0;
+    let is_bare = !rig.has_tags() && rig.pose().is_empty();
+    let is_even = |scale: Vec3| scale == Vec3::splat(scale.x);
+    is_plain
+        && args.meshes.is_empty()
+        && own.is_empty()
+        && is_bare
+        && rig.walk().all(|joint| is_even(joint.data.rest.scale))
+}
+
+/// Tells the nodes of a rig at rest, and saves it if that is asked for.
+pub(super) fn pose(args: &PoseArgs, rig: Rig, report: &mut Report) -> Result<(), Failure> {
+    let mut builder = Builder::new(Arc::new(limits::modules()));
+    builder.sync(&rig);
+    let outcome = builder.run_all();
+    let built = builder.built();
+    drop(builder);
+    if let Some(error) = outcome.error {
+        return Err(Failure::Input(Box::new(error)));
+    }
+    limits::check_time("building the rig")?;
+    tell(&built, report)?;
+    if let Some(output) = &args.output {
+        report.notes(build::store_at_rest(output, &args.rig, rig, built, &args.export, false)?);
+    }
+    Ok(())
+}
+
+/// Tells the nodes of a built rig, as entities show them and as the program computes them.
+fn tell(built: &BuiltRig, report: &mut Report) -> Result<(), PoseError> {
+    let program = RigProgram::compile(built, &CompileOptions::default()).map_err(PoseError::CannotRun)?;
+    let mut state = RigState::new(Arc::new(program));
+    state.evaluate(0.0);
+    let mut shown: Vec<GlobalTransform> = Vec::with_capacity(built.nodes.len());
+    for node in &built.nodes {
+        if state.global(node.uid).is_some_and(|global| !global.translation.is_finite()) {
+            return Err(PoseError::NotFinite { node: node.name.to_string() });
+        }
+        let above = node.parent.map_or(GlobalTransform::IDENTITY, |parent| shown[parent]);
+        let base = node.base;
+        shown.push(above.mul_transform(Transform {
+            translation: base.translation,
+            rotation: base.rotation,
+            scale: base.scale,
+        }));
+    }
+    let posed = built.nodes.iter().zip(&shown).filter_map(|(node, shown)| {
+        let place = state.global(node.uid)?;
+        let (translation, rotation, scale) = (place.translation, place.rotation, place.scale);
+        Some(PosedNode {
+            node: node.clone(),
+            parent: node.parent.map(|parent| built.nodes[parent].uid),
+            entity: shown.compute_transform(),
+            program: Transform { translation, rotation, scale },
+        })
+    });
+    tell_nodes(report, posed);
+    Ok(())
+}

@@ -1,0 +1,49 @@
+//! Rigs at rest, which are posed without an app: what is told and saved is that of an app.
+
+use std::fs;
+
+use super::pose;
+
+/// Turned and moved joints, a null, two roots and a joint without a label.
+const LIMBS: &str = r#"(
+    format: 2,
+    name: "limbs",
+    joints: [
+        (label: "hip", translation: (0.1, 1.0, -0.2), rotation: (0.0, 0.0, 0.6, 0.8), scale: (2.0, 2.0, 2.0)),
+        (label: "knee", parent: "hip", translation: (0, -0.4, 0.03), rotation: (0.6, 0.0, 0.0, 0.8)),
+        (label: "foot", parent: "knee", translation: (0.013, -0.41, 0.007)),
+        (uid: "00000000000000a1", parent: "foot", translation: (0.1, 0.2, 0.3)),
+        (label: "prop", kind: Null, translation: (0.5, 0.25, 0.125)),
+    ],
+)"#;
+
+/// Joints of which one is scaled unevenly, and another one turned below it.
+const UNEVEN: &str = r#"(
+    format: 2,
+    name: "uneven",
+    joints: [
+        (label: "top", translation: (0, 1, 0), scale: (1.0, 3.0, 1.0)),
+        (label: "turned", parent: "top", translation: (0, 0.5, 0), rotation: (0.0, 0.0, 0.6, 0.8)),
+        (label: "tip", parent: "turned", translation: (0, 0.5, 0)),
+    ],
+)"#;
+
+#[test]
+fn rigs_at_rest_are_told_and_saved_as_by_an_app() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [("limbs", LIMBS), ("uneven", UNEVEN)] {
+        let rig = format!("{name}.rig.ron");
+        fs::write(folder.path().join(&rig), text).unwrap();
+        for ending in ["glb", "rig.ron"] {
+            let [rest, app] = ["rest", "app"].map(|which| format!("{name}_{which}.{ending}"));
+            let told = pose(folder.path(), &rig, &["-o", &rest]);
+            // Frames pass in an app alone.
+            let shown = pose(folder.path(), &rig, &["-o", &app, "--frames", "1"]);
+            assert!(told["nodes"].as_array().is_some_and(|nodes| nodes.len() >= 3), "{told}");
+            assert_eq!(told["nodes"], shown["nodes"], "{name}");
+            assert_eq!(told["error"], shown["error"], "{name}");
+            let [saved, wanted] = [rest, app].map(|file| fs::read(folder.path().join(file)).unwrap());
+            assert!(saved == wanted, "{name}.{ending}: other bytes");
+        }
+    }
+}
