@@ -195,3 +195,32 @@ fn figures_of_plates_are_held_by_their_bones() {
     // The root on the ground holds nothing.
     assert!((0..points.len()).all(|point| weight(&weights, point, 0) == 0.0));
 }
+
+/// Legs that end at the knee, while foot and toe hang on the target of the leg: far from the body's bones they hold their
+/// flesh. Handles beside the body's own bones and small ones just behind its last joint hold nothing.
+#[test]
+fn feet_that_hang_on_targets_hold_flesh_and_handles_none() {
+    let (points, triangles) = tube();
+    let bound = |chain: [f32; 6], handles: [f32; 3]| {
+        let mut joints = vec![joint([0.0, -6.0, 0.0], None)];
+        joints.extend(chain.iter().enumerate().map(|(above, x)| joint([*x, 0.0, 0.0], Some(above))));
+        let parents = [0, 7, 8];
+        joints.extend(handles.iter().zip(parents).map(|(x, parent)| joint([*x, 0.0, 0.0], Some(parent))));
+        let weights = bind(&points, &triangles, &joints).0;
+        check_sound(&weights, points.len(), &joints, 8);
+        weights
+    };
+    let held = |weights: &Weights, point: usize| (7..10).map(|joint| weight(weights, point, joint)).sum::<f32>();
+    let feet = bound([0.1, 0.3, 0.5, 0.7, 0.9, 1.2], [3.0, 3.0, 3.4]);
+    for (point, place) in points.iter().enumerate() {
+        let held = held(&feet, point);
+        assert!(place.x < 3.45 || held > 0.9, "{held} of the foot at {place}");
+        assert!(place.x > 1.55 || held < 0.1, "{held} of the leg at {place}");
+    }
+    for (chain, handles) in
+        [([0.1, 0.5, 1.2, 2.0, 3.0, 3.6], [3.0, 3.0, 3.4]), ([0.1, 0.3, 0.5, 0.7, 1.2, 3.0], [3.2, 3.2, 3.25])]
+    {
+        let weights = bound(chain, handles);
+        assert!((0..points.len()).all(|point| held(&weights, point) == 0.0), "handles at {handles:?}");
+    }
+}
