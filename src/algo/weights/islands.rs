@@ -14,6 +14,8 @@ const SPECK: f32 = 0.2;
 
 /// A part moves with one joint if that joint holds at least this share of it.
 const HELD: f32 = 0.8;
+/// A part moves with a slot if the slot holds at least this share of it: slots hold no flesh, so it is a thing that they carry.
+const CARRIED: f32 = 0.5;
 
 /// Approximate number of places of a small part that look for the part that it lies on.
 const SAMPLES: usize = 32;
@@ -64,12 +66,13 @@ impl Islands {
 
     /// Weights with which parts stay as stiff as they are: a part that one joint holds in nearly its whole size (helmet,
     /// eye, sword) moves with that joint, and each small part moves as one. The holder of a small part is the joint with
-    /// the largest share. A surface in one piece stays as it is, and so do the parts that have one of the `bending`
-    /// places.
+    /// the largest share. A part of which a slot beside flesh, as `slots` flags joints, holds the most is what it carries. A
+    /// surface in one piece stays as it is, and so do the parts that have one of the `bending` places.
     pub fn stiffened(
         &self,
         (places, triangles): (&[Vec3], &[[u32; 3]]),
         weights: &Weights,
+        slots: &[bool],
         bending: &[u32],
     ) -> (Weights, Stiffness) {
         let mut sums: Vec<BTreeMap<u32, f32>> = vec![BTreeMap::new(); self.extents.len()];
@@ -82,12 +85,15 @@ impl Islands {
         }
         let mut bends = vec![false; self.extents.len()];
         bending.iter().for_each(|place| bends[self.of[*place as usize] as usize] = true);
+        // Where nothing else holds flesh slots do.
+        let has_flesh = sums.iter().flat_map(BTreeMap::keys).any(|joint| !slots[*joint as usize]);
+        let enough = |joint: u32| if has_flesh && slots[joint as usize] { CARRIED } else { HELD };
         let is_part = counts.iter().filter(|count| **count > 2).count() > 1;
         let mut rows: Vec<Option<Vec<(u32, f32)>>> = (sums.iter().zip(&counts).enumerate())
             .map(|(island, (sums, count))| {
                 let whole: f32 = sums.values().sum();
                 let first = sums.iter().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)))?;
-                match *first.1 >= HELD * whole {
+                match *first.1 >= enough(*first.0) * whole {
                     _ if !is_part || *count < 3 || bends[island] => None,
                     true => Some(vec![(*first.0, 1.0)]),
                     false if self.are_small(island) => {
