@@ -24,6 +24,22 @@ impl Model {
         (0..self.objects.len()).filter(is_gear).collect()
     }
 
+    /// The node on which each point hangs, as part of an object without a skin; empty if no object hangs on a node.
+    pub fn carriers(&self) -> Vec<Option<usize>> {
+        let mut carriers = Vec::new();
+        for part in &self.parts {
+            let object = self.objects.get(part.object).filter(|object| object.skin.is_none());
+            let Some(node) = object.and_then(|object| object.node) else { continue };
+            carriers.resize(self.points.len(), None);
+            for point in &part.vertices {
+                if let Some(carrier) = carriers.get_mut(*point as usize) {
+                    *carrier = Some(node);
+                }
+            }
+        }
+        carriers
+    }
+
     /// Numbers of the triangles, in the order of [`Model::point_triangles`], whose objects are wanted.
     pub fn triangles_of(&self, is_wanted: impl Fn(usize) -> bool) -> Vec<u32> {
         let mut first = 0;

@@ -9,7 +9,7 @@ use std::{
 use bevy::math::{Affine3, Mat4};
 
 use crate::{
-    mesh::model::{Channel, ChannelTarget, Clip, Model, Node, Object, SkinBinding, Weights},
+    mesh::model::{Channel, ChannelTarget, Clip, Model, Node, SkinBinding, Weights},
     rig::{
         BuiltRig, JointData, NodeKind, Rig, RigEdit, SkinData, Uid, UidSource,
         bake::baked,
@@ -53,35 +53,20 @@ pub fn import_skeleton(model: &Model, uids: &mut UidSource) -> ImportedSkeleton 
 /// Weights of a model in which points of objects without a skin follow the node that the object hangs on, as helmets and
 /// swords do. `None` for models in which nothing is skinned and no joint carries an object.
 fn followed(model: &Model) -> Option<Weights> {
-    let mut carriers: Vec<Option<u32>> = Vec::new();
-    let mut is_moved = model.weights.is_some();
-    for part in &model.parts {
-        let Some(node) = model.objects.get(part.object).and_then(carrier) else { continue };
-        carriers.resize(model.points.len(), None);
-        is_moved |= model.nodes.get(node).is_some_and(|node| node.joint);
-        for point in &part.vertices {
-            if let Some(carrier) = carriers.get_mut(*point as usize) {
-                *carrier = Some(node as u32);
-            }
-        }
-    }
-    if carriers.is_empty() || !is_moved {
+    let carriers = model.carriers();
+    let is_joint = |node: &usize| model.nodes.get(*node).is_some_and(|node| node.joint);
+    if carriers.is_empty() || model.weights.is_none() && !carriers.iter().flatten().any(is_joint) {
         return model.weights.clone();
     }
     let mut weights = Weights::default();
     for (point, carrier) in carriers.into_iter().enumerate() {
         match (carrier, &model.weights) {
-            (Some(node), _) => weights.push([(node, 1.0)]),
+            (Some(node), _) => weights.push([(node as u32, 1.0)]),
             (None, Some(given)) if point < given.len() => weights.push(given.of(point)),
             (None, _) => weights.push([]),
         }
     }
     Some(weights)
-}
-
-/// The node that an object without a skin hangs on.
-fn carrier(object: &Object) -> Option<usize> {
-    object.node.filter(|_| object.skin.is_none())
 }
 
 /// Turns a `.rig` text into edits that add its joints, parents before children, and returns their uids in its order.
@@ -214,23 +199,25 @@ pub fn character(parts: &Character) -> Model {
 /// Settles the objects that hang on a node in their file: those that follow it alone go on to hang on it, without weights, as
 /// files have them; others, as after painting, get a skin that is bound at rest.
 fn settle_carried(model: &mut Model, globals: &[(Uid, Affine3)]) {
-    if model.objects.iter().all(|object| carrier(object).is_none()) {
+    let carriers = model.carriers();
+    if carriers.is_empty() {
         return;
     }
     let Some(weights) = model.weights.take() else { return };
-    let mut held: Vec<Option<(usize, usize)>> = vec![None; weights.len()];
     let mut is_rebound = vec![false; model.objects.len()];
+    let mut object_of = vec![0; carriers.len()];
     for part in &model.parts {
-        let Some(node) = carrier(&model.objects[part.object]) else { continue };
-        for point in part.vertices.iter().map(|point| *point as usize).filter(|point| *point < weights.len()) {
-            held[point] = Some((node, part.object));
+        for point in part.vertices.iter().map(|point| *point as usize) {
+            let carrier = carriers.get(point).copied().flatten();
+            let Some(node) = carrier.filter(|_| point < weights.len()) else { continue };
+            object_of[point] = part.object;
             is_rebound[part.object] |= weights.of(point).any(|(joint, _)| joint as usize != node);
         }
     }
     let (mut settled, mut joints) = (Weights::default(), BTreeSet::new());
-    for (point, held) in held.into_iter().enumerate() {
-        match held {
-            Some((node, object)) if is_rebound[object] => {
+    for (point, carrier) in carriers.into_iter().enumerate().take(weights.len()) {
+        match carrier {
+            Some(node) if is_rebound[object_of[point]] => {
                 let mut row: Vec<(u32, f32)> = weights.of(point).collect();
                 if row.is_empty() {
                     row.push((node as u32, 1.0));
