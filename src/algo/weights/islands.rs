@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::Vec3;
 
-use super::{Method, claim::Claim, laplacian::Graph, report::Stiffness};
+use super::{Method, claim::Claim, laplacian::Graph, report::Stiffness, sight::is_surrounded};
 use crate::mesh::{adjacency, model::Weights, surface::Surface};
 
 /// Heat is trusted on an island if at least this share of its area sees the bone that claims it.
@@ -111,20 +111,16 @@ impl Islands {
                 None => stiff.push(weights.of(place)),
             }
         }
-        let strongest =
-            |row: &Vec<(u32, f32)>| row.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
-        let holders = rows.iter().map(|row| row.as_ref().and_then(strongest)).collect();
+        let holders = rows.iter().map(|row| row.as_deref().and_then(strongest)).collect();
         (stiff, Stiffness { of: self.of.clone(), holders })
     }
 
-    /// Gives each small part that several joints share to the joint that alone holds the large part on which it lies: a bolt
-    /// on a helmet moves with the helmet, whatever bones are near. Rows shared by joints would shrink it as they turn apart.
+    /// Gives each small part that several joints share to one of them, where one is known: a bolt on a helmet moves with the
+    /// joint that alone holds the helmet, whatever bones are near, and a tooth, which larger parts are all around, with the
+    /// joint that holds the most of it. Rows shared by joints would shrink such a part as they turn apart.
     fn take_along(&self, places: &[Vec3], triangles: &[[u32; 3]], rows: &mut [Option<Vec<(u32, f32)>>]) {
         let joints = |island: usize| rows[island].as_ref().map_or(0, Vec::len);
         let is_bearer = |island: usize| joints(island) == 1 && !self.are_small(island);
-        if !(0..rows.len()).any(is_bearer) {
-            return;
-        }
         let mut shared: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for (place, &island) in self.of.iter().enumerate().filter(|(_, island)| joints(**island as usize) > 1) {
             shared.entry(island as usize).or_default().push(place);
@@ -135,7 +131,7 @@ impl Islands {
         let island_of = |triangle: &[u32; 3]| self.of[triangle[0] as usize] as usize;
         let large: Vec<[u32; 3]> = triangles.iter().copied().filter(|t| !self.are_small(island_of(t))).collect();
         let surface = Surface::build(places, &large);
-        let bearer = |(&island, members): (&usize, &Vec<usize>)| {
+        let row_of = |island: usize, members: &Vec<usize>| {
             let samples = members.iter().step_by(members.len().div_ceil(SAMPLES));
             let (count, mut votes) = (samples.len(), BTreeMap::<usize, usize>::new());
             let nearest = samples.filter_map(|place| surface.closest_point(places[*place]));
@@ -143,11 +139,22 @@ impl Islands {
                 *votes.entry(island_of(&large[nearest.triangle as usize])).or_default() += 1;
             }
             let most = votes.into_iter().find(|(_, votes)| 2 * votes > count);
-            most.filter(|(bearer, _)| is_bearer(*bearer)).map(|(bearer, _)| (island, bearer))
+            if let Some((bearer, _)) = most.filter(|(bearer, _)| is_bearer(*bearer)) {
+                return rows[bearer].clone();
+            }
+            let center = members.iter().map(|place| places[*place]).sum::<Vec3>() / members.len() as f32;
+            let holder = rows[island].as_deref().and_then(strongest).filter(|_| is_surrounded(&surface, center));
+            holder.map(|(joint, _)| vec![(joint, 1.0)])
         };
-        let taken: Vec<(usize, usize)> = shared.iter().filter_map(bearer).collect();
-        for (island, bearer) in taken {
-            rows[island] = rows[bearer].clone();
+        let taken = shared.iter().filter_map(|(island, members)| Some((*island, row_of(*island, members)?)));
+        let taken: Vec<(usize, Vec<(u32, f32)>)> = taken.collect();
+        for (island, row) in taken {
+            rows[island] = Some(row);
         }
     }
+}
+
+/// The influence with the largest weight; the first joint of several.
+fn strongest(row: &[(u32, f32)]) -> Option<(u32, f32)> {
+    row.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
 }

@@ -224,3 +224,21 @@ fn feet_that_hang_on_targets_hold_flesh_and_handles_none() {
         assert!((0..points.len()).all(|point| held(&weights, point) == 0.0), "handles at {handles:?}");
     }
 }
+
+/// A thing inside of the tube where two bones meet, as a tooth, moves with one joint; one that lies on the tube there, as a
+/// button, keeps the shares of the skin around it.
+#[test]
+fn small_things_inside_of_flesh_move_with_one_joint() {
+    let (mut points, mut triangles) = tube();
+    let tooth = add_box(&mut points, &mut triangles, Vec3::new(1.9, -0.1, -0.1), Vec3::new(2.1, 0.1, 0.1));
+    let button = add_box(&mut points, &mut triangles, Vec3::new(1.95, 0.32, -0.05), Vec3::new(2.05, 0.36, 0.05));
+    let (weights, report) = bind(&points, &triangles, &tube_joints());
+    check_sound(&weights, points.len(), &tube_joints(), 8);
+    let row = |point: usize| weights.of(point).collect::<Vec<_>>();
+    let [(joint, share)] = row(tooth.start)[..] else { panic!("{:?}", row(tooth.start)) };
+    assert!(joint < 2 && share == 1.0 && tooth.clone().all(|point| row(point) == [(joint, 1.0)]));
+    assert!(row(button.start).len() > 1 && button.clone().all(|point| row(point) == row(button.start)));
+    let told = |piece: &Range<usize>| report.stiff_pieces.iter().find(|told| told.first as usize == piece.start);
+    assert_eq!(told(&tooth).map(|told| (told.joint, told.share)), Some((joint, 1.0)));
+    assert!(told(&button).is_some_and(|told| told.share < 0.8), "{:?}", report.stiff_pieces);
+}
