@@ -239,6 +239,6 @@ fn small_things_inside_of_flesh_move_with_one_joint() {
     assert!(joint < 2 && share == 1.0 && tooth.clone().all(|point| row(point) == [(joint, 1.0)]));
     assert!(row(button.start).len() > 1 && button.clone().all(|point| row(point) == row(button.start)));
     let told = |piece: &Range<usize>| report.stiff_pieces.iter().find(|told| told.first as usize == piece.start);
-    assert_eq!(told(&tooth).map(|told| (told.joint, told.share)), Some((joint, 1.0)));
+    assert_eq!(told(&tooth).map(|told| (told.joint, told.share)), Some((joint as usize, 1.0)));
     assert!(told(&button).is_some_and(|told| told.share < 0.8), "{:?}", report.stiff_pieces);
 }
