@@ -178,6 +178,9 @@ fn weights_of_named(
         numbers.insert(number, joints.len() as u32);
         joints.push(joint);
     }
+    if joints.is_empty() && !skin.weights.joints.is_empty() {
+        return None;
+    }
     let mut weights = Weights::default();
     for point in 0..skin.weights.len() {
         let known = |(number, weight): (u32, f32)| Some((*numbers.get(&number)?, weight));
