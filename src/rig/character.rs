@@ -9,7 +9,7 @@ use std::{
 use bevy::math::{Affine3, Mat4};
 
 use crate::{
-    mesh::model::{Channel, ChannelTarget, Clip, Model, Node, SkinBinding, Weights},
+    mesh::model::{Channel, ChannelTarget, Clip, Model, Node, Part, SkinBinding, Weights},
     rig::{
         BuiltRig, JointData, NodeKind, Rig, RigEdit, SkinData, Uid, UidSource,
         bake::baked,
@@ -206,7 +206,11 @@ fn settle_carried(model: &mut Model, globals: &[(Uid, Affine3)]) {
     let Some(weights) = model.weights.take() else { return };
     let mut is_rebound = vec![false; model.objects.len()];
     let mut object_of = vec![0; carriers.len()];
-    for part in &model.parts {
+    let hangs = |part: &&Part| {
+        let object = &model.objects[part.object];
+        object.skin.is_none() && object.node.is_some()
+    };
+    for part in model.parts.iter().filter(hangs) {
         for point in part.vertices.iter().map(|point| *point as usize) {
             let carrier = carriers.get(point).copied().flatten();
             let Some(node) = carrier.filter(|_| point < weights.len()) else { continue };
