@@ -1,11 +1,15 @@
 //! Conversion between models and rigs: a skeleton imported with a mesh, and a mesh exported with a skeleton.
 
-use std::{borrow::Cow, collections::HashMap, sync::Arc};
+use std::{
+    borrow::Cow,
+    collections::{BTreeSet, HashMap},
+    sync::Arc,
+};
 
 use bevy::math::{Affine3, Mat4};
 
 use crate::{
-    mesh::model::{Channel, ChannelTarget, Clip, Model, Node, SkinBinding, Weights},
+    mesh::model::{Channel, ChannelTarget, Clip, Model, Node, Part, SkinBinding, Weights},
     rig::{
         BuiltRig, JointData, NodeKind, Rig, RigEdit, SkinData, Uid, UidSource,
         bake::baked,
@@ -22,7 +26,7 @@ pub struct ImportedSkeleton {
     pub edits: Vec<RigEdit>,
     /// The joint that each node of the model becomes.
     pub nodes: Vec<Uid>,
-    /// The model's weights, if it has any.
+    /// The model's weights, if it has any. Objects that hang on a node follow that node alone.
     pub skin: Option<Arc<SkinData>>,
 }
 
@@ -42,8 +46,27 @@ pub fn import_skeleton(model: &Model, uids: &mut UidSource) -> ImportedSkeleton 
     });
     let labels: Vec<Option<&str>> = model.nodes.iter().map(|node| Some(node.name.as_str())).collect();
     let edits = edits.chain(pair_edits(&labels, &nodes)).collect();
-    let skin = model.weights.clone().map(|weights| SkinData { joints: nodes.clone(), weights, ..SkinData::default() });
+    let skin = followed(model).map(|weights| SkinData { joints: nodes.clone(), weights, ..SkinData::default() });
     ImportedSkeleton { edits, nodes, skin: skin.map(Arc::new) }
+}
+
+/// Weights of a model in which points of objects without a skin follow the node that the object hangs on, as helmets and
+/// swords do. `None` for models in which nothing is skinned and no joint carries an object.
+fn followed(model: &Model) -> Option<Weights> {
+    let carriers = model.carriers();
+    let is_joint = |node: &usize| model.nodes.get(*node).is_some_and(|node| node.joint);
+    if carriers.is_empty() || model.weights.is_none() && !carriers.iter().flatten().any(is_joint) {
+        return model.weights.clone();
+    }
+    let mut weights = Weights::default();
+    for (point, carrier) in carriers.into_iter().enumerate() {
+        match (carrier, &model.weights) {
+            (Some(node), _) => weights.push([(node as u32, 1.0)]),
+            (None, Some(given)) if point < given.len() => weights.push(given.of(point)),
+            (None, _) => weights.push([]),
+        }
+    }
+    Some(weights)
 }
 
 /// Turns a `.rig` text into edits that add its joints, parents before children, and returns their uids in its order.
@@ -164,10 +187,63 @@ pub fn character(parts: &Character) -> Model {
                 object.node = None;
             }
         }
-        Some(_) => model.skins = rebound(file, &node_of, &globals),
+        Some(_) => {
+            model.skins = rebound(file, &node_of, &globals);
+            settle_carried(&mut model, &globals);
+        }
         None => {}
     }
     model
+}
+
+/// Settles the objects that hang on a node in their file: those that follow it alone go on to hang on it, without weights, as
+/// files have them; others, as after painting, get a skin that is bound at rest.
+fn settle_carried(model: &mut Model, globals: &[(Uid, Affine3)]) {
+    let carriers = model.carriers();
+    if carriers.is_empty() {
+        return;
+    }
+    let Some(weights) = model.weights.take() else { return };
+    let mut is_rebound = vec![false; model.objects.len()];
+    let mut object_of = vec![0; carriers.len()];
+    let hangs = |part: &&Part| {
+        let object = &model.objects[part.object];
+        object.skin.is_none() && object.node.is_some()
+    };
+    for part in model.parts.iter().filter(hangs) {
+        for point in part.vertices.iter().map(|point| *point as usize) {
+            let carrier = carriers.get(point).copied().flatten();
+            let Some(node) = carrier.filter(|_| point < weights.len()) else { continue };
+            object_of[point] = part.object;
+            is_rebound[part.object] |= weights.of(point).any(|(joint, _)| joint as usize != node);
+        }
+    }
+    let (mut settled, mut joints) = (Weights::default(), BTreeSet::new());
+    for (point, carrier) in carriers.into_iter().enumerate().take(weights.len()) {
+        match carrier {
+            Some(node) if is_rebound[object_of[point]] => {
+                let mut row: Vec<(u32, f32)> = weights.of(point).collect();
+                if row.is_empty() {
+                    row.push((node as u32, 1.0));
+                }
+                joints.extend(row.iter().map(|(joint, _)| *joint as usize));
+                settled.push(row);
+            }
+            Some(_) => settled.push([]),
+            None => settled.push(weights.of(point)),
+        }
+    }
+    if !joints.is_empty() {
+        let skin = model.skins.len();
+        for (object, _) in model.objects.iter_mut().zip(&is_rebound).filter(|(_, rebound)| **rebound) {
+            (object.skin, object.node) = (Some(skin), None);
+        }
+        joints.iter().for_each(|joint| model.nodes[*joint].joint = true);
+        let inverse_binds = joints.iter().map(|joint| inverse_bind(&globals[*joint].1)).collect();
+        let joints = joints.into_iter().collect();
+        model.skins.push(SkinBinding { name: model.name.clone(), joints, inverse_binds });
+    }
+    model.weights = model.objects.iter().any(|object| object.skin.is_some()).then_some(settled);
 }
 
 /// Skin that lists all joints of `rig`, added to a model of it that has none: readers recognise joints by the skins that

@@ -7,6 +7,7 @@ mod animation;
 mod bench;
 mod build_limits;
 mod bvh;
+mod carried_objects;
 mod choices;
 #[cfg(feature = "cli")]
 mod cli;

@@ -234,3 +234,30 @@ fn the_command_draws_quietly_without_a_display_on_a_gpu() {
     assert!(output.status.success() && folder.path().join("hand.png").exists(), "{said}");
     assert!(!said.contains("XDG_RUNTIME_DIR") && !said.contains("error"), "{said}");
 }
+
+/// A twisted forearm is drawn otherwise with dual quaternions, and all else is drawn alike.
+#[cfg(feature = "cli")]
+#[test]
+fn the_command_shows_dual_quaternions_on_a_gpu() {
+    if !can_draw() {
+        return;
+    }
+    let _turn = TURN.lock();
+    let folder = tempfile::tempdir().unwrap();
+    let asset = |path: &str| format!("{}/assets/{path}", env!("CARGO_MANIFEST_DIR"));
+    let (rig, mesh) = (asset("templates/biped.rig.ron"), asset("models/biped.obj"));
+    let [turn, reach] = ["hand_ik_l.rotate=(0,150,0)", "hand_ik_l.translate=(0,0.3,0.25)"];
+    let picture = |deform: &str| {
+        let file = format!("{deform}.png");
+        let args: [&str; 12] =
+            ["pose", &rig, "--mesh", &mesh, "--set", turn, "--set", reach, "--deform", deform, "-o", &file];
+        let answer = crate::cli_build::rigsmith(folder.path(), &args);
+        assert_eq!(answer.code, 0, "{deform}: {}", answer.err);
+        image::open(folder.path().join(&file)).unwrap().to_rgb8()
+    };
+    let [linear, dual] = ["linear", "dqs"].map(picture);
+    assert_eq!(linear.dimensions(), dual.dimensions());
+    let is_other = |(a, b): &(&image::Rgb<u8>, &image::Rgb<u8>)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 24);
+    let differing = linear.pixels().zip(dual.pixels()).filter(is_other).count();
+    assert!((300..30_000).contains(&differing), "{differing} pixels differ");
+}

@@ -362,6 +362,8 @@ fn characters_of_many_parts_are_bound_part_by_part() {
     assert!(all.error("") < 1.1 * 0.241 && all.error("Head") < 0.03);
     // Slots lie inside of the hands and are their last joints; all other helpers stand beside the body.
     assert_eq!(all.claims_of_helpers(|node| all.held[node] == 0.0), 0);
+    let robot = Character::bind(&data.join("gltf_skinned/RobotExpressive.glb"), true);
+    assert_eq!(robot.claims_of_helpers(|node| robot.held[node] == 0.0), 0);
     let slots = all.report.idle_joints.iter().filter(|idle| idle.reason == IdleReason::Slot).count();
     assert_eq!(slots, 2, "{:?}", all.report.idle_joints);
     // Poles of knees and elbows are told with their distance from the body.
@@ -438,6 +440,15 @@ fn slots_in_hands_hold_what_they_carry_and_no_skin() {
     assert!(held > 50, "{held} points: {json}");
     let idle = json["idle_joints"].as_array().unwrap();
     assert!(idle.iter().all(|idle| idle["joint"] != "handslot.l"), "{json}");
+    // A file without nodes does not say what the books hang on: the slot holds the most of them, and carries them whole.
+    let convert = crate::cli_build::rigsmith(folder.path(), &["convert", path, "mage.obj"]);
+    assert_eq!(convert.code, 0, "{}", convert.err);
+    let skin = ["--json", "skin", path, "mage.obj", "-o", "books.glb"];
+    let json: Value = serde_json::from_str(&crate::cli_build::rigsmith(folder.path(), &skin).out).unwrap();
+    for book in ["Spellbook", "Spellbook_open"] {
+        let is_carried = |part: &Value| part["part"] == book && part["joint"] == "handslot.l" && part["share"] == 1.0;
+        assert!(json["rigid_parts"].as_array().unwrap().iter().any(is_carried), "{book}: {json}");
+    }
 }
 
 /// A robot of hard parts, opened without its skeleton: bolts on the head move with the head, although the neck's bone ends
@@ -474,6 +485,7 @@ fn characters_and_creatures_are_bound_as_well_as_they_were() {
     let Some(data) = test_data() else { return };
     for (file, measured) in [
         ("gltf_skinned/CesiumMan.glb", 0.089),
+        ("gltf_skinned/cesium_man.gltf", 0.089),
         ("gltf_skinned/RobotExpressive.glb", 0.190),
         ("gltf_skinned/Fox.glb", 0.228),
         ("creatures/fox-fox.glb", 0.184),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::Vec3;
 
-use super::{Method, claim::Claim, laplacian::Graph, report::Stiffness};
+use super::{Method, claim::Claim, laplacian::Graph, report::Stiffness, sight::is_surrounded};
 use crate::mesh::{adjacency, model::Weights, surface::Surface};
 
 /// Heat is trusted on an island if at least this share of its area sees the bone that claims it.
@@ -14,6 +14,8 @@ const SPECK: f32 = 0.2;
 
 /// A part moves with one joint if that joint holds at least this share of it.
 const HELD: f32 = 0.8;
+/// A part moves with a slot if the slot holds at least this share of it: slots hold no flesh, so it is a thing that they carry.
+const CARRIED: f32 = 0.5;
 
 /// Approximate number of places of a small part that look for the part that it lies on.
 const SAMPLES: usize = 32;
@@ -64,12 +66,13 @@ impl Islands {
 
     /// Weights with which parts stay as stiff as they are: a part that one joint holds in nearly its whole size (helmet,
     /// eye, sword) moves with that joint, and each small part moves as one. The holder of a small part is the joint with
-    /// the largest share. A surface in one piece stays as it is, and so do the parts that have one of the `bending`
-    /// places.
+    /// the largest share. A part of which a slot beside flesh, as `slots` flags joints, holds the most is what it carries. A
+    /// surface in one piece stays as it is, and so do the parts that have one of the `bending` places.
     pub fn stiffened(
         &self,
         (places, triangles): (&[Vec3], &[[u32; 3]]),
         weights: &Weights,
+        slots: &[bool],
         bending: &[u32],
     ) -> (Weights, Stiffness) {
         let mut sums: Vec<BTreeMap<u32, f32>> = vec![BTreeMap::new(); self.extents.len()];
@@ -82,12 +85,15 @@ impl Islands {
         }
         let mut bends = vec![false; self.extents.len()];
         bending.iter().for_each(|place| bends[self.of[*place as usize] as usize] = true);
+        // Where nothing else holds flesh slots do.
+        let has_flesh = sums.iter().flat_map(BTreeMap::keys).any(|joint| !slots[*joint as usize]);
+        let enough = |joint: u32| if has_flesh && slots[joint as usize] { CARRIED } else { HELD };
         let is_part = counts.iter().filter(|count| **count > 2).count() > 1;
         let mut rows: Vec<Option<Vec<(u32, f32)>>> = (sums.iter().zip(&counts).enumerate())
             .map(|(island, (sums, count))| {
                 let whole: f32 = sums.values().sum();
                 let first = sums.iter().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)))?;
-                match *first.1 >= HELD * whole {
+                match *first.1 >= enough(*first.0) * whole {
                     _ if !is_part || *count < 3 || bends[island] => None,
                     true => Some(vec![(*first.0, 1.0)]),
                     false if self.are_small(island) => {
@@ -105,20 +111,16 @@ impl Islands {
                 None => stiff.push(weights.of(place)),
             }
         }
-        let strongest =
-            |row: &Vec<(u32, f32)>| row.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
-        let holders = rows.iter().map(|row| row.as_ref().and_then(strongest)).collect();
+        let holders = rows.iter().map(|row| row.as_deref().and_then(strongest)).collect();
         (stiff, Stiffness { of: self.of.clone(), holders })
     }
 
-    /// Gives each small part that several joints share to the joint that alone holds the large part on which it lies: a bolt
-    /// on a helmet moves with the helmet, whatever bones are near. Rows shared by joints would shrink it as they turn apart.
+    /// Gives each small part that several joints share to one of them, where one is known: a bolt on a helmet moves with the
+    /// joint that alone holds the helmet, whatever bones are near, and a tooth, which larger parts are all around, with the
+    /// joint that holds the most of it. Rows shared by joints would shrink such a part as they turn apart.
     fn take_along(&self, places: &[Vec3], triangles: &[[u32; 3]], rows: &mut [Option<Vec<(u32, f32)>>]) {
         let joints = |island: usize| rows[island].as_ref().map_or(0, Vec::len);
         let is_bearer = |island: usize| joints(island) == 1 && !self.are_small(island);
-        if !(0..rows.len()).any(is_bearer) {
-            return;
-        }
         let mut shared: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         for (place, &island) in self.of.iter().enumerate().filter(|(_, island)| joints(**island as usize) > 1) {
             shared.entry(island as usize).or_default().push(place);
@@ -129,7 +131,7 @@ impl Islands {
         let island_of = |triangle: &[u32; 3]| self.of[triangle[0] as usize] as usize;
         let large: Vec<[u32; 3]> = triangles.iter().copied().filter(|t| !self.are_small(island_of(t))).collect();
         let surface = Surface::build(places, &large);
-        let bearer = |(&island, members): (&usize, &Vec<usize>)| {
+        let row_of = |island: usize, members: &Vec<usize>| {
             let samples = members.iter().step_by(members.len().div_ceil(SAMPLES));
             let (count, mut votes) = (samples.len(), BTreeMap::<usize, usize>::new());
             let nearest = samples.filter_map(|place| surface.closest_point(places[*place]));
@@ -137,11 +139,22 @@ impl Islands {
                 *votes.entry(island_of(&large[nearest.triangle as usize])).or_default() += 1;
             }
             let most = votes.into_iter().find(|(_, votes)| 2 * votes > count);
-            most.filter(|(bearer, _)| is_bearer(*bearer)).map(|(bearer, _)| (island, bearer))
+            if let Some((bearer, _)) = most.filter(|(bearer, _)| is_bearer(*bearer)) {
+                return rows[bearer].clone();
+            }
+            let center = members.iter().map(|place| places[*place]).sum::<Vec3>() / members.len() as f32;
+            let holder = rows[island].as_deref().and_then(strongest).filter(|_| is_surrounded(&surface, center));
+            holder.map(|(joint, _)| vec![(joint, 1.0)])
         };
-        let taken: Vec<(usize, usize)> = shared.iter().filter_map(bearer).collect();
-        for (island, bearer) in taken {
-            rows[island] = rows[bearer].clone();
+        let taken = shared.iter().filter_map(|(island, members)| Some((*island, row_of(*island, members)?)));
+        let taken: Vec<(usize, Vec<(u32, f32)>)> = taken.collect();
+        for (island, row) in taken {
+            rows[island] = Some(row);
         }
     }
+}
+
+/// The influence with the largest weight; the first joint of several.
+fn strongest(row: &[(u32, f32)]) -> Option<(u32, f32)> {
+    row.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)))
 }

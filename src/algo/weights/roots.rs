@@ -3,7 +3,12 @@
 
 use glam::Vec3;
 
-use super::{WeightJoint, bone::BoneSegment, sight::Sight};
+use super::{
+    WeightJoint,
+    bone::BoneSegment,
+    bone_tree::{BoneTree, closest_on},
+    sight::Sight,
+};
 
 /// Roots with more children than this keep all their bones.
 const MANY_CHILDREN: usize = 256;
@@ -48,8 +53,8 @@ impl Roots {
         Self { hangs_in_air }
     }
 
-    /// The joints of targets and handles: subtrees that hang in the air beside the largest one, at most half as large
-    /// and without a body part of their own.
+    /// The joints of targets and handles: subtrees that hang in the air beside the largest one, at most half as large,
+    /// without a body part of their own and without a bone in flesh that no bone of the largest one is near to.
     pub fn helpers(&self, joints: &[WeightJoint], sight: &Sight) -> Vec<bool> {
         let (order, _) = parents_first(joints);
         let mut top: Vec<usize> = (0..joints.len()).collect();
@@ -80,11 +85,45 @@ impl Roots {
         for index in (0..joints.len()).filter(|&index| self.hangs_in_air[top[index]] && top[index] != body) {
             own[top[index]] |= homes(index).iter().zip(&shared).any(|(home, shared)| *home && !shared);
         }
+        for index in self.apart(joints, &top, body, sight) {
+            own[top[index]] = true;
+        }
         let is_helper = |index: usize| {
             let top = top[index];
             self.hangs_in_air[top] && top != body && 2 * sizes[top] <= sizes[body] && !own[top]
         };
         (0..joints.len()).map(is_helper).collect()
+    }
+
+    /// The joints of other subtrees that end a bone in the flesh which is shorter than the way from either of its ends to
+    /// the bones of the body. The feet of a figure whose legs end at the knees hang on the targets of these legs; bones of
+    /// handles inside of a foot lie beside the foot's own.
+    fn apart(&self, joints: &[WeightJoint], top: &[usize], body: usize, sight: &Sight) -> Vec<usize> {
+        /// Bones almost as near as the nearest one meet at one joint.
+        const MEETING: f32 = 1e-3;
+        let of_body = |index: usize| {
+            let head = joints[index].head;
+            let above = joints[index].parent.filter(|&parent| top[parent] == body).map_or(head, |p| joints[p].head);
+            BoneSegment { joint: index as u32, head: above, tail: head }
+        };
+        let bones: Vec<BoneSegment> = (0..joints.len()).filter(|&index| top[index] == body).map(of_body).collect();
+        let tree = BoneTree::new(&bones);
+        let mut near = Vec::new();
+        // The way to the body's bones; none where the nearest is so long that its own flesh reaches here.
+        let mut way = |place: Vec3| {
+            tree.nearest(place, MEETING, |bone| closest_on(&bones[bone as usize], place).distance(place), &mut near);
+            let lengths = near.iter().map(|&(_, bone)| bones[bone as usize].head.distance(bones[bone as usize].tail));
+            let longest = lengths.fold(0f32, f32::max);
+            near.first().map_or(0.0, |nearest| if 2.0 * nearest.0 > longest { nearest.0 } else { 0.0 })
+        };
+        let is_apart = |index: &usize| {
+            let Some(parent) = joints[*index].parent.filter(|&parent| top[parent] == top[*index]) else { return false };
+            let (from, to) = (joints[parent].head, joints[*index].head);
+            let length = from.distance(to);
+            length > 0.0 && way(from).min(way(to)) > length && sight.encloses(from) && sight.encloses(to)
+        };
+        let is_beside = |index: &usize| self.hangs_in_air[top[*index]] && top[*index] != body;
+        (0..joints.len()).filter(is_beside).filter(is_apart).collect()
     }
 }
 

@@ -136,6 +136,12 @@ fn encloses(surface: &Surface, point: Vec3) -> bool {
     winding.unsigned_abs() as usize * 3 > DIRECTIONS || odd * 8 > DIRECTIONS * 5
 }
 
+/// True if a surface is around `place` in nearly all directions, as around teeth; a mouth may stand open.
+pub(super) fn is_surrounded(surface: &Surface, place: Vec3) -> bool {
+    let misses = |direction: &Vec3| surface.closest(&Ray { origin: place, direction: *direction }).is_none();
+    evenly_spread().filter(misses).nth(DIRECTIONS / 8).is_none()
+}
+
 /// Unit vectors on a spherical Fibonacci lattice. The golden angle is turned by repeated complex multiplication, so no
 /// sine is needed.
 fn evenly_spread() -> impl Iterator<Item = Vec3> {

@@ -18,6 +18,7 @@ use super::{
 use crate::{
     editor::{camera::FrameWhenReady, counts::counted, notice::Notice, settings::EditorSettings},
     files::{FileKind, journal::Origin},
+    mesh::model::Weights,
     plugins::{
         document::EditRequest,
         surface::{RigMesh, SkinOf},
@@ -149,7 +150,7 @@ fn take_joints(rig: &Rig, opened: &mut LoadedDocument) -> NamedJoints {
     let mut taken = NamedJoints { edits: Vec::new(), is_lost: false };
     for (mesh, _) in meshes {
         if let Some(skin) = own.skin(mesh.uid) {
-            match weights_of_named(skin, same) {
+            match weights_of_named(skin, &mesh.file.carriers(), same) {
                 Some(skin) => taken.edits.push(RigEdit::SetSkin(mesh.uid, Some(Arc::new(skin)))),
                 None => taken.is_lost = true,
             }
@@ -160,22 +161,34 @@ fn take_joints(rig: &Rig, opened: &mut LoadedDocument) -> NamedJoints {
 }
 
 /// Weights of a file over the joints of a rig that take the places of its joints. `None` if one that has weights finds none,
-/// or if two find the same.
-fn weights_of_named(skin: &SkinData, same: impl Fn(Uid) -> Option<Uid>) -> Option<SkinData> {
+/// or if two find the same. Points that hang on a joint without a namesake, as `carriers` has them, have no weights.
+fn weights_of_named(
+    skin: &SkinData,
+    carriers: &[Option<usize>],
+    same: impl Fn(Uid) -> Option<Uid>,
+) -> Option<SkinData> {
     let used: BTreeSet<u32> = skin.weights.joints.iter().copied().collect();
     let mut joints: Vec<Uid> = Vec::with_capacity(used.len());
     let (mut numbers, mut taken) = (BTreeMap::new(), BTreeSet::new());
     for number in used {
-        let joint = same(*skin.joints.get(number as usize)?)?;
+        let Some(joint) = same(*skin.joints.get(number as usize)?) else { continue };
         if !taken.insert(joint) {
             return None;
         }
         numbers.insert(number, joints.len() as u32);
         joints.push(joint);
     }
-    let mut weights = skin.weights.clone();
-    for number in &mut weights.joints {
-        *number = *numbers.get(&*number)?;
+    if joints.is_empty() && !skin.weights.joints.is_empty() {
+        return None;
+    }
+    let mut weights = Weights::default();
+    for point in 0..skin.weights.len() {
+        let known = |(number, weight): (u32, f32)| Some((*numbers.get(&number)?, weight));
+        match skin.weights.of(point).map(known).collect::<Option<Vec<(u32, f32)>>>() {
+            Some(row) => weights.push(row),
+            None if carriers.get(point).is_some_and(Option::is_some) => weights.push([]),
+            None => return None,
+        }
     }
     // The mesh is taken as it stands at rest, whatever bind pose its file has.
     Some(SkinData { joints, weights, at_rest: true, ..SkinData::default() })

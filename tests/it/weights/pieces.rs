@@ -143,7 +143,7 @@ fn slots_hold_things_and_no_flesh() {
     let (weights, report) = with(vec![3], Vec::new(), &[]);
     check_sound(&weights, points.len(), &joints, 8);
     assert_eq!(held(&weights), 0);
-    assert!(thing.clone().all(|point| weight(&weights, point, 3) > 0.5));
+    assert!(thing.clone().all(|point| weights.of(point).eq([(3, 1.0)])), "the thing moves as one");
     assert!(report.idle_joints.is_empty(), "{:?}", report.idle_joints);
     // What is given to a slot is no skin: it is told.
     let given = [(thing.start as u32..thing.end as u32, 3)];
@@ -194,4 +194,51 @@ fn figures_of_plates_are_held_by_their_bones() {
     assert!(held(trunk, &[2, 3, 4, 5]), "the spine holds the trunk: {:?}", report.stiff_pieces);
     // The root on the ground holds nothing.
     assert!((0..points.len()).all(|point| weight(&weights, point, 0) == 0.0));
+}
+
+/// Legs that end at the knee, while foot and toe hang on the target of the leg: far from the body's bones they hold their
+/// flesh. Handles beside the body's own bones and small ones just behind its last joint hold nothing.
+#[test]
+fn feet_that_hang_on_targets_hold_flesh_and_handles_none() {
+    let (points, triangles) = tube();
+    let bound = |chain: [f32; 6], handles: [f32; 3]| {
+        let mut joints = vec![joint([0.0, -6.0, 0.0], None)];
+        joints.extend(chain.iter().enumerate().map(|(above, x)| joint([*x, 0.0, 0.0], Some(above))));
+        let parents = [0, 7, 8];
+        joints.extend(handles.iter().zip(parents).map(|(x, parent)| joint([*x, 0.0, 0.0], Some(parent))));
+        let weights = bind(&points, &triangles, &joints).0;
+        check_sound(&weights, points.len(), &joints, 8);
+        weights
+    };
+    let held = |weights: &Weights, point: usize| (7..10).map(|joint| weight(weights, point, joint)).sum::<f32>();
+    let feet = bound([0.1, 0.3, 0.5, 0.7, 0.9, 1.2], [3.0, 3.0, 3.4]);
+    for (point, place) in points.iter().enumerate() {
+        let held = held(&feet, point);
+        assert!(place.x < 3.45 || held > 0.9, "{held} of the foot at {place}");
+        assert!(place.x > 1.55 || held < 0.1, "{held} of the leg at {place}");
+    }
+    for (chain, handles) in
+        [([0.1, 0.5, 1.2, 2.0, 3.0, 3.6], [3.0, 3.0, 3.4]), ([0.1, 0.3, 0.5, 0.7, 1.2, 3.0], [3.2, 3.2, 3.25])]
+    {
+        let weights = bound(chain, handles);
+        assert!((0..points.len()).all(|point| held(&weights, point) == 0.0), "handles at {handles:?}");
+    }
+}
+
+/// A thing inside of the tube where two bones meet, as a tooth, moves with one joint; one that lies on the tube there, as a
+/// button, keeps the shares of the skin around it.
+#[test]
+fn small_things_inside_of_flesh_move_with_one_joint() {
+    let (mut points, mut triangles) = tube();
+    let tooth = add_box(&mut points, &mut triangles, Vec3::new(1.9, -0.1, -0.1), Vec3::new(2.1, 0.1, 0.1));
+    let button = add_box(&mut points, &mut triangles, Vec3::new(1.95, 0.32, -0.05), Vec3::new(2.05, 0.36, 0.05));
+    let (weights, report) = bind(&points, &triangles, &tube_joints());
+    check_sound(&weights, points.len(), &tube_joints(), 8);
+    let row = |point: usize| weights.of(point).collect::<Vec<_>>();
+    let [(joint, share)] = row(tooth.start)[..] else { panic!("{:?}", row(tooth.start)) };
+    assert!(joint < 2 && share == 1.0 && tooth.clone().all(|point| row(point) == [(joint, 1.0)]));
+    assert!(row(button.start).len() > 1 && button.clone().all(|point| row(point) == row(button.start)));
+    let told = |piece: &Range<usize>| report.stiff_pieces.iter().find(|told| told.first as usize == piece.start);
+    assert_eq!(told(&tooth).map(|told| (told.joint, told.share)), Some((joint as usize, 1.0)));
+    assert!(told(&button).is_some_and(|told| told.share < 0.8), "{:?}", report.stiff_pieces);
 }
