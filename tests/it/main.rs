@@ -73,6 +73,7 @@ mod edits;
 mod examples;
 mod exports;
 mod face;
+mod face_accessories;
 #[cfg(feature = "cli")]
 mod face_arkit;
 mod face_bones;
