@@ -170,9 +170,11 @@ fn lashes_and_brows_go_with_the_skin() {
     };
     let lash = line_through(&marks.points[36..40]);
     let brow = on_skin(line_through(&marks.points[17..22]));
+    let floating: Vec<Vec3> = brow.iter().map(|place| *place + 0.06 * e * Vec3::Z).collect();
     let strips = [
         ("lash", add_strip(&mut mesh, &lash, e * Vec3::new(0.0, 0.03, 0.1))),
         ("brow", add_strip(&mut mesh, &brow, e * Vec3::new(0.0, 0.06, 0.01))),
+        ("floating brow", add_strip(&mut mesh, &floating, e * Vec3::new(0.0, 0.06, 0.01))),
     ];
     let (_, face) = analysed(&mesh);
     for (name, points) in strips {

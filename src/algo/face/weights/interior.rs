@@ -223,7 +223,11 @@ fn lashes(face: &Face, sides: &Sides, skin: &SkinColumns, members: &[usize], row
     let Some(root) = found.iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).copied() else {
         return false;
     };
-    let is_touching = |found: &Option<(f32, usize)>| found.is_some_and(|found| found.0 <= (0.03 * e) * (0.03 * e));
+    // Brows of drawn faces float in front of the skin; frames of glasses do, too, and reach below the eyes.
+    let size = high - low;
+    let is_brow = low.y > half.eye().y + 0.05 * e && size.y <= 0.3 * e && size.x > 1.2 * size.y;
+    let reach = e * if is_brow { 0.1 } else { 0.03 };
+    let is_touching = |found: &Option<(f32, usize)>| found.is_some_and(|found| found.0 <= reach * reach);
     if !is_touching(&Some(root)) || rigid::is_frame(face, members, |at| is_touching(&found[at])) {
         return false;
     }
