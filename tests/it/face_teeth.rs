@@ -113,12 +113,7 @@ fn stray_points((head, marks): &(heads::Mesh, Vec<usize>), mouth: &Mouth) -> Vec
     let half = 0.5 * (marks.points[48].x - marks.points[54].x).abs();
     let jaws = [true, false].map(|is_upper| add_jaw(&mut mesh, mouth, is_upper, middle, [eyes, half]));
     if mouth.has_tongue {
-        let places: Vec<Vec3> =
-            (0..9_u8).map(|at| middle + eyes * Vec3::new(0.0, -0.07, -0.35 + 0.03 * f32::from(at))).collect();
-        for side in [-0.5, 0.5] {
-            let places: Vec<Vec3> = places.iter().map(|place| *place + Vec3::X * side * 0.1 * eyes).collect();
-            add_gum(&mut mesh, &places, eyes * Vec3::new(0.0, 0.05, 0.02));
-        }
+        add_bar(&mut mesh, middle + eyes * Vec3::new(0.0, -0.07, -0.23), eyes * Vec3::new(0.2, 0.05, 0.26));
     }
     let settings =
         AutoSettings { bones: 12, up: Some(Vec3::Y), forward: Some(Vec3::Z), whole: true, ..AutoSettings::default() };
