@@ -76,6 +76,7 @@ mod edits;
 mod examples;
 mod exports;
 mod face;
+mod face_accessories;
 #[cfg(feature = "cli")]
 mod face_arkit;
 mod face_bones;

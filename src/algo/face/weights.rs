@@ -6,10 +6,12 @@
 
 mod facial_hair;
 mod interior;
+mod rigid;
 mod sides;
 mod skin;
 mod skin_columns;
 mod symmetry;
+mod tooth_rows;
 
 use glam::Vec3;
 

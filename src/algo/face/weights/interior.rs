@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 
 use super::{
-    Face, HEAD, NECK, Row, facial_hair,
+    Face, HEAD, Row, facial_hair, rigid,
     sides::{Rim, Sides},
     skin_columns::SkinColumns,
-    smooth,
+    smooth, tooth_rows,
 };
 use crate::algo::face::{bones::map::line_distance, shells::ShellKind};
 
@@ -27,23 +27,30 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
     let is_tongue = |members: &[usize]| members.first().is_some_and(|&v| kinds[v] == ShellKind::Tongue);
     let (inside, outside): (Vec<_>, Vec<_>) =
         members.values().partition(|members| is_tongue(members) || in_mouth(face, &outer, members));
-    let inside: Vec<MouthPart> = inside.into_iter().map(|members| MouthPart::new(face, members)).collect();
-    let ends = inside.iter().filter(|part| is_tongue(part.members)).map(|part| [part.low.z, part.high.z]);
+    let shells: Vec<&[usize]> =
+        inside.iter().map(|members| members.as_slice()).filter(|part| !is_tongue(part)).collect();
+    let tongues = inside.iter().map(|members| members.as_slice()).filter(|part| is_tongue(part));
+    let rows_of_teeth = tooth_rows::rows(face, &shells).into_iter().map(|row| {
+        let members = row.iter().flat_map(|&shell| shells[shell]).copied().collect();
+        MouthPart::new(face, members, row.len() > 1)
+    });
+    let inside: Vec<MouthPart> =
+        tongues.map(|members| MouthPart::new(face, members.to_vec(), false)).chain(rows_of_teeth).collect();
+    let ends = inside.iter().filter(|part| is_tongue(&part.members)).map(|part| [part.low.z, part.high.z]);
     let ends = ends.reduce(|[back, front], [low, high]| [back.min(low), front.max(high)]);
     for part in &inside {
         match (face.jaw, face.tongue, ends) {
-            (Some(jaw), Some(tongue), Some(ends)) if is_tongue(part.members) => {
+            (Some(jaw), Some(tongue), Some(ends)) if is_tongue(&part.members) => {
                 stretched(face, part, [jaw, tongue], ends, rows);
             }
             _ => mouth(face, part, &inside, rows),
         }
     }
     for members in outside {
-        if !lashes(face, sides, &skin, members, rows) && !facial_hair::rows(face, sides, &outer, members, rows) {
-            for &v in members {
-                let neck = face.neck_share(face.places[v]);
-                rows[v] = vec![(HEAD, 1.0 - neck), (NECK, neck)];
-            }
+        if lashes(face, sides, &skin, members, rows) || facial_hair::rows(face, sides, &outer, members, rows) {
+            rigid::stiffen(face, members, rows);
+        } else {
+            rigid::hang(face, members, rows);
         }
     }
 }
@@ -61,9 +68,9 @@ fn in_mouth(face: &Face, outer: &SkinColumns, members: &[usize]) -> bool {
     is_behind && !facial_hair::is_on_skin(face, outer, members)
 }
 
-/// A shell in the mouth: a row of teeth, a tooth, the tongue, or a bag around them.
-struct MouthPart<'a> {
-    members: &'a [usize],
+/// A part of the mouth: a row of teeth, of one shell or of many, a tooth, the tongue, or a bag around them.
+struct MouthPart {
+    members: Vec<usize>,
     /// Distance of each vertex below the lips.
     below: Vec<f32>,
     /// Mean of those distances.
@@ -74,14 +81,14 @@ struct MouthPart<'a> {
     high: Vec3,
 }
 
-impl<'a> MouthPart<'a> {
-    fn new(face: &Face, members: &'a [usize]) -> Self {
+impl MouthPart {
+    fn new(face: &Face, members: Vec<usize>, is_row: bool) -> Self {
         let below: Vec<f32> = members.iter().map(|&v| face.below_lips(face.places[v])).collect();
         let top = below.iter().copied().fold(f32::INFINITY, f32::min);
         let bottom = below.iter().copied().fold(f32::NEG_INFINITY, f32::max);
         let mean = below.iter().sum::<f32>() / below.len().max(1) as f32;
         let e = face.map.scale;
-        let spans = top < -0.1 * e && bottom > 0.1 * e && mean.abs() < 0.3 * (bottom - top);
+        let spans = !is_row && top < -0.1 * e && bottom > 0.1 * e && mean.abs() < 0.3 * (bottom - top);
         let places = || members.iter().map(|&v| face.places[v]);
         let (low, high) = (places().fold(Vec3::INFINITY, Vec3::min), places().fold(Vec3::NEG_INFINITY, Vec3::max));
         Self { members, below, mean, spans, low, high }
@@ -92,8 +99,7 @@ impl<'a> MouthPart<'a> {
     /// They and the part itself are split in two by height, so that a tooth does not fall to the other jaw because its own
     /// gum is above it.
     fn is_lower(&self, all: &[Self], face: &Face) -> Option<bool> {
-        let e = face.map.scale;
-        let facing = all.iter().filter(|other| self.faces(other, e));
+        let facing = all.iter().filter(|other| self.faces(other, face));
         let mut below: Vec<f32> =
             facing.map(|other| other.mean_beside(self, face) - self.mean_beside(other, face)).collect();
         if below.is_empty() {
@@ -120,7 +126,8 @@ impl<'a> MouthPart<'a> {
     }
 
     /// True for parts of which one lies over the other, as an upper tooth over a lower one, and not within it.
-    fn faces(&self, other: &Self, e: f32) -> bool {
+    fn faces(&self, other: &Self, face: &Face) -> bool {
+        let e = face.map.scale;
         let overlap = self.high.min(other.high) - self.low.max(other.low);
         let least = 0.5 * (self.high - self.low).min(other.high - other.low);
         let within = |inner: &Self, outer: &Self| {
@@ -129,7 +136,7 @@ impl<'a> MouthPart<'a> {
         };
         overlap.x >= least.x
             && overlap.z >= least.z
-            && (self.mean - other.mean).abs() > 0.05 * e
+            && (self.mean_beside(other, face) - other.mean_beside(self, face)).abs() > 0.05 * e
             && !within(self, other)
             && !within(other, self)
     }
@@ -141,7 +148,7 @@ const ROOT: f32 = 0.75;
 /// Fills the rows of a tongue, whose root stays with the jaw when its bone moves.
 fn stretched(face: &Face, part: &MouthPart, [jaw, tongue]: [u32; 2], [back, front]: [f32; 2], rows: &mut [Row]) {
     let least = f32::MIN_POSITIVE;
-    for &v in part.members {
+    for &v in &part.members {
         let share = smooth(back, back + (ROOT * (front - back)).max(least), face.places[v].z);
         rows[v] = vec![(tongue, share), (jaw, 1.0 - share)];
     }
@@ -170,7 +177,7 @@ fn split(sorted: &[f32]) -> f32 {
 /// lower ones to the jaw, and all are stiff.
 fn mouth(face: &Face, part: &MouthPart, all: &[MouthPart], rows: &mut [Row]) {
     let Some(jaw) = face.jaw else {
-        for &v in part.members {
+        for &v in &part.members {
             rows[v] = vec![(HEAD, 1.0)];
         }
         return;
@@ -216,7 +223,12 @@ fn lashes(face: &Face, sides: &Sides, skin: &SkinColumns, members: &[usize], row
     let Some(root) = found.iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))).copied() else {
         return false;
     };
-    if root.0 > (0.03 * e) * (0.03 * e) {
+    // Brows of drawn faces float in front of the skin; frames of glasses do, too, and reach below the eyes.
+    let size = high - low;
+    let is_brow = low.y > half.eye().y + 0.05 * e && size.y <= 0.3 * e && size.x > 1.2 * size.y;
+    let reach = e * if is_brow { 0.1 } else { 0.03 };
+    let is_touching = |found: &Option<(f32, usize)>| found.is_some_and(|found| found.0 <= reach * reach);
+    if !is_touching(&Some(root)) || rigid::is_frame(face, members, |at| is_touching(&found[at])) {
         return false;
     }
     // Tips may be nearer to the other lid: all vertices follow the lid at the root.
