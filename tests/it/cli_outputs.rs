@@ -256,3 +256,23 @@ fn a_template_out_of_its_layout_is_told_in_three_parts() {
     }
     assert_eq!(fs::read_to_string(folder.path().join("n.rig.ron")).unwrap(), text);
 }
+
+#[test]
+fn a_check_tells_the_place_that_the_reader_tells() {
+    let folder = folder();
+    let files = [
+        ("m.gltf", r#"{"asset":{"version":"2.0"},"meshes":[{"primitives":[{"attributes":{"POSITION":7}}]}]}"#),
+        ("p.rigsmith.ron", "(\n    format: 1,\n    name: 7,\n)"),
+        ("c.anim.ron", "(\n    format: 1,\n    clips: 7,\n)"),
+    ];
+    for (name, text) in files {
+        fs::write(folder.path().join(name), text).unwrap();
+        let [of_info, of_check] = ["info", "check"].map(|command| {
+            let (code, told) = json(folder.path(), &[command, name]);
+            assert_eq!(code, 1, "{command} {name}: {told}");
+            told["error"]["where"].as_str().unwrap().to_owned()
+        });
+        assert_eq!(of_check, of_info, "{name}");
+        assert!(of_check.len() > name.len() && of_check.starts_with(name), "{of_check}");
+    }
+}
