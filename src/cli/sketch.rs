@@ -78,7 +78,8 @@ pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
         counted(answers.len(), "gesture", "gestures"),
         counted(joints, "joint", "joints")
     ));
-    report.set("gestures", serde_json::to_value(&answers).unwrap_or(Value::Null));
+    let told = answers.iter().map(|answer| serde_json::to_value(answer).unwrap_or(Value::Null));
+    report.set_list("gestures", told);
     describe_rig(&mut report, bench.rig());
     save(&mut bench, &args.output, kind, args, &mut report)?;
     Ok(report)
@@ -121,17 +122,13 @@ pub(super) fn describe_rig(report: &mut Report, rig: &Rig) {
         return;
     }
     let globals = rig.rest_globals();
-    let joints: Vec<Value> = rig
-        .walk()
-        .zip(&globals)
-        .map(|(joint, (uid, global))| {
-            json!({
-                "uid": uid.to_string(),
-                "parent": joint.parent.map(|parent| parent.to_string()),
-                "label": joint.data.label,
-                "position": global.translation.to_array(),
-            })
+    let joints = rig.walk().zip(&globals).map(|(joint, (uid, global))| {
+        json!({
+            "uid": uid.to_string(),
+            "parent": joint.parent.map(|parent| parent.to_string()),
+            "label": joint.data.label,
+            "position": global.translation.to_array(),
         })
-        .collect();
-    report.set("joints", joints);
+    });
+    report.set_list("joints", joints);
 }
