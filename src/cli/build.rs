@@ -7,7 +7,7 @@ use std::{
 };
 
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs,
@@ -211,9 +211,9 @@ fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, ex
         return;
     }
     let executed: HashSet<Uid> = executed.iter().copied().collect();
-    let mut list = Vec::new();
-    for entry in builder.list() {
-        let Some(status) = builder.status(entry.command) else { continue };
+    let mut lines = Vec::new();
+    let told = builder.list().into_iter().filter_map(|entry| {
+        let status = builder.status(entry.command)?;
         let state = match status.state {
             CommandState::Pending => "pending",
             CommandState::Done => "done",
@@ -225,25 +225,22 @@ fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, ex
         if args.trace {
             let name = label.clone().unwrap_or_else(|| entry.joint.to_string());
             let reason = skipped.as_ref().map_or_else(String::new, |reason| format!("  ({reason})"));
-            report.line(format!("{state:>8} {:>9.1} µs  {name}  {}{reason}", status.micros, entry.module));
+            lines.push(format!("{state:>8} {:>9.1} µs  {name}  {}{reason}", status.micros, entry.module));
         }
-        if is_json() {
-            list.push(json!({
-                "uid": entry.command.to_string(),
-                "joint": entry.joint.to_string(),
-                "label": label,
-                "module": &*entry.module,
-                "state": state,
-                "micros": status.micros,
-                "executed": executed.contains(&entry.command),
-                "error": status.error.as_ref().map(ToString::to_string),
-                "skipped": skipped,
-            }));
-        }
-    }
-    if is_json() {
-        report.set("commands", Value::Array(list));
-    }
+        Some(json!({
+            "uid": entry.command.to_string(),
+            "joint": entry.joint.to_string(),
+            "label": label,
+            "module": &*entry.module,
+            "state": state,
+            "micros": status.micros,
+            "executed": executed.contains(&entry.command),
+            "error": status.error.as_ref().map(ToString::to_string),
+            "skipped": skipped,
+        }))
+    });
+    report.set_list("commands", told);
+    report.lines.append(&mut lines);
 }
 
 /// Built skeleton of a workbench as posed, with the meshes of files skinned to it, and the settings for writing it.

@@ -47,6 +47,8 @@ pub(super) struct CheckArgs {
 #[derive(Default)]
 struct Findings {
     error: Option<String>,
+    /// Place of the error, where its reader knows more of it than the file.
+    place: Option<String>,
     /// Problems of single commands of a rig, each with its place in the file.
     problems: Vec<SourceError>,
     remarks: Vec<String>,
@@ -83,6 +85,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<Report, Failure> {
             report.at_fault = true;
             let first = found.problems.first();
             let place = first.map(|problem| format!("{}:{}:{}", path.display(), problem.line, problem.column));
+            let place = place.or_else(|| found.place.clone());
             let what = first.map_or(error.as_str(), |problem| problem.message.as_str());
             report
                 .fault
@@ -157,6 +160,7 @@ fn check(path: &Path) -> Result<Findings, Failure> {
         }
     };
     if let Err(error) = loaded {
+        found.place = Some(Explanation::of_error(&error, &path.display().to_string()).place);
         found.error = Some(error.to_string());
     }
     Ok(found)

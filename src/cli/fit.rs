@@ -15,7 +15,7 @@ use super::{
     limits,
     progress::{Progress, spinning},
     report::counted,
-    update::companion,
+    update::{check_companion, companion},
     vrm::AvatarDraft,
 };
 use crate::{
@@ -147,6 +147,9 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
     });
     let inputs: Vec<&Path> = [Some(args.mesh.as_path()), file].into_iter().flatten().collect();
     args.in_place.check(&inputs, Some(&args.output), &[])?;
+    if kind == Some(FileKind::Template) {
+        check_companion(&args.output)?;
+    }
     let mut report = Report::default();
     let template = template(args, &mut report)?;
     let model = spinning("reading the mesh", || limits::load_model(&args.mesh))?;
@@ -219,6 +222,7 @@ pub(super) fn store_made(
         report.notes(store_rig_over(&RealDisk, output, rig, &[])?);
         return Ok(());
     };
+    check_companion(output)?;
     let rig = origin.adopted(rig).map_err(|error| Failure::Input(Box::new(error)))?;
     report.notes(store_rig_from(&RealDisk, output, &rig, &origin)?);
     let base = companion(output);

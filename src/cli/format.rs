@@ -77,7 +77,11 @@ pub(super) fn run(args: &FormatArgs) -> Result<Report, Failure> {
             (true, false) if args.check => format!("{file}: not in its layout; `rigsmith format` changes it"),
             (true, false) => format!("{file}: not changed: another file is at fault"),
         });
-        report.at_fault |= changed && args.check;
+        if changed && args.check {
+            report.at_fault = true;
+            let fault = format!("`{file}` is not in its layout; run `rigsmith format` without --check on it");
+            report.fault.get_or_insert_with(|| Explanation::at(file.to_string(), &fault));
+        }
         list.push(json!({ "file": file.to_string(), "changed": changed && (is_written || args.check), "error": null }));
     }
     report.set("files", Value::Array(list));

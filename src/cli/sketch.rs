@@ -79,7 +79,8 @@ pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
         counted(answers.len(), "gesture", "gestures"),
         counted(joints, "joint", "joints")
     ));
-    report.set("gestures", serde_json::to_value(&answers).unwrap_or(Value::Null));
+    let told = answers.iter().map(|answer| serde_json::to_value(answer).unwrap_or(Value::Null));
+    report.set_list("gestures", told);
     describe_rig(&mut report, bench.rig());
     save(&mut bench, &args.output, kind, args, &mut report)?;
     Ok(report)

@@ -19,12 +19,14 @@ use super::{
 };
 use crate::{
     files::{
-        Disk, FileKind, RealDisk, StoreError, TemplateVersion, base_text, diff_templates, save_atomic, update_template,
+        Disk, FileKind, ReadError, RealDisk, StoreError, TemplateVersion, base_text, diff_templates, read_capped,
+        save_atomic, update_template,
     },
     processor::keep_poses,
     rig::{
         Rig,
         part::Part,
+        template,
         update::{Change, Take, Update},
         version::VersionChange,
     },
@@ -137,6 +139,10 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     let (now, file) = (version(&args.rig, &mut report)?, version(&args.from, &mut report)?);
     let beside = companion(&args.rig);
     let is_beside = args.base.is_none() && RealDisk.entry(&beside, true).is_ok();
+    let keeps_base = args.keep_base || is_beside;
+    if let Some(output) = args.output.as_ref().filter(|_| keeps_base && !args.dry_run) {
+        check_companion(output)?;
+    }
     let base = match &args.base {
         Some(base) => Some(version(base, &mut report)?),
         None if is_beside => Some(limits::load_version(&beside)?),
@@ -154,7 +160,6 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     if args.is_undecided(updated.conflicts(), base.is_some(), &mut report) {
         return Ok(report);
     }
-    let keeps_base = args.keep_base || is_beside;
     // The versions are as large as what is written, which is read back.
     drop((base, now));
     let file = keeps_base.then_some(file);
@@ -193,6 +198,27 @@ pub(super) fn companion(rig: &Path) -> PathBuf {
     let mut name = rig.as_os_str().to_owned();
     name.push(".base");
     name.into()
+}
+
+/// Refuses an output beside which something else than a template has the name of its [`companion`]: it would be replaced,
+/// although nobody named it.
+pub(super) fn check_companion(output: &Path) -> Result<(), Failure> {
+    let base = companion(output);
+    let is_free = match read_capped(&RealDisk, &base, template::MAX_BYTES as u64) {
+        Ok(bytes) => template::read_header(&bytes).is_ok(),
+        Err(ReadError::Missing { .. }) => true,
+        Err(_) => false,
+    };
+    if is_free {
+        return Ok(());
+    }
+    let fault = format!(
+        "`{}` is no template, and has the name under which the version of the template is kept beside `{}`; move it away, \
+         or give another output",
+        base.display(),
+        output.display()
+    );
+    Err(Failure::Input(fault.into()))
 }
 
 pub(super) fn load(path: &Path, report: &mut Report) -> Result<Rig, Failure> {

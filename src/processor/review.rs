@@ -23,13 +23,15 @@ const MOST: usize = 200;
 /// The problems of all commands of a rig, in the order of the build list: those whose module or parameters are wrong,
 /// switched off or not, and those that fail when they run. A command that fails is left out for the rest, and those that
 /// cannot do without it are passed over: each fault is told once. A command has several problems where several of its
-/// parameters cannot be read, name what is not there, or are out of range.
+/// parameters cannot be read, name what is not there, or are out of range. Behind a command that goes over a limit of the
+/// whole rig no more is looked for.
 pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
     let (mut problems, mut repaired) = problems_before_run(rig, modules);
     let order: Vec<Uid> = rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| tag.uid)).collect();
     let mut running = rig.clone();
     running.disable_tags(&problems.iter().map(|error| error.command).collect());
     let mut builder = Builder::new(modules.clone());
+    let mut is_full = false;
     for _ in 0..MOST {
         builder.sync(&running);
         let Some(error) = builder.run_all().error else { break };
@@ -39,16 +41,28 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
         if running.find_tag(error.command).is_none() {
             break;
         }
+        is_full = is_limit_of_rig(&error.problem);
         running.disable_tags(&HashSet::from([error.command]));
         repaired.extend(repaired_by_default(rig, &error));
         problems.push(error);
+        // All commands behind it fail for the same reason.
+        if is_full {
+            break;
+        }
     }
-    problems.extend(further_problems(rig, &running, &mut builder, &mut repaired));
-    problems.extend(problems_behind(rig, &problems, &repaired, &mut builder));
+    if !is_full {
+        problems.extend(further_problems(rig, &running, &mut builder, &mut repaired));
+        problems.extend(problems_behind(rig, &problems, &repaired, &mut builder));
+    }
     let places: HashMap<Uid, usize> = order.into_iter().enumerate().map(|(place, tag)| (tag, place)).collect();
     problems.sort_by_key(|error| places.get(&error.command).copied());
     show_names_alone(rig, &mut problems);
     problems
+}
+
+/// True for more than all commands of a rig may make or do together.
+fn is_limit_of_rig(problem: &BuildProblem) -> bool {
+    matches!(problem, BuildProblem::Module(ModuleError::TooMany { name: "nodes" | "work", .. }))
 }
 
 /// Leaves out the uids of references in problems where the names beside them mean the same things.

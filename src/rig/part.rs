@@ -126,10 +126,11 @@ fn refers_to(joint: &RigJoint) -> impl Iterator<Item = (NameKind, Uid)> {
 pub(in crate::rig) fn unpaired_sides(rig: &Rig) -> Vec<(Uid, Uid)> {
     let mut paired: HashSet<Uid> =
         rig.walk().filter(|joint| joint.data.mirror.is_some()).map(|joint| joint.data.uid).collect();
+    let labelled = rig.joints_by_label();
     let mut pairs = Vec::new();
     for joint in rig.walk() {
         let (uid, opposite) = (joint.data.uid, joint.data.label.as_deref().and_then(mirrored_label));
-        let Some(other) = opposite.and_then(|label| rig.find_label(&label)) else { continue };
+        let Some(other) = opposite.and_then(|label| labelled.get(label.as_str()).copied()) else { continue };
         if !paired.contains(&uid) && !paired.contains(&other) {
             paired.extend([uid, other]);
             pairs.push((uid, other));

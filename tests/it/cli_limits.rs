@@ -117,6 +117,19 @@ fn builds_begin_no_command_after_their_time() {
     assert!(Builder::build(&rig, &Arc::new(modules)).is_ok());
 }
 
+/// A review that went on behind the limit would build the rig anew for each command.
+#[test]
+fn a_rig_over_its_limit_has_one_problem() {
+    let tags = vec!["Command(module: \"null\")"; 300].join(", ");
+    let text = format!("(format: 2, name: \"n\", joints: [(label: \"j\", tags: [{tags}])])");
+    let rig = read_template(text.as_bytes()).unwrap().rig;
+    let mut modules = rigsmith::modules::all();
+    modules.limits = RigLimits::default().with(Limit::Nodes, 50).build();
+    let problems = review(&rig, &Arc::new(modules));
+    assert_eq!(problems.len(), 1, "{problems:?}");
+    assert!(problems[0].to_string().contains("more than 50 nodes and constraints"), "{problems:?}");
+}
+
 #[test]
 fn what_is_told_has_limits() {
     let folder = folder();

@@ -215,3 +215,64 @@ fn templates_are_formatted_in_place_or_not_at_all() {
     assert_eq!(rigsmith(folder.path(), &["convert", "a.rig.ron", "c.rig.ron"]).0, 0);
     assert_eq!(read("c.rig.ron"), rough);
 }
+
+/// An update and a fit keep a version of the template beside their output, under a name that nobody gave.
+#[test]
+fn the_version_that_is_kept_replaces_nothing_but_a_template() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    for name in ["mine", "new"] {
+        let text = format!("(format: 2, name: \"{name}\", joints: [(label: \"a\")])");
+        fs::write(at(&format!("{name}.rig.ron")), text).unwrap();
+    }
+    fs::write(at("out.rig.ron.base"), "work of days").unwrap();
+    let update =
+        ["update", "mine.rig.ron", "--from", "new.rig.ron", "--take", "mine", "--keep-base", "-o", "out.rig.ron"];
+    let fit = ["fit", "b.obj", "--template", "parts/tail", "-o", "out.rig.ron"];
+    for args in [&update[..], &fit] {
+        let before = contents(folder.path());
+        let (code, told) = json(folder.path(), args);
+        assert_eq!(code, 1, "{args:?}: {told}");
+        assert!(told["error"]["what"].as_str().unwrap().contains("out.rig.ron.base"), "{args:?}: {told}");
+        assert!(contents(folder.path()) == before, "{args:?}");
+    }
+    fs::write(at("out.rig.ron.base"), "(format: 2, name: \"old\")").unwrap();
+    let (code, told) = json(folder.path(), &update);
+    assert_eq!(code, 0, "{told}");
+    assert!(fs::read_to_string(at("out.rig.ron.base")).unwrap().contains("\"new\""));
+}
+
+#[test]
+fn a_template_out_of_its_layout_is_told_in_three_parts() {
+    let folder = folder();
+    let text = "(format: 2,   name: \"n\", joints: [(label: \"a\")])";
+    fs::write(folder.path().join("n.rig.ron"), text).unwrap();
+    let (code, told) = json(folder.path(), &["format", "--check", "n.rig.ron"]);
+    assert_eq!(code, 1, "{told}");
+    assert_eq!(told["ok"], false, "{told}");
+    assert_eq!(told["error"]["where"], "n.rig.ron", "{told}");
+    for part in ["what", "do"] {
+        assert!(told["error"][part].as_str().is_some_and(|said| !said.is_empty()), "{told}");
+    }
+    assert_eq!(fs::read_to_string(folder.path().join("n.rig.ron")).unwrap(), text);
+}
+
+#[test]
+fn a_check_tells_the_place_that_the_reader_tells() {
+    let folder = folder();
+    let files = [
+        ("m.gltf", r#"{"asset":{"version":"2.0"},"meshes":[{"primitives":[{"attributes":{"POSITION":7}}]}]}"#),
+        ("p.rigsmith.ron", "(\n    format: 1,\n    name: 7,\n)"),
+        ("c.anim.ron", "(\n    format: 1,\n    clips: 7,\n)"),
+    ];
+    for (name, text) in files {
+        fs::write(folder.path().join(name), text).unwrap();
+        let [of_info, of_check] = ["info", "check"].map(|command| {
+            let (code, told) = json(folder.path(), &[command, name]);
+            assert_eq!(code, 1, "{command} {name}: {told}");
+            told["error"]["where"].as_str().unwrap().to_owned()
+        });
+        assert_eq!(of_check, of_info, "{name}");
+        assert!(of_check.len() > name.len() && of_check.starts_with(name), "{of_check}");
+    }
+}

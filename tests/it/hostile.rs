@@ -327,6 +327,7 @@ fn files_and_builds_stay_within_their_memory() {
     fs::write(at("dense.rigclip"), crate::packed_clips::dense_clip(1 << 20)).unwrap();
     fs::write(at("chain.rig"), skeleton(8_000, true)).unwrap();
     fs::write(at("long.rig"), skeleton(40_000, true)).unwrap();
+    fs::write(at("longer.rig"), skeleton(64_000, true)).unwrap();
     fs::write(at("unknown.rig.ron"), tags(6_000, |_| command("nope", ""))).unwrap();
     fs::write(at("nulls.rig.ron"), chain_of_nulls(1_500)).unwrap();
     let size = |file: &str| fs::metadata(at(file)).unwrap().len();
@@ -347,6 +348,7 @@ fn files_and_builds_stay_within_their_memory() {
         (&["check", "unknown.rig.ron"], size("unknown.rig.ron")),
         (&["build", "unknown.rig.ron"], size("unknown.rig.ron")),
         (&["info", "chain.rig"], size("chain.rig")),
+        (&["info", "longer.rig"], size("longer.rig")),
         (&["build", "chain.rig"], size("chain.rig")),
         (&["build", "chain.rig", "-o", "built.rig.ron"], size("chain.rig")),
         (&["build", "long.rig"], size("long.rig")),

@@ -254,11 +254,16 @@ fn check_needs(
     bindings: &BTreeMap<Uid, Uid>,
     asking: usize,
 ) -> Result<(), OperationError> {
+    let left = left_out(part, joints.len(), asking);
+    if left.is_empty() {
+        return Ok(());
+    }
+    let labelled = rig.joints_by_label();
     let is_found = |(kind, uid): &(NameKind, Uid)| {
-        let by_label = || part.name_of(NameKind::Joint, *uid).is_some_and(|label| rig.find_label(&label).is_some());
+        let by_label = || part.name_of(NameKind::Joint, *uid).is_some_and(|label| labelled.contains_key(&*label));
         bindings.contains_key(uid) || *kind == NameKind::Joint && by_label()
     };
-    if left_out(part, joints.len(), asking).iter().all(is_found) {
+    if left.iter().all(is_found) {
         return Ok(());
     }
     let (part, needs) = (part.about().name.clone(), PartNeeds::of(part));
