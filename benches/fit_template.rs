@@ -15,11 +15,11 @@
 
 #[path = "../tests/it/fit_data/decimate.rs"]
 mod decimate;
-#[path = "../tests/it/fit_data/known_joints.rs"]
-mod known_joints;
 #[expect(dead_code, reason = "tests use more of it")]
 #[path = "../tests/it/random.rs"]
 mod random;
+#[path = "../tests/it/fit_data/true_joints.rs"]
+mod true_joints;
 #[path = "../tests/it/fit_data/variants.rs"]
 mod variants;
 
@@ -41,8 +41,8 @@ use rigsmith::{
 
 use self::{
     decimate::decimated,
-    known_joints::{Figure, figures, held_back, is_finger, template_joints},
     random::Random,
+    true_joints::{Figure, figures, held_back, is_finger, template_joints},
     variants::{odd_turns, right_turns, subdivided, with_other_diagonals, with_points_shuffled, with_specks},
 };
 

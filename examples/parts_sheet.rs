@@ -242,7 +242,7 @@ fn has_shape(node: &BuiltNode, shape: &str) -> bool {
     node.control.as_ref().is_some_and(|control| control.shape == shape)
 }
 
-fn find(built: &BuiltRig, label: &str, is_it: impl Fn(&BuiltNode) -> bool) -> Result<Uid, String> {
+fn find(built: &BuiltRig, label: &str, is_it: impl Fn(&BuiltNode) -> bool) -> Result<Uid, Box<dyn Error>> {
     let found = built.nodes.iter().find(|node| node.label.as_deref() == Some(label) && is_it(node));
-    found.map(|node| node.uid).ok_or_else(|| format!("there is no such node at {label}"))
+    Ok(found.ok_or_else(|| format!("there is no such node at {label}"))?.uid)
 }

@@ -26,6 +26,7 @@ mod new;
 mod outputs;
 mod pose;
 mod progress;
+mod project_meshes;
 #[cfg(feature = "remote")]
 mod remote;
 #[cfg(feature = "render")]
@@ -62,11 +63,11 @@ use vrm::VrmArgs;
 #[command(after_help = limits::listing())]
 struct Cli {
     /// Answer in JSON, for programs
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = "Options of every command")]
     json: bool,
     /// Set a limit of what a command takes, makes or tells, such as joints=2000; may be repeated.
     /// `rigsmith --help` lists them
-    #[arg(long, global = true, value_name = "NAME=NUMBER")]
+    #[arg(long, global = true, help_heading = "Options of every command", value_name = "NAME=NUMBER")]
     limit: Vec<limits::LimitSetting>,
     #[command(subcommand)]
     command: Option<Command>,
@@ -127,7 +128,7 @@ impl Command {
         match self {
             Self::Edit(args) => args.file.as_deref(),
             Self::Sketch(args) => Some(&args.gestures),
-            Self::Skin(args) => Some(&args.mesh),
+            Self::Skin(args) => args.meshes.first().map(PathBuf::as_path),
             Self::Fit(args) => Some(&args.mesh),
             Self::Face(args) => Some(&args.mesh),
             Self::Convert(args) => Some(&args.input),
@@ -155,7 +156,7 @@ impl Command {
 /// Arguments of `edit`.
 #[derive(Args, Debug)]
 struct EditArgs {
-    /// The file
+    /// The mesh (.obj, .gltf, .glb, .vrm), the template (.rig.ron) or the project (.rigsmith.ron)
     file: Option<PathBuf>,
     /// Let other programs of this machine control the window over this port; 0 takes a free one
     #[cfg(feature = "remote")]
@@ -187,13 +188,15 @@ struct WeightArgs {
     /// Width of the blend between joints: 1 is usual, less is harder, more is softer
     #[arg(long, default_value_t = 1.0, value_parser = positive)]
     smoothing: f32,
-    /// Influences kept for each vertex while working
+    /// Joints that move one vertex, while weights are computed, at most
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u8).range(1..=8))]
     stored_influences: u8,
-    /// Let parts bend that one joint holds in their whole size; otherwise they move with that joint alone
+    /// Let every part of the mesh bend. Without it, a loose part that lies on one joint moves stiffly with it, as a helmet
+    /// does
     #[arg(long)]
     bend_parts: bool,
-    /// Let joints claim skin although they hang outside of the mesh or do not deform, by their labels; may be repeated
+    /// Labels of joints that get skin in any case, also where they lie outside of the mesh or are marked as not deforming;
+    /// may be repeated
     #[arg(long, value_name = "LABEL[,LABEL...]")]
     claim: Vec<String>,
 }
@@ -227,7 +230,7 @@ impl WeightArgs {
 /// Options of exported characters.
 #[derive(Args, Debug, Clone)]
 struct ExportArgs {
-    /// Influences written for each vertex, and found by a fit; more than 4 need a second set that not every program reads
+    /// Joints that move one vertex, in what is written, at most; more than 4 need a second set that not every program reads
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=8))]
     influences: u8,
     /// Write all joints, not only joints with weights and their ancestors

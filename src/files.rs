@@ -37,6 +37,7 @@ mod read;
 mod shapes;
 mod similar_parts;
 mod site;
+mod stoppable_disk;
 mod store;
 mod template_layout;
 mod template_origin;
@@ -76,9 +77,10 @@ pub use project::{
 pub use read::{OpenFile, ReadError, open, read_capped};
 pub use shapes::{LoadShapesError, load_shapes};
 pub use site::{SITE_FILE, SearchPaths, SiteError, TEMPLATES_VARIABLE};
+pub use stoppable_disk::{StopSign, StoppableDisk};
 pub use store::{
     DocumentBase, StoreError, is_template_of, store_animation, store_avatar, store_document_over, store_model,
-    store_owned_model, store_packed_clips, store_rig, store_rig_over, store_skin,
+    store_owned_model, store_packed_clips, store_rig, store_rig_over, store_short_rig, store_skin,
 };
 pub use template_layout::format_template_file;
 pub use template_origin::{TemplateOrigin, has_parts, store_rig_from};

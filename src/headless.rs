@@ -37,7 +37,7 @@ use crate::{
         limits::{Deadline, Limit, OutOfTime, RigLimits},
         mesh_reload::ReloadError,
         skinning::{BindAnswer, BindRequest, MeshPart, PartBinding, SkinningError, SkinningJob, SkinningReport},
-        surface::{RigMesh, SkinOf},
+        surface::{RigMesh, RigMeshes, SkinOf},
         task_pools,
     },
     processor::BuildLimits,
@@ -56,7 +56,8 @@ pub fn headless_app(seed: u64) -> App {
     app
 }
 
-/// App without a window, with the plugins of rigs, one rig and at most one mesh.
+/// App without a window, with the plugins of rigs, one rig and its meshes. Binding, fits and faces work on the mesh that
+/// was opened last.
 pub struct Workbench {
     app: App,
     rig: Entity,
@@ -419,9 +420,16 @@ impl Workbench {
         self.app.world().get::<Rig>(self.rig).unwrap_or(&EMPTY)
     }
 
-    /// The mesh.
+    /// The mesh that was opened last.
     pub fn mesh(&self) -> Option<&RigMesh> {
         self.app.world().get::<RigMesh>(self.mesh?)
+    }
+
+    /// All meshes, in the order in which they were opened.
+    pub fn meshes(&self) -> impl Iterator<Item = &RigMesh> {
+        let world = self.app.world();
+        let meshes = world.get::<RigMeshes>(self.rig).into_iter().flat_map(|meshes| meshes.iter());
+        meshes.filter_map(move |mesh| world.get::<RigMesh>(mesh))
     }
 
     /// The mesh's weights.
@@ -434,29 +442,21 @@ impl Workbench {
         self.app.world().get::<BuildResult>(self.rig).map(|built| &*built.0)
     }
 
-    /// Mesh with the rig's joints (the built ones if the rig is built) and weights, for export.
+    /// Meshes with the rig's joints (the built ones if the rig is built) and weights, for export: several as one model,
+    /// which has the name of the first.
     pub fn character(&self) -> Model {
-        match self.mesh() {
-            Some(mesh) => character(&Character {
-                rig: self.rig(),
-                built: self.built(),
-                file: &mesh.file,
-                rest: &mesh.rest,
-                nodes: &mesh.nodes,
-                skin: self.weights(),
-            }),
-            None => {
-                let empty = Model { name: self.rig().about().name.clone(), ..default() };
-                character(&Character {
-                    rig: self.rig(),
-                    built: self.built(),
-                    file: &empty,
-                    rest: &empty,
-                    nodes: &[],
-                    skin: None,
-                })
-            }
-        }
+        let (rig, built) = (self.rig(), self.built());
+        let model_of = |mesh: &RigMesh| {
+            let skin = rig.skin(mesh.uid).map(Arc::as_ref);
+            character(&Character { rig, built, file: &mesh.file, rest: &mesh.rest, nodes: &mesh.nodes, skin })
+        };
+        let mut models = self.meshes().map(model_of);
+        let Some(mut model) = models.next() else {
+            let empty = Model { name: rig.about().name.clone(), ..default() };
+            return character(&Character { rig, built, file: &empty, rest: &empty, nodes: &[], skin: None });
+        };
+        models.for_each(|more| model.append(more));
+        model
     }
 
     /// The app, for functions that the workbench does not offer.

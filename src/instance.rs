@@ -60,7 +60,7 @@ use std::{
 
 use bevy::{
     app::{AnimationSystems, MainScheduleOrder},
-    asset::{AssetId, AssetLoadFailedEvent, AssetPlugin, io::file::FileAssetReader},
+    asset::{AssetId, AssetPlugin, io::file::FileAssetReader},
     ecs::{schedule::ScheduleLabel, system::SystemParam},
     prelude::*,
 };
@@ -100,11 +100,12 @@ use crate::{
 /// them; it adds what it needs of both otherwise.
 #[derive(Debug, Clone)]
 pub struct RigInstancePlugin {
-    /// Files of templates are watched, and what is saved is taken over at once.
+    /// True if files of templates are watched, so that instances go on with what is saved.
     pub live: bool,
     /// Time between two looks at a watched file; with many files it is longer.
     pub look: Duration,
-    /// Time that a file which cannot be read as a template is waited for before it is told: it may be half written.
+    /// Time for which a file that cannot be read as a template may stay so before [`RigFailed`] tells it: it may be half
+    /// written.
     pub patience: Duration,
 }
 
@@ -148,6 +149,7 @@ impl Plugin for RigInstancePlugin {
                 is_live: self.live,
                 root,
                 built: HashMap::new(),
+                failed: HashMap::new(),
                 own: HashMap::new(),
                 is_fresh: false,
             })
@@ -156,7 +158,7 @@ impl Plugin for RigInstancePlugin {
         app.add_systems(
             UpdateInstances,
             (
-                (follow_assets, follow_failures, watch_files).chain(),
+                (apply::tell_known_failures, follow_assets, apply::follow_failures, watch_files).chain(),
                 apply::take_outcomes,
                 apply::update_instances.run_if(apply::is_due),
                 (
@@ -176,13 +178,8 @@ impl Plugin for RigInstancePlugin {
             UpdateInstances,
             (bodies::land_bodies, bodies::give_bodies, bodies::bind_bodies).chain().after(apply::update_instances),
         );
+        skins::add(app);
         app.add_systems(
-            UpdateInstances,
-            (skins::bind_skins.run_if(skins::is_due), file_nodes::fit_skins.run_if(file_nodes::fit_is_due))
-                .chain()
-                .after(apply::update_instances),
-        )
-        .add_systems(
             UpdateInstances,
             faces::express.after(clips::give_clips).after(bodies::bind_bodies).after(file_nodes::fit_skins),
         )
@@ -195,22 +192,21 @@ impl Plugin for RigInstancePlugin {
                 // Cameras have transforms, too; these are those of files' nodes and of rigs alone.
                 .ambiguous_with_all(),
         );
-        #[cfg(feature = "draw")]
-        app.add_systems(UpdateInstances, skins::share_meshes.after(apply::update_instances).before(skins::bind_skins));
         app.add_observer(apply::leave);
     }
 }
 
 /// Makes an entity a character of a template. Its nodes are spawned when the template is loaded and built, as
 /// [`InstanceMode`] says; [`RigBuilt`] tells it. Taking the component off despawns them; another mode spawns others, unposed.
+/// What a game hung on a node that is despawned stays, on the instance.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Eq)]
 #[reflect(Component)]
 #[require(InstanceMode, Transform)]
 pub struct RigInstance(pub Handle<RigTemplate>);
 
-/// Nodes that an instance in [`InstanceMode::Direct`] has as entities besides its joints and sockets, and poses besides the joints
-/// that stored poses move. Without this component it has all controls; instances with the same nodes share a program. A node that
-/// the template does not have is told ([`RigFailed`]), and the instance has all controls then.
+/// Nodes besides joints and sockets that an instance in [`InstanceMode::Direct`] has as entities, and that can be posed. Without
+/// this component these are all controls, and also where the template lacks one of the nodes, which [`RigFailed`] tells. Joints
+/// that stored poses move can be posed in any case. Instances with the same nodes share a program.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Eq, Default)]
 #[reflect(Component)]
 pub struct ExposedNodes(pub Vec<ExposedNode>);
@@ -240,7 +236,7 @@ pub struct RigBuilt {
 pub struct RigUpdated {
     /// The instance.
     pub entity: Entity,
-    /// Differences of the template.
+    /// Differences from the template, or the version of it, that the instance had.
     pub changes: Arc<[Change]>,
     /// Tags of the commands that ran again.
     pub ran: Arc<[Uid]>,
@@ -250,7 +246,8 @@ pub struct RigUpdated {
     pub clips: Arc<ClipReport>,
 }
 
-/// The template of an instance was not taken over; the instance goes on as it was.
+/// The template of an instance was not taken over; the instance goes on as it was. An instance that comes later, to a template
+/// that has never been built, is told the reason, too.
 #[derive(EntityEvent, Debug, Clone)]
 pub struct RigFailed {
     /// The instance.
@@ -301,6 +298,8 @@ pub struct RigTemplates {
     /// Folder of the asset server's files.
     root: Option<PathBuf>,
     built: HashMap<AssetId<RigTemplate>, Arc<BuiltTemplate>>,
+    /// Reasons for which templates have no build.
+    failed: HashMap<AssetId<RigTemplate>, TemplateError>,
     /// Templates that the thread has built before they became assets.
     own: HashMap<AssetId<RigTemplate>, RigTemplate>,
     is_fresh: bool,
@@ -310,6 +309,19 @@ impl RigTemplates {
     /// The built template of an asset; `None` until it is built.
     pub fn built(&self, template: &Handle<RigTemplate>) -> Option<&Arc<BuiltTemplate>> {
         self.built.get(&template.id())
+    }
+
+    /// Number of templates that are built. Those of which nobody has a handle are forgotten.
+    pub fn count(&self) -> usize {
+        self.built.len()
+    }
+
+    /// Forgets a template, and ends the watch of its file.
+    fn forget(&mut self, id: AssetId<RigTemplate>) {
+        self.own.remove(&id);
+        self.built.remove(&id);
+        self.failed.remove(&id);
+        self.builds.send(Work::Forget { id });
     }
 
     /// Sends templates that were changed by code, or loaded, to be built.
@@ -453,22 +465,9 @@ fn follow_assets(
                     templates.follow(*id, template, &modules);
                 }
             }
-            AssetEvent::Removed { id } => {
-                templates.own.remove(id);
-                templates.built.remove(id);
-                templates.builds.send(Work::Forget { id: *id });
-            }
-            AssetEvent::LoadedWithDependencies { .. } | AssetEvent::Unused { .. } => {}
-        }
-    }
-}
-
-/// Tells instances whose template the asset server cannot load.
-fn follow_failures(mut failed: MessageReader<AssetLoadFailedEvent<RigTemplate>>, users: Users, mut commands: Commands) {
-    for AssetLoadFailedEvent { id, error, .. } in failed.read() {
-        let error = TemplateError::Load(error.to_string());
-        for entity in users.of(*id) {
-            commands.trigger(RigFailed { entity, error: error.clone() });
+            // A template that never became an asset is told as unused alone.
+            AssetEvent::Removed { id } | AssetEvent::Unused { id } => templates.forget(*id),
+            AssetEvent::LoadedWithDependencies { .. } => {}
         }
     }
 }

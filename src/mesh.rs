@@ -8,6 +8,7 @@ mod bind_pose;
 mod gear;
 pub mod gltf;
 pub mod influences;
+mod joining;
 pub mod model;
 pub mod obj;
 pub mod ray;

@@ -132,6 +132,16 @@ use bevy::{
 /// | [`runtime::RuntimePlugin`] | compiled rigs that run each frame |
 /// | [`animation::ClipPlugin`] | clips that play on rigs; keys set with each pose |
 /// | [`journal::JournalPlugin`] | every change stored at once, for rigs that request it |
+///
+/// Each plugin can be left out or replaced, as in any [`PluginGroup`]:
+///
+/// ```
+/// use bevy::prelude::*;
+/// use rigsmith::{plugins::journal::JournalPlugin, prelude::*};
+///
+/// let mut app = App::new();
+/// app.add_plugins((MinimalPlugins, TransformPlugin, RigPlugins.build().disable::<JournalPlugin>()));
+/// ```
 pub struct RigPlugins;
 
 impl PluginGroup for RigPlugins {
@@ -168,16 +178,16 @@ pub enum RigSystems {
     Gesture,
     /// Carries out edit, undo and redo requests: the only place where rigs change.
     Edits,
-    /// Updates joint entities after their rig.
+    /// Writes changes of rigs to their joint entities.
     Build,
-    /// Updates meshes after their weights; starts background skinning and takes over its results.
+    /// Writes changed weights to meshes; starts background skinning and takes over its results.
     Bind,
     /// Runs rigs in `PostUpdate`, between Bevy's animation and its propagation of transforms.
     Solve,
     /// Writes world transforms of instances' joints in games, in `PostUpdate`, at the end of the propagation of
     /// transforms.
     Scatter,
-    /// Updates surfaces after the pose, in `PostUpdate`, after transforms have propagated.
+    /// Has surfaces follow changed poses, in `PostUpdate`, after transforms have propagated.
     Surface,
 }
 

@@ -1,4 +1,13 @@
 //! Common imports of games and tools that use Rigsmith.
+//!
+//! - Characters of a game: [`RigInstance`] on a [`RigTemplate`], posed with [`ControlPoses`] on the nodes that
+//!   [`InstanceNodes`] finds; [`RigSource`] where people edit the rig in the app.
+//! - Rigs that are edited: [`Rig`], [`EditRequest`] with an [`Operation`] or [`RigEdit`]s, answered by an [`EditReport`] or
+//!   an [`EditRefusal`].
+//! - Tools of a viewport: [`PickRequest`], [`PlaceRequest`], [`StrokeRequest`] and lists of [`Gesture`]s, whose rays and
+//!   views are in the rig's space; [`BindRequest`] for weights.
+//!
+//! Lengths have the unit of the mesh, angles are radians in code and degrees in templates, poses are relative to rest.
 
 pub use crate::{
     algo::{

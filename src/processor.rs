@@ -23,7 +23,7 @@ mod follow;
 pub mod form;
 mod ik;
 mod keep_clips;
-mod keep_moved;
+mod keep_moved_nodes;
 mod keep_poses;
 mod list;
 mod mirror;

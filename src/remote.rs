@@ -2,8 +2,8 @@
 //!
 //! A thread listens on the loopback interface and nowhere else. Before the body of a request is looked at, its method, its host,
 //! its origin, its token and its length are checked, and a request that arrives slowly is cut off. Calls are handed to the
-//! main world, which carries them out between two frames: edits are steps of the history, builds are build requests, and
-//! templates are read and saved in the folders that the app allows. `rpc.discover` describes all methods.
+//! main world, one at a time, which carries them out between two frames: edits are steps of the history, builds are build
+//! requests, and templates are read and saved in the folders that the app allows. `rpc.discover` describes all methods.
 //!
 //! ```no_run
 //! use bevy::prelude::*;
@@ -28,7 +28,7 @@ use std::{
     path::PathBuf,
     sync::{
         Arc, Mutex, PoisonError,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicUsize, Ordering},
         mpsc::{Receiver, Sender, channel},
     },
     thread,
@@ -101,6 +101,10 @@ struct Gate {
     answer_timeout: Duration,
     has_ended: AtomicBool,
     wake: Mutex<Option<Wake>>,
+    /// Number of connections that are being answered.
+    open: AtomicUsize,
+    /// Held by the call that the app carries out.
+    turn: Mutex<()>,
 }
 
 type Wake = Box<dyn Fn() + Send + Sync>;
@@ -129,8 +133,19 @@ impl RemotePlugin {
         let bound = TcpListener::bind((Ipv4Addr::LOCALHOST, port));
         let listener = bound.map_err(|source| RemoteError::Port { port, source })?;
         let address = listener.local_addr().map_err(|source| RemoteError::Port { port, source })?;
-        let (has_ended, wake) = (AtomicBool::new(false), Mutex::new(None));
-        let gate = Gate { listener, address, token, is_random, folders, read_timeout, answer_timeout, has_ended, wake };
+        let gate = Gate {
+            listener,
+            address,
+            token,
+            is_random,
+            folders,
+            read_timeout,
+            answer_timeout,
+            has_ended: AtomicBool::new(false),
+            wake: Mutex::new(None),
+            open: AtomicUsize::new(0),
+            turn: Mutex::new(()),
+        };
         Ok(Self { gate: Arc::new(gate) })
     }
 

@@ -37,6 +37,7 @@ mod tag;
 mod template_copy;
 mod touched_joints;
 mod uid;
+mod uid_list;
 pub mod update;
 pub mod version;
 pub mod vrm;

@@ -21,7 +21,7 @@ mod track;
 use glam::{Vec2, Vec3};
 use thiserror::Error;
 
-pub use gesture::{StrokeKind, classify, joint_at};
+pub use gesture::{StrokeKind, classify, is_scribble, is_straight, joint_at};
 
 use self::{
     axis::Axis,

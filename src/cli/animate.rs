@@ -11,20 +11,20 @@ use std::path::{Path, PathBuf};
 
 use bevy::math::Vec3A;
 use clap::{Args, ValueEnum};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs, build, limits, positive, progress::spinning,
-    report::counted, skin, vrm::AvatarDraft,
+    project_meshes::own_meshes, report::counted, skin, vrm::AvatarDraft,
 };
 use crate::{
-    files::{FileKind, RealDisk, store_animation, store_model},
+    files::{FileKind, RealDisk, store_animation, store_owned_model},
     headless::{Workbench, posing::PoseError},
     mesh::{
         gltf::GltfWriteSettings,
         model::{Clip, Model, Node},
     },
-    plugins::commands::BuildStep,
+    plugins::{commands::BuildStep, surface::RigMesh},
     rig::{
         BuiltRig, Rig, RigEdit, Uid,
         animation::RigClip,
@@ -50,10 +50,10 @@ pub(super) struct AnimateArgs {
     /// A clip to take from the files, by its name or its number from 1; may be repeated; all, if left out
     #[arg(long = "clip", value_name = "NAME")]
     chosen: Vec<String>,
-    /// A mesh to bind to the rig, for .glb, .vrm and .png; a rig that is a .glb, .gltf or .vrm keeps its own mesh and
-    /// weights in a .glb or .vrm
-    #[arg(long)]
-    mesh: Option<PathBuf>,
+    /// A mesh to bind to the rig, for .glb, .vrm and .png; may be repeated, for all meshes of one character; a rig that is a
+    /// .glb, .gltf, .vrm or project keeps its own meshes and weights in a .glb or .vrm
+    #[arg(long = "mesh", value_name = "MESH")]
+    meshes: Vec<PathBuf>,
     /// A map of joints for motion of another skeleton: a RON list of pairs of names, [("LeftUpLeg", "thigh_l"), ...];
     /// it wins over what is guessed, and "" beside a joint lets it move nothing
     #[arg(long, value_name = "FILE")]
@@ -143,7 +143,7 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
     }
     check(args, is_picture)?;
     let mut report = Report::default();
-    let mut rig = read(args, &mut report)?;
+    let (mut rig, mut own) = read(args, &mut report)?;
     let meta = args.vrm.meta(&rig, &args.output)?;
     let is_motion = args.clips.iter().any(|clip| is_motion(clip));
     let has_commands = rig.walk().any(|joint| !joint.data.tags.is_empty());
@@ -178,14 +178,21 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
             Some(model) => {
                 (model, GltfWriteSettings { all_joints: true, bind_unweighted: true, ..args.export.settings() })
             }
-            None => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, &mut report)?,
+            None => match own.len() {
+                0 => build::character_of(&mut bench, &args.meshes, &args.weights, &args.export, &mut report)?,
+                1 => {
+                    let mesh = build::MeshSource::Open(Box::new(own.swap_remove(0)));
+                    build::character_with(&mut bench, vec![mesh], &args.weights, &args.export, &mut report)?
+                }
+                _ => build::posed_meshes(&bench, &own, &args.export)?,
+            },
         };
         let draft = meta.map(|meta| (AvatarDraft::new(bench.rig(), bench.built(), &mut model), meta));
         model.clips = spinning("baking", || exported(args, &bench, &model, &clips, &mut report))?;
         dress(args, &mut model, &mut report);
         match draft {
-            Some((draft, meta)) => draft.store(&mut model, meta, &args.output, &settings, &mut report)?,
-            None => report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?),
+            Some((draft, meta)) => draft.store(model, meta, &args.output, &settings, &mut report)?,
+            None => report.notes(spinning("writing", || store_owned_model(&RealDisk, &args.output, model, &settings))?),
         }
     }
     report.line(format!("wrote {}", args.output.display()));
@@ -218,7 +225,7 @@ fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
             format!("cannot write `{}`; give .glb, .gltf, .vrm, .anim.ron, .rigclip or .png", args.output.display());
         return Err(Failure::Usage(text));
     }
-    if args.mesh.is_some() && (is_packed || kind == Some(FileKind::Animation)) {
+    if !args.meshes.is_empty() && (is_packed || kind == Some(FileKind::Animation)) {
         return Err(Failure::Usage("--mesh is for a character; write one with -o NAME.glb".to_owned()));
     }
     let is_known = |clip: &PathBuf| is_motion(clip) || FileKind::of(clip) == Some(FileKind::Animation);
@@ -247,26 +254,33 @@ fn check(args: &AnimateArgs, is_picture: bool) -> Result<(), Failure> {
         let text = "--map-out is for one file of motion; give one .bvh, .glb, .gltf, .vrm or .rigclip";
         return Err(Failure::Usage(text.to_owned()));
     }
-    let inputs = [Some(&args.rig), args.mesh.as_ref(), args.map.as_ref()].into_iter().flatten().chain(&args.clips);
+    let inputs = std::iter::once(&args.rig).chain(&args.meshes).chain(&args.map).chain(&args.clips);
     let inputs: Vec<&Path> = inputs.map(PathBuf::as_path).collect();
     let further: Vec<(&str, &Path)> = args.map_out.iter().map(|path| ("--map-out", path.as_path())).collect();
     InPlaceArgs::default().check(&inputs, Some(&args.output), &further)
 }
 
-fn read(args: &AnimateArgs, report: &mut Report) -> Result<Rig, Failure> {
+/// The rig, and the meshes that it has in a project where they are to be written.
+fn read(args: &AnimateArgs, report: &mut Report) -> Result<(Rig, Vec<RigMesh>), Failure> {
     match FileKind::of(&args.rig) {
         Some(FileKind::Project) => {}
-        Some(_) => return skin::load_rig(&args.rig, report),
+        Some(_) => return Ok((skin::load_rig(&args.rig, report)?, Vec::new())),
         None => {
             let template = limits::load_template(&args.rig)?;
             report.notes(template.notes);
-            return Ok(template.rig);
+            return Ok((template.rig, Vec::new()));
         }
     }
     let mut project = limits::load_project(&args.rig)?;
+    let is_character = args.meshes.is_empty() && FileKind::of(&args.output).is_some_and(FileKind::is_gltf);
+    if is_character {
+        limits::refuse_outside(&project)?;
+    }
     report.notes(project.notes);
     let empty = || Failure::Input(format!("`{}` has no rig to animate", args.rig.display()).into());
-    (!project.rigs.is_empty()).then(|| project.rigs.swap_remove(0)).ok_or_else(empty)
+    let rig = (!project.rigs.is_empty()).then(|| project.rigs.swap_remove(0)).ok_or_else(empty)?;
+    let own = if is_character { own_meshes(project.meshes, &rig, report) } else { Vec::new() };
+    Ok((rig, own))
 }
 
 /// The rig with its joints alone, as it is before any command.
@@ -301,13 +315,20 @@ fn describe(clips: &[RigClip], report: &mut Report) {
             counted(clip.key_count(), "key", "keys")
         ));
     }
-    report.set("clips", clips.iter().map(clip).collect::<Vec<_>>());
+    let told: Vec<Value> = clips.iter().map(clip).collect();
+    // A single clip is told without a list, too.
+    if let [only] = &told[..] {
+        for field in ["seconds", "tracks"] {
+            report.set(field, only[field].clone());
+        }
+    }
+    report.set("clips", told);
 }
 
 /// Character of the rig's own file, with its mesh and weights; `None` if the rig is no model or has no mesh, or if
 /// another mesh is given.
 fn own_character(args: &AnimateArgs, bench: &Workbench, report: &mut Report) -> Result<Option<Model>, Failure> {
-    if args.mesh.is_some() || !FileKind::of(&args.rig).is_some_and(FileKind::is_gltf) {
+    if !args.meshes.is_empty() || !FileKind::of(&args.rig).is_some_and(FileKind::is_gltf) {
         return Ok(None);
     }
     let model = limits::load_model(&args.rig)?;

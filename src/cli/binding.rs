@@ -45,6 +45,19 @@ pub(super) fn bind(
     Ok(())
 }
 
+/// Adds what was told of one of several meshes: lines and notes with its name, and an entry of the list `meshes` for
+/// programs.
+pub(super) fn add_of_mesh(report: &mut Report, name: &str, told: Report) {
+    report.lines.extend(told.lines.iter().map(|line| format!("{name}: {line}")));
+    report.notes.extend(told.notes.iter().map(|note| format!("{name}: {note}")));
+    let mut entry = told.json;
+    entry.insert("mesh".to_owned(), name.into());
+    let list = report.json.entry("meshes").or_insert_with(|| Value::Array(Vec::new()));
+    if let Value::Array(list) = list {
+        list.push(Value::Object(entry));
+    }
+}
+
 /// Labels of the joints that can hold skin, and the names of those without a label.
 pub(super) struct JointNames {
     list: Vec<(Uid, String)>,
@@ -93,7 +106,8 @@ impl JointNames {
         labels.map(|label| self.find("--claim", label)).collect()
     }
 
-    fn of(&self, uid: Uid) -> String {
+    /// Name of a joint; its uid if it has none.
+    pub fn of(&self, uid: Uid) -> String {
         self.joints.get(&uid).map_or_else(|| uid.to_string(), |at| self.list[*at].1.clone())
     }
 }
@@ -205,8 +219,8 @@ fn idle_lines(names: &JointNames, idle: &[IdleJoint], claims: &[Uid]) -> Vec<Str
         idle.iter().filter(is_one).collect()
     };
     let kinds = [
-        ("outside", "hold no skin, outside of the mesh"),
-        ("no_surface", "hold no skin, all of it belongs to other joints"),
+        ("outside", "hold no skin, outside of the mesh (--claim lets them)"),
+        ("no_surface", "hold no skin, all of it belongs to other joints (--claim lets those beside the body)"),
         ("slot", "hold no skin, carry or steer things by their names (--claim lets them)"),
         ("not_deforming", "hold no skin, do not deform"),
         ("locked", "hold no skin, locked without weights"),
@@ -250,7 +264,7 @@ fn named_once(names: &JointNames, joints: &[&IdleJoint]) -> Vec<String> {
 }
 
 /// The first of some names, and the number of the others.
-fn shortened(names: impl ExactSizeIterator<Item = String>) -> String {
+pub(super) fn shortened(names: impl ExactSizeIterator<Item = String>) -> String {
     let rest = names.len().saturating_sub(LISTED);
     let listed = names.take(LISTED).collect::<Vec<String>>().join(", ");
     if rest > 0 { format!("{listed} and {rest} more") } else { listed }

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs,
-    binding::bind,
+    binding::{add_of_mesh, bind},
     convert::skeleton_model,
     explanation::Explanation,
     limits,
@@ -32,7 +32,13 @@ use crate::{
         surface::RigMesh,
     },
     processor::{Builder, CommandState, RunReport},
-    rig::{BuiltRig, Rig, Uid, bake::baked, character::mark_joints, operations::Operation, update::edits_between},
+    rig::{
+        BuiltRig, Rig, Uid,
+        bake::baked,
+        character::{Character, character, mark_joints},
+        operations::Operation,
+        update::edits_between,
+    },
     solve::program::{CompileOptions, RigProgram},
 };
 
@@ -41,9 +47,9 @@ use crate::{
 pub(super) struct BuildArgs {
     /// The rig: a .rig.ron
     pub rig: PathBuf,
-    /// A mesh to bind to what is built
-    #[arg(long)]
-    mesh: Option<PathBuf>,
+    /// A mesh to bind to what is built; may be repeated, for all meshes of one character
+    #[arg(long = "mesh", value_name = "MESH")]
+    meshes: Vec<PathBuf>,
     #[command(flatten)]
     switches: SwitchArgs,
     /// Stops after so many commands
@@ -72,12 +78,12 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
     {
         return Err(Failure::Usage(format!("cannot write `{}`; give .glb, .gltf, .vrm or .rig.ron", output.display())));
     }
-    if args.mesh.is_some() && args.output.as_deref().is_none_or(|path| FileKind::of(path) == Some(FileKind::Template)) {
+    let is_character = args.output.as_deref().is_some_and(|path| FileKind::of(path) != Some(FileKind::Template));
+    if !args.meshes.is_empty() && !is_character {
         return Err(Failure::Usage("--mesh is for a character; write one with -o NAME.glb".to_owned()));
     }
     args.vrm.check(args.output.as_deref())?;
-    let inputs: Vec<&Path> =
-        [Some(&args.rig), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+    let inputs: Vec<&Path> = std::iter::once(&args.rig).chain(&args.meshes).map(PathBuf::as_path).collect();
     args.in_place.check(&inputs, args.output.as_deref(), &[])?;
     let mut report = Report::default();
     let mut rig = skin::load_rig(&args.rig, &mut report)?;
@@ -110,7 +116,7 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
         let skeleton = baked(&rig, &built);
         drop((rig, built));
         store_built(output, &args.rig, skeleton, has_commands)?
-    } else if args.mesh.is_none() && !has_commands && rig.pose().is_empty() && meta.is_none() {
+    } else if args.meshes.is_empty() && !has_commands && rig.pose().is_empty() && meta.is_none() {
         let mut model = skeleton_model(&rig, Some(&built));
         mark_joints(&mut model, &baked(&rig, &built));
         drop((rig, built));
@@ -120,12 +126,11 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
         drop(built);
         let mut bench = limits::workbench(rig);
         bench.build(args.until.map_or(BuildStep::All, BuildStep::To));
-        let (mut model, settings) =
-            character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, report)?;
+        let (mut model, settings) = character_of(&mut bench, &args.meshes, &args.weights, &args.export, report)?;
         match meta {
             Some(meta) => {
                 let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
-                draft.store(&mut model, meta, output, &settings, report)?;
+                draft.store(model, meta, output, &settings, report)?;
                 Vec::new()
             }
             None => {
@@ -225,19 +230,30 @@ fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, ex
     }
 }
 
-/// Built skeleton of a workbench as posed, with a mesh skinned to it if there is one, and the settings for writing it.
-/// Binding the mesh may change commands: the rig is built, and posed, as it is afterwards.
+/// Built skeleton of a workbench as posed, with the meshes of files skinned to it, and the settings for writing it.
+/// Binding a mesh may change commands: the rig is built, and posed, as it is afterwards.
 pub(super) fn character_of(
     bench: &mut Workbench,
-    mesh: Option<&Path>,
+    meshes: &[PathBuf],
     weights: &WeightArgs,
     export: &ExportArgs,
     report: &mut Report,
 ) -> Result<(Model, GltfWriteSettings), Failure> {
-    let Some(mesh) = mesh else { return posed_skeleton(bench, export) };
-    let model = limits::load_model(mesh)?;
-    report.notes(model.notes.iter().cloned());
-    character_with(bench, MeshSource::Model(Box::new(model)), weights, export, report)
+    match loaded(meshes, report)? {
+        none if none.is_empty() => posed_skeleton(bench, export),
+        meshes => character_with(bench, meshes, weights, export, report),
+    }
+}
+
+/// Meshes of files.
+pub(super) fn loaded(files: &[PathBuf], report: &mut Report) -> Result<Vec<MeshSource>, Failure> {
+    let mut meshes = Vec::with_capacity(files.len());
+    for file in files {
+        let model = limits::load_model(file)?;
+        report.notes(model.notes.iter().cloned());
+        meshes.push(MeshSource::Model(Box::new(model)));
+    }
+    Ok(meshes)
 }
 
 /// Mesh for a rig.
@@ -260,34 +276,60 @@ impl MeshSource {
         }
         bind(bench, weights.settings(), &weights.claim, Vec::new(), report)
     }
+
+    fn name(&self) -> &str {
+        match self {
+            Self::Model(model) => &model.name,
+            Self::Open(mesh) => &mesh.file.name,
+        }
+    }
 }
 
-/// Character as [`character_of`] makes it, with this mesh.
+/// Puts meshes on a workbench, whose rig is built, as [`MeshSource::open`] does. Of several, each is told by its name.
+pub(super) fn open_all(
+    meshes: Vec<MeshSource>,
+    bench: &mut Workbench,
+    weights: &WeightArgs,
+    report: &mut Report,
+) -> Result<(), Failure> {
+    let is_only = meshes.len() == 1;
+    for mesh in meshes {
+        if is_only {
+            return mesh.open(bench, weights, report);
+        }
+        let (name, mut told) = (mesh.name().to_owned(), Report::default());
+        mesh.open(bench, weights, &mut told)?;
+        add_of_mesh(report, &name, told);
+    }
+    Ok(())
+}
+
+/// Character as [`character_of`] makes it, with these meshes.
 pub(super) fn character_with(
     bench: &mut Workbench,
-    mesh: MeshSource,
+    meshes: Vec<MeshSource>,
     weights: &WeightArgs,
     export: &ExportArgs,
     report: &mut Report,
 ) -> Result<(Model, GltfWriteSettings), Failure> {
-    let own = bound_mesh(bench, mesh, weights, report)?;
+    let own = bound_meshes(bench, meshes, weights, report)?;
     posed_character(bench, &own, export)
 }
 
-/// Workbench with a mesh that is bound to the built rig of another one, which gets what binding changes.
-pub(super) fn bound_mesh(
+/// Workbench with meshes that are bound to the built rig of another one, which gets what binding changes.
+pub(super) fn bound_meshes(
     bench: &mut Workbench,
-    mesh: MeshSource,
+    meshes: Vec<MeshSource>,
     weights: &WeightArgs,
     report: &mut Report,
 ) -> Result<Workbench, Failure> {
-    // The mesh is bound elsewhere, so that no time passes for the pose.
+    // The meshes are bound elsewhere, so that no time passes for the pose.
     let mut own = limits::workbench(bench.rig().clone());
     own.build(match bench.processor().map(Processor::builder) {
         Some(builder) if builder.cursor() < builder.len() => BuildStep::To(builder.cursor()),
         _ => BuildStep::All,
     });
-    mesh.open(&mut own, weights, report)?;
+    open_all(meshes, &mut own, weights, report)?;
     let edits = edits_between(bench.rig(), own.rig()).map_err(|error| Failure::Input(Box::new(error)))?;
     if !edits.is_empty() {
         bench.operate(Operation::Edits(edits))?;
@@ -295,7 +337,8 @@ pub(super) fn bound_mesh(
     Ok(own)
 }
 
-/// Built skeleton of a workbench as posed, with the mesh that is bound to it in another one, and the settings for writing it.
+/// Built skeleton of a workbench as posed, with the meshes that are bound to it in another one, and the settings for
+/// writing it.
 pub(super) fn posed_character(
     bench: &Workbench,
     own: &Workbench,
@@ -305,6 +348,26 @@ pub(super) fn posed_character(
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let joints: Vec<Uid> = baked(bench.rig(), built).walk().map(|joint| joint.data.uid).collect();
     let mut model = own.character();
+    pose(&mut model, &joints, built, &posed);
+    Ok((model, export.settings()))
+}
+
+/// Built skeleton of a workbench as posed, with meshes that have weights in its rig, and the settings for writing it.
+pub(super) fn posed_meshes(
+    bench: &Workbench,
+    meshes: &[RigMesh],
+    export: &ExportArgs,
+) -> Result<(Model, GltfWriteSettings), Failure> {
+    let posed = bench.posed_nodes()?;
+    let (rig, built) = (bench.rig(), bench.built().ok_or(PoseError::NotBuilt)?);
+    let joints: Vec<Uid> = baked(rig, built).walk().map(|joint| joint.data.uid).collect();
+    let model_of = |mesh: &RigMesh| {
+        let skin = rig.skin(mesh.uid).map(Arc::as_ref);
+        character(&Character { rig, built: Some(built), file: &mesh.file, rest: &mesh.rest, nodes: &mesh.nodes, skin })
+    };
+    let mut models = meshes.iter().map(model_of);
+    let Some(mut model) = models.next() else { return posed_skeleton(bench, export) };
+    models.for_each(|more| model.append(more));
     pose(&mut model, &joints, built, &posed);
     Ok((model, export.settings()))
 }

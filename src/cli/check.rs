@@ -38,7 +38,7 @@ use crate::{
 /// Arguments of `rigsmith check`.
 #[derive(Args, Debug)]
 pub(super) struct CheckArgs {
-    /// The files
+    /// The files: meshes, templates, projects, clips, motion, weights or lists of gestures
     #[arg(required = true)]
     pub files: Vec<PathBuf>,
 }
@@ -143,6 +143,11 @@ fn check(path: &Path) -> Result<Findings, Failure> {
         Some(FileKind::Gestures) => load_gestures(&RealDisk, path).map(|gestures| {
             found.error = limits::check_gestures(path, &gestures).err().map(|error| error.to_string());
         }),
+        None if path.is_dir() => {
+            let files = path.join("*.rig.ron");
+            found.error = Some(format!("this is a folder; give the files in it, such as {}", files.display()));
+            Ok(())
+        }
         None => {
             found.error = Some(
                 "Rigsmith knows .obj, .gltf, .glb, .vrm, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .rigclip, .bvh, .skin and .ron"

@@ -14,7 +14,7 @@ use super::{
     update::{load, load_part},
 };
 use crate::{
-    files::{RealDisk, stem, store_rig, store_rig_over},
+    files::{RealDisk, stem, store_rig_over, store_short_rig},
     rig::{
         Rig, RigAbout, RigEdit, Uid, UidSource,
         extract::{self, Extraction},
@@ -29,8 +29,8 @@ pub(super) struct MergeArgs {
     /// The rigs, `.rig.ron`: all others come into the first
     #[arg(required = true, num_args = 2..)]
     pub rigs: Vec<PathBuf>,
-    /// Joint on which the roots of the others hang; they stay roots without it. `FILE:LABEL` says it of one of the others, and
-    /// may be given for several; a joint that another one brought counts, too
+    /// Joint on which the roots of the other rigs hang; without it they stay roots. FILE:LABEL sets the joint for the rig of
+    /// one file alone, and may be repeated. The joint is one of the first rig or of a rig that comes before
     #[arg(long, value_name = "[FILE:]LABEL")]
     parent: Vec<String>,
     /// The file to write, `.rig.ron`
@@ -211,7 +211,7 @@ pub(super) fn extract(args: &ExtractArgs) -> Result<Report, Failure> {
         let joints = out.walk().map(|joint| joint.data.uid).collect();
         orient(&mut out, joints, along, &mut uids, &mut report)?;
     }
-    report.notes(store_rig(&RealDisk, &args.output, &out)?);
+    report.notes(store_short_rig(&RealDisk, &args.output, &out)?);
     report.notes.extend(left.iter().cloned());
     report.line(format!("wrote {}: {}", args.output.display(), counted(out.len(), "joint", "joints")));
     report.set("joints", out.len());

@@ -6,13 +6,16 @@ use clap::Args;
 
 use super::{ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, limits, progress::spinning, skin::load_rig};
 use crate::{
-    files::{FileKind, RealDisk, stem, store_model, store_owned_model, store_rig, store_rig_over},
+    files::{FileKind, RealDisk, stem, store_owned_model, store_rig, store_rig_over},
     mesh::{gltf::GltfWriteSettings, model::Model},
     rig::{
         BuiltRig, Rig, UidSource,
         character::{Character, character, import_skeleton, mark_joints},
     },
 };
+
+/// Commands that give a mesh a skeleton.
+const SKELETON_MAKERS: &str = "`rigsmith fit` puts one into it, `rigsmith sketch` draws one";
 
 /// Arguments of `rigsmith convert`.
 #[derive(Args, Debug)]
@@ -38,13 +41,12 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
             report.notes(model.notes.iter().cloned());
             // Points without weights in the input stay unmoved in the only way that glTF offers: bound to the root.
             let settings = GltfWriteSettings { bind_unweighted: true, ..args.export.settings() };
-            spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?
+            spinning("writing", || store_owned_model(&RealDisk, &args.output, model, &settings))?
         }
         (Some(Gltf | Glb | Vrm), Some(RigText | Template)) => {
             let model = limits::load_model(&args.input)?;
             if model.nodes.is_empty() {
-                let message =
-                    format!("`{}` has no skeleton to convert; sketch one into it first", args.input.display());
+                let message = format!("`{}` has no skeleton to convert; {SKELETON_MAKERS}", args.input.display());
                 return Err(Failure::Input(message.into()));
             }
             let mut uids = UidSource::seeded(SEED);
@@ -65,6 +67,13 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
             mark_joints(&mut model, &rig);
             drop(rig);
             store_owned_model(&RealDisk, &args.output, model, &settings)?
+        }
+        (Some(Obj), Some(RigText | Template)) => {
+            return Err(Failure::Usage(format!(
+                "cannot make `{}` of `{}`, because an .obj has no skeleton; {SKELETON_MAKERS}",
+                args.output.display(),
+                args.input.display()
+            )));
         }
         (_, Some(Vrm)) => {
             return Err(Failure::Usage(format!(

@@ -1,6 +1,8 @@
 //! `rigsmith face`: bones, weights and expressions for a head mesh.
 
 mod fit_error;
+mod loose_parts;
+mod morphs;
 
 use std::{
     collections::BTreeMap,
@@ -26,12 +28,9 @@ use crate::{
     },
     files::{FileKind, RealDisk, load_shapes, stem, store_model, store_owned_model, store_rig},
     headless::Workbench,
-    mesh::{
-        model::{Channel, ChannelTarget, Clip, Interpolation, Model, Morph},
-        shapes::Shapes,
-    },
+    mesh::shapes::Shapes,
     plugins::face::{FaceExpressions, FaceReport, FaceShape, mixed},
-    rig::{Rig, StoredPose},
+    rig::Rig,
 };
 
 /// Arguments of `rigsmith face`.
@@ -60,12 +59,12 @@ pub(super) struct FaceArgs {
     /// Take the whole mesh for a head, even if it looks like a body
     #[arg(long)]
     whole: bool,
-    /// An expression, or one of the units that they are made of, by its own name or that of ARKit, with a strength from
-    /// 0 to 1.5; may be repeated
+    /// An expression such as happiness or wink, or one of the units that expressions are made of, by its own name or that of
+    /// ARKit, such as jawOpen, with a strength from 0 to 1.5; may be repeated
     #[arg(long, value_name = "NAME=STRENGTH", value_parser = strength)]
     expression: Vec<(String, f32)>,
     /// Move the bones to fit shapes: a .glb with morph targets, a folder of .obj files, or a .json beside its .f32. Each
-    /// shape is kept as a stored pose
+    /// shape is kept as a stored pose; a vertex then follows at most as many joints as --influences says
     #[arg(long, value_name = "SHAPES")]
     fit: Option<PathBuf>,
     /// Add the blend shapes of ARKit, baked from the bones: 52, or 51 on a face without a tongue of its own. As morph
@@ -151,6 +150,7 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     let placed = bench.face(settings, shapes, &mut |_: FaceStep, part| progress.at(part))?;
     drop(progress);
     describe(&mut report, &placed);
+    loose_parts::describe(&mut report, &bench, &placed);
     tell_mended(&mut report, &spinning("measuring units", || bench.mended_shares()));
     if !args.expression.is_empty() {
         express(args, &mut bench, &mut report)?;
@@ -219,9 +219,9 @@ fn write_character(
     report: &mut Report,
 ) -> Result<(), Failure> {
     let mut model = bench.character();
-    add_morphs(&mut model, &shapes);
+    morphs::add_morphs(&mut model, &shapes);
     drop(shapes);
-    model.clips.extend(clips(bench.rig()));
+    model.clips.extend(morphs::clips(bench.rig()));
     pose(&mut model.nodes, bench.rig());
     let settings = args.export.settings();
     let meta = args.vrm.meta(bench.rig(), &args.output)?;
@@ -231,7 +231,7 @@ fn write_character(
     match meta {
         Some(meta) => {
             let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
-            draft.store(&mut model, meta, &args.output, &settings, report)?;
+            draft.store(model, meta, &args.output, &settings, report)?;
         }
         None if is_plain => {
             report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?);
@@ -302,12 +302,12 @@ fn store_expression(args: &FaceArgs, bench: &mut Workbench, report: &mut Report)
 fn tell_mended(report: &mut Report, shares: &BTreeMap<String, f32>) {
     let percent = |share: f32| (f64::from(share) * 1000.0).round() / 10.0;
     let percent: BTreeMap<&str, f64> = shares.iter().map(|(unit, share)| (unit.as_str(), percent(*share))).collect();
-    let named: Vec<String> =
-        percent.iter().filter(|(_, taken)| **taken > 0.0).map(|(unit, taken)| format!("{unit} {taken} %")).collect();
-    report.line(match named.as_slice() {
-        [] => "mending of folds takes nothing of any unit".to_owned(),
-        named => format!("mending of folds takes of {}", named.join(", ")),
-    });
+    let (weakened, most) = percent
+        .values()
+        .filter(|taken| **taken > 0.0)
+        .fold((0_usize, 0.0_f64), |(count, most), taken| (count + 1, most.max(*taken)));
+    let units = counted(percent.len(), "unit", "units");
+    report.line(format!("mending of folds weakens {weakened} of {units}, by {most} % at most; --json lists them"));
     report.set("mended_percent", json!(percent));
 }
 
@@ -323,56 +323,6 @@ fn tell_kept_morphs(bench: &Workbench, shapes: &[FaceShape], report: &mut Report
              give the mesh without them"
         ));
     }
-}
-
-/// Adds shapes as morph targets to the objects that they move. Targets that an object has already stay as they are.
-fn add_morphs(model: &mut Model, shapes: &[FaceShape]) {
-    for object in 0..model.objects.len() {
-        let mut parts: Vec<_> = model.parts.iter_mut().filter(|part| part.object == object).collect();
-        let moves = |shape: &FaceShape| {
-            parts.iter().flat_map(|part| &part.vertices).any(|point| shape.offset(*point) != Vec3::ZERO)
-        };
-        if !shapes.iter().any(moves) {
-            continue;
-        }
-        let object = &mut model.objects[object];
-        for shape in shapes.iter().filter(|shape| !object.morph_names.contains(&shape.name)).collect::<Vec<_>>() {
-            for part in &mut parts {
-                let mut positions: Vec<Vec3> = part.vertices.iter().map(|point| shape.offset(*point)).collect();
-                // A part that stays where it is has no list of zeros.
-                if positions.iter().all(|offset| *offset == Vec3::ZERO) {
-                    positions = Vec::new();
-                }
-                part.morphs.push(Morph { positions, ..Morph::default() });
-            }
-            object.morph_names.push(shape.name.clone());
-            if !object.morph_weights.is_empty() {
-                object.morph_weights.push(0.0);
-            }
-        }
-    }
-}
-
-/// A clip of one frame for each stored pose.
-fn clips(rig: &Rig) -> Vec<Clip> {
-    let joints: Vec<_> = rig.walk().map(|joint| &joint.data).collect();
-    let clip = |stored: &StoredPose| {
-        let mut channels = Vec::new();
-        for (node, joint) in joints.iter().enumerate() {
-            let Some(offset) = stored.offsets.get(&joint.uid) else { continue };
-            let posed = offset.on(&joint.rest);
-            let mut add = |target: ChannelTarget, values: Vec<f32>| {
-                channels.push(Channel { target, interpolation: Interpolation::Linear, times: vec![0.0], values });
-            };
-            add(ChannelTarget::Translation(node), posed.translation.to_array().to_vec());
-            add(ChannelTarget::Rotation(node), posed.rotation.to_array().to_vec());
-            if posed.scale != joint.rest.scale {
-                add(ChannelTarget::Scale(node), posed.scale.to_array().to_vec());
-            }
-        }
-        Clip { name: stored.name.clone(), channels, extras: None }
-    };
-    rig.stored_poses().iter().map(clip).collect()
 }
 
 /// Sets the exported joints to their posed transforms; bind poses stay.
@@ -470,7 +420,7 @@ fn describe(report: &mut Report, placed: &FaceReport) {
     }
     let milliseconds = |time: &std::time::Duration| time.as_secs_f64() * 1000.0;
     let sum: f64 = placed.times.iter().map(|(_, time)| milliseconds(time)).sum();
-    report.line(format!("{sum:.0} ms"));
+    report.line(format!("placed in {sum:.0} ms"));
     report
         .set("groups", json!({ "face": face, "middle": middle, "back": back, "cut": placed.cut, "mask": placed.mask }));
     report.set("points", json!({ "head": head, "mesh": all }));

@@ -19,7 +19,7 @@ use super::{
     vrm::AvatarDraft,
 };
 use crate::{
-    algo::fit_template::FitSymmetry,
+    algo::fit_template::{FitNote, FitSymmetry},
     files::{
         BUNDLED_CHARACTERS, BUNDLED_PARTS, FileKind, LoadError, ReadError, RealDisk, StoreError, TemplateOrigin,
         bundled_characters, bundled_part, save_atomic, stem, store_model, store_rig_from, store_rig_over,
@@ -187,7 +187,7 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
         match args.vrm.meta(bench.rig(), &args.output)? {
             Some(meta) => {
                 let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
-                draft.store(&mut model, meta, &args.output, &settings, &mut report)?;
+                draft.store(model, meta, &args.output, &settings, &mut report)?;
             }
             None => report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?),
         }
@@ -338,16 +338,18 @@ fn describe(report: &mut Report, fitted: &FitReport) {
     }
     report.notes(fit.notes.iter().map(ToString::to_string));
     if fit.confidence < FitReport::DOUBTFUL {
-        let text = format!(
-            "the fit is a guess (confidence {:.2}): the mesh may be no {}; look at it, name another --template, or give --marker",
-            fit.confidence, fitted.template
-        );
-        report.notes.push(text);
+        let (confidence, template) = (fit.confidence, &fitted.template);
+        let wish = match fit.notes.iter().any(FitNote::is_of_direction) {
+            true => "leave --up and --forward out, or look at it".to_owned(),
+            false => format!("the mesh may be no {template}; look at it, name another --template, or give --marker"),
+        };
+        report.notes.push(format!("the fit is a guess (confidence {confidence:.2}): {wish}"));
     }
     report.set("template", fitted.template.as_str());
     report.set("choice", fitted.choice.as_str());
-    report.set("up", json!(fit.up.to_array()));
-    report.set("forward", json!(fit.forward.to_array()));
+    // Zero has no sign in a report.
+    report.set("up", json!((fit.up + Vec3::ZERO).to_array()));
+    report.set("forward", json!((fit.forward + Vec3::ZERO).to_array()));
     report.set("symmetric", fit.is_symmetric());
     report.set("height", fit.height);
     report.set("confidence", fit.confidence);
@@ -378,7 +380,8 @@ fn describe(report: &mut Report, fitted: &FitReport) {
 
 #[cfg(feature = "render")]
 fn picture(args: &FitArgs, bench: &Workbench, fitted: &FitReport) -> Result<(), Failure> {
-    super::render::picture_of_fit(bench, fitted, &args.output)
+    let is_part = !args.objects.is_empty() || !args.regions.is_empty();
+    super::render::picture_of_fit(bench, fitted, is_part, &args.output)
 }
 
 #[cfg(not(feature = "render"))]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::{Failure, Report};
+use super::{Failure, Report, explanation::Explanation};
 use crate::{
     files::{FileKind, LoadError, RealDisk, format_template_file, read_capped, save_atomic},
     rig::template::{self, UidStyle},
@@ -43,23 +43,42 @@ pub(super) fn run(args: &FormatArgs) -> Result<Report, Failure> {
     };
     let mut report = Report::default();
     let mut list = Vec::new();
-    // All of them are read before the first is written.
+    // All of them are read before the first is written, and none is written while one is at fault.
     let mut formatted = Vec::new();
     for path in &args.files {
-        formatted.push(format(path, style)?);
+        match format(path, style) {
+            Err(Failure::Input(error)) if args.files.len() > 1 => {
+                report.at_fault = true;
+                let name = path.display().to_string();
+                report.fault.get_or_insert_with(|| Explanation::of_error(error.as_ref(), &name));
+                formatted.push((path, Err(error.to_string())));
+            }
+            found => formatted.push((path, Ok(found?))),
+        }
     }
-    for (path, (before, after)) in args.files.iter().zip(formatted) {
+    let is_written = !args.check && !report.at_fault;
+    for (path, found) in formatted {
+        let file = path.display();
+        let (before, after) = match found {
+            Ok(texts) => texts,
+            Err(error) => {
+                report.line(format!("error: {error}"));
+                list.push(json!({ "file": file.to_string(), "changed": false, "error": error }));
+                continue;
+            }
+        };
         let changed = before != after;
-        if changed && !args.check {
+        if changed && is_written {
             save_atomic(&RealDisk, path, after.as_bytes()).map_err(|error| Failure::Input(Box::new(error)))?;
         }
-        report.line(match (changed, args.check) {
-            (false, _) => format!("{}: in its layout", path.display()),
-            (true, true) => format!("{}: not in its layout; `rigsmith format` changes it", path.display()),
-            (true, false) => format!("{}: formatted", path.display()),
+        report.line(match (changed, is_written) {
+            (false, _) => format!("{file}: in its layout"),
+            (true, true) => format!("{file}: formatted"),
+            (true, false) if args.check => format!("{file}: not in its layout; `rigsmith format` changes it"),
+            (true, false) => format!("{file}: not changed: another file is at fault"),
         });
         report.at_fault |= changed && args.check;
-        list.push(json!({ "file": path.display().to_string(), "changed": changed }));
+        list.push(json!({ "file": file.to_string(), "changed": changed && (is_written || args.check), "error": null }));
     }
     report.set("files", Value::Array(list));
     Ok(report)

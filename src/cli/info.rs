@@ -25,7 +25,8 @@ use crate::{
 /// Arguments of `rigsmith info`.
 #[derive(Args, Debug)]
 pub(super) struct InfoArgs {
-    /// The file
+    /// The file: a mesh (.obj, .gltf, .glb, .vrm), a rig (.rig.ron, .rig), a project (.rigsmith.ron), motion (.anim.ron,
+    /// .bvh, .rigclip), weights (.skin) or a list of gestures (.ron)
     pub file: PathBuf,
 }
 
@@ -45,6 +46,9 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
         Some(FileKind::Bvh) => describe_motion(&mut report, path)?,
         Some(FileKind::PackedClips) => describe_packed_clips(&mut report, path)?,
         Some(FileKind::Gestures) => describe_gestures(&mut report, path)?,
+        None if path.is_dir() => {
+            return Err(Failure::Usage(format!("`{}` is a folder; give a file in it", path.display())));
+        }
         None => {
             let message = format!(
                 "`{}`: Rigsmith knows .obj, .gltf, .glb, .vrm, .rig, .rig.ron, .rigsmith.ron, .anim.ron, .rigclip, .bvh, .skin and .ron",
@@ -60,7 +64,8 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
 fn describe_template(report: &mut Report, path: &Path) -> Result<(), Failure> {
     let template = limits::load_template(path)?;
     let about = template.rig.about();
-    report.line(format!("template \"{}\" {}", about.name, about.version));
+    let title = format!("template \"{}\" {}", about.name, about.version);
+    report.line(title.trim_end());
     if !about.description.is_empty() {
         report.line(about.description.clone());
     }

@@ -28,6 +28,8 @@ enum KindArg {
     Sides,
     /// A figure of parts: a trunk of its own, with arms, legs and a neck that come with Rigsmith
     Figure,
+    /// A part of its own, for figures: a finger with a number of joints, an option and a place where others hang
+    Part,
 }
 
 pub(super) fn run(args: &NewArgs) -> Result<Report, Failure> {
@@ -36,6 +38,7 @@ pub(super) fn run(args: &NewArgs) -> Result<Report, Failure> {
         KindArg::Limb => include_str!("../../assets/start/limb.rig.ron"),
         KindArg::Sides => include_str!("../../assets/start/sides.rig.ron"),
         KindArg::Figure => include_str!("../../assets/start/figure.rig.ron"),
+        KindArg::Part => include_str!("../../assets/start/part.rig.ron"),
     };
     let path = &args.output;
     if FileKind::of(path) != Some(FileKind::Template) {

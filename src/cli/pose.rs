@@ -9,12 +9,13 @@ use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
     build::{self, MeshSource},
     limits,
+    project_meshes::own_meshes,
     report::counted,
     skin,
     switches::SwitchArgs,
 };
 use crate::{
-    files::{FileKind, LoadedMesh, MeshState, RealDisk, store_owned_model},
+    files::{FileKind, RealDisk, store_owned_model},
     headless::{
         Workbench,
         posing::{ControlWrite, HeldValue, PoseError},
@@ -31,9 +32,9 @@ pub(super) struct PoseSteps {
     /// CONTROL is a name, a label or a reference (@...); may be repeated
     #[arg(long = "set", value_name = "NODE.CHANNEL=VALUE", allow_hyphen_values = true)]
     pub set: Vec<String>,
-    /// Throws a switch without a jump: NAME=ik, fk or the name of a space; NAME is a local group, a control or a joint of
-    /// the limb; the pose that --set makes is kept, and what --set says of controls that the switch moves holds
-    /// afterwards, too; may be repeated
+    /// Throws a switch without a jump: NAME=ik, NAME=fk or NAME=SPACE, the name of a space. NAME is a local group, a control
+    /// or a joint of the limb. Switches come after --set and keep the pose that it makes; controls that a switch moves
+    /// still get the values that --set gives them. May be repeated
     #[arg(long = "switch", value_name = "NAME=VALUE")]
     pub switches: Vec<String>,
     /// Frames of a sixtieth of a second that pass afterwards, for springs
@@ -56,9 +57,9 @@ impl PoseSteps {
 pub(super) struct PoseArgs {
     /// The rig: a .rig.ron, or a project (.rigsmith.ron), whose pose is kept
     pub rig: PathBuf,
-    /// A mesh to bind to what is built
-    #[arg(long)]
-    mesh: Option<PathBuf>,
+    /// A mesh to bind to what is built; may be repeated, for all meshes of one character
+    #[arg(long = "mesh", value_name = "MESH")]
+    meshes: Vec<PathBuf>,
     #[command(flatten)]
     steps: PoseSteps,
     /// A stored pose of a project to begin with
@@ -105,17 +106,16 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
                       which they are blended: write a .png";
         return Err(Failure::Usage(reason.to_owned()));
     }
-    let inputs: Vec<&Path> =
-        [Some(&args.rig), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
+    let inputs: Vec<&Path> = std::iter::once(&args.rig).chain(&args.meshes).map(PathBuf::as_path).collect();
     args.in_place.check(&inputs, args.output.as_deref(), &[])?;
     let writes = parsed(&args.steps, &args.rig)?;
-    if args.mesh.is_some() && (kind == Some(Some(FileKind::Template)) || kind.is_none()) {
+    if !args.meshes.is_empty() && (kind == Some(Some(FileKind::Template)) || kind.is_none()) {
         return Err(Failure::Usage(
             "--mesh is for a character or a picture; write one with -o NAME.glb or .png".to_owned(),
         ));
     }
     let mut report = Report::default();
-    let (mut rig, own_mesh) = read(args, &mut report)?;
+    let (mut rig, own) = read(args, &mut report)?;
     args.steps.parts.apply(&mut rig)?;
     let mut bench = limits::workbench(rig);
     let held = run_steps(&mut bench, &args.steps, &writes)?;
@@ -126,13 +126,14 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
         error = error.max(node.entity.translation.distance(node.program.translation));
     });
     report.set_list("nodes", told);
-    report.line(format!("{}; entities and program differ by {error:e} at most", counted(nodes, "node", "nodes")));
+    let nodes = counted(nodes, "node", "nodes");
+    report.line(format!("posed {nodes}; an app shows them within about {error:.0e} units of the computed places"));
     report.set("error", error);
     if let Some(output) = &args.output {
         if is_picture {
-            picture(args, own_mesh, output, &bench, &mut report)?;
+            picture(args, own, output, &bench, &mut report)?;
         } else {
-            write(args, own_mesh, output, bench, &mut report)?;
+            write(args, own, output, bench, &mut report)?;
         }
         report.line(format!("wrote {}", output.display()));
         report.set("output", output.display().to_string());
@@ -173,12 +174,12 @@ pub(super) fn run_steps(
     Ok(held)
 }
 
-/// The rig, and the mesh that it has in a project.
-fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Option<RigMesh>), Failure> {
-    let mut own_mesh = None;
+/// The rig, and the meshes that it has in a project.
+fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Vec<RigMesh>), Failure> {
+    let mut own = Vec::new();
     let mut rig = if FileKind::of(&args.rig) == Some(FileKind::Project) {
         let mut project = limits::load_project(&args.rig)?;
-        if args.mesh.is_none() {
+        if args.meshes.is_empty() {
             limits::refuse_outside(&project)?;
         }
         report.notes(project.notes);
@@ -191,16 +192,12 @@ fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Option<RigMesh>), 
                 .notes
                 .push(format!("the rig \"{}\" of the project is left out: the first one is posed", other.about().name));
         }
-        for LoadedMesh { uid, nodes, shape, .. } in project.meshes.into_iter().filter(|mesh| mesh.rig == rig.uid()) {
-            // The notes mention a missing mesh already.
-            let MeshState::Open { model, .. } = shape else { continue };
-            if own_mesh.is_some() {
-                report.notes.push(format!("the mesh \"{}\" is left out: the rig's first one is posed", model.name));
-                continue;
-            }
-            own_mesh = Some(RigMesh::new(uid, *model, nodes.to_vec()));
-        }
-        if args.mesh.is_some() && own_mesh.take().is_some() {
+        let mut told = Report::default();
+        own = own_meshes(project.meshes, &rig, &mut told);
+        if args.meshes.is_empty() {
+            report.notes(told.notes);
+        } else if !own.is_empty() {
+            own.clear();
             report.notes.push("--mesh stands in for the mesh of the project".to_owned());
         }
         rig
@@ -218,13 +215,13 @@ fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Option<RigMesh>), 
         let applied = Operation::ApplyPose(stored).run(&mut rig, &mut uids, None);
         applied.map_err(|error| Failure::Input(Box::new(error)))?;
     }
-    Ok((rig, own_mesh))
+    Ok((rig, own))
 }
 
 /// Writes the character, or the skeleton, in the pose of the entities.
 fn write(
     args: &PoseArgs,
-    own_mesh: Option<RigMesh>,
+    mut own: Vec<RigMesh>,
     output: &Output,
     mut bench: Workbench,
     report: &mut Report,
@@ -246,11 +243,13 @@ fn write(
         report.notes(build::store_built(output, &args.rig, skeleton, has_commands)?);
         return Ok(());
     }
-    let (model, settings) = match own_mesh {
-        Some(mesh) => {
-            build::character_with(&mut bench, MeshSource::Open(Box::new(mesh)), &args.weights, &args.export, report)?
+    let (model, settings) = match own.len() {
+        0 => build::character_of(&mut bench, &args.meshes, &args.weights, &args.export, report)?,
+        1 => {
+            let mesh = MeshSource::Open(Box::new(own.swap_remove(0)));
+            build::character_with(&mut bench, vec![mesh], &args.weights, &args.export, report)?
         }
-        None => build::character_of(&mut bench, args.mesh.as_deref(), &args.weights, &args.export, report)?,
+        _ => build::posed_meshes(&bench, &own, &args.export)?,
     };
     // What is written is read back, which takes as much memory again.
     drop(bench);
@@ -261,25 +260,20 @@ fn write(
 #[cfg(feature = "render")]
 fn picture(
     args: &PoseArgs,
-    own_mesh: Option<RigMesh>,
+    own: Vec<RigMesh>,
     output: &Output,
     bench: &Workbench,
     report: &mut Report,
 ) -> Result<(), Failure> {
-    let mesh = match (own_mesh, &args.mesh) {
-        (Some(mesh), _) => Some(MeshSource::Open(Box::new(mesh))),
-        (None, Some(path)) => {
-            let model = limits::load_model(path)?;
-            report.notes(model.notes.iter().cloned());
-            Some(MeshSource::Model(Box::new(model)))
-        }
-        (None, None) => None,
+    let meshes = match own.is_empty() {
+        true => build::loaded(&args.meshes, report)?,
+        false => own.into_iter().map(|mesh| MeshSource::Open(Box::new(mesh))).collect(),
     };
-    super::render::picture_of(bench, mesh, &args.weights, args.deform, output, report)
+    super::render::picture_of(bench, meshes, &args.weights, args.deform, output, report)
 }
 
 #[cfg(not(feature = "render"))]
-fn picture(_: &PoseArgs, _: Option<RigMesh>, output: &Output, _: &Workbench, _: &mut Report) -> Result<(), Failure> {
+fn picture(_: &PoseArgs, _: Vec<RigMesh>, output: &Output, _: &Workbench, _: &mut Report) -> Result<(), Failure> {
     let reason = format!("cannot draw `{}`: this program was built without pictures", output.display());
     Err(Failure::Usage(reason))
 }

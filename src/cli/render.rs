@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{
     ArgumentError, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
-    build::MeshSource,
+    build::{MeshSource, open_all},
     device_selection, limits,
     pose::{self, PoseSteps},
     progress::spinning,
@@ -31,6 +31,9 @@ use crate::{
         operations::Operation,
     },
 };
+
+/// Room around the joints of a part in its picture, as a share of their extent.
+const AROUND_PART: f32 = 0.4;
 
 /// Arguments of `rigsmith render`.
 #[derive(Args, Debug)]
@@ -227,10 +230,10 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Draws a rig as it stands on a workbench, with a mesh skinned to its built joints if there is one.
+/// Draws a rig as it stands on a workbench, with meshes skinned to its built joints.
 pub(super) fn picture_of(
     posed: &Workbench,
-    mesh: Option<MeshSource>,
+    meshes: Vec<MeshSource>,
     weights: &WeightArgs,
     deform: DeformArgs,
     output: &Path,
@@ -238,11 +241,8 @@ pub(super) fn picture_of(
 ) -> Result<(), Failure> {
     let mut bench = limits::workbench(posed.posed_document()?);
     bench.build(BuildStep::All);
-    let mut meshes = Vec::new();
-    if let Some(mesh) = mesh {
-        mesh.open(&mut bench, weights, report)?;
-        meshes.extend(bench.mesh().cloned());
-    }
+    open_all(meshes, &mut bench, weights, report)?;
+    let meshes: Vec<RigMesh> = bench.meshes().cloned().collect();
     let state = Some(posed.runtime()?.state().clone());
     let settings = PictureSettings { build: true, state, deform: deform.deform(), ..PictureSettings::default() };
     let picture = |error| Failure::Input(Box::new(error));
@@ -253,17 +253,31 @@ pub(super) fn picture_of(
 
 /// Draws a rig that was fitted to the mesh of a workbench as it is at rest, seen from the figure's front, the mesh half
 /// transparent; joints that the fit is not sure of are shown as selected, as in the window.
-pub(super) fn picture_of_fit(bench: &Workbench, fitted: &FitReport, output: &Path) -> Result<(), Failure> {
+pub(super) fn picture_of_fit(
+    bench: &Workbench,
+    fitted: &FitReport,
+    is_part: bool,
+    output: &Path,
+) -> Result<(), Failure> {
     let display = MeshDisplay { xray: true, ..MeshDisplay::default() };
     // The grid lies on the ground of the file's Y axis, which a figure that stands otherwise would hang beside.
     let drawing = RigDrawing { grid: fitted.fit.up == Vec3::Y, ..RigDrawing::default() };
     let selected = fitted.doubtful().collect();
-    let settings =
-        PictureSettings { display, drawing, selected, turn: fitted.fit.turn(), ..PictureSettings::default() };
+    let bounds = is_part.then(|| surroundings(fitted));
+    let turn = fitted.fit.turn();
+    let settings = PictureSettings { display, drawing, selected, turn, bounds, ..PictureSettings::default() };
     let picture = |error| Failure::Input(Box::new(error));
     let (rig, meshes) = (bench.rig().clone(), bench.mesh().cloned().into_iter().collect());
     let image = spinning("drawing", || Ok::<_, Failure>(take_picture(rig, meshes, &settings)))?.map_err(picture)?;
     save_atomic(&RealDisk, output, &png(image).map_err(picture)?).map_err(|error| Failure::Input(Box::new(error)))
+}
+
+/// Box around the joints of a fit, with some room: what a picture of a part shows.
+fn surroundings(fitted: &FitReport) -> [Vec3; 2] {
+    let places = fitted.fit.joints.iter().map(|joint| joint.position);
+    let (low, high) = places.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
+    let room = Vec3::splat(AROUND_PART * (high - low).max_element());
+    [low - room, high + room]
 }
 
 fn read(args: &RenderArgs, report: &mut Report) -> Result<Scene, Failure> {

@@ -1,4 +1,4 @@
-//! `rigsmith skin`: a skeleton and a mesh become a character.
+//! `rigsmith skin`: a skeleton and its meshes become a character.
 
 use std::{
     path::{Path, PathBuf},
@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
-    binding::{bind, chosen_parts},
+    binding::{add_of_mesh, bind, chosen_parts},
     limits,
     progress::spinning,
 };
@@ -30,8 +30,10 @@ use crate::{
 pub(super) struct SkinArgs {
     /// The skeleton: .rig.ron, .rig, or a .glb, .gltf or .vrm that has one
     rig: PathBuf,
-    /// The mesh: .obj, .gltf, .glb or .vrm. A skeleton in it is left aside
-    pub mesh: PathBuf,
+    /// The mesh: .obj, .gltf, .glb or .vrm; several become one character, such as a body and its clothes. A skeleton in
+    /// it is left aside
+    #[arg(required = true, value_name = "MESH")]
+    pub meshes: Vec<PathBuf>,
     /// Output file: .glb or .gltf, or only the weights as .skin
     #[arg(short, long)]
     output: Output,
@@ -68,28 +70,25 @@ pub(super) fn run(args: &SkinArgs) -> Result<Report, Failure> {
     if let Some(path) = args.save_weights.as_ref().filter(|path| FileKind::of(path) != Some(FileKind::Skin)) {
         return Err(Failure::Usage(format!("--save-weights `{}`: weights are saved as .skin", path.display())));
     }
-    let inputs: Vec<&Path> = [Some(&args.rig), Some(&args.mesh), args.weights_from.as_ref()]
-        .into_iter()
-        .flatten()
-        .map(PathBuf::as_path)
-        .collect();
+    check_number(args)?;
+    let inputs = std::iter::once(&args.rig).chain(&args.meshes).chain(&args.weights_from);
+    let inputs: Vec<&Path> = inputs.map(PathBuf::as_path).collect();
     let further: Vec<_> = args.save_weights.iter().map(|path| ("--save-weights", path.as_path())).collect();
     args.in_place.check(&inputs, Some(&args.output), &further)?;
     let mut report = Report::default();
     let rig = load_rig(&args.rig, &mut report)?;
-    let model = spinning("reading the mesh", || limits::load_model(&args.mesh))?;
-    report.notes(model.notes.iter().cloned());
-    if model.points.is_empty() {
-        return Err(Failure::Input(
-            format!("`{}` has no points to skin; open another mesh", args.mesh.display()).into(),
-        ));
-    }
     let mut bench = limits::workbench(rig);
-    bench.open(model, true)?;
-    let parts = chosen_parts(&args.rigid, &args.blend, &bench)?;
-    match &args.weights_from {
-        Some(path) => take_weights(&mut bench, path, &mut report)?,
-        None => bind(&mut bench, args.weights.settings(), &args.weights.claim, parts, &mut report)?,
+    match &args.meshes[..] {
+        [mesh] => skin(args, mesh, &mut bench, &mut report)?,
+        several => {
+            for mesh in several {
+                let mut told = Report::default();
+                skin(args, mesh, &mut bench, &mut told)?;
+                told.set("file", mesh.display().to_string());
+                let name = bench.mesh().map_or_else(|| stem(mesh), |mesh| mesh.file.name.clone());
+                add_of_mesh(&mut report, &name, told);
+            }
+        }
     }
     let weights_file = if FileKind::of(&args.output) == Some(FileKind::Skin) { Some(&args.output) } else { None };
     // The character first: where it cannot be written, weights beside an older one stay as they belong to that.
@@ -105,6 +104,38 @@ pub(super) fn run(args: &SkinArgs) -> Result<Report, Failure> {
     report.set("joints", bench.rig().len());
     report.set("output", args.output.display().to_string());
     Ok(report)
+}
+
+/// Refuses several meshes with options that are about a single one.
+fn check_number(args: &SkinArgs) -> Result<(), Failure> {
+    let given = [
+        ("a .skin output", FileKind::of(&args.output) == Some(FileKind::Skin)),
+        ("--weights-from", args.weights_from.is_some()),
+        ("--save-weights", args.save_weights.is_some()),
+        ("--rigid", !args.rigid.is_empty()),
+        ("--blend", !args.blend.is_empty()),
+    ];
+    match given.iter().find(|(_, is_given)| *is_given) {
+        Some((option, _)) if args.meshes.len() > 1 => {
+            Err(Failure::Usage(format!("{option} is about one mesh, and {} are given; give one", args.meshes.len())))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Opens a mesh on a workbench beside those that are there, and binds it.
+fn skin(args: &SkinArgs, mesh: &Path, bench: &mut Workbench, report: &mut Report) -> Result<(), Failure> {
+    let model = spinning("reading the mesh", || limits::load_model(mesh))?;
+    report.notes(model.notes.iter().cloned());
+    if model.points.is_empty() {
+        return Err(Failure::Input(format!("`{}` has no points to skin; open another mesh", mesh.display()).into()));
+    }
+    bench.open(model, true)?;
+    let parts = chosen_parts(&args.rigid, &args.blend, bench)?;
+    match &args.weights_from {
+        Some(path) => take_weights(bench, path, report),
+        None => bind(bench, args.weights.settings(), &args.weights.claim, parts, report),
+    }
 }
 
 /// Loads a rig from any file that holds one.
@@ -149,8 +180,9 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
     let file = load_skin(&RealDisk, path)?;
     let rig = bench.rig();
     let mut joints = Vec::with_capacity(file.joints().len());
+    let labelled = rig.joints_by_label();
     let found = |joint: &SkinJoint| {
-        let by_label = || rig.find_label(&joint.label).filter(|_| !joint.label.is_empty());
+        let by_label = || labelled.get(joint.label.as_str()).copied().filter(|_| !joint.label.is_empty());
         Some(Uid(joint.uid)).filter(|uid| rig.joint(*uid).is_some()).or_else(by_label)
     };
     // A joint that a command created is not in the document: its weights go to the joint that it was made for.
@@ -174,6 +206,7 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
         })?;
         joints.push(uid);
     }
+    drop(labelled);
     let mesh = bench.mesh().ok_or_else(|| Failure::Input("no mesh is open".into()))?;
     let (points, triangles): (Arc<_>, _) = (mesh.rest.clone(), mesh.triangles.clone());
     let weights = if file.fits(&points.points, &triangles) {

@@ -33,25 +33,26 @@ use crate::{
 /// Arguments of `rigsmith diff`.
 #[derive(Args, Debug)]
 pub(super) struct DiffArgs {
-    /// The one template, `.rig.ron`
+    /// The template before, `.rig.ron`
     from: PathBuf,
-    /// The other one
+    /// The template after
     pub to: PathBuf,
 }
 
 /// Arguments of `rigsmith update`.
 #[derive(Args, Debug)]
 pub(super) struct UpdateArgs {
-    /// The rig, `.rig.ron`, or a project, `.rigsmith.ron`: of several rigs the one that follows the template, else the first
+    /// The rig, `.rig.ron`, or a project, `.rigsmith.ron`. Of a project with several rigs it is the one that was made from
+    /// the template, else the first
     pub rig: PathBuf,
     /// The template in its new version
     #[arg(long)]
     from: PathBuf,
-    /// The template in the version that the rig was made from. Without it that is `RIG.base`, if there is such a file, or the
-    /// version that the project took over last, and else every difference is a conflict
+    /// The template in the version that the rig was made from. If left out, it is the file `RIG.base` beside the rig, or the
+    /// version that the project took over last; where there is neither, every difference is a conflict
     #[arg(long)]
     base: Option<PathBuf>,
-    /// Keep the version that is taken over as `OUT.base`, or in the project, for the next update
+    /// Keep the new version of the template for the next update: as `OUT.base`, or in the project
     #[arg(long)]
     keep_base: bool,
     /// Clips of the rig, `.anim.ron`, several times if need be: they are re-expressed, so that the joints move as before, and
@@ -85,13 +86,21 @@ impl UpdateArgs {
         }
     }
 
-    /// True if there are conflicts that nobody decided, which is told: nothing is written then.
-    fn is_undecided(&self, conflicts: usize, report: &mut Report) -> bool {
+    /// True if there are conflicts that nobody decided, which is told: nothing is written then. Without a base every
+    /// difference is a conflict, so the fault names `--base` first.
+    fn is_undecided(&self, conflicts: usize, has_base: bool, report: &mut Report) -> bool {
         report.set("conflicts", conflicts);
         let is_undecided = conflicts > 0 && self.take.is_none();
         if is_undecided {
             let fields = counted(conflicts, "field", "fields");
-            let fault = format!("both sides changed {fields}, and nothing was written; say --take theirs or mine");
+            let fault = if has_base {
+                format!("both sides changed {fields}, and nothing was written; say --take theirs or mine")
+            } else {
+                format!(
+                    "without a base every difference is a conflict, here in {fields}, and nothing was written; give the \
+                     template that the rig was made from as --base, or say --take theirs or mine"
+                )
+            };
             report.fault = Some(Explanation::at(self.rig.display().to_string(), &fault));
             report.notes.push(fault);
             report.at_fault = true;
@@ -142,7 +151,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     let was = base.as_ref().unwrap_or(&now).rig();
     tell_update(&mut report, (was, file.rig()), now.rig(), updated)?;
     let clips = clips::updated(args, (now.rig(), &updated.rig), &clip_files, &mut report)?;
-    if args.is_undecided(updated.conflicts(), &mut report) {
+    if args.is_undecided(updated.conflicts(), base.is_some(), &mut report) {
         return Ok(report);
     }
     let keeps_base = args.keep_base || is_beside;

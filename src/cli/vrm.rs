@@ -81,10 +81,10 @@ impl<'a> AvatarDraft<'a> {
         AvatarSource { rig: self.rig, built: self.built, joints: &self.joints }
     }
 
-    /// Writes the avatar, and tells what it has.
+    /// Writes the avatar, and tells what it has. The model is dropped before what is written is read back.
     pub fn store(
         &self,
-        model: &mut Model,
+        mut model: Model,
         meta: VrmMeta,
         output: &Path,
         settings: &GltfWriteSettings,
@@ -93,7 +93,7 @@ impl<'a> AvatarDraft<'a> {
         let recipe = |(preset, shapes)| ExpressionRecipe { preset, shapes };
         let recipes: Vec<ExpressionRecipe> =
             vrm_mixes(&*expressions::of_site(report)?).into_iter().map(recipe).collect();
-        let made = make_avatar(model, &self.source(), meta, &recipes)?;
+        let made = make_avatar(&mut model, &self.source(), meta, &recipes)?;
         report.notes(&made.notes);
         let (vrm, springs) = (&made.avatar.vrm, &made.avatar.springs);
         let bones: Vec<&String> = vrm.humanoid.human_bones.keys().collect();

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Report, WeightArgs,
-    build::{MeshSource, bound_mesh, posed_character, posed_skeleton},
+    build::{MeshSource, bound_meshes, posed_character, posed_skeleton},
     explanation::Explanation,
     limits,
     report::{counted, print, print_json},
@@ -34,7 +34,7 @@ use crate::{
 /// Arguments of `rigsmith watch`.
 #[derive(Args, Debug)]
 pub(super) struct WatchArgs {
-    /// The template, `.rig.ron`; it is waited for where it is not there yet, or broken
+    /// The template, `.rig.ron`. A file that is not there yet, or that cannot be built, is waited for
     pub template: PathBuf,
     /// A mesh to bind to what is built. When it is saved, joints stay, and its weights are transferred
     #[arg(long)]
@@ -300,12 +300,8 @@ impl Watch<'_> {
                     // Binding a mesh may change commands, and the rig here stays as its file has it.
                     let mut bench = limits::workbench(bench.rig().clone());
                     bench.build(BuildStep::All);
-                    let own = bound_mesh(
-                        &mut bench,
-                        MeshSource::Model(Box::new(model)),
-                        &args.weights,
-                        &mut Report::default(),
-                    )?;
+                    let meshes = vec![MeshSource::Model(Box::new(model))];
+                    let own = bound_meshes(&mut bench, meshes, &args.weights, &mut Report::default())?;
                     none.insert(BoundMesh { bench, own })
                 }
             };

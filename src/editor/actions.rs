@@ -35,6 +35,8 @@ pub enum Action {
     New,
     /// Asks for a file to open.
     Open,
+    /// Asks for a mesh, and puts it beside the meshes of the open rig.
+    AddMesh,
     /// Saves the project to its file, or asks for one.
     Save,
     /// Asks for a file and saves the project there.
@@ -216,6 +218,7 @@ impl Action {
             Self::UiUsual,
             Self::Theme,
             Self::Contrast,
+            Self::AddMesh,
         ];
         let of_timeline = TimelineAction::ALL.into_iter().map(Self::Timeline);
         let of_graph = GraphAction::ALL.into_iter().map(Self::Graph);

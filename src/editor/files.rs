@@ -12,13 +12,15 @@ mod dialog_view;
 mod document;
 mod error;
 mod export;
+mod file_drop;
+mod load_job;
 mod open;
 mod save;
 mod template;
 mod view;
 
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
 };
 
@@ -32,7 +34,7 @@ pub use self::{
     bundle::{BODY, BUNDLED_MODELS, BundledModel, HEAD},
     document::{MeshSource, OpenDocument, StateFolder},
     export::ExportOptions,
-    open::LoadJob,
+    load_job::LoadJob,
     save::SaveJob,
 };
 use self::{
@@ -51,8 +53,8 @@ use super::{
 };
 use crate::{
     files::{FileKind, RealDisk, journal::Origin, remove_stale_temps},
-    plugins::{RigSystems, journal::JournalTrouble},
-    rig::Rig,
+    plugins::{RigSystems, document::EditReport, journal::JournalTrouble},
+    rig::{Rig, Uid},
 };
 
 /// Plugin that opens, saves and exports files.
@@ -69,6 +71,8 @@ impl Plugin for FilesPlugin {
             .add_message::<ImportRequest>()
             .add_message::<MapRequest>()
             .add_message::<ExportRequest>()
+            .add_message::<RemoveMeshRequest>()
+            .add_message::<EditReport>()
             .add_message::<WindowCloseRequested>()
             .add_message::<FileDragAndDrop>()
             .init_resource::<LoadJob>()
@@ -98,6 +102,14 @@ pub enum OpenRequest {
     Empty,
     /// A mesh, a template or a project.
     File(PathBuf),
+    /// Several files as one document: the first as if it were alone, and once it is there, the others one after the other,
+    /// meshes beside those that are open.
+    Files {
+        /// File that is opened first.
+        first: PathBuf,
+        /// Files that come to it, in order.
+        others: Vec<PathBuf>,
+    },
 }
 
 impl OpenRequest {
@@ -118,6 +130,10 @@ pub struct DocumentLanded {
 /// Request to export to a file, as its ending says; a file that is there is replaced.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct ExportRequest(pub PathBuf);
+
+/// Request to remove a mesh, by its uid, from the open rig; its file stays.
+#[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RemoveMeshRequest(pub Uid);
 
 /// Action that follows once unsaved changes are saved or discarded.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -152,12 +168,24 @@ type Inbox<'w, 's> = (
     MessageReader<'w, 's, FileDragAndDrop>,
     MessageReader<'w, 's, JournalTrouble>,
     MessageReader<'w, 's, ExportRequest>,
+    MessageReader<'w, 's, RemoveMeshRequest>,
+    MessageReader<'w, 's, EditReport>,
 );
 
 /// Handles all file actions before this frame's edits, so that the saved state and the journal's count agree.
 pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, 'static>>) {
-    let Ok((mut opens, mut actions, mut answers, mut closes, mut drops, mut troubles, mut exports)) =
-        inbox.get_mut(world)
+    let open = active(world);
+    let Ok((
+        mut opens,
+        mut actions,
+        mut answers,
+        mut closes,
+        mut drops,
+        mut troubles,
+        mut exports,
+        mut removals,
+        mut reports,
+    )) = inbox.get_mut(world)
     else {
         return;
     };
@@ -165,12 +193,21 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
     let mut actions: Vec<Action> = actions.read().map(|request| request.0).collect();
     let answers: Vec<Answer> = answers.read().map(|answer| answer.0.clone()).collect();
     actions.extend(closes.read().map(|_| Action::Quit));
-    opens.extend(drops.read().filter_map(|drop| match drop {
-        FileDragAndDrop::DroppedFile { path_buf, .. } => Some(OpenRequest::File(path_buf.clone())),
+    let dropped = drops.read().filter_map(|drop| match drop {
+        FileDragAndDrop::DroppedFile { path_buf, .. } => Some(path_buf.clone()),
         _ => None,
-    }));
+    });
+    let dropped: Vec<PathBuf> = dropped.collect();
     let troubles: Vec<JournalTrouble> = troubles.read().cloned().collect();
     let exports: Vec<PathBuf> = exports.read().map(|request| request.0.clone()).collect();
+    let removals: Vec<Uid> = removals.read().map(|request| request.0).collect();
+    let mut changed_meshes: BTreeMap<Uid, bool> = BTreeMap::new();
+    for EditReport { committed, .. } in reports.read().filter(|report| Some(report.rig) == open) {
+        let edits = committed.iter().flat_map(|committed| committed.effect().0);
+        edits.for_each(|edit| edit.mesh_changes(&mut changed_meshes));
+    }
+    added_mesh::follow(world, &changed_meshes);
+    opens.extend(file_drop::requests(world, dropped));
     for trouble in troubles {
         world.write_message(match trouble.reason {
             Some(reason) => Notice::warning(reason.to_string()),
@@ -189,11 +226,15 @@ pub(super) fn attend(world: &mut World, inbox: &mut SystemState<Inbox<'static, '
     for path in exports {
         save::to(world, Purpose::Export, path, None);
     }
+    for mesh in removals {
+        added_mesh::remove(world, mesh);
+    }
     for action in actions {
         act(world, action);
     }
     save::poll(world);
     open::poll(world);
+    file_drop::open_next(world);
     recovery::poll(world);
     document::watch_places(world);
     show_title(world);
@@ -236,6 +277,7 @@ fn act(world: &mut World, action: Action) {
     match action {
         Action::New => request_open(world, OpenRequest::Empty),
         Action::Open => world.resource_mut::<Dialog>().ask(Question::Open),
+        Action::AddMesh => world.resource_mut::<Dialog>().ask(Question::Mesh),
         Action::Save => save(world, None),
         Action::SaveAs => ask_path(world, Purpose::Save, None),
         Action::Export => ask_path(world, Purpose::Export, None),
@@ -246,7 +288,7 @@ fn act(world: &mut World, action: Action) {
 
 /// Opens a document; asks about unsaved changes first if it would replace the open one.
 fn request_open(world: &mut World, request: OpenRequest) {
-    if let OpenRequest::File(path) = &request {
+    if let OpenRequest::File(path) | OpenRequest::Files { first: path, .. } = &request {
         if matches!(FileKind::of(path), Some(FileKind::Bvh | FileKind::PackedClips | FileKind::Animation))
             && has_joints(world)
         {
@@ -271,6 +313,17 @@ fn request_open(world: &mut World, request: OpenRequest) {
         }
     }
     after_asking(world, FollowUp::Open(request));
+}
+
+/// Reads a mesh to put it beside those of the open rig.
+fn request_mesh(world: &mut World, path: PathBuf) {
+    if !added_mesh::is_mesh_file(&path) {
+        let name = file_name(&path);
+        world.write_message(Notice::error(format!("{name} is no mesh; choose an .obj, .gltf, .glb or .vrm")));
+        return;
+    }
+    open::start(world, OpenRequest::File(path));
+    world.resource_mut::<LoadJob>().add_to_open();
 }
 
 fn has_joints(world: &World) -> bool {
@@ -329,6 +382,7 @@ fn dialog_answered(world: &mut World, question: Question, answer: Answer) {
         (Question::Unsaved { then, .. }, Answer::Discard) => proceed(world, then),
         (Question::Unsaved { then: FollowUp::Land, .. }, _) => open::drop_held(world),
         (Question::Open, Answer::Path(path)) => request_open(world, OpenRequest::File(path)),
+        (Question::Mesh, Answer::Path(path)) => request_mesh(world, path),
         (Question::Motion, Answer::Path(path)) => {
             world.write_message(ImportRequest(path));
         }

@@ -1,6 +1,7 @@
 //! Fit in the window: a key puts a template into the mesh or into chosen faces of it, doubtful joints stand out, and moving a
 //! joint corrects the fit.
 
+pub mod again;
 mod bar;
 pub mod doubts;
 
@@ -55,11 +56,12 @@ impl Plugin for FittingPlugin {
             .add_message::<RefitFailed>()
             .add_message::<PickRequest>()
             .add_message::<ShowDoubt>()
+            .add_message::<again::FitAgain>()
             .add_painter(bar::FitBar)
             .add_systems(
                 Update,
                 (
-                    (act, show_doubts)
+                    (act, again::begin_again, show_doubts)
                         .chain()
                         .after(ToolSystems::Tools)
                         .before(RigSystems::Script)
@@ -256,7 +258,9 @@ fn show_result(
         let choice = if report.choice.is_empty() { String::new() } else { format!(" ({})", report.choice) };
         let text = format!("{} fitted{choice} in {} ms", report.template, report.time.as_millis());
         commands.write_message(if report.fit.confidence < FitReport::DOUBTFUL {
-            Notice::warning(format!("{text}, but the mesh may be something else: look at the ringed joints."))
+            let warnings: Vec<String> = report.warnings().take(2).map(ToString::to_string).collect();
+            let reason = if warnings.is_empty() { String::new() } else { format!(" ({})", warnings.join("; ")) };
+            Notice::warning(format!("{text}, but the mesh may be something else{reason}: look at the ringed joints."))
         } else {
             Notice::done(format!("{text}."))
         });

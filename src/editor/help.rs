@@ -80,6 +80,7 @@ pub fn describe(action: Action) -> String {
         Action::Mode(mode) => return format!("{} mode", mode.name()),
         Action::New => "New project",
         Action::Open => "Open",
+        Action::AddMesh => "Add mesh",
         Action::Save => "Save",
         Action::SaveAs => "Save as",
         Action::Export => "Export",

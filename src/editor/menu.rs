@@ -32,6 +32,7 @@ const FILE_FIRST: &[Entry] =
 
 /// Last entries of the File menu, below the recent files.
 const FILE_LAST: &[Entry] = &[
+    Some(("Add mesh…", Action::AddMesh)),
     None,
     Some(("Save", Action::Save)),
     Some(("Save as…", Action::SaveAs)),

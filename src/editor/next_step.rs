@@ -9,7 +9,7 @@ use super::{
     keys::KeyBindings,
     mode::Mode,
     panels::{
-        skinning::is_held,
+        skinning::{is_held, mesh_name, needs_weights},
         timeline::{OpenClip, Timeline, TimelineAction},
     },
 };
@@ -62,6 +62,13 @@ pub fn next_step(world: &World) -> Option<String> {
             let builder = world.get::<Processor>(entity).map(Processor::builder);
             if let Some(builder) = builder.filter(|builder| has_commands && builder.cursor() < builder.len()) {
                 return Some(format!("Built {}: {} builds all.", built_commands(builder), key(Action::Build)));
+            }
+            let mut models = meshes.iter().filter_map(|mesh| world.get::<RigMesh>(*mesh));
+            if let Some(bare) = models.find(|mesh| is_skinned && needs_weights(rig, built, mesh)) {
+                let (name, skin) = (mesh_name(bare), key(Action::Skin));
+                return Some(format!(
+                    "{name} has no weights yet: {skin} skins what has none, the rest keeps its weights."
+                ));
             }
             match rig.clips() {
                 _ if !no_mesh && !is_skinned => {}

@@ -26,7 +26,7 @@ pub mod weights;
 
 mod displayed_rig;
 mod features;
-mod fields;
+pub(super) mod fields;
 mod groups;
 mod list;
 mod node_menu;

@@ -1,7 +1,10 @@
 //! Recovery of unsaved work after a crash: found when the window opens, or when its project is opened, and offered to
 //! the user.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::{Path, PathBuf},
+};
 
 use bevy::{
     prelude::*,
@@ -24,7 +27,7 @@ use super::{
 };
 use crate::{
     files::{
-        Disk, FileKind, RealDisk,
+        Disk, FileKind, MeshShape, MeshToSave, RealDisk,
         journal::{
             Basis, Condition, MAX_JOURNAL, Origin, PendingJournal, RecordKind, RecoveredJournal, RestoredRig,
             journal_beside, pending_journal, pending_journals, project_beside, recover,
@@ -32,7 +35,7 @@ use crate::{
         load_model, read_capped, stem,
     },
     plugins::surface::RigMesh,
-    rig::Rig,
+    rig::{Rig, Uid},
 };
 
 /// Largest number of gaps and skipped changes that are listed one by one.
@@ -159,15 +162,37 @@ fn restore(journal: &Path) -> Result<LoadedFile, OpenError> {
             (opened, Some(base))
         }
         // A long journal starts from a rig of its own; everything else is still as the project file says.
-        _ => (as_opened(&recovered).unwrap_or_else(|| with_meshes(&recovered)), None),
+        _ => (as_opened(&recovered).unwrap_or_else(|| without_meshes(&recovered)), None),
     };
+    add_meshes(&recovered, &mut opened);
     let restored = recovered.restore(basis, base);
     tell_losses(&recovered, &restored, basis, &mut opened);
+    set_removed_aside(&recovered, &restored, &mut opened);
     opened.pending = None;
     opened.origin = recovered.origin().clone();
     opened.rig = restored.replayed.rig.clone();
+    let rig = opened.rig.uid();
+    opened.missing.iter_mut().for_each(|mesh| mesh.rig = rig);
+    tell_misfits(&mut opened);
     opened.work = Some(Box::new(Work { recovered, restored, journal: journal.to_owned() }));
     Ok(document(opened))
+}
+
+/// Sets the meshes aside that were not in the document when the work ended, for undo and redo.
+fn set_removed_aside(recovered: &RecoveredJournal, restored: &RestoredRig, opened: &mut LoadedDocument) {
+    let listed = context_of(recovered).meshes;
+    let mut is_there: BTreeMap<Uid, bool> = listed.iter().map(|mesh| (mesh.uid, !mesh.is_set_aside)).collect();
+    let skipped: BTreeSet<usize> = restored.skipped.iter().map(|skipped| skipped.change).collect();
+    let made = if restored.replayed.refused.is_some() { restored.replayed.applied } else { usize::MAX };
+    for (number, committed) in recovered.changes().iter().enumerate().take(made) {
+        if !skipped.contains(&number) {
+            committed.effect().0.iter().for_each(|edit| edit.mesh_changes(&mut is_there));
+        }
+    }
+    let meshes = std::mem::take(&mut opened.meshes).into_iter();
+    let stays = |mesh: Uid| is_there.get(&mesh).copied().unwrap_or(true);
+    (opened.meshes, opened.set_aside) = meshes.partition(|(mesh, _)| stays(mesh.uid));
+    opened.missing.retain(|mesh| stays(mesh.uid));
 }
 
 /// The project from which the work started, if its file is as it was then.
@@ -226,16 +251,42 @@ fn tell_losses(recovered: &RecoveredJournal, restored: &RestoredRig, basis: Basi
     }
 }
 
-/// An empty rig with the meshes that were open, if they can be opened again.
-fn with_meshes(recovered: &RecoveredJournal) -> LoadedDocument {
-    let context: Context = ron::from_str(recovered.context()).unwrap_or_default();
+/// Adds warnings about weights that are of another number of points than their mesh, whose file has changed.
+fn tell_misfits(opened: &mut LoadedDocument) {
+    for (mesh, _) in &opened.meshes {
+        let (bound, points) = (opened.rig.skin(mesh.uid).map(|skin| skin.weights.len()), mesh.rest.points.len());
+        if bound.is_some_and(|bound| bound != points) {
+            opened.warnings.push(format!(
+                "the mesh {:?} has changed since it was bound: it has {points} points now, for which its weights are not \
+                 made; put the former file back and recover again, or bind it anew",
+                mesh.file.name
+            ));
+        }
+    }
+}
+
+/// Name and meshes of the document, as the journal has them.
+fn context_of(recovered: &RecoveredJournal) -> Context {
+    ron::from_str(recovered.context()).unwrap_or_default()
+}
+
+/// An empty rig under the name of the document.
+fn without_meshes(recovered: &RecoveredJournal) -> LoadedDocument {
+    let context = context_of(recovered);
     let name = match (context.name.is_empty(), recovered.origin().path()) {
         (false, _) => context.name,
         (true, Some(path)) => stem(path),
         (true, None) => "recovered".to_owned(),
     };
-    let mut opened = LoadedDocument::named(name, Rig::default());
-    for mesh in context.meshes {
+    LoadedDocument::named(name, Rig::default())
+}
+
+/// Adds the meshes that were open and are not in the document, as in a project that was not saved with them, if they can be
+/// opened again.
+fn add_meshes(recovered: &RecoveredJournal, opened: &mut LoadedDocument) {
+    let mut known: BTreeSet<Uid> = opened.missing.iter().map(|mesh| mesh.uid).collect();
+    known.extend(opened.meshes.iter().map(|(mesh, _)| mesh.uid));
+    for mesh in context_of(recovered).meshes.into_iter().filter(|mesh| !known.contains(&mesh.uid)) {
         let model = match &mesh.source {
             MeshSource::Bundled(name) => BundledModel::named(name).and_then(BundledModel::read),
             MeshSource::File(path) => load_model(&RealDisk, path).map_err(OpenError::from),
@@ -246,10 +297,18 @@ fn with_meshes(recovered: &RecoveredJournal) -> LoadedDocument {
                 let nodes = if mesh.nodes.len() == model.nodes.len() { mesh.nodes } else { Vec::new() };
                 opened.meshes.push((RigMesh::new(mesh.uid, model, nodes), mesh.source));
             }
-            Err(error) => opened
-                .warnings
-                .push(format!("a mesh of the project is not there: {error}; the rig was recovered without it")),
+            Err(error) => {
+                opened.warnings.push(format!(
+                    "a mesh of the project is not there: {error}; the rig was recovered without it; to keep its weights, \
+                     put the file back and recover again before you save"
+                ));
+                // A save goes on to name its file.
+                if let MeshSource::File(path) = mesh.source {
+                    let shape = MeshShape::Missing { hash: 0, skin: None };
+                    let (rig, nodes) = (opened.rig.uid(), mesh.nodes.into());
+                    opened.missing.push(MeshToSave { uid: mesh.uid, rig, path, nodes, shape });
+                }
+            }
         }
     }
-    opened
 }

@@ -25,6 +25,10 @@ impl Plugin for RunningWorkPlugin {
 pub enum StoppableWork {
     /// A document is being opened.
     Opening,
+    /// A document is being saved or exported.
+    Saving,
+    /// A template of the library is being read.
+    Library,
     /// A file of motion is being read, or its motion put onto the rig.
     Motion,
     /// Weights of a mesh are being computed or changed.
@@ -48,10 +52,10 @@ pub fn running(world: &World) -> Option<(String, Option<StoppableWork>)> {
         return Some((format!("Importing {what}"), Some(StoppableWork::Motion)));
     }
     if let Some(what) = world.get_resource::<LibraryJobs>().and_then(LibraryJobs::name) {
-        return Some((format!("Reading {what}"), None));
+        return Some((format!("Reading {what}"), Some(StoppableWork::Library)));
     }
     if let Some(what) = world.get_resource::<SaveJob>().and_then(SaveJob::name) {
-        return Some((format!("Saving {what}"), None));
+        return Some((format!("Saving {what}"), Some(StoppableWork::Saving)));
     }
     let meshes: Vec<Entity> = world.get::<RigMeshes>(rig?)?.iter().collect();
     let skinning = meshes.iter().filter_map(|mesh| world.get::<SkinningJob>(*mesh));
@@ -82,6 +86,16 @@ fn carry_out(world: &mut World, kind: StoppableWork) {
         StoppableWork::Opening => {
             if let Some(name) = world.get_resource_mut::<LoadJob>().and_then(|mut job| job.stop()) {
                 world.write_message(Notice::info(format!("{name} is not opened: it was stopped")));
+            }
+        }
+        StoppableWork::Saving => {
+            if let Some(saving) = world.get_resource::<SaveJob>() {
+                saving.stop();
+            }
+        }
+        StoppableWork::Library => {
+            if let Some(name) = world.get_resource_mut::<LibraryJobs>().and_then(|mut jobs| jobs.stop()) {
+                world.write_message(Notice::info(format!("{name} is not used: it was stopped")));
             }
         }
         StoppableWork::Motion => {

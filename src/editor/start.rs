@@ -158,7 +158,8 @@ impl Job {
         match self.request() {
             OpenRequest::Model(name) => Origin::Bundled(name),
             OpenRequest::Template(name) => OpenRequest::origin_of_template(&name),
-            OpenRequest::Bundled | OpenRequest::Empty | OpenRequest::File(_) => Origin::Empty,
+            OpenRequest::Bundled | OpenRequest::Empty => Origin::Empty,
+            OpenRequest::File(_) | OpenRequest::Files { .. } => Origin::Empty,
         }
     }
 

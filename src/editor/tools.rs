@@ -16,6 +16,7 @@
 //! request.
 
 pub mod actions;
+mod click_wishes;
 pub mod ghosts;
 pub mod gizmo;
 pub mod paint;

@@ -1,6 +1,9 @@
 //! Loader of any file that Rigsmith reads, by path.
 
-use std::path::{Path, PathBuf};
+use std::{
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::{Path, PathBuf},
+};
 
 use super::{
     Disk, ModelFolder, PartFiles, ReadError, UriError, open, parts::named_template, read::read_plausible, read_capped,
@@ -226,6 +229,12 @@ pub(super) fn surviving<T: Send>(
             Err(error) => Err(ReadError::Io { path: path.into(), source: error.into() }.into()),
         }
     })
+}
+
+/// Runs a reader on this thread, so that a panic in a dependency becomes an error. Memory that was let go of before serves it, while
+/// a thread of its own has a heap of its own.
+pub(super) fn surviving_here<T>(path: &Path, read: impl FnOnce() -> Result<T, LoadError>) -> Result<T, LoadError> {
+    catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(LoadError::Broken { path: path.into() }))
 }
 
 fn load_obj(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {

@@ -29,7 +29,7 @@ use crate::{
         part::PartInstance,
         project,
         skin::{SkinError, SkinFile},
-        template::{self, write_template},
+        template::{self, UidStyle, write_template},
         text::{self, RigTextError},
     },
     solve::packed_clip::PackedSkeleton,
@@ -247,14 +247,15 @@ fn model_set(
     Ok((set, notes))
 }
 
-/// Saves an avatar as `.vrm`, after reading back what is to be written.
+/// Saves an avatar as `.vrm`, after reading back what is to be written. A model that is handed over, not lent, is dropped before:
+/// reading back takes as much memory as the model.
 ///
 /// # Errors
 /// [`StoreError`]; the former file is unchanged.
 pub fn store_avatar(
     disk: &dyn Disk,
     path: &Path,
-    model: &Model,
+    model: impl Borrow<Model>,
     avatar: &Avatar,
     settings: &GltfWriteSettings,
 ) -> Result<(), StoreError> {
@@ -262,9 +263,11 @@ pub fn store_avatar(
         return Err(StoreError::Kind { path: path.into(), wanted: "an avatar is saved as .vrm" });
     }
     let mut set = FileSet::new(path);
-    let bytes = write_vrm(model, avatar, settings);
+    let bytes = write_vrm(model.borrow(), avatar, settings);
     set.finish(bytes.map_err(|source| StoreError::Gltf { path: path.into(), source })?);
-    verify::model(&set, ModelCounts::of(model))?;
+    let counts = ModelCounts::of(model.borrow());
+    drop(model);
+    verify::model(&set, counts)?;
     verify::avatar(&set, avatar)?;
     Ok(save_set(disk, &set)?)
 }
@@ -402,6 +405,21 @@ pub(super) fn save_template(disk: &dyn Disk, path: &Path, text: &str) -> Result<
     }
     verify::template(path, text.as_bytes())?;
     Ok(save_atomic(disk, path, text.as_bytes())?)
+}
+
+/// Saves a rig that had no file as a template that people go on to write: tags of the short form and names where they are
+/// enough, in the layout. Another kind of file, and a rig that such a text cannot say, is saved as by [`store_rig`]. Returns
+/// notes, a sentence each.
+///
+/// # Errors
+/// [`StoreError`]; the former file is unchanged.
+pub fn store_short_rig(disk: &dyn Disk, path: &Path, rig: &Rig) -> Result<Vec<String>, StoreError> {
+    let is_template = FileKind::of(path) == Some(FileKind::Template);
+    let short = if is_template { template::write_short_template(rig) } else { None };
+    let Some(text) = short else { return store_rig(disk, path, rig) };
+    let text = template::format_template(&text, UidStyle::Kept).unwrap_or(text);
+    save_template(disk, path, &text)?;
+    Ok(Vec::new())
 }
 
 /// Saves a rig as `.rig.ron`, or its skeleton as `.rig`. Returns notes about content that the format could not keep, a

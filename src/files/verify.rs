@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::{
     FileKind, FileSet, LoadError, StoreError,
-    load::{in_source, surviving},
+    load::{in_source, surviving_here},
     stem,
 };
 use crate::{
@@ -57,7 +57,7 @@ pub(super) fn model(set: &FileSet, written: ModelCounts) -> Result<(), StoreErro
             Ok(read_gltf(set.bytes(), &path.display().to_string(), &mut external)?)
         }
     };
-    let back = readable(path, surviving(path, read))?;
+    let back = readable(path, surviving_here(path, read))?;
     let same = |what, written: usize, read: usize| match written == read {
         true => Ok(()),
         false => Err(StoreError::Lost { path: path.into(), what, written, read }),

@@ -7,6 +7,10 @@ use super::{
     posing::{PoseError, WriteValue},
 };
 use crate::{
+    plugins::{
+        commands::Processor,
+        controls::{SwitchError, find_switches},
+    },
     rig::{
         BuiltNode, BuiltRig, Matching, NodeType, Uid,
         feature::off_at,
@@ -29,7 +33,13 @@ impl Workbench {
             None => did_you_mean(attribute, &all),
         };
         let off = self.processor().and_then(|processor| processor.builder().off_named(attribute));
-        let off = off.map_or_else(String::new, |off| format!("; one of that name is not built: {off}"));
+        let here = || node.label.as_deref().and_then(|label| off_at(self.rig(), label));
+        let off = match off {
+            Some(off) => format!("; one of that name is not built: {off}"),
+            // A similar name is likely what is meant.
+            None if known.ends_with('?') => String::new(),
+            None => here().map_or_else(String::new, |off| format!("; {off} there")),
+        };
         PoseError::NoAttribute { node: node.name.to_string(), attribute: attribute.to_owned(), known: known + &off }
     }
 
@@ -110,8 +120,43 @@ impl Workbench {
         }
         let of_kind = built.nodes.iter().filter(|node| query.is_of_kind(node));
         let names = of_kind.flat_map(|node| [Some(node.name.to_string()), node.label.as_deref().map(str::to_owned)]);
-        let nearest = did_you_mean(name, names.flatten());
+        let names: Vec<String> = names.flatten().collect();
+        let nearest = self.nearest_off(name, &names).unwrap_or_else(|| did_you_mean(name, &names));
         PoseError::NoNode { what: query.kind_name(), name: name.to_owned(), nearest }
+    }
+
+    /// End of the sentence about an unknown name where something that is off has the nearest name; `None` where a name of
+    /// `built` is at least as near.
+    fn nearest_off(&self, name: &str, built: &[String]) -> Option<String> {
+        let builder = self.processor()?.builder();
+        let off = builder.names_off();
+        let near = nearest(name, built.iter().chain(&off), 1);
+        let near = near.first().filter(|near| !built.contains(near))?;
+        let off = builder.off_named(near)?;
+        Some(format!("; did you mean {near:?}? It is not built: {off}; turn it on"))
+    }
+
+    /// Switches that a name matches, each as its control, its attribute and the number of `value`: see
+    /// [`find_switches`].
+    ///
+    /// # Errors
+    /// The rig is not built, or no switch has the name or the value. A switch whose control is off is told as such.
+    pub fn switches_named(&self, name: &str, value: &str) -> Result<Vec<(Uid, String, f32)>, PoseError> {
+        let built = self.built().ok_or(PoseError::NotBuilt)?;
+        find_switches(built, self.rig(), name, value).map_err(|error| self.switch_error(error))
+    }
+
+    /// Error of a switch; where the name is that of a control that is off, it says so.
+    fn switch_error(&self, error: SwitchError) -> PoseError {
+        let SwitchError::NoSwitch { name, .. } = &error else { return error.into() };
+        let off = self.processor().map(Processor::builder).and_then(|builder| {
+            let control = name.rsplit_once('.').map(|(control, _)| control);
+            builder.off_named(name).or_else(|| builder.off_named(control?))
+        });
+        match off {
+            Some(off) => SwitchError::Off { name: name.clone(), off: off.to_string() }.into(),
+            None => error.into(),
+        }
     }
 
     /// Error of a name that finds several nodes. Nodes of one name are told apart by their uids.

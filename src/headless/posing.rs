@@ -13,7 +13,7 @@ use crate::{
     mesh::model::Trs,
     plugins::{
         commands::{BuildDone, BuildRequest, BuildStep, BuiltEntities, Processor, RunFailure},
-        controls::{SwitchError, SwitchRequest, find_switches, number_of},
+        controls::{SwitchError, SwitchRequest, number_of},
         document::JointEntities,
         runtime::{RigRuntime, is_near},
         schema::Attributes,
@@ -320,7 +320,8 @@ impl Workbench {
         self.runtime().map(drop)
     }
 
-    /// Sets the switches that `name` matches, without moving the nodes that they match: see [`find_switches`].
+    /// Sets the switches that `name` matches, without moving the nodes that they match: see
+    /// [`find_switches`](crate::plugins::controls::find_switches).
     ///
     /// # Errors
     /// The built rig has no such switch or value, or the rig is not built.
@@ -330,9 +331,8 @@ impl Workbench {
 
     /// Sets the switches that `name` matches; returns their controls and attributes.
     fn throw(&mut self, name: &str, value: &str) -> Result<Vec<(Uid, String)>, PoseError> {
-        let built = self.built().ok_or(PoseError::NotBuilt)?;
         let mut thrown = Vec::new();
-        for (control, attribute, value) in find_switches(built, self.rig(), name, value)? {
+        for (control, attribute, value) in self.switches_named(name, value)? {
             thrown.push((control, attribute.clone()));
             self.app.world_mut().write_message(SwitchRequest { rig: self.rig, control, attribute, value });
             self.app.update();

@@ -2,11 +2,16 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use bevy::{ecs::entity::EntityHashMap, prelude::*, transform::components::TransformTreeChanged};
+use bevy::{
+    asset::{AssetId, AssetLoadFailedEvent},
+    ecs::entity::EntityHashMap,
+    prelude::*,
+    transform::components::TransformTreeChanged,
+};
 use rayon::prelude::*;
 
 use super::{
-    BuiltTemplate, ExposedNodes, RigBuilt, RigFailed, RigInstance, RigTemplate, RigTemplates, RigUpdated,
+    BuiltTemplate, ExposedNodes, RigBuilt, RigFailed, RigInstance, RigSource, RigTemplate, RigTemplates, RigUpdated,
     RunningTemplate, TemplateError, Users,
     clip_updates::{ClipJobs, ClipOrigin, UpdatedClips},
     exchange::{Exchange, described_otherwise},
@@ -15,10 +20,13 @@ use crate::{
     plugins::{
         animation::{PlayedClip, RigClips},
         runtime::{ControlPose, InstanceMode, RigNodes, RigRuntime, furnish_instance, spawn_instance},
-        schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer},
+        schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer, NodeOf},
     },
     processor::PoseNote,
-    rig::{AttributeValues, BuiltNode, MovedNodes, PoseOffset, RestTransform, Uid},
+    rig::{
+        AttributeValues, BuiltNode, MovedNodes, PoseOffset, RestTransform, Uid,
+        update::{Change, Take, update},
+    },
     solve::{
         keep_pose::KeptPose,
         program::{ProgramError, RigProgram, RigState},
@@ -37,19 +45,72 @@ pub(super) fn take_outcomes(
         let id = outcome.id;
         match outcome.result {
             Ok(built) => {
-                if let Some(template) = outcome.template {
-                    templates.own.insert(id, template.clone());
-                    // A handle without users has nowhere to put it.
-                    let _ = assets.insert(id, template);
+                let is_used = match outcome.template {
+                    Some(template) => {
+                        let is_used = assets.insert(id, template.clone()).is_ok();
+                        if is_used {
+                            templates.own.insert(id, template);
+                        }
+                        is_used
+                    }
+                    None => assets.contains(id),
+                };
+                // The last handle is gone, or the asset was removed, while the thread built.
+                if !is_used {
+                    templates.forget(id);
+                    continue;
                 }
                 templates.built.insert(id, built);
+                templates.failed.remove(&id);
                 templates.is_fresh = true;
             }
             Err(error) => {
+                templates.note_failure(id, &error);
                 for entity in users.of(id) {
                     commands.trigger(RigFailed { entity, error: error.clone() });
                 }
             }
+        }
+    }
+}
+
+/// Tells instances whose template the asset server cannot load.
+pub(super) fn follow_failures(
+    mut failed: MessageReader<AssetLoadFailedEvent<RigTemplate>>,
+    mut templates: ResMut<RigTemplates>,
+    users: Users,
+    mut commands: Commands,
+) {
+    for AssetLoadFailedEvent { id, error, .. } in failed.read() {
+        let error = TemplateError::Load(error.to_string());
+        templates.note_failure(*id, &error);
+        for entity in users.of(*id) {
+            commands.trigger(RigFailed { entity, error: error.clone() });
+        }
+    }
+}
+
+/// Tells instances of templates that are known to have no build: their failure was told before the instances came.
+pub(super) fn tell_known_failures(
+    instances: Query<(Entity, &RigInstance), Changed<RigInstance>>,
+    sources: Query<(Entity, &RigSource), Added<RigSource>>,
+    templates: Res<RigTemplates>,
+    mut commands: Commands,
+) {
+    let instances = instances.iter().map(|(entity, instance)| (entity, instance.0.id()));
+    let sources = sources.iter().map(|(entity, source)| (entity, source.template.id()));
+    for (entity, id) in instances.chain(sources) {
+        if let Some(error) = templates.failed.get(&id) {
+            commands.trigger(RigFailed { entity, error: error.clone() });
+        }
+    }
+}
+
+impl RigTemplates {
+    /// Keeps the reason for which a template has no build, for those who ask for it later.
+    fn note_failure(&mut self, id: AssetId<RigTemplate>, error: &TemplateError) {
+        if !self.built.contains_key(&id) {
+            self.failed.insert(id, error.clone());
         }
     }
 }
@@ -73,6 +134,8 @@ struct DueInstance {
     is_fresh: bool,
     /// True if its template is another version than the one it runs.
     is_other: bool,
+    /// The version that it runs.
+    before: Option<Arc<BuiltTemplate>>,
     /// Clips of the instance for that version.
     clips: Option<UpdatedClips>,
 }
@@ -123,8 +186,8 @@ pub(super) fn update_instances(world: &mut World) {
         });
         let runs_other = runtime.is_none_or(|runtime| !Arc::ptr_eq(runtime.state().program(), &program));
         if is_fresh || is_other || runs_other {
-            let (built, mode) = (built.clone(), *mode);
-            due.push(DueInstance { entity, built, program, mode, is_fresh, is_other, clips: updated });
+            let (built, mode, before) = (built.clone(), *mode, running.map(|running| running.0.clone()));
+            due.push(DueInstance { entity, built, program, mode, is_fresh, is_other, before, clips: updated });
         }
     }
     jobs.tidy();
@@ -135,7 +198,7 @@ pub(super) fn update_instances(world: &mut World) {
     }
     let (fresh, going): (Vec<DueInstance>, Vec<DueInstance>) = due.into_iter().partition(|due| due.is_fresh);
     for DueInstance { entity, built, program, mode, .. } in &fresh {
-        world.entity_mut(*entity).despawn_related::<RigNodes>();
+        despawn_nodes(world, *entity);
         spawn_instance(world, *entity, program, *mode);
         describe(world, *entity, &built.built.nodes);
         world.entity_mut(*entity).insert(RunningTemplate(built.clone()));
@@ -163,15 +226,38 @@ pub(super) fn update_instances(world: &mut World) {
     for DueInstance { entity, .. } in fresh {
         world.trigger(RigBuilt { entity });
     }
-    for DueInstance { entity, built, clips, .. } in going.into_iter().filter(|due| due.is_other) {
+    let mut known = Vec::new();
+    for DueInstance { entity, built, before, clips, .. } in going.into_iter().filter(|due| due.is_other) {
         let deviations = kept.remove(&entity).map(|kept| kept.deviations).unwrap_or_default();
         let poses = deviations.into_iter().map(|deviation| PoseNote { pose: None, deviation }).collect();
         let clips = clips.map(|clips| clips.report).unwrap_or_default();
-        world.trigger(RigUpdated { entity, changes: built.changes.clone(), ran: built.ran.clone(), poses, clips });
+        let changes = before.map_or_else(|| built.changes.clone(), |before| changes_since(&before, &built, &mut known));
+        world.trigger(RigUpdated { entity, changes, ran: built.ran.clone(), poses, clips });
     }
     for (entity, error) in failed {
         world.trigger(RigFailed { entity, error });
     }
+}
+
+/// Differences between two builds that do not follow each other.
+struct KnownChanges {
+    from: Arc<BuiltTemplate>,
+    to: Arc<BuiltTemplate>,
+    changes: Arc<[Change]>,
+}
+
+/// Differences of a build from the one that an instance ran: the build before it, an older one, or one of another template.
+fn changes_since(from: &Arc<BuiltTemplate>, to: &Arc<BuiltTemplate>, known: &mut Vec<KnownChanges>) -> Arc<[Change]> {
+    if to.way.as_ref().is_some_and(|way| way.described_since(from).is_some()) {
+        return to.changes.clone();
+    }
+    let is_it = |known: &&KnownChanges| Arc::ptr_eq(&known.from, from) && Arc::ptr_eq(&known.to, to);
+    if let Some(known) = known.iter().find(is_it) {
+        return known.changes.clone();
+    }
+    let changes: Arc<[Change]> = update(Some(&from.rig), &from.rig, &to.rig, Take::Theirs).changes.into();
+    known.push(KnownChanges { from: from.clone(), to: to.clone(), changes: changes.clone() });
+    changes
 }
 
 /// Gives an instance its clips for the version of its template that it goes on with.
@@ -380,13 +466,26 @@ fn set<C: Component + PartialEq>(entity: &mut EntityWorldMut, wanted: Option<C>)
     };
 }
 
+/// Despawns the nodes of an instance. What others hung on them stays, on the instance.
+fn despawn_nodes(world: &mut World, instance: Entity) {
+    let nodes: Vec<Entity> = world.get::<RigNodes>(instance).map(|nodes| nodes.iter().collect()).unwrap_or_default();
+    let is_hung = |child: &Entity| world.get::<NodeOf>(*child).is_none_or(|of| of.0 != instance);
+    let children = nodes.iter().filter_map(|node| world.get::<Children>(*node));
+    let hung: Vec<Entity> = children.flat_map(|children| children.iter()).filter(is_hung).collect();
+    for child in hung {
+        world.entity_mut(child).insert(ChildOf(instance));
+    }
+    world.entity_mut(instance).despawn_related::<RigNodes>();
+}
+
 /// Despawns the nodes of an entity that is no instance any more.
 pub(super) fn leave(removed: On<Remove, RigInstance>, mut commands: Commands) {
     if let Ok(mut entity) = commands.get_entity(removed.entity) {
         entity.queue_silenced(|mut entity: EntityWorldMut| {
             // Replacing the component is no leaving.
             if !entity.contains::<RigInstance>() {
-                entity.despawn_related::<RigNodes>();
+                let instance = entity.id();
+                entity.world_scope(|world| despawn_nodes(world, instance));
                 entity.remove::<(RigRuntime, RunningTemplate)>();
             }
         });

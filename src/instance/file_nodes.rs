@@ -205,7 +205,7 @@ impl LoadedSkin {
                 back: rest.inverse(),
                 turn,
                 has_moved: false,
-                is_pending: false,
+                is_pending: true,
                 is_told: false,
             };
             followed.push((*node, next));

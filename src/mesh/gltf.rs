@@ -27,6 +27,7 @@ mod uri;
 mod vrm;
 mod write;
 
+pub(super) use materials::append_materials;
 pub use uri::{ExternalError, ExternalFile, ExternalKind, GltfUriError};
 pub use vrm::read_avatar;
 pub use write::{GltfWriteSettings, write_glb, write_gltf, write_vrm};

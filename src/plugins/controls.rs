@@ -21,7 +21,9 @@ use super::{
 };
 use crate::{
     rig::{
-        AttributeKind, BuiltRig, Matching, Rig, SwitchData, Uid, feature::off_at, nearest::did_you_mean,
+        AttributeKind, BuiltRig, Matching, Rig, SwitchData, Uid,
+        feature::off_at,
+        nearest::{listed, nearest},
         operations::Operation,
     },
     solve::matching::{MatchError, SwitchOverError, match_switch},
@@ -229,11 +231,12 @@ pub fn find_switches(
     }
     let off = if found.is_empty() { off_at(rig, name) } else { None };
     if found.is_empty() && possible.is_empty() {
-        if let Some(off) = off {
+        if let Some(off) = off.or_else(|| off_at_control(built, rig, name)) {
             return Err(SwitchError::Off { name: name.to_owned(), off });
         }
         let known: Vec<String> = built.switches.iter().filter_map(|switch| name_of(built, switch)).collect();
-        let nearest = did_you_mean(name, known.iter().map(String::as_str));
+        let near = nearest(name, &known, 3);
+        let nearest = if near.is_empty() { String::new() } else { format!("; did you mean {}?", listed(&near, "or")) };
         return Err(SwitchError::NoSwitch { name: name.to_owned(), nearest, known: names(built) });
     }
     if found.is_empty() {
@@ -247,6 +250,13 @@ pub fn find_switches(
         });
     }
     Ok(found)
+}
+
+/// Clause about what is off at the joint of the control that a switch is named by, as `CONTROL` or `CONTROL.ATTRIBUTE`.
+fn off_at_control(built: &BuiltRig, rig: &Rig, name: &str) -> Option<String> {
+    let stem = name.rsplit_once('.').map_or(name, |(control, _)| control);
+    let control = built.nodes.iter().find(|node| *node.name == *name || *node.name == *stem)?;
+    off_at(rig, control.label.as_deref()?)
 }
 
 /// Names of the values of a switch, in their order.

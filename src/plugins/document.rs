@@ -5,6 +5,7 @@
 //! finds them. An [`EditRequest`] changes the document and the entities follow; writing, spawning or despawning the
 //! entities makes an edit. Both go through [`RigHistory`] in one system, the only one that changes a rig.
 
+mod added_chains;
 mod adopt;
 mod carry;
 pub(in crate::plugins) mod entities;
@@ -17,6 +18,7 @@ use std::{borrow::Cow, sync::Arc};
 use bevy::prelude::*;
 
 pub use self::{
+    added_chains::ChainParent,
     entities::{GroupEntities, JointEntities, TagEntities},
     error::{ChangeError, EntityWrite, EntityWriteError},
 };
@@ -98,6 +100,13 @@ pub enum Change {
     /// Places a joint at a position of the rig's space, at rest, below the joint that is active when the request is carried
     /// out, or as a root; answered by a [`ChangeReport`], too.
     Place(Vec3),
+    /// Draws a chain of joints, at rest; answered by a [`ChangeReport`], too.
+    Draw {
+        /// Positions of the joints in the rig's space, in their order.
+        positions: Vec<Vec3>,
+        /// Joint that the first one hangs on.
+        parent: ChainParent,
+    },
     /// Names the joint that is active when the request is carried out; answered by a [`ChangeReport`], too.
     LabelActive(String),
     /// Selects the listed joints, the active one last. It is no edit: nothing answers, and undo passes over it.
@@ -144,8 +153,8 @@ impl EditReport {
     }
 }
 
-/// Answer to a [`Change::Place`], [`Change::LabelActive`], [`Change::Undo`] or [`Change::Redo`], in the order of the
-/// requests.
+/// Answer to a [`Change::Place`], [`Change::Draw`], [`Change::LabelActive`], [`Change::Undo`] or [`Change::Redo`], in the
+/// order of the requests.
 #[derive(Message, Debug, Clone)]
 pub struct ChangeReport {
     /// The rig.
@@ -163,6 +172,17 @@ pub struct ReportedStep {
     pub added: usize,
     /// Number of joints that the rig has after it.
     pub joints: usize,
+    /// Chain of a [`Change::Draw`]; `None` for other changes.
+    pub chain: Option<ReportedChain>,
+}
+
+/// Chain that was drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ReportedChain {
+    /// Joint that the first joint hangs on; `None` for a root.
+    pub parent: Option<Uid>,
+    /// Last joint of the chain.
+    pub tip: Option<Uid>,
 }
 
 /// Message that a change was refused; the rig stays as it was.
@@ -184,26 +204,34 @@ fn apply_edits(
     mut refused: MessageWriter<EditRefusal>,
     mut reported: MessageWriter<ChangeReport>,
 ) {
+    let mut added = added_chains::AddedChains::default();
     let of_entities = std::mem::take(&mut entity_edits.bypass_change_detection().0).into_iter().map(|(rig, edits)| {
         let operation = Operation::Named { name: "Edit entities", edits };
         (EditRequest { rig, change: Change::Do(operation) }, true)
     });
     for (request, is_of_entities) in of_entities.chain(requests.read().map(|request| (request.clone(), false))) {
-        let EditRequest { rig, change } = &request;
+        let EditRequest { rig, change: requested } = &request;
         let rig = *rig;
         let Ok((mut document, mut selection, mut history, symmetry, auto_key, built)) = rigs.get_mut(rig) else {
             refused.write(EditRefusal { rig, reason: ChangeError::NoRig(rig) });
             continue;
         };
-        let is_reported = has_report(change);
+        let is_reported = has_report(requested);
         let before = document.len();
         let operation;
-        let change = match on_active(change, selection.active()) {
+        let bound = match requested {
+            Change::Draw { positions, parent } => {
+                let parent = added.parent(rig, &document, *parent, selection.active());
+                Some(Operation::Chain { positions: positions.clone(), parent })
+            }
+            _ => on_active(requested, selection.active()),
+        };
+        let change = match bound {
             Some(bound) => {
                 operation = Change::Do(bound);
                 &operation
             }
-            None => change,
+            None => requested,
         };
         if let Change::Select(joints) = change {
             selection.set_if_neq(Selection(joints.clone()));
@@ -253,8 +281,8 @@ fn apply_edits(
                     .map_err(ChangeError::from)
             }
             Change::LabelActive(_) => Err(ChangeError::NoActive),
-            // A joint to place has become an operation, and joints to select are selected.
-            Change::Place(_) | Change::Select(_) => continue,
+            // Joints to place or draw have become an operation, and joints to select are selected.
+            Change::Place(_) | Change::Draw { .. } | Change::Select(_) => continue,
             Change::Commit | Change::CancelPreview if !history.is_previewing() => continue,
             Change::Commit => {
                 let Some(step) = history.commit_preview(&mut selected) else { continue };
@@ -266,12 +294,21 @@ fn apply_edits(
             }
         };
         selection.set_if_neq(selected);
+        let tip = selection.active().filter(|_| result.is_ok());
+        added.note(rig, &document, requested, tip);
         if is_reported {
+            let chain = match (requested, change) {
+                (Change::Draw { .. }, Change::Do(Operation::Chain { parent, .. })) => {
+                    Some(ReportedChain { parent: *parent, tip })
+                }
+                _ => None,
+            };
             let joints = document.len();
             let step = result.as_ref().map(|done| ReportedStep {
                 name: done.name.clone(),
                 added: joints.saturating_sub(before),
                 joints,
+                chain,
             });
             reported.write(ChangeReport { rig, step: step.map_err(ChangeError::clone) });
         }
@@ -288,7 +325,7 @@ fn apply_edits(
 
 /// True for changes that a [`ChangeReport`] answers.
 fn has_report(change: &Change) -> bool {
-    matches!(change, Change::Place(_) | Change::LabelActive(_) | Change::Undo | Change::Redo)
+    matches!(change, Change::Place(_) | Change::Draw { .. } | Change::LabelActive(_) | Change::Undo | Change::Redo)
 }
 
 /// Operation of a change that is about the active joint; `None` for all other changes, and to name a joint where none is

@@ -30,7 +30,7 @@ pub use self::{
 pub use super::schema::{ControlPose, NodeOf, NodeSlot, RigNodes};
 use super::{RigSystems, configure_sets, document::EditRefusal};
 use crate::{
-    rig::{AttributeValues, NodeType, PoseOffset, Rig, Uid},
+    rig::{AttributeValues, PoseOffset, Rig, Uid},
     solve::program::{Carry, Memory, RigProgram, RigState},
 };
 
@@ -111,14 +111,14 @@ pub struct RigRuntime {
     /// Pose offsets of the document that were last passed on.
     posed: BTreeMap<Uid, PoseOffset>,
     valued: AttributeValues,
+    /// True if a document says what the pose and the attribute values are.
+    is_of_document: bool,
     /// True if a control has changed since the last run.
     is_due: bool,
     /// True if the next run writes all entities.
     all_due: bool,
     /// Place of the rig in the world at the last run, for springs that feel its motion.
     world: Option<Affine3A>,
-    /// Extent of the joints at rest in the rig's space, in [`InstanceMode::Hierarchy`]: see [`rest_height`].
-    height: f32,
 }
 
 impl RigRuntime {
@@ -139,8 +139,8 @@ impl RigRuntime {
             unknown_writes: Vec::new(),
             posed: BTreeMap::new(),
             valued: AttributeValues::new(),
+            is_of_document: false,
             all_due: mode == InstanceMode::Hierarchy,
-            height: if mode == InstanceMode::Hierarchy { rest_height(&program) } else { 0.0 },
             state: RigState::with_memory(program, memory),
             mode,
             controls: Vec::new(),
@@ -221,6 +221,7 @@ impl RigRuntime {
     /// Passes on the pose and the attribute values of a document where they differ from the last ones; the rest pose if
     /// `is_posed` is false.
     pub(super) fn pose_from(&mut self, rig: &Rig, is_posed: bool) {
+        self.is_of_document = true;
         let none = BTreeMap::new();
         let pose = if is_posed { rig.pose() } else { &none };
         if self.posed != *pose {
@@ -268,6 +269,7 @@ impl RigRuntime {
         let known = |node: &Uid| before.state.program().node(*node).is_some();
         self.posed = before.posed.iter().filter(|(node, _)| known(node)).map(|(node, at)| (*node, *at)).collect();
         self.valued = before.valued.iter().filter(|(node, _)| known(node)).map(|(n, v)| (*n, v.clone())).collect();
+        self.is_of_document = before.is_of_document;
         self.world = before.world;
         for (slot, from) in carry.nodes().iter().enumerate() {
             let Some((from, entity)) = from.and_then(|from| Some((from, before.entity(from)?))) else { continue };
@@ -305,9 +307,6 @@ impl RigRuntime {
             self.is_due |= !carry.has_same_bounds();
             // Results that no operation computes any more have other values, too.
             self.all_due |= self.mode == InstanceMode::Hierarchy && !carry.is_partial();
-            if self.mode == InstanceMode::Hierarchy {
-                self.height = rest_height(program);
-            }
             return;
         }
         let mut fresh = Self::new(Arc::clone(program), self.mode);
@@ -322,25 +321,6 @@ impl RigRuntime {
         driven.filter(|(_, attribute)| !attribute.is_settable).for_each(|(value, _)| *value = f32::NAN);
         self.attributes_due = true;
     }
-}
-
-/// Height of a program's joints as they are built, without constraints: their extent along Y, or along the longest axis
-/// where they lie flat (less than a tenth of that axis). Differences of places are measured against it.
-fn rest_height(program: &RigProgram) -> f32 {
-    let nodes = program.nodes();
-    let mut places: Vec<Affine3A> = Vec::with_capacity(nodes.len());
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for node in nodes {
-        let above = node.parent.map_or(Affine3A::IDENTITY, |parent| places[parent]);
-        let place = above * node.base.affine();
-        if node.kind == NodeType::Joint {
-            (low, high) = (low.min(place.translation.into()), high.max(place.translation.into()));
-        }
-        places.push(place);
-    }
-    let extent = (high - low).max(Vec3::ZERO);
-    let longest = extent.max_element();
-    if extent.y >= 0.1 * longest { extent.y } else { longest }
 }
 
 /// Marker for a slot whose entity has not been written yet; no entity has this transform.

@@ -195,7 +195,8 @@ pub struct NodeLayer(pub LayerData);
 
 /// Values of a node's attributes by name, as they are in effect. Writing a value drives the rig in the same frame, as
 /// writing a control's `Transform` does; the value of an attribute that a constraint drives is restored in the same frame, and
-/// told once.
+/// told once. Nodes of a game's instance have none until the game inserts some: the values that it inserts count, and those that
+/// it leaves out are added.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]
 #[reflect(Component)]
 pub struct Attributes(pub BTreeMap<String, f32>);

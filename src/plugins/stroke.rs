@@ -7,6 +7,8 @@ mod chain_preview;
 mod parent;
 mod plan;
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use bevy::{
     prelude::*,
     tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
@@ -18,7 +20,7 @@ pub use plan::{StrokePlan, StrokeScene, plan_stroke, stroke_kind};
 
 use super::{
     RigSystems, configure_sets,
-    document::{EditRequest, JointEntities, Selection, Symmetry},
+    document::{ChangeReport, EditRequest, JointEntities, ReportedChain, Selection, Symmetry},
     history::RigHistory,
     landing::Landing,
     picking::{PickAnswer, posed_joints},
@@ -42,6 +44,7 @@ impl Plugin for StrokePlugin {
             .add_message::<StrokeRequest>()
             .add_message::<StrokeDone>()
             .add_message::<PickAnswer>()
+            .add_message::<ChangeReport>()
             .add_systems(
                 Update,
                 (
@@ -256,6 +259,23 @@ enum ChainSearch {
 /// Largest number of triangles of a surface that answers the rays of a stroke in less than a millisecond.
 const FEW_TRIANGLES: usize = 4096;
 
+/// True for a surface that answers the rays of a stroke at once.
+pub(super) fn has_few_triangles(surface: &RigSurface) -> bool {
+    surface.ready().is_some_and(|surface| surface.triangle_count() <= FEW_TRIANGLES)
+}
+
+/// Chain of a stroke, followed through the surface on this thread.
+pub(super) fn followed_chain(
+    request: &StrokeRequest,
+    surface: &RigSurface,
+    symmetry: Option<MirrorPlane>,
+) -> FoundChain {
+    let StrokeRequest { plane, settings, choice, ref points, .. } = *request;
+    let surface = surface.shared().unwrap_or_default();
+    let followed = FollowedStroke::with_symmetry(surface, &plane, points, settings, symmetry);
+    followed.map(|stroke| stroke.chain(choice))
+}
+
 fn find_chain(request: &StrokeRequest, surface: &RigSurface, symmetry: Option<MirrorPlane>) -> ChainSearch {
     let surface = surface.shared().unwrap_or_default();
     let is_small = surface.triangle_count() <= FEW_TRIANGLES;
@@ -277,8 +297,10 @@ fn note_tips(
     mut commands: Commands,
     mut done: MessageReader<StrokeDone>,
     mut picked: MessageReader<PickAnswer>,
+    mut reported: MessageReader<ChangeReport>,
     mut rigs: Query<(&Selection, Option<&mut StrokeTips>)>,
 ) {
+    let mut drawn: BTreeMap<Entity, BTreeSet<Uid>> = BTreeMap::new();
     for PickAnswer { rig, joints } in picked.read() {
         let Ok((_, Some(mut tips))) = rigs.get_mut(*rig) else { continue };
         if joints.iter().any(|joint| tips.contains(*joint)) {
@@ -286,18 +308,26 @@ fn note_tips(
         }
     }
     for StrokeDone { rig, result } in done.read() {
-        let (StrokeResult::Chain { parent, .. }, Ok((selection, tips))) = (result, rigs.get_mut(*rig)) else {
-            continue;
-        };
+        let (StrokeResult::Chain { parent, .. }, Ok((selection, _))) = (result, rigs.get(*rig)) else { continue };
         // The parent is still selected if the chain was refused.
-        let Some(tip) = selection.active().filter(|active| Some(*active) != *parent) else { continue };
-        match tips {
-            Some(mut tips) => {
-                tips.0.insert(tip);
+        if let Some(tip) = selection.active().filter(|active| Some(*active) != *parent) {
+            drawn.entry(*rig).or_default().insert(tip);
+        }
+    }
+    for ChangeReport { rig, step } in reported.read() {
+        if let Some(ReportedChain { parent, tip: Some(tip) }) = step.as_ref().ok().and_then(|step| step.chain)
+            && Some(tip) != parent
+        {
+            drawn.entry(*rig).or_default().insert(tip);
+        }
+    }
+    for (rig, drawn) in drawn {
+        match rigs.get_mut(rig) {
+            Ok((_, Some(mut tips))) => tips.0.extend(drawn),
+            Ok((_, None)) => {
+                commands.entity(rig).insert(StrokeTips(drawn));
             }
-            None => {
-                commands.entity(*rig).insert(StrokeTips([tip].into()));
-            }
+            Err(_) => {}
         }
     }
 }

@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     Modules,
-    keep_moved::{carry_tracks, clip_without},
+    keep_moved_nodes::{carry_tracks, clip_without},
     keep_poses::built_program,
 };
 use crate::{

@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
 };
 
-use super::{Builder, Modules, keep_moved::carry_pose};
+use super::{Builder, Modules, keep_moved_nodes::carry_pose};
 use crate::{
     rig::{AttributeValues, BuiltRig, EditError, MovedNodes, MovedTags, PoseOffset, Rig, RigEdit, StoredPose, Uid},
     solve::{

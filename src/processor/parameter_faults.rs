@@ -6,7 +6,10 @@
 use std::ops::Range;
 
 use super::{BuildProblem, Modules};
-use crate::rig::{Field, Rig, SourceError, fields, reference::bind_names};
+use crate::rig::{
+    Field, SourceError, fields,
+    reference::{RigNameIndex, bind_names},
+};
 
 /// Largest number of faulty fields of one command that are looked for.
 const MOST: usize = 32;
@@ -19,8 +22,9 @@ pub(super) struct SurveyedParams {
     pub rest: Option<String>,
 }
 
-/// Reads the parameters of a command of a rig. References to labels that are not in the rig are told with the nearest.
-pub(super) fn survey_params(rig: &Rig, modules: &Modules, module: &str, params: &str) -> SurveyedParams {
+/// Reads the parameters of a command of the rig with these names. References to labels that are not in the rig are told with the
+/// nearest.
+pub(super) fn survey_params(names: &RigNameIndex, modules: &Modules, module: &str, params: &str) -> SurveyedParams {
     let Some(info) = modules.get(module) else {
         return SurveyedParams { problems: modules.load(module, params).err().into_iter().collect(), rest: None };
     };
@@ -41,7 +45,7 @@ pub(super) fn survey_params(rig: &Rig, modules: &Modules, module: &str, params: 
             break;
         };
         blank(&mut rest, field.start..field.end);
-        found.extend(faults_of_field(rig, params, &field, error));
+        found.extend(faults_of_field(names, params, &field, error));
     }
     found.sort_by_key(|error| error.offset);
     let problems = found.into_iter().map(BuildProblem::Parameters).collect();
@@ -63,8 +67,8 @@ pub(super) fn field_of(parameter: &str) -> &str {
 
 /// Faults of a field that cannot be read: its references to nothing, and the error of the reader unless it is about one
 /// of those.
-fn faults_of_field(rig: &Rig, params: &str, field: &Field, error: SourceError) -> Vec<SourceError> {
-    let bad = bind_names(&params[field.value..field.end], rig).1;
+fn faults_of_field(names: &RigNameIndex, params: &str, field: &Field, error: SourceError) -> Vec<SourceError> {
+    let bad = bind_names(&params[field.value..field.end], names).1;
     let places = bad.iter().map(|bad| bad.range.start + field.value..bad.range.end + field.value);
     let is_told = places.clone().any(|place| place.contains(&error.offset));
     let references = bad.iter().zip(places);

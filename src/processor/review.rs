@@ -68,13 +68,14 @@ fn show_names_alone(rig: &Rig, problems: &mut [BuildError]) {
 fn problems_before_run(rig: &Rig, modules: &Modules) -> (Vec<BuildError>, Vec<Repair>) {
     let (mut problems, mut repaired) = (Vec::new(), Vec::new());
     let mut judged: HashMap<(&str, &str), SurveyedParams> = HashMap::new();
+    let names = RigNameIndex::new(rig);
     for joint in rig.walk() {
         for tag in &joint.data.tags {
             let TagKind::Command { module, params, .. } = &tag.kind else { continue };
             // Equal commands have equal problems: a template may hold one command thousands of times.
             let survey = judged
                 .entry((module.as_str(), params.as_str()))
-                .or_insert_with(|| survey_before_run(rig, modules, module, params));
+                .or_insert_with(|| survey_before_run(rig, &names, modules, module, params));
             if survey.problems.is_empty() {
                 continue;
             }
@@ -187,8 +188,8 @@ fn with_params(rig: &Rig, running: &Rig, repaired: &Repair) -> Option<Rig> {
 }
 
 /// Problems of a command that are found without running it: in its module, its parameters, or the groups that these name.
-fn survey_before_run(rig: &Rig, modules: &Modules, module: &str, params: &str) -> SurveyedParams {
-    let mut survey = survey_params(rig, modules, module, params);
+fn survey_before_run(rig: &Rig, names: &RigNameIndex, modules: &Modules, module: &str, params: &str) -> SurveyedParams {
+    let mut survey = survey_params(names, modules, module, params);
     if modules.get(module).is_some() {
         survey.problems.extend(unknown_groups(rig, params).into_iter().map(BuildProblem::Module));
     }

@@ -3,10 +3,12 @@
 use std::{
     io::{ErrorKind, Read, Write},
     net::{Shutdown, SocketAddr, TcpStream},
-    sync::{atomic::Ordering, mpsc::Sender},
+    sync::{Arc, atomic::Ordering, mpsc::Sender},
     thread,
     time::{Duration, Instant},
 };
+
+use bevy::log::warn;
 
 use super::{Call, Gate, error::HttpRefusal, rpc};
 
@@ -16,21 +18,57 @@ pub(super) const MAX_HEAD: usize = 16 << 10;
 pub(super) const MAX_BODY: usize = 1 << 20;
 /// Time in which an answer has to be taken.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
+/// Largest number of connections that are read at once.
+const MAX_OPEN: usize = 16;
 /// Time, and number of bytes, that a refused request is read on, so that its sender reads the answer.
 const DRAIN: Duration = Duration::from_millis(250);
 const DRAIN_BYTES: usize = 4 << 20;
 
-/// Answers connections, one after the other, until the app has ended.
-pub(super) fn serve(gate: &Gate, calls: &Sender<Call>) {
+/// Answers connections until the app has ended. Each one is read on a thread of its own, so that a silent one holds up nobody.
+pub(super) fn serve(gate: &Arc<Gate>, calls: &Sender<Call>) {
     for stream in gate.listener.incoming() {
         if gate.has_ended.load(Ordering::SeqCst) {
             return;
         }
         match stream {
-            Ok(stream) => converse(stream, gate, calls),
+            Ok(stream) => admit(stream, gate, calls),
             // The system has no more connections to give at the moment.
             Err(_) => thread::sleep(Duration::from_millis(10)),
         }
+    }
+}
+
+/// Answers a connection on another thread, or on this one where there are many already.
+fn admit(stream: TcpStream, gate: &Arc<Gate>, calls: &Sender<Call>) {
+    let open = OpenConnection::new(gate.clone());
+    if open.number > MAX_OPEN {
+        return converse(stream, gate, calls);
+    }
+    let calls = calls.clone();
+    let thread = thread::Builder::new().name("remote call".to_owned());
+    let spawned = thread.spawn(move || converse(stream, &open.gate, &calls));
+    if let Err(error) = spawned {
+        warn!("a remote call is dropped, because no thread can be started: {error}");
+    }
+}
+
+/// A connection that is being answered.
+struct OpenConnection {
+    gate: Arc<Gate>,
+    /// Number of connections when it came, with itself.
+    number: usize,
+}
+
+impl OpenConnection {
+    fn new(gate: Arc<Gate>) -> Self {
+        let number = gate.open.fetch_add(1, Ordering::SeqCst) + 1;
+        Self { gate, number }
+    }
+}
+
+impl Drop for OpenConnection {
+    fn drop(&mut self) {
+        self.gate.open.fetch_sub(1, Ordering::SeqCst);
     }
 }
 

@@ -64,6 +64,8 @@ fn result(body: &[u8], gate: &Gate, calls: &Sender<Call>, id: &mut Value) -> Ans
         let hint = did_you_mean(&method, schema::names());
         return Err(CallError::UnknownMethod { name: method, hint });
     };
+    // Answers are told by what happens to the rig of a call, so there is one call at a time.
+    let _turn = gate.turn.lock().unwrap_or_else(PoisonError::into_inner);
     let (reply, answer) = channel();
     let until = Instant::now() + gate.answer_timeout;
     calls.send(Call { verb, params, reply, until }).map_err(|_| CallError::Ended)?;

@@ -336,7 +336,8 @@ fn save(world: &mut World, params: SaveParams) -> Result<Value, CallError> {
     let own = world.get::<RemoteFile>(entity).map(|file| file.0.clone());
     let path = match (&params.path, &own) {
         (Some(path), _) => gate.folders.target(template_path(path)?)?,
-        (None, Some(own)) => own.clone(),
+        // It may be a link by now.
+        (None, Some(own)) => gate.folders.target(own)?,
         (None, None) => return Err(CallError::NoFile(params.rig.to_string())),
     };
     let Some(rig) = world.get::<Rig>(entity).cloned() else { return Err(CallError::NoRig(params.rig.to_string())) };
@@ -360,7 +361,7 @@ fn renew(world: &mut World, params: UpdateParams) -> Result<StartedCall, CallErr
     let own = world.get::<RemoteFile>(entity).map(|file| file.0.clone());
     let path = match (&params.path, own) {
         (Some(path), _) => gate.folders.existing(template_path(path)?)?,
-        (None, Some(own)) => own,
+        (None, Some(own)) => gate.folders.existing(&own)?,
         (None, None) => return Err(CallError::NoFile(params.rig.to_string())),
     };
     let Some(source) = world.get::<RigSource>(entity) else {

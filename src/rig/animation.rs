@@ -31,7 +31,7 @@ pub(in crate::rig) use self::check::{check_about, check_clip, check_keys, check_
 pub(in crate::rig) use self::sample::{cubic_slope, slerp};
 pub use self::{
     check::{ClipFault, KeyFault},
-    names::{KnownNode, NodeNames, OrphanedKeys, keys_set_aside, orphaned_keys},
+    names::{NodeName, NodeNames, OrphanedKeys, keys_set_aside, orphaned_keys},
     sample::SampledPose,
     sampler::{ClipSampler, SampleCursor},
     splice::Splice,

@@ -17,6 +17,7 @@ use crate::{
         part::{DroppedPart, HeaderSocket, PartOption},
         rest_checkpoints::RestCheckpoints,
         touched_joints::TouchedJoints,
+        uid_list::UidList,
     },
 };
 
@@ -29,8 +30,8 @@ use crate::{
 pub struct Rig {
     pub(super) uid: Uid,
     pub(super) about: RigAbout,
-    pub(super) groups: Vec<GroupData>,
-    pub(super) inputs: Vec<RigInput>,
+    pub(super) groups: UidList<GroupData>,
+    pub(super) inputs: UidList<RigInput>,
     /// Copies of a rig share the joints that neither of them changes: reach for a joint with [`Arc::make_mut`].
     pub(super) joints: HashMap<Uid, Arc<RigJoint>>,
     pub(super) roots: Vec<Uid>,
@@ -41,7 +42,7 @@ pub struct Rig {
     pub(super) pose: BTreeMap<Uid, PoseOffset>,
     /// Attributes that have been set, by node and name; a node without any has no entry.
     pub(super) values: AttributeValues,
-    pub(super) poses: Vec<StoredPose>,
+    pub(super) poses: UidList<StoredPose>,
     pub(super) clips: Vec<RigClip>,
     /// Uids of all clips and layers, so that a clip is added without a search among the others.
     pub(super) clip_uids: HashSet<Uid>,
@@ -124,7 +125,7 @@ impl Rig {
 
     /// The local group with that uid.
     pub fn group(&self, uid: Uid) -> Option<&GroupData> {
-        self.groups.iter().find(|group| group.uid == uid)
+        self.groups.find(uid)
     }
 
     /// Declared inputs in order.
@@ -134,7 +135,7 @@ impl Rig {
 
     /// The declared input with that uid.
     pub fn input(&self, uid: Uid) -> Option<&RigInput> {
-        self.inputs.iter().find(|input| input.uid == uid)
+        self.inputs.find(uid)
     }
 
     /// Parts that were dropped onto joints, in their order. Those whose tags are gone have no effect, and those that the rig's
@@ -181,9 +182,9 @@ impl Rig {
     pub fn is_taken(&self, uid: Uid) -> bool {
         self.joints.contains_key(&uid)
             || self.tags.contains_key(&uid)
-            || self.group(uid).is_some()
-            || self.input(uid).is_some()
-            || self.stored_pose(uid).is_some()
+            || self.groups.has(uid)
+            || self.inputs.has(uid)
+            || self.poses.has(uid)
             || self.clip_uids.contains(&uid)
     }
 
@@ -240,6 +241,17 @@ impl Rig {
     /// The first joint with that label in the order of [`Rig::walk`].
     pub fn find_label(&self, label: &str) -> Option<Uid> {
         self.walk().find(|joint| joint.data.label.as_deref() == Some(label)).map(|joint| joint.data.uid)
+    }
+
+    /// The joint that [`Rig::find_label`] finds for each label: for many look-ups while the rig stays as it is.
+    pub fn joints_by_label(&self) -> HashMap<&str, Uid> {
+        let mut joints = HashMap::with_capacity(self.joints.len());
+        for joint in self.walk() {
+            if let Some(label) = joint.data.label.as_deref() {
+                joints.entry(label).or_insert(joint.data.uid);
+            }
+        }
+        joints
     }
 
     /// Position of a joint in the rig's space, at rest.

@@ -171,6 +171,10 @@ pub enum RigEdit {
     },
     /// Gives what is stored of each node (offset, attribute values, stored poses, keys) to the other one of its pair.
     ExchangeNodes(Vec<(Uid, Uid)>),
+    /// Tells that a mesh comes to the rig. The rig names meshes and holds none, so whoever shows them follows.
+    AddMesh(Uid),
+    /// Tells that a mesh leaves the rig; its weights are [`RigEdit::SetSkin`]'s.
+    RemoveMesh(Uid),
 }
 
 /// Error of applying an edit. The rig is unchanged.
@@ -317,20 +321,20 @@ impl Rig {
             RigEdit::AddLocalGroup(group, index) => {
                 self.check_free(group.uid)?;
                 check_color(group)?;
-                self.groups.insert((*index).min(self.groups.len()), group.clone());
+                self.groups.insert(*index, group.clone());
                 RigEdit::RemoveLocalGroup(group.uid)
             }
             RigEdit::RemoveLocalGroup(uid) => {
-                let index = self.groups.iter().position(|g| g.uid == *uid).ok_or(EditError::NoGroup(*uid))?;
-                if self.joints.values().any(|joint| joint.data.group == Some(*uid)) {
+                if self.groups.has(*uid) && self.joints.values().any(|joint| joint.data.group == Some(*uid)) {
                     return Err(EditError::GroupInUse(*uid));
                 }
-                RigEdit::AddLocalGroup(self.groups.remove(index), index)
+                let (index, group) = self.groups.remove(*uid).ok_or(EditError::NoGroup(*uid))?;
+                RigEdit::AddLocalGroup(group, index)
             }
             RigEdit::SetLocalGroup(group) => {
                 check_color(group)?;
-                let old = self.groups.iter_mut().find(|g| g.uid == group.uid).ok_or(EditError::NoGroup(group.uid))?;
-                RigEdit::SetLocalGroup(std::mem::replace(old, group.clone()))
+                let old = self.groups.replace(group.clone()).ok_or(EditError::NoGroup(group.uid))?;
+                RigEdit::SetLocalGroup(old)
             }
             RigEdit::SetAbout(about) => self.set_about(about)?,
             RigEdit::SetSkin(mesh, skin) => self.set_skin(*mesh, skin.as_ref())?,
@@ -364,6 +368,8 @@ impl Rig {
             RigEdit::SetWeights(mesh, patch) => self.set_weights(*mesh, patch)?,
             RigEdit::MoveTag { tag, joint, index } => self.move_tag(*tag, *joint, *index)?,
             RigEdit::ExchangeNodes(pairs) => self.exchange_nodes(pairs),
+            RigEdit::AddMesh(mesh) => RigEdit::RemoveMesh(*mesh),
+            RigEdit::RemoveMesh(mesh) => RigEdit::AddMesh(*mesh),
             RigEdit::SetDroppedParts(parts) => {
                 RigEdit::SetDroppedParts(std::mem::replace(&mut self.dropped, parts.clone()))
             }

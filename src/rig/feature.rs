@@ -162,7 +162,7 @@ pub fn combined_features(rig: &Rig) -> Vec<CombinedFeature> {
             parts.push(FeaturePart { switch, choice, enabled: tag.enabled });
         }
     }
-    let place = |group: Option<Uid>| group.and_then(|uid| rig.groups().iter().position(|group| group.uid == uid));
+    let place = |group: Option<Uid>| group.and_then(|uid| rig.groups.place(uid));
     found.sort_by_key(|(feature, _)| place(feature.key.group));
     found.into_iter().map(|(feature, parts)| with_switches(feature, &parts)).collect()
 }

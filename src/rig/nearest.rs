@@ -48,6 +48,19 @@ pub fn listed<S: AsRef<str>>(names: &[S], word: &str) -> String {
     }
 }
 
+/// Number of names that lists of [`listed_first`] have.
+pub(crate) const MOST_LISTED: usize = 12;
+
+/// The first of `count` names as [`listed`] lists them; of more than twelve it says how many others there are.
+pub fn listed_first(names: impl IntoIterator<Item = String>, count: usize, word: &str) -> String {
+    let first: Vec<String> = names.into_iter().take(MOST_LISTED).collect();
+    if count <= MOST_LISTED {
+        return listed(&first, word);
+    }
+    let quoted: Vec<String> = first.iter().map(|name| format!("{name:?}")).collect();
+    format!("{} {word} one of {} others", quoted.join(", "), count - first.len())
+}
+
 /// Number of characters that are compared, so that very long names cost little.
 const LONGEST: usize = 64;
 

@@ -33,7 +33,7 @@ pub use place::settle;
 pub use symmetry::MirrorPlane;
 pub(in crate::rig) use tags::drop_part;
 pub use tags::{
-    CopiedIdentifiers, CopiedJoint, PartOrder, PartSide, PasteTo, PasteWhat, Rewiring, TagClipboard, TagError,
+    CopiedIdentifiers, CopiedJoint, PartOrder, PartSide, PasteContent, PasteTo, Rewiring, TagClipboard, TagError,
     TagOperation, TagScope,
 };
 pub use whole_pose::WholePose;

@@ -14,6 +14,7 @@ mod overrides;
 mod resize;
 mod shortfall;
 mod socket;
+mod targets;
 
 use std::{
     collections::{HashMap, HashSet},
@@ -32,6 +33,7 @@ pub(in crate::rig) use resize::MOST_JOINTS;
 pub use resize::PartChain;
 pub(in crate::rig) use shortfall::Shortfall;
 pub use socket::{HeaderSocket, PartSocket, SocketError};
+pub(in crate::rig) use targets::PartTargets;
 
 use crate::rig::{
     NodeRef, Rig, RigJoint, TagKind, Uid,

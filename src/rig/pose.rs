@@ -136,7 +136,7 @@ impl Rig {
 
     /// The stored pose with that uid.
     pub fn stored_pose(&self, uid: Uid) -> Option<&StoredPose> {
-        self.poses.iter().find(|pose| pose.uid == uid)
+        self.poses.find(uid)
     }
 
     /// Transform of a joint in the current pose, relative to its parent. Identity for an unknown joint.

@@ -52,7 +52,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error as _};
 use crate::rig::{NodeType, Uid};
 
 pub use error::{PickError, ReferenceError, ReferenceProblem};
-pub use index::RigNameIndex;
+pub use index::{MOST_COMPARED, RigNameIndex};
 pub use names::{NameKind, NameScope, Names, RigNames, label_text};
 pub use params::{
     BadReference, FoundReference, bind_known_names, bind_names, given_names, map_references, map_unions,

@@ -83,11 +83,10 @@ pub(in crate::rig) fn other_side(rig: &Rig) -> HashMap<Uid, Uid> {
             }
         }
     }
+    // Of several groups with one name the first counts.
+    let named: HashMap<&str, Uid> = rig.groups().iter().rev().map(|group| (group.name.as_str(), group.uid)).collect();
     for group in rig.groups() {
-        let by_name = || {
-            let name = mirrored_label(&group.name)?;
-            rig.groups().iter().find(|other| other.name == name).map(|other| other.uid)
-        };
+        let by_name = || named.get(mirrored_label(&group.name)?.as_str()).copied();
         if let Some(partner) = groups.get(&group.uid).copied().flatten().or_else(by_name) {
             other.insert(group.uid, partner);
         }

@@ -24,7 +24,7 @@ const STRIDE: usize = 64;
 /// Checkpoints of a rig. They follow from its joints and are no content: any two compare as equal, and a clone has none.
 #[derive(Default)]
 pub(super) struct RestCheckpoints {
-    known: Mutex<KnownCheckpoints>,
+    known: Mutex<CheckpointTable>,
     /// Number of joints that were visited.
     visits: AtomicU64,
 }
@@ -41,13 +41,13 @@ struct Checkpoint {
 
 /// Checkpoints that were looked at.
 #[derive(Default)]
-struct KnownCheckpoints {
+struct CheckpointTable {
     of_joints: HashMap<Uid, Checkpoint>,
     /// The joints, each behind the number of joints above it.
     by_depth: BTreeSet<(usize, Uid)>,
 }
 
-impl KnownCheckpoints {
+impl CheckpointTable {
     fn insert(&mut self, joint: Uid, checkpoint: Checkpoint) {
         self.by_depth.insert((checkpoint.depth, joint));
         self.of_joints.insert(joint, checkpoint);
@@ -80,11 +80,11 @@ struct WayUp<'r> {
 }
 
 impl RestCheckpoints {
-    fn lock(&self) -> MutexGuard<'_, KnownCheckpoints> {
+    fn lock(&self) -> MutexGuard<'_, CheckpointTable> {
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn known_mut(&mut self) -> &mut KnownCheckpoints {
+    fn known_mut(&mut self) -> &mut CheckpointTable {
         self.known.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -18,12 +18,12 @@ pub(super) struct TouchedJoints(VecDeque<LoggedEdit>);
 struct LoggedEdit {
     before: Revision,
     after: Revision,
-    touched: Touched,
+    touched: EditReach,
 }
 
-/// Joints that an edit touches.
+/// Joints that an edit reaches.
 #[derive(Clone, Copy)]
-enum Touched {
+enum EditReach {
     /// None; the edits of a batch are logged one by one.
     Nothing,
     /// One joint, which it adds, removes, moves to another parent or changes.
@@ -32,7 +32,7 @@ enum Touched {
     Any,
 }
 
-impl Touched {
+impl EditReach {
     fn by(edit: &RigEdit) -> Self {
         use RigEdit::{
             AddJoint, AddTag, Batch, RemoveJoint, RemoveTag, SetFace, SetGroup, SetKind, SetLabel, SetLocked,
@@ -78,7 +78,7 @@ impl Rig {
         if log.len() >= MOST {
             log.pop_front();
         }
-        log.push_back(LoggedEdit { before, after: self.revision.clone(), touched: Touched::by(edit) });
+        log.push_back(LoggedEdit { before, after: self.revision.clone(), touched: EditReach::by(edit) });
     }
 
     /// Joints that edits of anything but motion have touched since a revision: added, removed, moved to another parent, or
@@ -93,11 +93,11 @@ impl Rig {
             // Not all revisions are made by edits.
             let logged = log.next().filter(|logged| logged.after.is_same(at))?;
             match logged.touched {
-                Touched::Nothing => {}
-                Touched::Joint(joint) => {
+                EditReach::Nothing => {}
+                EditReach::Joint(joint) => {
                     touched.insert(joint);
                 }
-                Touched::Any => return None,
+                EditReach::Any => return None,
             }
             at = &logged.before;
         }

@@ -27,7 +27,7 @@ use super::{
 use copies::{PlacedCopy, is_host};
 use fields::{Field, about_fields, group_fields, input_fields, joint_fields, joint_title, pose_fields};
 use order::merged_order;
-use shown_values::shown_values;
+use shown_values::{NamesOfBoth, shown_values};
 
 pub use change::{Change, ChangeKind};
 pub use choices::{Choices, Take};
@@ -111,8 +111,17 @@ fn update_copy(base: Option<&Rig>, now: &Rig, file: &Rig, (choices, others): (&C
     changes.retain(|change: &Change| change.from != change.to);
     let file = renamed.as_ref().map_or(file, |(renamed, _)| renamed);
     let told = changes.iter().map(|change| change.uid).collect();
-    let mut merge =
-        Merge { base, now, file, choices, changes, rig: now.clone(), placed: HashSet::new(), renamed: told };
+    let mut merge = Merge {
+        base,
+        now,
+        file,
+        names: NamesOfBoth::new(now, file),
+        choices,
+        changes,
+        rig: now.clone(),
+        placed: HashSet::new(),
+        renamed: told,
+    };
     merge.header();
     merge.groups();
     merge.inputs();
@@ -135,6 +144,7 @@ struct Merge<'a> {
     base: Option<&'a Rig>,
     now: &'a Rig,
     file: &'a Rig,
+    names: NamesOfBoth<'a>,
     choices: &'a Choices,
     changes: Vec<Change>,
     rig: Rig,
@@ -253,15 +263,17 @@ impl Merge<'_> {
                 above = now.joint(uid).and_then(|joint| joint.parent);
             }
         }
+        let mut stays = HashSet::new();
         for uid in removed.into_iter().filter(|uid| needed.contains(uid)) {
             if let Some(joint) = now.joint(uid) {
                 let mut data = joint.data.clone();
                 data.tags.retain(|tag| self.placed.insert(tag.uid));
                 joints.insert(uid, (data, joint.parent));
-                self.changes
-                    .retain(|change| !(change.uid == uid && change.kind == ChangeKind::Removed && !change.conflict));
+                stays.insert(uid);
             }
         }
+        let is_removal = |change: &Change| change.kind == ChangeKind::Removed && !change.conflict;
+        self.changes.retain(|change| !(is_removal(change) && stays.contains(&change.uid)));
         for (data, parent) in joints.values_mut() {
             data.group = data.group.filter(|group| groups.contains(group));
             *parent = parent.filter(|parent| *parent != data.uid);
@@ -314,7 +326,7 @@ impl Merge<'_> {
             return;
         }
         let titles = [mine, theirs].map(|parent| parent.map(|uid| joint_title(self.now, self.file, uid)));
-        let [from, to] = shown_values("parent", titles, self.now, self.file);
+        let [from, to] = shown_values("parent", titles, &self.names);
         let label = self.now.joint(uid).and_then(|joint| joint.data.label.clone());
         let title = label.unwrap_or_else(|| uid.to_string());
         let named = ChangeSubject { uid, joint: Some(&title), tag: None, prefix: "" };
@@ -403,7 +415,7 @@ impl Merge<'_> {
             let conflict = was.as_ref() != Some(&mine) && !is_close_to_base(now);
             let name = format!("{}{}", named.prefix, field.name);
             let take = self.choices.of(named.uid, Some(&name));
-            let [from, to] = shown_values(&field.name, [mine, theirs], self.now, self.file);
+            let [from, to] = shown_values(&field.name, [mine, theirs], &self.names);
             let told = Change { kind: ChangeKind::Changed, field: Some(name), from, to, conflict, ..named.change() };
             if conflict || !is_renamed || !matches!(field.name.as_str(), "label" | "name" | "switch") {
                 self.changes.push(told);

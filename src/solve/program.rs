@@ -36,6 +36,8 @@ use std::{
     },
 };
 
+use glam::{Affine3A, Vec3A};
+
 pub use cache::ProgramCache;
 pub use error::{ConstraintName, NumberPlace, ProgramError, StateError};
 pub use hash::ContentHash;
@@ -179,6 +181,8 @@ pub struct RigProgram {
     /// morph targets, others.
     x: Vec<Trs>,
     n: Vec<f32>,
+    /// See [`rest_height`](Self::rest_height).
+    height: f32,
 }
 
 /// Label and uid of a node, for messages.
@@ -265,6 +269,7 @@ impl RigProgram {
         Ok(Self {
             serial: next_serial(),
             hash,
+            height: rest_height(&nodes),
             nodes,
             by_uid,
             attributes,
@@ -303,6 +308,12 @@ impl RigProgram {
     /// Number of operations of a full evaluation.
     pub fn operations(&self) -> usize {
         self.ops.len()
+    }
+
+    /// Height of the joints as they are built, without constraints, in the rig's space: their extent along Y, or along the
+    /// longest axis where they lie flat (less than a tenth of that axis). Differences of places are measured against it.
+    pub fn rest_height(&self) -> f32 {
+        self.height
     }
 
     /// Returns `true` if the rig moves by itself as time passes.
@@ -345,6 +356,23 @@ fn run_fixed(graph: &mut Graph<'_>, fixed: &[Op]) {
         frame: None,
     };
     fixed.iter().for_each(|op| machine.run(op));
+}
+
+/// See [`RigProgram::rest_height`].
+fn rest_height(nodes: &[ProgramNode]) -> f32 {
+    let mut places: Vec<Affine3A> = Vec::with_capacity(nodes.len());
+    let (mut low, mut high) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
+    for node in nodes {
+        let above = node.parent.map_or(Affine3A::IDENTITY, |parent| places[parent]);
+        let place = above * node.base.affine();
+        if node.kind == NodeType::Joint {
+            (low, high) = (low.min(place.translation), high.max(place.translation));
+        }
+        places.push(place);
+    }
+    let extent = (high - low).max(Vec3A::ZERO);
+    let longest = extent.max_element();
+    if extent.y >= 0.1 * longest { extent.y } else { longest }
 }
 
 fn next_serial() -> u64 {

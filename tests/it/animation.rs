@@ -3,6 +3,7 @@
 mod app;
 mod files;
 pub mod keep;
+mod kept_changes;
 mod keys;
 mod layers;
 mod motion_capture;

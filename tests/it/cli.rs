@@ -118,6 +118,7 @@ fn convert_does_what_makes_sense() {
         let answer = run(&["convert", from, to]);
         assert_eq!(answer.code, 2, "{from} to {to}");
         assert!(answer.err.contains("cannot make"), "{}", answer.err);
+        assert_eq!(answer.err.contains("rigsmith fit"), to == "e.rig", "a mesh has no skeleton yet: {}", answer.err);
     }
     let rig = fs::read_to_string(folder.path().join("d.rig")).unwrap();
     assert_eq!(rig.lines().filter(|line| line.starts_with("joint")).count(), 3);

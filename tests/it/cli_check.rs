@@ -115,7 +115,7 @@ fn faults_of_the_structure_hide_no_others() {
                 control(at: "@joint qq"), // there is no joint "qq"
                 (x: 1), // there is no field `x` // Expected
                 half_joint(share: 3.0), // share: is 3
-                Feature(kind: 3, name: "f"), // Expected string
+                Feature(kind: 3, name: "f"), // Expected string; write a text in quotation marks
             ],
         ),
         (
@@ -329,4 +329,51 @@ fn missing_commas_are_told_alone_and_hide_no_others() {
     tells_what_it_says(folder.path(), "x.rig.ron", text);
     let answer = rigsmith(folder.path(), &["build", "x.rig.ron"]);
     assert!(answer.code == 1 && answer.err.contains("Expected comma before `joints`"), "{}", answer.err);
+}
+
+/// A wrong bracket is told alone, at its place, by `check` and by `build`.
+#[test]
+fn wrong_brackets_are_told_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = |tags: &str, end: &str| {
+        format!(
+            "(\n    format: 2,\n    name: \"x\",\n    joints: [\n        (label: \"a\", tags: {tags}\n        (label: \"b\", \
+             parent: \"a\", tags: [control(shap: 1)]),\n    ],\n){end}\n"
+        )
+    };
+    for (text, place, words) in [
+        (text("[control()),", ""), (5, 38), "`)` stands where `]` closes the last open bracket; write `]` before it"),
+        (text("[control(]),", ""), (5, 37), "`]` stands where `)` closes the last open bracket"),
+        (text("[control()])),", ""), (5, 40), "`)` stands where `]` closes the last open bracket"),
+        (text("[control()]),", ")"), (8, 2), "`)` closes nothing; remove it"),
+    ] {
+        fs::write(folder.path().join("x.rig.ron"), text).unwrap();
+        let answer = rigsmith(folder.path(), &["check", "x.rig.ron", "--json"]);
+        let problems = answer.json()["files"][0]["problems"].clone();
+        let told = problems.as_array().unwrap();
+        assert!(answer.code == 1 && told.len() == 1, "{problems}");
+        assert_eq!(
+            (told[0]["line"].as_u64(), told[0]["column"].as_u64()),
+            (Some(place.0), Some(place.1)),
+            "{problems}"
+        );
+        assert!(told[0]["message"].as_str().unwrap().contains(words), "{problems}");
+        let answer = rigsmith(folder.path(), &["build", "x.rig.ron"]);
+        let place = format!("x.rig.ron:{}:{}]", place.0, place.1);
+        assert!(answer.code == 1 && answer.err.contains(&place), "{}", answer.err);
+    }
+}
+
+#[test]
+fn a_folder_is_told_as_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let answer = rigsmith(folder.path(), &["check", "."]);
+    assert!(
+        answer.code == 1 && answer.out.contains("this is a folder; give the files in it"),
+        "{}{}",
+        answer.out,
+        answer.err
+    );
+    let answer = rigsmith(folder.path(), &["info", "."]);
+    assert!(answer.code == 2 && answer.err.contains("`.` is a folder"), "{}{}", answer.out, answer.err);
 }

@@ -177,6 +177,17 @@ fn object(
     text.push_str(&faces);
 }
 
+/// Largest difference between the ways of some points and of the skin nearest to them.
+fn off_skin(points: &[Moved], skin: &[Moved]) -> f32 {
+    let off = |point: &Moved| {
+        let nearest =
+            skin.iter().min_by(|a, b| a[0].distance_squared(point[0]).total_cmp(&b[0].distance_squared(point[0])));
+        let below = nearest.map_or(Vec3::ZERO, |[rest, moved]| *moved - *rest);
+        (point[1] - point[0]).distance(below)
+    };
+    points.iter().map(off).fold(0.0, f32::max)
+}
+
 /// Brows and hair that are meshes of their own move as the skin under them does, and hair does not turn the head over.
 #[test]
 fn brows_and_hair_ride_along() {
@@ -205,17 +216,110 @@ fn brows_and_hair_ride_along() {
     for (name, least, most) in [("brows", 0.05, 0.03), ("hair", 0.0, 0.06)] {
         let points = &objects[name];
         assert!(points.len() > 100, "{name} has {} points", points.len());
-        let off = |point: &Moved| {
-            let nearest =
-                head.iter().min_by(|a, b| a[0].distance_squared(point[0]).total_cmp(&b[0].distance_squared(point[0])));
-            let below = nearest.map_or(Vec3::ZERO, |[rest, moved]| *moved - *rest);
-            (point[1] - point[0]).distance(below)
-        };
-        let worst = points.iter().map(off).fold(0.0, f32::max) / eyes;
+        let worst = off_skin(points, head) / eyes;
         let moved = furthest(points) / eyes;
         println!("{name}: moves {moved:.3} eye distances, {worst:.3} off the skin");
         assert!(moved >= least && worst <= most, "{name}: moves {moved}, {worst} off the skin");
     }
+}
+
+/// Triangles as shells of their own, smaller than they were, as an object of an OBJ file.
+fn strands(
+    text: &mut String,
+    name: &str,
+    (points, triangles): &heads::Mesh,
+    first: &mut usize,
+    is_kept: impl Fn(Vec3) -> bool,
+) {
+    writeln!(text, "o {name}").unwrap();
+    for corners in triangles {
+        let places = corners.map(|corner| points[corner as usize]);
+        if !places.iter().all(|place| is_kept(*place)) {
+            continue;
+        }
+        let middle = places.iter().sum::<Vec3>() / 3.0;
+        for place in places {
+            let at = place.lerp(middle, 0.2);
+            writeln!(text, "v {} {} {}", at.x, at.y, at.z).unwrap();
+        }
+        writeln!(text, "f {} {} {}", *first + 1, *first + 2, *first + 3).unwrap();
+        *first += 3;
+    }
+}
+
+/// Moustaches and strands of beards that are meshes of their own move as the skin under them does, although they are beside
+/// the lips, where teeth belong to the jaw or to the skull.
+#[test]
+fn hair_on_the_face_rides_along() {
+    let mesh = heads::bundled();
+    let analysis = FaceAnalysis::new(&mesh.0, &mesh.1, &AutoSettings::default(), &|_, _| true).unwrap();
+    let (eyes, marks) = (analysis.landmarks.eye_distance(), &analysis.landmarks.points);
+    let moustache = |point: Vec3| {
+        let is_high = point.y > marks[51].y + 0.02 * eyes && point.y < marks[33].y - 0.02 * eyes;
+        let is_on_lip = is_high && (point.x - marks[51].x).abs() < 0.15 * eyes && point.z > marks[48].z;
+        is_on_lip.then(|| point + 0.01 * eyes * Vec3::Z)
+    };
+    let chin = 0.5 * (marks[57] + marks[8]);
+    let beard = |point: Vec3| point.distance(chin) < 0.15 * eyes && point.y < marks[57].y && point.z > marks[48].z;
+    let (mut text, mut first) = (String::new(), 0);
+    object(&mut text, "head", &mesh, &mut first, Some);
+    object(&mut text, "moustache", &mesh, &mut first, moustache);
+    strands(&mut text, "beard", &mesh, &mut first, beard);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("bearded.obj");
+    fs::write(&file, text).unwrap();
+    let objects = posed(&file, &["jawOpen=1", "mouthPucker=1"]);
+    let head = &objects["head"];
+    for (name, least) in [("moustache", 0.03), ("beard", 0.2)] {
+        let points = &objects[name];
+        assert!(points.len() > 20, "{name} has {} points", points.len());
+        let (moved, off) = (furthest(points) / eyes, off_skin(points, head) / eyes);
+        println!("{name}: {} points move {moved:.3} eye distances, {off:.3} off the skin", points.len());
+        assert!(moved >= least && off <= 0.04, "{name}: moves {moved}, {off} off the skin");
+    }
+}
+
+/// Names of loose parts and what they follow, as the command tells them.
+fn told_parts(mesh: &Path) -> Vec<(String, String)> {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = mesh.display().to_string();
+    let args = ["face", &mesh, "--bones", "12", "-o", "face.rig.ron"];
+    let answer = rigsmith(folder.path(), &[&args[..], &["--json"]].concat());
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    let text = |value: &serde_json::Value| value.as_str().unwrap().to_owned();
+    let told: Vec<(String, String)> = answer.json()["parts"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|part| (text(&part["part"]), text(&part["follows"])))
+        .collect();
+    let lines = rigsmith(folder.path(), &args).out;
+    for (part, joint) in &told {
+        let is_told = |line: &str| line.starts_with(&format!("following {joint}: ")) && line.contains(part.as_str());
+        assert!(lines.lines().any(is_told), "{part} follows {joint} in {lines}");
+    }
+    told
+}
+
+/// Loose parts of a head are told with the joints that they follow, by the names of their objects.
+#[test]
+fn what_loose_parts_follow_is_told() {
+    let own = |list: &[(&str, &str)]| -> Vec<(String, String)> {
+        list.iter().map(|(part, joint)| ((*part).to_owned(), (*joint).to_owned())).collect()
+    };
+    let bundled = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/head.obj");
+    assert_eq!(told_parts(&bundled), own(&[("eyes", "eye_l"), ("eyes", "eye_r")]));
+    let Some(data) = test_data() else { return };
+    let mut told = told_parts(&data.join("bodies/female_young/full.obj"));
+    told.sort();
+    let expected = [
+        ("helper-l-eye", "eye_l"),
+        ("helper-lower-teeth", "jaw"),
+        ("helper-r-eye", "eye_r"),
+        ("helper-tongue", "tongue"),
+        ("helper-upper-teeth", "head"),
+    ];
+    assert_eq!(told, own(&expected));
 }
 
 /// Furthest way down of some points.

@@ -204,6 +204,12 @@ fn templates_are_formatted_in_place_or_not_at_all() {
     let (code, said) = rigsmith(folder.path(), &["format", "a.rig.ron", "bad.rig.ron"]);
     assert!(code == 1 && said.contains("no joint \"x\"") && said.contains("bad.rig.ron"), "{said}");
     assert_eq!(read("a.rig.ron"), rough);
+    // All files are told at once, also those that are at fault.
+    fs::write(at("worse.rig.ron"), "(format: 2, name: \"w\", joints: [(label: \"j\", parent: \"y\")])").unwrap();
+    let (code, said) = json(folder.path(), &["format", "--check", "bad.rig.ron", "a.rig.ron", "worse.rig.ron"]);
+    let told = |file: usize, text: &str| said["files"][file]["error"].as_str().is_some_and(|told| told.contains(text));
+    assert!(code == 1 && told(0, "no joint \"x\"") && told(2, "no joint \"y\""), "{said}");
+    assert!(said["files"][1]["changed"] == true && said["files"][1]["error"].is_null(), "{said}");
     assert_eq!(rigsmith(folder.path(), &["format", "b.obj"]).0, 2);
     // What is converted keeps what its author wrote.
     assert_eq!(rigsmith(folder.path(), &["convert", "a.rig.ron", "c.rig.ron"]).0, 0);

@@ -59,7 +59,7 @@ fn rigid_parts_and_idle_joints_are_told_and_chosen() {
     assert!((far["distance"].as_f64().unwrap() - 8.338).abs() < 0.01, "{json}");
     let text = skin(&[], "tube.obj", &[]).out;
     assert!(text.contains("moving as one with tip: pouch (8 points)"), "{text}");
-    assert!(text.contains("outside of the mesh: far (8.3"), "{text}");
+    assert!(text.contains("outside of the mesh (--claim lets them): far (8.3"), "{text}");
 
     for (mesh, part) in [("tube.obj", "pouch"), ("one.obj", "part 2")] {
         for option in ["--blend", "--bend"] {
@@ -97,7 +97,7 @@ fn reports_count_what_they_name() {
     fs::write(folder.path().join("tube.rig"), format!("{TUBE_RIG}joint 3 0 3 9 0 far\n")).unwrap();
     fs::write(folder.path().join("tube.obj"), tube_with_pouch([2.8, 0.5, -0.1], [3.1, 0.7, 0.1])).unwrap();
     let text = rigsmith(folder.path(), &["skin", "tube.rig", "tube.obj", "-o", "a.glb"]).out;
-    assert!(text.contains("outside of the mesh: far (2 joints, 8.3"), "{text}");
+    assert!(text.contains("outside of the mesh (--claim lets them): far (2 joints, 8.3"), "{text}");
 }
 
 /// Whole words of labels tell joints that carry or steer things, unless flesh hangs below them.

@@ -37,7 +37,7 @@ fn builds(rig: &Rig) {
 #[test]
 fn new_templates_build_and_take_no_others_place() {
     let folder = tempfile::tempdir().unwrap();
-    for kind in ["chain", "limb", "sides", "figure"] {
+    for kind in ["chain", "limb", "sides", "figure", "part"] {
         let name = format!("{kind}.rig.ron");
         assert_eq!(rigsmith(folder.path(), &["new", kind, "-o", &name]).0, 0);
         builds(&rig(folder.path(), &name));
@@ -51,7 +51,7 @@ fn new_templates_build_and_take_no_others_place() {
     let (code, listed) = json(folder.path(), &["list"]);
     let templates = listed["templates"].as_array().unwrap();
     let counts: Vec<u64> = templates.iter().map(|one| one["joint_count"].as_u64().unwrap()).collect();
-    assert_eq!((code, counts), (0, vec![3, 52, 4, 3]));
+    assert_eq!((code, counts), (0, vec![3, 52, 4, 3, 3]));
     assert_eq!(templates[2]["features"].as_array().unwrap().len(), 2);
 }
 
@@ -397,6 +397,7 @@ fn the_version_that_was_taken_over_is_the_base_of_the_next_update() {
     // Nobody knows the base: every difference is a conflict.
     let (code, told) = json(folder.path(), &["update", "mine.rig.ron", "--from", "v2.rig.ron", "-o", "out.rig.ron"]);
     assert_eq!((code, &told["conflicts"]), (1, &Value::from(2)), "{told}");
+    assert!(told["error"]["do"].as_str().unwrap().contains("--base"), "{told}");
     let first =
         ["update", "mine.rig.ron", "--from", "v2.rig.ron", "--base", "v1.rig.ron", "--keep-base", "-o", "out.rig.ron"];
     assert_eq!(rigsmith(folder.path(), &first).0, 0);
@@ -473,4 +474,11 @@ fn joints_are_turned_and_rigs_hung_where_one_says() {
     let second = injected.joint(injected.find_label("a_2").unwrap()).unwrap().data.rest.translation;
     assert!(second.distance(glam::Vec3::new(0.0, 0.3, 0.0)) < 1e-5, "{second}");
     builds(&injected);
+    // What comes out of a rig is written as people write it.
+    let extract = ["extract", "fk.rig.ron", "--joints", "a_2,a_3", "-o", "out.rig.ron"];
+    assert_eq!(rigsmith(folder.path(), &extract).0, 0);
+    let text = fs::read_to_string(folder.path().join("out.rig.ron")).unwrap();
+    assert!(text.contains("control(") && !text.contains("Command(") && !text.contains("author"), "{text}");
+    assert_eq!(rigsmith(folder.path(), &["format", "--check", "out.rig.ron"]).0, 0, "in its layout: {text}");
+    builds(&rig(folder.path(), "out.rig.ron"));
 }

@@ -1,5 +1,5 @@
-//! Clicks, names and undone steps of lists that nobody watches: the same result as one a frame, and work in proportion to
-//! the length of the list.
+//! Clicks, strokes, names and undone steps of lists that nobody watches: the same result as one a frame, and work in
+//! proportion to the length of the list.
 
 use bevy::prelude::*;
 use rigsmith::{
@@ -8,6 +8,7 @@ use rigsmith::{
         document::JointEntities,
         gesture::{Gesture, GestureAnswer, GestureScript, read_gestures},
         history::RigHistory,
+        stroke::StrokeTips,
     },
     prelude::Selection,
     rig::{Rig, Uid},
@@ -209,6 +210,83 @@ fn work_of_strokes(count: usize) -> [u64; 2] {
     let rig = bench.rig_entity();
     let followed = bench.app_mut().world().get::<JointEntities>(rig).unwrap().visits();
     [bench.rig().visits(), followed]
+}
+
+#[test]
+fn runs_of_strokes_give_what_strokes_one_a_frame_give() {
+    let answers = check(
+        "[Recentre(false), Stroke(points: [(-0.8, 0.2), (-0.4, 0.4)], joints: 3), \
+         Stroke(points: [(-0.4, 0.4), (0.0, 0.5)], joints: 3), Click((0.4, 0.3)), \
+         Stroke(points: [(0.4, 0.3), (0.7, 0.6)], joints: 2), Stroke(points: [(-0.8, 0.2), (-0.8, 0.6)], joints: 3), \
+         Stroke(points: [(5.0, 5.0), (6.0, 5.0)], joints: 3), Deselect, \
+         Stroke(points: [(0.5, 1.2), (0.9, 1.2)], joints: 4), Label(\"tip\"), \
+         Stroke(points: [(0.9, 1.2), (0.9, 1.6)], joints: 3), Undo, Reach(0.3), \
+         Stroke(points: [(0.8, 1.3), (0.2, 1.8)], joints: 3), Stroke(points: [(-0.6, 1.7), (-0.2, 1.7)], threshold: 0.1), \
+         Reach(0.01), Recentre(true), Stroke(points: [(-0.2, 1.7), (0.0, 1.9)], joints: 2), View(Left), \
+         Stroke(points: [(0.0, 0.1), (0.3, 0.1)], joints: 2), Click((0.1, 0.9)), Click((0.1, 0.9)), \
+         Stroke(points: [(0.1, 0.9), (0.3, 0.7)], joints: 2), Mirror(true), View(Front), \
+         Stroke(points: [(0.3, 1.0), (0.6, 1.1)], joints: 2), Mirror(false), \
+         Stroke(points: [(0.3, 0.9), (0.6, 0.9)], joints: 1), SelectLabel(\"tip\"), \
+         Stroke(points: [(-0.9, 0.9), (-0.6, 0.9)], joints: 2)]",
+        |_| {},
+    );
+    let told = |number: usize| answers[number].message.as_str();
+    assert!(told(1).starts_with("drew a chain of 3 joints as a root"), "{answers:?}");
+    assert!([2, 4, 5].iter().all(|number| told(*number).contains("joints below \"")), "{answers:?}");
+    assert!(!answers[6].done, "{answers:?}");
+    assert!(told(8).contains("as a root") && told(10).contains("below \"tip\""), "{answers:?}");
+}
+
+#[test]
+fn runs_of_strokes_without_a_number_of_joints_give_what_strokes_one_a_frame_give() {
+    let answers = check(
+        "[Recentre(false), Stroke(points: [(-0.8, 1.2), (-0.2, 1.2)], joints: 3), Deselect, \
+         Stroke(points: [(-0.8, 1.8), (0.8, 1.8)], threshold: 0.01), \
+         Stroke(points: [(-0.65, 1.1), (-0.65, 1.3)]), \
+         Stroke(points: [(-0.5, 1.05), (-0.45, 1.95)], threshold: 0.05), \
+         Stroke(points: [(-0.2, 1.2), (0.0, 1.3), (0.2, 1.25)], threshold: 0.02), \
+         Stroke(points: [(0.3, 1.3), (0.4, 1.6), (0.7, 1.3)], threshold: 0.02), \
+         Stroke(points: [(0.35, 1.05), (0.6, 1.05)], threshold: 0.02), Deselect, \
+         Stroke(points: [(-0.4, 1.1), (-0.4, 1.28)]), Stroke(points: [(0.9, 1.1), (0.9, 1.3)], threshold: 0.02), \
+         Stroke(points: [(-0.9, 1.15), (0.9, 1.25), (-0.9, 1.2), (0.9, 1.3), (-0.9, 1.25), (0.9, 1.35), (-0.9, 1.3)]), \
+         Stroke(points: [(-0.9, 1.5), (0.9, 1.5)]), Undo]",
+        |_| {},
+    );
+    let told = |words: &str| answers.iter().any(|answer| answer.message.starts_with(words));
+    assert!(told("drew a chain") && told("put a joint") && told("deleted"), "{answers:?}");
+}
+
+#[test]
+fn runs_of_strokes_note_their_tips() {
+    let tips = |bench: &mut Workbench| {
+        let rig = bench.rig_entity();
+        bench.app_mut().world().get::<StrokeTips>(rig).cloned()
+    };
+    let (mut one, mut many) = (bench(), bench());
+    watched(&mut one, strokes(20));
+    many.gestures(strokes(20));
+    assert!(tips(&mut many).is_some());
+    assert_eq!(tips(&mut many), tips(&mut one));
+}
+
+/// Strokes that start apart from all joints, each a chain of five joints.
+fn strokes_apart(count: usize) -> Vec<Gesture> {
+    let stroke = |number: usize| {
+        let share = |step: f64| (number as f64 * step).fract() as f32;
+        let (across, up) = (-0.9 + 1.2 * share(0.618_034), 1.05 + 0.6 * share(0.754_877_7));
+        Gesture::Stroke { points: vec![(across, up), (across + 0.4, up + 0.3)], threshold: None, joints: Some(5) }
+    };
+    let settings = [Gesture::Recentre(false), Gesture::Reach(1e-6)];
+    settings.into_iter().chain((0..count).map(stroke)).collect()
+}
+
+#[test]
+fn entities_follow_strokes_a_few_times() {
+    for count in [100, 400] {
+        let [_, followed] = work(strokes_apart(count), 5 * count);
+        // One a frame, entities would follow half of the joints once for each stroke.
+        assert!(followed > 0 && followed <= 8 * 5 * count as u64, "{followed} joints of {}", 5 * count);
+    }
 }
 
 #[test]

@@ -17,6 +17,8 @@ use rigsmith::{
             Ease, Key, LayerMode, Marker, Property, RigClip, Track, TrackTarget,
             clip_extras::{ClipExtras, joined_extras},
             file_clip::{motion_of, own_joints, rig_clips},
+            humanoid::by_names,
+            joint_map::motion_joints,
         },
         character::import_skeleton,
         operations::KeyTolerance,
@@ -349,4 +351,26 @@ fn another_rig_has_no_joints_of_a_file() {
     model.nodes[3].rest.translation -= Vec3::Y;
     model.nodes[3].name = "other".to_owned();
     assert_eq!(own_joints(&model, &rig), None);
+}
+
+/// A motion file without a skin, in which only one thigh has keys: the others stand still, and are joints nevertheless.
+#[test]
+fn a_file_of_motion_alone_keeps_joints_that_are_still() {
+    let file = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 5]}], "nodes": [
+                {"name": "Hips", "children": [1, 3]}, {"name": "LeftUpLeg", "children": [2]}, {"name": "LeftLeg"},
+                {"name": "RightUpLeg", "children": [4]}, {"name": "RightLeg"}, {"name": "beside"}],
+            "animations": [{"samplers": [{"input": 0, "output": 1}],
+                "channels": [{"sampler": 0, "target": {"node": 1, "path": "rotation"}}]}],
+            "accessors": [
+                {"bufferView": 0, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [1]},
+                {"bufferView": 1, "componentType": 5126, "count": 2, "type": "VEC4"}],
+            "bufferViews": [{"buffer": 0, "byteLength": 8}, {"buffer": 0, "byteOffset": 8, "byteLength": 32}],
+            "buffers": [{"byteLength": 40, "uri":
+                "data:application/octet-stream;base64,AAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAAAAAAAAACamRk/zcxMPw=="}]}"#;
+    let model = read_gltf(file.as_bytes(), "motion.gltf", &mut |_| Ok(Vec::new())).unwrap();
+    let names: Vec<&str> = model.nodes.iter().map(|node| node.name.as_str()).collect();
+    assert_eq!(names, ["Hips", "LeftUpLeg", "LeftLeg", "RightUpLeg", "RightLeg"]);
+    let motion = motion_of(&model, &model.clips[0]);
+    let found: Vec<&str> = by_names(&motion_joints(&motion)).values().map(|of| names[of[0]]).collect();
+    assert_eq!(found, names, "a human");
 }

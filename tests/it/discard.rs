@@ -10,12 +10,13 @@ use rigsmith::{
     editor::{
         ActiveRig,
         files::{LoadJob, OpenRequest},
+        library::{LibraryAct, LibraryJobs, LibraryRequest},
         notice::Notice,
         panels::timeline::import::{ClipImport, ImportRequest},
         result_queue::waiting,
         running_work::{StopWork, StoppableWork},
     },
-    files::{RealDisk, load_model},
+    files::{RealDisk, TemplatePlace, load_model},
     mesh::model::{Model, Weights},
     plugins::{
         face::{FaceJob, FaceRequest},
@@ -252,4 +253,7 @@ fn files_that_are_read_can_be_stopped() {
     assert!(is_stopped(&mut frames, ImportRequest(path), StoppableWork::Motion, is_read));
     let is_opened = |world: &World| world.resource::<LoadJob>().name().is_some();
     assert!(is_stopped(&mut frames, OpenRequest::Bundled, StoppableWork::Opening, is_opened));
+    let load = LibraryRequest { place: TemplatePlace::Bundled("biped"), act: LibraryAct::Load { keep: true } };
+    let is_loaded = |world: &World| world.resource::<LibraryJobs>().name().is_some();
+    assert!(is_stopped(&mut frames, load, StoppableWork::Library, is_loaded));
 }

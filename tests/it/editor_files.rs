@@ -5,6 +5,8 @@ mod exporting;
 mod failures;
 mod joint_maps;
 mod journals;
+mod lost_meshes;
+mod several_meshes;
 mod views;
 
 use std::{
@@ -392,7 +394,11 @@ fn a_mesh_comes_to_the_open_rig() {
     assert!(window.is_unsaved(), "no file has both");
     assert!(window.notices.include(Severity::Done, "Opened box.obj with the 2 joints"), "{:?}", window.notices.list);
     window.change(Change::Undo);
+    assert!(window.mesh().is_none() && window.rig().len() == 2, "the mesh came as a step");
+    window.change(Change::Undo);
     assert_eq!(window.rig().len(), 1, "the history goes on");
+    window.change(Change::Redo);
+    window.change(Change::Redo);
 
     let path = window.save_as("both.rigsmith.ron");
     assert!(!window.is_unsaved());

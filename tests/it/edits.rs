@@ -1,5 +1,6 @@
 //! Editing a rig: every edit has its exact inverse, every operation is done as a whole or not at all.
 
+mod lists;
 mod skeleton;
 mod tag_params;
 
@@ -454,4 +455,23 @@ fn a_chain_of_ten_thousand_joints_is_no_problem() {
     assert_eq!(bench.rig.hierarchy(root).count(), 10_000);
     bench.run(Operation::Delete { joints: vec![root], keep_children: false });
     assert!(bench.rig.is_empty());
+}
+
+#[test]
+fn meshes_come_and_go_with_edits_that_undo_each_other() {
+    let mut rig = Rig::new(Uid(1), "rig");
+    let before = rig.clone();
+    let both = RigEdit::Batch(vec![RigEdit::AddMesh(Uid(5)), RigEdit::RemoveMesh(Uid(6))]);
+    let inverse = rig.apply(&both).unwrap();
+    assert_eq!(inverse, RigEdit::Batch(vec![RigEdit::AddMesh(Uid(6)), RigEdit::RemoveMesh(Uid(5))]));
+    assert!(rig == before && both.is_of_motion(), "the rig holds no meshes");
+    let changes = |edit: &RigEdit| {
+        let mut meshes = std::collections::BTreeMap::from([(Uid(5), false), (Uid(7), true)]);
+        edit.mesh_changes(&mut meshes);
+        meshes.into_iter().collect::<Vec<_>>()
+    };
+    assert_eq!(changes(&both), [(Uid(5), true), (Uid(6), false), (Uid(7), true)]);
+    assert_eq!(changes(&inverse), [(Uid(5), false), (Uid(6), true), (Uid(7), true)]);
+    let written: RigEdit = ron::from_str(&ron::to_string(&both).unwrap()).unwrap();
+    assert_eq!(written, both);
 }

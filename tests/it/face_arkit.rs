@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use glam::{Affine3A, Quat, Vec3};
 use rigsmith::{
-    files::{RealDisk, load_model, load_template},
+    files::{RealDisk, load_model, load_template, store_model},
     mesh::{
-        model::{ChannelTarget, Model},
+        gltf::GltfWriteSettings,
+        model::{Channel, ChannelTarget, Clip, Interpolation, Model, Morph},
         skinning::skin_points,
     },
 };
@@ -64,6 +65,51 @@ fn the_shapes_of_arkit_are_those_of_the_bones() {
     let template = load_template(&RealDisk, Path::new(&rig)).unwrap();
     // And both sides of three units without a name in ARKit.
     assert_eq!(template.rig.stored_poses().len(), 57);
+}
+
+/// Clips of the mesh that move morph targets of its own do so beside the baked shapes, too.
+#[test]
+fn clips_of_morph_targets_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/head.obj");
+    let mut model = load_model(&RealDisk, &head).unwrap();
+    let own = ["puff", "lift"].map(str::to_owned);
+    for object in &mut model.objects {
+        object.morph_names = own.to_vec();
+    }
+    for part in &mut model.parts {
+        let along = |axis: Vec3| Morph { positions: vec![0.01 * axis; part.vertices.len()], ..Morph::default() };
+        part.morphs = vec![along(Vec3::Z), along(Vec3::Y)];
+    }
+    let rows = [[0.0_f32, 0.25], [0.5, 1.0], [0.125, 0.75]].concat();
+    let clip = |name: &str, interpolation: Interpolation, times: Vec<f32>| Clip {
+        name: name.to_owned(),
+        channels: vec![Channel { target: ChannelTarget::MorphWeights(0), interpolation, times, values: rows.clone() }],
+        extras: None,
+    };
+    // The three rows of a cubic spline are the one key with its tangents.
+    model.clips = vec![
+        clip("line", Interpolation::Linear, vec![0.0, 1.0, 2.0]),
+        clip("spline", Interpolation::CubicSpline, vec![0.0]),
+    ];
+    let [mesh, glb] = ["morphs.glb", "arkit.glb"].map(|file| folder.path().join(file));
+    store_model(&RealDisk, &mesh, &model, &GltfWriteSettings::default()).unwrap();
+    let args = ["face", "morphs.glb", "--bones", "12", "--arkit", "-o", "arkit.glb"];
+    let answer = rigsmith(folder.path(), &args);
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    let written = load_model(&RealDisk, &glb).unwrap();
+    for name in ["line", "spline"] {
+        let clip = written.clips.iter().find(|clip| clip.name == name).unwrap_or_else(|| panic!("no clip {name}"));
+        let [channel] = clip.channels.as_slice() else { panic!("{:?}", clip.channels) };
+        let ChannelTarget::MorphWeights(object) = channel.target else { panic!("{:?}", channel.target) };
+        let names = &written.objects[object].morph_names;
+        assert!(names.starts_with(&own) && names.len() == 2 + 51, "{names:?}");
+        assert_eq!(channel.values.len(), 3 * names.len(), "{name}");
+        for (row, before) in channel.values.chunks(names.len()).zip(rows.chunks(2)) {
+            assert_eq!(&row[..2], before, "{name}");
+            assert!(row[2..].iter().all(|value| *value == 0.0), "{name}: {row:?}");
+        }
+    }
 }
 
 /// Points of a model skinned by its nodes as they stand.

@@ -125,9 +125,9 @@ fn beside_truth(name: &str, influences: usize) -> Option<([f64; 3], [f64; REGION
 #[test]
 fn units_do_what_the_true_shapes_do() {
     // The last head was kept away from the measurement of the units. Lids close further than in the true blink, which leaves 0.28
-    // of the opening, and that is a part of what is left.
+    // of the opening, and lips do not pass each other as the true ones do; both are a part of what is left.
     for (name, most) in
-        [("ict_neutral", 0.41), ("ict_identity_1", 0.42), ("ict_identity_2", 0.42), ("ict_identity_3", 0.475)]
+        [("ict_neutral", 0.4), ("ict_identity_1", 0.405), ("ict_identity_2", 0.405), ("ict_identity_3", 0.45)]
     {
         for influences in [8, 4] {
             let Some(([residual, cosine, amplitude], regions)) = beside_truth(name, influences) else { return };
@@ -181,8 +181,9 @@ fn units_do_what_another_source_shows() {
             let (cosine, amplitude) = (along / (own * square).sqrt(), along / square);
             let told = format!("{name}, {action} beside {unit}: cosine {cosine:.2}, amplitude {amplitude:.2}");
             println!("{told}");
-            // The least is 0.66, rounded, and hangs on a few triangles that are mended; 0.75 is missed.
-            if cosine < 0.65 || !(0.6..=1.4).contains(&amplitude) {
+            // The least is 0.75, rounded, that of the smile of one body. One body, `male_child_tpose`, was kept away from the
+            // measurement of the units.
+            if cosine < 0.745 || !(0.6..=1.4).contains(&amplitude) {
                 wrong.push(told);
             }
         }

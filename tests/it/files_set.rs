@@ -1,6 +1,7 @@
 //! Saving files that belong together: whatever fails, the old ones or the finished ones are there, and nothing else changes.
 
 mod other_disks;
+mod stopped_saves;
 
 use std::{
     collections::{BTreeMap, BTreeSet},

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use bevy::{math::Vec3, prelude::*};
 use rigsmith::{
-    algo::fit_template::{FitError, MeshAnalysis},
+    algo::fit_template::{FitError, FitReason, FitSymmetry, MeshAnalysis},
     files::{RealDisk, bundled_characters, bundled_part, load_model},
     headless::{Workbench, WorkbenchError},
     mesh::model::Model,
@@ -156,6 +156,64 @@ fn a_moved_joint_is_a_marker() {
         let moved = at(&after, label).distance(at(&before, label));
         assert!(moved < 0.02, "{label} moved by {moved}");
     }
+}
+
+/// The other side of a symmetric figure goes along with a joint that is put right, and says so; left and right that are fitted
+/// apart, and a joint that is put outside of the mesh, move alone.
+#[test]
+fn a_moved_joint_takes_its_partner_along() {
+    let image = |place: Vec3| place * Vec3::new(-1.0, 1.0, 1.0);
+    let moved = |symmetry: FitSymmetry, by: Vec3| {
+        let mut bench = bench(bundled_body());
+        let report = bench.fit(|request| request.symmetry = symmetry, &mut |_| ()).unwrap();
+        let before = bench.rig().clone();
+        let knee = before.find_label("shin_l").unwrap();
+        let to = before.position(knee) + by;
+        bench.operate(Operation::Move { to: vec![(knee, to)], with_children: false }).unwrap();
+        bench.operate(Operation::Edits(Vec::new())).unwrap();
+        assert!(bench.rig().position(knee).distance(to) < 1e-4 * report.fit.height, "{symmetry:?}");
+        (before, bench.rig().clone(), to)
+    };
+    let (before, after, to) = moved(FitSymmetry::Auto, Vec3::new(0.0, 0.04, 0.0));
+    let off = at(&after, "shin_r").distance(image(to));
+    assert!(off < 0.004, "the right knee is {off} off the image of the left one");
+    let [left, right] = ["foot_l", "foot_r"].map(|foot| at(&after, foot));
+    assert!(left.distance(image(right)) < 0.006, "{left} and {right}");
+    assert!(at(&after, "forearm_l").distance(at(&before, "forearm_l")) < 0.02, "arms stay");
+
+    // The model of bodies has legs of one length, so that the other knee follows on its own leg.
+    let (_, after, to) = moved(FitSymmetry::Off, Vec3::new(0.0, 0.04, 0.0));
+    let off = at(&after, "shin_r").distance(image(to));
+    assert!(off > 0.006, "fitted apart, the right knee is {off} off the image of the left one");
+
+    let (before, after, _) = moved(FitSymmetry::Auto, Vec3::new(0.35, 0.0, 0.0));
+    let went = at(&after, "shin_r").distance(at(&before, "shin_r"));
+    assert!(went < 0.02, "of a place in the air, the right knee went {went}");
+}
+
+/// A place for a joint by the command is one for its partner, which is trusted for that reason.
+#[test]
+fn a_marker_is_one_for_both_sides() {
+    let mut bench = bench(bundled_body());
+    let plain = fit(&mut bench).unwrap();
+    let at = |report: &FitReport, label: &str| {
+        let joint = report.joints.iter().position(|(_, known)| known == label).unwrap();
+        report.fit.joints[joint]
+    };
+    let place = at(&plain, "shin_l").position + Vec3::new(0.0, 0.03, 0.0);
+    let mut bench = self::bench(bundled_body());
+    let report = bench.fit(|request| request.markers = vec![("shin_l".to_owned(), place)], &mut |_| ()).unwrap();
+    let (left, right) = (at(&report, "shin_l"), at(&report, "shin_r"));
+    assert_eq!((left.position, left.reason, right.reason), (place, FitReason::Marker, FitReason::Partner));
+    assert_eq!(right.confidence, 1.0);
+    let off = right.position.distance(place * Vec3::new(-1.0, 1.0, 1.0));
+    assert!(off < 0.004, "{off}");
+    // A place of its own goes before that of its partner.
+    let own = at(&plain, "shin_r").position;
+    let markers = vec![("shin_l".to_owned(), place), ("shin_r".to_owned(), own)];
+    let mut bench = self::bench(bundled_body());
+    let report = bench.fit(|request| request.markers = markers, &mut |_| ()).unwrap();
+    assert_eq!((at(&report, "shin_l").position, at(&report, "shin_r").position), (place, own));
 }
 
 /// Whatever a person adds after a fit stays: other edits accept the fit, and joints that are moved then move alone. Of

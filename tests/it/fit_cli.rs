@@ -96,6 +96,41 @@ fn a_part_is_fitted_into_what_a_bone_moves() {
     assert!(unknown.code == 1 && unknown.err.contains("Tail_Base"), "names the bones: {}", unknown.err);
 }
 
+/// An arm without its hand shows no side: that of the body on which it is.
+#[test]
+fn an_arm_is_of_the_side_on_which_it_is() {
+    let (folder, body) = (tempfile::tempdir().unwrap(), body());
+    for (region, ending) in [("0.2,0.5,-0.5,1.0,1.6,0.6", "_l"), ("-0.2,0.5,-0.5,-1.0,1.6,0.6", "_r")] {
+        let args = ["fit", &body, "--template", "parts/arm", "--region", region, "-o", "arm.rig.ron"];
+        let fitted = rigsmith(folder.path(), &args);
+        assert_eq!(fitted.code, 0, "{}", fitted.err);
+        let arm = template(&folder.path().join("arm.rig.ron"));
+        let labels: Vec<_> = arm.walk().filter_map(|joint| joint.data.label.clone()).collect();
+        assert!(labels.iter().any(|label| label == &format!("forearm{ending}")), "{region}: {labels:?}");
+    }
+}
+
+/// A wing shows one branch, whatever feathers the part has: they go along with its bones.
+#[test]
+fn a_wing_is_fitted_into_what_a_bone_moves() {
+    let Some(data) = test_data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let eagle = data.join("creatures/bird-eagle.glb").display().to_string();
+    let span = load_model(&RealDisk, Path::new(&eagle)).unwrap().at_rest();
+    let span = span.points.iter().map(|point| point.x).fold(0.0, f32::max);
+    let args = ["--json", "fit", &eagle, "--template", "parts/wing", "--region", "wing_1_L", "-o", "wing.rig.ron"];
+    let fitted = rigsmith(folder.path(), &args);
+    assert_eq!(fitted.code, 0, "{}", fitted.err);
+    let wing = template(&folder.path().join("wing.rig.ron"));
+    let across = ["wing_1_l", "wing_2_l", "wing_3_l"].map(|label| at(&wing, label).x);
+    assert!(across[0] < across[1] && across[1] < across[2], "from the body outwards: {across:?}");
+    assert!(across[0] > 0.0 && across[2] > 0.3 * span, "{across:?} of {span}");
+    for joint in wing.walk() {
+        let place = wing.position(joint.data.uid);
+        assert!((0.0..1.1 * span).contains(&place.x), "{:?} is at {place}", joint.data.label);
+    }
+}
+
 /// The root of a tail is where it hangs on the body, without a word about the front.
 #[test]
 fn a_tail_begins_at_the_body() {

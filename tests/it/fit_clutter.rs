@@ -131,6 +131,45 @@ fn grounds_are_known_in_turned_files() {
     assert!(!notes.contains("sheets") && !notes.contains("stands on"), "{notes}");
 }
 
+/// The bundled body with other shells, each an object of its own, as OBJ.
+fn objects(others: Vec<Added>) -> String {
+    let (mut text, mut before) = (String::new(), 0);
+    for (number, (points, faces)) in std::iter::once(mesh_of_body()).chain(others).enumerate() {
+        writeln!(text, "o part_{number}").unwrap();
+        for point in &points {
+            writeln!(text, "v {} {} {}", point.x, point.y, point.z).unwrap();
+        }
+        for face in &faces {
+            let corners: Vec<String> = face.iter().map(|corner| (corner + before + 1).to_string()).collect();
+            writeln!(text, "f {}", corners.join(" ")).unwrap();
+        }
+        before += points.len();
+    }
+    text
+}
+
+/// A knight: helmet, sword, shield, belt, boots and a cloak in meshes of their own, which together look like a hand.
+#[test]
+fn a_figure_in_armour_is_fitted_without_it() {
+    let cloak = sheet(9, 12, false, |u, v| Vec3::new(0.9 * (u - 0.5), 0.3 + 1.1 * v, -0.2 + 0.2 * (u - 0.5).powi(2)));
+    let worn = vec![
+        cuboid([-0.13, 1.5, -0.15], [0.13, 1.85, 0.2]),
+        cuboid([0.58, 0.9, 0.0], [0.62, 0.94, 1.0]),
+        cuboid([-0.85, 0.7, -0.1], [-0.6, 1.3, 0.4]),
+        cuboid([-0.25, 0.95, -0.2], [0.25, 1.02, 0.25]),
+        cuboid([0.03, 0.0, -0.15], [0.28, 0.12, 0.25]),
+        cuboid([-0.28, 0.0, -0.15], [-0.03, 0.12, 0.25]),
+        cloak,
+    ];
+    let (alone, fit) = (fitted(&objects(Vec::new())), fitted(&objects(worn)));
+    assert_eq!(fit["template"].as_str(), Some("biped"), "{}", fit["choice"]);
+    assert!(fit["confidence"].as_f64().unwrap() > 0.9, "{}", fit["confidence"]);
+    assert!(fit["notes"].to_string().contains("7 objects beside the largest one were left out"), "{}", fit["notes"]);
+    let pairs = places(&fit).into_iter().zip(places(&alone));
+    let off = pairs.map(|(a, b)| a.distance(b)).fold(0.0, f32::max) / alone["height"].as_f64().unwrap() as f32;
+    assert!(off < 0.003, "joints move by {off} of the height");
+}
+
 /// Points and faces of the bundled body alone.
 fn mesh_of_body() -> Added {
     let (mut points, mut faces) = (Vec::new(), Vec::new());

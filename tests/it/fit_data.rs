@@ -4,9 +4,9 @@
 //! tuning.
 
 mod decimate;
-mod known_joints;
 mod limbs;
-mod shapes;
+pub mod shapes;
+mod true_joints;
 mod turns;
 mod variants;
 
@@ -23,7 +23,7 @@ use rigsmith::{
 };
 
 use self::{
-    known_joints::{Figure, HUMAN, figures, held_back, is_finger, template_joints},
+    true_joints::{Figure, HUMAN, figures, held_back, is_finger, template_joints},
     variants::{subdivided, with_specks},
 };
 use crate::{
@@ -206,7 +206,7 @@ fn skin_on_fitted_joints_is_as_good() {
     }
 }
 
-/// A joint that is put where it belongs takes its neighbours along: the error of the limb gets smaller.
+/// A joint that is put where it belongs takes its neighbours along: the error of the limb halves.
 #[test]
 fn one_drag_mends_a_limb() {
     let Some(all) = all() else { return };

@@ -1,5 +1,6 @@
 //! Fits in the window: keys, the bar, the pointer, undo and redo, without a display.
 
+mod again;
 mod regions;
 
 use std::{
@@ -41,7 +42,7 @@ use rigsmith::{
     test_app::strict_app,
 };
 
-use super::panels::desk::{Desk, Sheet};
+use super::panels::desk::{Desk, Sheet, ShownWidget};
 use crate::{
     bench::{begin_drag, new_clip, undo_meanwhile},
     viewport_app::{CONTROL, MESH, PLAIN, SHIFT, front},
@@ -49,12 +50,16 @@ use crate::{
 
 /// Notices and actions of a window.
 #[derive(Resource, Default)]
-struct Told {
+struct WindowMessages {
     notices: Vec<String>,
     actions: Vec<Action>,
 }
 
-fn collect(mut told: ResMut<Told>, mut notices: MessageReader<Notice>, mut actions: MessageReader<ActionRequest>) {
+fn collect(
+    mut told: ResMut<WindowMessages>,
+    mut notices: MessageReader<Notice>,
+    mut actions: MessageReader<ActionRequest>,
+) {
     told.notices.extend(notices.read().map(|notice| notice.text.clone()));
     told.actions.extend(actions.read().map(|action| action.0));
 }
@@ -78,7 +83,9 @@ struct Window {
 impl Window {
     fn new(model: Model) -> Self {
         let mut app = headless_app(1);
-        app.add_plugins((ToolsPlugin, FittingPlugin, HeldPlugin)).init_resource::<Told>().add_systems(Last, collect);
+        app.add_plugins((ToolsPlugin, FittingPlugin, HeldPlugin))
+            .init_resource::<WindowMessages>()
+            .add_systems(Last, collect);
         let mut app = strict_app(app);
         let rig = app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
         app.insert_resource(ActiveRig(rig)).insert_resource(ViewportSight(Some(front())));
@@ -113,8 +120,8 @@ impl Window {
         }
     }
 
-    fn told(&self) -> &Told {
-        self.world().resource::<Told>()
+    fn told(&self) -> &WindowMessages {
+        self.world().resource::<WindowMessages>()
     }
 
     #[track_caller]

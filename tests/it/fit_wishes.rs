@@ -9,7 +9,7 @@ use std::{
 use bevy::math::Vec3;
 use serde_json::Value;
 
-use crate::cli_build::rigsmith;
+use crate::{cli_build::rigsmith, fit_data::shapes::teapot};
 
 fn body() -> String {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/models/biped.obj").display().to_string()
@@ -148,4 +148,22 @@ fn names_that_do_not_exist_are_told() {
         let answer = rigsmith(folder.path(), &args);
         assert!(answer.code == code && answer.err.contains(words), "{wishes:?}: {}", answer.err);
     }
+}
+
+/// A mesh that shows no figure is refused with the reason, and nothing is written; whoever names a template gets a guess that
+/// says so.
+#[test]
+fn a_teapot_gets_a_skeleton_only_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let (points, triangles) = teapot();
+    let corners = points.iter().map(|point| format!("v {} {} {}\n", point.x, point.y, point.z));
+    let faces = triangles.iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
+    std::fs::write(folder.path().join("teapot.obj"), corners.chain(faces).collect::<String>()).unwrap();
+    let answer = rigsmith(folder.path(), &["fit", "teapot.obj", "-o", "out.rig.ron"]);
+    assert!(answer.code == 1 && answer.err.contains("the mesh shows no figure"), "{}: {}", answer.code, answer.err);
+    assert!(answer.err.contains("confidence 0.") && answer.err.contains("choose the template"), "{}", answer.err);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is written");
+    let answer = rigsmith(folder.path(), &["--json", "fit", "teapot.obj", "--template", "bird", "-o", "out.rig.ron"]);
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    says(&answer.json(), &["a guess"]);
 }

@@ -247,6 +247,39 @@ fn a_hand_of_an_instance_holds_a_wheel() {
 }
 
 #[test]
+fn a_hand_of_an_instance_holds_what_hangs_on_another_one() {
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let mut app = headless_app(1);
+        app.add_plugins(RigInstancePlugin::default());
+        let mut app = strict_app(app);
+        let template = RigTemplate::read(DRIVER.as_bytes()).unwrap();
+        let template = app.world_mut().resource_mut::<Assets<RigTemplate>>().add(template);
+        let at = Transform::from_xyz(10.0, 0.0, 0.0).with_rotation(Quat::from_rotation_y(1.0));
+        let first = app.world_mut().spawn((RigInstance(template.clone()), mode)).id();
+        let second = app.world_mut().spawn((RigInstance(template), mode, at)).id();
+        let start = Instant::now();
+        while [first, second].iter().any(|rig| app.world().get::<RigRuntime>(*rig).is_none()) {
+            assert!(start.elapsed() < HANG);
+            app.update();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        let hands = [first, second].map(|rig| {
+            app.world_mut().run_system_once(move |nodes: InstanceNodes| nodes.find(rig, "hand")).unwrap().unwrap()
+        });
+        let tool = app.world_mut().spawn((Transform::from_xyz(0.0, 0.5, 0.0), ChildOf(hands[0]))).id();
+        let declared = Transform::from_xyz(0.0, 1.0, 0.5).with_rotation(Quat::from_rotation_y(90f32.to_radians()));
+        let from_wheel = declared.compute_affine().inverse().transform_point3(Vec3::new(0.2, 1.0, 0.5));
+        for held in [hands[0], tool] {
+            app.world_mut().entity_mut(second).insert(RigInputs::from([("wheel", held)]));
+            (0..3).for_each(|_| app.update());
+            let wanted = app.world().get::<GlobalTransform>(held).unwrap().transform_point(from_wheel);
+            assert!(wanted.distance(at * Vec3::new(0.2, 1.0, 0.5)) > 1.0);
+            assert!(place(&app, hands[1]).distance(wanted) < 1e-4, "{mode:?}: {} {wanted}", place(&app, hands[1]));
+        }
+    }
+}
+
+#[test]
 fn a_hand_of_a_document_holds_a_wheel_through_edits_and_updates() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("driver.rig.ron");

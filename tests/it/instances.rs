@@ -5,8 +5,10 @@ mod faces;
 mod file_clips;
 mod kept_clips;
 mod meshes;
+mod moved_tags;
 mod reloads;
 mod saves;
+mod users;
 mod work;
 
 use std::{
@@ -36,7 +38,7 @@ use rigsmith::{
         RunningTemplate, SkinBound, TemplateFiles,
     },
     plugins::{
-        commands::BuildStep,
+        commands::{Attributes, BuildStep},
         document::JointEntities,
         runtime::{ControlPose, HandOver, InstanceMode, OutsideTransform, RigNodes, RigRuntime},
     },
@@ -192,6 +194,32 @@ fn an_instance_is_built_posed_and_taken_away() {
         game.app.world_mut().entity_mut(instance).remove::<RigInstance>();
         game.app.update();
         assert!(game.app.world().get_entity(end).is_err() && game.app.world().get::<RigRuntime>(instance).is_none());
+    }
+}
+
+#[test]
+fn values_that_a_game_gives_to_a_node_count_from_the_first_one_on() {
+    let valued = |name: &str, value: f32| {
+        format!(", attribute(node: \"@command control/ctl_a role:control\", name: \"{name}\", default: {value:?})")
+    };
+    let own = "control(creation: (name: \"ctl_a\"))";
+    let text = TWO.replace(own, &format!("{own}{}{}", valued("amount", 0.5), valued("more", 0.25)));
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut game = AppBench::still_game();
+        let instance = game.open(&saved(folder.path(), &text), mode);
+        let control = game.node(instance, "ctl_a");
+        game.frames(2);
+        let uid = *game.app.world().get::<Uid>(control).unwrap();
+        let held = |values: [f32; 2]| ["amount".to_owned(), "more".to_owned()].into_iter().zip(values).collect();
+        game.app.world_mut().entity_mut(control).insert(Attributes(BTreeMap::from([("amount".to_owned(), 0.75)])));
+        for amount in [0.75, 0.125] {
+            game.app.world_mut().get_mut::<Attributes>(control).unwrap().0.insert("amount".to_owned(), amount);
+            game.app.update();
+            let state = game.app.world().get::<RigRuntime>(instance).unwrap().state();
+            assert_eq!(state.attribute(uid, "amount"), Some(amount), "{mode:?}");
+            assert_eq!(game.app.world().get::<Attributes>(control).unwrap(), &Attributes(held([amount, 0.25])));
+        }
     }
 }
 

@@ -157,7 +157,8 @@ fn remove_tag(rig: &mut Rig, tag: Uid) {
     apply(rig, RigEdit::RemoveTag(joint, tag));
 }
 
-fn reparent(rig: &mut Rig, joint: Uid, parent: Uid) {
+/// Hangs a joint on another one; it stays where it is.
+pub fn reparent(rig: &mut Rig, joint: Uid, parent: Uid) {
     let global = rig.rest_global(joint);
     apply(rig, RigEdit::SetParent { joint, parent: Some(parent), index: usize::MAX });
     let rest = rig.local_rest(Some(parent), &global);

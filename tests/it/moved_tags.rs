@@ -13,7 +13,7 @@ use rigsmith::{
     rig::{
         PoseOffset, Rig, RigEdit, StoredPose, Uid,
         animation::{Key, Property, RigClip, TrackTarget},
-        operations::{Operation, PasteTo, PasteWhat, TagClipboard, TagOperation},
+        operations::{Operation, PasteContent, PasteTo, TagClipboard, TagOperation},
         update::{Change as TemplateChange, ChangeKind, Take, clip_edits, diff, edits_between, pose_edits, update},
     },
 };
@@ -29,7 +29,7 @@ const LAYER: Uid = Uid(0xC12);
 const STORED: Uid = Uid(0xC13);
 
 /// Two chains, with a control on one of the four joints and an attribute on that control.
-fn template(bearer: &str, more: &str) -> Rig {
+pub(super) fn template(bearer: &str, more: &str) -> Rig {
     let joint = |label: &str, parent: &str| {
         let own = format!(
             "control(uid: \"{TAG}\", at: \"@hierarchy this\"{more}), attribute(uid: \"00000000000000c2\", \
@@ -43,7 +43,7 @@ fn template(bearer: &str, more: &str) -> Rig {
 }
 
 /// Controls of a rig by the labels of their joints.
-fn control(rig: &Rig, label: &str) -> Uid {
+pub(super) fn control(rig: &Rig, label: &str) -> Uid {
     let joint = rig.find_label(label).unwrap();
     let built = Builder::build(rig, &Arc::new(modules::all())).unwrap();
     let is_it = |node: &&rigsmith::rig::BuiltNode| {
@@ -52,11 +52,11 @@ fn control(rig: &Rig, label: &str) -> Uid {
     built.nodes.iter().find(is_it).unwrap_or_else(|| panic!("{label} has no control")).uid
 }
 
-fn turned(angle: f32) -> PoseOffset {
+pub(super) fn turned(angle: f32) -> PoseOffset {
     PoseOffset::from_rotation(Quat::from_rotation_x(angle))
 }
 
-fn target(node: Uid) -> TrackTarget {
+pub(super) fn target(node: Uid) -> TrackTarget {
     TrackTarget { node, property: Property::Rotation }
 }
 
@@ -234,7 +234,7 @@ fn the_window_takes_poses_and_keys_along() {
     let clipboard = Arc::new(TagClipboard::copy_tags(&before, &tags).unwrap());
     bench.edit(Operation::Tags(TagOperation::Cut(clipboard.clone())));
     assert!(bench.rig().find_tag(TAG).is_none());
-    let paste = TagOperation::Paste { clipboard, what: PasteWhat::Both, to: PasteTo::Joints(vec![b]) };
+    let paste = TagOperation::Paste { clipboard, what: PasteContent::Both, to: PasteTo::Joints(vec![b]) };
     bench.edit(Operation::Tags(paste.clone()));
     assert_eq!(bench.rig().find_tag(TAG).unwrap().0.data.uid, b);
     check_carried(&before, bench.rig());

@@ -189,7 +189,7 @@ fn mistakes_are_named_with_their_place() {
         ),
         ("scale: (1.0, 2.0, 1.0)", "scale: (1.0, inf, 1.0)", "not finite", "(joint: \"0000000000000099\""),
         ("mode: \"Pose\"", "mode: 3", "xpected", "3,\n        shading"),
-        ("last: 1234", "last: -1", "out of bounds", "last: -1"),
+        ("last: 1234", "last: -1", "out of bounds; write a whole number", "last: -1"),
         ("format: 1,\n    name", "format: 0,\n    name", "format 0", "format: 0"),
     ];
     for (what, by, about, at) in table {

@@ -395,15 +395,19 @@ fn hostile_calls_are_refused_and_change_nothing() {
     }
     #[cfg(unix)]
     {
-        // A link in the folder that leads out of it.
-        std::os::unix::fs::symlink(remote.folder.path().join("secret.rig.ron"), remote.file("link.rig.ron")).unwrap();
+        // Links in the folder that lead out of it, one of them in the place of the file that was loaded.
+        fs::remove_file(remote.file("t.rig.ron")).unwrap();
+        let secret = remote.folder.path().join("secret.rig.ron");
+        ["link.rig.ron", "t.rig.ron"].iter().for_each(|name| std::os::unix::fs::symlink(&secret, remote.file(name)).unwrap());
         for (method, params) in [
             ("rig.template.load", json!({"path": "link.rig.ron"})),
             ("rig.template.save", json!({"rig": rig, "path": "link.rig.ron"})),
+            ("rig.template.save", json!({"rig": rig})),
+            ("rig.template.update", json!({"rig": rig})),
         ] {
             assert_eq!(remote.refusal(method, params).0, -32002);
         }
-        assert_eq!(fs::read_to_string(remote.folder.path().join("secret.rig.ron")).unwrap(), CHAIN);
+        assert_eq!(fs::read_to_string(secret).unwrap(), CHAIN);
     }
 }
 
@@ -431,6 +435,13 @@ fn a_call_that_arrives_too_slowly_is_refused_and_changes_nothing() {
     });
     assert!(told.contains("HTTP/1.1 408") && !told.contains("\"result\""), "{told}");
     assert_eq!(remote.base.get::<Rig>(rig), Some(&before));
+}
+
+#[test]
+fn silent_connections_hold_up_nobody() {
+    let mut remote = Remote::new();
+    let _silent: Vec<TcpStream> = (0..4).map(|_| TcpStream::connect(remote.address).unwrap()).collect();
+    assert_eq!(remote.call("rig.list", json!({})), json!([]));
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod hands;
 mod joints;
 mod keyed_nodes;
 mod maps;
+mod names;
 mod reduction;
 mod rests;
 

@@ -19,7 +19,7 @@ use rigsmith::{
     rig::{
         JointData, NodeType, PoseOffset, RestTransform, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
         label::mirrored_label,
-        operations::{Operation, PasteTo, PasteWhat, TagClipboard, TagOperation, TagScope},
+        operations::{Operation, PasteContent, PasteTo, TagClipboard, TagOperation, TagScope},
     },
     solve::program::{CompileOptions, RigProgram, RigState},
 };

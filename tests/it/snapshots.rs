@@ -25,7 +25,7 @@ use rigsmith::editor::{
 };
 
 use booth::{Booth, Canvas, Frame, Shot, Subject};
-use cases::{Case, GROUPS, Group, What};
+use cases::{Case, GROUPS, Group, PictureSubject};
 use picture::{Picture, write_sheets};
 
 /// Largest size of all pictures together in bytes.
@@ -88,10 +88,10 @@ const HOW: &str = "UPDATE_SNAPSHOTS=1 cargo test --test it snapshots makes it; l
 fn take(booth: &mut Booth, case: &Case) -> Shot {
     (case.before)(booth);
     let mut subject = match case.what {
-        What::Panel(panel) => Subject::Panel(panel()),
-        What::Toasts => Subject::Overlay(Box::new(Toasts::default())),
-        What::Overlays => Subject::Overlays,
-        What::Window => Subject::Window,
+        PictureSubject::Panel(panel) => Subject::Panel(panel()),
+        PictureSubject::Toasts => Subject::Overlay(Box::new(Toasts::default())),
+        PictureSubject::Overlays => Subject::Overlays,
+        PictureSubject::Window => Subject::Window,
     };
     booth.take(&mut subject, case.frame, case.steps)
 }

@@ -17,7 +17,7 @@ use rigsmith::{
         actions::{Action, ActionRequest},
         dock::{Layout, ShowPanel},
         files::{
-            FilesPlugin, LoadJob, OpenRequest, SaveJob, StateFolder,
+            FilesPlugin, LoadJob, OpenRequest, RemoveMeshRequest, SaveJob, StateFolder,
             dialog::{Answer, Dialog, DialogAnswer, Question},
             title,
         },
@@ -400,6 +400,30 @@ fn bones_and_meshes_are_hidden_by_switches() {
     desk.edit(Operation::Edits(vec![skin]));
     assert!(desk.says("1 of 2 joints moves points of a mesh."), "{:?}", desk.seen);
     assert_eq!(desk.steps().0, steps.0 + 1, "showing and hiding is no step");
+}
+
+/// Meshes that the panel asks to remove.
+#[derive(Resource, Default)]
+struct Removals(Vec<Uid>);
+
+#[test]
+fn one_of_several_meshes_can_be_removed() {
+    let (mut desk, ..) = with_body(Sheet::Panel(Box::new(DisplayPanel::default())));
+    desk.app.init_resource::<Removals>().add_message::<RemoveMeshRequest>();
+    desk.app.add_systems(Last, |mut asked: MessageReader<RemoveMeshRequest>, mut removals: ResMut<Removals>| {
+        removals.0.extend(asked.read().map(|request| request.0));
+    });
+    desk.frames(2);
+    assert!(desk.look("Remove body").is_none(), "the only mesh stays");
+    let mut model = crate::gestures::boxes(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]);
+    model.name = "coat".to_owned();
+    let rig = desk.rig;
+    desk.app.world_mut().spawn((RigMesh::new(Uid(98), model, Vec::new()), SkinOf(rig), Visibility::default()));
+    desk.frames(2);
+    desk.click("Remove coat");
+    desk.frames(2);
+    assert_eq!(desk.app.world().resource::<Removals>().0, [Uid(98)]);
+    assert_eq!((desk.find("body").on, desk.find("coat").on), (Some(true), Some(true)), "nothing is hidden by it");
 }
 
 /// Weights whose joints are gone are no weights.

@@ -2,6 +2,7 @@
 
 mod clipboard;
 mod features;
+mod many;
 
 use std::{path::Path, sync::Arc};
 
@@ -13,7 +14,7 @@ use rigsmith::rig::{
     EditError, GroupData, JointData, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
     feature::{FeatureKey, FeatureKind, FeatureKinds, FeatureState, combined_features, features_named, is_active},
     operations::{
-        Operation, OperationError, Outcome, PartOrder, PasteTo, PasteWhat, TagClipboard, TagError, TagOperation,
+        Operation, OperationError, Outcome, PartOrder, PasteContent, PasteTo, TagClipboard, TagError, TagOperation,
         TagScope,
     },
     reference::NameKind,
@@ -130,7 +131,7 @@ impl Desk {
         *feature
     }
 
-    fn paste(&mut self, clipboard: &TagClipboard, what: PasteWhat, to: PasteTo) -> Vec<String> {
+    fn paste(&mut self, clipboard: &TagClipboard, what: PasteContent, to: PasteTo) -> Vec<String> {
         self.run(TagOperation::Paste { clipboard: Arc::new(clipboard.clone()), what, to }).notes
     }
 }
@@ -277,7 +278,7 @@ fn a_part_is_dropped_onto_a_chain_until_either_list_ends() {
     assert_eq!(desk.refusal(drop_on(&[ARM_L])), needs(1).into());
     assert_eq!(desk.refusal(drop_on(&[ARM_L, HAND_L])), needs(2).into());
     assert!(desk.rig == before, "a refused part changes nothing");
-    assert!(needs(2).to_string().contains("needs 3 joints, from the first on upper, lower, end; 2 are selected"));
+    assert!(needs(2).to_string().contains("needs 3 joints, from the first on upper, lower, end; it gets 2:"));
 
     // A joint that is left out is found by its label, if the rig has it; the last joint's own tags are extras.
     desk.rig.apply(&RigEdit::SetLabel(HIPS, Some("end".into()))).unwrap();
@@ -332,7 +333,7 @@ fn random_operation(rig: &Rig, copied: &mut TagClipboard, (kind, a, b, c): (u8, 
     let name = ["", "IK", "IK_l", "left"][usize::from(b) % 4].to_owned();
     let key =
         FeatureKey { group: [None, Some(LEFT), Some(RIGHT)][usize::from(a) % 3], kind: "ik".into(), name: "IK".into() };
-    let what = [PasteWhat::Tags, PasteWhat::Values, PasteWhat::Both][usize::from(c) % 3];
+    let what = [PasteContent::Tags, PasteContent::Values, PasteContent::Both][usize::from(c) % 3];
     let feature =
         TagKind::Feature { kind: "ik".into(), name: name.clone(), switch: name.clone(), choice: String::new() };
     match kind % 14 {
@@ -420,7 +421,7 @@ fn notes_reach_those_who_asked_and_kinds_are_a_resource() {
     app.world_mut().resource_mut::<FeatureKinds>().register(FeatureKind::new("wing", "Wing", "Feathers."));
     let clipboard = Arc::new(copy(&body(), TagScope::Joints(vec![ARM_L, HAND_L]), false));
     let to = PasteTo::Joints(vec![HIPS]);
-    let paste = Operation::Tags(TagOperation::Paste { clipboard, what: PasteWhat::Both, to });
+    let paste = Operation::Tags(TagOperation::Paste { clipboard, what: PasteContent::Both, to });
     app.world_mut().write_message(EditRequest::operation(rig, paste));
     app.update();
     let edited: Vec<EditReport> = app.world_mut().resource_mut::<Messages<EditReport>>().drain().collect();

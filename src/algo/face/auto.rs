@@ -241,8 +241,7 @@ impl FaceAnalysis {
             }
         }
         step(FaceStep::Landmarks)?;
-        let mut shells = find_shells(&head, &faces);
-        let landmarks = find_landmarks(&head, &faces, &shells).map_err(FaceError::Landmarks)?;
+        let (mut shells, landmarks) = find_features(&head, &faces).map_err(FaceError::Landmarks)?;
         shells.mark_tongue(&head, &faces, &landmarks, &|_| None);
         step(FaceStep::Grouping)?;
         let groups =
@@ -364,6 +363,32 @@ impl FaceAnalysis {
             None => point,
         }
     }
+}
+
+/// Confidence from which landmarks tell whether balls are eyes.
+const CLEAR: f32 = 0.5;
+
+/// Finds the shells of a head and its landmarks.
+///
+/// Balls that are no eyes, such as buns of hair, mislead the search for landmarks. Where they are not behind the lids, or no
+/// face is clear with them, the face is searched without them, and the eyes on that face.
+fn find_features(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Shells, Landmarks), LandmarkError> {
+    let shells = find_shells(points, triangles);
+    let landmarks = find_landmarks(points, triangles, &shells)?;
+    let is_clear = landmarks.confidence >= CLEAR;
+    if !shells.has_eyes() || (is_clear && shells.are_eyes_on_face(points, &landmarks)) {
+        return Ok((shells, landmarks));
+    }
+    let mut other = shells.without_eyes();
+    let least = CLEAR.max(landmarks.confidence + if is_clear { -0.1 } else { 0.2 });
+    let Some(plain) = find_landmarks(points, triangles, &other).ok().filter(|plain| plain.confidence >= least) else {
+        return Ok((shells, landmarks));
+    };
+    if !other.mark_eyes(points, triangles, &plain) {
+        return Ok((other, plain));
+    }
+    let found = find_landmarks(points, triangles, &other)?;
+    Ok(if found.confidence >= plain.confidence { (other, found) } else { (other, plain) })
 }
 
 fn check(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<(), FaceError> {

@@ -75,12 +75,20 @@ pub fn find_shells(points: &[Vec3], triangles: &[[u32; 3]]) -> Shells {
     let (island_of, found) = adjacency::islands(&joined, count);
     let shell_of: Vec<u32> = welded.iter().map(|place| island_of[*place as usize]).collect();
 
-    let mut islands = vec![Island { low: Vec3::MAX, high: Vec3::MIN, area: 0.0 }; found];
-    for (point, shell) in points.iter().zip(&shell_of) {
+    let islands = measured(points, triangles, &shell_of, found);
+    let kinds = kinds(points, triangles, &shell_of, &islands);
+    Shells { shell_of, kinds }
+}
+
+/// Measurements of `count` shells. Triangles with corners past the end are ignored.
+fn measured(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], count: usize) -> Vec<Island> {
+    let mut islands = vec![Island { low: Vec3::MAX, high: Vec3::MIN, area: 0.0 }; count];
+    for (point, shell) in points.iter().zip(shell_of) {
         let island = &mut islands[*shell as usize];
         island.low = island.low.min(*point);
         island.high = island.high.max(*point);
     }
+    let whole = |triangle: &&[u32; 3]| triangle.iter().all(|corner| (*corner as usize) < points.len());
     for triangle in triangles.iter().filter(whole) {
         let [a, b, c] = triangle.map(|corner| points[corner as usize]);
         let area = 0.5 * (b - a).cross(c - a).length();
@@ -88,8 +96,7 @@ pub fn find_shells(points: &[Vec3], triangles: &[[u32; 3]]) -> Shells {
             islands[shell_of[triangle[0] as usize] as usize].area += area;
         }
     }
-    let kinds = kinds(points, triangles, &shell_of, &islands);
-    Shells { shell_of, kinds }
+    islands
 }
 
 fn kinds(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], islands: &[Island]) -> Vec<ShellKind> {
@@ -107,7 +114,7 @@ fn kinds(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], islands: &[I
         }
     }
     if solid > 1 {
-        eyes::find(points, shell_of, islands, &mut kinds);
+        eyes::find(points, shell_of, islands, None, &mut kinds);
     }
     // One shell has to be the skin, even of a shape that hides itself.
     if !kinds.contains(&ShellKind::Skin)

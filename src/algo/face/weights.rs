@@ -4,9 +4,11 @@
 //! neighbours overlap (two implicit steps, as wide as the bones are apart). Upper and lower lips and lids are separated
 //! along the surface, so that no bone of one moves the other. Heat from outside the mask belongs to the head bone.
 
+mod facial_hair;
 mod interior;
 mod sides;
 mod skin;
+mod skin_columns;
 mod symmetry;
 
 use glam::Vec3;

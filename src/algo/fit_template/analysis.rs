@@ -177,7 +177,13 @@ impl MeshAnalysis {
     pub(super) fn markers(&self, settings: &FitSettings) -> Vec<Marker> {
         let marker = |&(joint, position): &(usize, Vec3)| {
             let place = self.mesh.space.to_unit(position);
-            Marker { joint, place, outside: self.distance_from_volume(place) > OUTSIDE, against: false }
+            Marker {
+                joint,
+                place,
+                outside: self.distance_from_volume(place) > OUTSIDE,
+                against: false,
+                mirrored: false,
+            }
         };
         settings.markers.iter().map(marker).collect()
     }
@@ -186,6 +192,12 @@ impl MeshAnalysis {
     fn distance_from_volume(&self, place: Vec3) -> f32 {
         let centres = self.graph.centres.iter();
         centres.map(|centre| centre.distance_squared(place)).fold(f32::INFINITY, f32::min).sqrt()
+    }
+
+    /// True if a place, in unit space, is in the volume.
+    pub(super) fn is_solid(&self, place: Vec3) -> bool {
+        let cell = self.voxels.cell_at(self.voxels.to_grid(place));
+        cell.is_some_and(|cell| self.voxels.solid_index(cell).is_some())
     }
 
     /// Height of the lowest place of the figure along a direction of the mesh's space, where what it stands on was left out.

@@ -97,7 +97,8 @@ pub(super) fn level(template: &TemplateLimbs, turn: Quat, directions: &Direction
     Some((Quat::from_rotation_arc(yaw * rest, along) * yaw * upright).normalize())
 }
 
-/// Spreads the joints of a chain over all of its branch, from the tip at a leaf over the middle of the mesh to its root.
+/// Spreads the joints of a chain, with what hangs on them, over all of its branch, from the tip at a leaf over the middle of the
+/// mesh to its root.
 pub(super) fn spread(template: &TemplateLimbs, tree: &Tree, tip: usize, root: Option<Vec3>, places: &mut [Vec3]) {
     let Some(limb) = template.limbs.first() else { return };
     let ends: Vec<usize> = tree.branches.leaves.iter().copied().filter(|&leaf| leaf != tip).collect();
@@ -121,8 +122,15 @@ pub(super) fn spread(template: &TemplateLimbs, tree: &Tree, tip: usize, root: Op
     let whole: f32 = line.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
     let last = limb.joints[limb.joints.len() - 1];
     let rest = (template.length(limb.attach, last) + limb.beyond).max(1e-9);
-    for &joint in std::iter::once(&limb.attach).chain(&limb.joints) {
-        places[joint] = along(&line, whole * (1.0 - template.length(limb.attach, joint) / rest));
+    let before = places.to_vec();
+    let is_own = |joint: usize| joint == limb.attach || limb.joints.contains(&joint);
+    for &joint in &template.order {
+        if is_own(joint) {
+            places[joint] = along(&line, whole * (1.0 - template.length(limb.attach, joint) / rest));
+        } else if let Some(parent) = template.parents[joint] {
+            // What hangs on the chain, such as feathers, goes along.
+            places[joint] += places[parent] - before[parent];
+        }
     }
 }
 

@@ -228,9 +228,10 @@ impl<'a> Fit<'a> {
         }
         step(0.95)?;
         let (plane, is_forced) = self.make_symmetric(&mut places);
-        markers::warp(&self.template, &mut places, &self.markers, body.is_some());
+        let pulls = self.pulls(before, plane);
+        markers::warp(&self.template, &mut places, &pulls, body.is_some(), &|place| analysis.is_solid(place));
         let (up, forward) = self.directions(best, body.as_ref());
-        self.bend_as_template(best, up, forward, &mut places);
+        self.bend_as_template(best, (up, forward), &pulls, &mut places);
         let near: Vec<Option<f32>> = match (&body, &roles) {
             (Some(body), Some(roles)) => roles.iter().map(|r| r.map(|r| body.place(r).1)).collect(),
             _ => vec![None; places.len()],
@@ -247,8 +248,8 @@ impl<'a> Fit<'a> {
         }
         confidence::doubt_uneven(&self.template, &places, &mut trusted);
         let confidence = confidence::whole(&self.template, best, body.as_ref(), &trusted);
-        for marker in &self.markers {
-            trusted[marker.joint] = (1.0, FitReason::Marker);
+        for marker in &pulls {
+            trusted[marker.joint] = (1.0, if marker.mirrored { FitReason::Partner } else { FitReason::Marker });
         }
         let space = &analysis.mesh.space;
         let position = |joint: usize| {
@@ -292,7 +293,8 @@ impl<'a> Fit<'a> {
     ) -> Result<Option<human::FittedBody>, FitError> {
         let analysis = self.analysis;
         if let Some(before) = before {
-            return Ok(before.body.as_ref().map(|body| self.refitted_body(body, roles)));
+            let pulls = self.pulls(Some(before), None);
+            return Ok(before.body.as_ref().map(|body| self.refitted_body(body, roles, &pulls)));
         }
         let anchor = |(role, &position): (&Option<Role>, &Vec3)| match role {
             Some(Role::Bone(b)) => Some(human::Anchor { place: human::Place::Joint(*b), position, weight: 1.0 }),
@@ -302,7 +304,7 @@ impl<'a> Fit<'a> {
         let (surface, target) = (&analysis.surface, &analysis.target);
         let body = human::fit(surface, target, &self.template, &analysis.trees, hypotheses, &anchors, step)?;
         let body = body.filter(|body| body.residual <= UNLIKE);
-        Ok(body.map(|body| self.refitted_body(&body, roles)))
+        Ok(body.map(|body| self.refitted_body(&body, roles, &self.markers)))
     }
 
     /// True if each marker on a limb lies nearest to the branch that the limb has.
@@ -323,13 +325,25 @@ impl<'a> Fit<'a> {
         })
     }
 
-    fn refitted_body(&self, body: &human::FittedBody, roles: &[Option<Role>]) -> human::FittedBody {
+    /// Markers with their images on the other side, where mesh and pose are symmetric: about the plane of an earlier fit, or else
+    /// about one in unit space.
+    fn pulls(&self, before: Option<&FittedSkeleton>, plane: Option<(Vec3, Vec3)>) -> Vec<Marker> {
+        let space = &self.analysis.mesh.space;
+        let known = before.and_then(|before| before.symmetry);
+        let known = known.map(|(point, normal)| (space.to_unit(point), space.direction_to_unit(normal)));
+        match known.or(plane).filter(|_| self.settings.symmetry != FitSymmetry::Off) {
+            Some(plane) => markers::with_partners(&self.template, &self.markers, plane),
+            None => self.markers.clone(),
+        }
+    }
+
+    fn refitted_body(&self, body: &human::FittedBody, roles: &[Option<Role>], markers: &[Marker]) -> human::FittedBody {
         // A person's idea of the spine and of clavicles, which the surface hides, must not bend the body.
         let of_bone = |m: &Marker| match roles[m.joint] {
             Some(Role::Bone(bone)) if human::is_shown(bone) && !m.is_alone() => Some((bone, m.place)),
             _ => None,
         };
-        let kept: Vec<(usize, Vec3)> = self.markers.iter().filter_map(of_bone).collect();
+        let kept: Vec<(usize, Vec3)> = markers.iter().filter_map(of_bone).collect();
         if kept.is_empty() {
             return body.clone();
         }
@@ -397,14 +411,20 @@ impl<'a> Fit<'a> {
     }
 
     /// Bends elbows and knees as the template does; a place that a person gave stays with its neighbours.
-    fn bend_as_template(&self, best: &Hypothesis, up: Vec3, forward: Vec3, places: &mut [Vec3]) {
+    fn bend_as_template(
+        &self,
+        best: &Hypothesis,
+        (up, forward): (Vec3, Vec3),
+        markers: &[Marker],
+        places: &mut [Vec3],
+    ) {
         let space = &self.analysis.mesh.space;
         let (up, forward) = (space.direction_to_unit(up), space.direction_to_unit(forward));
         let Some(left) = up.cross(forward).try_normalize() else { return };
         let turn = Quat::from_mat3(&Mat3::from_cols(left, up, left.cross(up))).normalize();
         let lines = &self.analysis.trees[best.tree].lines;
         let radius = |limb: usize, place: Vec3| best.leaves[limb].map_or(0.0, |leaf| lines[leaf].radius_at(place));
-        let is_fixed = |joint: usize| self.markers.iter().any(|marker| marker.joint == joint);
+        let is_fixed = |joint: usize| markers.iter().any(|marker| marker.joint == joint);
         bends::follow_template(&self.template, turn, is_fixed, radius, places);
     }
 

@@ -194,7 +194,9 @@ pub(super) fn limbs(joints: &[TemplateJoint]) -> Option<TemplateLimbs> {
     } else {
         // A hand: the joint with the most chains becomes the root, and the wrist another chain.
         let busiest = order.iter().copied().max_by_key(|&j| (children[j].len(), std::cmp::Reverse(j))).unwrap_or(root);
-        let attach = if children[busiest].len() > 1 { busiest } else { root };
+        // Feathers are no limbs of their own: what a mesh shows of a wing is one branch.
+        let is_wing = joints.iter().any(|joint| joint.label.contains("wing"));
+        let attach = if children[busiest].len() > 1 && !is_wing { busiest } else { root };
         reroot(attach, &mut parents, &mut children);
         (order, below) = ordered(attach, &parents, &children, &positions);
         let segment = |j: usize| parents[j].map_or(0.0, |p| positions[j].distance(positions[p]));

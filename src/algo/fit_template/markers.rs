@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::limbs::TemplateLimbs;
+use super::limbs::{Limb, LimbKind, TemplateLimbs};
 
 /// A place for a joint of the template, in unit space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +13,8 @@ pub(super) struct Marker {
     pub(super) outside: bool,
     /// True if the mesh shows the joint elsewhere for sure.
     pub(super) against: bool,
+    /// True if a person gave the place for the partner on the other side of a symmetric figure.
+    pub(super) mirrored: bool,
 }
 
 impl Marker {
@@ -22,10 +24,59 @@ impl Marker {
     }
 }
 
-/// Moves joints so that each marker's joint is at its place; the rest of its limb follows, less with the distance along
-/// the skeleton, and joints between two markers share what both ask. Joints of other limbs follow only without
-/// `limb_alone`, and never a marker that contradicts the mesh.
-pub(super) fn warp(template: &TemplateLimbs, places: &mut [Vec3], markers: &[Marker], limb_alone: bool) {
+/// Joints of a front leg up to which it has no shoulder blade.
+const WITHOUT_BLADE: usize = 5;
+/// Steps in which the room of a joint that follows is measured.
+const STEPS: usize = 16;
+/// Distance to the surface, as a factor of the move, up to which a joint that follows has all the room it needs.
+const ROOM: f32 = 2.0;
+
+/// Markers with those that they mean for the other side of a figure that is symmetric about a plane: a partner that a person
+/// has not placed goes where the image of the marker is.
+pub(super) fn with_partners(
+    template: &TemplateLimbs,
+    markers: &[Marker],
+    (point, normal): (Vec3, Vec3),
+) -> Vec<Marker> {
+    let is_placed = |joint: usize| markers.iter().any(|marker| marker.joint == joint);
+    let partner = |marker: &Marker| {
+        let joint = template.mirror[marker.joint].filter(|&joint| !is_placed(joint) && !marker.is_alone())?;
+        let place = marker.place - normal * (2.0 * (marker.place - point).dot(normal));
+        Some(Marker { joint, place, mirrored: true, ..*marker })
+    };
+    markers.iter().copied().chain(markers.iter().filter_map(partner)).collect()
+}
+
+/// The joint in which a limb turns, and the one after it. The flesh of the trunk hides the first, and a bend shows the second:
+/// one that is wrong says nothing about the other.
+fn socket(template: &TemplateLimbs, limb: &Limb) -> Option<(usize, usize)> {
+    let is_front = limb.kind == LimbKind::Leg && template.trunk.first() != Some(&limb.attach);
+    let has_blade = is_front && limb.joints.len() > WITHOUT_BLADE;
+    let ball = template.ball_joint(limb)? + usize::from(has_blade);
+    Some((*limb.joints.get(ball)?, *limb.joints.get(ball + 1)?))
+}
+
+/// The part of a move from a place inside of the volume that goes at most half way to the surface.
+fn within(place: Vec3, way: Vec3, is_solid: &dyn Fn(Vec3) -> bool) -> Vec3 {
+    if !is_solid(place) {
+        return way;
+    }
+    let step = way * (ROOM / STEPS as f32);
+    let room = (1..=STEPS).take_while(|number| is_solid(place + step * *number as f32)).count();
+    way * (room as f32 / STEPS as f32)
+}
+
+/// Moves joints so that each marker's joint is at its place; the rest of its limb follows inside of the volume, less with the
+/// distance along the skeleton, and joints between two markers share what both ask. A shoulder or hip does not follow the
+/// bend of its limb, nor the bend the shoulder or hip. Joints of other limbs follow only without `limb_alone`, and never a
+/// marker that contradicts the mesh.
+pub(super) fn warp(
+    template: &TemplateLimbs,
+    places: &mut [Vec3],
+    markers: &[Marker],
+    limb_alone: bool,
+    is_solid: &dyn Fn(Vec3) -> bool,
+) {
     if markers.is_empty() {
         return;
     }
@@ -52,7 +103,10 @@ pub(super) fn warp(template: &TemplateLimbs, places: &mut [Vec3], markers: &[Mar
             _ => usize::MAX,
         };
     }
+    let sockets: Vec<(usize, usize)> = template.limbs.iter().filter_map(|limb| socket(template, limb)).collect();
+    let is_apart = |a: usize, b: usize| sockets.contains(&(a, b)) || sockets.contains(&(b, a));
     let mut sums = vec![(Vec3::ZERO, 0.0f32); places.len()];
+    let mut is_carried = vec![false; places.len()];
     for (marker, &way) in markers.iter().zip(&moves) {
         let reach = 0.6 * limb_length(marker.joint);
         let limb_alone = limb_alone || marker.is_alone();
@@ -64,6 +118,7 @@ pub(super) fn warp(template: &TemplateLimbs, places: &mut [Vec3], markers: &[Mar
         for &joint in template.order.iter().filter(|_| marker.is_alone()) {
             let above = template.parents[joint];
             is_below[joint] = joint == marker.joint || above.is_some_and(|above| is_below[above]);
+            is_carried[joint] |= is_below[joint];
         }
         let mut open = vec![marker.joint];
         while let Some(joint) = open.pop() {
@@ -71,7 +126,8 @@ pub(super) fn warp(template: &TemplateLimbs, places: &mut [Vec3], markers: &[Mar
             for next in neighbours.filter(|&n| !limb_alone || limb_of[n] == limb_of[marker.joint]) {
                 let bone = template.positions[joint].distance(template.positions[next]);
                 let there = distance[joint] + if is_below[next] { 0.0 } else { bone };
-                if there < distance[next] && there < reach {
+                let is_held = is_apart(joint, next) && !is_below[next];
+                if there < distance[next] && there < reach && !is_held {
                     distance[next] = there;
                     open.push(next);
                 }
@@ -85,9 +141,11 @@ pub(super) fn warp(template: &TemplateLimbs, places: &mut [Vec3], markers: &[Mar
             }
         }
     }
-    for (place, (sum, near)) in places.iter_mut().zip(&sums) {
+    for ((place, (sum, near)), is_carried) in places.iter_mut().zip(&sums).zip(&is_carried) {
         if *near > 0.0 {
-            *place += *sum / near;
+            let way = *sum / *near;
+            let way = if *is_carried { way } else { within(*place, way, is_solid) };
+            *place += way;
         }
     }
     for marker in markers {

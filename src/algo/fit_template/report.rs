@@ -66,6 +66,8 @@ pub struct JointFit {
 pub enum FitReason {
     /// A person put it there.
     Marker,
+    /// A person put its partner on the other side there.
+    Partner,
     /// The body model lies on the surface around it.
     Surface,
     /// The centre line of the limb.
@@ -86,6 +88,7 @@ impl fmt::Display for FitReason {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         f.write_str(match self {
             Self::Marker => "placed by hand",
+            Self::Partner => "the mirror image of its partner, which was placed by hand",
             Self::Surface => "the surface around it agrees with the body model",
             Self::CentreLine => "on the centre line of its limb",
             Self::Proportion => "by the template's proportions",
@@ -121,6 +124,8 @@ pub enum FitNote {
     Sheets(usize),
     /// Objects that hang on a bone and were left out: a hat, a weapon.
     Gear(usize),
+    /// Objects beside the largest one that were left out: armour, clothes, weapons.
+    Beside(usize),
     /// Branches that no limb of the template took: hair, clothes, weapons.
     UnusedBranches(usize),
     /// A limb of the template without a branch in the mesh.
@@ -146,8 +151,13 @@ pub enum FitNote {
 }
 
 impl FitNote {
+    /// True for notes that say what may be wrong, or what was left out; the others say how the fit was found.
+    pub fn is_warning(&self) -> bool {
+        !matches!(self, Self::BodyModel | Self::MadeSymmetric | Self::Tied(_))
+    }
+
     /// True for notes about directions that contradict the mesh.
-    pub(super) fn is_of_direction(&self) -> bool {
+    pub fn is_of_direction(&self) -> bool {
         matches!(self, Self::OtherUp(_) | Self::OtherForward(_))
     }
 }
@@ -195,6 +205,11 @@ impl fmt::Display for FitNote {
                 let objects = counted(*count, "object that hangs on a bone was", "objects that hang on a bone were");
                 write!(f, "{objects} left out; name objects to fit to others")
             }
+            Self::Beside(count) => {
+                let objects =
+                    counted(*count, "object beside the largest one was", "objects beside the largest one were");
+                write!(f, "{objects} left out, with which no figure shows for sure; name objects to fit to others")
+            }
             Self::UnusedBranches(count) => {
                 let branches = counted(*count, "branch of the mesh belongs", "branches of the mesh belong");
                 write!(f, "{branches} to no limb of the template")
@@ -205,7 +220,7 @@ impl fmt::Display for FitNote {
                 f.write_str("the front is uncertain: give the forward axis if the skeleton faces backwards")
             }
             Self::UncertainSide => f.write_str(
-                "the side of the part is uncertain: give a marker for a joint of its thumb if it is the other one",
+                "the side of the part is uncertain: give a marker for one of its joints if it is the other one",
             ),
             Self::MadeSymmetric => f.write_str("left and right were made alike"),
             Self::ForcedSymmetric(pairs) => {

@@ -88,7 +88,8 @@ const WIDTH: f32 = 0.3;
 /// Least length of a counted swing, as a share of the extent.
 const SWING: f32 = 0.4;
 
-fn is_scribble(points: &[Vec2], tolerance: f32) -> bool {
+/// True for a stroke that erases the joints under it, if there are any. The points are finite.
+pub fn is_scribble(points: &[Vec2], tolerance: f32) -> bool {
     let [long, wide] = main_axes(points);
     let extent = |axis: Vec2| {
         let (low, high) = points
@@ -174,18 +175,26 @@ fn contains(hull: &[Vec2], point: Vec2) -> bool {
         })
 }
 
-/// A short straight stroke across one bone: the bone and the place of the crossing.
-fn tick(points: &[Vec2], joints: &[(Vec2, Option<usize>)], tolerance: f32) -> Option<(usize, f32)> {
-    let (first, last) = (*points.first()?, *points.last()?);
+/// True for a stroke that inserts a joint if it crosses one bone that is no shorter than it.
+pub fn is_straight(points: &[Vec2]) -> bool {
+    let (Some(&first), Some(&last)) = (points.first(), points.last()) else { return false };
     let chord = last - first;
     let length = chord.length();
     let straight = points.iter().all(|&p| {
         let along = (p - first).dot(chord) / length;
         (p - first).perp_dot(chord).abs() <= 0.15 * length * length && along > -0.15 * length && along < 1.15 * length
     });
-    if length.is_nan() || length <= 0.0 || !straight {
+    length > 0.0 && straight
+}
+
+/// A short straight stroke across one bone: the bone and the place of the crossing.
+fn tick(points: &[Vec2], joints: &[(Vec2, Option<usize>)], tolerance: f32) -> Option<(usize, f32)> {
+    if !is_straight(points) {
         return None;
     }
+    let (first, last) = (*points.first()?, *points.last()?);
+    let chord = last - first;
+    let length = chord.length();
     let mut found = None;
     for (bone, &(foot, parent)) in joints.iter().enumerate() {
         let Some(&(head, _)) = parent.and_then(|parent| joints.get(parent)) else { continue };

@@ -40,7 +40,7 @@ impl Roots {
             let (from, to) = (joints[parent].head, joints[index].head);
             hangs_in_air[index] = share(from, to, |place| sight.encloses(place)) < 0.5;
             stands_off[parent] |= hangs_in_air[index] && 2 * sizes[index] >= sizes[parent];
-            is_root[index] = hangs_in_air[index] && !sight.encloses(to);
+            is_root[index] = hangs_in_air[index] && !sight.encloses(to) && !sight.is_amid(to);
         }
         for (index, joint) in joints.iter().enumerate() {
             hangs_in_air[index] |= joint.parent.is_some_and(|parent| stands_off[parent]);
@@ -122,6 +122,7 @@ impl Homes {
                 parts.iter_mut().filter_map(|part| part.get_mut(joint)).for_each(|is_home| *is_home = true);
             }
         }
+        adopt(&mut parts, slots, segments, points, sight);
         let bearers: Vec<usize> = (0..parts.len()).filter(|&part| !parts[part].is_empty()).collect();
         let mut members = vec![Vec::new(); parts.len()];
         for point in 0..points.len() {
@@ -157,6 +158,39 @@ impl Homes {
     /// True if a joint is a slot beside joints that hold flesh.
     pub fn is_slot(&self, joint: u32) -> bool {
         self.slots.get(joint as usize).is_some_and(|is_slot| *is_slot)
+    }
+}
+
+/// Gives parts that enclose no bone to the bones at home nowhere that run through their boxes: shells of plates and bars enclose
+/// nothing, and without this a mechanical head would go with the neck that it stands on. Slots and last joints take no such part.
+fn adopt(parts: &mut [Vec<bool>], slots: &[bool], segments: &[BoneSegment], points: &[Vec3], sight: &Sight) {
+    let has_home = |joint: usize| parts.iter().any(|part| part.get(joint) == Some(&true));
+    let is_homeless = |segment: &&BoneSegment| {
+        let joint = segment.joint as usize;
+        segment.head != segment.tail && !slots[joint] && !has_home(joint)
+    };
+    let homeless: Vec<&BoneSegment> = segments.iter().filter(is_homeless).collect();
+    if homeless.is_empty() {
+        return;
+    }
+    let mut boxes = vec![(Vec3::INFINITY, Vec3::NEG_INFINITY); parts.len()];
+    for (index, &point) in points.iter().enumerate() {
+        let (low, high) = &mut boxes[sight.island(index)];
+        (*low, *high) = (low.min(point), high.max(point));
+    }
+    for part in sight.parts() {
+        if !parts[part].is_empty() {
+            continue;
+        }
+        let (low, high) = boxes[part];
+        let is_within = |place: Vec3| place.cmpge(low).all() && place.cmple(high).all();
+        let mut at_home = vec![false; slots.len()];
+        for segment in &homeless {
+            at_home[segment.joint as usize] |= share(segment.head, segment.tail, is_within) >= AT_HOME;
+        }
+        if at_home.contains(&true) {
+            parts[part] = at_home;
+        }
     }
 }
 

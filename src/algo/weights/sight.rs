@@ -81,6 +81,13 @@ impl Sight {
         encloses(&self.whole, point)
     }
 
+    /// True if the pieces of a surface of several are around `point` in most directions, though none encloses it: hips between
+    /// plates. Below a robe or between two shoes about half of the directions are free.
+    pub fn is_amid(&self, point: Vec3) -> bool {
+        let meets = |direction: &Vec3| self.first(point, *direction).is_some();
+        self.parts().next().is_some() && evenly_spread().filter(meets).count() * 8 > DIRECTIONS * 5
+    }
+
     /// True if a large island is around `point`; of a surface of one island, always.
     pub fn is_within(&self, island: usize, point: Vec3) -> bool {
         self.islands[island].as_ref().is_none_or(|island| encloses(island, point))

@@ -8,11 +8,15 @@ use image::{ImageFormat, RgbImage};
 use super::AnimateArgs;
 use crate::{
     algo::view::View,
-    cli::{Failure, Report, binding::bind, limits, progress::spinning},
+    cli::{
+        Failure, Report,
+        build::{loaded, open_all},
+        progress::spinning,
+    },
     files::{RealDisk, save_atomic},
     headless::Workbench,
     mesh::skinning::skin_points,
-    plugins::drawing::RigDrawing,
+    plugins::{drawing::RigDrawing, surface::RigMesh},
     render::{PictureError, PictureSettings, take_picture},
     rig::{
         NodeType, PoseOffset, Rig, RigEdit, SkinData, Uid,
@@ -42,12 +46,8 @@ pub(super) fn draw(
             clips.len()
         ));
     }
-    if let Some(mesh) = &args.mesh {
-        let model = limits::load_model(mesh)?;
-        report.notes(model.notes.iter().cloned());
-        bench.open(model, true)?;
-        bind(bench, args.weights.settings(), &args.weights.claim, Vec::new(), report)?;
-    }
+    let meshes = loaded(&args.meshes, report)?;
+    open_all(meshes, bench, &args.weights, report)?;
     let count = u32::from(args.frames);
     let poses: Vec<SampledPose> = (0..count)
         .map(|frame| clip.sample(clip.range[0] + clip.duration() * frame as f32 / (count.max(2) - 1) as f32))
@@ -60,13 +60,13 @@ pub(super) fn draw(
         let settings = PictureSettings {
             size,
             view: View::Orbit(65.0, 8.0),
-            drawing: RigDrawing { rig: args.mesh.is_none(), ..RigDrawing::default() },
+            drawing: RigDrawing { rig: args.meshes.is_empty(), ..RigDrawing::default() },
             build: true,
             bounds: Some(bounds),
             ..PictureSettings::default()
         };
         let rig = posed(bench.rig(), pose)?;
-        let meshes = bench.mesh().cloned().into_iter().collect();
+        let meshes = bench.meshes().cloned().collect();
         let image = spinning("drawing", || take_picture(rig, meshes, &settings)).map_err(failed)?;
         let encode = |error: String| failed(PictureError::Encode(error));
         let image = image.try_into_dynamic().map_err(|error| encode(error.to_string()))?.to_rgb8();
@@ -92,7 +92,7 @@ fn posed(rig: &Rig, pose: &SampledPose) -> Result<Rig, Failure> {
     Ok(rig)
 }
 
-/// Weighted points of the mesh, which follow the joints.
+/// Weighted points of a mesh, which follow the joints.
 struct Body<'a> {
     points: &'a [Vec3],
     skin: Option<&'a SkinData>,
@@ -101,10 +101,10 @@ struct Body<'a> {
 }
 
 impl<'a> Body<'a> {
-    /// Points of the workbench's mesh; `None` without any.
-    fn of(bench: &'a Workbench) -> Option<Self> {
-        let points = &bench.mesh()?.rest.points[..];
-        let skin = bench.weights();
+    /// Points of a mesh of the workbench; `None` without any.
+    fn of(bench: &'a Workbench, mesh: &'a RigMesh) -> Option<Self> {
+        let points = &mesh.rest.points[..];
+        let skin = bench.rig().skin(mesh.uid).map(Arc::as_ref);
         let skeleton = DeformSkeleton::new(bench.rig(), bench.built());
         let held = skin.map(|skin| skeleton.holders(bench.rig(), skin)).unwrap_or_default();
         let holder = |at: usize| {
@@ -134,20 +134,22 @@ fn around(places: impl Iterator<Item = Vec3>) -> [Vec3; 2] {
     places.fold([Vec3::MAX, Vec3::MIN], |[low, high], place| [low.min(place), high.max(place)])
 }
 
-/// Boxes of one size around the mesh in each pose, or around the joints, with some room for flesh.
+/// Boxes of one size around the meshes in each pose, or around the joints, with some room for flesh.
 fn boxes(bench: &Workbench, poses: &[SampledPose]) -> Result<Vec<[Vec3; 2]>, Failure> {
     let program = bench.runtime()?.state().program();
     let mut state = RigState::new(Arc::clone(program));
-    let body = Body::of(bench);
+    let bodies: Vec<Body> = bench.meshes().filter_map(|mesh| Body::of(bench, mesh)).collect();
     let around: Vec<[Vec3; 2]> = poses
         .iter()
         .map(|pose| {
             strike(&mut state, pose);
             let joints = program.nodes().iter().zip(state.globals()).filter(|(node, _)| node.kind == NodeType::Joint);
-            body.as_ref().map_or_else(|| around(joints.map(|(_, at)| at.translation)), |body| body.around(&state))
+            let of_bodies = bodies.iter().map(|body| body.around(&state));
+            let whole = of_bodies.reduce(|[a, b], [low, high]| [a.min(low), b.max(high)]);
+            whole.unwrap_or_else(|| around(joints.map(|(_, at)| at.translation)))
         })
         .collect();
-    let room = if body.is_some() { 0.51 } else { 0.55 };
+    let room = if bodies.is_empty() { 0.55 } else { 0.51 };
     let mut half = around.iter().map(|[low, high]| room * (*high - *low)).fold(Vec3::ZERO, Vec3::max);
     // All pictures have one ground, and room for the highest pose.
     let low = around.iter().map(|[low, _]| low.y).fold(f32::MAX, f32::min);

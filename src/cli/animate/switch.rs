@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::{
     cli::{Failure, Report, progress::spinning},
     headless::{Workbench, posing::PoseError},
-    plugins::controls::{SwitchError, find_switches, switch_over},
+    plugins::controls::{SwitchError, switch_over},
     rig::{Uid, animation::RigClip},
     solve::matching::{SwitchOverError, SwitchedRange},
 };
@@ -51,8 +51,7 @@ pub(super) fn throw(
     for switch in &args.switches {
         let wrong = || Failure::Usage(format!("--switch {switch}: write NAME=VALUE, for example arm_l=fk"));
         let (name, value) = switch.split_once('=').ok_or_else(wrong)?;
-        let built = bench.built().ok_or(PoseError::NotBuilt)?;
-        let found = find_switches(built, bench.rig(), name.trim(), value.trim()).map_err(PoseError::from)?;
+        let found = bench.switches_named(name.trim(), value.trim())?;
         for clip in &mut *clips {
             let seconds = |frame: f32| (f64::from(frame) / f64::from(clip.frame_rate)) as f32;
             let span = args.range.map_or(clip.range, |range| range.map(seconds));

@@ -60,7 +60,7 @@ pub(super) fn run(args: &UpdateArgs) -> Result<Report, Failure> {
     tell_update(&mut report, (base.unwrap_or(&now), file.rig()), &now, &mut updated)?;
     re_express(args, &now, &mut updated.rig, &mut report)?;
     let clips = clips::updated(args, (&now, &updated.rig), &clip_files, &mut report)?;
-    if args.is_undecided(updated.conflicts(), &mut report) {
+    if args.is_undecided(updated.conflicts(), base.is_some(), &mut report) {
         return Ok(report);
     }
     let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) else { return Ok(report) };

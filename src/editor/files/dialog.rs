@@ -48,6 +48,8 @@ pub enum Question {
     },
     /// Choice of a file to open.
     Open,
+    /// Choice of a mesh to add to the open rig.
+    Mesh,
     /// Choice of a file of motion, to put it onto the rig.
     Motion,
     /// Choice of a map of joints for motion that waits.

@@ -62,6 +62,10 @@ const OPENED: &[(&str, &[FileKind])] = &[
     ("Projects (.rigsmith.ron)", &[FileKind::Project]),
 ];
 
+/// Kinds of files with meshes, by name.
+const MESHES: &[(&str, &[FileKind])] =
+    &[("Meshes (.obj, .gltf, .glb, .vrm)", &[FileKind::Obj, FileKind::Gltf, FileKind::Glb, FileKind::Vrm])];
+
 /// Kinds of files with motion, by name.
 const MOTION: &[(&str, &[FileKind])] = &[
     ("Motion (.bvh, .anim.ron, .rigclip, .glb, .gltf, .vrm)", MOTION_FILES),
@@ -87,6 +91,7 @@ impl EditorOverlay for DialogView {
                     self.options = world.get_resource::<ExportOptions>().cloned().unwrap_or_default();
                 }
                 Question::Open => self.browser = Some(browser(world, "Open", OPENED)),
+                Question::Mesh => self.browser = Some(browser(world, "Add mesh", MESHES)),
                 Question::Motion => self.browser = Some(browser(world, "Import motion", MOTION)),
                 Question::JointMap => self.browser = Some(browser(world, "Load map of joints", MAPS)),
                 _ => {}
@@ -138,8 +143,9 @@ impl DialogView {
             let picked = browser.take_picked();
             let is_open = *browser.state() == DialogState::Open;
             return match (question, picked) {
-                (Question::Open | Question::Motion | Question::JointMap, Some(path)) => Some(Answer::Path(path)),
-                (Question::Open | Question::Motion | Question::JointMap, None) => (!is_open).then_some(Answer::Cancel),
+                (Question::Open | Question::Mesh | Question::Motion | Question::JointMap, picked) => {
+                    picked.map(Answer::Path).or((!is_open).then_some(Answer::Cancel))
+                }
                 (_, picked) => {
                     if let Some(path) = picked {
                         self.text = path.display().to_string();
@@ -161,7 +167,7 @@ impl DialogView {
                 Question::Replace { path, .. } => self.replace(ui, path),
                 Question::Fit(fit) => self.fit(ui, fit),
                 Question::Recover(list) => self.recover(ui, list),
-                Question::Open | Question::Motion | Question::JointMap => None,
+                Question::Open | Question::Mesh | Question::Motion | Question::JointMap => None,
             }
         });
         let escaped = ctx.input(|input| input.key_pressed(egui::Key::Escape));

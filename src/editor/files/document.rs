@@ -33,6 +33,8 @@ pub struct OpenDocument {
     pub(super) journal: Journal,
     /// Meshes of the project that were not found; they are saved again unchanged.
     pub(super) missing: Vec<MeshToSave>,
+    /// Meshes that are not in the document at present, and that undo and redo bring back.
+    pub(super) set_aside: Vec<(RigMesh, MeshSource)>,
     /// Marks that the place of the journal is known, and that a notice was sent if it is not the usual one.
     pub(super) is_placed: bool,
 }
@@ -122,7 +124,7 @@ pub(super) fn meshes(world: &World, rig: Entity) -> Vec<(Entity, &RigMesh, Optio
     meshes
 }
 
-/// Context stored in the journal besides the rig: the open meshes.
+/// Context stored in the journal besides the rig: the open meshes, and those that are set aside.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub(in crate::editor) struct Context {
@@ -130,12 +132,32 @@ pub(in crate::editor) struct Context {
     pub meshes: Vec<ContextMesh>,
 }
 
-/// An open mesh.
+/// A mesh of a document.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(in crate::editor) struct ContextMesh {
     pub uid: Uid,
     pub source: MeshSource,
     pub nodes: Vec<Uid>,
+    /// Marks a mesh that was not in the document when this was written. Changes of the journal that name the mesh count
+    /// more.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_set_aside: bool,
+}
+
+impl ContextMesh {
+    pub fn of(mesh: &RigMesh, source: &MeshSource, is_set_aside: bool) -> Self {
+        Self { uid: mesh.uid, source: source.clone(), nodes: mesh.nodes.to_vec(), is_set_aside }
+    }
+}
+
+/// Context of the open document under a name.
+pub(super) fn context(world: &World, rig: Entity, name: String) -> Context {
+    let open = meshes(world, rig).into_iter();
+    let mut listed: Vec<ContextMesh> =
+        open.filter_map(|(_, mesh, source)| Some(ContextMesh::of(mesh, source?, false))).collect();
+    let set_aside = world.get::<OpenDocument>(rig).into_iter().flat_map(|document| &document.set_aside);
+    listed.extend(set_aside.map(|(mesh, source)| ContextMesh::of(mesh, source, true)));
+    Context { name, meshes: listed }
 }
 
 impl Context {

@@ -22,9 +22,10 @@ use crate::{
     algo::face::expression::{ExpressionSet, vrm_mixes},
     editor::counts::counted,
     files::{
-        DocumentBase, FileKind, LoadError, RealDisk, StoreError, TemplateOrigin, is_template_of, load_animation,
-        load_model, load_packed_clips, load_rig_text, load_skin, load_template, stem, store_animation, store_avatar,
-        store_document_over, store_model, store_packed_clips, store_rig_from, store_skin,
+        Disk, DocumentBase, FileKind, LoadError, RealDisk, StopSign, StoppableDisk, StoreError, TemplateOrigin,
+        is_template_of, load_animation, load_model, load_packed_clips, load_rig_text, load_skin, load_template, stem,
+        store_animation, store_avatar, store_document_over, store_model, store_packed_clips, store_rig_from,
+        store_skin,
     },
     instance::RigSource,
     mesh::{gltf::GltfWriteSettings, model::Model},
@@ -39,6 +40,7 @@ use crate::{
         animation::NodeNames,
         bake::baked,
         character::{Character, character, mark_joints},
+        nearest::listed,
         skeleton_preset::{SkeletonPreset, apply_preset},
         skin::{SkinFile, SkinJoint},
         vrm::{AvatarError, AvatarSource, ExpressionRecipe, avatar_meta, hang_half_joints},
@@ -90,9 +92,7 @@ pub(super) fn export(world: &mut World, path: PathBuf) {
     }
     let Some(rig) = active(world) else { return };
     let Some(data) = settled(world, rig) else { return };
-    let open = meshes(world, rig);
-    let more = open.len().saturating_sub(1);
-    let mesh = open.into_iter().next().map(|(_, mesh, _)| mesh.clone());
+    let open: Vec<RigMesh> = meshes(world, rig).into_iter().map(|(_, mesh, _)| mesh.clone()).collect();
     let (step, name) = (last_step(world, rig), file_name(&path));
     let built = world.get::<BuildResult>(rig).map(|built| built.0.clone());
     let Some(modules) = world.get_resource::<RigModules>().map(|modules| modules.0.clone()) else { return };
@@ -105,14 +105,15 @@ pub(super) fn export(world: &mut World, path: PathBuf) {
     let options = world.get_resource::<ExportOptions>().cloned().unwrap_or_default();
     let FaceExpressions(expressions) = world.get_resource().cloned().unwrap_or_default();
     let names = animated_names(world, &data);
+    let sign = StopSign::default();
+    let heeded = sign.clone();
     let task = spawn(move || {
+        let disk = StoppableDisk::new(&RealDisk, heeded);
         let (built, base) = (built.as_deref(), DocumentBase { rig: base.as_deref(), parts: &parts });
-        let (mesh, expressions, names) = (mesh.as_ref(), &*expressions, &names);
-        let source = ExportSource { rig: &data, built, modules: &modules, expressions, mesh, base, names };
-        let mut notes = source.write(&path, template.as_deref(), &options)?;
-        if more > 0 {
-            notes.push(format!("only the first mesh was exported; {more} more are open"));
-        }
+        let (meshes, expressions, names) = (&*open, &*expressions, &names);
+        let source =
+            ExportSource { disk: &disk, rig: &data, built, modules: &modules, expressions, meshes, base, names };
+        let notes = source.write(&path, template.as_deref(), &options)?;
         let checked = check(&path);
         let is_followed = match &template {
             Some(template) => *template == path,
@@ -121,17 +122,19 @@ pub(super) fn export(world: &mut World, path: PathBuf) {
         let template = is_followed.then(|| (path, Arc::new(data)));
         Ok(SavedContent::Export { checked, notes, template })
     });
-    world.resource_mut::<SaveJob>().begin(Job { name, rig, step, task, then: None });
+    world.resource_mut::<SaveJob>().begin(Job { name, rig, step, task, sign, then: None });
 }
 
 /// Document that is exported.
 struct ExportSource<'a> {
+    disk: &'a dyn Disk,
     rig: &'a Rig,
     built: Option<&'a BuiltRig>,
     modules: &'a Arc<Modules>,
     /// Expressions of faces.
     expressions: &'a ExpressionSet,
-    mesh: Option<&'a RigMesh>,
+    /// Meshes of the rig, which are one file together.
+    meshes: &'a [RigMesh],
     /// The version of the template that the document took over last.
     base: DocumentBase<'a>,
     /// Names of animated nodes that the window knows.
@@ -140,14 +143,14 @@ struct ExportSource<'a> {
 
 impl ExportSource<'_> {
     fn write(&self, path: &Path, template: Option<&Path>, options: &ExportOptions) -> Result<Vec<String>, WriteError> {
-        let (rig, mesh) = (self.rig, self.mesh);
+        let rig = self.rig;
         match FileKind::of(path) {
             Some(FileKind::Vrm) => self.avatar(path, options),
             Some(FileKind::Glb | FileKind::Gltf | FileKind::Obj) => {
                 let mut model = self.character();
                 self.mark_joints(&mut model);
                 put_clips(&mut model, rig, self.built, self.modules)?;
-                let mut notes = Vec::new();
+                let mut notes = self.loose_meshes();
                 if options.preset != SkeletonPreset::Plain
                     && takes_preset(path)
                     && apply_preset(&mut model, options.preset).is_none()
@@ -155,21 +158,21 @@ impl ExportSource<'_> {
                     notes.push("no human was found in the skeleton: names and axes stay".to_owned());
                 }
                 // Without weights no joint deforms, and none would be written.
-                let is_bare = mesh.is_none_or(|mesh| rig.skin(mesh.uid).is_none());
+                let is_bare = self.meshes.iter().all(|mesh| rig.skin(mesh.uid).is_none());
                 let settings = GltfWriteSettings { all_joints: is_bare, ..default() };
-                notes.extend(store_model(&RealDisk, path, &model, &settings)?);
+                notes.extend(store_model(self.disk, path, &model, &settings)?);
                 Ok(notes)
             }
             Some(FileKind::Animation) if rig.clips().is_empty() => Err(WriteError::NoClips),
             Some(FileKind::Animation) => {
                 let mut clips = rig.clips().to_vec();
                 clips.iter_mut().for_each(|clip| clip.names.extend(self.names));
-                store_animation(&RealDisk, path, rig, self.built, &clips)?;
+                store_animation(self.disk, path, rig, self.built, &clips)?;
                 Ok(Vec::new())
             }
             Some(FileKind::PackedClips) if rig.clips().is_empty() => Err(WriteError::NoClips),
             Some(FileKind::PackedClips) => {
-                store_packed_clips(&RealDisk, path, &packed_clips(rig, self.built, self.modules)?)?;
+                store_packed_clips(self.disk, path, &packed_clips(rig, self.built, self.modules)?)?;
                 Ok(Vec::new())
             }
             Some(FileKind::Template | FileKind::RigText) => {
@@ -178,13 +181,18 @@ impl ExportSource<'_> {
                 Ok(self.store_rig(path, &sources)?)
             }
             Some(FileKind::Skin) => {
-                let both = mesh.and_then(|mesh| Some((mesh, rig.skin(mesh.uid)?)));
-                let (mesh, skin) = both.ok_or(WriteError::NoWeights)?;
+                let mut bound = self.meshes.iter().filter_map(|mesh| Some((mesh, rig.skin(mesh.uid)?)));
+                let (mesh, skin) = bound.next().ok_or(WriteError::NoWeights)?;
+                let others: Vec<&str> = bound.map(|(mesh, _)| mesh.file.name.as_str()).collect();
                 let joints = SkinJoint::list(rig, skin);
                 let file = SkinFile::new(joints, skin.weights.clone(), &mesh.rest.points, &mesh.triangles, true);
                 let file = file?;
-                store_skin(&RealDisk, path, &file)?;
-                Ok(Vec::new())
+                store_skin(self.disk, path, &file)?;
+                let note = || {
+                    let (name, others) = (&mesh.file.name, listed(&others, "and"));
+                    format!("a .skin file is of one mesh, {name:?}: the weights of {others} are not in it")
+                };
+                Ok((!others.is_empty()).then(note).into_iter().collect())
             }
             _ => Err(WriteError::Ending),
         }
@@ -193,17 +201,39 @@ impl ExportSource<'_> {
     /// Saves the rig over its template. One that is in no file yet keeps the parts of the template of Rigsmith that it was made
     /// from, by a fit for example.
     fn store_rig(&self, path: &Path, sources: &[&Path]) -> Result<Vec<String>, StoreError> {
-        let is_known = sources.iter().any(|source| is_template_of(&RealDisk, source, self.rig.uid()));
+        let is_known = sources.iter().any(|source| is_template_of(self.disk, source, self.rig.uid()));
         let is_first = FileKind::of(path) == Some(FileKind::Template) && !is_known;
         match is_first.then(|| TemplateOrigin::of(self.rig)).flatten() {
-            Some(origin) => store_rig_from(&RealDisk, path, self.rig, &origin),
-            None => store_document_over(&RealDisk, path, self.rig, self.base, sources),
+            Some(origin) => store_rig_from(self.disk, path, self.rig, &origin),
+            None => store_document_over(self.disk, path, self.rig, self.base, sources),
         }
     }
 
-    /// The character at rest, with its mesh and weights.
+    /// The character at rest, with all its meshes and their weights.
     fn character(&self) -> Model {
-        let (rig, mesh) = (self.rig, self.mesh);
+        let mut models = self.meshes.iter().map(|mesh| self.character_of(Some(mesh)));
+        let mut model = models.next().unwrap_or_else(|| self.character_of(None));
+        models.for_each(|more| model.append(more));
+        model
+    }
+
+    /// Notes about meshes that stay where they are when joints of the file move, beside others that follow them.
+    fn loose_meshes(&self) -> Vec<String> {
+        let is_bound = |mesh: &RigMesh| self.rig.skin(mesh.uid).is_some();
+        if !self.meshes.iter().any(is_bound) {
+            return Vec::new();
+        }
+        let is_loose = |mesh: &RigMesh| !is_bound(mesh) && mesh.file.objects.iter().any(|object| object.node.is_none());
+        let names: Vec<&str> =
+            self.meshes.iter().filter(|mesh| is_loose(mesh)).map(|mesh| mesh.file.name.as_str()).collect();
+        let note =
+            || format!("joints do not move {}, without weights; the Skinning panel binds it", listed(&names, "and"));
+        (!names.is_empty()).then(note).into_iter().collect()
+    }
+
+    /// The rig with one of its meshes, or without any.
+    fn character_of(&self, mesh: Option<&RigMesh>) -> Model {
+        let rig = self.rig;
         let empty = Model { name: rig.about().name.clone(), ..default() };
         character(&Character {
             rig,
@@ -246,7 +276,7 @@ impl ExportSource<'_> {
         let made = make_avatar(&mut model, &source, meta, &recipes)?;
         // Bones of the human are written whether skin hangs on them or not.
         let settings = GltfWriteSettings { all_joints: true, ..default() };
-        store_avatar(&RealDisk, path, &model, &made.avatar, &settings)?;
+        store_avatar(self.disk, path, &model, &made.avatar, &settings)?;
         Ok(made.notes)
     }
 }

@@ -1,6 +1,6 @@
 //! Opening in the background; the open document stays until the next one is complete.
 
-use std::{path::Path, sync::Arc};
+use std::path::{Path, PathBuf};
 
 use bevy::{
     prelude::*,
@@ -16,7 +16,9 @@ use super::{
         places,
     },
     error::OpenError,
-    file_name, template, view,
+    file_name,
+    load_job::{HeldDocument, Job, LoadJob},
+    template, view,
 };
 use crate::{
     editor::{
@@ -44,48 +46,11 @@ use crate::{
         animation::file_clip::rig_clips,
         character::{import_rig_text, import_skeleton},
         project::ProjectView,
-        step::Step,
     },
 };
 
 /// Largest number of bytes of a file that are hashed.
 const MAX_HASHED: u64 = 1 << 30;
-
-/// Document that is being opened.
-#[derive(Resource, Default)]
-pub struct LoadJob {
-    job: Option<Job>,
-    /// Loaded document that waits for an answer about changes that were made while it loaded.
-    held: Option<(String, Box<LoadedDocument>)>,
-}
-
-struct Job {
-    name: String,
-    task: Task<Result<LoadedFile, OpenError>>,
-    /// Last step of the open document when its loss was accepted.
-    confirmed: Option<Arc<Step>>,
-    /// True if nobody has been asked yet about changes that would be lost.
-    asks: bool,
-}
-
-impl LoadJob {
-    /// Name of the document that is being opened.
-    pub fn name(&self) -> Option<&str> {
-        self.job.as_ref().map(|job| job.name.as_str())
-    }
-
-    /// Stops opening; returns the name of the document, which is not opened.
-    pub(in crate::editor) fn stop(&mut self) -> Option<String> {
-        self.job.take().map(|job| job.name)
-    }
-
-    /// Has unsaved changes asked about once it is known that they would be lost.
-    pub(super) fn ask_later(&mut self) {
-        if let Some(job) = &mut self.job {
-            job.asks = true;
-        }
-    }
-}
 
 /// Result of opening a file.
 pub(in crate::editor) enum LoadedFile {
@@ -101,6 +66,8 @@ pub(in crate::editor) struct LoadedDocument {
     pub rig: Rig,
     pub meshes: Vec<(RigMesh, MeshSource)>,
     pub missing: Vec<MeshToSave>,
+    /// Meshes of recovered work that undo and redo bring back.
+    pub set_aside: Vec<(RigMesh, MeshSource)>,
     pub view: Option<ProjectView>,
     pub project: Option<std::path::PathBuf>,
     /// Template that the rig of a project follows, and the version that it took over last.
@@ -129,6 +96,7 @@ impl LoadedDocument {
             rig,
             meshes: Vec::new(),
             missing: Vec::new(),
+            set_aside: Vec::new(),
             view: None,
             project: None,
             followed: None,
@@ -182,6 +150,7 @@ pub(super) fn is_rig_file(path: &Path) -> bool {
 /// Starts opening in the background; a previous attempt is dropped.
 pub(super) fn start(world: &mut World, request: OpenRequest) {
     let mut uids = UidSource::seeded(world.resource_mut::<UidSource>().next_uid().0);
+    let mut behind = Vec::new();
     let (name, task) = match request {
         OpenRequest::Bundled => model(bundle::BODY.to_owned(), uids),
         OpenRequest::Model(name) => model(name, uids),
@@ -192,21 +161,32 @@ pub(super) fn start(world: &mut World, request: OpenRequest) {
             let open = move || Ok(document(LoadedDocument::named("untitled", Rig::new(uids.next_uid(), "untitled"))));
             ("an empty rig".to_owned(), spawn(open))
         }
-        OpenRequest::File(path) => {
-            let path = std::path::absolute(&path).unwrap_or(path);
-            let limits = world.get_resource::<RigLimits>().cloned().unwrap_or_default();
-            (file_name(&path), spawn(move || limited_file(&path, &mut uids, &limits)))
+        OpenRequest::File(path) => file_task(world, path, uids),
+        OpenRequest::Files { first, others } => {
+            behind = others;
+            file_task(world, first, uids)
         }
     };
     begin(world, name, task);
+    if let Some(job) = &mut world.resource_mut::<LoadJob>().job {
+        job.behind = behind;
+    }
+}
+
+/// Starts to read a file.
+fn file_task(world: &World, path: PathBuf, mut uids: UidSource) -> (String, Task<Result<LoadedFile, OpenError>>) {
+    let path = std::path::absolute(&path).unwrap_or(path);
+    let limits = world.get_resource::<RigLimits>().cloned().unwrap_or_default();
+    (file_name(&path), spawn(move || limited_file(&path, &mut uids, &limits)))
 }
 
 /// Registers `task` as the document that is being opened.
 pub(in crate::editor) fn begin(world: &mut World, name: String, task: Task<Result<LoadedFile, OpenError>>) {
     let confirmed = active(world).and_then(|rig| last_step(world, rig));
     let mut loading = world.resource_mut::<LoadJob>();
-    loading.job = Some(Job { name, task, confirmed, asks: false });
+    loading.job = Some(Job { name, task, confirmed, asks: false, adds: false, behind: Vec::new() });
     loading.held = None;
+    loading.further.clear();
 }
 
 /// Runs long work on a background thread.
@@ -323,15 +303,23 @@ pub(super) fn poll(world: &mut World) {
     let mut loading = world.resource_mut::<LoadJob>();
     let Some(job) = &mut loading.bypass_change_detection().job else { return };
     let Some(result) = check_ready(&mut job.task) else { return };
-    let Some(Job { name, confirmed, asks, .. }) = loading.job.take() else { return };
+    let Some(Job { name, confirmed, asks, adds, behind, .. }) = loading.job.take() else { return };
+    let has_more = !behind.is_empty();
+    if result.is_ok() {
+        loading.further.extend(behind);
+    }
     match result {
         Err(error) => {
             world.write_message(Notice::error(format!("Could not open {name}: {error}")));
+            if has_more {
+                world.write_message(Notice::info(format!("The files beside {name} were not opened, either")));
+            }
             if active(world).is_none() {
                 start(world, OpenRequest::Empty);
             }
         }
         Ok(LoadedFile::Template(opened)) if template::has_mesh(world) => template::consider(world, *opened),
+        Ok(LoadedFile::Document(opened)) if adds && active(world).is_some() => added_mesh::add(world, &name, *opened),
         Ok(LoadedFile::Document(opened)) if added_mesh::is_alone(&opened) && added_mesh::is_awaited(world) => {
             added_mesh::put(world, &name, *opened);
         }
@@ -342,7 +330,9 @@ pub(super) fn poll(world: &mut World) {
                 .and_then(|rig| world.get::<OpenDocument>(rig));
             match changed.map(|document| document.name.clone()) {
                 Some(document) => {
-                    world.resource_mut::<LoadJob>().held = Some((name, opened));
+                    let mut loading = world.resource_mut::<LoadJob>();
+                    let further = std::mem::take(&mut loading.further);
+                    loading.held = Some(HeldDocument { name, opened, further });
                     world.resource_mut::<Dialog>().ask(Question::Unsaved { name: document, then: FollowUp::Land });
                 }
                 None => land(world, &name, *opened),
@@ -353,8 +343,10 @@ pub(super) fn poll(world: &mut World) {
 
 /// Takes over the held document; the open one may be lost.
 pub(super) fn land_held(world: &mut World) {
-    if let Some((name, opened)) = world.resource_mut::<LoadJob>().held.take() {
+    let held = world.resource_mut::<LoadJob>().held.take();
+    if let Some(HeldDocument { name, opened, further }) = held {
         land(world, &name, *opened);
+        world.resource_mut::<LoadJob>().further = further;
     }
 }
 
@@ -369,6 +361,7 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
         rig,
         meshes,
         missing,
+        set_aside,
         view: kept,
         project,
         followed,
@@ -388,13 +381,9 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
         world.resource_mut::<EditorSettings>().remember(path.to_owned());
     }
     let clips = if matches!(origin, Origin::Mesh { .. }) { rig.clips().len() } else { 0 };
-    let context = Context {
-        name: title.clone(),
-        meshes: meshes
-            .iter()
-            .map(|(mesh, source)| ContextMesh { uid: mesh.uid, source: source.clone(), nodes: mesh.nodes.to_vec() })
-            .collect(),
-    };
+    let listed = meshes.iter().map(|(mesh, source)| ContextMesh::of(mesh, source, false));
+    let listed = listed.chain(set_aside.iter().map(|(mesh, source)| ContextMesh::of(mesh, source, true)));
+    let context = Context { name: title.clone(), meshes: listed.collect() };
     world.write_message(DocumentLanded { origin: origin.clone() });
     // A journal left by a crash beside the project stays there until a person decides about it.
     let places = places(world, project.clone().filter(|_| pending.is_none()));
@@ -422,8 +411,17 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     };
     let sink = watched(journal.clone());
     let saved = if is_recovered { SavedAt::Nowhere } else { SavedAt::Step(None) };
-    let document =
-        OpenDocument { name: title.clone(), project, template, base, saved, journal, missing, is_placed: false };
+    let document = OpenDocument {
+        name: title.clone(),
+        project,
+        template,
+        base,
+        saved,
+        journal,
+        missing,
+        set_aside,
+        is_placed: false,
+    };
     let entity = world.spawn((bundle, sink, document)).id();
     for (mesh, source) in meshes {
         world.spawn((mesh, source, SkinOf(entity)));

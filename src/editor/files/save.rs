@@ -16,7 +16,7 @@ use super::{
     FollowUp, active, after_asking,
     bundle::{BODY, BundledModel},
     dialog::Purpose,
-    document::{Context, ContextMesh, MeshSource, OpenDocument, SavedAt, last_step, meshes, places},
+    document::{MeshSource, OpenDocument, SavedAt, context, last_step, meshes, places},
     error::WriteError,
     export, file_name,
     open::spawn,
@@ -32,7 +32,8 @@ use crate::{
         settings::EditorSettings,
     },
     files::{
-        Disk, FileKind, LoadError, MeshShape, MeshToSave, ProjectTemplate, ProjectToSave, RealDisk,
+        Disk, FileKind, LoadError, MeshShape, MeshToSave, ProjectTemplate, ProjectToSave, RealDisk, StopSign,
+        StoppableDisk,
         journal::{Journal, SaveMark},
         project_files, read_capped, save_atomic, save_set, stem,
     },
@@ -56,6 +57,13 @@ impl SaveJob {
     /// Name of the file that is being saved.
     pub fn name(&self) -> Option<&str> {
         self.job.as_ref().map(|job| job.name.as_str())
+    }
+
+    /// Has the writing stopped; the file stays as it was, unless it is replaced already.
+    pub(in crate::editor) fn stop(&self) {
+        if let Some(job) = &self.job {
+            job.sign.stop();
+        }
     }
 
     /// Takes a job up, while there is no other.
@@ -85,6 +93,8 @@ pub(super) struct Job {
     /// Last step in the snapshot.
     pub step: Option<Arc<Step>>,
     pub task: Task<Result<SavedContent, WriteError>>,
+    /// Wish to stop.
+    pub sign: StopSign,
     pub then: Option<FollowUp>,
 }
 
@@ -228,11 +238,17 @@ pub(super) fn project(world: &mut World, path: PathBuf, then: Option<FollowUp>) 
     snapshot.name = stem(&path);
     let position = journal.position();
     let (step, name) = (last_step(world, rig), file_name(&path));
-    let task = spawn(move || store(snapshot, bundled.as_deref(), path, &journal, position));
-    world.resource_mut::<SaveJob>().job = Some(Job { name, rig, step, task, then });
+    let sign = StopSign::default();
+    let heeded = sign.clone();
+    let task = spawn(move || {
+        let disk = StoppableDisk::new(&RealDisk, heeded);
+        store(&disk, snapshot, bundled.as_deref(), path, &journal, position)
+    });
+    world.resource_mut::<SaveJob>().job = Some(Job { name, rig, step, task, sign, then });
 }
 
 fn store(
+    disk: &dyn Disk,
     mut project: ProjectToSave,
     bundled: Option<&str>,
     path: PathBuf,
@@ -245,12 +261,12 @@ fn store(
             mesh.path.clone_from(bundled);
         }
     }
-    let files = project_files(&RealDisk, &path, &project)?;
+    let files = project_files(disk, &path, &project)?;
     let mark = SaveMark { path, hash: files.hash(), position };
     if let Err(reason) = journal.saving(mark.clone(), Duration::from_secs(2)) {
         debug!("the save is not noted in the journal: {reason}");
     }
-    save_set(&RealDisk, &files.set)?;
+    save_set(disk, &files.set)?;
     Ok(SavedContent::Project { mark, notes: files.notes, bundled })
 }
 
@@ -279,7 +295,7 @@ pub(super) fn poll(world: &mut World) {
     let mut saving = world.resource_mut::<SaveJob>();
     let Some(job) = &mut saving.bypass_change_detection().job else { return };
     let Some(result) = check_ready(&mut job.task) else { return };
-    let Some(Job { name, rig, step, then, .. }) = saving.job.take() else { return };
+    let Some(Job { name, rig, step, sign, then, .. }) = saving.job.take() else { return };
     let next = saving.waiting.pop_front();
     let is_done = result.is_ok();
     match result {
@@ -300,6 +316,9 @@ pub(super) fn poll(world: &mut World) {
                 let text = format!("The rig follows {name} from now on: what is changed there comes to the Updater");
                 world.write_message(Notice::info(text));
             }
+        }
+        Err(_) if sign.has_refused() => {
+            world.write_message(Notice::info(format!("{name} is not written: it was stopped")));
         }
         Err(error) => {
             world.write_message(Notice::error(format!("Could not write {name}: {error}")));
@@ -349,15 +368,7 @@ fn saved(world: &mut World, rig: Entity, step: Option<Arc<Step>>, mark: SaveMark
         }
     }
     let places = places(world, Some(mark.path.clone()));
-    let context = Context {
-        name: stem(&mark.path),
-        meshes: meshes(world, rig)
-            .into_iter()
-            .filter_map(|(_, mesh, source)| {
-                Some(ContextMesh { uid: mesh.uid, source: source?.clone(), nodes: mesh.nodes.to_vec() })
-            })
-            .collect(),
-    };
+    let context = context(world, rig, stem(&mark.path));
     world.resource_mut::<EditorSettings>().remember(mark.path.clone());
     let Some(mut document) = world.get_mut::<OpenDocument>(rig) else { return };
     document.saved = SavedAt::Step(step);

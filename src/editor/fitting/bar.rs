@@ -5,7 +5,11 @@ use std::sync::OnceLock;
 use bevy::prelude::*;
 use bevy_egui::egui;
 
-use super::{ShowDoubt, doubts::paint_rings};
+use super::{
+    ShowDoubt,
+    again::{FitAgain, FitWish},
+    doubts::paint_rings,
+};
 use crate::{
     editor::{
         ActiveRig,
@@ -15,7 +19,7 @@ use crate::{
         panel::{Requests, ViewportPainter},
         tools::region::{ChosenFaces, RegionSkeleton, RegionTool},
     },
-    files::{TemplatePlace, bundled_parts},
+    files::{BUNDLED_CHARACTERS, TemplatePlace, bundled_parts},
     plugins::{
         document::Selection,
         fit::{EndFit, FitJob, FitMarkers, FittedRig, RemoveMarker, region::triangles_of_joints},
@@ -79,8 +83,11 @@ fn corrections(ui: &mut egui::Ui, rig: Entity, fitted: &FittedRig, world: &World
         0 => "no doubt".to_owned(),
         more => counted(more, "doubtful joint", "doubtful joints"),
     };
-    if doubtful > 0 {
+    if doubtful > 0 || fitted.report.warnings().next().is_some() {
         egui::ScrollArea::vertical().max_height(LIST_HEIGHT).show(ui, |ui| {
+            for note in fitted.report.warnings() {
+                ui.label(note.to_string());
+            }
             for (joint, name, fit) in fitted.report.doubts() {
                 let text = format!("{name}: {}", fit.reason);
                 if ui.link(text).on_hover_text("Select the joint and go there").clicked() {
@@ -90,6 +97,7 @@ fn corrections(ui: &mut egui::Ui, rig: Entity, fitted: &FittedRig, world: &World
         });
     }
     markers(ui, rig, world, requests);
+    choice(ui, rig, fitted, requests);
     ui.horizontal(|ui| {
         let joints = counted(fitted.report.joints.len(), "joint", "joints");
         ui.label(format!("{}: {joints}, {doubt}", fitted.report.template));
@@ -103,6 +111,26 @@ fn corrections(ui: &mut egui::Ui, rig: Entity, fitted: &FittedRig, world: &World
             if ui.button(text).on_hover_text(key).clicked() {
                 requests.send(EndFit { rig, cancel });
             }
+        }
+    });
+}
+
+/// Widgets that begin the fit anew: another template in place of the one that was fitted, and the other front.
+fn choice(ui: &mut egui::Ui, rig: Entity, fitted: &FittedRig, requests: &mut Requests) {
+    ui.horizontal(|ui| {
+        if fitted.has_own_template {
+            let own = &fitted.report.template;
+            egui::ComboBox::from_label("Template").selected_text(own).show_ui(ui, |ui| {
+                for (name, _) in BUNDLED_CHARACTERS {
+                    if ui.selectable_label(own == name, *name).clicked() && own != name {
+                        requests.send(FitAgain { rig, wish: FitWish::Template((*name).to_owned()) });
+                    }
+                }
+            });
+        }
+        let button = ui.button("Turn round");
+        if button.on_hover_text("Fit again with the front where the back is").clicked() {
+            requests.send(FitAgain { rig, wish: FitWish::TurnRound });
         }
     });
 }

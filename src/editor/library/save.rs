@@ -19,7 +19,7 @@ use crate::{
         files::{ExportRequest, OpenDocument, loading::settled},
         notice::Notice,
     },
-    files::{FileKind, RealDisk, SaveError, StoreError, save_atomic, stem, store_rig},
+    files::{FileKind, RealDisk, SaveError, StoreError, save_atomic, stem, store_short_rig},
     instance::RigSource,
     plugins::{
         document::{Change, EditRequest},
@@ -233,7 +233,7 @@ fn refusal(world: &World, path: &Path, name: &str, may_replace: bool) -> Option<
 
 fn write_joints(path: &Path, rig: &Rig, joints: &[Uid]) -> Result<SaveProgress, SaveFailure> {
     let Extraction { rig: out, left } = extract(rig, joints, &stem(path), None)?;
-    let mut notes = store_rig(&RealDisk, path, &out)?;
+    let mut notes = store_short_rig(&RealDisk, path, &out)?;
     notes.extend(left);
     Ok(SaveProgress::Joints(out.len(), notes))
 }

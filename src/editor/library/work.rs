@@ -151,6 +151,12 @@ impl LibraryJobs {
         waiting.map(|job| job.request.place.stem())
     }
 
+    /// Stops reading a template; returns its name.
+    pub(in crate::editor) fn stop(&mut self) -> Option<String> {
+        let stopped = self.job.take_if(|job| matches!(job.work, Work::Runs(_)));
+        stopped.map(|job| job.request.place.stem())
+    }
+
     /// Drops a template that waits; returns its name.
     pub fn drop_waiting(&mut self) -> Option<String> {
         let dropped = self.job.take_if(|job| matches!(job.work, Work::Waits(_)));

@@ -10,6 +10,7 @@ use crate::{
     editor::{
         actions::{Action, ActionRequest},
         counts::counted,
+        files::RemoveMeshRequest,
         help::describe,
         keys::KeyBindings,
         onion::{ONION_COUNTS, OnionSkin, OnionStep},
@@ -119,8 +120,10 @@ fn meshes(ui: &mut Ui, world: &World, requests: &mut Requests) {
             name => name.to_owned(),
         };
         let mut on = !hidden.hides(mesh.uid);
-        let clicked =
-            ui.push_id(mesh.uid, |ui| ui.indent("mesh", |ui| ui.checkbox(&mut on, name).clicked()).inner).inner;
+        let (clicked, is_removed) = ui.push_id(mesh.uid, |ui| row(ui, &mut on, &name, meshes.len() > 1)).inner;
+        if is_removed {
+            requests.send(RemoveMeshRequest(mesh.uid));
+        }
         if clicked {
             // The switch of one mesh ends the common one.
             let mut next = HiddenMeshes { all: false, meshes: hidden.meshes.clone() };
@@ -135,6 +138,25 @@ fn meshes(ui: &mut Ui, world: &World, requests: &mut Requests) {
             requests.set(next);
         }
     }
+}
+
+/// Draws the switch of a mesh, and a button that removes the mesh where it is not the only one. Returns which of them is
+/// clicked.
+fn row(ui: &mut Ui, on: &mut bool, name: &str, is_one_of_several: bool) -> (bool, bool) {
+    let draw = |ui: &mut Ui| {
+        if !is_one_of_several {
+            return (ui.checkbox(on, name).clicked(), false);
+        }
+        let both = |ui: &mut Ui| {
+            let clicked = ui.checkbox(on, name).clicked();
+            let button = ui.small_button("Remove").on_hover_text("Take the mesh out of the document; its file stays");
+            let said = format!("Remove {name}");
+            button.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, &said));
+            (clicked, button.clicked())
+        };
+        ui.horizontal(both).inner
+    };
+    ui.indent("mesh", draw).inner
 }
 
 /// Draws the switch of the onion skin, and the number and distance of its poses.

@@ -14,6 +14,7 @@ use super::{
     fields::{self, TypedText},
     list,
     log::LogSystems,
+    weights::meshes::choose,
 };
 use crate::{
     algo::face::{
@@ -133,6 +134,8 @@ const DENSITIES: RangeInclusive<usize> = 4..=150;
 /// The panel.
 #[derive(Default)]
 pub struct FacePanel {
+    /// Mesh whose face is shown; without a choice, the first one with a face.
+    chosen: Option<Uid>,
     settings: AutoSettings,
     shown: Option<FaceData>,
     /// Strengths while a slider is dragged.
@@ -170,8 +173,9 @@ impl EditorPanel for FacePanel {
         let Some(shown) = DisplayedRig::of(world) else {
             return list::nothing(ui, "No rig is open.");
         };
-        let first = world.get::<RigMeshes>(shown.entity).and_then(|meshes| meshes.iter().next());
-        let Some((entity, mesh)) = first.and_then(|entity| Some((entity, world.get::<RigMesh>(entity)?))) else {
+        let meshes = world.get::<RigMeshes>(shown.entity);
+        let meshes: Vec<Entity> = meshes.map(|meshes| meshes.iter().collect()).unwrap_or_default();
+        let Some((entity, mesh)) = self.mesh(ui, world, &shown, meshes) else {
             return list::nothing(ui, "Open a head, or a character with one, to place a face in it.");
         };
         self.renew(&shown, (entity, mesh.uid), world.get::<Face>(entity));
@@ -201,6 +205,34 @@ impl EditorPanel for FacePanel {
 }
 
 impl FacePanel {
+    /// The mesh that was chosen, else the first one with a face, else the first one; draws the choice where there are several.
+    fn mesh<'w>(
+        &mut self,
+        ui: &mut Ui,
+        world: &'w World,
+        shown: &DisplayedRig,
+        meshes: Vec<Entity>,
+    ) -> Option<(Entity, &'w RigMesh)> {
+        let meshes: Vec<(Entity, &RigMesh)> =
+            meshes.into_iter().filter_map(|entity| Some((entity, world.get::<RigMesh>(entity)?))).collect();
+        let has_face = |entity: Entity, mesh: &RigMesh| {
+            world.get::<Face>(entity).is_some() || shown.rig.face_cut(mesh.uid).is_some()
+        };
+        let chosen = meshes.iter().find(|(_, mesh)| Some(mesh.uid) == self.chosen);
+        let first = || meshes.iter().find(|(entity, mesh)| has_face(*entity, mesh)).or_else(|| meshes.first());
+        let (mut entity, mut mesh) = *chosen.or_else(first)?;
+        if meshes.len() > 1 {
+            let mut next = mesh.uid;
+            choose(ui, "Mesh", meshes.iter().map(|(_, mesh)| *mesh), &mut next);
+            if let Some(other) = meshes.iter().find(|(_, mesh)| mesh.uid == next).filter(|_| next != mesh.uid) {
+                (entity, mesh) = *other;
+                self.chosen = Some(next);
+                (self.held, self.is_placing) = (None, false);
+            }
+        }
+        Some((entity, mesh))
+    }
+
     /// Reads the rig's face again if the rig has changed. The settings go on from the face of a mesh that is shown anew, and
     /// follow the density and grouping of the document.
     fn renew(&mut self, shown: &DisplayedRig, (mesh, uid): (Entity, Uid), face: Option<&Face>) {
@@ -273,11 +305,15 @@ impl FacePanel {
         }
         fields::labelled(ui, "Bones", |ui| {
             ui.spacing_mut().slider_width = (ui.available_width() - 52.0).max(30.0);
-            let slider = ui.add(Slider::new(&mut self.settings.bones, DENSITIES).logarithmic(true));
+            let typed = TypedText::default();
+            let slider = Slider::new(&mut self.settings.bones, DENSITIES).logarithmic(true).update_while_editing(false);
+            let ends = *DENSITIES.start() as f64..=*DENSITIES.end() as f64;
+            let slider = fields::typed_field(ui, "Bones", slider.custom_parser(typed.whole_reader(ends, "")));
             let slider = slider.on_hover_text("Density: bones of the facial skin");
-            fields::named(ui, slider.id, "Bones");
+            let is_dropped = typed.is_refused() || ui.input(|input| input.key_pressed(egui::Key::Escape));
+            typed.tell(&slider, "Bones", requests);
             // Releasing the slider is enough: an existing face is placed again with the new density, in one step with it.
-            let is_released = slider.drag_stopped() || slider.lost_focus();
+            let is_released = slider.drag_stopped() || slider.lost_focus() && !is_dropped;
             if is_released && again {
                 requests.send(FaceRequest { mesh: entity, settings: self.settings.clone(), fit: None });
             } else if is_released {
@@ -293,8 +329,8 @@ impl FacePanel {
             fields::labelled(ui, "Seed", |ui| {
                 let typed = TypedText::default();
                 let field = DragValue::new(&mut self.settings.seed).speed(0.1).update_while_editing(false);
-                let field = ui.add(field.custom_parser(typed.reader(0.0..=MOST_SEED, "")));
-                fields::named(ui, field.id, "Seed");
+                let field = field.custom_parser(typed.whole_reader(0.0..=MOST_SEED, ""));
+                let field = fields::typed_field(ui, "Seed", field);
                 typed.tell(&field, "Seed", requests);
                 field.on_hover_text("The same seed gives the same bones");
             });
@@ -308,7 +344,7 @@ impl FacePanel {
         });
         let Some(face) = world.get::<Face>(entity) else { return };
         CollapsingHeader::new("Grouping").show(ui, |ui| {
-            if dendrogram::show(ui, &face.analysis, &mut self.settings.groups) {
+            if dendrogram::show(ui, &face.analysis, &mut self.settings.groups, requests) {
                 self.keep_cut(shown, mesh, requests);
             }
         });

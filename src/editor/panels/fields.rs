@@ -4,7 +4,7 @@ use std::{cell::Cell, ops::RangeInclusive};
 
 use bevy_egui::egui::{
     self, Align, Color32, DragValue, Id, Key, Layout, Rect, Response, RichText, Sense, Slider, SliderClamping,
-    TextEdit, Ui, WidgetInfo, WidgetType,
+    TextEdit, Ui, Widget, WidgetInfo, WidgetType,
     text::{CCursor, CCursorRange},
     text_edit::TextEditState,
     vec2,
@@ -132,39 +132,83 @@ enum NumberError {
     #[error("{0} is no weight; write one from 0 to 1")]
     NoWeight(f32),
     /// The number lies beyond the ends of its field.
-    #[error("{number} is none of its numbers; write one from {low} to {high}")]
+    #[error("{number} is none of its numbers; write one {}", ends(low, high))]
     Outside {
         /// The number.
         number: f64,
-        /// Least number of the field.
+        /// Least number of the field; minus infinity for none.
         low: f64,
-        /// Largest number of the field.
+        /// Largest number of the field; infinity for none.
         high: f64,
     },
+    /// The number has a fraction.
+    #[error("{0} is no whole number; write one such as 3")]
+    NotWhole(f64),
     /// The number makes no sense on the rig.
     #[error(transparent)]
     Proportion(#[from] ProportionError),
 }
 
+/// Words for the ends of a field.
+fn ends(low: &f64, high: &f64) -> String {
+    match (low.is_finite(), high.is_finite()) {
+        (true, false) => format!("of at least {low}"),
+        (false, true) => format!("of at most {high}"),
+        _ => format!("from {low} to {high}"),
+    }
+}
+
+/// The number that people read for one of few digits.
+pub(super) fn decimal(number: f32) -> f64 {
+    number.to_string().parse().unwrap_or_else(|_| f64::from(number))
+}
+
+/// Draws a field of egui's own under a name for screen readers. Escape leaves its text behind: by itself such a field takes the
+/// text over one frame after Escape, and another identity has none.
+pub(in crate::editor) fn typed_field(ui: &mut Ui, said: &str, field: impl Widget) -> Response {
+    let drops = ui.id().with((said, "dropped texts"));
+    let dropped = ui.data(|data| data.get_temp::<u32>(drops)).unwrap_or_default();
+    let response = ui.push_id((said, dropped), |ui| ui.add(field)).inner;
+    named(ui, response.id, said);
+    if response.lost_focus() && ui.input(|input| input.key_pressed(Key::Escape)) {
+        ui.data_mut(|data| data.insert_temp(drops, dropped.wrapping_add(1)));
+    }
+    response
+}
+
 /// Text that was typed into a field of egui's own and not taken. By itself such a field drops wrong texts, and cuts off numbers
 /// beyond its ends, without a word.
 #[derive(Default)]
-pub(super) struct TypedText(Cell<Option<NumberError>>);
+pub(in crate::editor) struct TypedText(Cell<Option<NumberError>>);
 
 impl TypedText {
     /// Reader of the texts of a field with two ends and a unit. The field must not be updated while a text is typed.
     pub fn reader(&self, ends: RangeInclusive<f64>, suffix: &'static str) -> impl Fn(&str) -> Option<f64> {
-        move |text| {
-            let number = parse(text, suffix);
-            let refused = match number {
-                Some(number) if ends.contains(&number) => None,
-                Some(number) => Some(NumberError::Outside { number, low: *ends.start(), high: *ends.end() }),
-                None => Some(NumberError::NoNumber(text.trim().to_owned())),
-            };
-            let is_taken = refused.is_none();
-            self.0.set(refused);
-            number.filter(|_| is_taken)
-        }
+        move |text| self.taken(read(text, &ends, suffix))
+    }
+
+    /// Reader as of [`Self::reader`], of a field that takes whole numbers only.
+    pub fn whole_reader(&self, ends: RangeInclusive<f64>, suffix: &'static str) -> impl Fn(&str) -> Option<f64> {
+        let whole = |number: f64| if number.fract() == 0.0 { Ok(number) } else { Err(NumberError::NotWhole(number)) };
+        move |text| self.taken(read(text, &ends, suffix).and_then(whole))
+    }
+
+    /// The number that was read; keeps the reason of a text that is not taken.
+    fn taken(&self, read: Result<f64, NumberError>) -> Option<f64> {
+        let (number, refused) = match read {
+            Ok(number) => (Some(number), None),
+            Err(reason) => (None, Some(reason)),
+        };
+        self.0.set(refused);
+        number
+    }
+
+    /// True if the last text was not taken.
+    pub fn is_refused(&self) -> bool {
+        let refused = self.0.take();
+        let is_refused = refused.is_some();
+        self.0.set(refused);
+        is_refused
     }
 
     /// Sends a notice if the text of a field was not taken.
@@ -220,6 +264,20 @@ impl Numbers {
     pub fn tell(&mut self, requests: &mut Requests) {
         if let Some((field, reason)) = self.refused.take() {
             requests.send(Notice::warning(format!("{field} stays as it was: {reason}.")));
+        }
+    }
+
+    /// The edit of a number whose field has two ends: a typed number beyond them is noted for [`Self::tell`], and a drag stops
+    /// at them.
+    pub fn between(&mut self, field: &str, edit: NumberEdit, [low, high]: [f32; 2]) -> Option<NumberEdit> {
+        match edit {
+            NumberEdit::Set(number) if !(low..=high).contains(&number) => {
+                let [number, low, high] = [number, low, high].map(decimal);
+                self.refused = Some((field.to_owned(), NumberError::Outside { number, low, high }));
+                None
+            }
+            NumberEdit::Preview(number) => Some(NumberEdit::Preview(number.min(high).max(low))),
+            other => Some(other),
         }
     }
 
@@ -410,6 +468,15 @@ pub(super) fn short(number: f64, decimals: usize) -> String {
     let text = format!("{number:.decimals$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// The number of a text, between two ends.
+fn read(text: &str, ends: &RangeInclusive<f64>, suffix: &str) -> Result<f64, NumberError> {
+    let number = parse(text, suffix).ok_or_else(|| NumberError::NoNumber(text.trim().to_owned()))?;
+    match ends.contains(&number) {
+        true => Ok(number),
+        false => Err(NumberError::Outside { number, low: *ends.start(), high: *ends.end() }),
+    }
 }
 
 /// A typed number: with a comma or a point, with or without its unit.

@@ -1,4 +1,5 @@
-//! Skinning panel: a button that computes weights for every mesh, and a report of the results.
+//! Skinning panel: a button that computes weights, and a report of the results. Beside meshes without weights, those that
+//! have some keep them.
 
 mod findings;
 mod parts;
@@ -47,6 +48,7 @@ impl Plugin for SkinningPanelPlugin {
             .init_resource::<SkinningClaims>()
             .add_message::<ActionRequest>()
             .add_message::<CancelSkinning>()
+            .add_message::<SkinMesh>()
             .add_message::<Notice>()
             .add_message::<BindAnswer>()
             .add_message::<ResultHeld>()
@@ -70,24 +72,32 @@ impl SkinningResults {
     }
 }
 
+/// Request to compute the weights of one mesh; the others keep theirs.
+#[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SkinMesh(pub Entity);
+
 /// Request to cancel all computations for the active rig; the weights stay unchanged.
 #[derive(Message, Debug, Clone, Copy)]
 pub struct CancelSkinning;
 
-/// Requests weights for every mesh, or sends a notice with the obstacle.
+/// Requests weights for the meshes that have none, for every mesh if that is none or each of them, or for single ones; or
+/// sends a notice with the obstacle.
 fn skin(
     mut actions: MessageReader<ActionRequest>,
+    mut singles: MessageReader<SkinMesh>,
     active: Option<Res<ActiveRig>>,
-    rigs: Query<(&Rig, Option<&RigMeshes>)>,
+    rigs: Query<(&Rig, Option<&RigMeshes>, Option<&BuildResult>)>,
     jobs: Query<&SkinningJob>,
     models: Query<&RigMesh>,
     (settings, parts, claims): (Res<SkinningSettings>, Res<SkinningParts>, Res<SkinningClaims>),
     mut commands: Commands,
 ) {
-    if !actions.read().any(|request| request.0 == Action::Skin) {
+    let is_for_all = actions.read().any(|request| request.0 == Action::Skin);
+    let singles: Vec<Entity> = singles.read().map(|request| request.0).collect();
+    if !is_for_all && singles.is_empty() {
         return;
     }
-    let Some((rig, meshes)) = active.and_then(|active| rigs.get(active.0).ok()) else { return };
+    let Some((rig, meshes, built)) = active.and_then(|active| rigs.get(active.0).ok()) else { return };
     let meshes: Vec<Entity> = meshes.iter().flat_map(|meshes| meshes.iter()).collect();
     if let Some(progress) = meshes.iter().find_map(|mesh| jobs.get(*mesh).ok()).map(SkinningJob::progress) {
         let percent = (progress * 100.0) as u32;
@@ -99,7 +109,22 @@ fn skin(
         commands.write_message(Notice::warning(obstacle));
         return;
     }
-    for mesh in meshes {
+    let built = built.map(|built| &*built.0);
+    let models_of = |mesh: &Entity| models.get(*mesh).ok();
+    let (bare, bound): (Vec<Entity>, Vec<Entity>) =
+        meshes.iter().copied().partition(|mesh| models_of(mesh).is_some_and(|model| needs_weights(rig, built, model)));
+    let asked: Vec<Entity> = match is_for_all {
+        false => meshes.into_iter().filter(|mesh| singles.contains(mesh)).collect(),
+        true if bare.is_empty() || bound.is_empty() => meshes,
+        true => {
+            let kept: Vec<&str> = bound.iter().filter_map(models_of).map(mesh_name).collect();
+            let keep = if kept.len() == 1 { "keeps its" } else { "keep their" };
+            let text = format!("{} {keep} weights. Skin again computes those of all meshes.", kept.join(", "));
+            commands.write_message(Notice::info(text).at(TITLE));
+            bare
+        }
+    };
+    for mesh in asked {
         let parts = models.get(mesh).map(|model| parts.of(model.uid)).unwrap_or_default();
         let claims = claims.0.iter().copied().collect();
         commands.write_message(BindRequest { mesh, settings: settings.0.clone(), parts, claims });
@@ -166,7 +191,7 @@ fn is_cancelled(error: &SkinningError) -> bool {
 }
 
 /// Name of a mesh for people.
-pub(super) fn mesh_name(mesh: &RigMesh) -> &str {
+pub(in crate::editor) fn mesh_name(mesh: &RigMesh) -> &str {
     if mesh.file.name.is_empty() { "The mesh" } else { &mesh.file.name }
 }
 
@@ -213,8 +238,14 @@ impl EditorPanel for SkinningPanel {
             skin_button(ui, &shown, meshes.len(), &running, requests);
             ui.add_space(4.0);
             settings(ui, world, requests);
+            let is_alone = meshes.len() == 1;
             for entity in meshes {
                 ui.add_space(6.0);
+                if let Some(mesh) = world.get::<RigMesh>(entity) {
+                    ui.separator();
+                    let can_skin = (!is_alone).then_some(running.is_empty() && !shown.rig.is_empty());
+                    title(ui, (entity, mesh), can_skin, requests);
+                }
                 self.mesh(ui, world, entity, &shown);
                 if let Some(mesh) = world.get::<RigMesh>(entity) {
                     parts::show(ui, world, mesh, &shown, &mut self.held, requests);
@@ -232,7 +263,8 @@ fn skin_button(ui: &mut Ui, shown: &DisplayedRig, meshes: usize, running: &[&Ski
         let obstacle = obstacle(&shown.rig, meshes);
         let button = Button::new(RichText::new("Skin").size(16.0).strong());
         let response = ui.add_enabled_ui(obstacle.is_none(), |ui| ui.add_sized(size, button)).inner;
-        let response = response.on_hover_text("Compute weights of all meshes in the background");
+        let response =
+            response.on_hover_text("Compute weights in the background: of the meshes that have none, else of all");
         if response.clicked() {
             requests.send(ActionRequest(Action::Skin));
         }
@@ -249,6 +281,25 @@ fn skin_button(ui: &mut Ui, shown: &DisplayedRig, meshes: usize, running: &[&Ski
     if !running.iter().all(|job| job.waits()) {
         ui.ctx().request_repaint_after_secs(0.1);
     }
+}
+
+/// Draws the name of a mesh and, beside other meshes, a button that binds it alone.
+fn title(ui: &mut Ui, (entity, mesh): (Entity, &RigMesh), can_skin: Option<bool>, requests: &mut Requests) {
+    let name = mesh_name(mesh);
+    let Some(can) = can_skin else {
+        ui.strong(name);
+        return;
+    };
+    ui.horizontal_wrapped(|ui| {
+        ui.strong(name);
+        let button = ui.add_enabled(can, Button::new("Skin it alone").small());
+        let button = button.on_hover_text("Compute the weights of this mesh; the others keep theirs");
+        let said = format!("Skin {name} alone");
+        button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, can, &said));
+        if button.clicked() {
+            requests.send(SkinMesh(entity));
+        }
+    });
 }
 
 /// Draws the settings of the computation, folded by default.
@@ -272,15 +323,15 @@ fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
             let typed = TypedText::default();
             let slider = Slider::new(&mut next.0.smoothing, 0.25..=4.0).logarithmic(true).max_decimals(2);
             let slider = slider.update_while_editing(false).custom_parser(typed.reader(0.25..=4.0, ""));
-            let field = ui.add(slider).on_hover_text("Width of the blend between joints: 1 is usual, less is stiffer");
-            fields::named(ui, field.id, "Smoothing");
+            let field = fields::typed_field(ui, "Smoothing", slider);
+            let field = field.on_hover_text("Width of the blend between joints: 1 is usual, less is stiffer");
             typed.tell(&field, "Smoothing", requests);
         });
         fields::labelled(ui, "Influences", |ui| {
             let typed = TypedText::default();
             let field = DragValue::new(&mut next.0.max_influences).range(1..=16).speed(0.05);
-            let field = ui.add(field.update_while_editing(false).custom_parser(typed.reader(1.0..=16.0, "")));
-            fields::named(ui, field.id, "Influences");
+            let field = field.update_while_editing(false).custom_parser(typed.whole_reader(1.0..=16.0, ""));
+            let field = fields::typed_field(ui, "Influences", field);
             typed.tell(&field, "Influences", requests);
             field.on_hover_text("The largest number of joints that move one point; many games allow 4");
         });
@@ -292,8 +343,8 @@ fn settings(ui: &mut Ui, world: &World, requests: &mut Requests) {
         fields::labelled(ui, "Voxels", |ui| {
             let typed = TypedText::default();
             let field = DragValue::new(&mut next.0.voxel_resolution).range(32..=1024).speed(2.0);
-            let field = ui.add(field.update_while_editing(false).custom_parser(typed.reader(32.0..=1024.0, "")));
-            fields::named(ui, field.id, "Voxels");
+            let field = field.update_while_editing(false).custom_parser(typed.whole_reader(32.0..=1024.0, ""));
+            let field = fields::typed_field(ui, "Voxels", field);
             typed.tell(&field, "Voxels", requests);
             field.on_hover_text("Voxels along the longest side, where voxels are used");
         });
@@ -310,8 +361,6 @@ impl SkinningPanel {
     /// Draws the coverage of one mesh, and the sources of its points' weights.
     fn mesh(&mut self, ui: &mut Ui, world: &World, entity: Entity, shown: &DisplayedRig) {
         let Some(mesh) = world.get::<RigMesh>(entity) else { return };
-        ui.separator();
-        ui.strong(mesh_name(mesh));
         let points = mesh.rest.points.len();
         let Some(skin) = shown.rig.skin(mesh.uid) else {
             ui.weak(format!("Not skinned ({})", counted(points, "point", "points")));
@@ -361,6 +410,14 @@ impl SkinningPanel {
         self.counted.retain(|(uid, known, _)| *uid != mesh && known.strong_count() > 0);
         self.counted.push((mesh, std::sync::Arc::downgrade(skin), count));
         count
+    }
+}
+
+/// True for a mesh that nothing moves: without weights for joints that the rig has, and with objects that hang on no joint.
+pub(in crate::editor) fn needs_weights(rig: &Rig, built: Option<&BuiltRig>, mesh: &RigMesh) -> bool {
+    match rig.skin(mesh.uid) {
+        Some(skin) => skin.weights.is_empty() || !is_held(rig, built, skin),
+        None => mesh.file.objects.iter().any(|object| object.node.is_none()),
     }
 }
 

@@ -44,7 +44,7 @@ use crate::{
     processor::{CommandState, CommandStatus, Modules},
     rig::{
         TagKind, Uid,
-        operations::{Operation, PasteTo, PasteWhat, TagClipboard, TagOperation},
+        operations::{Operation, PasteContent, PasteTo, TagClipboard, TagOperation},
     },
 };
 use fault::Fault;
@@ -233,7 +233,7 @@ impl TagsPanel {
             CardRequest::Mirror => match TagClipboard::copy_tags(&shown.rig, &entry.uids()) {
                 Ok(copied) => {
                     let mirrored = copied.map_params(|module, params| modules.get(module)?.mirrored(params).ok());
-                    let (clipboard, what) = (Arc::new(mirrored), PasteWhat::Both);
+                    let (clipboard, what) = (Arc::new(mirrored), PasteContent::Both);
                     send(TagOperation::Paste { clipboard, what, to: PasteTo::Mirror }, shown, requests);
                 }
                 Err(error) => requests.send(Notice::error(format!("Nothing was mirrored: {error}."))),

@@ -2,7 +2,7 @@
 
 mod brush;
 mod joints;
-mod meshes;
+pub(super) mod meshes;
 mod points;
 
 use bevy::prelude::*;

@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use bevy_egui::egui;
 
 use super::{
-    Tool, ToolPointer, ToolSystems,
+    Tool, ToolPointer, ToolSystems, click_wishes,
     scene::{EditedRig, Scene},
     select,
 };
@@ -34,7 +34,7 @@ pub struct PlacePlugin;
 impl Plugin for PlacePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<PlaceTool>()
-            .add_systems(Update, (tell_late, place).chain().in_set(ToolSystems::Tools).after(select::select))
+            .add_systems(Update, (tell_late, place).chain().in_set(ToolSystems::Tools).after(click_wishes::answer))
             .add_message::<PlaceAnswer>()
             .add_systems(PostUpdate, show.in_set(ToolSystems::Show).after(select::say))
             .add_painter(DepthPainter);

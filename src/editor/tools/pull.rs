@@ -7,10 +7,11 @@ use bevy::prelude::*;
 
 use super::{
     PullHover, Tool, ToolPointer, ToolSystems,
+    click_wishes::{ClickWish, ClickWishes},
     gizmo::{Delta, GizmoDrag, GizmoFrame, Handle},
     pose::PosedJoint,
     scene::{EditedRig, Scene, joints},
-    select::{self, ClickedSelection, DrawnControls, SelectTool},
+    select::{self, DrawnControls, SelectTool},
     transform,
 };
 use crate::{
@@ -38,6 +39,7 @@ pub struct PullPlugin;
 impl Plugin for PullPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<PullTool>()
+            .init_resource::<ClickWishes>()
             .init_resource::<SelectTool>()
             .init_resource::<ControlsInUse>()
             .add_systems(Update, aim.after(use_controls).before(ToolSystems::Route))
@@ -145,7 +147,7 @@ fn drag(
     mut tool: ResMut<PullTool>,
     mut status: ResMut<StatusLine>,
     mut edits: MessageWriter<EditRequest>,
-    mut picks: MessageWriter<PickRequest>,
+    mut wishes: ResMut<ClickWishes>,
     mut notices: MessageWriter<Notice>,
 ) {
     let rig = scene.rig();
@@ -159,8 +161,8 @@ fn drag(
         }
         tool.held = None;
     }
-    let (mut preview, mut clicks) = (None, ClickedSelection::default());
-    for ToolPointer { tool: who, pointer } in pointers.read() {
+    let mut preview = None;
+    for (ToolPointer { tool: who, pointer }, event) in pointers.read_with_id() {
         if *who != Tool::Pull {
             continue;
         }
@@ -201,7 +203,8 @@ fn drag(
                         let posed = drag.posed(held.node);
                         if !rig.selection.0.contains(&posed) {
                             let what = Pick::Joints(vec![posed]);
-                            picks.write(PickRequest { rig: held.rig, what, add: pointer.held.shift });
+                            let request = PickRequest { rig: held.rig, what, add: pointer.held.shift };
+                            wishes.add(event, ClickWish::Pick(request));
                         }
                         drag.gizmo.to(pointer.at, pointer.held.control.then_some(drag.step));
                         edits.write(EditRequest { rig: held.rig, change: drag.preview() });
@@ -210,7 +213,7 @@ fn drag(
                     (None, Some(sight)) if !dragged => {
                         let pick = select::click_or_control(&scene, &controls, rig, &sight, held.at);
                         let under = hover.node_of_click(&hovered, &scene, &controls, rig, &sight, held.at);
-                        picks.write(clicks.request(rig, pick, pointer.held, count, under));
+                        wishes.add(event, ClickWish::Click { pick, held: pointer.held, count, under });
                     }
                     _ => {}
                 }

@@ -104,7 +104,7 @@ impl ChosenFaces {
 }
 
 /// Pieces of the mesh under the last click.
-struct KnownPieces {
+struct PieceCache {
     triangles: Arc<[[u32; 3]]>,
     pieces: Vec<u32>,
 }
@@ -114,7 +114,7 @@ fn choose(
     mut pointers: MessageReader<ToolPointer>,
     (scene, under): (Scene, PaintMeshes),
     meshes: Query<&RigMesh>,
-    mut known: Local<Option<KnownPieces>>,
+    mut known: Local<Option<PieceCache>>,
 ) {
     let is_of_rig = |rig: &EditedRig, faces: &ChosenFaces| rig.entity == faces.rig && meshes.contains(faces.mesh);
     let (rig, sight) = match (scene.rig(), scene.sight()) {
@@ -160,7 +160,7 @@ fn click(
     (rig, under, sight, at): (&EditedRig, &PaintMeshes, &Sight, Vec2),
     meshes: &Query<&RigMesh>,
     held: ModifierKeys,
-    known: &mut Option<KnownPieces>,
+    known: &mut Option<PieceCache>,
 ) {
     let Ok(place) = under.at(rig, sight, at) else {
         faces.take([], held);
@@ -171,9 +171,9 @@ fn click(
         (faces.mesh, faces.triangles) = (place.mesh, default());
     }
     if known.as_ref().is_none_or(|known| !Arc::ptr_eq(&known.triangles, &mesh.triangles)) {
-        *known = Some(KnownPieces { triangles: mesh.triangles.clone(), pieces: triangle_pieces(mesh) });
+        *known = Some(PieceCache { triangles: mesh.triangles.clone(), pieces: triangle_pieces(mesh) });
     }
-    let Some(KnownPieces { pieces, .. }) = known.as_ref() else { return };
+    let Some(PieceCache { pieces, .. }) = known.as_ref() else { return };
     let Some(piece) = pieces.get(place.triangle as usize) else { return };
     let same = pieces.iter().enumerate().filter(|(_, other)| *other == piece).map(|(number, _)| number as u32);
     faces.take(same, held);

@@ -7,6 +7,7 @@ use bevy_egui::egui;
 
 use super::{
     GizmoHover, Tool, ToolPointer, ToolSystems,
+    click_wishes::{ClickWish, ClickWishes, answer},
     scene::{EditedRig, Scene, joints},
 };
 use crate::{
@@ -36,8 +37,9 @@ pub struct SelectPlugin;
 impl Plugin for SelectPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<SelectTool>()
+            .init_resource::<ClickWishes>()
             .init_resource::<ControlsInUse>()
-            .add_systems(Update, select.in_set(ToolSystems::Tools))
+            .add_systems(Update, (select, answer).chain().in_set(ToolSystems::Tools))
             .add_systems(PostUpdate, say.in_set(ToolSystems::Show))
             .add_painter(BandPainter);
     }
@@ -155,7 +157,7 @@ pub(super) fn select(
     (scene, controls): (Scene, DrawnControls),
     (mode, area, gizmo): (Res<Mode>, Res<ViewportArea>, Res<GizmoHover>),
     hovered: Query<&HoveredNode>,
-    mut picks: MessageWriter<PickRequest>,
+    mut wishes: ResMut<ClickWishes>,
     mut hovers: MessageWriter<HoverRequest>,
 ) {
     let (Some(rig), Some(sight)) = (scene.rig(), scene.sight()) else {
@@ -165,8 +167,7 @@ pub(super) fn select(
     // The box is all that is shown; the pointer's position does not count as a change.
     let band = shown.band;
     let tool = shown.bypass_change_detection();
-    let mut clicks = ClickedSelection::default();
-    for ToolPointer { tool: who, pointer } in pointers.read() {
+    for (ToolPointer { tool: who, pointer }, event) in pointers.read_with_id() {
         if *who != Tool::Select {
             tool.pointer = None;
             continue;
@@ -179,21 +180,21 @@ pub(super) fn select(
             PointerAct::Released { dragged, count } => {
                 let band = tool.band.take();
                 let Some(press) = tool.press.take() else { continue };
-                let request = match band.filter(|_| dragged) {
+                let wish = match band.filter(|_| dragged) {
                     Some(band) => {
                         let corners = band.map(|corner| sight.point(corner));
                         // Where people pose, a box is for controls; joints are boxed where there are none in it.
                         let is_posing = *mode == Mode::Pose;
                         let found = if is_posing { controls.within(&rig, &sight, corners) } else { Vec::new() };
-                        boxed(&scene, &rig, &sight, corners, found, pointer.held)
+                        ClickWish::Pick(boxed(&scene, &rig, &sight, corners, found, pointer.held))
                     }
                     None => {
                         let pick = click_or_control(&scene, &controls, &rig, &sight, press);
                         let under = tool.node_of_click(&hovered, &scene, &controls, &rig, &sight, press);
-                        clicks.request(&rig, pick, pointer.held, count, under)
+                        ClickWish::Click { pick, held: pointer.held, count, under }
                     }
                 };
-                picks.write(request);
+                wishes.add(event, wish);
             }
             PointerAct::Moved | PointerAct::Wheel(_) => {}
         }

@@ -14,11 +14,12 @@ pub use target::GizmoTarget;
 
 use super::{
     GizmoHover, PointerOwner, Tool, ToolPointer, ToolSystems,
+    click_wishes::{ClickWish, ClickWishes},
     gizmo::{Delta, GizmoDrag, GizmoFrame, Handle, HandleShape, handle_at},
     pose::PosedJoint,
     pull::{Way, joint_at, pulls_by_others},
     scene::{EditedRig, Scene, joints},
-    select::{self, ClickedSelection, DrawnControls, REACH, SelectTool},
+    select::{self, DrawnControls, REACH, SelectTool},
 };
 use crate::{
     editor::{
@@ -47,6 +48,7 @@ pub struct TransformPlugin;
 impl Plugin for TransformPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<GizmoTool>()
+            .init_resource::<ClickWishes>()
             .init_resource::<SelectTool>()
             .init_resource::<ControlsInUse>()
             .init_resource::<PoseMoves>()
@@ -212,7 +214,7 @@ pub(super) fn drag(
     mut tool: ResMut<GizmoTool>,
     mut status: ResMut<StatusLine>,
     mut edits: MessageWriter<EditRequest>,
-    mut picks: MessageWriter<PickRequest>,
+    mut wishes: ResMut<ClickWishes>,
 ) {
     let rig = scene.rig();
     // Another change of the rig has undone the preview; the drag began with a different rig.
@@ -224,8 +226,8 @@ pub(super) fn drag(
         edits.write(EditRequest { rig: drag.rig, change: Change::CancelPreview });
         tool.drag = None;
     }
-    let (mut preview, mut clicks) = (None, ClickedSelection::default());
-    for ToolPointer { tool: who, pointer } in pointers.read() {
+    let mut preview = None;
+    for (ToolPointer { tool: who, pointer }, event) in pointers.read_with_id() {
         if *who != Tool::Gizmo {
             continue;
         }
@@ -242,7 +244,8 @@ pub(super) fn drag(
                 if let (Some(joint), Some(rig)) = (drag.grabbed, &rig)
                     && !rig.selection.0.contains(&joint)
                 {
-                    picks.write(PickRequest { rig: drag.rig, what: Pick::Joints(vec![joint]), add: false });
+                    let request = PickRequest { rig: drag.rig, what: Pick::Joints(vec![joint]), add: false };
+                    wishes.add(event, ClickWish::Pick(request));
                 }
                 drag.gizmo.to(pointer.at, drag.snap(pointer.held));
                 preview = Some(drag.preview(settings.move_children));
@@ -256,15 +259,14 @@ pub(super) fn drag(
                 } else {
                     let Some(sight) = scene.sight() else { continue };
                     let at = drag.gizmo.press();
-                    let pick = if drag.grabbed.is_some() {
+                    let wish = if drag.grabbed.is_some() {
                         let pick = select::click(&scene, rig, &sight, at);
                         let under = hover.node_of_click(&hovered, &scene, &controls, rig, &sight, at);
-                        Some(clicks.request(rig, pick, pointer.held, count, under))
+                        ClickWish::Click { pick, held: pointer.held, count, under }
                     } else {
-                        let pick = clicked(&scene, rig, clicks.nodes(rig), at, pointer.held, count);
-                        pick.inspect(|pick| clicks.follow(rig, pick, None))
+                        ClickWish::Handle { at, held: pointer.held, count }
                     };
-                    picks.write_batch(pick);
+                    wishes.add(event, wish);
                     Change::CancelPreview
                 };
                 edits.write(EditRequest { rig: drag.rig, change: commit });
@@ -352,7 +354,7 @@ pub(super) fn step(rig: &EditedRig) -> f32 {
 }
 
 /// The pick of a click on a handle: a joint at that pixel; of a double click, all that hangs below the active joint there.
-fn clicked(
+pub(super) fn clicked(
     scene: &Scene,
     rig: &EditedRig,
     selected: &[Uid],

@@ -189,6 +189,7 @@ fn known_nodes(nodes: Vec<Uid>, model: &Model, rig: &Rig) -> Vec<Uid> {
     if nodes.is_empty() || nodes.len() == model.nodes.len() {
         return nodes;
     }
-    let named = |name: &str| rig.find_label(name).filter(|_| !name.is_empty());
+    let labelled = rig.joints_by_label();
+    let named = |name: &str| labelled.get(name).copied().filter(|_| !name.is_empty());
     model.nodes.iter().map(|node| named(&node.name).unwrap_or(Uid(0))).collect()
 }

@@ -59,12 +59,15 @@ impl Hierarchy {
                 needed[parent] = true;
             }
         }
+        // A file of motion alone has a skeleton, of which some joints may be still.
+        let is_motion_alone = document.skins.is_empty() && document.nodes.iter().all(|entry| entry.mesh.is_none());
         let (mut kept, mut carrier) = (vec![None; count], vec![None; count]);
         let mut next = 0;
         for &node in &order {
             if let Some(parent) = parents[node] {
                 visible[node] |= visible[parent];
                 moves[node] |= moves[parent];
+                needed[node] |= is_motion_alone && needed[parent] && !document.nodes[node].camera;
             }
             if needed[node] {
                 kept[node] = Some(next);
@@ -96,7 +99,7 @@ impl Hierarchy {
     /// The model's nodes.
     pub(super) fn kept_nodes(&self, source: &Source) -> Result<Vec<Node>, GltfError> {
         let Source { document, budget, .. } = source;
-        let mut nodes = Vec::new();
+        let mut nodes = Vec::with_capacity(self.kept.iter().flatten().count());
         for &node in self.order.iter().filter(|&&node| self.kept[node].is_some()) {
             let entry = &document.nodes[node];
             let extras = entry.at.map.get("extras");

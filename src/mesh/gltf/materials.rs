@@ -214,3 +214,57 @@ pub(super) fn remap(object: &mut Map<String, Value>, key: &str, map: &[Option<us
         None => object.shift_remove(key),
     };
 }
+
+/// Appends materials with their textures, samplers and images to others. Indices in them are moved behind those that are there.
+pub(in crate::mesh) fn append_materials(set: &mut MaterialSet, other: MaterialSet) {
+    let (textures, samplers, images) = (set.textures.len(), set.samplers.len(), set.images.len());
+    for mut material in other.materials {
+        if let Value::Object(map) = &mut material {
+            move_textures(map, textures, 0);
+        }
+        set.materials.push(material);
+    }
+    for mut texture in other.textures {
+        if let Value::Object(map) = &mut texture {
+            move_index(map, "sampler", samplers);
+            move_index(map, "source", images);
+            if let Some(Value::Object(extensions)) = map.get_mut("extensions") {
+                for extension in extensions.values_mut().filter_map(Value::as_object_mut) {
+                    move_index(extension, "source", images);
+                }
+            }
+        }
+        set.textures.push(texture);
+    }
+    set.samplers.extend(other.samplers);
+    set.images.extend(other.images);
+    append_names(&mut set.extensions_used, other.extensions_used);
+    append_names(&mut set.extensions_required, other.extensions_required);
+}
+
+/// Moves the indices of every `...Texture` in a material, also in its extensions.
+fn move_textures(map: &mut Map<String, Value>, by: usize, depth: usize) {
+    for (key, value) in map.iter_mut() {
+        let Some(inner) = value.as_object_mut().filter(|_| key != "extras" && depth < 8) else {
+            continue;
+        };
+        if key.ends_with("Texture") {
+            move_index(inner, "index", by);
+        }
+        move_textures(inner, by, depth + 1);
+    }
+}
+
+fn move_index(object: &mut Map<String, Value>, key: &str, by: usize) {
+    if let Some(index) = object.get(key).and_then(whole) {
+        object.insert(key.to_owned(), Value::from(index.saturating_add(by)));
+    }
+}
+
+fn append_names(names: &mut Vec<String>, more: Vec<String>) {
+    for name in more {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+}

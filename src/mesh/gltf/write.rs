@@ -3,17 +3,18 @@
 mod buffer;
 mod check;
 mod clips;
+mod document;
 mod materials;
 mod meshes;
 mod skeleton;
 mod vrm;
 
-use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Map, Value};
 
 use super::{GltfError, uri::percent_encode};
 use crate::mesh::{CompanionSink, model::Model, vrm::Avatar};
-use buffer::{Accessor, Bin, View};
+use buffer::Bin;
+use document::{Document, Lists};
 use skeleton::Skeleton;
 
 /// Settings of [`write_glb`] and [`write_gltf`].
@@ -62,53 +63,26 @@ pub fn write_vrm(model: &Model, avatar: &Avatar, settings: &GltfWriteSettings) -
     glb(document(model, settings, Some(avatar), None)?)
 }
 
-/// A document and its buffer. The lists of accessors and views are the longest, and no trees of JSON.
-struct Document {
-    root: Map<String, Value>,
-    accessors: Vec<Accessor>,
-    views: Vec<View>,
-    /// The one buffer, as it is declared.
-    buffer: Option<Value>,
-    bytes: Vec<u8>,
-}
-
-impl Serialize for Document {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(None)?;
-        for (key, value) in &self.root {
-            map.serialize_entry(key, value)?;
-        }
-        if !self.accessors.is_empty() {
-            map.serialize_entry("accessors", &self.accessors)?;
-        }
-        if !self.views.is_empty() {
-            map.serialize_entry("bufferViews", &self.views)?;
-        }
-        if let Some(buffer) = &self.buffer {
-            map.serialize_entry("buffers", &[buffer])?;
-        }
-        map.end()
-    }
-}
-
-/// File of a document and its buffer.
-fn glb(document: Document) -> Result<Vec<u8>, GltfError> {
-    let mut json = to_bytes(&document, false)?;
-    let bin = document.bytes;
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let bin_chunk = if bin.is_empty() { 0 } else { 8 + bin.len() };
-    let length = 12 + 8 + json.len() + bin_chunk;
+/// File of a document and its buffer. The document is let go before the buffer is copied behind its text.
+fn glb(document: Document<'_>) -> Result<Vec<u8>, GltfError> {
+    const JSON: usize = 20;
+    let mut glb = vec![0_u8; JSON];
+    serde_json::to_writer(&mut glb, &document).map_err(|error| GltfError::model(error.to_string()))?;
+    glb.resize(glb.len().next_multiple_of(4), b' ');
+    let Document { root, lists, buffer, bytes: bin } = document;
+    drop((root, lists, buffer));
     let word = |number: usize| {
         let number = u32::try_from(number).map_err(|_| GltfError::model("a GLB holds at most 4 GiB; write .gltf"))?;
         Ok::<_, GltfError>(number.to_le_bytes())
     };
-    let mut glb = Vec::with_capacity(length);
-    glb.extend_from_slice(b"glTF\x02\0\0\0");
-    glb.extend_from_slice(&word(length)?);
-    glb.extend_from_slice(&word(json.len())?);
-    glb.extend_from_slice(b"JSON");
-    glb.append(&mut json);
+    let bin_chunk = if bin.is_empty() { 0 } else { 8 + bin.len() };
+    let (json, length) = (word(glb.len() - JSON)?, word(glb.len() + bin_chunk)?);
+    glb[..8].copy_from_slice(b"glTF\x02\0\0\0");
+    glb[8..12].copy_from_slice(&length);
+    glb[12..16].copy_from_slice(&json);
+    glb[16..JSON].copy_from_slice(b"JSON");
     if !bin.is_empty() {
+        glb.reserve_exact(bin_chunk);
         glb.extend_from_slice(&word(bin.len())?);
         glb.extend_from_slice(b"BIN\0");
         glb.extend_from_slice(&bin);
@@ -126,21 +100,17 @@ pub fn write_gltf(
     stem: &str,
     companion: &mut CompanionSink,
 ) -> Result<Vec<u8>, GltfError> {
-    to_bytes(&document(model, settings, None, Some((stem, companion)))?, true)
-}
-
-fn to_bytes(document: &Document, pretty: bool) -> Result<Vec<u8>, GltfError> {
-    let bytes = if pretty { serde_json::to_vec_pretty(document) } else { serde_json::to_vec(document) };
-    bytes.map_err(|error| GltfError::model(error.to_string()))
+    let document = document(model, settings, None, Some((stem, companion)))?;
+    serde_json::to_vec_pretty(&document).map_err(|error| GltfError::model(error.to_string()))
 }
 
 /// Document and buffer of a model. With `outside` (a stem and a sink of companions), buffer and images go to the sink.
-fn document(
-    model: &Model,
+fn document<'a>(
+    model: &'a Model,
     settings: &GltfWriteSettings,
     avatar: Option<&Avatar>,
     mut outside: Option<(&str, &mut CompanionSink)>,
-) -> Result<Document, GltfError> {
+) -> Result<Document<'a>, GltfError> {
     check::check(model)?;
     let mut bin = Bin::default();
     let skeleton = Skeleton::new(model, settings)?;
@@ -181,14 +151,18 @@ fn document(
         root.insert("scene".to_owned(), 0.into());
         root.insert("scenes".to_owned(), vec![Value::from(scene)].into());
     }
-    insert_list(&mut root, "nodes", nodes);
-    insert_list(&mut root, "meshes", meshes.meshes);
-    insert_list(&mut root, "skins", skins);
-    insert_list(&mut root, "animations", animations);
-    insert_list(&mut root, "materials", written.materials);
-    insert_list(&mut root, "textures", written.textures);
-    insert_list(&mut root, "images", written.images);
-    insert_list(&mut root, "samplers", written.samplers);
+    let lists = Lists {
+        nodes,
+        meshes: meshes.meshes,
+        skins,
+        animations,
+        materials: &model.material_set.materials,
+        textures: written.textures,
+        images: written.images,
+        samplers: &model.material_set.samplers,
+        accessors,
+        views,
+    };
     let mut declared = None;
     if !bytes.is_empty() {
         let mut buffer = Map::new();
@@ -199,7 +173,7 @@ fn document(
         }
         declared = Some(Value::from(buffer));
     }
-    Ok(Document { root, accessors, views, buffer: declared, bytes })
+    Ok(Document { root, lists, buffer: declared, bytes })
 }
 
 /// Inserts a list unless it is empty, which glTF forbids.
@@ -213,9 +187,4 @@ fn insert_name(map: &mut Map<String, Value>, name: &str) {
     if !name.is_empty() {
         map.insert("name".to_owned(), name.into());
     }
-}
-
-/// Floats as JSON numbers that read back to the same bits.
-fn floats(values: &[f32]) -> Value {
-    values.iter().map(|value| Value::from(f64::from(*value))).collect()
 }

@@ -13,7 +13,7 @@ use crate::{
         document::{
             EditRefusal, EntityWriteError, JointEntities, TagEntities,
             entities::{BuiltEntities, EntityIndex, EntityPart, IndexedEntity},
-            refusals::{Bearer, ToldRefusals},
+            refusals::{Bearer, RefusalLog},
         },
         runtime::RigRuntime,
         schema::{
@@ -96,7 +96,7 @@ pub(super) fn keep_built(
     rigs: Query<GuardedRig>,
     index: Res<EntityIndex>,
     mut refused: MessageWriter<EditRefusal>,
-    mut told: Local<ToldRefusals>,
+    mut told: Local<RefusalLog>,
 ) {
     let mut has_told = false;
     let mut entities = removed.entities();
@@ -133,7 +133,7 @@ pub(super) fn keep_results(
     mut removed: RemovedComponents<BuildResult>,
     mut rigs: Query<(&Rig, Option<&BuildResult>, Option<&mut Processor>), Without<SuppliedBuild>>,
     mut refused: MessageWriter<EditRefusal>,
-    mut told: Local<ToldRefusals>,
+    mut told: Local<RefusalLog>,
 ) {
     let mut has_told = false;
     let entities: BTreeSet<Entity> = removed.read().chain(written.iter()).collect();
@@ -171,7 +171,7 @@ pub(super) fn keep_places(
     rigs: Query<(&Rig, Option<&RigRuntime>)>,
     index: Res<EntityIndex>,
     mut refused: MessageWriter<EditRefusal>,
-    mut told: Local<ToldRefusals>,
+    mut told: Local<RefusalLog>,
 ) {
     let mut bare_nodes: BTreeSet<Bearer> = BTreeSet::new();
     for entity in removed.read() {
@@ -203,7 +203,7 @@ pub(super) fn keep_attributes(
     rigs: Query<(&Rig, &BuiltEntities, Option<&RigRuntime>)>,
     index: Res<EntityIndex>,
     mut refused: MessageWriter<EditRefusal>,
-    mut told: Local<ToldRefusals>,
+    mut told: Local<RefusalLog>,
 ) {
     let mut bare_nodes: BTreeSet<Bearer> = BTreeSet::new();
     for entity in removed.read().filter(|entity| bare.contains(*entity)) {

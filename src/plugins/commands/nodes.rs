@@ -130,14 +130,14 @@ pub(super) fn follow_nodes(
 
 /// Entities of a rig below which joints may stand in another order than in the document.
 #[derive(Debug, Clone)]
-pub(super) enum Unsorted {
+pub(super) enum SortScope {
     /// The entities that bear joints, all of them.
     All,
     /// The listed ones.
     Below(BTreeSet<Entity>),
 }
 
-impl Unsorted {
+impl SortScope {
     /// Adds entities below which joints may stand in another order.
     fn add(&mut self, bearers: impl IntoIterator<Item = Entity>) {
         if let Self::Below(known) = self {
@@ -146,7 +146,7 @@ impl Unsorted {
     }
 }
 
-impl Default for Unsorted {
+impl Default for SortScope {
     fn default() -> Self {
         Self::Below(BTreeSet::new())
     }
@@ -161,8 +161,8 @@ pub(super) fn unsorted_rigs(
     of_nodes: Query<(Entity, &NodeOf), Changed<Children>>,
     built: Query<(Has<BuildResult>, Option<&BuiltEntities>), With<Rig>>,
     parents: Query<&ChildOf>,
-) -> BTreeMap<Entity, Unsorted> {
-    let mut rigs: BTreeMap<Entity, Unsorted> = rebuilt.iter().map(|rig| (rig, Unsorted::All)).collect();
+) -> BTreeMap<Entity, SortScope> {
+    let mut rigs: BTreeMap<Entity, SortScope> = rebuilt.iter().map(|rig| (rig, SortScope::All)).collect();
     for rig in &of_rigs {
         rigs.entry(rig).or_default().add([rig]);
     }
@@ -174,14 +174,14 @@ pub(super) fn unsorted_rigs(
         match joints.touched_of_all(rig) {
             Some(touched) => rigs.entry(rig_entity).or_default().add(touched.iter().filter_map(parent)),
             None => {
-                rigs.insert(rig_entity, Unsorted::All);
+                rigs.insert(rig_entity, SortScope::All);
             }
         }
     }
     for (rig, unsorted) in &mut rigs {
         // Joints of several parents in the document may stand below one node that a build created.
         if built.get(*rig).is_ok_and(|(is_built, known)| is_built || known.is_some_and(|known| !known.is_empty())) {
-            *unsorted = Unsorted::All;
+            *unsorted = SortScope::All;
         }
     }
     rigs
@@ -199,7 +199,7 @@ pub(super) fn note_revisions(mut rigs: Query<(&Rig, &mut JointEntities)>) {
 /// Puts the joints below each node into the order that the document gives them. Created nodes keep their places among
 /// them.
 pub(super) fn order_siblings(
-    In(unsorted): In<BTreeMap<Entity, Unsorted>>,
+    In(unsorted): In<BTreeMap<Entity, SortScope>>,
     mut rigs: Query<(&Rig, &mut JointEntities)>,
     index: Res<EntityIndex>,
     parents: Query<&ChildOf>,
@@ -210,7 +210,7 @@ pub(super) fn order_siblings(
         let joints = joints.bypass_change_detection();
         let mut ranks: EntityHashMap<usize> = EntityHashMap::default();
         let bearers = match unsorted {
-            Unsorted::Below(bearers) => {
+            SortScope::Below(bearers) => {
                 for bearer in &bearers {
                     let joint = index.uid_of(*bearer, rig_entity, EntityPart::Joint);
                     if joint.is_some() || *bearer == rig_entity {
@@ -220,7 +220,7 @@ pub(super) fn order_siblings(
                 }
                 bearers
             }
-            Unsorted::All => {
+            SortScope::All => {
                 let mut bearers: BTreeSet<Entity> = BTreeSet::new();
                 for (rank, joint) in rig.walk().enumerate() {
                     let Some(entity) = joints.get(joint.data.uid) else { continue };

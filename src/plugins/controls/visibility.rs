@@ -16,7 +16,7 @@ use super::{NodeVisible, VISIBLE};
 use crate::plugins::{
     document::{
         EntityWriteError,
-        refusals::{Bearer, ToldRefusals},
+        refusals::{Bearer, RefusalLog},
     },
     schema::{Attributes, Control, NodeLayer, NodeOf},
 };
@@ -59,7 +59,7 @@ pub(super) struct ShownNode {
 #[derive(Default)]
 pub(super) struct ShownState {
     written: EntityHashMap<NodeVisible>,
-    told: ToldRefusals,
+    told: RefusalLog,
 }
 
 /// Updates the visibility of nodes whose layer, attributes or control changed or are gone, and puts it back where other code

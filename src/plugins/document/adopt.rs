@@ -30,7 +30,7 @@ use super::{
     EditRefusal, HoveredNode, Selection,
     entities::{BuiltEntities, EntityIndex, EntityPart, GroupEntities, JointEntities, TagEntities},
     error::{EntityWrite, EntityWriteError},
-    refusals::{Bearer, ToldRefusals},
+    refusals::{Bearer, RefusalLog},
 };
 use crate::{
     plugins::{
@@ -195,7 +195,7 @@ pub(super) fn adopt_writes(
     mut edits: ResMut<EntityEdits>,
     mut refused: MessageWriter<EditRefusal>,
     parked: Query<(), (With<ParkedNode>, Allow<Disabled>)>,
-    mut told: Local<ToldRefusals>,
+    mut told: Local<RefusalLog>,
 ) {
     let touched = written.take();
     let closed: HashSet<Entity> = written.rigs.read().filter(|rig| !rigs.contains(*rig)).collect();

@@ -22,9 +22,9 @@ pub(in crate::plugins) enum Bearer {
 /// Components of each bearer whose refused writes were told. The value is true until the component was looked at once
 /// more, as it was put back.
 #[derive(Debug, Default)]
-pub(in crate::plugins) struct ToldRefusals(HashMap<Bearer, HashMap<&'static str, bool>>);
+pub(in crate::plugins) struct RefusalLog(HashMap<Bearer, HashMap<&'static str, bool>>);
 
-impl ToldRefusals {
+impl RefusalLog {
     /// True if no refusal was told that is still remembered.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()

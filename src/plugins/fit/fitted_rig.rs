@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use bevy::prelude::*;
 
 use super::{
-    FitFailure, FitReport,
+    FitFailure, FitReport, FitRequest, FitTemplate,
     part::{AddedPart, changed_tags},
     refit::rests_of,
 };
@@ -29,6 +29,10 @@ pub struct FittedRig {
     pub report: Arc<FitReport>,
     /// Places that a person chose, by joint.
     pub markers: BTreeMap<Uid, Vec3>,
+    /// Request that the fit answers.
+    pub request: FitRequest,
+    /// True if the rig was empty before the fit: another template may take the place of this one.
+    pub has_own_template: bool,
     pub(super) analysis: Arc<MeshAnalysis>,
     pub(super) settings: FitSettings,
     /// Skeleton of the template at rest, before it was fitted.
@@ -130,6 +134,33 @@ impl FittedRig {
     pub(super) fn places_in(&self, rig: &Rig) -> Vec<Option<Vec3>> {
         let place = |uid: &Uid| rig.joint(*uid).map(|_| rig.position(*uid));
         self.report.joints.iter().map(|(uid, _)| place(uid)).collect()
+    }
+
+    /// Request for a fit of another template, by its name, to the same part of the mesh. The directions are left to the fit.
+    pub fn with_template(&self, name: &str) -> FitRequest {
+        FitRequest {
+            template: FitTemplate::Named(name.to_owned()),
+            up: None,
+            forward: None,
+            markers: Vec::new(),
+            ..self.request.clone()
+        }
+    }
+
+    /// Request for a fit of the same template that faces the other way.
+    pub fn turned_round(&self) -> FitRequest {
+        let fit = &self.report.fit;
+        let template = match &self.request.template {
+            FitTemplate::Choose if self.has_own_template => FitTemplate::Named(self.report.template.clone()),
+            given => given.clone(),
+        };
+        FitRequest {
+            template,
+            up: Some(fit.up),
+            forward: Some(-fit.forward),
+            markers: Vec::new(),
+            ..self.request.clone()
+        }
     }
 
     /// Notes the present report and markers as those after a correction.

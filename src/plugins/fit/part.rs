@@ -65,12 +65,17 @@ pub(super) fn with_hierarchies(rig: &Rig, joints: &[Uid]) -> BTreeSet<Uid> {
     below.filter(|joint| joint.data.kind == NodeKind::Joint).map(|joint| joint.data.uid).collect()
 }
 
+/// Side that the labels of a rig name first: 1 left, -1 right; `None` without one.
+pub(super) fn named_side(rig: &Rig) -> Option<i32> {
+    let side = |label: Option<&str>| label.map_or(0, label_side);
+    rig.walk().map(|joint| side(joint.data.label.as_deref())).find(|side| *side != 0)
+}
+
 /// Rigs of a part that may go below a joint: that of the joint's side, or of both sides where the joint is of neither.
 pub(super) fn sides(part: &Part, rig: &Rig, parent: Option<Uid>, modules: &Modules) -> Vec<Arc<Rig>> {
-    let side_of = |label: Option<&str>| label.map_or(0, label_side);
-    let own = part.rig.walk().map(|joint| side_of(joint.data.label.as_deref())).find(|side| *side != 0);
+    let own = named_side(&part.rig);
     let label = parent.and_then(|parent| rig.joint(parent)).and_then(|joint| joint.data.label.as_deref());
-    let wanted = side_of(label);
+    let wanted = label.map_or(0, label_side);
     let as_written = Arc::new(part.rig.clone());
     let Some(own) = own else { return vec![as_written] };
     if wanted == own {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::{
-    algo::fit_template::{FitError, FittedSkeleton, JointFit},
+    algo::fit_template::{FitError, FitNote, FittedSkeleton, JointFit},
     plugins::limits::{LimitError, OutOfTime},
     rig::{EditError, Uid, operations::OperationError},
 };
@@ -26,6 +26,16 @@ pub struct FitReport {
 impl FitReport {
     /// Confidence below which a joint is doubtful.
     pub const DOUBTFUL: f32 = 0.5;
+
+    /// Notes that say what may be wrong, or what was left out; equal ones are told once.
+    pub fn warnings(&self) -> impl Iterator<Item = &FitNote> {
+        let notes = &self.fit.notes;
+        notes
+            .iter()
+            .enumerate()
+            .filter(|(at, note)| note.is_warning() && !notes[..*at].contains(*note))
+            .map(|(_, note)| note)
+    }
 
     /// Joints that the fit is not sure of.
     pub fn doubtful(&self) -> impl Iterator<Item = Uid> + '_ {
@@ -72,6 +82,18 @@ pub enum FitFailure {
     TwoMarkers {
         /// Label of the joint.
         label: String,
+    },
+    /// The mesh shows none of the templates that the fit may choose.
+    #[error(
+        "the mesh shows no figure: it has {limbs} of the most similar template, \"{template}\" (confidence {confidence:.2}); choose the template yourself to fit it all the same"
+    )]
+    NoFigure {
+        /// Name of the most similar template.
+        template: String,
+        /// Limbs that the template has and that the mesh shows, in words.
+        limbs: String,
+        /// Confidence in the fit that was left.
+        confidence: f32,
     },
     /// No triangle of the mesh is in the region.
     #[error("no face of the mesh is in the region; choose faces, or joints that the mesh has weights of")]

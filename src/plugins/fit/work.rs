@@ -1,13 +1,18 @@
 //! Work of a fit in its task: the choice of a template, the fit, and the report.
 
-use std::{collections::BTreeMap, sync::Arc, time::Instant};
+use std::{
+    collections::{BTreeMap, HashSet},
+    sync::Arc,
+    time::Instant,
+};
 
 use bevy::prelude::*;
 
 use super::{
-    FinishedFit, FitFailure, FitPart, FitParts, FitReport, FitRequest, FitTemplate, FitTemplates, FittedRig,
+    FinishedFit, FitFailure, FitPart, FitParts, FitRegion, FitReport, FitRequest, FitTemplate, FitTemplates, FittedRig,
     fitted_rig::FitExtent,
-    part::{AddedPart, only, sides, with_hierarchies},
+    part::{AddedPart, named_side, only, sides, with_hierarchies},
+    region::middle,
 };
 use crate::{
     algo::fit_template::{
@@ -22,6 +27,14 @@ use crate::{
 const CENTRE: f32 = 0.003;
 /// Difference of the penalties of a part's two sides below which the side is uncertain.
 const SAME_SIDE: f32 = 0.03;
+/// Confidence below which a mesh shows no figure, where the choice of the template is left to the fit.
+const SHOWN: f32 = 0.2;
+/// Confidence from which on a fit into all objects of a mesh is not tried without those beside the largest one.
+const SURE: f32 = 0.7;
+/// Longest side of an object, as a share of that of the whole mesh, from which on it may be a figure that wears the others.
+const FIGURE: f32 = 0.6;
+/// Distance of a region from the middle of the mesh, as a share of its width, from which on it lies on a side.
+const ASIDE: f32 = 0.05;
 /// Kind of templates that are parts.
 const PART: &str = "part";
 
@@ -138,11 +151,41 @@ impl Work {
 
     pub(super) fn run(self, progress: &(dyn Fn(f32) -> bool + Sync)) -> Result<FinishedFit, FitFailure> {
         let begin = Instant::now();
-        let mut candidates = self.candidates()?;
         let (region, gear) = self.request.region.triangles(&self.mesh, &self.from);
         if region.as_ref().is_some_and(Vec::is_empty) {
             return Err(FitFailure::EmptyRegion);
         }
+        let note = (gear > 0).then_some(FitNote::Gear(gear));
+        let largest = match self.request.region {
+            FitRegion::Whole => largest_object(&self.mesh),
+            _ => None,
+        };
+        let Some((largest, others)) = largest else { return self.attempt(region, note, begin, progress) };
+        let whole = self.attempt(region, note, begin, &|part| progress(0.5 * part));
+        let is_sure = |fit: &FinishedFit| fit.fitted.report.fit.confidence >= SURE;
+        match &whole {
+            Err(FitFailure::Fit(FitError::Cancelled)) => return whole,
+            Ok(fit) if is_sure(fit) => return whole,
+            _ => {}
+        }
+        // Armour, a shield and a cloak together hide the figure that shows without them.
+        let note = Some(FitNote::Beside(others));
+        match self.attempt(Some(largest), note, begin, &|part| progress(0.5 + 0.5 * part)) {
+            Err(FitFailure::Fit(FitError::Cancelled)) => Err(FitError::Cancelled.into()),
+            Ok(fit) if is_sure(&fit) => Ok(fit),
+            _ => whole,
+        }
+    }
+
+    /// The fit into a region of the mesh, all of it if `None`, with a note about what is left out.
+    fn attempt(
+        &self,
+        region: Option<Vec<u32>>,
+        note: Option<FitNote>,
+        begin: Instant,
+        progress: &(dyn Fn(f32) -> bool + Sync),
+    ) -> Result<FinishedFit, FitFailure> {
+        let mut candidates = self.candidates()?;
         let points = &self.mesh.rest.points;
         let analysis =
             MeshAnalysis::new(points, &self.mesh.triangles, region.as_deref(), &|part| progress(0.5 * part))?;
@@ -165,6 +208,13 @@ impl Work {
         let cost = |fit: &FittedSkeleton| fit.hypotheses.first().map_or(f32::INFINITY, |best| best.cost);
         found.sort_by(|a, b| cost(&a.2).total_cmp(&cost(&b.2)));
         let is_close = matches!(&found[..], [first, second, ..] if cost(&second.2) - cost(&first.2) < SAME_SIDE);
+        if is_close {
+            let side = self.side_of_region(region.as_deref());
+            let is_of_side = |at: usize| side != 0 && named_side(&candidates[at].template) == Some(side);
+            if !is_of_side(found[0].0) && is_of_side(found[1].0) {
+                found.swap(0, 1);
+            }
+        }
         let Some((at, settings, mut fit)) = found.into_iter().next() else {
             return Err(refused.unwrap_or(FitFailure::NoTemplate));
         };
@@ -172,13 +222,17 @@ impl Work {
         let Candidate { template, extent } = &candidates[at];
         let (uids, labels, ..) = skeleton(template);
         fit.confidence *= certainty;
-        fit.notes.extend((gear > 0).then_some(FitNote::Gear(gear)));
+        fit.notes.extend(note);
         let lowest = || points.iter().filter(|p| p.is_finite()).map(|p| p.dot(fit.up)).fold(f32::INFINITY, f32::min);
         let floor = analysis.floor(fit.up).unwrap_or_else(lowest);
         let name = match extent {
             FitExtent::Part(part) => part.rig.about().name.clone(),
             FitExtent::Skeleton | FitExtent::Joints => template.about().name.clone(),
         };
+        let is_guess = self.from.is_empty() && matches!(self.request.template, FitTemplate::Choose);
+        if is_guess && self.request.markers.is_empty() && fit.confidence < SHOWN {
+            return Err(FitFailure::NoFigure { template: name, limbs: choice, confidence: fit.confidence });
+        }
         let joints = uids.iter().copied().zip(labels).collect();
         let report = Arc::new(FitReport { template: name, choice, joints, fit, time: begin.elapsed() });
         let markers: BTreeMap<Uid, Vec3> =
@@ -189,6 +243,8 @@ impl Work {
             places: report.fit.joints.iter().map(|joint| Some(joint.position)).collect(),
             report,
             markers,
+            request: self.request.clone(),
+            has_own_template: self.from.is_empty(),
             analysis: Arc::new(analysis),
             settings,
             template: template.clone(),
@@ -202,6 +258,24 @@ impl Work {
         };
         let target = fitted.target(&self.modules)?;
         Ok(FinishedFit { fitted, target })
+    }
+
+    /// Side of the mesh on which a region lies, in the directions of the request or of most files: 1 left, -1 right, 0 neither.
+    fn side_of_region(&self, region: Option<&[u32]>) -> i32 {
+        let (points, triangles) = (&self.mesh.rest.points, &self.mesh.triangles);
+        let (up, forward) = (self.request.up.unwrap_or(Vec3::Y), self.request.forward.unwrap_or(Vec3::Z));
+        let left = up.cross(forward).normalize_or(Vec3::X);
+        let along = points.iter().filter(|point| point.is_finite()).map(|point| point.dot(left));
+        let (low, high) = along.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
+        let corners = region.into_iter().flatten().filter_map(|at| triangles.get(*at as usize));
+        let middles = corners.filter_map(|corners| middle(points, corners)).filter(|middle| middle.is_finite());
+        let (sum, count) = middles.fold((0.0f32, 0usize), |(sum, count), middle| (sum + middle.dot(left), count + 1));
+        let aside = sum / count.max(1) as f32 - 0.5 * (low + high);
+        match count > 0 && aside.abs() > ASIDE * (high - low) {
+            true if aside > 0.0 => 1,
+            true => -1,
+            false => 0,
+        }
     }
 
     /// Place of the joint that a part or chosen joints hang on.
@@ -257,6 +331,33 @@ impl Work {
         centre(&mut fit, &labels, &settings.markers);
         Ok((settings, fit))
     }
+}
+
+/// Triangles of the object of a mesh that has the most, and the number of the others; `None` where there are no others, or where
+/// the object is too small for a figure that the others lie on.
+fn largest_object(mesh: &RigMesh) -> Option<(Vec<u32>, usize)> {
+    let others = mesh.rest.objects.len().checked_sub(1).filter(|others| *others > 0)?;
+    let mut counts = vec![0_usize; others + 1];
+    for part in &mesh.rest.parts {
+        if let Some(count) = counts.get_mut(part.object) {
+            *count += part.triangles.len();
+        }
+    }
+    let gear: HashSet<usize> = mesh.file.gear().into_iter().collect();
+    let figures = (0..=others).filter(|number| !gear.contains(number));
+    // Of objects that are equally large, the first one.
+    let largest = figures.reduce(|best, next| if counts[next] > counts[best] { next } else { best })?;
+    let largest = mesh.rest.triangles_of(|object| object == largest);
+    let extent = |corners: &mut dyn Iterator<Item = u32>| {
+        let places =
+            corners.filter_map(|corner| mesh.rest.points.get(corner as usize)).filter(|place| place.is_finite());
+        let bounds = places.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), at| (low.min(*at), high.max(*at)));
+        bounds.1 - bounds.0
+    };
+    let own = largest.iter().filter_map(|at| mesh.triangles.get(*at as usize)).flatten();
+    let (own, all) = (extent(&mut own.copied()), extent(&mut mesh.triangles.iter().flatten().copied()));
+    let axis = all.max_position();
+    (own[axis] >= FIGURE * all[axis]).then_some((largest, others))
 }
 
 /// Choice among candidates.

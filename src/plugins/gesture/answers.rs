@@ -52,8 +52,8 @@ impl Answers<'_, '_> {
             script.pending = false;
         }
         for ChangeReport { rig: entity, step } in self.reported.read() {
-            if let Ok((_, mut script, ..)) = scripts.get_mut(*entity) {
-                script.take_report(step);
+            if let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) {
+                script.take_report(step, rig);
             }
         }
         for StrokeDone { rig: entity, result } in self.drawn.read() {
@@ -66,9 +66,7 @@ impl Answers<'_, '_> {
                 }
                 StrokeResult::Erased(joints) => script.say(format!("deleted {} joints", joints.len())),
                 StrokeResult::Chain { chain, parent, .. } => {
-                    let on = parent.map_or("as a root".to_owned(), |parent| format!("below {}", name_of(rig, parent)));
-                    let notes: String = chain.notes.iter().map(|note| format!("; {}", heard(note))).collect();
-                    script.say(format!("drew a chain of {} joints {on}{notes}", chain.joints.len()));
+                    script.say(told_chain(rig, chain.joints.len(), *parent, &chain.notes));
                 }
             }
             script.pending = false;
@@ -155,6 +153,13 @@ fn name_of(rig: &Rig, joint: Uid) -> String {
 
 fn point(position: Vec3) -> String {
     format!("({:.4}, {:.4}, {:.4})", position.x, position.y, position.z)
+}
+
+/// Sentence about a chain of so many joints along a stroke, and the joint of the rig that it hangs on.
+pub(super) fn told_chain(rig: &Rig, joints: usize, parent: Option<Uid>, notes: &[StrokeNote]) -> String {
+    let on = parent.map_or("as a root".to_owned(), |parent| format!("below {}", name_of(rig, parent)));
+    let notes: String = notes.iter().map(|note| format!("; {}", heard(note))).collect();
+    format!("drew a chain of {joints} joints {on}{notes}")
 }
 
 /// Sentence about a step, and the number of joints of the rig after it.

@@ -7,7 +7,7 @@ use bevy::{ecs::system::SystemParam, prelude::*};
 use super::{
     Gesture,
     answers::Answers,
-    click_run::{self, RunRig},
+    click_run::{self, RequestedChange, RunRig},
     error::GestureError,
 };
 use crate::{
@@ -49,9 +49,9 @@ pub struct GestureScript {
     pub(super) pending: bool,
     /// True if gestures that follow one another are carried out in one frame where they can be.
     pub(super) is_unwatched: bool,
-    /// Indices of the answers of a run whose changes are requested.
+    /// Changes of a run that are requested, and complete its answers.
     #[reflect(ignore)]
-    pub(super) requested: VecDeque<usize>,
+    pub(super) requested: VecDeque<RequestedChange>,
     /// Number of refusals of changes of a run that are answered, and still to be read.
     pub(super) refused_changes: usize,
 }
@@ -102,6 +102,43 @@ impl UserState {
         }
         true
     }
+
+    /// View plane of a model between two corners.
+    pub(super) fn plane(&self, bounds: [Vec3; 2]) -> ViewPlane {
+        ViewPlane::orthographic(self.view, bounds)
+    }
+
+    /// Distance, in model units, up to which a point is on a joint.
+    pub(super) fn reach(&self, bounds: [Vec3; 2]) -> f32 {
+        self.reach.unwrap_or(0.005 * (bounds[1] - bounds[0]).max_element())
+    }
+
+    /// Request of a stroke on a rig whose model lies between two corners.
+    pub(super) fn stroke(
+        &self,
+        rig: Entity,
+        bounds: [Vec3; 2],
+        points: &[(f32, f32)],
+        threshold: Option<f32>,
+        joints: Option<usize>,
+    ) -> StrokeRequest {
+        let choice = match (joints, threshold) {
+            (Some(count), _) => ChainChoice::Joints(count),
+            (None, Some(threshold)) => ChainChoice::Threshold(threshold),
+            (None, None) => ChainChoice::Limb(0.02 * (bounds[1] - bounds[0]).max_element()),
+        };
+        StrokeRequest {
+            rig,
+            plane: self.plane(bounds),
+            points: points.iter().map(|point| Vec2::from(*point)).collect(),
+            choice,
+            settings: StrokeSettings { place: self.place, recentre: self.recentre },
+            chain_only: joints.is_some(),
+            reach: self.reach(bounds),
+            parent: StrokeParent::Selected,
+            chain: None,
+        }
+    }
 }
 
 impl GestureScript {
@@ -110,8 +147,8 @@ impl GestureScript {
         Self { waiting: gestures.into_iter().collect(), ..Self::default() }
     }
 
-    /// A script of these gestures in an app without a window: clicks, labels, undone and redone steps that follow one
-    /// another are carried out in one frame. The result is that of [`GestureScript::new`].
+    /// A script of these gestures in an app without a window: clicks, strokes, labels, undone and redone steps that
+    /// follow one another are carried out in one frame. The result is that of [`GestureScript::new`].
     pub fn unwatched(gestures: impl IntoIterator<Item = Gesture>) -> Self {
         Self { is_unwatched: true, ..Self::new(gestures) }
     }
@@ -167,9 +204,15 @@ pub(super) fn run_scripts(
         let bounds = surface.map_or([Vec3::splat(-0.5), Vec3::splat(0.5)], RigSurface::bounds);
         // Joints of a fit follow each edit.
         if is_fitted == (false, false) && click_run::is_due(&script, rig, surface) {
-            let run = RunRig { entity, rig, selection, surface, bounds };
-            click_run::carry_out(&mut script, &run, &mut requests.edits, &limits);
-            continue;
+            let has_mesh = meshes.is_some() && surface.and_then(RigSurface::ready).is_some();
+            let is_known = selection.active().is_none_or(|active| rig.joint(active).is_some());
+            // Commands and clips may move joints away from their rest.
+            let is_still = !rig.has_tags() && rig.clips().is_empty();
+            let can_draw = has_mesh && is_known && is_still && symmetry.0.is_none();
+            let run = RunRig { entity, rig, selection, surface, bounds, can_draw };
+            if click_run::carry_out(&mut script, &run, &mut requests.edits, &limits) {
+                continue;
+            }
         }
         let Some(gesture) = script.begin_next(rig.len(), &limits) else { continue };
         let mesh = meshes.and_then(|meshes| meshes.iter().next());
@@ -218,16 +261,8 @@ struct GestureRun<'a, 'w> {
 }
 
 impl GestureRun<'_, '_> {
-    fn size(&self) -> f32 {
-        (self.bounds[1] - self.bounds[0]).max_element()
-    }
-
     fn plane(&self) -> ViewPlane {
-        ViewPlane::orthographic(self.state.view, self.bounds)
-    }
-
-    fn reach(&self) -> f32 {
-        self.state.reach.unwrap_or(0.005 * self.size())
+        self.state.plane(self.bounds)
     }
 
     fn active(&self) -> Result<Uid, GestureError> {
@@ -257,7 +292,7 @@ impl GestureRun<'_, '_> {
                 return Ok(true);
             }
             Gesture::Stroke { points, threshold, joints } => {
-                requests.strokes.write(self.stroke(&points, threshold, joints));
+                requests.strokes.write(self.state.stroke(rig, self.bounds, &points, threshold, joints));
                 return Ok(true);
             }
             Gesture::Select(at) => pick = Some((self.click(at), false)),
@@ -307,26 +342,7 @@ impl GestureRun<'_, '_> {
     }
 
     fn click(&self, at: (f32, f32)) -> Pick {
-        Pick::Click { plane: self.plane(), point: at.into(), reach: self.reach() }
-    }
-
-    fn stroke(&self, points: &[(f32, f32)], threshold: Option<f32>, joints: Option<usize>) -> StrokeRequest {
-        let choice = match (joints, threshold) {
-            (Some(count), _) => ChainChoice::Joints(count),
-            (None, Some(threshold)) => ChainChoice::Threshold(threshold),
-            (None, None) => ChainChoice::Limb(0.02 * self.size()),
-        };
-        StrokeRequest {
-            rig: self.entity,
-            plane: self.plane(),
-            points: points.iter().map(|point| Vec2::from(*point)).collect(),
-            choice,
-            settings: StrokeSettings { place: self.state.place, recentre: self.state.recentre },
-            chain_only: joints.is_some(),
-            reach: self.reach(),
-            parent: StrokeParent::Selected,
-            chain: None,
-        }
+        Pick::Click { plane: self.plane(), point: at.into(), reach: self.state.reach(self.bounds) }
     }
 
     /// The operation of a gesture on the selected joints.

@@ -4,11 +4,11 @@ use bevy::prelude::*;
 
 use super::NodeSlot;
 
-/// Writes the world transforms of entities below joints in [`InstanceMode::Direct`](super::InstanceMode): these have no local
-/// transforms, so Bevy's propagation ends there.
+/// Writes the world transforms of entities below joints in [`InstanceMode::Direct`](super::InstanceMode), such as a sword, or a
+/// rider with nodes of its own: these joints have no local transforms, so Bevy's propagation ends there.
 pub(super) fn place_attachments(
     joints: Query<(Ref<GlobalTransform>, Ref<Children>), (With<NodeSlot>, Without<Transform>)>,
-    mut hung: Query<(Ref<Transform>, &mut GlobalTransform, Option<Ref<Children>>), Without<NodeSlot>>,
+    mut hung: Query<(Ref<Transform>, &mut GlobalTransform, Option<Ref<Children>>)>,
 ) {
     for (joint, children) in &joints {
         let is_moved = joint.is_changed() || children.is_changed();
@@ -23,7 +23,7 @@ fn place(
     entity: Entity,
     above: &GlobalTransform,
     is_moved: bool,
-    hung: &mut Query<(Ref<Transform>, &mut GlobalTransform, Option<Ref<Children>>), Without<NodeSlot>>,
+    hung: &mut Query<(Ref<Transform>, &mut GlobalTransform, Option<Ref<Children>>)>,
 ) {
     let Ok((transform, mut global, children)) = hung.get_mut(entity) else { return };
     let is_moved = is_moved || transform.is_changed();

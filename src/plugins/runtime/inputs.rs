@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use bevy::{math::Affine3, prelude::*};
+use bevy::{ecs::system::SystemParam, math::Affine3, prelude::*};
 
 use super::RigRuntime;
 use crate::{
@@ -32,18 +32,19 @@ impl<const COUNT: usize> From<[(&str, Entity); COUNT]> for RigInputs {
     }
 }
 
-/// Writes where the entities of inputs stand, seen from the rig, before it runs: in this frame, not in the last one.
-pub(super) fn read_inputs(mut rigs: Query<(Entity, &mut RigRuntime, Option<&RigInputs>)>, places: TransformHelper) {
+/// Writes where the entities of inputs stand, seen from the rig, before it runs: in this frame, not in the last one. What hangs
+/// on a joint of an instance without a hierarchy, or is one, stands where the last frame showed it.
+pub(super) fn read_inputs(mut rigs: Query<(Entity, &mut RigRuntime, Option<&RigInputs>)>, places: WorldPlaces) {
     for (rig, mut runtime, given) in &mut rigs {
         let program = runtime.state().program().clone();
         if program.declared_inputs().is_empty() {
             continue;
         }
-        let world = given.and_then(|_| places.compute_global_transform(rig).ok());
+        let world = given.and_then(|_| places.of(rig));
         let to_rig = world.map(|world| world.affine().inverse());
         for (slot, name) in program.declared_inputs().iter().enumerate() {
             let entity = given.and_then(|given| given.get(&**name));
-            let place = entity.and_then(|entity| places.compute_global_transform(*entity).ok());
+            let place = entity.and_then(|entity| places.of(*entity));
             let place = place
                 .zip(to_rig)
                 .map(|(place, to_rig)| Trs::from(RestTransform::from_affine(&Affine3::from(to_rig * place.affine()))));
@@ -51,6 +52,21 @@ pub(super) fn read_inputs(mut rigs: Query<(Entity, &mut RigRuntime, Option<&RigI
             // A place without extent, or at infinity, is none: the input stays.
             runtime.bypass_change_detection().state_mut().set_input_at(slot, place);
         }
+    }
+}
+
+/// Places of entities in the world, before transforms are propagated.
+#[derive(SystemParam)]
+pub(super) struct WorldPlaces<'w, 's> {
+    now: TransformHelper<'w, 's>,
+    shown: Query<'w, 's, &'static GlobalTransform>,
+}
+
+impl WorldPlaces<'_, '_> {
+    /// The place that the transforms of an entity and of those above it give. Joints of instances without a hierarchy have none:
+    /// for these, and for what hangs on them, it is the place in the last frame.
+    pub fn of(&self, entity: Entity) -> Option<GlobalTransform> {
+        self.now.compute_global_transform(entity).ok().or_else(|| self.shown.get(entity).ok().copied())
     }
 }
 

@@ -6,7 +6,9 @@ use bevy::{
 };
 use rayon::prelude::*;
 
-use super::{ControlPose, DrivenMorphs, InstanceMode, NodeOf, NodeSlot, RigRuntime, spawn::transform};
+use super::{
+    ControlPose, DrivenMorphs, InstanceMode, NodeOf, NodeSlot, RigRuntime, inputs::WorldPlaces, spawn::transform,
+};
 use crate::{
     mesh::model::Trs,
     plugins::schema::Attributes,
@@ -44,12 +46,12 @@ pub(super) fn note_controls(
 }
 
 /// Tells springs how their rigs have moved in the world since the last run.
-pub(super) fn feel_motion(mut rigs: Query<(Entity, &mut RigRuntime)>, places: TransformHelper) {
+pub(super) fn feel_motion(mut rigs: Query<(Entity, &mut RigRuntime)>, places: WorldPlaces) {
     for (entity, mut runtime) in &mut rigs {
         if !runtime.state.program().has_springs() {
             continue;
         }
-        let Ok(world) = places.compute_global_transform(entity) else { continue };
+        let Some(world) = places.of(entity) else { continue };
         let (now, runtime) = (world.affine(), runtime.bypass_change_detection());
         match runtime.world.replace(now) {
             Some(before) if before != now => {
@@ -136,6 +138,7 @@ fn gather(
         values,
         driven_writes,
         unknown_writes,
+        is_of_document,
         ..
     } = runtime;
     for (slot, entity) in controls.iter() {
@@ -163,6 +166,9 @@ fn gather(
             }
         }
     }
+    if attributes.is_empty() {
+        return;
+    }
     for (entity, slots) in holders.iter() {
         let Ok(Attributes(told)) = attributes.get(*entity) else { continue };
         let mut found = 0;
@@ -175,6 +181,11 @@ fn gather(
                 continue;
             };
             found += 1;
+            if values[slot].is_nan() && !*is_of_document && value.is_finite() {
+                // What a game gives to a node of an instance counts from its first value on.
+                state.set_attribute_at(slot, value);
+                *attributes_due = true;
+            }
             if !values[slot].is_nan() && value != values[slot] {
                 if !state.set_attribute_at(slot, value) {
                     driven_writes.push((*entity, slot as u32));
@@ -219,15 +230,20 @@ pub(super) fn scatter_locals(
         let nodes = state.program().nodes();
         for (slot, entity) in written.iter() {
             let at = *slot as usize;
+            let is_rewritten = *has_rewritten && rewritten[at];
             let is_due = is_all
+                || is_rewritten
                 || state.is_moved(at)
-                || nodes[at].parent.is_some_and(|parent| state.is_moved(parent))
-                || std::mem::take(&mut rewritten[at]);
+                || nodes[at].parent.is_some_and(|parent| state.is_moved(parent));
             if !is_due {
                 continue;
             }
-            let Ok(mut written) = transforms.get_mut(*entity) else { continue };
             let local = transform(&state.local_at(at));
+            // What nobody else wrote is on the entity as it was written last, which need not be looked up.
+            if !is_rewritten && (shown[at] == local || is_near(&shown[at], &local)) {
+                continue;
+            }
+            let Ok(mut written) = transforms.get_mut(*entity) else { continue };
             if *written != local && !is_near(&written, &local) {
                 *written = local;
             }
@@ -244,9 +260,14 @@ pub(super) fn scatter_attributes(
     mut rigs: Query<&mut RigRuntime, Changed<RigRuntime>>,
     mut holders: Query<&mut Attributes>,
 ) {
+    // Nodes of a game's instances hold no values before the game gives them some.
+    let is_any_held = !holders.is_empty();
     for mut runtime in &mut rigs {
         let RigRuntime { state, attributes, values, attributes_due, .. } = runtime.bypass_change_detection();
         *attributes_due = false;
+        if !is_any_held {
+            continue;
+        }
         for (entity, slots) in attributes.iter() {
             let is_other = |slot: &&u32| {
                 let slot = **slot as usize;
@@ -324,7 +345,7 @@ pub(super) fn correct_globals(
     let correct = |(runtime, world): (&RigRuntime, &GlobalTransform), slot: usize, mut node: Mut<GlobalTransform>| {
         let world = world.affine();
         let wanted = world * runtime.state.global_at(slot).affine();
-        let height = runtime.height * world.matrix3.y_axis.length();
+        let height = runtime.state.program().rest_height() * world.matrix3.y_axis.length();
         if !is_same_place(&node.affine(), &wanted, height) {
             *node = GlobalTransform::from(wanted);
         }

@@ -95,6 +95,14 @@ impl MeshParts {
         Some(object.map_or(MeshPart::Piece(piece), MeshPart::Object))
     }
 
+    /// Object that a part is or belongs to; `None` for a piece that belongs to none.
+    pub fn object(&self, part: MeshPart) -> Option<MeshPart> {
+        match part {
+            MeshPart::Object(_) => Some(part),
+            MeshPart::Piece(piece) => self.objects.get(piece).copied().flatten().map(MeshPart::Object),
+        }
+    }
+
     /// Points of a part, as runs of following numbers.
     pub(super) fn points(&self, mesh: &RigMesh, part: MeshPart) -> Vec<Range<u32>> {
         match part {

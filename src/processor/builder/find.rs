@@ -1,5 +1,7 @@
 //! Nodes of what is built, found by references in their text form.
 
+use std::collections::BTreeSet;
+
 use super::{
     super::{
         NodeId,
@@ -87,5 +89,18 @@ impl Builder {
         };
         let found = self.list.iter().filter(|number| off.commands.contains_key(*number)).find(is_named)?;
         off.commands.get(found).map(|command| command.reason.off().clone())
+    }
+
+    /// Names for which [`off_named`](Self::off_named) finds an exclusion: labels of joints, and names that commands give to
+    /// their nodes.
+    pub fn names_off(&self) -> BTreeSet<String> {
+        let off = &self.world.off;
+        let labels = off.joints.values().filter_map(|joint| match &joint.off {
+            Exclusion::Joint { joint, .. } => Some(joint.to_string()),
+            _ => None,
+        });
+        let commands = self.list.iter().filter(|number| off.commands.contains_key(*number));
+        let given = commands.flat_map(|number| given_names(&self.commands[*number as usize].params));
+        labels.chain(given).filter(|name| !name.is_empty()).collect()
     }
 }

@@ -237,6 +237,7 @@ pub fn named_bones(joints: &[SkeletonJoint]) -> BTreeMap<HumanBone, usize> {
     }
     name_arms(joints, &mut named);
     name_feet(joints, &mut named);
+    name_thumbs(joints, &mut named);
     if !named.contains_key(&HumanBone::Head)
         && let Some(head) = end_of_spine(joints, &named)
     {
@@ -299,6 +300,18 @@ fn name_feet(joints: &[SkeletonJoint], named: &mut BTreeMap<HumanBone, usize>) {
         if is_ball && !named.contains_key(&toes) {
             named.insert(foot, at);
             named.insert(toes, ball);
+        }
+    }
+}
+
+/// Names the joints of thumbs as Unity and VRM 0 have them: proximal, intermediate, distal.
+fn name_thumbs(joints: &[SkeletonJoint], named: &mut BTreeMap<HumanBone, usize>) {
+    for (at, joint) in joints.iter().enumerate() {
+        let Some((side, parent)) = names::middle_thumb_side_of(&joint.name).zip(joint.parent) else { continue };
+        let [first, second] = [1, 2].map(|number| HumanBone::Finger(side, Finger::Thumb, number));
+        if named.get(&second) == Some(&parent) && !named.contains_key(&first) {
+            named.insert(first, parent);
+            named.insert(second, at);
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::rig::{BuiltRig, Rig, Uid};
 
 /// Names by which a node can be found again when it has another uid.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
-pub struct KnownNode {
+pub struct NodeName {
     /// The label; empty without one.
     #[serde(default)]
     pub label: String,
@@ -21,7 +21,7 @@ pub struct KnownNode {
 /// Names of nodes by their uids.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct NodeNames(pub BTreeMap<Uid, KnownNode>);
+pub struct NodeNames(pub BTreeMap<Uid, NodeName>);
 
 impl NodeNames {
     /// Names of the joints of a document and of the nodes that its commands built.
@@ -30,11 +30,11 @@ impl NodeNames {
         for node in built.into_iter().flat_map(|built| &built.nodes) {
             let label = node.label.as_deref().unwrap_or(&node.name).to_owned();
             let role = node.origin.as_ref().map_or_else(String::new, |origin| origin.role.to_string());
-            names.insert(node.uid, KnownNode { label, role });
+            names.insert(node.uid, NodeName { label, role });
         }
         for joint in rig.walk() {
             let label = joint.data.label.clone().unwrap_or_default();
-            names.insert(joint.data.uid, KnownNode { label, role: String::new() });
+            names.insert(joint.data.uid, NodeName { label, role: String::new() });
         }
         Self(names)
     }
@@ -51,11 +51,11 @@ impl NodeNames {
 
     /// The only node with the label and role of `name`; without a role in `name`, the only joint with its label, or else
     /// the only node with it. `None` if there are several, or none.
-    pub fn find(&self, name: &KnownNode) -> Option<Uid> {
+    pub fn find(&self, name: &NodeName) -> Option<Uid> {
         if name.label.is_empty() {
             return None;
         }
-        let only = |is_it: &dyn Fn(&KnownNode) -> bool| {
+        let only = |is_it: &dyn Fn(&NodeName) -> bool| {
             let mut found = self.0.iter().filter(|(_, known)| is_it(known)).map(|(uid, _)| *uid);
             let first = found.next()?;
             found.next().is_none().then_some(first)
@@ -76,7 +76,7 @@ pub struct OrphanedKeys {
     /// The node that is gone.
     pub node: Uid,
     /// Last known names of the node.
-    pub name: KnownNode,
+    pub name: NodeName,
     /// Number of its tracks.
     pub tracks: usize,
     /// Number of its keys.

@@ -1,6 +1,7 @@
-//! Effects of edits: the joints and tags that an edit adds, the size of its weights, and whether it concerns motion alone.
+//! Effects of edits: the joints and tags that an edit adds, the meshes that come and go, the size of its weights, and
+//! whether it concerns motion alone.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 use super::RigEdit;
 use crate::rig::Uid;
@@ -26,6 +27,20 @@ impl RigEdit {
         }
     }
 
+    /// Meshes that the edit has come to the rig (`true`) or leave it, put into `meshes` in place of what that says of them.
+    pub fn mesh_changes(&self, meshes: &mut BTreeMap<Uid, bool>) {
+        match self {
+            Self::AddMesh(mesh) => {
+                meshes.insert(*mesh, true);
+            }
+            Self::RemoveMesh(mesh) => {
+                meshes.insert(*mesh, false);
+            }
+            Self::Batch(edits) => edits.iter().for_each(|edit| edit.mesh_changes(meshes)),
+            _ => {}
+        }
+    }
+
     /// Bytes of the weights that the edit gives to meshes: what makes an edit heavy.
     pub fn weight_bytes(&self) -> usize {
         match self {
@@ -38,8 +53,8 @@ impl RigEdit {
         }
     }
 
-    /// True if the edit changes nothing but pose, attribute values, stored poses, clips, selection sets or cuts of faces, which no
-    /// command reads.
+    /// True if the edit changes nothing but pose, attribute values, stored poses, clips, selection sets, cuts of faces or
+    /// meshes, which no command reads.
     pub fn is_of_motion(&self) -> bool {
         match self {
             Self::SetOffset(..) | Self::SetAttributeValue(..) => true,
@@ -47,6 +62,7 @@ impl RigEdit {
             Self::AddClip(..) | Self::RemoveClip(..) | Self::SetClipAbout(..) => true,
             Self::AddLayer { .. } | Self::RemoveLayer { .. } | Self::SetLayer { .. } | Self::SetKeys { .. } => true,
             Self::SetSelectionSets(..) | Self::SetFaceCut(..) | Self::ExchangeNodes(..) => true,
+            Self::AddMesh(..) | Self::RemoveMesh(..) => true,
             Self::Batch(edits) => edits.iter().all(Self::is_of_motion),
             _ => false,
         }

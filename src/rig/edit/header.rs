@@ -1,5 +1,7 @@
 //! Edits of the header of a rig's template.
 
+use std::collections::HashSet;
+
 use ron::value::RawValue;
 
 use super::EditError;
@@ -34,19 +36,21 @@ impl RigAbout {
     /// # Errors
     /// A socket or an option with which no template could be read.
     pub fn check(&self) -> Result<(), HeaderFault> {
-        for (number, socket) in self.sockets.iter().enumerate() {
+        let mut names = HashSet::with_capacity(self.sockets.len());
+        for socket in &self.sockets {
             if socket.name.is_empty() || socket.name.contains('.') {
                 return Err(HeaderFault::SocketName(socket.name.clone()));
             }
-            if self.sockets[..number].iter().any(|other| other.name == socket.name) {
+            if !names.insert(socket.name.as_str()) {
                 return Err(HeaderFault::SocketTwice(socket.name.clone()));
             }
             if !socket.translation.is_finite() || !degrees(socket.rotation).is_finite() {
                 return Err(HeaderFault::SocketPlace(socket.name.clone()));
             }
         }
-        for (number, option) in self.options.iter().enumerate() {
-            if self.options[..number].iter().any(|other| other.name == option.name) {
+        names.clear();
+        for option in &self.options {
+            if !names.insert(option.name.as_str()) {
                 return Err(HeaderFault::OptionTwice(option.name.clone()));
             }
             let read: Result<Box<RawValue>, _> = ron_options().from_str(&option.default);

@@ -25,10 +25,10 @@ impl Rig {
         for &(one, other) in pairs {
             exchange(&mut self.pose, one, other);
             exchange(&mut self.values, one, other);
-            for pose in &mut self.poses {
+            self.poses.change_each(|pose| {
                 exchange(&mut pose.offsets, one, other);
                 exchange(&mut pose.values, one, other);
-            }
+            });
             let other_of = |node: Uid| match node {
                 node if node == one => other,
                 node if node == other => one,

@@ -40,19 +40,18 @@ impl Rig {
         self.check_free(pose.uid)?;
         let pose = checked(pose)?;
         let uid = pose.uid;
-        self.poses.insert(index.min(self.poses.len()), pose);
+        self.poses.insert(index, pose);
         Ok(RigEdit::RemoveStoredPose(uid))
     }
 
     pub(super) fn remove_stored_pose(&mut self, uid: Uid) -> Result<RigEdit, EditError> {
-        let index = self.poses.iter().position(|pose| pose.uid == uid).ok_or(EditError::NoPose(uid))?;
-        Ok(RigEdit::AddStoredPose(Box::new(self.poses.remove(index)), index))
+        let (index, pose) = self.poses.remove(uid).ok_or(EditError::NoPose(uid))?;
+        Ok(RigEdit::AddStoredPose(Box::new(pose), index))
     }
 
     pub(super) fn set_stored_pose(&mut self, pose: &StoredPose) -> Result<RigEdit, EditError> {
-        let next = checked(pose)?;
-        let old = self.poses.iter_mut().find(|old| old.uid == pose.uid).ok_or(EditError::NoPose(pose.uid))?;
-        Ok(RigEdit::SetStoredPose(Box::new(std::mem::replace(old, next))))
+        let old = self.poses.replace(checked(pose)?).ok_or(EditError::NoPose(pose.uid))?;
+        Ok(RigEdit::SetStoredPose(Box::new(old)))
     }
 }
 

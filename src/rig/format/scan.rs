@@ -107,25 +107,47 @@ pub(crate) fn elements_around(text: &str, offset: usize) -> Vec<Range<usize>> {
     found
 }
 
-/// Start of the last bracket or string that is open at the end of a text whose brackets fit otherwise: such a text is cut
-/// short. `None` for whole texts, and for those in which a bracket closes one of another kind.
-pub(crate) fn cut_short(text: &str) -> Option<usize> {
+/// Fault of the brackets of a text, with its places as byte offsets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum BracketFault {
+    /// Start of the last bracket or string that is open at the end of a text, which is cut short.
+    Open(usize),
+    /// A closing bracket of another kind than the bracket that it closes.
+    Crossed {
+        /// Place of the closing bracket.
+        at: usize,
+        /// The bracket that should stand there.
+        wanted: char,
+    },
+    /// A closing bracket where no bracket is open.
+    Surplus(usize),
+}
+
+/// First fault of the brackets of a text; `None` where each is closed by one of its kind.
+pub(crate) fn bracket_fault(text: &str) -> Option<BracketFault> {
     let mut open: Vec<Token> = Vec::new();
     for token in tokens(text) {
         let is_string = token.text.starts_with('"');
         if is_string && token.start + token.text.len() == text.len() && !(token.text.len() > 1 && text.ends_with('"')) {
-            return Some(token.start);
+            return Some(BracketFault::Open(token.start));
         }
         match token.text {
             "(" | "[" | "{" => open.push(token),
-            closing @ (")" | "]" | "}") => match (open.pop()?.text, closing) {
-                ("(", ")") | ("[", "]") | ("{", "}") => {}
-                _ => return None,
-            },
+            closing @ (")" | "]" | "}") => {
+                let wanted = match open.pop().map(|opening| opening.text) {
+                    None => return Some(BracketFault::Surplus(token.start)),
+                    Some("(") => ')',
+                    Some("[") => ']',
+                    Some(_) => '}',
+                };
+                if !closing.starts_with(wanted) {
+                    return Some(BracketFault::Crossed { at: token.start, wanted });
+                }
+            }
             _ => {}
         }
     }
-    open.last().map(|token| token.start)
+    open.last().map(|token| BracketFault::Open(token.start))
 }
 
 /// Starts of the elements of the outermost list, in bytes.

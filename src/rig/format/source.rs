@@ -3,7 +3,7 @@
 use ron::{Options, extensions::Extensions};
 use serde::{Serialize, de::DeserializeOwned};
 
-use super::scan::cut_short;
+use super::scan::{BracketFault, bracket_fault};
 use crate::rig::nearest::nearest;
 
 /// Error in a text file, with its place.
@@ -34,15 +34,31 @@ impl SourceError {
         }
     }
 
-    /// Fault of a text that is cut short; `None` for others.
-    pub(crate) fn cut_short(text: &str) -> Option<Self> {
-        let message = "the file is cut short: nothing closes what begins here; take a backup, or close it";
-        cut_short(text).map(|at| Self::at(text, at, message))
+    /// Fault of the brackets of a text; `None` where each is closed by one of its kind.
+    pub(crate) fn of_brackets(text: &str) -> Option<Self> {
+        let shown = |at: usize| text[at..].chars().next().unwrap_or_default();
+        Some(match bracket_fault(text)? {
+            BracketFault::Open(at) => {
+                let message = "the file is cut short: nothing closes what begins here; take a backup, or close it";
+                Self::at(text, at, message)
+            }
+            BracketFault::Crossed { at, wanted } => {
+                let closing = shown(at);
+                let message = format!(
+                    "`{closing}` stands where `{wanted}` closes the last open bracket; write `{wanted}` before it, or \
+                     remove one of the two brackets"
+                );
+                Self::at(text, at, message)
+            }
+            BracketFault::Surplus(at) => {
+                Self::at(text, at, format!("`{}` closes nothing; remove it, or open it before", shown(at)))
+            }
+        })
     }
 
     /// An error of the RON reader, with its remedy.
     pub(crate) fn from_ron(text: &str, error: &ron::error::SpannedError) -> Self {
-        if let Some(fault) = Self::cut_short(text) {
+        if let Some(fault) = Self::of_brackets(text) {
             return fault;
         }
         let message = match &error.code {
@@ -56,10 +72,27 @@ impl SourceError {
                 format!("the field `{field}` is there twice; keep one of the two")
             }
             ron::Error::Eof => format!("{}; the file is cut short: take a backup", error.code),
-            code => code.to_string(),
+            code => match remedy(code) {
+                Some(remedy) => format!("{code}; {remedy}"),
+                None => code.to_string(),
+            },
         };
         Self::at(text, byte_offset(text, error.span.start), message)
     }
+}
+
+/// Advice for a value of a wrong kind; `None` for other errors.
+fn remedy(error: &ron::Error) -> Option<&'static str> {
+    Some(match error {
+        ron::Error::IntegerOutOfBounds => "write a whole number that fits here; counts have no sign",
+        ron::Error::ExpectedInteger => "write a whole number, such as 2",
+        ron::Error::ExpectedFloat => "write a number, such as 0.5",
+        ron::Error::ExpectedBoolean => "write true or false",
+        ron::Error::ExpectedString => "write a text in quotation marks",
+        ron::Error::ExpectedArray => "write a list in square brackets",
+        ron::Error::ExpectedStructLike => "write fields or numbers in round brackets",
+        _ => return None,
+    })
 }
 
 /// Largest number of names that are listed where none is near.

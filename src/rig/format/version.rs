@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use super::{scan::Field, source::SourceError};
 
 /// Names that are allowed for a field at its place; `None` where any name is allowed.
-pub(super) type KnownNames = fn(&[Field], &Field) -> Option<&'static [&'static str]>;
+pub(super) type AllowedNames = fn(&[Field], &Field) -> Option<&'static [&'static str]>;
 
 /// Kind of file with a format number.
 pub(super) struct Format {
@@ -15,7 +15,7 @@ pub(super) struct Format {
     /// Format number that is written.
     pub number: u32,
     /// Allowed names of fields.
-    pub known: KnownNames,
+    pub known: AllowedNames,
 }
 
 impl Format {

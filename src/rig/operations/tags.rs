@@ -6,6 +6,7 @@ mod clipboard;
 mod insert;
 mod part;
 mod paste;
+mod steady_names;
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -13,7 +14,7 @@ pub use clipboard::{CopiedIdentifiers, CopiedJoint, TagClipboard, TagScope};
 pub use insert::Rewiring;
 pub use part::PartOrder;
 pub(in crate::rig) use part::drop_part;
-pub use paste::{PasteTo, PasteWhat};
+pub use paste::{PasteContent, PasteTo};
 
 use super::{Draft, OperationError};
 use crate::rig::{
@@ -22,6 +23,7 @@ use crate::rig::{
     part::{Part, PartError},
     reference::{BadReference, NameKind, bind_names, refresh_names},
 };
+use steady_names::SteadyNames;
 
 /// A change of tags that a person requests. Tags are identified by their uids, wherever in the rig they are.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +90,7 @@ pub enum TagOperation {
         /// The copied tags, from this rig or another.
         clipboard: Arc<TagClipboard>,
         /// Tags, values or both.
-        what: PasteWhat,
+        what: PasteContent,
         /// Target joints.
         to: PasteTo,
     },
@@ -174,8 +176,8 @@ pub enum TagError {
     NoMirror,
     /// Fewer joints than a part needs.
     #[error(
-        "the part \"{part}\" needs {} joints, from the first on {}; {given} are selected: select the rest of the chain, or \
-         add joints",
+        "the part \"{part}\" needs {} joints, from the first on {}; it gets {given}: select or name the rest of the \
+         chain, or add joints",
         joints.len(),
         joints.join(", ")
     )]
@@ -257,9 +259,10 @@ impl From<FeatureError> for OperationError {
 pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), OperationError> {
     match operation {
         TagOperation::Add { joints, kind, index } => {
+            let names = SteadyNames::default();
             for &joint in joints {
                 let tag = TagData { uid: draft.next_uid(), enabled: true, comment: String::new(), kind: kind.clone() };
-                let tag = bound(draft, tag)?;
+                let tag = bound(draft, &names, tag)?;
                 add(draft, joint, tag, index.unwrap_or(usize::MAX))?;
             }
             Ok(())
@@ -276,13 +279,18 @@ pub(super) fn run(draft: &mut Draft, operation: &TagOperation) -> Result<(), Ope
             moves.iter().try_for_each(|(tag, joint, before)| relocate(draft, &[*tag], *joint, *before))
         }
         TagOperation::Comment(tag, comment) => change(draft, *tag, |tag| tag.comment.clone_from(comment)),
-        TagOperation::Params(tags) => tags.iter().try_for_each(|(uid, text)| {
-            let (joint, mut tag) = found(draft, *uid)?;
-            let TagKind::Command { params, .. } = &mut tag.kind else { return Err(TagError::NotCommand(*uid).into()) };
-            params.clone_from(text);
-            let tag = bound(draft, tag)?;
-            set(draft, joint, tag)
-        }),
+        TagOperation::Params(tags) => {
+            let names = SteadyNames::default();
+            tags.iter().try_for_each(|(uid, text)| {
+                let (joint, mut tag) = found(draft, *uid)?;
+                let TagKind::Command { params, .. } = &mut tag.kind else {
+                    return Err(TagError::NotCommand(*uid).into());
+                };
+                params.clone_from(text);
+                let tag = bound(draft, &names, tag)?;
+                set(draft, joint, tag)
+            })
+        }
         TagOperation::Feature { tag, kind, name, switch } => {
             feature_tag(draft, *tag)?;
             change(draft, *tag, |tag| {
@@ -364,9 +372,9 @@ fn change(draft: &mut Draft, tag: Uid, change: impl FnOnce(&mut TagData)) -> Res
 }
 
 /// The tag with uids beside all names in its references.
-fn bound(draft: &Draft, mut tag: TagData) -> Result<TagData, TagError> {
+fn bound(draft: &Draft, names: &SteadyNames, mut tag: TagData) -> Result<TagData, TagError> {
     if let TagKind::Command { params, .. } = &mut tag.kind {
-        let (text, bad) = bind_names(params, draft.rig());
+        let (text, bad) = bind_names(params, &names.of(draft.rig()));
         let text = text.into_owned();
         if let Some(bad) = bad.into_iter().next() {
             return Err(TagError::BadReference(tag.uid, bad));

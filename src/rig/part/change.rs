@@ -4,13 +4,12 @@ use std::{borrow::Cow, collections::HashMap};
 
 use bevy::math::Quat;
 
-use super::{PartError, PartInstance, instance::set_tag};
+use super::{PartError, PartInstance, PartTargets, instance::set_tag};
 use crate::rig::{
-    EditError, Rig, RigEdit, RigJoint, TagData, TagKind, Uid,
+    EditError, Rig, RigEdit, TagData, TagKind, Uid,
     format::tree::{Tree, with_field},
-    nearest::did_you_mean,
     operations::Draft,
-    reference::{NameKind, NameScope, Names, bind_known_names, given_name, map_references},
+    reference::{NameKind, NameScope, Names, RigNameIndex, bind_known_names, given_name, map_references},
 };
 
 /// A difference of an instance from its part: of a joint or of a tag.
@@ -45,18 +44,37 @@ pub struct PartChange {
     pub tags: Vec<TagData>,
 }
 
+/// A part that an instance changes, with what all of its changes look up.
+pub(super) struct ChangedPart<'a> {
+    part: &'a Rig,
+    /// Names in the part.
+    names: RigNameIndex<'a>,
+    targets: PartTargets<'a>,
+    /// Joints of the rig, in the order of those of the part that are there.
+    joints: &'a [Uid],
+    /// Joints of the rig onto which joints of the part went.
+    places: HashMap<Uid, Uid>,
+}
+
+impl<'a> ChangedPart<'a> {
+    /// A fitted part, whose joints are these in the rig.
+    pub fn new(instance: &'a PartInstance, part: &'a Rig, joints: &'a [Uid]) -> Self {
+        let places = part.walk().map(|joint| joint.data.uid).zip(joints.iter().copied()).collect();
+        let (names, targets) = (RigNameIndex::new(part), PartTargets::new(instance, part));
+        Self { part, names, targets, joints, places }
+    }
+}
+
 impl PartInstance {
     /// Makes a change of the part, which is in the rig.
     pub(super) fn change(
         &self,
         draft: &mut Draft,
-        part: &Rig,
-        joints: &[Uid],
+        changed: &ChangedPart,
         change: &PartChange,
     ) -> Result<(), PartError> {
-        let places: HashMap<Uid, Uid> = part.walk().map(|joint| joint.data.uid).zip(joints.iter().copied()).collect();
         if let Some(name) = &change.tag {
-            let tag = self.uid_of(self.find_tag(part, name)?);
+            let tag = self.uid_of(changed.targets.find_tag(name)?);
             if change.removed {
                 return remove_tag(draft, tag);
             }
@@ -72,7 +90,7 @@ impl PartInstance {
             if let Some(others) = &change.params {
                 // Names are those of the part first, then those of the template, in which other parts may bring more, then those
                 // that the part's file has, without the prefix.
-                let names = PartNames { part, host: draft.rig(), instance: self, joints: &places };
+                let names = PartNames { changed, host: draft.rig(), instance: self };
                 let others = &map_references(&bind_known_names(others, &names), |reference| {
                     for (_, uid) in reference.uids_mut() {
                         *uid = names.uid_here(*uid);
@@ -86,8 +104,8 @@ impl PartInstance {
             }
         }
         let Some(label) = &change.joint else { return Ok(()) };
-        let place = self.find_joint(part, label)?;
-        let Some(joint) = joints.get(place).copied() else {
+        let place = changed.targets.find_joint(label)?;
+        let Some(joint) = changed.joints.get(place).copied() else {
             return Err(PartError::UnusedJoint { label: label.clone() });
         };
         Ok(self.change_joint(draft, joint, change)?)
@@ -117,17 +135,7 @@ impl PartInstance {
     /// # Errors
     /// A label that no joint has.
     pub(in crate::rig) fn find_joint(&self, part: &Rig, label: &str) -> Result<usize, PartError> {
-        let uid = label.parse::<Uid>().ok();
-        let is_called = |joint: &RigJoint| {
-            let known = joint.data.label.as_deref();
-            known == Some(label)
-                || known.and_then(|known| known.strip_prefix(self.prefix.as_str())) == Some(label)
-                || uid == Some(joint.data.uid)
-        };
-        part.walk().position(is_called).ok_or_else(|| {
-            let known: Vec<&str> = part.walk().filter_map(|joint| joint.data.label.as_deref()).collect();
-            PartError::UnknownJoint { label: label.to_owned(), nearest: did_you_mean(label, known) }
-        })
+        PartTargets::new(self, part).find_joint(label)
     }
 
     /// A label by which a change means that joint of the fitted part, and no other; `None` if there is none.
@@ -156,7 +164,7 @@ impl PartInstance {
     }
 
     /// Names of the tags of the fitted part.
-    fn called(&self, part: &Rig) -> Vec<(String, Uid)> {
+    pub(super) fn called(&self, part: &Rig) -> Vec<(String, Uid)> {
         let mut called: Vec<(String, Uid)> = Vec::new();
         for joint in part.walk() {
             for tag in &joint.data.tags {
@@ -176,55 +184,37 @@ impl PartInstance {
     /// # Errors
     /// A name that no tag has, or that several have.
     pub(in crate::rig) fn find_tag(&self, part: &Rig, name: &str) -> Result<Uid, PartError> {
-        let called = self.called(part);
-        let (plain, number) = match name.rsplit_once('#').map(|(plain, number)| (plain, number.parse::<usize>())) {
-            Some((plain, Ok(number))) => (plain, Some(number)),
-            _ => (name, None),
-        };
-        let mut found: Vec<Uid> = called.iter().filter(|(known, _)| known == plain).map(|(_, uid)| *uid).collect();
-        found.dedup();
-        if let Some(number) = number {
-            found = number.checked_sub(1).and_then(|at| found.get(at).copied()).into_iter().collect();
-        }
-        match found[..] {
-            [tag] => Ok(tag),
-            [] => {
-                let known: Vec<&str> = called.iter().map(|(known, _)| known.as_str()).collect();
-                Err(PartError::UnknownTag { name: name.to_owned(), nearest: did_you_mean(name, known) })
-            }
-            _ => Err(PartError::AmbiguousTag { name: name.to_owned(), count: found.len() }),
-        }
+        PartTargets::new(self, part).find_tag(name)
     }
 }
 
 /// Names in a part, then those in the template that uses it, each for the uid that it has there.
-struct PartNames<'a> {
-    part: &'a Rig,
+struct PartNames<'a, 'p> {
+    changed: &'a ChangedPart<'p>,
     host: &'a Rig,
     instance: &'a PartInstance,
-    /// Joints of the template onto which joints of the part went.
-    joints: &'a HashMap<Uid, Uid>,
 }
 
-impl PartNames<'_> {
+impl PartNames<'_, '_> {
     /// The uid in the template of something that has this one in the part; any other uid as it is.
     fn uid_here(&self, uid: Uid) -> Uid {
-        match self.joints.get(&uid) {
+        match self.changed.places.get(&uid) {
             Some(joint) => *joint,
-            None if self.part.is_taken(uid) => self.instance.uid_of(uid),
+            None if self.changed.part.is_taken(uid) => self.instance.uid_of(uid),
             None => uid,
         }
     }
 }
 
-impl Names for PartNames<'_> {
+impl Names for PartNames<'_, '_> {
     fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>> {
-        self.host.name_of(kind, uid).or_else(|| self.part.name_of(kind, uid))
+        self.host.name_of(kind, uid).or_else(|| self.changed.part.name_of(kind, uid))
     }
 
     fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid> {
         let here = |found: Vec<Uid>| found.into_iter().map(|uid| self.uid_here(uid)).collect::<Vec<Uid>>();
-        let found = self.part.find(scope, kind, name);
+        let part = &self.changed.names;
+        let found = part.find(scope, kind, name);
         if !found.is_empty() {
             return here(found);
         }
@@ -237,15 +227,15 @@ impl Names for PartNames<'_> {
         match (kind, name.split_once('/')) {
             (NameKind::Command, Some((module, name))) => {
                 let name = name.replace('/', &format!("/{prefix}"));
-                here(self.part.find(scope, kind, &format!("{module}/{prefix}{name}")))
+                here(part.find(scope, kind, &format!("{module}/{prefix}{name}")))
             }
-            (NameKind::Joint | NameKind::Label, _) => here(self.part.find(scope, kind, &format!("{prefix}{name}"))),
+            (NameKind::Joint | NameKind::Label, _) => here(part.find(scope, kind, &format!("{prefix}{name}"))),
             _ => found,
         }
     }
 
     fn all(&self, scope: NameScope, kind: NameKind) -> Vec<Cow<'_, str>> {
-        self.part.all(scope, kind).into_iter().chain(self.host.all(scope, kind)).collect()
+        self.changed.part.all(scope, kind).into_iter().chain(self.host.all(scope, kind)).collect()
     }
 }
 

@@ -11,7 +11,7 @@ use std::{
 
 use bevy::math::{Affine3, Vec3};
 
-use super::{OptionError, PartChain, PartChange, PartError, PartOption, PartSocket};
+use super::{OptionError, PartChain, PartChange, PartError, PartOption, PartSocket, PartTargets, change::ChangedPart};
 use crate::rig::{
     JointData, RestTransform, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
     format::{
@@ -179,8 +179,9 @@ impl PartInstance {
         };
         faults.extend(self.turn_off(&mut draft, part).into_iter().map(|error| (None, error)));
         let changes = self.changes.iter().enumerate().map(|(number, change)| (Some(number), change));
+        let changed = ChangedPart::new(self, part, &joints);
         for (number, change) in options.iter().map(|option| (None, option)).chain(changes) {
-            let done = self.change(&mut draft, part, &joints, change);
+            let done = self.change(&mut draft, &changed, change);
             faults.extend(done.err().map(|error| (number, error)));
         }
         let notes = draft.finish().notes.into_iter().map(|note| format!("part {}: {note}", self.title())).collect();
@@ -226,10 +227,15 @@ impl PartInstance {
     /// Parameters that the instance's options set: tag, parameter and value; and what is wrong with its options.
     fn option_values(&self, part: &Part) -> (Vec<(Uid, String, String)>, Vec<OptionError>) {
         let (mut values, mut errors) = (Vec::new(), Vec::new());
+        let options: HashMap<&str, &PartOption> =
+            part.options.iter().map(|option| (option.name.as_str(), option)).collect();
+        // The option names tags as the part's file does.
+        let plain = PartInstance::default();
+        let targets = PartTargets::new(&plain, &part.rig);
         for (name, value) in &self.options {
-            let Some(option) = part.options.iter().find(|option| option.name == *name) else {
-                let known: Vec<&str> = part.options.iter().map(|option| option.name.as_str()).collect();
-                errors.push(OptionError::Unknown { name: name.clone(), nearest: did_you_mean(name, known) });
+            let Some(option) = options.get(name.as_str()) else {
+                let known = || part.options.iter().map(|option| option.name.clone()).collect();
+                errors.push(OptionError::Unknown { name: name.clone(), nearest: targets.nearest(name, known) });
                 continue;
             };
             if let Err(error) = option.check(value) {
@@ -237,8 +243,7 @@ impl PartInstance {
                 continue;
             }
             for (tag, param) in &option.sets {
-                // The option names tags as the part's file does.
-                match PartInstance::default().find_tag(&part.rig, tag) {
+                match targets.find_tag(tag) {
                     Ok(tag) => values.push((tag, param.clone(), value.clone())),
                     Err(reason) => {
                         errors.push(OptionError::Target { name: name.clone(), reason: Box::new(reason) });
@@ -282,9 +287,10 @@ impl PartInstance {
         }
         errors.extend(self.option_values(part).1.into_iter().map(PartError::from));
         errors.extend(self.off.iter().filter_map(|name| self.tags_called(fitted, name).err()));
+        let targets = PartTargets::new(self, fitted);
         let of_change = |(number, change): (usize, &PartChange)| {
-            let tag = change.tag.as_ref().and_then(|name| self.find_tag(fitted, name).err());
-            let joint = change.joint.as_ref().and_then(|label| self.find_joint(fitted, label).err());
+            let tag = change.tag.as_ref().and_then(|name| targets.find_tag(name).err());
+            let joint = change.joint.as_ref().and_then(|label| targets.find_joint(label).err());
             tag.or(joint).map(|error| (Some(number), error))
         };
         let of_changes = self.changes.iter().enumerate().filter_map(of_change);
@@ -334,12 +340,14 @@ impl PartInstance {
         let globals: HashMap<Uid, _> = part.rest_globals().into_iter().collect();
         let order: Vec<Uid> = part.walk().map(|joint| joint.data.uid).collect();
         let prefixed = |name: &str| format!("{}{name}", self.prefix);
-        for group in part.groups.iter_mut().filter(|_| self.mirror) {
-            group.name = mirrored_label(&group.name).unwrap_or_else(|| group.name.clone());
-        }
-        for input in part.inputs.iter_mut().filter(|_| self.mirror) {
-            input.name = mirrored_label(&input.name).unwrap_or_else(|| input.name.clone());
-            input.rest = RestTransform::from_affine(&plane.mirrored_affine(&input.rest.affine()));
+        if self.mirror {
+            part.groups.change_each(|group| {
+                group.name = mirrored_label(&group.name).unwrap_or_else(|| group.name.clone());
+            });
+            part.inputs.change_each(|input| {
+                input.name = mirrored_label(&input.name).unwrap_or_else(|| input.name.clone());
+                input.rest = RestTransform::from_affine(&plane.mirrored_affine(&input.rest.affine()));
+            });
         }
         part.checkpoints.clear();
         part.label_index.clear();

@@ -3,7 +3,7 @@
 use super::NameKind;
 use crate::rig::{
     Uid,
-    nearest::{did_you_mean, listed},
+    nearest::{did_you_mean, listed_first},
 };
 
 /// Error in the text of a reference: malformed, or with a name that is unknown or ambiguous; with the place and a hint.
@@ -80,13 +80,15 @@ pub enum ReferenceProblem {
         nearest: Vec<String>,
     },
     /// A name that several objects have.
-    #[error("{} {kind}s are called \"{name}\"; write {name}#UID with one of {}", candidates.len(), uids(candidates))]
+    #[error("{count} {kind}s are called \"{name}\"; write {name}#UID with one of {}", uids(candidates, *count))]
     Ambiguous {
         /// Kind of the named object.
         kind: NameKind,
         /// The name.
         name: String,
-        /// Uids of the objects with the name.
+        /// Number of the objects with the name.
+        count: usize,
+        /// Uids of the objects with the name, without those that an error would not list.
         candidates: Vec<Uid>,
     },
     /// Several references in place of one.
@@ -110,6 +112,6 @@ impl ReferenceError {
     }
 }
 
-fn uids(list: &[Uid]) -> String {
-    listed(&list.iter().map(|uid| format!("#{uid}")).collect::<Vec<_>>(), "or")
+fn uids(list: &[Uid], count: usize) -> String {
+    listed_first(list.iter().map(|uid| format!("#{uid}")), count, "or")
 }

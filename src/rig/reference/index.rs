@@ -1,6 +1,10 @@
 //! Index of the names in a rig, for many look-ups while the rig stays as it is.
 
-use std::{borrow::Cow, cell::OnceCell, collections::HashMap};
+use std::{
+    borrow::Cow,
+    cell::{Cell, OnceCell},
+    collections::HashMap,
+};
 
 use super::{
     GroupScope, NameKind, NameScope, Names,
@@ -8,12 +12,21 @@ use super::{
 };
 use crate::rig::{Rig, Uid};
 
-/// Names of a rig, sorted when one is first looked up: [`Names`] of the rig itself walk through it for each name.
+/// Number of names that are compared with unknown ones for suggestions, by one index: each unknown name is compared with all.
+pub const MOST_COMPARED: usize = 200_000;
+
+/// Names of a rig, sorted when one is first looked up: [`Names`] of the rig itself walk through it for each name. An index
+/// that has listed [`MOST_COMPARED`] names for suggestions lists none any more, so that thousands of unknown names cost no more
+/// than a few.
 pub struct RigNameIndex<'a> {
     rig: &'a Rig,
+    groups: OnceCell<HashMap<&'a str, Vec<Uid>>>,
+    inputs: OnceCell<HashMap<&'a str, Vec<Uid>>>,
     joints: OnceCell<HashMap<String, Vec<Uid>>>,
     bearers: OnceCell<HashMap<String, Vec<(Option<Uid>, Uid)>>>,
     commands: OnceCell<CommandNames>,
+    /// Number of names that were listed for suggestions.
+    compared: Cell<usize>,
 }
 
 /// Commands by their names.
@@ -28,7 +41,19 @@ struct CommandNames {
 impl<'a> RigNameIndex<'a> {
     /// Index of a rig.
     pub fn new(rig: &'a Rig) -> Self {
-        Self { rig, joints: OnceCell::new(), bearers: OnceCell::new(), commands: OnceCell::new() }
+        let (groups, inputs) = (OnceCell::new(), OnceCell::new());
+        let (joints, bearers, commands) = (OnceCell::new(), OnceCell::new(), OnceCell::new());
+        Self { rig, groups, inputs, joints, bearers, commands, compared: Cell::new(0) }
+    }
+
+    fn groups(&self, name: &str) -> &[Uid] {
+        let named = || by_name(self.rig.groups().iter().map(|group| (group.name.as_str(), group.uid)));
+        self.groups.get_or_init(named).get(name).map_or(&[], Vec::as_slice)
+    }
+
+    fn inputs(&self, name: &str) -> &[Uid] {
+        let named = || by_name(self.rig.inputs().iter().map(|input| (input.name.as_str(), input.uid)));
+        self.inputs.get_or_init(named).get(name).map_or(&[], Vec::as_slice)
     }
 
     fn joints(&self, label: &str) -> &[Uid] {
@@ -94,6 +119,15 @@ impl<'a> RigNameIndex<'a> {
     }
 }
 
+/// Uids by name, in their order.
+fn by_name<'a>(named: impl Iterator<Item = (&'a str, Uid)>) -> HashMap<&'a str, Vec<Uid>> {
+    let mut found: HashMap<&str, Vec<Uid>> = HashMap::new();
+    for (name, uid) in named {
+        found.entry(name).or_default().push(uid);
+    }
+    found
+}
+
 impl Names for RigNameIndex<'_> {
     fn name_of(&self, kind: NameKind, uid: Uid) -> Option<Cow<'_, str>> {
         self.rig.name_of(kind, uid)
@@ -108,11 +142,18 @@ impl Names for RigNameIndex<'_> {
             NameKind::Joint => self.joints(name).to_vec(),
             NameKind::Label => self.bearer(scope.group, name).into_iter().collect(),
             NameKind::Command => self.commands(name),
-            NameKind::Rig | NameKind::Group | NameKind::Input => self.rig.find(scope, kind, name),
+            NameKind::Group => self.groups(name).to_vec(),
+            NameKind::Input => self.inputs(name).to_vec(),
+            NameKind::Rig => self.rig.find(scope, kind, name),
         }
     }
 
     fn all(&self, scope: NameScope, kind: NameKind) -> Vec<Cow<'_, str>> {
-        self.rig.all(scope, kind)
+        if self.compared.get() >= MOST_COMPARED {
+            return Vec::new();
+        }
+        let all = self.rig.all(scope, kind);
+        self.compared.set(self.compared.get() + all.len());
+        all
     }
 }

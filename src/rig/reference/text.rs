@@ -6,7 +6,7 @@ use super::{
     GroupScope, NameKind, Names, NodeRef, NodeTypes, Pick, PickAt, ReferenceError, ReferenceProblem, RigScope, Source,
     Top, names::NameScope,
 };
-use crate::rig::Uid;
+use crate::rig::{Uid, nearest::MOST_LISTED};
 
 const SOURCES: [&str; 10] =
     ["any", "this", "root", "joints", "joint", "hierarchy", "command", "module", "input", "none"];
@@ -253,7 +253,12 @@ impl<'a> Reader<'a, '_> {
         Err(self.error(
             start,
             match candidates.is_empty() {
-                false => ReferenceProblem::Ambiguous { kind, name, candidates },
+                false => {
+                    let count = candidates.len();
+                    candidates.truncate(MOST_LISTED);
+                    candidates.shrink_to_fit();
+                    ReferenceProblem::Ambiguous { kind, name, count, candidates }
+                }
                 true => {
                     let all = names.all(scope, kind);
                     let mut nearest = crate::rig::nearest::nearest(&name, &all, 3);

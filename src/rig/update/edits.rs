@@ -232,7 +232,7 @@ impl Steps {
             self.apply(RigEdit::RemoveStoredPose(uid))?;
         }
         for (index, pose) in to.stored_poses().iter().enumerate() {
-            let place = self.rig.stored_poses().iter().position(|own| own.uid == pose.uid);
+            let place = self.rig.poses.place(pose.uid);
             let is_same = self.rig.stored_pose(pose.uid) == Some(pose);
             match place {
                 Some(place) if place == index && is_same => {}

@@ -11,6 +11,7 @@ use std::{
 use super::{
     Change, ChangeKind, Choices, Take,
     fields::{Field, field, joint_title},
+    shown_values::{NamesOfBoth, shown_values},
 };
 use crate::rig::{
     Rig, TagData, TagKind, Uid,
@@ -18,7 +19,7 @@ use crate::rig::{
         template::{Template, quaternion, quoted, vector},
         tree::{Tree, with_field},
     },
-    part::{PartChange, PartInstance},
+    part::{PartChange, PartInstance, PartTargets},
 };
 
 /// Fields that say where a part is. A part is in one place, so that these are decided together.
@@ -77,6 +78,7 @@ pub fn merge_parts(
     choices: &Choices,
 ) -> MergedParts {
     let mut merged = MergedParts::default();
+    let names = NamesOfBoth::new(&now.rig, &file.rig);
     for instance in &now.template.parts {
         let Some(theirs) = file.by_uids(instance.uid) else { continue };
         let was = base.and_then(|base| base.by_uids(instance.uid));
@@ -88,7 +90,7 @@ pub fn merge_parts(
         let sides = Sides { base: was.as_ref(), now: &mine, file: &theirs };
         let fields = sides.fields(&now.rig, &file.rig);
         merged.differs |= fields.iter().any(|field| sides.differ(field));
-        let instance = sides.merged(&fields, choices, &mut merged.changes);
+        let instance = sides.merged(&fields, choices, &names, &mut merged.changes);
         merged.instances.push(instance);
     }
     merged
@@ -183,11 +185,12 @@ impl Sides<'_> {
         list
     }
 
-    /// The instance after the update.
+    /// The instance after the update. Values are told with the `names` that identify now and in the file.
     fn merged(
         &self,
         fields: &[Field<PartInstance>],
         choices: &Choices,
+        names: &NamesOfBoth,
         changes: &mut Vec<FieldChange>,
     ) -> PartInstance {
         let Self { base, now, file } = *self;
@@ -206,14 +209,15 @@ impl Sides<'_> {
             if !conflict || choices.of(now.uid, Some(&name)) == Take::Theirs {
                 (field.take)(&mut merged, file);
             }
+            let [from, to] = shown_values(&field.name, [mine, theirs], names);
             let change = Change {
                 kind: ChangeKind::Changed,
                 uid: now.uid,
                 joint: None,
                 tag: None,
                 field: Some(name),
-                from: mine,
-                to: theirs,
+                from,
+                to,
                 conflict,
             };
             changes.push(FieldChange { change, is_name: field.name == NAME });
@@ -356,7 +360,9 @@ impl TemplateWithParts {
             }
         }
         for (part, (instance, fitted)) in template.parts.iter_mut().zip(&self.fitted) {
-            part.changes.iter_mut().for_each(|change| self.bind_change(change, instance, fitted));
+            let targets = PartTargets::new(instance, fitted);
+            let joints: Vec<Uid> = fitted.walk().map(|joint| joint.data.uid).collect();
+            part.changes.iter_mut().for_each(|change| self.bind_change(change, instance, &targets, &joints));
         }
     }
 
@@ -367,9 +373,10 @@ impl TemplateWithParts {
         }
     }
 
-    fn bind_change(&self, change: &mut PartChange, instance: &PartInstance, fitted: &Rig) {
+    /// Refers by uids in a change of an instance whose part has these `joints`.
+    fn bind_change(&self, change: &mut PartChange, instance: &PartInstance, targets: &PartTargets, joints: &[Uid]) {
         change.tags.iter_mut().for_each(|tag| self.bind_tag(tag));
-        if let Some(tag) = change.tag.as_ref().and_then(|name| instance.find_tag(fitted, name).ok()) {
+        if let Some(tag) = change.tag.as_ref().and_then(|name| targets.find_tag(name).ok()) {
             if let Some(params) = &mut change.params
                 && let Some((_, bound)) = self.rig.find_tag(instance.uid_of(tag))
                 && let TagKind::Command { params: bound, .. } = &bound.kind
@@ -378,9 +385,9 @@ impl TemplateWithParts {
             }
             change.tag = Some(tag.to_string());
         }
-        let place = change.joint.as_ref().and_then(|label| instance.find_joint(fitted, label).ok());
-        if let Some(joint) = place.and_then(|place| fitted.walk().nth(place)) {
-            change.joint = Some(joint.data.uid.to_string());
+        let place = change.joint.as_ref().and_then(|label| targets.find_joint(label).ok());
+        if let Some(joint) = place.and_then(|place| joints.get(place)) {
+            change.joint = Some(joint.to_string());
         }
     }
 }

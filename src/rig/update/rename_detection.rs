@@ -246,8 +246,8 @@ pub(super) fn with_uids(rig: &Rig, uids: HashMap<Uid, Uid>) -> Rig {
     let get = |uid: Uid| remap.get(uid).unwrap_or(uid);
     let joints = rig.walk().map(|joint| (get(joint.data.uid), (remap.joint(&joint.data), joint.parent.map(get))));
     let mut out = rig.clone();
-    out.groups.iter_mut().for_each(|group| group.uid = get(group.uid));
-    out.inputs.iter_mut().for_each(|input| input.uid = get(input.uid));
+    out.groups.change_each(|group| group.uid = get(group.uid));
+    out.inputs.change_each(|input| input.uid = get(input.uid));
     out.about.sockets.iter_mut().for_each(|socket| socket.joint = get(socket.joint));
     out.clips = rig.clips().iter().map(|clip| clip.with_nodes(get)).collect();
     out.clip_uids.clone_from(&rig.clip_uids);

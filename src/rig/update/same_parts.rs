@@ -4,63 +4,91 @@
 //! A uid that is left out follows from the file of the part and from the name, or else from the joints that the part goes onto.
 //! So another file or other joints make another uid, and what was posed and changed of the part would be lost with it.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::{Change, ChangeKind, TemplateWithParts};
-use crate::rig::{Uid, format::template::quoted, part::PartInstance};
+use crate::rig::{RestTransform, Uid, format::template::quoted, part::PartInstance};
 
 /// Pairs of instances with different uids: the uid in `other`, and the uid of the corresponding instance in `own`. Instances
-/// correspond by their names, by their joints, by their part and the place where it stands, or by their part with prefix and
-/// side, in this order, and each has one counterpart at most. Instances whose uids are written in both files do not
-/// correspond.
+/// correspond by their names, by their joints, by their part and the place where it stands, by their part and side if they have
+/// no names, or by their part, side and a prefix that is not empty, in this order, and each has one counterpart at most.
+/// Instances whose uids are written in both files do not correspond.
 pub fn same_parts(own: &[PartInstance], other: &[PartInstance]) -> BTreeMap<Uid, Uid> {
-    let is_in = |list: &[PartInstance], uid: Uid| list.iter().any(|part| part.uid == uid);
-    let mut gone: Vec<&PartInstance> = own.iter().filter(|part| !is_in(other, part.uid)).collect();
-    let mut come: Vec<&PartInstance> = other.iter().filter(|part| !is_in(own, part.uid)).collect();
-    let rules: [fn(&PartInstance, &PartInstance) -> bool; 4] =
-        [have_one_name, have_one_place, stand_in_one_place, are_of_one_kind];
+    let uids = |list: &[PartInstance]| list.iter().map(|part| part.uid).collect::<HashSet<Uid>>();
+    let (old_uids, new_uids) = (uids(own), uids(other));
+    let mut gone: Vec<&PartInstance> = own.iter().filter(|part| !new_uids.contains(&part.uid)).collect();
+    let mut come: Vec<&PartInstance> = other.iter().filter(|part| !old_uids.contains(&part.uid)).collect();
+    let keys: [fn(&PartInstance) -> Option<String>; 5] = [name_key, place_key, standing_key, kind_key, prefix_key];
     let mut same = BTreeMap::new();
-    for rule in rules {
-        let are_one = |old: &PartInstance, new: &PartInstance| rule(old, new) && (is_derived(old) || is_derived(new));
-        let mut pairs: Vec<(Uid, Uid)> = Vec::new();
-        for new in &come {
-            let olds: Vec<&PartInstance> = gone.iter().copied().filter(|old| are_one(old, new)).collect();
-            let [old] = olds[..] else { continue };
-            // Two that could be it are none.
-            if come.iter().filter(|rival| are_one(old, rival)).count() == 1 {
-                pairs.push((new.uid, old.uid));
+    for key in keys {
+        let mut groups: HashMap<String, AlikeParts> = HashMap::new();
+        for (side, parts) in [&gone, &come].into_iter().enumerate() {
+            for part in parts {
+                if let Some(key) = key(part) {
+                    groups.entry(key).or_default().add(side, part);
+                }
             }
         }
-        gone.retain(|old| pairs.iter().all(|(_, uid)| *uid != old.uid));
-        come.retain(|new| pairs.iter().all(|(uid, _)| *uid != new.uid));
+        let pairs: BTreeMap<Uid, Uid> = groups.values().flat_map(AlikeParts::pairs).collect();
+        let paired: HashSet<Uid> = pairs.values().copied().collect();
+        gone.retain(|part| !paired.contains(&part.uid));
+        come.retain(|part| !pairs.contains_key(&part.uid));
         same.extend(pairs);
     }
     same
 }
 
-fn have_one_name(old: &PartInstance, new: &PartInstance) -> bool {
-    !old.name.is_empty() && old.name == new.name
+/// Instances of two versions that a rule takes for the same: in each version those whose uids are written, and the others.
+#[derive(Default)]
+struct AlikeParts {
+    written: [Vec<Uid>; 2],
+    derived: [Vec<Uid>; 2],
 }
 
-fn have_one_place(old: &PartInstance, new: &PartInstance) -> bool {
-    !old.onto.is_empty() && old.onto == new.onto && are_alike(old, new)
+impl AlikeParts {
+    fn add(&mut self, side: usize, part: &PartInstance) {
+        let list = if is_derived(part) { &mut self.derived } else { &mut self.written };
+        list[side].push(part.uid);
+    }
+
+    /// The new and the old uid of the instances that correspond. Two that could be it are none, and uids that are written in both
+    /// versions are of two.
+    fn pairs(&self) -> Option<(Uid, Uid)> {
+        let [old_written, new_written] = &self.written;
+        let [old_derived, new_derived] = &self.derived;
+        match (&old_written[..], &old_derived[..], &new_written[..], &new_derived[..]) {
+            ([], [old], [], [new]) | ([old], [], _, [new]) | (_, [old], [new], []) => Some((*new, *old)),
+            _ => None,
+        }
+    }
 }
 
-/// True for one part in one place, whatever it is called: another name is no other part.
-fn stand_in_one_place(old: &PartInstance, new: &PartInstance) -> bool {
-    let place = |of: &PartInstance| (of.adds, of.mirror, of.is_world, of.rest);
-    let hangs_on_one = (&old.onto, &old.parent, &old.socket) == (&new.onto, &new.parent, &new.socket);
-    old.part == new.part && hangs_on_one && place(old) == place(new)
+fn name_key(part: &PartInstance) -> Option<String> {
+    (!part.name.is_empty()).then(|| part.name.clone())
 }
 
-fn are_of_one_kind(old: &PartInstance, new: &PartInstance) -> bool {
-    old.part == new.part && are_alike(old, new)
+fn place_key(part: &PartInstance) -> Option<String> {
+    let is_placed = part.name.is_empty() && !part.onto.is_empty();
+    is_placed.then(|| format!("{:?}", (&part.onto, &part.prefix, part.mirror)))
 }
 
-/// True for two without names, with one prefix and on one side.
-fn are_alike(old: &PartInstance, new: &PartInstance) -> bool {
-    let are_nameless = old.name.is_empty() && new.name.is_empty();
-    are_nameless && old.prefix == new.prefix && old.mirror == new.mirror
+/// Key of one part in one place, whatever it is called: another name is no other part.
+fn standing_key(part: &PartInstance) -> Option<String> {
+    let PartInstance { onto, parent, socket, adds, mirror, is_world, rest, .. } = part;
+    // Both zeros are the same place.
+    let RestTransform { translation, rotation, scale } = rest;
+    let numbers = translation.to_array().into_iter().chain(rotation.to_array()).chain(scale.to_array());
+    let rest: Vec<f32> = numbers.map(|number| number + 0.0).collect();
+    Some(format!("{:?}", (&part.part, onto, parent, socket, adds, mirror, is_world, rest)))
+}
+
+fn kind_key(part: &PartInstance) -> Option<String> {
+    part.name.is_empty().then(|| format!("{:?}", (&part.part, &part.prefix, part.mirror)))
+}
+
+/// Key of one part whose joints have the same labels, whatever it is called and wherever it hangs.
+fn prefix_key(part: &PartInstance) -> Option<String> {
+    (!part.prefix.is_empty()).then(|| format!("{:?}", (&part.part, &part.prefix, part.mirror)))
 }
 
 /// True if the uid of an instance is the one that it has where none is written.
@@ -94,20 +122,26 @@ pub fn moved_part(uid: Uid, from: &PartInstance, to: &PartInstance) -> Option<Ch
 /// tag that the instance brings.
 pub fn with_whole_parts(mut changes: Vec<Change>, [from, to]: [&TemplateWithParts; 2]) -> Vec<Change> {
     for (of, other, kind) in [(from, to, ChangeKind::Removed), (to, from, ChangeKind::Added)] {
-        for (instance, fitted) in &of.fitted {
-            if other.template.parts.iter().any(|part| part.uid == instance.uid) {
-                continue;
+        let known: HashSet<Uid> = other.template.parts.iter().map(|part| part.uid).collect();
+        let mut bearers: HashMap<Uid, &PartInstance> = HashMap::new();
+        for (instance, fitted) in of.fitted.iter().filter(|(instance, _)| !known.contains(&instance.uid)) {
+            for uid in instance.brought(fitted) {
+                bearers.entry(uid).or_insert(instance);
             }
-            let brought: HashSet<Uid> = instance.brought(fitted).into_iter().collect();
-            let is_brought = |change: &Change| change.kind == kind && !change.conflict && brought.contains(&change.uid);
-            let Some(place) = changes.iter().position(is_brought) else { continue };
-            changes.retain(|change| !is_brought(change));
+        }
+        let mut told = HashSet::new();
+        let whole = |change: Change| {
+            let is_brought = change.kind == kind && !change.conflict;
+            let Some(instance) = bearers.get(&change.uid).filter(|_| is_brought) else { return Some(change) };
+            if !told.insert(instance.uid) {
+                return None;
+            }
             let file = Some(quoted(&instance.part));
             let (from, to) = if kind == ChangeKind::Added { (None, file) } else { (file, None) };
             let field = Some(format!("part {}", instance.title()));
-            let whole = Change { kind, uid: instance.uid, joint: None, tag: None, field, from, to, conflict: false };
-            changes.insert(place, whole);
-        }
+            Some(Change { kind, uid: instance.uid, joint: None, tag: None, field, from, to, conflict: false })
+        };
+        changes = changes.into_iter().filter_map(whole).collect();
     }
     changes
 }

@@ -1,6 +1,6 @@
 //! Values of changes as people read them: uids stand beside names only where the names do not identify.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, cell::OnceCell, collections::HashMap};
 
 use super::fields::tag_title;
 use crate::rig::{
@@ -9,21 +9,25 @@ use crate::rig::{
 };
 
 /// Values of the two sides of a field. Uids that tell them apart stay.
-pub(super) fn shown_values(field: &str, values: [Option<String>; 2], now: &Rig, file: &Rig) -> [Option<String>; 2] {
+pub(super) fn shown_values(field: &str, values: [Option<String>; 2], names: &NamesOfBoth) -> [Option<String>; 2] {
     if !values.iter().flatten().any(|value| value.contains('#')) {
         return values;
     }
-    let names = NamesOfBoth { now: RigNameIndex::new(now), file: RigNameIndex::new(file) };
-    let shown =
-        [&values[0], &values[1]].map(|value| value.as_deref().map(|value| shown(field, value, &names, [now, file])));
+    let shown = [&values[0], &values[1]].map(|value| value.as_deref().map(|value| shown(field, value, names)));
     if shown[0] == shown[1] { values } else { shown }
 }
 
-fn shown(field: &str, value: &str, names: &NamesOfBoth, rigs: [&Rig; 2]) -> String {
+fn shown(field: &str, value: &str, names: &NamesOfBoth) -> String {
+    let joint_alone = |joint: &str| name_alone(joint, |name| names.find(NameScope::default(), NameKind::Joint, name));
     let kind = match field {
+        // A label with a comma keeps its uid.
+        "onto" => {
+            let joints = value.strip_prefix('[').and_then(|list| list.strip_suffix(']')).unwrap_or(value);
+            return format!("[{}]", joints.split(", ").map(joint_alone).collect::<Vec<_>>().join(", "));
+        }
         "parent" | "mirror" | "joint" => NameKind::Joint,
         "group" => NameKind::Group,
-        "feature" => return name_alone(value, |name| features(rigs, name)),
+        "feature" => return name_alone(value, |name| names.features(name).to_vec()),
         _ => return without_uids(value, names, |_| true).into_owned(),
     };
     name_alone(value, |name| names.find(NameScope::default(), kind, name))
@@ -38,22 +42,39 @@ fn name_alone(value: &str, find: impl Fn(&str) -> Vec<Uid>) -> String {
     named.map_or(value, |(name, _)| name).to_owned()
 }
 
-/// Features with a title in either rig.
-fn features(rigs: [&Rig; 2], title: &str) -> Vec<Uid> {
-    let tags = rigs.into_iter().flat_map(|rig| rig.walk().flat_map(|joint| &joint.data.tags));
-    let mut found: Vec<Uid> = tags
-        .filter(|tag| matches!(tag.kind, TagKind::Feature { .. }) && tag_title(tag) == title)
-        .map(|tag| tag.uid)
-        .collect();
-    found.sort_unstable();
-    found.dedup();
-    found
-}
-
-/// Names in the rig as it is now and in the file: what has one name in one of them and another name in the other has both.
-struct NamesOfBoth<'a> {
+/// Names in the rig as it is now and in the file, for all changes of an update: what has one name in one of them and another name
+/// in the other has both.
+pub(super) struct NamesOfBoth<'a> {
+    rigs: [&'a Rig; 2],
     now: RigNameIndex<'a>,
     file: RigNameIndex<'a>,
+    features: OnceCell<HashMap<String, Vec<Uid>>>,
+}
+
+impl<'a> NamesOfBoth<'a> {
+    /// Names of two rigs.
+    pub fn new(now: &'a Rig, file: &'a Rig) -> Self {
+        let rigs = [now, file];
+        Self { rigs, now: RigNameIndex::new(now), file: RigNameIndex::new(file), features: OnceCell::new() }
+    }
+
+    /// Features with a title in either rig, sorted.
+    fn features(&self, title: &str) -> &[Uid] {
+        let features = self.features.get_or_init(|| {
+            let mut features: HashMap<String, Vec<Uid>> = HashMap::new();
+            for tag in self.rigs.into_iter().flat_map(|rig| rig.walk().flat_map(|joint| &joint.data.tags)) {
+                if matches!(tag.kind, TagKind::Feature { .. }) {
+                    features.entry(tag_title(tag)).or_default().push(tag.uid);
+                }
+            }
+            for list in features.values_mut() {
+                list.sort_unstable();
+                list.dedup();
+            }
+            features
+        });
+        features.get(title).map_or(&[], Vec::as_slice)
+    }
 }
 
 impl Names for NamesOfBoth<'_> {
@@ -63,8 +84,12 @@ impl Names for NamesOfBoth<'_> {
 
     fn find(&self, scope: NameScope, kind: NameKind, name: &str) -> Vec<Uid> {
         let mut found = self.now.find(scope, kind, name);
-        let more = self.file.find(scope, kind, name);
-        found.extend(more.into_iter().filter(|uid| !found.contains(uid)).collect::<Vec<Uid>>());
+        // Several things of one rig make the name ambiguous, whatever the other one has.
+        if found.len() < 2 {
+            let more = self.file.find(scope, kind, name);
+            let known = found.first().copied();
+            found.extend(more.into_iter().filter(|uid| Some(*uid) != known));
+        }
         found
     }
 

@@ -26,7 +26,7 @@ impl Merge<'_> {
         let named = ChangeSubject { uid, joint: Some(title), tag: Some(&name), prefix: "" };
         if let Some(place) = place.filter(|place| place.is_told) {
             let titles = [place.now, place.file].map(|joint| Some(joint_title(now, file, joint)));
-            let [from, to] = shown_values("joint", titles, now, file);
+            let [from, to] = shown_values("joint", titles, &self.names);
             let field = Some("joint".to_owned());
             let conflict = place.is_conflict;
             self.changes.push(Change { kind: ChangeKind::Moved, field, from, to, conflict, ..named.change() });

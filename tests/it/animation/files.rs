@@ -8,7 +8,7 @@ use rigsmith::{
     rig::{
         Rig, RigEdit, Uid,
         animation::{
-            ClipLayer, Ease, Key, KnownNode, LayerMode, Marker, NodeNames, Property, RigClip, Track, orphaned_keys,
+            ClipLayer, Ease, Key, LayerMode, Marker, NodeName, NodeNames, Property, RigClip, Track, orphaned_keys,
         },
         format::animation::{read_animation, write_animation, write_named},
         operations::{ClipOperation, KeyOperation, Operation},
@@ -53,8 +53,8 @@ fn frozen() -> RigClip {
 }
 
 fn names() -> NodeNames {
-    let hand = KnownNode { label: "hand_l".into(), role: "control".into() };
-    NodeNames([(Uid(0x1001), hand), (Uid(0x1002), KnownNode { label: "spine".into(), role: String::new() })].into())
+    let hand = NodeName { label: "hand_l".into(), role: "control".into() };
+    NodeNames([(Uid(0x1001), hand), (Uid(0x1002), NodeName { label: "spine".into(), role: String::new() })].into())
 }
 
 #[test]
@@ -96,7 +96,7 @@ fn clips_find_the_nodes_of_another_rig_by_their_labels() {
     let orphans = orphaned_keys(&rig, None, &known);
     assert_eq!((orphans.len(), orphans[0].node, orphans[0].tracks, orphans[0].keys), (1, Uid(0x1001), 2, 4));
     assert_eq!(orphans[0].offer, None);
-    known.0.insert(Uid(0x1001), KnownNode { label: "hand_l".into(), role: String::new() });
+    known.0.insert(Uid(0x1001), NodeName { label: "hand_l".into(), role: String::new() });
     let offer = orphaned_keys(&rig, None, &known)[0].offer.unwrap();
     assert_eq!(Some(offer), rig.find_label("hand_l"));
     let change = KeyOperation::Adopt { from: Uid(0x1001), to: offer };

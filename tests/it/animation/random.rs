@@ -33,12 +33,13 @@ fn keys_of(rig: &Rig) -> ExpectedKeys {
     layer.tracks.iter().map(|(target, track)| (target.clone(), track.keys.iter().map(of).collect())).collect()
 }
 
-fn bytes(rig: &Rig) -> String {
+/// Text of a project with a rig.
+pub fn bytes(rig: &Rig) -> String {
     write_project(&Project { rigs: vec![ProjectRig { rig: rig.clone(), skins: Vec::new() }], ..Default::default() })
 }
 
 /// Versions of the biped's file, and the one that was taken over last.
-struct TemplateVersions {
+pub struct TemplateVersions {
     rigs: Vec<Rig>,
     base: usize,
     reloads: usize,
@@ -46,7 +47,7 @@ struct TemplateVersions {
 
 impl TemplateVersions {
     /// The biped as it is, with changed files of parts, and with a changed file of its own.
-    fn new() -> Self {
+    pub fn new() -> Self {
         let text = include_str!("../../../assets/templates/biped.rig.ron");
         let with_part = |part: &str, was: &str, is: &str| {
             let (_, content) = BUNDLED_PARTS.iter().find(|(name, _)| *name == part).unwrap();
@@ -72,15 +73,21 @@ impl TemplateVersions {
         Self { base: rigs.len() - 1, rigs, reloads: 0 }
     }
 
-    /// The edits of a reload of another version, as instances and the window carry them out.
-    fn reload(&mut self, rig: &Rig, random: &mut Random) -> Vec<RigEdit> {
+    /// The rig after an update to another version, with poses and clips as they are.
+    pub fn updated(&mut self, rig: &Rig, random: &mut Random) -> Rig {
         let next = (self.base + 1 + random.below(self.rigs.len() - 1)) % self.rigs.len();
         let take = if random.chance(2) { Take::Mine } else { Take::Theirs };
         let updated = update(Some(&self.rigs[self.base]), rig, &self.rigs[next], take).rig;
+        self.base = next;
+        updated
+    }
+
+    /// The edits of a reload of another version that leaves keys as they are.
+    fn reload(&mut self, rig: &Rig, random: &mut Random) -> Vec<RigEdit> {
+        let updated = self.updated(rig, random);
         let mut edits = edits_between(rig, &updated).unwrap();
         edits.extend(pose_edits(rig, &updated));
         edits.extend(clip_edits(rig, &updated).unwrap());
-        self.base = next;
         self.reloads += usize::from(!edits.is_empty());
         edits
     }

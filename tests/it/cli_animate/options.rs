@@ -206,6 +206,9 @@ fn an_animal_moves_another_one_by_the_chains_of_its_skeleton() {
         assert!(source.starts_with(from), "{to} moves as {source}");
     }
     assert!(answer["clips"][0]["tracks"].as_u64().unwrap() > 20, "{answer}");
+    for field in ["seconds", "tracks"] {
+        assert_eq!(answer[field], answer["clips"][0][field], "a single clip is told without a list, too");
+    }
     run(&other, &["--map", "map.ron", "-o", "again.anim.ron"]);
     let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
     assert!(read("walk.anim.ron") == read("again.anim.ron"), "the written map gives another clip");

@@ -96,6 +96,26 @@ fn wrong_inputs_are_refused_and_write_nothing() {
         (vec![&biped, "--feature", "ik=off", "--set", "hand_r.rotate=(0,0,9)"], 1, "ik is off"),
         (vec![crane, "--group", "arm=off", "--set", "lift.rotate=(0,0,9)"], 1, "in the group arm, which is off"),
         (vec![&biped, "--feature", "fingers=curl=off", "--set", "thumb_01_l.curl=1"], 1, "fingers:curl"),
+        (
+            vec![&biped, "--feature", "arm_l:ik=off", "--switch", "hand_ik_l=chest"],
+            1,
+            "\"hand_ik_l\" is not built: control/hand_l is in the feature ik, which is off; turn it on",
+        ),
+        (
+            vec![&biped, "--feature", "arm_l:ik=off", "--switch", "arm_settings_l=fk"],
+            1,
+            "\"arm_settings_l\" is not built: the feature ik is off; turn it on",
+        ),
+        (
+            vec![&biped, "--feature", "arm_l:ik=off", "--set", "arm_settings_l.ik_fk=1"],
+            1,
+            "the feature ik is off there",
+        ),
+        (
+            vec![&biped, "--group", "hand_l=off", "--set", "thumb_1_l.rotate=(0,9,0)"],
+            1,
+            "did you mean \"thumb_01_l\"? It is not built: thumb_01_l is in the group hand_l, which is off; turn it on",
+        ),
         (vec![&biped, "--feature", "leg_l:fingers=off"], 2, "the group \"leg_l\" has no feature \"fingers\"; it is in"),
     ]);
     let names = |folder: &Path| -> BTreeSet<String> {
@@ -114,6 +134,9 @@ fn wrong_inputs_are_refused_and_write_nothing() {
     let answer = rigsmith(folder.path(), &["pose", crane, "--json", "--set", "lift.rotate=(0,0,9)", "--set", "x.y=1"]);
     assert_eq!(answer.code, 1);
     assert_eq!(answer.json()["ok"], false);
+    // All switches are listed once where none has a similar name.
+    let answer = rigsmith(folder.path(), &["pose", &arm, "--switch", "zzzzzzzz=fk"]);
+    assert_eq!(answer.err.matches("arm_settings_l.ik_fk").count(), 1, "{}", answer.err);
     // Whoever says so may.
     let answer = rigsmith(folder.path(), &["pose", crane, "-o", crane, "--in-place"]);
     assert_eq!(answer.code, 0, "{}", answer.err);

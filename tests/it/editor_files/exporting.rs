@@ -1,6 +1,36 @@
 //! Exports of the window, and what they read back.
 
+use rigsmith::editor::{
+    files::ExportRequest,
+    running_work::{RunningWorkPlugin, StopWork, StoppableWork},
+};
+
 use super::*;
+
+#[test]
+fn an_export_can_be_stopped() {
+    let folder = folder();
+    let plugins = (FilesPlugin, RunningWorkPlugin);
+    let mut window = Window::of(AppBench::with_files(folder.path().join("state"), plugins), folder.path());
+    window.open(OpenRequest::Bundled);
+    let path = folder.path().join("stopped.glb");
+    let is_stopped = (0..100).any(|_| {
+        window.base.app.world_mut().write_message(ExportRequest(path.clone()));
+        window.send(StopWork(StoppableWork::Saving));
+        // An export that ended before it was stopped is asked for again.
+        let is_there = path.exists();
+        if is_there {
+            std::fs::remove_file(&path).unwrap();
+        }
+        !is_there
+    });
+    assert!(is_stopped, "{:?}", window.notices.list);
+    let text = "stopped.glb is not written: it was stopped";
+    assert!(window.notices.include(Severity::Info, text), "{:?}", window.notices.list);
+    assert!(window.notices.list.iter().all(|notice| notice.severity != Severity::Error), "{:?}", window.notices.list);
+    window.send(ExportRequest(path.clone()));
+    assert!(path.exists(), "the next export is written");
+}
 
 #[test]
 fn clips_of_the_document_are_exported_as_they_are_edited() {

@@ -246,7 +246,7 @@ fn visemes_close_roll_and_part_the_lips() {
     faults.assert_none();
 }
 
-/// Skin under the chin and at the corners of the mouth creases where the jaw opens: 248 triangles of the bundled head turn
+/// Skin under the chin and at the corners of the mouth creases where the jaw opens: 249 triangles of the bundled head turn
 /// by more than a right angle, and no more than a tenth above that may.
 #[test]
 fn the_open_jaw_folds_no_more_than_it_did() {
@@ -272,8 +272,8 @@ fn no_expression_crosses_lips_or_lids() {
                         let height = points[head.marks[above]].y - points[head.marks[below]].y;
                         height / head.landmarks.eye_distance()
                     };
-                    // Lips may overlap in the mesh itself. With 80 bones those of two heads pass each other by 0.005 in caricature.
-                    let least = gap(&head.points).min(0.0) - if head.bones.len() > 80 { 0.0065 } else { 0.003 };
+                    // Lips may overlap in the mesh itself. With 80 bones the lids of one head pass each other by 0.004 in caricature.
+                    let least = gap(&head.points).min(0.0) - if head.bones.len() > 80 { 0.005 } else { 0.003 };
                     let told = format!("{name}, {} of {strength}: {above} above {below}", expression.name);
                     faults.check(&told, gap(&moved.points), least..=1.0);
                 }

@@ -40,7 +40,7 @@ fn sheet(count: u32, wide: u32, around: u32) -> Vec<[u32; 3]> {
 }
 
 /// A belly with a lid and a knob, a spout, and a handle, each in a shell of its own.
-fn teapot() -> Mesh {
+pub fn teapot() -> Mesh {
     let profile: [(f32, f32); 13] = [
         (0.0, 0.0),
         (0.7, 0.0),

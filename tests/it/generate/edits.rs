@@ -44,13 +44,13 @@ pub fn scene_of(rig: &Rig) -> Scene {
 }
 
 /// Joints and tags of a rig, for choices among them.
-struct Known {
+struct RigParts {
     joints: Vec<Uid>,
     tags: Vec<(Uid, TagData)>,
     groups: Vec<Uid>,
 }
 
-impl Known {
+impl RigParts {
     fn of(rig: &Rig) -> Self {
         let tags = |joint: &rigsmith::rig::RigJoint| {
             let uid = joint.data.uid;
@@ -94,7 +94,7 @@ fn offset(choices: &mut Choices) -> PoseOffset {
 }
 
 /// Weights of a mesh of a few points; now and then ones that do not fit.
-fn skin(choices: &mut Choices, known: &Known) -> SkinData {
+fn skin(choices: &mut Choices, known: &RigParts) -> SkinData {
     let mut weights = Weights::default();
     for _ in 0..choices.below(6) {
         let joint = choices.below(known.joints.len().max(1)) as u32;
@@ -143,7 +143,7 @@ pub fn tag(choices: &mut Choices, rig: &Rig, modules: &Modules, uid: Uid) -> Tag
 
 /// An operation; `number` is another one each time, for the uids of what it adds.
 pub fn operation(choices: &mut Choices, rig: &Rig, modules: &Modules, number: u64) -> Operation {
-    let known = Known::of(rig);
+    let known = RigParts::of(rig);
     let (one, other) = (known.joint(choices), known.joint(choices));
     let text = choices.pick(&TEXTS).to_owned();
     let parent = choices.chance(2).then_some(other);
@@ -187,7 +187,7 @@ pub fn operation(choices: &mut Choices, rig: &Rig, modules: &Modules, number: u6
     }
 }
 
-fn tags(choices: &mut Choices, rig: &Rig, modules: &Modules, known: &Known) -> TagOperation {
+fn tags(choices: &mut Choices, rig: &Rig, modules: &Modules, known: &RigParts) -> TagOperation {
     let (one, other) = (known.joint(choices), known.joint(choices));
     let (_, first) = known.tag(choices).unwrap_or((NOBODY, tag(choices, rig, modules, NOBODY)));
     let key = FeatureKey { group: None, kind: "ik".into(), name: choices.pick(&NAMES).to_owned() };
@@ -210,7 +210,7 @@ fn tags(choices: &mut Choices, rig: &Rig, modules: &Modules, known: &Known) -> T
     }
 }
 
-fn clips(choices: &mut Choices, rig: &Rig, known: &Known) -> ClipOperation {
+fn clips(choices: &mut Choices, rig: &Rig, known: &RigParts) -> ClipOperation {
     let own = rig.clips().first();
     let (uid, layer) =
         own.map_or((NOBODY, NOBODY), |own: &RigClip| (own.uid, own.layers.first().map_or(NOBODY, |l| l.uid)));
@@ -232,7 +232,7 @@ fn clips(choices: &mut Choices, rig: &Rig, known: &Known) -> ClipOperation {
 }
 
 /// A raw edit, as files, remote calls and updates make them.
-fn edit(choices: &mut Choices, rig: &Rig, modules: &Modules, known: &Known, number: u64) -> RigEdit {
+fn edit(choices: &mut Choices, rig: &Rig, modules: &Modules, known: &RigParts, number: u64) -> RigEdit {
     let (one, other) = (known.joint(choices), known.joint(choices));
     let uid = Uid(0xED17_0000_0000 + number);
     let found = known.tag(choices);

@@ -198,6 +198,42 @@ fn rigid_parts_hang_where_they_were() {
     }
 }
 
+/// A chain that turns, grows and shrinks by the same amounts, with an object on each of its nodes.
+#[test]
+fn objects_all_along_a_chain_hang_where_they_were() {
+    const COUNT: usize = 60;
+    let mut model = Model { name: "chain".into(), ..Model::default() };
+    for number in 0..COUNT {
+        let scale = if number % 2 == 0 { 1.25 } else { 0.8 };
+        model.nodes.push(Node {
+            name: format!("n{number}"),
+            parent: number.checked_sub(1),
+            rest: Trs {
+                translation: Vec3::new(0.1, 0.2, 0.0),
+                rotation: glam::Quat::from_rotation_z(0.3),
+                scale: Vec3::splat(scale),
+            },
+            ..Node::default()
+        });
+        let first = 3 * number as u32;
+        model.points.extend([0.0, 0.5, 1.0].map(|along| Vec3::new(along, along * along, 0.01 * number as f32)));
+        model.objects.push(Object { name: format!("o{number}"), node: Some(number), ..Object::default() });
+        model.parts.push(Part {
+            object: number,
+            vertices: vec![first, first + 1, first + 2],
+            triangles: vec![[0, 1, 2]],
+            ..Part::default()
+        });
+    }
+    let again = there_and_back("objects_on_a_chain", &model, &GltfWriteSettings::default());
+    assert_eq!(again.points.len(), model.points.len());
+    for (point, before) in again.points.iter().zip(&model.points) {
+        assert!(point.abs_diff_eq(*before, 1e-4), "{point} was {before}");
+    }
+    let carriers = |model: &Model| -> Vec<Option<usize>> { model.objects.iter().map(|object| object.node).collect() };
+    assert_eq!(carriers(&again), carriers(&model));
+}
+
 #[test]
 fn unused_vertices_are_not_written() {
     let mut model = triangle().read().unwrap();

@@ -33,7 +33,7 @@ use super::{AppBench, TWO, saved};
 const GONE: Uid = Uid(0xDEAD);
 
 #[derive(Resource, Default)]
-struct ClipTold {
+struct ClipMessages {
     bound: Vec<Vec<Uid>>,
     markers: Vec<(Entity, String)>,
 }
@@ -58,10 +58,12 @@ fn file(way: f32) -> String {
 fn game(folder: &Path) -> AppBench {
     let mut game = AppBench::game_with(RigInstancePlugin::default(), folder, |app| {
         app.add_plugins((AnimationPlugin, ClipPlugin))
-            .init_resource::<ClipTold>()
+            .init_resource::<ClipMessages>()
             .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(100)))
-            .add_observer(|bound: On<ClipsBound>, mut told: ResMut<ClipTold>| told.bound.push(bound.missing.clone()))
-            .add_observer(|reached: On<MarkerReached>, mut told: ResMut<ClipTold>| {
+            .add_observer(|bound: On<ClipsBound>, mut told: ResMut<ClipMessages>| {
+                told.bound.push(bound.missing.clone())
+            })
+            .add_observer(|reached: On<MarkerReached>, mut told: ResMut<ClipMessages>| {
                 told.markers.push((reached.entity, reached.name.clone()));
             });
     });
@@ -69,8 +71,8 @@ fn game(folder: &Path) -> AppBench {
     game
 }
 
-fn told(game: &AppBench) -> &ClipTold {
-    game.app.world().resource::<ClipTold>()
+fn told(game: &AppBench) -> &ClipMessages {
+    game.app.world().resource::<ClipMessages>()
 }
 
 /// Updates until clips were bound so many times.

@@ -6,7 +6,7 @@ use bevy::{
     prelude::*,
 };
 use rigsmith::{
-    instance::{JointsHeld, RigInstance, RigInstancePlugin, RunningTemplate},
+    instance::{BoundTo, JointsHeld, RigInstance, RigInstancePlugin, RigTemplate, RunningTemplate},
     plugins::runtime::InstanceMode,
 };
 
@@ -150,5 +150,109 @@ fn bind_poses_fit_the_rest_of_the_template() {
             let file = assets.get(&one.bindposes).unwrap();
             assert_eq!(file[1], Mat4::from_translation(Vec3::new(0.0, -1.5, 0.0)), "the file's own stay");
         }
+    }
+}
+
+/// Template of [`TWO`] without a joint.
+fn without(label: &str) -> String {
+    let label = format!("label: \"{label}\"");
+    TWO.lines().filter(|line| !line.contains(&label)).map(|line| format!("{line}\n")).collect()
+}
+
+/// Checks that the mesh is moved by the nodes of its instance, but for a joint that the instance does not have, and that it stands
+/// as in the file.
+#[track_caller]
+fn check_bound(game: &mut AppBench, instance: Entity, loaded: &Loaded, missing: Option<&str>) {
+    game.frames(3);
+    for (number, (name, parent, _)) in NODES.into_iter().enumerate() {
+        let above = parent.map(|parent| NODES[parent].0);
+        let (joint, above) = if missing == Some(name) {
+            (loaded.nodes[number], game.node(instance, above.unwrap()))
+        } else {
+            (game.node(instance, name), parent.map_or(loaded.scene, |parent| loaded.nodes[parent]))
+        };
+        let world = game.app.world();
+        assert_eq!(world.get::<SkinnedMesh>(loaded.mesh).unwrap().joints[number], joint, "{name}");
+        assert_eq!(world.get::<ChildOf>(loaded.nodes[number]).map(ChildOf::parent), Some(above), "{name}");
+    }
+    check_at_rest(game, loaded);
+}
+
+/// Checks that the mesh stands as in the file.
+#[track_caller]
+fn check_at_rest(game: &AppBench, loaded: &Loaded) {
+    let world = game.app.world();
+    let skin = world.get::<SkinnedMesh>(loaded.mesh).unwrap();
+    let matrices = world.resource::<Assets<SkinnedMeshInverseBindposes>>().get(&skin.inverse_bindposes).unwrap();
+    for (joint, matrix) in skin.joints.iter().zip(matrices.iter()) {
+        let whole = world.get::<GlobalTransform>(*joint).unwrap().to_matrix() * *matrix;
+        assert!(whole.abs_diff_eq(Mat4::IDENTITY, 1e-5), "{whole}");
+    }
+}
+
+#[test]
+fn a_loaded_mesh_follows_whatever_becomes_of_its_instance() {
+    let modes = [InstanceMode::Hierarchy, InstanceMode::Direct];
+    for (mode, other_mode) in [(modes[0], modes[1]), (modes[1], modes[0])] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut game = game();
+        let instance = game.open(&saved(folder.path(), &without("b_end")), mode);
+        let loaded = Loaded::below(&mut game, instance, None);
+        let end = game.node(instance, "a_end");
+        let sword = game.app.world_mut().spawn((Transform::default(), ChildOf(end))).id();
+        check_bound(&mut game, instance, &loaded, Some("b_end"));
+        // A saved template has the joint, and the next one has it no more.
+        game.offer(instance, TWO.as_bytes());
+        game.until("the joint", |told| told.updated.len() == 1);
+        check_bound(&mut game, instance, &loaded, None);
+        game.offer(instance, without("b_end").as_bytes());
+        game.until("the joint is gone", |told| told.updated.len() == 2);
+        check_bound(&mut game, instance, &loaded, Some("b_end"));
+        // Another mode has other nodes; what hung on the former ones is there.
+        game.app.world_mut().entity_mut(instance).insert(other_mode);
+        game.until("the other mode", |told| told.built == 2);
+        check_bound(&mut game, instance, &loaded, Some("b_end"));
+        assert_eq!(game.app.world().get::<ChildOf>(sword).map(ChildOf::parent), Some(instance), "{mode:?}");
+        // Another template.
+        let other = RigTemplate::read(without("a_end").as_bytes()).unwrap();
+        let other = game.app.world_mut().resource_mut::<Assets<RigTemplate>>().add(other);
+        game.app.world_mut().entity_mut(instance).insert(RigInstance(other.clone()));
+        game.until("the other template", |told| told.updated.len() == 3);
+        check_bound(&mut game, instance, &loaded, Some("a_end"));
+        // Without an instance the mesh is moved by its own joints, as it was loaded; and it is bound again by the next one.
+        game.app.world_mut().entity_mut(instance).remove::<RigInstance>();
+        game.frames(3);
+        let skin = game.app.world().get::<SkinnedMesh>(loaded.mesh).unwrap();
+        assert_eq!((&skin.joints, &skin.inverse_bindposes), (&loaded.nodes, &loaded.bindposes), "{mode:?}");
+        assert!(game.app.world().get::<BoundTo>(loaded.mesh).is_none());
+        check_at_rest(&game, &loaded);
+        game.app.world_mut().entity_mut(instance).insert(RigInstance(other));
+        game.until("the instance again", |told| told.built == 3);
+        check_bound(&mut game, instance, &loaded, Some("a_end"));
+    }
+}
+
+#[test]
+fn a_loaded_mesh_follows_the_instance_that_it_is_put_below() {
+    for mode in [InstanceMode::Hierarchy, InstanceMode::Direct] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut game = game();
+        let first = game.open(&saved(folder.path(), TWO), mode);
+        let template = game.app.world().get::<RigInstance>(first).unwrap().0.clone();
+        let second = game.spawn(template, mode);
+        // Loaded elsewhere.
+        let other = game.app.world_mut().spawn(Transform::default()).id();
+        let loaded = Loaded::below(&mut game, other, None);
+        game.frames(2);
+        let joints = |game: &AppBench| game.app.world().get::<SkinnedMesh>(loaded.mesh).unwrap().joints.clone();
+        assert_eq!(joints(&game), loaded.nodes);
+        for instance in [first, second] {
+            game.app.world_mut().entity_mut(loaded.scene).insert(ChildOf(instance));
+            check_bound(&mut game, instance, &loaded, None);
+        }
+        game.app.world_mut().entity_mut(loaded.scene).remove::<ChildOf>();
+        game.frames(3);
+        assert_eq!(joints(&game), loaded.nodes, "{mode:?}");
+        check_at_rest(&game, &loaded);
     }
 }

@@ -28,19 +28,21 @@ use crate::animation::keep::{NEAR, flip_all, gentle, joints_off};
 
 /// Reports of updates about clips.
 #[derive(Resource, Default)]
-struct ToldClips(Vec<Arc<ClipReport>>);
+struct ClipReportLog(Vec<Arc<ClipReport>>);
 
 fn game(folder: &Path) -> AppBench {
     AppBench::game_with(RigInstancePlugin::default(), folder, |app| {
         app.add_plugins(ClipPlugin)
-            .init_resource::<ToldClips>()
+            .init_resource::<ClipReportLog>()
             .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(10)))
-            .add_observer(|updated: On<RigUpdated>, mut told: ResMut<ToldClips>| told.0.push(updated.clips.clone()));
+            .add_observer(|updated: On<RigUpdated>, mut told: ResMut<ClipReportLog>| {
+                told.0.push(updated.clips.clone())
+            });
     })
 }
 
 fn told(game: &AppBench) -> &[Arc<ClipReport>] {
-    &game.app.world().resource::<ToldClips>().0
+    &game.app.world().resource::<ClipReportLog>().0
 }
 
 /// The character, and a clip of its controls.

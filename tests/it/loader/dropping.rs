@@ -166,6 +166,37 @@ fn options_of_a_part_are_set_in_its_card() {
     assert!(studio.text() == text && studio.told("has no option \"weight\""), "{:?}", studio.desk.told());
 }
 
+#[test]
+fn wrong_numbers_of_options_are_told() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let spring = LIMB.replace("name: \"limb\"", "name: \"spring\"");
+    let spring = spring.replace("default: 0.5,", "default: 0.5, form: Slider(min: 0.1, max: 2),");
+    fs::write(studio.site.join("spring.rig.ron"), spring).unwrap();
+    studio.click("List the templates again");
+    studio.click("Part spring");
+    for (text, words) in [
+        ("0.05", "0.05 is none of its numbers; write one from 0.1 to 2"),
+        ("3", "3 is none of its numbers; write one from 0.1 to 2"),
+        ("much", "\"much\" is no number; write one such as 1.5 or -20"),
+    ] {
+        studio.desk.click("Option size");
+        studio.desk.type_text(text);
+        studio.desk.key(egui::Key::Enter);
+        studio.desk.frames(3);
+        assert_eq!(studio.desk.told().pop(), Some(format!("Option size stays as it was: {words}.")));
+    }
+    // Both ends are numbers of it.
+    let told = studio.desk.told().len();
+    for text in ["0.1", "2"] {
+        studio.desk.click("Option size");
+        studio.desk.type_text(text);
+        studio.desk.key(egui::Key::Enter);
+        studio.desk.frames(3);
+        assert_eq!(studio.desk.find("Option size").value.parse::<f32>(), text.parse());
+    }
+    assert_eq!(studio.desk.told().len(), told);
+}
+
 /// The name by which a template calls a part of a folder.
 #[test]
 fn parts_are_called_relative_to_the_document_or_the_site() {

@@ -17,7 +17,7 @@ use rigsmith::{
     rig::FaceCut,
 };
 
-use super::desk::{Desk, Sheet};
+use super::desk::{Desk, Sheet, ShownWidget};
 
 /// The panel, tall enough for all of it, and the bundled head.
 fn with_head() -> (Desk, Entity) {
@@ -41,6 +41,13 @@ fn opened(rig: Option<Rig>) -> (Desk, Entity) {
 /// Where a word is written.
 fn written(desk: &Desk, word: &str) -> Option<egui::Rect> {
     desk.seen.iter().find(|seen| seen.value == word || seen.label == word).map(|seen| seen.rect)
+}
+
+/// The number of bones beside its slider.
+fn number(desk: &Desk) -> ShownWidget {
+    let row = written(desk, "Bones").expect("the density").center().y;
+    let is_it = |seen: &&ShownWidget| seen.rect.y_range().contains(row) && seen.value.parse::<f32>().is_ok();
+    desk.seen.iter().find(is_it).expect("its number").clone()
 }
 
 fn wait(desk: &mut Desk, mesh: Entity) {
@@ -172,6 +179,60 @@ fn the_density_is_that_of_the_opened_face() {
     desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change: Change::Undo });
     desk.frames(4);
     assert_eq!((desk.rig().face_cut(Uid(99)), number_of_bones(&desk)), (None, 40.0));
+}
+
+#[test]
+fn a_number_of_bones_that_cannot_be_is_told() {
+    let (mut desk, mesh) = with_head();
+    let type_in = |desk: &mut Desk, text: &str| {
+        desk.time += 1.0;
+        desk.click_at(number(desk).rect.center());
+        desk.frames(2);
+        desk.type_text(text);
+        desk.key(egui::Key::Enter);
+        desk.frames(4);
+    };
+    for (text, words) in [
+        ("900", "900 is none of its numbers; write one from 4 to 150"),
+        ("12.5", "12.5 is no whole number; write one such as 3"),
+        ("some", "\"some\" is no number; write one such as 1.5 or -20"),
+    ] {
+        type_in(&mut desk, text);
+        assert_eq!(desk.told().pop(), Some(format!("Bones stays as it was: {words}.")));
+        assert_eq!((number(&desk).value.as_str(), desk.rig().face_cut(Uid(99))), ("40", None), "{text}");
+    }
+    type_in(&mut desk, "24");
+    assert_eq!(desk.rig().face_cut(Uid(99)), Some(FaceCut { bones: 24, groups: None }));
+    assert!(desk.app.world().get::<FaceJob>(mesh).is_none(), "there is no face yet that is placed again");
+}
+
+/// Of several meshes, the first one with a face is shown, until another is chosen.
+#[test]
+fn the_face_of_each_mesh_is_shown() {
+    let (mut desk, first) = with_head();
+    assert!(desk.look("Mesh").is_none(), "there is one mesh");
+    let mut second = desk.app.world().get::<RigMesh>(first).unwrap().clone();
+    second.uid = Uid(98);
+    desk.app.world_mut().spawn((second, SkinOf(desk.rig)));
+    desk.frames(2);
+    assert_eq!(number(&desk).value, "40");
+    let cut = RigEdit::SetFaceCut(Uid(98), Some(FaceCut { bones: 24, groups: None }));
+    desk.edit(Operation::Edits(vec![cut]));
+    assert_eq!(number(&desk).value, "24");
+    // Both have one name, and so a number.
+    let name = desk.app.world().get::<RigMesh>(first).unwrap().file.name.clone();
+    assert!(!name.is_empty());
+    desk.click("Mesh");
+    desk.frames(2);
+    let entry = desk.seen.iter().find(|seen| seen.label == name && seen.clickable).expect("an entry").rect.center();
+    desk.click_at(entry);
+    desk.frames(3);
+    assert_eq!(number(&desk).value, "40");
+    desk.click("Place face");
+    wait(&mut desk, first);
+    assert!(desk.app.world().get::<Face>(first).is_some());
+    // The usual number of bones is none of the document's.
+    assert_eq!([99, 98].map(|mesh| desk.rig().face_cut(Uid(mesh)).map(|cut| cut.bones)), [None, Some(24)]);
 }
 
 #[test]

@@ -63,6 +63,7 @@ fn wrong_numbers_of_the_settings_are_told() {
     let wrong = [
         ("Voxels", "5000", "Voxels stays as it was: 5000 is none of its numbers; write one from 32 to 1024."),
         ("Voxels", "many", "Voxels stays as it was: \"many\" is no number; write one such as 1.5 or -20."),
+        ("Influences", "2.5", "Influences stays as it was: 2.5 is no whole number; write one such as 3."),
         ("Influences", "0", "Influences stays as it was: 0 is none of its numbers; write one from 1 to 16."),
     ];
     for (field, text, words) in wrong {
@@ -77,6 +78,12 @@ fn wrong_numbers_of_the_settings_are_told() {
             .map(|last| (last.notice.text.clone(), last.times));
         assert_eq!(last, Some((words.to_owned(), 1)));
     }
+    // Escape leaves a text behind, for good.
+    desk.click("Voxels");
+    desk.type_text("48");
+    desk.key(Key::Escape);
+    desk.frames(3);
+    assert_eq!(settings(&desk), before);
     type_into(&mut desk, "Voxels", "64");
     type_into(&mut desk, "Influences", "3");
     assert_eq!((settings(&desk).voxel_resolution, settings(&desk).max_influences), (64, 3));
@@ -156,4 +163,57 @@ fn rigid_parts_and_idle_joints_have_a_choice_each() {
     desk.click("claims skin");
     desk.frames(2);
     assert!(desk.app.world().resource::<SkinningClaims>().0.is_empty());
+}
+
+/// Spawns a box as a mesh of that name.
+fn spawn_named(desk: &mut Desk, uid: u64, name: &str) -> Entity {
+    let model =
+        rigsmith::mesh::model::Model { name: name.to_owned(), ..boxes(&[[[-0.2, 0.0, -0.2], [0.2, 1.0, 0.2]]]) };
+    let mesh = (RigMesh::new(Uid(uid), model, Vec::new()), SkinOf(desk.rig));
+    desk.app.world_mut().spawn(mesh).id()
+}
+
+/// Weights that were painted on a body are not lost to the skinning of a coat that comes later.
+#[test]
+fn meshes_with_weights_keep_them_where_another_has_none() {
+    let mut desk = Desk::new(SkinningPanel::default());
+    let joints = desk.chain(&["a", "b"]);
+    let body = spawn_named(&mut desk, 98, "body");
+    let points = desk.app.world().get::<RigMesh>(body).unwrap().rest.points.len();
+    let mut weights = rigsmith::mesh::model::Weights::default();
+    (0..points).for_each(|_| weights.push([(0, 1.0)]));
+    let painted = rigsmith::rig::SkinData { joints: vec![joints[1]], weights, at_rest: true, ..default() };
+    desk.edit(Operation::Edits(vec![RigEdit::SetSkin(Uid(98), Some(std::sync::Arc::new(painted.clone())))]));
+    let coat = spawn_named(&mut desk, 99, "coat");
+    desk.frames(2);
+    let next = rigsmith::editor::next_step::next_step(desk.app.world()).unwrap();
+    assert!(next.contains("coat has no weights yet"), "{next}");
+    desk.app.world_mut().write_message(ActionRequest(Action::Skin));
+    desk.frames(2);
+    wait(&mut desk, coat);
+    assert!(desk.rig().skin(Uid(99)).is_some(), "{:?}", desk.told());
+    assert_eq!(desk.rig().skin(Uid(98)).map(|skin| &**skin), Some(&painted));
+    assert!(desk.told().iter().any(|told| told.starts_with("body keeps its weights.")), "{:?}", desk.told());
+    // With weights everywhere, all are computed.
+    desk.app.world_mut().write_message(ActionRequest(Action::Skin));
+    desk.frames(2);
+    wait(&mut desk, body);
+    wait(&mut desk, coat);
+    assert_ne!(desk.rig().skin(Uid(98)).map(|skin| &**skin), Some(&painted), "{:?}", desk.told());
+}
+
+#[test]
+fn one_of_several_meshes_is_skinned_alone() {
+    let mut desk = Desk::new(SkinningPanel::default());
+    desk.chain(&["a", "b"]);
+    spawn_named(&mut desk, 98, "body");
+    let coat = spawn_named(&mut desk, 99, "coat");
+    desk.frames(2);
+    desk.click("Skin coat alone");
+    wait(&mut desk, coat);
+    let bound: Vec<Uid> = desk.rig().skins().map(|(mesh, _)| mesh).collect();
+    assert_eq!(bound, [Uid(99)], "{:?}", desk.told());
+    desk.app.world_mut().entity_mut(coat).despawn();
+    desk.frames(2);
+    assert!(desk.look("Skin body alone").is_none(), "the only mesh has the common button");
 }

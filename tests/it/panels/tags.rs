@@ -23,7 +23,7 @@ use rigsmith::{
     processor::{BuildScope, ModuleError, RigModule},
     rig::{
         RigEdit, TagData, TagKind, Uid,
-        operations::{Operation, PasteTo, PasteWhat, TagClipboard, TagOperation},
+        operations::{Operation, PasteContent, PasteTo, TagClipboard, TagOperation},
         template::read_template,
     },
 };
@@ -234,7 +234,7 @@ fn what_an_operation_notes_is_told_once_it_is_done() {
     let clipboard = Arc::new(TagClipboard::copy_tags(desk.rig(), &tags).unwrap());
     let paste = |to: PasteTo| {
         let clipboard = Arc::clone(&clipboard);
-        Operation::Tags(TagOperation::Paste { clipboard, what: PasteWhat::Both, to })
+        Operation::Tags(TagOperation::Paste { clipboard, what: PasteContent::Both, to })
     };
     let is_told = |desk: &Desk| desk.told().iter().filter(|told| told.contains("left over")).count();
     // A refused one notes nothing.

@@ -389,8 +389,17 @@ fn panels_change_nothing_themselves() {
 }
 
 /// Actions that are no edits of the open document by what they are: they open, save or close documents, or are undo itself.
-const OF_FILES: [Action; 8] =
-    [Action::New, Action::Open, Action::Save, Action::SaveAs, Action::Export, Action::Quit, Action::Undo, Action::Redo];
+const OF_FILES: [Action; 9] = [
+    Action::New,
+    Action::Open,
+    Action::AddMesh,
+    Action::Save,
+    Action::SaveAs,
+    Action::Export,
+    Action::Quit,
+    Action::Undo,
+    Action::Redo,
+];
 
 #[test]
 fn all_actions_are_taken_back_by_undo() {

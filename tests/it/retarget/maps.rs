@@ -131,6 +131,28 @@ fn bones_of_old_and_of_nameless_files_are_found() {
     check(&figure(&nameless, false), FoundBy::Shape, "a shape with a joint above the head");
 }
 
+/// Skeletons of Character Creator and Daz have their legs on a joint beside the spine.
+#[test]
+fn legs_on_a_joint_beside_the_spine_are_found_by_shape() {
+    const HUB: usize = 14;
+    let names: Vec<String> = (0..JOINTS.len()).map(|at| format!("b{at}")).collect();
+    let mut motion = figure(&names, true);
+    let shifted = |joint: usize| if joint < HUB { joint } else { joint + 1 };
+    for (at, joint) in motion.joints.iter_mut().enumerate() {
+        let is_thigh = at == 14 || at == 18;
+        joint.parent = if is_thigh { Some(HUB) } else { joint.parent.map(shifted) };
+    }
+    let hub = MotionJoint { name: "hub".into(), parent: Some(0), rest: Trs::IDENTITY, ..MotionJoint::default() };
+    motion.joints.insert(HUB, hub);
+    let map = JointMap::new(&motion, &shipped("biped"), &[]).unwrap();
+    assert_eq!(map.found_by, FoundBy::Shape);
+    for (bone, joint) in bones() {
+        let joint = if bone == HumanBone::Hips { HUB } else { shifted(joint) };
+        assert_eq!(map.source.get(&bone).map(|joints| &joints[..]), Some(&[joint][..]), "{bone}");
+    }
+    assert_eq!(map.source[&HumanBone::Spine], [1, 2, 3]);
+}
+
 /// Web sites number the nodes of a file, and scenes of several rigs number those.
 #[test]
 fn numbers_of_nodes_and_of_rigs_are_passed_over() {

@@ -303,3 +303,16 @@ fn equal_content_shares_a_program() {
     changed.nodes[3].name = "another".into();
     assert_eq!(hash(&changed), known, "names do not count");
 }
+
+/// A body that stands is as high as its joints; one that lies flat is measured along its longest side.
+#[test]
+fn the_height_at_rest_is_that_of_the_joints_alone() {
+    let height = |places: &[(&str, Vec3)]| {
+        let mut rig = controls(&[("goal", Vec3::Y * 9.0)]);
+        chain(&mut rig, places);
+        compile(&rig.rig, Keep::All).rest_height()
+    };
+    assert_eq!(height(&[("a", Vec3::Y), ("b", Vec3::Y * 2.0), ("c", Vec3::new(0.25, 2.5, 0.0))]), 1.5);
+    assert_eq!(height(&[("a", Vec3::Y), ("b", Vec3::new(0.0, 1.0, 2.0))]), 2.0);
+    assert_eq!(height(&[]), 0.0);
+}

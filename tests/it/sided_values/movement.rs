@@ -50,7 +50,7 @@ impl Stage {
         let modules = modules::all();
         let copied = TagClipboard::copy(&self.rig, &TagScope::Joints(self.left.clone()), false, |_| true).unwrap();
         let copied = copied.map_params(|module, params| modules.get(module)?.mirrored(params).ok());
-        let paste = TagOperation::Paste { clipboard: copied.into(), what: PasteWhat::Both, to: PasteTo::Mirror };
+        let paste = TagOperation::Paste { clipboard: copied.into(), what: PasteContent::Both, to: PasteTo::Mirror };
         Operation::Tags(paste).run(&mut self.rig, &mut self.uids, None).unwrap();
         self
     }

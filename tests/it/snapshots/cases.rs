@@ -24,7 +24,7 @@ use super::{
 pub struct Case {
     /// Name of the picture in its group.
     pub name: String,
-    pub what: What,
+    pub what: PictureSubject,
     pub frame: Frame,
     /// Preparation of the state.
     pub before: fn(&mut Booth),
@@ -36,7 +36,7 @@ pub struct Case {
 }
 
 #[derive(Clone, Copy)]
-pub enum What {
+pub enum PictureSubject {
     Panel(fn() -> Box<dyn EditorPanel>),
     Toasts,
     Overlays,
@@ -116,7 +116,7 @@ fn panel((name, panel): Panel, (look_name, look): (&str, Look), size: [u16; 2], 
     let is_scrolled = ["timeline", "curves", "graph"].contains(&name);
     Case {
         name: format!("{name}_{look_name}_{}", size[0]),
-        what: What::Panel(panel),
+        what: PictureSubject::Panel(panel),
         frame: Frame { size, scale: 1.0, look },
         before: states::as_it_is,
         steps: &[],
@@ -235,7 +235,7 @@ fn updater() -> Vec<Case> {
 pub fn whole(name: &str, (look_name, look): (&str, Look), size: [u16; 2]) -> Case {
     Case {
         name: format!("{name}_{look_name}_{}", size[0]),
-        what: What::Window,
+        what: PictureSubject::Window,
         frame: Frame { size, scale: 1.0, look },
         before: states::as_it_is,
         steps: &[],

@@ -22,11 +22,11 @@ use rigsmith::{
 
 use super::{
     booth::{Booth, Frame, Step},
-    cases::{ALL, CONTRAST, Case, DARK, LARGE, LIGHT, NAMES, SMALL, WHOLE, What},
+    cases::{ALL, CONTRAST, Case, DARK, LARGE, LIGHT, NAMES, PictureSubject, SMALL, WHOLE},
     queries::Asked,
 };
 
-fn case(name: &str, what: What, look: (&str, Look), size: [u16; 2], before: fn(&mut Booth)) -> Case {
+fn case(name: &str, what: PictureSubject, look: (&str, Look), size: [u16; 2], before: fn(&mut Booth)) -> Case {
     Case {
         name: format!("{name}_{}_{}", look.0, size[0]),
         what,
@@ -39,8 +39,8 @@ fn case(name: &str, what: What, look: (&str, Look), size: [u16; 2], before: fn(&
 }
 
 pub fn cases() -> Vec<Case> {
-    let toasts = |name, look, before| case(name, What::Toasts, look, [400, 320], before);
-    let over = |name, look, size, before| case(name, What::Overlays, look, size, before);
+    let toasts = |name, look, before| case(name, PictureSubject::Toasts, look, [400, 320], before);
+    let over = |name, look, size, before| case(name, PictureSubject::Overlays, look, size, before);
     let asked = |case: Case, asked: Asked| Case { asked, ..case };
     let typed = |case: Case, steps: &'static [Step]| Case { steps, ..case };
     let small = [620, 460];
@@ -73,8 +73,8 @@ pub fn cases() -> Vec<Case> {
         over("start", CONTRAST, SMALL, show_start),
         asked(over("start_recent", DARK, SMALL, show_start_with_files), NAMES),
         asked(over("start_column", DARK, [560, 640], show_start_with_files), NAMES),
-        asked(case("empty_window", What::Window, DARK, LARGE, show_nothing), WHOLE),
-        asked(case("empty_window", What::Window, LIGHT, SMALL, show_nothing), WHOLE),
+        asked(case("empty_window", PictureSubject::Window, DARK, LARGE, show_nothing), WHOLE),
+        asked(case("empty_window", PictureSubject::Window, LIGHT, SMALL, show_nothing), WHOLE),
     ]
 }
 

@@ -91,9 +91,12 @@ fn check_keys(studio: &Studio, before: Option<&RigClip>, is_same: bool, step: us
     }
 }
 
-/// Joints that an update could not hold.
+/// Losses that updates have told: joints that a pose could not hold, and nodes whose keys are set aside.
 #[derive(Resource, Default)]
-struct ListedJoints(HashSet<Uid>);
+struct ListedLosses {
+    joints: HashSet<Uid>,
+    set_aside: HashSet<Uid>,
+}
 
 #[test]
 fn a_long_life_of_edits_and_saves_loses_nothing() {
@@ -106,13 +109,14 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
         joints.push(Some(FileJoint { name: format!("joint_{number}"), above, place, turn: 0.0, size: 1.0 }));
     }
     let mut studio = Studio::of(true, &template_of_joints(&joints));
-    studio.base.app.init_resource::<ListedJoints>();
-    studio.base.app.add_observer(|updated: On<RigUpdated>, mut listed: ResMut<ListedJoints>| {
-        listed.0 = updated.poses.iter().map(|note| note.deviation.joint).collect();
+    studio.base.app.init_resource::<ListedLosses>();
+    studio.base.app.add_observer(|updated: On<RigUpdated>, mut listed: ResMut<ListedLosses>| {
+        listed.joints.extend(updated.poses.iter().map(|note| note.deviation.joint));
+        listed.set_aside.extend(updated.clips.set_aside.iter().map(|aside| aside.keys.node));
     });
     let first = write_template(studio.base.rig());
     let mut keys = 0;
-    let (mut done, mut is_mixed, mut reloads, mut offers, mut held) = (0usize, false, 0, 0, 0);
+    let (mut done, mut is_mixed, mut reloads, mut offers, mut held, mut aside) = (0usize, false, 0, 0, 0, 0);
     let (mut version, mut parts) = (0, 0);
     for step in 0..steps {
         // An undo may have taken it away.
@@ -156,7 +160,9 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                 let was = template_of_joints(&joints);
                 let is_part = dice.below(4) == 0;
                 let mut means_other = false;
-                studio.base.app.world_mut().resource_mut::<ListedJoints>().0.clear();
+                let keyed: Vec<Uid> =
+                    clip_before.iter().flat_map(RigClip::nodes).filter(|node| studio.is_built(*node)).collect();
+                *studio.base.app.world_mut().resource_mut::<ListedLosses>() = ListedLosses::default();
                 if is_part {
                     let next =
                         (1..).map(|more| version + more).find(|next| written_part(*next) != written_part(version));
@@ -197,13 +203,19 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
                     assert_eq!(after.values.get(node), Some(values), "step {step}");
                 }
                 check_keys(&studio, clip_before.as_ref(), !means_other && !is_mixed, step);
-                let listed = &studio.base.app.world().resource::<ListedJoints>().0;
+                let listed = studio.base.app.world().resource::<ListedLosses>();
+                for node in keyed.iter().filter(|node| !studio.is_built(**node)) {
+                    assert!(listed.set_aside.contains(node), "step {step}: keys of {node} are gone and not listed");
+                    aside += 1;
+                }
                 if !means_other && !is_mixed {
                     for (node, offset) in before.pose.iter().filter(|(node, _)| studio.is_built(**node)) {
                         assert_eq!(after.pose.get(node), Some(offset), "step {step}");
                     }
                 } else if !is_mixed {
-                    for (joint, place, rest) in before.joints.iter().filter(|(joint, ..)| !listed.contains(joint)) {
+                    for (joint, place, rest) in
+                        before.joints.iter().filter(|(joint, ..)| !listed.joints.contains(joint))
+                    {
                         let Some((_, now, rest_now)) = after.joints.iter().find(|(known, ..)| known == joint) else {
                             continue;
                         };
@@ -225,7 +237,7 @@ fn a_long_life_of_edits_and_saves_loses_nothing() {
     }
     assert!(reloads > steps / 10 && parts > steps / 40, "{reloads} reloads, {parts} of them of the part");
     println!(
-        "{steps} steps, {reloads} reloads, {parts} of the part, {offers} offered, {held} joints held, {keys} keys"
+        "{steps} steps, {reloads} reloads, {parts} of the part, {offers} offered, {held} held, {keys} keys, {aside} aside"
     );
     assert!(held > steps / 10 && keys > steps / 40, "{held} {keys}");
     for _ in 0..steps * 2 {

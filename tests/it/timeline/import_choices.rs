@@ -48,6 +48,13 @@ fn the_clip_of_imported_motion_has_the_rate_and_the_loop_that_are_chosen() {
     desk.frames(3);
     assert_eq!(options(&desk).frame_rate, Some(30.0));
     desk.click("Frames a second of the clip");
+    desk.type_text("5000");
+    desk.key(KeyboardKey::Enter);
+    desk.frames(3);
+    assert_eq!(options(&desk).frame_rate, Some(30.0));
+    let told = "Frames a second of the clip stays as it was: 5000 is none of its numbers; write one from 1 to 1000.";
+    assert_eq!(desk.told().last().map(String::as_str), Some(told));
+    desk.click("Frames a second of the clip");
     desk.type_text("12");
     desk.key(KeyboardKey::Enter);
     desk.frames(3);

@@ -63,12 +63,22 @@ fn range_rate_and_loop_are_fields() {
         assert_eq!((clip(&desk).range, clip(&desk).frame_rate), (range, rate), "{field}");
         assert_eq!(desk.steps().1, steps + number + 1);
     }
-    desk.click("Start frame");
-    desk.type_text("500");
-    desk.key(KeyboardKey::Enter);
-    desk.frames(3);
-    assert_eq!(clip(&desk).range, [3.0, 3.0], "a range never ends before it begins");
-    undo(&mut desk);
+    // A range never ends before it begins, and what is no number of a field is told.
+    let (unchanged, steps) = (bytes(&desk), desk.steps());
+    let wrong = [
+        ("Start frame", "500", "500 is none of its numbers; write one of at most 72"),
+        ("End frame", "-5", "-5 is none of its numbers; write one of at least 0"),
+        ("Frames a second", "0", "0 is none of its numbers; write one from 0.1 to 1000"),
+        ("Frames a second", "fast", "\"fast\" is no number; write one such as 1.5 or -20"),
+    ];
+    for (field, text, words) in wrong {
+        desk.click(field);
+        desk.type_text(text);
+        desk.key(KeyboardKey::Enter);
+        desk.frames(3);
+        assert_eq!((bytes(&desk), desk.steps()), (unchanged.clone(), steps), "{field} {text}");
+        assert_eq!(desk.told().pop(), Some(format!("{field} stays as it was: {words}.")));
+    }
     desk.click("Loop the clip");
     desk.frames(3);
     assert!(clip(&desk).looped && desk.app.world().get::<ClipPlayer>(desk.rig).unwrap().looped);

@@ -281,7 +281,8 @@ fn a_double_click_over_two_frames_selects_the_hierarchy_in_every_mode() {
 /// One press is on a handle of the gizmo, the other one on a joint beside it.
 #[test]
 fn each_press_of_a_frame_belongs_to_what_lies_under_it() {
-    for (mode, is_handle_first) in [(Mode::Move, true), (Mode::Move, false), (Mode::Pose, true)] {
+    let modes = [Mode::Move, Mode::Scale, Mode::Pose];
+    for (mode, is_handle_first) in modes.into_iter().flat_map(|mode| [(mode, true), (mode, false)]) {
         let (mut hand, joints) = Hand::with_joints(mode);
         let [a, b] = [joints[0], joints[5]];
         let [at_a, at_b] = [hand.base.pixel(a), hand.base.pixel(b)];
@@ -292,6 +293,22 @@ fn each_press_of_a_frame_belongs_to_what_lies_under_it() {
         hand.frame(&[To(first), Down, Up, To(last), Down, Up]);
         let wanted = if is_handle_first { b } else { a };
         assert_eq!(hand.base.selected(), [wanted], "{mode:?}, the handle first: {is_handle_first}");
+    }
+}
+
+/// Joints are clicked with another tool than the handle of the gizmo.
+#[test]
+fn clicks_of_two_tools_in_one_frame_add_up() {
+    for mode in [Mode::Scale, Mode::Pose] {
+        let (mut hand, joints) = Hand::with_joints(mode);
+        let [a, b] = [joints[0], joints[5]];
+        let [at_a, at_b] = [hand.base.pixel(a), hand.base.pixel(b)];
+        hand.frame(&[To(at_a), Down, Up]);
+        hand.frame(&[To(at_a + Vec2::new(1.0, 0.0))]);
+        assert_eq!(hand.base.selected(), [a], "{mode:?}");
+        // The first click adds one, the second takes the other out.
+        hand.frame(&[Press("Ctrl"), To(at_b), Down, Up, To(at_a), Down, Up, Lift("Ctrl")]);
+        assert_eq!(hand.base.selected(), [b], "{mode:?}");
     }
 }
 

@@ -1,6 +1,10 @@
 //! The tool for strokes: previews, ticks and scribbles.
 
+use bevy_egui::egui;
+use rigsmith::editor::notice::Notice;
+
 use super::*;
+use crate::panels::desk::{Desk, Sheet};
 
 const ARM: [[f32; 3]; 3] = [[0.17, 1.4, 0.0], [0.37, 1.2, 0.0], [0.53, 1.02, 0.0]];
 
@@ -45,6 +49,50 @@ fn what_is_previewed_is_what_is_taken() {
             assert!(shown.distance(*taken) <= EXACT, "{shown} was shown, {taken} was taken");
         }
     }
+}
+
+/// Texts of the notices so far.
+#[derive(Resource, Default)]
+struct NoticeTexts(Vec<String>);
+
+fn keep(mut notices: MessageReader<Notice>, mut told: ResMut<NoticeTexts>) {
+    told.0.extend(notices.read().map(|notice| notice.text.clone()));
+}
+
+/// The bar under a preview takes whole texts, and tells numbers that it does not take.
+#[test]
+fn wrong_numbers_of_the_bar_are_told() {
+    let mut bench = RigBench::with_body(Mode::Stroke);
+    bench.preview(&ARM);
+    bench.app.init_resource::<NoticeTexts>().add_systems(Last, keep);
+    bench.frames(3);
+    let RigBench { app, rig } = bench;
+    let mut desk = Desk::of(app, rig, Sheet::Window, egui::vec2(900.0, 500.0));
+    desk.frames(3);
+    let choice = |desk: &Desk| match &desk.app.world().resource::<StrokeTool>().state {
+        StrokeState::Preview(preview) => preview.request.choice,
+        other => panic!("{other:?}"),
+    };
+    let type_in = |desk: &mut Desk, text: &str| {
+        desk.app.insert_resource(NoticeTexts::default());
+        desk.click("Number of joints");
+        desk.type_text(text);
+        desk.key(egui::Key::Enter);
+        desk.frames(2);
+        desk.app.world().resource::<NoticeTexts>().0.clone()
+    };
+    let before = choice(&desk);
+    for (text, words) in [
+        ("500", "500 is none of its numbers; write one from 2 to 60"),
+        ("4.5", "4.5 is no whole number; write one such as 3"),
+        ("few", "\"few\" is no number; write one such as 1.5 or -20"),
+    ] {
+        let told = type_in(&mut desk, text);
+        assert_eq!(told, [format!("The number of joints stays as it was: {words}.")]);
+        assert_eq!(choice(&desk), before, "{text}");
+    }
+    assert_eq!(type_in(&mut desk, "12"), [""; 0]);
+    assert_eq!(choice(&desk), ChainChoice::Joints(12));
 }
 
 #[test]

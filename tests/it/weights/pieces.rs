@@ -158,3 +158,40 @@ fn slots_hold_things_and_no_flesh() {
     assert!(report.idle_joints.iter().all(|idle| idle.reason != IdleReason::Slot), "{:?}", report.idle_joints);
     assert!((0..body).any(|point| weight(&weights, point, 0) > 0.9));
 }
+
+/// A figure of plates: its hips lie in the air between two of them, which nothing encloses, and the root on the ground below.
+/// Hips, legs and trunk hold their own plates.
+#[test]
+fn figures_of_plates_are_held_by_their_bones() {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    let mut add = |low: [f32; 3], high: [f32; 3]| add_box(&mut points, &mut triangles, low.into(), high.into());
+    let front = add([-0.9, 1.8, 0.4], [0.9, 2.6, 0.5]);
+    let back = add([-0.9, 1.8, -0.5], [0.9, 2.6, -0.4]);
+    let legs = [add([0.4, 0.35, -0.2], [0.8, 1.7, 0.2]), add([-0.8, 0.35, -0.2], [-0.4, 1.7, 0.2])];
+    let trunk = add([-0.9, 2.8, -0.5], [0.9, 4.0, 0.5]);
+    // A strap makes one piece of the two plates around the hips.
+    triangles.push([front.start + 1, front.start + 3, back.start + 5].map(|point| point as u32));
+    let joints = [
+        joint([0.0, 0.0, 0.0], None),
+        joint([0.0, 2.2, 0.0], Some(0)),
+        joint([0.0, 2.9, 0.0], Some(1)),
+        joint([0.0, 3.2, 0.0], Some(2)),
+        joint([0.0, 3.6, 0.0], Some(3)),
+        joint([0.0, 3.9, 0.0], Some(4)),
+        joint([0.6, 1.8, 0.0], Some(1)),
+        joint([0.6, 0.1, 0.0], Some(6)),
+        joint([-0.6, 1.8, 0.0], Some(1)),
+        joint([-0.6, 0.1, 0.0], Some(8)),
+    ];
+    let (weights, report) = bind(&points, &triangles, &joints);
+    check_sound(&weights, points.len(), &joints, 8);
+    let held = |mut piece: Range<usize>, by: &[u32]| {
+        piece.all(|point| by.iter().map(|joint| weight(&weights, point, *joint)).sum::<f32>() > 0.99)
+    };
+    assert!(held(front, &[1]) && held(back, &[1]), "the hips hold their plates: {:?}", report.stiff_pieces);
+    let [left, right] = legs;
+    assert!(held(left, &[6, 7]) && held(right, &[8, 9]), "the legs hold theirs: {:?}", report.stiff_pieces);
+    assert!(held(trunk, &[2, 3, 4, 5]), "the spine holds the trunk: {:?}", report.stiff_pieces);
+    // The root on the ground holds nothing.
+    assert!((0..points.len()).all(|point| weight(&weights, point, 0) == 0.0));
+}

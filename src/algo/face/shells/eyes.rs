@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::{Island, ShellKind};
+use super::{Island, ShellKind, Shells, measured};
+use crate::algo::face::landmarks::Landmarks;
 
 /// A shell with the shape of a ball, or of a large part of one.
 #[derive(Debug, Clone, Copy)]
@@ -19,9 +20,75 @@ const LARGEST: f32 = 0.2;
 const ROUND: f32 = 0.12;
 /// Least number of points of a ball; a sphere runs through any four.
 const FEWEST: usize = 8;
+/// Least extent of a ball, or of a part of one, as a share of its largest. A sphere runs through the corners of any bar,
+/// too, such as the temple of a pair of glasses.
+const FLATTEST: f32 = 0.18;
+/// Largest distance of two eyes, in radii. Human eyes are 5 apart; beads and earrings are small and far from each other.
+const APART: f32 = 16.0;
 
-/// Marks the eyes among `kinds`.
-pub fn find(points: &[Vec3], shell_of: &[u32], islands: &[Island], kinds: &mut [ShellKind]) {
+/// Places of the eyes on a face, the left one first, where eyeballs have to be.
+pub struct Sockets {
+    places: [Vec3; 2],
+    /// Distance of the eyes' outer corners.
+    scale: f32,
+}
+
+impl Sockets {
+    fn of(landmarks: &Landmarks) -> Self {
+        Self { places: [true, false].map(|left| landmarks.eye_center(left)), scale: landmarks.eye_distance() }
+    }
+
+    /// Returns `true` for balls that are behind the lids, or bulge out of them.
+    fn hold(&self, balls: [(Vec3, f32); 2]) -> bool {
+        balls.iter().zip(self.places).all(|((center, radius), place)| {
+            let off = *center - place;
+            off.truncate().length() <= 0.2 * self.scale + 0.5 * radius
+                && off.z <= 0.1 * self.scale + 0.5 * radius
+                && off.z >= -0.3 * self.scale - 2.5 * radius
+        })
+    }
+}
+
+impl Shells {
+    /// Returns `true` if shells are marked as eyes.
+    pub fn has_eyes(&self) -> bool {
+        self.kinds.iter().any(|kind| matches!(kind, ShellKind::LeftEye | ShellKind::RightEye))
+    }
+
+    /// Returns `true` if both eyes are where `landmarks` have them; `points` are those that the shells were found in.
+    pub fn are_eyes_on_face(&self, points: &[Vec3], landmarks: &Landmarks) -> bool {
+        let bounds = |wanted: ShellKind| {
+            let own = points.iter().enumerate().filter(|(point, _)| self.kind(*point) == wanted);
+            own.fold((Vec3::MAX, Vec3::MIN), |(low, high), (_, place)| (low.min(*place), high.max(*place)))
+        };
+        let balls = [ShellKind::LeftEye, ShellKind::RightEye].map(|kind| {
+            let (low, high) = bounds(kind);
+            (0.5 * (low + high), 0.5 * (high - low).max_element())
+        });
+        Sockets::of(landmarks).hold(balls)
+    }
+
+    /// The shells with no eye among them: balls that were marked as eyes are [`ShellKind::Inside`].
+    pub fn without_eyes(&self) -> Self {
+        let kind = |kind: &ShellKind| match kind {
+            ShellKind::LeftEye | ShellKind::RightEye => ShellKind::Inside,
+            other => *other,
+        };
+        Self { shell_of: self.shell_of.clone(), kinds: self.kinds.iter().map(kind).collect() }
+    }
+
+    /// Marks a pair of balls where `landmarks` have the eyes as eyes; returns `false` if there is none.
+    ///
+    /// `points` and `triangles` are those that the shells were found in. Linear time.
+    pub fn mark_eyes(&mut self, points: &[Vec3], triangles: &[[u32; 3]], landmarks: &Landmarks) -> bool {
+        let islands = measured(points, triangles, &self.shell_of, self.kinds.len());
+        find(points, &self.shell_of, &islands, Some(&Sockets::of(landmarks)), &mut self.kinds);
+        self.has_eyes()
+    }
+}
+
+/// Marks the eyes among `kinds`: the balls in `sockets` if they are given.
+pub fn find(points: &[Vec3], shell_of: &[u32], islands: &[Island], sockets: Option<&Sockets>, kinds: &mut [ShellKind]) {
     let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
     for island in islands.iter().filter(|island| island.area > 0.0) {
         low = low.min(island.low);
@@ -29,7 +96,7 @@ pub fn find(points: &[Vec3], shell_of: &[u32], islands: &[Island], kinds: &mut [
     }
     let size = (high - low).max_element();
     let balls = balls(points, shell_of, islands, size);
-    let Some((left, right)) = pair(&balls, (low.z + high.z) * 0.5) else { return };
+    let Some((left, right)) = pair(&balls, (low.z + high.z) * 0.5, sockets) else { return };
     for (eye, kind) in [(left, ShellKind::LeftEye), (right, ShellKind::RightEye)] {
         for (shell, island) in islands.iter().enumerate() {
             // Cornea and iris are often shells of their own; every shell within the eye turns with it. Lashes reach out
@@ -46,7 +113,8 @@ pub fn find(points: &[Vec3], shell_of: &[u32], islands: &[Island], kinds: &mut [
 fn balls(points: &[Vec3], shell_of: &[u32], islands: &[Island], size: f32) -> Vec<Ball> {
     let fits = |island: &Island| {
         let extent = island.high - island.low;
-        island.area > 0.0 && extent.max_element() < 2.2 * LARGEST * size && extent.min_element() > 0.0
+        let is_flat = extent.min_element() <= FLATTEST * extent.max_element();
+        island.area > 0.0 && extent.max_element() < 2.2 * LARGEST * size && !is_flat
     };
     let possible: Vec<bool> = islands.iter().map(fits).collect();
     let mut members: Vec<Vec<Vec3>> = vec![Vec::new(); islands.len()];
@@ -117,7 +185,7 @@ fn solve(mut system: [[f64; 5]; 4]) -> Option<[f64; 4]> {
 ///
 /// The balls have one size and lie side by side rather than above or behind each other. The largest pair wins, since
 /// beads and buttons are smaller; of equal pairs the one in front.
-fn pair(balls: &[Ball], middle: f32) -> Option<(Ball, Ball)> {
+fn pair(balls: &[Ball], middle: f32, sockets: Option<&Sockets>) -> Option<(Ball, Ball)> {
     let mut best: Option<(f32, Ball, Ball)> = None;
     for (index, a) in balls.iter().enumerate() {
         for b in &balls[index + 1..] {
@@ -125,14 +193,16 @@ fn pair(balls: &[Ball], middle: f32) -> Option<(Ball, Ball)> {
             let radius = (a.radius + b.radius) * 0.5;
             let alike = (a.radius - b.radius).abs() <= 0.15 * radius;
             let beside = apart.x.abs() > 1.2 * radius && apart.x.abs() > 0.6 * apart.length();
-            if !alike || !beside || apart.length() > 30.0 * radius {
+            let (left, right) = if a.center.x >= b.center.x { (*a, *b) } else { (*b, *a) };
+            let placed = [(left.center, left.radius), (right.center, right.radius)];
+            let is_off_face = sockets.is_some_and(|sockets| !sockets.hold(placed));
+            if !alike || !beside || apart.length() > APART * radius || is_off_face {
                 continue;
             }
             let front = if (a.center.z + b.center.z) * 0.5 >= middle { 1.0 } else { 0.5 };
             let straight = apart.x.abs() / apart.length();
             let score = radius * front * straight;
             if best.is_none_or(|best| score > best.0) {
-                let (left, right) = if a.center.x >= b.center.x { (*a, *b) } else { (*b, *a) };
                 best = Some((score, left, right));
             }
         }

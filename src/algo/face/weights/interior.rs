@@ -1,12 +1,13 @@
-//! Weights of parts other than skin: eyeballs, teeth, tongue, lashes.
+//! Weights of parts other than skin: eyeballs, teeth, tongue, lashes, hair on the face.
 
 use std::collections::BTreeMap;
 
 use glam::Vec3;
 
 use super::{
-    Face, HEAD, NECK, Row,
+    Face, HEAD, NECK, Row, facial_hair,
     sides::{Rim, Sides},
+    skin_columns::SkinColumns,
     smooth,
 };
 use crate::algo::face::{bones::map::line_distance, shells::ShellKind};
@@ -22,9 +23,10 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
             ShellKind::Inside | ShellKind::Tongue => members.entry(shell[v]).or_default().push(v),
         }
     }
+    let (skin, outer) = (SkinColumns::new(face, |_| face.map.trusted), facial_hair::outer_skin(face));
     let is_tongue = |members: &[usize]| members.first().is_some_and(|&v| kinds[v] == ShellKind::Tongue);
     let (inside, outside): (Vec<_>, Vec<_>) =
-        members.values().partition(|members| is_tongue(members) || in_mouth(face, members));
+        members.values().partition(|members| is_tongue(members) || in_mouth(face, &outer, members));
     let inside: Vec<MouthPart> = inside.into_iter().map(|members| MouthPart::new(face, members)).collect();
     let ends = inside.iter().filter(|part| is_tongue(part.members)).map(|part| [part.low.z, part.high.z]);
     let ends = ends.reduce(|[back, front], [low, high]| [back.min(low), front.max(high)]);
@@ -37,7 +39,7 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
         }
     }
     for members in outside {
-        if !lashes(face, sides, members, rows) {
+        if !lashes(face, sides, &skin, members, rows) && !facial_hair::rows(face, sides, &outer, members, rows) {
             for &v in members {
                 let neck = face.neck_share(face.places[v]);
                 rows[v] = vec![(HEAD, 1.0 - neck), (NECK, neck)];
@@ -46,8 +48,8 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
     }
 }
 
-/// Returns `true` for a shell whose middle lies behind the lips.
-fn in_mouth(face: &Face, members: &[usize]) -> bool {
+/// Returns `true` for a shell whose middle lies behind the lips, and that does not lie on the skin.
+fn in_mouth(face: &Face, outer: &SkinColumns, members: &[usize]) -> bool {
     if !face.map.trusted {
         return false;
     }
@@ -55,7 +57,8 @@ fn in_mouth(face: &Face, members: &[usize]) -> bool {
     let (half, p) = face.map.fold(middle);
     let corner = half.lip_corner();
     let e = face.map.scale;
-    p.x < 1.3 * corner.x && (p.y - corner.y).abs() < 0.4 * e && p.z < half.lip_line()[0].z + 0.02 * e
+    let is_behind = p.x < 1.3 * corner.x && (p.y - corner.y).abs() < 0.4 * e && p.z < half.lip_line()[0].z + 0.02 * e;
+    is_behind && !facial_hair::is_on_skin(face, outer, members)
 }
 
 /// A shell in the mouth: a row of teeth, a tooth, the tongue, or a bag around them.
@@ -82,6 +85,38 @@ impl<'a> MouthPart<'a> {
         let places = || members.iter().map(|&v| face.places[v]);
         let (low, high) = (places().fold(Vec3::INFINITY, Vec3::min), places().fold(Vec3::NEG_INFINITY, Vec3::max));
         Self { members, below, mean, spans, low, high }
+    }
+
+    /// True for a part that belongs to the jaw, by the parts that it faces; `None` if it faces none.
+    ///
+    /// They and the part itself are split in two by height, so that a tooth does not fall to the other jaw because its own
+    /// gum is above it.
+    fn is_lower(&self, all: &[Self], face: &Face) -> Option<bool> {
+        let e = face.map.scale;
+        let facing = all.iter().filter(|other| self.faces(other, e));
+        let mut below: Vec<f32> =
+            facing.map(|other| other.mean_beside(self, face) - self.mean_beside(other, face)).collect();
+        if below.is_empty() {
+            return None;
+        }
+        below.push(0.0);
+        below.sort_by(f32::total_cmp);
+        Some(split(&below) < 0.0)
+    }
+
+    /// Mean distance below the lips where the part is beside another, which may be a single tooth below a row; of the whole
+    /// part if no vertex is there.
+    fn mean_beside(&self, other: &Self, face: &Face) -> f32 {
+        let margin = 0.03 * face.map.scale;
+        let (mut sum, mut count) = (0.0_f32, 0_u32);
+        for (&v, below) in self.members.iter().zip(&self.below) {
+            let x = face.places[v].x;
+            if x >= other.low.x - margin && x <= other.high.x + margin {
+                sum += below;
+                count += 1;
+            }
+        }
+        if count == 0 { self.mean } else { sum / count as f32 }
     }
 
     /// True for parts of which one lies over the other, as an upper tooth over a lower one, and not within it.
@@ -112,11 +147,27 @@ fn stretched(face: &Face, part: &MouthPart, [jaw, tongue]: [u32; 2], [back, fron
     }
 }
 
+/// The value between the two groups of sorted numbers that are furthest apart, by the variance between them.
+fn split(sorted: &[f32]) -> f32 {
+    let sum: f32 = sorted.iter().sum();
+    let (mut lower, mut most, mut best) = (0.0_f32, f32::NEG_INFINITY, 0.0_f32);
+    for (at, pair) in sorted.windows(2).enumerate() {
+        lower += pair[0];
+        let (count, rest) = ((at + 1) as f32, (sorted.len() - at - 1) as f32);
+        let apart = (sum - lower) / rest - lower / count;
+        let variance = count * rest * apart * apart;
+        if variance > most {
+            (most, best) = (variance, 0.5 * (pair[0] + pair[1]));
+        }
+    }
+    best
+}
+
 /// Fills the rows of a part of the mouth.
 ///
 /// A part below the lips follows the jaw fully, one above them the head; a bag that spans both is shared smoothly. Upper
-/// teeth often hang below the lips: of parts that face each other near the lips the upper one belongs to the head and the
-/// lower one to the jaw, and both are stiff.
+/// teeth often hang below the lips: of parts that face each other near the lips the upper ones belong to the head and the
+/// lower ones to the jaw, and all are stiff.
 fn mouth(face: &Face, part: &MouthPart, all: &[MouthPart], rows: &mut [Row]) {
     let Some(jaw) = face.jaw else {
         for &v in part.members {
@@ -125,16 +176,11 @@ fn mouth(face: &Face, part: &MouthPart, all: &[MouthPart], rows: &mut [Row]) {
         return;
     };
     let e = face.map.scale;
-    let facing: Vec<&MouthPart> = all.iter().filter(|other| part.faces(other, e)).collect();
-    let is_upper = !facing.is_empty() && facing.iter().all(|other| other.mean > part.mean);
-    let is_lower = !facing.is_empty() && facing.iter().all(|other| other.mean < part.mean);
-    let follows_jaw = match part.mean {
-        mean if is_upper && mean < 0.15 * e => false,
-        mean if is_lower && mean > -0.15 * e => true,
-        mean => mean > 0.0,
-    };
+    let is_lower = part.is_lower(all, face);
+    let is_near = part.mean > -0.15 * e && part.mean < 0.25 * e;
+    let follows_jaw = is_lower.filter(|_| is_near).unwrap_or(part.mean > 0.0);
     for (&v, &below) in part.members.iter().zip(&part.below) {
-        let share = match part.spans && facing.is_empty() {
+        let share = match part.spans && is_lower.is_none() {
             true => smooth(-0.06 * e, 0.06 * e, below),
             false => f32::from(u8::from(follows_jaw)),
         };
@@ -144,7 +190,7 @@ fn mouth(face: &Face, part: &MouthPart, all: &[MouthPart], rows: &mut [Row]) {
 
 /// Fills the rows of lashes, brows and the like that lie on the skin with the weights of the nearest skin; returns
 /// `false` for a shell of another kind.
-fn lashes(face: &Face, sides: &Sides, members: &[usize], rows: &mut [Row]) -> bool {
+fn lashes(face: &Face, sides: &Sides, skin: &SkinColumns, members: &[usize], rows: &mut [Row]) -> bool {
     if !face.map.trusted {
         return false;
     }
@@ -158,9 +204,7 @@ fn lashes(face: &Face, sides: &Sides, members: &[usize], rows: &mut [Row]) -> bo
     let low = members.iter().fold(Vec3::INFINITY, |a, &v| a.min(face.places[v]));
     let high = members.iter().fold(Vec3::NEG_INFINITY, |a, &v| a.max(face.places[v]));
     let margin = Vec3::splat(0.12 * e);
-    let skin: Vec<usize> = (0..face.places.len())
-        .filter(|&v| face.mask[v] && (face.places[v].cmpge(low - margin) & face.places[v].cmple(high + margin)).all())
-        .collect();
+    let skin: Vec<usize> = skin.within(low - margin, high + margin).collect();
     let nearest = |v: usize, rim: Option<(usize, Rim)>| {
         skin.iter()
             .copied()

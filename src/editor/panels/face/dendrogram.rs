@@ -7,7 +7,11 @@ use crate::{
         face::{auto::FaceAnalysis, grouping::HeadGroup},
         linkage::Dendrogram,
     },
-    editor::style,
+    editor::{
+        panel::Requests,
+        panels::fields::{TypedText, typed_field},
+        style,
+    },
 };
 
 /// Number of drawn leaves; each stands for the subtree below it.
@@ -24,7 +28,7 @@ struct Branch {
 
 /// Draws the tree. A click between two heights cuts there at the next placement; a double click restores the automatic
 /// choice. Returns true once a person has chosen: after a click, and after the release of the slider.
-pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usize>) -> bool {
+pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usize>, requests: &mut Requests) -> bool {
     let tree = &analysis.groups.depth;
     let heights = tree.heights(LEAVES);
     let Some(top) = heights.first().copied().filter(|top| *top > 0.0) else {
@@ -54,12 +58,16 @@ pub(super) fn show(ui: &mut Ui, analysis: &FaceAnalysis, groups: &mut Option<usi
     }
     key(ui);
     let mut count = cut;
-    let slider = ui.add(egui::Slider::new(&mut count, 1..=heights.len() + 1).text("groups"));
-    if slider.changed() {
+    let (typed, most) = (TypedText::default(), heights.len() + 1);
+    let slider = egui::Slider::new(&mut count, 1..=most).text("groups").update_while_editing(false);
+    let slider = typed_field(ui, "groups", slider.custom_parser(typed.whole_reader(1.0..=most as f64, "")));
+    typed.tell(&slider, "The number of groups", requests);
+    // The field of the number changes with each letter, its number when the field is left.
+    let is_other = count != cut;
+    if is_other {
         *groups = Some(count);
     }
-    is_chosen |=
-        slider.drag_stopped() || slider.lost_focus() || slider.changed() && !slider.is_pointer_button_down_on();
+    is_chosen |= slider.drag_stopped() || is_other && !slider.is_pointer_button_down_on();
     ui.weak(match groups {
         Some(_) => "Cut by hand; place again to use it. The front groups that hold features are joined.",
         None => "Cut where every feature lies in the face. Front groups are joined.",

@@ -10,7 +10,7 @@ use crate::{
     algo::face::expression::{Expression, MAX_STRENGTH},
     editor::{
         panel::Requests,
-        panels::fields::{TypedText, named},
+        panels::fields::{TypedText, typed_field},
     },
     plugins::{
         document::{Change, EditRequest},
@@ -129,9 +129,8 @@ fn strength(ui: &mut Ui, name: &str, strengths: &mut BTreeMap<String, f32>, requ
     let typed = TypedText::default();
     let slider = Slider::new(&mut value, 0.0..=MAX_STRENGTH).max_decimals(2).update_while_editing(false);
     let slider = slider.custom_parser(typed.reader(0.0..=f64::from(MAX_STRENGTH), ""));
-    let slider = ui.push_id(name, |ui| ui.add(slider)).inner;
     let said = format!("Strength of {}", name.replace('_', " "));
-    named(ui, slider.id, &said);
+    let slider = typed_field(ui, &said, slider);
     typed.tell(&slider, &said, requests);
     // The field of the number changes with each letter, its number when the field is left.
     let is_other = value != before;

@@ -1,6 +1,6 @@
 //! Card of the chosen template: what its header says, its options, and what can be done with it.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use bevy::prelude::World;
 use bevy_egui::egui::{
@@ -12,7 +12,10 @@ use crate::{
         counts::counted,
         library::{LibraryAct, LibraryAction, LibraryListing, LibraryRequest, PartSides, obstacle, partners},
         panel::Requests,
-        panels::displayed_rig::DisplayedRig,
+        panels::{
+            displayed_rig::DisplayedRig,
+            fields::{TypedText, decimal, typed_field},
+        },
         style,
     },
     files::{ListedTemplate, TemplatePlace},
@@ -65,7 +68,7 @@ impl Card {
             if let Some((version, place)) = listing.newer(listed) {
                 ui.colored_label(style::accent(ui.visuals()), format!("Version {version} is in {place}"));
             }
-            self.options(ui, header);
+            self.options(ui, header, requests);
             self.buttons(ui, world, listed, shown, requests);
         });
     }
@@ -78,7 +81,7 @@ impl Card {
     }
 
     /// Draws the options of a part.
-    pub fn options(&mut self, ui: &mut Ui, header: &TemplateHeader) {
+    pub fn options(&mut self, ui: &mut Ui, header: &TemplateHeader, requests: &mut Requests) {
         if header.options.is_empty() {
             return;
         }
@@ -92,7 +95,7 @@ impl Card {
                     ui.add(Label::new(&name).truncate()).on_hover_text(&option.description);
                 });
                 let now = self.options.get(&option.name).unwrap_or(&option.default).clone();
-                if let Some(value) = self.field(ui, option, &now) {
+                if let Some(value) = self.field(ui, option, &now, requests) {
                     if value == option.default {
                         self.options.remove(&option.name);
                     } else {
@@ -104,7 +107,7 @@ impl Card {
     }
 
     /// Draws the field of an option; returns its value after a change.
-    fn field(&mut self, ui: &mut Ui, option: &OptionSummary, now: &str) -> Option<String> {
+    fn field(&mut self, ui: &mut Ui, option: &OptionSummary, now: &str, requests: &mut Requests) -> Option<String> {
         let said = format!("Option {}", option.name);
         match &option.form {
             Some(OptionForm::Check) => {
@@ -113,8 +116,10 @@ impl Card {
                 field.widget_info(|| WidgetInfo::selected(WidgetType::Checkbox, true, on, &said));
                 field.clicked().then(|| on.to_string())
             }
-            Some(OptionForm::Slider { min, max, .. }) => number(ui, &said, now, Some((*min, *max))),
-            Some(OptionForm::Number) => number(ui, &said, now, None),
+            Some(OptionForm::Slider { min, max, .. }) => {
+                number(ui, &said, now, decimal(*min)..=decimal(*max), requests)
+            }
+            Some(OptionForm::Number) => number(ui, &said, now, f64::NEG_INFINITY..=f64::INFINITY, requests),
             Some(OptionForm::Menu { options }) => {
                 let current = ron::from_str::<String>(now).unwrap_or_default();
                 let mut chosen = current.clone();
@@ -227,16 +232,16 @@ pub(in crate::editor::panels) fn about(ui: &mut Ui, listed: &ListedTemplate, hea
     }
 }
 
-fn number(ui: &mut Ui, said: &str, now: &str, range: Option<(f32, f32)>) -> Option<String> {
-    let mut value = ron::from_str::<f32>(now).unwrap_or_default();
-    let drag = DragValue::new(&mut value).speed(0.01).max_decimals(4);
-    let drag = match range {
-        Some((min, max)) => drag.range(min..=max),
-        None => drag,
-    };
-    let field = ui.add(drag);
-    field.widget_info(|| WidgetInfo::labeled(WidgetType::DragValue, true, said));
-    (field.changed() && value.is_finite()).then(|| value.to_string())
+/// Draws the field of a number; returns the number as RON once it is another.
+fn number(ui: &mut Ui, said: &str, now: &str, ends: RangeInclusive<f64>, requests: &mut Requests) -> Option<String> {
+    let before = ron::from_str::<f32>(now).unwrap_or_default();
+    let (mut value, typed) = (before, TypedText::default());
+    let drag = DragValue::new(&mut value).speed(0.01).max_decimals(4).update_while_editing(false);
+    let drag = drag.range(ends.clone()).custom_parser(typed.reader(ends, ""));
+    let field = typed_field(ui, said, drag);
+    typed.tell(&field, said, requests);
+    // The field changes with each letter, its number when the field is left.
+    (value != before && value.is_finite()).then(|| value.to_string())
 }
 
 /// A text as RON.

@@ -11,13 +11,13 @@ use crate::{
     processor::Modules,
     rig::{
         TagKind,
-        operations::{PasteTo, PasteWhat, TagClipboard, TagOperation, TagScope},
+        operations::{PasteContent, PasteTo, TagClipboard, TagOperation, TagScope},
     },
 };
 
 /// Choices of what is pasted: name and part of the copied tags.
-const PASTED: [(&str, PasteWhat); 3] =
-    [("Tags", PasteWhat::Tags), ("Values", PasteWhat::Values), ("Tags and values", PasteWhat::Both)];
+const PASTED: [(&str, PasteContent); 3] =
+    [("Tags", PasteContent::Tags), ("Values", PasteContent::Values), ("Tags and values", PasteContent::Both)];
 
 impl TagsPanel {
     /// Draws the head.
@@ -111,7 +111,7 @@ impl TagsPanel {
         requests: &mut Requests,
     ) {
         let joints = &self.stack.joints;
-        let mut paste = |clipboard: Arc<TagClipboard>, what: PasteWhat, to: PasteTo| {
+        let mut paste = |clipboard: Arc<TagClipboard>, what: PasteContent, to: PasteTo| {
             send(TagOperation::Paste { clipboard, what, to }, shown, requests);
         };
         for (name, what) in PASTED {

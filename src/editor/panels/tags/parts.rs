@@ -71,7 +71,7 @@ impl PartMenu {
         {
             about(ui, listed, header);
             self.card.of(&listed.place);
-            self.card.options(ui, header);
+            self.card.options(ui, header, requests);
             if ui.button("Add part").clicked() {
                 requests.send(adding(&listed.place, self.card.values()));
                 ui.close();

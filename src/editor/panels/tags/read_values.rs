@@ -45,7 +45,7 @@ impl Rows {
 
 /// Value of one parameter in all commands of a card.
 #[derive(Debug, Clone, Default)]
-pub(super) struct KnownValue {
+pub(super) struct CardValue {
     /// RON of the value in the last command.
     pub text: String,
     /// Value without quotation marks.
@@ -73,7 +73,7 @@ pub(super) struct KnownValue {
 pub(super) struct CommandValues {
     /// Values of each command.
     pub commands: Vec<ParameterValues>,
-    known: BTreeMap<String, KnownValue>,
+    known: BTreeMap<String, CardValue>,
 }
 
 impl CommandValues {
@@ -103,21 +103,21 @@ impl CommandValues {
     fn know_items(&mut self, rows: Option<&Rows>) {
         for element in rows.into_iter().flat_map(|rows| rows.elements.iter().flatten()) {
             if let Some((path, _)) = element.bound() {
-                let known = KnownValue { is_default: true, ..self.value(element, path) };
+                let known = CardValue { is_default: true, ..self.value(element, path) };
                 self.known.insert(path.to_owned(), known);
             }
         }
     }
 
-    fn value(&self, element: &FormElement, path: &str) -> KnownValue {
+    fn value(&self, element: &FormElement, path: &str) -> CardValue {
         let texts = self.commands.iter().map(|values| values.get(path).unwrap_or("None"));
         let CommonValue { value: text, mixed } = CommonValue::of(texts).unwrap_or_default();
-        let mut known = KnownValue {
+        let mut known = CardValue {
             text: text.to_owned(),
             plain: plain(text),
             mixed,
             is_default: self.commands.iter().all(|values| values.is_default(path)),
-            ..KnownValue::default()
+            ..CardValue::default()
         };
         match element {
             FormElement::Vector(_) => (known.vector, known.boxes) = (self.vector(path), read(text)),
@@ -136,7 +136,7 @@ impl CommandValues {
     }
 
     /// The value of a parameter that the form has an element for.
-    pub fn get(&self, path: &str) -> Option<&KnownValue> {
+    pub fn get(&self, path: &str) -> Option<&CardValue> {
         self.known.get(path)
     }
 }

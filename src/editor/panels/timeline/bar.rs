@@ -65,6 +65,8 @@ struct Rename {
 }
 
 const FRAMES: Look = Look { speed: 0.2, decimals: 2, suffix: "", quantity: Quantity::Plain };
+/// Least and largest frame rate of a clip.
+const RATES: [f32; 2] = [0.1, 1000.0];
 const RATE: Look = Look { speed: 0.1, decimals: 3, suffix: "", quantity: Quantity::Plain };
 
 /// Widths with which the bar stays on one line.
@@ -251,12 +253,19 @@ impl Bar {
             (Header::End, field(ui, "End frame", "to ", end, FRAMES, of_end)),
             (Header::Rate, field(ui, "Frames a second", "fps ", clip.frame_rate, RATE, of_rate)),
         ];
+        // People type the digits that the fields show.
+        let [first, last] = [start, end].map(shown_frame);
+        let (from, to) = match is_stretched {
+            true => ([f32::NEG_INFINITY, shown_frame(end - 1.0)], [shown_frame(start + 1.0), f32::INFINITY]),
+            false => ([f32::NEG_INFINITY, last], [first, f32::INFINITY]),
+        };
+        let ends = [(from, "Start frame"), (to, "End frame"), (RATES, "Frames a second")];
         // A drag previews from what was before it, not from its own preview.
         if !ui.input(|input| input.pointer.any_down()) {
             self.dragged = None;
         }
-        for (header, edit) in edits {
-            let Some(edit) = edit else { continue };
+        for ((header, edit), (ends, said)) in edits.into_iter().zip(ends) {
+            let Some(edit) = edit.and_then(|edit| self.numbers.between(said, edit, ends)) else { continue };
             let change = if is_stretched {
                 let now = ClipTiming { clip: clip.uid, range: clip.range, rate: clip.frame_rate };
                 let before = self.dragged.filter(|before| before.clip == clip.uid).unwrap_or(now);
@@ -268,12 +277,18 @@ impl Bar {
                 changed(clip, edit, |about, value| match header {
                     Header::Start => about.range[0] = seconds(value).min(about.range[1]),
                     Header::End => about.range[1] = seconds(value).max(about.range[0]),
-                    Header::Rate => about.frame_rate = value.clamp(0.1, 1000.0),
+                    Header::Rate => about.frame_rate = value.clamp(RATES[0], RATES[1]),
                 })
             };
             requests.send(EditRequest { rig: open.entity, change });
         }
+        self.numbers.tell(requests);
     }
+}
+
+/// A frame with the digits that its field shows.
+fn shown_frame(frame: f32) -> f32 {
+    (frame * 100.0).round() / 100.0
 }
 
 /// Change of a clip's header by a number.
@@ -298,7 +313,9 @@ fn stretched(before: &ClipTiming, header: Header, value: f32) -> Operation {
     let to = match header {
         Header::Start => [seconds.min(end - frame), end],
         Header::End => [start, seconds.max(start + frame)],
-        Header::Rate => return Operation::Clips(ClipOperation::SetRate { clip, rate: value.clamp(0.1, 1000.0) }),
+        Header::Rate => {
+            return Operation::Clips(ClipOperation::SetRate { clip, rate: value.clamp(RATES[0], RATES[1]) });
+        }
     };
     Operation::Clips(ClipOperation::Retime { clip, from: [start, end], to })
 }

@@ -65,7 +65,7 @@ pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy:
         ));
     });
     let onto = target_of(&shown.rig);
-    let (options, is_left) = ui.add_enabled_ui(!is_busy, |ui| choices(ui, draft.options, onto)).inner;
+    let (options, is_left) = ui.add_enabled_ui(!is_busy, |ui| choices(ui, draft.options, onto, requests)).inner;
     // A field that is being typed into takes Escape for itself, too.
     is_cancelled |= is_escaped && !is_left;
     if options != draft.options {

@@ -2,10 +2,14 @@
 
 use std::sync::Arc;
 
-use bevy_egui::egui::{Checkbox, DragValue, Key, Ui};
+use bevy_egui::egui::{Checkbox, DragValue, Ui};
 
 use crate::{
-    editor::counts::counted,
+    editor::{
+        counts::counted,
+        panel::Requests,
+        panels::fields::{TypedText, typed_field},
+    },
     rig::{
         BuiltRig, Rig,
         animation::{joint_map::JointMap, motion::Motion},
@@ -80,7 +84,12 @@ impl MotionOptions {
 
 /// Draws the choices; returns them as they are now, and true if a field was left, as Escape does. Keys go to nodes of the kind
 /// `onto`.
-pub(super) fn choices(ui: &mut Ui, options: MotionOptions, onto: MotionTarget) -> (MotionOptions, bool) {
+pub(super) fn choices(
+    ui: &mut Ui,
+    options: MotionOptions,
+    onto: MotionTarget,
+    requests: &mut Requests,
+) -> (MotionOptions, bool) {
     let (mut now, mut is_left) = (options, false);
     ui.horizontal_wrapped(|ui| {
         ui.checkbox(&mut now.travel, "Travel")
@@ -94,30 +103,24 @@ pub(super) fn choices(ui: &mut Ui, options: MotionOptions, onto: MotionTarget) -
         ui.checkbox(&mut now.lock_feet, "Lock feet").on_hover_text("Standing feet are held in their places");
         ui.checkbox(&mut now.lock_hands, "Lock hands").on_hover_text("Hands are held where they touch something");
         ui.checkbox(&mut now.looped, "Loop").on_hover_text("The clip is played over and over");
-        is_left = rate(ui, &mut now.frame_rate);
+        is_left = rate(ui, &mut now.frame_rate, requests);
     });
     (now, is_left)
 }
 
 /// Draws the choice of a frame rate; returns true if its field was left.
-fn rate(ui: &mut Ui, chosen: &mut Option<f32>) -> bool {
+fn rate(ui: &mut Ui, chosen: &mut Option<f32>, requests: &mut Requests) -> bool {
     let mut is_own = chosen.is_some();
     ui.checkbox(&mut is_own, "Frame rate")
         .on_hover_text("The clip has a frame rate of its own; without, it has that of the file, but at most 60");
     *chosen = is_own.then(|| chosen.unwrap_or(FIRST_RATE));
     let Some(rate) = chosen else { return false };
+    let (typed, said) = (TypedText::default(), "Frames a second of the clip");
     let number = DragValue::new(rate).range(1.0..=1000.0).speed(0.2).max_decimals(3).update_while_editing(false);
-    // A field takes the text over one frame after Escape; another identity leaves the text behind.
-    let drops = ui.id().with("dropped rates");
-    let dropped = ui.data(|data| data.get_temp::<u32>(drops)).unwrap_or_default();
-    let field = ui.push_id(("rate", dropped), |ui| ui.add(number)).inner;
+    let field = typed_field(ui, said, number.custom_parser(typed.reader(1.0..=1000.0, "")));
     let field = field.on_hover_text("Frames a second that the clip gets");
-    ui.ctx().accesskit_node_builder(field.id, |node| node.set_label("Frames a second of the clip"));
-    let is_left = field.lost_focus();
-    if is_left && ui.input(|input| input.key_pressed(Key::Escape)) {
-        ui.data_mut(|data| data.insert_temp(drops, dropped.wrapping_add(1)));
-    }
-    is_left
+    typed.tell(&field, said, requests);
+    field.lost_focus()
 }
 
 /// Sentences about motion that was put onto a rig: the control with its travel, and how well feet and hands stay in their places.

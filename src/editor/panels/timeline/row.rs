@@ -253,6 +253,8 @@ fn layer(
         let weight = RichText::new("weight ").color(KeyColors::of(ui.visuals()).quiet);
         let width = right.width().min(90.0);
         let edit = panel.numbers.field(ui, &name, weight, layer.weight.into(), WEIGHT, vec2(width, height));
+        let edit = edit.and_then(|edit| panel.numbers.between(&name, edit, [0.0, 1.0]));
+        panel.numbers.tell(requests);
         let weigh = |value: f32| set(&|about| about.weight = value.clamp(0.0, 1.0));
         let change = edit.map(|edit| match edit {
             NumberEdit::Set(value) => Change::Do(weigh(value)),

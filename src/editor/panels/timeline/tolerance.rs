@@ -4,7 +4,10 @@ use bevy_egui::egui::{DragValue, Ui};
 
 use super::state::{Timeline, TimelineRequest};
 use crate::{
-    editor::{panel::Requests, panels::fields::TypedText},
+    editor::{
+        panel::Requests,
+        panels::fields::{TypedText, typed_field},
+    },
     rig::{Rig, operations::KeyTolerance},
 };
 
@@ -51,9 +54,7 @@ pub(super) fn fields(ui: &mut Ui, timeline: &Timeline, requests: &mut Requests) 
         let fields = [(distance, "Tolerance in millimetres", by_distance), (angle, "Tolerance in degrees", by_angle)];
         let drawn = fields.map(|(field, said, tip)| {
             let field = field.max_decimals(4).update_while_editing(false);
-            let response = ui.push_id(said, |ui| ui.add(field)).inner.on_hover_text(tip);
-            ui.ctx().accesskit_node_builder(response.id, |node| node.set_label(said));
-            (response, said)
+            (typed_field(ui, said, field).on_hover_text(tip), said)
         });
         for (typed, (response, said)) in typed.into_iter().zip(drawn) {
             typed.tell(&response, said, requests);

@@ -139,7 +139,12 @@ fn button(ui: &mut Ui, name: &str, tip: &str, obstacle: Option<&str>) -> bool {
 }
 
 /// Draws a choice of one of several meshes.
-fn choose<'a>(ui: &mut Ui, name: &str, meshes: impl Iterator<Item = &'a RigMesh>, chosen: &mut Uid) {
+pub(in crate::editor::panels) fn choose<'a>(
+    ui: &mut Ui,
+    name: &str,
+    meshes: impl Iterator<Item = &'a RigMesh>,
+    chosen: &mut Uid,
+) {
     let mut list: Vec<(Uid, String)> = Vec::new();
     for (number, mesh) in meshes.enumerate() {
         let name = if mesh.file.name.is_empty() { format!("Mesh {}", number + 1) } else { mesh.file.name.clone() };

@@ -10,6 +10,7 @@ use crate::{
         ActiveRig,
         actions::{Action, ActionRequest},
         panel::{Requests, ViewportPainter},
+        panels::fields::{TypedText, typed_field},
     },
     plugins::surface::RigSurface,
 };
@@ -48,26 +49,33 @@ impl ViewportPainter for StrokeBar {
 
 fn contents(ui: &mut egui::Ui, preview: &StrokePreview, size: f32, requests: &mut Requests) {
     let chain = preview.chain();
-    let mut count = match preview.request.choice {
+    let counted = match preview.request.choice {
         ChainChoice::Joints(count) => count,
         ChainChoice::Threshold(_) | ChainChoice::Limb(_) => chain.map_or(2, |chain| chain.joints.len()),
     };
-    let most = MOST.max(count);
+    let (mut count, most, typed) = (counted, MOST.max(counted), TypedText::default());
     let drag = egui::DragValue::new(&mut count).range(2..=most).speed(0.05).suffix(" joints");
-    let field = ui.add(drag).on_hover_text("Exactly so many joints (wheel)");
-    ui.ctx().accesskit_node_builder(field.id, |node| node.set_label("Number of joints"));
-    if field.changed() {
+    let drag = drag.update_while_editing(false).custom_parser(typed.whole_reader(2.0..=most as f64, "joints"));
+    let field = typed_field(ui, "Number of joints", drag).on_hover_text("Exactly so many joints (wheel)");
+    typed.tell(&field, "The number of joints", requests);
+    // A field changes with each letter, its number when the field is left.
+    if count != counted {
         requests.send(StrokeTune::Choice(ChainChoice::Joints(count)));
     }
     ui.separator();
-    let mut share = match preview.request.choice {
+    let before: f32 = match preview.request.choice {
         ChainChoice::Threshold(threshold) | ChainChoice::Limb(threshold) => 100.0 * threshold / size,
         ChainChoice::Joints(_) => 2.0,
     };
+    let before = before.clamp(0.2, 10.0);
+    let (mut share, typed) = (before, TypedText::default());
     let slider =
         egui::Slider::new(&mut share, 0.2..=10.0).logarithmic(true).fixed_decimals(1).suffix(" %").text("threshold");
+    let slider = slider.update_while_editing(false).custom_parser(typed.reader(0.2..=10.0, "%"));
     let hint = "Joints at corners of the stroke and bends of the limb that stray further than this share of the character's size from the bones";
-    if ui.add(slider).on_hover_text(hint).changed() {
+    let field = typed_field(ui, "threshold", slider).on_hover_text(hint);
+    typed.tell(&field, "The threshold", requests);
+    if field.changed() && share != before {
         requests.send(StrokeTune::Choice(ChainChoice::Limb(share * 0.01 * size)));
     }
     if let Some((volume, of)) = chain.and_then(volumes) {

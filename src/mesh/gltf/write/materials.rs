@@ -19,11 +19,9 @@ use crate::mesh::{
     model::{Image, MaterialSet},
 };
 
-/// Lists of the document that come from materials.
+/// Lists of the document that come from materials; materials and samplers are written as they are.
 pub(super) struct WrittenMaterials {
-    pub(super) materials: Vec<Value>,
     pub(super) textures: Vec<Value>,
-    pub(super) samplers: Vec<Value>,
     pub(super) images: Vec<Value>,
     pub(super) extensions_used: Vec<String>,
     pub(super) extensions_required: Vec<String>,
@@ -85,14 +83,7 @@ pub(super) fn write(
     }
     let (extensions_used, extensions_required) =
         declare(found, &material_set.extensions_used, &material_set.extensions_required);
-    WrittenMaterials {
-        materials: material_set.materials.clone(),
-        samplers: material_set.samplers.clone(),
-        textures,
-        images,
-        extensions_used,
-        extensions_required,
-    }
+    WrittenMaterials { textures, images, extensions_used, extensions_required }
 }
 
 /// Number of texture coordinate sets that a material uses: glTF demands them of each of its meshes.

@@ -1,13 +1,15 @@
 //! Meshes and nodes of objects and parts.
 
+use std::borrow::Cow;
+
 use glam::{DAffine3, Vec3, Vec4};
 use serde_json::{Map, Value};
 
 use super::{
     buffer::{Bin, Target},
-    floats, insert_list, insert_name,
+    document::{Attribute, Attributes, Mesh, MorphTarget, Node, Primitive},
     materials::uv_sets,
-    skeleton::{Skeleton, insert_transform},
+    skeleton::Skeleton,
 };
 use crate::mesh::{
     gltf::{
@@ -20,102 +22,89 @@ use crate::mesh::{
 };
 
 /// The written meshes.
-pub(super) struct Meshes {
-    pub(super) meshes: Vec<Value>,
+pub(super) struct Meshes<'a> {
+    pub(super) meshes: Vec<Mesh<'a>>,
     /// The glTF node of each object that is written.
     pub(super) node_of_object: Vec<Option<usize>>,
 }
 
 /// Writes all objects that have triangles, appending their nodes.
-pub(super) fn write(
-    model: &Model,
+pub(super) fn write<'a>(
+    model: &'a Model,
     skeleton: &Skeleton,
     bin: &mut Bin,
-    nodes: &mut Vec<Map<String, Value>>,
+    nodes: &mut Vec<Node<'a>>,
     scene_nodes: &mut Vec<usize>,
-) -> Result<Meshes, GltfError> {
+) -> Result<Meshes<'a>, GltfError> {
     let mut meshes = Vec::new();
     let mut node_of_object = vec![None; model.objects.len()];
     let mut parts_of = vec![Vec::new(); model.objects.len()];
     for part in model.parts.iter().filter(|part| !part.triangles.is_empty()) {
         parts_of[part.object].push(part);
     }
-    let mut added_children: Vec<Vec<usize>> = vec![Vec::new(); nodes.len()];
+    let mut worlds = None;
     for (index, (object, parts)) in model.objects.iter().zip(&parts_of).enumerate() {
         if parts.is_empty() {
             continue;
         }
         let at = nodes.len();
         node_of_object[index] = Some(at);
-        let mut node = Map::new();
-        insert_name(&mut node, &object.name);
-        node.insert("mesh".to_owned(), meshes.len().into());
+        let mut node = Node { name: &object.name, mesh: Some(meshes.len()), ..Node::default() };
         let carrier = object.node.filter(|_| object.skin.is_none());
         let mut bake = Bake::none();
         match carrier {
             Some(carrier) => {
-                let (trs, moved) = placement(model, carrier, parts);
-                insert_transform(&mut node, &trs);
+                let worlds = worlds.get_or_insert_with(|| node_worlds(model));
+                let (trs, moved) = placement(model, &worlds[carrier], parts);
+                node.set_transform(&trs);
                 bake = moved;
                 if let Some(parent) = skeleton.node_of[carrier] {
-                    added_children[parent].push(at);
+                    nodes[parent].children.push(at);
                 }
             }
             None => {
-                if let Some(skin) = object.skin.and_then(|skin| skeleton.skin_of[skin]) {
-                    node.insert("skin".to_owned(), skin.into());
-                }
+                node.skin = object.skin.and_then(|skin| skeleton.skin_of[skin]);
                 scene_nodes.push(at);
             }
         }
         nodes.push(node);
-        let mut primitives = Vec::new();
+        let mut primitives = Vec::with_capacity(parts.len());
         for part in parts {
             primitives.push(primitive(model, skeleton, object, part, &bake, bin)?);
         }
         meshes.push(mesh(object, primitives));
     }
-    for (node, added) in nodes.iter_mut().zip(added_children) {
-        if added.is_empty() {
-            continue;
-        }
-        let mut children = node.get("children").and_then(Value::as_array).cloned().unwrap_or_default();
-        children.extend(added.into_iter().map(Value::from));
-        node.insert("children".to_owned(), children.into());
-    }
     Ok(Meshes { meshes, node_of_object })
 }
 
-fn mesh(object: &Object, primitives: Vec<Value>) -> Value {
-    let mut mesh = Map::new();
-    insert_name(&mut mesh, &object.name);
-    insert_list(&mut mesh, "primitives", primitives);
-    if !object.morph_weights.is_empty() {
-        mesh.insert("weights".to_owned(), floats(&object.morph_weights));
-    }
-    let mut extras = object.extras.clone();
+fn mesh(object: &Object, primitives: Vec<Primitive>) -> Mesh<'_> {
+    let mut extras = object.extras.as_ref().map(Cow::Borrowed);
     if object.morph_names.iter().any(|name| !name.is_empty()) {
         let names: Value = object.morph_names.iter().map(|name| Value::from(name.as_str())).collect();
+        let mut own = object.extras.clone().unwrap_or_else(|| Map::new().into());
         // Extras that are not an object cannot hold names.
-        if let Value::Object(map) = extras.get_or_insert_with(|| Map::new().into()) {
+        if let Value::Object(map) = &mut own {
             map.insert("targetNames".to_owned(), names);
         }
+        extras = Some(Cow::Owned(own));
     }
-    if let Some(extras) = extras {
-        mesh.insert("extras".to_owned(), extras);
-    }
-    mesh.into()
+    Mesh { name: &object.name, primitives, weights: &object.morph_weights, extras }
 }
 
-/// Transform of a rigid part below its node. If the carrier's rest transform is invertible, the vertices stay in model
-/// space and the mesh's node undoes it; else the vertices are moved into the carrier's space.
-fn placement(model: &Model, carrier: usize, parts: &[&Part]) -> (Trs, Bake) {
-    let mut world = DAffine3::IDENTITY;
-    let mut node = Some(carrier);
-    while let Some(at) = node {
-        world = matrix::affine(&model.nodes[at].rest) * world;
-        node = model.nodes[at].parent;
+/// Rest transforms of all nodes to model space. Parents come first, so that one pass over them is enough, however deep
+/// they hang and however many objects they carry.
+fn node_worlds(model: &Model) -> Vec<DAffine3> {
+    let mut worlds: Vec<DAffine3> = Vec::with_capacity(model.nodes.len());
+    for node in &model.nodes {
+        let own = matrix::affine(&node.rest);
+        worlds.push(node.parent.map_or(own, |parent| worlds[parent] * own));
     }
+    worlds
+}
+
+/// Transform of a rigid part below its node, whose transform to model space is `world`. If that is invertible, the vertices
+/// stay in model space and the mesh's node undoes it; else the vertices are moved into the node's space.
+fn placement(model: &Model, world: &DAffine3, parts: &[&Part]) -> (Trs, Bake) {
     if world.matrix3.determinant() == 0.0 {
         return (Trs::IDENTITY, Bake::none());
     }
@@ -127,7 +116,7 @@ fn placement(model: &Model, carrier: usize, parts: &[&Part]) -> (Trs, Bake) {
     let extent = vertices.fold(0.0_f32, |most, point| most.max(model.points[*point as usize].abs().max_element()));
     let (trs, _) = matrix::decompose(inverse.into());
     let finite = trs.affine().is_finite();
-    if finite && matrix::is_identity(&(world * matrix::affine(&trs)), f64::from(extent)) {
+    if finite && matrix::is_identity(&(*world * matrix::affine(&trs)), f64::from(extent)) {
         return (trs, Bake::none());
     }
     (Trs::IDENTITY, Bake::new(inverse, f64::from(extent)))
@@ -140,7 +129,7 @@ fn primitive(
     part: &Part,
     bake: &Bake,
     bin: &mut Bin,
-) -> Result<Value, GltfError> {
+) -> Result<Primitive, GltfError> {
     let mut triangles = part.triangles.clone();
     let used = compact(&mut triangles, part.vertices.len());
     if bake.flip {
@@ -151,13 +140,15 @@ fn primitive(
     if positions.iter().any(|position| !position.is_finite()) {
         return Err(GltfError::model(format!("object \"{}\" is too far away to be written", object.name)));
     }
-    let mut attributes = Map::new();
-    let mut put = |name: &str, accessor: usize| drop(attributes.insert(name.to_owned(), accessor.into()));
-    put("POSITION", bin.positions(&positions));
+    let mut attributes = Attributes::default();
+    attributes.put(Attribute::Position, bin.positions(&positions));
     let up = |normal: Vec3| if normal == Vec3::ZERO { Vec3::Y } else { normal };
     let normals: Vec<Vec3> = pick(&part.normals, &used).map(|normal| up(bake.normal(up(unit(normal))))).collect();
     if !normals.is_empty() {
-        put("NORMAL", bin.floats(&normals.iter().map(Vec3::to_array).collect::<Vec<_>>(), Target::Vertices));
+        attributes.put(
+            Attribute::Normal,
+            bin.floats(&normals.iter().map(Vec3::to_array).collect::<Vec<_>>(), Target::Vertices),
+        );
     }
     if !part.tangents.is_empty() && !normals.is_empty() {
         let sign = if bake.flip { -1.0 } else { 1.0 };
@@ -167,7 +158,7 @@ fn primitive(
             moved.extend(if tangent.w < 0.0 { -sign } else { sign }).to_array()
         };
         let tangents: Vec<[f32; 4]> = pick(&part.tangents, &used).zip(&normals).map(one).collect();
-        put("TANGENT", bin.floats(&tangents, Target::Vertices));
+        attributes.put(Attribute::Tangent, bin.floats(&tangents, Target::Vertices));
     }
     // An empty set below other sets, or one that the material's textures need, is written as zeros.
     let own_sets = part.uvs.iter().rposition(|uvs| !uvs.is_empty()).map_or(0, |last| last + 1);
@@ -176,12 +167,12 @@ fn primitive(
         let mut uvs: Vec<[f32; 2]> =
             part.uvs.get(set).map_or(vec![], |uvs| pick(uvs, &used).map(|uv| uv.to_array()).collect());
         uvs.resize(used.len(), [0.0; 2]);
-        put(&format!("TEXCOORD_{set}"), bin.floats(&uvs, Target::Vertices));
+        attributes.put(Attribute::TexCoord(set), bin.floats(&uvs, Target::Vertices));
     }
     if !part.colors.is_empty() {
         let clamp = |channel: f32| if channel.is_nan() { 0.0 } else { channel.clamp(0.0, 1.0) };
         let colors: Vec<[f32; 4]> = pick(&part.colors, &used).map(|color| color.to_array().map(clamp)).collect();
-        put("COLOR_0", bin.floats(&colors, Target::Vertices));
+        attributes.put(Attribute::Color, bin.floats(&colors, Target::Vertices));
     }
     if let Some(skin) = object.skin {
         let mut lists = Vec::with_capacity(used.len());
@@ -197,21 +188,15 @@ fn primitive(
                     weights[vertex][i] = *weight;
                 }
             }
-            put(&format!("JOINTS_{set}"), bin.joints(&joints, skeleton.joint_count(skin)));
-            put(&format!("WEIGHTS_{set}"), bin.floats(&weights, Target::Vertices));
+            attributes.put(Attribute::Joints(set), bin.joints(&joints, skeleton.joint_count(skin)));
+            attributes.put(Attribute::Weights(set), bin.floats(&weights, Target::Vertices));
         }
     }
     let targets = morphs(part, &used, &normals, bake, bin);
     let indices: Vec<u32> = triangles.into_iter().flatten().collect();
 
-    let mut map = Map::new();
-    map.insert("attributes".to_owned(), attributes.into());
-    map.insert("indices".to_owned(), bin.indices(&indices, used.len()).into());
-    if let Some(material) = part.material {
-        map.insert("material".to_owned(), material.into());
-    }
-    insert_list(&mut map, "targets", targets);
-    Ok(map.into())
+    let indices = bin.indices(&indices, used.len());
+    Ok(Primitive { attributes, indices, material: part.material, targets })
 }
 
 fn pick<'a, T: Copy>(list: &'a [T], used: &'a [u32]) -> impl Iterator<Item = T> + 'a {
@@ -219,27 +204,26 @@ fn pick<'a, T: Copy>(list: &'a [T], used: &'a [u32]) -> impl Iterator<Item = T> 
     used.iter().filter_map(|vertex| list.get(*vertex as usize).copied())
 }
 
-fn morphs(part: &Part, used: &[u32], normals: &[Vec3], bake: &Bake, bin: &mut Bin) -> Vec<Value> {
-    let mut targets = Vec::new();
+fn morphs(part: &Part, used: &[u32], normals: &[Vec3], bake: &Bake, bin: &mut Bin) -> Vec<MorphTarget> {
+    let mut targets = Vec::with_capacity(part.morphs.len());
     let own_normals: Vec<Vec3> = pick(&part.normals, used).collect();
     for morph in &part.morphs {
-        let mut target = Map::new();
         let mut positions: Vec<Vec3> = pick(&morph.positions, used).map(|offset| bake.vector(offset)).collect();
         // The target gets zero positions if it has none, because some programs refuse a target without positions.
         positions.resize(used.len(), Vec3::ZERO);
-        target.insert("POSITION".to_owned(), bin.displacements(&positions).into());
+        let mut target = MorphTarget { position: bin.displacements(&positions), normal: None, tangent: None };
         if !morph.normals.is_empty() && !normals.is_empty() {
             let moved = pick(&morph.normals, used).zip(&own_normals);
             let moved: Vec<[f32; 3]> =
                 moved.map(|(offset, normal)| bake.normal_offset(*normal, offset).to_array()).collect();
-            target.insert("NORMAL".to_owned(), bin.floats(&moved, Target::Vertices).into());
+            target.normal = Some(bin.floats(&moved, Target::Vertices));
         }
         if !morph.tangents.is_empty() && !part.tangents.is_empty() && !normals.is_empty() {
             let moved: Vec<[f32; 3]> =
                 pick(&morph.tangents, used).map(|offset| bake.vector(offset).to_array()).collect();
-            target.insert("TANGENT".to_owned(), bin.floats(&moved, Target::Vertices).into());
+            target.tangent = Some(bin.floats(&moved, Target::Vertices));
         }
-        targets.push(target.into());
+        targets.push(target);
     }
     targets
 }

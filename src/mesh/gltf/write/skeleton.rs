@@ -1,15 +1,13 @@
 //! Selection of the written nodes, and the skins over them.
 
-use serde_json::{Map, Value};
-
 use super::{
     GltfWriteSettings,
     buffer::{Bin, Target},
-    floats, insert_list, insert_name,
+    document::{Node, Skin},
 };
 use crate::mesh::{
-    gltf::{GltfError, matrix, skin::settle},
-    model::{Model, Trs, Weights},
+    gltf::{GltfError, skin::settle},
+    model::{Model, Weights},
 };
 
 /// The name of the node that joins several roots.
@@ -95,13 +93,11 @@ impl Skeleton {
     }
 
     /// The chosen nodes as glTF objects.
-    pub(super) fn nodes(&self, model: &Model) -> Vec<Map<String, Value>> {
+    pub(super) fn nodes<'a>(&self, model: &'a Model) -> Vec<Node<'a>> {
         let mut children = vec![Vec::new(); self.node_of.iter().flatten().max().map_or(0, |last| last + 1)];
         let mut nodes = Vec::new();
         if !self.joined.is_empty() {
-            let mut root = Map::new();
-            insert_name(&mut root, COMMON_ROOT);
-            nodes.push(root);
+            nodes.push(Node { name: COMMON_ROOT, ..Node::default() });
             children[0] = self.joined.iter().filter_map(|node| self.node_of[*node]).collect();
         }
         for (node, at) in model.nodes.iter().zip(&self.node_of) {
@@ -111,22 +107,18 @@ impl Skeleton {
             if let Some(parent) = node.parent.and_then(|parent| self.node_of[parent]) {
                 children[parent].push(at);
             }
-            let mut map = Map::new();
-            insert_name(&mut map, &node.name);
-            insert_transform(&mut map, &node.rest);
-            if let Some(extras) = &node.extras {
-                map.insert("extras".to_owned(), extras.clone());
-            }
-            nodes.push(map);
+            let mut written = Node { name: &node.name, extras: node.extras.as_ref(), ..Node::default() };
+            written.set_transform(&node.rest);
+            nodes.push(written);
         }
         for (node, children) in nodes.iter_mut().zip(children) {
-            insert_list(node, "children", children);
+            node.children = children;
         }
         nodes
     }
 
     /// The skins over written joints.
-    pub(super) fn skins(&self, model: &Model, bin: &mut Bin) -> Vec<Value> {
+    pub(super) fn skins<'a>(&self, model: &'a Model, bin: &mut Bin) -> Vec<Skin<'a>> {
         let mut skins = Vec::new();
         for skin in &model.skins {
             let (mut joints, mut matrices) = (Vec::new(), Vec::new());
@@ -143,11 +135,8 @@ impl Skeleton {
             if joints.is_empty() {
                 continue;
             }
-            let mut map = Map::new();
-            insert_name(&mut map, &skin.name);
-            map.insert("inverseBindMatrices".to_owned(), bin.floats(&matrices, Target::Other).into());
-            insert_list(&mut map, "joints", joints);
-            skins.push(map.into());
+            let inverse_bind_matrices = bin.floats(&matrices, Target::Other);
+            skins.push(Skin { name: &skin.name, inverse_bind_matrices, joints });
         }
         skins
     }
@@ -171,20 +160,6 @@ impl Skeleton {
             return self.root_joints[skin].map(|root| Ok((slot(root)?, 1.0))).into_iter().collect();
         }
         list.map(|(node, weight)| Ok((slot(node as usize)?, weight))).collect()
-    }
-}
-
-/// Inserts a transform's components, but for those that are the identity.
-pub(super) fn insert_transform(map: &mut Map<String, Value>, trs: &Trs) {
-    if trs.translation != Trs::IDENTITY.translation {
-        map.insert("translation".to_owned(), floats(&trs.translation.to_array()));
-    }
-    let rotation = matrix::unit(trs.rotation).unwrap_or_default();
-    if rotation != Trs::IDENTITY.rotation {
-        map.insert("rotation".to_owned(), floats(&rotation.to_array()));
-    }
-    if trs.scale != Trs::IDENTITY.scale {
-        map.insert("scale".to_owned(), floats(&trs.scale.to_array()));
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::skeleton::Skeleton;
+use super::{document::Node, skeleton::Skeleton};
 use crate::mesh::{gltf::GltfError, model::Model, vrm::Avatar};
 
 /// Extension of the figure.
@@ -21,7 +21,7 @@ pub(super) fn write(
     model: &Model,
     skeleton: &Skeleton,
     node_of_object: &[Option<usize>],
-    nodes: &mut [Map<String, Value>],
+    nodes: &mut [Node<'_>],
 ) -> Result<Map<String, Value>, GltfError> {
     check(avatar, model)?;
     let node = |node: usize| skeleton.node_of.get(node).copied().flatten();
@@ -36,7 +36,7 @@ pub(super) fn write(
     for (at, constraint) in &avatar.constraints {
         let Some(node) = nodes.get_mut(*at) else { return Err(outside()) };
         let own = Map::from_iter([(CONSTRAINT.to_owned(), value(constraint)?)]);
-        node.insert("extensions".to_owned(), own.into());
+        node.extensions = Some(Box::new(own.into()));
     }
     Ok(extensions)
 }

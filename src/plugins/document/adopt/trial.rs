@@ -6,7 +6,7 @@ use bevy::prelude::*;
 
 use super::super::{
     error::{EntityWrite, EntityWriteError},
-    refusals::{Bearer, ToldRefusals},
+    refusals::{Bearer, RefusalLog},
 };
 use crate::rig::{Rig, RigEdit, Uid, UidSource, operations::Operation};
 
@@ -39,7 +39,7 @@ pub(super) struct TrialResult {
 
 impl TrialResult {
     /// Takes the reasons to tell: those of writes that were not told already.
-    pub fn take_refused(&mut self, told: &mut ToldRefusals) -> Vec<EntityWriteError> {
+    pub fn take_refused(&mut self, told: &mut RefusalLog) -> Vec<EntityWriteError> {
         if told.is_empty() && self.refused.is_empty() {
             return Vec::new();
         }

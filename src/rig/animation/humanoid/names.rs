@@ -2,13 +2,14 @@
 //!
 //! Known are the names of Mixamo (`mixamorig:LeftUpLeg`), Unreal (`thigh_l`), VRM (`J_Bip_L_UpperLeg`, `leftUpperLeg`), CMU
 //! (`LeftUpLeg`, `LHipJoint`; `LeftHip`, `LeftKnee`; `lfemur`, `ltibia`), MakeHuman (`upperleg01.L`, `UpLeg_L`), Rigify
-//! (`DEF-thigh.L`), Biped (`Bip01 L Thigh`), SMPL (`L_Knee`, `m_avg_L_Knee`), Motive (`LThigh`, `LUArm`) and the
-//! templates of this crate (`thigh_l`).
+//! (`DEF-thigh.L`), Biped (`Bip01 L Thigh`), SMPL (`L_Knee`, `m_avg_L_Knee`), Motive (`LThigh`, `LUArm`), Rokoko
+//! (`LeftThigh`, `LeftFinger2Medial`), Xsens (`LeftHip`, `LeftSecondPP`), Character Creator (`CC_Base_L_Thigh`), Daz
+//! (`lThighBend`) and the templates of this crate (`thigh_l`).
 
 use super::{BodySide, Finger, HeadBone, HumanBone, LimbBone};
 
 /// Beginnings of names that say which tool made the skeleton.
-const PREFIXES: [&[&str]; 10] = [
+const PREFIXES: [&[&str]; 11] = [
     &["j", "bip"],
     &["mixamorig"],
     &["def"],
@@ -19,15 +20,23 @@ const PREFIXES: [&[&str]; 10] = [
     &["bip"],
     &["m", "avg"],
     &["f", "avg"],
+    &["cc", "base"],
 ];
 
 /// Words that the names of CMU's ASF files glue to the letter of their side: `lfemur`.
 const GLUED: [&str; 9] = ["clavicle", "humerus", "radius", "wrist", "hand", "femur", "tibia", "foot", "toes"];
 
+/// Fingers in the order in which skeletons number them.
+const FINGERS: [Finger; 5] = [Finger::Thumb, Finger::Index, Finger::Middle, Finger::Ring, Finger::Little];
+
+/// Name without the namespace before it.
+fn without_namespace(name: &str) -> &str {
+    name.rsplit([':', '|']).next().unwrap_or(name)
+}
+
 /// Words of a name without namespace and without the tool's prefix.
 fn own_words(name: &str) -> Vec<String> {
-    let name = name.rsplit([':', '|']).next().unwrap_or(name);
-    let mut words = words(name);
+    let mut words = words(without_namespace(name));
     for prefix in PREFIXES {
         if words.len() > prefix.len() && words.iter().zip(prefix).all(|(word, known)| word == known) {
             words.drain(..prefix.len());
@@ -76,6 +85,9 @@ pub(super) fn bone_of(name: &str) -> Option<(HumanBone, usize)> {
     if name.starts_with("__") {
         return None;
     }
+    if let Some(bone) = biped_finger(name) {
+        return Some((bone, 0));
+    }
     let words = own_words(name);
     let (words, side) = unglued(without_side(&words));
     let (number, stem) = numbered(&words);
@@ -100,16 +112,16 @@ pub(super) fn bone_of(name: &str) -> Option<(HumanBone, usize)> {
         ("hip" | "cog", None) => Some((HumanBone::Hips, 1)),
         ("head", None) if number <= 1 => Some((HumanBone::Head, 0)),
         ("neck", None) if number <= 1 => Some((HumanBone::Neck, 0)),
-        ("upperarm" | "uparm" | "uarm", _) => side_of(LimbBone::UpperArm, 0),
+        ("upperarm" | "uparm" | "uarm" | "shldr" | "shldrbend", _) => side_of(LimbBone::UpperArm, 0),
         ("arm", _) => side_of(LimbBone::UpperArm, 1),
         ("clavicle" | "collar" | "collarbone", _) => side_of(LimbBone::Shoulder, 0),
         ("shoulder", _) => side_of(LimbBone::Shoulder, 1),
-        ("forearm" | "lowerarm" | "loarm" | "lowarm" | "larm", _) => side_of(LimbBone::LowerArm, 0),
+        ("forearm" | "forearmbend" | "lowerarm" | "loarm" | "lowarm" | "larm", _) => side_of(LimbBone::LowerArm, 0),
         ("humerus", _) => side_of(LimbBone::UpperArm, 2),
         ("elbow" | "radius", _) => side_of(LimbBone::LowerArm, 1),
         ("hand", _) => side_of(LimbBone::Hand, 0),
         ("wrist", _) => side_of(LimbBone::Hand, 1),
-        ("thigh" | "upleg" | "upperleg" | "uleg", _) => side_of(LimbBone::UpperLeg, 0),
+        ("thigh" | "thighbend" | "upleg" | "upperleg" | "uleg", _) => side_of(LimbBone::UpperLeg, 0),
         ("shin" | "calf" | "shank" | "lowerleg" | "loleg" | "lowleg" | "lleg", _) => side_of(LimbBone::LowerLeg, 0),
         ("leg", _) => side_of(LimbBone::LowerLeg, 1),
         ("hip" | "femur", _) => side_of(LimbBone::UpperLeg, 1),
@@ -147,6 +159,14 @@ pub(super) fn ankle_side_of(name: &str) -> Option<BodySide> {
     let words = own_words(name);
     let (words, side) = unglued(without_side(&words));
     side.filter(|_| words == ["ankle"])
+}
+
+/// Side of the joint of a thumb that is called intermediate: the one that carries it is the first, although the second one of
+/// VRM 1.0 has its name.
+pub(super) fn middle_thumb_side_of(name: &str) -> Option<BodySide> {
+    let words = own_words(name);
+    let (words, side) = without_side(&words);
+    side.filter(|_| words == ["thumb", "intermediate"])
 }
 
 /// Bone of the head that a name means.
@@ -233,29 +253,53 @@ fn numbered(words: &[&str]) -> (u32, String) {
 fn finger(words: &[&str]) -> Option<(Finger, u8)> {
     // VRM and Rigify: `indexProximal`, `f_index`; Mixamo: `HandIndex1`.
     let rest: Vec<&str> = words.iter().copied().filter(|word| !matches!(*word, "f" | "hand" | "finger")).collect();
-    let kind = match *rest.first()? {
+    let [word, bone] = rest[..] else { return None };
+    let kind = match word {
         "thumb" => Finger::Thumb,
         "index" => Finger::Index,
         "middle" | "mid" => Finger::Middle,
         "ring" => Finger::Ring,
         "little" | "pinky" => Finger::Little,
-        // MakeHuman: `finger2-1` is the index finger.
-        number if words.first() == Some(&"finger") => {
-            let kinds = [Finger::Thumb, Finger::Index, Finger::Middle, Finger::Ring, Finger::Little];
-            let kind = number.parse::<usize>().ok()?.checked_sub(1).and_then(|number| kinds.get(number))?;
-            return Some((*kind, rest.get(1)?.parse().ok()?));
+        // MakeHuman: `finger2-1` is the index finger; Rokoko: `Finger2Proximal`.
+        number if words.first() == Some(&"finger") => numbered_finger(number.parse().ok()?)?,
+        // Xsens: `SecondPP` is the index finger.
+        word if matches!(bone, "mc" | "pp" | "mp" | "dp") => {
+            let place = ["first", "second", "third", "fourth", "fifth"].iter().position(|known| *known == word);
+            FINGERS[place?]
         }
         _ => return None,
     };
-    let number = match rest.get(1..).unwrap_or_default() {
-        [number] => match *number {
-            "metacarpal" if kind == Finger::Thumb => 1,
-            "proximal" => 1 + u8::from(kind == Finger::Thumb),
-            "intermediate" => 2,
-            "distal" => 3,
-            number => number.parse().ok()?,
-        },
+    Some((kind, finger_bone(kind, bone)?))
+}
+
+/// Finger with that number, counted from 1 at the thumb.
+fn numbered_finger(number: usize) -> Option<Finger> {
+    FINGERS.get(number.checked_sub(1)?).copied()
+}
+
+/// Number of a finger's joint by the name of its bone, or as it is written.
+fn finger_bone(finger: Finger, bone: &str) -> Option<u8> {
+    let is_thumb = finger == Finger::Thumb;
+    match bone {
+        "metacarpal" | "mc" => is_thumb.then_some(1),
+        "proximal" | "pp" => Some(1 + u8::from(is_thumb)),
+        "intermediate" | "medial" | "mp" => Some(2),
+        "distal" | "dp" => Some(3),
+        number => number.parse().ok(),
+    }
+}
+
+/// Joint of a finger in a Biped of 3ds Max, which counts from 0 at the thumb: `Bip01 L Finger1` carries `Bip01 L Finger11`.
+fn biped_finger(name: &str) -> Option<HumanBone> {
+    let words = words(without_namespace(name));
+    let (words, side) = without_side(&words);
+    let ["bip", .., "finger", digits] = words[..] else { return None };
+    let (finger, joint) = match *digits.as_bytes() {
+        [finger] => (finger, b'0'),
+        [finger, joint] => (finger, joint),
         _ => return None,
     };
-    Some((kind, number))
+    let finger = FINGERS.get(usize::from(finger.checked_sub(b'0')?)).copied()?;
+    let joint = joint.checked_sub(b'0').filter(|joint| *joint < 3)?;
+    Some(HumanBone::Finger(side?, finger, joint + 1))
 }

@@ -10,6 +10,11 @@ use super::{
 
 /// Length of a bone above which it is a head rather than a neck, as a share of the height from a foot to the last joint.
 const HEAD: f32 = 0.085;
+/// Distance of the joint that carries legs and trunk from the one that carries the legs, at most, as a share of the way from
+/// there to a foot.
+const BESIDE: f32 = 0.2;
+/// Height of an upright trunk's end above its start, as a share of the way between them; that of animals is less.
+const UPRIGHT: f32 = 0.85;
 
 /// Joints that stand for bones, by the chains of the skeleton at rest: two that go down are legs, two that branch off above
 /// them to the sides are arms, the one that goes up is spine and head. Empty if the skeleton has another shape.
@@ -31,9 +36,7 @@ pub fn by_shape(joints: &[SkeletonJoint], up: Vec3, forward: Vec3) -> HumanJoint
     let (Some(left_foot), Some(right_foot)) = (lowest(1.0), lowest(-1.0)) else { return HumanJoints::new() };
     let of_right: Vec<usize> = ancestors(joints, right_foot).collect();
     let Some(hips) = ancestors(joints, left_foot).find(|at| of_right.contains(at)) else { return HumanJoints::new() };
-    if !is_above(joints, hips, top) {
-        return HumanJoints::new();
-    }
+    let Some(start) = trunk_start(joints, hips, left_foot, top, up) else { return HumanJoints::new() };
     let mut named = BTreeMap::from([(HumanBone::Hips, hips)]);
     for (side, sign, foot) in [(BodySide::Left, 1.0, left_foot), (BodySide::Right, -1.0, right_foot)] {
         let leg = bends(joints, &path(joints, foot, Some(hips)));
@@ -47,10 +50,10 @@ pub fn by_shape(joints: &[SkeletonJoint], up: Vec3, forward: Vec3) -> HumanJoint
             named.insert(HumanBone::Limb(side, LimbBone::Toes), *toes);
         }
         // A figure without arms is no human: a hand has fingers at both sides, which are no legs.
-        let is_arm = |end: &usize| is_above(joints, hips, *end) && ![left_foot, right_foot].contains(end);
+        let is_arm = |end: &usize| is_above(joints, start, *end) && ![left_foot, right_foot].contains(end);
         let Some(hand) = outermost(sign).filter(is_arm) else { return HumanJoints::new() };
-        let trunk: Vec<usize> = path(joints, top, Some(hips));
-        let arm: Vec<usize> = path(joints, hand, Some(hips)).into_iter().filter(|at| !trunk.contains(at)).collect();
+        let trunk: Vec<usize> = path(joints, top, Some(start));
+        let arm: Vec<usize> = path(joints, hand, Some(start)).into_iter().filter(|at| !trunk.contains(at)).collect();
         let arm = bends(joints, &arm);
         let Some(first) = limb_start(joints, &arm) else { return HumanJoints::new() };
         for (bone, joint) in [LimbBone::UpperArm, LimbBone::LowerArm, LimbBone::Hand].into_iter().zip(&arm[first..]) {
@@ -59,6 +62,18 @@ pub fn by_shape(joints: &[SkeletonJoint], up: Vec3, forward: Vec3) -> HumanJoint
     }
     named.insert(HumanBone::Head, head_of(joints, &named, top, height(top) - height(left_foot)));
     complete(joints, &named)
+}
+
+/// Joint from which the trunk goes to `top`: the one that carries the legs; or else the joint that carries it at about the same
+/// place, as where legs hang on a pelvis beside the spine, if the trunk stands upright. `None` if neither carries `top`.
+fn trunk_start(joints: &[SkeletonJoint], hips: usize, foot: usize, top: usize, up: Vec3) -> Option<usize> {
+    if is_above(joints, hips, top) {
+        return Some(hips);
+    }
+    let way = |joint: usize| joints[joint].position - joints[hips].position;
+    let is_upright = way(top).dot(up) >= UPRIGHT * way(top).length();
+    let is_beside = |above: &usize| way(*above).length() <= BESIDE * way(foot).length();
+    joints[hips].parent.filter(is_beside).filter(|above| is_upright && is_above(joints, *above, top))
 }
 
 /// Length of an arm in proportion to the leg of its side.

@@ -11,7 +11,7 @@ use super::Place;
 use crate::rig::{
     EditError, Uid,
     animation::{
-        ClipLayer, Ease, Key, KeyFault, KnownNode, LayerMode, Marker, NodeNames, Property, RigClip, Track, TrackTarget,
+        ClipLayer, Ease, Key, KeyFault, LayerMode, Marker, NodeName, NodeNames, Property, RigClip, Track, TrackTarget,
         check_about, check_keys, check_layer,
     },
     format::tree::Tree,
@@ -227,7 +227,7 @@ fn layer(file: LayerFile, place: &ClipPlace, names: &mut NodeNames) -> Result<Cl
     let LayerFile { uid, name, mode, weight, muted, mask, tracks: files } = file;
     let mut note = |node: Uid, label: String, role: String| {
         if !label.is_empty() || !role.is_empty() {
-            names.0.insert(node, KnownNode { label, role });
+            names.0.insert(node, NodeName { label, role });
         }
     };
     let mut masked = Vec::with_capacity(mask.len());

@@ -7,7 +7,10 @@ use super::{
     shorthand::{Declarations, TagForm},
     write::{feature_summaries, features_of, needs_summary},
 };
-use crate::rig::{Rig, Uid, part::PartInstance};
+use crate::rig::{
+    Rig, Uid,
+    part::{PartInstance, PartTargets},
+};
 
 /// The header with the uid that follows from the name, and, where the file is complete and says none, the number of
 /// joints and the named features. What parts bring is in other files: see [`TemplateHeader::complete_from`].
@@ -67,8 +70,9 @@ impl TemplateHeader {
             let joints = if there == 0 || instance.adds { part.len() } else { there.min(part.len()) };
             self.joint_count += joints.saturating_sub(there);
             let removed = instance.changes.iter().filter(|change| change.removed);
+            let targets = PartTargets::new(instance, part);
             let removed: HashSet<Uid> =
-                removed.filter_map(|change| instance.find_tag(part, change.tag.as_deref()?).ok()).collect();
+                removed.filter_map(|change| targets.find_tag(change.tag.as_deref()?).ok()).collect();
             let of_part = part.walk().take(joints).flat_map(|joint| &joint.data.tags);
             let added = instance.changes.iter().flat_map(|change| &change.tags);
             add(features_of(of_part.filter(|tag| !removed.contains(&tag.uid)).chain(added)));

@@ -2,6 +2,7 @@
 
 mod hung_joints;
 mod inputs;
+mod instance_places;
 mod parts;
 mod survey;
 
@@ -58,9 +59,9 @@ pub(in crate::rig) fn read_text(source: &str, first_line: usize) -> Result<Templ
         None => read_explicit(&explicit, first_line).map_err(|error| explicit.fault(error)),
     };
     read.map_err(|error| {
-        // What follows from a missing comma is no fault of its own.
+        // What follows from a wrong bracket or a missing comma is no fault of its own.
         let lacking = || with_missing_commas(source).1.into_iter().next();
-        SourceError::cut_short(source).or_else(lacking).unwrap_or(error)
+        SourceError::of_brackets(source).or_else(lacking).unwrap_or(error)
     })
 }
 
@@ -126,6 +127,7 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
         ..RigAbout::default()
     };
     let mut seen = HashSet::new();
+    let mut groups = Vec::with_capacity(file.groups.len());
     for (number, group) in file.groups.into_iter().enumerate() {
         if !seen.insert(group.uid) {
             faults.push(places.used_twice(group.uid));
@@ -137,9 +139,10 @@ fn build(places: &Places, file: TemplateFile, mut notes: Vec<String>, faults: &m
             faults.push(places.error(group.uid, 0, "color", message));
             color = [0.5; 3];
         }
-        rig.groups.push(GroupData { uid: group.uid, name: group.name, color, enabled: group.enabled });
+        groups.push(GroupData { uid: group.uid, name: group.name, color, enabled: group.enabled });
     }
-    rig.inputs = inputs::inputs(places, file.inputs, &mut seen, faults);
+    rig.groups = groups.into_iter().collect();
+    rig.inputs = inputs::inputs(places, file.inputs, &mut seen, faults).into_iter().collect();
     let (format, count) = (file.format, file.joints.len());
     let instances = parts::instances(places, file.parts, faults);
     if let Some(claimed) = file.joint_count.filter(|claimed| *claimed != count && instances.is_empty()) {

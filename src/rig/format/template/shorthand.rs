@@ -10,6 +10,7 @@ mod declarations;
 
 use std::{
     borrow::Cow,
+    cell::Cell,
     collections::{BTreeMap, HashMap},
     ops::Range,
 };
@@ -22,8 +23,8 @@ use crate::rig::{
         template::{quaternion, quoted},
         tree::{Item, NodeId, Tree},
     },
-    nearest::{did_you_mean, listed},
-    reference::NameKind,
+    nearest::{did_you_mean, listed_first},
+    reference::{MOST_COMPARED, NameKind},
 };
 
 pub(in crate::rig::format) use declarations::{Declaration, Declarations, TagForm};
@@ -155,33 +156,42 @@ pub(in crate::rig::format) enum NameError {
         nearest: String,
     },
     /// A name that several things of its kind have.
-    #[error("{} {kind}s are called \"{name}\"; write the uid, {}", uids.len(), uids_in_words(uids))]
+    #[error("{count} {kind}s are called \"{name}\"; write the uid, {uids}")]
     Ambiguous {
         /// Kind of thing: joint, group, feature.
         kind: String,
         /// The name.
         name: String,
-        /// Uids of the things with that name.
-        uids: Vec<Uid>,
+        /// Number of the things with that name.
+        count: usize,
+        /// Uids of the first of them, in words: thousands of things with one name make no text each that names them all.
+        uids: String,
     },
 }
 
-fn uids_in_words(uids: &[Uid]) -> String {
-    listed(&uids.iter().map(Uid::to_string).collect::<Vec<_>>(), "or")
+impl NameError {
+    /// Error about a name that things with these uids have.
+    pub fn ambiguous(kind: &str, name: &str, uids: &[Uid]) -> Self {
+        let listed = listed_first(uids.iter().map(Uid::to_string), uids.len(), "or");
+        Self::Ambiguous { kind: kind.to_owned(), name: name.to_owned(), count: uids.len(), uids: listed }
+    }
 }
 
 /// Things of a text by the names that refer to them.
-pub(super) struct NameIndex<'d, 'a> {
-    declared: &'d Declarations<'a>,
+pub(super) struct NameIndex<'d> {
     groups: ByName<'d>,
     joints: ByName<'d>,
     features: ByName<'d>,
+    /// Features of each joint by their names, `None` for several of one name; joints are told by their first tag.
+    of_joints: HashMap<NodeId, HashMap<String, Option<Uid>>>,
+    /// Number of names that unknown ones were compared with.
+    compared: Cell<usize>,
 }
 
 type ByName<'d> = HashMap<Cow<'d, str>, Vec<Uid>>;
 
-impl<'d, 'a> NameIndex<'d, 'a> {
-    pub fn new(declared: &'d Declarations<'a>) -> Self {
+impl<'d> NameIndex<'d> {
+    pub fn new(declared: &'d Declarations) -> Self {
         fn by_name<'d>(named: impl Iterator<Item = (Cow<'d, str>, Uid)>) -> ByName<'d> {
             let mut called = ByName::new();
             for (name, uid) in named {
@@ -190,12 +200,24 @@ impl<'d, 'a> NameIndex<'d, 'a> {
             called
         }
         let named = |one: &'d Declaration| Some((Cow::Borrowed(one.name.as_deref()?), one.uid));
-        let feature = |tag: &Declaration| Some((Cow::Owned(feature_name(&declared.tree, tag.node)?), tag.uid));
+        let (mut of_joints, mut features) = (HashMap::new(), ByName::new());
+        for tags in &declared.tags {
+            let mut own: HashMap<String, Option<Uid>> = HashMap::new();
+            for tag in tags {
+                let Some(name) = feature_name(&declared.tree, tag.node) else { continue };
+                own.entry(name.clone()).and_modify(|only| *only = None).or_insert(Some(tag.uid));
+                features.entry(Cow::Owned(name)).or_default().push(tag.uid);
+            }
+            if let Some(first) = tags.first().filter(|_| !own.is_empty()) {
+                of_joints.insert(first.node, own);
+            }
+        }
         Self {
-            declared,
             groups: by_name(declared.groups.iter().filter_map(named)),
             joints: by_name(declared.joints.iter().filter_map(named)),
-            features: by_name(declared.tags.iter().flatten().filter_map(feature)),
+            features,
+            of_joints,
+            compared: Cell::new(0),
         }
     }
 
@@ -205,7 +227,7 @@ impl<'d, 'a> NameIndex<'d, 'a> {
     /// See [`NameError`].
     pub fn find(&self, name: &str, kind: NameKind) -> Result<Uid, NameError> {
         let among = if kind == NameKind::Group { &self.groups } else { &self.joints };
-        found(among, name, &kind.to_string())
+        self.found(among, name, &kind.to_string())
     }
 
     /// The feature with that name: by name, or by name and switch with a point between, or by its kind if it has no name;
@@ -214,18 +236,38 @@ impl<'d, 'a> NameIndex<'d, 'a> {
     /// # Errors
     /// As [`find`](Self::find).
     pub fn feature(&self, name: &str, own: &[Declaration]) -> Result<Uid, NameError> {
-        let tree = &self.declared.tree;
-        let mut of_joint = own.iter().filter(|tag| feature_name(tree, tag.node).as_deref() == Some(name));
-        match (of_joint.next(), of_joint.next()) {
-            (Some(tag), None) => Ok(tag.uid),
-            _ => found(&self.features, name, "feature"),
+        let of_joint = own.first().and_then(|first| self.of_joints.get(&first.node));
+        match of_joint.and_then(|features| features.get(name)) {
+            Some(Some(uid)) => Ok(*uid),
+            _ => self.found(&self.features, name, "feature"),
+        }
+    }
+
+    /// The only thing with that name. An unknown name is compared with all others, until these are [`MOST_COMPARED`].
+    ///
+    /// # Errors
+    /// See [`NameError`].
+    fn found(&self, among: &ByName, name: &str, kind: &str) -> Result<Uid, NameError> {
+        match among.get(name).map(Vec::as_slice) {
+            Some([uid]) => Ok(*uid),
+            Some(uids) => Err(NameError::ambiguous(kind, name, uids)),
+            None => {
+                let mut names: Vec<&str> = Vec::new();
+                if self.compared.get() < MOST_COMPARED {
+                    names.extend(among.keys().map(|name| &**name));
+                    names.sort_unstable();
+                }
+                self.compared.set(self.compared.get() + names.len());
+                let nearest = did_you_mean(name, names);
+                Err(NameError::Unknown { kind: kind.to_owned(), name: name.to_owned(), nearest })
+            }
         }
     }
 }
 
 struct Writer<'d, 'a> {
     declared: &'d Declarations<'a>,
-    called: NameIndex<'d, 'a>,
+    called: NameIndex<'d>,
     changes: Vec<Change>,
     faults: Vec<SourceError>,
     parents: BTreeMap<Uid, String>,
@@ -396,23 +438,6 @@ impl<'d, 'a> Writer<'d, 'a> {
     fn fault(&mut self, item: &Item, message: String) -> String {
         self.faults.push(SourceError::at(self.tree().text, item.start, message));
         "None".to_owned()
-    }
-}
-
-/// The only thing with that name.
-///
-/// # Errors
-/// See [`NameError`].
-fn found(among: &ByName, name: &str, kind: &str) -> Result<Uid, NameError> {
-    match among.get(name).map(Vec::as_slice) {
-        Some([uid]) => Ok(*uid),
-        Some(uids) => Err(NameError::Ambiguous { kind: kind.to_owned(), name: name.to_owned(), uids: uids.to_vec() }),
-        None => {
-            let mut names: Vec<&str> = among.keys().map(|name| &**name).collect();
-            names.sort_unstable();
-            let nearest = did_you_mean(name, names);
-            Err(NameError::Unknown { kind: kind.to_owned(), name: name.to_owned(), nearest })
-        }
     }
 }
 

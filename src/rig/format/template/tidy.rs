@@ -105,7 +105,7 @@ struct Uids<'d, 'a> {
     names: Option<RigNameIndex<'d>>,
     parts: &'d [PartInstance],
     style: UidStyle,
-    called: NameIndex<'d, 'a>,
+    called: NameIndex<'d>,
     by_uid: HashMap<Uid, &'d Declaration>,
     /// Uids that the text will not have.
     derived: HashSet<Uid>,

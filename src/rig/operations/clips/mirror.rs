@@ -7,7 +7,7 @@ use bevy::math::Mat3;
 use super::{KeyTimes, OperationError, keys::Changes, keys::selected};
 use crate::rig::{
     BuiltRig, Rig, Uid,
-    animation::{ClipLayer, Ease, Key, KnownNode, NodeNames, Property, TrackTarget},
+    animation::{ClipLayer, Ease, Key, NodeName, NodeNames, Property, TrackTarget},
     label::mirrored_label,
     operations::{Draft, MirrorPlane, frame::Frame},
 };
@@ -61,7 +61,7 @@ pub(in crate::rig::operations) fn partners(rig: &Rig, built: Option<&BuiltRig>) 
     let names = NodeNames::of(rig, built);
     for (uid, name) in &names.0 {
         let Some(label) = mirrored_label(&name.label) else { continue };
-        if let Some(partner) = names.find(&KnownNode { label, role: name.role.clone() }) {
+        if let Some(partner) = names.find(&NodeName { label, role: name.role.clone() }) {
             pairs.insert(*uid, partner);
         }
     }

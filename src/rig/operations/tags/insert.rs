@@ -1,6 +1,6 @@
 //! Commands that are inserted between two others.
 
-use super::{TagError, add, bound, found, refresh, set};
+use super::{SteadyNames, TagError, add, bound, found, refresh, set};
 use crate::rig::{
     EditError, NodeRef, TagData, TagKind, Uid, fields,
     operations::{Draft, OperationError},
@@ -32,7 +32,7 @@ pub(super) fn insert(
     };
     let uid = draft.next_uid();
     let tag = TagData { uid, enabled: true, comment: String::new(), kind: kind.clone() };
-    let mut tag = bound(draft, tag)?;
+    let mut tag = bound(draft, &SteadyNames::default(), tag)?;
     refresh(draft.rig(), &mut tag);
     add(draft, joint, tag, index)?;
     let Some(rewired) = rewired else { return Ok(()) };

@@ -14,7 +14,7 @@ use crate::rig::{
 
 /// Part of the copied tags that is pasted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum PasteWhat {
+pub enum PasteContent {
     /// Tags without their values: commands with the defaults of their modules. Identifier tags are all value.
     Tags,
     /// Values into the existing tags: of the same module or kind, in order.
@@ -55,7 +55,7 @@ pub(super) fn cut(draft: &mut Draft, clipboard: &TagClipboard) -> Result<(), Ope
 pub(super) fn paste(
     draft: &mut Draft,
     clipboard: &TagClipboard,
-    what: PasteWhat,
+    what: PasteContent,
     to: &PasteTo,
 ) -> Result<(), OperationError> {
     if clipboard.is_empty() {
@@ -67,7 +67,7 @@ pub(super) fn paste(
         PasteTo::Joints(joints) => pairs_in_order(draft, clipboard, joints)?,
     };
     let base = if mirrored { Remap { uids: other_side(draft.rig()), ..Remap::default() } } else { Remap::default() };
-    if what != PasteWhat::Tags {
+    if what != PasteContent::Tags {
         pairs.iter().try_for_each(|pair| paste_identifiers(draft, pair, mirrored))?;
     }
     // Tags of one joint that go to several have independent copies on each.
@@ -79,13 +79,13 @@ pub(super) fn paste(
         let mut remap = base.clone();
         joints_and_groups(draft, set, &mut remap);
         match what {
-            PasteWhat::Values => paste_values(draft, set, remap, mirrored)?,
-            PasteWhat::Tags => paste_tags(draft, set, remap, mirrored, |tag| {
+            PasteContent::Values => paste_values(draft, set, remap, mirrored)?,
+            PasteContent::Tags => paste_tags(draft, set, remap, mirrored, |tag| {
                 if let TagKind::Command { params, .. } = &mut tag.kind {
                     *params = "()".to_owned();
                 }
             })?,
-            PasteWhat::Both => {
+            PasteContent::Both => {
                 // Tags that were cut are the same ones again where they come back.
                 if !mirrored && clipboard.rig == draft.rig().uid() {
                     let cut = set.iter().flat_map(|(joint, _)| &joint.tags).map(|tag| tag.uid);

@@ -6,7 +6,9 @@ use super::super::{
     HungJoint, Template,
     shorthand::{Declarations, NameError},
 };
-use crate::rig::{Rig, RigEdit, RigJoint, SourceError, Uid, nearest::did_you_mean, part::Shortfall};
+use crate::rig::{
+    Rig, RigEdit, RigJoint, SourceError, Uid, nearest::did_you_mean, part::Shortfall, reference::MOST_COMPARED,
+};
 
 /// Reason why a joint of a template cannot hang on a joint that a part brings.
 #[derive(Debug, thiserror::Error)]
@@ -63,16 +65,21 @@ impl Template {
             }
         }
         let bearers = bearers(&self.rig, hung);
-        let mut faults = Vec::new();
+        let (mut faults, mut compared) = (Vec::new(), 0);
         for one in hung {
             let name = one.parent.clone();
             let uids = bearers.get(&name).map(Vec::as_slice).unwrap_or_default();
             let fault = match uids {
                 [] if shortfall.may_have(&name) => continue,
-                [] => HangError::Unknown { nearest: did_you_mean(&name, labels(&self.rig)), name },
+                [] => {
+                    let is_compared = compared < MOST_COMPARED;
+                    compared += self.rig.len();
+                    let nearest = if is_compared { did_you_mean(&name, labels(&self.rig)) } else { String::new() };
+                    HangError::Unknown { nearest, name }
+                }
                 [_] if !waiting.contains(one) => continue,
                 [_] => HangError::Circle { name },
-                uids => NameError::Ambiguous { kind: "joint".to_owned(), name, uids: uids.to_vec() }.into(),
+                uids => NameError::ambiguous("joint", &name, uids).into(),
             };
             faults.push((one.joint, fault));
         }

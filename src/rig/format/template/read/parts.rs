@@ -17,17 +17,16 @@ use super::{
         quoted,
         shorthand::Declarations,
     },
-    Places, bind_references, read_text,
+    Places, bind_references,
+    instance_places::InstancePlaces,
+    read_text,
 };
 use crate::rig::{
     RestTransform, Rig, RigEdit, SourceError, TagData, TagKind, Uid, degrees,
-    format::{
-        scan::{Field, fields},
-        source::ron_text,
-    },
+    format::{scan::Field, source::ron_text},
     part::{
         MOST_BROUGHT, MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption,
-        PartSocket, Shortfall, unpaired_sides,
+        PartSocket, PartTargets, Shortfall, unpaired_sides,
     },
 };
 
@@ -39,15 +38,19 @@ pub(super) fn chains(
     notes: &mut Vec<String>,
 ) -> Vec<PartChain> {
     let mut known: Vec<PartChain> = Vec::with_capacity(chains.len() + branches.len());
+    if chains.is_empty() && branches.is_empty() {
+        return known;
+    }
+    let by_label = rig.joints_by_label();
+    let mut names: HashSet<String> = HashSet::new();
+    // Joints of chains and of branches.
+    let mut taken: [HashSet<Uid>; 2] = Default::default();
     let files = chains.into_iter().map(|file| (file, false)).chain(branches.into_iter().map(|file| (file, true)));
     for (ChainFile { name, joints: labels, min, max }, is_fan) in files {
-        let joints: Vec<Uid> = labels.iter().filter_map(|label| rig.find_label(label)).collect();
+        let joints: Vec<Uid> = labels.iter().filter_map(|label| by_label.get(label.as_str()).copied()).collect();
         let (min, max) = (min.unwrap_or(1), max.unwrap_or(MOST_JOINTS));
         let parent = |joint: Uid| rig.joint(joint).and_then(|joint| joint.parent);
-        let is_taken = |chain: &PartChain| {
-            let shares = chain.joints.iter().any(|of| joints.contains(of));
-            chain.name == name || (shares && chain.is_fan == is_fan)
-        };
+        let of_kind = &mut taken[usize::from(is_fan)];
         let fault = if joints.len() != labels.len() || joints.len() < 2 {
             "it needs two joints or more, all of them in the file".to_owned()
         } else if !is_fan && joints.windows(2).any(|pair| parent(pair[1]) != Some(pair[0])) {
@@ -56,9 +59,11 @@ pub(super) fn chains(
             "all of its joints must hang on one joint".to_owned()
         } else if !(1..=joints.len()).contains(&min) || !(joints.len()..=MOST_JOINTS).contains(&max) {
             format!("`min` is 1 to {0}, and `max` {0} to {MOST_JOINTS}, for its {0} joints", joints.len())
-        } else if known.iter().any(is_taken) {
+        } else if names.contains(&name) || joints.iter().any(|joint| of_kind.contains(joint)) {
             "another has its name or one of its joints".to_owned()
         } else {
+            names.insert(name.clone());
+            of_kind.extend(&joints);
             known.push(PartChain { name, joints, min, max, is_fan });
             continue;
         };
@@ -337,39 +342,14 @@ fn rotation_of(text: &str) -> Result<Quat, PartChangeError> {
     Ok(Quat::from_xyzw(x, y, z, w))
 }
 
-/// Places in a template's text of its part instances and of their changes.
-struct InstancePlaces<'a> {
-    fields: Vec<Field<'a>>,
-}
-
-impl InstancePlaces<'_> {
-    /// Places of the changes of the instance at a place, each with its parameters if it has any.
-    fn changes(&self, instance: usize) -> Vec<(usize, Option<usize>)> {
-        let fields = &self.fields;
-        let list = fields.iter().find(|field| field.start == instance).and_then(|instance| {
-            fields.iter().position(|field| field.bracket == instance.bracket && field.name == "changes")
-        });
-        let is_subject =
-            |field: &&Field| field.parent == list && list.is_some() && matches!(field.name, "tag" | "joint");
-        let params = |subject: &Field| {
-            fields
-                .iter()
-                .find(|field| field.bracket == subject.bracket && field.name == "params")
-                .map(|field| field.start)
-        };
-        let mut subjects: Vec<&Field> = fields.iter().filter(is_subject).collect();
-        subjects.dedup_by_key(|subject| subject.bracket);
-        subjects.into_iter().map(|subject| (subject.start, params(subject))).collect()
-    }
-}
-
 impl PartInstance {
     /// Origins of the commands that come of the instance; `fitted` is what comes of the part, and `places` are those of the
     /// changes.
     fn origins(&self, part: &Part, fitted: &Rig, places: &[(usize, Option<usize>)]) -> Vec<(Uid, PartOrigin)> {
         let changes = self.changes.iter().zip(places).filter(|(change, _)| change.params.is_some());
+        let targets = PartTargets::new(self, fitted);
         let changed: HashMap<Uid, usize> = changes
-            .filter_map(|(change, place)| Some((self.find_tag(fitted, change.tag.as_deref()?).ok()?, place.1?)))
+            .filter_map(|(change, place)| Some((targets.find_tag(change.tag.as_deref()?).ok()?, place.1?)))
             .collect();
         let title: Arc<str> = self.title().into();
         let tags = fitted.walk().flat_map(|joint| &joint.data.tags);
@@ -415,7 +395,7 @@ impl Template {
         let hung = std::mem::take(&mut self.hung);
         let mut waiting = hung.clone();
         let (mut faults, mut shortfall, mut brings) = (Vec::new(), Shortfall::default(), 0);
-        let places = InstancePlaces { fields: fields(source) };
+        let places = InstancePlaces::new(source);
         for instance in std::mem::take(&mut self.parts) {
             let message = |error: &dyn fmt::Display| format!("part \"{}\": {error}", instance.title());
             let found = part(&instance.part).and_then(|part| {

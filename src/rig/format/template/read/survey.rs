@@ -30,7 +30,7 @@ const REPARSED: usize = 64 << 20;
 /// A text that cannot be read as a template at all, with the faults that were found before that.
 pub fn survey_template(bytes: &[u8]) -> Result<(Template, Vec<SourceError>), Vec<SourceError>> {
     let source = text_of(bytes).map_err(|error| vec![error])?;
-    if let Some(fault) = SourceError::cut_short(source) {
+    if let Some(fault) = SourceError::of_brackets(source) {
         return Err(vec![fault]);
     }
     let first = survey(source);

@@ -17,11 +17,15 @@ const BEHIND_HEADER: [&str; 5] = ["groups", "inputs", "joints", "parts", "poses"
 pub(super) fn header_labels(patch: &mut Patch, tree: &Tree, before: &Rig, rig: &Rig) {
     sockets(patch, tree, before, rig);
     options(patch, tree, before, rig);
+    let lists = ["chains", "branches"].map(|list| tree.elements(tree.root(), list));
+    if lists.iter().all(|list| list.is_empty()) {
+        return;
+    }
+    let by_label = before.joints_by_label();
     let renamed = |label: &str| {
-        let now = rig.joint(before.find_label(label)?)?.data.label.clone()?;
+        let now = rig.joint(*by_label.get(label)?)?.data.label.clone()?;
         (now != label).then(|| quoted(&now))
     };
-    let lists = ["chains", "branches"].map(|list| tree.elements(tree.root(), list));
     for chain in lists.into_iter().flatten() {
         for item in tree.elements(chain.value, "joints") {
             let label: Option<String> = ron::from_str(tree.written(item.value)).ok();

@@ -20,7 +20,7 @@ use crate::rig::{
         },
         tree::{NodeId, Tree},
     },
-    part::{PartInstance, switch_name},
+    part::{PartInstance, PartTargets, switch_name},
     reference::RigNameIndex,
 };
 pub(super) use change::short_tag;
@@ -173,10 +173,12 @@ impl Overrides<'_, '_> {
     fn entries(&self, node: NodeId, instance: &PartInstance, part: &Rig) -> HashMap<Target, usize> {
         let count = self.tree.elements(node, "changes").len();
         let mut entries = HashMap::new();
+        let targets = PartTargets::new(instance, part);
+        let joints: Vec<Uid> = part.walk().map(|joint| joint.data.uid).collect();
         for (number, change) in instance.changes.iter().enumerate().take(count) {
-            let joint = change.joint.as_ref().and_then(|label| instance.find_joint(part, label).ok());
-            let joint = joint.and_then(|place| part.walk().nth(place)).map(|joint| Target::Joint(joint.data.uid));
-            let tag = change.tag.as_ref().and_then(|name| instance.find_tag(part, name).ok()).map(Target::Tag);
+            let joint = change.joint.as_ref().and_then(|label| targets.find_joint(label).ok());
+            let joint = joint.and_then(|place| joints.get(place)).map(|joint| Target::Joint(*joint));
+            let tag = change.tag.as_ref().and_then(|name| targets.find_tag(name).ok()).map(Target::Tag);
             if let Some(target) = joint.or(tag) {
                 // Of several, the last one wins when the part is put in.
                 entries.insert(target, number);

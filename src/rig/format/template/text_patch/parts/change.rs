@@ -125,14 +125,14 @@ impl JointDiff<'_> {
 }
 
 /// A tag before and after a change, and as the part gives it.
-pub(super) struct TagDiff<'d> {
+pub(super) struct TagDiff<'d, 'w> {
     pub before: &'d TagData,
     pub now: &'d TagData,
     pub plain: &'d TagData,
-    pub words: &'d Words<'d>,
+    pub words: &'d Words<'w>,
 }
 
-impl TagDiff<'_> {
+impl TagDiff<'_, '_> {
     /// Fields of the change that are different now, without its parameters.
     pub fn fields(&self) -> Vec<FieldChange> {
         let Self { before, now, plain, .. } = *self;

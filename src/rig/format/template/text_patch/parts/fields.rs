@@ -9,7 +9,7 @@ use crate::rig::{
         template::{quoted, shorthand::Declarations, vector},
         tree::{NodeId, Tree},
     },
-    part::PartInstance,
+    part::{PartInstance, PartTargets},
 };
 
 /// The text of a template with other fields of its part instances. `parts` are the instances before and after, each with its
@@ -58,22 +58,23 @@ fn instance_fields(
         }
     }
     let mut gone = Vec::new();
+    let (old, new) = (PartTargets::new(was, was_fitted), PartTargets::new(is, is_fitted));
     for (number, (item, change)) in tree.elements(node, "changes").iter().zip(&was.changes).enumerate() {
         if let Some(name) = &change.tag
-            && let Ok(tag) = was.find_tag(was_fitted, name)
+            && let Ok(tag) = old.find_tag(name)
         {
             if is_fitted.find_tag(tag).is_none() {
                 gone.push(number);
-            } else if is.find_tag(is_fitted, name) != Ok(tag) {
+            } else if new.find_tag(name) != Ok(tag) {
                 patch.set(item.value, "tag", &quoted(&is.name_of_tag(is_fitted, tag)));
             }
         }
-        let place = change.joint.as_ref().and_then(|label| was.find_joint(was_fitted, label).ok());
+        let place = change.joint.as_ref().and_then(|label| old.find_joint(label).ok());
         if let (Some(label), Some(joint)) = (&change.joint, place.and_then(|place| was_fitted.walk().nth(place))) {
             let uid = joint.data.uid;
             match is_fitted.walk().position(|joint| joint.data.uid == uid) {
                 None => gone.push(number),
-                Some(place) if is.find_joint(is_fitted, label) != Ok(place) => {
+                Some(place) if new.find_joint(label) != Ok(place) => {
                     let name = is.name_of_joint(is_fitted, place).map_or_else(|| uid.to_string(), str::to_owned);
                     patch.set(item.value, "joint", &quoted(&name));
                 }

@@ -15,7 +15,7 @@ use crate::rig::{
         template::{quoted, shorthand::Declarations},
         tree::{NodeId, Tree},
     },
-    part::PartInstance,
+    part::{PartInstance, PartTargets},
     reference::RigNameIndex,
 };
 
@@ -181,16 +181,18 @@ pub(super) fn added_tags(rig: &Rig, rigs: &PartRigs, written_out: &BTreeSet<usiz
 fn joints_set_by_changes(rigs: &PartRigs, written_out: &BTreeSet<usize>) -> HashSet<Uid> {
     let mut set = HashSet::new();
     let parts = rigs.parts.iter().enumerate().filter(|(number, _)| !written_out.contains(number));
+    let labelled = rigs.own.joints_by_label();
     for (_, (instance, part)) in parts {
+        let targets = PartTargets::new(instance, part);
         for change in &instance.changes {
             let is_set = change.translation.is_some()
                 || change.rotation.is_some()
                 || change.scale.is_some()
                 || change.label.is_some()
                 || change.locked.is_some();
-            let place = change.joint.as_ref().and_then(|label| instance.find_joint(part, label).ok());
+            let place = change.joint.as_ref().and_then(|label| targets.find_joint(label).ok());
             let onto = place.filter(|_| is_set).and_then(|place| instance.onto.get(place));
-            set.extend(onto.and_then(|label| rigs.own.find_label(label)));
+            set.extend(onto.and_then(|label| labelled.get(label.as_str()).copied()));
         }
     }
     set

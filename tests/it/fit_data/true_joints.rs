@@ -12,7 +12,7 @@ use rigsmith::{
 
 /// Mesh: file, template, and pairs of template label and name of the joint that is in its place. `@` stands for a side, as the
 /// file writes it.
-struct KnownMesh {
+struct MeshWithJoints {
     file: &'static str,
     template: &'static str,
     joints: &'static [(&'static str, &'static str)],
@@ -81,8 +81,8 @@ const LEGS_OF_FOXES: &[(&str, &str)] = &[
     ("tail_6", "Tail_Tip"),
 ];
 
-const OTHERS: [KnownMesh; 6] = [
-    KnownMesh {
+const OTHERS: [MeshWithJoints; 6] = [
+    MeshWithJoints {
         file: "gltf_skinned/CesiumMan.glb",
         template: "biped",
         joints: &[
@@ -103,7 +103,7 @@ const OTHERS: [KnownMesh; 6] = [
         ],
         sides: ["L", "R"],
     },
-    KnownMesh {
+    MeshWithJoints {
         file: "gltf_skinned/RobotExpressive.glb",
         template: "biped",
         joints: &[
@@ -120,7 +120,7 @@ const OTHERS: [KnownMesh; 6] = [
         ],
         sides: ["L", "R"],
     },
-    KnownMesh {
+    MeshWithJoints {
         file: "characters/Mage.glb",
         template: "biped",
         joints: &[
@@ -138,9 +138,9 @@ const OTHERS: [KnownMesh; 6] = [
         ],
         sides: ["l", "r"],
     },
-    KnownMesh { file: "creatures/fox-fox.glb", template: "quadruped", joints: LEGS_OF_FOXES, sides: ["L", "R"] },
-    KnownMesh { file: "creatures/fox-dog.glb", template: "quadruped", joints: LEGS_OF_FOXES, sides: ["L", "R"] },
-    KnownMesh {
+    MeshWithJoints { file: "creatures/fox-fox.glb", template: "quadruped", joints: LEGS_OF_FOXES, sides: ["L", "R"] },
+    MeshWithJoints { file: "creatures/fox-dog.glb", template: "quadruped", joints: LEGS_OF_FOXES, sides: ["L", "R"] },
+    MeshWithJoints {
         file: "creatures/bird-eagle.glb",
         template: "bird",
         joints: &[
@@ -161,7 +161,7 @@ const OTHERS: [KnownMesh; 6] = [
 ];
 
 /// Creature that no bound and no constant of the fit was chosen on.
-const HELD_BACK: KnownMesh = KnownMesh {
+const HELD_BACK: MeshWithJoints = MeshWithJoints {
     file: "gltf_skinned/Fox.glb",
     template: "quadruped",
     joints: &[
@@ -222,8 +222,8 @@ pub fn held_back(data: &Path) -> Result<Figure, Box<dyn Error>> {
     figure(data, &HELD_BACK)
 }
 
-fn figure(data: &Path, known: &KnownMesh) -> Result<Figure, Box<dyn Error>> {
-    let KnownMesh { file, template, joints, sides } = *known;
+fn figure(data: &Path, known: &MeshWithJoints) -> Result<Figure, Box<dyn Error>> {
+    let MeshWithJoints { file, template, joints, sides } = *known;
     let model = load_model(&RealDisk, &data.join(file))?;
     let globals = model.rest_globals();
     let place = |name: &str| {

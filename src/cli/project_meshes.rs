@@ -1,0 +1,31 @@
+//! Meshes of a project's rig, for commands that write or draw a character.
+
+use super::Report;
+use crate::{
+    files::{LoadedMesh, MeshState},
+    plugins::surface::RigMesh,
+    rig::Rig,
+};
+
+/// Meshes of a rig among those of its project: those that have weights, or the first one if none has. The others are told.
+pub(super) fn own_meshes(meshes: Vec<LoadedMesh>, rig: &Rig, report: &mut Report) -> Vec<RigMesh> {
+    let open = meshes.into_iter().filter(|mesh| mesh.rig == rig.uid()).filter_map(|mesh| match mesh.shape {
+        MeshState::Open { model, .. } => Some((mesh.uid, model, mesh.nodes)),
+        // The notes mention a missing mesh already.
+        MeshState::Missing { .. } => None,
+    });
+    let open: Vec<_> = open.collect();
+    let is_any_bound = open.iter().any(|(uid, ..)| rig.skin(*uid).is_some());
+    let mut own = Vec::new();
+    for (uid, model, nodes) in open {
+        let is_kept = if is_any_bound { rig.skin(uid).is_some() } else { own.is_empty() };
+        if !is_kept {
+            report
+                .notes
+                .push(format!("the mesh \"{}\" is left out: it has no weights; skin it in the window", model.name));
+            continue;
+        }
+        own.push(RigMesh::new(uid, *model, nodes.to_vec()));
+    }
+    own
+}
