@@ -118,8 +118,7 @@ fn a_creature_held_back_is_fitted() {
     assert!(body <= 7.45, "{body}: {off:?}");
 }
 
-/// Of joints that are wrong by more than 5, most are doubtful. Of doubtful ones half should be wrong: 30 of 73 were measured since
-/// hips, heads and wings are mended, which stay doubtful.
+/// Of joints that are wrong by more than 5, most are doubtful; of doubtful ones, half are wrong.
 #[test]
 fn doubt_is_honest() {
     let Some(all) = all() else { return };
@@ -134,7 +133,7 @@ fn doubt_is_honest() {
     }
     println!("of {wrong} wrong joints {told} are doubtful; of {doubtful} doubtful ones {told} are wrong");
     assert!(told as f32 >= 0.9 * wrong as f32, "{told} of {wrong}");
-    assert!(told as f32 >= 0.37 * doubtful as f32, "{told} of {doubtful}");
+    assert!(told as f32 >= 0.5 * doubtful as f32, "{told} of {doubtful}");
 }
 
 /// Every joint lies in its own limb or finger: the nearest point of the skin is painted with the joint's bone, or with the
