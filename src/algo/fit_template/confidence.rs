@@ -37,8 +37,8 @@ fn trust(value: f32, half: f32) -> f32 {
 }
 
 /// Joints that the limbs of an upright figure show by themselves, whatever its proportions are: a shoulder lies where its arm
-/// leaves the trunk, by the arm's thickness, and elbows, wrists, knees and the head lie on centre lines where these bend, end or
-/// are narrow. Hips are hidden, and ankles and toes go by lengths.
+/// leaves the trunk, by the arm's thickness, and elbows, wrists and knees lie on centre lines where these bend or end. Hips are
+/// hidden, ankles and toes go by lengths, and a big head has no neck.
 fn shown(template: &TemplateLimbs, placement: &Placement) -> Vec<bool> {
     let mut shown = vec![false; placement.places.len()];
     for limb in template.limbs.iter().filter(|_| template.is_upright()) {
@@ -49,7 +49,6 @@ fn shown(template: &TemplateLimbs, placement: &Placement) -> Vec<bool> {
             shown[joint] = match limb.kind {
                 LimbKind::Arm => is_on_line && at >= ball || is_placed && at == ball,
                 LimbKind::Leg => is_on_line && at == ball + 1,
-                LimbKind::Head => is_on_line,
                 _ => false,
             };
         }
