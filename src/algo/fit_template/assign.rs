@@ -32,7 +32,7 @@ const MOST_SPREAD: f32 = 0.6;
 const MISSING: f32 = 0.25;
 /// Penalties of a missing head, which hardly any figure lacks, and of a missing tail.
 const MISSING_HEAD: f32 = 0.4;
-const MISSING_TAIL: f32 = 0.08;
+const MISSING_TAIL: f32 = 0.1;
 /// Penalty of a missing limb in a template without sides.
 const MISSING_FREE: f32 = 0.5;
 /// Penalty of a branch that has no limb, for a branch as long as the body's reach.
@@ -52,8 +52,9 @@ const SIDED: f32 = 1.2;
 pub(super) const POSED: f32 = 0.8;
 /// Penalty of a centre of branches other than the middle of the volume, for animals.
 const OTHER_CENTRE: f32 = 0.1;
-/// Penalty of a tail or an arm that is thicker than the head, for a factor of e.
+/// Penalties of an arm or a wing, and of a tail, that is thicker than the head, for a factor of e.
 const THICKER: f32 = 0.12;
+const THICKER_TAIL: f32 = 0.3;
 /// Thickness that the trunk may have, as a factor of the head's.
 const STOUT: f32 = 1.8;
 /// Thickness that another branch may have, as a factor of the head's.
@@ -304,11 +305,14 @@ impl Search<'_> {
             let thicker = bevy::math::ops::ln(self.tree.trunk_thickness / (STOUT * thickness(head)));
             cost += THICKER * thicker.max(0.0);
             for (limb, leaf) in limbs.iter().zip(chosen) {
-                if let Some(leaf) =
-                    leaf.filter(|_| matches!(limb.kind, LimbKind::Tail | LimbKind::Arm | LimbKind::Wing))
-                {
+                let weight = match limb.kind {
+                    LimbKind::Tail => THICKER_TAIL,
+                    LimbKind::Arm | LimbKind::Wing => THICKER,
+                    _ => continue,
+                };
+                if let Some(leaf) = *leaf {
                     let thicker = bevy::math::ops::ln(thickness(leaf) / thickness(head));
-                    cost += THICKER * thicker.max(0.0);
+                    cost += weight * thicker.max(0.0);
                 }
             }
         }
@@ -484,6 +488,12 @@ impl Search<'_> {
                 cost += 2.0 * (away - nearest);
             }
         }
-        Some(Hypothesis { tree: self.number, leaves, alignment, pairs, cost, rest, weight })
+        let mut found = Hypothesis { tree: self.number, leaves, alignment, pairs, cost, rest, weight };
+        if !template.is_upright() {
+            let turn = level::level(template, self.tree, &found, self.directions).unwrap_or(alignment.rotation);
+            let up = turn * Vec3::Y;
+            found.cost += self.off_ground(&found.leaves, up, alignment.scale);
+        }
+        Some(found)
     }
 }

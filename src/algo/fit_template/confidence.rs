@@ -26,12 +26,34 @@ const ROOTED: f32 = 0.63;
 const FREE: f32 = 0.2;
 /// Confidence in the head and the tail of an animal, whose lengths vary most, as a share of that in its legs.
 const STEM: f32 = 0.87;
+/// Confidence in the joints that an upright figure's limbs show by themselves, in a figure without doubt.
+const SHOWN: f32 = 0.76;
 /// Confidence in the spine of an animal between the ends of its trunk, in a figure without doubt.
 const BETWEEN: f32 = 0.9;
 
 fn trust(value: f32, half: f32) -> f32 {
     let q = value / half;
     1.0 / (1.0 + q * q)
+}
+
+/// Joints that the limbs of an upright figure show by themselves, whatever its proportions are: a shoulder lies where its arm
+/// leaves the trunk, by the arm's thickness, and elbows, wrists and knees lie on centre lines where these bend or end. Hips are
+/// hidden, ankles and toes go by lengths, and a big head has no neck.
+fn shown(template: &TemplateLimbs, placement: &Placement) -> Vec<bool> {
+    let mut shown = vec![false; placement.places.len()];
+    for limb in template.limbs.iter().filter(|_| template.is_upright()) {
+        let ball = template.ball_joint(limb).unwrap_or(0);
+        for (at, &joint) in limb.joints.iter().enumerate() {
+            let is_on_line = placement.reasons[joint] == FitReason::CentreLine;
+            let is_placed = placement.reasons[joint] == FitReason::Proportion;
+            shown[joint] = match limb.kind {
+                LimbKind::Arm => is_on_line && at >= ball || is_placed && at == ball,
+                LimbKind::Leg => is_on_line && at == ball + 1,
+                _ => false,
+            };
+        }
+    }
+    shown
 }
 
 /// Confidence of each joint with its reason.
@@ -64,6 +86,7 @@ pub(super) fn joints(
         template.is_on_fours()
             && (heads.contains(&joint) || template.trunk.contains(&joint) && !ends.contains(&Some(&joint)))
     };
+    let shown = shown(template, placement);
     (0..places.len())
         .map(|joint| {
             let (mut confidence, mut reason) = match body {
@@ -86,7 +109,8 @@ pub(super) fn joints(
                         _ if is_between(joint) => BETWEEN * doubt,
                         _ => 0.52 * doubt,
                     };
-                    (confidence, placement.reasons[joint])
+                    let by_itself = if shown[joint] { trust(best.posed_cost(), HALF_COST).sqrt() } else { 0.0 };
+                    (confidence.max(SHOWN * by_itself), placement.reasons[joint])
                 }
             };
             if confidence < 0.5 && reason == FitReason::Surface {

@@ -1,5 +1,6 @@
 //! Placement: the template's joints on the centre lines of their branches and in the sections of the trunk.
 
+mod legs;
 mod trunk;
 
 use glam::{Quat, Vec3};
@@ -20,7 +21,7 @@ const SPINE_HEIGHT: f32 = 0.52;
 const SECTION: f32 = 2.5;
 /// Radii of a limb between where it leaves the trunk and the ball that it turns about.
 const BALL_OF_SHOULDER: f32 = 1.2;
-const BALL_OF_HIP: f32 = 1.4;
+const BALL_OF_HIP: f32 = 1.1;
 /// Distance of a joint from the line between its neighbours above which a limb is bent, as a share of their distance.
 const BENT: f32 = 0.04;
 
@@ -28,20 +29,16 @@ const BENT: f32 = 0.04;
 const WING: [f32; 3] = [0.0, 0.17, 0.38];
 
 /// Root of a wing, as a share of the way from the middle of the trunk to the place at which the wing leaves it.
-const WING_ROOT: f32 = 0.4;
+const WING_ROOT: f32 = 0.3;
 
 /// Place of the bones in a wing, as a share of the way from its centre line to its leading edge.
-const LEADING_EDGE: f32 = 0.55;
+const LEADING_EDGE: f32 = 0.4;
 
-/// Share of a leg's free length above which the trunk's flesh hides how it bends, and the share of the template's bend that
-/// a joint takes there.
-const HIDDEN: f32 = 0.5;
-const SHAPED: f32 = 0.9;
-/// Share of a leg's free length at which its distance from the plane of symmetry is taken, the share by which its root
-/// follows it, and the cosine of its angle to up from which on it hangs straight down.
-const LEG: f32 = 0.7;
-const LEG_WIDTH: f32 = 0.8;
-const HANGS: f32 = 0.85;
+/// Rounds in which the joints of an animal's limb move to its bends: a hock that moves up takes the knee along, and shows more of
+/// its own bend then.
+const ROUNDS: usize = 2;
+/// Share of the way from the crown to where the neck enters the head by which the head's joint lies inside of the head.
+const IN_SKULL: f32 = 0.1;
 
 /// The joints of a template in the mesh.
 #[derive(Debug, Clone)]
@@ -214,7 +211,9 @@ impl Work<'_> {
                 *length = whole * ratio * (1.0 - share);
             }
         } else {
-            self.bend(limb, line, &mut lengths, root);
+            for _ in 0..if self.template.is_upright() { 1 } else { ROUNDS } {
+                self.bend(limb, line, &mut lengths, root);
+            }
         }
         let whole = lengths[0];
         Reach { lengths, root, whole, measured }
@@ -259,71 +258,6 @@ impl Work<'_> {
         }
     }
 
-    /// Draws the joints of an animal's leg that lie where the leg runs into the trunk to the shape that the template has
-    /// between their neighbours: the flesh about a knee hides its bend.
-    fn hold_bends(&self, limb: &Limb, line: &CentreLine, lengths: &[f32], places: &mut [Option<Vec3>]) {
-        if limb.kind != LimbKind::Leg || self.template.is_upright() {
-            return;
-        }
-        for (joints, length) in limb.joints.windows(3).zip(lengths.iter().skip(1)) {
-            let near = length / line.free.max(1e-9);
-            let [before, here, after] = [joints[0], joints[1], joints[2]];
-            if near < HIDDEN {
-                continue;
-            }
-            let (Some(a), Some(c), Some(b)) = (places[before], places[here], places[after]) else { continue };
-            let [from, at, to] = [before, here, after].map(|joint| self.template.positions[joint]);
-            let chord = to - from;
-            let share = (at - from).dot(chord) / chord.length_squared().max(1e-12);
-            let out = at - from - chord * share;
-            let way = b - a;
-            let side = self.stretch.turn(out);
-            let side = (side - way * side.dot(way) / way.length_squared().max(1e-12)).normalize_or_zero();
-            let shaped = a + way * share + side * (out.length() / chord.length().max(1e-9) * way.length());
-            places[here] = Some(c.lerp(shaped, ((near - HIDDEN) / (1.0 - HIDDEN)).min(1.0).sqrt() * SHAPED));
-        }
-    }
-
-    /// Moves the joints of an animal's leg that the trunk hides over the part of the leg that hangs free: as far from the plane
-    /// of symmetry as that tells, and as the template has them.
-    fn keep_over_foot(&self, limb: &Limb, line: &CentreLine, lengths: &[f32], places: &mut [Option<Vec3>]) {
-        let Some(attach) = places[limb.attach].filter(|_| limb.kind == LimbKind::Leg && !self.template.is_upright())
-        else {
-            return;
-        };
-        let turn = self.hypothesis.alignment.rotation;
-        let (left, up) = (turn * Vec3::X, turn * Vec3::Y);
-        let of = |joint: usize| self.template.positions[joint].x - self.template.positions[limb.attach].x;
-        let below = of(limb.joints[limb.joints.len() / 2]);
-        let free = |share: f32| line.at(line.free * share);
-        let hangs = (free(LEG) - free(1.0 - LEG)).normalize_or_zero().dot(up);
-        if below.abs() < 1e-6 || hangs < HANGS {
-            return;
-        }
-        let wide = (free(LEG) - attach).dot(left) / below;
-        for (&joint, length) in limb.joints.iter().zip(lengths).filter(|(_, length)| **length > LEG * line.free) {
-            let hidden = ((length / line.free - LEG) / (1.0 - LEG)).min(1.0);
-            if let Some(place) = &mut places[joint] {
-                *place += left * (wide * of(joint) - (*place - attach).dot(left)) * hidden;
-            }
-        }
-    }
-
-    /// The root of a leg that hangs straight down, as far from the plane of symmetry as the leg itself tells.
-    fn over_leg(&self, limb: &Limb, line: &CentreLine, attach: Vec3, root: Vec3) -> Vec3 {
-        let turn = self.hypothesis.alignment.rotation;
-        let (left, up) = (turn * Vec3::X, turn * Vec3::Y);
-        let of = |joint: usize| self.template.positions[joint].x - self.template.positions[limb.attach].x;
-        let below = of(limb.joints[limb.joints.len() / 2]);
-        let share = of(limb.joints[0]) / below;
-        let hangs = (line.at(line.free * LEG) - line.at(line.free * (1.0 - LEG))).normalize_or_zero().dot(up) > HANGS;
-        if limb.kind != LimbKind::Leg || !hangs || below.abs() < 1e-6 || !(0.0..=1.5).contains(&share) {
-            return root;
-        }
-        let wide = (line.at(line.free * LEG) - attach).dot(left) * share;
-        root + left * (wide - (root - attach).dot(left)) * LEG_WIDTH
-    }
-
     /// Distance between the middles of shoulders and of hips over that of the template.
     fn ball_scale(&self) -> f32 {
         let middle = |kind: LimbKind| {
@@ -351,13 +285,13 @@ impl Work<'_> {
         at + back * (behind * radius).min(0.4 * line.free)
     }
 
-    /// Lengths of the joints of neck and head and of the chest from the crown: the head turns where the neck is
+    /// Lengths of the joints of neck and head and of the chest from the crown: the head turns a little above where the neck is
     /// narrowest.
     fn neck_lengths(&self, limb: &Limb, line: &CentreLine, chest: Vec3) -> (Vec<f32>, f32) {
         let from = line.lengths.partition_point(|&l| l < 0.3 * line.free).min(line.free_count - 1);
         let narrow =
             (from..line.free_count).reduce(|a, b| if line.radii[b] < line.radii[a] { b } else { a }).unwrap_or(from);
-        let head = line.lengths[narrow];
+        let head = line.lengths[narrow] * (1.0 - IN_SKULL);
         let below = head + line.at(head).distance(chest);
         let whole = self.template.length(limb.attach, limb.joints[limb.joints.len() - 1]).max(1e-9);
         let share = |j: usize| self.template.length(limb.attach, j) / whole;
@@ -430,14 +364,24 @@ impl Work<'_> {
         place + left * centroid.dot(left) + across * depth
     }
 
-    /// The section of the trunk at a place: how far it reaches from there across the trunk, at its middle, and its centroid.
+    /// The section of the trunk at a place: how far it reaches from there across the trunk, at its middle, and its centroid. What
+    /// lies over an animal's shoulders and rump may belong to its head and its tail.
     fn section(&self, place: Vec3, along: Vec3, left: Vec3, across: Vec3) -> Option<(f32, f32, Vec3)> {
         let branches = &self.tree.branches;
         let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
         let (mut sum, mut count) = (Vec3::ZERO, 0);
+        let limbs = self.template.limbs.iter().zip(&self.hypothesis.leaves);
+        let ends: Vec<usize> = limbs
+            .filter(|(limb, _)| self.template.is_on_fours() && matches!(limb.kind, LimbKind::Head | LimbKind::Tail))
+            .filter_map(|(_, leaf)| *leaf)
+            .collect();
         for (node, centre) in self.graph.centres.iter().enumerate() {
             let arc = branches.arc_of[node];
-            if arc == u32::MAX || branches.arcs[arc as usize].children.is_empty() {
+            if arc == u32::MAX {
+                continue;
+            }
+            let arc = arc as usize;
+            if branches.arcs[arc].children.is_empty() && !ends.contains(&arc) {
                 continue;
             }
             let away = *centre - place;

@@ -1,4 +1,4 @@
-//! Front of a figure that does not stand upright: where its feet point, and in which order its limbs end.
+//! Front of a figure that does not stand upright: where its feet point, in which order its limbs end, and what it stands on.
 
 use glam::Vec3;
 
@@ -12,8 +12,21 @@ const FOOT: f32 = 0.2;
 /// template's size, from which on two of them have an order.
 const DISORDER: f32 = 0.6;
 const BEFORE: f32 = 0.1;
+/// Penalty of legs that end as high over the lowest end of all branches as the template is large.
+const OFF_GROUND: f32 = 1.0;
 
 impl Search<'_> {
+    /// The penalty of legs that end above the lowest of all branches, in the mean: what stands has nothing under its feet, and
+    /// ears are no legs.
+    pub(super) fn off_ground(&self, leaves: &[Option<usize>], up: Vec3, scale: f32) -> f32 {
+        let height = |leaf: usize| self.tree.lines[leaf].at(0.0).dot(up);
+        let lowest = self.leaves.iter().map(|&leaf| height(leaf)).fold(f32::INFINITY, f32::min);
+        let limbs = self.template.limbs.iter().zip(leaves);
+        let legs = limbs.filter_map(|(limb, leaf)| leaf.filter(|_| limb.kind == LimbKind::Leg));
+        let (sum, count) = legs.fold((0.0, 0.0), |(sum, count), leg| (sum + height(leg) - lowest, count + 1.0));
+        OFF_GROUND * sum / (f32::max(count, 1.0) * self.template.size * scale).max(1e-6)
+    }
+
     /// The penalty of a front that the order of limbs contradicts, and feet more than the opposite one: hooves point nowhere.
     pub(super) fn backwards(&self, leaves: &[Option<usize>], forward: Vec3, scale: f32) -> f32 {
         let feet = self.backward_feet(leaves, forward) - self.backward_feet(leaves, -forward);
