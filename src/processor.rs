@@ -10,6 +10,7 @@
 
 mod amount;
 mod anchors;
+mod attribute_list;
 mod authoring;
 mod axis;
 mod builder;
@@ -40,6 +41,7 @@ mod visibility;
 mod world;
 
 pub use amount::Amount;
+pub use attribute_list::AttributeList;
 pub use authoring::{check_finite, check_limits};
 pub use axis::Axis;
 pub use builder::{Builder, CommandCounts, CommandDependency, CommandState, CommandStatus, FindError, RunReport};

@@ -244,27 +244,23 @@ pub(super) fn update_instances(world: &mut World) {
 }
 
 /// Differences between two builds that do not follow each other.
-struct BuildDifference {
+struct BuildChanges {
     from: Arc<BuiltTemplate>,
     to: Arc<BuiltTemplate>,
     changes: Arc<[Change]>,
 }
 
 /// Differences of a build from the one that an instance ran: the build before it, an older one, or one of another template.
-fn changes_since(
-    from: &Arc<BuiltTemplate>,
-    to: &Arc<BuiltTemplate>,
-    known: &mut Vec<BuildDifference>,
-) -> Arc<[Change]> {
+fn changes_since(from: &Arc<BuiltTemplate>, to: &Arc<BuiltTemplate>, known: &mut Vec<BuildChanges>) -> Arc<[Change]> {
     if to.way.as_ref().is_some_and(|way| way.described_since(from).is_some()) {
         return to.changes.clone();
     }
-    let is_it = |known: &&BuildDifference| Arc::ptr_eq(&known.from, from) && Arc::ptr_eq(&known.to, to);
+    let is_it = |known: &&BuildChanges| Arc::ptr_eq(&known.from, from) && Arc::ptr_eq(&known.to, to);
     if let Some(known) = known.iter().find(is_it) {
         return known.changes.clone();
     }
     let changes: Arc<[Change]> = update(Some(&from.rig), &from.rig, &to.rig, Take::Theirs).changes.into();
-    known.push(BuildDifference { from: from.clone(), to: to.clone(), changes: changes.clone() });
+    known.push(BuildChanges { from: from.clone(), to: to.clone(), changes: changes.clone() });
     changes
 }
 

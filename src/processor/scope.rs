@@ -10,13 +10,13 @@ use trace::world_children;
 pub(super) use trace::{Read, Trace};
 
 use super::{
-    Creation, ModuleError,
+    AttributeList, Creation, ModuleError,
     resolve::Asker,
     world::{Aspect, Birth, NodeId, Value, World},
 };
 use crate::{
     mesh::model::Trs,
-    rig::{Attribute, Constraint, ControlData, Dependency, LayerData, NodeType, Origin, SwitchData, Uid, created_uid},
+    rig::{Constraint, ControlData, Dependency, LayerData, NodeType, Origin, SwitchData, Uid, created_uid},
 };
 
 /// The side of the body that a node is on.
@@ -239,10 +239,10 @@ impl BuildScope<'_> {
     }
 
     /// The attributes of a node, in order.
-    pub fn attributes(&mut self, node: NodeId) -> Arc<[Attribute]> {
+    pub fn attributes(&mut self, node: NodeId) -> AttributeList {
         match self.read(node, Aspect::Attributes) {
             Some(Value::Attributes(attributes)) => attributes,
-            _ => Arc::new([]),
+            _ => AttributeList::default(),
         }
     }
 

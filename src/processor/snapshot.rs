@@ -187,7 +187,7 @@ fn read_values(world: &World, node: NodeId, place: u32, built: &mut BuiltNode) {
         _ => None,
     };
     built.attributes = match world.read_at(node, Aspect::Attributes, place) {
-        Some(Value::Attributes(attributes)) => attributes.clone(),
+        Some(Value::Attributes(attributes)) => attributes.iter().cloned().collect(),
         _ => NO_ATTRIBUTES.clone(),
     };
 }

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use bevy::platform::collections::{HashMap, HashSet};
 
-use super::{ModuleError, anchors::Anchors, exclusion::Exclusions, module::BuildLimits};
+use super::{AttributeList, ModuleError, anchors::Anchors, exclusion::Exclusions, module::BuildLimits};
 use crate::{
     mesh::model::Trs,
-    rig::{Attribute, Constraint, ControlData, LayerData, NodeType, Origin, RigInput, SwitchData, Uid},
+    rig::{Constraint, ControlData, LayerData, NodeType, Origin, RigInput, SwitchData, Uid},
 };
 
 /// A node, as long as its builder lives: nodes that are rolled back keep their place.
@@ -80,7 +80,7 @@ pub enum Value {
     /// See [`Aspect::Layer`].
     Layer(Arc<LayerData>),
     /// See [`Aspect::Attributes`].
-    Attributes(Arc<[Attribute]>),
+    Attributes(AttributeList),
     /// Constraint, with its place among the constraints that the same command made.
     Constraint(u32, Arc<Constraint>),
     /// Switch, with its place among the switches that the same command made.
@@ -92,10 +92,7 @@ impl Value {
     pub(super) fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Base(a), Self::Base(b)) => bits(a) == bits(b),
-            (Self::Attributes(a), Self::Attributes(b)) => {
-                let default = |list: &[Attribute]| list.iter().map(|a| a.default.to_bits()).collect::<Vec<_>>();
-                a == b && default(a) == default(b)
-            }
+            (Self::Attributes(a), Self::Attributes(b)) => a.is_same(b),
             _ => self == other,
         }
     }

@@ -184,7 +184,10 @@ fn a_rig_without_a_file_gets_one_with_parts() {
     desk.drop(&["arm_l", "elbow_l"], false);
     fs::remove_file(desk.path()).unwrap();
     let text = desk.save();
-    assert!(text.contains("format: 2") && text.contains("limb.rig.ron") && text.contains("\"fk\""), "{text}");
+    assert!(
+        text.contains("format: 2") && text.contains(r#"(part: "limb.rig.ron", onto: ["arm_l", "elbow_l"])"#),
+        "{text}"
+    );
     assert_eq!(desk.instances(), [["arm_l", "elbow_l"]]);
     // Beside another file, where the part is not found, it is written out, and the person is told.
     let elsewhere = tempfile::tempdir().unwrap();

@@ -70,7 +70,7 @@ impl BuildScope<'_> {
     pub fn add_attribute(&mut self, node: NodeId, attribute: Attribute) -> Result<(), ModuleError> {
         self.check_inside(Some(node))?;
         let name = &attribute.name;
-        let mut list = self.attributes(node).to_vec();
+        let list = self.attributes(node);
         if name.trim().is_empty() {
             return Err(ModuleError::parameter("name", "an attribute needs a name"));
         }
@@ -91,8 +91,7 @@ impl BuildScope<'_> {
             return Err(ModuleError::TooMany { what: "attributes of one node", name: "attributes", limit });
         }
         let default = attribute.clamp(attribute.default);
-        list.push(Attribute { default, ..attribute });
-        self.write(node, Aspect::Attributes, Value::Attributes(list.into()));
+        self.write(node, Aspect::Attributes, Value::Attributes(list.with(Attribute { default, ..attribute })));
         Ok(())
     }
 
