@@ -2,6 +2,7 @@
 
 mod dependencies;
 mod find;
+mod finite;
 mod follow;
 mod loops;
 mod status;
@@ -441,8 +442,7 @@ impl Builder {
             return Err(error_references::as_written(problem, params, &self.world, asker.place));
         }
         self.world.check_work()?;
-        self.check_loops(&trace.writes, asker.place + 1)?;
-        Ok(())
+        Ok(self.check_writes(number, &trace.writes, asker.place + 1)?)
     }
 
     /// Removes what a command wrote, and returns it; unregisters what it read.

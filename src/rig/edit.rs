@@ -57,7 +57,7 @@ pub enum RigEdit {
         /// Index among the siblings there.
         index: usize,
     },
-    /// Renames a joint.
+    /// Renames a joint; an empty label is none.
     SetLabel(Uid, Option<String>),
     /// Puts a joint into a local group.
     SetGroup(Uid, Option<Uid>),
@@ -280,6 +280,8 @@ impl Rig {
             }
             RigEdit::SetParent { joint, parent, index } => self.set_parent(*joint, *parent, *index)?,
             RigEdit::SetLabel(uid, label) => {
+                // An empty label is none, as on entities.
+                let label = label.clone().filter(|label| !label.is_empty());
                 let before = std::mem::replace(&mut self.joint_mut(*uid)?.data.label, label.clone());
                 self.label_index.change(before.as_deref(), label.as_deref());
                 RigEdit::SetLabel(*uid, before)
@@ -444,8 +446,9 @@ impl Rig {
         let siblings = self.siblings_mut(parent)?;
         siblings.insert(index.min(siblings.len()), data.uid);
         self.tags.extend(data.tags.iter().map(|tag| (tag.uid, data.uid)));
-        self.label_index.change(None, data.label.as_deref());
-        let data = JointData { tags, ..data.clone() };
+        let label = data.label.clone().filter(|label| !label.is_empty());
+        self.label_index.change(None, label.as_deref());
+        let data = JointData { tags, label, ..data.clone() };
         let uid = data.uid;
         self.joints.insert(uid, Arc::new(RigJoint { data, parent, children: Vec::new() }));
         // `RemoveJoint` also removes the joint's offset from the pose; the inverse restores an offset that the uid

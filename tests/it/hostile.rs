@@ -330,6 +330,11 @@ fn files_and_builds_stay_within_their_memory() {
     fs::write(at("longer.rig"), skeleton(64_000, true)).unwrap();
     fs::write(at("unknown.rig.ron"), tags(6_000, |_| command("nope", ""))).unwrap();
     fs::write(at("nulls.rig.ron"), chain_of_nulls(1_500)).unwrap();
+    // Nodes that get one attribute after the other.
+    let attributes: Vec<String> = (0..1_000).map(|n| format!("attribute(name: \"a{n}\")")).collect();
+    let joint = |n: usize| format!("(label: \"j{n}\", tags: [{}])", attributes.join(", "));
+    let joints: Vec<String> = (0..12).map(joint).collect();
+    fs::write(at("attributes.rig.ron"), format!("(format: 2, name: \"n\", joints: [{}])", joints.join(", "))).unwrap();
     let size = |file: &str| fs::metadata(at(file)).unwrap().len();
     let cases = [
         (&["info", "buffers.gltf"][..], size("buffers.gltf") + 10_000_000),
@@ -355,6 +360,8 @@ fn files_and_builds_stay_within_their_memory() {
         (&["build", "long.rig", "-o", "built.rig.ron"], size("long.rig")),
         (&["convert", "long.rig", "long.rig.ron"], size("long.rig")),
         (&["build", "nulls.rig.ron"], size("nulls.rig.ron")),
+        (&["build", "attributes.rig.ron"], size("attributes.rig.ron")),
+        (&["check", "attributes.rig.ron"], size("attributes.rig.ron")),
     ];
     for (args, size) in cases {
         let (ended, _) = json_answer(folder.path(), args);
