@@ -84,8 +84,9 @@ fn each_limit_can_be_set_and_is_named_by_its_error() {
 fn commands_are_given_up_when_their_time_is_over() {
     let folder = folder();
     let walker = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/retarget/walker.bvh");
-    let commands: [(&[&str], &str); 4] = [
+    let commands: [(&[&str], &str); 5] = [
         (&["check", "tags.rig.ron"], "checking the files"),
+        (&["pose", "tags.rig.ron", "-o", "out.glb"], "building the rig"),
         (&["build", "tags.rig.ron", "-o", "out.glb"], "building the rig"),
         (&["animate", "tags.rig.ron", walker, "-o", "out.anim.ron"], "building the rig"),
         (&["merge", "tags.rig.ron", "tags.rig.ron", "-o", "out.rig.ron"], "merging the rigs"),
