@@ -1,7 +1,7 @@
 //! Nodes that are despawned, however deep their hierarchy is.
 //!
-//! Bevy despawns the children of an entity within the despawning of that entity, and their children within theirs: a chain of a
-//! few thousand joints takes more stack than a thread has. Deep hierarchies are taken apart before.
+//! Bevy despawns the children of an entity while it despawns that entity, and their children while it despawns them: a chain
+//! of a few thousand joints takes more stack than a thread has. Deep hierarchies are taken apart before.
 
 use bevy::{ecs::entity::EntityHashSet, prelude::*};
 
@@ -24,19 +24,28 @@ pub(in crate::plugins) fn allow_any_depth(app: &mut App) {
 /// Despawns the nodes of an instance. What others hung on them stays, on the instance.
 pub(crate) fn despawn_nodes(world: &mut World, instance: Entity) {
     let nodes: Vec<Entity> = world.get::<RigNodes>(instance).map(|nodes| nodes.iter().collect()).unwrap_or_default();
-    let is_hung = |child: &Entity| world.get::<NodeOf>(*child).is_none_or(|of| of.0 != instance);
     let children = nodes.iter().filter_map(|node| world.get::<Children>(*node));
-    let hung: Vec<Entity> = children.flat_map(|children| children.iter()).filter(is_hung).collect();
+    let below = children.flat_map(|children| children.iter());
+    let hung: Vec<Entity> = below.filter(|child| is_of_another(world, *child, instance)).collect();
     for child in hung {
         world.entity_mut(child).insert(ChildOf(instance));
     }
-    let deep = deep_below(nodes, |entity| world.get(entity), |entity| world.get(entity));
+    let now = &*world;
+    let is_top =
+        |node: &Entity| now.get::<ChildOf>(*node).is_none_or(|above| is_of_another(now, above.parent(), instance));
+    let tops: Vec<Entity> = nodes.into_iter().filter(is_top).collect();
+    let deep = deep_below(tops, |entity| now.get(entity), |entity| now.get(entity));
     match deep {
         Some(found) => despawn_apart(world, &found),
         None => {
             world.entity_mut(instance).despawn_related::<RigNodes>();
         }
     }
+}
+
+/// True for an entity that is no node of an instance.
+fn is_of_another(world: &World, entity: Entity, instance: Entity) -> bool {
+    world.get::<NodeOf>(entity).is_none_or(|of| of.0 != instance)
 }
 
 /// Queues the despawning of all that goes with a rig, if it hangs deep below it. Commands of observers run before those with
@@ -53,14 +62,14 @@ fn take_apart(
     }
 }
 
-/// All that is despawned together with some entities, and those themselves; `None` if the hierarchy is shallow.
+/// All that is despawned together with the tops of hierarchies, and those themselves; `None` if the hierarchies are shallow.
 fn deep_below<'w>(
-    entities: Vec<Entity>,
+    mut tops: Vec<Entity>,
     children: impl Fn(Entity) -> Option<&'w Children>,
     nodes: impl Fn(Entity) -> Option<&'w RigNodes>,
 ) -> Option<Vec<Entity>> {
-    let (mut found, mut seen) = (Vec::new(), EntityHashSet::default());
-    let (mut tops, mut depth) = (entities, 0);
+    let (mut found, mut seen): (Vec<Entity>, _) = (Vec::new(), EntityHashSet::default());
+    let mut depth = 0;
     while !tops.is_empty() {
         let first = found.len();
         found.extend(tops.into_iter().filter(|entity| seen.insert(*entity)));
