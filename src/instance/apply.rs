@@ -19,8 +19,8 @@ use super::{
 use crate::{
     plugins::{
         animation::{PlayedClip, RigClips},
-        runtime::{ControlPose, InstanceMode, RigNodes, RigRuntime, furnish_instance, spawn_instance},
-        schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer, NodeOf},
+        runtime::{ControlPose, InstanceMode, RigRuntime, despawn_nodes, furnish_instance, spawn_instance},
+        schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer},
     },
     processor::{ClipReport, PoseNote},
     rig::{
@@ -468,18 +468,6 @@ fn set<C: Component + PartialEq>(entity: &mut EntityWorldMut, wanted: Option<C>)
         Some(wanted) => entity.insert(wanted),
         None => entity.remove::<C>(),
     };
-}
-
-/// Despawns the nodes of an instance. What others hung on them stays, on the instance.
-fn despawn_nodes(world: &mut World, instance: Entity) {
-    let nodes: Vec<Entity> = world.get::<RigNodes>(instance).map(|nodes| nodes.iter().collect()).unwrap_or_default();
-    let is_hung = |child: &Entity| world.get::<NodeOf>(*child).is_none_or(|of| of.0 != instance);
-    let children = nodes.iter().filter_map(|node| world.get::<Children>(*node));
-    let hung: Vec<Entity> = children.flat_map(|children| children.iter()).filter(is_hung).collect();
-    for child in hung {
-        world.entity_mut(child).insert(ChildOf(instance));
-    }
-    world.entity_mut(instance).despawn_related::<RigNodes>();
 }
 
 /// Despawns the nodes of an entity that is no instance any more.

@@ -124,11 +124,16 @@ struct SkinFit {
 impl LoadedSkin {
     /// Place of a node when the rig is at rest: that of the rig's node, or below one.
     fn rig_place(&self, node: Entity, rig: &BTreeMap<Uid, Affine3A>) -> Affine3A {
-        if let Some(place) = self.nodes.get(&node).and_then(|uid| rig.get(uid)) {
-            return *place;
+        let (mut at, mut place, mut below) = (Some(node), None, Vec::new());
+        while let Some(node) = at {
+            place = self.nodes.get(&node).and_then(|uid| rig.get(uid)).copied();
+            if place.is_some() {
+                break;
+            }
+            below.push(self.rests.get(&node).map_or(Affine3A::IDENTITY, |rest| rest.local.compute_affine()));
+            at = self.parents.get(&node).copied();
         }
-        let local = self.rests.get(&node).map_or(Affine3A::IDENTITY, |rest| rest.local.compute_affine());
-        self.parents.get(&node).map_or(local, |above| self.rig_place(*above, rig) * local)
+        below.into_iter().rev().fold(place.unwrap_or(Affine3A::IDENTITY), |above, local| above * local)
     }
 
     fn file_place(&self, node: Entity) -> Affine3A {

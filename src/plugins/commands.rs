@@ -198,6 +198,7 @@ fn build_rigs(
     mut edited: MessageReader<EditReport>,
     mut rigs: Query<(&Rig, Option<&mut Processor>, Option<&BuildResult>, Has<BuildFailure>)>,
     modules: Res<RigModules>,
+    limits: Res<RigLimits>,
     mut done: MessageWriter<BuildDone>,
 ) {
     let mut changed: Vec<(Entity, Vec<RigEdit>, bool)> = Vec::new();
@@ -231,6 +232,7 @@ fn build_rigs(
         }
         if processor.follow {
             let goal = processor.goal.unwrap_or(usize::MAX);
+            processor.builder.set_deadline(limits.deadline());
             let report = processor.builder.run_to(goal);
             finish(&mut commands, entity, &mut processor.builder, (built, failed), report, &mut done);
         }
@@ -263,6 +265,7 @@ fn build_rigs(
                 &mut fresh
             }
         };
+        processor.builder.set_deadline(limits.deadline());
         let report = carry_out(processor, rig, step);
         finish(&mut commands, *entity, &mut processor.builder, (built, failed), report, &mut done);
         if is_fresh {

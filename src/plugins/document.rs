@@ -28,6 +28,7 @@ use super::{
     commands::{BuildResult, RigModules},
     configure_sets,
     history::{RecordedOperation, RigHistory, joint_name},
+    runtime::despawn::allow_any_depth,
 };
 pub use super::{
     schema::{Joint, NodeLabel, NodeOf},
@@ -46,6 +47,7 @@ pub struct DocumentPlugin;
 impl Plugin for DocumentPlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
+        allow_any_depth(app);
         app.register_required_components::<Rig, Transform>();
         app.register_required_components::<Rig, Selection>();
         app.register_required_components::<Rig, HoveredNode>();

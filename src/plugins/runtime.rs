@@ -11,6 +11,7 @@
 //! writes the `Transform`s of all nodes that moved. The document's pose is passed on only where the document changes.
 
 mod attachments;
+pub(in crate::plugins) mod despawn;
 mod driven_attributes;
 mod hand_over;
 mod inputs;
@@ -21,7 +22,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use bevy::{math::Affine3A, prelude::*};
 
-pub(crate) use self::systems::is_near;
+pub(crate) use self::{despawn::despawn_nodes, systems::is_near};
 pub use self::{
     hand_over::{HandOver, OutsideTransform},
     inputs::RigInputs,
@@ -40,6 +41,7 @@ pub struct RuntimePlugin;
 impl Plugin for RuntimePlugin {
     fn build(&self, app: &mut App) {
         configure_sets(app);
+        despawn::allow_any_depth(app);
         app.add_message::<EditRefusal>().add_systems(
             PostUpdate,
             (

@@ -427,9 +427,8 @@ impl Builder {
         let Some(asker) = self.asker(number) else {
             return Err(ModuleError::other("the joint of the tag is not in the built rig").into());
         };
-        if let Some(deadline) = &self.modules.deadline {
-            deadline.check("building the rig")?;
-        }
+        let mut deadlines = self.modules.deadline.iter().chain(&self.world.deadline);
+        deadlines.try_for_each(|deadline| deadline.check("building the rig"))?;
         let command = &mut self.commands[number as usize];
         let modules = &self.modules;
         let loaded = command.loaded.get_or_insert_with(|| modules.load(&command.module, &command.params));

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use bevy::platform::collections::{HashMap, HashSet};
 
-use super::{AttributeList, ModuleError, anchors::Anchors, exclusion::Exclusions, module::BuildLimits};
+use super::{
+    AttributeList, ModuleError, anchors::Anchors, deadline::Deadline, exclusion::Exclusions, module::BuildLimits,
+};
 use crate::{
     mesh::model::Trs,
     rig::{Constraint, ControlData, LayerData, NodeType, Origin, RigInput, SwitchData, Uid},
@@ -217,6 +219,8 @@ pub(super) struct World {
     pub anchors: Anchors,
     /// Limits on the nodes and constraints that commands make.
     pub limits: BuildLimits,
+    /// End of the time in which commands may begin; `None` for no end.
+    pub deadline: Option<Deadline>,
     /// Number of slots of nodes and constraints that commands make.
     made: usize,
     /// Nodes and constraints that are there, counted by the running command once there may be too many.

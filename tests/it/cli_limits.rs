@@ -41,8 +41,10 @@ fn each_limit_can_be_set_and_is_named_by_its_error() {
     let biped = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/models/biped.obj");
     let skeleton = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/models/biped.rig");
     let out = ["-o", "out.glb"];
+    let (code, said) = rigsmith(folder.path(), &["skin", "chain.rig", "b.obj", "-o", "skinned.glb"]);
+    assert_eq!(code, 0, "{said}");
     // Command, limit that is one too low, and what its error tells beside the name of the limit.
-    let cases: [(&[&str], &str, &str); 15] = [
+    let cases: [(&[&str], &str, &str); 16] = [
         (&["info", "chain.rig"], "joints=5", "the rig has 6 joints"),
         (&["check", "chain.rig"], "joints=5", "the rig has 6 joints"),
         (&["convert", "chain.rig", "out.rig.ron"], "joints=5", "the rig has 6 joints"),
@@ -51,6 +53,7 @@ fn each_limit_can_be_set_and_is_named_by_its_error() {
         (&["info", "b.obj"], "points=3", "the mesh has 4 points"),
         (&["check", "b.obj"], "triangles=3", "the mesh has 4 triangles"),
         (&["skin", "chain.rig", "b.obj", out[0], out[1]], "points=3", "the mesh has 4 points"),
+        (&["info", "skinned.glb"], "influences=3", "influences, and no more than 3 are taken"),
         (&["info", "g.ron"], "gestures=1", "the list has 2 gestures"),
         (&["sketch", "b.obj", "g.ron", out[0], "out.rig"], "stroke_points=2", "gesture 2 (Stroke) has 3 points"),
         (&["build", "tags.rig.ron"], "attributes=3", "attribute on j"),
@@ -84,8 +87,9 @@ fn each_limit_can_be_set_and_is_named_by_its_error() {
 fn commands_are_given_up_when_their_time_is_over() {
     let folder = folder();
     let walker = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/retarget/walker.bvh");
-    let commands: [(&[&str], &str); 4] = [
+    let commands: [(&[&str], &str); 5] = [
         (&["check", "tags.rig.ron"], "checking the files"),
+        (&["pose", "tags.rig.ron", "-o", "out.glb"], "building the rig"),
         (&["build", "tags.rig.ron", "-o", "out.glb"], "building the rig"),
         (&["animate", "tags.rig.ron", walker, "-o", "out.anim.ron"], "building the rig"),
         (&["merge", "tags.rig.ron", "tags.rig.ron", "-o", "out.rig.ron"], "merging the rigs"),

@@ -11,7 +11,9 @@ const RIG: &str = "rig 1\njoint 0 -1 0 0 0 root\njoint 1 0 0 0.5 0 tip\n";
 
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    for (name, text) in [("b.obj", BOX), ("a.rig", RIG), ("g.ron", "[Stroke(points: [(0.1, 0.1), (0.1, 0.4)])]")] {
+    let gestures = "[Stroke(points: [(0.1, 0.1), (0.1, 0.4)])]";
+    let template = "(format: 2, name: \"n\", joints: [(label: \"j\")])";
+    for (name, text) in [("b.obj", BOX), ("a.rig", RIG), ("g.ron", gestures), ("j.rig.ron", template)] {
         fs::write(folder.path().join(name), text).unwrap();
     }
     folder
@@ -54,7 +56,7 @@ fn run(folder: &Path, args: &[&str], stream: Stream, is_out: bool) -> (Option<i3
 #[test]
 fn an_output_that_takes_nothing_is_a_failure() {
     let folder = folder();
-    let commands: [&[&str]; 14] = [
+    let commands: [&[&str]; 21] = [
         &["--help"],
         &["build", "--help"],
         &["--version"],
@@ -69,6 +71,13 @@ fn an_output_that_takes_nothing_is_a_failure() {
         &["sketch", "b.obj", "g.ron", "-o", "out.rig"],
         &["new", "limb", "-o", "limb.rig.ron"],
         &["info", "missing.obj", "--json"],
+        &["list", "."],
+        &["diff", "j.rig.ron", "j.rig.ron"],
+        &["merge", "j.rig.ron", "j.rig.ron", "-o", "merged.rig.ron"],
+        &["extract", "j.rig.ron", "--joints", "j", "-o", "extracted.rig.ron"],
+        &["update", "j.rig.ron", "--from", "j.rig.ron", "-o", "updated.rig.ron"],
+        &["pose", "j.rig.ron", "--json"],
+        &["watch", "j.rig.ron", "-o", "watched.glb", "--count", "1"],
     ];
     for args in commands {
         for stream in [Stream::Full, Stream::Closed] {

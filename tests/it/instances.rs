@@ -1,6 +1,7 @@
 //! Characters of a game: instances of templates, and templates whose files are saved while they move.
 
 mod clips;
+mod deep_chains;
 mod faces;
 mod file_clips;
 mod kept_clips;

@@ -14,6 +14,8 @@ mod cli;
 #[cfg(feature = "cli")]
 mod cli_animate;
 #[cfg(feature = "cli")]
+mod cli_answers;
+#[cfg(feature = "cli")]
 mod cli_build;
 #[cfg(feature = "cli")]
 mod cli_check;

@@ -119,6 +119,29 @@ fn builds_obey_the_limits_of_the_app() {
     assert!(made.is_some_and(|made| made >= 4), "{made:?}");
 }
 
+/// The window, `watch` and games build in an app: what they build ends with its time, and says where.
+#[test]
+fn builds_of_an_app_are_given_up_when_their_time_is_over() {
+    let mut bench = Bench::new(RigLimits::default().with(Limit::Seconds, 0));
+    let rig = bench.base.rig;
+    let failure = |bench: &Bench| bench.base.get::<BuildFailure>(rig).map(|failure| failure.0.to_string());
+    bench.base.step(BuildStep::All);
+    bench.base.app.update();
+    let told = failure(&bench).unwrap_or_default();
+    for wanted in ["null", "root", "building the rig took longer than 0 s", "raise the limit `seconds`"] {
+        assert!(told.contains(wanted), "{wanted}: {told}");
+    }
+    // The time is that of one build, however long the app has been open.
+    bench.base.app.insert_resource(RigLimits::default());
+    bench.base.app.update();
+    for step in [BuildStep::Restart, BuildStep::All] {
+        bench.base.step(step);
+        bench.base.app.update();
+    }
+    assert_eq!(failure(&bench), None);
+    assert!(bench.base.built().nodes.len() >= 4);
+}
+
 #[test]
 fn lists_of_gestures_obey_the_limits() {
     let limits = RigLimits::default().with(Limit::Gestures, 2).with(Limit::StrokePoints, 2);

@@ -1,6 +1,7 @@
 //! One world: the entities of a rig say what its document and its program say, whoever changed what.
 
 mod counts;
+pub mod deep_chains;
 mod followers;
 mod layers;
 mod leftovers;

@@ -120,6 +120,7 @@ impl Work {
             }
             Order::Flush(answer) => {
                 self.write(block);
+                self.leave_removed_file();
                 if self.open.is_none() {
                     self.reopen();
                 }
@@ -192,6 +193,18 @@ impl Work {
             let path = open.path.clone();
             self.open = None;
             self.report(path, reason);
+            self.reopen();
+            return;
+        }
+        self.leave_removed_file();
+    }
+
+    /// Writes the whole journal anew if its file was removed, or its folder moved away: many systems let a file without a
+    /// name take bytes, which nobody finds after a crash.
+    fn leave_removed_file(&mut self) {
+        let disk = self.writer.disk.as_ref();
+        if self.open.as_ref().is_some_and(|open| matches!(is_there(disk, &open.path), Ok(false))) {
+            self.open = None;
             self.reopen();
         }
     }

@@ -18,21 +18,24 @@ pub(super) fn place_attachments(
     }
 }
 
-/// Places an entity and what is below it, as far as something moved.
+/// Places an entity and what is below it, as far as something moved. What hangs there may be deeper than a stack of calls.
 fn place(
     entity: Entity,
     above: &GlobalTransform,
     is_moved: bool,
     hung: &mut Query<(Ref<Transform>, &mut GlobalTransform, Option<Ref<Children>>)>,
 ) {
-    let Ok((transform, mut global, children)) = hung.get_mut(entity) else { return };
-    let is_moved = is_moved || transform.is_changed();
-    if is_moved {
-        global.set_if_neq(above.mul_transform(*transform));
-    }
-    let (here, is_moved) = (*global, is_moved || children.as_ref().is_some_and(|children| children.is_changed()));
-    let children: Vec<Entity> = children.map(|children| children.to_vec()).unwrap_or_default();
-    for child in children {
-        place(child, &here, is_moved, hung);
+    let mut waiting = vec![(entity, *above, is_moved)];
+    while let Some((entity, above, is_moved)) = waiting.pop() {
+        let Ok((transform, mut global, children)) = hung.get_mut(entity) else { continue };
+        let is_moved = is_moved || transform.is_changed();
+        if is_moved {
+            global.set_if_neq(above.mul_transform(*transform));
+        }
+        let Some(children) = children else { continue };
+        let (here, is_moved) = (*global, is_moved || children.is_changed());
+        for child in &children {
+            waiting.push((*child, here, is_moved));
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Builder, Command};
 use crate::{
-    processor::{BuildProblem, SkipReason, scope::Trace, world::NOWHERE},
+    processor::{BuildProblem, Deadline, SkipReason, scope::Trace, world::NOWHERE},
     rig::Uid,
 };
 
@@ -47,6 +47,12 @@ pub struct CommandCounts {
 }
 
 impl Builder {
+    /// Sets the end of the time in which commands may begin; those that would begin later fail and tell that. It holds for all
+    /// runs until another one is set, beside that of the modules.
+    pub fn set_deadline(&mut self, deadline: Deadline) {
+        self.world.deadline = Some(deadline);
+    }
+
     /// Numbers of commands: those in effect, those that a whole build carries out, and those that it passes over. References
     /// to something that is off are known from the first run on.
     pub fn counts(&self) -> CommandCounts {

@@ -251,3 +251,156 @@ fn an_app_keeps_what_its_rigs_ask_for_and_tells_trouble_once() {
     assert!(reason.contains("save soon") && reason.contains("state"), "{reason}");
     assert_eq!(app.world().get::<Rig>(rig).map(Rig::len), Some(41), "editing goes on");
 }
+
+/// A desk that works on a project in a folder of its own, with a change that is on the disk.
+fn on_share(disk: Arc<dyn Disk>, share: &Path, folder: &Path) -> Desk {
+    fs::create_dir(share).unwrap();
+    let project = share.join("hero.rigsmith.ron");
+    let places = JournalPlaces { project: Some(project.clone()), ..start(folder).places };
+    let begin = JournalStart { places, rig: Some(Rig::new(Uid(1), "hero")), ..default() };
+    let mut desk = Desk::new(disk, begin);
+    desk.place(1);
+    desk.flush();
+    assert_eq!(desk.journal.path(), Some(journal_beside(&project)));
+    desk
+}
+
+/// A file without a name goes on taking bytes, which nobody would find after a crash.
+#[cfg(unix)]
+#[test]
+fn a_journal_whose_file_is_gone_is_written_anew() {
+    for is_folder_gone in [true, false] {
+        let folder = fresh();
+        let [share, away] = ["share", "away"].map(|name| folder.path().join(name));
+        let mut desk = on_share(Arc::new(RealDisk), &share, folder.path());
+        let beside = desk.journal.path().unwrap();
+        match is_folder_gone {
+            true => fs::rename(&share, &away).unwrap(),
+            false => fs::remove_file(&beside).unwrap(),
+        }
+        desk.place(2);
+        desk.flush();
+        let path = desk.journal.path().unwrap();
+        assert_eq!((path == beside, share.exists()), (!is_folder_gone, !is_folder_gone), "{}", path.display());
+        assert_eq!((recover_at(&path).rig, desk.journal.trouble()), (desk.rig.clone(), None));
+        if is_folder_gone {
+            // What went away with the folder took the last change as well.
+            assert_eq!(recover_at(&away.join(beside.file_name().unwrap())).rig, desk.rig);
+            // Without another change, too: whoever saves waits for the journal.
+            fs::remove_file(&path).unwrap();
+            desk.flush();
+            assert_eq!(recover_at(&desk.journal.path().unwrap()).rig, desk.rig);
+        }
+        desk.journal.close(LONG).unwrap();
+    }
+}
+
+/// A disk with a folder of another machine, which cannot be reached while the switch is on.
+#[derive(Clone)]
+struct NetworkDisk {
+    share: PathBuf,
+    is_gone: Arc<AtomicBool>,
+}
+
+impl NetworkDisk {
+    fn reach(&self, path: &Path) -> io::Result<RealDisk> {
+        match self.is_gone.load(Ordering::Relaxed) && path.starts_with(&self.share) {
+            true => Err(io::ErrorKind::HostUnreachable.into()),
+            false => Ok(RealDisk),
+        }
+    }
+}
+
+struct NetworkFile(Box<dyn DiskFile>, PathBuf, NetworkDisk);
+
+impl DiskFile for NetworkFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.2.reach(&self.1)?;
+        self.0.write(bytes)
+    }
+    fn keep_permissions(&mut self, of: &Path) -> io::Result<()> {
+        self.0.keep_permissions(of)
+    }
+    fn sync(&mut self) -> io::Result<()> {
+        self.2.reach(&self.1)?;
+        self.0.sync()
+    }
+}
+
+impl Disk for NetworkDisk {
+    fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
+        self.reach(path)?.entry(path, follow)
+    }
+    fn read_link(&self, path: &Path) -> io::Result<PathBuf> {
+        self.reach(path)?.read_link(path)
+    }
+    fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
+        self.reach(path)?.canonical(path)
+    }
+    fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
+        self.reach(folder)?.list(folder, limit)
+    }
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
+        Ok(Box::new(NetworkFile(self.reach(path)?.create(path)?, path.to_owned(), self.clone())))
+    }
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        self.reach(to)?.rename(from, to)
+    }
+    fn hard_link(&self, existing: &Path, path: &Path) -> io::Result<()> {
+        self.reach(path)?.hard_link(existing, path)
+    }
+    fn sync_folder(&self, folder: &Path) -> io::Result<()> {
+        self.reach(folder)?.sync_folder(folder)
+    }
+    fn remove(&self, path: &Path) -> io::Result<()> {
+        self.reach(path)?.remove(path)
+    }
+    fn create_folder(&self, path: &Path) -> io::Result<()> {
+        self.reach(path)?.create_folder(path)
+    }
+    fn open(&self, path: &Path) -> io::Result<Box<dyn io::Read + Send>> {
+        self.reach(path)?.open(path)
+    }
+}
+
+#[test]
+fn work_on_a_network_folder_that_vanishes_is_kept_on_this_machine() {
+    let folder = fresh();
+    let share = folder.path().join("share");
+    let is_gone = Arc::new(AtomicBool::new(false));
+    let disk = NetworkDisk { share: share.clone(), is_gone: is_gone.clone() };
+    let mut desk = on_share(Arc::new(disk.clone()), &share, folder.path());
+    let beside = desk.journal.path().unwrap();
+    is_gone.store(true, Ordering::Relaxed);
+    desk.place(2);
+    desk.flush();
+    let here = desk.journal.path().unwrap();
+    assert!(here.starts_with(folder.path().join("state")), "{}", here.display());
+    assert_eq!((recover_at(&here).rig, desk.journal.trouble()), (desk.rig.clone(), None));
+    // A save is told, and takes nothing away; with the folder it comes back, and so does the journal beside it.
+    let project = share.join("hero.rigsmith.ron");
+    let save = |desk: &Desk| {
+        let text = write_template(&desk.rig);
+        let mark =
+            SaveMark { path: project.clone(), hash: file_hash(text.as_bytes()), position: desk.journal.position() };
+        desk.journal.saving(mark.clone(), LONG).unwrap();
+        save_atomic(&disk, &project, text.as_bytes())?;
+        let places = JournalPlaces { project: Some(project.clone()), ..start(folder.path()).places };
+        desk.journal.saved(mark, places);
+        Ok::<(), rigsmith::files::SaveError>(())
+    };
+    let error = save(&desk).unwrap_err().to_string();
+    assert!(error.contains("share"), "{error}");
+    desk.place(3);
+    desk.flush();
+    assert_eq!(recover_at(&here).rig, desk.rig);
+    is_gone.store(false, Ordering::Relaxed);
+    save(&desk).unwrap();
+    desk.place(4);
+    desk.flush();
+    assert_eq!(desk.journal.trouble(), None);
+    let path = desk.journal.path().unwrap();
+    assert_eq!(recover_at(&path).rig, desk.rig, "{}", path.display());
+    assert!(beside.exists(), "what was cut off stays until a person decides about it");
+    desk.journal.close(LONG).unwrap();
+}
