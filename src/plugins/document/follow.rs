@@ -233,7 +233,7 @@ fn spawn_joint(
     };
     describe(commands, &mut mirrored, data.label.as_deref(), data.group, groups);
     index.insert(entity, rig_entity, data.uid, EntityPart::Joint);
-    known.joints.insert(data.uid, mirrored);
+    known.joints.insert(data.uid, Box::new(mirrored));
     known.set_posed(data.uid, offset);
 }
 
