@@ -102,7 +102,7 @@ pub(in crate::plugins) fn misplaced(
 #[reflect(opaque)]
 #[reflect(Component, Debug, Clone, Default)]
 pub struct JointEntities {
-    /// Boxed: a table that grows is there twice for a moment, and up to half of its places are free.
+    /// Mirrors of joints, boxed: a table that grows is there twice for a moment, and up to half of its places are free.
     pub(super) joints: HashMap<Uid, Box<MirroredJoint>>,
     /// Pose offsets of the document that the joints' transforms were last set to.
     pub(super) posed: BTreeMap<Uid, PoseOffset>,

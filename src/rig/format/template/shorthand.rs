@@ -280,7 +280,7 @@ impl<'d> NameIndex<'d> {
 
 struct Writer<'d, 'a> {
     declared: &'d Declarations<'a>,
-    /// Made for the first name: a text whose references are uids has none.
+    /// Index of names, made when the first is looked up: a text whose references are uids needs none.
     called: OnceCell<NameIndex<'d>>,
     changes: Vec<Change>,
     faults: Vec<SourceError>,
