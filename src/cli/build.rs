@@ -149,12 +149,11 @@ pub(super) fn store_at_rest(
     has_commands: bool,
 ) -> Result<Vec<String>, StoreError> {
     let skeleton = baked(&rig, &built);
+    drop((rig, built));
     if FileKind::of(output) == Some(FileKind::Template) {
-        drop((rig, built));
         return store_built(output, source, skeleton, has_commands);
     }
-    let mut model = skeleton_model(&rig, Some(&built));
-    drop((rig, built));
+    let mut model = skeleton_model(&skeleton);
     mark_joints(&mut model, &skeleton);
     drop(skeleton);
     let settings = GltfWriteSettings { all_joints: true, ..export.settings() };
@@ -394,8 +393,9 @@ pub(super) fn posed_skeleton(bench: &Workbench, export: &ExportArgs) -> Result<(
     let (rig, built) = (bench.rig(), bench.built().ok_or(PoseError::NotBuilt)?);
     let skeleton = baked(rig, built);
     let joints: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
-    let mut model = skeleton_model(rig, Some(built));
+    let mut model = skeleton_model(&skeleton);
     mark_joints(&mut model, &skeleton);
+    drop(skeleton);
     pose(&mut model, &joints, built, &posed);
     Ok((model, GltfWriteSettings { all_joints: true, ..export.settings() }))
 }
