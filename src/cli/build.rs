@@ -149,12 +149,11 @@ pub(super) fn store_at_rest(
     has_commands: bool,
 ) -> Result<Vec<String>, StoreError> {
     let skeleton = baked(&rig, &built);
+    drop((rig, built));
     if FileKind::of(output) == Some(FileKind::Template) {
-        drop((rig, built));
         return store_built(output, source, skeleton, has_commands);
     }
-    let mut model = skeleton_model(&rig, Some(&built));
-    drop((rig, built));
+    let mut model = skeleton_model(&skeleton);
     mark_joints(&mut model, &skeleton);
     drop(skeleton);
     let settings = GltfWriteSettings { all_joints: true, ..export.settings() };
@@ -388,13 +387,24 @@ pub(super) fn posed_meshes(
 /// Built skeleton of a workbench as posed, without a mesh, and the settings for writing it.
 pub(super) fn posed_skeleton(bench: &Workbench, export: &ExportArgs) -> Result<(Model, GltfWriteSettings), Failure> {
     let posed = bench.posed_nodes()?;
-    let (rig, built) = (bench.rig(), bench.built().ok_or(PoseError::NotBuilt)?);
+    let built = bench.built().ok_or(PoseError::NotBuilt)?;
+    Ok(skeleton_in_pose(bench.rig(), built, &posed, export))
+}
+
+/// Built skeleton in a pose, without a mesh, and the settings for writing it.
+pub(super) fn skeleton_in_pose(
+    rig: &Rig,
+    built: &BuiltRig,
+    posed: &[Trs],
+    export: &ExportArgs,
+) -> (Model, GltfWriteSettings) {
     let skeleton = baked(rig, built);
     let joints: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
-    let mut model = skeleton_model(rig, Some(built));
+    let mut model = skeleton_model(&skeleton);
     mark_joints(&mut model, &skeleton);
-    pose(&mut model, &joints, built, &posed);
-    Ok((model, GltfWriteSettings { all_joints: true, ..export.settings() }))
+    drop(skeleton);
+    pose(&mut model, &joints, built, posed);
+    (model, GltfWriteSettings { all_joints: true, ..export.settings() })
 }
 
 /// Moves the nodes of an exported model to the pose; bind poses stay.

@@ -9,7 +9,7 @@ use crate::{
     files::{FileKind, RealDisk, stem, store_owned_model, store_rig, store_rig_over},
     mesh::{gltf::GltfWriteSettings, model::Model},
     rig::{
-        BuiltRig, Rig, UidSource,
+        Rig, UidSource,
         character::{Character, character, import_skeleton, mark_joints},
     },
 };
@@ -63,7 +63,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
         (Some(RigText | Template), Some(Gltf | Glb)) => {
             let rig = load_rig(&args.input, &mut report)?;
             let settings = GltfWriteSettings { all_joints: true, ..args.export.settings() };
-            let mut model = skeleton_model(&rig, None);
+            let mut model = skeleton_model(&rig);
             mark_joints(&mut model, &rig);
             drop(rig);
             store_owned_model(&RealDisk, &args.output, model, &settings)?
@@ -98,7 +98,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
 }
 
 /// A model of a rig without a mesh.
-pub(super) fn skeleton_model(rig: &Rig, built: Option<&BuiltRig>) -> Model {
+pub(super) fn skeleton_model(rig: &Rig) -> Model {
     let empty = Model { name: rig.about().name.clone(), ..Model::default() };
-    character(&Character { rig, built, file: &empty, rest: &empty, nodes: &[], skin: None })
+    character(&Character { rig, built: None, file: &empty, rest: &empty, nodes: &[], skin: None })
 }

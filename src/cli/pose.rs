@@ -20,7 +20,7 @@ use crate::{
     files::{FileKind, RealDisk, store_owned_model},
     headless::{
         Workbench,
-        posing::{ControlWrite, HeldValue, PoseError, PosedNode},
+        posing::{ControlWrite, HeldValue, PoseError, PosedNode, PosedRig},
     },
     plugins::{commands::BuildStep, surface::RigMesh},
     rig::{Rig, RigEdit, bake::baked, operations::Operation},
@@ -238,9 +238,8 @@ fn write(
     report: &mut Report,
 ) -> Result<(), Failure> {
     if FileKind::of(output) == Some(FileKind::Template) {
-        let built = bench.built().ok_or(PoseError::NotBuilt)?;
-        let posed = bench.posed_nodes()?;
-        let mut skeleton = baked(bench.rig(), built);
+        let PosedRig { rig, built, nodes: posed } = bench.into_posed()?;
+        let mut skeleton = baked(&rig, &built);
         let joints: Vec<_> = skeleton.walk().map(|joint| joint.data.uid).collect();
         let index = built.index();
         for joint in joints {
@@ -249,9 +248,17 @@ fn write(
                 skeleton.apply(&set).map_err(|error| Failure::Input(Box::new(error)))?;
             }
         }
-        let has_commands = bench.rig().walk().any(|joint| !joint.data.tags.is_empty());
-        drop(bench);
+        let has_commands = rig.walk().any(|joint| !joint.data.tags.is_empty());
+        drop((index, rig, built));
         report.notes(build::store_built(output, &args.rig, skeleton, has_commands)?);
+        return Ok(());
+    }
+    if own.is_empty() && args.meshes.is_empty() {
+        let (model, settings) = {
+            let PosedRig { rig, built, nodes } = bench.into_posed()?;
+            build::skeleton_in_pose(&rig, &built, &nodes, &args.export)
+        };
+        report.notes(store_owned_model(&RealDisk, output, model, &settings)?);
         return Ok(());
     }
     let (model, settings) = match own.len() {

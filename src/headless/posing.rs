@@ -12,7 +12,7 @@ pub use super::{held_values::HeldValue, posed_node::PosedNode};
 use crate::{
     mesh::model::Trs,
     plugins::{
-        commands::{BuildDone, BuildRequest, BuildStep, BuiltEntities, Processor, RunFailure},
+        commands::{BuildDone, BuildRequest, BuildResult, BuildStep, BuiltEntities, Processor, RunFailure},
         controls::{SwitchError, SwitchRequest, number_of},
         document::JointEntities,
         runtime::{RigRuntime, is_near},
@@ -20,7 +20,7 @@ use crate::{
     },
     processor::{Exclusion, FindError, RunReport},
     rig::{
-        AttributeKind, BuiltNode, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::listed,
+        AttributeKind, BuiltNode, BuiltRig, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::listed,
         proportion::ProportionError,
     },
     solve::program::ProgramError,
@@ -436,4 +436,24 @@ impl Workbench {
         };
         Ok(built.nodes.iter().map(|node| local(node).unwrap_or(node.base)).collect())
     }
+
+    /// The posed rig alone: entities and program, which take several times its memory, are gone.
+    ///
+    /// # Errors
+    /// If the rig is not built or cannot run.
+    pub fn into_posed(self) -> Result<PosedRig, PoseError> {
+        let nodes = self.posed_nodes()?;
+        let built = self.app.world().get::<BuildResult>(self.rig).ok_or(PoseError::NotBuilt)?;
+        Ok(PosedRig { rig: self.rig().clone(), built: Arc::clone(&built.0), nodes })
+    }
+}
+
+/// A rig in the pose that its entities had.
+pub struct PosedRig {
+    /// The document.
+    pub rig: Rig,
+    /// Result of its commands.
+    pub built: Arc<BuiltRig>,
+    /// Transforms of the built nodes, relative to their parents.
+    pub nodes: Vec<Trs>,
 }

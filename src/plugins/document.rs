@@ -11,6 +11,7 @@ mod carry;
 pub(in crate::plugins) mod entities;
 mod error;
 pub(in crate::plugins) mod follow;
+mod follow_groups;
 pub(in crate::plugins) mod refusals;
 
 use std::{borrow::Cow, sync::Arc};
@@ -69,7 +70,9 @@ impl Plugin for DocumentPlugin {
                 Update,
                 (
                     (adopt::adopt_writes, apply_edits).chain().in_set(RigSystems::Edits),
-                    (follow::follow_rigs, follow::order_groups, follow::follow_tags).chain().in_set(RigSystems::Build),
+                    (follow::follow_rigs, follow_groups::order_groups, follow::follow_tags)
+                        .chain()
+                        .in_set(RigSystems::Build),
                 ),
             );
     }

@@ -69,7 +69,7 @@ pub struct FaceExpressions(pub Arc<ExpressionSet>);
 
 impl Default for FaceExpressions {
     fn default() -> Self {
-        Self(Arc::new(ExpressionSet::bundled().clone()))
+        Self(ExpressionSet::bundled_shared())
     }
 }
 

@@ -166,8 +166,7 @@ pub fn character(parts: &Character) -> Model {
         })
         .collect();
     model.clips = file.clips.iter().filter_map(|clip| remaining_clip(clip, &node_of)).collect();
-    let skeleton = DeformSkeleton::new(document, *built);
-    model.weights = skin.map(|skin| remapped(skin, document, &skeleton, &place));
+    model.weights = skin.map(|skin| remapped(skin, document, &DeformSkeleton::new(document, *built), &place));
     for object in &mut model.objects {
         object.node = object.node.and_then(|node| node_of.get(node).copied().flatten());
     }

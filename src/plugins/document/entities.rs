@@ -102,7 +102,8 @@ pub(in crate::plugins) fn misplaced(
 #[reflect(opaque)]
 #[reflect(Component, Debug, Clone, Default)]
 pub struct JointEntities {
-    pub(super) joints: HashMap<Uid, MirroredJoint>,
+    /// Mirrors of joints, boxed: a table that grows is there twice for a moment, and up to half of its places are free.
+    pub(super) joints: HashMap<Uid, Box<MirroredJoint>>,
     /// Pose offsets of the document that the joints' transforms were last set to.
     pub(super) posed: BTreeMap<Uid, PoseOffset>,
     /// Uid and name last written to the entity of the rig, or adopted from it.
@@ -198,7 +199,7 @@ impl JointEntities {
     }
 
     pub(in crate::plugins) fn mirrored_mut(&mut self, joint: Uid) -> Option<&mut MirroredJoint> {
-        self.joints.get_mut(&joint)
+        self.joints.get_mut(&joint).map(|mirrored| &mut **mirrored)
     }
 
     /// Pose offset of the document that a joint's transform was last set to.

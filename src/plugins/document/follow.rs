@@ -2,24 +2,29 @@
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
-use bevy::{ecs::entity::EntityHashMap, prelude::*};
+use bevy::{
+    ecs::{
+        entity::{Entities, EntityAllocator},
+        world::CommandQueue,
+    },
+    prelude::*,
+};
 
 use super::{
     ShowRest,
-    entities::{
-        EntityIndex, EntityPart, GroupEntities, JointEntities, MirroredJoint, MirroredTag, TagEntities, misplaced,
-    },
+    entities::{EntityIndex, EntityPart, GroupEntities, JointEntities, MirroredJoint, MirroredTag, TagEntities},
+    follow_groups::follow_groups,
 };
 use crate::{
     plugins::{
         runtime::RigRuntime,
-        schema::{
-            CommandTag, FeatureTag, GroupOf, InFeature, InGroup, Joint, LocalGroup, LocalGroups, NodeLabel, NodeOf,
-            Null, Tag, TagOf,
-        },
+        schema::{CommandTag, FeatureTag, InFeature, InGroup, Joint, NodeLabel, NodeOf, Null, Tag, TagOf},
     },
     rig::{NodeKind, PoseOffset, RestTransform, Rig, RigJoint, TagKind, Uid},
 };
+
+/// Number of joints whose commands are carried out and freed together: the buffer of a system keeps its size.
+const PIECE: usize = 128;
 
 type FollowedRig<'a> = (
     Entity,
@@ -39,6 +44,8 @@ pub(in crate::plugins) fn follow_rigs(
     mut rigs: Query<FollowedRig, Or<(Changed<Rig>, Changed<ShowRest>)>>,
     mut places: Query<(&mut Transform, &mut RestTransform), With<Joint>>,
     mut index: ResMut<EntityIndex>,
+    allocator: &EntityAllocator,
+    entities: &Entities,
 ) {
     for (rig_entity, rig, mut joints, mut groups, show_rest, is_running, name, uid) in &mut rigs {
         let rig: &Rig = &rig;
@@ -59,13 +66,20 @@ pub(in crate::plugins) fn follow_rigs(
         };
         known.count(due.len());
         known.is_behind = false;
-        for joint in due {
-            let offset = rig.offset(joint.data.uid).filter(|_| is_posed);
-            if known.joints.contains_key(&joint.data.uid) {
-                follow_joint(&mut commands, joint, offset, known, groups, is_running, &mut places);
-            } else {
-                spawn_joint(&mut commands, rig_entity, joint, offset, known, groups, &mut index);
-                is_other = true;
+        for piece in due.chunks(PIECE) {
+            let mut queue = CommandQueue::default();
+            let mut of_piece = Commands::new_from_entities(&mut queue, allocator, entities);
+            for &joint in piece {
+                let offset = rig.offset(joint.data.uid).filter(|_| is_posed);
+                if known.joints.contains_key(&joint.data.uid) {
+                    follow_joint(&mut of_piece, joint, offset, known, groups, is_running, &mut places);
+                } else {
+                    spawn_joint(&mut of_piece, rig_entity, joint, offset, known, groups, &mut index);
+                    is_other = true;
+                }
+            }
+            if !queue.is_empty() {
+                commands.queue(move |world: &mut World| queue.apply(world));
             }
         }
         if touched.is_some() {
@@ -219,7 +233,7 @@ fn spawn_joint(
     };
     describe(commands, &mut mirrored, data.label.as_deref(), data.group, groups);
     index.insert(entity, rig_entity, data.uid, EntityPart::Joint);
-    known.joints.insert(data.uid, mirrored);
+    known.joints.insert(data.uid, Box::new(mirrored));
     known.set_posed(data.uid, offset);
 }
 
@@ -285,54 +299,6 @@ pub(super) fn write_group(commands: &mut Commands, entity: Entity, group: Option
         Some(group) => commands.entity(entity).try_insert(InGroup(group)),
         None => commands.entity(entity).try_remove::<InGroup>(),
     };
-}
-
-fn follow_groups(
-    commands: &mut Commands,
-    rig_entity: Entity,
-    rig: &Rig,
-    known: &mut GroupEntities,
-    index: &mut EntityIndex,
-) {
-    let mut gone: Vec<Uid> = known.groups.keys().filter(|uid| rig.group(**uid).is_none()).copied().collect();
-    gone.sort_unstable();
-    for uid in gone {
-        if let Some((entity, _)) = known.groups.remove(&uid) {
-            index.remove(entity);
-            commands.entity(entity).try_despawn();
-        }
-    }
-    for group in rig.groups() {
-        let told = LocalGroup { name: group.name.clone(), color: group.color, enabled: group.enabled };
-        match known.groups.get_mut(&group.uid) {
-            Some((_, data)) if data == group => {}
-            Some((entity, data)) => {
-                data.clone_from(group);
-                commands.entity(*entity).try_insert((told, Name::new(group.name.clone())));
-            }
-            None => {
-                let bundle = (told, group.uid, GroupOf(rig_entity), Name::new(group.name.clone()));
-                let entity = commands.spawn(bundle).id();
-                index.insert(entity, rig_entity, group.uid, EntityPart::Group);
-                known.groups.insert(group.uid, (entity, group.clone()));
-            }
-        }
-    }
-}
-
-/// Puts the local groups of rigs into the order of the document, where the document or other code changed the order.
-pub(in crate::plugins) fn order_groups(
-    mut commands: Commands,
-    rigs: Query<(Entity, &Rig, &GroupEntities, &LocalGroups), Or<(Changed<Rig>, Changed<LocalGroups>)>>,
-) {
-    for (rig_entity, rig, known, groups) in &rigs {
-        let ranks: EntityHashMap<usize> =
-            (rig.groups().iter().enumerate()).filter_map(|(rank, group)| Some((known.get(group.uid)?, rank))).collect();
-        for group in misplaced(groups.iter(), &ranks) {
-            // Removing and inserting each group in turn puts it behind the ones before it.
-            commands.entity(group).try_remove::<GroupOf>().try_insert(GroupOf(rig_entity));
-        }
-    }
 }
 
 /// Spawns, updates and despawns the entities of tags so that they match the document.

@@ -22,11 +22,13 @@ pub(in crate::rig) type NodeId = usize;
 pub(in crate::rig) struct Tree<'a> {
     /// The text.
     pub text: &'a str,
-    nodes: Vec<Node<'a>>,
+    nodes: Vec<PackedNode>,
+    /// Items of all brackets, in the order in which these are closed.
+    items: Vec<Item<'a>>,
 }
 
 /// A value.
-pub(in crate::rig) struct Node<'a> {
+pub(in crate::rig) struct Node<'t, 'a> {
     /// Identifier before the opening bracket; empty without one.
     pub name: &'a str,
     /// Opening bracket: `(`, `[` or `{`; `None` for a plain value.
@@ -35,8 +37,22 @@ pub(in crate::rig) struct Node<'a> {
     pub range: Range<usize>,
     /// Place behind the opening bracket.
     pub inside: usize,
-    /// Items between the brackets; with no room for more of them, because a text has a bracket for each joint.
-    pub items: Box<[Item<'a>]>,
+    /// Items between the brackets.
+    pub items: &'t [Item<'a>],
+}
+
+/// A value in few bytes, because a text has several for each joint.
+struct PackedNode {
+    /// Bytes from the identifier or bracket, or the first token of a plain value, to the end of the last.
+    start: u32,
+    end: u32,
+    /// Length of the identifier, which the value begins with.
+    name: u32,
+    bracket: Option<char>,
+    inside: u32,
+    /// Place and number of the items among those of the tree.
+    first_item: u32,
+    item_count: u32,
 }
 
 /// An item of a list, struct or map.
@@ -55,9 +71,11 @@ pub(in crate::rig) struct Item<'a> {
 
 impl<'a> Tree<'a> {
     /// Tree of a text with one value; `None` if its brackets do not match, an item has no value, brackets are nested
-    /// deeper than [`DEPTH`], or there are too many of them. A node has a lower number than those inside of it. Time is linear.
+    /// deeper than [`DEPTH`], there are too many of them, or the text has 4 GiB. A node has a lower number than those
+    /// inside of it. Time is linear.
     pub fn parse(text: &'a str) -> Option<Self> {
-        let mut nodes: Vec<Node> = vec![Node::plain(0..0)];
+        u32::try_from(text.len()).ok()?;
+        let (mut nodes, mut all_items) = (vec![PackedNode::plain(0, 0)], Vec::new());
         let mut open: Vec<OpenBracket> = vec![OpenBracket::of(0)];
         for token in tokens(text).skip(attribute(text)) {
             if open.len() > DEPTH || nodes.len() > FREE_NODES + text.len() / BYTES_PER_NODE {
@@ -74,14 +92,15 @@ impl<'a> Tree<'a> {
                         Some(node) if nodes[node].bracket.is_none() => node,
                         Some(_) => return None,
                         None => {
-                            nodes.push(Node::plain(start..end));
+                            nodes.push(PackedNode::plain(start, end));
                             let pending = pending.get_or_insert(PendingItem { key: None, start, value: None });
                             *pending.value.insert(nodes.len() - 1)
                         }
                     };
-                    nodes[node].name = if named.is_some() { &text[nodes[node].range.clone()] } else { "" };
-                    nodes[node].bracket = token.text.chars().next();
-                    nodes[node].inside = end;
+                    let opened = &mut nodes[node];
+                    opened.name = if named.is_some() { opened.end - opened.start } else { 0 };
+                    opened.bracket = token.text.chars().next();
+                    opened.inside = end as u32;
                     open.push(OpenBracket::of(node));
                 }
                 ")" | "]" | "}" => {
@@ -93,14 +112,14 @@ impl<'a> Tree<'a> {
                     if let Some(last) = last {
                         items.push(last.finished(&nodes, None)?);
                     }
-                    nodes[closed].items = items.into();
-                    nodes[closed].range.end = end;
+                    nodes[closed].put_items(items, &mut all_items);
+                    nodes[closed].end = end as u32;
                 }
                 "," => items.push(pending.take()?.finished(&nodes, Some(end))?),
                 ":" if pending.as_ref().is_some_and(|pending| pending.key.is_none()) => {
                     let pending = pending.as_mut()?;
                     let key = pending.value.take()?;
-                    pending.key = Some(&text[nodes[key].range.clone()]);
+                    pending.key = Some(&text[nodes[key].range()]);
                     // A key is no value: its node makes room for that of the value.
                     if key + 1 == nodes.len() {
                         nodes.pop();
@@ -109,9 +128,9 @@ impl<'a> Tree<'a> {
                 _ => {
                     let pending = pending.get_or_insert(PendingItem { key: None, start, value: None });
                     match pending.value {
-                        Some(value) => nodes[value].range.end = end,
+                        Some(value) => nodes[value].end = end as u32,
                         None => {
-                            nodes.push(Node::plain(start..end));
+                            nodes.push(PackedNode::plain(start, end));
                             pending.value = Some(nodes.len() - 1);
                         }
                     }
@@ -123,9 +142,10 @@ impl<'a> Tree<'a> {
         if !open.is_empty() || !items.is_empty() {
             return None;
         }
-        nodes[0].items = Box::new([item]);
+        nodes[0].put_items(vec![item], &mut all_items);
         nodes.shrink_to_fit();
-        Some(Self { text, nodes })
+        all_items.shrink_to_fit();
+        Some(Self { text, nodes, items: all_items })
     }
 
     /// Number of nodes.
@@ -134,23 +154,31 @@ impl<'a> Tree<'a> {
     }
 
     /// The node with that number.
-    pub fn node(&self, id: NodeId) -> &Node<'a> {
-        &self.nodes[id]
+    pub fn node(&self, id: NodeId) -> Node<'_, 'a> {
+        let node = &self.nodes[id];
+        let range = node.range();
+        let name = &self.text[range.start..range.start + node.name as usize];
+        Node { name, bracket: node.bracket, range, inside: node.inside as usize, items: self.items_of(id) }
+    }
+
+    fn items_of(&self, id: NodeId) -> &[Item<'a>] {
+        let first = self.nodes[id].first_item as usize;
+        &self.items[first..first + self.nodes[id].item_count as usize]
     }
 
     /// The value of the whole text.
     pub fn root(&self) -> NodeId {
-        self.nodes[0].items[0].value
+        self.items_of(0)[0].value
     }
 
     /// The item of a struct with that name.
     pub fn field(&self, node: NodeId, name: &str) -> Option<&Item<'a>> {
-        self.nodes[node].items.iter().find(|item| item.key == Some(name))
+        self.items_of(node).iter().find(|item| item.key == Some(name))
     }
 
     /// The text of a value as written.
     pub fn written(&self, node: NodeId) -> &'a str {
-        &self.text[self.nodes[node].range.clone()]
+        &self.text[self.nodes[node].range()]
     }
 
     /// The text of the string literal that is the value of a field; `None` if it is another value.
@@ -161,22 +189,33 @@ impl<'a> Tree<'a> {
 
     /// The value inside `Some(...)`, or the value itself.
     pub fn optional(&self, node: NodeId) -> NodeId {
-        match &*self.nodes[node].items {
-            [only] if self.nodes[node].name == "Some" && only.key.is_none() => only.value,
+        match self.items_of(node) {
+            [only] if self.node(node).name == "Some" && only.key.is_none() => only.value,
             _ => node,
         }
     }
 
     /// Elements of the list that is the value of a field; empty for another value.
     pub fn elements(&self, node: NodeId, name: &str) -> &[Item<'a>] {
-        let list = self.field(node, name).map(|field| &self.nodes[field.value]);
-        list.filter(|list| list.bracket == Some('[')).map_or(&[], |list| &list.items)
+        let list = self.field(node, name).map(|field| self.node(field.value));
+        list.filter(|list| list.bracket == Some('[')).map_or(&[], |list| list.items)
     }
 }
 
-impl Node<'_> {
-    fn plain(range: Range<usize>) -> Self {
-        Self { name: "", bracket: None, inside: range.start, range, items: Box::default() }
+impl PackedNode {
+    fn plain(start: usize, end: usize) -> Self {
+        let (start, end) = (start as u32, end as u32);
+        Self { start, end, name: 0, bracket: None, inside: start, first_item: 0, item_count: 0 }
+    }
+
+    fn range(&self) -> Range<usize> {
+        self.start as usize..self.end as usize
+    }
+
+    /// Puts the items of the node behind those of others.
+    fn put_items<'a>(&mut self, items: Vec<Item<'a>>, all: &mut Vec<Item<'a>>) {
+        (self.first_item, self.item_count) = (all.len() as u32, items.len() as u32);
+        all.extend(items);
     }
 }
 
@@ -201,9 +240,9 @@ struct PendingItem<'a> {
 }
 
 impl<'a> PendingItem<'a> {
-    fn finished(self, nodes: &[Node], comma: Option<usize>) -> Option<Item<'a>> {
+    fn finished(self, nodes: &[PackedNode], comma: Option<usize>) -> Option<Item<'a>> {
         let value = self.value?;
-        let end = comma.unwrap_or(nodes[value].range.end);
+        let end = comma.unwrap_or(nodes[value].end as usize);
         Some(Item { key: self.key, start: self.start, value, end, has_comma: comma.is_some() })
     }
 }
@@ -276,6 +315,15 @@ mod tests {
         assert_eq!(with_field("", "b", "2"), "(b: 2)");
         assert_eq!(with_field("Named()", "b", "2"), "Named(b: 2)");
         assert_eq!(with_field("(a: [1)", "b", "2"), "(a: [1)");
+    }
+
+    #[test]
+    fn nodes_are_small() {
+        assert!(size_of::<PackedNode>() <= 28);
+        let tree = Tree::parse("(a: [1, b(c: 2)], d: e (3))").unwrap();
+        assert_eq!((tree.len(), tree.items.len()), (8, 7));
+        let named: Vec<&str> = (1..tree.len()).map(|id| tree.node(id).name).filter(|name| !name.is_empty()).collect();
+        assert_eq!(named, ["b", "e"]);
     }
 
     #[test]

@@ -250,7 +250,7 @@ fn remove_tag(draft: &mut Draft, tag: Uid) -> Result<(), PartError> {
 /// Parameters without some of them.
 fn without_params(params: &str, unset: &[String]) -> String {
     let Some(tree) = Tree::parse(params) else { return params.to_owned() };
-    let items = &tree.node(tree.root()).items;
+    let items = tree.node(tree.root()).items;
     let kept = items.iter().filter(|item| item.key.is_none_or(|key| !unset.iter().any(|name| name == key)));
     let kept: Vec<&str> = kept.map(|item| &params[item.start..tree.node(item.value).range.end]).collect();
     format!("({})", kept.join(", "))
@@ -260,7 +260,7 @@ fn without_params(params: &str, unset: &[String]) -> String {
 fn with_params(params: &str, others: &str) -> String {
     let mut out = params.to_owned();
     let Some(others) = Tree::parse(others) else { return out };
-    for item in &others.node(others.root()).items {
+    for item in others.node(others.root()).items {
         let Some(key) = item.key else { continue };
         out = with_field(&out, key, others.written(item.value));
     }

@@ -46,7 +46,7 @@ impl PartInstance {
             if let Some(params) = change.params.as_deref()
                 && let Some(tree) = Tree::parse(params)
             {
-                for item in &tree.node(tree.root()).items {
+                for item in tree.node(tree.root()).items {
                     add(&target, item.key.unwrap_or("params"), tree.written(item.value).to_owned());
                 }
             }

@@ -291,7 +291,7 @@ fn with_parameter(params: &str, key: &str, value: Option<&str>) -> String {
     let Some(tree) = Tree::parse(params) else { return params.to_owned() };
     let root = tree.node(tree.root());
     let mut list: Vec<String> = Vec::new();
-    for item in &root.items {
+    for item in root.items {
         let text = if item.key == Some(key) { value } else { Some(tree.written(item.value)) };
         list.extend(text.map(|text| format!("{}: {text}", item.key.unwrap_or_default())));
     }

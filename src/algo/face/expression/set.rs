@@ -1,6 +1,10 @@
 //! Sets of units and expressions, with the bundled ones.
 
-use std::{borrow::Cow, collections::BTreeSet, sync::LazyLock};
+use std::{
+    borrow::Cow,
+    collections::BTreeSet,
+    sync::{Arc, LazyLock},
+};
 
 use super::text::{Expression, ExpressionError, Sides, Unit, UnitUse, last_quoted, located};
 
@@ -116,6 +120,12 @@ fn one_side<'a>(name: &'a str, [left, right]: [&str; 2]) -> Option<(&'a str, Sid
     left.or_else(|| name.strip_suffix(right).map(|base| (base, Sides::Right)))
 }
 
+/// The bundled set, read when it is first used. A test checks that its files have no errors.
+static BUNDLED: LazyLock<Arc<ExpressionSet>> = LazyLock::new(|| {
+    let files: Vec<(&str, &str)> = ExpressionSet::bundled_files().collect();
+    Arc::new(ExpressionSet::parse(&files).unwrap_or_default())
+});
+
 /// Expressions, each name once, and the units that they are made of.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExpressionSet {
@@ -126,12 +136,12 @@ pub struct ExpressionSet {
 impl ExpressionSet {
     /// The bundled set: neutral, the six basic expressions, a few others, the visemes, and their units.
     pub fn bundled() -> &'static Self {
-        // A test checks that the files have no errors.
-        static BUNDLED: LazyLock<ExpressionSet> = LazyLock::new(|| {
-            let files: Vec<(&str, &str)> = ExpressionSet::bundled_files().collect();
-            ExpressionSet::parse(&files).unwrap_or_default()
-        });
         &BUNDLED
+    }
+
+    /// The [bundled](Self::bundled) set for owners who may exchange theirs: all of them share one.
+    pub fn bundled_shared() -> Arc<Self> {
+        Arc::clone(&BUNDLED)
     }
 
     /// Reads files, each a name and a text: those that end in `.units.ron` have units, all others an expression. Units

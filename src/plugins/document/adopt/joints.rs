@@ -71,9 +71,8 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             self.trial.refuse(EntityWriteError::ForeignGroup(uid));
         }
         self.index.insert(entity, rig_entity, uid, EntityPart::Joint);
-        self.joints
-            .joints
-            .insert(uid, MirroredJoint { entity, label, group, rest, parent: Some(above), kind, tags: Vec::new() });
+        let mirrored = MirroredJoint { entity, label, group, rest, parent: Some(above), kind, tags: Vec::new() };
+        self.joints.joints.insert(uid, Box::new(mirrored));
     }
 
     pub fn joints_written(&mut self, writes: &RigWrites) {

@@ -23,7 +23,7 @@ pub(super) fn complete(mut header: TemplateHeader, text: &str) -> TemplateHeader
     }
     let Some(declared) = Declarations::find(text) else { return header };
     let tree = &declared.tree;
-    let parts = tree.field(tree.root(), "parts").map(|parts| &tree.node(parts.value).items);
+    let parts = tree.field(tree.root(), "parts").map(|parts| tree.node(parts.value).items);
     if parts.is_some_and(|parts| !parts.is_empty()) {
         return header;
     }

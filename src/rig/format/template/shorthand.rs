@@ -10,7 +10,7 @@ mod declarations;
 
 use std::{
     borrow::Cow,
-    cell::Cell,
+    cell::{Cell, OnceCell},
     collections::{BTreeMap, HashMap},
     ops::Range,
 };
@@ -94,15 +94,11 @@ pub fn explicit(source: &str) -> ExplicitText<'_> {
     let Some(declared) = Declarations::find(source).filter(|declared| declared.format() >= FIRST_FORMAT) else {
         return unchanged;
     };
-    let mut writer = Writer::new(&declared);
-    writer.declarations();
-    let Writer { mut changes, mut faults, parents, .. } = writer;
-    faults.extend(declared.faults);
-    faults.sort_by_key(|fault| fault.offset);
+    // The tree, which is larger than the text, is gone before the text with the changes comes.
+    let Omissions { changes, faults, parents } = omissions_of(declared);
     if changes.is_empty() {
         return ExplicitText { faults, ..unchanged };
     }
-    changes.sort_by_key(|change| (change.range.start, change.range.end));
     let (mut text, mut pieces) = (String::with_capacity(source.len() * 2), Vec::new());
     let mut at = 0;
     for Change { range, text: with } in &changes {
@@ -115,6 +111,23 @@ pub fn explicit(source: &str) -> ExplicitText<'_> {
     pieces.push(Piece { start: text.len(), source: at, is_copy: true });
     text.push_str(&source[at..]);
     ExplicitText { source, text: Cow::Owned(text), pieces, faults, parents }
+}
+
+/// Text of the things that a source leaves out, in the order of their places, and what is at fault.
+struct Omissions {
+    changes: Vec<Change>,
+    faults: Vec<SourceError>,
+    parents: BTreeMap<Uid, String>,
+}
+
+fn omissions_of(declared: Declarations) -> Omissions {
+    let mut writer = Writer::new(&declared);
+    writer.declarations();
+    let Writer { mut changes, mut faults, parents, .. } = writer;
+    faults.extend(declared.faults);
+    faults.sort_by_key(|fault| fault.offset);
+    changes.sort_by_key(|change| (change.range.start, change.range.end));
+    Omissions { changes, faults, parents }
 }
 
 /// Returns `true` for a text that says a format without shorthand: no tree of it is needed, which is ten times as large.
@@ -267,7 +280,8 @@ impl<'d> NameIndex<'d> {
 
 struct Writer<'d, 'a> {
     declared: &'d Declarations<'a>,
-    called: NameIndex<'d>,
+    /// Index of names, made when the first is looked up: a text whose references are uids needs none.
+    called: OnceCell<NameIndex<'d>>,
     changes: Vec<Change>,
     faults: Vec<SourceError>,
     parents: BTreeMap<Uid, String>,
@@ -275,8 +289,12 @@ struct Writer<'d, 'a> {
 
 impl<'d, 'a> Writer<'d, 'a> {
     fn new(declared: &'d Declarations<'a>) -> Self {
-        let (called, parents) = (NameIndex::new(declared), BTreeMap::new());
+        let (called, parents) = (OnceCell::new(), BTreeMap::new());
         Self { declared, called, changes: Vec::new(), faults: Vec::new(), parents }
+    }
+
+    fn called(&self) -> &NameIndex<'d> {
+        self.called.get_or_init(|| NameIndex::new(self.declared))
     }
 
     fn tree(&self) -> &'d Tree<'a> {
@@ -354,7 +372,7 @@ impl<'d, 'a> Writer<'d, 'a> {
     fn refer(&mut self, node: NodeId, field: &str, kind: NameKind) {
         let Some(item) = self.tree().field(node, field) else { return };
         let Some(name) = self.tree().string(node, field).filter(|name| name.parse::<Uid>().is_err()) else { return };
-        let said = match self.called.find(&name, kind) {
+        let said = match self.called().find(&name, kind) {
             Ok(uid) => format!("\"{uid}\""),
             Err(NameError::Unknown { .. }) if field == "parent" && self.has_parts() => {
                 let uid = Uid::derived(["parent in a part", name.as_str()]);
@@ -379,7 +397,7 @@ impl<'d, 'a> Writer<'d, 'a> {
         let written = tree.written(item.value);
         let name: Option<String> = ron::from_str(tree.written(tree.optional(item.value))).ok();
         let Some(name) = name.filter(|name| name.parse::<Uid>().is_err()) else { return written.to_owned() };
-        match self.called.feature(&name, own) {
+        match self.called().feature(&name, own) {
             Ok(uid) => format!("\"{uid}\""),
             Err(error) => self.fault(item, error.to_string()),
         }

@@ -7,6 +7,7 @@ mod lists;
 mod order;
 mod parts;
 pub(super) mod patch;
+mod shared_joints;
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -36,6 +37,7 @@ pub(crate) use parts::{
     write_changes_over, write_own_over,
 };
 use patch::Patch;
+use shared_joints::share_equal_joints;
 
 /// The text of a rig's template, as changes of a text of the same rig. `None` if `source` is no template of this rig, or
 /// cannot be changed so that it says the same: [`write_template`] then writes it anew, without its comments.
@@ -72,7 +74,8 @@ pub(crate) fn write_short_template(rig: &Rig) -> Option<String> {
 
 /// The text, or the text in the rig's order, if that says what the rig is.
 fn said(rig: &Rig, text: String) -> Option<String> {
-    let wanted = comparable(read_text(&write_template(rig), 1).ok()?.rig);
+    let mut wanted = comparable(read_text(&write_template(rig), 1).ok()?.rig);
+    share_equal_joints(&mut wanted, rig);
     let is_right = |text: &str| read_text(text, 1).is_ok_and(|read| comparable(read.rig) == wanted);
     if is_right(&text) {
         return Some(text);
@@ -192,6 +195,8 @@ impl<'d, 'a> Rewriter<'d, 'a> {
         self.poses();
         let (has_fresh, declared, with_names) = (self.has_fresh(), self.declared, self.with_names);
         let text = self.patch.text();
+        // What names were looked up in makes room for what is read to lay joints out.
+        drop((self.names, self.index));
         if has_fresh { settled(text, declared, with_names) } else { text }
     }
 
@@ -442,7 +447,7 @@ impl<'d, 'a> Rewriter<'d, 'a> {
 
     fn fields(&mut self, node: NodeId, now: &Tree, value: NodeId, others: &[&str]) {
         let tree = self.tree();
-        for item in &tree.node(node).items {
+        for item in tree.node(node).items {
             let Some(key) = item.key.filter(|key| !others.contains(key)) else { continue };
             // Which of two of a name is meant, nobody knows.
             if tree.node(node).items.iter().filter(|other| other.key == Some(key)).count() > 1 {
@@ -453,7 +458,7 @@ impl<'d, 'a> Rewriter<'d, 'a> {
                 None => self.patch.set_or_remove(node, key, None),
             }
         }
-        for item in &now.node(value).items {
+        for item in now.node(value).items {
             if let Some(key) = item.key.filter(|key| tree.field(node, key).is_none()) {
                 let text = self.styled(now.written(item.value));
                 self.patch.set(node, key, &text);

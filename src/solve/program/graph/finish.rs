@@ -9,7 +9,8 @@ use crate::{
 };
 
 impl Graph<'_> {
-    /// Ends every node, attribute and morph target with the operation that makes its final value.
+    /// Ends every node, attribute and morph target with the operation that makes its final value. No node is looked up
+    /// by its uid afterwards.
     ///
     /// Returns the driven register of each node.
     pub(in super::super) fn finish(&mut self) -> Vec<DrivenRegister> {
@@ -51,6 +52,9 @@ impl Graph<'_> {
                 }
             });
         }
+        // What found nodes makes room for the program.
+        self.index = HashMap::default();
+        self.built = Vec::new();
         let driven = |state: &NodeState| match (state.local, state.whole) {
             (None, _) => DrivenRegister::Not,
             (Some(_), Some(_)) => DrivenRegister::Global,

@@ -174,6 +174,7 @@ fn laid_out_joints(text: &str, before: &Declarations, known: &HashSet<Uid>) -> O
         if has_fresh
             && was.get(&joint.uid).is_none_or(had_layout)
             && let Some(text) = in_layout(&declared.tree, joint.node)
+            && text != declared.tree.written(joint.node)
         {
             changes.push((declared.tree.node(joint.node).range.clone(), text));
         }

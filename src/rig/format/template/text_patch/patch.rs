@@ -117,7 +117,7 @@ impl<'d, 'a> Patch<'d, 'a> {
         if old.iter().zip(new).all(same) {
             return;
         }
-        let written = self.tree.field(node, field).map(|item| &self.tree.node(item.value).items);
+        let written = self.tree.field(node, field).map(|item| self.tree.node(item.value).items);
         match written.filter(|items| items.len() == new.len()) {
             Some(items) => {
                 for ((item, old), new) in items.iter().zip(old).zip(new) {
@@ -162,7 +162,7 @@ impl<'d, 'a> Patch<'d, 'a> {
         (gone, fresh): (&[usize], &[String]),
         before: &[&str],
     ) {
-        let items = &self.tree.node(node).items;
+        let items = self.tree.node(node).items;
         let place = items.iter().position(|item| item.key.is_some_and(|key| before.contains(&key)));
         match place.filter(|_| !fresh.is_empty() && self.tree.field(node, field).is_none()) {
             Some(place) => self.insert(node, place.checked_sub(1), &format!("{field}: [{}]", fresh.join(", "))),
@@ -183,7 +183,7 @@ impl<'d, 'a> Patch<'d, 'a> {
 
     /// Adds a field with a list to a struct: on one line, or with a line for each of several where the fields have lines.
     fn add_list(&mut self, node: NodeId, field: &str, elements: &[String]) {
-        let items = &self.tree.node(node).items;
+        let items = self.tree.node(node).items;
         let text = match items.last().filter(|last| elements.len() > 1 && self.is_alone(last)) {
             Some(last) => {
                 let blanks = self.indentation(last.start);
@@ -262,7 +262,7 @@ impl<'d, 'a> Patch<'d, 'a> {
 
     /// Adds a field to a struct: one of a header in its place there, others before the tags, which may be long, else at the end.
     fn add(&mut self, node: NodeId, field: &str, value: &str) {
-        let items = &self.tree.node(node).items;
+        let items = self.tree.node(node).items;
         let in_header = (node == self.tree.root()).then(|| HEADER.iter().position(|known| *known == field)).flatten();
         let behind = match in_header {
             Some(number) => {
@@ -282,7 +282,7 @@ impl<'d, 'a> Patch<'d, 'a> {
     /// Writes which items of a bracket go, and which come behind those that stay.
     fn change_items(&mut self, node: NodeId, changes: &ItemChanges) {
         let tree = self.tree;
-        let (items, inside) = (&tree.node(node).items, tree.node(node).inside);
+        let (items, inside) = (tree.node(node).items, tree.node(node).inside);
         if tree.node(node).bracket.is_none() {
             let texts: Vec<String> = changes.added.iter().map(|added| item_on_one_line(&added.text)).collect();
             let end = tree.node(node).range.end;

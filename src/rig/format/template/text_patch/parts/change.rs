@@ -184,7 +184,7 @@ impl TagDiff<'_, '_> {
         let TagKind::Command { params, .. } = &tag.kind else { return Vec::new() };
         let current = self.words.current(params);
         let Some(tree) = Tree::parse(&current) else { return Vec::new() };
-        let items = &tree.node(tree.root()).items;
+        let items = tree.node(tree.root()).items;
         items.iter().filter_map(|item| Some((item.key?.to_owned(), tree.written(item.value).to_owned()))).collect()
     }
 }

@@ -1,0 +1,36 @@
+//! Joints that two rigs have in common, held once while the rigs are compared.
+
+use std::sync::Arc;
+
+use crate::rig::Rig;
+
+/// Gives a rig the joints of another where they are equal.
+pub(super) fn share_equal_joints(rig: &mut Rig, other: &Rig) {
+    for (uid, joint) in &mut rig.joints {
+        if let Some(same) = other.joints.get(uid).filter(|same| ***same == **joint) {
+            *joint = Arc::clone(same);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::{Uid, format::template::read::read_text};
+
+    #[test]
+    fn equal_joints_of_two_rigs_are_held_once() {
+        let [mut rig, other] = [1, 2].map(|y| {
+            let moved = format!("(label: \"b\", translation: (0, {y}, 0))");
+            read_text(&format!("(format: 2, name: \"n\", joints: [(label: \"a\"), {moved}])"), 1).unwrap().rig
+        });
+        let before = rig.clone();
+        share_equal_joints(&mut rig, &other);
+        assert_eq!(rig, before);
+        let is_shared = |label: &str| {
+            let uid = Uid::derived(["joint", label]);
+            Arc::ptr_eq(&rig.joints[&uid], &other.joints[&uid])
+        };
+        assert_eq!(["a", "b"].map(is_shared), [true, false]);
+    }
+}
