@@ -122,12 +122,15 @@ impl Steps {
     }
 
     fn groups(&mut self, to: &Rig) -> Result<(), EditError> {
-        for (place, group) in to.groups().iter().enumerate() {
+        // Groups that leave are still between the others: a new one comes behind the one that it follows.
+        let mut next = 0;
+        for group in to.groups() {
             match self.rig.group(group.uid) {
-                None => self.apply(RigEdit::AddLocalGroup(group.clone(), place))?,
+                None => self.apply(RigEdit::AddLocalGroup(group.clone(), next))?,
                 Some(own) if own != group => self.apply(RigEdit::SetLocalGroup(group.clone()))?,
                 Some(_) => {}
             }
+            next = self.rig.groups.place(group.uid).map_or(next, |place| place + 1);
         }
         Ok(())
     }

@@ -66,7 +66,7 @@ pub fn check(bytes: &[u8]) {
     let made = template(&mut choices, &limited(), true);
     let Some(rig) = made.read().map(|template| template.rig) else { return };
     let mut bench = Workbench::with_rig(4, rig);
-    bench.set_limits(LIMITS, Duration::from_secs(30));
+    bench.set_limits(LIMITS, Duration::from_secs(600));
     let report = bench.build(BuildStep::All);
     let mut writes = Vec::new();
     for _ in 0..1 + choices.below(6) {
