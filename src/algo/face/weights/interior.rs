@@ -77,6 +77,8 @@ struct MouthPart {
     mean: f32,
     /// True if much of it lies on either side of the lips.
     spans: bool,
+    /// True for a row of single teeth.
+    is_row: bool,
     low: Vec3,
     high: Vec3,
 }
@@ -91,7 +93,7 @@ impl MouthPart {
         let spans = !is_row && top < -0.1 * e && bottom > 0.1 * e && mean.abs() < 0.3 * (bottom - top);
         let places = || members.iter().map(|&v| face.places[v]);
         let (low, high) = (places().fold(Vec3::INFINITY, Vec3::min), places().fold(Vec3::NEG_INFINITY, Vec3::max));
-        Self { members, below, mean, spans, low, high }
+        Self { members, below, mean, spans, is_row, low, high }
     }
 
     /// True for a part that belongs to the jaw, by the parts that it faces; `None` if it faces none.
@@ -126,6 +128,8 @@ impl MouthPart {
     }
 
     /// True for parts of which one lies over the other, as an upper tooth over a lower one, and not within it.
+    ///
+    /// A row of teeth is never within another, though the bounds of one with fangs hold the other row.
     fn faces(&self, other: &Self, face: &Face) -> bool {
         let e = face.map.scale;
         let overlap = self.high.min(other.high) - self.low.max(other.low);
@@ -137,8 +141,7 @@ impl MouthPart {
         overlap.x >= least.x
             && overlap.z >= least.z
             && (self.mean_beside(other, face) - other.mean_beside(self, face)).abs() > 0.05 * e
-            && !within(self, other)
-            && !within(other, self)
+            && (self.is_row && other.is_row || !within(self, other) && !within(other, self))
     }
 }
 
