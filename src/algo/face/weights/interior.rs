@@ -12,8 +12,16 @@ use super::{
 };
 use crate::algo::face::{bones::map::line_distance, shells::ShellKind};
 
-/// Fills the rows of vertices that are not skin, shell by shell.
-pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind], rows: &mut [Row]) {
+/// Fills the rows of vertices that are not skin, shell by shell; returns the number of the stiff shell of each vertex that
+/// is on one.
+pub(crate) fn rows(
+    face: &Face,
+    sides: &Sides,
+    shell: &[u32],
+    kinds: &[ShellKind],
+    rows: &mut [Row],
+) -> Vec<Option<u32>> {
+    let mut stiff = vec![None; face.places.len()];
     let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for v in 0..face.places.len() {
         match kinds[v] {
@@ -48,11 +56,14 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
     }
     for members in outside {
         if lashes(face, sides, &skin, members, rows) || facial_hair::rows(face, sides, &outer, members, rows) {
-            rigid::stiffen(face, members, rows);
+            if rigid::stiffen(face, members, rows) {
+                members.iter().for_each(|&v| stiff[v] = Some(shell[v]));
+            }
         } else {
             rigid::hang(face, members, rows);
         }
     }
+    stiff
 }
 
 /// Returns `true` for a shell whose middle lies behind the lips, and that does not lie on the skin.
