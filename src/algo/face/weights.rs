@@ -168,7 +168,7 @@ pub fn face_weights(
     };
     let sides = sides::Sides::new(&face);
     let mut rows = skin::rows(&face, &sides, progress)?;
-    interior::rows(&face, &sides, &shell, &kinds, &mut rows);
+    let stiff = interior::rows(&face, &sides, &shell, &kinds, &mut rows);
     rows.iter_mut().for_each(|row| finish(row, most));
     if !progress(1.0) {
         return Err(FaceWeightsError::Cancelled);
@@ -179,6 +179,8 @@ pub fn face_weights(
     }
     if let Some(mirror) = Mirror::new(points, bones, landmarks) {
         mirror.apply(&mut weights, most);
+        let part_of: Vec<Option<u32>> = welded.iter().map(|&v| stiff[v as usize]).collect();
+        mirror.stiffen(&mut weights, &part_of);
     }
     Ok(weights)
 }

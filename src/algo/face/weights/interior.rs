@@ -12,8 +12,16 @@ use super::{
 };
 use crate::algo::face::{bones::map::line_distance, shells::ShellKind};
 
-/// Fills the rows of vertices that are not skin, shell by shell.
-pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind], rows: &mut [Row]) {
+/// Fills the rows of vertices that are not skin, shell by shell; returns the number of the stiff shell of each vertex that
+/// is on one.
+pub(crate) fn rows(
+    face: &Face,
+    sides: &Sides,
+    shell: &[u32],
+    kinds: &[ShellKind],
+    rows: &mut [Row],
+) -> Vec<Option<u32>> {
+    let mut stiff = vec![None; face.places.len()];
     let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for v in 0..face.places.len() {
         match kinds[v] {
@@ -48,11 +56,14 @@ pub(crate) fn rows(face: &Face, sides: &Sides, shell: &[u32], kinds: &[ShellKind
     }
     for members in outside {
         if lashes(face, sides, &skin, members, rows) || facial_hair::rows(face, sides, &outer, members, rows) {
-            rigid::stiffen(face, members, rows);
+            if rigid::stiffen(face, members, rows) {
+                members.iter().for_each(|&v| stiff[v] = Some(shell[v]));
+            }
         } else {
             rigid::hang(face, members, rows);
         }
     }
+    stiff
 }
 
 /// Returns `true` for a shell whose middle lies behind the lips, and that does not lie on the skin.
@@ -77,6 +88,8 @@ struct MouthPart {
     mean: f32,
     /// True if much of it lies on either side of the lips.
     spans: bool,
+    /// True for a row of single teeth.
+    is_row: bool,
     low: Vec3,
     high: Vec3,
 }
@@ -91,7 +104,7 @@ impl MouthPart {
         let spans = !is_row && top < -0.1 * e && bottom > 0.1 * e && mean.abs() < 0.3 * (bottom - top);
         let places = || members.iter().map(|&v| face.places[v]);
         let (low, high) = (places().fold(Vec3::INFINITY, Vec3::min), places().fold(Vec3::NEG_INFINITY, Vec3::max));
-        Self { members, below, mean, spans, low, high }
+        Self { members, below, mean, spans, is_row, low, high }
     }
 
     /// True for a part that belongs to the jaw, by the parts that it faces; `None` if it faces none.
@@ -126,6 +139,8 @@ impl MouthPart {
     }
 
     /// True for parts of which one lies over the other, as an upper tooth over a lower one, and not within it.
+    ///
+    /// A row of teeth is never within another, though the bounds of one with fangs hold the other row.
     fn faces(&self, other: &Self, face: &Face) -> bool {
         let e = face.map.scale;
         let overlap = self.high.min(other.high) - self.low.max(other.low);
@@ -137,8 +152,7 @@ impl MouthPart {
         overlap.x >= least.x
             && overlap.z >= least.z
             && (self.mean_beside(other, face) - other.mean_beside(self, face)).abs() > 0.05 * e
-            && !within(self, other)
-            && !within(other, self)
+            && (self.is_row && other.is_row || !within(self, other) && !within(other, self))
     }
 }
 

@@ -3,11 +3,13 @@
 //! Lashes and brows are on the skin along their whole length. Frames of glasses are as near to the eyes, but touch the skin
 //! at few places, such as the bridge of the nose, or go around the eye and across the face.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, f32::consts::TAU};
 
+use bevy::math::ops::atan2;
 use glam::Vec3;
 
 use super::{Face, HEAD, NECK, Row};
+use crate::algo::face::bones::map::line_distance;
 
 /// Largest extent of a lash, a tuft or a bead, which are on the skin wherever they touch it, in distances of the eyes'
 /// outer corners.
@@ -19,6 +21,11 @@ const HANGING: f32 = 0.6;
 /// Number of sections across a part, and the least number of those that touch the skin in a lash or a brow.
 const SECTIONS: usize = 12;
 const TOUCHING: usize = 6;
+/// Least distance of a lens's frame from the lids, on whose rims lashes stand.
+const OFF_LIDS: f32 = 0.08;
+/// Number of directions from the middle of an eye, and the least number of those in which a frame is off the lids.
+const DIRECTIONS: usize = 12;
+const CLEAR: usize = 8;
 
 /// Least and greatest corner of a shell.
 fn bounds(face: &Face, members: &[usize]) -> (Vec3, Vec3) {
@@ -45,14 +52,36 @@ pub(super) fn is_frame(face: &Face, members: &[usize], is_touching: impl Fn(usiz
     }
     let filled = touching.iter().flatten().count();
     let held = touching.iter().flatten().filter(|is_touching| **is_touching).count();
-    is_across || held * SECTIONS < TOUCHING * filled
+    is_across || held * SECTIONS < TOUCHING * filled || is_around_eye(face, members, [low, high], &is_touching)
 }
 
-/// Gives all vertices of a small shell on the skin the mean of their weights, so that a piercing keeps its shape.
-pub(super) fn stiffen(face: &Face, members: &[usize], rows: &mut [Row]) {
+/// True for a shell that goes around an eye off its lids, such as a monocle, even one that brow and cheek hold; paint around
+/// an eye lies on the skin everywhere.
+fn is_around_eye(face: &Face, members: &[usize], [low, high]: [Vec3; 2], is_touching: impl Fn(usize) -> bool) -> bool {
+    let (middle, reach) = (face.map.middle, OFF_LIDS * face.map.scale);
+    let (half, _) = face.map.fold(0.5 * (low + high));
+    let (eye, side) = (half.eye(), if low.x + high.x < 2.0 * middle { -1.0 } else { 1.0 });
+    let mut nearest = [f32::INFINITY; DIRECTIONS];
+    for &v in members {
+        let at = face.places[v];
+        let at = at.with_x(side * (at.x - middle));
+        let turn = atan2(at.y - eye.y, at.x - eye.x) / TAU + 0.5;
+        let direction = ((turn * DIRECTIONS as f32) as usize).min(DIRECTIONS - 1);
+        let distance = line_distance(&half.upper_lid, at).min(line_distance(&half.lower_lid, at));
+        nearest[direction] = nearest[direction].min(distance);
+    }
+    let is_whole = nearest.iter().all(|distance| distance.is_finite());
+    let clear = nearest.iter().filter(|distance| **distance > reach).count();
+    let touching = (0..members.len()).filter(|&at| is_touching(at)).count();
+    is_whole && clear >= CLEAR && 10 * touching < 9 * members.len()
+}
+
+/// Gives all vertices of a small shell on the skin the mean of their weights, so that a piercing keeps its shape; returns
+/// `false` for a larger one.
+pub(super) fn stiffen(face: &Face, members: &[usize], rows: &mut [Row]) -> bool {
     let (low, high) = bounds(face, members);
     if (high - low).max_element() > STIFF * face.map.scale {
-        return;
+        return false;
     }
     let mut sums: BTreeMap<u32, f32> = BTreeMap::new();
     for &v in members {
@@ -65,6 +94,7 @@ pub(super) fn stiffen(face: &Face, members: &[usize], rows: &mut [Row]) {
     for &v in members {
         rows[v].clone_from(&mean);
     }
+    true
 }
 
 /// Fills the rows of a shell that rides with head and neck; a small one hangs on its highest place and stays stiff.

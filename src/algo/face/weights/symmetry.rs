@@ -3,6 +3,8 @@
 //! Triangles of a mesh that was drawn symmetric are often cut along other diagonals on the two sides, and distances along
 //! the surface differ by that.
 
+use std::collections::BTreeMap;
+
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 
@@ -144,5 +146,27 @@ impl Mirror {
             both.push(list.iter().copied());
         }
         *weights = both;
+    }
+
+    /// Gives all points of each stiff part the weights of its first point that has a partner: [`Self::apply`] changes those
+    /// alone, and a part in the middle has some.
+    ///
+    /// `part_of` has the number of each point's part, `None` for a point of no stiff part.
+    pub fn stiffen(&self, weights: &mut Weights, part_of: &[Option<u32>]) {
+        let mut leaders: BTreeMap<u32, usize> = BTreeMap::new();
+        for (point, (part, partner)) in part_of.iter().zip(&self.points).enumerate().take(weights.len()) {
+            if let (Some(part), Some(_)) = (part, partner) {
+                leaders.entry(*part).or_insert(point);
+            }
+        }
+        if leaders.is_empty() {
+            return;
+        }
+        let mut stiff = Weights::default();
+        for point in 0..weights.len() {
+            let leader = part_of.get(point).copied().flatten().and_then(|part| leaders.get(&part));
+            stiff.push(weights.of(leader.copied().unwrap_or(point)));
+        }
+        *weights = stiff;
     }
 }
