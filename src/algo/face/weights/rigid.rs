@@ -14,7 +14,7 @@ use crate::algo::face::bones::map::line_distance;
 /// Largest extent of a lash, a tuft or a bead, which are on the skin wherever they touch it, in distances of the eyes'
 /// outer corners.
 const SMALL: f32 = 0.25;
-/// Largest extent of a piercing, bead or single hair, which is stiff on the skin that moves it.
+/// Largest extent of a piercing or bead, which is stiff on the skin that moves it.
 const STIFF: f32 = 0.15;
 /// Largest extent of a part that hangs on one place, such as an earring.
 const HANGING: f32 = 0.6;
@@ -76,11 +76,18 @@ fn is_around_eye(face: &Face, members: &[usize], [low, high]: [Vec3; 2], is_touc
     is_whole && clear >= CLEAR && 10 * touching < 9 * members.len()
 }
 
-/// Gives all vertices of a small shell on the skin the mean of their weights, so that a piercing keeps its shape; returns
-/// `false` for a larger one.
+/// True for a shell without a border, such as a ring, by its number of edges (Euler). Strands and lashes of flat strips have one.
+fn is_closed(face: &Face, members: &[usize]) -> bool {
+    let neighbours = |v: usize| face.graph.starts[v + 1] - face.graph.starts[v];
+    let edges = members.iter().map(|&v| neighbours(v) as usize).sum::<usize>() / 2;
+    members.len() > 4 && edges + 6 >= 3 * members.len()
+}
+
+/// Gives all vertices of a small closed shell on the skin the mean of their weights, so that a piercing keeps its shape;
+/// returns `false` for a larger or an open one, such as a strand of a beard, whose root goes with the skin.
 pub(super) fn stiffen(face: &Face, members: &[usize], rows: &mut [Row]) -> bool {
     let (low, high) = bounds(face, members);
-    if (high - low).max_element() > STIFF * face.map.scale {
+    if (high - low).max_element() > STIFF * face.map.scale || !is_closed(face, members) {
         return false;
     }
     let mut sums: BTreeMap<u32, f32> = BTreeMap::new();
