@@ -55,7 +55,9 @@ pub(crate) fn rows(
         }
     }
     for members in outside {
-        if lashes(face, sides, &skin, members, rows) || facial_hair::rows(face, sides, &outer, members, rows) {
+        let is_of_skin = !rigid::is_hanging_ring(face, members)
+            && (lashes(face, sides, &skin, members, rows) || facial_hair::rows(face, sides, &outer, members, rows));
+        if is_of_skin {
             if rigid::stiffen(face, members, rows) {
                 members.iter().for_each(|&v| stiff[v] = Some(shell[v]));
             }

@@ -76,11 +76,22 @@ fn is_around_eye(face: &Face, members: &[usize], [low, high]: [Vec3; 2], is_touc
     is_whole && clear >= CLEAR && 10 * touching < 9 * members.len()
 }
 
-/// True for a shell without a border, such as a ring, by its number of edges (Euler). Strands and lashes of flat strips have one.
-fn is_closed(face: &Face, members: &[usize]) -> bool {
+/// Number of edges of a shell.
+fn edges(face: &Face, members: &[usize]) -> usize {
     let neighbours = |v: usize| face.graph.starts[v + 1] - face.graph.starts[v];
-    let edges = members.iter().map(|&v| neighbours(v) as usize).sum::<usize>() / 2;
-    members.len() > 4 && edges + 6 >= 3 * members.len()
+    members.iter().map(|&v| neighbours(v) as usize).sum::<usize>() / 2
+}
+
+/// True for a shell without a border, by its number of edges (Euler). Strands and lashes of flat strips have one.
+fn is_closed(face: &Face, members: &[usize]) -> bool {
+    members.len() > 4 && edges(face, members) + 6 >= 3 * members.len()
+}
+
+/// True for a closed shell with a hole, too large for a piercing: an earring, which hangs even where it lies on the skin.
+pub(super) fn is_hanging_ring(face: &Face, members: &[usize]) -> bool {
+    let (low, high) = bounds(face, members);
+    let size = (high - low).max_element() / face.map.scale;
+    members.len() > 4 && size > STIFF && size <= HANGING && edges(face, members) >= 3 * members.len()
 }
 
 /// Gives all vertices of a small closed shell on the skin the mean of their weights, so that a piercing keeps its shape;
