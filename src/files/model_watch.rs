@@ -9,11 +9,11 @@ use std::{
     ffi::OsString,
     io::{self, Read},
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Mutex, PoisonError},
     time::{Duration, Instant, SystemTime},
 };
 
-use super::{Disk, DiskFile, Entry, EntryKind, FileKind, LoadError, load_model, read::is_missing};
+use super::{Disk, DiskFile, Entry, EntryKind, FileKind, LoadError, load_model};
 use crate::{mesh::model::Model, rig::skin::content_hash};
 
 /// Time for which files have to stand still before they are read.
@@ -86,7 +86,7 @@ impl ModelWatch {
     pub fn know(&mut self, disk: &dyn Disk) {
         let mut asked = BTreeSet::new();
         if FileKind::of(&self.path) == Some(FileKind::Gltf) {
-            asked = read_with_names(disk, &self.path).asked;
+            asked = read_with_names(disk, &self.path).1;
         }
         self.follow(asked, disk);
     }
@@ -135,14 +135,8 @@ impl ModelWatch {
     /// See [`load_model`].
     pub fn read(&mut self, disk: &dyn Disk) -> Option<Result<Model, LoadError>> {
         let before = stamps(disk, self.stamps.keys());
-        let FilesRead { model, asked, failed } = read_with_names(disk, &self.path);
+        let (model, asked) = read_with_names(disk, &self.path);
         self.follow(asked, disk);
-        // What a disk refused once is news as soon as it can be read, even if it could be hashed.
-        for path in &failed {
-            if let Some(known) = self.known.get_mut(path) {
-                *known = None;
-            }
-        }
         // What is saved while files are read or hashed is another version than the model, whatever was hashed.
         if stamps(disk, before.keys()) != before {
             self.known.clear();
@@ -188,64 +182,28 @@ fn hash_of(disk: &dyn Disk, path: &Path) -> io::Result<u64> {
     }
 }
 
-/// A model as it was read.
-struct FilesRead {
-    model: Result<Model, LoadError>,
-    /// Files that the reader opened or looked for in vain.
-    asked: BTreeSet<PathBuf>,
-    /// Files that the disk refused, or that are not there.
-    failed: BTreeSet<PathBuf>,
-}
-
-/// Reads a model, and takes note of the files that its reader asks for.
-fn read_with_names(disk: &dyn Disk, path: &Path) -> FilesRead {
-    let noting = NotingDisk { disk, asked: Mutex::default(), failed: Arc::default() };
+/// A model, and the files that its reader opened or looked for in vain.
+fn read_with_names(disk: &dyn Disk, path: &Path) -> (Result<Model, LoadError>, BTreeSet<PathBuf>) {
+    let noting = NotingDisk { disk, asked: Mutex::default() };
     let model = load_model(&noting, path);
-    let asked = noting.asked.into_inner().unwrap_or_else(PoisonError::into_inner);
-    let failed = std::mem::take(&mut *noting.failed.lock().unwrap_or_else(PoisonError::into_inner));
-    FilesRead { model, asked, failed }
+    (model, noting.asked.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
 /// Disk that takes note of the files that are asked for. It can only be read.
 struct NotingDisk<'d> {
     disk: &'d dyn Disk,
     asked: Mutex<BTreeSet<PathBuf>>,
-    failed: Arc<Mutex<BTreeSet<PathBuf>>>,
 }
 
 impl NotingDisk<'_> {
     fn note(&self, path: &Path) {
         self.asked.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned());
     }
-
-    fn fail(&self, path: &Path) {
-        self.failed.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned());
-    }
-}
-
-/// Content of a file, of which a failure is noted.
-struct NotingReader {
-    reader: Box<dyn Read + Send>,
-    path: PathBuf,
-    failed: Arc<Mutex<BTreeSet<PathBuf>>>,
-}
-
-impl Read for NotingReader {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        self.reader.read(bytes).inspect_err(|_| {
-            self.failed.lock().unwrap_or_else(PoisonError::into_inner).insert(self.path.clone());
-        })
-    }
 }
 
 impl Disk for NotingDisk<'_> {
     fn entry(&self, path: &Path, follow: bool) -> io::Result<Entry> {
-        self.disk.entry(path, follow).inspect_err(|error| {
-            if !is_missing(error) {
-                self.note(path);
-                self.fail(path);
-            }
-        })
+        self.disk.entry(path, follow)
     }
 
     fn read_link(&self, path: &Path) -> io::Result<PathBuf> {
@@ -253,10 +211,7 @@ impl Disk for NotingDisk<'_> {
     }
 
     fn canonical(&self, path: &Path) -> io::Result<PathBuf> {
-        self.disk.canonical(path).inspect_err(|_| {
-            self.note(path);
-            self.fail(path);
-        })
+        self.disk.canonical(path).inspect_err(|_| self.note(path))
     }
 
     fn list(&self, folder: &Path, limit: usize) -> io::Result<Vec<OsString>> {
@@ -289,7 +244,6 @@ impl Disk for NotingDisk<'_> {
 
     fn open(&self, path: &Path) -> io::Result<Box<dyn Read + Send>> {
         self.note(path);
-        let reader = self.disk.open(path).inspect_err(|_| self.fail(path))?;
-        Ok(Box::new(NotingReader { reader, path: path.to_owned(), failed: self.failed.clone() }))
+        self.disk.open(path)
     }
 }

@@ -13,7 +13,7 @@ use std::{
 
 use bevy::{ecs::message::MessageCursor, prelude::*};
 use rigsmith::{
-    files::{Disk, DiskFile, Entry, FaultyDisk, ModelWatch, RealDisk, SETTLE, load_model},
+    files::{Disk, DiskFile, Entry, ModelWatch, RealDisk, SETTLE, load_model},
     instance::{
         FollowedModels, InstanceSkins, ModelFault, ModelFile, ModelFilesPlugin, RigInstance, RigInstancePlugin,
         RigSource, RigTemplate,
@@ -30,7 +30,6 @@ use rigsmith::{
 use crate::{
     bench::{AppBench, HANG, save_whole, wait_with},
     disks::{entries_of_the_disk, no_changes},
-    files_faults::{is_passing, plans},
 };
 
 /// A square column from a height of 0.9, that wide and high, with so many rings of points, as an OBJ.
@@ -207,37 +206,6 @@ fn a_broken_file_is_told_once_and_the_next_good_one_is_read() {
     fs::write(watched.at("a.obj"), sleeve(0.1, 5)).unwrap();
     watched.until("the good file", Option::is_some);
     assert_eq!(watched.read, [None, Some(20)]);
-}
-
-/// A disk that fails once delays a version; one that goes on failing gives out nothing else.
-#[test]
-fn a_saved_mesh_is_read_whole_whatever_fails_meanwhile() {
-    // Looks at a saved version on a disk. Pauses of a watch are longer where reading takes long, and so are the looks.
-    let watched = |disk: &FaultyDisk, is_awaited: bool| {
-        let mut watched = Watched::new("a.obj", &sleeve(0.1, 4));
-        save_whole(&watched.at("a.obj"), sleeve(0.1, 5));
-        let (start, mut looks) = (Instant::now(), 0);
-        while looks < 120 || (is_awaited && watched.read.last() != Some(&Some(20))) {
-            assert!(start.elapsed() < HANG, "{:?}, {:?}", watched.read, disk.log());
-            looks += 1;
-            watched.now += Duration::from_millis(10);
-            if watched.watch.look_at(disk, watched.now) {
-                watched.read.extend(watched.watch.read(disk).map(|model| model.ok().map(|model| model.points.len())));
-            }
-        }
-        watched.read
-    };
-    let counted = FaultyDisk::new(RealDisk, None);
-    assert_eq!(watched(&counted, true), [Some(20)]);
-    // Looks before and after are alike; what lies between reads and hashes.
-    let log = counted.log();
-    let last = log.iter().rposition(|step| *step == "read").unwrap();
-    let first = log.iter().position(|step| *step == "read").unwrap();
-    for plan in plans(last + 2).filter(|plan| plan.at + 2 >= first) {
-        let read = watched(&FaultyDisk::new(RealDisk, Some(plan)), is_passing(plan));
-        assert!(read.iter().all(|points| points.is_none_or(|points| points == 20)), "{plan:?}: {read:?}");
-        assert!(read.len() <= 4, "{plan:?}: told again and again, {read:?}");
-    }
 }
 
 /// A disk on which a file is saved right before the opening of a file with that number, from 1; it can only be read.
