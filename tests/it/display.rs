@@ -1,6 +1,6 @@
 //! Meshes of a rig as they are drawn: pieces, weights, edges, colours, materials. No renderer is needed to look at it.
 
-mod carried;
+mod gear;
 mod materials;
 mod weights;
 
