@@ -84,7 +84,9 @@ pub use store::{
 };
 pub use template_layout::format_template_file;
 pub use template_origin::{TemplateOrigin, has_parts, store_rig_from};
-pub(crate) use template_text::{new_template_text, template_text};
+#[cfg(feature = "cli")]
+pub(crate) use template_text::new_template_text;
+pub(crate) use template_text::template_text;
 pub use template_update::{
     DocumentUpdate, TemplateBase, TemplateUpdate, TemplateVersion, base_text, diff_templates, update_document,
     update_template, update_with_known_parts,

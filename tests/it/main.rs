@@ -27,6 +27,7 @@ mod cli_face_parts;
 mod cli_limits;
 #[cfg(all(feature = "cli", unix))]
 mod cli_names;
+#[cfg(feature = "cli")]
 mod cli_numbers;
 #[cfg(feature = "cli")]
 mod cli_outputs;
@@ -42,6 +43,7 @@ mod cli_skin;
 mod cli_streams;
 #[cfg(feature = "cli")]
 mod cli_template_answers;
+#[cfg(feature = "cli")]
 mod cli_templates;
 #[cfg(feature = "cli")]
 mod cli_update_clips;
@@ -168,6 +170,7 @@ mod modules_nodes;
 mod modules_rigs;
 mod moved_tags;
 mod mutate;
+#[cfg(feature = "cli")]
 mod new_templates;
 mod obj;
 mod obj_materials;
