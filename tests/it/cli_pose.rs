@@ -492,9 +492,8 @@ fn the_mesh_of_a_project_is_posed_with_its_own_weights() {
 #[test]
 fn frames_end_with_the_time_that_a_command_may_take() {
     let folder = folder();
-    let limits = ["--limit", "seconds=1", "--limit", "frames=100000000"];
+    // The build before the frames counts, too, and takes a while on a machine that does something else.
+    let limits = ["--limit", "seconds=4", "--limit", "frames=100000000"];
     let answer = rigsmith(folder.path(), &[&limits[..], &["pose", "crane.rig.ron", "--frames", "100000000"]].concat());
-    // On a machine that does something else the build alone may take as long.
-    let told = ["the frames", "building the rig"].map(|work| format!("{work} took longer than 1 s"));
-    assert!(answer.code == 1 && told.iter().any(|text| answer.err.contains(text)), "{}", answer.err);
+    assert!(answer.code == 1 && answer.err.contains("the frames took longer than 4 s"), "{}", answer.err);
 }

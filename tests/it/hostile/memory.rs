@@ -137,7 +137,7 @@ fn weights_clips_and_projects_stay_within_their_memory() {
 /// where frames pass or values are written: its app has entities, too. None was asked for.
 const AT_REST: u64 = 400;
 const DOCUMENT: u64 = 1_600;
-const ENTITIES: u64 = 3_500;
+const ENTITIES: u64 = 2_000;
 
 #[test]
 fn templates_of_bare_and_placed_joints_stay_within_their_memory() {

@@ -57,17 +57,23 @@ fn changed(constraint: &mut Constraint, by: f32) -> bool {
     }
 }
 
-#[test]
-fn programs_with_other_numbers_are_those_compiled_from_nothing() {
+/// The built biped, and its state where every seventh node is turned.
+fn posed_biped(cache: &mut ProgramCache) -> (BuiltRig, RigState) {
     let rig = crate::bench::shipped("biped");
-    let mut built: BuiltRig = (*Arc::new(Builder::build(&rig, &Arc::new(modules::all())).unwrap())).clone();
-    let options = CompileOptions::default();
-    let mut cache = ProgramCache::default();
-    let mut state = RigState::new(cache.get(&built, &options).unwrap());
+    let built: BuiltRig = (*Arc::new(Builder::build(&rig, &Arc::new(modules::all())).unwrap())).clone();
+    let mut state = RigState::new(cache.get(&built, &CompileOptions::default()).unwrap());
     for slot in (0..state.program().nodes().len()).step_by(7) {
         state.set_offset_at(slot, PoseOffset::from_rotation(Quat::from_rotation_y(0.03 * (slot % 11) as f32)));
     }
     state.evaluate(0.0);
+    (built, state)
+}
+
+#[test]
+fn programs_with_other_numbers_are_those_compiled_from_nothing() {
+    let options = CompileOptions::default();
+    let mut cache = ProgramCache::default();
+    let (mut built, mut state) = posed_biped(&mut cache);
     let (mut partial, mut rounds) = (0, 0);
     for round in 0..built.constraints.len() + 40 {
         let by = 1.0 + 0.01 * (1 + round % 9) as f32;
@@ -176,15 +182,9 @@ fn numbers_that_others_have_too_change_alone() {
 /// A program of another layout runs whole, and tells the nodes that move alone: the others stand where they stood.
 #[test]
 fn programs_of_other_layouts_tell_what_moves() {
-    let rig = crate::bench::shipped("biped");
-    let mut built: BuiltRig = (*Arc::new(Builder::build(&rig, &Arc::new(modules::all())).unwrap())).clone();
     let options = CompileOptions::default();
     let mut cache = ProgramCache::default();
-    let mut state = RigState::new(cache.get(&built, &options).unwrap());
-    for slot in (0..state.program().nodes().len()).step_by(7) {
-        state.set_offset_at(slot, PoseOffset::from_rotation(Quat::from_rotation_y(0.03 * (slot % 11) as f32)));
-    }
-    state.evaluate(0.0);
+    let (mut built, mut state) = posed_biped(&mut cache);
     let finger = built.nodes.iter().find(|node| node.label.as_deref() == Some("index_03_l")).unwrap();
     // The finger gets longer by one more constraint.
     let least = finger.base.translation.length() + 0.01;
