@@ -8,6 +8,8 @@
 
 use bevy::{
     camera::{Viewport, visibility::RenderLayers},
+    input::mouse::{AccumulatedMouseScroll, MouseScrollUnit},
+    math::ops,
     prelude::*,
     window::PrimaryWindow,
 };
@@ -41,7 +43,7 @@ impl Plugin for CameraPlugin {
             .add_systems(Startup, spawn_camera)
             .add_systems(PreUpdate, see.after(super::pointer::follow_pointer))
             .add_systems(Update, (carry_out, frame_when_ready))
-            .add_systems(PostUpdate, (steer, fit_viewport).chain().before(PanOrbitCameraSystemSet))
+            .add_systems(PostUpdate, (steer, pace_zoom, fit_viewport).chain().before(PanOrbitCameraSystemSet))
             .add_systems(PostUpdate, keep_depths.after(PanOrbitCameraSystemSet).before(TransformSystems::Propagate));
     }
 }
@@ -297,6 +299,34 @@ fn steer(
     }
 }
 
+/// Part of the distance to the focus that one notch of the wheel leaves.
+const NOTCH: f32 = 0.8;
+/// Notches a pixel of a trackpad's scrolling, as the camera counts them.
+const PIXEL: f32 = 0.005;
+/// Part of the distance that the camera takes for a notch at a sensitivity of 1.
+const TAKEN: f32 = 0.2;
+
+/// Makes several notches of one frame go as far as the same notches of as many frames. The camera adds the notches of a frame
+/// up, so that five of them, which a fast hand or a slow frame brings together, end at the nearest distance that is allowed.
+fn pace_zoom(mut cameras: Query<&mut PanOrbitCamera>, scroll: Res<AccumulatedMouseScroll>) {
+    let notches = match scroll.unit {
+        MouseScrollUnit::Line => scroll.delta.y,
+        MouseScrollUnit::Pixel => scroll.delta.y * PIXEL,
+    };
+    let sensitivity = zoom_sensitivity(notches);
+    for mut camera in &mut cameras {
+        if camera.zoom_sensitivity != sensitivity {
+            camera.zoom_sensitivity = sensitivity;
+        }
+    }
+}
+
+/// Sensitivity at which some notches, added up, leave [`NOTCH`] of the distance each.
+fn zoom_sensitivity(notches: f32) -> f32 {
+    let sensitivity = (1.0 - ops::powf(NOTCH, notches)) / (TAKEN * notches);
+    if sensitivity.is_finite() { sensitivity } else { 1.0 }
+}
+
 /// Restricts drawing to the part of the window that the panels leave free.
 fn fit_viewport(
     area: Res<ViewportArea>,
@@ -351,5 +381,26 @@ fn keep_depths(
             *projection = next;
             orbit.force_update = true;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notches_of_one_frame_go_as_far_as_those_of_many() {
+        let left = |notches: f32| 1.0 - TAKEN * notches * zoom_sensitivity(notches);
+        for notches in 1..=40 {
+            let one_by_one = (0..notches).fold([1.0; 2], |[near, far], _| [near * left(1.0), far * left(-1.0)]);
+            let at_once = [left(notches as f32), left(-notches as f32)];
+            for (a, b) in at_once.into_iter().zip(one_by_one) {
+                assert!(
+                    a > 0.0 && (a - b).abs() <= 1e-4 * b.max(1e-2),
+                    "{notches} notches: {a} at once, {b} one by one"
+                );
+            }
+        }
+        assert_eq!(zoom_sensitivity(0.0), 1.0);
     }
 }

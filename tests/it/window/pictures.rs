@@ -25,6 +25,14 @@ impl Hands<'_> {
         [report.viewport[0] + 12.0, report.viewport[1] + 12.0]
     }
 
+    /// Turns the wheel by some notches towards what is in the middle of the viewport.
+    fn approach(&self, notches: usize) {
+        let [left, top, width, height] = self.report().expect("the window reports").viewport;
+        self.point([left + 0.5 * width, top + 0.5 * height]);
+        (0..notches).for_each(|_| drop(self.xdotool(&["click", "4"])));
+        self.rests();
+    }
+
     /// Brings a panel of the dock forward by its tab.
     fn bring(&self, panel: &str) {
         self.press(&format!("Show {panel}"));
@@ -128,7 +136,10 @@ fn rigged(hands: &Hands) {
 /// Three poses of an arm, stored and keyed: their cards, keys and curves.
 fn posed(hands: &Hands) {
     hands.key("p");
-    let report = hands.until("controls are posed", |report| report.mode == "Pose");
+    hands.until("controls are posed", |report| report.mode == "Pose");
+    // Near enough for the outline of the hand's control to be free of those of the fingers.
+    hands.approach(2);
+    let report = hands.report().expect("the window reports");
     let uid = &report.labels["hand_l"];
     let rest = report.places[uid];
     hands.bring("Controls");
