@@ -125,7 +125,10 @@ fn check(path: &Path) -> Result<Findings, Failure> {
                     found.remarks.extend(remarks_on_rig(&rig));
                     found.error = faults_of_places(&rig).into_iter().next().map(|(_, fault)| fault);
                 }
-                Err(Failure::Input(error)) => found.error = Some(error.to_string()),
+                Err(Failure::Input(error)) => {
+                    found.place = Some(Explanation::of_error(error.as_ref(), &path.display().to_string()).place);
+                    found.error = Some(error.to_string());
+                }
                 Err(usage) => return Err(usage),
             }
             Ok(())

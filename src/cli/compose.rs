@@ -182,7 +182,9 @@ pub(super) fn inject(args: &InjectArgs) -> Result<Report, Failure> {
     let size = part.sized_for(joints.len()).map_or(part.rig.len(), |sized| sized.len());
     let left = (size.saturating_sub(joints.len()), joints.len().saturating_sub(size));
     let operation = Operation::Tags(TagOperation::Drop { part: Arc::new(part), joints, bindings: Default::default() });
+    limits::check_time("injecting the template")?;
     run(&mut rig, &operation, &mut uids, &mut report)?;
+    limits::check_time("injecting the template")?;
     let tags = count(&rig) - before;
     write(&args.output, rig, &[&args.rig], &mut report)?;
     report.line(format!("{} injected", counted(tags, "tag", "tags")));
@@ -199,6 +201,7 @@ pub(super) fn extract(args: &ExtractArgs) -> Result<Report, Failure> {
     if args.hierarchy {
         joints = joints.iter().flat_map(|top| rig.hierarchy(*top).map(|joint| joint.data.uid)).collect();
     }
+    limits::check_time("extracting the joints")?;
     let mut uids = uids_of(std::slice::from_ref(&rig));
     let name = stem(&args.output);
     let extracted = extract::extract(&rig, &joints, &name, args.new_uids.then_some(&mut uids));
@@ -211,6 +214,7 @@ pub(super) fn extract(args: &ExtractArgs) -> Result<Report, Failure> {
         let joints = out.walk().map(|joint| joint.data.uid).collect();
         orient(&mut out, joints, along, &mut uids, &mut report)?;
     }
+    limits::check_time("extracting the joints")?;
     report.notes(store_rig(&RealDisk, &args.output, &out)?);
     report.notes.extend(left.iter().cloned());
     report.line(format!("wrote {}: {}", args.output.display(), counted(out.len(), "joint", "joints")));

@@ -39,6 +39,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
         (Some(Obj | Gltf | Glb | Vrm), Some(Obj | Gltf | Glb)) => {
             let model = spinning("reading", || limits::load_model(&args.input))?;
             report.notes(model.notes.iter().cloned());
+            limits::check_time("converting the file")?;
             // Points without weights in the input stay unmoved in the only way that glTF offers: bound to the root.
             let settings = GltfWriteSettings { bind_unweighted: true, ..args.export.settings() };
             spinning("writing", || store_owned_model(&RealDisk, &args.output, model, &settings))?
@@ -54,10 +55,12 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
             for edit in &import_skeleton(&model, &mut uids).edits {
                 rig.apply(edit).map_err(|error| Failure::Input(Box::new(error)))?;
             }
+            limits::check_time("converting the file")?;
             store_rig(&RealDisk, &args.output, rig)?
         }
         (Some(RigText | Template), Some(RigText | Template)) => {
             let rig = load_rig(&args.input, &mut report)?;
+            limits::check_time("converting the file")?;
             store_rig_over(&RealDisk, &args.output, rig, &[&args.input])?
         }
         (Some(RigText | Template), Some(Gltf | Glb)) => {
@@ -66,6 +69,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Report, Failure> {
             let mut model = skeleton_model(&rig);
             mark_joints(&mut model, &rig);
             drop(rig);
+            limits::check_time("converting the file")?;
             store_owned_model(&RealDisk, &args.output, model, &settings)?
         }
         (Some(Obj), Some(RigText | Template)) => {

@@ -81,7 +81,13 @@ fn of_load(error: &(dyn Error + 'static)) -> Option<String> {
         LoadError::Read(error) => Some(named(error.path())),
         LoadError::Gltf(error) => of_gltf(error),
         LoadError::Source { path, source, .. } => Some(format!("{}:{}:{}", named(path), source.line, source.column)),
-        error => error.path().map(named),
+        error => {
+            let file = named(error.path()?);
+            Some(match error.line() {
+                Some(line) => format!("{file}:{line}"),
+                None => file,
+            })
+        }
     }
 }
 

@@ -57,6 +57,7 @@ pub(super) fn run(args: &InfoArgs) -> Result<Report, Failure> {
             return Err(Failure::Usage(message));
         }
     }
+    limits::check_time("reading the file")?;
     Ok(report)
 }
 

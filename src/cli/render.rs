@@ -159,6 +159,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
     InPlaceArgs::default().check(&[&args.file], Some(&args.output), &[])?;
     let mut report = Report::default();
     let mut scene = read(args, &mut report)?;
+    limits::check_time("drawing the picture")?;
     if let Some(pose) = &args.pose {
         strike(&mut scene.rig, pose)?;
     }
@@ -220,10 +221,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Report, Failure> {
     if let Some((name, true)) = adapter() {
         report.notes.push(format!("no graphics card: drawn in software ({name})"));
     }
-    let picture = |error| Failure::Input(Box::new(error));
-    let image = spinning("drawing", || Ok::<_, Failure>(take_picture(rig, meshes, &settings)))?.map_err(picture)?;
-    let bytes = png(image).map_err(picture)?;
-    save_atomic(&RealDisk, &args.output, &bytes).map_err(|error| Failure::Input(Box::new(error)))?;
+    draw(rig, meshes, &settings, &args.output)?;
     report.line(format!("wrote {} ({} x {} pixels)", args.output.display(), args.size.0, args.size.1));
     report.set("output", args.output.display().to_string());
     report.set("size", json!([args.size.0, args.size.1]));
@@ -245,10 +243,7 @@ pub(super) fn picture_of(
     let meshes: Vec<RigMesh> = bench.meshes().cloned().collect();
     let state = Some(posed.runtime()?.state().clone());
     let settings = PictureSettings { build: true, state, deform: deform.deform(), ..PictureSettings::default() };
-    let picture = |error| Failure::Input(Box::new(error));
-    let rig = bench.rig().clone();
-    let image = spinning("drawing", || Ok::<_, Failure>(take_picture(rig, meshes, &settings)))?.map_err(picture)?;
-    save_atomic(&RealDisk, output, &png(image).map_err(picture)?).map_err(|error| Failure::Input(Box::new(error)))
+    draw(bench.rig().clone(), meshes, &settings, output)
 }
 
 /// Draws a rig that was fitted to the mesh of a workbench as it is at rest, seen from the figure's front, the mesh half
@@ -266,10 +261,17 @@ pub(super) fn picture_of_fit(
     let bounds = is_part.then(|| surroundings(fitted));
     let turn = fitted.fit.turn();
     let settings = PictureSettings { display, drawing, selected, turn, bounds, ..PictureSettings::default() };
+    draw(bench.rig().clone(), bench.mesh().cloned().into_iter().collect(), &settings, output)
+}
+
+/// Draws a picture and writes it, where time is left for each.
+fn draw(rig: Rig, meshes: Vec<RigMesh>, settings: &PictureSettings, output: &Path) -> Result<(), Failure> {
     let picture = |error| Failure::Input(Box::new(error));
-    let (rig, meshes) = (bench.rig().clone(), bench.mesh().cloned().into_iter().collect());
-    let image = spinning("drawing", || Ok::<_, Failure>(take_picture(rig, meshes, &settings)))?.map_err(picture)?;
-    save_atomic(&RealDisk, output, &png(image).map_err(picture)?).map_err(|error| Failure::Input(Box::new(error)))
+    limits::check_time("drawing the picture")?;
+    let image = spinning("drawing", || Ok::<_, Failure>(take_picture(rig, meshes, settings)))?.map_err(picture)?;
+    let bytes = png(image).map_err(picture)?;
+    limits::check_time("drawing the picture")?;
+    save_atomic(&RealDisk, output, &bytes).map_err(|error| Failure::Input(Box::new(error)))
 }
 
 /// Box around the joints of a fit, with some room: what a picture of a part shows.

@@ -122,8 +122,10 @@ enum TakeArg {
 pub(super) fn run_diff(args: &DiffArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let (from, to) = (version(&args.from, &mut report)?, version(&args.to, &mut report)?);
+    limits::check_time("comparing the templates")?;
     let changes = diff_templates(&RealDisk, &from, &to);
     drop((from, to));
+    limits::check_time("comparing the templates")?;
     tell(&mut report, &changes);
     Ok(report)
 }
@@ -152,6 +154,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
         "base",
         is_beside.then(|| beside.display().to_string()).or(args.base.as_ref().map(|base| base.display().to_string())),
     );
+    limits::check_time("updating the rig")?;
     let mut update = update_template(&RealDisk, base.as_ref(), &now, &file, &args.side().into());
     let updated = &mut update.update;
     let was = base.as_ref().unwrap_or(&now).rig();
@@ -163,6 +166,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     // The versions are as large as what is written, which is read back.
     drop((base, now));
     let file = keeps_base.then_some(file);
+    limits::check_time("updating the rig")?;
     if let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) {
         report.notes(update.store(&RealDisk, output)?);
         report.line(format!("wrote {}", output.display()));

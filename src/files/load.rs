@@ -206,6 +206,23 @@ impl LoadError {
             | Self::Broken { path } => Some(path),
         }
     }
+
+    /// Line of the fault, counted from 1; `None` where the reader knows none, and for glTF, whose errors hold their places.
+    pub fn line(&self) -> Option<u64> {
+        match self {
+            Self::Obj { source, .. } => source.line(),
+            Self::RigText { source, .. } => source.line().map(|line| line as u64),
+            Self::Source { source, .. } => Some(source.line as u64),
+            Self::Bvh { source, .. } => Some(source.line() as u64),
+            Self::Read(_)
+            | Self::Kind { .. }
+            | Self::Gltf(_)
+            | Self::PackedClips { .. }
+            | Self::Skin { .. }
+            | Self::Outside { .. }
+            | Self::Broken { .. } => None,
+        }
+    }
 }
 
 /// Reads a mesh: `.obj`, `.gltf`, `.glb` or `.vrm`.

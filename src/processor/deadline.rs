@@ -12,7 +12,7 @@ pub struct Deadline {
 
 /// Error of work that took too long.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{work} took longer than {seconds} s and was given up; simplify the input, or raise the limit `seconds`")]
+#[error("{work} took longer than {seconds} s and had to stop; simplify the input, or raise the limit `seconds`")]
 pub struct OutOfTime {
     /// The work, as the subject of a sentence.
     pub work: &'static str,

@@ -1,6 +1,6 @@
 //! Limits of commands: `--limit` sets them, and errors say which one and what went over it.
 
-use std::{fs, sync::Arc};
+use std::{fs, path::Path, sync::Arc};
 
 use rigsmith::{
     plugins::limits::{Limit, RigLimits},
@@ -87,23 +87,49 @@ fn each_limit_can_be_set_and_is_named_by_its_error() {
 fn commands_are_given_up_when_their_time_is_over() {
     let folder = folder();
     let walker = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/retarget/walker.bvh");
-    let commands: [(&[&str], &str); 5] = [
+    let commands: [(&[&str], &str); 13] = [
         (&["check", "tags.rig.ron"], "checking the files"),
         (&["pose", "tags.rig.ron", "-o", "out.glb"], "building the rig"),
         (&["build", "tags.rig.ron", "-o", "out.glb"], "building the rig"),
         (&["animate", "tags.rig.ron", walker, "-o", "out.anim.ron"], "building the rig"),
         (&["merge", "tags.rig.ron", "tags.rig.ron", "-o", "out.rig.ron"], "merging the rigs"),
+        (&["inject", "tags.rig.ron", "tags.rig.ron", "--joints", "j", "-o", "out.rig.ron"], "injecting the template"),
+        (&["extract", "tags.rig.ron", "--joints", "j", "-o", "out.rig.ron"], "extracting the joints"),
+        (&["convert", "b.obj", "out.glb"], "converting the file"),
+        (&["convert", "chain.rig", "out.rig.ron"], "converting the file"),
+        (&["convert", "chain.rig", "out.glb"], "converting the file"),
+        (&["info", "chain.rig"], "reading the file"),
+        (&["diff", "tags.rig.ron", "tags.rig.ron"], "comparing the templates"),
+        (&["update", "tags.rig.ron", "--from", "tags.rig.ron", "-o", "out.rig.ron"], "updating the rig"),
     ];
     for (args, work) in commands {
-        let (code, said) = rigsmith(folder.path(), &[args, &["--limit", "seconds=0", "--json"]].concat());
-        let answer: Value = serde_json::from_str(&said).unwrap_or_else(|error| panic!("{error}: {said}"));
-        let told = explained(&answer);
-        assert_eq!(code, 1, "{args:?}: {told}");
-        assert!(told.contains(&format!("{work} took longer than 0 s")), "{args:?}: {told}");
-        assert!(told.contains("raise the limit `seconds`"), "{args:?}: {told}");
-        for written in ["out.glb", "out.anim.ron", "out.rig.ron"] {
-            assert!(!folder.path().join(written).exists(), "{args:?}");
-        }
+        gives_up(folder.path(), args, work);
+    }
+}
+
+/// Files of all kinds are read in their time, and a picture is drawn in it.
+#[test]
+fn reading_and_drawing_have_a_time() {
+    let folder = folder();
+    #[cfg(feature = "render")]
+    for file in ["chain.rig", "tags.rig.ron", "b.obj"] {
+        gives_up(folder.path(), &["render", file, "-o", "out.png"], "drawing the picture");
+    }
+    for file in ["chain.rig", "tags.rig.ron", "b.obj", "g.ron"] {
+        gives_up(folder.path(), &["info", file], "reading the file");
+    }
+}
+
+/// Fails unless a command without time says that its work took too long, and writes nothing.
+fn gives_up(folder: &Path, args: &[&str], work: &str) {
+    let (code, said) = rigsmith(folder, &[args, &["--limit", "seconds=0", "--json"]].concat());
+    let answer: Value = serde_json::from_str(&said).unwrap_or_else(|error| panic!("{error}: {said}"));
+    let told = explained(&answer);
+    assert_eq!(code, 1, "{args:?}: {told}");
+    assert!(told.contains(&format!("{work} took longer than 0 s and had to stop")), "{args:?}: {told}");
+    assert!(told.contains("raise the limit `seconds`"), "{args:?}: {told}");
+    for written in ["out.glb", "out.anim.ron", "out.rig.ron", "out.png"] {
+        assert!(!folder.join(written).exists(), "{args:?}");
     }
 }
 

@@ -276,3 +276,32 @@ fn a_check_tells_the_place_that_the_reader_tells() {
         assert!(of_check.len() > name.len() && of_check.starts_with(name), "{of_check}");
     }
 }
+
+/// Readers of text know the line of a fault, and every command that reads it tells it.
+#[test]
+fn places_of_faults_have_lines() {
+    let folder = folder();
+    let files = [
+        ("m.obj", "v 0 0 0\nv 1 x 0\n", "m.obj:2"),
+        ("s.rig", "rig 1\njoint 0 -1 0 0 0 a\njoint 1 0 0 zero 0 b\n", "s.rig:3"),
+        ("w.bvh", "HIERARCHY\nROOT hips\n{\n  OFFSET 0 up 0\n}\n", "w.bvh:4"),
+    ];
+    for (name, text, _) in files {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    let rig = "(format: 2, name: \"n\", joints: [(label: \"j\")])";
+    fs::write(folder.path().join("j.rig.ron"), rig).unwrap();
+    let of = |args: &[&str]| {
+        let (code, told) = json(folder.path(), args);
+        assert_eq!(code, 1, "{args:?}: {told}");
+        told["error"]["where"].as_str().unwrap().to_owned()
+    };
+    for (name, _, place) in files {
+        for command in ["info", "check"] {
+            assert_eq!(of(&[command, name]), place, "{command}");
+        }
+    }
+    assert_eq!(of(&["convert", "m.obj", "out.glb"]), "m.obj:2");
+    assert_eq!(of(&["skin", "s.rig", "b.obj", "-o", "out.glb"]), "s.rig:3");
+    assert_eq!(of(&["animate", "j.rig.ron", "w.bvh", "-o", "out.anim.ron"]), "w.bvh:4");
+}

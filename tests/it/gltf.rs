@@ -4,6 +4,7 @@ pub mod compose;
 pub mod data;
 mod errors;
 mod external;
+mod peer_files;
 mod writing;
 
 use compose::{ComposedDocument, PNG, character, triangle};

@@ -157,6 +157,7 @@ mod layout;
 mod layout_names;
 mod leg_strokes;
 mod linkage;
+mod list_orders;
 #[cfg(feature = "editor")]
 mod loader;
 mod long_run;

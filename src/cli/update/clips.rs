@@ -98,6 +98,7 @@ pub(super) fn updated<'a>(
     let rig = Arc::new((next.clone(), is.clone()));
     let (mut files, mut facts) = (Vec::new(), Vec::new());
     for (number, path) in args.clips.iter().enumerate() {
+        limits::check_time("re-expressing the clips")?;
         let read = load_animation(&RealDisk, path)?;
         report.notes(read.notes.iter().cloned());
         let bound = read.onto(now, Some(&was));

@@ -47,6 +47,7 @@ pub(super) fn run(args: &UpdateArgs) -> Result<Report, Failure> {
     let source = args.base.as_ref().or(known.map(|_| &args.rig));
     report.set("base", source.map(|path| path.display().to_string()));
     let choices: Choices = args.side().into();
+    limits::check_time("updating the rig")?;
     let of_parts = match (&given, &of_project) {
         // A base that is known with its parts tells their fields.
         (Some(base), _) => update_document(&RealDisk, base, &now, &file, &choices),
@@ -64,6 +65,7 @@ pub(super) fn run(args: &UpdateArgs) -> Result<Report, Failure> {
         return Ok(report);
     }
     let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) else { return Ok(report) };
+    limits::check_time("updating the rig")?;
     exchange(&mut project.rigs[number], &updated.rig).map_err(refused)?;
     let taken_over = taken_over.as_ref().unwrap_or(&file);
     let rig = Arc::new(with_identities(taken_over.rig(), &updated.identities));

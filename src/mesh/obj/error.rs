@@ -34,6 +34,16 @@ pub enum ObjError {
     Inconsistent,
 }
 
+impl ObjError {
+    /// Line of the fault, counted from 1; `None` for a fault of the whole file.
+    pub fn line(&self) -> Option<u64> {
+        match self {
+            Self::Line { line, .. } => Some(*line),
+            Self::Io(_) | Self::TooMany { .. } | Self::NoGeometry | Self::Inconsistent => None,
+        }
+    }
+}
+
 /// Problem on a line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]

@@ -219,7 +219,12 @@ impl FittedRig {
             FitExtent::Skeleton if !rig.is_empty() => Ok(edits_between(rig, &self.placed(rig, modules)?)?),
             FitExtent::Skeleton => {
                 let mut edits = edits_between(rig, target)?;
-                edits.retain(|edit| !matches!(edit, RigEdit::RemoveLocalGroup(_) | RigEdit::RemoveStoredPose(_)));
+                // Groups and poses that move are removed, too, and come back at once.
+                edits.retain(|edit| match edit {
+                    RigEdit::RemoveLocalGroup(uid) => target.group(*uid).is_some(),
+                    RigEdit::RemoveStoredPose(uid) => target.stored_pose(*uid).is_some(),
+                    _ => true,
+                });
                 Ok(edits)
             }
             FitExtent::Joints => {

@@ -1,6 +1,6 @@
 //! Edits that make one rig of another.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use crate::rig::{
     EditError, Rig, RigEdit, RigJoint, Uid,
@@ -65,8 +65,10 @@ fn key_edit(clip: Uid, layer: Uid, target: &TrackTarget, now: Option<&Track>, th
     is_other.then(|| RigEdit::SetKeys { clip, layer, target: target.clone(), removed, inserted })
 }
 
-/// The edits after which `from` has the content of `to`: header, groups, inputs, joints, tags and stored poses. Weights, the current
-/// pose, attribute values and clips stay; those of joints that go, go with them. What is the same in both is not touched.
+/// The edits after which `from` has the content of `to`: header, groups, inputs, joints, tags and stored poses, each list in
+/// its order there. Weights, the current pose, attribute values, clips, selection sets, cuts of faces and the record of
+/// dropped parts stay; what is stored of joints that go, goes with them. What is the same in both is not touched, except
+/// that the joints of a group that moves are out of it meanwhile.
 ///
 /// # Errors
 /// [`EditError`] of an edit that is refused: one of the two has values that no rig can have.
@@ -122,17 +124,49 @@ impl Steps {
     }
 
     fn groups(&mut self, to: &Rig) -> Result<(), EditError> {
-        // Groups that leave are still between the others: a new one comes behind the one that it follows.
+        self.empty_moving_groups(to)?;
+        // Groups that leave are still between the others: one that comes or moves goes behind the one that it follows.
         let mut next = 0;
         for group in to.groups() {
-            match self.rig.group(group.uid) {
+            match self.rig.groups.place(group.uid) {
                 None => self.apply(RigEdit::AddLocalGroup(group.clone(), next))?,
-                Some(own) if own != group => self.apply(RigEdit::SetLocalGroup(group.clone()))?,
-                Some(_) => {}
+                Some(place) => {
+                    if place < next {
+                        self.move_group(group.uid, next - 1)?;
+                    }
+                    if self.rig.group(group.uid) != Some(group) {
+                        self.apply(RigEdit::SetLocalGroup(group.clone()))?;
+                    }
+                }
             }
             next = self.rig.groups.place(group.uid).map_or(next, |place| place + 1);
         }
         Ok(())
+    }
+
+    /// Takes the joints out of the groups that stand behind others in `to` than now: only a group without joints can be
+    /// moved. The joints come back with their other fields.
+    fn empty_moving_groups(&mut self, to: &Rig) -> Result<(), EditError> {
+        let (mut last, mut moving) = (0, HashSet::new());
+        for group in to.groups() {
+            match self.rig.groups.place(group.uid) {
+                Some(place) if place < last => {
+                    moving.insert(group.uid);
+                }
+                Some(place) => last = place,
+                None => {}
+            }
+        }
+        let in_moving = |joint: &&RigJoint| joint.data.group.is_some_and(|group| moving.contains(&group));
+        let joints: Vec<Uid> = self.rig.walk().filter(in_moving).map(|joint| joint.data.uid).collect();
+        joints.into_iter().try_for_each(|joint| self.apply(RigEdit::SetGroup(joint, None)))
+    }
+
+    /// Moves a group without joints to a place among the others.
+    fn move_group(&mut self, uid: Uid, place: usize) -> Result<(), EditError> {
+        let group = self.rig.group(uid).cloned().ok_or(EditError::NoGroup(uid))?;
+        self.apply(RigEdit::RemoveLocalGroup(uid))?;
+        self.apply(RigEdit::AddLocalGroup(group, place))
     }
 
     /// Takes away the tags that are gone.
