@@ -161,11 +161,11 @@ impl<'a> Hands<'a> {
             let place = if name == "place" { [over[0], over[1] - 30.0] } else { [joint[0] + 60.0, joint[1] - 90.0] };
             self.xdotool(&["mousemove", &place[0].round().to_string(), &place[1].round().to_string()]);
             // Toasts go, colours come.
-            sleep(Duration::from_millis(4000));
+            self.rests();
             self.shot(name);
         }
         self.key("p");
-        sleep(Duration::from_millis(3000));
+        self.rests();
         self.shot("pose");
     }
 
