@@ -24,7 +24,7 @@ use crate::{
 
 /// Share of the line that what a click does may take from the words on the right.
 const LEFT_SHARE: f32 = 0.6;
-/// Distance of the two, in points.
+/// Least distance between what a click does and the words on the right, in points.
 const GAP: f32 = 24.0;
 
 /// Draws the status line.
@@ -82,7 +82,8 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
             }
         });
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.add(egui::Label::new(egui::RichText::new(end).size(12.0).color(quiet)).truncate());
+            let text = egui::RichText::new(end).size(12.0).color(quiet);
+            ui.add(egui::Label::new(text).truncate().halign(egui::Align::LEFT));
         });
     });
 }
@@ -123,7 +124,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_make_room_before_the_next_step_does_and_nothing_meets() {
+    fn counts_make_room_before_the_next_step_does() {
         assert_eq!(shares(1000.0, 300.0, &[500.0, 400.0]), (300.0, 0));
         assert_eq!(shares(1000.0, 500.0, &[500.0, 400.0]), (500.0, 1));
         // Neither fits: both are cut off.
