@@ -113,7 +113,10 @@ fn describe(
     };
     let is_control = |node: &Uid| rig.built_node(*node).is_some_and(|node| node.control.is_some());
     if aim.parts == GizmoParts::default() && !aim.joints.iter().any(is_control) {
-        return format!("{what} follows its controls: drag it to pull it by them, or drag a control.");
+        return match aim.joints.as_slice() {
+            [_] => format!("{what} follows its controls: drag it to pull it by them, or drag a control."),
+            _ => format!("{what} follow their controls: drag a joint to pull it by them, or drag a control."),
+        };
     }
     let axis = |number: usize| ["X", "Y", "Z"][number % 3];
     let space = settings.gizmo_space.name().to_lowercase();
