@@ -178,14 +178,19 @@ fn is_of_window(action: Action) -> bool {
     )
 }
 
-/// Actions whose descriptions contain all words; those that begin with the first word come first.
+/// Actions whose descriptions contain all words. Those that begin with the first word come first, then those one of whose words
+/// begins with it.
 pub fn found(words: &str) -> Vec<Action> {
     let words: Vec<String> = words.split_whitespace().map(str::to_lowercase).collect();
-    let begins = |text: &str| words.first().is_some_and(|word| text.starts_with(word.as_str()));
+    let rank = |text: &str| {
+        let begins = |part: &str| words.first().is_some_and(|word| part.starts_with(word.as_str()));
+        let mut parts = text.split(|letter: char| !letter.is_alphanumeric());
+        (!begins(text), !parts.any(begins))
+    };
     let mut list: Vec<(Action, String)> =
         Action::all().into_iter().map(|action| (action, describe(action).to_lowercase())).collect();
     list.retain(|(_, text)| words.iter().all(|word| text.contains(word.as_str())));
-    list.sort_by_key(|(_, text)| !begins(text));
+    list.sort_by_key(|(_, text)| rank(text));
     list.into_iter().map(|(action, _)| action).collect()
 }
 

@@ -7,13 +7,16 @@ use bevy_egui::{
 };
 use rigsmith::{
     editor::{
+        ActiveRig,
         dock::{DockPlugin, Layout, VIEWPORT},
         files::{FilesPlugin, StateFolder},
         follow::FollowPlugin,
+        notice::StatusLine,
         panel::Panels,
         panels::PanelsPlugin,
     },
     headless::headless_app,
+    prelude::*,
     test_app::strict_app,
 };
 
@@ -143,6 +146,28 @@ fn all_words_of_the_window_can_be_read() {
             assert!(rect.right() <= size[0] && rect.bottom() <= size[1] + 1.0, "{size:?}: {word:?} at {rect:?}");
             assert!(word.trim().is_empty() || rect.height() >= 9.0, "{size:?}: {word:?} is small: {rect:?}");
         }
+    }
+}
+
+/// What a click does, the next step and the counts share the bottom line, also in a small window or in large letters.
+#[test]
+fn words_of_the_status_line_never_meet() {
+    let hint = "Drag a handle to pose hand_ik_l (world axes: V), or any joint or control to pull it. Ctrl: in steps.";
+    for size in [[640.0, 360.0], [853.0, 480.0], [1024.0, 600.0], USUAL, [1920.0, 1080.0]] {
+        let mut frames = Frames::new(size);
+        let rig = frames.app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
+        frames.app.insert_resource(ActiveRig(rig));
+        frames.app.insert_resource(StatusLine { hint: hint.to_owned(), ..default() });
+        (0..3).for_each(|_| frames.frame());
+        let is_there = |(_, rect, _): &&(String, Rect, Rect)| rect.center().y > size[1] - 18.0;
+        let mut line: Vec<(&str, Rect)> =
+            frames.words.iter().filter(is_there).map(|(word, rect, _)| (word.as_str(), *rect)).collect();
+        line.sort_by(|a, b| a.1.left().total_cmp(&b.1.left()));
+        let [(said, left), (end, right)] = line[..] else { panic!("{size:?}: {line:?}") };
+        assert!(said == hint && end.starts_with("Next: "), "{size:?}: {line:?}");
+        assert!(left.right() < right.left() && right.right() <= size[0], "{size:?}: {line:?}");
+        let shares = [left, right].map(|rect| rect.width() / size[0]);
+        assert!(shares[0] > 0.25 && shares[1] > 0.15, "{size:?}: both are seen: {line:?}");
     }
 }
 

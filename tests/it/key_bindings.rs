@@ -13,6 +13,7 @@ use rigsmith::{
         actions::{Action, ActionRequest},
         keys::{Chord, ChosenKey, KeyBindings, KeysPlugin},
         notice::Notice,
+        palette,
     },
     headless::headless_app,
     test_app::strict_app,
@@ -77,4 +78,12 @@ fn every_action_takes_another_key() {
         assert!(bindings.doubles().is_empty(), "{action:?}");
         assert_eq!(press(&mut app, KeyCode::KeyJ, j()), [action]);
     }
+}
+
+/// "graph" is in "orthographic", too.
+#[test]
+fn the_palette_lists_words_that_begin_so_before_parts_of_words() {
+    let found = palette::found("graph");
+    assert_eq!(found.last(), Some(&Action::Projection), "{found:?}");
+    assert!(found.len() > 2, "{found:?}");
 }

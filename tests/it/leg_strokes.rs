@@ -245,6 +245,18 @@ fn sides_that_are_drawn_one_by_one_have_the_same_names() {
     assert_eq!(found, expected.concat());
 }
 
+/// Without symmetry a chain that crosses the middle, as fingers of a hand do, has one side: that of its end.
+#[test]
+fn a_chain_that_crosses_the_middle_has_one_side() {
+    let mut bench = Workbench::new(7, "names");
+    chain(&mut bench, &[[0.003, 0.0, 0.0], [-0.02, 0.1, 0.0], [-0.03, 0.2, 0.0]], None);
+    let wrist = joint_of(&bench, "arm_r_1");
+    chain(&mut bench, &[[-0.01, 0.1, 0.0], [0.02, 0.2, 0.0]], Some(wrist));
+    let mut found = labels(&bench);
+    found.sort();
+    assert_eq!(found, ["arm_r_1", "arm_r_2", "arm_r_3", "finger_l_1", "finger_l_2"]);
+}
+
 /// Labels that are there already may end with any number and hold any name.
 #[test]
 fn names_go_around_what_is_there() {

@@ -428,6 +428,7 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     }
     world.insert_resource(ActiveRig(entity));
     view::show_all(world);
+    view::leave_weights(world, entity);
     let restored = kept.is_some_and(|kept| view::restore(world, &kept));
     world.resource_mut::<FrameWhenReady>().0 = !restored;
     world.write_message(match is_recovered {

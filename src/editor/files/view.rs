@@ -56,6 +56,15 @@ pub(super) fn show_all(world: &mut World) {
     }
 }
 
+/// Leaves the modes of weights for a rig without any: its mesh would be as dark as where a joint moves nothing.
+pub(super) fn leave_weights(world: &mut World, rig: Entity) {
+    let has_weights = world.get::<Rig>(rig).is_some_and(|rig| rig.skins().next().is_some());
+    let Some(mut mode) = world.get_resource_mut::<Mode>().filter(|_| !has_weights) else { return };
+    if matches!(*mode, Mode::Weights | Mode::Paint) {
+        *mode = Mode::Select;
+    }
+}
+
 /// Restores the view state. Returns `true` if it includes the camera.
 pub(super) fn restore(world: &mut World, view: &ProjectView) -> bool {
     let mut state: SystemState<(

@@ -15,6 +15,7 @@ use crate::{
     editor::{
         notice::Notice,
         panel::{EditorPanel, Requests},
+        style,
     },
     plugins::{
         document::{Change, EditRequest},
@@ -265,7 +266,8 @@ impl GroupsPanel {
     /// The name; a double click edits it.
     fn name(&mut self, ui: &mut Ui, group: &GroupData, shown: &DisplayedRig, request: &mut Option<RowRequest>) {
         let Some((_, text)) = self.renamed.as_mut().filter(|(uid, _)| *uid == group.uid) else {
-            let text = egui::RichText::new(&group.name).color(color(group.color));
+            // Light colours of groups cannot be read on the ground of the light theme.
+            let text = egui::RichText::new(&group.name).color(style::readable(ui.visuals(), color(group.color)));
             let label = ui.add(egui::Label::new(text).truncate().sense(egui::Sense::click()));
             label.widget_info(|| WidgetInfo::labeled(WidgetType::Link, true, &group.name));
             let label = label.on_hover_text("Click selects its joints, a double click renames it");

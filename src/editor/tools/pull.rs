@@ -113,20 +113,30 @@ fn aim(
     tool.aims = found.into_iter().filter_map(|(at, node)| Some((at, node?))).collect();
 }
 
-/// The control whose outline is at a pixel, or else the joint there.
+/// The control whose outline is at a pixel, or the joint there if it is nearer: outlines of fingers pass over the joint of the
+/// hand, and a press on that joint means the hand.
 fn node_at(scene: &Scene, controls: &DrawnControls, at: Vec2) -> Option<Uid> {
     let (rig, sight) = (scene.rig()?, scene.sight()?);
-    controls.at(&rig, &sight, at).or_else(|| joint_at(scene, &rig, &sight, at))
+    let control = controls.nearest(&rig, &sight, at);
+    let joint = nearest_joint(scene, &rig, &sight, at);
+    let is_joint = |(_, far): (Uid, f32)| joint.is_some_and(|(_, distance)| distance < far);
+    let found = if control.is_none_or(is_joint) { joint } else { control };
+    found.map(|(node, _)| node)
 }
 
 /// The joint nearest to a pixel within reach; the selected one of several at the same distance.
 pub(super) fn joint_at(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<Uid> {
+    nearest_joint(scene, rig, sight, at).map(|(joint, _)| joint)
+}
+
+/// Joint of [`joint_at`], with its distance from the pixel.
+fn nearest_joint(scene: &Scene, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<(Uid, f32)> {
     let near = scene.posed(rig).into_iter().filter_map(|(joint, place)| {
         let distance = sight.project(place)?.distance(at);
         (distance <= select::REACH).then_some((joint, distance, rig.selection.active() != Some(joint)))
     });
     let nearest = near.min_by(|a, b| a.1.total_cmp(&b.1).then(a.2.cmp(&b.2)));
-    nearest.map(|(joint, ..)| joint)
+    nearest.map(|(joint, distance, _)| (joint, distance))
 }
 
 /// True if the joint under a pixel is pulled by other controls than the selected one.

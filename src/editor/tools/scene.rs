@@ -21,6 +21,9 @@ use crate::{
     solve::program::RigState,
 };
 
+/// Cosine of half the angle from which on a node counts as turned.
+const LEAST_TURN: f32 = 0.9999;
+
 /// Access to the active rig and its view.
 #[derive(SystemParam)]
 pub struct Scene<'w, 's> {
@@ -136,6 +139,25 @@ impl EditedRig<'_> {
     pub fn built_slot(&self, node: Uid) -> Option<(&RigState, usize)> {
         let state = self.runtime.as_ref()?.state();
         Some((state, state.program().node(node)?))
+    }
+
+    /// True for a node of a built rig whose pose has no effect: constraints drive it, and it does not turn by itself.
+    pub fn is_overridden(&self, node: Uid) -> bool {
+        let Some((state, slot)) = self.built_slot(node) else { return false };
+        if !state.program().nodes()[slot].is_driven {
+            return false;
+        }
+        let mut tried = state.clone();
+        tried.evaluate(0.0);
+        let (offset, before) = (tried.offset_at(slot), tried.global_at(slot).rotation);
+        let turn = Quat::from_xyzw(0.12, 0.14, 0.1, 1.0).normalize();
+        // A hinge at its end turns one way alone.
+        let has_turned = [turn, turn.inverse()].into_iter().any(|turn| {
+            tried.set_offset_at(slot, PoseOffset { rotation: (offset.rotation * turn).normalize(), ..offset });
+            tried.evaluate(0.0);
+            tried.global_at(slot).rotation.dot(before).abs() < LEAST_TURN
+        });
+        !has_turned
     }
 
     /// Transform of a joint or created node as posed, in the rig's space.

@@ -21,7 +21,7 @@ use crate::{
     plugins::{
         controls::{
             ControlsInUse,
-            outline::{ControlNodes, ControlOutline, control_at},
+            outline::{ControlNodes, ControlOutline, nearest_control},
         },
         document::HoveredNode,
         picking::{HoverRequest, Pick, PickRequest},
@@ -111,11 +111,18 @@ impl DrawnControls<'_, '_> {
 
     /// The control whose outline is at a pixel; `None` while a skeleton is drawn in place of controls.
     pub(super) fn at(&self, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<Uid> {
+        self.nearest(rig, sight, at).map(|(control, _)| control)
+    }
+
+    /// The control whose outline is at a pixel, with the distance of the outline from there in pixels; `None` while a skeleton
+    /// is drawn in place of controls.
+    pub(super) fn nearest(&self, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<(Uid, f32)> {
         if !self.in_use.0 {
             return None;
         }
         let visible = self.nodes.visible(self.rigs.get(rig.entity).ok(), rig.place.affine().inverse());
-        control_at(&visible, &sight.plane, sight.point(at), REACH * sight.pixel)
+        let found = nearest_control(&visible, &sight.plane, sight.point(at), REACH * sight.pixel)?;
+        Some((found.0, found.1 / sight.pixel))
     }
 }
 

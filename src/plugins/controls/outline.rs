@@ -71,6 +71,11 @@ fn sized_lines(control: &ControlData, place: Affine3A, factor: f32) -> Vec<Vec<V
 /// The control whose outline passes nearest to a point of the view plane, within `reach` (rig units on that plane). Of
 /// several at the same distance the first wins.
 pub fn control_at(controls: &[ControlOutline], plane: &ViewPlane, point: Vec2, reach: f32) -> Option<Uid> {
+    nearest_control(controls, plane, point, reach).map(|(control, _)| control)
+}
+
+/// Control of [`control_at`], with the distance of its outline from the point in rig units on the view plane.
+pub fn nearest_control(controls: &[ControlOutline], plane: &ViewPlane, point: Vec2, reach: f32) -> Option<(Uid, f32)> {
     let mut best: Option<(f32, Uid)> = None;
     for control in controls.iter().filter(|control| control.display == LayerDisplay::Normal) {
         for line in &control.lines {
@@ -85,5 +90,5 @@ pub fn control_at(controls: &[ControlOutline], plane: &ViewPlane, point: Vec2, r
             }
         }
     }
-    best.map(|(_, uid)| uid)
+    best.map(|(distance, uid)| (uid, distance))
 }

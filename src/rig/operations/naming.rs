@@ -21,30 +21,35 @@ const HIP: f32 = 0.35;
 pub(super) struct ChainName {
     base: String,
     first: u32,
+    /// Ending of all joints; `None` with a plane of symmetry, where each joint has that of its own place.
+    side: Option<&'static str>,
 }
 
 impl ChainName {
     /// Name of a chain by the joint that carries it and by its direction. `positions` are the places of the chain's joints,
     /// `parent` is the joint above. The names are those of a character that stands upright and looks along +Z.
     pub fn new(rig: &Rig, positions: &[Vec3], parent: Option<Uid>, plane: Option<&MirrorPlane>) -> Self {
+        let side = positions.last().map_or("", |last| side_ending(*last, plane));
+        // Drawn without a plane, a finger that crosses the middle of a hand is one chain of one side.
+        let whole = plane.is_none().then_some(side);
         let upper = parent.and_then(|parent| rig.joint(parent));
         let known = upper.and_then(|joint| joint.data.label.as_deref()).and_then(ChainPlace::of);
         if let (Some(place), Some(joint)) = (&known, upper)
             && joint.children.is_empty()
             && stays_on_side(place.chain, positions, rig.position(joint.data.uid), plane)
         {
-            return Self { base: place.base().to_owned(), first: place.number + 1 };
+            return Self { base: place.base().to_owned(), first: place.number + 1, side: whole };
         }
         let base = base(rig, positions, parent, known.as_ref(), plane);
         // With a plane of symmetry the name has to be free on both sides.
-        let side = positions.last().map_or("", |last| side_ending(*last, plane));
         let sides = match side {
             "_l" if plane.is_none() => ChainSides::Left,
             "_r" if plane.is_none() => ChainSides::Right,
             _ => ChainSides::All,
         };
         let number = rig.free_chain_number(base, sides);
-        Self { base: if number == 1 { base.to_owned() } else { format!("{base}{number}") }, first: 1 }
+        let base = if number == 1 { base.to_owned() } else { format!("{base}{number}") };
+        Self { base, first: 1, side: whole }
     }
 
     /// True if the chain goes on with the numbers of the chain that it is drawn onto.
@@ -52,9 +57,10 @@ impl ChainName {
         self.first > 1
     }
 
-    /// The name of the joint at a place of the chain, from 0: with the side on which `position` lies.
+    /// The name of the joint at a place of the chain, from 0: with the side on which the chain ends, or with a plane of symmetry
+    /// the side on which `position` lies.
     pub fn joint(&self, rig: &Rig, place: usize, position: Vec3, plane: Option<&MirrorPlane>) -> String {
-        let side = side_ending(position, plane);
+        let side = self.side.unwrap_or_else(|| side_ending(position, plane));
         let name = |number: u32| format!("{}{side}_{number}", self.base);
         let is_free = |name: &str| !rig.has_label(name) && (plane.is_none() || !rig.has_label(&partner_name(name)));
         let first = self.first + place as u32;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use bevy_panorbit_camera::PanOrbitCamera;
 use rigsmith::{
-    editor::{camera, panels::graph::GraphView},
+    editor::{camera, mode::Mode, panels::graph::GraphView},
     rig::{TagKind, operations::TagOperation, project::ProjectCamera},
 };
 
@@ -48,5 +48,17 @@ fn zoom_ends_near_what_is_in_view() {
         let least = orbit.zoom_lower_limit / distance;
         assert!((0.004..0.04).contains(&least), "{least} of {distance}");
         assert!(orbit.zoom_upper_limit.is_some_and(|most| most >= 10.0 * distance), "{distance}");
+    }
+}
+
+/// A brush has nothing to paint on a body without weights, which would be dark all over.
+#[test]
+fn a_document_without_weights_is_not_opened_for_painting() {
+    let folder = folder();
+    let mut window = Window::new(folder.path());
+    for (mode, then) in [(Mode::Paint, Mode::Select), (Mode::Weights, Mode::Select), (Mode::Stroke, Mode::Stroke)] {
+        window.base.app.insert_resource(mode);
+        window.open(OpenRequest::Bundled);
+        assert_eq!(window.world().get_resource::<Mode>(), Some(&then), "opened in {mode:?}");
     }
 }

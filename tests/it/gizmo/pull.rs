@@ -1,8 +1,22 @@
 //! Drags on joints and controls in Pose mode: they go where the pointer goes, and the joints above follow.
 
+use bevy::ecs::system::RunSystemOnce;
 use rigsmith::{
-    editor::tools::{pull::PullTool, select::SelectTool},
-    plugins::{controls::SwitchRequest, drawing::RigDrawing},
+    editor::{
+        notice::StatusLine,
+        tools::{
+            pull::PullTool,
+            select::{REACH, SelectTool},
+        },
+    },
+    plugins::{
+        controls::{
+            SwitchRequest,
+            outline::{ControlNodes, control_at},
+        },
+        drawing::RigDrawing,
+        schema::RigNodes,
+    },
     solve::pull::{chain_above, pull},
 };
 
@@ -179,4 +193,70 @@ fn a_built_rig_is_pulled_by_its_controls() {
         assert_eq!(*bench.base.rig(), before);
         assert!(pixel(&bench, hand).distance(from) < 0.5);
     }
+}
+
+/// A joint that its controls hold has no handles: their poses would move nothing, and rings would take the presses on the joints
+/// around it.
+#[test]
+fn a_joint_that_controls_hold_has_no_handles_in_the_way_of_others() {
+    let [sight, _] = sights(Transform::IDENTITY);
+    let mut bench = Bench::built(headless_app(1), crate::bench::shipped("biped"), sight);
+    let rig = bench.base.rig;
+    let built = bench.base.get::<BuildResult>(rig).expect("a built rig").0.clone();
+    let [hand, elbow] = ["hand_l", "forearm_l"].map(|label| built.find_label(label).expect("a joint").uid);
+    bench.base.select(&[elbow]);
+    bench.mode(Mode::Pose);
+    bench.base.app.update();
+    assert!(bench.shapes().is_empty(), "the elbow follows its controls");
+    let hint = bench.base.app.world().resource::<StatusLine>().hint.clone();
+    assert!(hint.starts_with("forearm_l follows its controls"), "{hint}");
+
+    let pixel = |bench: &Bench| {
+        let state = bench.base.get::<RigRuntime>(rig).unwrap().state();
+        sight.project(state.global(hand).unwrap().translation).unwrap()
+    };
+    let (from, by) = (pixel(&bench), Vec2::new(-12.0, -24.0));
+    bench.drag(from, by, ModifierKeys::default());
+    assert_eq!(pulled(&bench), Some(hand));
+    bench.release(from + by);
+    bench.base.app.update();
+    assert!(pixel(&bench).distance(from) > 10.0, "the hand moves");
+    let is_control = |node: &Uid| built.node(*node).is_some_and(|node| node.control.is_some());
+    assert!(bench.base.rig().pose().keys().all(is_control), "controls alone are posed");
+
+    // What was pulled is selected: a control, which has handles.
+    assert!(bench.base.selected().iter().all(is_control), "{:?}", bench.base.selected());
+    assert!(!bench.shapes().is_empty());
+}
+
+/// Outlines of fingers pass over the joint of the hand: a press on a joint pulls that joint.
+#[test]
+fn a_press_on_a_joint_pulls_it_though_an_outline_passes_by() {
+    let [sight, _] = sights(Transform::IDENTITY);
+    let mut bench = Bench::built(headless_app(1), crate::bench::shipped("biped"), sight);
+    let rig = bench.base.rig;
+    bench.base.select(&[]);
+    bench.mode(Mode::Pose);
+    let visible = move |controls: ControlNodes, nodes: Query<&RigNodes>| {
+        controls.visible(nodes.get(rig).ok(), bevy::math::Affine3A::IDENTITY)
+    };
+    let outlines = bench.base.app.world_mut().run_system_once(visible).unwrap();
+    let state = bench.base.get::<RigRuntime>(rig).expect("a built rig").state();
+    let has_outline = |at: &Vec2| control_at(&outlines, &sight.plane, sight.point(*at), REACH * sight.pixel).is_some();
+    let place = |joint: Uid| sight.project(state.global(joint)?.translation);
+    let labels = ["hand_l", "hand_r", "index_01_l", "middle_01_l", "pinky_01_r", "foot_l"];
+    let joints = labels.map(|label| bench.base.rig().find_label(label).expect("a joint"));
+    let crossed: Vec<Vec2> = joints.into_iter().filter_map(place).filter(has_outline).collect();
+    assert!(!crossed.is_empty(), "no outline passes by any of the joints");
+    let mut count = 0;
+    for at in crossed {
+        bench.drag(at, Vec2::new(9.0, -14.0), ModifierKeys::default());
+        if let Some(node) = pulled(&bench) {
+            assert!(bench.base.rig().joint(node).is_some(), "a control is pulled at {at}, where a joint is");
+            count += 1;
+        }
+        bench.base.act(Action::Cancel);
+        bench.release(at + Vec2::new(9.0, -14.0));
+    }
+    assert!(count > 0, "no joint is pulled");
 }

@@ -10,11 +10,12 @@ use crate::{
         notice::StatusLine,
         settings::EditorSettings,
         tools::{
-            gizmo::{Handle, handle_at},
+            gizmo::{GizmoParts, Handle, handle_at},
             scene::{EditedRig, Scene, joints},
         },
     },
     plugins::{document::ShowRest, stage::RigStage},
+    rig::Uid,
 };
 
 /// Shows the rest pose while it is edited.
@@ -110,6 +111,13 @@ fn describe(
         [only] => rig.name(*only),
         several => joints(several.len()),
     };
+    let is_control = |node: &Uid| rig.built_node(*node).is_some_and(|node| node.control.is_some());
+    if aim.parts == GizmoParts::default() && !aim.joints.iter().any(is_control) {
+        return match aim.joints.as_slice() {
+            [_] => format!("{what} follows its controls: drag it to pull it by them, or drag a control."),
+            _ => format!("{what} follow their controls: drag a joint to pull it by them, or drag a control."),
+        };
+    }
     let axis = |number: usize| ["X", "Y", "Z"][number % 3];
     let space = settings.gizmo_space.name().to_lowercase();
     let drag = match handle {

@@ -14,6 +14,7 @@ use crate::{
         },
     },
     rig::Uid,
+    solve::pull::is_within_limb,
 };
 
 /// Gizmo of the current selection.
@@ -47,11 +48,13 @@ impl GizmoTarget {
             let control = rig.built_node(active).and_then(|node| node.control.as_ref());
             let channels = control.map(|control| control.channels);
             let is_root = joint.is_some_and(|joint| joint.parent.is_none());
+            // Handles of a joint that its controls hold would set poses that nobody sees, and be in the way of a pull.
+            let is_free = channels.is_some() || !rig.is_overridden(active);
             parts.moves = match channels {
                 Some(channels) => channels.translate.contains(&true),
-                None => moves || is_root,
+                None => (moves || is_root) && (is_free || is_within_limb(&rig.rig, active)),
             };
-            parts.turns = channels.is_none_or(|channels| channels.rotate.contains(&true));
+            parts.turns = channels.map_or(is_free, |channels| channels.rotate.contains(&true));
         }
         let own = if mode == Mode::Pose { rig.posed_global(active) } else { rig.rig.rest_global(active) };
         let origin = if mode == Mode::Pose || space == GizmoSpace::Local {
