@@ -164,7 +164,7 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
         rig = bare;
     }
     let mut bench = running(rig)?;
-    let mut clips = source::clips(args, onto, &mut bench, whole.as_ref(), &mut report)?;
+    let (mut clips, map_file) = source::clips(args, onto, &mut bench, whole.as_ref(), &mut report)?;
     switch::throw(&args.switches, &mut bench, &mut clips, &mut report)?;
     describe(&clips, &mut report);
     if is_picture {
@@ -200,6 +200,11 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
         }
     }
     report.line(format!("wrote {}", args.output.display()));
+    if let Some(file) = map_file {
+        let line = format!("wrote {}", file.path().display());
+        file.put_in_place()?;
+        report.line(line);
+    }
     report.set("output", args.output.display().to_string());
     Ok(report)
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::Args;
 
 use super::Failure;
-use crate::files::{FileKind, RealDisk, is_same_file};
+use crate::files::{FileKind, RealDisk, check_place, is_same_file};
 
 /// The permission to write over an input.
 #[derive(Args, Debug, Clone, Copy, Default)]
@@ -16,9 +16,20 @@ pub(super) struct InPlaceArgs {
 }
 
 impl InPlaceArgs {
-    /// Checks that `output` is no input, unless replacing it was allowed, and that each of the `further` outputs, with
-    /// the options that name them, is neither an input nor another output.
+    /// Checks that `output` is no input, unless replacing it was allowed, that each of the `further` outputs, with the
+    /// options that name them, is neither an input nor another output, and that all of them can be written.
     pub fn check(
+        self,
+        inputs: &[&Path],
+        output: Option<&Path>,
+        further: &[(&'static str, &Path)],
+    ) -> Result<(), Failure> {
+        self.check_names(inputs, output, further)?;
+        check_places(output.into_iter().chain(further.iter().map(|(_, path)| *path)))
+    }
+
+    /// Checks outputs as [`check`](Self::check) does, but for whether they can be written.
+    pub fn check_names(
         self,
         inputs: &[&Path],
         output: Option<&Path>,
@@ -52,4 +63,9 @@ impl InPlaceArgs {
         }
         Ok(())
     }
+}
+
+/// Checks whether files can be written at paths, before a command works for minutes or writes the first of its outputs.
+pub(super) fn check_places<'p>(paths: impl IntoIterator<Item = &'p Path>) -> Result<(), Failure> {
+    paths.into_iter().try_for_each(|path| Ok(check_place(&RealDisk, path)?))
 }

@@ -15,6 +15,7 @@ use super::{
     Failure, InPlaceArgs, Report,
     explanation::Explanation,
     limits,
+    outputs::check_places,
     report::{counted, is_json},
 };
 use crate::{
@@ -80,6 +81,12 @@ impl UpdateArgs {
         [Some(&self.rig), Some(&self.from), self.base.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect()
     }
 
+    /// Checks whether the rig and its clips can be written, unless nothing is to be written.
+    fn check_places(&self, clips: &[PathBuf]) -> Result<(), Failure> {
+        let outputs = self.output.iter().chain(clips).filter(|_| !self.dry_run);
+        check_places(outputs.map(PathBuf::as_path))
+    }
+
     /// Side whose values are taken in conflicts.
     fn side(&self) -> Take {
         match self.take {
@@ -133,8 +140,9 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
         return project::run(args);
     }
     let inputs = args.inputs();
-    args.in_place.check(&inputs, args.output.as_deref(), &[])?;
+    args.in_place.check_names(&inputs, args.output.as_deref(), &[])?;
     let clip_files = clips::outputs(args, &inputs)?;
+    args.check_places(&clip_files)?;
     let mut report = Report::default();
     let (now, file) = (version(&args.rig, &mut report)?, version(&args.from, &mut report)?);
     let beside = companion(&args.rig);
@@ -142,6 +150,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     let keeps_base = args.keep_base || is_beside;
     if let Some(output) = args.output.as_ref().filter(|_| keeps_base && !args.dry_run) {
         check_companion(output)?;
+        check_places([companion(output).as_path()])?;
     }
     let base = match &args.base {
         Some(base) => Some(version(base, &mut report)?),
@@ -164,10 +173,11 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     drop((base, now));
     let file = keeps_base.then_some(file);
     if let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) {
+        let clips = clips::stage(&clips)?;
         report.notes(update.store(&RealDisk, output)?);
         report.line(format!("wrote {}", output.display()));
         report.set("output", output.display().to_string());
-        clips::store(&clips, &mut report)?;
+        clips::store(clips, &mut report)?;
         if let Some(file) = file {
             let base = companion(output);
             save_atomic(&RealDisk, &base, base_text(&RealDisk, &file, output).as_bytes()).map_err(StoreError::from)?;

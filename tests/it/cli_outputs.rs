@@ -87,6 +87,104 @@ fn weights_are_saved_beside_a_character_that_is_there() {
     assert_eq!((code, contents(folder.path())), (1, before), "{said}");
 }
 
+/// Names of the files and folders below a folder.
+fn names_below(folder: &Path) -> Vec<PathBuf> {
+    let mut names = Vec::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() && !path.is_symlink() {
+                folders.push(path.clone());
+            }
+            names.push(path);
+        }
+    }
+    names.sort();
+    names
+}
+
+/// One output that cannot be written leaves none of the others behind.
+#[test]
+fn outputs_of_a_command_are_all_written_or_none() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    for name in ["mine", "new"] {
+        let text = format!("(format: 2,   name: \"{name}\", joints: [(label: \"a\")])");
+        fs::write(at(&format!("{name}.rig.ron")), text).unwrap();
+    }
+    fs::write(at("walker.bvh"), include_str!("retarget/walker.bvh")).unwrap();
+    let (code, said) = rigsmith(folder.path(), &["animate", "biped.rig.ron", "walker.bvh", "-o", "w.anim.ron"]);
+    assert_eq!(code, 0, "{said}");
+    for name in ["folder.skin", "out/w.anim.ron", "demo/biped.glb"] {
+        fs::create_dir_all(at(name)).unwrap();
+    }
+    #[cfg(unix)]
+    for name in ["fitted.rig.ron.base", "updated.rig.ron.base"] {
+        std::os::unix::fs::symlink("nowhere/base", at(name)).unwrap();
+    }
+    let commands: &[(&[&str], &str)] = &[
+        (&["skin", "a.rig", "b.obj", "-o", "c.glb", "--save-weights", "folder.skin"], "folder.skin"),
+        (&["skin", "a.rig", "b.obj", "-o", "c.gltf", "--save-weights", "nowhere/c.skin"], "nowhere/c.skin"),
+        (
+            &["animate", "biped.rig.ron", "walker.bvh", "--map-out", "map.ron", "-o", "nowhere/w.anim.ron"],
+            "nowhere/w.anim.ron",
+        ),
+        (
+            &["animate", "biped.rig.ron", "walker.bvh", "--map-out", "nowhere/map.ron", "-o", "x.anim.ron"],
+            "nowhere/map.ron",
+        ),
+        (
+            &[
+                "update",
+                "biped.rig.ron",
+                "--from",
+                "biped.rig.ron",
+                "--take",
+                "mine",
+                "--clips",
+                "w.anim.ron",
+                "-o",
+                "out/x.rig.ron",
+            ],
+            "out/w.anim.ron",
+        ),
+        #[cfg(unix)]
+        (&["fit", "b.obj", "--template", "parts/tail", "-o", "fitted.rig.ron"], "fitted.rig.ron.base"),
+        #[cfg(unix)]
+        (
+            &[
+                "update",
+                "mine.rig.ron",
+                "--from",
+                "new.rig.ron",
+                "--take",
+                "mine",
+                "--keep-base",
+                "-o",
+                "updated.rig.ron",
+            ],
+            "updated.rig.ron.base",
+        ),
+    ];
+    let before = (names_below(folder.path()), contents(folder.path()));
+    for (args, place) in commands {
+        let (code, told) = json(folder.path(), args);
+        assert_eq!((code, told["error"]["where"].as_str()), (1, Some(*place)), "{args:?}: {told}");
+        assert!((names_below(folder.path()), contents(folder.path())) == before, "{args:?} left something behind");
+    }
+    // The demonstration writes two files into the working folder.
+    assert_eq!(rigsmith(&at("demo"), &["--json"]).0, 1);
+    assert_eq!(names_below(&at("demo")), [at("demo/biped.glb")]);
+    // All templates are put into their layout, or none.
+    let mut rules = fs::metadata(at("new.rig.ron")).unwrap().permissions();
+    rules.set_readonly(true);
+    fs::set_permissions(at("new.rig.ron"), rules).unwrap();
+    let (code, said) = rigsmith(folder.path(), &["format", "mine.rig.ron", "new.rig.ron"]);
+    assert!(code == 1 && said.contains("write-protected"), "{said}");
+    assert!(contents(folder.path()) == before.1, "one of two templates was formatted");
+}
+
 #[test]
 fn an_input_is_no_output() {
     let folder = folder();

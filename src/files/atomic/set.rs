@@ -117,7 +117,7 @@ pub fn save_set(disk: &dyn Disk, set: &FileSet) -> Result<(), SaveError> {
     }
     if missing.is_empty() && former.is_empty() {
         let temp = target.stage(disk, &set.bytes)?;
-        target.replace(temp, &set.bytes)?;
+        target.replace(temp, set.bytes.len())?;
         return target.confirm(disk);
     }
 
@@ -180,7 +180,7 @@ fn put_in_place(
         disk.sync_folder(folder)
             .map_err(|error| SaveError::new(&set.path, folder, set.bytes.len(), SaveStep::Sync, error))?;
     }
-    target.replace(main, &set.bytes)
+    target.replace(main, set.bytes.len())
 }
 
 /// Tells whether a companion is in place.
