@@ -20,8 +20,8 @@ use super::{
 };
 use crate::{
     files::{
-        Disk, FileKind, ReadError, RealDisk, StoreError, TemplateVersion, base_text, diff_templates, read_capped,
-        save_atomic, update_template,
+        Disk, EntryKind, FileKind, ReadError, RealDisk, StoreError, TemplateVersion, base_text, diff_templates,
+        read_capped, save_atomic, update_template,
     },
     processor::keep_poses,
     rig::{
@@ -203,9 +203,12 @@ fn tell_update(report: &mut Report, (was, is): (&Rig, &Rig), now: &Rig, updated:
     Ok(())
 }
 
-/// File beside a rig that has the version of the template that it was made from, or updated to last.
+/// File beside a rig that has the version of the template that it was made from, or updated to last. Of a link it is beside the
+/// file that the link leads to, as that is the one that is read and saved.
 pub(super) fn companion(rig: &Path) -> PathBuf {
-    let mut name = rig.as_os_str().to_owned();
+    let is_link = RealDisk.entry(rig, false).is_ok_and(|entry| entry.kind == EntryKind::Link);
+    let linked = is_link.then(|| RealDisk.canonical(rig).ok()).flatten();
+    let mut name = linked.as_deref().unwrap_or(rig).as_os_str().to_owned();
     name.push(".base");
     name.into()
 }

@@ -340,6 +340,30 @@ fn the_version_that_is_kept_replaces_nothing_but_a_template() {
     assert!(fs::read_to_string(at("out.rig.ron.base")).unwrap().contains("\"new\""));
 }
 
+/// Whoever updates the rig by its own name finds the version that was kept through a link.
+#[cfg(unix)]
+#[test]
+fn the_version_of_a_link_is_kept_beside_the_file_that_it_leads_to() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("sub")).unwrap();
+    for name in ["sub/real", "new"] {
+        fs::write(at(&format!("{name}.rig.ron")), format!("(format: 2, name: \"{name}\", joints: [(label: \"a\")])"))
+            .unwrap();
+    }
+    std::os::unix::fs::symlink("sub/real.rig.ron", at("link.rig.ron")).unwrap();
+    let update = ["--from", "new.rig.ron", "--take", "theirs", "--keep-base"];
+    let (code, told) = json(
+        folder.path(),
+        &[&["update", "link.rig.ron"][..], &update, &["-o", "link.rig.ron", "--in-place"]].concat(),
+    );
+    assert_eq!(code, 0, "{told}");
+    assert!(at("link.rig.ron").is_symlink() && !at("link.rig.ron.base").exists());
+    assert!(fs::read_to_string(at("sub/real.rig.ron.base")).unwrap().contains("\"new\""));
+    let (code, told) = json(folder.path(), &["update", "sub/real.rig.ron", "--from", "new.rig.ron", "--dry-run"]);
+    assert_eq!((code, told["base"].as_str()), (0, Some("sub/real.rig.ron.base")), "{told}");
+}
+
 #[test]
 fn a_template_out_of_its_layout_is_told_in_three_parts() {
     let folder = folder();

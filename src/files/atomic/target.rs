@@ -95,6 +95,11 @@ impl Target {
     }
 }
 
+/// File that a save to `path` writes: links are followed. A path to which nothing can be saved stays as it is.
+pub(in crate::files) fn saved_file(disk: &dyn Disk, path: &Path) -> PathBuf {
+    Target::find(disk, path).map_or_else(|_| path.to_path_buf(), |target| target.file)
+}
+
 /// True if the path ends in a separator, which `Path` drops: the caller means a folder.
 fn ends_in_separator(path: &Path) -> bool {
     path.as_os_str().as_encoded_bytes().last().is_some_and(|&byte| std::path::is_separator(char::from(byte)))
