@@ -14,8 +14,12 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs, build, limits, positive, progress::spinning,
-    project_meshes::own_meshes, report::counted, skin, vrm::AvatarDraft,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs, build, limits, positive,
+    progress::spinning,
+    project_meshes::{check_output, own_meshes},
+    report::counted,
+    skin,
+    vrm::AvatarDraft,
 };
 use crate::{
     files::{FileKind, RealDisk, store_animation, store_owned_model},
@@ -281,6 +285,7 @@ fn read(args: &AnimateArgs, report: &mut Report) -> Result<(Rig, Vec<RigMesh>), 
         }
     }
     let mut project = limits::load_project(&args.rig)?;
+    check_output(&project, Some(&args.output), InPlaceArgs::default())?;
     let is_character = args.meshes.is_empty() && FileKind::of(&args.output).is_some_and(FileKind::is_gltf);
     if is_character {
         limits::refuse_outside(&project)?;
