@@ -238,6 +238,33 @@ fn an_input_is_no_output() {
     assert_eq!(load_model(&RealDisk, &folder.path().join("b.obj")).unwrap().face_count(), 6);
 }
 
+/// Parts of a template are inputs, although nobody has named them.
+#[test]
+fn a_part_of_an_input_is_no_output() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("parts")).unwrap();
+    let arm = "(format: 2, name: \"arm\", kind: \"part\", joints: [(label: \"a\")])";
+    let man = "(format: 2, name: \"man\", joints: [(label: \"body\")], parts: [(part: \"parts/arm.rig.ron\", \
+               name: \"l\", parent: \"body\")])";
+    for (name, text) in [("parts/arm.rig.ron", arm), ("other.rig.ron", arm), ("man.rig.ron", man)] {
+        fs::write(at(name), text).unwrap();
+    }
+    let commands: [&[&str]; 3] = [
+        &["build", "man.rig.ron", "-o", "parts/arm.rig.ron"],
+        &["convert", "man.rig.ron", "./parts/../parts/arm.rig.ron"],
+        &["merge", "other.rig.ron", "man.rig.ron", "-o", "parts/arm.rig.ron"],
+    ];
+    for args in commands {
+        let (code, said) = rigsmith(folder.path(), args);
+        assert!(code == 2 && said.contains("is a part of the input"), "{args:?}: {said}");
+        assert_eq!(fs::read_to_string(at("parts/arm.rig.ron")).unwrap(), arm, "{args:?}");
+    }
+    // Another file that is there is no part of it.
+    let (code, said) = rigsmith(folder.path(), &["build", "man.rig.ron", "-o", "other.rig.ron"]);
+    assert_eq!(code, 0, "{said}");
+}
+
 #[test]
 fn nothing_is_written_where_there_is_nothing_to_write() {
     let folder = folder();
