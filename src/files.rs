@@ -47,7 +47,10 @@ mod verify;
 mod watch;
 
 pub use allowed_folders::{AllowedError, AllowedFolders};
-pub use atomic::{FileSet, SaveError, SaveStep, is_temp_name, remove_stale_temps, save_atomic, save_set};
+pub use atomic::{
+    FileSet, SaveError, SaveStep, StagedFile, check_place, is_temp_name, remove_stale_temps, save_atomic, save_set,
+    stage_file,
+};
 pub use disk::{Disk, DiskFile, Entry, EntryKind, Hold, RealDisk};
 pub use disk_error::DiskError;
 pub use expressions::{
@@ -79,8 +82,8 @@ pub use shapes::{LoadShapesError, load_shapes};
 pub use site::{SITE_FILE, SearchPaths, SiteError, TEMPLATES_VARIABLE};
 pub use stoppable_disk::{StopSign, StoppableDisk};
 pub use store::{
-    DocumentBase, StoreError, is_template_of, store_animation, store_avatar, store_document_over, store_model,
-    store_owned_model, store_packed_clips, store_rig, store_rig_over, store_skin,
+    DocumentBase, StoreError, is_template_of, stage_animation, stage_skin, store_animation, store_avatar,
+    store_document_over, store_model, store_owned_model, store_packed_clips, store_rig, store_rig_over, store_skin,
 };
 pub use template_layout::format_template_file;
 pub use template_origin::{TemplateOrigin, has_parts, store_rig_from};

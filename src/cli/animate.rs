@@ -14,8 +14,12 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::{
-    ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs, build, limits, positive, progress::spinning,
-    project_meshes::own_meshes, report::counted, skin, vrm::AvatarDraft,
+    ExportArgs, Failure, InPlaceArgs, Output, Report, VrmArgs, WeightArgs, build, limits, positive,
+    progress::spinning,
+    project_meshes::{check_output, own_meshes},
+    report::counted,
+    skin,
+    vrm::AvatarDraft,
 };
 use crate::{
     files::{FileKind, RealDisk, store_animation, store_owned_model},
@@ -164,7 +168,7 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
         rig = bare;
     }
     let mut bench = running(rig)?;
-    let mut clips = source::clips(args, onto, &mut bench, whole.as_ref(), &mut report)?;
+    let (mut clips, map_file) = source::clips(args, onto, &mut bench, whole.as_ref(), &mut report)?;
     switch::throw(&args.switches, &mut bench, &mut clips, &mut report)?;
     describe(&clips, &mut report);
     if is_picture {
@@ -200,6 +204,11 @@ pub(super) fn run(args: &AnimateArgs) -> Result<Report, Failure> {
         }
     }
     report.line(format!("wrote {}", args.output.display()));
+    if let Some(file) = map_file {
+        let line = format!("wrote {}", file.path().display());
+        file.put_in_place()?;
+        report.line(line);
+    }
     report.set("output", args.output.display().to_string());
     Ok(report)
 }
@@ -276,6 +285,7 @@ fn read(args: &AnimateArgs, report: &mut Report) -> Result<(Rig, Vec<RigMesh>), 
         }
     }
     let mut project = limits::load_project(&args.rig)?;
+    check_output(&project, Some(&args.output), InPlaceArgs::default())?;
     let is_character = args.meshes.is_empty() && FileKind::of(&args.output).is_some_and(FileKind::is_gltf);
     if is_character {
         limits::refuse_outside(&project)?;

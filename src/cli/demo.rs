@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Failure, Report, WindowError, binding::bind, limits, report::counted};
+use super::{Failure, Report, WindowError, binding::bind, limits, outputs::check_places, report::counted};
 use crate::{
     algo::weights::WeightSettings,
     files::{ReadError, RealDisk, new_template_text, read_capped, save_atomic},
@@ -16,12 +16,19 @@ use crate::{
 const MESH: &[u8] = include_bytes!("../../assets/models/biped.obj");
 const GESTURES: &[u8] = include_bytes!("../../assets/gestures/biped.ron");
 
+/// Files that are written into the working folder: the template and the character.
+const OUTPUTS: [&str; 2] = ["biped.rig.ron", "biped.glb"];
+
 /// Runs the workflow without a window; `reason` is the reason why no window opens.
 pub(super) fn run(reason: Option<&WindowError>) -> Result<Report, Failure> {
     let mut report = Report::default();
     if let Some(reason) = reason {
         report.line(format!("No window: {reason}. Doing the job without one."));
     }
+    let [rig_file, character_file] = OUTPUTS.map(Path::new);
+    let (former_rig, former_character) = (content(rig_file)?, content(character_file)?);
+    let missing = [(rig_file, &former_rig), (character_file, &former_character)];
+    check_places(missing.into_iter().filter(|(_, former)| former.is_none()).map(|(path, _)| path))?;
     report.line("Rigging the bundled character; give a command to rig yours (see below).");
     let model = read_model(MESH, "biped", &ObjSettings::default(), &mut |_| None)
         .map_err(|error| Failure::Input(Box::new(error)))?;
@@ -40,11 +47,11 @@ pub(super) fn run(reason: Option<&WindowError>) -> Result<Report, Failure> {
         counted(faces, "face", "faces")
     ));
     let template = new_template_text(bench.rig());
-    save_new(Path::new("biped.rig.ron"), template.as_bytes(), "the template", &mut report)?;
+    save_new(rig_file, former_rig, template.as_bytes(), "the template", &mut report)?;
     bind(&mut bench, WeightSettings::default(), &[], Vec::new(), &mut report)?;
     let glb = write_glb(&bench.character(), &GltfWriteSettings::default());
     let glb = glb.map_err(|error| Failure::Input(Box::new(error)))?;
-    if save_new(Path::new("biped.glb"), &glb, "the character", &mut report)? {
+    if save_new(character_file, former_character, &glb, "the character", &mut report)? {
         report.line("drop it into any glTF viewer, Blender or a Bevy game");
     }
     report.line("");
@@ -59,21 +66,35 @@ pub(super) fn run(reason: Option<&WindowError>) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Writes a file under a default name, unless a file of that name with other content exists. Returns true if the file
-/// now has this content.
-fn save_new(path: &Path, bytes: &[u8], what: &str, report: &mut Report) -> Result<bool, Failure> {
-    let name = path.display();
+/// Content of a file under a default name; `None` if there is none.
+fn content(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
     match read_capped(&RealDisk, path, 1 << 30) {
-        Ok(there) if there != bytes => {
+        Ok(bytes) => Ok(Some(bytes)),
+        Err(ReadError::Missing { .. }) => Ok(None),
+        Err(error) => Err(Failure::Input(Box::new(error))),
+    }
+}
+
+/// Writes a file under a default name, unless a file of that name with other content, `former`, exists. Returns true if the
+/// file now has this content.
+fn save_new(
+    path: &Path,
+    former: Option<Vec<u8>>,
+    bytes: &[u8],
+    what: &str,
+    report: &mut Report,
+) -> Result<bool, Failure> {
+    let name = path.display();
+    match former {
+        Some(former) if former != bytes => {
             report.notes.push(format!("kept the {name} that is there, which differs"));
             return Ok(false);
         }
-        Ok(_) => report.line(format!("{name} is there already")),
-        Err(ReadError::Missing { .. }) => {
-            save_atomic(&RealDisk, path, bytes).map_err(|error| Failure::Input(Box::new(error)))?;
+        Some(_) => report.line(format!("{name} is there already")),
+        None => {
+            save_atomic(&RealDisk, path, bytes)?;
             report.line(format!("wrote {what} {name}"));
         }
-        Err(error) => return Err(Failure::Input(Box::new(error))),
     }
     Ok(true)
 }

@@ -21,8 +21,8 @@ use super::{
 use crate::{
     algo::fit_template::{FitNote, FitSymmetry},
     files::{
-        BUNDLED_CHARACTERS, BUNDLED_PARTS, FileKind, LoadError, ReadError, RealDisk, StoreError, TemplateOrigin,
-        bundled_characters, bundled_part, save_atomic, stem, store_model, store_rig_from, store_rig_over,
+        BUNDLED_CHARACTERS, BUNDLED_PARTS, FileKind, LoadError, ReadError, RealDisk, TemplateOrigin,
+        bundled_characters, bundled_part, stage_file, stem, store_model, store_rig_from, store_rig_over,
     },
     headless::Workbench,
     mesh::model::Model,
@@ -224,9 +224,10 @@ pub(super) fn store_made(
     };
     check_companion(output)?;
     let rig = origin.adopted(rig).map_err(|error| Failure::Input(Box::new(error)))?;
-    report.notes(store_rig_from(&RealDisk, output, &rig, &origin)?);
     let base = companion(output);
-    save_atomic(&RealDisk, &base, write_template(origin.rig()).as_bytes()).map_err(StoreError::from)?;
+    let staged = stage_file(&RealDisk, &base, write_template(origin.rig()).as_bytes())?;
+    report.notes(store_rig_from(&RealDisk, output, &rig, &origin)?);
+    staged.put_in_place()?;
     report.line(format!("wrote {}, the template as it is now, for `rigsmith update`", base.display()));
     report.set("base", base.display().to_string());
     Ok(())

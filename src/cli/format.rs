@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::{Failure, Report, explanation::Explanation};
+use super::{Failure, Report, explanation::Explanation, outputs::check_places};
 use crate::{
     files::{FileKind, LoadError, RealDisk, format_template_file, read_capped, save_atomic},
     rig::template::{self, UidStyle},
@@ -57,6 +57,11 @@ pub(super) fn run(args: &FormatArgs) -> Result<Report, Failure> {
         }
     }
     let is_written = !args.check && !report.at_fault;
+    if is_written {
+        let is_changed = |found: &Result<(String, String), String>| found.as_ref().is_ok_and(|(was, is)| was != is);
+        let changed = formatted.iter().filter(|(_, found)| is_changed(found));
+        check_places(changed.map(|(path, _)| path.as_path()))?;
+    }
     for (path, found) in formatted {
         let file = path.display();
         let (before, after) = match found {

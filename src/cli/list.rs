@@ -1,6 +1,6 @@
 //! `rigsmith list`: templates of a folder, or of all folders in which templates are looked for, by their headers alone.
 
-use std::{cmp::Ordering, path::PathBuf};
+use std::{cmp::Ordering, collections::BTreeMap, path::PathBuf};
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -27,6 +27,9 @@ pub(super) struct ListArgs {
 
 /// Most templates that are listed.
 const MOST: usize = 10_000;
+
+/// Most files that are named with the fault that they have in common.
+const NAMED: usize = 5;
 
 pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
@@ -61,11 +64,13 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
         report.line(format!("no templates, .rig.ron, in {}", own.display()));
     }
     let templates: Vec<Value> = listed.iter().map(|one| tell(one, &newest, &mut report)).collect();
+    tell_faults(&listed, &mut report);
     report.set("templates", Value::Array(templates));
     if args.folder.is_none() {
         report.line("with Rigsmith:");
-        let bundled: Vec<Value> = bundled.iter().map(|one| tell(one, &newest, &mut report)).collect();
-        report.set("bundled", Value::Array(bundled));
+        let told: Vec<Value> = bundled.iter().map(|one| tell(one, &newest, &mut report)).collect();
+        tell_faults(&bundled, &mut report);
+        report.set("bundled", Value::Array(told));
     }
     Ok(report)
 }
@@ -80,16 +85,29 @@ fn left_out(error: &FolderListError) -> String {
     format!("`{}` is left out: {}", error.folder.display(), error.source)
 }
 
-/// Tells a template in a line; returns what programs read of it.
+/// Tells what is wrong with templates that have no header: a line for each fault, with the files that have it.
+fn tell_faults(listed: &[ListedTemplate], report: &mut Report) {
+    let mut files: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for ListedTemplate { place, header, .. } in listed {
+        if let Err(error) = header {
+            files.entry(error.to_string()).or_default().push(place.to_string());
+        }
+    }
+    for (fault, files) in files {
+        let more = files.len().saturating_sub(NAMED);
+        let named = files[..files.len() - more].join(", ");
+        let more = if more > 0 { format!(" and {}", counted(more, "more file", "more files")) } else { String::new() };
+        report.line(format!("{named}{more}: {fault}"));
+    }
+}
+
+/// Tells a template in a line, but for one without a header; returns what programs read of it.
 fn tell(one: &ListedTemplate, newest: &NewestVersions, report: &mut Report) -> Value {
     let ListedTemplate { place, header, .. } = one;
     let file = &place.to_string();
     let header = match header {
         Ok(header) => header,
-        Err(error) => {
-            report.line(format!("{file}: {error}"));
-            return json!({ "file": file, "error": error.to_string() });
-        }
+        Err(error) => return json!({ "file": file, "error": error.to_string() }),
     };
     let mut value = value(file, header);
     let newer = newest.get(&VersionedTemplate::of(header));

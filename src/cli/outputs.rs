@@ -5,7 +5,10 @@ use std::path::Path;
 use clap::Args;
 
 use super::Failure;
-use crate::files::{FileKind, RealDisk, is_same_file};
+use crate::{
+    files::{Disk, FileKind, PartFiles, RealDisk, check_place, is_same_file, read_capped},
+    rig::template,
+};
 
 /// The permission to write over an input.
 #[derive(Args, Debug, Clone, Copy, Default)]
@@ -16,9 +19,20 @@ pub(super) struct InPlaceArgs {
 }
 
 impl InPlaceArgs {
-    /// Checks that `output` is no input, unless replacing it was allowed, and that each of the `further` outputs, with
-    /// the options that name them, is neither an input nor another output.
+    /// Checks that `output` is no input, unless replacing it was allowed, that each of the `further` outputs, with the
+    /// options that name them, is neither an input nor another output, and that all of them can be written.
     pub fn check(
+        self,
+        inputs: &[&Path],
+        output: Option<&Path>,
+        further: &[(&'static str, &Path)],
+    ) -> Result<(), Failure> {
+        self.check_names(inputs, output, further)?;
+        check_places(output.into_iter().chain(further.iter().map(|(_, path)| *path)))
+    }
+
+    /// Checks outputs as [`check`](Self::check) does, but for whether they can be written.
+    pub fn check_names(
         self,
         inputs: &[&Path],
         output: Option<&Path>,
@@ -40,6 +54,16 @@ impl InPlaceArgs {
                 )));
             }
         }
+        if let Some(output) = output.filter(|_| !self.in_place)
+            && let Some(input) = inputs.iter().find(|input| has_part(input, output))
+        {
+            return Err(Failure::Usage(format!(
+                "`{}` is a part of the input `{}` and would be replaced; give another output, or --in-place where there is \
+                 that option",
+                output.display(),
+                input.display()
+            )));
+        }
         for (number, (option, path)) in further.iter().enumerate() {
             let earlier = further[..number].iter().map(|(_, path)| *path);
             let mut taken = inputs.iter().copied().chain(output).chain(earlier);
@@ -52,4 +76,23 @@ impl InPlaceArgs {
         }
         Ok(())
     }
+}
+
+/// True if the template in the file `input` takes a part from the file `output`, which is as much of an input.
+fn has_part(input: &Path, output: &Path) -> bool {
+    let is_template = |path: &Path| FileKind::of(path) == Some(FileKind::Template);
+    // Where nothing is replaced, the template does not have to be read.
+    if !is_template(input) || !is_template(output) || RealDisk.entry(output, true).is_err() {
+        return false;
+    }
+    let Ok(bytes) = read_capped(&RealDisk, input, template::MAX_BYTES as u64) else { return false };
+    let mut parts = PartFiles::new(&RealDisk);
+    // Faults of the template are told where the command reads it.
+    let _ = parts.complete(input, &bytes);
+    parts.asked.keys().any(|part| is_same_file(&RealDisk, part, output))
+}
+
+/// Checks whether files can be written at paths, before a command works for minutes or writes the first of its outputs.
+pub(super) fn check_places<'p>(paths: impl IntoIterator<Item = &'p Path>) -> Result<(), Failure> {
+    paths.into_iter().try_for_each(|path| Ok(check_place(&RealDisk, path)?))
 }

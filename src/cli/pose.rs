@@ -11,7 +11,7 @@ use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
     build::{self, MeshSource},
     limits,
-    project_meshes::own_meshes,
+    project_meshes::{check_output, own_meshes},
     report::counted,
     skin,
     switches::SwitchArgs,
@@ -190,6 +190,7 @@ fn read(args: &PoseArgs, report: &mut Report) -> Result<(Rig, Vec<RigMesh>), Fai
     let mut own = Vec::new();
     let mut rig = if FileKind::of(&args.rig) == Some(FileKind::Project) {
         let mut project = limits::load_project(&args.rig)?;
+        check_output(&project, args.output.as_deref(), args.in_place)?;
         if args.meshes.is_empty() {
             limits::refuse_outside(&project)?;
         }

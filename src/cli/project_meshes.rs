@@ -1,11 +1,25 @@
 //! Meshes of a project's rig, for commands that write or draw a character.
 
-use super::Report;
+use std::path::Path;
+
+use super::{Failure, InPlaceArgs, Report};
 use crate::{
-    files::{LoadedMesh, MeshState},
+    files::{LoadedMesh, LoadedProject, MeshState},
     plugins::surface::RigMesh,
     rig::Rig,
 };
+
+/// Checks that `output` is neither a mesh nor a template of a project, unless replacing inputs was allowed.
+pub(super) fn check_output(
+    project: &LoadedProject,
+    output: Option<&Path>,
+    in_place: InPlaceArgs,
+) -> Result<(), Failure> {
+    let meshes = project.meshes.iter().map(|mesh| mesh.path.as_path());
+    let templates = project.templates.iter().map(|template| template.path.as_path());
+    let inputs: Vec<&Path> = meshes.chain(templates).collect();
+    in_place.check_names(&inputs, output, &[])
+}
 
 /// Meshes of a rig among those of its project: those that have weights, or the first one if none has. The others are told.
 pub(super) fn own_meshes(meshes: Vec<LoadedMesh>, rig: &Rig, report: &mut Report) -> Vec<RigMesh> {

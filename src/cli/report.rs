@@ -13,7 +13,7 @@ use super::{
     limits::{self, Limit, LimitError},
 };
 use crate::{
-    files::{LoadError, LoadShapesError, StoreError},
+    files::{LoadError, LoadShapesError, SaveError, StoreError},
     headless::WorkbenchError,
     rig::format::json::json_text,
 };
@@ -119,6 +119,12 @@ impl From<StoreError> for Failure {
             StoreError::Kind { .. } => Self::Usage(error.to_string()),
             error => Self::Input(Box::new(error)),
         }
+    }
+}
+
+impl From<SaveError> for Failure {
+    fn from(error: SaveError) -> Self {
+        Self::Input(Box::new(error))
     }
 }
 

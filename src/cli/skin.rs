@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     algo::transfer::{TransferMesh, TransferSettings, transfer_weights},
-    files::{FileKind, RealDisk, load_skin, stem, store_model, store_skin},
+    files::{FileKind, RealDisk, load_skin, stage_skin, stem, store_model},
     headless::Workbench,
     rig::{
         Rig, SkinData, Uid, UidSource,
@@ -91,15 +91,20 @@ pub(super) fn run(args: &SkinArgs) -> Result<Report, Failure> {
         }
     }
     let weights_file = if FileKind::of(&args.output) == Some(FileKind::Skin) { Some(&args.output) } else { None };
+    let mut staged = Vec::new();
+    for path in weights_file.into_iter().chain(&args.save_weights) {
+        staged.push(stage_skin(&RealDisk, path, &skin_file(&bench)?)?);
+    }
     // The character first: where it cannot be written, weights beside an older one stay as they belong to that.
     if weights_file.is_none() {
         let write = || store_model(&RealDisk, &args.output, &bench.character(), &args.export.settings());
         report.notes(spinning("writing", write)?);
         report.line(format!("wrote {}", args.output.display()));
     }
-    for path in weights_file.into_iter().chain(&args.save_weights) {
-        store_skin(&RealDisk, path, &skin_file(&bench)?)?;
-        report.line(format!("wrote {}", path.display()));
+    for file in staged {
+        let line = format!("wrote {}", file.path().display());
+        file.put_in_place()?;
+        report.line(line);
     }
     report.set("joints", bench.rig().len());
     report.set("output", args.output.display().to_string());

@@ -15,12 +15,13 @@ use super::{
     Failure, InPlaceArgs, Report,
     explanation::Explanation,
     limits,
+    outputs::check_places,
     report::{counted, is_json},
 };
 use crate::{
     files::{
-        Disk, FileKind, ReadError, RealDisk, StoreError, TemplateVersion, base_text, diff_templates, read_capped,
-        save_atomic, update_template,
+        Disk, EntryKind, FileKind, ReadError, RealDisk, StoreError, TemplateVersion, base_text, diff_templates,
+        read_capped, save_atomic, update_template,
     },
     processor::keep_poses,
     rig::{
@@ -80,6 +81,12 @@ impl UpdateArgs {
         [Some(&self.rig), Some(&self.from), self.base.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect()
     }
 
+    /// Checks whether the rig and its clips can be written, unless nothing is to be written.
+    fn check_places(&self, clips: &[PathBuf]) -> Result<(), Failure> {
+        let outputs = self.output.iter().chain(clips).filter(|_| !self.dry_run);
+        check_places(outputs.map(PathBuf::as_path))
+    }
+
     /// Side whose values are taken in conflicts.
     fn side(&self) -> Take {
         match self.take {
@@ -135,8 +142,9 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
         return project::run(args);
     }
     let inputs = args.inputs();
-    args.in_place.check(&inputs, args.output.as_deref(), &[])?;
+    args.in_place.check_names(&inputs, args.output.as_deref(), &[])?;
     let clip_files = clips::outputs(args, &inputs)?;
+    args.check_places(&clip_files)?;
     let mut report = Report::default();
     let (now, file) = (version(&args.rig, &mut report)?, version(&args.from, &mut report)?);
     let beside = companion(&args.rig);
@@ -144,6 +152,7 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     let keeps_base = args.keep_base || is_beside;
     if let Some(output) = args.output.as_ref().filter(|_| keeps_base && !args.dry_run) {
         check_companion(output)?;
+        check_places([companion(output).as_path()])?;
     }
     let base = match &args.base {
         Some(base) => Some(version(base, &mut report)?),
@@ -168,10 +177,11 @@ pub(super) fn run_update(args: &UpdateArgs) -> Result<Report, Failure> {
     let file = keeps_base.then_some(file);
     limits::check_time("updating the rig")?;
     if let Some(output) = args.output.as_ref().filter(|_| !args.dry_run) {
+        let clips = clips::stage(&clips)?;
         report.notes(update.store(&RealDisk, output)?);
         report.line(format!("wrote {}", output.display()));
         report.set("output", output.display().to_string());
-        clips::store(&clips, &mut report)?;
+        clips::store(clips, &mut report)?;
         if let Some(file) = file {
             let base = companion(output);
             save_atomic(&RealDisk, &base, base_text(&RealDisk, &file, output).as_bytes()).map_err(StoreError::from)?;
@@ -197,9 +207,12 @@ fn tell_update(report: &mut Report, (was, is): (&Rig, &Rig), now: &Rig, updated:
     Ok(())
 }
 
-/// File beside a rig that has the version of the template that it was made from, or updated to last.
+/// File beside a rig that has the version of the template that it was made from, or updated to last. Of a link it is beside the
+/// file that the link leads to, as that is the one that is read and saved.
 pub(super) fn companion(rig: &Path) -> PathBuf {
-    let mut name = rig.as_os_str().to_owned();
+    let is_link = RealDisk.entry(rig, false).is_ok_and(|entry| entry.kind == EntryKind::Link);
+    let linked = is_link.then(|| RealDisk.canonical(rig).ok()).flatten();
+    let mut name = linked.as_deref().unwrap_or(rig).as_os_str().to_owned();
     name.push(".base");
     name.into()
 }

@@ -76,7 +76,8 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
     }
     let inputs: Vec<&Path> =
         [Some(&args.template), args.mesh.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect();
-    args.in_place.check(&inputs, Some(&args.output), &[])?;
+    // A folder that is not there yet may come while templates are watched.
+    args.in_place.check_names(&inputs, Some(&args.output), &[])?;
     let mut watch = Watch {
         args,
         is_json,

@@ -9,19 +9,21 @@ mod companion;
 mod error;
 mod record;
 mod set;
+mod staged;
 mod target;
 mod temp;
 
 pub use error::{SaveError, SaveStep};
 pub use set::{FileSet, save_set};
+pub use staged::{StagedFile, check_place, stage_file};
 pub use temp::{is_temp_name, remove_stale_temps};
 
+pub(super) use target::saved_file;
 pub(super) use temp::temp_name;
 
 use std::path::Path;
 
 use super::disk::Disk;
-use target::Target;
 
 /// Saves `bytes` as the file `path`. Afterwards the file holds its former content or all of `bytes`, at whatever point
 /// the save fails.
@@ -34,12 +36,7 @@ use target::Target;
 /// # Errors
 /// See [`SaveError`]; the only one after which `path` holds `bytes` is [`SaveError::Unconfirmed`].
 pub fn save_atomic(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<(), SaveError> {
-    let target = Target::find(disk, path)?;
-    // Left-over temporary files that cannot be removed are no reason not to save.
-    let _ = remove_stale_temps(disk, &target.folder);
-    let temp = target.stage(disk, bytes)?;
-    target.replace(temp, bytes)?;
-    target.confirm(disk)
+    stage_file(disk, path, bytes)?.put_in_place()
 }
 
 /// The folder of a path; `.` for a bare name.

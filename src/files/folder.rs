@@ -8,7 +8,7 @@ use std::{
     ffi::OsString,
     io::ErrorKind,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
 };
 
 use thiserror::Error;
@@ -80,6 +80,10 @@ pub struct ModelFolder<'d> {
     disk: &'d dyn Disk,
     /// Canonical path of the folder, so that prefixes can be compared.
     root: PathBuf,
+    /// The model's file, if it is known.
+    model: Option<PathBuf>,
+    /// Canonical path of the folder to which the model's file is a link.
+    linked: OnceLock<Option<PathBuf>>,
     search: Mutex<Search>,
 }
 
@@ -114,12 +118,13 @@ impl Names {
 }
 
 impl<'d> ModelFolder<'d> {
-    /// Returns the folder in which the file `model` lies.
+    /// Returns the folder in which the file `model` lies. If that is a link, what is not in the folder is looked for beside the
+    /// file that it leads to, where saves put companions.
     ///
     /// # Errors
     /// When the folder does not exist or cannot be reached.
     pub fn of(disk: &'d dyn Disk, model: &Path) -> Result<Self, ReadError> {
-        Self::at(disk, folder_of(model))
+        Ok(Self { model: Some(model.to_path_buf()), ..Self::at(disk, folder_of(model))? })
     }
 
     /// Returns the folder `folder` itself.
@@ -128,7 +133,7 @@ impl<'d> ModelFolder<'d> {
     /// When it does not exist or cannot be reached.
     pub fn at(disk: &'d dyn Disk, folder: &Path) -> Result<Self, ReadError> {
         let root = disk.canonical(folder).map_err(|error| ReadError::new(disk, folder, error))?;
-        Ok(Self { disk, root, search: Mutex::default() })
+        Ok(Self { disk, root, model: None, linked: OnceLock::new(), search: Mutex::default() })
     }
 
     /// Returns the folder, absolute and with links resolved.
@@ -145,7 +150,28 @@ impl<'d> ModelFolder<'d> {
     /// For anything but a relative reference to something below the folder, and where nothing is there.
     pub fn resolve(&self, uri: &str) -> Result<PathBuf, UriError> {
         let names = self.split(uri)?;
-        let mut path = self.root.clone();
+        let found = self.find(uri, &names, &self.root);
+        if matches!(&found, Err(UriError::Read { source: ReadError::Missing { .. }, .. }))
+            && let Some(linked) = self.linked()
+            && let Ok(path) = self.find(uri, &names, linked)
+        {
+            return Ok(path);
+        }
+        found
+    }
+
+    /// Folder of the file that the model's file leads to as a link; `None` if that is the model's own folder.
+    fn linked(&self) -> Option<&Path> {
+        let find = || {
+            let file = self.disk.canonical(self.model.as_deref()?).ok()?;
+            file.parent().map(Path::to_path_buf).filter(|folder| *folder != self.root)
+        };
+        self.linked.get_or_init(find).as_deref()
+    }
+
+    /// Finds what the names lead to below `root`.
+    fn find(&self, uri: &str, names: &[String], root: &Path) -> Result<PathBuf, UriError> {
+        let mut path = root.to_path_buf();
         for (i, name) in names.iter().enumerate() {
             let exact = path.join(name);
             path = match self.disk.canonical(&exact) {
@@ -163,7 +189,7 @@ impl<'d> ModelFolder<'d> {
                 }
             };
             // Checked at every step, so that no folder outside is even listed.
-            if !path.starts_with(&self.root) {
+            if !path.starts_with(root) {
                 return Err(self.outside(uri));
             }
         }

@@ -6,9 +6,9 @@ use std::{
 };
 
 use super::{
-    Disk, FileKind, FileSet, LoadError, PartFiles, ReadError, SaveError,
+    Disk, FileKind, FileSet, LoadError, PartFiles, ReadError, SaveError, StagedFile,
     kept_lists::with_kept_lists,
-    read_capped, save_atomic, save_set, stem,
+    read_capped, save_atomic, save_set, stage_file, stem,
     template_origin::moved_text,
     template_text::{TemplateText, new_template_text, template_text},
     template_update::with_known_uids,
@@ -445,6 +445,17 @@ pub fn store_animation(
     built: Option<&BuiltRig>,
     clips: &[RigClip],
 ) -> Result<(), StoreError> {
+    Ok(stage_animation(disk, path, rig, built, clips)?.put_in_place()?)
+}
+
+/// Stages clips for saving with other files; otherwise as [`store_animation`].
+pub fn stage_animation<'d>(
+    disk: &'d dyn Disk,
+    path: &Path,
+    rig: &Rig,
+    built: Option<&BuiltRig>,
+    clips: &[RigClip],
+) -> Result<StagedFile<'d>, StoreError> {
     if FileKind::of(path) != Some(FileKind::Animation) {
         return Err(StoreError::Kind { path: path.into(), wanted: "clips are saved as .anim.ron" });
     }
@@ -453,7 +464,7 @@ pub fn store_animation(
         return Err(StoreError::AnimationTooLarge { path: path.into(), mebibytes: text.len() >> 20 });
     }
     verify::animation(path, text.as_bytes(), clips)?;
-    Ok(save_atomic(disk, path, text.as_bytes())?)
+    Ok(stage_file(disk, path, text.as_bytes())?)
 }
 
 /// Saves packed clips with their skeleton as `.rigclip`, after reading back what is to be written.
@@ -468,10 +479,15 @@ pub fn store_packed_clips(disk: &dyn Disk, path: &Path, packed: &PackedSkeleton)
 
 /// Saves weights as `.skin`.
 pub fn store_skin(disk: &dyn Disk, path: &Path, skin: &SkinFile) -> Result<(), StoreError> {
+    Ok(stage_skin(disk, path, skin)?.put_in_place()?)
+}
+
+/// Stages weights for saving with other files; otherwise as [`store_skin`].
+pub fn stage_skin<'d>(disk: &'d dyn Disk, path: &Path, skin: &SkinFile) -> Result<StagedFile<'d>, StoreError> {
     if FileKind::of(path) != Some(FileKind::Skin) {
         return Err(StoreError::Kind { path: path.into(), wanted: "weights are saved as .skin" });
     }
     let bytes = skin.write();
     verify::skin(path, &bytes)?;
-    Ok(save_atomic(disk, path, &bytes)?)
+    Ok(stage_file(disk, path, &bytes)?)
 }

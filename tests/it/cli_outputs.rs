@@ -87,6 +87,104 @@ fn weights_are_saved_beside_a_character_that_is_there() {
     assert_eq!((code, contents(folder.path())), (1, before), "{said}");
 }
 
+/// Names of the files and folders below a folder.
+fn names_below(folder: &Path) -> Vec<PathBuf> {
+    let mut names = Vec::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() && !path.is_symlink() {
+                folders.push(path.clone());
+            }
+            names.push(path);
+        }
+    }
+    names.sort();
+    names
+}
+
+/// One output that cannot be written leaves none of the others behind.
+#[test]
+fn outputs_of_a_command_are_all_written_or_none() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    for name in ["mine", "new"] {
+        let text = format!("(format: 2,   name: \"{name}\", joints: [(label: \"a\")])");
+        fs::write(at(&format!("{name}.rig.ron")), text).unwrap();
+    }
+    fs::write(at("walker.bvh"), include_str!("retarget/walker.bvh")).unwrap();
+    let (code, said) = rigsmith(folder.path(), &["animate", "biped.rig.ron", "walker.bvh", "-o", "w.anim.ron"]);
+    assert_eq!(code, 0, "{said}");
+    for name in ["folder.skin", "out/w.anim.ron", "demo/biped.glb"] {
+        fs::create_dir_all(at(name)).unwrap();
+    }
+    #[cfg(unix)]
+    for name in ["fitted.rig.ron.base", "updated.rig.ron.base"] {
+        std::os::unix::fs::symlink("nowhere/base", at(name)).unwrap();
+    }
+    let commands: &[(&[&str], &str)] = &[
+        (&["skin", "a.rig", "b.obj", "-o", "c.glb", "--save-weights", "folder.skin"], "folder.skin"),
+        (&["skin", "a.rig", "b.obj", "-o", "c.gltf", "--save-weights", "nowhere/c.skin"], "nowhere/c.skin"),
+        (
+            &["animate", "biped.rig.ron", "walker.bvh", "--map-out", "map.ron", "-o", "nowhere/w.anim.ron"],
+            "nowhere/w.anim.ron",
+        ),
+        (
+            &["animate", "biped.rig.ron", "walker.bvh", "--map-out", "nowhere/map.ron", "-o", "x.anim.ron"],
+            "nowhere/map.ron",
+        ),
+        (
+            &[
+                "update",
+                "biped.rig.ron",
+                "--from",
+                "biped.rig.ron",
+                "--take",
+                "mine",
+                "--clips",
+                "w.anim.ron",
+                "-o",
+                "out/x.rig.ron",
+            ],
+            "out/w.anim.ron",
+        ),
+        #[cfg(unix)]
+        (&["fit", "b.obj", "--template", "parts/tail", "-o", "fitted.rig.ron"], "fitted.rig.ron.base"),
+        #[cfg(unix)]
+        (
+            &[
+                "update",
+                "mine.rig.ron",
+                "--from",
+                "new.rig.ron",
+                "--take",
+                "mine",
+                "--keep-base",
+                "-o",
+                "updated.rig.ron",
+            ],
+            "updated.rig.ron.base",
+        ),
+    ];
+    let before = (names_below(folder.path()), contents(folder.path()));
+    for (args, place) in commands {
+        let (code, told) = json(folder.path(), args);
+        assert_eq!((code, told["error"]["where"].as_str()), (1, Some(*place)), "{args:?}: {told}");
+        assert!((names_below(folder.path()), contents(folder.path())) == before, "{args:?} left something behind");
+    }
+    // The demonstration writes two files into the working folder.
+    assert_eq!(rigsmith(&at("demo"), &["--json"]).0, 1);
+    assert_eq!(names_below(&at("demo")), [at("demo/biped.glb")]);
+    // All templates are put into their layout, or none.
+    let mut rules = fs::metadata(at("new.rig.ron")).unwrap().permissions();
+    rules.set_readonly(true);
+    fs::set_permissions(at("new.rig.ron"), rules).unwrap();
+    let (code, said) = rigsmith(folder.path(), &["format", "mine.rig.ron", "new.rig.ron"]);
+    assert!(code == 1 && said.contains("write-protected"), "{said}");
+    assert!(contents(folder.path()) == before.1, "one of two templates was formatted");
+}
+
 #[test]
 fn an_input_is_no_output() {
     let folder = folder();
@@ -138,6 +236,33 @@ fn an_input_is_no_output() {
         assert_eq!(code, 0, "{args:?}: {said}");
     }
     assert_eq!(load_model(&RealDisk, &folder.path().join("b.obj")).unwrap().face_count(), 6);
+}
+
+/// Parts of a template are inputs, although nobody has named them.
+#[test]
+fn a_part_of_an_input_is_no_output() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("parts")).unwrap();
+    let arm = "(format: 2, name: \"arm\", kind: \"part\", joints: [(label: \"a\")])";
+    let man = "(format: 2, name: \"man\", joints: [(label: \"body\")], parts: [(part: \"parts/arm.rig.ron\", \
+               name: \"l\", parent: \"body\")])";
+    for (name, text) in [("parts/arm.rig.ron", arm), ("other.rig.ron", arm), ("man.rig.ron", man)] {
+        fs::write(at(name), text).unwrap();
+    }
+    let commands: [&[&str]; 3] = [
+        &["build", "man.rig.ron", "-o", "parts/arm.rig.ron"],
+        &["convert", "man.rig.ron", "./parts/../parts/arm.rig.ron"],
+        &["merge", "other.rig.ron", "man.rig.ron", "-o", "parts/arm.rig.ron"],
+    ];
+    for args in commands {
+        let (code, said) = rigsmith(folder.path(), args);
+        assert!(code == 2 && said.contains("is a part of the input"), "{args:?}: {said}");
+        assert_eq!(fs::read_to_string(at("parts/arm.rig.ron")).unwrap(), arm, "{args:?}");
+    }
+    // Another file that is there is no part of it.
+    let (code, said) = rigsmith(folder.path(), &["build", "man.rig.ron", "-o", "other.rig.ron"]);
+    assert_eq!(code, 0, "{said}");
 }
 
 #[test]
@@ -240,6 +365,30 @@ fn the_version_that_is_kept_replaces_nothing_but_a_template() {
     let (code, told) = json(folder.path(), &update);
     assert_eq!(code, 0, "{told}");
     assert!(fs::read_to_string(at("out.rig.ron.base")).unwrap().contains("\"new\""));
+}
+
+/// Whoever updates the rig by its own name finds the version that was kept through a link.
+#[cfg(unix)]
+#[test]
+fn the_version_of_a_link_is_kept_beside_the_file_that_it_leads_to() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("sub")).unwrap();
+    for name in ["sub/real", "new"] {
+        fs::write(at(&format!("{name}.rig.ron")), format!("(format: 2, name: \"{name}\", joints: [(label: \"a\")])"))
+            .unwrap();
+    }
+    std::os::unix::fs::symlink("sub/real.rig.ron", at("link.rig.ron")).unwrap();
+    let update = ["--from", "new.rig.ron", "--take", "theirs", "--keep-base"];
+    let (code, told) = json(
+        folder.path(),
+        &[&["update", "link.rig.ron"][..], &update, &["-o", "link.rig.ron", "--in-place"]].concat(),
+    );
+    assert_eq!(code, 0, "{told}");
+    assert!(at("link.rig.ron").is_symlink() && !at("link.rig.ron.base").exists());
+    assert!(fs::read_to_string(at("sub/real.rig.ron.base")).unwrap().contains("\"new\""));
+    let (code, told) = json(folder.path(), &["update", "sub/real.rig.ron", "--from", "new.rig.ron", "--dry-run"]);
+    assert_eq!((code, told["base"].as_str()), (0, Some("sub/real.rig.ron.base")), "{told}");
 }
 
 #[test]

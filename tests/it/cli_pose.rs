@@ -463,6 +463,18 @@ fn the_mesh_of_a_project_is_posed_with_its_own_weights() {
     let weights = written.weights.unwrap();
     let shares: Vec<f32> = (0..4).flat_map(|point| weights.of(point).map(|(_, share)| share)).collect();
     assert!(shares.len() == 8 && shares.iter().all(|share| (share - 0.25).abs() < 1e-3 || (share - 0.75).abs() < 1e-3));
+    // The project's own mesh is an input, although nobody has named it.
+    let text = fs::read_to_string(path("square.rigsmith.ron")).unwrap();
+    fs::write(path("of_glb.rigsmith.ron"), text.replace("\"square.obj\"", "\"square.glb\"")).unwrap();
+    let before = fs::read(path("square.glb")).unwrap();
+    for args in [
+        &["pose", "of_glb.rigsmith.ron", "-o", "square.glb"][..],
+        &["animate", "of_glb.rigsmith.ron", "walk.bvh", "-o", "./square.glb"],
+    ] {
+        let answer = rigsmith(folder.path(), args);
+        assert!(answer.code == 2 && answer.err.contains("is an input"), "{args:?}: {}", answer.err);
+        assert!(fs::read(path("square.glb")).unwrap() == before, "{args:?}");
+    }
     // A mesh that is given stands in for it.
     fs::write(path("other.obj"), format!("{square}v 0 2 0\nf 4 3 5\n")).unwrap();
     let args = ["pose", "square.rigsmith.ron", "--mesh", "other.obj", "-o", "other.glb"];

@@ -386,6 +386,29 @@ fn overrides_sockets_and_options_are_listed() {
     }
 }
 
+/// A folder of many files with one fault is told in one line, and by all of its files to programs.
+#[test]
+fn a_fault_that_many_templates_have_is_told_once() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("good.rig.ron"), "(format: 2, name: \"good\", joints: [(label: \"a\")])").unwrap();
+    fs::write(folder.path().join("one.rig.ron"), "(format: 2, nam").unwrap();
+    for number in 0..300 {
+        fs::write(folder.path().join(format!("bad{number:03}.rig.ron")), "no template").unwrap();
+    }
+    let (code, said) = rigsmith(folder.path(), &["list", "."]);
+    assert_eq!(code, 0, "{said}");
+    let lines: Vec<&str> = said.lines().collect();
+    assert_eq!(lines.len(), 3, "{said}");
+    assert!(lines[0].contains("good (1 joint)"), "{said}");
+    let of_many: Vec<&str> = lines.iter().copied().filter(|line| line.contains("and 295 more files: line 1")).collect();
+    assert_eq!(of_many.len(), 1, "{said}");
+    assert!(of_many[0].contains("bad000.rig.ron, ") && of_many[0].contains("bad004.rig.ron and"), "{said}");
+    assert!(lines.iter().any(|line| line.contains("one.rig.ron: line 1")), "{said}");
+    let (_, listed) = json(folder.path(), &["list", "."]);
+    let faults = listed["templates"].as_array().unwrap().iter().filter(|one| one["error"].is_string());
+    assert_eq!(faults.count(), 301);
+}
+
 #[test]
 fn the_version_that_was_taken_over_is_the_base_of_the_next_update() {
     let folder = tempfile::tempdir().unwrap();

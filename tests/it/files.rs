@@ -8,7 +8,8 @@ use std::{
 };
 
 use rigsmith::files::{
-    Disk, Fault, FaultPlan, FaultyDisk, FileWatch, RealDisk, SaveError, is_temp_name, remove_stale_temps, save_atomic,
+    Disk, Fault, FaultPlan, FaultyDisk, FileWatch, RealDisk, SaveError, check_place, is_temp_name, remove_stale_temps,
+    save_atomic, stage_file,
 };
 use tempfile::TempDir;
 
@@ -32,6 +33,36 @@ fn plans(operations: usize) -> impl Iterator<Item = FaultPlan> {
     (0..operations).flat_map(|at| {
         Fault::ALL.into_iter().flat_map(move |fault| [false, true].map(|lasting| FaultPlan { at, fault, lasting }))
     })
+}
+
+#[test]
+fn a_staged_file_is_in_its_place_once_it_is_put_there() {
+    let folder = fresh();
+    let path = folder.path().join("a.skin");
+    fs::write(&path, OLD).unwrap();
+    drop(stage_file(&RealDisk, &path, b"given up").unwrap());
+    assert_eq!((fs::read(&path).unwrap(), temps(folder.path())), (OLD.to_vec(), 0));
+    let staged = stage_file(&RealDisk, &path, b"the next one").unwrap();
+    // Another save in the folder clears away what dead processes left, and nothing that waits.
+    save_atomic(&RealDisk, &folder.path().join("b.skin"), b"another").unwrap();
+    assert_eq!((fs::read(&path).unwrap(), temps(folder.path())), (OLD.to_vec(), 1));
+    assert_eq!(staged.path(), path);
+    staged.put_in_place().unwrap();
+    assert_eq!((fs::read(&path).unwrap(), temps(folder.path())), (b"the next one".to_vec(), 0));
+}
+
+#[test]
+fn a_place_is_checked_without_a_trace() {
+    let folder = fresh();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("there"), OLD).unwrap();
+    check_place(&RealDisk, &at("there")).unwrap();
+    check_place(&RealDisk, &at("later")).unwrap();
+    assert!(matches!(check_place(&RealDisk, &at("nowhere/a")), Err(SaveError::NoFolder { .. })));
+    assert!(matches!(check_place(&RealDisk, &at("there/a")), Err(SaveError::NoFolder { .. })));
+    assert!(matches!(check_place(&RealDisk, folder.path()), Err(SaveError::IsFolder { .. })));
+    assert_eq!(fs::read(at("there")).unwrap(), OLD);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
 #[test]

@@ -347,20 +347,35 @@ fn a_name_that_is_taken_is_left_alone() {
     assert_eq!(fs::read_to_string(folder.path().join(&name)).unwrap(), "mine");
 }
 
+/// A set that is saved through a link is whole in the folder of the file that the link leads to, where others open it, and is
+/// read through the link, too.
 #[test]
-fn a_link_stays_a_link_and_companions_lie_beside_it() {
+fn a_link_stays_a_link_and_companions_lie_beside_the_file_that_it_leads_to() {
     #[cfg(unix)]
-    {
-        let (folder, other) = (furnished(), tempfile::tempdir().unwrap());
-        let main = Kind::Gltf.main(folder.path());
-        std::os::unix::fs::symlink(other.path().join("real.gltf"), &main).unwrap();
+    for kind in Kind::ALL {
+        let (folder, other) = (furnished(), furnished());
+        let (main, real) = (kind.main(folder.path()), kind.main(other.path()));
+        std::os::unix::fs::symlink(&real, &main).unwrap();
+        let before = names(folder.path());
         for version in [1, 2] {
-            Kind::Gltf.save(&RealDisk, folder.path(), version).unwrap();
-            assert_eq!(Kind::Gltf.load(folder.path()), Ok(version));
+            // The mesh of a project has to lie below the project's folder.
+            let saved = match kind {
+                Kind::Project => store_project(&RealDisk, &main, &project(&other.path().join("mesh.obj"), version)),
+                _ => store_model(&RealDisk, &main, &triangle(version), &GltfWriteSettings::default()),
+            };
+            assert_eq!(saved.unwrap(), [""; 0], "{kind:?}");
+            assert_eq!((kind.load(folder.path()), kind.load(other.path())), (Ok(version), Ok(version)), "{kind:?}");
         }
-        assert!(main.is_symlink());
-        assert_eq!(names(folder.path()), expected(Kind::Gltf, 2));
-        assert_eq!(fs::read_dir(other.path()).unwrap().count(), 1);
+        assert!(main.is_symlink(), "{kind:?}");
+        assert_eq!(names(folder.path()), before, "{kind:?}: nothing lies beside the link");
+        assert_eq!(names(other.path()), expected(kind, 2), "{kind:?}: nothing is left of the former version");
+        // What lies beside a link is read from there, as other programs do.
+        if kind == Kind::Gltf {
+            for name in names(other.path()).difference(&before) {
+                fs::rename(other.path().join(name), folder.path().join(name)).unwrap();
+            }
+            assert_eq!(kind.load(folder.path()), Ok(2));
+        }
     }
 }
 

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     cli::{Failure, Report, limits, progress::spinning, report::counted},
-    files::{FileKind, RealDisk, load_animation, load_joint_map, load_motion, save_atomic, stem},
+    files::{FileKind, RealDisk, StagedFile, load_animation, load_joint_map, load_motion, stage_file, stem},
     headless::{Workbench, posing::PoseError},
     mesh::model::Model,
     rig::{
@@ -33,6 +33,9 @@ use crate::{
     },
 };
 
+/// Clips of all files, and the map of joints that is to be written with them.
+type ClipsWithMap = (Vec<RigClip>, Option<StagedFile<'static>>);
+
 /// Clips of all files, added to the rig as one would add them in the window. `whole` is the rig with its commands where the
 /// bench has its joints alone: clips of its controls are baked onto the joints.
 pub(super) fn clips(
@@ -41,13 +44,14 @@ pub(super) fn clips(
     bench: &mut Workbench,
     whole: Option<&Workbench>,
     report: &mut Report,
-) -> Result<Vec<RigClip>, Failure> {
+) -> Result<ClipsWithMap, Failure> {
     let pairs = args.map.as_deref().map(|path| load_joint_map(&RealDisk, path)).transpose()?.unwrap_or_default();
     let mut taking = ClipCollector {
         args,
         onto,
         choice: Choice::new(&args.chosen),
         maps: GivenMap::new(pairs),
+        map_file: None,
         added: Vec::new(),
         told: Vec::new(),
         set_aside: Vec::new(),
@@ -91,7 +95,7 @@ pub(super) fn clips(
     if !taking.set_aside.is_empty() {
         report.set("set_aside", taking.set_aside);
     }
-    Ok(taking.added)
+    Ok((taking.added, taking.map_file))
 }
 
 /// Work of taking clips from files.
@@ -100,6 +104,8 @@ struct ClipCollector<'a> {
     onto: MotionTarget,
     choice: Choice<'a>,
     maps: GivenMap,
+    /// The map that is to be written.
+    map_file: Option<StagedFile<'static>>,
     /// Clips as the document has them.
     added: Vec<RigClip>,
     /// Facts about motions, for programs.
@@ -305,8 +311,7 @@ impl ClipCollector<'_> {
         // All clips of a model have one skeleton, and so one map.
         if let Some(path) = args.map_out.as_ref().filter(|_| self.told.is_empty()) {
             let text = write_joint_map(&map.names(motion, bench.rig()));
-            save_atomic(&RealDisk, path, text.as_bytes()).map_err(|error| Failure::Input(Box::new(error)))?;
-            report.line(format!("wrote {}", path.display()));
+            self.map_file = Some(stage_file(&RealDisk, path, text.as_bytes())?);
         }
         // Keys of joints go into such files as they are.
         let is_written = onto == MotionTarget::Joints && FileKind::of(&args.output).is_some_and(FileKind::is_gltf);

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::{UpdateArgs, limits};
 use crate::{
     cli::{Failure, Report, report::counted},
-    files::{FileKind, RealDisk, is_same_file, load_animation, store_animation},
+    files::{FileKind, RealDisk, StagedFile, is_same_file, load_animation, stage_animation},
     processor::{BuildError, Builder, Modules, RigVersion, clips_between},
     rig::{
         BuiltRig, Rig,
@@ -70,7 +70,7 @@ pub(super) fn outputs(args: &UpdateArgs, inputs: &[&Path]) -> Result<Vec<PathBuf
     let beside = |clip: &PathBuf| output.with_file_name(clip.file_name().unwrap_or_default());
     let outputs: Vec<PathBuf> = args.clips.iter().map(beside).collect();
     for (number, path) in outputs.iter().enumerate() {
-        args.in_place.check(&inputs, Some(path.as_path()), &[])?;
+        args.in_place.check_names(&inputs, Some(path.as_path()), &[])?;
         if outputs[..number].iter().any(|other| is_same_file(&RealDisk, other, path)) {
             let fault = "two files of clips have that name, and would be written to one; rename one of them";
             return Err(Failure::Usage(format!("--clips `{}`: {fault}", path.display())));
@@ -143,11 +143,21 @@ pub(super) fn updated<'a>(
     Ok(files)
 }
 
-/// Writes the clips.
-pub(super) fn store(files: &[UpdatedFile<'_>], report: &mut Report) -> Result<(), Failure> {
-    for UpdatedFile { output, rig, clips } in files {
-        store_animation(&RealDisk, output, &rig.0, Some(&rig.1), clips)?;
-        report.line(format!("wrote {}", output.display()));
+/// Writes the clips beside their places, where they wait for the rig.
+pub(super) fn stage(files: &[UpdatedFile<'_>]) -> Result<Vec<StagedFile<'static>>, Failure> {
+    let stage = |file: &UpdatedFile<'_>| {
+        let (rig, built) = &*file.rig;
+        stage_animation(&RealDisk, file.output, rig, Some(built), &file.clips).map_err(Failure::from)
+    };
+    files.iter().map(stage).collect()
+}
+
+/// Puts the clips in their places.
+pub(super) fn store(staged: Vec<StagedFile<'static>>, report: &mut Report) -> Result<(), Failure> {
+    for file in staged {
+        let line = format!("wrote {}", file.path().display());
+        file.put_in_place()?;
+        report.line(line);
     }
     Ok(())
 }

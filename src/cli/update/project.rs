@@ -26,8 +26,9 @@ pub(super) fn run(args: &UpdateArgs) -> Result<Report, Failure> {
         return Err(Failure::Usage(format!("`{rig}` is a project, and `{output}` is none; give a .rigsmith.ron")));
     }
     let inputs = args.inputs();
-    args.in_place.check(&inputs, args.output.as_deref(), &[])?;
+    args.in_place.check_names(&inputs, args.output.as_deref(), &[])?;
     let clip_files = clips::outputs(args, &inputs)?;
+    args.check_places(&clip_files)?;
     let mut report = Report::default();
     let mut project = limits::load_project(&args.rig)?;
     report.notes(std::mem::take(&mut project.notes));
@@ -83,9 +84,10 @@ pub(super) fn run(args: &UpdateArgs) -> Result<Report, Failure> {
         }
         (None, _) => {}
     }
+    let clips = clips::stage(&clips)?;
     report.notes(store_project(&RealDisk, output, &to_save(project, names_before(&now)))?);
     report.line(format!("wrote {}", output.display()));
-    clips::store(&clips, &mut report)?;
+    clips::store(clips, &mut report)?;
     Ok(report)
 }
 

@@ -6,8 +6,8 @@ use std::{
 };
 
 use super::{
-    SaveError, SaveStep, companion, folder_of, record,
-    target::Target,
+    SaveError, SaveStep, companion, record,
+    target::{Target, saved_file},
     temp::{Temp, remove_stale_in_turn},
 };
 use crate::{files::disk::Disk, rig::skin::content_hash};
@@ -16,7 +16,8 @@ use crate::{files::disk::Disk, rig::skin::content_hash};
 const MAX_COPIES: u32 = 100;
 
 /// A main file and its companions: the files beside it that it refers to by name, such as the buffer of a `.gltf`, the
-/// materials of an `.obj` or the weights of a project.
+/// materials of an `.obj` or the weights of a project. If the main file is a link, they lie beside the file that it leads to,
+/// since that is the one that is written.
 ///
 /// [`add`](Self::add) chooses the name of a companion, which holds the hash of its content; the main file, which holds
 /// those names, is [finished](Self::finish) last.
@@ -38,6 +39,7 @@ impl FileSet {
     /// companion another name.
     pub fn add(&mut self, disk: &dyn Disk, plain: &str, bytes: Vec<u8>) -> String {
         let hash = content_hash(&bytes);
+        let main = saved_file(disk, &self.path);
         let mut copy = 0;
         loop {
             let name = companion::name(plain, hash, copy);
@@ -45,7 +47,7 @@ impl FileSet {
                 Some(known) if known == bytes => return name,
                 Some(_) => {}
                 None => {
-                    let there = companion::holds(disk, &self.path.with_file_name(&name), &bytes);
+                    let there = companion::holds(disk, &main.with_file_name(&name), &bytes);
                     if matches!(there, Ok(None | Some(true))) || copy == MAX_COPIES {
                         self.companions.push((name.clone(), bytes));
                         return name;
@@ -96,14 +98,11 @@ impl FileSet {
 /// See [`SaveError`]; the only one after which the set is in place is [`SaveError::Unconfirmed`].
 pub fn save_set(disk: &dyn Disk, set: &FileSet) -> Result<(), SaveError> {
     let target = Target::find(disk, &set.path)?;
-    let folder = folder_of(&set.path);
+    let folder = target.folder.as_path();
     // On file systems without folder locks, two saves at the same instant may conflict; consecutive saves never do.
     let _turn = disk.lock_folder(folder).ok().flatten();
     // Left-over temporary files that cannot be removed are no reason not to save.
     let _ = remove_stale_in_turn(disk, folder);
-    if target.folder != folder {
-        let _ = remove_stale_in_turn(disk, &target.folder);
-    }
     let mut missing = Vec::new();
     for companion in &set.companions {
         if !is_there(disk, &folder.join(&companion.0), &companion.1)? {
@@ -117,7 +116,7 @@ pub fn save_set(disk: &dyn Disk, set: &FileSet) -> Result<(), SaveError> {
     }
     if missing.is_empty() && former.is_empty() {
         let temp = target.stage(disk, &set.bytes)?;
-        target.replace(temp, &set.bytes)?;
+        target.replace(temp, set.bytes.len())?;
         return target.confirm(disk);
     }
 
@@ -152,7 +151,7 @@ fn put_in_place(
     missing: &[&(String, Vec<u8>)],
     placed: &mut Vec<PathBuf>,
 ) -> Result<(), SaveError> {
-    let folder = folder_of(&set.path);
+    let folder = target.folder.as_path();
     let main = target.stage(disk, &set.bytes)?;
     let mut staged = Vec::with_capacity(missing.len());
     for ((name, bytes), number) in missing.iter().zip(1..) {
@@ -180,7 +179,7 @@ fn put_in_place(
         disk.sync_folder(folder)
             .map_err(|error| SaveError::new(&set.path, folder, set.bytes.len(), SaveStep::Sync, error))?;
     }
-    target.replace(main, &set.bytes)
+    target.replace(main, set.bytes.len())
 }
 
 /// Tells whether a companion is in place.

@@ -66,15 +66,23 @@ impl Target {
 
     /// Writes `bytes` to a temporary file beside the target, with its permissions, syncs it and reads it back.
     pub fn stage<'d>(&self, disk: &'d dyn Disk, bytes: &[u8]) -> Result<Temp<'d>, SaveError> {
-        let mut temp = Temp::anchor(disk, &self.folder).map_err(|error| self.failed(bytes, SaveStep::Create, error))?;
+        let len = bytes.len();
+        let mut temp = Temp::anchor(disk, &self.folder).map_err(|error| self.failed(len, SaveStep::Create, error))?;
         temp.fill(bytes, self.exists.then_some(self.file.as_path()))
-            .map_err(|(step, error)| self.failed(bytes, step, error))?;
+            .map_err(|(step, error)| self.failed(len, step, error))?;
         Ok(temp)
     }
 
-    /// Puts a finished temporary file in the target's place.
-    pub fn replace(&self, temp: Temp, bytes: &[u8]) -> Result<(), SaveError> {
-        temp.rename_to(&self.file).map_err(|error| self.failed(bytes, SaveStep::Replace, error))
+    /// Checks that files can be created beside the target.
+    pub fn check_folder(&self, disk: &dyn Disk) -> Result<(), SaveError> {
+        let temp = Temp::anchor(disk, &self.folder).map_err(|error| self.failed(0, SaveStep::Create, error))?;
+        drop(temp);
+        Ok(())
+    }
+
+    /// Puts a finished temporary file of `len` bytes in the target's place.
+    pub fn replace(&self, temp: Temp, len: usize) -> Result<(), SaveError> {
+        temp.rename_to(&self.file).map_err(|error| self.failed(len, SaveStep::Replace, error))
     }
 
     /// Waits until the name of the file in place has reached the device.
@@ -82,9 +90,14 @@ impl Target {
         disk.sync_folder(&self.folder).map_err(|source| SaveError::Unconfirmed { path: self.path.clone(), source })
     }
 
-    fn failed(&self, bytes: &[u8], step: SaveStep, source: std::io::Error) -> SaveError {
-        SaveError::new(&self.path, &self.folder, bytes.len(), step, source)
+    fn failed(&self, len: usize, step: SaveStep, source: std::io::Error) -> SaveError {
+        SaveError::new(&self.path, &self.folder, len, step, source)
     }
+}
+
+/// File that a save to `path` writes: links are followed. A path to which nothing can be saved stays as it is.
+pub(in crate::files) fn saved_file(disk: &dyn Disk, path: &Path) -> PathBuf {
+    Target::find(disk, path).map_or_else(|_| path.to_path_buf(), |target| target.file)
 }
 
 /// True if the path ends in a separator, which `Path` drops: the caller means a folder.

@@ -38,8 +38,17 @@ pub(super) fn located(project: &Path, text: &str) -> PathBuf {
 }
 
 /// Path of a file from a project's reference `text`; `None` if the reference, or a link that it names, leads out of the
-/// project's folder.
+/// project's folder. If the project's file is a link, its files lie beside the file that it leads to.
 pub(super) fn below(disk: &dyn Disk, project: &Path, text: &str) -> Option<PathBuf> {
+    let is_link = disk.entry(project, false).is_ok_and(|entry| entry.kind == EntryKind::Link);
+    let linked = is_link.then(|| disk.canonical(project).ok()).flatten();
+    let is_there = |path: &PathBuf| disk.entry(path, true).is_ok();
+    let beside_linked = linked.and_then(|file| below_folder_of(disk, &file, text)).filter(is_there);
+    beside_linked.or_else(|| below_folder_of(disk, project, text))
+}
+
+/// Path of a file from a reference `text` of the project in that very folder.
+fn below_folder_of(disk: &dyn Disk, project: &Path, text: &str) -> Option<PathBuf> {
     let plain = |part: Component| matches!(part, Component::Normal(_) | Component::CurDir);
     let path = Path::new(text);
     let is_plain = path.file_name().is_some() && path.components().all(plain);

@@ -7,7 +7,7 @@ use super::{
     path::{Place, is_of_site, place, reference},
 };
 use crate::{
-    files::{Disk, FileSet, StoreError, TemplateBase, save_set, stem, verify},
+    files::{Disk, FileSet, StoreError, TemplateBase, atomic::saved_file, save_set, stem, verify},
     rig::{
         Rig, SkinData,
         project::{self, MeshReference, Project, ProjectRig, SkinReference, TemplateReference, write_project},
@@ -69,10 +69,12 @@ pub fn project_files(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> R
         }
         rigs.push(ProjectRig { rig: rig.clone(), skins });
     }
+    // References are relative to the file that is written, also through a link.
+    let main = saved_file(disk, path);
     let mut meshes = Vec::with_capacity(project.meshes.len());
     for mesh in &project.meshes {
-        let named = reference(disk, path, &mesh.path, &mut notes);
-        if !matches!(place(disk, path, &named), Place::Inside(_)) {
+        let named = reference(disk, &main, &mesh.path, &mut notes);
+        if !matches!(place(disk, &main, &named), Place::Inside(_)) {
             notes.push(format!(
                 "the mesh `{named}` is outside of the project's folder and does not open with the project; copy it into \
                  that folder"
@@ -87,8 +89,8 @@ pub fn project_files(disk: &dyn Disk, path: &Path, project: &ProjectToSave) -> R
         });
     }
     let templates = project.templates.iter().map(|template| {
-        let named = reference(disk, path, &template.path, &mut notes);
-        if !matches!(place(disk, path, &named), Place::Inside(_)) && !is_of_site(disk, &template.path) {
+        let named = reference(disk, &main, &template.path, &mut notes);
+        if !matches!(place(disk, &main, &named), Place::Inside(_)) && !is_of_site(disk, &template.path) {
             notes.push(format!(
                 "the template `{named}` is outside of the project's folder and is not followed when the project is opened; \
                  copy it into that folder, or name its folder as one of templates (RIGSMITH_TEMPLATES)"
