@@ -86,6 +86,7 @@ fn elements<'p>(places: &'p Places, list: &'static str) -> impl Iterator<Item = 
 pub(super) fn sockets(places: &Places, files: Vec<SocketFile>, faults: &mut Vec<SourceError>) -> Vec<PartSocket> {
     let mut offsets = elements(places, "sockets");
     let mut found: Vec<PartSocket> = Vec::with_capacity(files.len());
+    let mut names: HashSet<String> = HashSet::with_capacity(files.len());
     for SocketFile { name, joint, translation, rotation } in files {
         let offset = offsets.next().unwrap_or_default();
         let rest = RestTransform {
@@ -95,12 +96,13 @@ pub(super) fn sockets(places: &Places, files: Vec<SocketFile>, faults: &mut Vec<
         };
         let fault = if name.is_empty() || name.contains('.') {
             "a socket has a name without points".to_owned()
-        } else if found.iter().any(|other| other.name == name) {
+        } else if names.contains(&name) {
             format!("two sockets are called \"{name}\"; give the second another name")
         } else if !rest.is_valid() {
             "the place of the socket is not finite; correct the numbers".to_owned()
         } else {
             let angles = <[f32; 3]>::from(rotation).into();
+            names.insert(name.clone());
             found.push(PartSocket { name, label: joint, joint: None, rest, angles, offset });
             continue;
         };
@@ -111,32 +113,26 @@ pub(super) fn sockets(places: &Places, files: Vec<SocketFile>, faults: &mut Vec<
 
 /// Gives sockets their joints. One without a joint is told and left out.
 pub(super) fn place_sockets(rig: &Rig, sockets: &mut Vec<PartSocket>, text: &str, faults: &mut Vec<SourceError>) {
-    sockets.retain_mut(|socket| match socket.in_rig(rig) {
-        Ok(placed) => {
-            *socket = placed;
-            true
-        }
-        Err(error) => {
-            faults.push(SourceError::at(text, socket.offset, error.to_string()));
-            false
-        }
-    });
+    let left_out = PartSocket::put_in_rig(sockets, rig);
+    faults.extend(left_out.into_iter().map(|(socket, error)| SourceError::at(text, socket.offset, error.to_string())));
 }
 
 /// Options of a file.
 pub(super) fn options(places: &Places, files: Vec<OptionFile>, faults: &mut Vec<SourceError>) -> Vec<PartOption> {
     let mut offsets = elements(places, "options");
     let mut found: Vec<PartOption> = Vec::with_capacity(files.len());
+    let mut names: HashSet<String> = HashSet::with_capacity(files.len());
     for OptionFile { name, default, description, form, sets } in files {
         let offset = offsets.next().unwrap_or_default();
         let default = default.trim().get_ron().to_owned();
         let sets = sets.into_iter().map(|OptionTargetFile { tag, param }| (tag, param)).collect();
         let option = PartOption { name, default, description, form, sets };
-        let fault = if found.iter().any(|other| other.name == option.name) {
+        let fault = if names.contains(&option.name) {
             format!("two options are called \"{}\"; give the second another name", option.name)
         } else if let Err(error) = option.check(&option.default) {
             format!("the default does not fit: {error}")
         } else {
+            names.insert(option.name.clone());
             found.push(option);
             continue;
         };
