@@ -79,7 +79,7 @@ fn switches_gather_their_tags_in_the_order_of_the_document() {
     let tag = |number: usize| format!("Feature(kind: \"ik\", name: \"limb\", switch: {:?})", switch(number));
     let tags = (0..count).map(tag).collect::<Vec<String>>().join(", ");
     let text = format!("(format: 2, name: \"n\", joints: [(label: \"a\", tags: [{tags}])])");
-    let rig = rigsmith::rig::template::read_template(text.as_bytes()).unwrap().rig;
+    let rig = read_template(text.as_bytes()).unwrap().rig;
     let features = combined_features(&rig);
     assert_eq!((features.len(), features[0].tags.len()), (1, count));
     let mut names: Vec<String> = Vec::new();
