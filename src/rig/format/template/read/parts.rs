@@ -23,7 +23,10 @@ use super::{
 };
 use crate::rig::{
     RestTransform, Rig, RigEdit, SourceError, TagData, TagKind, Uid, degrees,
-    format::{scan::Field, source::ron_text},
+    format::{
+        scan::Field,
+        source::{TextLines, ron_text},
+    },
     part::{
         MOST_BROUGHT, MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption,
         PartSocket, PartTargets, Shortfall, unpaired_sides,
@@ -114,7 +117,10 @@ pub(super) fn sockets(places: &Places, files: Vec<SocketFile>, faults: &mut Vec<
 /// Gives sockets their joints. One without a joint is told and left out.
 pub(super) fn place_sockets(rig: &Rig, sockets: &mut Vec<PartSocket>, text: &str, faults: &mut Vec<SourceError>) {
     let left_out = PartSocket::put_in_rig(sockets, rig);
-    faults.extend(left_out.into_iter().map(|(socket, error)| SourceError::at(text, socket.offset, error.to_string())));
+    if !left_out.is_empty() {
+        let lines = TextLines::new(text);
+        faults.extend(left_out.into_iter().map(|(socket, error)| lines.error(socket.offset, error.to_string())));
+    }
 }
 
 /// Options of a file.
