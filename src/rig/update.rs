@@ -241,7 +241,7 @@ impl Merge<'_> {
                 Fate::Added((mut data, parent)) => {
                     // Tags that are on another joint now come from there, with what was changed of them.
                     for tag in std::mem::take(&mut data.tags) {
-                        if now.find_tag(tag.uid).is_some() {
+                        if now.tags.contains_key(&tag.uid) {
                             data.tags.extend(self.tag(uid, &title, tag.uid));
                         } else if self.placed.insert(tag.uid) {
                             data.tags.push(tag);

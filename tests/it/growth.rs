@@ -107,7 +107,7 @@ fn builds_of_the_worst_shapes_grow_with_their_size() {
     }
 }
 
-/// What one command makes along a long chain stands where the joints do, whatever it keeps of the transforms above.
+/// Copies that one command makes of a long chain stand where the joints do, whatever it keeps of the transforms above.
 #[test]
 fn copies_of_long_chains_stand_where_the_joints_do() {
     use rigsmith::{

@@ -62,7 +62,7 @@ struct TagPlace {
 impl TagPlace {
     /// Place of a tag; `None` if one side does not have it. `choice` decides where both sides moved it.
     fn of(uid: Uid, base: Option<&Rig>, now: &Rig, file: &Rig, choice: &dyn Fn() -> Take) -> Option<Self> {
-        let bearer = |rig: &Rig| Some(rig.find_tag(uid)?.0.data.uid);
+        let bearer = |rig: &Rig| rig.tags.get(&uid).copied();
         let (mine, theirs) = (bearer(now)?, bearer(file)?);
         let was = base.and_then(bearer);
         let place = Self { now: mine, file: theirs, joint: mine, is_told: false, is_conflict: false };
