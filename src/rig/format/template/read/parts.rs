@@ -393,6 +393,9 @@ impl Template {
         mirror: MirrorParams,
     ) -> (Self, Vec<SourceError>) {
         let mut of_parts: Vec<PartSocket> = Vec::new();
+        // Places of sockets among those of the file and of its parts.
+        let mut by_name: HashMap<String, usize> = HashMap::new();
+        note_sockets(&mut by_name, &self.sockets, 0);
         let groups = self.take_groups();
         let hung = std::mem::take(&mut self.hung);
         let mut waiting = hung.clone();
@@ -417,7 +420,10 @@ impl Template {
                 }
             };
             let among = self.sockets.iter().chain(&of_parts);
-            let socket = instance.socket.as_deref().map(|name| PartSocket::find(name, among, &self.rig));
+            let socket = instance.socket.as_deref().map(|name| {
+                let known = by_name.get(name).and_then(|place| among.clone().nth(*place));
+                known.map_or_else(|| PartSocket::find(name, among, &self.rig), |socket| socket.in_rig(&self.rig))
+            });
             let brought = instance.sockets_in(&self.rig, &part, &fitted);
             let put = socket
                 .transpose()
@@ -428,6 +434,7 @@ impl Template {
             let found = match put {
                 Ok(put) => {
                     self.notes.extend(put.notes);
+                    note_sockets(&mut by_name, &brought, self.sockets.len() + of_parts.len());
                     of_parts.extend(brought);
                     self.origins.extend(instance.origins(&part, &fitted, &changes));
                     // The next parts may hang on them.
@@ -460,6 +467,13 @@ impl Template {
         }
         bind_references(&mut self.rig, &mut self.unbound);
         (self, faults)
+    }
+}
+
+/// Notes the places of sockets, of which the first has that place; the first of a name counts.
+fn note_sockets(by_name: &mut HashMap<String, usize>, sockets: &[PartSocket], first: usize) {
+    for (place, socket) in sockets.iter().enumerate() {
+        by_name.entry(socket.name.clone()).or_insert(first + place);
     }
 }
 
