@@ -8,7 +8,7 @@ use crate::{
     mesh::model::Trs,
     parameters,
     processor::{
-        BuildScope, Creation, ModuleError, NodeId, Resize, RigModule, Side, check_finite, check_limits,
+        BuildScope, Creation, ListedNodes, ModuleError, NodeId, Resize, RigModule, Side, check_finite, check_limits,
         mirrored_angles, mirrored_direction, opposite,
     },
     rig::{
@@ -175,11 +175,13 @@ impl RigModule for ControlModule {
         self.check(scope)?;
         let nodes = scope.resolve_some("at", &self.at)?;
         let parent = scope.resolve_parent("parent", &self.parent)?;
-        let hinges = among(scope, &nodes, "hinges", &self.hinges)?;
-        let limited = among(scope, &nodes, "limited", &self.limited)?;
+        let listed: ListedNodes = nodes.iter().copied().collect();
+        let hinges = among(scope, &listed, "hinges", &self.hinges)?;
+        let limited = among(scope, &listed, "limited", &self.limited)?;
         let mut controls: Vec<MadeControl> = Vec::with_capacity(nodes.len());
+        let mut controlled = ListedNodes::default();
         for (index, node) in nodes.iter().copied().enumerate() {
-            let upper = if self.hierarchy { scope.upper_in(node, &nodes[..index]) } else { None };
+            let upper = if self.hierarchy { scope.upper_in(node, &controlled) } else { None };
             let above = match (upper, parent) {
                 (Some(upper), _) => Some(controls[upper].control),
                 (None, Some(parent)) => parent,
@@ -188,10 +190,11 @@ impl RigModule for ControlModule {
             // The control of the node right above, whose space is that of the node's own parent.
             let parent_control =
                 upper.filter(|upper| scope.parent(node) == Some(nodes[*upper])).map(|upper| controls[upper].carrier);
-            let hinge = if hinges.contains(&node) { Some(self.hinge(scope, node, &nodes)) } else { None };
-            let is_limited = self.limited == NodeRefs::NONE || limited.contains(&node);
+            let hinge = if hinges.contains(node) { Some(self.hinge(scope, node, &listed)) } else { None };
+            let is_limited = self.limited == NodeRefs::NONE || limited.contains(node);
             let limits = if is_limited { self.limits } else { Limits::default() };
             controls.push(self.make(scope, node, index, above, parent_control, (limits, hinge))?);
+            controlled.push(node);
         }
         Ok(())
     }
@@ -224,16 +227,16 @@ impl RigModule for ControlModule {
 /// Nodes that a parameter names among those that get a control.
 fn among(
     scope: &mut BuildScope<'_>,
-    nodes: &[NodeId],
+    nodes: &ListedNodes,
     parameter: &str,
     named: &NodeRefs,
-) -> Result<Vec<NodeId>, ModuleError> {
+) -> Result<ListedNodes, ModuleError> {
     let found = scope.resolve(parameter, named)?;
-    if let Some(outside) = found.iter().find(|node| !nodes.contains(node)) {
+    if let Some(outside) = found.iter().find(|node| !nodes.contains(**node)) {
         let problem = format!("{} gets no control here; name nodes of \"at\"", scope.name(*outside));
         return Err(ModuleError::reference(parameter, named, problem));
     }
-    Ok(found)
+    Ok(found.into_iter().collect())
 }
 
 impl ControlModule {
@@ -262,10 +265,10 @@ impl ControlModule {
     }
 
     /// The hinge of a node between two bones: how its control is turned, and how it is bent as built.
-    fn hinge(&self, scope: &mut BuildScope<'_>, node: NodeId, nodes: &[NodeId]) -> Hinge {
+    fn hinge(&self, scope: &mut BuildScope<'_>, node: NodeId, nodes: &ListedNodes) -> Hinge {
         let global = scope.global(node);
         let plain = Hinge { rotation: global.rotation, bent: None };
-        let own = scope.child_joints(node).into_iter().find(|child| nodes.contains(child));
+        let own = scope.child_joints(node).into_iter().find(|child| nodes.contains(*child));
         let lower = match own {
             Some(child) => Some(scope.position(child) - global.translation),
             None => scope.bone(node),

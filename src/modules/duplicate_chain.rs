@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     parameters,
-    processor::{BuildScope, Creation, ModuleError, NodeId, RigModule},
+    processor::{BuildScope, Creation, ListedNodes, ModuleError, NodeId, RigModule},
     rig::{
         NodeType,
         reference::{NodeRefs, Source, Top},
@@ -60,8 +60,9 @@ impl RigModule for DuplicateChainModule {
             CopyKind::Joint => NodeType::Joint,
         };
         let mut copies: Vec<NodeId> = Vec::with_capacity(nodes.len());
+        let mut copied = ListedNodes::default();
         for (index, node) in nodes.iter().copied().enumerate() {
-            let above = match (scope.upper_in(node, &nodes[..index]), parent) {
+            let above = match (scope.upper_in(node, &copied), parent) {
                 (Some(upper), _) => Some(copies[upper]),
                 (None, Some(parent)) => parent,
                 (None, None) => scope.parent(node),
@@ -75,6 +76,7 @@ impl RigModule for DuplicateChainModule {
             }
             let global = scope.global(node);
             copies.push(scope.spawn_at(kind, "copy", node, 0, above, global, &creation)?);
+            copied.push(node);
         }
         Ok(())
     }

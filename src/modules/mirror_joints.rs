@@ -7,7 +7,8 @@ use crate::{
     mesh::model::Trs,
     parameters,
     processor::{
-        BuildScope, Creation, ModuleError, NodeId, RigModule, check_finite, mirrored_direction, mirrored_line,
+        BuildScope, Creation, ListedNodes, ModuleError, NodeId, RigModule, check_finite, mirrored_direction,
+        mirrored_line,
     },
     rig::{
         NodeType,
@@ -59,8 +60,9 @@ impl RigModule for MirrorJointsModule {
         let joints = scope.resolve_some("joints", &self.joints)?;
         let parent = scope.resolve_parent("parent", &self.parent)?;
         let mut copies: Vec<NodeId> = Vec::with_capacity(joints.len());
+        let mut copied = ListedNodes::default();
         for (index, joint) in joints.iter().copied().enumerate() {
-            let above = match (scope.upper_in(joint, &joints[..index]), parent) {
+            let above = match (scope.upper_in(joint, &copied), parent) {
                 (Some(upper), _) => Some(copies[upper]),
                 (None, Some(parent)) => parent,
                 (None, None) => scope.parent(joint),
@@ -78,6 +80,7 @@ impl RigModule for MirrorJointsModule {
             let kind = scope.kind(joint).unwrap_or(NodeType::Joint);
             let copy = scope.spawn_at(kind, "joint", joint, 0, above, global, &creation)?;
             copies.push(copy);
+            copied.push(joint);
         }
         Ok(())
     }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     mesh::model::Trs,
     parameters,
-    processor::{Axis, BuildScope, ModuleError, NodeId, RigModule, check_finite, mirrored_direction},
+    processor::{Axis, BuildScope, ListedNodes, ModuleError, NodeId, RigModule, check_finite, mirrored_direction},
     rig::{
         NodeType,
         reference::{NodeRefs, Source, Top},
@@ -95,9 +95,10 @@ impl RigModule for OrientJointsModule {
         for joint in &joints {
             scope.need_kind("joints", *joint, &[NodeType::Joint, NodeType::Null], "a joint or null")?;
         }
+        let listed: ListedNodes = joints.iter().copied().collect();
         for joint in &joints {
             let global = scope.global(*joint);
-            let rotation = match self.next(scope, *joint, &joints) {
+            let rotation = match self.next(scope, *joint, &listed) {
                 Some(next) => self.along_bone(scope, *joint, next, up_node),
                 None => match (self.end, scope.parent(*joint)) {
                     (EndMode::Parent, Some(parent)) => scope.global(parent).rotation,
@@ -119,11 +120,11 @@ impl RigModule for OrientJointsModule {
 
 impl OrientJointsModule {
     /// The joint that the bone leads to: a child in the list rather than another, and none in the same place.
-    fn next(&self, scope: &mut BuildScope<'_>, joint: NodeId, joints: &[NodeId]) -> Option<NodeId> {
+    fn next(&self, scope: &mut BuildScope<'_>, joint: NodeId, joints: &ListedNodes) -> Option<NodeId> {
         let place = scope.position(joint);
         let mut children = scope.child_joints(joint);
         children.retain(|child| scope.position(*child) != place);
-        let listed = children.iter().copied().find(|child| joints.contains(child));
+        let listed = children.iter().copied().find(|child| joints.contains(*child));
         listed.or(children.first().copied())
     }
 

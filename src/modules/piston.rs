@@ -47,7 +47,7 @@ impl RigModule for Piston {
             let problem = format!("stands where {} stands; move one of them", scope.name(first));
             return Err(ModuleError::reference("second", &self.second, problem));
         };
-        if scope.upper_in(second, &[first]).is_some() || scope.upper_in(first, &[second]).is_some() {
+        if scope.is_below(second, first) || scope.is_below(first, second) {
             let problem = "is below the other end, which turns it; hang the two on different nodes";
             return Err(ModuleError::reference("second", &self.second, problem.to_owned()));
         }

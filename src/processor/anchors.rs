@@ -10,7 +10,7 @@ use super::world::{Aspect, NOWHERE, NodeId, World};
 use crate::mesh::model::Trs;
 
 /// Number of nodes of a stretch. A way of no more is one product.
-const STRETCH: usize = 128;
+pub(super) const STRETCH: usize = 128;
 
 /// Known anchors.
 #[derive(Debug, Clone, Default)]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::{BuildScope, Creation, ModuleError, NodeId, Side};
+use super::{BuildScope, Creation, ListedNodes, ModuleError, NodeId, Side};
 use crate::{
     mesh::model::Trs,
     rig::{
@@ -44,19 +44,28 @@ impl BuildScope<'_> {
     }
 
     /// The nearest node above `node` that is in the list, as its place in it.
-    pub fn upper_in(&mut self, node: NodeId, list: &[NodeId]) -> Option<usize> {
+    pub fn upper_in(&mut self, node: NodeId, list: &ListedNodes) -> Option<usize> {
         // Whatever stands above, it is not in the list.
         if list.is_empty() {
             return None;
         }
         let mut at = self.parent(node);
         while let Some(node) = at {
-            if let Some(place) = list.iter().position(|listed| *listed == node) {
+            if let Some(place) = list.place(node) {
                 return Some(place);
             }
             at = self.parent(node);
         }
         None
+    }
+
+    /// True if a node stands below another one, however far.
+    pub fn is_below(&mut self, node: NodeId, upper: NodeId) -> bool {
+        let mut at = self.parent(node);
+        while let Some(node) = at.filter(|node| *node != upper) {
+            at = self.parent(node);
+        }
+        at.is_some()
     }
 
     /// The one joint below `joint` that continues its chain.
@@ -96,7 +105,7 @@ impl BuildScope<'_> {
             return Err(ModuleError::reference(parameter, references, problem));
         }
         for pair in nodes.windows(2) {
-            if self.upper_in(pair[1], &[pair[0]]).is_none() {
+            if !self.is_below(pair[1], pair[0]) {
                 let (upper, lower) = (self.name(pair[0]), self.name(pair[1]));
                 let problem = format!(
                     "{lower} is not below {upper}; a chain needs each node below the one before: list them one by one"

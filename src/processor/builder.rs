@@ -435,7 +435,7 @@ impl Builder {
         let module = loaded.clone()?;
         let name = command.module.clone();
         self.world.begin_command();
-        let mut scope = BuildScope { world: &mut self.world, trace, asker, command: number, module: name };
+        let mut scope = BuildScope::new(&mut self.world, trace, asker, number, name);
         if let Err(problem) = module.construct(&mut scope) {
             let params = &self.commands[number as usize].params;
             return Err(error_references::as_written(problem, params, &self.world, asker.place));

@@ -1,11 +1,13 @@
 //! Scope of a command: the only way in which a module reads and changes the built world.
 
 mod node_changes;
+mod own_transforms;
 mod references;
 mod trace;
 
 use std::sync::Arc;
 
+use own_transforms::OwnAnchors;
 use trace::world_children;
 pub(super) use trace::{Read, Trace};
 
@@ -41,6 +43,20 @@ pub struct BuildScope<'a> {
     pub(super) asker: Asker,
     pub(super) command: u32,
     pub(super) module: Arc<str>,
+    own: OwnAnchors,
+}
+
+impl<'a> BuildScope<'a> {
+    /// The scope of a command with that number, of a module with that name, that is about to run.
+    pub(super) fn new(
+        world: &'a mut World,
+        trace: &'a mut Trace,
+        asker: Asker,
+        command: u32,
+        module: Arc<str>,
+    ) -> Self {
+        Self { world, trace, asker, command, module, own: OwnAnchors::default() }
+    }
 }
 
 impl BuildScope<'_> {
@@ -174,18 +190,6 @@ impl BuildScope<'_> {
                 readers.insert(at, self.command);
                 self.world.global_reads += 1;
             }
-        }
-        global
-    }
-
-    /// Transform, in the rig's space, of a node that the command itself moved, or that stands below such a node: the other
-    /// values on the way up are read one by one.
-    fn global_of_own(&mut self, node: NodeId) -> Trs {
-        let mut global = self.base(node);
-        let mut at = node;
-        while let Some(parent) = self.parent(at) {
-            global = self.base(parent) * global;
-            at = parent;
         }
         global
     }
@@ -408,6 +412,7 @@ impl BuildScope<'_> {
         self.world.work += 1;
         self.world.note_parent(node, &value);
         self.world.anchors.note_written(node, aspect);
+        self.own.note_written(node, aspect);
         let writes = self.world.cell_mut(node, aspect).writes_mut();
         match writes.iter_mut().find(|(writer, _)| *writer == command) {
             Some((_, old)) => *old = value,

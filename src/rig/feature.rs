@@ -293,13 +293,18 @@ struct FeaturePart<'a> {
 }
 
 fn with_switches(mut feature: CombinedFeature, parts: &[FeaturePart]) -> CombinedFeature {
-    for (number, FeaturePart { switch, choice, .. }) in parts.iter().enumerate() {
-        let is_first = parts[..number].iter().all(|other| other.switch != *switch);
-        if switch.is_empty() || !is_first {
-            continue;
-        }
-        let own = parts.iter().zip(&feature.tags).filter(|(other, _)| other.switch == *switch);
-        let (enabled, tags): (Vec<bool>, Vec<Uid>) = own.map(|(part, tag)| (part.enabled, *tag)).unzip();
+    // Tags of each switch, in the order in which the switches come.
+    let mut numbers: HashMap<&str, usize> = HashMap::new();
+    let mut switches: Vec<(&FeaturePart, Vec<(bool, Uid)>)> = Vec::new();
+    for (part, tag) in parts.iter().zip(&feature.tags).filter(|(part, _)| !part.switch.is_empty()) {
+        let number = *numbers.entry(part.switch).or_insert_with(|| {
+            switches.push((part, Vec::new()));
+            switches.len() - 1
+        });
+        switches[number].1.push((part.enabled, *tag));
+    }
+    for (FeaturePart { switch, choice, .. }, own) in switches {
+        let (enabled, tags): (Vec<bool>, Vec<Uid>) = own.into_iter().unzip();
         let (name, choice) = ((*switch).to_owned(), (*choice).to_owned());
         feature.switches.push(FeatureSwitch { name, choice, state: state(enabled.into_iter()), tags });
     }

@@ -28,6 +28,7 @@ use copies::{PlacedCopy, is_host};
 use fields::{Field, about_fields, group_fields, input_fields, joint_fields, joint_title, pose_fields};
 use order::merged_order;
 use shown_values::{NamesOfBoth, shown_values};
+use tags::TagsByUid;
 
 pub use change::{Change, ChangeKind};
 pub use choices::{Choices, Take};
@@ -115,6 +116,7 @@ fn update_copy(base: Option<&Rig>, now: &Rig, file: &Rig, (choices, others): (&C
         base,
         now,
         file,
+        tags: [base, Some(now), Some(file)].map(TagsByUid::of),
         names: NamesOfBoth::new(now, file),
         choices,
         changes,
@@ -144,6 +146,8 @@ struct Merge<'a> {
     base: Option<&'a Rig>,
     now: &'a Rig,
     file: &'a Rig,
+    /// Tags of the base, of the rig and of the file.
+    tags: [TagsByUid<'a>; 3],
     names: NamesOfBoth<'a>,
     choices: &'a Choices,
     changes: Vec<Change>,
@@ -241,7 +245,7 @@ impl Merge<'_> {
                 Fate::Added((mut data, parent)) => {
                     // Tags that are on another joint now come from there, with what was changed of them.
                     for tag in std::mem::take(&mut data.tags) {
-                        if now.find_tag(tag.uid).is_some() {
+                        if now.tags.contains_key(&tag.uid) {
                             data.tags.extend(self.tag(uid, &title, tag.uid));
                         } else if self.placed.insert(tag.uid) {
                             data.tags.push(tag);

@@ -66,3 +66,32 @@ fn of_a_choice_exactly_one_switch_is_on() {
     run(&mut rig, TagOperation::Choice(tags, "any".into())).unwrap();
     assert_eq!(state(&rig), ([true, false, false], FeatureState::On));
 }
+
+/// Tags of one switch may stand anywhere: the switches come as their first tags do, each with all of its tags.
+#[test]
+fn switches_gather_their_tags_in_the_order_of_the_document() {
+    let count = 200;
+    let switch = |number: usize| match number % 3 {
+        0 => String::new(),
+        1 => format!("own {number}"),
+        _ => format!("shared {}", number % 4),
+    };
+    let tag = |number: usize| format!("Feature(kind: \"ik\", name: \"limb\", switch: {:?})", switch(number));
+    let tags = (0..count).map(tag).collect::<Vec<String>>().join(", ");
+    let text = format!("(format: 2, name: \"n\", joints: [(label: \"a\", tags: [{tags}])])");
+    let rig = read_template(text.as_bytes()).unwrap().rig;
+    let features = combined_features(&rig);
+    assert_eq!((features.len(), features[0].tags.len()), (1, count));
+    let mut names: Vec<String> = Vec::new();
+    for name in (0..count).map(switch).filter(|name| !name.is_empty()) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let found: Vec<&str> = features[0].switches.iter().map(|part| part.name.as_str()).collect();
+    assert_eq!(found, names);
+    for part in &features[0].switches {
+        let own = (0..count).filter(|number| switch(*number) == part.name).map(|number| features[0].tags[number]);
+        assert_eq!(part.tags, own.collect::<Vec<_>>(), "{}", part.name);
+    }
+}

@@ -95,6 +95,51 @@ fn builds_of_the_worst_shapes_grow_with_their_size() {
     check("chain under one reference", many, |count| {
         chain(count, |at| if at == 0 { vec![null("@any")] } else { vec![] })
     });
+    // What one command makes or turns stands below what it made or turned before.
+    for (module, params) in [
+        ("control", "at: \"@hierarchy this\""),
+        ("duplicate_chain", "suffix: \"b\""),
+        ("mirror_joints", "joints: \"@hierarchy this\""),
+        ("orient_joints", "joints: \"@hierarchy this\", along: x"),
+    ] {
+        let tag = format!("Command(module: \"{module}\", params: ({params}))");
+        check(module, many, |count| chain(count, |at| if at == 0 { vec![tag.clone()] } else { vec![] }));
+    }
+}
+
+/// Copies that one command makes of a long chain stand where the joints do, whatever it keeps of the transforms above.
+#[test]
+fn copies_of_long_chains_stand_where_the_joints_do() {
+    use rigsmith::{
+        mesh::model::Trs,
+        rig::{BuiltNode, NodeType, RestTransform, RigEdit},
+    };
+
+    let count = 400;
+    let turn = "Command(module: \"orient_joints\", params: (joints: \"@hierarchy this\", along: x))".to_owned();
+    let copy = "Command(module: \"duplicate_chain\", params: (suffix: \"b\"))".to_owned();
+    let mut rig = chain(count, |at| if at == 0 { vec![turn.clone(), copy.clone()] } else { vec![] });
+    for (number, joint) in rig.walk().map(|joint| joint.data.uid).collect::<Vec<_>>().into_iter().enumerate() {
+        let (sin, cos) = bevy::math::ops::sin_cos(0.05 * number as f32);
+        let rest = RestTransform::from_translation(glam::Vec3::new(0.1 * cos, 0.1 * sin, 0.01));
+        rig.apply(&RigEdit::SetRest(joint, rest)).unwrap();
+    }
+    let built = Builder::build(&rig, &Arc::new(rigsmith::modules::all())).unwrap();
+    let mut globals: Vec<Trs> = Vec::new();
+    for node in &built.nodes {
+        let above = node.parent.map_or(Trs::IDENTITY, |parent| globals[parent]);
+        globals.push(above * node.base);
+    }
+    let expected = rig.rest_globals();
+    for kind in [NodeType::Joint, NodeType::Null] {
+        let nodes = built.nodes.iter().zip(&globals);
+        let found: Vec<(&BuiltNode, &Trs)> = nodes.filter(|(node, _)| node.kind == kind).collect();
+        assert_eq!(found.len(), count, "{kind:?}");
+        for ((node, found), (_, expected)) in found.into_iter().zip(&expected) {
+            let (found, expected) = (found.translation, expected.translation);
+            assert!(found.distance(expected) < 2e-3, "{}: {found} instead of {expected}", node.name);
+        }
+    }
 }
 
 /// Long chains are built the same from nothing and after edits at any height, whatever is known of them.

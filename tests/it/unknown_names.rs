@@ -92,3 +92,29 @@ fn names_of_many_joints_do_not_list_all_of_them_each_time() {
         assert!(few > 150 * 20 && many as f64 <= 2.3 * few as f64, "{few} and {many} bytes");
     }
 }
+
+/// A part may have a socket on each of its joints: each finds its own, and labels that no joint has are compared within the budget.
+#[test]
+fn sockets_of_thousands_of_joints_find_their_own() {
+    for count in [20, 1_000] {
+        let text = |end: &str| {
+            let socket = |number: usize| format!("(name: \"s{number}\", joint: \"joint_{number}{end}\")");
+            let sockets: Vec<String> = (0..count).map(socket).collect();
+            let joints: Vec<String> = (0..count).map(|number| format!("(label: \"joint_{number}\")")).collect();
+            let (sockets, joints) = (sockets.join(", "), joints.join(", "));
+            format!("(format: 2, name: \"n\", kind: \"part\", sockets: [{sockets}], joints: [{joints}])")
+        };
+        let rig = read_template(text("").as_bytes()).unwrap().rig;
+        assert_eq!(rig.about().sockets.len(), count);
+        for (number, socket) in rig.about().sockets.iter().enumerate() {
+            let label = rig.joint(socket.joint).and_then(|joint| joint.data.label.clone());
+            assert_eq!((&*socket.name, label), (&*format!("s{number}"), Some(format!("joint_{number}"))));
+        }
+        let (Ok((_, faults)) | Err(faults)) = survey_template(text("x").as_bytes());
+        let missing = || faults.iter().filter(|fault| fault.message.contains("which is not there"));
+        let similar = missing().filter(|fault| fault.message.contains("did you mean")).count();
+        assert_eq!(missing().count(), count);
+        assert!(similar > 0 && (similar - 1) * count <= MOST_COMPARED, "{similar} of {count}");
+        assert!(count > 20 || similar == count, "{similar} of {count}");
+    }
+}

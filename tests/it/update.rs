@@ -2,7 +2,7 @@
 
 use bevy::math::Vec3;
 use rigsmith::rig::{
-    GroupData, JointData, PoseOffset, Rig, RigEdit, TagData, TagKind, Uid, UidSource,
+    GroupData, JointData, PoseOffset, Rig, RigEdit, RigJoint, TagData, TagKind, Uid, UidSource,
     update::{Change, ChangeKind, Take, diff, edits_between, update},
 };
 
@@ -293,4 +293,35 @@ fn values_show_uids_only_where_names_do_not_identify() {
     let other = text("00000000000000b2", "b#00000000000000b2", twin);
     let lines = told(&to, &other);
     assert_eq!(lines[0], format!("Changed c parent b#{b} b#00000000000000b2"), "{lines:?}");
+}
+
+/// Hundreds of joints, groups, inputs and commands that are only called otherwise stay the same ones, each for itself.
+#[test]
+fn hundreds_of_things_with_other_names_stay_the_same_ones() {
+    let count = 300;
+    let text = |end: &str| {
+        let list = |element: &dyn Fn(usize) -> String| (0..count).map(element).collect::<Vec<String>>().join(", ");
+        let groups = list(&|n| format!("(name: \"group_{n}{end}\")"));
+        let inputs = list(&|n| format!("(name: \"input_{n}{end}\", translation: ({n}, 0, 0))"));
+        let tags = list(&|n| format!("null(translate: ({n}.0, 0.0, 0.0), creation: (name: \"null_{n}{end}\"))"));
+        let place = |n: usize| format!("group: \"group_{n}{end}\", translation: (0, {n}, 0)");
+        let joints = list(&|n| format!("(label: \"joint_{n}{end}\", parent: \"top\", {})", place(n)));
+        let joints = format!("(label: \"top\", tags: [{tags}]), {joints}");
+        format!("(format: 2, name: \"n\", groups: [{groups}], inputs: [{inputs}], joints: [{joints}])")
+    };
+    let (base, file) = (read(&text("")), read(&text("_new")));
+    let updated = update(Some(&base), &base, &file, Take::Mine);
+    let renamed = updated.changes.iter().filter(|change| change.kind == ChangeKind::Renamed);
+    assert_eq!(renamed.count(), 4 * count);
+    assert_eq!(updated.rig.len(), base.len());
+    for joint in base.walk() {
+        let now = updated.rig.joint(joint.data.uid).unwrap();
+        let (was, is) = (joint.data.label.clone().unwrap(), now.data.label.clone().unwrap());
+        assert!(is == was && was == "top" || is == format!("{was}_new"), "{was} is called {is}");
+        assert_eq!(now.data.group, joint.data.group, "{was}");
+        let tags = |joint: &RigJoint| joint.data.tags.iter().map(|tag| tag.uid).collect::<Vec<Uid>>();
+        assert_eq!(tags(now), tags(joint), "{was}");
+    }
+    let uids = |rig: &Rig| rig.inputs().iter().map(|input| input.uid).collect::<Vec<Uid>>();
+    assert_eq!(uids(&updated.rig), uids(&base));
 }

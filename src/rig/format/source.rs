@@ -20,10 +20,55 @@ pub struct SourceError {
     pub message: String,
 }
 
+/// Lines and columns of a text, for errors at thousands of its places.
+pub(crate) struct TextLines<'a> {
+    text: &'a str,
+    /// Marks in the text, in order: byte offset, 1-based line and column.
+    marks: Vec<[usize; 3]>,
+}
+
+/// Bytes from one mark to the next, but for those of one character.
+const MARKED: usize = 1024;
+
+impl<'a> TextLines<'a> {
+    /// Marks a text. Time is linear in its length.
+    pub(crate) fn new(text: &'a str) -> Self {
+        let (mut marks, mut place, mut next) = (vec![[0, 1, 1]], [1, 1], MARKED);
+        for (at, character) in text.char_indices() {
+            if at >= next {
+                let [line, column] = place;
+                marks.push([at, line, column]);
+                next = at + MARKED;
+            }
+            place = place_after(place, character);
+        }
+        Self { text, marks }
+    }
+
+    /// Error as [`SourceError::at`] makes it, in the same time wherever it is.
+    pub(crate) fn error(&self, offset: usize, message: impl Into<String>) -> SourceError {
+        let offset = boundary(self.text, offset);
+        let number = self.marks.partition_point(|[at, ..]| *at <= offset).saturating_sub(1);
+        let [from, line, column] = self.marks[number];
+        let [line, column] = self.text[from..offset].chars().fold([line, column], place_after);
+        SourceError { line, column, offset, message: message.into() }
+    }
+}
+
+/// Line and column behind a character at a line and column.
+fn place_after([line, column]: [usize; 2], character: char) -> [usize; 2] {
+    if character == '\n' { [line + 1, 1] } else { [line, column + 1] }
+}
+
+/// The last place between two characters that is not behind `offset`.
+fn boundary(text: &str, offset: usize) -> usize {
+    (0..=offset.min(text.len())).rev().find(|o| text.is_char_boundary(*o)).unwrap_or(0)
+}
+
 impl SourceError {
     /// An error at a byte offset of `text`.
     pub fn at(text: &str, offset: usize, message: impl Into<String>) -> Self {
-        let offset = (0..=offset.min(text.len())).rev().find(|o| text.is_char_boundary(*o)).unwrap_or(0);
+        let offset = boundary(text, offset);
         let before = &text[..offset];
         let line_start = before.rfind('\n').map_or(0, |at| at + 1);
         Self {
@@ -185,4 +230,21 @@ fn byte_offset(text: &str, place: ron::error::Position) -> usize {
     let line_start: usize = text.split_inclusive('\n').take(place.line.saturating_sub(1)).map(str::len).sum();
     let line = text[line_start.min(text.len())..].chars();
     line_start + line.take(place.col.saturating_sub(1)).map(char::len_utf8).sum::<usize>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_at_many_places_are_those_at_single_ones() {
+        let text = "\u{e4}, b\n".repeat(300) + &"long ".repeat(1000) + "\n\r\nend";
+        let lines = TextLines::new(&text);
+        // No place is far behind a mark, whatever the length of its line.
+        assert!(lines.marks.len() > 5);
+        assert!(lines.marks.windows(2).all(|pair| pair[1][0] - pair[0][0] < MARKED + 4));
+        for offset in (0..text.len() + 3).step_by(5).chain(text.len() - 3..text.len() + 3) {
+            assert_eq!(lines.error(offset, "x"), SourceError::at(&text, offset, "x"), "{offset}");
+        }
+    }
 }

@@ -20,15 +20,17 @@ pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Resu
     let mut uids: HashMap<Uid, Uid> = groups.chain(joints).map(|uid| (uid, copy.uid_of(uid))).collect();
     let moved = if copy.is_plain() { 0 } else { uids.len() };
     let mut inputs = draft.rig().inputs().to_vec();
+    let mut known: HashMap<String, Uid> = inputs.iter().map(|own| (own.name.clone(), own.uid)).collect();
     for input in other.inputs() {
         // The two mean the same thing outside of them.
-        if let Some(own) = inputs.iter().find(|own| own.name == input.name) {
-            uids.insert(input.uid, own.uid);
+        if let Some(own) = known.get(&input.name) {
+            uids.insert(input.uid, *own);
             continue;
         }
         let uid = copy.uid_of(input.uid);
         let uid = if draft.rig().is_taken(uid) { draft.next_uid() } else { uid };
         uids.insert(input.uid, uid);
+        known.insert(input.name.clone(), uid);
         inputs.push(RigInput { uid, ..input.clone() });
     }
     if inputs != draft.rig().inputs() {
@@ -36,9 +38,11 @@ pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Resu
     }
     let remap = Remap { uids, ..Remap::default() };
     let prefix = prefix(draft.rig(), other);
+    let mut names: HashSet<String> = draft.rig().groups().iter().map(|group| group.name.clone()).collect();
     for group in other.groups() {
-        let named = draft.rig().groups().iter().any(|own| own.name == group.name);
+        let named = names.contains(&group.name);
         let name = if named { format!("{prefix}_{}", group.name) } else { group.name.clone() };
+        names.insert(name.clone());
         let uid = remap.get(group.uid).unwrap_or(group.uid);
         let place = draft.rig().groups().len();
         draft.apply(RigEdit::AddLocalGroup(GroupData { uid, name, ..group.clone() }, place))?;
@@ -76,6 +80,7 @@ pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Resu
             "{renamed} joints of {name} are called {prefix}_..., because the rig has their labels already"
         ));
     }
+    let mut names: HashSet<String> = draft.rig().clips().iter().map(|clip| clip.name.clone()).collect();
     for clip in other.clips() {
         let mut clip = clip.with_nodes(|node| remap.get(node).unwrap_or(node));
         for uid in std::iter::once(&mut clip.uid).chain(clip.layers.iter_mut().map(|layer| &mut layer.uid)) {
@@ -83,9 +88,10 @@ pub(super) fn merge(draft: &mut Draft, other: &Rig, parent: Option<Uid>) -> Resu
                 *uid = draft.next_uid();
             }
         }
-        if draft.rig().clips().iter().any(|own| own.name == clip.name) {
+        if names.contains(&clip.name) {
             clip.name = format!("{prefix}_{}", clip.name);
         }
+        names.insert(clip.name.clone());
         draft.apply(RigEdit::AddClip(Box::new(clip), usize::MAX))?;
     }
     if !other.stored_poses().is_empty() {

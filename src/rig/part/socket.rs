@@ -3,7 +3,7 @@
 use bevy::math::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::rig::{RestTransform, Rig, Uid, nearest::did_you_mean};
+use crate::rig::{RestTransform, Rig, Uid, nearest::did_you_mean, reference::MOST_COMPARED};
 
 /// A socket of a rig itself, as people write it in the header of its template.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -71,12 +71,33 @@ impl PartSocket {
     /// A joint that the rig does not have.
     pub fn in_rig(&self, rig: &Rig) -> Result<Self, SocketError> {
         let found = self.joint.filter(|joint| rig.joint(*joint).is_some()).or_else(|| rig.find_label(&self.label));
-        let joint = found.ok_or_else(|| {
-            let known: Vec<&str> = rig.walk().filter_map(|joint| joint.data.label.as_deref()).collect();
-            let nearest = did_you_mean(&self.label, known);
-            SocketError::NoJoint { name: self.name.clone(), label: self.label.clone(), nearest }
-        })?;
+        let joint = found.ok_or_else(|| self.no_joint(rig.walk().filter_map(|joint| joint.data.label.as_deref())))?;
         Ok(Self { joint: Some(joint), ..self.clone() })
+    }
+
+    /// Gives sockets their joints as [`PartSocket::in_rig`] finds them. Those without a joint are taken out of the list, each
+    /// with its error; their labels are compared with [`MOST_COMPARED`] labels in all.
+    pub(in crate::rig) fn put_in_rig(sockets: &mut Vec<Self>, rig: &Rig) -> Vec<(Self, SocketError)> {
+        let by_label = rig.joints_by_label();
+        let (mut left_out, mut compared) = (Vec::new(), 0);
+        sockets.retain_mut(|socket| {
+            let known = socket.joint.filter(|joint| rig.joint(*joint).is_some());
+            let found = known.or_else(|| by_label.get(socket.label.as_str()).copied());
+            if found.is_some() {
+                socket.joint = found;
+            } else {
+                let similar = if compared < MOST_COMPARED { Some(by_label.keys()) } else { None };
+                compared += by_label.len();
+                left_out.push((socket.clone(), socket.no_joint(similar.into_iter().flatten().copied())));
+            }
+            found.is_some()
+        });
+        left_out
+    }
+
+    fn no_joint<'a>(&self, labels: impl Iterator<Item = &'a str>) -> SocketError {
+        let nearest = did_you_mean(&self.label, labels);
+        SocketError::NoJoint { name: self.name.clone(), label: self.label.clone(), nearest }
     }
 
     /// The socket with that name, with its joint.

@@ -172,7 +172,7 @@ impl Steps {
     /// Takes away the tags that are gone.
     fn leaving_tags(&mut self, to: &Rig) -> Result<(), EditError> {
         let all = self.rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag.uid)));
-        let leaving: Vec<_> = all.filter(|(_, tag)| to.find_tag(*tag).is_none()).collect();
+        let leaving: Vec<_> = all.filter(|(_, tag)| !to.tags.contains_key(tag)).collect();
         leaving.into_iter().try_for_each(|(joint, tag)| self.apply(RigEdit::RemoveTag(joint, tag)))
     }
 
@@ -191,7 +191,7 @@ impl Steps {
             let Some(own) = self.rig.joint(uid) else {
                 // Tags that come from other joints move there.
                 let mut joint = Box::new(joint.data.clone());
-                joint.tags.retain(|tag| self.rig.find_tag(tag.uid).is_none());
+                joint.tags.retain(|tag| !self.rig.tags.contains_key(&tag.uid));
                 self.apply(RigEdit::AddJoint { joint, parent, index })?;
                 continue;
             };

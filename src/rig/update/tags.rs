@@ -1,5 +1,7 @@
 //! Tags in an update: their content, and the joints that they are on.
 
+use std::collections::HashMap;
+
 use super::{
     Change, ChangeKind, ChangeSubject, Fate, Merge,
     choices::Take,
@@ -7,6 +9,18 @@ use super::{
     shown_values::shown_values,
 };
 use crate::rig::{Rig, TagData, Uid};
+
+/// Tags of a rig with their joints. A joint may have thousands, of which [`Rig::find_tag`] looks at one after the other.
+pub(super) struct TagsByUid<'a>(HashMap<Uid, (Uid, &'a TagData)>);
+
+impl<'a> TagsByUid<'a> {
+    /// Tags of a rig; none without one.
+    pub(super) fn of(rig: Option<&'a Rig>) -> Self {
+        let joints = rig.into_iter().flat_map(Rig::walk);
+        let tags = joints.flat_map(|joint| joint.data.tags.iter().map(move |tag| (tag.uid, (joint.data.uid, tag))));
+        Self(tags.collect())
+    }
+}
 
 impl Merge<'_> {
     /// Tag of a joint that stays; `None` if it is gone, or on another joint. A tag that both sides have is one tag, whichever
@@ -17,11 +31,10 @@ impl Merge<'_> {
         if place.is_some_and(|place| place.joint != joint) {
             return None;
         }
-        let of = |rig: &Rig| {
-            let found = rig.find_tag(uid).filter(|(on, _)| place.is_some() || on.data.uid == joint);
-            found.map(|(_, tag)| tag.clone())
-        };
-        let (was, is, theirs) = (base.and_then(of), of(now), of(file));
+        let [was, is, theirs] = self.tags.each_ref().map(|tags| {
+            let found = tags.0.get(&uid).filter(|(on, _)| place.is_some() || *on == joint);
+            found.map(|(_, tag)| (*tag).clone())
+        });
         let name = is.as_ref().or(theirs.as_ref()).or(was.as_ref()).map(tag_title)?;
         let named = ChangeSubject { uid, joint: Some(title), tag: Some(&name), prefix: "" };
         if let Some(place) = place.filter(|place| place.is_told) {
@@ -62,7 +75,7 @@ struct TagPlace {
 impl TagPlace {
     /// Place of a tag; `None` if one side does not have it. `choice` decides where both sides moved it.
     fn of(uid: Uid, base: Option<&Rig>, now: &Rig, file: &Rig, choice: &dyn Fn() -> Take) -> Option<Self> {
-        let bearer = |rig: &Rig| Some(rig.find_tag(uid)?.0.data.uid);
+        let bearer = |rig: &Rig| rig.tags.get(&uid).copied();
         let (mine, theirs) = (bearer(now)?, bearer(file)?);
         let was = base.and_then(bearer);
         let place = Self { now: mine, file: theirs, joint: mine, is_told: false, is_conflict: false };

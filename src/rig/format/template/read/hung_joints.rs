@@ -1,13 +1,14 @@
 //! Joints of a template beside those of its parts: they hang on what parts bring, and are in groups that parts look for.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use super::super::{
     HungJoint, Template,
     shorthand::{Declarations, NameError},
 };
 use crate::rig::{
-    Rig, RigEdit, RigJoint, SourceError, Uid, nearest::did_you_mean, part::Shortfall, reference::MOST_COMPARED,
+    Rig, RigEdit, RigJoint, SourceError, Uid, format::source::TextLines, nearest::did_you_mean, part::Shortfall,
+    reference::MOST_COMPARED,
 };
 
 /// Reason why a joint of a template cannot hang on a joint that a part brings.
@@ -83,9 +84,12 @@ impl Template {
             };
             faults.push((one.joint, fault));
         }
-        let declared = if faults.is_empty() { None } else { Declarations::find(source) };
-        let place = |joint| declared.as_ref().and_then(|declared| place_of_parent(declared, joint)).unwrap_or_default();
-        faults.into_iter().map(|(joint, fault)| SourceError::at(source, place(joint), fault.to_string())).collect()
+        if faults.is_empty() {
+            return Vec::new();
+        }
+        let (lines, places) = (TextLines::new(source), places_of_parents(source));
+        let place = |joint: &Uid| places.get(joint).copied().unwrap_or_default();
+        faults.into_iter().map(|(joint, fault)| lines.error(place(&joint), fault.to_string())).collect()
     }
 }
 
@@ -137,8 +141,14 @@ fn labels(rig: &Rig) -> impl Iterator<Item = &str> {
     rig.walk().filter_map(|joint| joint.data.label.as_deref())
 }
 
-/// Place of the parent of a joint in the text that declares it.
-fn place_of_parent(declared: &Declarations, joint: Uid) -> Option<usize> {
-    let node = declared.joints.iter().find(|one| one.uid == joint)?.node;
-    Some(declared.tree.field(node, "parent")?.start)
+/// Places of the parents of joints in the text that declares them, by joint.
+fn places_of_parents(source: &str) -> HashMap<Uid, usize> {
+    let mut places = HashMap::new();
+    let Some(declared) = Declarations::find(source) else { return places };
+    for joint in &declared.joints {
+        if let Some(parent) = declared.tree.field(joint.node, "parent") {
+            places.entry(joint.uid).or_insert(parent.start);
+        }
+    }
+    places
 }

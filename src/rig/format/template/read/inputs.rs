@@ -15,12 +15,13 @@ pub(super) fn inputs(
     faults: &mut Vec<SourceError>,
 ) -> Vec<RigInput> {
     let mut found: Vec<RigInput> = Vec::with_capacity(list.len());
+    let mut names: HashSet<String> = HashSet::with_capacity(list.len());
     for InputFile { uid, name, translation, rotation: (x, y, z, w), scale } in list {
         if !seen.insert(uid) {
             faults.push(places.used_twice(uid));
             continue;
         }
-        if name.is_empty() || found.iter().any(|other| other.name == name) {
+        if name.is_empty() || names.contains(&name) {
             let message = format!("an input needs a name that no other has; \"{name}\" is none");
             faults.push(places.error(uid, 0, "name", message));
             continue;
@@ -42,6 +43,7 @@ pub(super) fn inputs(
             faults.push(places.error(uid, 0, wrong, message));
             continue;
         }
+        names.insert(name.clone());
         found.push(RigInput { uid, name, rest });
     }
     found

@@ -23,7 +23,10 @@ use super::{
 };
 use crate::rig::{
     RestTransform, Rig, RigEdit, SourceError, TagData, TagKind, Uid, degrees,
-    format::{scan::Field, source::ron_text},
+    format::{
+        scan::Field,
+        source::{TextLines, ron_text},
+    },
     part::{
         MOST_BROUGHT, MOST_JOINTS, MirrorParams, Part, PartChain, PartChange, PartError, PartInstance, PartOption,
         PartSocket, PartTargets, Shortfall, unpaired_sides,
@@ -86,6 +89,7 @@ fn elements<'p>(places: &'p Places, list: &'static str) -> impl Iterator<Item = 
 pub(super) fn sockets(places: &Places, files: Vec<SocketFile>, faults: &mut Vec<SourceError>) -> Vec<PartSocket> {
     let mut offsets = elements(places, "sockets");
     let mut found: Vec<PartSocket> = Vec::with_capacity(files.len());
+    let mut names: HashSet<String> = HashSet::with_capacity(files.len());
     for SocketFile { name, joint, translation, rotation } in files {
         let offset = offsets.next().unwrap_or_default();
         let rest = RestTransform {
@@ -95,12 +99,13 @@ pub(super) fn sockets(places: &Places, files: Vec<SocketFile>, faults: &mut Vec<
         };
         let fault = if name.is_empty() || name.contains('.') {
             "a socket has a name without points".to_owned()
-        } else if found.iter().any(|other| other.name == name) {
+        } else if names.contains(&name) {
             format!("two sockets are called \"{name}\"; give the second another name")
         } else if !rest.is_valid() {
             "the place of the socket is not finite; correct the numbers".to_owned()
         } else {
             let angles = <[f32; 3]>::from(rotation).into();
+            names.insert(name.clone());
             found.push(PartSocket { name, label: joint, joint: None, rest, angles, offset });
             continue;
         };
@@ -111,32 +116,29 @@ pub(super) fn sockets(places: &Places, files: Vec<SocketFile>, faults: &mut Vec<
 
 /// Gives sockets their joints. One without a joint is told and left out.
 pub(super) fn place_sockets(rig: &Rig, sockets: &mut Vec<PartSocket>, text: &str, faults: &mut Vec<SourceError>) {
-    sockets.retain_mut(|socket| match socket.in_rig(rig) {
-        Ok(placed) => {
-            *socket = placed;
-            true
-        }
-        Err(error) => {
-            faults.push(SourceError::at(text, socket.offset, error.to_string()));
-            false
-        }
-    });
+    let left_out = PartSocket::put_in_rig(sockets, rig);
+    if !left_out.is_empty() {
+        let lines = TextLines::new(text);
+        faults.extend(left_out.into_iter().map(|(socket, error)| lines.error(socket.offset, error.to_string())));
+    }
 }
 
 /// Options of a file.
 pub(super) fn options(places: &Places, files: Vec<OptionFile>, faults: &mut Vec<SourceError>) -> Vec<PartOption> {
     let mut offsets = elements(places, "options");
     let mut found: Vec<PartOption> = Vec::with_capacity(files.len());
+    let mut names: HashSet<String> = HashSet::with_capacity(files.len());
     for OptionFile { name, default, description, form, sets } in files {
         let offset = offsets.next().unwrap_or_default();
         let default = default.trim().get_ron().to_owned();
         let sets = sets.into_iter().map(|OptionTargetFile { tag, param }| (tag, param)).collect();
         let option = PartOption { name, default, description, form, sets };
-        let fault = if found.iter().any(|other| other.name == option.name) {
+        let fault = if names.contains(&option.name) {
             format!("two options are called \"{}\"; give the second another name", option.name)
         } else if let Err(error) = option.check(&option.default) {
             format!("the default does not fit: {error}")
         } else {
+            names.insert(option.name.clone());
             found.push(option);
             continue;
         };
@@ -391,6 +393,9 @@ impl Template {
         mirror: MirrorParams,
     ) -> (Self, Vec<SourceError>) {
         let mut of_parts: Vec<PartSocket> = Vec::new();
+        // Places of sockets among those of the file and of its parts.
+        let mut by_name: HashMap<String, usize> = HashMap::new();
+        note_sockets(&mut by_name, &self.sockets, 0);
         let groups = self.take_groups();
         let hung = std::mem::take(&mut self.hung);
         let mut waiting = hung.clone();
@@ -415,7 +420,10 @@ impl Template {
                 }
             };
             let among = self.sockets.iter().chain(&of_parts);
-            let socket = instance.socket.as_deref().map(|name| PartSocket::find(name, among, &self.rig));
+            let socket = instance.socket.as_deref().map(|name| {
+                let known = by_name.get(name).and_then(|place| among.clone().nth(*place));
+                known.map_or_else(|| PartSocket::find(name, among, &self.rig), |socket| socket.in_rig(&self.rig))
+            });
             let brought = instance.sockets_in(&self.rig, &part, &fitted);
             let put = socket
                 .transpose()
@@ -426,6 +434,7 @@ impl Template {
             let found = match put {
                 Ok(put) => {
                     self.notes.extend(put.notes);
+                    note_sockets(&mut by_name, &brought, self.sockets.len() + of_parts.len());
                     of_parts.extend(brought);
                     self.origins.extend(instance.origins(&part, &fitted, &changes));
                     // The next parts may hang on them.
@@ -458,6 +467,13 @@ impl Template {
         }
         bind_references(&mut self.rig, &mut self.unbound);
         (self, faults)
+    }
+}
+
+/// Notes the places of sockets, of which the first has that place; the first of a name counts.
+fn note_sockets(by_name: &mut HashMap<String, usize>, sockets: &[PartSocket], first: usize) {
+    for (place, socket) in sockets.iter().enumerate() {
+        by_name.entry(socket.name.clone()).or_insert(first + place);
     }
 }
 

@@ -1,5 +1,7 @@
 //! Sockets, options and chains in the header of a text.
 
+use std::collections::HashMap;
+
 use super::{super::write, patch::Patch};
 use crate::rig::{
     Rig,
@@ -7,6 +9,7 @@ use crate::rig::{
         template::quoted,
         tree::{Item, Tree},
     },
+    part::{HeaderSocket, PartOption},
 };
 
 /// Fields before which sockets and options are put: what lists headers reads the beginning of a file alone.
@@ -41,10 +44,12 @@ fn sockets(patch: &mut Patch, tree: &Tree, before: &Rig, rig: &Rig) {
     let now: Vec<_> = write::labelled_sockets(rig).collect();
     let names: Vec<&str> = now.iter().map(|(socket, _)| socket.name.as_str()).collect();
     let pairs = Pairs::of(tree, elements, &names);
+    let known: HashMap<&str, &HeaderSocket> =
+        before.about().sockets.iter().map(|socket| (socket.name.as_str(), socket)).collect();
     for (place, number) in &pairs.both {
         let (node, (socket, label)) = (elements[*place].value, now[*number]);
         let name = tree.string(node, "name").unwrap_or_default();
-        let Some(was) = before.about().sockets.iter().find(|was| was.name == name) else { continue };
+        let Some(was) = known.get(name.as_str()) else { continue };
         if name != socket.name {
             patch.set(node, "name", &quoted(&socket.name));
         }
@@ -64,10 +69,12 @@ fn options(patch: &mut Patch, tree: &Tree, before: &Rig, rig: &Rig) {
     let now = &rig.about().options;
     let names: Vec<&str> = now.iter().map(|option| option.name.as_str()).collect();
     let pairs = Pairs::of(tree, elements, &names);
+    let known: HashMap<&str, &PartOption> =
+        before.about().options.iter().map(|option| (option.name.as_str(), option)).collect();
     for (place, number) in &pairs.both {
         let (node, option) = (elements[*place].value, &now[*number]);
         let name = tree.string(node, "name").unwrap_or_default();
-        let Some(was) = before.about().options.iter().find(|was| was.name == name) else { continue };
+        let Some(was) = known.get(name.as_str()) else { continue };
         if was.name != option.name {
             patch.set(node, "name", &quoted(&option.name));
         }
@@ -103,10 +110,19 @@ impl Pairs {
     /// Pairs by name. As many as go and come are the same ones with other names.
     fn of(tree: &Tree, elements: &[Item], names: &[&str]) -> Self {
         let written: Vec<Option<String>> = elements.iter().map(|item| tree.string(item.value, "name")).collect();
-        let find = |place: usize| names.iter().position(|name| written[place].as_deref() == Some(*name));
-        let mut both: Vec<(usize, usize)> = (0..elements.len()).filter_map(|at| Some((at, find(at)?))).collect();
-        let mut gone: Vec<usize> = (0..elements.len()).filter(|at| both.iter().all(|(place, _)| place != at)).collect();
-        let mut fresh: Vec<usize> = (0..names.len()).filter(|at| both.iter().all(|(_, number)| number != at)).collect();
+        let numbers: HashMap<&str, usize> = names.iter().enumerate().map(|(number, name)| (*name, number)).collect();
+        let find = |name: &Option<String>| numbers.get(name.as_deref()?).copied();
+        let (mut both, mut gone, mut is_known) = (Vec::new(), Vec::new(), vec![false; names.len()]);
+        for (place, name) in written.iter().enumerate() {
+            match find(name) {
+                Some(number) => {
+                    both.push((place, number));
+                    is_known[number] = true;
+                }
+                None => gone.push(place),
+            }
+        }
+        let mut fresh: Vec<usize> = (0..names.len()).filter(|number| !is_known[*number]).collect();
         if gone.len() == fresh.len() {
             both.extend(gone.drain(..).zip(fresh.drain(..)));
         }
