@@ -18,7 +18,7 @@ use self::{
     edit::Gesture,
 };
 use super::{
-    displayed_rig::DisplayedRig,
+    displayed_rig::{DisplayedRig, node_name},
     fields, list,
     timeline::{
         KeyColors, Markers, OpenClip, TimeAxis, Timeline, lines, navigate, paint_playhead, ruler_height, show_key_menu,
@@ -30,7 +30,8 @@ use crate::{
         panel::{EditorPanel, Requests},
         style,
     },
-    rig::{Uid, animation::TrackTarget},
+    plugins::commands::BuildResult,
+    rig::{BuiltRig, Uid, animation::TrackTarget},
 };
 
 /// Most tracks whose curves are drawn.
@@ -115,7 +116,8 @@ impl EditorPanel for CurvesPanel {
         show_ruler(&mut self.markers, ui, over, &axis, &open, requests);
         let area = Rect::from_min_max(pos2(split, below), rect.max);
         navigate(ui, over, &axis, requests);
-        let all = drawn(&open, timeline, &targets, &axis);
+        let built = world.get::<BuildResult>(open.entity).map(|built| &*built.0);
+        let all = drawn(&open, built, &targets, &axis);
         let legend = Rect::from_min_max(rect.min, pos2(split - 6.0, rect.bottom()));
         self.legend(ui, legend, &all);
         let plot = Plot { axis, values: self.visible(&all), y: area.y_range() };
@@ -186,7 +188,8 @@ impl CurvesPanel {
             let height = list::row_height(ui);
             let room = ((rect.bottom() - ui.cursor().top()) / height).floor().max(0.0) as usize;
             for curve in all.iter().take(room) {
-                let (row, _) = ui.allocate_exact_size(vec2(rect.width(), height), Sense::hover());
+                let (row, response) = ui.allocate_exact_size(vec2(rect.width(), height), Sense::hover());
+                response.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, &curve.name));
                 list::line(ui, row, &curve.name, style::readable(ui.visuals(), curve.color));
             }
         });
@@ -204,13 +207,10 @@ fn targets(open: &OpenClip, timeline: &Timeline, selected: &[Uid]) -> Vec<TrackT
     found
 }
 
-fn drawn(open: &OpenClip, timeline: &Timeline, targets: &[TrackTarget], axis: &TimeAxis) -> Vec<Curve> {
+fn drawn(open: &OpenClip, built: Option<&BuiltRig>, targets: &[TrackTarget], axis: &TimeAxis) -> Vec<Curve> {
     let Some(layer) = open.layer else { return Vec::new() };
-    let name = |node: Uid| {
-        let known = timeline.names.0.get(&node).map(|name| name.label.clone());
-        known.filter(|label| !label.is_empty()).unwrap_or_else(|| format!("joint {:04x}", node.0 >> 48))
-    };
-    targets.iter().flat_map(|target| curves(layer, target, &name(target.node), axis)).collect()
+    let of = |target: &TrackTarget| curves(layer, target, &node_name(open.rig, built, target.node), axis);
+    targets.iter().flat_map(of).collect()
 }
 
 /// Lines of time and of values.

@@ -8,7 +8,7 @@ use bevy_egui::egui::Color32;
 use crate::{
     editor::ActiveRig,
     plugins::document::{HoveredNode, Selection},
-    rig::{JointData, Rig, Uid},
+    rig::{BuiltRig, JointData, Rig, Uid},
 };
 
 /// The active rig and its selection.
@@ -74,6 +74,13 @@ pub fn joint_name(joint: &JointData) -> Cow<'_, str> {
         Some(label) => Cow::Borrowed(label),
         None => Cow::Owned(unlabelled(joint.uid)),
     }
+}
+
+/// Name of a node for people: of a joint, or the one that a command gave to what it made.
+pub(super) fn node_name(rig: &Rig, built: Option<&BuiltRig>, node: Uid) -> String {
+    let made = || built.and_then(|built| built.node(node)).map(|made| made.name.to_string());
+    let joint = rig.joint(node).map(|joint| joint_name(&joint.data).into_owned());
+    joint.or_else(made).unwrap_or_else(|| unlabelled(node))
 }
 
 fn unlabelled(joint: Uid) -> String {

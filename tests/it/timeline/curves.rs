@@ -205,6 +205,26 @@ fn the_panel_says_what_to_do_while_there_are_no_curves() {
     assert!(desk.look("Curves of the selected tracks").is_some());
 }
 
+/// A control is told by its own name, as in the rows of the Timeline, and not by the label that it shares with its joint.
+#[test]
+fn curves_of_controls_have_the_names_of_controls() {
+    let (mut desk, _) = desk_with(CurvesPanel::default());
+    let entity = desk.rig;
+    desk.app.world_mut().entity_mut(entity).insert(crate::bench::shipped("biped"));
+    let build = rigsmith::plugins::commands::BuildStep::All;
+    desk.app.world_mut().write_message(rigsmith::plugins::commands::BuildRequest { rig: entity, step: build });
+    desk.frames(4);
+    act(&mut desk, TimelineAction::NewClip);
+    let built = desk.app.world().get::<BuildResult>(entity).unwrap().0.clone();
+    let hand = built.nodes.iter().find(|node| &*node.name == "hand_ik_l").unwrap();
+    assert_ne!(hand.label.as_deref(), Some("hand_ik_l"));
+    desk.select(&[hand.uid]);
+    act(&mut desk, TimelineAction::Key);
+    desk.frames(2);
+    let told = |name: &str| desk.says(&format!("{name} translation X"));
+    assert_eq!((told("hand_ik_l"), told("hand_l")), (true, false));
+}
+
 #[test]
 fn turns_are_angles_without_jumps() {
     let node = Uid(5);

@@ -138,7 +138,7 @@ fn posed(hands: &Hands) {
     hands.key("p");
     hands.until("controls are posed", |report| report.mode == "Pose");
     // Near enough for the outline of the hand's control to be free of those of the fingers.
-    hands.approach(2);
+    hands.approach(1);
     let report = hands.report().expect("the window reports");
     let uid = &report.labels["hand_l"];
     let rest = report.places[uid];
@@ -208,5 +208,7 @@ fn face(display: &Display, folder: &Path) {
     hands.bring("Face");
     hands.press("Place face");
     hands.until("a face is placed", |report| report.joints > 10 && report.skinned == 1 && !report.busy);
+    // The controls are what people take; bones lie over the face.
+    hands.key("h");
     hands.picture("face");
 }

@@ -4,7 +4,8 @@ use bevy_egui::egui::{Button, Ui, WidgetInfo, WidgetType};
 
 use super::row::RowContext;
 use crate::{
-    editor::counts::counted,
+    editor::{counts::counted, panels::displayed_rig::node_name},
+    plugins::commands::BuildResult,
     rig::{Uid, animation::ClipLayer},
 };
 
@@ -55,11 +56,8 @@ pub(super) fn entries(ui: &mut Ui, layer: &ClipLayer, context: &RowContext) -> O
 
 /// Names of the nodes of a mask, as part of a sentence.
 fn names(layer: &ClipLayer, context: &RowContext) -> String {
-    let known = &context.timeline.names.0;
-    let name = |node: &Uid| {
-        let name = known.get(node).map(|name| name.label.as_str()).unwrap_or_default();
-        if name.is_empty() { format!("node {:04x}", node.0 >> 48) } else { name.to_owned() }
-    };
+    let built = context.world.get::<BuildResult>(context.open.entity).map(|built| &*built.0);
+    let name = |node: &Uid| node_name(context.open.rig, built, *node);
     let mut names: Vec<String> = layer.mask.iter().take(MOST).map(name).collect();
     if layer.mask.len() > MOST {
         names.push(format!("{} more", layer.mask.len() - MOST));
