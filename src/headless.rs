@@ -16,7 +16,7 @@ use std::{
 };
 
 use bevy::{
-    app::{Main, MainSchedulePlugin},
+    app::MainSchedulePlugin,
     ecs::{schedule::ScheduleLabel, system::despawn_unused_registered_systems},
     prelude::*,
     time::TimeUpdateStrategy,
