@@ -185,7 +185,7 @@ fn templates_of_bare_and_placed_joints_stay_within_their_memory() {
 fn section_bytes(program: &[u8], kind: u32) -> u64 {
     let number = |at: usize, bytes: usize| {
         let low_first = program[at..at + bytes].iter().rev();
-        low_first.fold(0_u64, |number, byte| number << 8 | u64::from(*byte)) as usize
+        low_first.fold(0_u64, |value, byte| (value << 8) | u64::from(*byte)) as usize
     };
     let (first, size, count) = (number(0x28, 8), number(0x3a, 2), number(0x3c, 2));
     let sections = (0..count).map(|section| first + section * size);
