@@ -15,7 +15,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bevy::{prelude::*, time::TimeUpdateStrategy};
+use bevy::{
+    app::MainSchedulePlugin,
+    ecs::{schedule::ScheduleLabel, system::despawn_unused_registered_systems},
+    prelude::*,
+    time::TimeUpdateStrategy,
+};
 
 use crate::{
     algo::{
@@ -50,9 +55,24 @@ use crate::{
 
 /// An app with [`RigPlugins`], without window and renderer, before `finish`. The same seed gives the same uids.
 pub fn headless_app(seed: u64) -> App {
-    let mut app = App::new();
+    with_rig_plugins(App::new(), seed)
+}
+
+fn with_rig_plugins(mut app: App, seed: u64) -> App {
     app.add_plugins((MinimalPlugins.set(task_pools()), TransformPlugin, RigPlugins))
         .insert_resource(UidSource::seeded(seed));
+    app
+}
+
+/// An app as [`App::new`] makes it, whose registry has only the types that plugins register themselves. Nothing here reads the
+/// other types of Bevy, which take a megabyte, and the code that registers them lies in 6 MB of pages of the program.
+fn app_without_derived_types() -> App {
+    let mut app = App::empty();
+    app.main_mut().update_schedule = Some(Main.intern());
+    app.init_resource::<AppTypeRegistry>()
+        .add_plugins(MainSchedulePlugin)
+        .add_systems(Last, despawn_unused_registered_systems)
+        .add_message::<AppExit>();
     app
 }
 
@@ -112,7 +132,7 @@ impl Pause {
 impl Workbench {
     /// A workbench with an empty rig. The same seed gives the same uids.
     pub fn new(seed: u64, name: &str) -> Self {
-        let mut app = headless_app(seed);
+        let mut app = with_rig_plugins(app_without_derived_types(), seed);
         // Time passes only where frames are requested, so that springs give the same result on every machine.
         app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
         app.finish();

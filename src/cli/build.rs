@@ -39,7 +39,7 @@ use crate::{
         operations::Operation,
         update::edits_between,
     },
-    solve::program::{CompileOptions, RigProgram},
+    solve::program::RigProgram,
 };
 
 /// Arguments of `rigsmith build`.
@@ -108,8 +108,8 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
         return Ok(());
     }
     limits::check_time("building the rig")?;
-    // Compiled even if no file is written: a built rig that cannot run, such as one with a cycle of parents, is no rig.
-    RigProgram::compile(&built, &CompileOptions::default()).map_err(PoseError::CannotRun)?;
+    // Checked even if no file is written: a built rig that cannot run, such as one with a cycle of parents, is no rig.
+    RigProgram::check(&built).map_err(PoseError::CannotRun)?;
     let Some(output) = &args.output else { return Ok(()) };
     let meta = args.vrm.meta(&rig, output)?;
     let is_plain = args.meshes.is_empty() && !has_commands && rig.pose().is_empty() && meta.is_none();

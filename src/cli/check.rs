@@ -32,7 +32,7 @@ use crate::{
         proportion,
         template::{self, PartOrigin, Template},
     },
-    solve::program::{CompileOptions, RigProgram},
+    solve::program::RigProgram,
 };
 
 /// Arguments of `rigsmith check`.
@@ -294,7 +294,7 @@ fn problem_of_program(
     locate: &dyn Fn(&BuildError) -> SourceError,
 ) -> Option<SourceError> {
     let built = Builder::build(rig, modules).ok()?;
-    let problem = RigProgram::compile(&built, &CompileOptions::default()).err()?;
+    let problem = RigProgram::check(&built).err()?;
     let found = problem.commands().iter().find_map(|command| rig.find_tag(*command));
     let Some((joint, TagData { uid, kind: TagKind::Command { module, .. }, .. })) = found else {
         return Some(places.beginning(problem.to_string()));

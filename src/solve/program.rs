@@ -203,6 +203,19 @@ impl RigProgram {
         Self::compile_hashed(rig, options, hash, &mut ByConstraint::default(), &mut Layouts::default())
     }
 
+    /// Checks that a built rig can run: [`compile`](Self::compile) takes it, with all of its nodes. A rig without constraints is
+    /// checked node by node, without the memory of a program.
+    ///
+    /// # Errors
+    ///
+    /// See [`ProgramError`].
+    pub fn check(rig: &BuiltRig) -> Result<(), ProgramError> {
+        if rig.constraints.is_empty() {
+            return graph::placed_nodes(rig).map(drop);
+        }
+        Self::compile(rig, &CompileOptions::default()).map(drop)
+    }
+
     /// Compiles a built rig whose hash is known. Expressions are read once for each constraint, and layouts worked out once
     /// for rigs that differ in numbers only.
     fn compile_hashed(

@@ -181,13 +181,16 @@ pub fn retarget(
         }
         MotionTarget::Joints => (joints::keyed(&body, &poses), Vec::new()),
     };
-    if settings.root_motion && settings.onto == MotionTarget::Controls && keyed.root.is_none() {
+    // Poses of a long motion make room for the places that reducing it takes.
+    drop(poses);
+    let root = keyed.root;
+    if settings.root_motion && settings.onto == MotionTarget::Controls && root.is_none() {
         notes.push("no control carries the whole figure; the travel stays where it is without root motion".to_owned());
     }
     let tolerance = settings.tolerance.for_height(target.height);
-    let keys = tracks::fill(&mut clip, &keyed, &times, &program, &tolerance, settings.curves);
+    let keys = tracks::fill(&mut clip, keyed, &times, &program, &tolerance, settings.curves);
     let (stances, touches) = (contacts.stances(&body, &times), touches.list(&times));
-    Ok(RetargetedMotion { clip, keys, stances, touches, unmoved, root: keyed.root, notes })
+    Ok(RetargetedMotion { clip, keys, stances, touches, unmoved, root, notes })
 }
 
 /// Frame rate of a motion, divided until it is at most 60.

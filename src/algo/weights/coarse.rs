@@ -95,7 +95,12 @@ impl Coarse {
         smoothing: f32,
         claim: impl Fn(usize) -> &'a Claim + Sync,
     ) -> Weights {
-        let mut weights = Weights { starts: Vec::with_capacity(self.cluster.len() + 1), ..Weights::default() };
+        let influences: usize = self.cluster.iter().map(|c| coarse.of(*c as usize).len()).sum();
+        let mut weights = Weights {
+            starts: Vec::with_capacity(self.cluster.len() + 1),
+            joints: Vec::with_capacity(influences),
+            values: Vec::with_capacity(influences),
+        };
         weights.starts.push(0);
         for &c in &self.cluster {
             weights.push(coarse.of(c as usize));

@@ -75,7 +75,9 @@ impl<'a> Tree<'a> {
     /// inside of it. Time is linear.
     pub fn parse(text: &'a str) -> Option<Self> {
         u32::try_from(text.len()).ok()?;
-        let (mut nodes, mut all_items) = (vec![PackedNode::plain(0, 0)], Vec::new());
+        let most = most_items(text);
+        let (mut nodes, mut all_items) = (Vec::with_capacity(most + 2), Vec::with_capacity(most));
+        nodes.push(PackedNode::plain(0, 0));
         let mut open: Vec<OpenBracket> = vec![OpenBracket::of(0)];
         for token in tokens(text).skip(attribute(text)) {
             if open.len() > DEPTH || nodes.len() > FREE_NODES + text.len() / BYTES_PER_NODE {
@@ -272,6 +274,13 @@ pub(crate) fn list_items(text: &str) -> Vec<Range<usize>> {
         return Vec::new();
     }
     root.items.iter().map(|item| tree.node(item.value).range.clone()).collect()
+}
+
+/// Most items of a text, each of which ends with a comma, a bracket or the text. Lists with room for as many need not grow, which
+/// takes as much memory again.
+fn most_items(text: &str) -> usize {
+    let ends = text.bytes().filter(|byte| matches!(byte, b',' | b')' | b']' | b'}')).count();
+    ends.min(FREE_NODES + text.len() / BYTES_PER_NODE) + 1
 }
 
 /// Number of the tokens of an attribute of the file, such as `#![enable(implicit_some)]`.

@@ -88,27 +88,36 @@ pub(super) struct Graph<'a> {
     aliases: Vec<(usize, X)>,
 }
 
+/// Places of the nodes of a built rig by their uids, and their transforms in the rig's space without any pose.
+///
+/// # Errors
+/// Two nodes have the same uid, a node stands before its parent, or its transform is no transform.
+pub(super) fn placed_nodes(rig: &BuiltRig) -> Result<(HashMap<Uid, usize>, Vec<Trs>), ProgramError> {
+    let mut index = HashMap::with_capacity_and_hasher(rig.nodes.len(), Default::default());
+    let mut built: Vec<Trs> = Vec::with_capacity(rig.nodes.len());
+    for (at, node) in rig.nodes.iter().enumerate() {
+        if let Some(first) = index.insert(node.uid, at) {
+            let (first, second) = (name(rig, first), name(rig, at));
+            return Err(ProgramError::DuplicateNode { uid: node.uid, first, second });
+        }
+        let parent = match node.parent {
+            Some(parent) if parent >= at => {
+                return Err(ProgramError::ParentOrder { node: name(rig, at), parent });
+            }
+            parent => parent.map_or(Trs::IDENTITY, |parent| built[parent]),
+        };
+        if !valid(&node.base) {
+            return Err(ProgramError::NotFinite { place: NumberPlace::Base(name(rig, at)) });
+        }
+        built.push(multiply(&parent, &node.base));
+    }
+    Ok((index, built))
+}
+
 impl<'a> Graph<'a> {
     /// A graph with a register for every node's rig transform: node `i` has register `i + 1`.
     pub fn new(rig: &'a BuiltRig, keep: &Keep, outside: &[ExternalNode]) -> Result<Self, ProgramError> {
-        let mut index = HashMap::with_capacity_and_hasher(rig.nodes.len(), Default::default());
-        let mut built: Vec<Trs> = Vec::with_capacity(rig.nodes.len());
-        for (at, node) in rig.nodes.iter().enumerate() {
-            if let Some(first) = index.insert(node.uid, at) {
-                let (first, second) = (name(rig, first), name(rig, at));
-                return Err(ProgramError::DuplicateNode { uid: node.uid, first, second });
-            }
-            let parent = match node.parent {
-                Some(parent) if parent >= at => {
-                    return Err(ProgramError::ParentOrder { node: name(rig, at), parent });
-                }
-                parent => parent.map_or(Trs::IDENTITY, |parent| built[parent]),
-            };
-            if !valid(&node.base) {
-                return Err(ProgramError::NotFinite { place: NumberPlace::Base(name(rig, at)) });
-            }
-            built.push(multiply(&parent, &node.base));
-        }
+        let (index, built) = placed_nodes(rig)?;
         let exposed = exposed(rig, &index, keep)?;
         let mut graph = Self {
             rig,

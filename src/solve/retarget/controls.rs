@@ -5,7 +5,7 @@
 //! control that stands where it stands, or by a null where there is no such control. The hips are moved by the control at their
 //! place that carries the body and leaves standing feet where they are.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use bevy::math::{Quat, Vec3};
 use rayon::prelude::*;
@@ -114,7 +114,7 @@ pub(super) fn keyed(
             for pose in *block {
                 state = strike(built, state, &steps, pose)?;
                 list.push(PosedFrame {
-                    offsets: (0..program.nodes().len()).map(|slot| state.offset_at(slot)).collect(),
+                    offsets: stored_offsets(&state),
                     dials: dials.iter().map(|slot| state.attribute_at(*slot)).collect(),
                 });
             }
@@ -126,10 +126,10 @@ pub(super) fn keyed(
         frames.extend(block?);
     }
     let mut keyed = KeyedTracks { root, ..KeyedTracks::default() };
-    for (slot, node) in program.nodes().iter().enumerate() {
-        if frames.iter().any(|frame| frame.offsets[slot] != PoseOffset::IDENTITY) {
-            keyed.nodes.push((node.uid, frames.iter().map(|frame| frame.offsets[slot]).collect()));
-        }
+    let moved: BTreeSet<usize> = frames.iter().flat_map(PosedFrame::moved).collect();
+    for slot in moved {
+        let offsets = frames.iter().map(|frame| frame.offset_at(slot)).collect();
+        keyed.nodes.push((program.nodes()[slot].uid, offsets));
     }
     for (place, slot) in dials.iter().enumerate() {
         let attribute = &program.attributes()[*slot];
@@ -140,10 +140,38 @@ pub(super) fn keyed(
     Ok((keyed, unmoved))
 }
 
-/// Offsets of all nodes, and the attributes that turn joints.
+/// Offsets of nodes, and the attributes that turn joints.
 struct PosedFrame {
-    offsets: Vec<PoseOffset>,
+    /// Slots with offsets other than the identity, in their order: few of a rig's nodes move, through a million frames.
+    offsets: Box<[(usize, PoseOffset)]>,
     dials: Vec<f32>,
+}
+
+impl PosedFrame {
+    /// Slots of the nodes that stand elsewhere than at rest.
+    fn moved(&self) -> impl Iterator<Item = usize> {
+        self.offsets.iter().filter(|(_, offset)| *offset != PoseOffset::IDENTITY).map(|(slot, _)| *slot)
+    }
+
+    fn offset_at(&self, slot: usize) -> PoseOffset {
+        let place = self.offsets.binary_search_by_key(&slot, |(slot, _)| *slot);
+        place.map_or(PoseOffset::IDENTITY, |place| self.offsets[place].1)
+    }
+}
+
+/// Slots with offsets that are not the identity bit for bit: a zero may have a sign.
+fn stored_offsets(state: &RigState) -> Box<[(usize, PoseOffset)]> {
+    let bits = |offset: &PoseOffset| {
+        let PoseOffset { translation, rotation, scale } = offset;
+        (
+            translation.to_array().map(f32::to_bits),
+            rotation.to_array().map(f32::to_bits),
+            scale.to_array().map(f32::to_bits),
+        )
+    };
+    let identity = bits(&PoseOffset::IDENTITY);
+    let all = (0..state.program().nodes().len()).map(|slot| (slot, state.offset_at(slot)));
+    all.filter(|(_, offset)| bits(offset) != identity).collect()
 }
 
 /// Limbs with switches whose joints the motion moves: legs, and arms of hands that are held, follow their goals, other arms

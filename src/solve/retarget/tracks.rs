@@ -37,7 +37,7 @@ pub(super) fn empty_clip(rig: &Rig, name: &str, rate: f32, range: [f32; 2], loop
 /// numbers of keys before and after.
 pub(super) fn fill(
     clip: &mut RigClip,
-    keyed: &KeyedTracks,
+    mut keyed: KeyedTracks,
     times: &[f32],
     program: &Arc<RigProgram>,
     tolerance: &KeyTolerance,
@@ -47,7 +47,10 @@ pub(super) fn fill(
     let start = times.first().copied().unwrap_or_default();
     let Some(layer) = clip.layers.first_mut() else { return counts };
     let (targets, mut tracks) = keyed.tracks();
-    let player = Player::new(program, &targets, &keyed.values);
+    let held = std::mem::take(&mut keyed.values);
+    // The tracks have the values once more.
+    drop(keyed);
+    let player = Player::new(program, &targets, &held);
     let reaches = player.reaches(&tracks, 20.0 * tolerance.distance);
     for (track, reach) in tracks.iter_mut().zip(&reaches) {
         // Numbers that turn joints are angles in degrees.
@@ -75,7 +78,7 @@ pub(super) fn fill(
         counts[1] += keys.len();
         layer.tracks.insert(target, Arc::new(Track { keys }));
     }
-    for (node, name, value) in &keyed.values {
+    for (node, name, value) in &held {
         let key = Key { ease: Ease::Stepped, ..Key::number(start, *value) };
         let target = TrackTarget { node: *node, property: Property::Attribute(name.clone()) };
         layer.tracks.insert(target, Arc::new(Track { keys: vec![key] }));

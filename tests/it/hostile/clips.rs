@@ -36,6 +36,22 @@ fn long_clip(seconds: u32) -> String {
     )
 }
 
+/// Motion capture of so many frames, thirty a second: a walk again and again.
+fn long_motion(frames: usize) -> String {
+    let (skeleton, motion) = include_str!("../retarget/walker.bvh").split_once("MOTION").unwrap();
+    let rows: Vec<&str> = motion.trim().lines().skip(2).collect();
+    let rows: String = rows.iter().cycle().take(frames).map(|row| format!("{row}\n")).collect();
+    format!("{skeleton}MOTION\nFrames: {frames}\nFrame Time: 0.0333333\n{rows}")
+}
+
+#[test]
+fn motion_of_many_frames_is_retargeted_within_its_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let motion = "walk.bvh";
+    fs::write(folder.path().join(motion), long_motion(3_600)).unwrap();
+    check(folder.path(), &[(&[motion], &["animate", "biped", motion, "-o", "walk.anim.ron"])]);
+}
+
 #[test]
 fn clips_of_many_frames_are_baked_within_their_memory() {
     let folder = tempfile::tempdir().unwrap();

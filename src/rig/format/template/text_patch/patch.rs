@@ -60,7 +60,8 @@ impl<'d, 'a> Patch<'d, 'a> {
         // What comes at a place stands before what is changed there, and what goes is cut out whole.
         self.changes.sort_by_key(|(range, _)| (range.start, !range.is_empty(), Reverse(range.end)));
         let source = self.tree.text;
-        let mut out = String::with_capacity(source.len());
+        let added: usize = self.changes.iter().map(|(_, text)| text.len()).sum();
+        let mut out = String::with_capacity(source.len() + added);
         let mut at = 0;
         for (range, text) in &self.changes {
             // What is inside of something removed goes with it.
