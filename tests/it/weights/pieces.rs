@@ -242,3 +242,30 @@ fn small_things_inside_of_flesh_move_with_one_joint() {
     assert_eq!(told(&tooth).map(|told| (told.joint, told.share)), Some((joint as usize, 1.0)));
     assert!(told(&button).is_some_and(|told| told.share < 0.8), "{:?}", report.stiff_pieces);
 }
+
+/// A foot of one joint that hangs on the root while the leg ends at the knee holds its flesh without being asked to claim it;
+/// a target of one joint beside the leg's own bones, or where the leg ends, holds nothing.
+#[test]
+fn lone_feet_hold_flesh_and_lone_targets_none() {
+    let (points, triangles) = tube();
+    let bound = |chain: [f32; 6], foot: f32| {
+        let mut joints = vec![joint([0.0, -6.0, 0.0], None)];
+        joints.extend(chain.iter().enumerate().map(|(above, x)| joint([*x, 0.0, 0.0], Some(above))));
+        joints.push(joint([foot, 0.0, 0.0], Some(0)));
+        let weights = bind(&points, &triangles, &joints).0;
+        check_sound(&weights, points.len(), &joints, 8);
+        weights
+    };
+    for foot in [3.2, 3.4] {
+        let weights = bound([0.1, 0.3, 0.5, 0.7, 0.9, 1.2], foot);
+        for (point, place) in points.iter().enumerate() {
+            let held = weight(&weights, point, 7);
+            assert!(place.x < 3.15 || held > 0.9, "{held} of the foot at {place}");
+            assert!(place.x > 1.25 || held < 0.1, "{held} of the leg at {place}");
+        }
+    }
+    for (chain, target) in [([0.1, 0.5, 1.2, 2.0, 3.0, 3.6], 3.3), ([0.1, 0.5, 1.0, 1.5, 2.0, 3.2], 3.6)] {
+        let weights = bound(chain, target);
+        assert!((0..points.len()).all(|point| weight(&weights, point, 7) == 0.0), "a target at {target}");
+    }
+}
