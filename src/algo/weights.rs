@@ -10,7 +10,7 @@
 //! asked of patches of skin rather than of single points, and of each large piece of the surface alone; a piece belongs
 //! to the bones inside of it, and joints that stand off from the body (roots, targets, poles) hold nothing; skin whose
 //! bone lies across the air is left to its neighbours; arms, legs and necks share flesh as painted bodies do; pieces that
-//! one joint holds stay stiff; large meshes are solved on a coarser surface.
+//! one joint holds stay stiff, and so do rings around a bone; large meshes are solved on a coarser surface.
 
 mod anatomy;
 pub mod bends;
@@ -31,6 +31,7 @@ pub(crate) mod laplacian;
 pub(crate) mod ldl;
 mod odds;
 mod report;
+mod rings;
 mod roots;
 mod sight;
 mod twist;
@@ -104,8 +105,8 @@ pub struct WeightSettings {
     /// Weights below this are dropped before the rest is made to sum to one.
     pub prune: f32,
     /// Parts of the mesh (connected pieces) that one joint holds in nearly their whole size move with that joint alone,
-    /// as helmets, swords and eyes do, and small parts move as one, with what they lie on if one joint holds that; `false` lets
-    /// them bend.
+    /// as helmets, swords and eyes do, rings with the joint whose bone runs through them, and small parts move as one, with
+    /// what they lie on if one joint holds that; `false` lets them bend.
     pub stiff_parts: bool,
     /// Ranges of points whose parts bend although [`WeightSettings::stiff_parts`] would hold them stiff.
     pub bending: Vec<Range<u32>>,

@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::{
     Method, WeightError, WeightJoint, WeightSettings,
     anatomy::Anatomy,
+    bone::BoneSegment,
     bones::{self, Bones},
     claim::{self, Claim},
     coarse::{self, Coarse},
@@ -66,17 +67,18 @@ pub(crate) fn bind(
     let graph = Graph::new(&places, &triangles);
     step(0.1)?;
     let anatomy = Anatomy::new(&joints);
-    let (weights, sources, sight) = if count <= coarse::LIMIT {
-        let (weights, sources, _, sight) = job.run(&places, &triangles, &graph)?;
-        (weights, sources, sight)
+    let (weights, sources, sight, bones) = if count <= coarse::LIMIT {
+        let Bound { weights, sources, sight, bones, .. } = job.run(&places, &triangles, &graph)?;
+        (weights, sources, sight, bones)
     } else {
         let coarse = Coarse::new(&places, &triangles, &graph);
         let coarse_graph = Graph::new(&coarse.points, &coarse.triangles);
-        let (weights, sources, claims, sight) = job.run(&coarse.points, &coarse.triangles, &coarse_graph)?;
+        let Bound { weights, sources, claims, sight, bones } =
+            job.run(&coarse.points, &coarse.triangles, &coarse_graph)?;
         let none = Claim::default();
         let bound = |c: usize| if sources[c] == Source::Surface { &claims[c] } else { &none };
         let weights = coarse.spread(&weights, &graph, settings.blend(), bound);
-        (weights, coarse.cluster.iter().map(|&c| sources[c as usize]).collect(), sight)
+        (weights, coarse.cluster.iter().map(|&c| sources[c as usize]).collect(), sight, bones)
     };
     let weights = anatomy.share(&places, weights);
     let (mut weights, mut stiff) = (weights, Stiffness::default());
@@ -84,7 +86,7 @@ pub(crate) fn bind(
         let bending = settings.bending.iter().cloned().flatten();
         let bending: Vec<u32> = bending.filter_map(|point| place.get(point as usize).copied()).collect();
         (weights, stiff) =
-            Islands::new(&places, &triangles).stiffened((&places, &triangles), &weights, slots, &bending);
+            Islands::new(&places, &triangles).stiffened((&places, &triangles), &weights, slots, &bending, &bones);
     }
     Ok(BoundSurface { place, weights, sources, stiff, gaps: Gaps { sight, joints, scale } })
 }
@@ -116,18 +118,23 @@ struct Job<'a> {
     progress: &'a (dyn Fn(f32) -> bool + Sync),
 }
 
+/// Result of a binding for each place of a surface, and what it was bound to.
+struct Bound {
+    weights: Weights,
+    sources: Vec<Source>,
+    claims: Vec<Claim>,
+    sight: Sight,
+    /// Bones of joints that may hold flesh.
+    bones: Vec<BoneSegment>,
+}
+
 impl Job<'_> {
     fn step(&self, share: f32) -> Result<(), WeightError> {
         if (self.progress)(share) { Ok(()) } else { Err(WeightError::Cancelled) }
     }
 
-    /// Binds a surface without duplicate points, of unit size: weights, where they come from, the claims, and what is seen.
-    fn run(
-        &self,
-        places: &[Vec3],
-        triangles: &[[u32; 3]],
-        graph: &Graph,
-    ) -> Result<(Weights, Vec<Source>, Vec<Claim>, Sight), WeightError> {
+    /// Binds a surface without duplicate points, of unit size.
+    fn run(&self, places: &[Vec3], triangles: &[[u32; 3]], graph: &Graph) -> Result<Bound, WeightError> {
         let method = self.settings.method;
         let islands = Islands::new(places, triangles);
         let sight = Sight::new(places, triangles, &islands);
@@ -163,7 +170,7 @@ impl Job<'_> {
                 mark(&weights, &mut sources, source);
             }
         }
-        Ok((weights, sources, claims, sight))
+        Ok(Bound { weights, sources, claims, sight, bones: fleshed })
     }
 
     /// Weights of all places by voxels; none if the mesh has no volume to speak of.

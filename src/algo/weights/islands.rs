@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use glam::Vec3;
 
-use super::{Method, claim::Claim, laplacian::Graph, report::Stiffness, sight::is_surrounded};
+use super::{
+    Method, bone::BoneSegment, claim::Claim, laplacian::Graph, report::Stiffness, rings, sight::is_surrounded,
+};
 use crate::mesh::{adjacency, model::Weights, surface::Surface};
 
 /// Heat is trusted on an island if at least this share of its area sees the bone that claims it.
@@ -67,13 +69,15 @@ impl Islands {
     /// Weights with which parts stay as stiff as they are: a part that one joint holds in nearly its whole size (helmet,
     /// eye, sword) moves with that joint, and each small part moves as one. The holder of a small part is the joint with
     /// the largest share. A part of which a slot beside flesh, as `slots` flags joints, holds the most is what it carries. A
-    /// surface in one piece stays as it is, and so do the parts that have one of the `bending` places.
+    /// ring moves with the one of `bones` that runs through it. A surface in one piece stays as it is, and so do the parts
+    /// that have one of the `bending` places.
     pub fn stiffened(
         &self,
         (places, triangles): (&[Vec3], &[[u32; 3]]),
         weights: &Weights,
         slots: &[bool],
         bending: &[u32],
+        bones: &[BoneSegment],
     ) -> (Weights, Stiffness) {
         let mut sums: Vec<BTreeMap<u32, f32>> = vec![BTreeMap::new(); self.extents.len()];
         let mut counts = vec![0usize; self.extents.len()];
@@ -87,19 +91,24 @@ impl Islands {
         bending.iter().for_each(|place| bends[self.of[*place as usize] as usize] = true);
         // Where nothing else holds flesh slots do.
         let has_flesh = sums.iter().flat_map(BTreeMap::keys).any(|joint| !slots[*joint as usize]);
-        let enough = |joint: u32| if has_flesh && slots[joint as usize] { CARRIED } else { HELD };
+        let is_carrier = |joint: u32| has_flesh && slots[joint as usize];
         let is_part = counts.iter().filter(|count| **count > 2).count() > 1;
+        let rings = rings::bearers(&self.of, counts.len(), places, bones);
         let mut rows: Vec<Option<Vec<(u32, f32)>>> = (sums.iter().zip(&counts).enumerate())
             .map(|(island, (sums, count))| {
+                if !is_part || *count < 3 || bends[island] {
+                    return None;
+                }
                 let whole: f32 = sums.values().sum();
                 let first = sums.iter().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)))?;
-                match *first.1 >= enough(*first.0) * whole {
-                    _ if !is_part || *count < 3 || bends[island] => None,
-                    true => Some(vec![(*first.0, 1.0)]),
-                    false if self.are_small(island) => {
+                let is_carried = is_carrier(*first.0) && *first.1 >= CARRIED * whole;
+                match rings[island] {
+                    Some(joint) if !is_carried => Some(vec![(joint, 1.0)]),
+                    _ if is_carried || *first.1 >= HELD * whole => Some(vec![(*first.0, 1.0)]),
+                    _ if self.are_small(island) => {
                         Some(sums.iter().map(|(joint, sum)| (*joint, sum / whole)).collect())
                     }
-                    false => None,
+                    _ => None,
                 }
             })
             .collect();

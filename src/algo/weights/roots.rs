@@ -96,11 +96,14 @@ impl Roots {
     }
 
     /// The joints of other subtrees that end a bone in the flesh which is shorter than the way from either of its ends to
-    /// the bones of the body. The feet of a figure whose legs end at the knees hang on the targets of these legs; bones of
-    /// handles inside of a foot lie beside the foot's own.
+    /// the bones of the body, and those without bones that lie in the flesh about as far beyond the last bone of a limb as it
+    /// is long. The feet of a figure whose legs end at the knees hang on the targets of these legs or on the root; bones of
+    /// handles inside of a foot lie beside the foot's own, and targets where the limb ends.
     fn apart(&self, joints: &[WeightJoint], top: &[usize], body: usize, sight: &Sight) -> Vec<usize> {
         /// Bones almost as near as the nearest one meet at one joint.
         const MEETING: f32 = 1e-3;
+        /// Share of the length of the bone that ends towards it which a joint without bones is farther away than.
+        const ALONE: f32 = 0.9;
         let of_body = |index: usize| {
             let head = joints[index].head;
             let above = joints[index].parent.filter(|&parent| top[parent] == body).map_or(head, |p| joints[p].head);
@@ -109,17 +112,35 @@ impl Roots {
         let bones: Vec<BoneSegment> = (0..joints.len()).filter(|&index| top[index] == body).map(of_body).collect();
         let tree = BoneTree::new(&bones);
         let mut near = Vec::new();
-        // The way to the body's bones; none where the nearest is so long that its own flesh reaches here.
-        let mut way = |place: Vec3| {
+        // The bones of the body nearest to a place, the way there and the length of the longest of them.
+        let mut nearest = |place: Vec3| -> (Vec<u32>, f32, f32) {
             tree.nearest(place, MEETING, |bone| closest_on(&bones[bone as usize], place).distance(place), &mut near);
             let lengths = near.iter().map(|&(_, bone)| bones[bone as usize].head.distance(bones[bone as usize].tail));
             let longest = lengths.fold(0f32, f32::max);
-            near.first().map_or(0.0, |nearest| if 2.0 * nearest.0 > longest { nearest.0 } else { 0.0 })
+            (near.iter().map(|&(_, bone)| bone).collect(), near.first().map_or(0.0, |nearest| nearest.0), longest)
         };
+        let mut has_child = vec![false; joints.len()];
+        for parent in joints.iter().filter_map(|joint| joint.parent) {
+            has_child[parent] = true;
+        }
         let is_apart = |index: &usize| {
-            let Some(parent) = joints[*index].parent.filter(|&parent| top[parent] == top[*index]) else { return false };
-            let (from, to) = (joints[parent].head, joints[*index].head);
+            let to = joints[*index].head;
+            let Some(parent) = joints[*index].parent.filter(|&parent| top[parent] == top[*index]) else {
+                let (ending, way, longest) = nearest(to);
+                let ends_towards = |bone: &u32| {
+                    let BoneSegment { tail, .. } = bones[*bone as usize];
+                    closest_on(&bones[*bone as usize], to).distance(tail) <= MEETING * longest
+                };
+                let is_beyond = way > ALONE * longest && ending.iter().all(ends_towards);
+                return !has_child[*index] && is_beyond && sight.encloses(to);
+            };
+            let from = joints[parent].head;
             let length = from.distance(to);
+            // No way where the nearest bone is so long that its own flesh reaches here.
+            let mut way = |place: Vec3| {
+                let (_, way, longest) = nearest(place);
+                if 2.0 * way > longest { way } else { 0.0 }
+            };
             length > 0.0 && way(from).min(way(to)) > length && sight.encloses(from) && sight.encloses(to)
         };
         let is_beside = |index: &usize| self.hangs_in_air[top[*index]] && top[*index] != body;

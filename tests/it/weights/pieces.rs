@@ -242,3 +242,60 @@ fn small_things_inside_of_flesh_move_with_one_joint() {
     assert_eq!(told(&tooth).map(|told| (told.joint, told.share)), Some((joint as usize, 1.0)));
     assert!(told(&button).is_some_and(|told| told.share < 0.8), "{:?}", report.stiff_pieces);
 }
+
+/// A foot of one joint that hangs on the root while the leg ends at the knee holds its flesh without being asked to claim it;
+/// a target of one joint beside the leg's own bones, or where the leg ends, holds nothing.
+#[test]
+fn lone_feet_hold_flesh_and_lone_targets_none() {
+    let (points, triangles) = tube();
+    let bound = |chain: [f32; 6], foot: f32| {
+        let mut joints = vec![joint([0.0, -6.0, 0.0], None)];
+        joints.extend(chain.iter().enumerate().map(|(above, x)| joint([*x, 0.0, 0.0], Some(above))));
+        joints.push(joint([foot, 0.0, 0.0], Some(0)));
+        let weights = bind(&points, &triangles, &joints).0;
+        check_sound(&weights, points.len(), &joints, 8);
+        weights
+    };
+    for foot in [3.2, 3.4] {
+        let weights = bound([0.1, 0.3, 0.5, 0.7, 0.9, 1.2], foot);
+        for (point, place) in points.iter().enumerate() {
+            let held = weight(&weights, point, 7);
+            assert!(place.x < 3.15 || held > 0.9, "{held} of the foot at {place}");
+            assert!(place.x > 1.25 || held < 0.1, "{held} of the leg at {place}");
+        }
+    }
+    for (chain, target) in [([0.1, 0.5, 1.2, 2.0, 3.0, 3.6], 3.3), ([0.1, 0.5, 1.0, 1.5, 2.0, 3.2], 3.6)] {
+        let weights = bound(chain, target);
+        assert!((0..points.len()).all(|point| weight(&weights, point, 7) == 0.0), "a target at {target}");
+    }
+}
+
+/// Rings around the second bone, from close behind the joint to close before the bone's end, move with it alone, and some
+/// around the first bone with that.
+#[test]
+fn rings_move_with_the_bone_inside_of_them() {
+    const SIDES: u32 = 12;
+    let (tube_points, tube_triangles) = tube();
+    for (place, bone) in [(1.7, 0), (1.9, 0), (2.1, 1), (2.2, 1), (2.4, 1), (3.0, 1), (3.6, 1)] {
+        let (mut points, mut triangles) = (tube_points.clone(), tube_triangles.clone());
+        let first = points.len();
+        for side in 0..SIDES {
+            let turn = glam::Quat::from_rotation_x(side as f32 * std::f32::consts::TAU / SIDES as f32);
+            for [x, y] in [[-0.06, 0.46], [-0.06, 0.56], [0.06, 0.56], [0.06, 0.46]] {
+                points.push(turn * Vec3::new(0.0, y, 0.0) + Vec3::X * (place + x));
+            }
+            for edge in 0..4 {
+                let at = |side: u32, edge: u32| first as u32 + side % SIDES * 4 + edge % 4;
+                let [a, b, c, d] = [at(side, edge), at(side, edge + 1), at(side + 1, edge + 1), at(side + 1, edge)];
+                triangles.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+        let (weights, report) = bind(&points, &triangles, &tube_joints());
+        check_sound(&weights, points.len(), &tube_joints(), 8);
+        for point in first..points.len() {
+            let row: Vec<(u32, f32)> = weights.of(point).collect();
+            assert_eq!(row, [(bone, 1.0)], "a ring at {place}");
+        }
+        assert_eq!(report.stiff, points.len() - first);
+    }
+}
