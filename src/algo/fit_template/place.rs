@@ -1,6 +1,7 @@
 //! Placement: the template's joints on the centre lines of their branches and in the sections of the trunk.
 
 mod legs;
+mod soles;
 mod trunk;
 
 use glam::{Quat, Vec3};
@@ -33,9 +34,13 @@ const WING_ROOT: f32 = 0.3;
 
 /// Place of the bones in a wing, as a share of the way from its centre line to its leading edge.
 const LEADING_EDGE: f32 = 0.4;
+/// Share at the shoulder, which carries the leading edge, and the part of the wing beside the trunk over which it falls to
+/// that of the rest.
+const SHOULDER_EDGE: f32 = 0.65;
+const SHOULDER: f32 = 0.15;
 
-/// Rounds in which the joints of an animal's limb move to its bends: a hock that moves up takes the knee along, and shows more of
-/// its own bend then.
+/// Rounds in which the joints of a limb of an animal on all fours move to its bends: a hock that moves up takes the knee
+/// along, and shows more of its own bend then.
 const ROUNDS: usize = 2;
 /// Share of the way from the crown to where the neck enters the head by which the head's joint lies inside of the head.
 const IN_SKULL: f32 = 0.1;
@@ -74,7 +79,7 @@ pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, h
         places[joint] = Some(place);
     }
     work.standing = work.standing_scale(&places);
-    for (limb, line) in template.limbs.iter().zip(&work.lines) {
+    for ((limb, line), leaf) in template.limbs.iter().zip(&work.lines).zip(&hypothesis.leaves) {
         let Some(line) = line else {
             for &joint in &limb.joints {
                 reasons[joint] = FitReason::NoLimb;
@@ -93,6 +98,7 @@ pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, h
         }
         work.hold_bends(limb, line, &lengths, &mut places);
         work.keep_over_foot(limb, line, &lengths, &mut places);
+        work.stand_on_sole(limb, *leaf, &mut places);
     }
     Placement { places: follow(template, &stretch, &places), reasons, strain, along: along_limb }
 }
@@ -116,7 +122,9 @@ fn leading_edge(line: CentreLine, leaf: usize, tree: &Tree, graph: &VoxelGraph, 
         // Sections beside the body and at the tip hold little of the wing.
         let around = shifts.get(at.saturating_sub(3)..(at + 4).min(shifts.len())).unwrap_or_default();
         let mean = around.iter().sum::<f32>() / around.len().max(1) as f32;
-        *place + forward * (LEADING_EDGE * if around.is_empty() { last } else { mean })
+        let shoulder = 1.0 - (1.0 - at as f32 / line.free_count.max(1) as f32) / SHOULDER;
+        let edge = LEADING_EDGE + (SHOULDER_EDGE - LEADING_EDGE) * shoulder.clamp(0.0, 1.0);
+        *place + forward * (edge * if around.is_empty() { last } else { mean })
     });
     let shifted = shifted.collect();
     line.along(shifted)
@@ -211,7 +219,8 @@ impl Work<'_> {
                 *length = whole * ratio * (1.0 - share);
             }
         } else {
-            for _ in 0..if self.template.is_upright() { 1 } else { ROUNDS } {
+            self.hide_knee(limb, line, &mut lengths);
+            for _ in 0..if self.template.is_on_fours() { ROUNDS } else { 1 } {
                 self.bend(limb, line, &mut lengths, root);
             }
         }

@@ -12,6 +12,8 @@ use crate::algo::fit_template::{
 /// a joint takes there.
 const HIDDEN: f32 = 0.5;
 const SHAPED: f32 = 0.75;
+/// Place of a knee that the trunk hides, as a share of the way from where its leg leaves the trunk to the hip.
+const HIDDEN_KNEE: f32 = 0.5;
 /// Share of a leg's free length at which its distance from the plane of symmetry is taken, the share by which its root
 /// follows it, and the cosine of its angle to up from which on it hangs straight down; an animal's leg that steps forward or
 /// back has that cosine to the plane of symmetry.
@@ -21,12 +23,33 @@ const HANGS: f32 = 0.85;
 const STEPS: f32 = 0.42;
 
 impl Work<'_> {
+    /// Moves the knee of an animal on two legs into the trunk: the thighs of birds lie along the body, and what bends where it
+    /// can be seen is the hock. The joints below it lie closer together or further apart.
+    pub(super) fn hide_knee(&self, limb: &Limb, line: &CentreLine, lengths: &mut [f32]) {
+        if !self.has_hidden_knee(limb) {
+            return;
+        }
+        let [hip, knee, hock, foot, ..] = lengths else { return };
+        let hidden = line.free + HIDDEN_KNEE * (*hip - line.free);
+        if hidden > *knee && *knee > *foot && hidden < *hip {
+            *hock = *foot + (*hock - *foot) * (hidden - *foot) / (*knee - *foot);
+            *knee = hidden;
+        }
+    }
+
+    /// True for a leg of an animal that walks on two with a hock below its knee.
+    fn has_hidden_knee(&self, limb: &Limb) -> bool {
+        let template = self.template;
+        limb.kind == LimbKind::Leg && !template.is_upright() && !template.is_on_fours() && limb.joints.len() > 3
+    }
+
     /// Draws the joints of an animal's leg that lie where the leg runs into the trunk to the shape that the template has
     /// between their neighbours: the flesh about a knee hides its bend.
     pub(super) fn hold_bends(&self, limb: &Limb, line: &CentreLine, lengths: &[f32], places: &mut [Option<Vec3>]) {
         if limb.kind != LimbKind::Leg || self.template.is_upright() {
             return;
         }
+        let has_hidden_knee = self.has_hidden_knee(limb);
         for (joints, length) in limb.joints.windows(3).zip(lengths.iter().skip(1)) {
             let near = length / line.free.max(1e-9);
             let [before, here, after] = [joints[0], joints[1], joints[2]];
@@ -39,6 +62,8 @@ impl Work<'_> {
             let share = (at - from).dot(chord) / chord.length_squared().max(1e-12);
             let out = at - from - chord * share;
             let way = b - a;
+            // What the trunk hides of a leg is no part of the template's proportions.
+            let share = if has_hidden_knee { (c - a).dot(way) / way.length_squared().max(1e-12) } else { share };
             let side = self.stretch.turn(out);
             let side = (side - way * side.dot(way) / way.length_squared().max(1e-12)).normalize_or_zero();
             let shaped = a + way * share + side * (out.length() / chord.length().max(1e-9) * way.length());

@@ -1,0 +1,56 @@
+//! Soles: feet of animals that walk on all of the foot, as bears do.
+
+use glam::Vec3;
+
+use super::Work;
+use crate::algo::fit_template::limbs::{Limb, LimbKind};
+
+/// Height of the part of a leg that stands on the ground, as a share of the height of the trunk's joint over it.
+const SOLE: f32 = 0.1;
+/// Length of a foot, as a share of that height, from which on it begins to be a sole, and from which on it is one. Paws and
+/// hooves are shorter.
+const PAW: f32 = 0.33;
+const WHOLE_SOLE: f32 = 0.42;
+/// Length of a block over the standard deviation of places in it.
+const BLOCK: f32 = 3.464;
+/// Places of the ankle, the ball and the toes, as shares of the foot's length from the heel and over the ground.
+const FOOT: [(f32, f32); 3] = [(0.25, 0.25), (0.6, 0.12), (0.85, 0.08)];
+/// Fewest cells of a foot.
+const CELLS: usize = 12;
+
+impl Work<'_> {
+    /// Draws ankle, ball and toes of an animal's leg down to a foot that is long for the leg: animals that walk on their toes
+    /// have short feet and hocks high above them. The knee follows by its share of the way.
+    pub(super) fn stand_on_sole(&self, limb: &Limb, leaf: Option<usize>, places: &mut [Option<Vec3>]) {
+        let [.., hip, knee, ankle, ball, toes] = *limb.joints.as_slice() else { return };
+        if limb.kind != LimbKind::Leg || !self.template.is_on_fours() {
+            return;
+        }
+        let (Some(leaf), Some(attach)) = (leaf, places[limb.attach]) else { return };
+        let turn = self.hypothesis.alignment.rotation;
+        let (left, up, forward) = (turn * Vec3::X, turn * Vec3::Y, turn * Vec3::Z);
+        let arc_of = &self.tree.branches.arc_of;
+        let nodes = (0..self.graph.len()).filter(|&node| arc_of[node] as usize == leaf);
+        let leg: Vec<Vec3> = nodes.map(|node| self.graph.centres[node]).collect();
+        let ground = leg.iter().map(|place| place.dot(up)).fold(f32::INFINITY, f32::min) - 0.5 * self.graph.cell;
+        let tall = attach.dot(up) - ground;
+        let foot: Vec<Vec3> = leg.iter().copied().filter(|place| place.dot(up) - ground < SOLE * tall).collect();
+        if foot.len() < CELLS {
+            return;
+        }
+        let middle = foot.iter().sum::<Vec3>() / foot.len() as f32;
+        let variance = foot.iter().map(|place| (*place - middle).dot(forward)).map(|away| away * away).sum::<f32>();
+        let length = BLOCK * (variance / foot.len() as f32).sqrt();
+        let share = ((length / tall - PAW) / (WHOLE_SOLE - PAW)).clamp(0.0, 1.0);
+        let (Some(above), Some(bend), Some(before)) = (places[hip], places[knee], places[ankle]) else { return };
+        let back = middle.dot(forward) - 0.5 * length;
+        for (joint, (along, high)) in [ankle, ball, toes].into_iter().zip(FOOT) {
+            let on_sole = left * middle.dot(left) + up * (ground + high * length) + forward * (back + along * length);
+            places[joint] = places[joint].map(|place| place.lerp(on_sole, share));
+        }
+        let moved = places[ankle].unwrap_or(before) - before;
+        let way = before - above;
+        let part = ((bend - above).dot(way) / way.length_squared().max(1e-12)).clamp(0.0, 1.0);
+        places[knee] = Some(bend + moved * part);
+    }
+}
