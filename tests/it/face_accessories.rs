@@ -8,6 +8,7 @@ use rigsmith::{
         auto::{AutoFace, AutoSettings, FaceAnalysis},
         expression::ExpressionSet,
         landmarks::Landmarks,
+        shells::ShellKind,
     },
     mesh::model::Weights,
 };
@@ -182,4 +183,112 @@ fn lashes_and_brows_go_with_the_skin() {
         let held = least(&face.weights, middle..middle + 1, HEAD);
         assert!(held < 0.5, "the middle of the {name} follows the head by {held}");
     }
+}
+
+/// Adds a sheet of two layers through a grid of places, as thin as `thickness`; returns its points.
+fn add_sheet((points, triangles): &mut heads::Mesh, rows: &[Vec<Vec3>], thickness: Vec3) -> Range<usize> {
+    let first = points.len() as u32;
+    let width = rows[0].len() as u32;
+    let layer = width * rows.len() as u32;
+    points.extend(rows.iter().flatten());
+    points.extend(rows.iter().flatten().map(|place| *place + thickness));
+    for row in 0..rows.len() as u32 - 1 {
+        for column in 0..width - 1 {
+            let at = first + row * width + column;
+            let [a, b, c, d] = [at, at + 1, at + width + 1, at + width];
+            triangles.extend([
+                [a, b, c],
+                [a, c, d],
+                [a + layer, c + layer, b + layer],
+                [a + layer, d + layer, c + layer],
+            ]);
+        }
+    }
+    let corners = [0, layer].map(|layer| [first + layer, first + layer + 1]);
+    triangles.extend([[corners[0][0], corners[1][0], corners[0][1]], [corners[0][1], corners[1][0], corners[1][1]]]);
+    first as usize..points.len()
+}
+
+/// Adds a dome of felt over the skull with a brim around it; returns its points.
+fn add_hat(mesh: &mut heads::Mesh, marks: &Landmarks, brim: f32, rise: f32) -> Range<usize> {
+    let e = marks.eye_distance();
+    let base = marks.points[19].y + 0.35 * e;
+    let around = mesh.0.iter().filter(|point| (point.y - base).abs() < 0.15 * e);
+    let (low, high) = around.fold((Vec3::MAX, Vec3::MIN), |(low, high), point| (low.min(*point), high.max(*point)));
+    let top = mesh.0.iter().map(|point| point.y).fold(f32::MIN, f32::max) + rise * e;
+    let (middle, radii) = (0.5 * (low + high), 0.5 * (high - low) + 0.05 * e);
+    let ring = |share: f32, y: f32| -> Vec<Vec3> {
+        let at = |step: u8| {
+            let (sin, cos) = (TAU * f32::from(step) / 36.0).sin_cos();
+            Vec3::new(middle.x + share * radii.x * cos, y, middle.z + share * radii.z * sin)
+        };
+        (0..=36).map(at).collect()
+    };
+    let edge = [brim, 0.5 * (1.0 + brim)].map(|share| ring(share, base));
+    let dome = (0..=10_u8).map(|step| {
+        let (sin, cos) = (0.25 * TAU * f32::from(step) / 10.0).sin_cos();
+        ring(cos.max(0.0).powf(0.7), base + (top - base) * sin)
+    });
+    let rows: Vec<Vec<Vec3>> = edge.into_iter().chain(dome).collect();
+    add_sheet(mesh, &rows, 0.02 * e * Vec3::Y)
+}
+
+/// Adds dark glass in front of the skin, between two shares of the face's width from its middle; returns its points.
+fn add_glass(mesh: &mut heads::Mesh, marks: &Landmarks, [from, to]: [f32; 2], gap: f32) -> Range<usize> {
+    let e = marks.eye_distance();
+    let width = (marks.points[0].x - marks.points[16].x).abs();
+    let eyes = 0.5 * (marks.eye_center(true) + marks.eye_center(false));
+    let row = |row: u8| {
+        let y = eyes.y + e * (0.22 - 0.44 * f32::from(row) / 8.0);
+        let at = |column: u8| marks.middle + width * (from + (to - from) * f32::from(column) / 24.0);
+        (0..=24).map(|column| front(mesh, Vec3::new(at(column), y, eyes.z - e), 0.12 * e) + gap * e * Vec3::Z).collect()
+    };
+    let rows: Vec<Vec<Vec3>> = (0..=8).map(row).collect();
+    add_sheet(mesh, &rows, 0.02 * e * Vec3::Z)
+}
+
+/// Hats with brims and dark glasses, as large as pieces of skin, are no skin: the landmarks under them are those of the bare head,
+/// and they follow the head alone.
+#[test]
+fn hats_and_sunglasses_are_no_skin() {
+    let mut wrong = Vec::new();
+    for (head, bare) in heads::bundled_and("ict_identity_3") {
+        let marks = analysed(&bare).0.landmarks;
+        let e = marks.eye_distance();
+        let worn = |parts: &dyn Fn(&mut heads::Mesh) -> Vec<Range<usize>>| {
+            let mut mesh = bare.clone();
+            let parts = parts(&mut mesh);
+            (mesh, parts)
+        };
+        let cases = [
+            ("cap", worn(&|mesh| vec![add_hat(mesh, &marks, 1.1, 0.05)])),
+            ("hat", worn(&|mesh| vec![add_hat(mesh, &marks, 1.5, 0.2)])),
+            ("sombrero", worn(&|mesh| vec![add_hat(mesh, &marks, 2.0, 0.3)])),
+            ("glasses", worn(&|mesh| vec![add_glass(mesh, &marks, [-0.4, 0.4], 0.06)])),
+            ("close glasses", worn(&|mesh| vec![add_glass(mesh, &marks, [-0.4, 0.4], 0.01)])),
+            ("small glasses", worn(&|mesh| vec![add_glass(mesh, &marks, [-0.2, 0.2], 0.04)])),
+            (
+                "two lenses",
+                worn(&|mesh| [[-0.42, -0.05], [0.05, 0.42]].map(|at| add_glass(mesh, &marks, at, 0.05)).into()),
+            ),
+            (
+                "close lenses",
+                worn(&|mesh| [[-0.42, -0.05], [0.05, 0.42]].map(|at| add_glass(mesh, &marks, at, 0.01)).into()),
+            ),
+        ];
+        for (name, (mesh, parts)) in cases {
+            let (analysis, face) = analysed(&mesh);
+            let own = analysis.landmarks.points.iter().zip(&marks.points);
+            let off = own.map(|(found, bare)| found.distance(*bare)).fold(0.0, f32::max) / e;
+            let is_skin = parts.iter().any(|points| analysis.shells.kind(points.start) == ShellKind::Skin);
+            let held = parts.into_iter().map(|points| least(&face.weights, points, HEAD)).fold(1.0, f32::min);
+            println!("{head}, {name}: skin {is_skin}, follows the head by {held:.3}, landmarks off by {off:.4}");
+            if is_skin || held < 0.999 || off > 0.01 {
+                wrong.push(format!(
+                    "{head}, {name}: skin {is_skin}, follows the head by {held}, landmarks off by {off}"
+                ));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -6,7 +6,7 @@ use rigsmith::{
         bones::{
             FaceBone, FaceBoneKind, FaceBones, FaceBonesError, FaceBonesSettings, FixedBone, Region, Side, place_bones,
         },
-        grouping::{HeadGroup, HeadGroups, group_head},
+        grouping::{HeadGroup, HeadGroups, group_head, visible_mask},
         landmarks::{Landmarks, find_landmarks},
         shells::{ShellKind, Shells, find_shells},
         weights::face_weights,
@@ -32,6 +32,7 @@ impl Head {
             depth: Default::default(),
             groups: 3,
             of: vec![HeadGroup::Face; points.len()],
+            visible: visible_mask(&points, &triangles, &mask, &landmarks),
             mask,
             upper_mean: Vec3::new(0.0, 5.0, 0.0),
             lower_mean: Vec3::new(0.0, -12.0, -2.0),
@@ -229,9 +230,9 @@ fn bad_input_is_told() {
     let mut head = Head::sphere();
     assert_eq!(head.place(&[], &settings(0)), Err(FaceBonesError::NoBones));
     assert!(matches!(head.place(&[], &settings(100_000)), Err(FaceBonesError::TooManyBones { .. })));
-    head.groups.mask.fill(false);
+    head.groups.visible.fill(false);
     assert_eq!(head.place(&[], &settings(5)), Err(FaceBonesError::EmptyMask));
-    head.groups.mask.clear();
+    head.groups.visible.clear();
     assert_eq!(head.place(&[], &settings(5)), Err(FaceBonesError::EmptyMask));
     check_weights(&head, &head.weigh(&[]), 2);
     head.triangles.push([0, 1, 1_000_000]);

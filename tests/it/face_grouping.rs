@@ -83,9 +83,12 @@ impl AnalyzedHead {
         }
     }
 
-    /// No mask in the back, below the jaw or on eyes.
+    /// No mask in the back, below the jaw or on eyes, and some of it visible.
     fn check_mask(&self, name: &str) {
         assert!(self.groups.mask.contains(&true), "{name}");
+        let HeadGroups { mask, visible, .. } = &self.groups;
+        assert!(visible.contains(&true) && visible.len() == mask.len(), "{name}");
+        assert!(visible.iter().zip(mask).all(|(visible, mask)| *mask || !*visible), "{name}: visible beside the mask");
         for (point, _) in self.groups.mask.iter().enumerate().filter(|(_, mask)| **mask) {
             assert_eq!(self.groups.of[point], HeadGroup::Face, "{name}: {point}");
             assert_eq!(self.shells.kind(point), ShellKind::Skin, "{name}: {point}");

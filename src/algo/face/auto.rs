@@ -370,10 +370,25 @@ const CLEAR: f32 = 0.5;
 
 /// Finds the shells of a head and its landmarks.
 ///
-/// Balls that are no eyes, such as buns of hair, mislead the search for landmarks. Where they are not behind the lids, or no
-/// face is clear with them, the face is searched without them, and the eyes on that face.
+/// Hats and sunglasses that are as large as skin hide the face: where parts are worn over the skin, the face is searched without
+/// them, and with them only if none is clear.
 fn find_features(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Shells, Landmarks), LandmarkError> {
     let shells = find_shells(points, triangles);
+    let Some(bare) = shells.without_worn(points, triangles) else { return find_face(points, triangles, shells) };
+    let bare = find_face(points, triangles, bare);
+    if bare.as_ref().is_ok_and(|(_, landmarks)| landmarks.confidence >= CLEAR) {
+        return bare;
+    }
+    let dressed = find_face(points, triangles, shells);
+    let confidence = |face: &Result<(Shells, Landmarks), _>| face.as_ref().map_or(-1.0, |(_, marks)| marks.confidence);
+    if confidence(&bare) > confidence(&dressed) { bare } else { dressed }
+}
+
+/// Finds the landmarks of a head whose shells are known.
+///
+/// Balls that are no eyes, such as buns of hair, mislead the search for landmarks. Where they are not behind the lids, or no
+/// face is clear with them, the face is searched without them, and the eyes on that face.
+fn find_face(points: &[Vec3], triangles: &[[u32; 3]], shells: Shells) -> Result<(Shells, Landmarks), LandmarkError> {
     let landmarks = find_landmarks(points, triangles, &shells)?;
     let is_clear = landmarks.confidence >= CLEAR;
     if !shells.has_eyes() || (is_clear && shells.are_eyes_on_face(points, &landmarks)) {

@@ -8,7 +8,7 @@
 mod extras;
 pub(crate) mod map;
 mod name;
-pub(crate) mod sample;
+mod sample;
 mod spread;
 
 use glam::Vec3;
@@ -220,7 +220,7 @@ pub fn place_bones(
 ) -> Result<FaceBones, FaceBonesError> {
     check(points, triangles, fixed, settings)?;
     let map = FaceMap::new(landmarks, settings.symmetric, extent(points));
-    let seen = sample::visible_mask(points, triangles, shells, groups, map.scale);
+    let seen = &groups.visible;
     let vertices = seen.iter().filter(|&&s| s).count();
     if vertices == 0 {
         return Err(FaceBonesError::EmptyMask);
@@ -231,7 +231,7 @@ pub fn place_bones(
     if settings.bones > MOST_BONES {
         return Err(FaceBonesError::AboveMost { bones: settings.bones });
     }
-    let patches = sample::patches(points, triangles, &seen, &map, group_of, PARTS.len());
+    let patches = sample::patches(points, triangles, seen, &map, group_of, PARTS.len());
     let on_skin: Vec<FixedPlace> = fixed
         .iter()
         .enumerate()
@@ -247,11 +247,11 @@ pub fn place_bones(
     let mut seats = spread(&mut spreader, &patches, &on_skin)?;
     let rounds = spreader.rounds;
     let parts: Vec<Part> = seats.iter().map(|s| part_of(s, &map)).collect();
-    drop_onto_skin(&mut seats, points, triangles, &seen, &map, landmarks.symmetric && settings.symmetric);
+    drop_onto_skin(&mut seats, points, triangles, seen, &map, landmarks.symmetric && settings.symmetric);
     let mut bones = name::name(&seats, &parts, &map);
     let square_error = points
         .iter()
-        .zip(&seen)
+        .zip(seen)
         .filter(|(_, seen)| **seen)
         .map(|(p, _)| f64::from(bones.iter().map(|b| b.position.distance_squared(*p)).fold(f32::INFINITY, f32::min)))
         .sum();

@@ -18,6 +18,9 @@ use crate::algo::linkage::{Dendrogram, LinkageError, average_linkage_1d};
 
 mod jaw;
 mod spread;
+mod visible;
+
+pub use visible::visible_mask;
 
 /// A part of the head by depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +44,8 @@ pub struct HeadGroups {
     pub of: Vec<HeadGroup>,
     /// Marks points of the facial mask: skin of the face group without the neck.
     pub mask: Vec<bool>,
+    /// Marks points of the mask that are visible from the front, not the walls of mouth, nose and sockets.
+    pub visible: Vec<bool>,
     /// Mean of the upper half of the middle group.
     pub upper_mean: Vec3,
     /// Mean of the lower half of the middle group.
@@ -138,8 +143,9 @@ pub fn group_head(
     }
     let chin = jaw.chin();
     let [upper_mean, lower_mean] = heights(points, triangles, shells, &of, landmarks, chin)?;
+    let visible = visible_mask(points, triangles, &mask, landmarks);
     progress(1.0);
-    Ok(HeadGroups { depth, groups: cut.groups, of, mask, upper_mean, lower_mean, chin })
+    Ok(HeadGroups { depth, groups: cut.groups, of, mask, visible, upper_mean, lower_mean, chin })
 }
 
 /// Borders of the merge history, last merge first: a cut into k groups uses the first k - 1 borders, and each group

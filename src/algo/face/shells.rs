@@ -11,6 +11,7 @@ use crate::mesh::adjacency;
 mod eyes;
 mod tongue;
 mod visibility;
+mod worn;
 
 pub use tongue::MouthName;
 

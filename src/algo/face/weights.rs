@@ -16,7 +16,7 @@ mod tooth_rows;
 use glam::Vec3;
 
 use super::{
-    bones::{FaceBone, FaceBoneKind, Side, extent, map::FaceMap, sample::visible_mask},
+    bones::{FaceBone, FaceBoneKind, Side, extent, map::FaceMap},
     grouping::HeadGroups,
     landmarks::Landmarks,
     shells::{ShellKind, Shells},
@@ -124,7 +124,6 @@ pub fn face_weights(
     }
     let (welded, count) = weld(points);
     let map = FaceMap::new(landmarks, landmarks.symmetric, extent(points));
-    let seen = visible_mask(points, triangles, shells, groups, map.scale);
     let mut places = vec![Vec3::ZERO; count];
     let (mut skin, mut mask) = (vec![false; count], vec![false; count]);
     let mut shell = vec![u32::MAX; count];
@@ -132,7 +131,7 @@ pub fn face_weights(
     for (i, &v) in welded.iter().enumerate() {
         let v = v as usize;
         places[v] = points[i];
-        mask[v] |= seen.get(i).copied().unwrap_or(false);
+        mask[v] |= groups.visible.get(i).copied().unwrap_or(false);
         if !skin[v] {
             kinds[v] = shells.kind(i);
             skin[v] = kinds[v] == ShellKind::Skin;

@@ -51,6 +51,17 @@ pub(crate) struct FaceMap {
     pub trusted: bool,
 }
 
+/// True for landmarks that are finite, with a distance between the eyes.
+fn is_sound(landmarks: &Landmarks) -> bool {
+    let distance = landmarks.eye_distance();
+    landmarks.points.iter().all(|p| p.is_finite()) && distance > 0.0 && distance.is_finite()
+}
+
+/// The distance of the outer corners of the eyes; without sound landmarks `size`, which replaces it.
+pub(crate) fn scale(landmarks: &Landmarks, size: f32) -> f32 {
+    if is_sound(landmarks) { landmarks.eye_distance() } else { size.max(f32::MIN_POSITIVE) }
+}
+
 impl FaceMap {
     /// Makes the map of landmarks; `symmetric` makes both halves their mean. `size` replaces a missing distance of the
     /// eyes.
@@ -81,12 +92,8 @@ impl FaceMap {
         if symmetric {
             left.meet(&mut right);
         }
-        let distance = landmarks.eye_distance();
-        let finite = landmarks.points.iter().all(|p| p.is_finite());
-        let sound = finite && distance > 0.0 && distance.is_finite();
-        let scale = if sound { distance } else { size.max(f32::MIN_POSITIVE) };
-        let trusted = sound && landmarks.confidence >= TRUSTED;
-        Self { halves: [left, right], middle, scale, trusted }
+        let trusted = is_sound(landmarks) && landmarks.confidence >= TRUSTED;
+        Self { halves: [left, right], middle, scale: scale(landmarks, size), trusted }
     }
 
     /// The half at a place, and the place in the half's coordinates.

@@ -23,6 +23,8 @@ const SECTIONS: usize = 12;
 const TOUCHING: usize = 6;
 /// Least distance of a lens's frame from the lids, on whose rims lashes stand.
 const OFF_LIDS: f32 = 0.08;
+/// Distance from the middle of an eye, as seen from the front, at which a vertex is over the eye; rims of lids are further away.
+const OVER_EYE: f32 = 0.05;
 /// Number of directions from the middle of an eye, and the least number of those in which a frame is off the lids.
 const DIRECTIONS: usize = 12;
 const CLEAR: usize = 8;
@@ -55,13 +57,15 @@ pub(super) fn is_frame(face: &Face, members: &[usize], is_touching: impl Fn(usiz
     is_across || held * SECTIONS < TOUCHING * filled || is_around_eye(face, members, [low, high], &is_touching)
 }
 
-/// True for a shell that goes around an eye off its lids, such as a monocle, even one that brow and cheek hold; paint around
-/// an eye lies on the skin everywhere.
+/// True for a shell that goes around an eye off its lids, such as a monocle, even one that brow and cheek hold, and for one that
+/// covers the eye and reaches beyond the lids, such as dark glass; paint around an eye lies on the skin everywhere.
 fn is_around_eye(face: &Face, members: &[usize], [low, high]: [Vec3; 2], is_touching: impl Fn(usize) -> bool) -> bool {
     let (middle, reach) = (face.map.middle, OFF_LIDS * face.map.scale);
     let (half, _) = face.map.fold(0.5 * (low + high));
     let (eye, side) = (half.eye(), if low.x + high.x < 2.0 * middle { -1.0 } else { 1.0 });
     let mut nearest = [f32::INFINITY; DIRECTIONS];
+    let mut furthest = [0.0_f32; DIRECTIONS];
+    let mut covers = false;
     for &v in members {
         let at = face.places[v];
         let at = at.with_x(side * (at.x - middle));
@@ -69,11 +73,14 @@ fn is_around_eye(face: &Face, members: &[usize], [low, high]: [Vec3; 2], is_touc
         let direction = ((turn * DIRECTIONS as f32) as usize).min(DIRECTIONS - 1);
         let distance = line_distance(&half.upper_lid, at).min(line_distance(&half.lower_lid, at));
         nearest[direction] = nearest[direction].min(distance);
+        furthest[direction] = furthest[direction].max(distance);
+        covers |= at.truncate().distance(eye.truncate()) < OVER_EYE * face.map.scale;
     }
     let is_whole = nearest.iter().all(|distance| distance.is_finite());
-    let clear = nearest.iter().filter(|distance| **distance > reach).count();
+    let off_lids =
+        |distances: [f32; DIRECTIONS]| distances.iter().filter(|distance| **distance > reach).count() >= CLEAR;
     let touching = (0..members.len()).filter(|&at| is_touching(at)).count();
-    is_whole && clear >= CLEAR && 10 * touching < 9 * members.len()
+    is_whole && (off_lids(nearest) && 10 * touching < 9 * members.len() || covers && off_lids(furthest))
 }
 
 /// Number of edges of a shell.
