@@ -257,6 +257,17 @@ fn a_chain_that_crosses_the_middle_has_one_side() {
     assert_eq!(found, ["arm_r_1", "arm_r_2", "arm_r_3", "finger_l_1", "finger_l_2"]);
 }
 
+/// Clicks that miss the middle by less than a pixel are in the middle; small things beside it are not.
+#[test]
+fn clicks_beside_the_middle_by_less_than_a_pixel_have_no_side() {
+    let mut bench = Workbench::new(7, "names");
+    chain(&mut bench, &[[0.0015, 1.0, 0.0], [-0.002, 1.2, 0.0], [0.0018, 1.4, 0.0]], None);
+    chain(&mut bench, &[[0.004, 0.0, 0.1], [0.004, 0.05, 0.1], [0.004, 0.1, 0.1]], None);
+    let found = labels(&bench);
+    let sides: Vec<bool> = found.iter().map(|label| label.contains("_l_") || label.contains("_r_")).collect();
+    assert_eq!(sides, [false, false, false, true, true, true], "{found:?}");
+}
+
 /// Labels that are there already may end with any number and hold any name.
 #[test]
 fn names_go_around_what_is_there() {

@@ -489,3 +489,19 @@ fn commands_that_are_off_are_counted_apart() {
     desk.frames(2);
     assert!(!desk.says("2 off") && desk.says("0 of 3"), "{:?}", desk.seen);
 }
+
+/// What commands made has no properties of its own: the panel says where its values are.
+#[test]
+fn properties_say_where_the_values_of_controls_are() {
+    let mut desk = Desk::new(PropertiesPanel::default());
+    let entity = desk.rig;
+    desk.app.world_mut().entity_mut(entity).insert(crate::bench::shipped("biped"));
+    desk.app.world_mut().write_message(BuildRequest { rig: entity, step: BuildStep::All });
+    desk.frames(4);
+    let built = desk.app.world().get::<BuildResult>(entity).unwrap().0.clone();
+    let made = built.nodes.iter().find(|node| desk.rig().joint(node.uid).is_none()).unwrap().uid;
+    desk.app.world_mut().get_mut::<Selection>(entity).unwrap().0 = vec![made];
+    desk.frames(2);
+    let hint = "Commands made what is selected. Controls has the values of controls, Tags the commands of joints.";
+    assert!(desk.says(hint));
+}

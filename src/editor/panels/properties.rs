@@ -59,7 +59,13 @@ impl EditorPanel for PropertiesPanel {
         self.values.refresh(&shown);
         self.keep_label(&shown, requests);
         if self.values.joints.is_empty() {
-            return list::nothing(ui, "Select a joint to see its properties.");
+            let is_made = !shown.selection.0.is_empty();
+            let hint = if is_made {
+                "Commands made what is selected. Controls has the values of controls, Tags the commands of joints."
+            } else {
+                "Select a joint to see its properties."
+            };
+            return list::nothing(ui, hint);
         }
         ScrollArea::vertical().id_salt("properties").auto_shrink(false).show(ui, |ui| {
             if self.values.joints.len() > 1 {

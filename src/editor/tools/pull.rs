@@ -113,13 +113,16 @@ fn aim(
     tool.aims = found.into_iter().filter_map(|(at, node)| Some((at, node?))).collect();
 }
 
-/// The control whose outline is at a pixel, or the joint there if it is nearer: outlines of fingers pass over the joint of the
-/// hand, and a press on that joint means the hand.
+/// Distances that a hand does not tell apart, in pixels.
+const SAME: f32 = 1.0;
+
+/// The control whose outline is at a pixel, or the joint there unless it is farther: outlines of fingers pass over the joint of
+/// the hand, and a press on that joint means the hand.
 fn node_at(scene: &Scene, controls: &DrawnControls, at: Vec2) -> Option<Uid> {
     let (rig, sight) = (scene.rig()?, scene.sight()?);
     let control = controls.nearest(&rig, &sight, at);
     let joint = nearest_joint(scene, &rig, &sight, at);
-    let is_joint = |(_, far): (Uid, f32)| joint.is_some_and(|(_, distance)| distance < far);
+    let is_joint = |(_, far): (Uid, f32)| joint.is_some_and(|(_, distance)| distance < far + SAME);
     let found = if control.is_none_or(is_joint) { joint } else { control };
     found.map(|(node, _)| node)
 }

@@ -14,6 +14,9 @@ use crate::rig::{
 /// Least share of a chain's extent that its rise or fall has to be, to be a chain that goes up or down.
 const STEEP: f32 = 0.6;
 
+/// A pixel of a view of a whole character, in parts of the distance from the ground in the middle of it.
+const PIXEL: f32 = 0.002;
+
 /// Place along the trunk, from 0 at its start to 1 at its end, below which legs begin; arms begin above it.
 const HIP: f32 = 0.35;
 
@@ -81,10 +84,11 @@ fn side_ending(position: Vec3, plane: Option<&MirrorPlane>) -> &'static str {
     }
 }
 
-/// Side of a place: 1 left (towards +X), -1 right, 0 on the plane between them.
+/// Side of a place: 1 left (towards +X), -1 right, 0 on the plane between them. Without a plane of symmetry a place is in the
+/// middle that is as near to it as a pixel of a view of the whole character.
 fn side(position: Vec3, plane: Option<&MirrorPlane>) -> i32 {
     let across = plane.map_or(position.x, |plane| plane.distance(position));
-    let tolerance = plane.map_or(1e-4, |plane| plane.tolerance);
+    let tolerance = plane.map_or((PIXEL * position.length()).max(1e-4), |plane| plane.tolerance);
     i32::from(across > tolerance) - i32::from(across < -tolerance)
 }
 

@@ -218,7 +218,7 @@ fn curves_of_controls_have_the_names_of_controls() {
     let built = desk.app.world().get::<BuildResult>(entity).unwrap().0.clone();
     let hand = built.nodes.iter().find(|node| &*node.name == "hand_ik_l").unwrap();
     assert_ne!(hand.label.as_deref(), Some("hand_ik_l"));
-    desk.select(&[hand.uid]);
+    desk.app.world_mut().get_mut::<Selection>(entity).unwrap().0 = vec![hand.uid];
     act(&mut desk, TimelineAction::Key);
     desk.frames(2);
     let told = |name: &str| desk.says(&format!("{name} translation X"));
