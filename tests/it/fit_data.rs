@@ -136,6 +136,26 @@ fn doubt_is_honest() {
     assert!(told as f32 >= 0.5 * doubtful as f32, "{told} of {doubtful}");
 }
 
+/// Joints of a tail share out its length, and are doubtful. Hocks are not where legs bend as the template's do.
+#[test]
+fn tails_are_doubted_and_hocks_that_show_are_not() {
+    let Some(all) = all() else { return };
+    let (mut tails, mut hocks) = (0, 0);
+    for FittedFigure { figure, fit } in all.iter().filter(|fitted| fitted.figure.template != "biped") {
+        for (joint, label) in fit.joints.iter().zip(labels(figure.template)) {
+            if label.starts_with("tail_") && figure.template == "quadruped" {
+                assert!(joint.confidence < 0.5, "{}: {label} {}", figure.name, joint.confidence);
+                tails += 1;
+            }
+            if label.starts_with("metatarsus_") && figure.name == "creatures/bird-eagle.glb" {
+                assert!(joint.confidence >= 0.5, "{}: {label} {}", figure.name, joint.confidence);
+                hocks += 1;
+            }
+        }
+    }
+    assert_eq!((tails, hocks), (12, 2), "two foxes and an eagle");
+}
+
 /// Every joint lies in its own limb or finger: the nearest point of the skin is painted with the joint's bone, or with the
 /// one above or below it.
 #[test]

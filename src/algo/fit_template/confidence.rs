@@ -1,7 +1,10 @@
 //! Confidence: how far a fit is to be trusted, joint by joint and as a whole.
 
+mod evidence;
+
 use glam::Vec3;
 
+use self::evidence::Evidence;
 use super::{
     assign::Hypothesis,
     human::FittedBody,
@@ -24,9 +27,9 @@ const HALF_STRAIN: f32 = 0.6;
 /// that fades.
 const ROOTED: f32 = 0.63;
 const FREE: f32 = 0.2;
-/// Confidence in the head and the tail of an animal, whose lengths vary most, as a share of that in its legs.
+/// Confidence in the head of an animal, whose length varies most, as a share of that in its legs.
 const STEM: f32 = 0.87;
-/// Confidence in the joints that an upright figure's limbs show by themselves, in a figure without doubt.
+/// Confidence in the joints that a figure's limbs show by themselves, in a figure without doubt.
 const SHOWN: f32 = 0.76;
 /// Confidence in the spine of an animal between the ends of its trunk, in a figure without doubt.
 const BETWEEN: f32 = 0.9;
@@ -34,26 +37,6 @@ const BETWEEN: f32 = 0.9;
 fn trust(value: f32, half: f32) -> f32 {
     let q = value / half;
     1.0 / (1.0 + q * q)
-}
-
-/// Joints that the limbs of an upright figure show by themselves, whatever its proportions are: a shoulder lies where its arm
-/// leaves the trunk, by the arm's thickness, and elbows, wrists and knees lie on centre lines where these bend or end. Hips are
-/// hidden, ankles and toes go by lengths, and a big head has no neck.
-fn shown(template: &TemplateLimbs, placement: &Placement) -> Vec<bool> {
-    let mut shown = vec![false; placement.places.len()];
-    for limb in template.limbs.iter().filter(|_| template.is_upright()) {
-        let ball = template.ball_joint(limb).unwrap_or(0);
-        for (at, &joint) in limb.joints.iter().enumerate() {
-            let is_on_line = placement.reasons[joint] == FitReason::CentreLine;
-            let is_placed = placement.reasons[joint] == FitReason::Proportion;
-            shown[joint] = match limb.kind {
-                LimbKind::Arm => is_on_line && at >= ball || is_placed && at == ball,
-                LimbKind::Leg => is_on_line && at == ball + 1,
-                _ => false,
-            };
-        }
-    }
-    shown
 }
 
 /// Confidence of each joint with its reason.
@@ -75,18 +58,15 @@ pub(super) fn joints(
         })
     };
     let ends = [template.trunk.first(), template.trunk.last()];
-    let of = |kinds: &[LimbKind]| -> Vec<usize> {
-        let limbs = template.limbs.iter().filter(|limb| template.is_on_fours() && kinds.contains(&limb.kind));
-        limbs.flat_map(|limb| limb.joints.iter().copied()).collect()
-    };
-    let (heads, stems) = (of(&[LimbKind::Head]), of(&[LimbKind::Head, LimbKind::Tail]));
+    let heads = template.limbs.iter().filter(|limb| template.is_on_fours() && limb.kind == LimbKind::Head);
+    let heads: Vec<usize> = heads.flat_map(|limb| limb.joints.iter().copied()).collect();
     // An animal's trunk is placed over its legs and under its back: what lies between its ends, and the neck before them, is right
     // where the assignment is.
     let is_between = |joint: usize| {
         template.is_on_fours()
             && (heads.contains(&joint) || template.trunk.contains(&joint) && !ends.contains(&Some(&joint)))
     };
-    let shown = shown(template, placement);
+    let evidence = Evidence::of(template, placement, best, places);
     (0..places.len())
         .map(|joint| {
             let (mut confidence, mut reason) = match body {
@@ -96,21 +76,26 @@ pub(super) fn joints(
                 },
                 None => {
                     let doubt = trust(placement.strain[joint], HALF_STRAIN) * trust(best.posed_cost(), HALF_COST);
-                    let confidence = match placement.reasons[joint] {
+                    let reason = match placement.reasons[joint] {
+                        FitReason::CentreLine if evidence.is_shared_out[joint] => FitReason::Proportion,
+                        reason => reason,
+                    };
+                    let confidence = match reason {
                         FitReason::NoLimb => 0.2 * doubt,
                         // Towards its end a limb is right whatever the rest of the figure is like, unless parts of it stand
                         // apart.
                         FitReason::CentreLine => {
                             let free = ((ROOTED - placement.along[joint]) / FREE).clamp(0.0, 1.0);
                             let free = if graph.tied > 0 { 0.0 } else { free };
-                            let own = if stems.contains(&joint) { STEM } else { 1.0 };
+                            let own = if heads.contains(&joint) { STEM } else { 1.0 };
                             own * (0.76 + 0.19 * free) * bevy::math::ops::powf(doubt, 1.0 - 0.5 * free)
                         }
                         _ if is_between(joint) => BETWEEN * doubt,
                         _ => 0.52 * doubt,
                     };
-                    let by_itself = if shown[joint] { trust(best.posed_cost(), HALF_COST).sqrt() } else { 0.0 };
-                    (confidence.max(SHOWN * by_itself), placement.reasons[joint])
+                    let is_shown = evidence.is_shown[joint];
+                    let by_itself = if is_shown { trust(best.posed_cost(), HALF_COST).sqrt() } else { 0.0 };
+                    (confidence.max(SHOWN * by_itself) * evidence.carried[joint], reason)
                 }
             };
             if confidence < 0.5 && reason == FitReason::Surface {
