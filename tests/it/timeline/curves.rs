@@ -222,7 +222,8 @@ fn curves_of_controls_have_the_names_of_controls() {
     act(&mut desk, TimelineAction::Key);
     desk.frames(2);
     let told = |name: &str| desk.says(&format!("{name} translation X"));
-    assert_eq!((told("hand_ik_l"), told("hand_l")), (true, false));
+    let seen: Vec<&str> = desk.seen.iter().map(|seen| seen.value.as_str()).collect();
+    assert_eq!((told("hand_ik_l"), told("hand_l")), (true, false), "{seen:?}");
 }
 
 #[test]
