@@ -247,8 +247,8 @@ fn add_glass(mesh: &mut heads::Mesh, marks: &Landmarks, [from, to]: [f32; 2], ga
     add_sheet(mesh, &rows, 0.02 * e * Vec3::Z)
 }
 
-/// Hats with brims and dark glasses, as large as pieces of skin, are no skin: the landmarks under them are those of the bare head,
-/// and they follow the head alone.
+/// Hats with brims and dark glasses, as large as pieces of skin, are no skin: the landmarks under them are those of the
+/// bare head, and they follow the head alone.
 #[test]
 fn hats_and_sunglasses_are_no_skin() {
     let mut wrong = Vec::new();

@@ -370,8 +370,8 @@ const CLEAR: f32 = 0.5;
 
 /// Finds the shells of a head and its landmarks.
 ///
-/// Hats and sunglasses that are as large as skin hide the face: where parts are worn over the skin, the face is searched without
-/// them, and with them only if none is clear.
+/// Hats and sunglasses that are as large as skin hide the face: where parts are worn over the skin, the face is searched
+/// without them, and with them only if none is clear.
 fn find_features(points: &[Vec3], triangles: &[[u32; 3]]) -> Result<(Shells, Landmarks), LandmarkError> {
     let shells = find_shells(points, triangles);
     let Some(bare) = shells.without_worn(points, triangles) else { return find_face(points, triangles, shells) };

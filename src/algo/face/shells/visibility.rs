@@ -75,8 +75,8 @@ pub fn shares(points: &[Vec3], triangles: &[[u32; 3]], shell_of: &[u32], islands
     shown.iter().zip(&alone).map(|(shown, alone)| *shown as f32 / (2 * *alone).max(1) as f32).collect()
 }
 
-/// Share of the visible places of each shell, from the six sides along the axes, that have another shell close behind them: no
-/// further than `close`, as a share of the largest extent. Only shells that `takes_part` marks are looked at.
+/// Share of the visible places of each shell, from the six sides along the axes, that have another shell close behind
+/// them: no further than `close`, as a share of the largest extent. Only shells that `takes_part` marks are looked at.
 pub fn covering(
     points: &[Vec3],
     triangles: &[[u32; 3]],

@@ -1,14 +1,14 @@
 //! Parts that are worn over the skin: hats, hair, large sunglasses.
 //!
-//! They are large and visible as skin is, but have skin close behind them wherever they are seen. Pieces of skin, such as those
-//! of a scan, lie side by side.
+//! They are large and visible as skin is, but have skin close behind them wherever they are seen. Pieces of skin, such as
+//! those of a scan, lie side by side.
 
 use glam::Vec3;
 
 use super::{ShellKind, Shells, measured, visibility};
 
-/// Least share of a shell's visible places that have another shell close behind them, of a part that is worn. The brim of a hat
-/// reaches beyond the head, so that most of a sombrero has nothing behind it.
+/// Least share of a shell's visible places that have another shell close behind them, of a part that is worn. The brim of
+/// a hat reaches beyond the head, so that most of a sombrero has nothing behind it.
 const WORN: f32 = 0.2;
 /// Largest distance of a worn part from the skin behind it, as a share of the largest extent of all shells.
 const CLOSE: f32 = 0.15;

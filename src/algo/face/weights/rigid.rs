@@ -1,7 +1,7 @@
 //! Parts that no expression bends: glasses, monocles, earrings, piercings, hats.
 //!
-//! Lashes and brows are on the skin along their whole length. Frames of glasses are as near to the eyes, but touch the skin
-//! at few places, such as the bridge of the nose, or go around the eye and across the face.
+//! Lashes and brows are on the skin along their whole length. Frames of glasses are as near to the eyes, but touch the
+//! skin at few places, such as the bridge of the nose, or go around the eye and across the face.
 
 use std::{collections::BTreeMap, f32::consts::TAU};
 
@@ -23,7 +23,8 @@ const SECTIONS: usize = 12;
 const TOUCHING: usize = 6;
 /// Least distance of a lens's frame from the lids, on whose rims lashes stand.
 const OFF_LIDS: f32 = 0.08;
-/// Distance from the middle of an eye, as seen from the front, at which a vertex is over the eye; rims of lids are further away.
+/// Distance from the middle of an eye, as seen from the front, at which a vertex is over the eye; rims of lids are
+/// further away.
 const OVER_EYE: f32 = 0.05;
 /// Number of directions from the middle of an eye, and the least number of those in which a frame is off the lids.
 const DIRECTIONS: usize = 12;
@@ -57,8 +58,9 @@ pub(super) fn is_frame(face: &Face, members: &[usize], is_touching: impl Fn(usiz
     is_across || held * SECTIONS < TOUCHING * filled || is_around_eye(face, members, [low, high], &is_touching)
 }
 
-/// True for a shell that goes around an eye off its lids, such as a monocle, even one that brow and cheek hold, and for one that
-/// covers the eye and reaches beyond the lids, such as dark glass; paint around an eye lies on the skin everywhere.
+/// True for a shell that goes around an eye off its lids, such as a monocle, even one that brow and cheek hold, and for
+/// one that covers the eye and reaches beyond the lids, such as dark glass; paint around an eye lies on the skin
+/// everywhere.
 fn is_around_eye(face: &Face, members: &[usize], [low, high]: [Vec3; 2], is_touching: impl Fn(usize) -> bool) -> bool {
     let (middle, reach) = (face.map.middle, OFF_LIDS * face.map.scale);
     let (half, _) = face.map.fold(0.5 * (low + high));
