@@ -12,7 +12,7 @@ use super::{
     bone::BoneSegment,
     bone_tree::{BoneTree, closest_on},
     keypoints,
-    roots::{Homes, Roots},
+    roots::{Homes, Roots, parents_first},
     sight::Sight,
 };
 
@@ -66,10 +66,7 @@ pub(crate) fn build(
     let joints = keypoints::set_back(joints, sight);
     let joints = &joints[..];
     let owners: Vec<Option<u32>> = owners(joints).into_iter().map(|o| o.filter(|&j| takes_part[j as usize])).collect();
-    let mut children = vec![0usize; joints.len()];
-    for parent in joints.iter().filter_map(|j| j.parent) {
-        children[parent] += 1;
-    }
+    let children = parents_first(joints).1;
     let tree = Roots::new(joints, &children, sight);
     let helpers = tree.helpers(joints, sight);
     let carries: Vec<bool> = joints
@@ -91,6 +88,9 @@ pub(crate) fn build(
     for (index, joint) in joints.iter().enumerate() {
         let Some(parent) = joint.parent else { continue };
         let Some(owner) = owners[parent] else { continue };
+        if carries[index] && passes_beside(joints, &carries, &children, index) {
+            continue;
+        }
         let is_claimed =
             claims[parent] && (helpers[parent] || !helpers[index]) && joints[parent].head.distance(joint.head) > SAME;
         if (is_claimed || carries[index] && !helpers[index]) && !(behind[index] && leads_on[parent]) {
@@ -100,7 +100,7 @@ pub(crate) fn build(
     let mut leaves = Vec::new();
     for (index, joint) in joints.iter().enumerate() {
         let Some(owner) = owners[index] else { continue };
-        let is_leaf = children[index] == 0 && !helpers[index];
+        let is_leaf = children[index].is_empty() && !helpers[index];
         if !(is_leaf || claims[index] && segments.iter().all(|segment| segment.joint != owner)) {
             continue;
         }
@@ -137,6 +137,36 @@ fn is_behind(joints: &[WeightJoint], carries: &[bool], joint: usize) -> bool {
     let onwards = (joints[joint].head - joints[parent].head).normalize_or_zero();
     let arriving = (joints[parent].head - joints[grandparent].head).normalize_or_zero();
     carries[parent] && onwards.dot(arriving) < TURN
+}
+
+/// True if the bone to `joint` runs along a longer one of the same parent, and a limb that is small beside it goes off to the
+/// side there: a thumb that hangs on the forearm of a figure without wrists. The forearm's flesh is the longer bone's, and what
+/// is around the joint is the thumb's. Bones to fingers run side by side, too, but fingers go straight on.
+fn passes_beside(joints: &[WeightJoint], carries: &[bool], children: &[Vec<usize>], joint: usize) -> bool {
+    /// The flesh of a limb is about this share of its length thick: bones nearer to each other run through the same flesh, and
+    /// a limb whose first bone is shorter begins in it.
+    const THICK: f32 = 0.25;
+    /// The cosine of the least turn to the side: 60 degrees.
+    const ASIDE: f32 = 0.5;
+    let Some(parent) = joints[joint].parent else { return false };
+    let (from, to) = (joints[parent].head, joints[joint].head);
+    let way = to - from;
+    let length = way.length();
+    let goes_aside = |child: &usize| {
+        let onwards = joints[*child].head - to;
+        onwards.length() < THICK * length && onwards.dot(way) < ASIDE * onwards.length() * length
+    };
+    let mut limb = children[joint].iter().filter(|child| carries[**child]).peekable();
+    if limb.peek().is_none() || !limb.all(goes_aside) {
+        return false;
+    }
+    children[parent].iter().any(|&other| {
+        let bone = BoneSegment { joint: 0, head: from, tail: joints[other].head };
+        other != joint
+            && carries[other]
+            && from.distance(bone.tail) > length
+            && closest_on(&bone, to).distance(to) < THICK * length
+    })
 }
 
 /// Joint that carries the flesh of each joint: itself, or the nearest ancestor that deforms. All deform if none does.

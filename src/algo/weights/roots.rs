@@ -25,7 +25,7 @@ pub(crate) struct Roots {
 
 impl Roots {
     /// Finds the roots of checked joints.
-    pub fn new(joints: &[WeightJoint], children: &[usize], sight: &Sight) -> Self {
+    pub fn new(joints: &[WeightJoint], children: &[Vec<usize>], sight: &Sight) -> Self {
         let (order, _) = parents_first(joints);
         let mut sizes = vec![1usize; joints.len()];
         for &index in order.iter().rev() {
@@ -39,7 +39,7 @@ impl Roots {
         let mut stands_off = vec![false; joints.len()];
         for &index in &order {
             let Some(parent) = joints[index].parent.filter(|&parent| is_root[parent]) else { continue };
-            if children[parent] > MANY_CHILDREN {
+            if children[parent].len() > MANY_CHILDREN {
                 continue;
             }
             let (from, to) = (joints[parent].head, joints[index].head);
