@@ -47,13 +47,12 @@ impl Hands<'_> {
         self.until("it is selected", |report| report.selection == [joint]);
     }
 
-    /// Drags a control in Pose mode, by a piece of its outline that is not near any other.
-    fn pull(&self, control: &str, by: [f32; 2]) {
-        // The handles of what is selected lie in front of outlines.
+    /// Drags a joint in Pose mode, by which the control that holds it is pulled.
+    fn pull(&self, joint: &str, control: &str, by: [f32; 2]) {
+        // The handles of what is selected lie in front of joints.
         self.click(self.corner());
-        let before =
-            self.until("the control is free", |report| report.selected == 0 && report.controls.contains_key(control));
-        let from = before.controls[control];
+        let before = self.until("nothing is selected", |report| report.selected == 0);
+        let from = before.places[&before.labels[joint]];
         self.drag(&[from, [from[0] + by[0], from[1] + by[1]]]);
         self.until("the control is pulled", |report| {
             report.steps.len() > before.steps.len() && report.selection == [control] && !report.busy
@@ -137,7 +136,7 @@ fn rigged(hands: &Hands) {
 fn posed(hands: &Hands) {
     hands.key("p");
     hands.until("controls are posed", |report| report.mode == "Pose");
-    // Near enough for the outline of the hand's control to be free of those of the fingers.
+    // The whole figure is small beside its controls.
     hands.approach(1);
     let report = hands.report().expect("the window reports");
     let uid = &report.labels["hand_l"];
@@ -148,7 +147,7 @@ fn posed(hands: &Hands) {
     for to in [[-20.0, -70.0], [30.0, -60.0], [20.0, 40.0]] {
         let now = hands.report().expect("the window reports");
         let at = now.places[uid];
-        hands.pull("hand_ik_l", [rest[0] + to[0] - at[0], rest[1] + to[1] - at[1]]);
+        hands.pull("hand_l", "hand_ik_l", [rest[0] + to[0] - at[0], rest[1] + to[1] - at[1]]);
         hands.key("k");
         hands.until("a key is set", |report| report.keys > now.keys && !report.busy);
         hands.press("Store");
