@@ -13,9 +13,14 @@ pub const MOST: f32 = 4.0;
 /// Share of its length that is outside of a shape that people find and hit.
 const SEEN: f32 = 0.5;
 
-/// Largest factor of a shape that would not be [`SEEN`] otherwise: about a short bone in wide plumage, for example, or about the
-/// thigh of a bird, which lies in the trunk.
-const MOST_UNSEEN: f32 = 10.0;
+/// Largest factor of a shape that would not be [`SEEN`] otherwise: about a short bone in wide plumage, for example.
+const MOST_UNSEEN: f32 = 8.0;
+
+/// Share of its length that is outside of a shape that people can find at least.
+const FOUND: f32 = 0.25;
+
+/// Largest factor of a shape that would not be [`FOUND`] otherwise: about the thigh of a bird, which lies in the trunk.
+const MOST_LOST: f32 = 10.0;
 
 /// Factor between one size that is tried and the next.
 const STEP: f32 = 1.08;
@@ -29,9 +34,9 @@ const DIRECTIONS: [Vec3; 3] = [
 
 /// Factor by which a shape has to grow about a point so that [`OUTSIDE`] of its length is outside of a closed mesh: 1 for a
 /// shape that is, up to [`MOST`]. Where no factor is enough, the one with the most length outside; where that is less than half,
-/// the first beyond with half outside, or the one with the most, up to ten.
+/// the first beyond with half outside, up to twice as large, and where that is less than a quarter the first with a quarter.
 ///
-/// `lines` are the shape's polylines at factor 1, in the space of the surface. A shape of `n` points costs `n` to `90 n` ray
+/// `lines` are the shape's polylines at factor 1, in the space of the surface. A shape of `n` points costs `n` to `120 n` ray
 /// queries.
 pub fn clear_factor(surface: &Surface, lines: &[Vec<Vec3>], about: Vec3) -> f32 {
     let (mut factor, mut best) = (1.0, (0.0, 1.0));
@@ -45,12 +50,15 @@ pub fn clear_factor(surface: &Surface, lines: &[Vec<Vec3>], about: Vec3) -> f32 
         }
         factor *= STEP;
     }
-    while best.0 < SEEN && factor <= MOST_UNSEEN {
-        let share = outside_share(surface, lines, about, factor);
-        if share > best.0 {
-            best = (share, factor);
+    let wanted = [(SEEN, MOST_UNSEEN), (FOUND, MOST_LOST)];
+    for (least, most) in wanted {
+        let mut larger = factor;
+        while best.0 < least && larger <= most {
+            if outside_share(surface, lines, about, larger) >= least {
+                return larger;
+            }
+            larger *= STEP;
         }
-        factor *= STEP;
     }
     best.1
 }

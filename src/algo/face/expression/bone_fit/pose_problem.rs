@@ -19,13 +19,13 @@ const CLOSED: f32 = 0.2;
 /// Distance of lids that counts as closed, as a share of that at rest.
 const CLOSED_LIDS: f32 = 0.12;
 /// Least distance of lids, as a share of that at rest.
-const CROSSED_LIDS: f32 = 0.1;
+const CROSSED_LIDS: f32 = 0.05;
 /// Weight of lids that are too near beside those that are too far.
 const CROSSED: f32 = 8.0;
 /// Stiffness of bones of lids that are brought to their distance, beside the number of points.
 const STIFF_LIDS: f32 = 0.02;
 /// Most rounds, after folds were mended, in which lips and lids that cross are moved apart.
-const GUARDS: usize = 12;
+const GUARDS: usize = 6;
 /// Rounds in which bones of lids are moved one after the other.
 const LID_ROUNDS: usize = 40;
 /// Mobility of the lower lid beside that of the upper one.
@@ -234,8 +234,8 @@ impl FittedFace {
         for facing in &self.moving.apart {
             let gap = |points: &[Vec3]| points[facing.above as usize].y - points[facing.below as usize].y;
             let (rest, now) = (gap(&self.moving.points), gap(&posed.points));
-            // Lips and lids that touch or overlap at rest may stay as they are.
-            let least = |share: f32| if rest > 0.0 { share * rest } else { rest };
+            // Lips and lids that touch at rest may keep touching.
+            let least = |share: f32| if rest > slack { share * rest } else { rest - slack };
             let Some(eye) = facing.eye else {
                 let missing = least(CLOSED) - now;
                 if missing > 0.0 {
