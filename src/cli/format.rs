@@ -35,6 +35,21 @@ enum UidsArg {
     Derive,
 }
 
+/// Result for one file.
+enum FileLayout {
+    /// Text as it is, and in its layout.
+    Texts(String, String),
+    /// Words of the error of a file that cannot be read.
+    Fault(String),
+}
+
+impl FileLayout {
+    /// True for a text that is not in its layout.
+    fn is_another(&self) -> bool {
+        matches!(self, Self::Texts(before, after) if before != after)
+    }
+}
+
 pub(super) fn run(args: &FormatArgs) -> Result<Report, Failure> {
     let style = match args.uids {
         UidsArg::Keep => UidStyle::Kept,
@@ -51,22 +66,24 @@ pub(super) fn run(args: &FormatArgs) -> Result<Report, Failure> {
                 report.at_fault = true;
                 let name = path.display().to_string();
                 report.fault.get_or_insert_with(|| Explanation::of_error(error.as_ref(), &name));
-                formatted.push((path, Err(error.to_string())));
+                formatted.push((path, FileLayout::Fault(error.to_string())));
             }
-            found => formatted.push((path, Ok(found?))),
+            found => {
+                let (before, after) = found?;
+                formatted.push((path, FileLayout::Texts(before, after)));
+            }
         }
     }
     let is_written = !args.check && !report.at_fault;
     if is_written {
-        let is_changed = |found: &Result<(String, String), String>| found.as_ref().is_ok_and(|(was, is)| was != is);
-        let changed = formatted.iter().filter(|(_, found)| is_changed(found));
+        let changed = formatted.iter().filter(|(_, found)| found.is_another());
         check_places(changed.map(|(path, _)| path.as_path()))?;
     }
     for (path, found) in formatted {
         let file = path.display();
         let (before, after) = match found {
-            Ok(texts) => texts,
-            Err(error) => {
+            FileLayout::Texts(before, after) => (before, after),
+            FileLayout::Fault(error) => {
                 report.line(format!("error: {error}"));
                 list.push(json!({ "file": file.to_string(), "changed": false, "error": error }));
                 continue;

@@ -9,13 +9,13 @@ mod companion;
 mod error;
 mod record;
 mod set;
-mod staged;
+mod staging;
 mod target;
 mod temp;
 
 pub use error::{SaveError, SaveStep};
 pub use set::{FileSet, save_set};
-pub use staged::{StagedFile, check_place, stage_file};
+pub use staging::{StagedFile, check_place, stage_file};
 pub use temp::{is_temp_name, remove_stale_temps};
 
 pub(super) use target::saved_file;

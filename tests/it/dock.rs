@@ -149,7 +149,7 @@ fn all_words_of_the_window_can_be_read() {
     }
 }
 
-/// What a click does, the next step and the counts share the bottom line, also in a small window or in large letters.
+/// Words of the status line share it: the tool's, the next step and the counts, also in a small window or in large letters.
 #[test]
 fn words_of_the_status_line_never_meet() {
     let hint = "Drag a handle to pose hand_ik_l (world axes: V), or any joint or control to pull it. Ctrl: in steps.";

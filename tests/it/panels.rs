@@ -490,7 +490,7 @@ fn commands_that_are_off_are_counted_apart() {
     assert!(!desk.says("2 off") && desk.says("0 of 3"), "{:?}", desk.seen);
 }
 
-/// What commands made has no properties of its own: the panel says where its values are.
+/// Nodes that commands made have no properties of their own: the panel says where their values are.
 #[test]
 fn properties_say_where_the_values_of_controls_are() {
     let mut desk = Desk::new(PropertiesPanel::default());

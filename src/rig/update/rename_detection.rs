@@ -147,12 +147,12 @@ impl<'a> Likeness<'a> {
 }
 
 /// Tags of a joint that are not in the file, by their likenesses, as long as they have no counterpart.
-struct GoneTags<'a> {
+struct RemovedTags<'a> {
     tags: Vec<&'a TagData>,
     places: HashMap<Likeness<'a>, BTreeSet<usize>>,
 }
 
-impl<'a> GoneTags<'a> {
+impl<'a> RemovedTags<'a> {
     fn new(tags: Vec<&'a TagData>) -> Self {
         let mut places: HashMap<Likeness<'a>, BTreeSet<usize>> = HashMap::new();
         for (place, tag) in tags.iter().copied().enumerate() {
@@ -194,7 +194,7 @@ fn tags<'a>(
     if come.is_empty() {
         return;
     }
-    let mut gone = GoneTags::new(old.data.tags.iter().filter(is_gone).collect());
+    let mut gone = RemovedTags::new(old.data.tags.iter().filter(is_gone).collect());
     let is_renamed_joint = old.data.uid != new.data.uid;
     // Commands first, by which features are told apart.
     let (first, features): (Vec<&TagData>, Vec<&TagData>) = come.into_iter().partition(|tag| is_command(tag));
