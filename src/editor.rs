@@ -44,6 +44,7 @@ pub mod style;
 mod toolbar;
 pub mod tools;
 pub mod typing;
+pub mod viewport_bars;
 
 use bevy::prelude::*;
 

@@ -244,6 +244,8 @@ mod update;
 mod updater;
 #[cfg(feature = "editor")]
 mod viewport_app;
+#[cfg(feature = "editor")]
+mod viewport_views;
 mod voxels;
 #[cfg(feature = "cli")]
 mod vrm;
