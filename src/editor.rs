@@ -8,6 +8,7 @@ pub mod app;
 pub mod building;
 pub mod camera;
 pub mod clicks;
+pub mod control_density;
 pub mod counts;
 pub mod dock;
 pub mod files;

@@ -124,7 +124,7 @@ fn spawn_camera(mut commands: Commands) {
 }
 
 /// Updates [`ViewportSight`] after the last frame's transforms have propagated, before tools read it.
-fn see(
+pub(super) fn see(
     cameras: Query<(&GlobalTransform, &Projection, &RigViewport), With<PanOrbitCamera>>,
     rig: Option<Res<ActiveRig>>,
     places: Query<&GlobalTransform>,

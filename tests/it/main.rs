@@ -52,6 +52,8 @@ mod click_runs;
 mod clicks;
 mod clip_files;
 mod commands;
+#[cfg(feature = "editor")]
+mod control_density;
 mod control_sizes;
 mod custom_module;
 #[cfg(feature = "editor")]
