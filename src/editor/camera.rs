@@ -46,7 +46,7 @@ impl Plugin for CameraPlugin {
         app.add_plugins(PanOrbitCameraPlugin)
             .init_resource::<ViewportSight>()
             .init_resource::<FrameWhenReady>()
-            .init_resource::<FramedView>()
+            .init_resource::<LastFraming>()
             .init_resource::<ViewportBars>()
             .init_resource::<ZoomStart>()
             .add_systems(Startup, spawn_camera)
@@ -75,10 +75,10 @@ pub struct FrameWhenReady(pub bool);
 
 /// View that a box was framed in last, with the lasting bars that it leaves room for; `None` before the first.
 #[derive(Resource, Debug, Clone, PartialEq, Default)]
-struct FramedView(Option<Framed>);
+struct LastFraming(Option<Framing>);
 
 #[derive(Debug, Clone, PartialEq)]
-struct Framed {
+struct Framing {
     bounds: [Vec3; 2],
     bars: Vec<Rect>,
     focus: Vec3,
@@ -86,7 +86,7 @@ struct Framed {
     angles: [f32; 2],
 }
 
-impl Framed {
+impl Framing {
     /// True while the camera is where the framing has put it.
     fn is_seen_by(&self, camera: &PanOrbitCamera) -> bool {
         self.focus == camera.target_focus
@@ -147,7 +147,7 @@ fn carry_out(
     rigs: Query<(&Rig, &Selection, &JointEntities, &GlobalTransform, Option<&RigSurface>)>,
     places: Query<&GlobalTransform>,
     (area, bars): (Res<ViewportArea>, Res<ViewportBars>),
-    mut framed: ResMut<FramedView>,
+    mut framing: ResMut<LastFraming>,
 ) {
     for ActionRequest(action) in actions.read() {
         let Ok((mut camera, mut projection)) = cameras.single_mut() else { continue };
@@ -175,7 +175,7 @@ fn carry_out(
                     }
                     _ => everything(surface, place, data, entities, &places),
                 };
-                framed.0 = Some(frame(&mut camera, bounds, area.size, &bars));
+                framing.0 = Some(frame(&mut camera, bounds, area.size, &bars));
             }
             _ => {}
         }
@@ -272,7 +272,7 @@ pub fn angles(view: View) -> (f32, f32) {
 }
 
 /// Moves the camera so that a box fills the viewport beside its bars, in the current view direction.
-fn frame(camera: &mut PanOrbitCamera, bounds: [Vec3; 2], size: Vec2, bars: &ViewportBars) -> Framed {
+fn frame(camera: &mut PanOrbitCamera, bounds: [Vec3; 2], size: Vec2, bars: &ViewportBars) -> Framing {
     let angles = [camera.target_yaw, camera.target_pitch];
     let [yaw, pitch] = angles.map(f32::to_degrees);
     let (focus, radius) = framing_beside(bounds, View::Orbit(yaw, pitch).axes(), size, &bars.all());
@@ -280,22 +280,22 @@ fn frame(camera: &mut PanOrbitCamera, bounds: [Vec3; 2], size: Vec2, bars: &View
     camera.target_radius = radius;
     limit_zoom(camera);
     camera.force_update = true;
-    Framed { bounds, bars: bars.lasting.clone(), focus, radius, angles }
+    Framing { bounds, bars: bars.lasting.clone(), focus, radius, angles }
 }
 
 /// Frames the box of the last framing anew where a bar came or went since then, unless a person has moved the view or drags.
 fn make_room(
-    mut framed: ResMut<FramedView>,
+    mut framing: ResMut<LastFraming>,
     mut cameras: Query<&mut PanOrbitCamera>,
     (area, bars, pointer): (Res<ViewportArea>, Res<ViewportBars>, Res<PointerState>),
 ) {
-    let Some(last) = framed.0.as_ref().filter(|last| last.bars != bars.lasting) else { return };
+    let Some(last) = framing.0.as_ref().filter(|last| last.bars != bars.lasting) else { return };
     let Ok(mut camera) = cameras.single_mut() else { return };
     if pointer.is_busy() || area.size.x < 1.0 {
         return;
     }
     let bounds = last.bounds;
-    framed.0 = last.is_seen_by(&camera).then(|| frame(&mut camera, bounds, area.size, &bars));
+    framing.0 = last.is_seen_by(&camera).then(|| frame(&mut camera, bounds, area.size, &bars));
 }
 
 /// Least and greatest distance to the focus, in parts of the distance at which something fills the view.
@@ -317,7 +317,7 @@ fn frame_when_ready(
     places: Query<&GlobalTransform>,
     mut cameras: Query<&mut PanOrbitCamera>,
     (area, bars): (Res<ViewportArea>, Res<ViewportBars>),
-    mut framed: ResMut<FramedView>,
+    mut framing: ResMut<LastFraming>,
 ) {
     if !wanted.0 || area.size.x < 1.0 {
         return;
@@ -328,7 +328,7 @@ fn frame_when_ready(
         return;
     }
     let bounds = everything(surface, place, data, entities, &places);
-    framed.0 = Some(frame(&mut camera, bounds, area.size, &bars));
+    framing.0 = Some(frame(&mut camera, bounds, area.size, &bars));
     wanted.0 = false;
 }
 

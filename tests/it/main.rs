@@ -208,6 +208,8 @@ mod render;
 mod retarget;
 mod rig_limits;
 mod rig_text;
+#[cfg(feature = "editor")]
+mod run_failures;
 mod runtime;
 mod same_parts;
 mod saved_text;
