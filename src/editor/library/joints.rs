@@ -133,7 +133,7 @@ fn check_free(rig: &Rig, instances: &[PartInstance], part: &Part, joints: &[Uid]
     };
     let count: usize = pairs.iter().map(|(_, modules)| modules.len()).sum();
     match pairs.first() {
-        Some((joint, _)) if count >= TELLING && pairs.iter().all(has_all) => {
+        Some(&(joint, _)) if count >= TELLING && pairs.iter().all(has_all) => {
             Err(occupied(joint, "a part of this kind".to_owned()))
         }
         _ => Ok(()),
