@@ -9,18 +9,19 @@ use bevy::{
     prelude::*,
     window::{CursorMoved, PrimaryWindow, WindowEvent},
 };
-use bevy_egui::{EguiContext, PrimaryEguiContext};
+use bevy_egui::{EguiContext, PrimaryEguiContext, egui};
 use bevy_panorbit_camera::{ActiveCameraData, PanOrbitCamera};
 use rigsmith::{
     algo::view::View,
     editor::{
         ActiveRig,
         actions::ActionRequest,
-        camera::{CameraPlugin, ViewportSight},
+        camera::{CameraPlugin, FrameWhenReady, ViewportSight},
         mode::Mode,
         notice::StatusLine,
         pointer::{PointerPlugin, PointerState, ViewportArea, WheelUse},
         tools::ToolsPlugin,
+        viewport_bars::ViewportBars,
     },
     headless::headless_app,
     plugins::viewport::{FIELD_OF_VIEW, RigViewport, Sight, framing, framing_beside},
@@ -28,7 +29,11 @@ use rigsmith::{
     test_app::strict_app,
 };
 
-use crate::{bench::RigBench, viewport_app::front};
+use crate::{
+    bench::{RigBench, shipped},
+    panels::desk::{Desk, Sheet},
+    viewport_app::front,
+};
 
 const SIZE: Vec2 = Vec2::new(640.0, 520.0);
 
@@ -88,8 +93,8 @@ fn a_figure_is_framed_above_the_bars() {
     assert!((1.5..2.6).contains(&(distance / whole)), "{distance} after {whole}");
 }
 
-#[test]
-fn the_wheel_zooms_to_the_pointer() {
+/// An app with the viewport's camera after its first frames.
+fn camera_app() -> App {
     let mut app = headless_app(1);
     app.add_plugins((InputPlugin, CameraPlugin))
         .init_resource::<WheelUse>()
@@ -100,6 +105,55 @@ fn the_wheel_zooms_to_the_pointer() {
     app.cleanup();
     app.update();
     app.update();
+    app
+}
+
+#[test]
+fn a_bar_that_comes_gets_room_unless_the_view_was_moved() {
+    let mut app = camera_app();
+    let rig = app.world_mut().spawn(shipped("biped")).id();
+    app.insert_resource(ActiveRig(rig));
+    app.update();
+    app.update();
+    app.insert_resource(FrameWhenReady(true));
+    let mut cameras = app.world_mut().query::<&mut PanOrbitCamera>();
+    let mut view = |app: &mut App, bars: ViewportBars, yaw: f32| {
+        app.insert_resource(bars);
+        app.update();
+        app.update();
+        let mut camera = cameras.single_mut(app.world_mut()).unwrap();
+        let view = (camera.target_focus, camera.target_radius);
+        camera.target_yaw += yaw;
+        view
+    };
+    let bar = vec![Rect::new(12.0, 390.0, 520.0, 508.0)];
+    let lasting = ViewportBars { lasting: bar.clone(), ..default() };
+    let whole = view(&mut app, ViewportBars::default(), 0.0);
+    let above = view(&mut app, lasting.clone(), 0.0);
+    assert!(above.1 > 1.1 * whole.1 && above.0.y < whole.0.y, "{above:?} after {whole:?}");
+    assert_eq!(view(&mut app, ViewportBars::default(), 0.0), whole, "the bar is gone");
+    let brief = ViewportBars { brief: bar, ..default() };
+    assert_eq!(view(&mut app, brief, 0.0), whole, "a bar of one gesture moves nothing");
+    assert_eq!(view(&mut app, ViewportBars::default(), 0.3), whole);
+    assert_eq!(view(&mut app, lasting, 0.0), whole, "a person has turned the view");
+}
+
+#[test]
+fn the_switch_of_pose_mode_is_in_an_upper_corner() {
+    let mut app = headless_app(1);
+    app.add_plugins(ToolsPlugin);
+    let mut app = strict_app(app);
+    let rig = app.world_mut().spawn(shipped("biped")).id();
+    app.insert_resource(ActiveRig(rig)).insert_resource(Mode::Pose);
+    let mut desk = Desk::of(app, rig, Sheet::Window, egui::vec2(SIZE.x, SIZE.y));
+    desk.frames(4);
+    let switch = desk.find("Move joints, too").rect;
+    assert!(switch.right() > SIZE.x - 40.0 && switch.bottom() < 60.0, "{switch:?} covers what is posed");
+}
+
+#[test]
+fn the_wheel_zooms_to_the_pointer() {
+    let mut app = camera_app();
     let mut cameras = app.world_mut().query::<(Entity, &PanOrbitCamera, &GlobalTransform, &Projection, &RigViewport)>();
     let mut seen = |app: &App| {
         let (camera, orbit, place, projection, viewport) = cameras.single(app.world()).unwrap();

@@ -53,7 +53,7 @@ impl ControlNodes<'_, '_> {
     fn outlines(&self, nodes: Option<&RigNodes>, to_rig: Affine3A, with_crowded: bool) -> Vec<ControlOutline> {
         let controls = nodes.into_iter().flat_map(|nodes| nodes.iter()).filter_map(|node| self.nodes.get(node).ok());
         let visible = controls.filter(|(_, _, _, visible, _, _, crowded)| {
-            visible.is_none_or(|visible| visible.0) && (with_crowded || !crowded.is_some_and(|crowded| crowded.0))
+            visible.is_none_or(|visible| visible.0) && (with_crowded || crowded.is_none_or(|crowded| !crowded.0))
         });
         visible
             .map(|(uid, control, place, _, layer, factor, _)| ControlOutline {
