@@ -377,9 +377,13 @@ pub(super) fn clicked(
         return Some(PickRequest { rig: rig.entity, what, add: is_added });
     }
     let joints = near.into_iter().filter(|(joint, _)| Some(*joint) != active);
-    let control = controls.nearest_besides(active, rig, &sight, at);
+    // The second click of a double click is at what the first one took.
+    let control = controls.nearest_besides(active.filter(|_| count == 1), rig, &sight, at);
     // Controls are drawn over joints, so that one at the same distance is the one that is seen.
     let (node, _) = control.into_iter().chain(joints).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    if active == Some(node) {
+        return None;
+    }
     let (what, add) = if held.control && selected.contains(&node) {
         (selected.iter().copied().filter(|other| *other != node).collect(), false)
     } else {
