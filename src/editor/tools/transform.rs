@@ -376,14 +376,15 @@ pub(super) fn clicked(
         let what = Pick::Joints(select::hierarchy_below(rig, active));
         return Some(PickRequest { rig: rig.entity, what, add: is_added });
     }
-    let joints = near.into_iter().filter(|(joint, _)| Some(*joint) != active);
-    // The second click of a double click is at what the first one took.
-    let control = controls.nearest_besides(active.filter(|_| count == 1), rig, &sight, at);
-    // Controls are drawn over joints, so that one at the same distance is the one that is seen.
-    let (node, _) = control.into_iter().chain(joints).min_by(|a, b| a.1.total_cmp(&b.1))?;
-    if active == Some(node) {
+    // The second click of a double click means what the first one took.
+    let is_active = |node: Uid| Some(node) == active;
+    if count > 1 && controls.nearest_among(is_active, rig, &sight, at).is_some() {
         return None;
     }
+    let joints = near.into_iter().filter(|(joint, _)| !is_active(*joint));
+    let control = controls.nearest_among(|control| !is_active(control), rig, &sight, at);
+    // Controls are drawn over joints, so that one at the same distance is the one that is seen.
+    let (node, _) = control.into_iter().chain(joints).min_by(|a, b| a.1.total_cmp(&b.1))?;
     let (what, add) = if held.control && selected.contains(&node) {
         (selected.iter().copied().filter(|other| *other != node).collect(), false)
     } else {
