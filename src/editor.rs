@@ -8,6 +8,7 @@ pub mod app;
 pub mod building;
 pub mod camera;
 pub mod clicks;
+pub mod control_density;
 pub mod counts;
 pub mod dock;
 pub mod files;
@@ -44,6 +45,7 @@ pub mod style;
 mod toolbar;
 pub mod tools;
 pub mod typing;
+pub mod viewport_bars;
 
 use bevy::prelude::*;
 

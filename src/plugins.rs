@@ -22,6 +22,7 @@
 //! | [`commands::CommandReport`], [`commands::BuildFailure`], [`commands::RunFailure`] | the build | immutable in place; what is inserted or removed stands until the build writes it again |
 //! | [`Control`](schema::Control), [`NodeLayer`](schema::NodeLayer), [`CreatedRole`](schema::CreatedRole), [`NodeOf`](schema::NodeOf), [`Null`](schema::Null), [`NodeLabel`](schema::NodeLabel) and `Name` of a node of a game's instance | the instance | not guarded, because an instance has no document: stands until the instance takes another template over; [`controls::NodeVisible`] follows it, and is put back and told here as well |
 //! | [`controls::size::ShapeFactor`] | the measurement of shapes on a mesh | stands until the mesh or the build changes |
+//! | [`controls::density::CrowdedControl`] | apps with a view, for the controls that it leaves out | takes effect in the same frame |
 //! | [`CreatedBy`](schema::CreatedBy), [`Constrains`](schema::Constrains), [`NodeOf`](schema::NodeOf) | the build, and the document for its joints | put back in the same frame and told, but on nodes of games' instances |
 //! | a despawned constraint | | spawned again and told: change the command instead |
 //! | [`RigNodes`](schema::RigNodes), [`LocalGroups`](schema::LocalGroups), [`GroupMembers`](schema::GroupMembers), [`FeatureCommands`](schema::FeatureCommands), [`CreatedNodes`](schema::CreatedNodes), [`NodeConstraints`](schema::NodeConstraints) | Bevy, as the other side of a relation | write the relation instead |

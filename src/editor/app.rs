@@ -20,6 +20,7 @@ use wgpu::BlendState;
 use super::tools::stroke::StrokeTool;
 use super::{
     camera::CameraPlugin,
+    control_density::ControlDensityPlugin,
     dock::DockPlugin,
     files::{FilesPlugin, LoadJob},
     help::HelpPlugin,
@@ -135,7 +136,7 @@ impl Plugin for EditorPlugin {
             SettingsPlugin,
             (KeysPlugin, PointerPlugin),
             DockPlugin,
-            CameraPlugin,
+            (CameraPlugin, ControlDensityPlugin),
             ScreenPlugin,
             (HelpPlugin, super::palette::PalettePlugin, StartPlugin { file: self.options.file.clone() }),
             LabelsPlugin,

@@ -91,7 +91,7 @@ type NewRunFailure = (Changed<RunFailure>, With<Rig>);
 fn report_failures(
     active: Option<Res<ActiveRig>>,
     failures: Query<&BuildFailure, NewFailure>,
-    run_failures: Query<&RunFailure, NewRunFailure>,
+    run_failures: Query<(&RunFailure, &Rig), NewRunFailure>,
     processors: Query<&Processor>,
     mut done: MessageReader<BuildDone>,
     mut place: Local<Option<usize>>,
@@ -101,8 +101,8 @@ fn report_failures(
     if let Ok(failure) = failures.get(active.0) {
         notices.write(Notice::error(format!("The build stopped: {}", failure.0)).at("Process"));
     }
-    if let Ok(failure) = run_failures.get(active.0) {
-        notices.write(Notice::error(format!("The built rig cannot run: {}", failure.0)).at("Process"));
+    if let Ok((failure, rig)) = run_failures.get(active.0) {
+        notices.write(Notice::error(format!("The built rig cannot run: {}", failure.words(rig))).at("Process"));
     }
     let Some(done) = done.read().filter(|done| done.rig == active.0).last() else { return };
     let Ok(processor) = processors.get(active.0) else { return };

@@ -5,6 +5,11 @@
 //! | orbit | middle drag, or Alt and left drag | two fingers | Alt and drag |
 //! | pan | right drag, or Shift and middle drag | Shift and two fingers | Alt, Shift and drag |
 //! | zoom | wheel, or Alt and right drag | Control and two fingers, or pinch | wheel |
+//!
+//! Wheel and pinch zoom to the pointer: what is under the pointer stays there. A drag zooms to the middle.
+//!
+//! A view of the whole figure leaves room for the bars over the lower edge of the viewport, and makes room for a bar that comes
+//! later, as long as nobody has turned or moved the view.
 
 use bevy::{
     camera::{Viewport, visibility::RenderLayers},
@@ -19,6 +24,7 @@ use super::{
     ActiveRig,
     actions::{Action, ActionRequest},
     pointer::{PointerState, ViewportArea, WheelUse},
+    viewport_bars::ViewportBars,
 };
 use crate::{
     algo::view::View,
@@ -27,7 +33,7 @@ use crate::{
         document::{JointEntities, Selection},
         drawing::BACKGROUND,
         surface::RigSurface,
-        viewport::{FIELD_OF_VIEW, RigViewport, Sight, framing},
+        viewport::{FIELD_OF_VIEW, RigViewport, Sight, framing_beside, zoom_shift},
     },
     rig::{Rig, project::ProjectCamera},
 };
@@ -40,11 +46,22 @@ impl Plugin for CameraPlugin {
         app.add_plugins(PanOrbitCameraPlugin)
             .init_resource::<ViewportSight>()
             .init_resource::<FrameWhenReady>()
+            .init_resource::<LastFraming>()
+            .init_resource::<ViewportBars>()
+            .init_resource::<ZoomStart>()
             .add_systems(Startup, spawn_camera)
             .add_systems(PreUpdate, see.after(super::pointer::follow_pointer))
-            .add_systems(Update, (carry_out, frame_when_ready))
-            .add_systems(PostUpdate, (steer, pace_zoom, fit_viewport).chain().before(PanOrbitCameraSystemSet))
-            .add_systems(PostUpdate, keep_depths.after(PanOrbitCameraSystemSet).before(TransformSystems::Propagate));
+            .add_systems(Update, (carry_out, frame_when_ready, make_room).chain())
+            .add_systems(
+                PostUpdate,
+                (
+                    (steer, pace_zoom, fit_viewport, start_zoom).chain().before(PanOrbitCameraSystemSet),
+                    (zoom_to_pointer, keep_depths)
+                        .chain()
+                        .after(PanOrbitCameraSystemSet)
+                        .before(TransformSystems::Propagate),
+                ),
+            );
     }
 }
 
@@ -55,6 +72,32 @@ pub struct ViewportSight(pub Option<Sight>);
 /// Request to frame the whole character as soon as it is loaded, set after a file was opened.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FrameWhenReady(pub bool);
+
+/// View that a box was framed in last, with the lasting bars that it leaves room for; `None` before the first.
+#[derive(Resource, Debug, Clone, PartialEq, Default)]
+struct LastFraming(Option<Framing>);
+
+#[derive(Debug, Clone, PartialEq)]
+struct Framing {
+    bounds: [Vec3; 2],
+    bars: Vec<Rect>,
+    focus: Vec3,
+    radius: f32,
+    angles: [f32; 2],
+}
+
+impl Framing {
+    /// True while the camera is where the framing has put it.
+    fn is_seen_by(&self, camera: &PanOrbitCamera) -> bool {
+        self.focus == camera.target_focus
+            && self.radius == camera.target_radius
+            && self.angles == [camera.target_yaw, camera.target_pitch]
+    }
+}
+
+/// Distance of the camera from its focus before the wheel of the frame; `None` before the first frame.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Default)]
+struct ZoomStart(Option<f32>);
 
 fn spawn_camera(mut commands: Commands) {
     commands.spawn((
@@ -81,7 +124,7 @@ fn spawn_camera(mut commands: Commands) {
 }
 
 /// Updates [`ViewportSight`] after the last frame's transforms have propagated, before tools read it.
-fn see(
+pub(super) fn see(
     cameras: Query<(&GlobalTransform, &Projection, &RigViewport), With<PanOrbitCamera>>,
     rig: Option<Res<ActiveRig>>,
     places: Query<&GlobalTransform>,
@@ -103,7 +146,8 @@ fn carry_out(
     rig: Option<Res<ActiveRig>>,
     rigs: Query<(&Rig, &Selection, &JointEntities, &GlobalTransform, Option<&RigSurface>)>,
     places: Query<&GlobalTransform>,
-    area: Res<ViewportArea>,
+    (area, bars): (Res<ViewportArea>, Res<ViewportBars>),
+    mut framing: ResMut<LastFraming>,
 ) {
     for ActionRequest(action) in actions.read() {
         let Ok((mut camera, mut projection)) = cameras.single_mut() else { continue };
@@ -131,7 +175,7 @@ fn carry_out(
                     }
                     _ => everything(surface, place, data, entities, &places),
                 };
-                frame(&mut camera, bounds, area.size);
+                framing.0 = Some(frame(&mut camera, bounds, area.size, &bars));
             }
             _ => {}
         }
@@ -227,16 +271,31 @@ pub fn angles(view: View) -> (f32, f32) {
     }
 }
 
-/// Moves the camera so that a box fills the viewport, in the current view direction.
-fn frame(camera: &mut PanOrbitCamera, bounds: [Vec3; 2], size: Vec2) {
-    let aspect = if size.y > 0.0 { size.x / size.y } else { 1.5 };
-    let degrees = |radians: f32| radians.to_degrees();
-    let view = View::Orbit(degrees(camera.target_yaw), degrees(camera.target_pitch));
-    let (focus, distance) = framing(bounds, view.axes(), aspect);
+/// Moves the camera so that a box fills the viewport beside its bars, in the current view direction.
+fn frame(camera: &mut PanOrbitCamera, bounds: [Vec3; 2], size: Vec2, bars: &ViewportBars) -> Framing {
+    let angles = [camera.target_yaw, camera.target_pitch];
+    let [yaw, pitch] = angles.map(f32::to_degrees);
+    let (focus, radius) = framing_beside(bounds, View::Orbit(yaw, pitch).axes(), size, &bars.all());
     camera.target_focus = focus;
-    camera.target_radius = distance;
+    camera.target_radius = radius;
     limit_zoom(camera);
     camera.force_update = true;
+    Framing { bounds, bars: bars.lasting.clone(), focus, radius, angles }
+}
+
+/// Frames the box of the last framing anew where a bar came or went since then, unless a person has moved the view or drags.
+fn make_room(
+    mut framing: ResMut<LastFraming>,
+    mut cameras: Query<&mut PanOrbitCamera>,
+    (area, bars, pointer): (Res<ViewportArea>, Res<ViewportBars>, Res<PointerState>),
+) {
+    let Some(last) = framing.0.as_ref().filter(|last| last.bars != bars.lasting) else { return };
+    let Ok(mut camera) = cameras.single_mut() else { return };
+    if pointer.is_busy() || area.size.x < 1.0 {
+        return;
+    }
+    let bounds = last.bounds;
+    framing.0 = last.is_seen_by(&camera).then(|| frame(&mut camera, bounds, area.size, &bars));
 }
 
 /// Least and greatest distance to the focus, in parts of the distance at which something fills the view.
@@ -257,7 +316,8 @@ fn frame_when_ready(
     rigs: Query<(&Rig, &JointEntities, &GlobalTransform, Option<&RigSurface>)>,
     places: Query<&GlobalTransform>,
     mut cameras: Query<&mut PanOrbitCamera>,
-    area: Res<ViewportArea>,
+    (area, bars): (Res<ViewportArea>, Res<ViewportBars>),
+    mut framing: ResMut<LastFraming>,
 ) {
     if !wanted.0 || area.size.x < 1.0 {
         return;
@@ -267,7 +327,8 @@ fn frame_when_ready(
     if surface.is_none() && data.is_empty() {
         return;
     }
-    frame(&mut camera, everything(surface, place, data, entities, &places), area.size);
+    let bounds = everything(surface, place, data, entities, &places);
+    framing.0 = Some(frame(&mut camera, bounds, area.size, &bars));
     wanted.0 = false;
 }
 
@@ -325,6 +386,30 @@ fn pace_zoom(mut cameras: Query<&mut PanOrbitCamera>, scroll: Res<AccumulatedMou
 fn zoom_sensitivity(notches: f32) -> f32 {
     let sensitivity = (1.0 - ops::powf(NOTCH, notches)) / (TAKEN * notches);
     if sensitivity.is_finite() { sensitivity } else { 1.0 }
+}
+
+/// Notes the distance to the focus before the camera takes the input of the frame.
+fn start_zoom(cameras: Query<&PanOrbitCamera>, mut start: ResMut<ZoomStart>) {
+    let camera = cameras.single().ok().filter(|camera| camera.initialized);
+    start.set_if_neq(ZoomStart(camera.map(|camera| camera.target_radius)));
+}
+
+/// Moves a camera that has zoomed across its view, so that what is under the pointer stays there.
+fn zoom_to_pointer(
+    start: Res<ZoomStart>,
+    (area, pointer): (Res<ViewportArea>, Res<PointerState>),
+    mut cameras: Query<(&mut PanOrbitCamera, &mut Transform)>,
+) {
+    let (Some(start), Some(at)) = (start.0, area.pointer) else { return };
+    let Ok((mut camera, mut place)) = cameras.single_mut() else { return };
+    let approach = start - camera.target_radius;
+    if approach == 0.0 || pointer.is_camera() {
+        return;
+    }
+    let shift = zoom_shift([*place.right(), *place.up()], at, area.size, approach);
+    camera.target_focus += shift;
+    camera.focus += shift;
+    place.translation += shift;
 }
 
 /// Restricts drawing to the part of the window that the panels leave free.

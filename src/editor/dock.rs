@@ -17,6 +17,7 @@ use super::{
     running_work::RunningWorkPlugin,
     settings::EditorSettings,
     status, style, toolbar,
+    viewport_bars::ViewportBars,
 };
 
 /// Plugin that draws the window.
@@ -259,6 +260,11 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
     world.insert_resource(panels);
     world.insert_resource(layout);
     remember_area(world, viewport);
+    let bars = viewport.map(|viewport| ViewportBars::drawn(&ctx, viewport)).unwrap_or_default();
+    if world.get_resource_or_init::<ViewportBars>().set_if_neq(bars) {
+        trace!("drawing on: a bar came or went");
+        world.write_message(bevy::window::RequestRedraw);
+    }
     if !requests.is_empty() {
         trace!("drawing on: panels asked for something");
         // Requests take effect in the next frame, which has to be requested, too.

@@ -156,7 +156,8 @@ pub(super) fn follow_pointer(
     mut modifiers: Local<ModifierKeys>,
     mut pointer: MessageWriter<ViewportPointer>,
 ) {
-    if events.is_empty() {
+    // What comes over a resting pointer takes it without an event.
+    if events.is_empty() && area.pointer.is_none() {
         return;
     }
     let (Ok(window), Ok(mut context)) = (windows.single(), contexts.single_mut()) else {
@@ -223,6 +224,10 @@ pub(super) fn follow_pointer(
                     };
                     state.last_click = (!dragged).then_some((at, now, count));
                     send(at, PointerAct::Released { dragged, count }, *modifiers, &area);
+                    // The pointer left during the drag, which had it until now.
+                    if !over(at, &area) {
+                        send(at, PointerAct::Left, *modifiers, &area);
+                    }
                 } else if down && tool && over(state.at, &area) {
                     state.pressed = Some(state.at);
                     state.dragged = false;
@@ -242,5 +247,9 @@ pub(super) fn follow_pointer(
             }
             _ => {}
         }
+    }
+    if area.pointer.is_some() && state.pressed.is_none() && !over(state.at, &area) {
+        area.pointer = None;
+        send(state.at, PointerAct::Left, *modifiers, &area);
     }
 }

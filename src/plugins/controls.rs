@@ -3,6 +3,7 @@
 //! A node is visible unless its layer is hidden, or its attribute [`VISIBLE`] is below one half. Commands drive that
 //! attribute like any other, so the controls of inverse kinematics hide while a limb follows the forward ones.
 
+pub mod density;
 pub mod outline;
 mod range;
 pub mod size;
@@ -47,6 +48,7 @@ impl Plugin for ControlsPlugin {
             .add_message::<EditRefusal>()
             .add_systems(Update, (throw_switches, range::throw_over).chain().in_set(RigSystems::Gesture))
             .register_type::<size::ShapeFactor>()
+            .register_type::<density::CrowdedControl>()
             .add_systems(
                 PostUpdate,
                 (visibility::show_nodes.after(RigSystems::Solve), size::measure_shapes.after(RigSystems::Surface)),

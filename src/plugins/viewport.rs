@@ -21,6 +21,45 @@ pub fn framing(bounds: [Vec3; 2], axes: [Vec3; 3], aspect: f32) -> (Vec3, f32) {
     ((low + high) * 0.5, distance.max(1e-3))
 }
 
+/// Least share of a picture's height that a box is framed into beside bars.
+const LEAST_FREE: f32 = 0.4;
+
+/// [`framing`] in a picture of `size` pixels that bars cover in part: the box fills the room above the bars at the bottom.
+///
+/// A bar counts if it reaches into the middle half of the box, as it would be without bars; one in a corner covers nothing.
+pub fn framing_beside(bounds: [Vec3; 2], axes: [Vec3; 3], size: Vec2, bars: &[Rect]) -> (Vec3, f32) {
+    let aspect = if size.y > 0.0 { size.x / size.y } else { 1.5 };
+    let (centre, distance) = framing(bounds, axes, aspect);
+    let [across, tall, before] = axes.map(|axis| ((bounds[1] - bounds[0]) * 0.5).dot(axis.abs()));
+    let half = bevy::math::ops::tan(FIELD_OF_VIEW * 0.5);
+    let pixels = size.y / (2.0 * half * (distance - before).max(1e-6));
+    let covers = |bar: &&Rect| {
+        let apart = (bar.min.x - size.x * 0.5).max(size.x * 0.5 - bar.max.x);
+        let is_beside = apart >= 0.5 * across * pixels || bar.min.y >= size.y * 0.5 + tall * pixels;
+        bar.center().y > size.y * 0.5 && !is_beside
+    };
+    let covering = bars.iter().filter(covers);
+    let free = covering.map(|bar| bar.min.y).fold(size.y, f32::min).max(LEAST_FREE * size.y);
+    if free >= size.y {
+        return (centre, distance);
+    }
+    let distance = 1.12 * (tall * size.y / (half * free)).max(across / (half * aspect.max(0.1))) + before;
+    let distance = distance.max(1e-3);
+    // Measured on the near side of the box, which looks largest.
+    let shift = (size.y - free) * half * (distance - before) / size.y;
+    (centre - axes[1] * shift, distance)
+}
+
+/// Movement of a camera across its view that goes with an approach, so that everything under a pixel stays under that pixel.
+///
+/// `axes` are the view's right and up axes, `at` is the pixel in a picture of `size` pixels, and `approach` is the length by
+/// which the camera comes nearer to its focus, in any unit. The same movement holds for the orthographic cameras of [`framing`].
+pub fn zoom_shift(axes: [Vec3; 2], at: Vec2, size: Vec2, approach: f32) -> Vec3 {
+    let off = at - size * 0.5;
+    let slope = 2.0 * bevy::math::ops::tan(FIELD_OF_VIEW * 0.5) / size.y.max(1.0);
+    (axes[0] * off.x - axes[1] * off.y) * (slope * approach)
+}
+
 /// Marks the camera of the viewport.
 #[derive(Component, Reflect, Debug, Clone, Copy)]
 #[reflect(Component, Default)]

@@ -4,6 +4,7 @@ mod edits;
 mod focus;
 mod frames;
 mod layout;
+mod letters;
 
 use std::collections::BTreeSet;
 

@@ -52,6 +52,8 @@ mod click_runs;
 mod clicks;
 mod clip_files;
 mod commands;
+#[cfg(feature = "editor")]
+mod control_density;
 mod control_sizes;
 mod custom_module;
 #[cfg(feature = "editor")]
@@ -206,6 +208,8 @@ mod render;
 mod retarget;
 mod rig_limits;
 mod rig_text;
+#[cfg(feature = "editor")]
+mod run_failures;
 mod runtime;
 mod same_parts;
 mod saved_text;
@@ -244,6 +248,8 @@ mod update;
 mod updater;
 #[cfg(feature = "editor")]
 mod viewport_app;
+#[cfg(feature = "editor")]
+mod viewport_views;
 mod voxels;
 #[cfg(feature = "cli")]
 mod vrm;

@@ -18,6 +18,7 @@ use crate::{
         library::ChosenTemplate,
         panel::{Requests, ViewportPainter},
         tools::region::{ChosenFaces, RegionSkeleton, RegionTool},
+        viewport_bars::FIT_BAR,
     },
     files::{BUNDLED_CHARACTERS, TemplatePlace, bundled_parts},
     plugins::{
@@ -51,7 +52,7 @@ impl ViewportPainter for FitBar {
         if job.is_none() && fitted.is_none() && faces.is_none() {
             return;
         }
-        egui::Area::new(egui::Id::new("fit bar"))
+        egui::Area::new(egui::Id::new(FIT_BAR))
             .order(egui::Order::Middle)
             .pivot(egui::Align2::LEFT_BOTTOM)
             .fixed_pos(area.left_bottom() + egui::vec2(12.0, -12.0))

@@ -10,7 +10,7 @@ use bevy::{
 
 use super::{
     follow::{LoadSteps, PendingLoad},
-    joints::{PartAddition, added, added_by},
+    joints::{AdditionError, PartAddition, added, added_by},
     listing::{LibraryFolders, own_folder},
     sides::PartSides,
 };
@@ -41,7 +41,7 @@ use crate::{
     rig::{
         EditError, Rig, RigEdit, Uid,
         operations::{Operation, TagOperation},
-        part::{Part, PartError, PartInstance},
+        part::{Part, PartInstance},
         template::Template,
         update::{Take, Update, clip_edits, edits_between, pose_edits, update, with_identities},
     },
@@ -106,7 +106,7 @@ enum WorkError {
     #[error(transparent)]
     Edit(#[from] EditError),
     #[error(transparent)]
-    Part(#[from] PartError),
+    Addition(#[from] AdditionError),
 }
 
 /// Requests that wait, and the one that is being worked on.
@@ -257,11 +257,13 @@ impl Snapshot {
         site: &SearchPaths,
         joints: &[Uid],
         options: &[(String, String)],
-    ) -> Result<Ready, PartError> {
+    ) -> Result<Ready, AdditionError> {
         let name = place.part_name(self.beside.as_deref(), site);
         let part = (name, Part::from(template));
         let joints = (joints, self.stroke.as_slice());
-        let PartAddition { operation, lonely } = added(&self.rig, joints, part, options, self.both, &self.modules)?;
+        let instances = self.followed.as_ref().map_or(&[][..], |(_, instances)| instances.as_slice());
+        let rig = (&self.rig, instances);
+        let PartAddition { operation, lonely } = added(rig, joints, part, options, self.both, &self.modules)?;
         let note = lonely.and_then(|joint| self.rig.joint(joint)).map(|joint| {
             let (part, joint) = (place.stem(), joint_name(&joint.data));
             format!("{part} went onto one side only: {joint} has no partner on the other; mirror the joints first")

@@ -90,7 +90,8 @@ fn build_state(ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut 
         }
     });
     let failure = world.get::<BuildFailure>(shown.entity).map(|failure| failure.0.to_string());
-    if let Some(text) = failure.or(world.get::<RunFailure>(shown.entity).map(|failure| failure.0.to_string())) {
+    let run_failure = || Some(world.get::<RunFailure>(shown.entity)?.words(&shown.rig));
+    if let Some(text) = failure.or_else(run_failure) {
         ui.colored_label(ui.visuals().error_fg_color, text);
     }
 }

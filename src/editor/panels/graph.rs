@@ -16,6 +16,7 @@ mod edits;
 mod focus;
 mod gesture;
 pub mod layout;
+mod letters;
 mod look;
 mod menu;
 mod model;

@@ -5,7 +5,12 @@
 
 use bevy::{ecs::message::MessageId, prelude::*};
 
-use super::{ToolPointer, scene::Scene, select::ClickedSelection, transform};
+use super::{
+    ToolPointer,
+    scene::Scene,
+    select::{ClickedSelection, DrawnControls},
+    transform,
+};
 use crate::{
     editor::pointer::ModifierKeys,
     plugins::picking::{Pick, PickRequest},
@@ -31,7 +36,7 @@ pub(super) enum ClickWish {
         /// Node that the click picks.
         under: Option<Uid>,
     },
-    /// Click on a handle of a gizmo, which never hides the joints below it.
+    /// Click on a handle of a gizmo, which never hides the joints and controls below it.
     Handle { at: Vec2, held: ModifierKeys, count: u8 },
 }
 
@@ -43,7 +48,11 @@ impl ClickWishes {
 }
 
 /// Asks for what the clicks of the frame pick.
-pub(super) fn answer(mut wishes: ResMut<ClickWishes>, scene: Scene, mut picks: MessageWriter<PickRequest>) {
+pub(super) fn answer(
+    mut wishes: ResMut<ClickWishes>,
+    (scene, controls): (Scene, DrawnControls),
+    mut picks: MessageWriter<PickRequest>,
+) {
     if wishes.0.is_empty() {
         return;
     }
@@ -59,7 +68,7 @@ pub(super) fn answer(mut wishes: ResMut<ClickWishes>, scene: Scene, mut picks: M
             }
             ClickWish::Click { pick, held, count, under } => Some(selection.request(&rig, pick, held, count, under)),
             ClickWish::Handle { at, held, count } => {
-                let request = transform::clicked(&scene, &rig, selection.nodes(&rig), at, held, count);
+                let request = transform::clicked((&scene, &controls), &rig, selection.nodes(&rig), at, held, count);
                 request.inspect(|request| selection.follow(&rig, request, None))
             }
         };

@@ -117,10 +117,22 @@ impl DrawnControls<'_, '_> {
     /// The control whose outline is at a pixel, with the distance of the outline from there in pixels; `None` while a skeleton
     /// is drawn in place of controls.
     pub(super) fn nearest(&self, rig: &EditedRig, sight: &Sight, at: Vec2) -> Option<(Uid, f32)> {
+        self.nearest_among(|_| true, rig, sight, at)
+    }
+
+    /// The control of [`nearest`](Self::nearest) among some controls.
+    pub(super) fn nearest_among(
+        &self,
+        is_meant: impl Fn(Uid) -> bool,
+        rig: &EditedRig,
+        sight: &Sight,
+        at: Vec2,
+    ) -> Option<(Uid, f32)> {
         if !self.in_use.0 {
             return None;
         }
-        let visible = self.nodes.visible(self.rigs.get(rig.entity).ok(), rig.place.affine().inverse());
+        let mut visible = self.nodes.visible(self.rigs.get(rig.entity).ok(), rig.place.affine().inverse());
+        visible.retain(|control| is_meant(control.uid));
         let found = nearest_control(&visible, &sight.plane, sight.point(at), REACH * sight.pixel)?;
         Some((found.0, found.1 / sight.pixel))
     }

@@ -353,9 +353,10 @@ pub(super) fn step(rig: &EditedRig) -> f32 {
     height * MOVE_STEP
 }
 
-/// The pick of a click on a handle: a joint at that pixel; of a double click, all that hangs below the active joint there.
+/// The pick of a click on a handle: the joint or the control that is nearest to that pixel, but for the active one, around which
+/// the handles are; of a double click, all that hangs below the active joint there.
 pub(super) fn clicked(
-    scene: &Scene,
+    (scene, controls): (&Scene, &DrawnControls),
     rig: &EditedRig,
     selected: &[Uid],
     at: Vec2,
@@ -366,16 +367,28 @@ pub(super) fn clicked(
     let active = selected.last().copied();
     let near = scene.posed(rig).into_iter().filter_map(|(joint, place)| {
         let distance = sight.project(place)?.distance(at);
-        (distance <= REACH && (count > 1 || active != Some(joint))).then_some((joint, distance))
+        (distance <= REACH).then_some((joint, distance))
     });
-    let (joint, _) = near.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let near: Vec<(Uid, f32)> = near.collect();
+    let is_active_there = near.iter().any(|(joint, _)| Some(*joint) == active);
     let is_added = held.shift || held.control;
-    let (what, add) = if count > 1 && active == Some(joint) {
-        (select::hierarchy_below(rig, joint), is_added)
-    } else if held.control && selected.contains(&joint) {
-        (selected.iter().copied().filter(|other| *other != joint).collect(), false)
+    if let Some(active) = active.filter(|_| count > 1 && is_active_there) {
+        let what = Pick::Joints(select::hierarchy_below(rig, active));
+        return Some(PickRequest { rig: rig.entity, what, add: is_added });
+    }
+    // The second click of a double click means what the first one took.
+    let is_active = |node: Uid| Some(node) == active;
+    if count > 1 && controls.nearest_among(is_active, rig, &sight, at).is_some() {
+        return None;
+    }
+    let joints = near.into_iter().filter(|(joint, _)| !is_active(*joint));
+    let control = controls.nearest_among(|control| !is_active(control), rig, &sight, at);
+    // Controls are drawn over joints, so that one at the same distance is the one that is seen.
+    let (node, _) = control.into_iter().chain(joints).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (what, add) = if held.control && selected.contains(&node) {
+        (selected.iter().copied().filter(|other| *other != node).collect(), false)
     } else {
-        (vec![joint], is_added)
+        (vec![node], is_added)
     };
     Some(PickRequest { rig: rig.entity, what: Pick::Joints(what), add })
 }

@@ -10,7 +10,7 @@ use crate::{
         document::{JointEntities, ShowRest},
         runtime::{InstanceMode, RigRuntime},
     },
-    rig::{PoseOffset, RestTransform, Rig},
+    rig::{PoseOffset, RestTransform, Rig, TagKind, Uid, nearest::listed_first},
     solve::program::{Carry, CompileOptions, ProgramCache, ProgramError},
 };
 
@@ -24,6 +24,45 @@ pub struct Programs(pub ProgramCache);
 #[reflect(opaque)]
 #[reflect(Component, Debug, Clone, PartialEq)]
 pub struct RunFailure(pub ProgramError);
+
+impl RunFailure {
+    /// The reason with the names that people know: tags by their module and joint, joints by their label.
+    pub fn words(&self, rig: &Rig) -> String {
+        let ProgramError::Cycle { commands, nodes, .. } = &self.0 else {
+            let tag = self.0.commands().first().and_then(|command| tag_name(rig, *command));
+            return tag.map_or_else(|| self.0.to_string(), |tag| format!("{tag}: {}", self.0));
+        };
+        let (mut tags, mut doubles) = (Vec::new(), Vec::new());
+        for tag in commands.iter().filter_map(|command| tag_name(rig, *command)) {
+            let list = if tags.contains(&tag) { &mut doubles } else { &mut tags };
+            list.push(tag);
+        }
+        let joints = nodes.iter().filter_map(|node| rig.joint(*node)?.data.label.clone());
+        let mut joints: Vec<String> = joints.collect();
+        joints.dedup();
+        if tags.is_empty() {
+            return self.0.to_string();
+        }
+        let count = tags.len();
+        let moved = match joints.len() {
+            0 => "what they move".to_owned(),
+            count => listed_first(joints, count, "and"),
+        };
+        let hint = doubles.first().map_or_else(String::new, |double| {
+            format!("; {double:?} is there twice, so two parts may move the same joints: delete one of them")
+        });
+        let (tags, rest) = (listed_first(tags, count, "and"), "or let it follow a node that the others do not move");
+        format!("the tags {tags} wait for each other to place {moved}; turn one of them off, delete it, {rest}{hint}")
+    }
+}
+
+/// Name of a command for people: its module and its joint.
+fn tag_name(rig: &Rig, tag: Uid) -> Option<String> {
+    let (joint, tag) = rig.find_tag(tag)?;
+    let TagKind::Command { module, .. } = &tag.kind else { return None };
+    let joint = joint.data.label.as_deref().unwrap_or("a joint without a label");
+    Some(format!("{} on {joint}", module.replace('_', " ")))
+}
 
 type BuiltRigs<'a> = (
     Entity,

@@ -2,7 +2,7 @@
 
 use bevy::{ecs::system::SystemParam, math::Affine3A, prelude::*};
 
-use super::{NodeVisible, size::ShapeFactor};
+use super::{NodeVisible, density::CrowdedControl, size::ShapeFactor};
 use crate::{
     algo::view::ViewPlane,
     plugins::schema::{Control, NodeLayer, RigNodes},
@@ -35,15 +35,28 @@ type Node = (
     Option<&'static NodeVisible>,
     Option<&'static NodeLayer>,
     Option<&'static ShapeFactor>,
+    Option<&'static CrowdedControl>,
 );
 
 impl ControlNodes<'_, '_> {
-    /// Visible controls of a rig, in the order of its nodes. `to_rig` transforms world space to rig space.
+    /// Visible controls of a rig but those that the view leaves out ([`CrowdedControl`]), in the order of its nodes. `to_rig`
+    /// transforms world space to rig space.
     pub fn visible(&self, nodes: Option<&RigNodes>, to_rig: Affine3A) -> Vec<ControlOutline> {
+        self.outlines(nodes, to_rig, false)
+    }
+
+    /// The controls of [`visible`](Self::visible) and those that the view leaves out.
+    pub fn visible_near(&self, nodes: Option<&RigNodes>, to_rig: Affine3A) -> Vec<ControlOutline> {
+        self.outlines(nodes, to_rig, true)
+    }
+
+    fn outlines(&self, nodes: Option<&RigNodes>, to_rig: Affine3A, with_crowded: bool) -> Vec<ControlOutline> {
         let controls = nodes.into_iter().flat_map(|nodes| nodes.iter()).filter_map(|node| self.nodes.get(node).ok());
-        let visible = controls.filter(|(_, _, _, visible, ..)| visible.is_none_or(|visible| visible.0));
+        let visible = controls.filter(|(_, _, _, visible, _, _, crowded)| {
+            visible.is_none_or(|visible| visible.0) && (with_crowded || crowded.is_none_or(|crowded| !crowded.0))
+        });
         visible
-            .map(|(uid, control, place, _, layer, factor)| ControlOutline {
+            .map(|(uid, control, place, _, layer, factor, _)| ControlOutline {
                 uid: *uid,
                 lines: sized_lines(&control.0, to_rig * place.affine(), factor.map_or(1.0, |factor| factor.0)),
                 color: layer.and_then(|layer| layer.0.color).unwrap_or(control.0.color),

@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     plugins::{
-        controls::{ControlsInUse, NodeVisible, outline::ControlNodes, size::ShapeFactor},
+        controls::{ControlsInUse, NodeVisible, density::CrowdedControl, outline::ControlNodes, size::ShapeFactor},
         document::{HoveredNode, Joint, JointEntities, NodeOf, Selection, Symmetry},
         schema::{Control, NodeLayer, RigNodes},
         surface::{RigMesh, RigMeshes},
@@ -198,8 +198,14 @@ pub(super) fn frame_planes(
 }
 
 /// A node that looks otherwise than in the frame before.
-type NodeRedrawn =
-    Or<(Changed<GlobalTransform>, Changed<NodeVisible>, Changed<Control>, Changed<NodeLayer>, Changed<ShapeFactor>)>;
+type NodeRedrawn = Or<(
+    Changed<GlobalTransform>,
+    Changed<NodeVisible>,
+    Changed<Control>,
+    Changed<NodeLayer>,
+    Changed<ShapeFactor>,
+    Changed<CrowdedControl>,
+)>;
 
 /// Builds the pictures of rigs.
 pub(super) fn draw_rigs(

@@ -250,3 +250,73 @@ fn arrows_in_pose_mode_keep_the_lengths_of_limbs() {
         assert_eq!(after.pose().keys().collect::<Vec<_>>(), [&leaves[0]], "nothing else is posed");
     }
 }
+
+/// Rings of a selected control lie over the controls and joints around it: a click on a ring takes what is there, and a drag turns.
+#[test]
+fn a_click_on_a_ring_takes_the_control_or_joint_under_it() {
+    let [_, sight] = sights(Transform::IDENTITY);
+    let mut bench = Bench::built(headless_app(1), crate::bench::shipped("biped"), sight);
+    let rig = bench.base.rig;
+    let visible = move |controls: ControlNodes, nodes: Query<&RigNodes>| {
+        controls.visible(nodes.get(rig).ok(), bevy::math::Affine3A::IDENTITY)
+    };
+    let outlines = bench.base.app.world_mut().run_system_once(visible).unwrap();
+    let state = bench.base.get::<RigRuntime>(rig).expect("a built rig").state().clone();
+    let joints: Vec<(Uid, Vec2)> = bench
+        .base
+        .rig()
+        .walk()
+        .filter_map(|joint| Some((joint.data.uid, sight.project(state.global(joint.data.uid)?.translation)?)))
+        .collect();
+    let is_ring = |handle: &Handle| matches!(handle, Handle::Ring(_) | Handle::ViewRing);
+    let (mut controls, mut nodes, mut turns) = (0, 0, 0);
+    for selected in outlines.iter().map(|outline| outline.uid) {
+        bench.base.select(&[selected]);
+        bench.mode(Mode::Pose);
+        let shapes = bench.shapes();
+        let others: Vec<_> = outlines.iter().filter(|outline| outline.uid != selected).cloned().collect();
+        let middle = sight.project(state.global(selected).unwrap().translation).unwrap();
+        let rings = shapes.iter().filter(|shape| is_ring(&shape.handle)).flat_map(|shape| &shape.lines);
+        let pixels = rings.filter(|line| line.paint != LinePaint::Far).flat_map(|line| &line.points).copied();
+        // Places with one thing under the ring, and not two at almost the same distance.
+        let under = |at: Vec2| {
+            let joint = joints.iter().filter(|(_, place)| place.distance(at) <= REACH);
+            let joint: Vec<Uid> = joint.map(|(uid, _)| *uid).collect();
+            let control = control_at(&others, &sight.plane, sight.point(at), REACH * sight.pixel);
+            match (joint.as_slice(), control) {
+                ([], Some(control)) => Some((control, true)),
+                ([joint], None) => Some((*joint, false)),
+                _ => None,
+            }
+        };
+        let is_on_ring = |at: &Vec2| handle_at(&shapes, *at).is_some_and(|handle| is_ring(&handle));
+        let mut found = pixels.filter(|at| at.distance(middle) > 2.0 * REACH && is_on_ring(at));
+        let Some((at, (node, is_control))) = found.find_map(|at| Some((at, under(at)?))) else { continue };
+        bench.pointer(at, PointerAct::Pressed, ModifierKeys::default());
+        bench.pointer(at, PointerAct::Released { dragged: false, count: 1 }, ModifierKeys::default());
+        bench.base.app.update();
+        assert_eq!(bench.base.selected(), [node], "the ring of {selected} blocks what is under it at {at}");
+        if control_at(&outlines, &sight.plane, sight.point(at), REACH * sight.pixel) == Some(node) {
+            // The second click of a double click leaves it selected.
+            bench.pointer(at, PointerAct::Pressed, ModifierKeys::default());
+            bench.pointer(at, PointerAct::Released { dragged: false, count: 2 }, ModifierKeys::default());
+            bench.base.app.update();
+            assert_eq!(bench.base.selected(), [node], "a double click at {at} goes on to something else");
+        }
+        (controls, nodes) = (controls + usize::from(is_control), nodes + usize::from(!is_control));
+
+        // A drag from the same place turns what was selected.
+        bench.base.select(&[selected]);
+        bench.mode(Mode::Pose);
+        let steps = bench.base.steps();
+        bench.drag(at, Vec2::new(17.0, 23.0), ModifierKeys::default());
+        bench.release(at + Vec2::new(17.0, 23.0));
+        assert_eq!(bench.base.selected(), [selected], "a drag of a ring at {at} selects");
+        if bench.base.steps() > steps {
+            turns += 1;
+            bench.base.change(Change::Undo);
+            bench.base.app.update();
+        }
+    }
+    assert!(controls > 3 && turns > 3, "{controls} controls and {nodes} joints under rings, {turns} turns");
+}

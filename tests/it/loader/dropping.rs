@@ -1,5 +1,7 @@
 //! Parts that are dropped onto joints and strokes, and their options.
 
+use rigsmith::editor::library::PartSides;
+
 use super::*;
 
 #[test]
@@ -213,4 +215,66 @@ fn parts_are_called_relative_to_the_document_or_the_site() {
     let elsewhere = TemplatePlace::File(PathBuf::from("/elsewhere/arm.rig.ron"));
     assert_eq!(elsewhere.part_name(None, &site), "/elsewhere/arm.rig.ron");
     assert_eq!(TemplatePlace::Bundled("parts/arm.rig.ron").part_name(None, &site), "parts/arm.rig.ron");
+}
+
+/// Two parts of a kind on the same joints wait for each other when they are built: the second one is refused at once.
+#[test]
+fn a_part_goes_onto_the_same_joints_once() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let [arm_l, elbow_l, arm_r] = ["arm_l", "elbow_l", "arm_r"].map(|label| studio.joint(label));
+    let onto = |studio: &mut Studio, joints: Vec<Uid>| {
+        let place = studio.limb();
+        studio.act(place, LibraryAct::Part { joints, options: Vec::new() });
+    };
+    onto(&mut studio, vec![arm_l]);
+    let (text, steps) = (studio.text(), studio.desk.steps());
+    for joints in [vec![arm_l], vec![arm_l, elbow_l], vec![elbow_l]] {
+        onto(&mut studio, joints.clone());
+        assert_eq!((studio.text(), studio.desk.steps()), (text.clone(), steps), "{joints:?}");
+    }
+    let told = "arm_l belongs to the part \"limb\" already";
+    assert!(studio.told(told) && studio.told("delete its tags first"), "{:?}", studio.desk.told());
+    // Another joint takes it, and so does the same one once the part is gone.
+    onto(&mut studio, vec![arm_r]);
+    assert_eq!(studio.desk.rig().dropped_parts().len(), 2, "{:?}", studio.desk.told());
+    studio.change(Change::Undo);
+    studio.change(Change::Undo);
+    assert!(studio.desk.rig().dropped_parts().is_empty());
+    onto(&mut studio, vec![arm_l, elbow_l]);
+    assert_eq!(studio.desk.rig().dropped_parts().len(), 1, "{:?}", studio.desk.told());
+    // With both sides, one side that has the part is enough.
+    let both = PartSides::choice(studio.world(), true);
+    studio.desk.app.insert_resource(both);
+    let steps = studio.desk.steps();
+    onto(&mut studio, vec![arm_r]);
+    assert_eq!((studio.desk.rig().dropped_parts().len(), studio.desk.steps()), (1, steps));
+}
+
+#[test]
+fn a_part_does_not_go_onto_joints_that_a_template_or_tags_gave_such_a_part() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let home = studio.folder.path().join("home");
+    fs::write(home.join("limb.rig.ron"), LIMB).unwrap();
+    let parts = "parts: [(part: \"limb.rig.ron\", name: \"left arm\", onto: [\"arm_l\", \"elbow_l\"])],\n    joints: [";
+    let armed = home.join("armed.rig.ron");
+    fs::write(&armed, MAN.replacen("joints: [", parts, 1).replace("\"man\"", "\"armed\"")).unwrap();
+    studio.open(OpenRequest::File(armed));
+    studio.desk.until("the followed file", |desk| {
+        desk.app.world().get::<RigSource>(desk.rig).is_some_and(|source| source.base().is_some())
+    });
+    let (arm, text) = (studio.joint("arm_l"), studio.text());
+    let place = TemplatePlace::File(home.join("limb.rig.ron"));
+    studio.act(place, LibraryAct::Part { joints: vec![arm], options: Vec::new() });
+    assert!(studio.told("arm_l belongs to the part \"left arm\" already"), "{:?}", studio.desk.told());
+    assert_eq!(studio.text(), text);
+
+    // Tags that are no part any more.
+    let joints = studio.desk.chain(&["clavicle_l", "upper_arm_l", "forearm_l", "hand_l"]);
+    let place = TemplatePlace::Bundled("parts/arm.rig.ron");
+    studio.act(place.clone(), LibraryAct::Inject { joints: joints.clone() });
+    let text = studio.text();
+    assert!(text.contains("ik_fk_switch"), "{:?}", studio.desk.told());
+    studio.act(place, LibraryAct::Part { joints: joints[..1].to_vec(), options: Vec::new() });
+    assert!(studio.told("clavicle_l belongs to a part of this kind already"), "{:?}", studio.desk.told());
+    assert_eq!(studio.text(), text);
 }

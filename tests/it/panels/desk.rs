@@ -37,6 +37,8 @@ pub struct Desk {
     held: Modifiers,
     /// Number of shapes that the last frame was drawn with.
     pub shapes: usize,
+    /// Texts of the last frame.
+    pub texts: Vec<DrawnText>,
     /// Nothing that the panel asks for is done.
     pub deaf: bool,
     /// True if the last frame asked for another one at once.
@@ -55,6 +57,34 @@ pub struct ShownWidget {
     pub enabled: bool,
     /// True if it can have the keyboard and be clicked.
     pub clickable: bool,
+}
+
+/// A text as it is drawn.
+#[derive(Debug, Clone)]
+pub struct DrawnText {
+    pub text: String,
+    /// Size of the pictures of its letters.
+    pub size: f32,
+    /// Height of its lines on the screen.
+    pub height: f32,
+}
+
+fn drawn_texts<'a>(shapes: impl Iterator<Item = &'a egui::Shape>) -> Vec<DrawnText> {
+    let mut open: Vec<&egui::Shape> = shapes.collect();
+    let mut texts = Vec::new();
+    while let Some(shape) = open.pop() {
+        match shape {
+            egui::Shape::Vec(parts) => open.extend(parts),
+            egui::Shape::Text(shape) => {
+                let galley = &shape.galley;
+                let Some(section) = galley.job.sections.first() else { continue };
+                let (size, height) = (section.format.font_id.size, galley.size().y);
+                texts.push(DrawnText { text: galley.job.text.clone(), size, height });
+            }
+            _ => {}
+        }
+    }
+    texts
 }
 
 impl Desk {
@@ -86,6 +116,7 @@ impl Desk {
             seen: Vec::new(),
             held: Modifiers::NONE,
             shapes: 0,
+            texts: Vec::new(),
             deaf: false,
             awake: false,
             wakes_in: std::time::Duration::MAX,
@@ -127,6 +158,7 @@ impl Desk {
             self.app.insert_resource(window);
         }
         self.shapes = output.shapes.len();
+        self.texts = drawn_texts(output.shapes.iter().map(|clipped| &clipped.shape));
         let delays = output.viewport_output.values().map(|viewport| viewport.repaint_delay);
         self.wakes_in = delays.min().unwrap_or(std::time::Duration::MAX);
         self.awake = output.viewport_output.values().any(|viewport| viewport.repaint_delay.is_zero());

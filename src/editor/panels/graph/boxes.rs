@@ -1,13 +1,10 @@
 //! Frames as they are drawn: a title over the nodes of an open one, a box with counts and pins in place of a folded one.
 
-use bevy_egui::egui::{
-    Color32, FontId, Painter, Pos2, Rect, Stroke, StrokeKind, Visuals, pos2,
-    text::{LayoutJob, TextWrapping},
-    vec2,
-};
+use bevy_egui::egui::{Color32, Painter, Rect, Stroke, StrokeKind, Visuals, pos2, vec2};
 
 use super::{
     canvas::Scene,
+    letters,
     model::Graph,
     wires::{Spots, box_pins},
 };
@@ -15,6 +12,11 @@ use crate::{
     editor::{counts::counted, panels::process, style},
     processor::{CommandState, CommandStatus},
 };
+
+/// Height of a line as a multiple of the size of its letters.
+const LINE: f32 = 1.3;
+/// Length in the graph of a point of the screen from which on a folded frame has its title alone.
+const FAR: f32 = 1.6;
 
 /// Numbers of the commands of a frame by their states.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -81,7 +83,8 @@ pub(super) fn draw(painter: &Painter, view: Rect, scene: &Scene, visuals: &Visua
         let size = 14.0f32.max(11.0 * unit).min(40.0);
         let color = style::quiet(visuals);
         let title = format!("⏷ {}{off}   {}", frame.title(), scene.tallies[number].words());
-        text(painter, space.min + vec2(10.0, 6.0), space.width() - 20.0, title, size, color);
+        let place = Rect::from_min_size(space.min + vec2(10.0, 6.0), vec2(space.width() - 20.0, LINE * size));
+        letters::line(painter, place, &title, size, color, 1.0 / unit);
     }
 }
 
@@ -112,26 +115,20 @@ pub(super) fn draw_folded(painter: &Painter, view: Rect, scene: &Scene, visuals:
         painter.rect_filled(strip, 4.0, process::color(visuals, status));
         let strong = if frame.enabled { visuals.strong_text_color() } else { style::quiet(visuals) };
         let (corner, room) = (folded.min + vec2(16.0, 6.0), folded.width() - 28.0);
+        let row = |top: f32, size: f32| Rect::from_min_size(corner + vec2(0.0, top), vec2(room, LINE * size));
         // From afar the title alone is to be read, as large as the box.
-        if unit > 1.6 {
+        if unit > FAR {
             let size = (11.0 * unit).min(folded.height() * 0.62);
-            let at = pos2(corner.x, folded.center().y - size * 0.6);
-            text(painter, at, room, frame.title(), size, strong);
+            let place =
+                Rect::from_center_size(pos2(corner.x + 0.5 * room, folded.center().y), vec2(room, folded.height()));
+            letters::title(painter, place, &frame.title(), size, strong, 1.0 / unit);
         } else {
             let off = if frame.enabled { "" } else { " (off)" };
-            text(painter, corner, room, format!("⏵ {}{off}", frame.title()), 16.0, strong);
-            text(painter, corner + vec2(0.0, 26.0), room, tally.words(), 13.0, style::quiet(visuals));
+            letters::line(painter, row(0.0, 16.0), &format!("⏵ {}{off}", frame.title()), 16.0, strong, 1.0 / unit);
+            letters::line(painter, row(26.0, 13.0), &tally.words(), 13.0, style::quiet(visuals), 1.0 / unit);
         }
         for pin in box_pins(folded) {
             painter.circle(pin, 4.0, visuals.text_color(), Stroke::new(1.0, Color32::from_gray(60)));
         }
     }
-}
-
-/// Draws a line of text, cut with an ellipsis.
-fn text(painter: &Painter, at: Pos2, room: f32, text: String, size: f32, color: Color32) {
-    let mut job = LayoutJob::simple_singleline(text, FontId::proportional(size), color);
-    job.wrap = TextWrapping::truncate_at_width(room.max(1.0));
-    let galley = painter.layout_job(job);
-    painter.galley(at, galley, color);
 }

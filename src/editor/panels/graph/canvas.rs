@@ -6,8 +6,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use bevy_egui::egui::{
-    self, Align2, Color32, FontId, Frame, Id, Painter, Pos2, Rect, Response, Sense, Shape, Stroke, StrokeKind, Style,
-    Ui, emath::TSTransform,
+    self, Color32, Frame, Id, Painter, Pos2, Rect, Response, Sense, Shape, Stroke, StrokeKind, Style, Ui,
+    emath::TSTransform,
 };
 use egui_snarl::{
     InPin, NodeId, OutPin, Snarl,
@@ -17,9 +17,10 @@ use egui_snarl::{
 use super::{
     boxes::{self, Tally},
     focus::Focus,
+    letters,
     model::{Graph, GraphWire},
     node,
-    wires::{self, Spots, WireInk},
+    wires::{self, HEAD, Spots, WireInk},
 };
 use crate::{
     editor::{panels::process, style},
@@ -128,7 +129,7 @@ impl Canvas<'_> {
                 self.name(&named, space, &boxes::said(&self.scene, number), None);
             }
         }
-        ground
+        self.tell_unread(ui, ground)
     }
 
     fn is_detailed(&self) -> bool {
@@ -158,13 +159,37 @@ impl Canvas<'_> {
             mesh.add_colored_rect(state, process::color(visuals, scene.statuses[*number].as_ref()));
         }
         painter.add(Shape::mesh(mesh));
-        if self.transform.scaling < LEGIBLE || self.visible.len() > MOST_TITLED {
+        if !self.has_titles() {
             return;
         }
         for number in &self.visible {
-            let at = scene.rects[*number].min + egui::vec2(14.0, 6.0);
+            let rect = scene.rects[*number];
+            let place =
+                Rect::from_min_max(rect.min + egui::vec2(14.0, 0.0), egui::pos2(rect.right() - 6.0, rect.top() + HEAD));
             let title = &scene.graph.nodes[*number].title;
-            painter.text(at, Align2::LEFT_TOP, title, FontId::proportional(15.0), visuals.text_color());
+            letters::title(painter, place, title, 15.0, visuals.text_color(), self.transform.scaling);
+        }
+    }
+
+    /// True if rectangles in place of nodes have titles.
+    fn has_titles(&self) -> bool {
+        self.transform.scaling >= LEGIBLE && self.visible.len() <= MOST_TITLED
+    }
+
+    /// Tells about a node or folded frame under the pointer whose letters are too small to be drawn.
+    fn tell_unread(&self, ui: &Ui, ground: Response) -> Response {
+        let scene = &self.scene;
+        let Some(at) = ui.input(|input| input.pointer.hover_pos()).filter(|_| ground.hovered()) else { return ground };
+        let at = self.transform.inverse() * at;
+        let node = self.visible.iter().copied().rfind(|number| scene.rects[*number].contains(at));
+        if let Some(node) = node.filter(|_| !self.is_detailed() && !self.has_titles()) {
+            return ground.on_hover_ui_at_pointer(|ui| node::about(ui, scene, node));
+        }
+        let is_unread =
+            |folded: &Rect| folded.contains(at) && folded.height() * self.transform.scaling < letters::LEAST;
+        match scene.boxes.iter().position(|folded| folded.as_ref().is_some_and(is_unread)) {
+            Some(frame) => ground.on_hover_text_at_pointer(boxes::said(scene, frame)),
+            None => ground,
         }
     }
 
@@ -277,7 +302,7 @@ impl SnarlViewer<Uid> for Canvas<'_> {
         let Some(number) = snarl.get_node(id).and_then(|tag| self.scene.graph.at.get(tag)).copied() else { return };
         let rect = self.scene.rects[number];
         ui.allocate_exact_size(rect.size(), Sense::hover());
-        node::draw(ui, &self.scene, number);
+        node::draw(ui, &self.scene, number, self.transform.scaling);
         let said = node::said(&self.scene, number);
         let frame = self.id.with(("snarl-node", id)).with("frame");
         if let Some(body) = ui.ctx().read_response(frame) {

@@ -4,19 +4,23 @@ use bevy_egui::egui::{Pos2, Rect, Stroke, StrokeKind, Ui, pos2, vec2};
 
 use super::{
     canvas::{NodePart, Scene},
+    letters,
     model::GraphWire,
     wires::{HEAD, ROW, input_pin, output_pin},
 };
 use crate::{
     editor::{
-        panels::{list, process, properties},
+        panels::{process, properties},
         style,
     },
     processor::CommandState,
 };
 
-/// Draws a node in its space.
-pub(super) fn draw(ui: &Ui, scene: &Scene, number: usize) {
+/// Size of letters, in the graph's units.
+const TEXT: f32 = 13.0;
+
+/// Draws a node in its space; `scale` is that of the view.
+pub(super) fn draw(ui: &Ui, scene: &Scene, number: usize, scale: f32) {
     let (node, rect) = (&scene.graph.nodes[number], scene.rects[number]);
     let visuals = ui.visuals();
     let status = scene.statuses[number].as_ref();
@@ -39,13 +43,13 @@ pub(super) fn draw(ui: &Ui, scene: &Scene, number: usize) {
     let line = |top: f32, left: f32, height: f32| {
         Rect::from_min_max(rect.min + vec2(left, top), pos2(rect.right() - 12.0, rect.top() + top + height))
     };
-    list::line(ui, line(4.0, 26.0, 20.0), &node.title, strong);
+    letters::title(painter, line(4.0, 26.0, 20.0), &node.title, TEXT, strong, scale);
     if !node.summary.is_empty() {
-        list::line(ui, line(22.0, 12.0, 18.0), &node.summary, quiet);
+        letters::line(painter, line(22.0, 12.0, 18.0), &node.summary, TEXT, quiet, scale);
     }
     for (number, input) in node.inputs.iter().enumerate() {
         let row = line(HEAD + ROW * number as f32, 12.0, ROW);
-        list::line(ui, row, input, visuals.text_color());
+        letters::line(painter, row, input, TEXT, visuals.text_color(), scale);
     }
 }
 

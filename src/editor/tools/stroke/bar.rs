@@ -11,6 +11,7 @@ use crate::{
         actions::{Action, ActionRequest},
         panel::{Requests, ViewportPainter},
         panels::fields::{TypedText, typed_field},
+        viewport_bars::STROKE_BAR,
     },
     plugins::surface::RigSurface,
 };
@@ -33,7 +34,7 @@ impl ViewportPainter for StrokeBar {
             let [low, high] = surface.bounds();
             (high - low).max_element()
         });
-        egui::Area::new(egui::Id::new("stroke bar"))
+        egui::Area::new(egui::Id::new(STROKE_BAR))
             .order(egui::Order::Middle)
             // The bar is in a corner, where it hides no limb.
             .pivot(egui::Align2::LEFT_BOTTOM)

@@ -41,8 +41,9 @@ impl ViewportPainter for GizmoPainter {
         let mut on = moves.0;
         egui::Area::new(egui::Id::new("pose bar"))
             .order(egui::Order::Middle)
-            .pivot(egui::Align2::CENTER_BOTTOM)
-            .fixed_pos(area.center_bottom() - egui::vec2(0.0, 14.0))
+            // The root's control is at the bottom, fits have their bar there, and the tour its card on the left.
+            .pivot(egui::Align2::RIGHT_TOP)
+            .fixed_pos(area.right_top() + egui::vec2(-12.0, 12.0))
             .constrain_to(area)
             .show(ui.ctx(), |ui| {
                 egui::Frame::popup(ui.style()).show(ui, |ui| {

@@ -1,0 +1,67 @@
+//! Reasons why a built rig cannot run, in the names that people know.
+
+use bevy::prelude::*;
+use rigsmith::{
+    editor::{ActiveRig, building::BuildingPlugin},
+    headless::headless_app,
+    plugins::commands::RunFailure,
+    prelude::*,
+    rig::TagKind,
+    solve::program::ProgramError,
+    test_app::strict_app,
+};
+
+use crate::bench::{RigBench, shipped};
+
+/// Commands of a joint whose module has this name.
+fn commands(rig: &Rig, joint: &str, wanted: &str) -> Vec<Uid> {
+    let tags = &rig.joint(rig.find_label(joint).unwrap()).unwrap().data.tags;
+    let is_meant = |kind: &TagKind| matches!(kind, TagKind::Command { module, .. } if module == wanted);
+    tags.iter().filter(|tag| is_meant(&tag.kind)).map(|tag| tag.uid).collect()
+}
+
+/// A circle of the arm's commands, with texts that are full of uids.
+fn cycle(rig: &Rig, commands: Vec<Uid>) -> RunFailure {
+    let nodes: Vec<Uid> = ["forearm_l", "hand_l"].map(|label| rig.find_label(label).unwrap()).to_vec();
+    let loop_text = format!("{} drives {}, on which the first depends", commands[0], nodes[0]);
+    RunFailure(ProgramError::Cycle { loop_text, constraints: commands.clone(), commands, nodes })
+}
+
+#[test]
+fn a_cycle_names_tags_and_joints() {
+    let rig = shipped("biped");
+    let (switch, control) = (commands(&rig, "hand_l", "ik_fk_switch")[0], commands(&rig, "upper_arm_l", "control")[0]);
+    let words = cycle(&rig, vec![switch, control]).words(&rig);
+    for part in ["\"ik fk switch on hand_l\"", "\"control on upper_arm_l\"", "\"forearm_l\" and \"hand_l\"", "turn one"]
+    {
+        assert!(words.contains(part), "{part} is not in: {words}");
+    }
+    let hand = rig.find_label("hand_l").unwrap();
+    for uid in [switch, control, hand] {
+        assert!(!words.contains(&uid.to_string()), "{uid} is in: {words}");
+    }
+    assert!(!words.contains("twice"), "{words}");
+    // Two controls of a joint have the same name, as those of two parts of a kind have.
+    let controls = commands(&rig, "hand_l", "control");
+    let words = cycle(&rig, controls).words(&rig);
+    assert!(words.contains("\"control on hand_l\" is there twice"), "{words}");
+    // Tags that are gone leave the text of the program.
+    let gone = cycle(&rig, vec![Uid(1)]);
+    assert_eq!(gone.words(&rig), gone.0.to_string());
+}
+
+#[test]
+fn the_window_tells_a_cycle_by_names() {
+    let mut app = headless_app(1);
+    app.add_plugins(BuildingPlugin);
+    let mut bench = RigBench::with(strict_app(app), shipped("biped"));
+    bench.app.insert_resource(ActiveRig(bench.rig));
+    (0..3).for_each(|_| bench.app.update());
+    bench.notices();
+    let failure = cycle(bench.rig(), commands(bench.rig(), "hand_l", "ik_fk_switch"));
+    bench.app.world_mut().entity_mut(bench.rig).insert(failure);
+    bench.app.update();
+    let notices = bench.notices();
+    let told = |part: &str| notices.iter().any(|notice| notice.text.contains(part));
+    assert!(told("cannot run: the tags \"ik fk switch on hand_l\" wait for each other"), "{notices:?}");
+}
