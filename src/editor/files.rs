@@ -319,7 +319,8 @@ fn request_open(world: &mut World, request: OpenRequest) {
 fn request_mesh(world: &mut World, path: PathBuf) {
     if !added_mesh::is_mesh_file(&path) {
         let name = file_name(&path);
-        world.write_message(Notice::error(format!("{name} is no mesh; choose an .obj, .gltf, .glb or .vrm")));
+        let text = format!("{name} is no mesh; choose an .obj, .gltf, .glb or .vrm");
+        world.write_message(Notice::error(text).named());
         return;
     }
     open::start(world, OpenRequest::File(path));

@@ -320,7 +320,8 @@ impl ProcessPanel {
             Click::Values => show_tag(world, shown, row.entry.command, requests),
             Click::Made => match made_by(world, shown, row.entry.command) {
                 nodes if nodes.is_empty() => {
-                    requests.send(Notice::info(format!("{} of {} made no node.", row.name, row.joint)));
+                    let text = format!("{} of {} made no node.", row.name, row.joint);
+                    requests.send(Notice::info(text).named());
                 }
                 nodes => requests.send(pick(nodes)),
             },
