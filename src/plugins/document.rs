@@ -374,7 +374,7 @@ fn deletes(edits: &[RigEdit]) -> bool {
 
 /// Title of an operation's step, with the names of joints and of nodes that commands created.
 pub(crate) fn titled(operation: &Operation, rig: &Rig, built: Option<&BuildResult>) -> Cow<'static, str> {
-    operation.title(&|node| {
+    operation.title(rig, &|node| {
         let created = || Some(built?.0.node(node)?.name.to_string());
         joint_name(rig, node).or_else(created)
     })
