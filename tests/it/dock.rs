@@ -13,7 +13,7 @@ use rigsmith::{
         follow::FollowPlugin,
         notice::StatusLine,
         panel::Panels,
-        panels::PanelsPlugin,
+        panels::{PanelsPlugin, log::LogBook},
     },
     headless::headless_app,
     prelude::*,
@@ -188,6 +188,34 @@ fn words_of_the_status_line_never_meet() {
         let shares = [left, right].map(|rect| rect.width() / size[0]);
         assert!(shares[0] > 0.25 && shares[1] > 0.15, "{size:?}: both are seen: {line:?}");
     }
+}
+
+/// Entries of menus and buttons of the toolbar that can do nothing are greyed, and say why.
+#[test]
+fn menus_and_the_toolbar_say_why_an_action_can_do_nothing() {
+    let mut frames = Frames::new(USUAL);
+    let rig = frames.app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
+    frames.app.insert_resource(ActiveRig(rig));
+    (0..3).for_each(|_| frames.frame());
+    let point = |frames: &mut Frames, word: &str| {
+        let at = frames.find(word).unwrap_or_else(|| panic!("{word} is not in sight")).center();
+        frames.events.push(Event::PointerMoved(at));
+        (0..5).for_each(|_| frames.frame());
+        at
+    };
+    let is_asked = |frames: &Frames, action: &str| {
+        let mut told = frames.app.world().resource::<LogBook>().entries();
+        told.any(|entry| entry.notice.text.starts_with(action))
+    };
+    let fit = point(&mut frames, "Fit");
+    assert!(frames.find("no mesh is open").is_some(), "the button says why");
+    frames.click(fit, PointerButton::Primary);
+    let menu = point(&mut frames, "Rig");
+    frames.click(menu, PointerButton::Primary);
+    let entry = point(&mut frames, "Store pose");
+    assert!(frames.find("there are no joints").is_some(), "the entry says why");
+    frames.click(entry, PointerButton::Primary);
+    assert!(!is_asked(&frames, "Store pose") && !is_asked(&frames, "There is no mesh"));
 }
 
 /// The bar of the viewport's tab is none of its picture.
