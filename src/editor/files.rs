@@ -47,7 +47,10 @@ use super::{
     camera::FrameWhenReady,
     notice::Notice,
     panel::PanelApp,
-    panels::timeline::import::{ImportRequest, MapRequest},
+    panels::timeline::{
+        TimelineRequest,
+        import::{ImportRequest, MapRequest},
+    },
     recovery,
     settings::EditorSettings,
 };
@@ -69,6 +72,7 @@ impl Plugin for FilesPlugin {
             .add_message::<Notice>()
             .add_message::<JournalTrouble>()
             .add_message::<ImportRequest>()
+            .add_message::<TimelineRequest>()
             .add_message::<MapRequest>()
             .add_message::<ExportRequest>()
             .add_message::<RemoveMeshRequest>()
