@@ -91,6 +91,7 @@ impl RigHistory {
         symmetry: Option<MirrorPlane>,
         operation: &Operation,
     ) -> Result<RecordedOperation, OperationError> {
+        self.cancel_preview(rig);
         let title = operation.title(rig, &|node| joint_name(rig, node));
         self.edit_as(title, rig, selection, uids, symmetry, operation)
     }

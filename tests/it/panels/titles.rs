@@ -46,7 +46,14 @@ fn steps_name_the_tags_that_they_change() {
     let [control, null, legs] = tags(&desk, hips)[..] else { panic!() };
     let set = |params: &str| TagOperation::Params(vec![(control, params.to_owned())]);
     check(&mut desk, set("(size: 0.7)"), "Set size of control of hips");
-    check(&mut desk, set("(size: 0.7, shape: \"circle\")"), "Set shape of control of hips");
+    // A drag shows the value before it is let go.
+    for size in ["(size: 0.8)", "(size: 0.9)"] {
+        let change = Change::Preview(Operation::Tags(set(size)));
+        desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change });
+        desk.frames(2);
+    }
+    check(&mut desk, set("(size: 0.9)"), "Set size of control of hips");
+    check(&mut desk, set("(size: 0.9, shape: \"circle\")"), "Set shape of control of hips");
     check(&mut desk, set("(size: 0.2)"), "Change control of hips");
     check(&mut desk, TagOperation::Comment(control, "root".to_owned()), "Comment control of hips");
     check(&mut desk, TagOperation::Enable(vec![control, null], false), "Disable control of hips and 1 more");
