@@ -44,7 +44,7 @@ pub struct ProcessPanel {
     filtered: Option<String>,
     /// Scrolls to the command that ran last.
     follow: bool,
-    /// True if the choice above was made in the last frame.
+    /// Choice of the last frame.
     was_following: bool,
     cursor: usize,
     /// First row that an edit made run again, until it is scrolled to.
