@@ -42,7 +42,7 @@ fn always() -> Vec<Action> {
     Mode::ALL.into_iter().map(Action::Mode).chain(others).chain(of_library).collect()
 }
 
-/// What can be done in one of the states, beside what can be done always.
+/// Actions that can be done in each of the states, beside those that can be done always.
 fn states() -> Vec<(&'static str, Vec<Action>)> {
     let brush = [
         BrushAction::Smaller,
