@@ -12,6 +12,9 @@ use crate::rig::{Rig, RigEdit, SelectionSet, TagKind, Uid, animation::TrackTarge
 /// Largest number of letters of a joint's name in a title.
 const LETTERS: usize = 40;
 
+/// Largest number of nodes of a pose that its title is about; a pose of more is one of the whole rig.
+const FEW: usize = 3;
+
 /// Largest number of letters of a module or parameter, which stands beside a joint's name.
 const WORD_LETTERS: usize = 24;
 
@@ -57,7 +60,12 @@ impl Operation {
             Self::Keyed { operation, .. } | Self::Built { operation, .. } | Self::Carried { operation, .. } => {
                 return operation.title(rig, name_of);
             }
-            Self::SetPose { .. } => None,
+            Self::SetPose { name, offsets, values } => {
+                let posed = offsets.iter().map(|(node, _)| *node).chain(values.iter().map(|(node, ..)| *node));
+                let posed: Vec<Uid> = posed.collect::<BTreeSet<Uid>>().into_iter().collect();
+                let is_few = posed.len() <= FEW;
+                if is_few { names.nodes(&format!("{name} of"), &posed) } else { None }
+            }
         };
         title.map_or(Cow::Borrowed(self.name()), Cow::Owned)
     }

@@ -78,6 +78,8 @@ fn steps_name_poses_clips_groups_and_sets() {
     };
     let bent = PoseOffset::from_rotation(Quat::from_rotation_z(1.0));
     check(&mut desk, Operation::Pose(vec![(left, bent)]), "Pose hand_l");
+    let mirrored = Operation::SetPose { name: "Mirror pose", offsets: vec![(hips, bent)], values: Vec::new() };
+    check(&mut desk, mirrored, "Mirror pose of hips");
     check(&mut desk, Operation::StorePose("wave".to_owned()), "Store pose wave");
     let pose = desk.rig().stored_poses()[0].uid;
     check(&mut desk, Operation::ResetPose(vec![left]), "Reset hand_l");
