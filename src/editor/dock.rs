@@ -3,11 +3,14 @@
 //! A single system draws the whole window with read access to the world; the requests of panels are carried out after
 //! the last panel.
 
+mod borders;
+
 use bevy::{ecs::system::SystemState, prelude::*, window::PrimaryWindow};
 use bevy_egui::{EguiContext, EguiPrimaryContextPass, PrimaryEguiContext, egui};
 use egui_dock::{DockArea, DockState, NodeIndex, TabViewer, tab_viewer::OnCloseResponse};
 use serde::{Deserialize, Serialize};
 
+use self::borders::Borders;
 use super::{
     files::attend,
     follow, menu,
@@ -77,9 +80,24 @@ const TAB_BAR: f32 = 36.0;
 
 /// Arrangement of the panels; stored between runs.
 #[derive(Resource, Clone, Serialize, Deserialize)]
-#[serde(transparent)]
+#[serde(from = "DockState<String>", into = "DockState<String>")]
 pub struct Layout {
     dock: DockState<String>,
+    borders: Borders,
+}
+
+impl From<DockState<String>> for Layout {
+    fn from(dock: DockState<String>) -> Self {
+        Self { dock, borders: Borders::default() }
+    }
+}
+
+impl From<Layout> for DockState<String> {
+    /// The arrangement for a window of any size.
+    fn from(Layout { mut dock, borders }: Layout) -> Self {
+        borders.restore(&mut dock);
+        dock
+    }
 }
 
 impl Default for Layout {
@@ -91,7 +109,7 @@ impl Default for Layout {
         let [centre, right] = tree.split_right(centre, 0.75, tabs(RIGHT));
         let [_, _] = tree.split_below(right, 0.5, tabs(LOWER_RIGHT));
         let [_, _] = tree.split_below(centre, 0.78, tabs(BELOW));
-        Self { dock }
+        dock.into()
     }
 }
 
@@ -240,14 +258,20 @@ fn draw(world: &mut World, state: &mut SystemState<Query<&mut EguiContext, With<
             closed: None,
             text: tab_text(ctx.viewport_rect().width()),
         };
+        layout.borders.note(&layout.dock);
+        let style = style::dock(&ctx);
+        let least = style.separator.extra;
         // A button on each tab would take as much room as a word.
         DockArea::new(&mut layout.dock)
-            .style(style::dock(&ctx))
+            .style(style)
             .show_close_buttons(false)
             .show_leaf_close_all_buttons(false)
             .show_leaf_collapse_buttons(false)
             .show_inside(ui, &mut tabs);
         let closed = tabs.closed;
+        if layout.borders.follow(&mut layout.dock, least) {
+            ctx.request_repaint();
+        }
         name_borders(ui, &layout);
         if let Some(closed) = closed.filter(|closed| layout.shows(closed)) {
             layout.toggle(&closed);

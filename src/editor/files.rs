@@ -47,7 +47,10 @@ use super::{
     camera::FrameWhenReady,
     notice::Notice,
     panel::PanelApp,
-    panels::timeline::import::{ImportRequest, MapRequest},
+    panels::timeline::{
+        TimelineRequest,
+        import::{ImportRequest, MapRequest},
+    },
     recovery,
     settings::EditorSettings,
 };
@@ -69,6 +72,7 @@ impl Plugin for FilesPlugin {
             .add_message::<Notice>()
             .add_message::<JournalTrouble>()
             .add_message::<ImportRequest>()
+            .add_message::<TimelineRequest>()
             .add_message::<MapRequest>()
             .add_message::<ExportRequest>()
             .add_message::<RemoveMeshRequest>()
@@ -319,7 +323,8 @@ fn request_open(world: &mut World, request: OpenRequest) {
 fn request_mesh(world: &mut World, path: PathBuf) {
     if !added_mesh::is_mesh_file(&path) {
         let name = file_name(&path);
-        world.write_message(Notice::error(format!("{name} is no mesh; choose an .obj, .gltf, .glb or .vrm")));
+        let text = format!("{name} is no mesh; choose an .obj, .gltf, .glb or .vrm");
+        world.write_message(Notice::error(text).named());
         return;
     }
     open::start(world, OpenRequest::File(path));

@@ -54,6 +54,6 @@ fn watch_folders(
 
 fn tell_faults(mut faults: MessageReader<FolderFault>, mut commands: Commands) {
     for FolderFault { file, error } in faults.read() {
-        commands.write_message(Notice::error(format!("{} is not in use: {error}", file.display())));
+        commands.write_message(Notice::error(format!("{} is not in use: {error}", file.display())).named());
     }
 }

@@ -158,16 +158,17 @@ fn wake(
 fn tell_update(updated: On<RigUpdated>, documents: Query<&OpenDocument>, mut notices: MessageWriter<Notice>) {
     let Ok(document) = documents.get(updated.entity) else { return };
     let count = counted(updated.changes.len(), "change", "changes");
-    notices.write(Notice::done(format!("{}: {count} taken over from the file; Ctrl+Z takes it back", document.name)));
+    let text = format!("{}: {count} taken over from the file; Ctrl+Z takes it back", document.name);
+    notices.write(Notice::done(text).named());
     for note in updated.poses.iter() {
-        notices.write(Notice::warning(note.to_string()).quiet());
+        notices.write(Notice::warning(note.to_string()).named().quiet());
     }
     if !updated.poses.is_empty() {
         let text = "Some joints do not stand as before in poses; the log lists them";
         notices.write(Notice::warning(text));
     }
     for line in updated.clips.lines() {
-        notices.write(Notice::warning(line).quiet());
+        notices.write(Notice::warning(line).named().quiet());
     }
     if !updated.clips.notes.is_empty() {
         notices.write(Notice::warning("Some joints do not move as before in clips; the log lists them"));

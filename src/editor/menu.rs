@@ -12,6 +12,7 @@ use super::{
     keys::KeyBindings,
     library::LibraryAction,
     mode::Mode,
+    palette,
     panel::Requests,
     panels::timeline::TimelineAction,
     settings::EditorSettings,
@@ -129,8 +130,9 @@ const WINDOW_LAST: &[Entry] = &[
     Some(("High contrast", Action::Contrast)),
 ];
 
-/// Draws entries; a click sends the action and closes the menu.
-fn show_entries(ui: &mut egui::Ui, keys: Option<&KeyBindings>, list: &[Entry], requests: &mut Requests) {
+/// Draws entries; a click sends the action and closes the menu. Actions that can do nothing at present are greyed, and say why.
+fn show_entries(ui: &mut egui::Ui, world: &World, list: &[Entry], requests: &mut Requests) {
+    let keys = world.get_resource::<KeyBindings>();
     for entry in list {
         let Some((name, action)) = entry else {
             ui.separator();
@@ -141,9 +143,14 @@ fn show_entries(ui: &mut egui::Ui, keys: Option<&KeyBindings>, list: &[Entry], r
             Some(key) => button.shortcut_text(key.to_string()),
             None => button,
         };
-        if ui.add(button).clicked() {
+        let why_not = palette::obstacle(world, *action);
+        let entry = ui.add_enabled(why_not.is_none(), button);
+        if entry.clicked() {
             requests.send(ActionRequest(*action));
             ui.close();
+        }
+        if let Some(why_not) = why_not {
+            entry.on_disabled_hover_text(why_not);
         }
     }
 }
@@ -214,8 +221,7 @@ pub(super) fn show(
     panels: &[&'static str],
     requests: &mut Requests,
 ) {
-    let keys = world.get_resource::<KeyBindings>();
-    let mut entries = |ui: &mut egui::Ui, list: &[Entry]| show_entries(ui, keys, list, requests);
+    let mut entries = |ui: &mut egui::Ui, list: &[Entry]| show_entries(ui, world, list, requests);
     let mut recent: Option<PathBuf> = None;
     let mut toggled: Option<&'static str> = None;
     let (mut reset, mut updates) = (false, false);

@@ -63,9 +63,10 @@ fn tell(
                 let weights = if report.weights.is_some() { "; its weights were transferred" } else { "" };
                 let moved = report.moved;
                 Notice::done(format!("{name} was read again: {points}points moved by {moved:.4} at most{weights}."))
+                    .named()
             }
-            Err(error @ ReloadError::Discarded) => Notice::info(format!("{name} was not read again: {error}.")),
-            Err(error) => Notice::error(format!("{name} was not read again: {error}.")),
+            Err(error @ ReloadError::Discarded) => Notice::info(format!("{name} was not read again: {error}.")).named(),
+            Err(error) => Notice::error(format!("{name} was not read again: {error}.")).named(),
         };
         commands.write_message(notice);
     }

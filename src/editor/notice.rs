@@ -28,27 +28,29 @@ pub struct Notice {
     pub quiet: bool,
     /// Panel that shows what the notice is about; the log without one.
     pub panel: Option<&'static str>,
+    /// True for a text that begins with the name of a file, mesh, joint or module, which is written as it is.
+    pub is_named: bool,
 }
 
 impl Notice {
     /// A notice about an event.
     pub fn info(text: impl Into<String>) -> Self {
-        Self { severity: Severity::Info, text: text.into(), quiet: false, panel: None }
+        Self { severity: Severity::Info, text: text.into(), quiet: false, panel: None, is_named: false }
     }
 
     /// A notice about a success.
     pub fn done(text: impl Into<String>) -> Self {
-        Self { severity: Severity::Done, text: text.into(), quiet: false, panel: None }
+        Self { severity: Severity::Done, text: text.into(), quiet: false, panel: None, is_named: false }
     }
 
     /// A warning.
     pub fn warning(text: impl Into<String>) -> Self {
-        Self { severity: Severity::Warning, text: text.into(), quiet: false, panel: None }
+        Self { severity: Severity::Warning, text: text.into(), quiet: false, panel: None, is_named: false }
     }
 
     /// A notice about a failure.
     pub fn error(text: impl Into<String>) -> Self {
-        Self { severity: Severity::Error, text: text.into(), quiet: false, panel: None }
+        Self { severity: Severity::Error, text: text.into(), quiet: false, panel: None, is_named: false }
     }
 
     /// Names the panel that a click on the notice's toast brings forward.
@@ -59,6 +61,31 @@ impl Notice {
     /// Restricts the notice to the log.
     pub fn quiet(self) -> Self {
         Self { quiet: true, ..self }
+    }
+
+    /// Leaves the first letter as it is: the text begins with a name.
+    pub fn named(self) -> Self {
+        Self { is_named: true, ..self }
+    }
+
+    /// The text as people read it: it begins with a capital, unless it begins with a name.
+    pub fn sentence(&self) -> Cow<'_, str> {
+        if self.is_named { Cow::Borrowed(&self.text) } else { capitalised(&self.text) }
+    }
+}
+
+/// A text with a capital at its start. A first word that is a path, the name of a file or an identifier stays as it is: it has
+/// marks or digits in it.
+pub fn capitalised(text: &str) -> Cow<'_, str> {
+    let word = text.split_whitespace().next().unwrap_or_default();
+    let word = word.trim_end_matches([':', ',', ';', '.', '!', '?']);
+    let is_word = word.chars().all(|letter| letter.is_alphabetic() || matches!(letter, '-' | '\''));
+    let mut letters = text.chars();
+    match letters.next() {
+        Some(first) if is_word && first.is_lowercase() => {
+            Cow::Owned(format!("{}{}", first.to_uppercase(), letters.as_str()))
+        }
+        _ => Cow::Borrowed(text),
     }
 }
 

@@ -15,7 +15,9 @@ use super::{
     mode::Mode,
     notice::Notice,
     panel::{EditorOverlay, PanelApp, PanelTitles, Requests},
-    panels::{graph, timeline},
+    panels::{graph, poses::PosedRig, timeline},
+    running_work::running,
+    settings::{EditorSettings, UI_SCALES},
     style,
     tools::{
         paint::brush,
@@ -27,7 +29,7 @@ use crate::{
     plugins::{
         RigSystems, commands::Processor, document::Selection, fit::FittedRig, history::RigHistory, surface::RigMeshes,
     },
-    rig::{Rig, TagKind},
+    rig::{Rig, TagKind, Uid},
 };
 
 /// Plugin of the command palette.
@@ -88,7 +90,7 @@ fn tell_obstacles(mut actions: MessageReader<ActionRequest>, mut commands: Comma
 /// The reason why an action can do nothing at present, in a few words; `None` if it can.
 pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
     if is_of_window(action) {
-        return None;
+        return of_window(world, action);
     }
     let Some(entity) = world.get_resource::<ActiveRig>().map(|rig| rig.0) else { return Some("no rig is open") };
     if let Action::Library(action) = action {
@@ -105,7 +107,8 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
     }
     let rig = world.get::<Rig>(entity)?;
     let history = world.get::<RigHistory>(entity);
-    let selected = world.get::<Selection>(entity).is_some_and(|selection| !selection.0.is_empty());
+    let selection: &[Uid] = world.get::<Selection>(entity).map_or(&[], |selection| &selection.0);
+    let has_joint = || selection.iter().any(|node| rig.joint(*node).is_some());
     let has_mesh = world.get::<RigMeshes>(entity).is_some_and(|meshes| !meshes.is_empty());
     let commands = rig.walk().flat_map(|joint| &joint.data.tags);
     let has_commands = || commands.into_iter().any(|tag| matches!(tag.kind, TagKind::Command { .. }));
@@ -114,21 +117,46 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
         Action::Undo => history.is_some_and(|history| history.steps().1 == 0).then_some("there is no step to undo"),
         Action::Redo => history.is_some_and(|history| !history.can_redo()).then_some("nothing was undone"),
         Action::Delete | Action::DeleteHierarchy | Action::MirrorSelected => {
-            (!selected).then_some("no joint is selected")
+            (!has_joint()).then_some("no joint is selected")
         }
-        Action::SelectAll | Action::StorePose | Action::ResetPose | Action::MirrorPose => {
+        Action::SelectNone => selection.is_empty().then_some("nothing is selected"),
+        Action::SelectAll | Action::StorePose | Action::Labels | Action::LocalAxes | Action::Bones => {
             rig.is_empty().then_some("there are no joints")
         }
+        Action::ResetPose | Action::MirrorPose if rig.is_empty() => Some("there are no joints"),
+        Action::ResetPose | Action::MirrorPose => {
+            let posed = PosedRig::of(world, entity)?;
+            let is_at_rest = posed.shown.offsets.is_empty() && posed.shown.values.is_empty();
+            match action {
+                Action::MirrorPose if !selection.is_empty() => {
+                    posed.other_side().is_empty().then_some("what is selected has no other side")
+                }
+                _ => is_at_rest.then_some("nothing is posed"),
+            }
+        }
+        Action::FrameSelected | Action::FrameAll => {
+            (rig.is_empty() && !has_mesh).then_some("there is nothing to look at")
+        }
+        Action::Export => {
+            (rig.is_empty() && !has_mesh && rig.clips().is_empty()).then_some("there is nothing to export")
+        }
+        Action::Controls => (!has_commands()).then_some("no joint has commands: add tags, or a part"),
         Action::OnionSkin => timeline::OpenClip::of(world).is_none().then_some("no clip is open"),
         Action::Accept => {
             let is_fitted = world.get::<FittedRig>(entity).is_some();
             let chooses = world.get_resource::<RegionTool>().is_some_and(RegionTool::is_open);
             (!is_fitted && !chooses && !is_drawing(world)).then_some("nothing is drawn or fitted")
         }
-        Action::NextVolume => {
-            let places = world.get_resource::<Mode>() == Some(&Mode::Place);
-            (!places && !is_drawing(world)).then_some("no joint is placed, and no stroke is drawn")
+        Action::Cancel => {
+            let is_fitted = world.get::<FittedRig>(entity).is_some();
+            let chooses = world.get_resource::<RegionTool>().is_some_and(RegionTool::is_open);
+            let is_busy = is_fitted || chooses || is_drawing(world) || running(world).is_some();
+            (!is_busy && !is_placing(world)).then_some("nothing is drawn, fitted or computed")
         }
+        Action::NextVolume if !is_placing(world) && !is_drawing(world) => {
+            Some("no joint is placed, and no stroke is drawn")
+        }
+        Action::NextVolume => (!has_mesh).then_some("no mesh is open"),
         Action::Fit | Action::FitPart | Action::Meshes | Action::XRay | Action::Wireframe => {
             (!has_mesh).then_some("no mesh is open")
         }
@@ -150,6 +178,23 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
         }
         _ => None,
     }
+}
+
+/// The reason why an action that needs no rig can do nothing at present.
+fn of_window(world: &World, action: Action) -> Option<&'static str> {
+    let scale = world.get_resource::<EditorSettings>()?.ui_scale;
+    let [least, .., most] = UI_SCALES;
+    match action {
+        Action::UiLarger => (scale >= most).then_some("it has its largest size"),
+        Action::UiSmaller => (scale <= least).then_some("it has its smallest size"),
+        Action::UiUsual => (scale == 1.0).then_some("it is as large as usual"),
+        _ => None,
+    }
+}
+
+/// True in the mode that places joints.
+fn is_placing(world: &World) -> bool {
+    world.get_resource::<Mode>() == Some(&Mode::Place)
 }
 
 /// True while a stroke is drawn or shown.

@@ -108,7 +108,9 @@ pub(super) fn answered(world: &mut World, mut list: Vec<PendingJournal>, answer:
         Answer::Forget(journal) => {
             list.retain(|pending| pending.path != journal);
             if let Err(error) = RealDisk.remove(&journal) {
-                world.write_message(Notice::warning(format!("{} could not be deleted: {error}", journal.display())));
+                world.write_message(
+                    Notice::warning(format!("{} could not be deleted: {error}", journal.display())).named(),
+                );
             }
             world.resource_mut::<Recovery>().found = list;
         }

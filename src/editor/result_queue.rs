@@ -82,7 +82,7 @@ fn carry_out(world: &mut World, kind: HeldResult) {
         }
     };
     if let Some((name, what)) = dropped {
-        world.write_message(Notice::info(format!("{name} is not {what}: it was discarded")));
+        world.write_message(Notice::info(format!("{name} is not {what}: it was discarded")).named());
     }
 }
 

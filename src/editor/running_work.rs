@@ -89,7 +89,7 @@ fn carry_out(world: &mut World, kind: StoppableWork) {
     match kind {
         StoppableWork::Opening => {
             if let Some(name) = world.get_resource_mut::<LoadJob>().and_then(|mut job| job.stop()) {
-                world.write_message(Notice::info(format!("{name} is not opened: it was stopped")));
+                world.write_message(Notice::info(format!("{name} is not opened: it was stopped")).named());
             }
         }
         StoppableWork::Saving => {
@@ -102,12 +102,12 @@ fn carry_out(world: &mut World, kind: StoppableWork) {
         }
         StoppableWork::Library => {
             if let Some(name) = world.get_resource_mut::<LibraryJobs>().and_then(|mut jobs| jobs.stop()) {
-                world.write_message(Notice::info(format!("{name} is not used: it was stopped")));
+                world.write_message(Notice::info(format!("{name} is not used: it was stopped")).named());
             }
         }
         StoppableWork::Motion => {
             if let Some(name) = world.get_resource_mut::<ClipImport>().and_then(|mut import| import.stop()) {
-                world.write_message(Notice::info(format!("{name} is not imported: it was stopped")));
+                world.write_message(Notice::info(format!("{name} is not imported: it was stopped")).named());
             }
         }
         StoppableWork::Weights | StoppableWork::Face => {

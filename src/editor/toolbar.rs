@@ -9,6 +9,7 @@ use super::{
     follow,
     keys::KeyBindings,
     mode::Mode,
+    palette,
     panel::Requests,
     settings::EditorSettings,
     style,
@@ -46,14 +47,20 @@ pub(super) fn show(ui: &mut egui::Ui, world: &World, requests: &mut Requests) {
         }
         ui.separator();
         let what = "Put a skeleton into the mesh: the template whose limbs it shows, or the rig's own joints";
-        if ui.button("Fit").on_hover_text(tip(what, Action::Fit)).clicked() {
-            requests.send(ActionRequest(Action::Fit));
-        }
-        ui.separator();
-        let mut switch = |ui: &mut egui::Ui, on: bool, name: &str, what: &str, action: Action| {
-            if ui.selectable_label(on, name).on_hover_text(tip(what, action)).clicked() {
+        let mut button = |ui: &mut egui::Ui, button: egui::Button, what: &str, action: Action| {
+            let why_not = palette::obstacle(world, action);
+            let response = ui.add_enabled(why_not.is_none(), button).on_hover_text(tip(what, action));
+            if response.clicked() {
                 requests.send(ActionRequest(action));
             }
+            if let Some(why_not) = why_not {
+                response.on_disabled_hover_text(why_not);
+            }
+        };
+        button(ui, egui::Button::new("Fit"), what, Action::Fit);
+        ui.separator();
+        let mut switch = |ui: &mut egui::Ui, on: bool, name: &str, what: &str, action: Action| {
+            button(ui, egui::Button::selectable(on, name), what, action);
         };
         let symmetry = world
             .get_resource::<ActiveRig>()

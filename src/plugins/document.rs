@@ -259,6 +259,8 @@ fn apply_edits(
         let keyed = |operation| auto_key.map_or(Cow::Borrowed(operation), |auto_key| auto_key.keyed(operation));
         let result = match change {
             Change::Do(operation) => {
+                // Titles are about what the document has without a preview.
+                history.cancel_preview(&mut document);
                 let title = titled(operation, &document, built);
                 let operation = of_built(keyed(operation), built, is_of_entities);
                 let known = (built, modules.as_deref());
@@ -279,6 +281,7 @@ fn apply_edits(
                 .and_then(|redone| Ok(redone?))
                 .map(|step| done(step.name.clone(), Some(Commit::Redone(step)))),
             Change::Preview(operation) => {
+                history.cancel_preview(&mut document);
                 let title = titled(operation, &document, built);
                 history
                     .preview(title, &mut document, &mut uids, symmetry.0, &keyed(operation))
@@ -374,7 +377,7 @@ fn deletes(edits: &[RigEdit]) -> bool {
 
 /// Title of an operation's step, with the names of joints and of nodes that commands created.
 pub(crate) fn titled(operation: &Operation, rig: &Rig, built: Option<&BuildResult>) -> Cow<'static, str> {
-    operation.title(&|node| {
+    operation.title(rig, &|node| {
         let created = || Some(built?.0.node(node)?.name.to_string());
         joint_name(rig, node).or_else(created)
     })

@@ -91,7 +91,8 @@ impl RigHistory {
         symmetry: Option<MirrorPlane>,
         operation: &Operation,
     ) -> Result<RecordedOperation, OperationError> {
-        let title = operation.title(&|node| joint_name(rig, node));
+        self.cancel_preview(rig);
+        let title = operation.title(rig, &|node| joint_name(rig, node));
         self.edit_as(title, rig, selection, uids, symmetry, operation)
     }
 

@@ -13,7 +13,7 @@ use rigsmith::{
         follow::FollowPlugin,
         notice::StatusLine,
         panel::Panels,
-        panels::PanelsPlugin,
+        panels::{PanelsPlugin, log::LogBook},
     },
     headless::headless_app,
     prelude::*,
@@ -79,6 +79,25 @@ impl Frames {
             self.frame();
         }
         (0..2).for_each(|_| self.frame());
+    }
+
+    pub fn drag(&mut self, from: Pos2, to: Pos2) {
+        let button = |pos: Pos2, pressed: bool| Event::PointerButton {
+            pos,
+            button: PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        };
+        self.events.push(Event::PointerMoved(from));
+        self.frame();
+        self.events.push(button(from, true));
+        self.frame();
+        for step in 1..=4 {
+            self.events.push(Event::PointerMoved(from.lerp(to, step as f32 / 4.0)));
+            self.frame();
+        }
+        self.events.push(button(to, false));
+        (0..3).for_each(|_| self.frame());
     }
 
     /// Place of a text of the last frame, as far as it is seen.
@@ -171,6 +190,34 @@ fn words_of_the_status_line_never_meet() {
     }
 }
 
+/// Entries of menus and buttons of the toolbar that can do nothing are greyed, and say why.
+#[test]
+fn menus_and_the_toolbar_say_why_an_action_can_do_nothing() {
+    let mut frames = Frames::new(USUAL);
+    let rig = frames.app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
+    frames.app.insert_resource(ActiveRig(rig));
+    (0..3).for_each(|_| frames.frame());
+    let point = |frames: &mut Frames, word: &str| {
+        let at = frames.find(word).unwrap_or_else(|| panic!("{word} is not in sight")).center();
+        frames.events.push(Event::PointerMoved(at));
+        (0..5).for_each(|_| frames.frame());
+        at
+    };
+    let is_asked = |frames: &Frames, action: &str| {
+        let mut told = frames.app.world().resource::<LogBook>().entries();
+        told.any(|entry| entry.notice.text.starts_with(action))
+    };
+    let fit = point(&mut frames, "Fit");
+    assert!(frames.find("no mesh is open").is_some(), "the button says why");
+    frames.click(fit, PointerButton::Primary);
+    let menu = point(&mut frames, "Rig");
+    frames.click(menu, PointerButton::Primary);
+    let entry = point(&mut frames, "Store pose");
+    assert!(frames.find("there are no joints").is_some(), "the entry says why");
+    frames.click(entry, PointerButton::Primary);
+    assert!(!is_asked(&frames, "Store pose") && !is_asked(&frames, "There is no mesh"));
+}
+
 /// The bar of the viewport's tab is none of its picture.
 #[test]
 fn the_viewport_has_two_fifths_of_a_large_window() {
@@ -180,6 +227,48 @@ fn the_viewport_has_two_fifths_of_a_large_window() {
         let share = area.width() * (area.height() - 24.0) / (size[0] * size[1]);
         assert!(share >= 0.4, "{share} of {size:?}");
     }
+}
+
+/// Larger letters, or a smaller window, leave places less room than they had; later they have it again.
+#[test]
+fn places_have_their_former_size_after_a_smaller_window() {
+    let mut frames = Frames::new(USUAL);
+    let sizes = |frames: &Frames| {
+        let layout = frames.layout();
+        let area = |title| layout.area(title).expect("the panel is shown");
+        ["Hierarchy", "Properties", "History", "Timeline", VIEWPORT].map(|title| area(title).size().round())
+    };
+    let resize = |frames: &mut Frames, scale: f32| {
+        frames.size = egui::vec2(USUAL[0] / scale, USUAL[1] / scale);
+        (0..4).for_each(|_| frames.frame());
+    };
+    let before = sizes(&frames);
+    for scale in [1.1, 1.25, 1.5, 1.75, 2.0, 1.75, 1.5, 1.25, 1.1, 1.0] {
+        resize(&mut frames, scale);
+        let least = sizes(&frames)[0].x;
+        assert!(least >= 170.0, "{scale}: the panels at the left can be read: {least}");
+    }
+    assert_eq!(sizes(&frames), before);
+
+    // A border that a person moves while there is little room stays where it was put.
+    resize(&mut frames, 2.0);
+    let area = frames.layout().area("Hierarchy").expect("the panel is shown");
+    let (from, to) = (Pos2::new(area.right() + 1.0, area.center().y), Pos2::new(area.right() + 41.0, area.center().y));
+    frames.drag(from, to);
+    let moved = sizes(&frames)[0].x;
+    assert!((moved - area.width() - 40.0).abs() < 4.0, "{moved} after {}", area.width());
+    resize(&mut frames, 1.0);
+    resize(&mut frames, 2.0);
+    assert!((sizes(&frames)[0].x - moved).abs() < 2.0, "{:?} after {moved}", sizes(&frames));
+
+    // What is kept for the next time are the borders for a window of any size.
+    let mut frames = Frames::new(USUAL);
+    resize(&mut frames, 2.0);
+    let text = ron::to_string(frames.layout()).expect("a layout is text");
+    let again: Layout = ron::from_str(&text).expect("a layout is read");
+    frames.app.insert_resource(again);
+    resize(&mut frames, 1.0);
+    assert_eq!(sizes(&frames), before);
 }
 
 #[test]

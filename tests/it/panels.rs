@@ -14,6 +14,7 @@ mod stepping;
 mod tag_lists;
 mod tag_values;
 mod tags;
+mod titles;
 mod walk;
 mod weights;
 

@@ -114,6 +114,7 @@ fn the_frozen_file_of_format_1_opens() {
         shading: "x_ray".into(),
         switches: [("axes".to_owned(), false), ("grid".to_owned(), true)].into(),
         graph: [].into(),
+        clip: None,
     };
     assert_eq!(project.view, view);
     assert_eq!(project.journal, Some(JournalReference { file: "biped.rigsmith.journal".into(), last: 1234 }));
@@ -211,14 +212,14 @@ fn mistakes_are_named_with_their_place() {
 #[test]
 fn a_newer_format_opens_and_says_what_it_does_not_know() {
     let text = FROZEN
-        .replacen("format: 1,", "format: 8, lights: [(x: 1)],", 1)
+        .replacen("format: 1,", "format: 9, lights: [(x: 1)],", 1)
         .replacen("mode: \"Pose\"", "fog: 0.5, mode: \"Pose\"", 1)
         .replacen("skins: [", "muscles: [], skins: [", 1)
         .replacen("format: 1,", "format: 5, meaning: 42,", 1);
     let read = read_project(text.as_bytes()).unwrap();
     assert_eq!(read.project, frozen());
     let told = read.notes.join("\n");
-    for part in ["project has format 8", "`lights`", "`fog`", "`muscles`", "template has format 5"] {
+    for part in ["project has format 9", "`lights`", "`fog`", "`muscles`", "template has format 5"] {
         assert!(told.contains(part), "{part}: {told}");
     }
     let line = place(&text, "meaning: 42").0;
@@ -301,6 +302,19 @@ fn the_frozen_file_of_format_7_keeps_texts_of_templates_with_parts() {
     // Without the text the file is of the format before.
     project.templates[0].text = None;
     assert_eq!(write_project(&project), include_str!("../frozen/format-6.rigsmith.ron"));
+}
+
+#[test]
+fn the_frozen_file_of_format_8_keeps_the_open_clip() {
+    let text = include_str!("../frozen/format-8.rigsmith.ron");
+    let read = read_project(text.as_bytes()).unwrap();
+    assert_eq!(read.notes, Vec::<String>::new());
+    let mut project = read.project;
+    assert_eq!(project.view.clip, Some(Uid(0xc1)));
+    assert_eq!(write_project(&project), text);
+    // Where the first clip is open the file is of the format before.
+    project.view.clip = None;
+    assert_eq!(write_project(&project), include_str!("../frozen/format-7.rigsmith.ron"));
 }
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\

@@ -185,6 +185,7 @@ pub(super) fn watch_places(world: &mut World) {
             "{} is open in another window, too: whoever saves last replaces the work of the other; close one of the two",
             file_name(project)
         ))
+        .named()
     });
     if let Some(mut document) = world.get_mut::<OpenDocument>(rig) {
         document.is_placed = true;

@@ -387,7 +387,7 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     world.write_message(DocumentLanded { origin: origin.clone() });
     // A journal left by a crash beside the project stays there until a person decides about it.
     let places = places(world, project.clone().filter(|_| pending.is_none()));
-    let is_recovered = work.is_some();
+    let (is_recovered, is_project) = (work.is_some(), project.is_some());
     let opened = work.as_ref().map_or(&origin, |work| work.recovered.origin());
     let (template, base) = match (opened, followed) {
         (Origin::Template { path, .. }, _) => (Some(path.clone()), None),
@@ -429,6 +429,9 @@ fn land(world: &mut World, name: &str, opened: LoadedDocument) {
     world.insert_resource(ActiveRig(entity));
     view::show_all(world);
     view::leave_weights(world, entity);
+    if is_project {
+        view::open_clip(world, entity, kept.as_ref());
+    }
     let restored = kept.is_some_and(|kept| view::restore(world, &kept));
     world.resource_mut::<FrameWhenReady>().0 = !restored;
     world.write_message(match is_recovered {

@@ -318,7 +318,7 @@ pub(super) fn poll(world: &mut World) {
             }
         }
         Err(_) if sign.has_refused() => {
-            world.write_message(Notice::info(format!("{name} is not written: it was stopped")));
+            world.write_message(Notice::info(format!("{name} is not written: it was stopped")).named());
         }
         Err(error) => {
             world.write_message(Notice::error(format!("Could not write {name}: {error}")));

@@ -60,12 +60,13 @@ pub(super) fn consider(world: &mut World, opened: LoadedDocument) {
     let fit = Fit { name: opened.name, rig_height, mesh_height, rig: Arc::new(opened.rig) };
     let ratio = fit.ratio();
     if ratio.is_finite() && ratio > 0.0 && !(1.0 / ALLOWED..=ALLOWED).contains(&ratio) {
-        world.write_message(Notice::warning(format!(
+        let text = format!(
             "{} is for a mesh of another size: its joints are {} tall, this mesh {}. Scale it to the mesh, or take it as it is",
             fit.name,
             number(rig_height),
             number(mesh_height)
-        )));
+        );
+        world.write_message(Notice::warning(text).named());
         world.resource_mut::<Dialog>().ask(Question::Fit(fit));
     } else {
         put(world, &fit, 1.0);

@@ -4,7 +4,15 @@ use bevy::{ecs::system::SystemState, prelude::*};
 use bevy_panorbit_camera::PanOrbitCamera;
 
 use crate::{
-    editor::{ActiveRig, camera, mode::Mode, panels::graph::GraphView, screen::HiddenMeshes},
+    editor::{
+        ActiveRig, camera,
+        mode::Mode,
+        panels::{
+            graph::GraphView,
+            timeline::{Timeline, TimelineRequest},
+        },
+        screen::HiddenMeshes,
+    },
     plugins::{
         display::{MeshDisplay, Shading},
         drawing::{LabelChoice, RigDrawing},
@@ -43,7 +51,22 @@ pub(in crate::editor) fn now(world: &mut World) -> ProjectView {
     if let (Some(rig), Some(graph)) = (active, world.get_resource::<GraphView>().filter(|graph| graph.rig == active)) {
         view.graph = world.get::<Rig>(rig).map(|rig| graph.places(rig)).unwrap_or_default();
     }
+    if let (Some(rig), Some(timeline)) = (active, world.get_resource::<Timeline>().filter(|line| line.rig == active)) {
+        let clips = world.get::<Rig>(rig).map(Rig::clips).unwrap_or_default();
+        // The first one is opened without a word.
+        view.clip = timeline.clip.filter(|open| clips.iter().skip(1).any(|clip| clip.uid == *open));
+    }
     view
+}
+
+/// Opens the clip that was open when a project was saved, or else the first one.
+pub(super) fn open_clip(world: &mut World, rig: Entity, view: Option<&ProjectView>) {
+    let Some(rig) = world.get::<Rig>(rig) else { return };
+    let kept = view.and_then(|view| view.clip).filter(|clip| rig.clip(*clip).is_some());
+    let clip = kept.or_else(|| rig.clips().first().map(|clip| clip.uid));
+    if clip.is_some() {
+        world.write_message(TimelineRequest::Open(clip));
+    }
 }
 
 /// Shows what the former document hid: whoever opens something wants to see it.

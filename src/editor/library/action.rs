@@ -130,9 +130,11 @@ pub fn obstacle(world: &World, action: LibraryAction) -> Option<&'static str> {
         return None;
     }
     let Some(entity) = world.get_resource::<ActiveRig>().map(|active| active.0) else { return Some("no rig is open") };
-    let is_empty = world.get::<Rig>(entity).is_none_or(Rig::is_empty);
+    let rig = world.get::<Rig>(entity)?;
+    let is_empty = rig.is_empty();
     let stage = world.get::<RigStage>(entity).copied();
-    let is_selected = world.get::<Selection>(entity).is_some_and(|selection| !selection.0.is_empty());
+    let selection: &[Uid] = world.get::<Selection>(entity).map_or(&[], |selection| &selection.0);
+    let is_selected = selection.iter().any(|node| rig.joint(*node).is_some());
     let chosen = world.get_resource::<ChosenTemplate>().and_then(|chosen| chosen.0.as_ref());
     match action {
         LibraryAction::Loader | LibraryAction::List | LibraryAction::Updater => None,

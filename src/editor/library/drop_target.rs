@@ -131,7 +131,8 @@ impl ViewportPainter for DropTarget {
             }
             (Some((joint, _)), DragSubject::Module(module)) => requests.send(attach(rig, joint, module)),
             (None, dragged) => {
-                requests.send(Notice::warning(format!("{}: there is no joint; drop it on one", dragged.name())));
+                let text = format!("{}: there is no joint; drop it on one", dragged.name());
+                requests.send(Notice::warning(text).named());
             }
         }
     }

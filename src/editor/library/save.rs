@@ -282,7 +282,7 @@ pub(super) fn go_on(mut save: ResMut<TemplateSave>, histories: Query<&RigHistory
     };
     commands.write_message(match failure {
         Some(error) => Notice::error(format!("Could not write {name}: {error}")),
-        None => Notice::info(format!("{name} is not written: it was stopped")),
+        None => Notice::info(format!("{name} is not written: it was stopped")).named(),
     });
     // The header names no picture that is not there.
     if let Some((rig, file)) = named

@@ -190,7 +190,8 @@ pub(super) fn start(
     if !jobs.waiting.is_empty()
         && let Some(name) = jobs.drop_waiting()
     {
-        commands.write_message(Notice::info(format!("{name} is not used: another was asked for while it waited")));
+        let text = format!("{name} is not used: another was asked for while it waited");
+        commands.write_message(Notice::info(text).named());
     }
     if jobs.job.is_none()
         && let Some(request) = jobs.waiting.pop_front()
@@ -202,7 +203,8 @@ pub(super) fn start(
 fn begin(world: &mut World, request: LibraryRequest) {
     let name = request.place.stem();
     let Some(rig) = world.get_resource::<ActiveRig>().map(|active| active.0) else {
-        world.write_message(Notice::error(format!("{name} is not used: no rig is open; open or begin one first")));
+        let text = format!("{name} is not used: no rig is open; open or begin one first");
+        world.write_message(Notice::error(text).named());
         return;
     };
     let (Some(data), Some(modules)) = (settled(world, rig), world.get_resource::<RigModules>()) else { return };
@@ -341,7 +343,7 @@ pub(super) fn land(mut jobs: ResMut<LibraryJobs>, mut commands: Commands) {
         Ok(ready) => put(world, rig, request, landing, ready),
         Err(error) => {
             let name = request.place.stem();
-            world.write_message(Notice::error(format!("{name} is not used: {error}")));
+            world.write_message(Notice::error(format!("{name} is not used: {error}")).named());
         }
     });
 }
@@ -351,7 +353,8 @@ fn put(world: &mut World, rig: Entity, request: LibraryRequest, mut landing: Lan
     let history = world.get::<RigHistory>(rig);
     let is_active = world.get_resource::<ActiveRig>().is_some_and(|active| active.0 == rig);
     let Some(history) = history.filter(|_| is_active) else {
-        world.write_message(Notice::info(format!("{name} is not used: another rig was opened meanwhile")));
+        let text = format!("{name} is not used: another rig was opened meanwhile");
+        world.write_message(Notice::info(text).named());
         return;
     };
     let is_as_before = landing.is_as_at_start(history);

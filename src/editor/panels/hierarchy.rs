@@ -373,7 +373,8 @@ fn reparent(joints: &[Uid], parent: Option<Uid>, shown: &DisplayedRig, requests:
         return;
     }
     if let Some(obstacle) = obstacle(joints, parent, shown) {
-        requests.send(Notice::warning(format!("{obstacle}. Drop it on a joint outside its hierarchy.")));
+        let text = format!("{obstacle}. Drop it on a joint outside its hierarchy.");
+        requests.send(Notice::warning(text).named());
         return;
     }
     let elsewhere = |joint: &Uid| shown.rig.joint(*joint).is_some_and(|joint| joint.parent != parent);

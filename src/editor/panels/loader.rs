@@ -3,6 +3,7 @@
 
 pub(super) mod card;
 mod export;
+mod namesakes;
 mod stages;
 pub(super) mod tiles;
 

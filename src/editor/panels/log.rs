@@ -10,7 +10,7 @@ use crate::{
     editor::{
         counts::counted,
         dock::ShowPanel,
-        notice::{EditNotice, Notice, Severity},
+        notice::{EditNotice, Notice, Severity, capitalised},
         panel::{EditorPanel, Requests},
         style,
     },
@@ -168,10 +168,8 @@ fn tell_switches(mut switched: MessageReader<SwitchedOver>, mut notices: Message
 
 /// A reason as a sentence: capitalised, with a full stop.
 fn sentence(reason: &str) -> String {
-    let mut letters = reason.chars();
-    let first = letters.next().map(|first| first.to_uppercase().to_string()).unwrap_or_default();
     let end = if reason.ends_with(['.', '!', '?']) { "" } else { "." };
-    format!("{first}{}{end}", letters.as_str())
+    format!("{}{end}", capitalised(reason))
 }
 
 fn keep_notices(
@@ -187,11 +185,12 @@ fn keep_notices(
     }
     let at = time.map(|time| time.elapsed()).unwrap_or_default();
     for notice in notices.read() {
-        let mut notice = notice.clone();
+        // Toasts and the log show the same text.
+        let mut text = notice.sentence().into_owned();
         if let Some(limits) = &limits {
-            notice.text = limits.shortened(&notice.text);
+            text = limits.shortened(&text);
         }
-        book.add(notice, at);
+        book.add(Notice { text, ..notice.clone() }, at);
         redraw.write(RequestRedraw);
     }
 }

@@ -26,7 +26,9 @@ use crate::{
         ActiveRig,
         actions::{Action, ActionRequest},
         counts::counted,
+        help::describe,
         notice::Notice,
+        palette,
         panel::{EditorPanel, Requests},
         style,
     },
@@ -61,18 +63,19 @@ fn pose_actions(mut actions: MessageReader<ActionRequest>, active: Option<Res<Ac
 }
 
 fn carry_out(world: &mut World, entity: Entity, action: Action) {
+    if let Some(why_not) = palette::obstacle(world, action) {
+        world.write_message(Notice::info(format!("{}: {why_not}.", describe(action))));
+        return;
+    }
     let Some(posed) = PosedRig::of(world, entity) else { return };
     let has_selection = world.get::<Selection>(entity).is_some_and(|selection| !selection.0.is_empty());
     let operation = match action {
         Action::ResetPose => posed.reset(!has_selection),
         Action::StorePose => posed.store(free_name(posed.rig)),
-        _ if has_selection => match posed.mirror_selected() {
-            Some(operation) => operation,
-            None => {
-                world.write_message(Notice::info("Mirror pose: what is selected has no other side."));
-                return;
-            }
-        },
+        _ if has_selection => {
+            let Some(operation) = posed.mirror_selected() else { return };
+            operation
+        }
         _ => posed.flip(),
     };
     world.write_message(EditRequest::operation(entity, operation));
@@ -205,7 +208,9 @@ impl PosesPanel {
             let entered = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
             let text = if replaces { "Replace" } else { "Store" };
             let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
-            entered || ui.add(Button::new(text).min_size(size)).clicked()
+            let can_store = !posed.rig.is_empty();
+            let button = ui.add_enabled(can_store, Button::new(text).min_size(size));
+            entered && can_store || button.on_disabled_hover_text("there are no joints").clicked()
         });
         accepted.inner.then(|| {
             let name = std::mem::take(&mut self.name);

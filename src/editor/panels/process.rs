@@ -42,9 +42,13 @@ pub struct ProcessPanel {
     /// Rows that contain the words.
     shown: Vec<usize>,
     filtered: Option<String>,
-    /// Scrolls to the next command after each step.
+    /// Scrolls to the command that ran last.
     follow: bool,
+    /// Choice of the last frame.
+    was_following: bool,
     cursor: usize,
+    /// First row that an edit made run again, until it is scrolled to.
+    rerun: Option<usize>,
     in_range: bool,
 }
 
@@ -83,10 +87,7 @@ impl EditorPanel for ProcessPanel {
         self.refresh(&shown, processor.last_changed(), builder);
         self.head(ui, &shown, (world.get::<RigStage>(shown.entity), processor.follows()), builder, requests);
         self.find();
-        let reveal = (self.follow && self.cursor != builder.cursor())
-            .then(|| self.shown.iter().position(|row| *row + 1 >= builder.cursor()))
-            .flatten();
-        self.cursor = builder.cursor();
+        let reveal = self.news(builder.cursor()).and_then(|row| self.shown.iter().position(|shown| *shown >= row));
         let height = list::row_height(ui);
         let rows = List { id: "commands", count: self.shown.len(), height, reveal, follow: false };
         let mut clicked = None;
@@ -135,9 +136,20 @@ impl ProcessPanel {
         if before.is_empty() || !ran.is_empty() {
             let all = self.rows.iter().filter_map(Row::runs).count();
             self.ran = if ran.len() < all { ran } else { BTreeSet::new() };
+            self.rerun = self.rows.iter().position(|row| self.ran.contains(&row.entry.command));
         }
         self.made_from = made_from;
         self.filtered = None;
+    }
+
+    /// Row to scroll to: the last one in effect after a step, or the first one that an edit made run again.
+    fn news(&mut self, cursor: usize) -> Option<usize> {
+        let is_begun = std::mem::replace(&mut self.was_following, self.follow) != self.follow;
+        let is_step = std::mem::replace(&mut self.cursor, cursor) != cursor;
+        let rerun = self.rerun.take();
+        let row = if is_step { None } else { rerun };
+        let row = row.or_else(|| (is_step || is_begun).then(|| cursor.saturating_sub(1)));
+        row.filter(|_| self.follow)
     }
 
     fn find(&mut self) {
@@ -320,7 +332,8 @@ impl ProcessPanel {
             Click::Values => show_tag(world, shown, row.entry.command, requests),
             Click::Made => match made_by(world, shown, row.entry.command) {
                 nodes if nodes.is_empty() => {
-                    requests.send(Notice::info(format!("{} of {} made no node.", row.name, row.joint)));
+                    let text = format!("{} of {} made no node.", row.name, row.joint);
+                    requests.send(Notice::info(text).named());
                 }
                 nodes => requests.send(pick(nodes)),
             },

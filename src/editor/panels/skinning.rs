@@ -120,7 +120,7 @@ fn skin(
             let kept: Vec<&str> = bound.iter().filter_map(models_of).map(mesh_name).collect();
             let keep = if kept.len() == 1 { "keeps its" } else { "keep their" };
             let text = format!("{} {keep} weights. Skin again computes those of all meshes.", kept.join(", "));
-            commands.write_message(Notice::info(text).at(TITLE));
+            commands.write_message(Notice::info(text).named().at(TITLE));
             bare
         }
     };
@@ -169,10 +169,11 @@ fn tell_results(
         notices.write(match result {
             Ok(SkinningReport { weights: report, .. }) => {
                 let told = format!("{name} is skinned: {}.", covered(report.points, unweighted(report)));
-                if unweighted(report) == 0 { Notice::done(told) } else { Notice::warning(told).at(TITLE) }
+                let notice = if unweighted(report) == 0 { Notice::done(told) } else { Notice::warning(told).at(TITLE) };
+                notice.named()
             }
             Err(error) if is_cancelled(error) => Notice::info("Skinning was cancelled. The weights are as they were."),
-            Err(error) => Notice::error(format!("{name} was not skinned: {error}.")).at(TITLE),
+            Err(error) => Notice::error(format!("{name} was not skinned: {error}.")).named().at(TITLE),
         });
         results.0.retain(|(known, _)| known != mesh && meshes.contains(*known));
         results.0.push((*mesh, result.clone()));

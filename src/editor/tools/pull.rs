@@ -199,7 +199,7 @@ fn drag(
                         Err(reason) => {
                             held.is_refused = true;
                             let name = rig.name(held.node);
-                            notices.write(Notice::info(format!("{name} cannot be pulled: {reason}.")));
+                            notices.write(Notice::info(format!("{name} cannot be pulled: {reason}.")).named());
                         }
                     }
                 }

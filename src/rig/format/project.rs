@@ -21,8 +21,9 @@ use crate::rig::{Rig, Uid, animation::NodeNames};
 ///
 /// Format 2 adds values of attributes, and poses of nodes that are not joints; format 3 adds clips, and the templates that rigs
 /// follow; format 4 adds parts that were dropped onto joints, and selection sets; format 5 adds places in the graph; format 6 adds cuts
-/// of faces; format 7 adds texts of templates with parts. A project is written in the first format that can hold it.
-pub const FORMAT: u32 = 7;
+/// of faces; format 7 adds texts of templates with parts; format 8 adds the clip that is open. A project is written in the first
+/// format that can hold it.
+pub const FORMAT: u32 = 8;
 
 /// Largest size in bytes of a project that is read.
 pub const MAX_BYTES: usize = 64 << 20;
@@ -121,6 +122,9 @@ pub struct ProjectView {
     /// Places of the graph's nodes and folded frames that a person moved, by the uid of the command tag, feature or local group.
     #[serde(default)]
     pub graph: BTreeMap<Uid, [f32; 2]>,
+    /// Clip that is open in the timeline; `None` for the first one.
+    #[serde(default)]
+    pub clip: Option<Uid>,
 }
 
 /// A camera that orbits a point of the world.

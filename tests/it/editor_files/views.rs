@@ -4,7 +4,14 @@ use std::collections::BTreeMap;
 
 use bevy_panorbit_camera::PanOrbitCamera;
 use rigsmith::{
-    editor::{camera, mode::Mode, panels::graph::GraphView},
+    editor::{
+        camera,
+        mode::Mode,
+        panels::{
+            graph::GraphView,
+            timeline::{OpenClip, TimelineRequest},
+        },
+    },
     rig::{TagKind, operations::TagOperation, project::ProjectCamera},
 };
 
@@ -61,4 +68,42 @@ fn a_document_without_weights_is_not_opened_for_painting() {
         window.open(OpenRequest::Bundled);
         assert_eq!(window.world().get_resource::<Mode>(), Some(&then), "opened in {mode:?}");
     }
+}
+
+/// A project opens with the clip that was open in the Timeline, or else with the first one; that is no change of it.
+#[test]
+fn the_open_clip_of_a_project_is_open_again() {
+    let folder = folder();
+    let mut window = Window::with_panels(folder.path());
+    window.open(OpenRequest::Empty);
+    window.place(1.0);
+    let clip = |number: u64, name: &str| {
+        let clip = RigClip { range: [0.0, 1.0], ..RigClip::new(Uid(0x70 + number), Uid(0x80 + number), name) };
+        RigEdit::AddClip(Box::new(clip), usize::MAX)
+    };
+    window.change(Change::Do(Operation::Edits(vec![clip(0, "walk"), clip(1, "run"), clip(2, "jump")])));
+    let opened = |window: &Window| OpenClip::of(window.world()).map(|open| open.clip.name.clone());
+    assert_eq!(opened(&window), None, "nobody has opened one");
+    let project = window.save_as("clips.rigsmith.ron");
+    for (open, named) in
+        [(Some(Uid(0x71)), "run"), (Some(Uid(0x70)), "walk"), (Some(Uid(0x72)), "jump"), (None, "walk")]
+    {
+        window.send(TimelineRequest::Open(open));
+        window.act(Action::Save);
+        let mut again = Window::with_panels(folder.path());
+        again.open_file(&project);
+        assert_eq!(opened(&again).as_deref(), Some(named), "{open:?}");
+        assert!(!again.is_unsaved(), "a clip that is open is no change");
+        again.act(Action::New);
+        assert_eq!(opened(&again), None, "another document has none of it");
+    }
+    // A clip that is gone leaves the first one.
+    window.send(TimelineRequest::Open(Some(Uid(0x72))));
+    window.act(Action::Save);
+    let text = std::fs::read_to_string(&project).expect("the project is text");
+    std::fs::write(&project, text.replace("clip: \"0000000000000072\"", "clip: \"0000000000000099\""))
+        .expect("written");
+    let mut again = Window::with_panels(folder.path());
+    again.open_file(&project);
+    assert_eq!(opened(&again).as_deref(), Some("walk"));
 }

@@ -62,6 +62,47 @@ fn templates_are_found_by_words_and_folder_and_are_those_of_the_command() {
     assert!(matches!(pictured(&studio.desk, "broken"), Some(TemplatePicture::Nothing)));
 }
 
+/// Several templates may have one name: those of the program and copies of them, or two parts of the program.
+#[test]
+fn tiles_of_one_name_tell_their_difference() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let biped = MAN.replace("name: \"man\"", "name: \"biped\"");
+    fs::write(studio.site.join("biped.rig.ron"), &biped).unwrap();
+    let limbs = studio.site.join("limbs");
+    fs::write(limbs.join("first.rig.ron"), biped.replace("name: \"biped\"", "name: \"twin\"")).unwrap();
+    fs::write(limbs.join("second.rig.ron"), biped.replace("name: \"biped\"", "name: \"twin\"")).unwrap();
+    fs::write(limbs.join("man.rig.ron"), LIMB.replace("name: \"limb\"", "name: \"man\"")).unwrap();
+    studio.settle();
+    studio.click("List the templates again");
+    studio.settle();
+    let find = |studio: &mut Studio, words: &str| -> Vec<String> {
+        studio.desk.click("Search templates");
+        studio.desk.type_text(words);
+        studio.settle();
+        let mut found: Vec<String> = studio.tiles().into_iter().map(str::to_owned).collect();
+        found.sort();
+        studio.desk.click("Clear search templates");
+        studio.settle();
+        found
+    };
+    let bipeds = find(&mut studio, "biped.rig");
+    assert_eq!(bipeds, ["Template biped"], "alone among what is shown, its name is enough");
+    let bipeds = find(&mut studio, "biped");
+    for wanted in ["Template biped, site", "Template biped, Rigsmith"] {
+        assert!(bipeds.iter().any(|tile| tile == wanted), "{wanted} is not among {bipeds:?}");
+    }
+    assert_eq!(find(&mut studio, "twin"), ["Template twin, first", "Template twin, second"]);
+    let hands: Vec<String> = find(&mut studio, "left hand").into_iter().filter(|tile| tile.contains("hand")).collect();
+    assert!(hands.len() >= 2, "{hands:?}");
+    let mut different = hands.clone();
+    different.sort();
+    different.dedup();
+    assert_eq!(different.len(), hands.len(), "{hands:?}");
+    // A template and a part of one name, which screen readers tell apart already.
+    let men = find(&mut studio, "man");
+    assert!(men.iter().any(|tile| tile == "Template man") && men.iter().any(|tile| tile == "Part man"), "{men:?}");
+}
+
 #[test]
 fn headers_are_read_again_only_where_the_file_has_changed() {
     let folder = tempfile::tempdir().unwrap();

@@ -10,20 +10,20 @@ fn everything_is_told_and_the_log_is_capped() {
     let told = desk.told();
     assert!(told.len() == 1 && told[0].starts_with("There is no joint"), "{told:?}");
     for number in 0..LogBook::CAPACITY + 300 {
-        desk.app.world_mut().write_message(Notice::info(format!("notice {number}")));
+        desk.app.world_mut().write_message(Notice::info(format!("Notice {number}")));
     }
     for _ in 0..5 {
-        desk.app.world_mut().write_message(Notice::warning("again"));
+        desk.app.world_mut().write_message(Notice::warning("Again"));
     }
     desk.frames(4);
     let book = desk.app.world().resource::<LogBook>();
     assert_eq!(book.entries().len(), LogBook::CAPACITY);
     assert_eq!(book.entries().next_back().map(|last| last.times), Some(5), "repetitions are counted");
-    assert!(desk.look("again").is_some(), "the newest is in view");
+    assert!(desk.look("Again").is_some(), "the newest is in view");
     desk.click("Search");
     desk.type_text("notice 1234");
     desk.frames(3);
-    assert!(desk.look("notice 1234").is_some() && desk.look("again").is_none());
+    assert!(desk.look("Notice 1234").is_some() && desk.look("Again").is_none());
     desk.click("Clear");
     desk.frames(2);
     assert!(desk.told().is_empty());
@@ -45,13 +45,13 @@ fn everything_is_told_and_the_log_is_capped() {
 fn the_log_is_filtered_by_severity() {
     let mut desk = Desk::new(LogPanel::default());
     for notice in
-        [Notice::info("told"), Notice::done("made"), Notice::warning("doubtful"), Notice::error("wrong").at("Process")]
+        [Notice::info("Told"), Notice::done("Made"), Notice::warning("Doubtful"), Notice::error("Wrong").at("Process")]
     {
         desk.app.world_mut().write_message(notice);
     }
     desk.frames(3);
     let listed = |desk: &Desk| -> Vec<&str> {
-        ["told", "made", "doubtful", "wrong"].into_iter().filter(|text| desk.look(text).is_some()).collect()
+        ["Told", "Made", "Doubtful", "Wrong"].into_iter().filter(|text| desk.look(text).is_some()).collect()
     };
     let toggled = |desk: &mut Desk, name: &str| {
         let was_on = desk.find(name).on;
@@ -59,22 +59,22 @@ fn the_log_is_filtered_by_severity() {
         desk.frames(2);
         assert_ne!(desk.find(name).on, was_on, "{name} tells its state");
     };
-    assert_eq!(listed(&desk), ["told", "made", "doubtful", "wrong"]);
+    assert_eq!(listed(&desk), ["Told", "Made", "Doubtful", "Wrong"]);
     toggled(&mut desk, "Show information");
-    assert_eq!(listed(&desk), ["doubtful", "wrong"]);
+    assert_eq!(listed(&desk), ["Doubtful", "Wrong"]);
     toggled(&mut desk, "Show warnings");
-    assert_eq!(listed(&desk), ["wrong"]);
+    assert_eq!(listed(&desk), ["Wrong"]);
     toggled(&mut desk, "Show errors");
     assert!(listed(&desk).is_empty());
     // Others that come are sorted in, too, and words narrow what is listed.
-    desk.app.world_mut().write_message(Notice::done("made again"));
+    desk.app.world_mut().write_message(Notice::done("Made again"));
     toggled(&mut desk, "Show information");
-    assert_eq!(listed(&desk), ["told", "made"]);
-    assert!(desk.look("made again").is_some());
+    assert_eq!(listed(&desk), ["Told", "Made"]);
+    assert!(desk.look("Made again").is_some());
     desk.click("Search");
     desk.type_text("again");
     desk.frames(2);
-    assert!(listed(&desk).is_empty() && desk.look("made again").is_some());
+    assert!(listed(&desk).is_empty() && desk.look("Made again").is_some());
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn toasts_are_few_and_errors_stay_longest() {
     desk.app.world_mut().write_message(Notice::error("It cannot be. Do that instead."));
     desk.app.world_mut().write_message(Notice::info("not shown").quiet());
     for number in 0..7 {
-        desk.app.world_mut().write_message(Notice::info(format!("notice {number}")));
+        desk.app.world_mut().write_message(Notice::info(format!("Notice {number}")));
     }
     desk.frames(4);
     assert_eq!(shown(&desk), 4);
@@ -133,16 +133,16 @@ fn equal_toasts_are_counted() {
     let send = |desk: &mut Desk, notice: Notice| {
         desk.app.world_mut().write_message(notice);
     };
-    send(&mut desk, Notice::warning("again"));
-    send(&mut desk, Notice::warning("again"));
+    send(&mut desk, Notice::warning("Again"));
+    send(&mut desk, Notice::warning("Again"));
     desk.frames(3);
-    assert!(desk.says("again ×2"), "{:?}", desk.seen);
+    assert!(desk.says("Again ×2"), "{:?}", desk.seen);
     // Another one between them makes no second toast.
-    send(&mut desk, Notice::info("other"));
+    send(&mut desk, Notice::info("Other"));
     desk.frames(2);
-    send(&mut desk, Notice::warning("again"));
+    send(&mut desk, Notice::warning("Again"));
     desk.frames(3);
-    assert!(desk.says("again ×3") && desk.says("other") && shown(&desk) == 2, "{:?}", desk.seen);
+    assert!(desk.says("Again ×3") && desk.says("Other") && shown(&desk) == 2, "{:?}", desk.seen);
 
     // A key pressed too often is told, as what it is.
     for change in [Change::Undo, Change::Undo, Change::Redo] {
@@ -155,4 +155,32 @@ fn equal_toasts_are_counted() {
     let [undo, redo] = ["undo", "redo"].map(none);
     assert!(told.contains(&(undo.0, undo.1.as_str())) && told.contains(&(redo.0, redo.1.as_str())), "{told:?}");
     assert!(desk.says("There is nothing to undo. ×2"), "{:?}", desk.seen);
+}
+
+/// Notices are sentences; names at their start are as people wrote them.
+#[test]
+fn notices_begin_with_a_capital_unless_they_begin_with_a_name() {
+    let mut desk = Desk::new(LogPanel::default());
+    for (text, told) in [
+        ("the disk is full: free some space", "The disk is full: free some space"),
+        ("nothing: no joint is selected", "Nothing: no joint is selected"),
+        ("über alles", "Über alles"),
+        ("Some joints are gone", "Some joints are gone"),
+        ("hero.glb was not opened", "hero.glb was not opened"),
+        ("models/hero: no such file", "models/hero: no such file"),
+        ("hand_l has no partner", "hand_l has no partner"),
+        ("\"hips\" is given twice", "\"hips\" is given twice"),
+        ("3 joints move nothing", "3 joints move nothing"),
+    ] {
+        desk.app.world_mut().write_message(Notice::info(text));
+        desk.frames(2);
+        assert_eq!(desk.told().last().map(String::as_str), Some(told));
+    }
+    desk.app.world_mut().write_message(Notice::info("hips keeps its weights.").named());
+    desk.frames(2);
+    assert_eq!(desk.told().last().map(String::as_str), Some("hips keeps its weights."));
+    // Refusals of edits are told by the same rule.
+    desk.edit(Operation::Delete { joints: vec![Uid(404)], keep_children: true });
+    desk.frames(2);
+    assert!(desk.told().last().is_some_and(|told| told.starts_with("There is no joint")), "{:?}", desk.told());
 }

@@ -1,9 +1,14 @@
 //! The Process panel: steps by command and by joint both ways, runs to a command and to breakpoints, and a range of joints.
 
+use bevy::{ecs::system::RunSystemOnce, math::Affine3A, prelude::*};
 use bevy_egui::egui;
 use rigsmith::{
     editor::panels::process::ProcessPanel,
-    plugins::commands::{BuildRequest, BuildStep, Processor},
+    plugins::{
+        commands::{BuildRequest, BuildStep, Processor},
+        controls::outline::ControlNodes,
+        schema::RigNodes,
+    },
 };
 
 use super::{desk::Desk, tag_values::add_command};
@@ -64,4 +69,32 @@ fn builds_are_stepped_run_to_a_command_and_stopped_at_breakpoints() {
     step(&mut desk, "Selection only");
     assert_eq!(processor(&desk).builder().len(), 4);
     assert_eq!((desk.rig().clone(), desk.steps()), before, "builds change no document");
+}
+
+/// Controls that are drawn and picked in the viewport are those of the commands that are in effect.
+#[test]
+fn the_viewport_shows_the_rig_grow_and_shrink_with_each_step() {
+    let mut desk = Desk::new(ProcessPanel::default());
+    let joints = desk.chain(&["a", "b", "c"]);
+    for joint in &joints {
+        add_command(&mut desk, *joint, "control", "()");
+    }
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::All });
+    desk.frames(4);
+    let drawn = |desk: &mut Desk| -> usize {
+        let rig = desk.rig;
+        let visible = move |controls: ControlNodes, nodes: Query<&RigNodes>| {
+            controls.visible(nodes.get(rig).ok(), Affine3A::IDENTITY).len()
+        };
+        desk.app.world_mut().run_system_once(visible).expect("the system runs")
+    };
+    assert_eq!(drawn(&mut desk), 3);
+    step(&mut desk, "Roll all back");
+    assert_eq!(drawn(&mut desk), 0, "nothing is built");
+    for count in 1..=3 {
+        step(&mut desk, "Carry out the next command");
+        assert_eq!(drawn(&mut desk), count);
+    }
+    step(&mut desk, "Take the last command back");
+    assert_eq!(drawn(&mut desk), 2);
 }

@@ -6,6 +6,7 @@
 
 mod coverage;
 mod of_library;
+mod states;
 mod with_mesh;
 
 use std::{
@@ -133,6 +134,13 @@ struct Shelf {
 
 impl Walk {
     fn new(panel: Box<dyn EditorPanel>, size: egui::Vec2) -> Self {
+        let mut walk = Self::empty(panel, size);
+        walk.fill();
+        walk
+    }
+
+    /// The app with an empty document.
+    fn empty(panel: Box<dyn EditorPanel>, size: egui::Vec2) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let time = TimeUpdateStrategy::ManualDuration(Duration::ZERO);
         let mut app = docked_app(folder.path().join("state"), Vec::new(), time);
@@ -145,7 +153,6 @@ impl Walk {
         walk.desk.app.world_mut().write_message(OpenRequest::Empty);
         walk.rest();
         walk.desk.rig = walk.desk.app.world().resource::<ActiveRig>().0;
-        walk.fill();
         walk
     }
 

@@ -80,7 +80,7 @@ pub fn cases() -> Vec<Case> {
 
 fn one_toast(booth: &mut Booth) {
     show_nothing(booth);
-    booth.tell([Notice::done("biped is skinned: 100 % of 13380 points have weights.")]);
+    booth.tell([Notice::done("biped is skinned: 100 % of 13380 points have weights.").named()]);
 }
 
 fn many_toasts(booth: &mut Booth) {

@@ -84,7 +84,7 @@ pub fn typical() -> Booth {
     booth.app.insert_resource(Mode::Select);
     booth.tell([
         Notice::info("biped.rig.ron is open: 71 joints.").quiet(),
-        Notice::done("biped is skinned: 100 % of 13380 points have weights.").quiet(),
+        Notice::done("biped is skinned: 100 % of 13380 points have weights.").named().quiet(),
         Notice::warning("2 joints move nothing: the Skinning panel lists them.").quiet(),
         Notice::error("No face was placed: the mesh has no head. Choose \"Whole mesh\" in the Face panel.").quiet(),
     ]);
@@ -239,7 +239,7 @@ pub fn extreme() -> Booth {
             2 => Notice::warning(text),
             _ => Notice::error(format!("{text}.\nA second line says where.\nA third one says what to do about it.")),
         };
-        notice.quiet()
+        notice.named().quiet()
     };
     booth.tell((0..2300).map(told));
     booth

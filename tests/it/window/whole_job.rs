@@ -85,7 +85,7 @@ fn an_unseen_body_becomes_an_animated_character_by_hand_on_a_display_and_gpu() {
     hands.press("Part");
     hands.press("Part jaw");
     let added = hands.until("the part is added and built", |report| {
-        report.steps.last().is_some_and(|step| step == "Add part")
+        report.steps.last().is_some_and(|step| step == "Add part jaw")
             && report.commands[1] > skinned.commands[1]
             && report.commands[0] == report.commands[1]
     });

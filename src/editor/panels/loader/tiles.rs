@@ -8,6 +8,7 @@ use bevy_egui::egui::{
     TextureHandle, TextureOptions, Ui, WidgetInfo, WidgetType, pos2, text::LayoutJob, text::TextWrapping, vec2,
 };
 
+use super::namesakes::differences;
 use crate::{
     editor::{
         library::{
@@ -25,6 +26,8 @@ use crate::{
 const TILE: f32 = 72.0;
 /// Height of the name below it.
 const NAME: f32 = 16.0;
+/// Height of the line below the name that tells templates of one name apart.
+const DIFFERENCE: f32 = 12.0;
 
 /// Search, folder and textures.
 #[derive(Default)]
@@ -32,9 +35,17 @@ pub(in crate::editor::panels) struct Tiles {
     words: String,
     folder: Option<String>,
     textures: BTreeMap<TemplatePlace, (Option<FileState>, TextureHandle)>,
-    /// Templates that were found, with what they were found from.
-    found: Vec<Arc<ListedTemplate>>,
+    /// Templates that were found, each with what tells it from others of its name.
+    found: Vec<(Arc<ListedTemplate>, Option<String>)>,
     from: Option<(u64, String, Option<String>, bool)>,
+}
+
+/// Lines below a picture.
+struct TileNames<'a> {
+    /// Words that tell the template from others of its name.
+    difference: Option<&'a str>,
+    /// Height of the lines.
+    height: f32,
 }
 
 /// Choice of what is shown.
@@ -77,22 +88,25 @@ impl Tiles {
         let least = if wanted.parts_only { wanted.height } else { 64.0 };
         let area = ScrollArea::vertical().id_salt("templates").max_height(wanted.height).min_scrolled_height(least);
         let area = area.auto_shrink([false, true]);
+        let has_namesakes = self.found.iter().any(|(_, difference)| difference.is_some());
+        let foot = if has_namesakes { NAME + DIFFERENCE } else { NAME };
         let mut row = |ui: &mut Ui, row: usize| {
             let in_row: Vec<_> = self.found.iter().skip(row * columns).take(columns).cloned().collect();
-            for listed in in_row {
+            for (listed, difference) in in_row {
                 let picture = pictures.and_then(|pictures| pictures.get(&listed));
                 if picture.is_none() && pictures.is_some_and(|pictures| !pictures.is_wanted(&listed)) {
                     missing.push(listed.clone());
                 }
                 let is_chosen = wanted.chosen == Some(&listed.place);
-                if self.tile(ui, &listed, picture, is_chosen).clicked() {
+                let names = TileNames { difference: difference.as_deref(), height: foot };
+                if self.tile(ui, &listed, names, picture, is_chosen).clicked() {
                     clicked = Some(listed);
                 }
             }
         };
         ui.scope(|ui| {
             ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
-            area.show_rows(ui, TILE + NAME, rows, |ui, visible| {
+            area.show_rows(ui, TILE + foot, rows, |ui, visible| {
                 visible.for_each(|number| {
                     ui.horizontal(|ui| row(ui, number));
                 });
@@ -140,7 +154,9 @@ impl Tiles {
         let folders = folders.filter(|folder| self.folder.as_ref().is_none_or(|name| folder.name == *name));
         let found = folders.flat_map(|folder| &folder.templates);
         let found = found.filter(|listed| (!parts_only || listed.is_part()) && listed.has_words(&self.words));
-        self.found = found.cloned().collect();
+        let found: Vec<Arc<ListedTemplate>> = found.cloned().collect();
+        let different = differences(&found);
+        self.found = found.into_iter().zip(different).collect();
         self.from = from;
     }
 
@@ -156,13 +172,17 @@ impl Tiles {
         &mut self,
         ui: &mut Ui,
         listed: &Arc<ListedTemplate>,
+        names: TileNames,
         picture: Option<&TemplatePicture>,
         is_chosen: bool,
     ) -> Response {
-        let (rect, response) = ui.allocate_exact_size(vec2(TILE, TILE + NAME), Sense::click_and_drag());
+        let (rect, response) = ui.allocate_exact_size(vec2(TILE, TILE + names.height), Sense::click_and_drag());
         let name = listed.name().replace('_', " ");
         let kind = if listed.is_part() { "Part" } else { "Template" };
-        let said = format!("{kind} {name}");
+        let said = match names.difference {
+            Some(difference) if !difference.eq_ignore_ascii_case(kind) => format!("{kind} {name}, {difference}"),
+            _ => format!("{kind} {name}"),
+        };
         response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, is_chosen, &said));
         if listed.header.is_ok() {
             response.dnd_set_drag_payload(DraggedTemplate { place: listed.place.clone(), name: name.clone() });
@@ -178,11 +198,10 @@ impl Tiles {
         self.paint(ui, square.shrink(3.0), listed, picture);
         let is_ok = listed.header.is_ok();
         let color = if is_ok { ui.visuals().text_color() } else { ui.visuals().error_fg_color };
-        let mut job = LayoutJob::simple_singleline(name, FontId::proportional(11.0), color);
-        job.wrap = TextWrapping::truncate_at_width(TILE);
-        let galley = ui.painter().layout_job(job);
-        let left = square.center().x - galley.size().x / 2.0;
-        ui.painter().galley(pos2(left, square.bottom() + 1.0), galley, color);
+        line_below(ui, square, 1.0, &name, 11.0, color);
+        if let Some(difference) = names.difference {
+            line_below(ui, square, NAME - 1.0, difference, 10.0, style::quiet(ui.visuals()));
+        }
         let tip = match &listed.header {
             Ok(header) if header.description.is_empty() => listed.place.to_string(),
             Ok(header) => format!("{}\n{}", header.description, listed.place),
@@ -221,4 +240,13 @@ impl Tiles {
             None => {}
         }
     }
+}
+
+/// Draws a line of text below a picture, in its middle, and cut where it is wider.
+fn line_below(ui: &Ui, square: Rect, distance: f32, text: &str, size: f32, color: Color32) {
+    let mut job = LayoutJob::simple_singleline(text.to_owned(), FontId::proportional(size), color);
+    job.wrap = TextWrapping::truncate_at_width(TILE);
+    let galley = ui.painter().layout_job(job);
+    let left = square.center().x - galley.size().x / 2.0;
+    ui.painter().galley(pos2(left, square.bottom() + distance), galley, color);
 }

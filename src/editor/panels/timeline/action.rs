@@ -232,7 +232,11 @@ pub fn obstacle(world: &World, action: TimelineAction) -> Option<&'static str> {
     let rig = world.get::<Rig>(active.0)?;
     let timeline = world.get_resource::<Timeline>()?;
     match action {
-        TimelineAction::AutoKey | TimelineAction::Stretch => return None,
+        // What is on can be turned off.
+        TimelineAction::AutoKey => return (rig.is_empty() && !timeline.auto_key).then_some("there are no joints"),
+        TimelineAction::Stretch => {
+            return (rig.clips().is_empty() && !timeline.stretch).then_some("the rig has no clips");
+        }
         TimelineAction::NewClip => return rig.is_empty().then_some("there are no joints"),
         TimelineAction::Import | TimelineAction::ImportOwn => {
             let is_busy = world.get_resource::<ClipImport>().is_some_and(|import| import.name().is_some());
@@ -278,6 +282,7 @@ pub fn obstacle(world: &World, action: TimelineAction) -> Option<&'static str> {
         TimelineAction::KeyAll => open.layer.is_none().then_some("the clip has no layer"),
         TimelineAction::Paste if open.layer.is_none() => Some("the clip has no layer"),
         TimelineAction::Paste => timeline.copied.is_none().then_some("no keys were copied"),
+        TimelineAction::SelectNone => timeline.keys.is_empty().then_some("no key is selected"),
         TimelineAction::SelectAll => {
             open.layer.is_none_or(|layer| layer.tracks.is_empty()).then_some("the layer has no keys")
         }

@@ -189,7 +189,8 @@ fn begin(world: &mut World, path: &Path) {
     let Some(entity) = world.get_resource::<ActiveRig>().map(|active| active.0) else { return };
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     if world.get_resource::<ClipImport>().is_some_and(|import| import.name().is_some()) {
-        world.write_message(Notice::info(format!("{name} has to wait: another file is being read. Import it then.")));
+        let text = format!("{name} has to wait: another file is being read. Import it then.");
+        world.write_message(Notice::info(text).named());
         return;
     }
     let Some((rig, modules, landing)) = snapshot(world, entity) else { return };
@@ -414,7 +415,8 @@ fn put(world: &mut World, rig: Entity, name: String, mut landing: Landing, impor
     let is_active = world.get_resource::<ActiveRig>().is_some_and(|active| active.0 == rig);
     let Some(history) = world.get::<RigHistory>(rig).filter(|_| is_active) else {
         world.resource_mut::<ClipImport>().draft = None;
-        world.write_message(Notice::info(format!("{name} is not imported: another rig was opened meanwhile")));
+        let text = format!("{name} is not imported: another rig was opened meanwhile");
+        world.write_message(Notice::info(text).named());
         return;
     };
     if let JobOutcome::Hold { is_news } = landing.decide(history, || true) {

@@ -234,6 +234,14 @@ pub fn obstacle(world: &World, action: BrushAction) -> Option<&'static str> {
             let selected = world.get_resource::<SelectedPoints>()?;
             selected.points.is_empty().then_some("no point is selected")
         }
+        _ if world.get::<RigMeshes>(entity).is_none_or(|meshes| meshes.is_empty()) => Some("no mesh is open"),
+        BrushAction::Weaker | BrushAction::Stronger => {
+            let strength = world.get_resource::<PaintBrush>()?.strength;
+            match action {
+                BrushAction::Weaker => (strength <= 0.0).then_some("the brush has its least strength"),
+                _ => (strength >= 1.0).then_some("the brush has its full strength"),
+            }
+        }
         _ => None,
     }
 }

@@ -351,7 +351,7 @@ fn known_names(fields: &[Field], field: &Field) -> Option<&'static [&'static str
         (5, ["poses", "rigs", ""]) => Some(&["uid", "name", "offsets", "values"]),
         (7, ["offsets", "poses", "rigs"]) => Some(OFFSET),
         (5, ["values", "rigs", ""]) | (7, ["values", "poses", "rigs"]) => Some(&["node", "name", "value"]),
-        (2, ["view", "", ""]) => Some(&["camera", "mode", "shading", "switches", "graph"]),
+        (2, ["view", "", ""]) => Some(&["camera", "mode", "shading", "switches", "graph", "clip"]),
         (3, ["camera", "view", ""]) => Some(&["yaw", "pitch", "distance", "focus", "orthographic"]),
         (2, ["journal", "", ""]) => Some(&["file", "last"]),
         _ => None,

@@ -26,7 +26,9 @@ fn write_into(out: &mut String, project: &Project) -> std::fmt::Result {
     let of_rigs = project.rigs.iter().map(|entry| needed_format(&entry.rig)).max().unwrap_or(1);
     let of_templates = project.templates.iter().map(|template| if template.text.is_some() { 7 } else { 3 }).max();
     let of_content = of_rigs.max(of_templates.unwrap_or(1));
-    let format = if project.view.graph.is_empty() { of_content } else { of_content.max(5) };
+    let of_graph = if project.view.graph.is_empty() { 1 } else { 5 };
+    let of_clip = if project.view.clip.is_none() { 1 } else { 8 };
+    let format = of_content.max(of_graph).max(of_clip);
     writeln!(out, "(\n    format: {format},\n    name: {},", quoted(&project.name))?;
     writeln!(out, "    meshes: [")?;
     for mesh in &project.meshes {
@@ -197,6 +199,9 @@ fn write_view(out: &mut String, view: &ProjectView) -> std::fmt::Result {
             writeln!(out, "            \"{uid}\": ({x:?}, {y:?}),")?;
         }
         writeln!(out, "        }},")?;
+    }
+    if let Some(clip) = view.clip {
+        writeln!(out, "        clip: \"{clip}\",")?;
     }
     writeln!(out, "    ),")
 }

@@ -53,3 +53,18 @@ fn no_panel_is_left_out() {
         assert_eq!(panel.title(), title, "the panel of that title is walked over");
     }
 }
+
+#[test]
+fn no_panel_asks_for_frames_while_nothing_happens() {
+    let loader: Box<dyn EditorPanel> = Box::new(LoaderPanel::default());
+    let loader = (OF_LIBRARY, loader, egui::vec2(360.0, 2000.0));
+    for (title, panel, size) in panels().into_iter().chain([loader]) {
+        let mut walk = Walk::new(panel, size);
+        walk.ready();
+        walk.rest();
+        walk.desk.move_to(Pos2::new(-10.0, -10.0));
+        // Bars that fade and lists that come in the background are done by then.
+        walk.desk.frames(120);
+        assert!(!walk.desk.awake, "{title} asks for a frame, with nothing to show in it");
+    }
+}
