@@ -19,7 +19,14 @@ const NEAR: usize = 32;
 
 /// Notes of a rig. They follow from its tags and are no content: any two compare as equal, and a clone has none.
 #[derive(Default)]
-pub(super) struct TagPlaces(Mutex<HashMap<Uid, usize>>);
+pub(super) struct TagPlaces(Mutex<TagNotes>);
+
+#[derive(Default)]
+struct TagNotes {
+    places: HashMap<Uid, usize>,
+    /// Distance from its note at which the last tag was found: tags that were taken out or put in before one shift many others.
+    shift: isize,
+}
 
 impl Clone for TagPlaces {
     fn clone(&self) -> Self {
@@ -49,28 +56,33 @@ impl TagPlaces {
         }
         let mut notes = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         // A tag without a note was most likely added at the end.
-        let noted = notes.get(&tag).copied().unwrap_or(tags.len() - 1);
-        let near = (0..=NEAR).flat_map(|far| [noted.checked_sub(far), Some(noted.saturating_add(far))]).flatten();
+        let noted = notes.places.get(&tag).copied().unwrap_or(tags.len() - 1);
+        let around = |centre: usize| {
+            (0..=NEAR).flat_map(move |far| [centre.checked_sub(far), centre.checked_add(far)]).flatten()
+        };
         let mut looked = 0;
+        let near = around(noted.saturating_add_signed(notes.shift)).chain(around(noted));
         let found = near.inspect(|_| looked += 1).find(|place| is_there(*place));
         count(looked);
         if let Some(place) = found {
-            notes.insert(tag, place);
+            notes.shift = isize::try_from(place).unwrap_or_default() - isize::try_from(noted).unwrap_or_default();
+            notes.places.insert(tag, place);
             return Some(place);
         }
         count(tags.len());
-        notes.extend(tags.iter().zip(0..).map(|(known, place)| (known.uid, place)));
-        notes.get(&tag).copied().filter(|place| is_there(*place))
+        notes.shift = 0;
+        notes.places.extend(tags.iter().zip(0..).map(|(known, place)| (known.uid, place)));
+        notes.places.get(&tag).copied().filter(|place| is_there(*place))
     }
 
     /// Notes that a tag was put at a place.
     pub(super) fn note(&mut self, tag: Uid, place: usize) {
-        self.0.get_mut().unwrap_or_else(PoisonError::into_inner).insert(tag, place);
+        self.0.get_mut().unwrap_or_else(PoisonError::into_inner).places.insert(tag, place);
     }
 
     /// Forgets a tag.
     pub(super) fn forget(&mut self, tag: Uid) {
-        self.0.get_mut().unwrap_or_else(PoisonError::into_inner).remove(&tag);
+        self.0.get_mut().unwrap_or_else(PoisonError::into_inner).places.remove(&tag);
     }
 }
 
