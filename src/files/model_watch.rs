@@ -192,7 +192,7 @@ fn read_with_names(disk: &dyn Disk, path: &Path) -> (Result<Model, LoadError>, B
     read_noting_files(disk, |disk| load_model(disk, path))
 }
 
-/// What a reader gives, and the files that it opened or looked for in vain: its own, and all that those name. The reader cannot
+/// Result of a reader, and the files that it opened or looked for in vain: its own, and all that those name. The reader cannot
 /// write.
 pub fn read_noting_files<T>(disk: &dyn Disk, read: impl FnOnce(&dyn Disk) -> T) -> (T, BTreeSet<PathBuf>) {
     let noting = NotingDisk { disk, asked: Mutex::default() };

@@ -11,7 +11,7 @@ use crate::{
     mesh::model::Weights,
     rig::{
         AttributeValues, FaceCut, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint,
-        SelectionSet, StoredPose, TagData, Uid,
+        SelectionSet, StoredPose, Uid,
         animation::RigClip,
         group_members::GroupMembers,
         label_index::LabelIndex,
@@ -137,7 +137,7 @@ impl Rig {
         self.groups.named(name, |listed| self.checkpoints.count(listed))
     }
 
-    /// Those of some local groups that the rig has, in its order.
+    /// Local groups of a set that the rig has, in its order.
     pub fn groups_in_order(&self, groups: &BTreeSet<Uid>) -> Vec<&GroupData> {
         let mut places: Vec<usize> = groups.iter().filter_map(|group| self.groups.place(*group)).collect();
         places.sort_unstable();

@@ -404,7 +404,10 @@ fn delete(draft: &mut Draft, tags: &[Uid]) -> Result<(), OperationError> {
     }
     if !features.is_empty() {
         let all = draft.rig().walk().flat_map(|joint| &joint.data.tags);
-        let is_in_one = |tag: &&TagData| matches!(tag.kind, TagKind::Command { feature: Some(feature), .. } if features.contains(&feature));
+        let is_in_one = |tag: &&TagData| match tag.kind {
+            TagKind::Command { feature: Some(feature), .. } => features.contains(&feature),
+            _ => false,
+        };
         let commands: Vec<Uid> = all.filter(is_in_one).map(|tag| tag.uid).collect();
         attach(draft, &commands, None)?;
     }
