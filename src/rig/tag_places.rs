@@ -62,11 +62,14 @@ impl TagPlaces {
         };
         let mut looked = 0;
         let near = around(noted.saturating_add_signed(notes.shift)).chain(around(noted));
-        let found = near.inspect(|_| looked += 1).find(|place| is_there(*place));
+        let mut near = std::iter::once(noted).chain(near).inspect(|_| looked += 1);
+        let found = near.find(|place| is_there(*place));
         count(looked);
         if let Some(place) = found {
-            notes.shift = isize::try_from(place).unwrap_or_default() - isize::try_from(noted).unwrap_or_default();
-            notes.places.insert(tag, place);
+            if place != noted {
+                notes.shift = isize::try_from(place).unwrap_or_default() - isize::try_from(noted).unwrap_or_default();
+                notes.places.insert(tag, place);
+            }
             return Some(place);
         }
         count(tags.len());
