@@ -60,10 +60,15 @@ impl TagPlaces {
         let around = |centre: usize| {
             (0..=NEAR).flat_map(move |far| [centre.checked_sub(far), centre.checked_add(far)]).flatten()
         };
-        let mut looked = 0;
         let near = around(noted.saturating_add_signed(notes.shift)).chain(around(noted));
-        let mut near = std::iter::once(noted).chain(near).inspect(|_| looked += 1);
-        let found = near.find(|place| is_there(*place));
+        let (mut looked, mut found) = (0, None);
+        for place in std::iter::once(noted).chain(near) {
+            looked += 1;
+            if is_there(place) {
+                found = Some(place);
+                break;
+            }
+        }
         count(looked);
         if let Some(place) = found {
             if place != noted {
