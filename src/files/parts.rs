@@ -123,7 +123,8 @@ pub struct FoundPart {
 }
 
 /// Reader of templates with their parts. A part is looked for beside its template, where that is a link also beside the file that
-/// it leads to, then in the folders of the site ([`SearchPaths`]), then among those that come with Rigsmith. The reader notes the files that it has asked for.
+/// it leads to, then in the folders of the site ([`SearchPaths`]), then among those that come with Rigsmith. The reader notes the
+/// files that it has asked for.
 ///
 /// A template from elsewhere may name any file of the machine. An absolute path is one below the template's folder or a
 /// folder of the site, or it is refused, as a project's meshes are; ways up (`../parts/arm.rig.ron`) lead to parts that
