@@ -9,6 +9,7 @@ pub mod linkage;
 pub mod paint;
 pub mod picking;
 pub mod placement;
+pub mod point_tree;
 pub mod stroke;
 pub mod transfer;
 pub mod view;

@@ -35,6 +35,7 @@ mod report;
 mod sketch;
 mod skin;
 mod switches;
+mod timed_disk;
 mod update;
 mod vrm;
 mod watch;

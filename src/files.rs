@@ -67,7 +67,7 @@ pub use load::{
     FileKind, LoadError, load_animation, load_gestures, load_joint_map, load_model, load_motion, load_packed_clips,
     load_rig_text, load_skin, load_template, stem,
 };
-pub use model_watch::{ModelWatch, SETTLE};
+pub use model_watch::{ModelWatch, SETTLE, read_noting_files};
 pub use part_cache::PartCache;
 pub use part_error::PartFileError;
 pub use parts::{

@@ -128,7 +128,8 @@ pub(super) fn run(args: &FaceArgs) -> Result<Report, Failure> {
     let mut report = Report::default();
     let model = spinning("reading the mesh", || limits::load_model(&args.mesh))?;
     report.notes(model.notes.iter().cloned());
-    let shapes = args.fit.as_ref().map(|path| spinning("reading shapes", || load_shapes(&RealDisk, path, &model)));
+    let read = |path: &PathBuf| limits::load(path, |disk| load_shapes(disk, path, &model));
+    let shapes = args.fit.as_ref().map(|path| spinning("reading shapes", || read(path)));
     let shapes = shapes.transpose()?.map(Arc::new);
     let mut bench = limits::empty_workbench(&stem(&args.mesh));
     let set = expressions::of_site(&mut report)?;

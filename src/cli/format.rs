@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::{Failure, Report, explanation::Explanation, outputs::check_places};
+use super::{Failure, Report, explanation::Explanation, limits, outputs::check_places};
 use crate::{
     files::{FileKind, LoadError, RealDisk, format_template_file, read_capped, save_atomic},
     rig::template::{self, UidStyle},
@@ -61,6 +61,7 @@ pub(super) fn run(args: &FormatArgs) -> Result<Report, Failure> {
     // All of them are read before the first is written, and none is written while one is at fault.
     let mut formatted = Vec::new();
     for path in &args.files {
+        limits::check_time("formatting the templates")?;
         match format(path, style) {
             Err(Failure::Input(error)) if args.files.len() > 1 => {
                 report.at_fault = true;
@@ -74,6 +75,7 @@ pub(super) fn run(args: &FormatArgs) -> Result<Report, Failure> {
             }
         }
     }
+    limits::check_time("formatting the templates")?;
     let is_written = !args.check && !report.at_fault;
     if is_written {
         let changed = formatted.iter().filter(|(_, found)| found.is_another());

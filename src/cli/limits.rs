@@ -2,10 +2,10 @@
 
 use std::{borrow::Cow, fmt::Write as _, path::Path, str::FromStr, sync::OnceLock};
 
-use super::{ArgumentError, Failure, SEED};
+use super::{ArgumentError, Failure, SEED, outputs::check_named_files};
 pub(super) use crate::plugins::limits::{Deadline, Limit, LimitError, RigLimits};
 use crate::{
-    files::{self, LoadError, LoadedProject, MeshState, RealDisk, TemplateVersion},
+    files::{self, Disk, LoadError, LoadedProject, MeshState, RealDisk, TemplateVersion},
     headless::Workbench,
     mesh::model::Model,
     modules,
@@ -117,9 +117,20 @@ pub(super) fn check_gestures(path: &Path, gestures: &[Gesture]) -> Result<(), Li
     chosen().check_gestures(&path.display().to_string(), gestures)
 }
 
+/// Reads an input, unless it names a file that is an output.
+pub(super) fn load<T, E>(path: &Path, read: impl FnOnce(&dyn Disk) -> Result<T, E>) -> Result<T, Failure>
+where
+    Failure: From<E>,
+{
+    let (found, files) = files::read_noting_files(&RealDisk, read);
+    let found = found?;
+    check_named_files(path, &files)?;
+    Ok(found)
+}
+
 /// Reads a mesh.
 pub(super) fn load_model(path: &Path) -> Result<Model, Failure> {
-    let model = files::load_model(&RealDisk, path)?;
+    let model = load(path, |disk| files::load_model(disk, path))?;
     check_model(path, &model)?;
     Ok(model)
 }
@@ -142,21 +153,21 @@ pub(super) fn load_rig_text(path: &Path) -> Result<RigText, Failure> {
 
 /// Reads a template with its parts.
 pub(super) fn load_template(path: &Path) -> Result<Template, Failure> {
-    let template = files::load_template(&RealDisk, path)?;
+    let template = load(path, |disk| files::load_template(disk, path))?;
     check_rig(path, &template.rig)?;
     Ok(template)
 }
 
 /// Reads a version of a template.
 pub(super) fn load_version(path: &Path) -> Result<TemplateVersion, Failure> {
-    let version = TemplateVersion::read(&RealDisk, path)?;
+    let version = load(path, |disk| TemplateVersion::read(disk, path))?;
     check_rig(path, version.rig())?;
     Ok(version)
 }
 
 /// Reads a project with its meshes.
 pub(super) fn load_project(path: &Path) -> Result<LoadedProject, Failure> {
-    let project = files::load_project(&RealDisk, path)?;
+    let project = load(path, |disk| files::load_project(disk, path))?;
     check_project(path, &project)?;
     Ok(project)
 }

@@ -1,14 +1,18 @@
 //! `rigsmith list`: templates of a folder, or of all folders in which templates are looked for, by their headers alone.
 
-use std::{cmp::Ordering, collections::BTreeMap, path::PathBuf};
+use std::{
+    cmp::Ordering,
+    collections::{BTreeMap, HashSet},
+    path::PathBuf,
+};
 
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::{Failure, Report, report::counted};
+use super::{Failure, Report, limits::check_time, report::counted, timed_disk::TimedDisk};
 use crate::{
     files::{
-        FolderListError, FolderListing, HeaderMemory, ListedTemplate, NewestVersions, RealDisk, SearchPaths,
+        FolderListError, FolderListing, HeaderMemory, ListedTemplate, NewestVersions, SearchPaths, TemplatePlace,
         VersionedTemplate, list_bundled, list_templates, newest_versions,
     },
     rig::{
@@ -25,6 +29,9 @@ pub(super) struct ListArgs {
     pub folder: Option<PathBuf>,
 }
 
+/// The work, as the subject of a sentence.
+const LISTING: &str = "listing the templates";
+
 /// Most templates that are listed.
 const MOST: usize = 10_000;
 
@@ -36,18 +43,23 @@ pub(super) fn run(args: &ListArgs) -> Result<Report, Failure> {
     let site = SearchPaths::of_site().map_err(|error| Failure::Input(Box::new(error)))?;
     let own = args.folder.clone().unwrap_or_else(|| PathBuf::from("."));
     let none = HeaderMemory::default();
-    let mut listed = match list_templates(&RealDisk, &own, usize::MAX, &site, &none) {
+    let found = list_templates(&TimedDisk, &own, usize::MAX, &site, &none);
+    check_time(LISTING)?;
+    let mut listed = match found {
         Ok(listing) => taken(listing, &mut report),
         Err(error) => return Err(Failure::Input(format!("{error}; give a folder").into())),
     };
     let mut elsewhere = Vec::new();
     for folder in &site.folders {
-        match list_templates(&RealDisk, folder, usize::MAX, &site, &none) {
+        let found = list_templates(&TimedDisk, folder, usize::MAX, &site, &none);
+        check_time(LISTING)?;
+        match found {
             Ok(listing) => elsewhere.extend(taken(listing, &mut report)),
             Err(error) => report.notes.push(left_out(&error)),
         }
     }
-    elsewhere.retain(|other| listed.iter().all(|own| own.place != other.place));
+    let own_places: HashSet<TemplatePlace> = listed.iter().map(|own| own.place.clone()).collect();
+    elsewhere.retain(|other| !own_places.contains(&other.place));
     // Beside a folder's templates only their versions are of interest.
     let bundled = list_bundled(args.folder.is_none());
     if args.folder.is_none() {

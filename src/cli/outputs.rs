@@ -1,6 +1,11 @@
-//! Outputs of a command: checked against its inputs before the command does anything.
+//! Outputs of a command: checked against its inputs before the command does anything, and against the files that the inputs name
+//! once these are read.
 
-use std::path::Path;
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
+};
 
 use clap::Args;
 
@@ -17,6 +22,9 @@ pub(super) struct InPlaceArgs {
     #[arg(long)]
     in_place: bool,
 }
+
+/// Outputs of this command that were checked, each with the permission to replace an input of its kind.
+static CHECKED: Mutex<Vec<(PathBuf, bool)>> = Mutex::new(Vec::new());
 
 impl InPlaceArgs {
     /// Checks that `output` is no input, unless replacing it was allowed, that each of the `further` outputs, with the
@@ -38,6 +46,9 @@ impl InPlaceArgs {
         output: Option<&Path>,
         further: &[(&'static str, &Path)],
     ) -> Result<(), Failure> {
+        let named = output.into_iter().map(|path| (path.to_owned(), self.in_place));
+        let named = named.chain(further.iter().map(|(_, path)| (path.to_path_buf(), false)));
+        CHECKED.lock().unwrap_or_else(PoisonError::into_inner).extend(named);
         let is_same = |a: &Path, b: &Path| is_same_file(&RealDisk, a, b);
         for input in inputs {
             let Some(output) = output.filter(|output| is_same(input, output)) else { continue };
@@ -76,6 +87,28 @@ impl InPlaceArgs {
         }
         Ok(())
     }
+}
+
+/// Checks that no output of this command is one of the files that an input names, of which those were read: buffers, materials,
+/// pictures, parts, weights.
+pub(super) fn check_named_files(input: &Path, read: &BTreeSet<PathBuf>) -> Result<(), Failure> {
+    let outputs = CHECKED.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    let is_there = |path: &Path| RealDisk.entry(path, true).is_ok();
+    for (output, in_place) in outputs.iter().filter(|(output, _)| is_there(output)) {
+        let is_same = |other: &Path| is_same_file(&RealDisk, other, output);
+        // Whether the input itself may be replaced was asked before.
+        let may_replace =
+            |file: &Path| *in_place && FileKind::of(file).is_some_and(|kind| FileKind::of(output) == Some(kind));
+        if is_same(input) || !read.iter().any(|file| is_there(file) && is_same(file) && !may_replace(file)) {
+            continue;
+        }
+        return Err(Failure::Usage(format!(
+            "`{}` is an input, which `{}` names, and would be replaced; give another output",
+            output.display(),
+            input.display()
+        )));
+    }
+    Ok(())
 }
 
 /// True if the template in the file `input` takes a part from the file `output`, which is as much of an input.

@@ -1,6 +1,7 @@
 //! `rigsmith skin`: a skeleton and its meshes become a character.
 
 use std::{
+    collections::HashMap,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -192,9 +193,9 @@ fn take_weights(bench: &mut Workbench, path: &Path, report: &mut Report) -> Resu
     };
     // A joint that a command created is not in the document: its weights go to the joint that it was made for.
     let mut subjects = SkinJoint::subjects(file.joints());
+    let by_uid: HashMap<u64, &SkinJoint> = file.joints().iter().rev().map(|joint| (joint.uid, joint)).collect();
     for subject in subjects.values_mut() {
-        let joint = file.joints().iter().find(|joint| joint.uid == subject.0);
-        *subject = joint.and_then(found).unwrap_or(*subject);
+        *subject = by_uid.get(&subject.0).copied().and_then(found).unwrap_or(*subject);
     }
     for joint in file.joints() {
         let created = || Some(Uid(joint.uid)).filter(|uid| subjects.contains_key(uid));

@@ -15,6 +15,7 @@ use super::{
     build::{MeshSource, bound_meshes, posed_character, posed_skeleton},
     explanation::Explanation,
     limits,
+    outputs::check_named_files,
     report::{counted, print, print_json},
 };
 use crate::{
@@ -234,6 +235,7 @@ impl Watch<'_> {
         // A file that changed while it was read is told again.
         let Some(model) = mesh.read(&RealDisk) else { return Ok(None) };
         let model = model?;
+        check_named_files(path, &mesh.files())?;
         limits::check_model(path, &model)?;
         let mut reloaded = None;
         if let Some(BoundMesh { own, .. }) = &mut self.bound {

@@ -18,7 +18,7 @@ pub use set::{FileSet, save_set};
 pub use staging::{StagedFile, check_place, stage_file};
 pub use temp::{is_temp_name, remove_stale_temps};
 
-pub(super) use target::saved_file;
+pub(super) use target::{linked_file, saved_file};
 pub(super) use temp::temp_name;
 
 use std::path::Path;

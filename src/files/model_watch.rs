@@ -81,6 +81,11 @@ impl ModelWatch {
         &self.path
     }
 
+    /// The model's file and the files that it names, as far as they are known.
+    pub fn files(&self) -> BTreeSet<PathBuf> {
+        self.stamps.keys().cloned().collect()
+    }
+
     /// Takes note of the files as they are: the next version is the first that is told. A `.gltf`, whose shape lies in other
     /// files, is read once for their names.
     pub fn know(&mut self, disk: &dyn Disk) {
@@ -184,9 +189,15 @@ fn hash_of(disk: &dyn Disk, path: &Path) -> io::Result<u64> {
 
 /// A model, and the files that its reader opened or looked for in vain.
 fn read_with_names(disk: &dyn Disk, path: &Path) -> (Result<Model, LoadError>, BTreeSet<PathBuf>) {
+    read_noting_files(disk, |disk| load_model(disk, path))
+}
+
+/// Result of a reader, and the files that it opened or looked for in vain: its own, and all that those name. The reader cannot
+/// write.
+pub fn read_noting_files<T>(disk: &dyn Disk, read: impl FnOnce(&dyn Disk) -> T) -> (T, BTreeSet<PathBuf>) {
     let noting = NotingDisk { disk, asked: Mutex::default() };
-    let model = load_model(&noting, path);
-    (model, noting.asked.into_inner().unwrap_or_else(PoisonError::into_inner))
+    let found = read(&noting);
+    (found, noting.asked.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
 /// Disk that takes note of the files that are asked for. It can only be read.

@@ -7,8 +7,8 @@ use std::{
 };
 
 use super::{
-    Disk, PartCache, ReadError, SearchPaths, SiteError, part_error::PartFileError, read::is_missing, read_capped,
-    similar_parts::similar_parts,
+    Disk, PartCache, ReadError, SearchPaths, SiteError, atomic::linked_file, part_error::PartFileError,
+    read::is_missing, read_capped, similar_parts::similar_parts,
 };
 use crate::{
     modules,
@@ -122,8 +122,9 @@ pub struct FoundPart {
     pub content: Vec<u8>,
 }
 
-/// Reader of templates with their parts. A part is looked for beside its template, then in the folders of the site
-/// ([`SearchPaths`]), then among those that come with Rigsmith. The reader notes the files that it has asked for.
+/// Reader of templates with their parts. A part is looked for beside its template, where that is a link also beside the file that
+/// it leads to, then in the folders of the site ([`SearchPaths`]), then among those that come with Rigsmith. The reader notes the
+/// files that it has asked for.
 ///
 /// A template from elsewhere may name any file of the machine. An absolute path is one below the template's folder or a
 /// folder of the site, or it is refused, as a project's meshes are; ways up (`../parts/arm.rig.ron`) lead to parts that
@@ -218,10 +219,9 @@ impl<'a> PartFiles<'a> {
             return Ok(template);
         }
         self.begin();
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let (modules, mirrored) = (self.modules.clone(), self.cache.mirrored.clone());
         let mirror = |module: &str, params: &str| mirrored.of(&modules, module, params);
-        template.with_parts(text, &mut |part| self.part(&folder, part), &mirror)
+        template.with_parts(text, &mut |part| self.part(path, part), &mirror)
     }
 
     /// Puts parts into a template, and lists all faults of parts that cannot be read or do not fit; these are left out.
@@ -230,10 +230,9 @@ impl<'a> PartFiles<'a> {
             return (template, Vec::new());
         }
         self.begin();
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let (modules, mirrored) = (self.modules.clone(), self.cache.mirrored.clone());
         let mirror = |module: &str, params: &str| mirrored.of(&modules, module, params);
-        template.survey_parts(text, &mut |part| self.part(&folder, part), &mirror)
+        template.survey_parts(text, &mut |part| self.part(path, part), &mirror)
     }
 
     /// Every part instance of a template with its part, [fitted](PartInstance::fitted).
@@ -273,8 +272,7 @@ impl<'a> PartFiles<'a> {
     }
 
     fn of_instance(&mut self, path: &Path, instance: &PartInstance) -> Result<Arc<Part>, PartFileError> {
-        let folder = path.parent().unwrap_or(Path::new(""));
-        self.part(folder, &instance.part)
+        self.part(path, &instance.part)
     }
 
     /// Begins with another template, unless it is one of the parts of the present one: what stands in the way of a part, such as
@@ -285,10 +283,14 @@ impl<'a> PartFiles<'a> {
         }
     }
 
-    /// The part of that name, beside its template, whose folder is given, or elsewhere.
-    fn part(&mut self, folder: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
+    /// The part of that name, beside its template, whose file is given, or elsewhere.
+    fn part(&mut self, template: &Path, name: &str) -> Result<Arc<Part>, PartFileError> {
+        let folder = template.parent().unwrap_or(Path::new(""));
         self.check_inside(folder, Path::new(name))?;
-        let first = &folder.join(name);
+        let beside = folder.join(name);
+        let is_known = self.known.contains_key(&beside);
+        let linked = if is_known { None } else { self.beside_linked(template, &beside, name) };
+        let first = &linked.unwrap_or(beside);
         if let Some(known) = self.known.get(first) {
             return Ok(known.clone());
         }
@@ -299,6 +301,22 @@ impl<'a> PartFiles<'a> {
             let error = Arc::new(error);
             self.refused.insert(first.to_owned(), error.clone());
             PartFileError::Again(error)
+        })
+    }
+
+    /// The place of a part beside the file to which its template is a link, if the part lies there and not beside the link.
+    fn beside_linked(&mut self, template: &Path, beside: &Path, name: &str) -> Option<PathBuf> {
+        let Source::Disk(disk) = self.source else { return None };
+        if Path::new(name).is_absolute() || !disk.entry(beside, true).is_err_and(|error| is_missing(&error)) {
+            return None;
+        }
+        let file = linked_file(disk, template);
+        let place = file.parent()?.join(name);
+        let is_there = file != template && place != beside && disk.entry(&place, true).is_ok();
+        is_there.then(|| {
+            // The part may come beside the link.
+            self.asked.insert(beside.to_owned(), None);
+            place
         })
     }
 

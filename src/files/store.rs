@@ -7,6 +7,7 @@ use std::{
 
 use super::{
     Disk, FileKind, FileSet, LoadError, PartFiles, ReadError, SaveError, StagedFile,
+    atomic::linked_file,
     kept_lists::with_kept_lists,
     read_capped, save_atomic, save_set, stage_file, stem,
     template_origin::moved_text,
@@ -338,13 +339,16 @@ fn store_over(
     let reader = || PartFiles::new(disk);
     // Parts beside the one file may not be there beside the other. Those that were dropped are known by the names that they had.
     let has_dropped = !rig.borrow().dropped_parts().is_empty();
-    let elsewhere = found.as_ref().filter(|(source, _)| !has_dropped && source.parent() != path.parent());
-    let moved = elsewhere.and_then(|(source, text)| moved_text(text, source, path, &reader));
+    let linked = linked_file(disk, path);
+    let place = linked.as_path();
+    let elsewhere = found.as_ref().filter(|(source, _)| !has_dropped && source.parent() != place.parent());
+    let moved = elsewhere.and_then(|(source, text)| moved_text(text, source, place, &reader));
     let source = match &moved {
-        Some(text) => Some((path, text.as_str())),
+        Some(text) => Some((place, text.as_str())),
         None => found.as_ref().map(|(source, text)| (*source, text.as_str())),
     };
-    let TemplateText { text, note } = template_text(rig.borrow(), source, path, &reader);
+    let place = if moved.is_some() { place } else { path };
+    let TemplateText { text, note } = template_text(rig.borrow(), source, place, &reader);
     drop((rig, found, moved));
     save_template(disk, path, &text)?;
     Ok(note.into_iter().chain(is_unread.then(|| SOURCE_UNREAD.to_owned())).collect())

@@ -7,6 +7,7 @@ use std::{
 
 use super::{
     BUNDLED_CHARACTERS, BUNDLED_PARTS, Disk, FileKind, FoundPart, LoadError, PartFiles, StoreError,
+    atomic::linked_file,
     load::{in_source, template_file},
     store::save_template,
     store_rig,
@@ -110,8 +111,11 @@ pub fn store_rig_from(
         return store_rig(disk, path, rig);
     }
     let reader = || PartFiles::new(disk);
-    let source = origin.text_at(path, rig.uid(), &reader);
-    let TemplateText { text, note } = template_text(rig, source.as_deref().map(|text| (path, text)), path, &reader);
+    let linked = linked_file(disk, path);
+    let of_link = origin.text_at(&linked, rig.uid(), &reader);
+    let place = if of_link.is_some() { linked.as_path() } else { path };
+    let source = of_link.or_else(|| origin.text_at(path, rig.uid(), &reader));
+    let TemplateText { text, note } = template_text(rig, source.as_deref().map(|text| (place, text)), place, &reader);
     let (text, away) = match &source {
         Some(source) => (template::with_changes_on_lines(&text, source), None),
         None => (text, Some(PARTS_AWAY)),

@@ -28,7 +28,7 @@ use super::{
     animation::AutoKey,
     commands::{BuildResult, RigModules},
     configure_sets,
-    history::{RecordedOperation, RigHistory, joint_name},
+    history::{RecordedOperation, RigHistory, joint_name, quoted_name},
     runtime::despawn::allow_any_depth,
 };
 pub use super::{
@@ -36,7 +36,7 @@ pub use super::{
     selection::{HoveredNode, Selection},
 };
 use crate::rig::{
-    Rig, RigEdit, Uid, UidSource,
+    EditError, Rig, RigEdit, Uid, UidSource,
     feature::FeatureKinds,
     operations::{MirrorPlane, Operation},
     step::Commit,
@@ -114,6 +114,19 @@ pub enum Change {
     },
     /// Names the joint that is active when the request is carried out; answered by a [`ChangeReport`], too.
     LabelActive(String),
+    /// Puts the joints that are selected when the request is carried out into a local group, with a colour if one is given;
+    /// answered by a [`ChangeReport`], too.
+    GroupSelected {
+        /// Name of the group; an empty one takes the joints out of their groups.
+        name: String,
+        /// sRGB colour of the group.
+        color: Option<[f32; 3]>,
+    },
+    /// Locks the weights of the joints that are selected when the request is carried out, or unlocks them; answered by a
+    /// [`ChangeReport`], too.
+    LockSelected(bool),
+    /// Selects one joint. It is no edit: undo passes over it. Answered by a [`ChangeReport`].
+    Pick(JointPick),
     /// Selects the listed joints, the active one last. It is no edit: nothing answers, and undo passes over it.
     Select(Vec<Uid>),
     /// Undoes the last step; answered by a [`ChangeReport`], too.
@@ -127,6 +140,15 @@ pub enum Change {
     Commit,
     /// Reverts the preview; does nothing without a preview.
     CancelPreview,
+}
+
+/// Joint of a [`Change::Pick`].
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum JointPick {
+    /// The joint with that uid.
+    Joint(Uid),
+    /// The first joint that has the label when the request is carried out.
+    Label(String),
 }
 
 impl EditRequest {
@@ -158,8 +180,8 @@ impl EditReport {
     }
 }
 
-/// Answer to a [`Change::Place`], [`Change::Draw`], [`Change::LabelActive`], [`Change::Undo`] or [`Change::Redo`], in the
-/// order of the requests.
+/// Answer to a [`Change::Place`], [`Change::Draw`], [`Change::LabelActive`], [`Change::GroupSelected`],
+/// [`Change::LockSelected`], [`Change::Pick`], [`Change::Undo`] or [`Change::Redo`], in the order of the requests.
 #[derive(Message, Debug, Clone)]
 pub struct ChangeReport {
     /// The rig.
@@ -179,6 +201,8 @@ pub struct ReportedStep {
     pub joints: usize,
     /// Chain of a [`Change::Draw`]; `None` for other changes.
     pub chain: Option<ReportedChain>,
+    /// Name of the joint of a [`Change::Pick`], as sentences have it; `None` for other changes.
+    pub picked: Option<String>,
 }
 
 /// Chain that was drawn.
@@ -229,7 +253,7 @@ fn apply_edits(
                 let parent = added.parent(rig, &document, *parent, selection.active());
                 Some(Operation::Chain { positions: positions.clone(), parent })
             }
-            _ => on_active(requested, selection.active()),
+            _ => on_selection(requested, &selection),
         };
         let change = match bound {
             Some(bound) => {
@@ -240,6 +264,18 @@ fn apply_edits(
         };
         if let Change::Select(joints) = change {
             selection.set_if_neq(Selection(joints.clone()));
+            continue;
+        }
+        if let Change::Pick(pick) = change {
+            let step = picked(pick, &document).map(|joint| {
+                selection.set_if_neq(Selection(vec![joint]));
+                let picked = Some(quoted_name(&document, joint));
+                ReportedStep { name: Cow::Borrowed("Pick"), added: 0, joints: before, chain: None, picked }
+            });
+            if let Err(reason) = &step {
+                refused.write(EditRefusal { rig, reason: reason.clone() });
+            }
+            reported.write(ChangeReport { rig, step });
             continue;
         }
         // The selection is written only where it changes.
@@ -288,9 +324,11 @@ fn apply_edits(
                     .map(previewed)
                     .map_err(ChangeError::from)
             }
-            Change::LabelActive(_) => Err(ChangeError::NoActive),
+            Change::LabelActive(_) | Change::GroupSelected { .. } | Change::LockSelected(_) => {
+                Err(ChangeError::NoActive)
+            }
             // Joints to place or draw have become an operation, and joints to select are selected.
-            Change::Place(_) | Change::Draw { .. } | Change::Select(_) => continue,
+            Change::Place(_) | Change::Draw { .. } | Change::Select(_) | Change::Pick(_) => continue,
             Change::Commit | Change::CancelPreview if !history.is_previewing() => continue,
             Change::Commit => {
                 let Some(step) = history.commit_preview(&mut selected) else { continue };
@@ -317,6 +355,7 @@ fn apply_edits(
                 added: joints.saturating_sub(before),
                 joints,
                 chain,
+                picked: None,
             });
             reported.write(ChangeReport { rig, step: step.map_err(ChangeError::clone) });
         }
@@ -333,16 +372,41 @@ fn apply_edits(
 
 /// True for changes that a [`ChangeReport`] answers.
 fn has_report(change: &Change) -> bool {
-    matches!(change, Change::Place(_) | Change::Draw { .. } | Change::LabelActive(_) | Change::Undo | Change::Redo)
+    matches!(
+        change,
+        Change::Place(_)
+            | Change::Draw { .. }
+            | Change::LabelActive(_)
+            | Change::GroupSelected { .. }
+            | Change::LockSelected(_)
+            | Change::Undo
+            | Change::Redo
+    )
 }
 
-/// Operation of a change that is about the active joint; `None` for all other changes, and to name a joint where none is
-/// active.
-fn on_active(change: &Change, active: Option<Uid>) -> Option<Operation> {
+/// Operation of a change that is about the active joint or the selected ones; `None` for all other changes, and where it needs
+/// a selected joint and there is none.
+fn on_selection(change: &Change, selection: &Selection) -> Option<Operation> {
+    let active = selection.active();
+    let selected = || active.map(|_| selection.0.clone());
     match change {
         Change::Place(position) => Some(Operation::Place { position: *position, parent: active }),
         Change::LabelActive(label) => Some(Operation::Labels(vec![(active?, label.clone())])),
+        Change::GroupSelected { name, color } => {
+            Some(Operation::Group { joints: selected()?, name: name.clone(), color: *color })
+        }
+        Change::LockSelected(locked) => Some(Operation::Lock(selected()?, *locked)),
         _ => None,
+    }
+}
+
+/// The joint of a pick.
+fn picked(pick: &JointPick, rig: &Rig) -> Result<Uid, ChangeError> {
+    match pick {
+        JointPick::Joint(joint) => {
+            rig.joint(*joint).map(|joint| joint.data.uid).ok_or(EditError::NoJoint(*joint).into())
+        }
+        JointPick::Label(label) => rig.labelled(label).ok_or_else(|| ChangeError::NoLabel(label.clone())),
     }
 }
 

@@ -68,6 +68,12 @@ pub(super) fn joint_name(rig: &Rig, joint: Uid) -> Option<String> {
     Some(label.unwrap_or_else(|| format!("joint {:04x}", joint.0 >> 48)))
 }
 
+/// Name of a joint in a sentence: its label in quotes, or its uid.
+pub(super) fn quoted_name(rig: &Rig, joint: Uid) -> String {
+    let label = rig.joint(joint).and_then(|joint| joint.data.label.clone());
+    label.map_or_else(|| format!("joint {joint}"), |label| format!("\"{label}\""))
+}
+
 fn apply_all(rig: &mut Rig, edits: &[RigEdit]) -> Result<(), EditError> {
     edits.iter().try_for_each(|edit| rig.apply(edit).map(drop))
 }

@@ -4,7 +4,10 @@
 //! frame. Undoing the step brings both back, redoing it exchanges both again. A mesh of an instance, which has no document, gets
 //! the version and its weights alone.
 
-use std::sync::{Arc, OnceLock};
+use std::{
+    collections::HashMap,
+    sync::{Arc, OnceLock},
+};
 
 use bevy::{
     prelude::*,
@@ -205,8 +208,9 @@ fn reloaded(before: &RigMesh, model: &Model, skin: Option<&SkinData>) -> Result<
         return Err(ReloadError::Empty);
     }
     // Nodes of the file are found by their names; those that are not there any more move nothing.
-    let named = |name: &str| before.file.nodes.iter().position(|node| node.name == name);
-    let joint = |name: &str| named(name).and_then(|node| before.nodes.get(node).copied());
+    let by_name = before.file.nodes.iter().enumerate().rev().map(|(place, node)| (node.name.as_str(), place));
+    let places: HashMap<&str, usize> = by_name.collect();
+    let joint = |name: &str| places.get(name).and_then(|node| before.nodes.get(*node).copied());
     let nodes = model.nodes.iter().map(|node| joint(&node.name).unwrap_or(Uid(0))).collect();
     let mesh = RigMesh::new(before.uid, model.clone(), nodes);
     let (old, new) = (&before.rest.points, &mesh.rest.points);

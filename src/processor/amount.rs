@@ -123,7 +123,7 @@ impl BuildScope<'_> {
         kind: AttributeKind,
         default: f32,
     ) -> Result<Scalar, ModuleError> {
-        if !self.attributes(node).iter().any(|known| *known.name == *name) {
+        if !self.attributes(node).has(name) {
             self.add_attribute(node, Attribute { name: name.into(), kind, default })?;
         }
         Ok(Scalar::attribute(self.uid(node), name))

@@ -89,7 +89,7 @@ impl BuildScope<'_> {
             Scalar::Attribute { node, name, .. } | Scalar::Choice { node, name, .. } => (name.clone(), *node),
         };
         let attributes = self.id(node).map(|node| self.attributes(node));
-        let known = attributes.iter().flat_map(|list| list.iter()).find(|known| known.name == name);
+        let known = attributes.as_ref().and_then(|list| list.get(&name));
         let value = known.map_or(0.0, |known| known.default);
         match scalar {
             Scalar::Attribute { factor, add, .. } => value * factor + add,

@@ -19,7 +19,7 @@ impl BuildScope<'_> {
         // A null below a joint is no part of a control that happens to carry the joint, such as that of the whole rig.
         let control = above.filter(|at| self.kind(*at) == Some(NodeType::Control));
         let (Some(control), Some(carrier)) = (control, driver.node()) else { return Ok(()) };
-        let is_driven = self.attributes(control).iter().any(|known| *known.name == *VISIBLE);
+        let is_driven = self.attributes(control).has(VISIBLE);
         if is_driven || self.uid(control) == carrier {
             return Ok(());
         }

@@ -24,6 +24,8 @@ const MAX_OPEN: usize = 16;
 /// Time, and number of bytes, that a refused request is read on, so that its sender reads the answer.
 const DRAIN: Duration = Duration::from_millis(250);
 const DRAIN_BYTES: usize = 4 << 20;
+/// Longest time that is waited for anything.
+const YEAR: Duration = Duration::from_secs(365 * 24 * 60 * 60);
 
 /// Answers connections until the app has ended. Each one is read on a thread of its own, so that a silent one holds up nobody.
 pub(super) fn serve(gate: &Arc<Gate>, calls: &Sender<Call>) {
@@ -74,7 +76,7 @@ impl Drop for OpenConnection {
 }
 
 fn converse(stream: TcpStream, gate: &Gate, calls: &Sender<Call>) {
-    let mut request = Request { stream, until: Instant::now() + gate.read_timeout, bytes: Vec::new() };
+    let mut request = Request { stream, until: end_of(gate.read_timeout), bytes: Vec::new() };
     let (status, answer, is_whole) = match request.body(gate) {
         Ok(body) => ("200 OK", rpc::answer(&body, gate, calls), true),
         Err(refusal) => (refusal.status(), rpc::refused(refusal), false),
@@ -92,6 +94,12 @@ fn converse(stream: TcpStream, gate: &Gate, calls: &Sender<Call>) {
     if !is_whole {
         request.drain();
     }
+}
+
+/// End of a time that begins now, of a year at most: a clock reaches no end of a time that is longer than it counts.
+pub(super) fn end_of(time: Duration) -> Instant {
+    let now = Instant::now();
+    now.checked_add(time.min(YEAR)).unwrap_or(now)
 }
 
 /// A request that arrives.

@@ -13,6 +13,7 @@ use serde_json::{Map, Value, json};
 use super::{
     Answer, Call, Gate,
     error::{CallError, HttpRefusal},
+    http::end_of,
     schema::{self, DISCOVER},
 };
 use crate::rig::nearest::did_you_mean;
@@ -67,7 +68,7 @@ fn result(body: &[u8], gate: &Gate, calls: &Sender<Call>, id: &mut Value) -> Ans
     // Answers are told by what happens to the rig of a call, so there is one call at a time.
     let _turn = gate.turn.lock().unwrap_or_else(PoisonError::into_inner);
     let (reply, answer) = channel();
-    let until = Instant::now() + gate.answer_timeout;
+    let until = end_of(gate.answer_timeout);
     calls.send(Call { verb, params, reply, until }).map_err(|_| CallError::Ended)?;
     loop {
         if let Some(wake) = &*gate.wake.lock().unwrap_or_else(PoisonError::into_inner) {

@@ -1,7 +1,7 @@
 //! The rig as one document: joints in a hierarchy, groups, tags and weights.
 
 use std::{
-    collections::{BTreeMap, HashMap, HashSet},
+    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
     sync::Arc,
 };
 
@@ -11,11 +11,13 @@ use crate::{
     mesh::model::Weights,
     rig::{
         AttributeValues, FaceCut, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint,
-        SelectionSet, StoredPose, TagData, Uid,
+        SelectionSet, StoredPose, Uid,
         animation::RigClip,
+        group_members::GroupMembers,
         label_index::LabelIndex,
         part::{DroppedPart, HeaderSocket, PartOption},
         rest_checkpoints::RestCheckpoints,
+        tag_places::TagPlaces,
         touched_joints::TouchedJoints,
         uid_list::UidList,
     },
@@ -55,6 +57,8 @@ pub struct Rig {
     pub(super) revision: Revision,
     pub(super) checkpoints: RestCheckpoints,
     pub(super) label_index: LabelIndex,
+    pub(super) group_members: GroupMembers,
+    pub(super) tag_places: TagPlaces,
     pub(super) touched: TouchedJoints,
 }
 
@@ -128,6 +132,18 @@ impl Rig {
         self.groups.find(uid)
     }
 
+    /// The first local group with that name.
+    pub fn group_named(&self, name: &str) -> Option<&GroupData> {
+        self.groups.named(name, |listed| self.checkpoints.count(listed))
+    }
+
+    /// Local groups of a set that the rig has, in its order.
+    pub fn groups_in_order(&self, groups: &BTreeSet<Uid>) -> Vec<&GroupData> {
+        let mut places: Vec<usize> = groups.iter().filter_map(|group| self.groups.place(*group)).collect();
+        places.sort_unstable();
+        places.into_iter().filter_map(|place| self.groups.get(place)).collect()
+    }
+
     /// Declared inputs in order.
     pub fn inputs(&self) -> &[RigInput] {
         &self.inputs
@@ -152,13 +168,6 @@ impl Rig {
     /// The joint with that uid.
     pub fn joint(&self, uid: Uid) -> Option<&RigJoint> {
         self.joints.get(&uid).map(|joint| &**joint)
-    }
-
-    /// The tag with that uid, and the joint that carries it.
-    pub fn find_tag(&self, uid: Uid) -> Option<(&RigJoint, &TagData)> {
-        let joint = self.joint(*self.tags.get(&uid)?)?;
-        let tag = joint.data.tags.iter().find(|tag| tag.uid == uid)?;
-        Some((joint, tag))
     }
 
     /// True if a joint carries a tag.
@@ -309,6 +318,7 @@ impl Rig {
         self.revision = Revision::default();
         self.checkpoints.clear();
         self.label_index.clear();
+        self.group_members.clear();
         self.tags.clear();
         self.joints.clear();
         self.roots = children.remove(&None).unwrap_or_default();

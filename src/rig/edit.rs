@@ -6,6 +6,7 @@
 
 mod clips;
 mod effect;
+mod groups;
 mod header;
 mod inputs;
 mod moves;
@@ -13,6 +14,7 @@ mod poses;
 mod skin_weights;
 mod skins;
 mod tag_params;
+mod tags;
 mod weight_patch;
 
 use std::{collections::HashSet, sync::Arc};
@@ -283,14 +285,10 @@ impl Rig {
                 // An empty label is none, as on entities.
                 let label = label.clone().filter(|label| !label.is_empty());
                 let before = std::mem::replace(&mut self.joint_mut(*uid)?.data.label, label.clone());
-                self.label_index.change(before.as_deref(), label.as_deref());
+                self.label_index.change(*uid, before.as_deref(), label.as_deref());
                 RigEdit::SetLabel(*uid, before)
             }
-            RigEdit::SetGroup(uid, group) => {
-                self.check_group(*group)?;
-                let joint = self.joint_mut(*uid)?;
-                RigEdit::SetGroup(*uid, std::mem::replace(&mut joint.data.group, *group))
-            }
+            RigEdit::SetGroup(uid, group) => self.set_group(*uid, *group)?,
             RigEdit::SetMirror(uid, mirror) => {
                 let joint = self.joint_mut(*uid)?;
                 RigEdit::SetMirror(*uid, std::mem::replace(&mut joint.data.mirror, *mirror))
@@ -299,45 +297,12 @@ impl Rig {
                 let joint = self.joint_mut(*uid)?;
                 RigEdit::SetLocked(*uid, std::mem::replace(&mut joint.data.locked, *locked))
             }
-            RigEdit::AddTag { joint, tag, index } => {
-                self.check_free(tag.uid)?;
-                let added = checked(tag)?;
-                let tags = &mut self.joint_mut(*joint)?.data.tags;
-                tags.insert((*index).min(tags.len()), added);
-                self.tags.insert(tag.uid, *joint);
-                RigEdit::RemoveTag(*joint, tag.uid)
-            }
-            RigEdit::RemoveTag(joint, tag) => {
-                let tags = &mut self.joint_mut(*joint)?.data.tags;
-                let index = tags.iter().position(|t| t.uid == *tag).ok_or(EditError::NoTag(*joint, *tag))?;
-                let removed = Box::new(tags.remove(index));
-                self.tags.remove(tag);
-                RigEdit::AddTag { joint: *joint, tag: removed, index }
-            }
-            RigEdit::SetTag(joint, tag) => {
-                let next = checked(tag)?;
-                let tags = &mut self.joint_mut(*joint)?.data.tags;
-                let old = tags.iter_mut().find(|t| t.uid == tag.uid).ok_or(EditError::NoTag(*joint, tag.uid))?;
-                RigEdit::SetTag(*joint, Box::new(std::mem::replace(old, next)))
-            }
-            RigEdit::AddLocalGroup(group, index) => {
-                self.check_free(group.uid)?;
-                check_color(group)?;
-                self.groups.insert(*index, group.clone());
-                RigEdit::RemoveLocalGroup(group.uid)
-            }
-            RigEdit::RemoveLocalGroup(uid) => {
-                if self.groups.has(*uid) && self.joints.values().any(|joint| joint.data.group == Some(*uid)) {
-                    return Err(EditError::GroupInUse(*uid));
-                }
-                let (index, group) = self.groups.remove(*uid).ok_or(EditError::NoGroup(*uid))?;
-                RigEdit::AddLocalGroup(group, index)
-            }
-            RigEdit::SetLocalGroup(group) => {
-                check_color(group)?;
-                let old = self.groups.replace(group.clone()).ok_or(EditError::NoGroup(group.uid))?;
-                RigEdit::SetLocalGroup(old)
-            }
+            RigEdit::AddTag { joint, tag, index } => self.add_tag(*joint, tag, *index)?,
+            RigEdit::RemoveTag(joint, tag) => self.remove_tag(*joint, *tag)?,
+            RigEdit::SetTag(joint, tag) => self.set_tag(*joint, tag)?,
+            RigEdit::AddLocalGroup(group, index) => self.add_local_group(group, *index)?,
+            RigEdit::RemoveLocalGroup(uid) => self.remove_local_group(*uid)?,
+            RigEdit::SetLocalGroup(group) => self.set_local_group(group)?,
             RigEdit::SetAbout(about) => self.set_about(about)?,
             RigEdit::SetSkin(mesh, skin) => self.set_skin(*mesh, skin.as_ref())?,
             RigEdit::SetOffset(joint, offset) => self.set_offset(*joint, *offset)?,
@@ -447,7 +412,8 @@ impl Rig {
         siblings.insert(index.min(siblings.len()), data.uid);
         self.tags.extend(data.tags.iter().map(|tag| (tag.uid, data.uid)));
         let label = data.label.clone().filter(|label| !label.is_empty());
-        self.label_index.change(None, label.as_deref());
+        self.label_index.change(data.uid, None, label.as_deref());
+        self.group_members.change(None, data.group);
         let data = JointData { tags, label, ..data.clone() };
         let uid = data.uid;
         self.joints.insert(uid, Arc::new(RigJoint { data, parent, children: Vec::new() }));
@@ -468,8 +434,10 @@ impl Rig {
         let joint = Arc::unwrap_or_clone(self.joints.remove(&uid).ok_or(EditError::NoJoint(uid))?);
         for tag in &joint.data.tags {
             self.tags.remove(&tag.uid);
+            self.tag_places.forget(tag.uid);
         }
-        self.label_index.change(joint.data.label.as_deref(), None);
+        self.label_index.change(uid, joint.data.label.as_deref(), None);
+        self.group_members.change(joint.data.group, None);
         let back = RigEdit::AddJoint { joint: Box::new(joint.data), parent, index };
         Ok(match self.pose.remove(&uid) {
             Some(offset) => RigEdit::Batch(vec![back, RigEdit::SetOffset(uid, Some(offset))]),
@@ -493,8 +461,4 @@ impl Rig {
         self.joint_mut(uid)?.parent = parent;
         Ok(RigEdit::SetParent { joint: uid, parent: old_parent, index: old_index })
     }
-}
-
-fn check_color(group: &GroupData) -> Result<(), EditError> {
-    if group.color.iter().all(|part| part.is_finite()) { Ok(()) } else { Err(EditError::BadColor(group.uid)) }
 }

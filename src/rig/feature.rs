@@ -215,9 +215,10 @@ pub fn set_switch(rig: &Rig, key: &FeatureKey, switch: &str, on: bool) -> Result
 /// The edits after which of each choice that has one of these tags exactly one switch is on.
 pub(in crate::rig) fn settled_choices(rig: &Rig, tags: &[Uid]) -> Vec<RigEdit> {
     let features = combined_features(rig);
+    let chosen: BTreeSet<&Uid> = tags.iter().collect();
     let changed = features
         .iter()
-        .filter(|feature| feature.state != FeatureState::Off && feature.tags.iter().any(|tag| tags.contains(tag)));
+        .filter(|feature| feature.state != FeatureState::Off && feature.tags.iter().any(|tag| chosen.contains(tag)));
     let settled = changed.flat_map(|feature| {
         let unchosen = feature.unchosen();
         let in_choice = feature.switches.iter().filter(|part| !part.choice.is_empty()).flat_map(|part| &part.tags);

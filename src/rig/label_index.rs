@@ -9,7 +9,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
-use crate::rig::Rig;
+use crate::rig::{Rig, Uid};
 
 /// Highest number of a label from which a chain goes on.
 const HIGHEST: u32 = 1_000_000;
@@ -116,26 +116,36 @@ impl Default for ChainNumbers {
     }
 }
 
+/// Joints with one label.
+#[derive(Default)]
+struct LabelBearers {
+    count: usize,
+    /// Exclusive or of their uids: the uid of the joint where there is one.
+    uids: u64,
+}
+
 #[derive(Default)]
 struct Labels {
-    /// Number of joints with each label.
-    counts: HashMap<String, usize>,
+    bearers: HashMap<String, LabelBearers>,
     chains: HashMap<String, ChainNumbers>,
 }
 
 impl Labels {
-    fn add(&mut self, label: &str) {
-        *self.counts.entry(label.to_owned()).or_default() += 1;
+    fn add(&mut self, joint: Uid, label: &str) {
+        let bearers = self.bearers.entry(label.to_owned()).or_default();
+        bearers.count += 1;
+        bearers.uids ^= joint.0;
         if let Some((name, number, side)) = ChainPlace::of(label).and_then(|place| place.numbered()) {
             self.chains.entry(name.to_owned()).or_default().add(number, side);
         }
     }
 
-    fn remove(&mut self, label: &str) {
-        let Some(count) = self.counts.get_mut(label) else { return };
-        *count -= 1;
-        if *count == 0 {
-            self.counts.remove(label);
+    fn remove(&mut self, joint: Uid, label: &str) {
+        let Some(bearers) = self.bearers.get_mut(label) else { return };
+        bearers.count = bearers.count.saturating_sub(1);
+        bearers.uids ^= joint.0;
+        if bearers.count == 0 {
+            self.bearers.remove(label);
         }
         let place = ChainPlace::of(label).and_then(|place| place.numbered());
         if let Some((name, number, side)) = place
@@ -160,13 +170,13 @@ impl LabelIndex {
     }
 
     /// Takes over that the label of a joint changed; `None` stands for no label, and for no joint.
-    pub fn change(&mut self, before: Option<&str>, now: Option<&str>) {
+    pub fn change(&mut self, joint: Uid, before: Option<&str>, now: Option<&str>) {
         let Some(labels) = self.0.get_mut().unwrap_or_else(PoisonError::into_inner) else { return };
         if let Some(before) = before {
-            labels.remove(before);
+            labels.remove(joint, before);
         }
         if let Some(now) = now {
-            labels.add(now);
+            labels.add(joint, now);
         }
     }
 }
@@ -192,7 +202,17 @@ impl fmt::Debug for LabelIndex {
 impl Rig {
     /// True if a joint has that label.
     pub(super) fn has_label(&self, label: &str) -> bool {
-        self.read_labels(|labels| labels.counts.contains_key(label))
+        self.read_labels(|labels| labels.bearers.contains_key(label))
+    }
+
+    /// The joint that [`find_label`](Self::find_label) finds, without a walk where one joint has the label: for look-ups between
+    /// edits.
+    pub fn labelled(&self, label: &str) -> Option<Uid> {
+        let bearers = self.read_labels(|labels| labels.bearers.get(label).map(|found| (found.count, found.uids)));
+        match bearers? {
+            (1, uid) => Some(Uid(uid)),
+            _ => self.find_label(label),
+        }
     }
 
     /// Lowest number from 1 that no chain of that name has on some sides. `name` is one without digits at its end; a chain that
@@ -206,7 +226,8 @@ impl Rig {
         let labels = index.get_or_insert_with(|| {
             self.checkpoints.count(self.len());
             let mut labels = Labels::default();
-            self.joints.values().filter_map(|joint| joint.data.label.as_deref()).for_each(|label| labels.add(label));
+            let labelled = self.joints.iter().filter_map(|(uid, joint)| Some((*uid, joint.data.label.as_deref()?)));
+            labelled.for_each(|(joint, label)| labels.add(joint, label));
             labels
         });
         read(labels)

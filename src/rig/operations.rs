@@ -21,7 +21,7 @@ mod title;
 mod transform;
 mod whole_pose;
 
-use std::sync::Arc;
+use std::{collections::HashSet, sync::Arc};
 
 use bevy::math::{Affine3, Quat, Vec3};
 
@@ -392,9 +392,10 @@ fn label_joint(draft: &mut Draft, joint: Uid, label: &str) -> Result<(), Operati
 fn group(draft: &mut Draft, joints: &[Uid], name: &str, color: Option<[f32; 3]>) -> Result<(), OperationError> {
     let group = named_group(draft, name, color)?;
     let other_name = crate::rig::label::mirrored_label(name).unwrap_or_else(|| name.to_owned());
+    let listed: HashSet<Uid> = joints.iter().copied().collect();
     for &joint in joints {
         draft.apply(RigEdit::SetGroup(joint, group))?;
-        if let Some(partner) = draft.partner(joint).filter(|partner| !joints.contains(partner)) {
+        if let Some(partner) = draft.partner(joint).filter(|partner| !listed.contains(partner)) {
             let other = named_group(draft, &other_name, color)?;
             draft.apply(RigEdit::SetGroup(partner, other))?;
         }
@@ -406,7 +407,7 @@ fn named_group(draft: &mut Draft, name: &str, color: Option<[f32; 3]>) -> Result
     if name.is_empty() {
         return Ok(None);
     }
-    let known = draft.rig().groups().iter().find(|group| group.name == name).cloned();
+    let known = draft.rig().group_named(name).cloned();
     let group = match (known, color) {
         (Some(group), Some(color)) if group.color != color => {
             draft.apply(RigEdit::SetLocalGroup(GroupData { color, ..group.clone() }))?;

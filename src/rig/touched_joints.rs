@@ -1,4 +1,4 @@
-//! Log of the joints that the last edits touched: what follows a document looks at these alone.
+//! Log of the joints and local groups that the last edits touched: what follows a document looks at these alone.
 
 use std::{
     collections::{BTreeSet, VecDeque},
@@ -21,13 +21,15 @@ struct LoggedEdit {
     touched: EditReach,
 }
 
-/// Joints that an edit reaches.
+/// Joints or groups that an edit reaches.
 #[derive(Clone, Copy)]
 enum EditReach {
     /// None; the edits of a batch are logged one by one.
     Nothing,
     /// One joint, which it adds, removes, moves to another parent or changes.
     Joint(Uid),
+    /// One local group, which it adds, removes or changes. Joints are in it, or not, by edits of their own.
+    Group(Uid),
     /// More than can be told.
     Any,
 }
@@ -35,8 +37,8 @@ enum EditReach {
 impl EditReach {
     fn by(edit: &RigEdit) -> Self {
         use RigEdit::{
-            AddJoint, AddTag, Batch, RemoveJoint, RemoveTag, SetFace, SetGroup, SetKind, SetLabel, SetLocked,
-            SetMirror, SetParent, SetRest, SetTag,
+            AddJoint, AddLocalGroup, AddTag, Batch, RemoveJoint, RemoveLocalGroup, RemoveTag, SetFace, SetGroup,
+            SetKind, SetLabel, SetLocalGroup, SetLocked, SetMirror, SetParent, SetRest, SetTag,
         };
         match edit {
             Batch(_) => Self::Nothing,
@@ -46,6 +48,8 @@ impl EditReach {
             }
             RemoveJoint(joint) | SetRest(joint, _) | SetLabel(joint, _) | SetGroup(joint, _) => Self::Joint(*joint),
             SetMirror(joint, _) | SetLocked(joint, _) | SetKind(joint, _) | SetFace(joint, _) => Self::Joint(*joint),
+            AddLocalGroup(group, _) | SetLocalGroup(group) => Self::Group(group.uid),
+            RemoveLocalGroup(group) => Self::Group(*group),
             _ => Self::Any,
         }
     }
@@ -86,19 +90,32 @@ impl Rig {
     ///
     /// `None` where more than single joints may have changed, or where the revision is too long ago, or another rig's.
     pub fn touched_since(&self, revision: &Revision) -> Option<BTreeSet<Uid>> {
+        self.reached_since(revision, |reach| match reach {
+            EditReach::Joint(joint) => Some(joint),
+            _ => None,
+        })
+    }
+
+    /// Local groups that edits have added, removed or changed since a revision, as [`touched_since`](Self::touched_since) tells
+    /// joints. The order of the others stays.
+    pub fn touched_groups_since(&self, revision: &Revision) -> Option<BTreeSet<Uid>> {
+        self.reached_since(revision, |reach| match reach {
+            EditReach::Group(group) => Some(group),
+            _ => None,
+        })
+    }
+
+    fn reached_since(&self, revision: &Revision, reached: fn(EditReach) -> Option<Uid>) -> Option<BTreeSet<Uid>> {
         let mut touched = BTreeSet::new();
         let mut at = self.revision();
         let mut log = self.touched.0.iter().rev();
         while !at.is_same(revision) {
             // Not all revisions are made by edits.
             let logged = log.next().filter(|logged| logged.after.is_same(at))?;
-            match logged.touched {
-                EditReach::Nothing => {}
-                EditReach::Joint(joint) => {
-                    touched.insert(joint);
-                }
-                EditReach::Any => return None,
+            if matches!(logged.touched, EditReach::Any) {
+                return None;
             }
+            touched.extend(reached(logged.touched));
             at = &logged.before;
         }
         Some(touched)

@@ -1,4 +1,4 @@
-//! Lists whose items are found by their uids without a search: groups, inputs and stored poses of a rig.
+//! Lists whose items are found by their uids and names without a search: groups, inputs and stored poses of a rig.
 
 use std::{
     collections::{HashMap, HashSet},
@@ -13,11 +13,17 @@ use crate::rig::{GroupData, RigInput, StoredPose, Uid};
 pub(in crate::rig) trait HasUid {
     /// The identity.
     fn uid(&self) -> Uid;
+    /// The name that people see.
+    fn name(&self) -> &str;
 }
 
 impl HasUid for GroupData {
     fn uid(&self) -> Uid {
         self.uid
+    }
+
+    fn name(&self) -> &str {
+        &self.name
     }
 }
 
@@ -25,11 +31,19 @@ impl HasUid for RigInput {
     fn uid(&self) -> Uid {
         self.uid
     }
+
+    fn name(&self) -> &str {
+        &self.name
+    }
 }
 
 impl HasUid for StoredPose {
     fn uid(&self) -> Uid {
         self.uid
+    }
+
+    fn name(&self) -> &str {
+        &self.name
     }
 }
 
@@ -40,6 +54,8 @@ pub(in crate::rig) struct UidList<T> {
     uids: HashSet<Uid>,
     /// Place of each item, from the first look-up after a change within the list.
     places: OnceLock<HashMap<Uid, usize>>,
+    /// Place of the first item of each name, from the first look-up after a change of names or places.
+    names: OnceLock<HashMap<String, usize>>,
 }
 
 impl<T: fmt::Debug> fmt::Debug for UidList<T> {
@@ -51,7 +67,7 @@ impl<T: fmt::Debug> fmt::Debug for UidList<T> {
 
 impl<T> Default for UidList<T> {
     fn default() -> Self {
-        Self { items: Vec::new(), uids: HashSet::new(), places: OnceLock::new() }
+        Self { items: Vec::new(), uids: HashSet::new(), places: OnceLock::new(), names: OnceLock::new() }
     }
 }
 
@@ -89,6 +105,19 @@ impl<T: HasUid> UidList<T> {
         self.items.get(self.place(uid)?)
     }
 
+    /// The first item with that name. `count` is called with the number of items that are listed for it.
+    pub(in crate::rig) fn named(&self, name: &str, count: impl FnOnce(usize)) -> Option<&T> {
+        let names = self.names.get_or_init(|| {
+            count(self.items.len());
+            let mut names = HashMap::with_capacity(self.items.len());
+            for (item, place) in self.items.iter().zip(0..) {
+                names.entry(item.name().to_owned()).or_insert(place);
+            }
+            names
+        });
+        self.items.get(*names.get(name)?)
+    }
+
     /// True if an item has that uid.
     pub(in crate::rig) fn has(&self, uid: Uid) -> bool {
         self.uids.contains(&uid)
@@ -100,8 +129,11 @@ impl<T: HasUid> UidList<T> {
         self.uids.insert(uid);
         if place < end {
             self.items.insert(place, item);
-            self.places = OnceLock::new();
+            (self.places, self.names) = (OnceLock::new(), OnceLock::new());
             return;
+        }
+        if let Some(names) = self.names.get_mut() {
+            names.entry(item.name().to_owned()).or_insert(end);
         }
         self.items.push(item);
         if let Some(places) = self.places.get_mut() {
@@ -119,9 +151,17 @@ impl<T: HasUid> UidList<T> {
         let item = self.items.remove(place);
         self.uids.remove(&uid);
         if place < self.items.len() {
-            self.places = OnceLock::new();
-        } else if let Some(places) = self.places.get_mut() {
+            (self.places, self.names) = (OnceLock::new(), OnceLock::new());
+            return Some((place, item));
+        }
+        if let Some(places) = self.places.get_mut() {
             places.remove(&uid);
+        }
+        // The last item may be the first of its name; then it is the only one.
+        if let Some(names) = self.names.get_mut()
+            && names.get(item.name()) == Some(&place)
+        {
+            names.remove(item.name());
         }
         Some((place, item))
     }
@@ -129,7 +169,11 @@ impl<T: HasUid> UidList<T> {
     /// Exchanges the item with the uid of another item for that; returns the one that was there.
     pub(in crate::rig) fn replace(&mut self, item: T) -> Option<T> {
         let place = self.place(item.uid())?;
-        self.items.get_mut(place).map(|old| std::mem::replace(old, item))
+        let old = self.items.get_mut(place)?;
+        if old.name() != item.name() {
+            self.names = OnceLock::new();
+        }
+        Some(std::mem::replace(old, item))
     }
 
     /// Exchanges all items; returns those that were there.
@@ -159,7 +203,7 @@ impl<T: HasUid> UidList<T> {
 
     /// Notes the uids anew.
     fn renew(&mut self) {
-        self.places = OnceLock::new();
+        (self.places, self.names) = (OnceLock::new(), OnceLock::new());
         self.uids.clear();
         self.uids.extend(self.items.iter().map(HasUid::uid));
     }

@@ -166,6 +166,11 @@ impl Merge<'_> {
         self.rig.about = self.fields(&about_fields(), base, self.now.about(), self.file.about(), &named);
     }
 
+    /// True if the file has a thing of another kind with that uid, which names one thing alone.
+    fn is_other_kind(&self, uid: Uid, is_same_kind: bool) -> bool {
+        !is_same_kind && self.file.is_taken(uid) && !self.file.clip_uids.contains(&uid)
+    }
+
     fn groups(&mut self) {
         let (base, now, file) = (self.base, self.now, self.file);
         let lists = [base, Some(now), Some(file)].map(|rig| uids(rig.into_iter().flat_map(Rig::groups), |g| g.uid));
@@ -183,6 +188,7 @@ impl Merge<'_> {
         for group in now.groups().iter().filter(|group| used.contains(&group.uid)) {
             kept.entry(group.uid).or_insert_with(|| group.clone());
         }
+        kept.retain(|uid, _| !self.is_other_kind(*uid, file.group(*uid).is_some()));
         let order = merged_order(base.is_some().then_some(&lists[0]), &lists[1], &lists[2]);
         self.rig.groups = order.into_iter().filter_map(|uid| kept.remove(&uid)).collect();
     }
@@ -201,6 +207,7 @@ impl Merge<'_> {
             }
         }
         let order = merged_order(base.is_some().then_some(&lists[0]), &lists[1], &lists[2]);
+        kept.retain(|uid, _| !self.is_other_kind(*uid, file.input(*uid).is_some()));
         // Of two with one name the first one stays: only one entity can be given for it.
         let mut names = HashSet::new();
         let inputs = order.into_iter().filter_map(|uid| kept.remove(&uid));
@@ -221,6 +228,7 @@ impl Merge<'_> {
                 kept.insert(uid, pose);
             }
         }
+        kept.retain(|uid, _| !self.is_other_kind(*uid, file.stored_pose(*uid).is_some()));
         let order = merged_order(base.is_some().then_some(&lists[0]), &lists[1], &lists[2]);
         self.rig.poses = order.into_iter().filter_map(|uid| kept.remove(&uid)).collect();
     }
@@ -281,6 +289,10 @@ impl Merge<'_> {
         for (data, parent) in joints.values_mut() {
             data.group = data.group.filter(|group| groups.contains(group));
             *parent = parent.filter(|parent| *parent != data.uid);
+        }
+        joints.retain(|uid, _| !self.is_other_kind(*uid, file.joint(*uid).is_some()));
+        for (data, _) in joints.values_mut() {
+            data.tags.retain(|tag| !self.is_other_kind(tag.uid, file.tags.contains_key(&tag.uid)));
         }
         self.untangle(&mut joints);
         self.rig.set_joints(joints, |parent| {

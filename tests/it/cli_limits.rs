@@ -87,8 +87,11 @@ fn each_limit_can_be_set_and_is_named_by_its_error() {
 fn commands_are_given_up_when_their_time_is_over() {
     let folder = folder();
     let walker = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/retarget/walker.bvh");
-    let commands: [(&[&str], &str); 13] = [
+    let commands: [(&[&str], &str); 16] = [
         (&["check", "tags.rig.ron"], "checking the files"),
+        (&["format", "tags.rig.ron"], "formatting the templates"),
+        (&["format", "--check", "tags.rig.ron", "tags.rig.ron"], "formatting the templates"),
+        (&["list", "."], "listing the templates"),
         (&["pose", "tags.rig.ron", "-o", "out.glb"], "building the rig"),
         (&["build", "tags.rig.ron", "-o", "out.glb"], "building the rig"),
         (&["animate", "tags.rig.ron", walker, "-o", "out.anim.ron"], "building the rig"),

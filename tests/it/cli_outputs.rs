@@ -265,6 +265,41 @@ fn a_part_of_an_input_is_no_output() {
     assert_eq!(code, 0, "{said}");
 }
 
+/// Buffers, materials and pictures that a mesh names are inputs, too, whatever their names end in.
+#[test]
+fn a_file_that_an_input_names_is_no_output() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let run = |args: &[&str]| rigsmith(folder.path(), args);
+    assert_eq!(run(&["convert", "b.obj", "made.gltf"]).0, 0);
+    // The buffer has the name of a character, the picture that of another, and a library of materials that of a mesh.
+    let text = fs::read_to_string(at("made.gltf")).unwrap();
+    let buffer = text.split('"').find(|word| word.ends_with(".bin")).unwrap().to_owned();
+    fs::rename(at(&buffer), at("buffer.glb")).unwrap();
+    let picture = "\"images\": [{\"uri\": \"my%20picture.glb\"}], \"asset\"";
+    fs::write(at("named.gltf"), text.replace(&buffer, "buffer.glb").replacen("\"asset\"", picture, 1)).unwrap();
+    fs::write(at("my picture.glb"), b"\x89PNG\r\n\x1a\n").unwrap();
+    fs::write(at("mtl.obj"), format!("mtllib colours.obj\n{BOX}")).unwrap();
+    fs::write(at("colours.obj"), "newmtl red\nKd 1 0 0\n").unwrap();
+    fs::remove_file(at("made.gltf")).unwrap();
+    let before = contents(folder.path());
+    for args in [
+        &["skin", "a.rig", "named.gltf", "-o", "buffer.glb"][..],
+        &["skin", "a.rig", "named.gltf", "-o", "my picture.glb"],
+        &["skin", "a.rig", "named.gltf", "-o", "FOLDER/my picture.glb"],
+        &["convert", "named.gltf", "buffer.glb", "--in-place"],
+        &["convert", "mtl.obj", "colours.obj"],
+    ] {
+        let args: Vec<String> =
+            args.iter().map(|arg| arg.replace("FOLDER", &folder.path().to_string_lossy())).collect();
+        let (code, said) = run(&args.iter().map(String::as_str).collect::<Vec<_>>());
+        assert!(code == 2 && said.contains("input"), "{args:?}: {said}");
+        assert!(contents(folder.path()) == before, "{args:?} changed something");
+    }
+    assert_eq!(run(&["skin", "a.rig", "named.gltf", "-o", "other.glb"]).0, 0);
+    assert_eq!(run(&["skin", "a.rig", "named.gltf", "-o", "other.glb"]).0, 0, "an output is no input the second time");
+}
+
 #[test]
 fn nothing_is_written_where_there_is_nothing_to_write() {
     let folder = folder();

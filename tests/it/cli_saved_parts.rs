@@ -60,3 +60,39 @@ fn rigs_that_are_merged_below_joints_of_parts_leave_the_parts() {
     let text = fs::read_to_string(at("all.rig.ron")).unwrap();
     assert!(text.contains("tags: [control()]") && !text.contains("Command("), "{text}");
 }
+
+/// A template that is saved through a link into another folder is whole from the link and from the file that it leads to.
+#[cfg(unix)]
+#[test]
+fn parts_of_a_template_are_found_from_both_ends_of_a_link() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for name in ["own/parts", "links", "far/away"] {
+        fs::create_dir_all(at(name)).unwrap();
+    }
+    let arm = "(format: 2, name: \"arm\", kind: \"part\", joints: [(label: \"a\", translation: (1, 0, 0))])";
+    let man = "(format: 2, name: \"man\", uid: \"00000000000000aa\", joints: [(label: \"body\")],\n    \
+               parts: [(part: \"parts/arm.rig.ron\", name: \"l\", parent: \"body\")])";
+    let ring = "(format: 2, name: \"ring\", joints: [(label: \"ring\")])";
+    for (name, text) in [("own/parts/arm.rig.ron", arm), ("own/man.rig.ron", man), ("own/ring.rig.ron", ring)] {
+        fs::write(at(name), text).unwrap();
+    }
+    std::os::unix::fs::symlink("../far/away/real.rig.ron", at("links/man.rig.ron")).unwrap();
+    let merge = ["merge", "own/man.rig.ron", "own/ring.rig.ron", "-o", "links/man.rig.ron"];
+    let (code, said) = rigsmith(folder.path(), &merge);
+    assert_eq!(code, 0, "{said}");
+    let real = fs::read_to_string(at("far/away/real.rig.ron")).unwrap();
+    assert!(real.contains("own/parts/arm.rig.ron"), "{real}");
+    let whole = load(&at("links/man.rig.ron"));
+    assert_eq!(whole, load(&at("far/away/real.rig.ron")));
+    assert_eq!(whole.walk().filter_map(|joint| joint.data.label.as_deref()).collect::<Vec<_>>(), ["body", "a", "ring"]);
+    // A part beside the file is found through the link, and one beside the link goes first.
+    fs::create_dir(at("far/away/parts")).unwrap();
+    fs::write(at("far/away/parts/arm.rig.ron"), arm.replace("\"a\"", "\"there\"")).unwrap();
+    fs::write(at("far/away/real.rig.ron"), man).unwrap();
+    assert!(load(&at("links/man.rig.ron")).find_label("there").is_some());
+    fs::create_dir(at("links/parts")).unwrap();
+    fs::write(at("links/parts/arm.rig.ron"), arm.replace("\"a\"", "\"here\"")).unwrap();
+    assert!(load(&at("links/man.rig.ron")).find_label("here").is_some());
+    assert!(load(&at("far/away/real.rig.ron")).find_label("there").is_some());
+}

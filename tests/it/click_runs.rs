@@ -5,13 +5,14 @@ use bevy::prelude::*;
 use rigsmith::{
     headless::Workbench,
     plugins::{
-        document::JointEntities,
+        document::{GroupEntities, JointEntities},
         gesture::{Gesture, GestureAnswer, GestureScript, read_gestures},
         history::RigHistory,
+        schema::LocalGroup,
         stroke::StrokeTips,
     },
     prelude::Selection,
-    rig::{Rig, Uid, template::read_template},
+    rig::{GroupData, Rig, RigEdit, Uid, operations::Operation, template::read_template},
 };
 
 use crate::gestures::boxes;
@@ -189,6 +190,84 @@ fn undone_lists_take_work_in_proportion_to_their_length() {
     let undone = |count: usize| [named_clicks(count), vec![Gesture::Undo; 2 * count]].concat();
     let works: Vec<[u64; 2]> = [1000, 2000, 4000].into_iter().map(|count| work(undone(count), 0)).collect();
     check_growth("undone", &works);
+}
+
+#[test]
+fn runs_of_groups_and_picks_give_what_they_give_one_a_frame() {
+    let answers = check(
+        "[Click((0.0, 0.2)), Click((0.3, 0.9)), Label(\"a\"), Click((-0.4, 1.5)), Deselect, Group(\"none\", None), \
+         Lock(true), Select((0.0, 0.2)), Group(\"g\", None), Select((0.3, 0.9)), Lock(true), SelectLabel(\"a\"), \
+         Group(\"h\", Some((1.0, 0.0, 0.0))), SelectLabel(\"missing\"), Group(\"g\", None), Select((-0.4, 1.5)), \
+         Label(\"b\"), Select((-0.4, 1.5)), Select((-0.4, 1.5)), Group(\"\", None), Undo, Undo, Select((0.0, 0.2)), \
+         Group(\"z\", None), Click((0.1, 0.5)), Select((0.1, 0.5)), Group(\"y\", None), Select((0.0, 0.2)), \
+         Group(\"x\", None), Select((0.0, 0.2)), Select((0.0, 0.2)), Label(\"c\"), Lock(false), SelectLabel(\"c\"), \
+         Click((0.2, 0.6)), SelectLabel(\"b\"), Group(\"g\", None)]",
+        |_| {},
+    );
+    let told = |number: usize| (answers[number].done, answers[number].message.as_str());
+    assert_eq!(told(5), (false, "no joint is selected; select one first"));
+    assert_eq!(told(6), told(5));
+    assert_eq!(told(11), (true, "selected \"a\""));
+    assert_eq!(told(13), (false, "no joint has the label \"missing\""));
+    assert!(answers[7].message.starts_with("selected "), "{answers:?}");
+    assert_eq!(told(8).1, "assign group: 3 joints now");
+}
+
+/// Joint on a grid in the upper box, apart from all others.
+fn on_grid(number: usize) -> (f32, f32) {
+    (-0.95 + 0.03 * (number % 60) as f32, 0.05 + 0.03 * (number / 60) as f32)
+}
+
+/// Clicks, then picks of each joint, each put into a group of its own.
+fn grouped(count: usize, pick: impl Fn(usize) -> Gesture) -> Vec<Gesture> {
+    let clicks =
+        (0..count).flat_map(|number| [Gesture::Click(on_grid(number)), Gesture::Label(format!("name{number}"))]);
+    let group = |number: usize| [pick(number), Gesture::Group(format!("group{number}"), None)];
+    clicks.chain((0..count).flat_map(group)).collect()
+}
+
+/// Work of gestures, with the joints and groups at which entities look to follow them.
+fn work_of_groups(gestures: Vec<Gesture>, joints: usize) -> [u64; 4] {
+    let mut bench = bench();
+    bench.app_mut().init_resource::<FollowedJoints>().add_systems(Last, count_followed);
+    let answers = bench.gestures(gestures);
+    assert!(answers.iter().all(|answer| answer.done), "{:?}", answers.iter().find(|answer| !answer.done));
+    assert_eq!((bench.rig().len(), bench.rig().groups().len()), (joints, joints));
+    let (visits, rig) = (bench.rig().visits(), bench.rig_entity());
+    let world = bench.app_mut().world();
+    let (joints, groups) = (world.get::<JointEntities>(rig).unwrap(), world.get::<GroupEntities>(rig).unwrap());
+    [visits, world.resource::<FollowedJoints>().0, joints.visits(), groups.visits()]
+}
+
+#[test]
+fn picks_and_groups_take_work_in_proportion_to_their_number() {
+    let picks: [(&str, fn(usize) -> Gesture); 2] = [
+        ("labels", |number| Gesture::SelectLabel(format!("name{number}"))),
+        ("clicks", |number| Gesture::Select(on_grid(number))),
+    ];
+    for (name, pick) in picks {
+        let works: Vec<[u64; 4]> =
+            [400, 800, 1600].into_iter().map(|count| work_of_groups(grouped(count, pick), count)).collect();
+        for pair in works.windows(2) {
+            for (less, more) in pair[0].into_iter().zip(pair[1]) {
+                assert!(less > 0 && more as f64 <= GROWTH * less as f64, "{name}: {works:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn entities_follow_a_group_without_a_look_at_all_joints() {
+    let mut bench = bench();
+    watched(&mut bench, (0..40).map(|number| click(number, 3)).collect());
+    let rig = bench.rig_entity();
+    let looked = |bench: &mut Workbench| bench.app_mut().world().get::<JointEntities>(rig).unwrap().visits();
+    let before = looked(&mut bench);
+    let group = GroupData { uid: Uid(0x77), name: "new".into(), color: [0.5; 3], enabled: true };
+    bench.operate(Operation::Edits(vec![RigEdit::AddLocalGroup(group, 0)])).unwrap();
+    assert!(looked(&mut bench) - before < 10, "{}", looked(&mut bench) - before);
+    let world = bench.app_mut().world_mut();
+    assert_eq!(world.query::<&LocalGroup>().single(world).unwrap().name, "new");
 }
 
 /// Strokes through the upper half of the first box, each a chain of five joints below the one before.

@@ -416,3 +416,69 @@ fn extracted_joints_hang_on_the_nearest_one_above() {
         }
     }
 }
+
+/// Tags that are looked at where each of many tags of one joint is found, set, moved to the end and deleted.
+fn looked_at(count: usize) -> u64 {
+    use rigsmith::rig::{
+        TagData, UidSource,
+        operations::{Operation, TagOperation},
+    };
+
+    let mut rig = all_tags_on_one_joint(count / 2);
+    let (joint, copy) = (rig.roots()[0], rig.clone());
+    let tags: Vec<TagData> = rig.joint(joint).unwrap().data.tags.clone();
+    assert_eq!(tags.len(), count);
+    let before = rig.visits();
+    let mut inverses = Vec::new();
+    for tag in &tags {
+        assert_eq!(rig.find_tag(tag.uid).map(|(_, found)| found), Some(tag));
+        let off = TagData { enabled: false, ..tag.clone() };
+        inverses.push(rig.apply(&rigsmith::rig::RigEdit::SetTag(joint, Box::new(off))).unwrap());
+    }
+    let uids: Vec<_> = tags.iter().map(|tag| tag.uid).collect();
+    let half = uids[..count / 2].to_vec();
+    for operation in [TagOperation::Move { tags: half, joint, before: None }, TagOperation::Delete(uids)] {
+        let outcome = Operation::Tags(operation).run(&mut rig, &mut UidSource::seeded(1), None).unwrap();
+        inverses.extend(outcome.inverses.into_iter().rev());
+    }
+    assert!(rig.joint(joint).unwrap().data.tags.is_empty());
+    inverses.iter().rev().for_each(|edit| drop(rig.apply(edit).unwrap()));
+    assert_eq!(rig, copy);
+    rig.visits() - before
+}
+
+#[test]
+fn tags_of_one_joint_are_found_without_a_look_at_the_others() {
+    let looked: Vec<u64> = [400, 800, 1600].into_iter().map(looked_at).collect();
+    for pair in looked.windows(2) {
+        assert!(pair[0] > 0 && pair[1] as f64 <= GROWTH * pair[0] as f64, "{looked:?}");
+    }
+}
+
+/// Groups without joints are removed, and groups found by their names, without a look at all joints and groups.
+#[test]
+fn groups_are_found_and_removed_in_proportion_to_their_number() {
+    use rigsmith::rig::{GroupData, RigEdit, Uid};
+
+    let looked = |count: usize| {
+        let mut rig = chain(count, |_| vec![]);
+        let before = rig.visits();
+        let uid = |number: usize| Uid(0x7000_0000 + number as u64);
+        for number in 0..count {
+            let name = format!("g{number}");
+            let group = GroupData { uid: uid(number), name: name.clone(), color: [0.5; 3], enabled: true };
+            assert_eq!(rig.group_named(&name), None);
+            rig.apply(&RigEdit::AddLocalGroup(group.clone(), usize::MAX)).unwrap();
+            assert_eq!(rig.group_named(&name), Some(&group));
+        }
+        for number in (0..count).rev() {
+            rig.apply(&RigEdit::RemoveLocalGroup(uid(number))).unwrap();
+            assert_eq!(rig.group_named(&format!("g{number}")), None);
+        }
+        rig.visits() - before
+    };
+    let looked: Vec<u64> = [300, 600, 1200].into_iter().map(looked).collect();
+    for pair in looked.windows(2) {
+        assert!(pair[0] > 0 && pair[1] as f64 <= GROWTH * pair[0] as f64, "{looked:?}");
+    }
+}

@@ -4,6 +4,7 @@ use glam::{Vec2, Vec3};
 use rigsmith::{
     algo::{
         picking::{PickCycle, candidates, in_box, nearest_on_plane},
+        point_tree::PointTree,
         view::{View, ViewPlane},
     },
     mesh::surface::Surface,
@@ -88,4 +89,34 @@ fn boxes_take_what_they_show() {
     ] {
         assert_eq!(in_box(&plane, corners, &joints), expected, "{corners:?}");
     }
+}
+
+#[test]
+fn the_two_nearest_points_are_found_without_a_look_at_all() {
+    let spread = |number: usize| {
+        let part = |prime: usize| (number * prime % 4099) as f32 / 4099.0;
+        Vec3::new(part(733), part(1289), part(2741))
+    };
+    let mut visits = Vec::new();
+    for count in [1000, 4000] {
+        let mut points: Vec<Vec3> = (0..count).map(spread).collect();
+        points[7] = Vec3::NAN;
+        let tree = PointTree::new(points.iter().copied());
+        for number in 0..100 {
+            let place = spread(number * 17) + Vec3::splat(0.003);
+            let mut distances: Vec<(f32, usize)> =
+                points.iter().map(|point| point.distance(place)).zip(0..).filter(|(far, _)| far.is_finite()).collect();
+            distances.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let found = tree.nearest_two(place).map(|found| found.unwrap().0);
+            assert_eq!(found, [distances[0].0, distances[1].0], "{number} of {count}");
+        }
+        visits.push(tree.visits());
+    }
+    assert!(visits[1] < 2 * visits[0], "{visits:?}");
+    // Points at one place, and fewer than two.
+    let one_place = PointTree::new(std::iter::repeat_n(Vec3::ONE, 100));
+    assert_eq!(one_place.nearest_two(Vec3::ZERO).map(|found| found.unwrap().0), [Vec3::ONE.length(); 2]);
+    assert_eq!(PointTree::default().nearest_two(Vec3::ZERO), [None, None]);
+    let single = PointTree::new([Vec3::X]).nearest_two(Vec3::ZERO);
+    assert_eq!(single, [Some((1.0, 0)), None]);
 }

@@ -46,6 +46,10 @@ impl Remote {
 
     /// An app that refuses calls which do not arrive within a time.
     fn reading_for(read_timeout: Duration) -> Self {
+        Self::timed(read_timeout, HANG)
+    }
+
+    fn timed(read_timeout: Duration, answer_timeout: Duration) -> Self {
         let folder = tempfile::tempdir().unwrap();
         fs::create_dir(folder.path().join("allowed")).unwrap();
         fs::write(folder.path().join("allowed/t.rig.ron"), CHAIN).unwrap();
@@ -54,7 +58,7 @@ impl Remote {
             token: Some(TOKEN.to_owned()),
             folders: vec![folder.path().join("allowed")],
             read_timeout,
-            answer_timeout: HANG,
+            answer_timeout,
             ..default()
         };
         let remote = RemotePlugin::bind(settings).unwrap();
@@ -136,6 +140,12 @@ impl Remote {
     fn load(&mut self) -> Value {
         self.call("rig.template.load", json!({"path": "t.rig.ron"}))["rig"].clone()
     }
+}
+
+#[test]
+fn a_call_may_wait_for_ever() {
+    let mut remote = Remote::timed(Duration::MAX, Duration::MAX);
+    assert!(remote.load().is_string() || remote.load().is_number(), "the call is answered");
 }
 
 fn rest(mut stream: TcpStream) -> String {

@@ -325,3 +325,43 @@ fn hundreds_of_things_with_other_names_stay_the_same_ones() {
     let uids = |rig: &Rig| rig.inputs().iter().map(|input| input.uid).collect::<Vec<Uid>>();
     assert_eq!(uids(&updated.rig), uids(&base));
 }
+
+/// A uid that names a thing of another kind in the file: what it named goes, and the other comes.
+#[test]
+fn a_uid_changes_its_kind() {
+    let of = |content: &str| {
+        let text = format!("(format: 2, uid: \"00000000000000f0\", name: \"kinds\", {content})");
+        rigsmith::rig::template::read_template(text.as_bytes()).unwrap_or_else(|error| panic!("{content}: {error}")).rig
+    };
+    const U: &str = "uid: \"00000000000000aa\"";
+    let joint = |number: usize, inside: &str| {
+        format!("(uid: \"00000000000000b{number}\", label: \"{}\"{inside})", ["one", "two"][number - 1])
+    };
+    let rigs = [
+        of(&format!(
+            "joints: [({U}, label: \"was\"), {}, {}]",
+            joint(1, ", parent: \"was\", translation: (0, 1, 0)"),
+            joint(2, ", parent: \"one\"")
+        )),
+        of(&format!("groups: [({U}, name: \"g\")], joints: [{}, {}]", joint(1, ", group: \"g\""), joint(2, ""))),
+        of(&format!("inputs: [({U}, name: \"eyes\")], joints: [{}]", joint(1, ""))),
+        of(&format!("joints: [{}], poses: [({U}, name: \"rest\")]", joint(1, ""))),
+        of(&format!("joints: [{}]", joint(1, &format!(", tags: [null({U}, at: \"@this\")]")))),
+    ];
+    for (number, from) in rigs.iter().enumerate() {
+        for (other, to) in rigs.iter().enumerate() {
+            let case = format!("{number} to {other}");
+            let mut rig = from.clone();
+            let edits = edits_between(from, to).unwrap_or_else(|error| panic!("{case}: {error}"));
+            let inverses: Vec<RigEdit> = edits.iter().map(|edit| rig.apply(edit).unwrap()).collect();
+            assert_eq!(&rig, to, "{case}");
+            inverses.iter().rev().for_each(|edit| drop(rig.apply(edit).unwrap()));
+            assert_eq!(&rig, from, "{case}");
+            assert_eq!(&update(Some(from), from, to, Take::Mine).rig, to, "{case}");
+            assert_eq!(diff(from, to).is_empty(), number == other, "{case}");
+            // What a person has made of it is in the way of nothing.
+            let mine = update(None, from, to, Take::Mine).rig;
+            edits_between(from, &mine).unwrap_or_else(|error| panic!("{case}: {error}"));
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! Choices among the clips of files, maps for their joints, and reasons for not taking them.
 
 use std::{
-    collections::BTreeSet,
+    collections::{BTreeSet, HashSet},
     path::{Path, PathBuf},
 };
 
@@ -145,8 +145,9 @@ impl GivenMap {
         let is_single = args.clips.iter().filter(|clip| is_motion(clip)).count() < 2;
         self.joints.extend(motion.joints.iter().map(|joint| joint.name.clone()));
         let mut own = NamePairs::new();
+        let names: HashSet<&str> = motion.joints.iter().map(|joint| joint.name.as_str()).collect();
         for (place, pair) in self.pairs.iter().enumerate() {
-            let is_there = motion.joints.iter().any(|joint| joint.name == pair.0);
+            let is_there = names.contains(pair.0.as_str());
             if is_there {
                 self.used.insert(place);
             }

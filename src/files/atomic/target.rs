@@ -100,6 +100,17 @@ pub(in crate::files) fn saved_file(disk: &dyn Disk, path: &Path) -> PathBuf {
     Target::find(disk, path).map_or_else(|_| path.to_path_buf(), |target| target.file)
 }
 
+/// File that a save to `path` writes, where that is a link, in its own folder with all links resolved: what a text names relative
+/// to its file is relative to that. Any other path stays as it is.
+pub(in crate::files) fn linked_file(disk: &dyn Disk, path: &Path) -> PathBuf {
+    let file = saved_file(disk, path);
+    if file == path {
+        return file;
+    }
+    let resolved = disk.canonical(folder_of(&file)).ok().zip(file.file_name());
+    resolved.map(|(folder, name)| folder.join(name)).unwrap_or(file)
+}
+
 /// True if the path ends in a separator, which `Path` drops: the caller means a folder.
 fn ends_in_separator(path: &Path) -> bool {
     path.as_os_str().as_encoded_bytes().last().is_some_and(|&byte| std::path::is_separator(char::from(byte)))

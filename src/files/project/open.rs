@@ -1,6 +1,7 @@
 //! Loader of projects.
 
 use std::{
+    collections::HashMap,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -49,10 +50,15 @@ pub fn load_project(disk: &dyn Disk, path: &Path) -> Result<LoadedProject, LoadE
     let (mut rigs, skins): (Vec<Rig>, Vec<Vec<SkinReference>>) =
         entries.into_iter().map(|entry| (entry.rig, entry.skins)).unzip();
     let mut meshes = Vec::with_capacity(references.len());
+    let places: HashMap<Uid, usize> = rigs.iter().enumerate().rev().map(|(place, rig)| (rig.uid(), place)).collect();
+    let skins_of =
+        skins.iter().zip(0..).flat_map(|(skins, rig)| skins.iter().map(move |skin| ((rig, skin.mesh), skin)));
+    let skins_of: Vec<((usize, Uid), &SkinReference)> = skins_of.collect();
+    let skins_of: HashMap<(usize, Uid), &SkinReference> = skins_of.into_iter().rev().collect();
     for reference in references {
         // The reader has checked that this rig exists.
-        let Some(number) = rigs.iter().position(|rig| rig.uid() == reference.rig) else { continue };
-        let skin = skins[number].iter().find(|skin| skin.mesh == reference.uid);
+        let Some(number) = places.get(&reference.rig).copied() else { continue };
+        let skin = skins_of.get(&(number, reference.uid)).copied();
         let skin = skin.and_then(|skin| Some((read_skin(disk, path, skin, &mut notes)?, skin.at_rest)));
         let (mesh, bound) = open_mesh(disk, path, reference, skin, &rigs[number], &mut notes);
         if let Some(bound) = bound

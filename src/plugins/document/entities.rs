@@ -158,6 +158,11 @@ impl JointEntities {
         rig.touched_since(self.of_joints.as_ref().filter(|_| !self.is_behind)?)
     }
 
+    /// Local groups that edits touched since their entities followed the document; `None` if all have to be looked at.
+    pub(super) fn touched_groups(&self, rig: &Rig) -> Option<BTreeSet<Uid>> {
+        rig.touched_groups_since(self.of_joints.as_ref()?)
+    }
+
     /// Joints that edits touched since all entities followed the document; `None` if all have to be looked at.
     pub(in crate::plugins) fn touched_of_all(&self, rig: &Rig) -> Option<BTreeSet<Uid>> {
         rig.touched_since(self.revision.as_ref()?)
@@ -250,12 +255,21 @@ impl TagEntities {
 #[reflect(Component, Debug, Clone, Default)]
 pub struct GroupEntities {
     pub(super) groups: HashMap<Uid, (Entity, GroupData)>,
+    /// True if groups came, left or changed since their entities were put into the order of the document.
+    pub(super) is_unsorted: bool,
+    /// Number of groups that were looked at.
+    pub(super) visits: u64,
 }
 
 impl GroupEntities {
     /// The entity of a local group.
     pub fn get(&self, group: Uid) -> Option<Entity> {
         self.groups.get(&group).map(|(entity, _)| *entity)
+    }
+
+    /// Number of groups that were looked at so far, so that entities follow the document; for tests of growth.
+    pub fn visits(&self) -> u64 {
+        self.visits
     }
 }
 

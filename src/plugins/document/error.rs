@@ -22,6 +22,9 @@ pub enum ChangeError {
     /// The change is about the active joint, and none is selected.
     #[error("no joint is selected; select one first")]
     NoActive,
+    /// No joint has the label.
+    #[error("no joint has the label \"{0}\"")]
+    NoLabel(String),
     /// The rig refuses the operation.
     #[error(transparent)]
     Operation(#[from] OperationError),

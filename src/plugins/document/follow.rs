@@ -57,7 +57,7 @@ pub(in crate::plugins) fn follow_rigs(
             continue;
         }
         let groups = groups.bypass_change_detection();
-        follow_groups(&mut commands, rig_entity, rig, groups, &mut index);
+        follow_groups(&mut commands, rig_entity, rig, known.touched_groups(rig).as_ref(), groups, &mut index);
         let touched = known.touched(rig);
         let mut is_other = remove_gone_joints(&mut commands, rig, known, touched.as_ref(), &mut index);
         let due: Vec<&RigJoint> = match &touched {

@@ -1,22 +1,30 @@
 //! Entities of local groups follow the document, in its order.
 
+use std::collections::BTreeSet;
+
 use bevy::{ecs::entity::EntityHashMap, prelude::*};
 
 use super::entities::{EntityIndex, EntityPart, GroupEntities, misplaced};
 use crate::{
     plugins::schema::{GroupOf, LocalGroup, LocalGroups},
-    rig::{Rig, Uid},
+    rig::{GroupData, Rig, Uid},
 };
 
-/// Spawns, updates and despawns the entities of local groups so that they match the document.
+/// Spawns, updates and despawns the entities of local groups so that they match the document: of the `touched` groups, or of
+/// all of them where these are not known.
 pub(super) fn follow_groups(
     commands: &mut Commands,
     rig_entity: Entity,
     rig: &Rig,
+    touched: Option<&BTreeSet<Uid>>,
     known: &mut GroupEntities,
     index: &mut EntityIndex,
 ) {
-    let mut gone: Vec<Uid> = known.groups.keys().filter(|uid| rig.group(**uid).is_none()).copied().collect();
+    let is_gone = |uid: &&Uid| rig.group(**uid).is_none();
+    let mut gone: Vec<Uid> = match touched {
+        Some(touched) => touched.iter().filter(is_gone).copied().collect(),
+        None => known.groups.keys().filter(is_gone).copied().collect(),
+    };
     gone.sort_unstable();
     for uid in gone {
         if let Some((entity, _)) = known.groups.remove(&uid) {
@@ -24,7 +32,13 @@ pub(super) fn follow_groups(
             commands.entity(entity).try_despawn();
         }
     }
-    for group in rig.groups() {
+    let due: Vec<&GroupData> = match touched {
+        Some(touched) => rig.groups_in_order(touched),
+        None => rig.groups().iter().collect(),
+    };
+    known.visits += due.len() as u64;
+    known.is_unsorted |= !due.is_empty();
+    for group in due {
         let told = LocalGroup { name: group.name.clone(), color: group.color, enabled: group.enabled };
         match known.groups.get_mut(&group.uid) {
             Some((_, data)) if data == group => {}
@@ -45,9 +59,14 @@ pub(super) fn follow_groups(
 /// Puts the local groups of rigs into the order of the document, where the document or other code changed the order.
 pub(in crate::plugins) fn order_groups(
     mut commands: Commands,
-    rigs: Query<(Entity, &Rig, &GroupEntities, &LocalGroups), Or<(Changed<Rig>, Changed<LocalGroups>)>>,
+    mut rigs: Query<(Entity, &Rig, &mut GroupEntities, Ref<LocalGroups>), Or<(Changed<Rig>, Changed<LocalGroups>)>>,
 ) {
-    for (rig_entity, rig, known, groups) in &rigs {
+    for (rig_entity, rig, mut known, groups) in &mut rigs {
+        let known = known.bypass_change_detection();
+        if !std::mem::take(&mut known.is_unsorted) && !groups.is_changed() {
+            continue;
+        }
+        known.visits += rig.groups().len() as u64;
         let ranks: EntityHashMap<usize> =
             (rig.groups().iter().enumerate()).filter_map(|(rank, group)| Some((known.get(group.uid)?, rank))).collect();
         for group in misplaced(groups.iter(), &ranks) {

@@ -11,6 +11,7 @@ use crate::{
     plugins::{
         document::{ChangeReport, EditRefusal, EditReport},
         fit::{FIT_AROUND, FitAnswer},
+        history::quoted_name,
         picking::PickAnswer,
         placement::{PlaceAnswer, PlaceRefusal},
         stroke::{StrokeDone, StrokeResult},
@@ -40,7 +41,7 @@ impl Answers<'_, '_> {
             match joints.as_slice() {
                 _ if !script.pending => continue,
                 [] => script.fail(&GestureError::NothingToPick),
-                [joint] => script.say(format!("selected {}", name_of(rig, *joint))),
+                [joint] => script.say(format!("selected {}", quoted_name(rig, *joint))),
                 joints => script.say(format!("selected {} joints", joints.len())),
             }
             script.pending = false;
@@ -62,7 +63,7 @@ impl Answers<'_, '_> {
             match result {
                 StrokeResult::Nothing(why) => script.fail(&why.clone().into()),
                 StrokeResult::Inserted { child } => {
-                    script.say(format!("put a joint into the bone that ends at {}", name_of(rig, *child)));
+                    script.say(format!("put a joint into the bone that ends at {}", quoted_name(rig, *child)));
                 }
                 StrokeResult::Erased(joints) => script.say(format!("deleted {} joints", joints.len())),
                 StrokeResult::Chain { chain, parent, .. } => {
@@ -146,18 +147,13 @@ impl GestureScript {
     }
 }
 
-fn name_of(rig: &Rig, joint: Uid) -> String {
-    let label = rig.joint(joint).and_then(|joint| joint.data.label.clone());
-    label.map_or_else(|| format!("joint {joint}"), |label| format!("\"{label}\""))
-}
-
 fn point(position: Vec3) -> String {
     format!("({:.4}, {:.4}, {:.4})", position.x, position.y, position.z)
 }
 
 /// Sentence about a chain of so many joints along a stroke, and the joint of the rig that it hangs on.
 pub(super) fn told_chain(rig: &Rig, joints: usize, parent: Option<Uid>, notes: &[StrokeNote]) -> String {
-    let on = parent.map_or("as a root".to_owned(), |parent| format!("below {}", name_of(rig, parent)));
+    let on = parent.map_or("as a root".to_owned(), |parent| format!("below {}", quoted_name(rig, parent)));
     let notes: String = notes.iter().map(|note| format!("; {}", heard(note))).collect();
     format!("drew a chain of {joints} joints {on}{notes}")
 }

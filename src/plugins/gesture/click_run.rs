@@ -1,10 +1,11 @@
-//! Runs of clicks: clicks, strokes, names and undone steps that follow one another, carried out in one frame.
+//! Runs of clicks: clicks, strokes, names, groups, locks, picks and undone steps that follow one another, carried out in one
+//! frame.
 //!
 //! Nobody watches the gestures of a command. Between two clicks on a mesh at rest nothing happens that the second one
-//! depends on but the joint of the first, so that entities have to follow the document once for all of them; names and
-//! undone steps depend on nothing else, and a stroke that is surely a chain only on the joint on which it starts. A run
-//! has at most as many gestures as the rig has joints: frames cost what the joints of the rig cost, and a list takes time in
-//! proportion to its length.
+//! depends on but the joint of the first, so that entities have to follow the document once for all of them; names, groups and
+//! undone steps depend on nothing else, a stroke that is surely a chain only on the joint on which it starts, and a pick on
+//! where the joints are. A run has at most as many gestures as the rig has joints and groups: frames cost what these cost, and a
+//! list takes time in proportion to its length.
 
 use bevy::prelude::*;
 
@@ -12,12 +13,13 @@ use super::{
     Gesture, GestureScript,
     answers::{told_chain, told_step},
     error::GestureError,
+    pick_run::RunPicks,
     stroke_run::RunJoints,
 };
 use crate::{
     algo::{stroke::StrokeNote, view::ViewPlane},
     plugins::{
-        document::{Change, ChangeError, EditRequest, ReportedStep, Selection},
+        document::{Change, ChangeError, EditRequest, JointPick, ReportedStep, Selection},
         limits::RigLimits,
         placement::joint_at,
         stroke::has_few_triangles,
@@ -26,7 +28,7 @@ use crate::{
     rig::{Rig, operations::MirrorPlane},
 };
 
-/// Number of gestures that a run may have on a rig of fewer joints.
+/// Number of gestures that a run may have on a rig of fewer joints and groups.
 const LEAST: usize = 64;
 
 /// Rig on which a run is carried out.
@@ -39,6 +41,8 @@ pub(super) struct RunRig<'a> {
     pub bounds: [Vec3; 2],
     /// True if strokes depend on nothing but the mesh at rest and the joints on which they start.
     pub can_draw: bool,
+    /// True if nothing but the last click depends on what is picked.
+    pub can_pick: bool,
     /// Plane of live mirroring, the same for all gestures of the run.
     pub symmetry: Option<MirrorPlane>,
 }
@@ -69,34 +73,78 @@ pub(super) struct ChainAnswer {
 /// Changes that the gestures of a run have requested so far.
 #[derive(Clone, Copy, Default)]
 struct RunState {
+    /// True if a joint is selected.
+    has_active: bool,
+    /// True after a change of the rig, which ends the cycle of clicks at one spot.
     has_changes: bool,
+    /// True if the last change is one of the rig, and not a pick.
+    is_edited: bool,
     /// True after an undone or redone step, which may pose or bind the mesh.
     has_steps: bool,
+    /// True after a joint was added.
+    has_joints: bool,
+    /// True after a joint was picked.
+    has_picks: bool,
     /// Number of strokes.
     strokes: usize,
 }
 
 impl RunState {
-    /// True if a gesture can be the next of the run.
-    fn takes(self, gesture: &Gesture) -> bool {
+    /// True if a gesture can be the next of the run; `next` is the one behind it.
+    fn takes(self, gesture: &Gesture, next: Option<&Gesture>, can_pick: bool) -> bool {
+        let picks = can_pick && self.strokes == 0 && self.has_changes;
         match gesture {
             Gesture::View(_) | Gesture::Depth(_) | Gesture::Volume(_) | Gesture::Recentre(_) | Gesture::Reach(_) => {
                 true
             }
+            Gesture::Group(..) | Gesture::Lock(_) => true,
             // The answer to a stroke names the joint that its chain hangs on.
             Gesture::Label(_) | Gesture::Undo | Gesture::Redo => self.strokes == 0,
-            Gesture::Click(_) | Gesture::Stroke { .. } => !self.has_steps,
+            Gesture::Click(_) => !self.has_steps,
+            Gesture::Stroke { .. } => !self.has_steps && !self.has_picks,
             // A selection that is cleared at once is a pick, which ends the cycle of clicks at one spot, as edits do.
             Gesture::Deselect => self.has_changes,
+            Gesture::SelectLabel(_) => picks,
+            // Between two edits no other click at that spot can follow.
+            Gesture::Select(_) => {
+                let is_apart = self.is_edited && !self.has_joints && !self.has_steps;
+                let is_left = matches!(next, Some(Gesture::Group(..) | Gesture::Lock(_) | Gesture::Label(_)));
+                picks && is_apart && is_left
+            }
             _ => false,
         }
+    }
+
+    /// Takes over a change that is requested.
+    fn note(&mut self, change: &Change) {
+        let is_edit = match change {
+            Change::Place(_) | Change::Draw { .. } => {
+                (self.has_joints, self.has_active) = (true, true);
+                true
+            }
+            Change::Undo | Change::Redo => {
+                self.has_steps = true;
+                true
+            }
+            Change::Select(joints) => {
+                self.has_active = !joints.is_empty();
+                false
+            }
+            Change::Pick(_) => {
+                (self.has_picks, self.has_active) = (true, true);
+                false
+            }
+            _ => self.has_active,
+        };
+        self.has_changes |= is_edit;
+        self.is_edited = is_edit;
     }
 }
 
 /// True if the next gestures of a script make a run: the rig is at rest, and no joint of it moves the mesh.
 pub(super) fn is_due(script: &GestureScript, rig: &Rig, surface: Option<&RigSurface>) -> bool {
     script.is_unwatched
-        && script.waiting.front().is_some_and(|gesture| RunState::default().takes(gesture))
+        && script.waiting.front().is_some_and(|gesture| RunState::default().takes(gesture, None, false))
         && rig.pose().is_empty()
         && rig.skins().next().is_none()
         && surface.is_none_or(|surface| !surface.is_stale())
@@ -109,11 +157,17 @@ pub(super) fn carry_out(
     edits: &mut MessageWriter<EditRequest>,
     limits: &RigLimits,
 ) -> bool {
-    let mut joints = RunJoints::new(run);
+    let (mut joints, mut picks) = (RunJoints::new(run), RunPicks::default());
     let mut has_begun = false;
-    let mut state = RunState::default();
-    for _ in 0..run.rig.len().max(LEAST) {
-        let Some(gesture) = script.waiting.front().filter(|gesture| state.takes(gesture)) else { break };
+    let mut state = RunState { has_active: run.selection.active().is_some(), ..RunState::default() };
+    for _ in 0..run.rig.len().max(run.rig.groups().len()).max(LEAST) {
+        let (gesture, next) = (script.waiting.front(), script.waiting.get(1));
+        let Some(gesture) = gesture.filter(|gesture| state.takes(gesture, next, run.can_pick)) else { break };
+        let mut pick = None;
+        if let Gesture::Select(point) = gesture {
+            let Some(found) = picks.picked(run, &script.state.plane(run.bounds), (*point).into()) else { break };
+            pick = Some(found);
+        }
         let mut start = None;
         if let Gesture::Stroke { points, joints: count, .. } = gesture {
             let (plane, size) = (script.state.plane(run.bounds), (run.bounds[1] - run.bounds[0]).max_element());
@@ -129,8 +183,11 @@ pub(super) fn carry_out(
         }
         has_begun = true;
         let Some(gesture) = script.begin_next(run.rig.len(), limits) else { continue };
-        state.has_steps |= matches!(gesture, Gesture::Undo | Gesture::Redo);
         let (change, chain) = match (start, gesture) {
+            (_, Gesture::Select(_)) => {
+                let Some(joint) = pick else { continue };
+                (Change::Pick(JointPick::Joint(joint)), None)
+            }
             (Some(start), Gesture::Stroke { points, threshold, joints }) => {
                 let request = script.state.stroke(run.entity, run.bounds, &points, threshold, joints);
                 let Some((change, chain)) = script.drawn_chain(&request, start, run) else { continue };
@@ -143,7 +200,7 @@ pub(super) fn carry_out(
             }
         };
         joints.note(&change, run.symmetry.as_ref());
-        state.has_changes = true;
+        state.note(&change);
         if !matches!(change, Change::Select(_)) {
             script.requested.push_back(RequestedChange { answer: script.answers.len() - 1, chain });
         }
@@ -164,6 +221,9 @@ impl GestureScript {
                 placed.rest.map(Change::Place)
             }
             Gesture::Label(label) => Some(Change::LabelActive(label)),
+            Gesture::Group(name, color) => Some(Change::GroupSelected { name, color: color.map(<[f32; 3]>::from) }),
+            Gesture::Lock(locked) => Some(Change::LockSelected(locked)),
+            Gesture::SelectLabel(label) => Some(Change::Pick(JointPick::Label(label))),
             Gesture::Deselect => Some(Change::Select(Vec::new())),
             Gesture::Undo => Some(Change::Undo),
             Gesture::Redo => Some(Change::Redo),
@@ -184,6 +244,9 @@ impl GestureScript {
                 answer.joints_added = step.added;
                 if let (Some(told), Some(drawn)) = (chain, step.chain) {
                     answer.message = told_chain(rig, told.joints, drawn.parent, &told.notes);
+                }
+                if let Some(name) = &step.picked {
+                    answer.message = format!("selected {name}");
                 }
                 // A click has told where its joint is.
                 if answer.message.is_empty() {

@@ -23,7 +23,7 @@ use crate::{
         limits::{Limit, RigLimits},
         picking::{Pick, PickRequest},
         placement::PlaceRequest,
-        stroke::{StrokeParent, StrokeRequest},
+        stroke::{StrokeParent, StrokeRequest, StrokeTips},
         surface::{RigMeshes, RigSurface},
     },
     rig::{
@@ -185,7 +185,7 @@ pub(super) type ScriptedRig<'a> = (
     Option<&'a RigSurface>,
     Option<&'a RigMeshes>,
     (Has<FittedRig>, Has<FitMarkers>),
-    Has<BuildResult>,
+    (Has<BuildResult>, Has<StrokeTips>),
 );
 
 /// Reads the answers to the last gesture of each script and carries out the next one.
@@ -196,7 +196,9 @@ pub(super) fn run_scripts(
     limits: Res<RigLimits>,
 ) {
     answers.collect(&mut scripts);
-    for (entity, mut script, rig, selection, mut symmetry, surface, meshes, is_fitted, is_built) in &mut scripts {
+    for (entity, mut script, rig, selection, mut symmetry, surface, meshes, is_fitted, (is_built, has_tips)) in
+        &mut scripts
+    {
         if script.pending
             || script.waiting.is_empty()
             || (meshes.is_some() && surface.and_then(RigSurface::ready).is_none())
@@ -211,7 +213,9 @@ pub(super) fn run_scripts(
             // Commands that were built, and clips, may move joints away from their rest.
             let is_still = (!rig.has_tags() || !is_built) && rig.clips().is_empty();
             let can_draw = has_mesh && is_known && is_still;
-            let run = RunRig { entity, rig, selection, surface, bounds, can_draw, symmetry: symmetry.0 };
+            // Controls are picked before joints, and strokes go on from joints that nobody picked.
+            let can_pick = can_draw && !rig.has_tags() && !is_built && !has_tips;
+            let run = RunRig { entity, rig, selection, surface, bounds, can_draw, can_pick, symmetry: symmetry.0 };
             if click_run::carry_out(&mut script, &run, &mut requests.edits, &limits) {
                 continue;
             }

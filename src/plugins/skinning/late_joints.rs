@@ -1,7 +1,7 @@
 //! Created joints that are built after a mesh was bound: when a feature or group is switched on, its twist and half joints take
 //! their shares from the weights that the mesh has.
 
-use std::sync::Arc;
+use std::{collections::HashSet, sync::Arc};
 
 use bevy::{prelude::*, tasks::AsyncComputeTaskPool};
 
@@ -96,17 +96,22 @@ fn switches_on(step: &Step) -> bool {
 /// True if twist or half joints are built that the weights do not name.
 fn lacks_joints(rig: &Rig, built: &BuiltRig, skin: &SkinData) -> bool {
     let skeleton = DeformSkeleton::new(rig, Some(built));
-    let mut created = skeleton.joints().iter().filter(|joint| joint.twist.is_some() || joint.halves.is_some());
-    created.any(|joint| !skin.joints.contains(&joint.uid))
+    let mut created =
+        skeleton.joints().iter().filter(|joint| joint.twist.is_some() || joint.halves.is_some()).peekable();
+    if created.peek().is_none() {
+        return false;
+    }
+    let named: HashSet<Uid> = skin.joints.iter().copied().collect();
+    created.any(|joint| !named.contains(&joint.uid))
 }
 
 impl SkinningInput {
     /// The weights that a mesh has, with shares for the created joints that they do not name.
     fn late_shares(&self, mesh: &RigMesh, skin: &SkinData) -> BoundSkin {
         let created = self.joints.iter().map(|joint| joint.twist.is_some() || joint.halves.is_some());
-        let is_late = |((uid, is_created), is_locked): ((&Uid, bool), &bool)| {
-            is_created && !is_locked && !skin.joints.contains(uid)
-        };
+        let named: HashSet<Uid> = skin.joints.iter().copied().collect();
+        let is_late =
+            |((uid, is_created), is_locked): ((&Uid, bool), &bool)| is_created && !is_locked && !named.contains(uid);
         let is_late: Vec<bool> = self.uids.iter().zip(created).zip(&self.locked).map(is_late).collect();
         let points = &mesh.rest.points;
         let mut is_fixed = vec![false; points.len()];

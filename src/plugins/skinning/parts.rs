@@ -1,6 +1,9 @@
 //! Parts of a mesh: its objects and connected pieces, with the names by which people choose a binding for them.
 
-use std::{collections::BTreeMap, ops::Range};
+use std::{
+    collections::{BTreeMap, HashSet},
+    ops::Range,
+};
 
 use crate::{
     mesh::{adjacency, model::Model},
@@ -48,8 +51,11 @@ impl MeshParts {
         let number = |piece: usize| format!("part {}", piece + 1);
         let mut names: Vec<String> = (0..count).map(number).collect();
         let object_names = object_names(model, &objects);
+        let of_objects: HashSet<&String> = object_names.iter().collect();
+        let mut of_pieces: HashSet<String> = names.iter().cloned().collect();
         for (piece, name) in material_names(model, &piece_of) {
-            if !object_names.contains(&name) && !names.contains(&name) {
+            if !of_objects.contains(&name) && of_pieces.insert(name.clone()) {
+                of_pieces.remove(&names[piece]);
                 names[piece] = name;
             }
         }
@@ -184,15 +190,17 @@ fn object_names(model: &Model, objects: &[Option<usize>]) -> Vec<String> {
     for (piece, object) in objects.iter().enumerate() {
         pieces.entry(object.unwrap_or(usize::MAX)).or_default().push(piece);
     }
-    let name = |(number, object): (usize, &crate::mesh::model::Object)| {
-        let is_first = model.objects[..number].iter().all(|other| other.name != object.name);
-        match pieces.get(&number).map(Vec::as_slice) {
+    let mut earlier: HashSet<&str> = HashSet::with_capacity(model.objects.len());
+    let mut names = Vec::with_capacity(model.objects.len());
+    for (number, object) in model.objects.iter().enumerate() {
+        let is_first = earlier.insert(object.name.as_str());
+        names.push(match pieces.get(&number).map(Vec::as_slice) {
             _ if !object.name.is_empty() && is_first => object.name.clone(),
             Some([piece]) => format!("part {}", piece + 1),
             _ => format!("object {}", number + 1),
-        }
-    };
-    model.objects.iter().enumerate().map(name).collect()
+        });
+    }
+    names
 }
 
 /// Names of materials that one piece alone has, of pieces with one material.

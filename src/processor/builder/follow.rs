@@ -42,8 +42,10 @@ impl Builder {
         match edit {
             RigEdit::SetTag(joint, tag) => {
                 let TagKind::Command { module, params, .. } = &tag.kind else { return false };
-                let tags = rig.joint(*joint).map(|joint| &joint.data.tags);
-                let Some(tag) = tags.and_then(|tags| tags.iter().find(|now| now.uid == tag.uid)) else { return false };
+                let Some((bearer, tag)) = rig.find_tag(tag.uid) else { return false };
+                if bearer.data.uid != *joint {
+                    return false;
+                }
                 let Some(number) = self.world.creator_of(tag.uid) else { return false };
                 let TagKind::Command { feature, .. } = &tag.kind else { return false };
                 let command = &mut self.commands[number as usize];

@@ -74,7 +74,7 @@ impl BuildScope<'_> {
         if name.trim().is_empty() {
             return Err(ModuleError::parameter("name", "an attribute needs a name"));
         }
-        if list.iter().any(|known| known.name == *name) {
+        if list.has(name) {
             let node = self.name(node);
             return Err(ModuleError::other(format!("{node} has an attribute \"{name}\" already; choose another name")));
         }
@@ -101,7 +101,7 @@ impl BuildScope<'_> {
     /// If the node has no such attribute, with the nearest names.
     pub fn attribute(&mut self, node: NodeId, name: &str) -> Result<Scalar, ModuleError> {
         let list = self.attributes(node);
-        if list.iter().any(|known| *known.name == *name) {
+        if list.has(name) {
             return Ok(Scalar::attribute(self.uid(node), name));
         }
         let nearest = crate::rig::nearest::did_you_mean(name, list.iter().map(|known| known.name.to_string()));

@@ -1,25 +1,10 @@
-//! Edits that move tags to other joints, and what is stored of nodes to other nodes.
+//! Edits that move what is stored of nodes to other nodes.
 
 use std::collections::BTreeMap;
 
-use crate::rig::{EditError, Rig, RigEdit, Uid};
+use crate::rig::{Rig, RigEdit, Uid};
 
 impl Rig {
-    /// Moves a tag to a place among the tags of a joint.
-    pub(super) fn move_tag(&mut self, tag: Uid, joint: Uid, index: usize) -> Result<RigEdit, EditError> {
-        let from = self.tags.get(&tag).copied().ok_or(EditError::NoTag(joint, tag))?;
-        if !self.joints.contains_key(&joint) {
-            return Err(EditError::NoJoint(joint));
-        }
-        let tags = &mut self.joint_mut(from)?.data.tags;
-        let place = tags.iter().position(|known| known.uid == tag).ok_or(EditError::NoTag(from, tag))?;
-        let moved = tags.remove(place);
-        let tags = &mut self.joint_mut(joint)?.data.tags;
-        tags.insert(index.min(tags.len()), moved);
-        self.tags.insert(tag, joint);
-        Ok(RigEdit::MoveTag { tag, joint: from, index: place })
-    }
-
     /// Exchanges what is stored of the two nodes of each pair, pair after pair.
     pub(super) fn exchange_nodes(&mut self, pairs: &[(Uid, Uid)]) -> RigEdit {
         for &(one, other) in pairs {

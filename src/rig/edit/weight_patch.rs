@@ -156,7 +156,9 @@ impl WeightPatch {
     pub(super) fn applied(&self, skin: &SkinData) -> SkinData {
         let (stay, leave) = skin.joints.split_at(self.kept as usize);
         let mut subjects = skin.subjects.clone();
-        subjects.retain(|joint, _| !leave.contains(joint));
+        for joint in leave {
+            subjects.remove(joint);
+        }
         subjects.extend(self.added.iter().filter_map(|(joint, subject)| Some((*joint, (*subject)?))));
         SkinData {
             joints: stay.iter().copied().chain(self.added.iter().map(|(joint, _)| *joint)).collect(),

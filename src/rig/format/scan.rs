@@ -79,15 +79,26 @@ fn end_at(fields: &mut [Field], field: Option<usize>, end: usize) {
 
 /// Elements of lists around a place, the innermost first, each without white space, comments and comma around it.
 pub(crate) fn elements_around(text: &str, offset: usize) -> Vec<Range<usize>> {
+    let mut found = Vec::new();
+    each_element(text, |element| found.extend(Some(element).filter(|element| element.contains(&offset))));
+    found
+}
+
+/// All elements of lists, each without white space, comments and comma around it, in the order of their ends.
+pub(crate) fn list_elements(text: &str) -> Vec<Range<usize>> {
+    let mut found = Vec::new();
+    each_element(text, |element| found.push(element));
+    found
+}
+
+/// Calls `take` with each element of a list that ends.
+fn each_element(text: &str, mut take: impl FnMut(Range<usize>)) {
     /// Open bracket: of a list, with the start of its element that goes on, if one does.
     struct Open {
         is_list: bool,
         element: Option<usize>,
     }
-    let mut found = Vec::new();
-    let mut close = |start: Option<usize>, end: usize| {
-        found.extend(start.map(|start| start..end).filter(|element| element.contains(&offset)));
-    };
+    let mut close = |start: Option<usize>, end: usize| start.into_iter().for_each(|start| take(start..end));
     let mut open: Vec<Open> = Vec::new();
     let mut end = 0;
     for token in tokens(text) {
@@ -104,7 +115,6 @@ pub(crate) fn elements_around(text: &str, offset: usize) -> Vec<Range<usize>> {
         }
         end = token.start + token.text.len();
     }
-    found
 }
 
 /// Fault of the brackets of a text, with its places as byte offsets.

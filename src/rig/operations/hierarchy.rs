@@ -18,7 +18,14 @@ pub(super) fn delete(draft: &mut Draft, joints: &[Uid], keep_children: bool) -> 
         if keep_children {
             doomed.push(joint);
         } else {
-            doomed.extend(draft.rig().hierarchy(joint).map(|j| j.data.uid).filter(|uid| seen.insert(*uid)));
+            // Whatever stands below a joint that is listed already is listed, too.
+            let mut open = vec![joint];
+            while let Some(uid) = open.pop() {
+                if seen.insert(uid) {
+                    doomed.push(uid);
+                    open.extend(draft.rig().children(Some(uid)).iter().rev());
+                }
+            }
         }
     }
     // Children are deleted before parents. A hierarchy lists parents first, and a joint may be listed before its own
@@ -56,8 +63,9 @@ fn lift_children(draft: &mut Draft, joint: Uid) -> Result<(), OperationError> {
 
 /// Reparents joints below `parent` without moving them; partners go below the partner of `parent`.
 pub(super) fn reparent(draft: &mut Draft, joints: &[Uid], parent: Option<Uid>) -> Result<(), OperationError> {
+    let listed: HashSet<Uid> = joints.iter().copied().collect();
     for &joint in joints {
-        let partner = draft.partner(joint).filter(|partner| !joints.contains(partner));
+        let partner = draft.partner(joint).filter(|partner| !listed.contains(partner));
         reparent_one(draft, joint, parent)?;
         if let Some(partner) = partner {
             let other_parent = parent.map(|parent| draft.partner(parent).unwrap_or(parent));

@@ -1,5 +1,7 @@
 //! Turning joints along their bones.
 
+use std::collections::HashSet;
+
 use bevy::math::{Affine3, Mat3, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -28,13 +30,14 @@ pub(super) fn orient(draft: &mut Draft, joints: &[Uid], along: Axis) -> Result<(
         order.push((draft.rig().root_and_depth(joint).1, joint));
     }
     order.sort_by_key(|(depth, _)| *depth);
+    let listed: HashSet<Uid> = joints.iter().copied().collect();
     for (_, joint) in order {
         let global = draft.rig().rest_global(joint);
         let Some(rotation) = rotation_for(draft, joint, along) else { continue };
         let (scale, _, translation) = global.to_scale_rotation_translation();
         let turned = Affine3::from_scale_rotation_translation(scale, rotation, translation);
         draft.keeping_children(joint, |draft| draft.set_global(joint, &turned))?;
-        let partner = draft.partner(joint).filter(|partner| !joints.contains(partner));
+        let partner = draft.partner(joint).filter(|partner| !listed.contains(partner));
         if let (Some(partner), Some(plane)) = (partner, draft.symmetry()) {
             let mirrored = plane.mirrored_affine(&turned);
             draft.keeping_children(partner, |draft| draft.set_global(partner, &mirrored))?;

@@ -8,7 +8,10 @@ mod part;
 mod paste;
 mod steady_names;
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{BTreeMap, HashSet},
+    sync::Arc,
+};
 
 pub use clipboard::{CopiedIdentifiers, CopiedJoint, TagClipboard, TagScope};
 pub use insert::Rewiring;
@@ -392,12 +395,26 @@ fn refresh(rig: &Rig, tag: &mut TagData) {
 }
 
 fn delete(draft: &mut Draft, tags: &[Uid]) -> Result<(), OperationError> {
+    let mut features = HashSet::new();
     for &uid in tags {
-        let (joint, tag) = found(draft, uid)?;
+        let (_, tag) = draft.rig().find_tag(uid).ok_or(TagError::NoTag(uid))?;
         if matches!(tag.kind, TagKind::Feature { .. }) {
-            let commands: Vec<Uid> = feature::commands_of(draft.rig(), uid).map(|(_, tag)| tag.uid).collect();
-            attach(draft, &commands, None)?;
+            features.insert(uid);
         }
+    }
+    if !features.is_empty() {
+        let all = draft.rig().walk().flat_map(|joint| &joint.data.tags);
+        let is_in_one = |tag: &&TagData| match tag.kind {
+            TagKind::Command { feature: Some(feature), .. } => features.contains(&feature),
+            _ => false,
+        };
+        let commands: Vec<Uid> = all.filter(is_in_one).map(|tag| tag.uid).collect();
+        attach(draft, &commands, None)?;
+    }
+    // The last ones first, which leaves the places of the others.
+    for &uid in tags.iter().rev() {
+        let (joint, _) = draft.rig().find_tag(uid).ok_or(TagError::NoTag(uid))?;
+        let joint = joint.data.uid;
         draft.apply(RigEdit::RemoveTag(joint, uid))?;
     }
     Ok(())
@@ -416,32 +433,32 @@ fn attach(draft: &mut Draft, tags: &[Uid], to: Option<Uid>) -> Result<(), Operat
 
 fn relocate(draft: &mut Draft, tags: &[Uid], joint: Uid, before: Option<Uid>) -> Result<(), OperationError> {
     let mut moved: Vec<Uid> = Vec::with_capacity(tags.len());
+    let mut is_moved: HashSet<Uid> = HashSet::with_capacity(tags.len());
     for &tag in tags {
         found(draft, tag)?;
-        if !moved.contains(&tag) {
+        if is_moved.insert(tag) {
             moved.push(tag);
         }
     }
-    let order = |draft: &Draft| -> Result<Vec<Uid>, OperationError> {
-        let joint = draft.rig().joint(joint).ok_or(EditError::NoJoint(joint))?;
-        Ok(joint.data.tags.iter().map(|tag| tag.uid).collect())
-    };
-    let old = order(draft)?;
+    let bearer = draft.rig().joint(joint).ok_or(EditError::NoJoint(joint))?;
+    let old: Vec<Uid> = bearer.data.tags.iter().map(|tag| tag.uid).collect();
     let start = match before {
         Some(before) => old.iter().position(|tag| *tag == before).ok_or(EditError::NoTag(joint, before))?,
         None => old.len(),
     };
     // The next tag that does not move itself.
-    let next = old[start..].iter().find(|tag| !moved.contains(tag)).copied();
-    let mut wanted: Vec<Uid> = old.iter().filter(|tag| !moved.contains(tag)).copied().collect();
+    let next = old[start..].iter().find(|tag| !is_moved.contains(tag)).copied();
+    let mut wanted: Vec<Uid> = old.iter().filter(|tag| !is_moved.contains(tag)).copied().collect();
     let place = next.and_then(|next| wanted.iter().position(|tag| *tag == next)).unwrap_or(wanted.len());
     wanted.splice(place..place, moved.iter().copied());
     if wanted == old {
         return Ok(());
     }
     for &tag in &moved {
-        let mut others = order(draft)?.into_iter().filter(|other| *other != tag);
-        let index = others.position(|other| Some(other) == next).unwrap_or(usize::MAX);
+        // The place before the next tag, once the moved one has left its own place.
+        let before = next.and_then(|next| draft.rig().tag_place(joint, next));
+        let own = draft.rig().tag_place(joint, tag);
+        let index = before.map_or(usize::MAX, |before| before - usize::from(own.is_some_and(|own| own < before)));
         draft.apply(RigEdit::MoveTag { tag, joint, index })?;
     }
     Ok(())

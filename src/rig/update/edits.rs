@@ -68,7 +68,8 @@ fn key_edit(clip: Uid, layer: Uid, target: &TrackTarget, now: Option<&Track>, th
 /// The edits after which `from` has the content of `to`: header, groups, inputs, joints, tags and stored poses, each list in
 /// its order there. Weights, the current pose, attribute values, clips, selection sets, cuts of faces and the record of
 /// dropped parts stay; what is stored of joints that go, goes with them. What is the same in both is not touched, except
-/// that the joints of a group that moves are out of it meanwhile.
+/// that the joints of a group that moves are out of it meanwhile. A uid of things of two kinds, such as a joint in `from` and a
+/// group in `to`, is a removal and an addition.
 ///
 /// # Errors
 /// [`EditError`] of an edit that is refused: one of the two has values that no rig can have.
@@ -77,8 +78,9 @@ pub fn edits_between(from: &Rig, to: &Rig) -> Result<Vec<RigEdit>, EditError> {
     if from.about() != to.about() {
         steps.apply(RigEdit::SetAbout(Box::new(to.about().clone())))?;
     }
+    steps.other_kinds(to)?;
     steps.groups(to)?;
-    if from.inputs() != to.inputs() {
+    if steps.rig.inputs() != to.inputs() {
         steps.apply(RigEdit::SetInputs(to.inputs().to_vec()))?;
     }
     steps.leaving_tags(to)?;
@@ -121,6 +123,39 @@ impl Steps {
             }
         }
         Ok(())
+    }
+
+    /// Takes away what has the uid of a thing of another kind in `to`. Joints below such a joint are roots meanwhile.
+    fn other_kinds(&mut self, to: &Rig) -> Result<(), EditError> {
+        let is_other = |uid: Uid, is_same_kind: bool| !is_same_kind && to.is_taken(uid);
+        let all = self.rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| (joint.data.uid, tag.uid)));
+        let tags: Vec<(Uid, Uid)> = all.filter(|(_, tag)| is_other(*tag, to.tags.contains_key(tag))).collect();
+        tags.into_iter().try_for_each(|(joint, tag)| self.apply(RigEdit::RemoveTag(joint, tag)))?;
+        let all = self.rig.walk().map(|joint| joint.data.uid);
+        let joints: Vec<Uid> = all.filter(|joint| is_other(*joint, to.joint(*joint).is_some())).collect();
+        for uid in joints.into_iter().rev() {
+            for joint in self.rig.children(Some(uid)).to_vec().into_iter().rev() {
+                self.apply(RigEdit::SetParent { joint, parent: None, index: usize::MAX })?;
+            }
+            self.apply(RigEdit::RemoveJoint(uid))?;
+        }
+        let all = self.rig.groups().iter().map(|group| group.uid);
+        let groups: HashSet<Uid> = all.filter(|group| is_other(*group, to.group(*group).is_some())).collect();
+        if !groups.is_empty() {
+            let is_in_one = |joint: &&RigJoint| joint.data.group.is_some_and(|group| groups.contains(&group));
+            let members: Vec<Uid> = self.rig.walk().filter(is_in_one).map(|joint| joint.data.uid).collect();
+            members.into_iter().try_for_each(|joint| self.apply(RigEdit::SetGroup(joint, None)))?;
+            let listed: Vec<Uid> = self.rig.groups().iter().map(|group| group.uid).collect();
+            for uid in listed.into_iter().rev().filter(|uid| groups.contains(uid)) {
+                self.apply(RigEdit::RemoveLocalGroup(uid))?;
+            }
+        }
+        let all = self.rig.stored_poses().iter().map(|pose| pose.uid);
+        let poses: Vec<Uid> = all.filter(|pose| is_other(*pose, to.stored_pose(*pose).is_some())).collect();
+        poses.into_iter().try_for_each(|pose| self.apply(RigEdit::RemoveStoredPose(pose)))?;
+        let mut inputs = self.rig.inputs().to_vec();
+        inputs.retain(|input| !is_other(input.uid, to.input(input.uid).is_some()));
+        if inputs.len() < self.rig.inputs().len() { self.apply(RigEdit::SetInputs(inputs)) } else { Ok(()) }
     }
 
     fn groups(&mut self, to: &Rig) -> Result<(), EditError> {

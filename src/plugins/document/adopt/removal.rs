@@ -18,8 +18,9 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
         let dead: HashMap<Entity, IndexedEntity> = writes.dead.iter().copied().collect();
         let is_joint = |indexed: &IndexedEntity| indexed.part == EntityPart::Joint;
         let joints = writes.dead.iter().map(|(_, indexed)| *indexed).filter(is_joint);
+        let mut tops = HashMap::new();
         let along: HashSet<Uid> =
-            joints.map(|joint| joint.uid).filter(|joint| self.went_along(*joint, &dead)).collect();
+            joints.map(|joint| joint.uid).filter(|joint| self.went_along(*joint, &dead, &mut tops)).collect();
         let mut deleted = Vec::new();
         for (entity, indexed) in &writes.dead {
             self.index.remove(*entity);
@@ -51,6 +52,18 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
             self.trial.look_at_entity(self.trial.rig_entity);
             self.trial.operate(EntityWrite::DespawnedJoint, &delete);
         }
+        let uids_of = |part: EntityPart| -> HashSet<Uid> {
+            writes.dead.iter().filter(|(_, indexed)| indexed.part == part).map(|(_, indexed)| indexed.uid).collect()
+        };
+        let (dead_tags, dead_groups) = (uids_of(EntityPart::Tag), uids_of(EntityPart::Group));
+        let mut members: HashMap<Uid, Vec<Uid>> = HashMap::new();
+        if !dead_groups.is_empty() {
+            for joint in self.rig().walk() {
+                if let Some(group) = joint.data.group.filter(|group| dead_groups.contains(group)) {
+                    members.entry(group).or_default().push(joint.data.uid);
+                }
+            }
+        }
         for (_, indexed) in &writes.dead {
             let uid = indexed.uid;
             self.trial.look_at(uid);
@@ -62,40 +75,46 @@ impl Adoption<'_, '_, '_, '_, '_, '_> {
                         self.trial.edit(EntityWrite::DespawnedTag, vec![RigEdit::RemoveTag(joint, uid)]);
                     }
                     self.tags.tags.remove(&uid);
-                    for mirrored in self.joints.joints.values_mut() {
-                        mirrored.tags.retain(|tag| *tag != uid);
-                    }
                 }
                 EntityPart::Group => {
                     self.groups.groups.remove(&uid);
-                    let members =
-                        self.rig().walk().filter(|joint| joint.data.group == Some(uid)).map(|joint| joint.data.uid);
+                    let members = members.remove(&uid).unwrap_or_default().into_iter();
                     let mut edits: Vec<RigEdit> = members.map(|joint| RigEdit::SetGroup(joint, None)).collect();
                     edits.push(RigEdit::RemoveLocalGroup(uid));
                     if self.rig().group(uid).is_some() {
                         self.trial.edit(EntityWrite::DespawnedLocalGroup, edits);
                     }
-                    for mirrored in self.joints.joints.values_mut().filter(|mirrored| mirrored.group == Some(uid)) {
-                        mirrored.group = None;
-                    }
                 }
                 EntityPart::Joint | EntityPart::Node | EntityPart::Constraint => {}
             }
         }
+        if dead_tags.is_empty() && dead_groups.is_empty() {
+            return;
+        }
+        for mirrored in self.joints.joints.values_mut() {
+            mirrored.tags.retain(|tag| !dead_tags.contains(tag));
+            mirrored.group = mirrored.group.filter(|group| !dead_groups.contains(group));
+        }
     }
 
     /// True if a joint's entity was despawned because of a created node above it, not by itself or because of another
-    /// joint.
-    fn went_along(&self, joint: Uid, dead: &HashMap<Entity, IndexedEntity>) -> bool {
+    /// joint. `known` keeps the answer for each entity on the way up, so that a way that joints share is walked once.
+    fn went_along(&self, joint: Uid, dead: &HashMap<Entity, IndexedEntity>, known: &mut HashMap<Entity, bool>) -> bool {
+        let (mut way, mut is_created) = (Vec::new(), false);
         let mut above = self.joints.joints.get(&joint).and_then(|mirrored| mirrored.parent);
-        let mut is_created = false;
-        while let Some(indexed) = above.and_then(|above| dead.get(&above)) {
+        while let Some((entity, indexed)) = above.and_then(|above| Some((above, dead.get(&above)?))) {
+            if let Some(found) = known.get(&entity) {
+                is_created = *found;
+                break;
+            }
+            way.push(entity);
             is_created = indexed.part == EntityPart::Node;
             above = match indexed.part {
                 EntityPart::Joint => self.joints.joints.get(&indexed.uid).and_then(|mirrored| mirrored.parent),
                 _ => self.built.as_ref().and_then(|built| built.nodes.get(&indexed.uid)).and_then(|node| node.parent),
             };
         }
+        known.extend(way.into_iter().map(|entity| (entity, is_created)));
         is_created
     }
 

@@ -4,12 +4,10 @@ mod hung_joints;
 mod inputs;
 mod instance_places;
 mod parts;
+mod places;
 mod survey;
 
-use std::{
-    collections::{BTreeMap, HashMap, HashSet},
-    ops::Range,
-};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use bevy::math::{Quat, Vec3};
 
@@ -32,6 +30,8 @@ use crate::rig::{
     part::PartSocket,
     reference::{RigNameIndex, bind_names, refresh_names},
 };
+
+use places::Places;
 
 pub(super) use parts::derived_tag_uids;
 pub use survey::survey_template;
@@ -71,7 +71,7 @@ fn read_explicit(explicit: &ExplicitText, first_line: usize) -> Result<Template,
     let known = TEMPLATE.readable(text, &fields, first_line, &mut notes)?;
     let file = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
     let mut faults = Vec::new();
-    let template = build(&Places { text, fields: &fields, left_out: &[] }, file, notes, &mut faults);
+    let template = build(&Places::new(text, &fields, &[]), file, notes, &mut faults);
     match faults.into_iter().next() {
         Some(fault) => Err(fault),
         None => Ok(in_text(explicit, template).with_unbound_told()),
@@ -413,58 +413,5 @@ fn tag_from(tag: TagFile) -> TagData {
         TagFile::Feature { uid, enabled, comment, kind, name, switch, choice } => {
             TagData { uid, enabled, comment, kind: TagKind::Feature { kind, name, switch, choice } }
         }
-    }
-}
-
-/// Finds the places of declarations in the text.
-struct Places<'a> {
-    text: &'a str,
-    fields: &'a [Field<'a>],
-    /// Elements of lists that are not read, because they are at fault.
-    left_out: &'a [Range<usize>],
-}
-
-impl Places<'_> {
-    /// True if something with that uid is declared in an element that is not read.
-    fn is_left_out(&self, uid: Uid) -> bool {
-        let digits = uid.to_string();
-        let declares = |field: &&Field| {
-            field.name == "uid" && self.text[field.value..field.end].trim_start_matches([' ', '"']).starts_with(&digits)
-        };
-        !self.left_out.is_empty() && self.fields.iter().filter(declares).any(|field| self.is_inside_left_out(field))
-    }
-
-    /// True if the template uses parts.
-    fn has_parts(&self) -> bool {
-        let is_of_part = |field: &Field| {
-            let list = field.parent.map(|parent| &self.fields[parent]);
-            field.depth == 3 && list.is_some_and(|list| list.depth == 1 && list.name == "parts")
-        };
-        self.fields.iter().any(is_of_part)
-    }
-
-    /// True for a field in an element that is not read.
-    fn is_inside_left_out(&self, field: &Field) -> bool {
-        self.left_out.iter().any(|range| range.contains(&field.start))
-    }
-
-    fn used_twice(&self, uid: Uid) -> SourceError {
-        self.error(uid, 1, "uid", format!("uid {uid} is used twice; give the second a uid of its own"))
-    }
-
-    /// An error at the field `name` of the `nth` declaration with that uid (or of the first).
-    fn error(&self, uid: Uid, nth: usize, name: &str, message: String) -> SourceError {
-        let digits = uid.to_string();
-        let declares = |field: &&Field| {
-            let value = self.text[field.value..field.end].trim_start().trim_start_matches('"');
-            field.depth > 1
-                && field.name == "uid"
-                && known_names(self.fields, field).is_some()
-                && value.get(..digits.len()).is_some_and(|value| value.eq_ignore_ascii_case(&digits))
-        };
-        let thing = self.fields.iter().filter(declares).nth(nth).or_else(|| self.fields.iter().find(declares));
-        let field = thing.and_then(|uid| self.fields.iter().find(|f| f.bracket == uid.bracket && f.name == name));
-        let at = field.or(thing).map_or(0, |field| field.start);
-        SourceError::at(self.text, at, message)
     }
 }

@@ -19,7 +19,7 @@ use crate::rig::{
     Uid, UidError, degrees,
     format::{
         scan::tokens,
-        source::SourceError,
+        source::{SourceError, TextLines},
         template::{quaternion, quoted},
         tree::{Item, NodeId, Tree},
     },
@@ -81,6 +81,15 @@ impl<'a> ExplicitText<'a> {
             true => error,
             false => SourceError::at(self.source, self.in_source(error.offset), error.message),
         }
+    }
+
+    /// Errors in the text as errors in the source.
+    pub(super) fn faults_in_source(&self, errors: Vec<SourceError>) -> Vec<SourceError> {
+        if self.pieces.is_empty() || errors.is_empty() {
+            return errors;
+        }
+        let lines = TextLines::new(self.source);
+        errors.into_iter().map(|error| lines.error(self.in_source(error.offset), error.message)).collect()
     }
 }
 
@@ -284,13 +293,15 @@ struct Writer<'d, 'a> {
     called: OnceCell<NameIndex<'d>>,
     changes: Vec<Change>,
     faults: Vec<SourceError>,
+    /// Lines of the text, marked for the first fault.
+    lines: OnceCell<TextLines<'a>>,
     parents: BTreeMap<Uid, String>,
 }
 
 impl<'d, 'a> Writer<'d, 'a> {
     fn new(declared: &'d Declarations<'a>) -> Self {
         let (called, parents) = (OnceCell::new(), BTreeMap::new());
-        Self { declared, called, changes: Vec::new(), faults: Vec::new(), parents }
+        Self { declared, called, changes: Vec::new(), faults: Vec::new(), lines: OnceCell::new(), parents }
     }
 
     fn called(&self) -> &NameIndex<'d> {
@@ -351,7 +362,7 @@ impl<'d, 'a> Writer<'d, 'a> {
                 Some(text) => UidError(text).to_string(),
                 None => format!("{} is no uid; write 16 hexadecimal digits in quotes", tree.written(field.value)),
             };
-            self.faults.push(SourceError::at(tree.text, tree.node(field.value).range.start, message));
+            self.tell(tree.node(field.value).range.start, message);
             self.replace(field.value, said);
         } else {
             let comma = if node.items.is_empty() { "" } else { ", " };
@@ -452,9 +463,15 @@ impl<'d, 'a> Writer<'d, 'a> {
         self.changes.push(Change { range, text });
     }
 
+    /// Tells a fault at a place of the text.
+    fn tell(&mut self, offset: usize, message: String) {
+        let error = self.lines.get_or_init(|| TextLines::new(self.declared.tree.text)).error(offset, message);
+        self.faults.push(error);
+    }
+
     /// Tells a fault of a field; returns the value that stands for the missing one.
     fn fault(&mut self, item: &Item, message: String) -> String {
-        self.faults.push(SourceError::at(self.tree().text, item.start, message));
+        self.tell(item.start, message);
         "None".to_owned()
     }
 }

@@ -257,8 +257,9 @@ impl<'d, 'a> Rewriter<'d, 'a> {
             let Some((old, new)) = both(declared) else { continue };
             self.joint(declared, old, new);
             for tag in tags {
-                let old = old.data.tags.iter().find(|old| old.uid == tag.uid);
-                let new = new.data.tags.iter().find(|new| new.uid == tag.uid);
+                let found = |rig: &Rig, joint: &RigJoint| rig.tag_place(joint.data.uid, tag.uid);
+                let old = found(before, old).and_then(|place| old.data.tags.get(place));
+                let new = found(rig, new).and_then(|place| new.data.tags.get(place));
                 if let (Some(old), Some(new)) = (old, new) {
                     self.tag(tag, old, new);
                 }

@@ -109,7 +109,7 @@ pub(super) fn sockets(places: &Places, files: Vec<SocketFile>, faults: &mut Vec<
             found.push(PartSocket { name, label: joint, joint: None, rest, angles, offset });
             continue;
         };
-        faults.push(SourceError::at(places.text, offset, fault));
+        faults.push(places.error_at(offset, fault));
     }
     found
 }
@@ -142,7 +142,7 @@ pub(super) fn options(places: &Places, files: Vec<OptionFile>, faults: &mut Vec<
             found.push(option);
             continue;
         };
-        faults.push(SourceError::at(places.text, offset, fault));
+        faults.push(places.error_at(offset, fault));
     }
     found
 }
@@ -158,7 +158,7 @@ pub(super) fn instances(places: &Places, parts: Vec<PartFile>, faults: &mut Vec<
     let mut found = Vec::with_capacity(parts.len());
     for file in parts {
         let offset = offsets.next().unwrap_or_default();
-        let mut fault = |message: String| faults.push(SourceError::at(places.text, offset, message));
+        let mut fault = |message: String| faults.push(places.error_at(offset, message));
         let uid = file.uid.unwrap_or_else(|| PartInstance::derived_uid(&file.part, &file.name, &file.onto));
         if !seen.insert(uid) {
             fault(format!("two uses of \"{}\" are called the same; give each a `name`", file.part));

@@ -1,6 +1,6 @@
 //! Survey of a template with faults: the structure is read again without what is at fault, until the rest can be read.
 
-use std::{borrow::Cow, ops::Range};
+use std::{borrow::Cow, collections::HashMap, ops::Range};
 
 use super::{
     super::{
@@ -14,8 +14,8 @@ use crate::rig::{
     SourceError,
     format::{
         commas::with_missing_commas,
-        scan::{self, Field, elements_around},
-        source::{ron_options, unknown_name},
+        scan::{self, Field, elements_around, list_elements},
+        source::{TextLines, ron_options, unknown_name},
     },
     template::quoted,
 };
@@ -61,29 +61,34 @@ fn survey(source: &str) -> Result<(Template, Vec<SourceError>), Vec<SourceError>
         TEMPLATE.readable(text, &fields, 1, &mut notes).map_err(|error| in_source(&explicit, vec![error]))?;
     // In a file of a newer format they are notes.
     let unknown = if matches!(readable, Cow::Borrowed(_)) { TEMPLATE.unknown(&fields) } else { Vec::new() };
-    for field in &unknown {
-        let known = known_names(&fields, field).unwrap_or_default();
-        let message = unknown_name("field", field.name, known);
-        faults.push(SourceError::at(text, field.start, message));
+    if !unknown.is_empty() {
+        let lines = TextLines::new(text);
+        faults.extend(unknown.iter().map(|field| {
+            let known = known_names(&fields, field).unwrap_or_default();
+            lines.error(field.start, unknown_name("field", field.name, known))
+        }));
     }
     let mut survey = Survey { text, fields: &fields, blank: Vec::new(), left_out: Vec::new(), stand_ins: Vec::new() };
     survey.blank.extend(unknown.iter().map(|field| field.start..field.end));
     let Some(file) = survey.read(&readable, &mut faults) else { return Err(in_source(&explicit, faults)) };
-    let places = Places { text, fields: &fields, left_out: &survey.left_out };
+    let places = Places::new(text, &fields, &survey.left_out);
     let template = build(&places, file, notes, &mut faults);
     Ok((in_text(&explicit, template), in_source(&explicit, faults)))
 }
 
 /// All faults of a text, those of its shorthand too, in the order of the source.
 fn in_source(explicit: &ExplicitText, faults: Vec<SourceError>) -> Vec<SourceError> {
-    let mut all: Vec<SourceError> = faults.into_iter().map(|fault| explicit.fault(fault)).collect();
-    let source = explicit.source();
+    let mut all = explicit.faults_in_source(faults);
+    all.sort_by_key(|fault| fault.offset);
+    let element_ends: HashMap<usize, usize> = match all.is_empty() || explicit.faults.is_empty() {
+        true => HashMap::new(),
+        false => list_elements(explicit.source()).into_iter().map(|element| (element.start, element.end)).collect(),
+    };
     // An element that cannot be read says nothing of its names.
     let is_unreadable = |fault: &SourceError| {
-        !all.is_empty()
-            && elements_around(source, fault.offset).first().is_some_and(|element| {
-                fault.offset == element.start && all.iter().any(|other| element.contains(&other.offset))
-            })
+        let first = all.partition_point(|other| other.offset < fault.offset);
+        let end = element_ends.get(&fault.offset);
+        end.is_some_and(|end| all.get(first).is_some_and(|other| other.offset < *end))
     };
     let of_shorthand: Vec<SourceError> =
         explicit.faults.iter().filter(|fault| !is_unreadable(fault)).cloned().collect();
