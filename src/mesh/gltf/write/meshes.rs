@@ -68,6 +68,7 @@ pub(super) fn write<'a>(
             }
         }
         nodes.push(node);
+        bin.begin_mesh();
         let mut primitives = Vec::with_capacity(parts.len());
         for part in parts {
             primitives.push(primitive(model, skeleton, object, part, &bake, bin)?);
@@ -141,7 +142,7 @@ fn primitive(
         return Err(GltfError::model(format!("object \"{}\" is too far away to be written", object.name)));
     }
     let mut attributes = Attributes::default();
-    attributes.put(Attribute::Position, bin.positions(&positions));
+    attributes.put(Attribute::Position, bin.vertices(&positions));
     let up = |normal: Vec3| if normal == Vec3::ZERO { Vec3::Y } else { normal };
     let normals: Vec<Vec3> = pick(&part.normals, &used).map(|normal| up(bake.normal(up(unit(normal))))).collect();
     if !normals.is_empty() {
