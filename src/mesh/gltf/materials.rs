@@ -9,7 +9,7 @@ use super::{
     accessor::Source,
     budget::{Budget, Notes},
     json::{JsonObject, copy, whole_float},
-    tree::{Fields, Json},
+    tree::Fields,
     uri,
 };
 use crate::mesh::model::{Image, MaterialSet};
@@ -205,8 +205,8 @@ pub(super) fn sniff(bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// A whole number within range, also when it is written as a float.
-fn whole(value: &Value) -> Option<usize> {
+/// A whole number of a carried value, within range, also when it is written as a float.
+pub(super) fn whole(value: &Value) -> Option<usize> {
     match value.as_u64() {
         Some(number) => usize::try_from(number).ok(),
         None => whole_float(value.as_f64()?),
