@@ -361,6 +361,19 @@ fn accessors_of_the_same_content_are_written_once() {
     }
     assert_eq!((count(&many, "meshes"), count(&many, "skins")), (20, 20));
     assert_eq!(many["buffers"], one["buffers"]);
+    // Objects that have the same name, too, are one mesh in several places.
+    let mut namesakes = alike(20);
+    namesakes.objects.iter_mut().for_each(|object| object.name = "twin".to_owned());
+    namesakes.objects[8].extras = Some(json!({"id": 8}));
+    let json = json_of(&write_glb(&namesakes, &GltfWriteSettings::default()).unwrap());
+    let meshes: Vec<u64> = json["nodes"].as_array().unwrap().iter().filter_map(|node| node["mesh"].as_u64()).collect();
+    assert_eq!(count(&json, "meshes"), 2);
+    assert!(
+        meshes.len() == 20 && meshes.iter().enumerate().all(|(at, mesh)| *mesh == u64::from(at == 8)),
+        "{meshes:?}"
+    );
+    let again = there_and_back("namesakes", &namesakes, &GltfWriteSettings::default());
+    assert_eq!(again.objects[8].extras, namesakes.objects[8].extras);
     let again = there_and_back("alike", &alike(20), &GltfWriteSettings::default());
     assert_eq!((again.points.len(), again.skins.len(), again.parts.len()), (60, 20, 20));
 }
