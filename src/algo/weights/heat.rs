@@ -49,7 +49,7 @@ pub(crate) fn solve(graph: &Graph, claims: &[Claim], wanted: &[bool], smoothing:
                         }
                     }
                 }
-                factor.solve_in_order(&mut block);
+                factor.solve(&mut block);
                 let mut found = Vec::new();
                 for (row, &v) in block.iter().zip(factor.order()) {
                     for (&joint, &value) in group.iter().zip(row) {

@@ -140,22 +140,14 @@ impl Ldl {
         Some(Self { order, starts, values, row_starts, rows, inverse_diagonal: diagonal })
     }
 
-    /// Solves for a block of right-hand sides; `block` has one row an unknown and is overwritten with the solution.
-    pub fn solve(&self, block: &mut [Lane]) {
-        let mut x: Vec<Lane> = self.order.iter().map(|&old| block[old as usize]).collect();
-        self.solve_in_order(&mut x);
-        for (row, &old) in x.iter().zip(&self.order) {
-            block[old as usize] = *row;
-        }
-    }
-
     /// Index of each unknown in the matrix, in the order of the factor.
     pub fn order(&self) -> &[u32] {
         &self.order
     }
 
-    /// Solves for a block of right-hand sides whose rows are in the order of the factor, without a copy of it.
-    pub fn solve_in_order(&self, x: &mut [Lane]) {
+    /// Solves for a block of right-hand sides, which is overwritten with the solution. `x` has one row an unknown, in the order
+    /// of the factor ([`Self::order`]): a copy in that order would take as much memory again on each thread.
+    pub fn solve(&self, x: &mut [Lane]) {
         let n = self.order.len();
         for k in 0..n {
             let xk = x[k];
@@ -258,8 +250,13 @@ mod tests {
     fn error(matrix: &Symmetric, factor: &Ldl) -> f64 {
         let count = matrix.diagonal.len();
         let side = |row: usize, lane: usize| ((row * 7 + lane * 3) % 11) as f64 - 5.0;
-        let mut block: Vec<Lane> = (0..count).map(|row| std::array::from_fn(|lane| side(row, lane))).collect();
-        factor.solve(&mut block);
+        let side_of = |&row: &u32| std::array::from_fn(|lane| side(row as usize, lane));
+        let mut solved: Vec<Lane> = factor.order().iter().map(side_of).collect();
+        factor.solve(&mut solved);
+        let mut block = vec![[0.0; LANES]; count];
+        for (row, &at) in solved.iter().zip(factor.order()) {
+            block[at as usize] = *row;
+        }
         let mut most = 0.0_f64;
         for row in 0..count {
             let range = matrix.starts[row] as usize..matrix.starts[row + 1] as usize;
