@@ -222,12 +222,9 @@ fn skins_that_share_accessors_stay_within_their_memory() {
     let folder = tempfile::tempdir().unwrap();
     let skins = "skins.gltf";
     fs::write(folder.path().join(skins), shared_accessors(30_000)).unwrap();
-    check(
-        folder.path(),
-        &[(&[skins], &["info", skins]), (&[skins], &["check", skins]), (&[skins], &["convert", skins, "out.glb"])],
-    );
+    check(folder.path(), &[(&[skins], &["info", skins]), (&[skins], &["convert", skins, "out.glb"])]);
     let size = |file: &str| fs::metadata(folder.path().join(file)).unwrap().len();
-    assert!(size("out.glb") < 5 * size(skins), "{} bytes of {}", size("out.glb"), size(skins));
+    assert!(size("out.glb") < 2 * size(skins), "{} bytes of {}", size("out.glb"), size(skins));
 }
 
 /// Bytes of the sections of a kind in a program of 64 bits, low bytes first, as the ELF format numbers them.
