@@ -122,7 +122,10 @@ pub(super) fn run(args: &PoseArgs) -> Result<Report, Failure> {
     if !is_picture && rest::is_at_rest(args, &own, &rig) {
         rest::pose(args, rig, &mut report)?;
     } else {
-        let mut bench = limits::workbench(rig);
+        let mut bench = match !is_picture && rest::needs_no_processor(args, &own, &rig) {
+            true => rest::built_bench(rig)?,
+            false => limits::workbench(rig),
+        };
         let held = run_steps(&mut bench, &args.steps, &writes)?;
         report.notes(held);
         tell_nodes(&mut report, bench.iter_nodes()?);
@@ -162,8 +165,8 @@ pub(super) fn parsed(steps: &PoseSteps, rig: &Path) -> Result<Vec<ControlWrite>,
     steps.set.iter().map(|text| Ok(text.parse::<ControlWrite>()?)).collect()
 }
 
-/// Builds the rig, writes values, throws switches, which keep that pose, writes the values again, for the controls that the
-/// switches moved, and simulates frames.
+/// Builds the rig unless it is built, writes values, throws switches, which keep that pose, writes the values again, for the
+/// controls that the switches moved, and simulates frames.
 ///
 /// Returns the values that locks and limits hold.
 pub(super) fn run_steps(
@@ -171,7 +174,9 @@ pub(super) fn run_steps(
     steps: &PoseSteps,
     writes: &[ControlWrite],
 ) -> Result<Vec<HeldValue>, Failure> {
-    if let Some(error) = bench.build(BuildStep::All).error {
+    if bench.built().is_none()
+        && let Some(error) = bench.build(BuildStep::All).error
+    {
         return Err(Failure::Input(Box::new(error)));
     }
     let mut switches = Vec::with_capacity(steps.switches.len());

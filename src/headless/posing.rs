@@ -441,10 +441,13 @@ impl Workbench {
     ///
     /// # Errors
     /// If the rig is not built or cannot run.
-    pub fn into_posed(self) -> Result<PosedRig, PoseError> {
+    pub fn into_posed(mut self) -> Result<PosedRig, PoseError> {
         let nodes = self.posed_nodes()?;
-        let built = self.app.world().get::<BuildResult>(self.rig).ok_or(PoseError::NotBuilt)?;
-        Ok(PosedRig { rig: self.rig().clone(), built: Arc::clone(&built.0), nodes })
+        let world = self.app.world_mut();
+        let built = Arc::clone(&world.get::<BuildResult>(self.rig).ok_or(PoseError::NotBuilt)?.0);
+        // Tables of a copy would stand beside the app.
+        let rig = world.get_mut::<Rig>(self.rig).map(|mut rig| std::mem::take(&mut *rig)).unwrap_or_default();
+        Ok(PosedRig { rig, built, nodes })
     }
 }
 

@@ -23,6 +23,7 @@ mod materials;
 mod matrix;
 mod primitive;
 mod skin;
+mod tree;
 mod uri;
 mod vrm;
 mod write;

@@ -40,19 +40,21 @@ pub(crate) fn solve(graph: &Graph, claims: &[Claim], wanted: &[bool], smoothing:
             .par_chunks(LANES)
             .map(|group| {
                 let mut block = vec![[0f64; LANES]; claims.len()];
-                for (v, claim) in claims.iter().enumerate() {
+                for (row, &v) in block.iter_mut().zip(factor.order()) {
+                    let v = v as usize;
+                    let claim = &claims[v];
                     for &(joint, share) in claim.shares.iter().filter(|s| s.1 > 0.0) {
                         if let Ok(lane) = group.binary_search(&joint) {
-                            block[v][lane] += warmth(graph, claims, v, smoothing, floor) * f64::from(share);
+                            row[lane] += warmth(graph, claims, v, smoothing, floor) * f64::from(share);
                         }
                     }
                 }
                 factor.solve(&mut block);
                 let mut found = Vec::new();
-                for (v, row) in block.iter().enumerate() {
+                for (row, &v) in block.iter().zip(factor.order()) {
                     for (&joint, &value) in group.iter().zip(row) {
-                        if wanted[v] && value as f32 > LEAST {
-                            found.push((v as u32, joint, value as f32));
+                        if wanted[v as usize] && value as f32 > LEAST {
+                            found.push((v, joint, value as f32));
                         }
                     }
                 }

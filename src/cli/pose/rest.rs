@@ -1,5 +1,5 @@
 //! Rigs at rest: where nothing is written to a rig without commands, its nodes are told and saved without an app, whose
-//! entities take several times the memory.
+//! entities take several times the memory. Where frames pass, the rig is built before its app begins.
 
 use std::sync::Arc;
 
@@ -8,7 +8,10 @@ use bevy::prelude::{GlobalTransform, Transform, Vec3};
 use super::{PoseArgs, tell_nodes};
 use crate::{
     cli::{Failure, Report, build, limits},
-    headless::posing::{PoseError, PosedNode},
+    headless::{
+        Workbench,
+        posing::{PoseError, PosedNode},
+    },
     plugins::surface::RigMesh,
     processor::Builder,
     rig::{BuiltRig, Rig},
@@ -29,10 +32,25 @@ pub(super) fn is_at_rest(args: &PoseArgs, own: &[RigMesh], rig: &Rig) -> bool {
         && rig.walk().all(|joint| is_even(joint.data.rest.scale))
 }
 
-/// Tells the nodes of a rig at rest, and saves it if that is asked for.
-pub(super) fn pose(args: &PoseArgs, rig: Rig, report: &mut Report) -> Result<(), Failure> {
+/// True if the command asks for no node by its name, for no mesh and no picture, and the rig has no commands: nothing then asks
+/// a processor.
+pub(super) fn needs_no_processor(args: &PoseArgs, own: &[RigMesh], rig: &Rig) -> bool {
+    let names_nothing = args.steps.set.is_empty() && args.steps.switches.is_empty();
+    names_nothing && args.meshes.is_empty() && own.is_empty() && !rig.has_tags()
+}
+
+/// A workbench with a rig that is built, and without the values that a processor keeps for its next build.
+pub(super) fn built_bench(rig: Rig) -> Result<Workbench, Failure> {
+    let built = built(&rig)?;
+    let mut bench = limits::workbench(rig);
+    bench.set_built(Arc::new(built));
+    Ok(bench)
+}
+
+/// Result of the commands of a rig, without an app.
+fn built(rig: &Rig) -> Result<BuiltRig, Failure> {
     let mut builder = Builder::new(Arc::new(limits::modules()));
-    builder.sync(&rig);
+    builder.sync(rig);
     let outcome = builder.run_all();
     let built = builder.built();
     drop(builder);
@@ -40,6 +58,12 @@ pub(super) fn pose(args: &PoseArgs, rig: Rig, report: &mut Report) -> Result<(),
         return Err(Failure::Input(Box::new(error)));
     }
     limits::check_time("building the rig")?;
+    Ok(built)
+}
+
+/// Tells the nodes of a rig at rest, and saves it if that is asked for.
+pub(super) fn pose(args: &PoseArgs, rig: Rig, report: &mut Report) -> Result<(), Failure> {
+    let built = built(&rig)?;
     tell(&built, report)?;
     if let Some(output) = &args.output {
         report.notes(build::store_at_rest(output, &args.rig, rig, built, &args.export, false)?);

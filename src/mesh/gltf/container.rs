@@ -1,10 +1,8 @@
 //! The outermost layer: GLB chunks (section 4) and the JSON text, measured before it is parsed.
 
-use std::mem::size_of;
+use std::{borrow::Cow, mem::size_of};
 
-use serde_json::Value;
-
-use super::{GltfError, budget::Budget};
+use super::{GltfError, budget::Budget, tree::Json};
 
 /// A file's JSON text and, in a GLB, its binary chunk.
 pub(super) struct Container<'a> {
@@ -80,16 +78,16 @@ fn split_glb(bytes: &[u8]) -> Result<Container<'_>, GltfError> {
 }
 
 /// Parses the JSON after charging the memory of its tree.
-pub(super) fn parse(json: &[u8], budget: &Budget) -> Result<Value, GltfError> {
+pub(super) fn parse<'a>(json: &'a [u8], budget: &Budget) -> Result<Json<'a>, GltfError> {
     let json = json.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(json);
     budget.take(1, tree_size(json), "")?;
-    let value: Value = serde_json::from_slice(json).map_err(|error| GltfError::Json {
+    let value: Json = serde_json::from_slice(json).map_err(|error| GltfError::Json {
         file: String::new(),
         line: error.line(),
         column: error.column(),
         what: error.to_string(),
     })?;
-    if !value.is_object() {
+    if value.as_object().is_none() {
         return Err(GltfError::at("/", "the JSON is not an object"));
     }
     Ok(value)
@@ -98,11 +96,12 @@ pub(super) fn parse(json: &[u8], budget: &Budget) -> Result<Value, GltfError> {
 /// An upper bound of the memory that the parsed tree takes: `[0,0,...` is two bytes a value in the file and dozens in
 /// memory. Ill-formed text may be measured wrongly; the parser stops at it, having used no more than counted so far.
 fn tree_size(json: &[u8]) -> usize {
-    // An entry of an object: hash, key and value; and its slot in the hash table.
-    const ENTRY: usize = size_of::<Value>() + size_of::<String>() + 2 * size_of::<usize>() + 2;
+    // A list that grows is copied into one of twice its length, and both are there while it is copied.
+    const VALUE: usize = size_of::<Json>() * 3 / 2;
+    const FIELD: usize = (size_of::<Json>() + size_of::<Cow<str>>()) * 3 / 2;
     let close = |entry: usize, commas: usize| (commas + 1).next_power_of_two().max(4) * entry + 32;
     let mut open: Vec<(usize, usize)> = Vec::new();
-    let mut total = size_of::<Value>();
+    let mut total = size_of::<Json>();
     let mut rest = json.iter();
     while let Some(byte) = rest.next() {
         match byte {
@@ -119,8 +118,8 @@ fn tree_size(json: &[u8]) -> usize {
                 total += length + 32;
             }
             // The parser refuses text deeper than 128 levels.
-            b'[' if open.len() < 256 => open.push((size_of::<Value>(), 0)),
-            b'{' if open.len() < 256 => open.push((ENTRY, 0)),
+            b'[' if open.len() < 256 => open.push((VALUE, 0)),
+            b'{' if open.len() < 256 => open.push((FIELD, 0)),
             b',' => {
                 if let Some((_, commas)) = open.last_mut() {
                     *commas += 1;

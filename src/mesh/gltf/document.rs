@@ -2,14 +2,13 @@
 
 use std::{collections::BTreeMap, mem::size_of, ops::Deref, rc::Rc};
 
-use serde_json::Value;
-
 use super::{
     ExternalError, ExternalFile, ExternalKind, GltfError,
     accessor::{Accessor, View},
     budget::{Budget, Notes},
     json::JsonObject,
     primitive::Mesh,
+    tree::Json,
     uri,
 };
 
@@ -69,7 +68,7 @@ pub(super) struct ChannelEntry<'a> {
 /// An animation as declared.
 pub(super) struct AnimationEntry<'a> {
     pub(super) name: &'a str,
-    pub(super) extras: Option<&'a Value>,
+    pub(super) extras: Option<&'a Json<'a>>,
     pub(super) channels: Vec<ChannelEntry<'a>>,
 }
 
@@ -105,7 +104,7 @@ const SUPPORTED: &[&str] = &[
 ];
 
 impl<'a> Document<'a> {
-    pub(super) fn new(root: &'a Value, budget: &Budget, notes: &Notes) -> Result<Self, GltfError> {
+    pub(super) fn new(root: &'a Json<'a>, budget: &Budget, notes: &Notes) -> Result<Self, GltfError> {
         let root = JsonObject::new(root, String::new())?;
         check_version(&root)?;
         let extensions_used = names(&root, "extensionsUsed")?;
@@ -118,6 +117,7 @@ impl<'a> Document<'a> {
         let count = |key: &str| Ok::<_, GltfError>(root.array(key)?.len());
         let (node_count, mesh_count, skin_count) = (count("nodes")?, count("meshes")?, count("skins")?);
         let (accessor_count, material_count) = (count("accessors")?, count("materials")?);
+        let camera_count = count("cameras")?;
 
         let mut buffers = Vec::new();
         for at in root.objects("buffers")? {
@@ -146,7 +146,7 @@ impl<'a> Document<'a> {
                 children: at.indices("children", node_count, "node")?,
                 mesh: at.index("mesh", mesh_count, "mesh")?,
                 skin: at.index("skin", skin_count, "skin")?,
-                camera: at.index("camera", count("cameras")?, "camera")?.is_some(),
+                camera: at.index("camera", camera_count, "camera")?.is_some(),
                 at,
             });
         }
@@ -233,7 +233,7 @@ fn check_version(root: &JsonObject) -> Result<(), GltfError> {
 }
 
 fn names<'a>(root: &JsonObject<'a>, key: &str) -> Result<Vec<&'a str>, GltfError> {
-    let name = |value: &'a Value| value.as_str().ok_or_else(|| root.fail(key, "must be a list of names"));
+    let name = |value: &'a Json<'a>| value.as_str().ok_or_else(|| root.fail(key, "must be a list of names"));
     root.array(key)?.iter().map(name).collect()
 }
 

@@ -2,19 +2,23 @@
 
 use std::mem::size_of;
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
-use super::{GltfError, budget::Budget};
+use super::{
+    GltfError,
+    budget::Budget,
+    tree::{Fields, Json},
+};
 
 /// A JSON object and the pointer to it.
 #[derive(Clone)]
 pub(super) struct JsonObject<'a> {
-    pub(super) map: &'a Map<String, Value>,
+    pub(super) map: &'a Fields<'a>,
     pub(super) place: String,
 }
 
 impl<'a> JsonObject<'a> {
-    pub(super) fn new(value: &'a Value, place: String) -> Result<Self, GltfError> {
+    pub(super) fn new(value: &'a Json<'a>, place: String) -> Result<Self, GltfError> {
         match value.as_object() {
             Some(map) => Ok(Self { map, place }),
             None => Err(GltfError::at(place, "must be an object")),
@@ -42,10 +46,10 @@ impl<'a> JsonObject<'a> {
     }
 
     /// An array's elements; none if absent.
-    pub(super) fn array(&self, key: &str) -> Result<&'a [Value], GltfError> {
+    pub(super) fn array(&self, key: &str) -> Result<&'a [Json<'a>], GltfError> {
         match self.map.get(key) {
             None => Ok(&[]),
-            Some(Value::Array(list)) => Ok(list),
+            Some(Json::List(list)) => Ok(list),
             Some(_) => Err(self.fail(key, "must be an array")),
         }
     }
@@ -98,20 +102,20 @@ impl<'a> JsonObject<'a> {
     pub(super) fn text(&self, key: &str) -> Result<Option<&'a str>, GltfError> {
         match self.map.get(key) {
             None => Ok(None),
-            Some(Value::String(text)) => Ok(Some(text)),
+            Some(Json::Text(text)) => Ok(Some(text)),
             Some(_) => Err(self.fail(key, "must be a string")),
         }
     }
 
     /// The `name`; empty if absent or not a string, since nothing depends on it.
     pub(super) fn name(&self) -> &'a str {
-        self.map.get("name").and_then(Value::as_str).unwrap_or_default()
+        self.map.get("name").and_then(Json::as_str).unwrap_or_default()
     }
 
     pub(super) fn flag(&self, key: &str) -> Result<bool, GltfError> {
         match self.map.get(key) {
             None => Ok(false),
-            Some(Value::Bool(flag)) => Ok(*flag),
+            Some(Json::Flag(flag)) => Ok(*flag),
             Some(_) => Err(self.fail(key, "must be true or false")),
         }
     }
@@ -146,11 +150,15 @@ impl<'a> JsonObject<'a> {
 }
 
 /// A whole number within range, also when it is written as a float.
-pub(super) fn whole(value: &Value) -> Option<usize> {
-    if let Some(number) = value.as_u64() {
-        return usize::try_from(number).ok();
+pub(super) fn whole(value: &Json) -> Option<usize> {
+    match value.as_u64() {
+        Some(number) => usize::try_from(number).ok(),
+        None => whole_float(value.as_f64()?),
     }
-    let number = value.as_f64()?;
+}
+
+/// A float as a whole number within range.
+pub(super) fn whole_float(number: f64) -> Option<usize> {
     // 2^53: up to here every whole number is exact.
     (number.fract() == 0.0 && (0.0..=9_007_199_254_740_992.0).contains(&number)).then_some(number as usize)
 }
@@ -160,18 +168,18 @@ fn out_of_range(index: usize, len: usize, of: &str) -> String {
 }
 
 /// A copy of a value that is carried unread, within the budget: many objects may refer to the same value.
-pub(super) fn copy(value: &Value, budget: &Budget, place: &str) -> Result<Value, GltfError> {
+pub(super) fn copy(value: &Json, budget: &Budget, place: &str) -> Result<Value, GltfError> {
     budget.take(1, tree_bytes(value), place)?;
-    Ok(value.clone())
+    Ok(value.to_value())
 }
 
-/// Memory of a value in bytes; the parser's limit on depth keeps the recursion shallow.
-fn tree_bytes(value: &Value) -> usize {
+/// Memory of a copy of a value in bytes; the parser's limit on depth keeps the recursion shallow.
+fn tree_bytes(value: &Json) -> usize {
     const ENTRY: usize = 64;
     let inside = match value {
-        Value::String(text) => text.len(),
-        Value::Array(list) => list.iter().map(tree_bytes).sum(),
-        Value::Object(map) => map.iter().map(|(key, value)| key.len() + ENTRY + tree_bytes(value)).sum(),
+        Json::Text(text) => text.len(),
+        Json::List(list) => list.iter().map(tree_bytes).sum(),
+        Json::Object(map) => map.iter().map(|(key, value)| key.len() + ENTRY + tree_bytes(value)).sum(),
         _ => 0,
     };
     size_of::<Value>() + inside

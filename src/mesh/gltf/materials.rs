@@ -8,7 +8,8 @@ use super::{
     ExternalError, ExternalFile, ExternalKind, GltfError, MAX_IMAGE_BYTES,
     accessor::Source,
     budget::{Budget, Notes},
-    json::{JsonObject, copy, whole},
+    json::{JsonObject, copy, whole_float},
+    tree::Fields,
     uri,
 };
 use crate::mesh::model::{Image, MaterialSet};
@@ -37,7 +38,7 @@ pub(super) fn read(
         at.index("sampler", samplers, "sampler")?;
         at.index("source", images, "image")?;
         if let Some(extensions) = at.object("extensions")? {
-            for (name, value) in extensions.map {
+            for (name, value) in extensions.map.iter() {
                 if let Some(value) = value.as_object().filter(|value| value.contains_key("source")) {
                     let extension = JsonObject { map: value, place: extensions.sub(name) };
                     extension.index("source", images, "image")?;
@@ -82,8 +83,8 @@ pub(super) fn declare(
 /// A copy of an object, without references to packets of metadata that are not carried.
 fn carried(at: &JsonObject, budget: &Budget, notes: &Notes) -> Result<Value, GltfError> {
     let mut map = Map::new();
-    for (key, value) in at.map {
-        map.insert(key.clone(), copy(value, budget, &at.place)?);
+    for (key, value) in at.map.iter() {
+        map.insert(key.to_owned(), copy(value, budget, &at.place)?);
     }
     if let Some(Value::Object(extensions)) = map.get_mut("extensions")
         && extensions.shift_remove("KHR_xmp_json_ld").is_some()
@@ -94,8 +95,8 @@ fn carried(at: &JsonObject, budget: &Budget, notes: &Notes) -> Result<Value, Glt
 }
 
 /// Checks every `...Texture` in a material, also in its extensions, to refer to a texture.
-fn check_textures(map: &Map<String, Value>, place: &str, textures: usize, depth: usize) -> Result<(), GltfError> {
-    for (key, value) in map {
+fn check_textures(map: &Fields, place: &str, textures: usize, depth: usize) -> Result<(), GltfError> {
+    for (key, value) in map.iter() {
         let Some(inner) = value.as_object().filter(|_| key != "extras" && depth < 8) else {
             continue;
         };
@@ -172,8 +173,8 @@ fn images(
             return Err(too_large(at.place));
         }
         image.mime = sniff(&image.bytes).map_or(mime, str::to_owned);
-        for (key, value) in at.map.iter().filter(|(key, _)| !OWN_FIELDS.contains(&key.as_str())) {
-            image.rest.insert(key.clone(), copy(value, source.budget, &at.place)?);
+        for (key, value) in at.map.iter().filter(|(key, _)| !OWN_FIELDS.contains(key)) {
+            image.rest.insert(key.to_owned(), copy(value, source.budget, &at.place)?);
         }
         images.push(image);
     }
@@ -201,6 +202,14 @@ pub(super) fn sniff(bytes: &[u8]) -> Option<&'static str> {
         Some("image/avif")
     } else {
         None
+    }
+}
+
+/// A whole number of a carried value, within range, also when it is written as a float.
+pub(super) fn whole(value: &Value) -> Option<usize> {
+    match value.as_u64() {
+        Some(number) => usize::try_from(number).ok(),
+        None => whole_float(value.as_f64()?),
     }
 }
 

@@ -1,12 +1,11 @@
 //! Meshes and primitives as declared (section 3.7): their accessors, checked against each other.
 
-use serde_json::Value;
-
 use super::{
     GltfError,
     accessor::Accessor,
     budget::{Budget, Notes},
     json::{JsonObject, whole},
+    tree::Json,
 };
 
 /// Attribute names and their accessors, in the file's order.
@@ -20,7 +19,7 @@ pub(super) struct Mesh<'a> {
     pub(super) name: &'a str,
     pub(super) primitives: Vec<Primitive<'a>>,
     pub(super) weights: Vec<f32>,
-    pub(super) extras: Option<&'a Value>,
+    pub(super) extras: Option<&'a Json<'a>>,
     /// Morph targets of every primitive.
     pub(super) targets: usize,
 }
@@ -126,9 +125,9 @@ impl<'a> Primitive<'a> {
 
 fn attributes<'a>(at: &JsonObject<'a>, accessors: usize) -> Result<Attributes<'a>, GltfError> {
     let mut list = Vec::with_capacity(at.map.len());
-    for (name, value) in at.map {
+    for (name, value) in at.map.iter() {
         match whole(value) {
-            Some(index) if index < accessors => list.push((name.as_str(), index)),
+            Some(index) if index < accessors => list.push((name, index)),
             Some(index) => {
                 let what = format!("refers to accessor {index}, but there are {accessors}");
                 return Err(at.fail(name, what));

@@ -45,6 +45,7 @@ pub(super) fn read_bindings(
             Some(accessor) => source.matrices(accessor)?,
         };
         inverse_binds.truncate(joints.len());
+        inverse_binds.shrink_to_fit();
         for matrix in &mut inverse_binds {
             if matrix.row(3) != Vec4::W {
                 notes.add("The last row of an inverse bind matrix was not 0 0 0 1; it is now");

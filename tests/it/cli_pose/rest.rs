@@ -1,6 +1,10 @@
 //! Rigs at rest, which are posed without an app: what is told and saved is that of an app.
 
-use std::fs;
+use std::{fs, sync::Arc};
+
+use rigsmith::{
+    headless::Workbench, modules, plugins::commands::BuildStep, processor::Builder, rig::template::read_template,
+};
 
 use super::pose;
 
@@ -45,5 +49,25 @@ fn rigs_at_rest_are_told_and_saved_as_by_an_app() {
             let [saved, wanted] = [rest, app].map(|file| fs::read(folder.path().join(file)).unwrap());
             assert!(saved == wanted, "{name}.{ending}: other bytes");
         }
+    }
+}
+
+/// A bench whose rig was built elsewhere has no processor, and poses as one that builds.
+#[test]
+fn rigs_that_were_built_elsewhere_are_posed_as_in_an_app_that_builds() {
+    for text in [LIMBS, UNEVEN] {
+        let rig = read_template(text.as_bytes()).unwrap().rig;
+        let built = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
+        let [mut supplied, mut own] = [0; 2].map(|_| Workbench::with_rig(5, rig.clone()));
+        supplied.set_built(Arc::new(built));
+        assert!(own.build(BuildStep::All).error.is_none());
+        for bench in [&mut supplied, &mut own] {
+            bench.pose_through(&[], &[]).unwrap();
+            bench.frames(3).unwrap();
+        }
+        assert!(supplied.processor().is_none() && own.processor().is_some());
+        assert_eq!(supplied.nodes().unwrap(), own.nodes().unwrap());
+        let [supplied, own] = [supplied, own].map(|bench| bench.into_posed().unwrap());
+        assert_eq!((supplied.rig, supplied.nodes, supplied.built), (own.rig, own.nodes, own.built));
     }
 }

@@ -302,3 +302,39 @@ fn deep_hierarchies() {
     assert_eq!(model.nodes.len(), count);
     assert_eq!(model.nodes[count - 1].parent, Some(count - 2));
 }
+
+/// Nodes as programs write them take less memory than their file allows, whatever their number.
+#[test]
+fn long_lists_of_nodes_are_within_the_memory_of_their_file() {
+    let count = 120_000;
+    let mut file = triangle();
+    let first = file.json["nodes"].as_array().unwrap().len();
+    for i in 0..count {
+        let mut node = json!({"name": format!("joint_{i:06}"), "translation": [0.0, 0.125, 0.0]});
+        if i + 1 < count {
+            node["children"] = json!([first + i + 1]);
+        }
+        file.push("nodes", node);
+    }
+    file.push("skins", json!({"joints": (first..first + count).collect::<Vec<_>>()}));
+    let model = file.read().unwrap();
+    assert_eq!(model.nodes.len(), count);
+    assert_eq!(model.nodes[count - 1].name, "joint_119999");
+}
+
+/// The last of several fields with one key counts, as in other readers of JSON.
+#[test]
+fn repeated_keys_count_once() {
+    let more: String = (0..40).map(|number| format!("\"x{number}\":{number},")).collect();
+    for (before, after) in [("", ""), (&*more, ""), ("", &*more)] {
+        let text = format!(
+            "{{\"asset\":{{\"version\":\"9\",\"version\":\"2.0\"}},{before}\"nodes\":[{{\"name\":\"first\"}}],\"skins\":[{{\
+             \"joints\":[0]}}],{after}\"nodes\":[{{\"name\":\"second\"}}],\"nodes\":[{{\"na\\u006de\":\"l\\u0061st\",\
+             \"extras\":{{\"b\":1,\"a\":-2,\"b\":2.5}}}}]}}"
+        );
+        let model = read(text.as_bytes()).unwrap();
+        assert_eq!(model.nodes.len(), 1);
+        assert_eq!(model.nodes[0].name, "last");
+        assert_eq!(serde_json::to_string(&model.nodes[0].extras).unwrap(), "{\"b\":2.5,\"a\":-2}");
+    }
+}

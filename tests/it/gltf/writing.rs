@@ -334,3 +334,67 @@ fn models_that_do_not_fit_together() {
     check(&|model| model.clips[0].channels[0].values.truncate(8), "clip 0 has a wrong number");
     check(&|model| model.clips[0].channels[0].times[1] = 0.0, "clip 0 is not finite, or its times");
 }
+
+/// A triangle with a skin of its own, again and again, all of the same content.
+fn alike(count: usize) -> Model {
+    let mut model = rigged(3, |point| vec![(point as u32, 1.0)]);
+    let (part, skin) = (model.parts[0].clone(), model.skins[0].clone());
+    let row: Vec<Vec<(u32, f32)>> = (0..3).map(|point| model.weights.as_ref().unwrap().of(point).collect()).collect();
+    for number in 1..count {
+        let first = model.points.len() as u32;
+        model.points.extend_from_within(..3);
+        row.iter().for_each(|row| model.weights.as_mut().unwrap().push(row.iter().copied()));
+        model.objects.push(Object { name: format!("o{number}"), skin: Some(number), ..Object::default() });
+        model.parts.push(Part { object: number, vertices: vec![first, first + 1, first + 2], ..part.clone() });
+        model.skins.push(skin.clone());
+    }
+    model
+}
+
+#[test]
+fn accessors_of_the_same_content_are_written_once() {
+    let count = |json: &Value, list: &str| json[list].as_array().unwrap().len();
+    let one = json_of(&write_glb(&alike(1), &GltfWriteSettings::default()).unwrap());
+    let many = json_of(&write_glb(&alike(20), &GltfWriteSettings::default()).unwrap());
+    for list in ["accessors", "bufferViews"] {
+        assert_eq!(count(&many, list), count(&one, list), "{list}");
+    }
+    assert_eq!((count(&many, "meshes"), count(&many, "skins")), (20, 20));
+    assert_eq!(many["buffers"], one["buffers"]);
+    // Objects that have the same name, too, are one mesh in several places.
+    let mut namesakes = alike(20);
+    namesakes.objects.iter_mut().for_each(|object| object.name = "twin".to_owned());
+    namesakes.objects[8].extras = Some(json!({"id": 8}));
+    let json = json_of(&write_glb(&namesakes, &GltfWriteSettings::default()).unwrap());
+    let meshes: Vec<u64> = json["nodes"].as_array().unwrap().iter().filter_map(|node| node["mesh"].as_u64()).collect();
+    assert_eq!(count(&json, "meshes"), 2);
+    assert!(
+        meshes.len() == 20 && meshes.iter().enumerate().all(|(at, mesh)| *mesh == u64::from(at == 8)),
+        "{meshes:?}"
+    );
+    let again = there_and_back("namesakes", &namesakes, &GltfWriteSettings::default());
+    assert_eq!(again.objects[8].extras, namesakes.objects[8].extras);
+    let again = there_and_back("alike", &alike(20), &GltfWriteSettings::default());
+    assert_eq!((again.points.len(), again.skins.len(), again.parts.len()), (60, 20, 20));
+}
+
+/// Parts of one object keep points of their own, though all of them lie in the same places.
+#[test]
+fn parts_in_the_same_place_keep_their_points() {
+    let mut model = alike(4);
+    for (part, object) in model.parts.iter_mut().zip([0, 0, 1, 1]) {
+        part.object = object;
+    }
+    model.objects.truncate(2);
+    let json = json_of(&write_glb(&model, &GltfWriteSettings::default()).unwrap());
+    let position = |mesh: usize, primitive: usize| {
+        json["meshes"][mesh]["primitives"][primitive]["attributes"]["POSITION"].as_u64().unwrap()
+    };
+    assert_ne!(position(0, 0), position(0, 1));
+    assert_ne!(position(1, 0), position(1, 1));
+    let bounds =
+        |accessor: u64| (&json["accessors"][accessor as usize]["min"], &json["accessors"][accessor as usize]["max"]);
+    assert_eq!(bounds(position(0, 0)), bounds(position(0, 1)));
+    let again = there_and_back("same_place", &model, &GltfWriteSettings::default());
+    assert_eq!(again.points, model.points);
+}

@@ -180,6 +180,53 @@ fn templates_of_bare_and_placed_joints_stay_within_their_memory() {
     }
 }
 
+/// Meshes and skins of one character many times over, which share all accessors of the file.
+fn shared_accessors(count: usize) -> String {
+    let list = |one: &dyn Fn(usize) -> String| (0..count).map(one).collect::<Vec<String>>().join(",");
+    let nodes = list(&|number| format!(r#"{{"mesh":0,"skin":{number}}}"#));
+    let skins = list(&|_| r#"{"joints":[0],"inverseBindMatrices":4}"#.to_owned());
+    let roots = list(&|number| (number + 1).to_string());
+    // Positions, weights and a matrix of floats, joints and corners of bytes.
+    let floats: [f32; 37] = std::array::from_fn(|at| match at {
+        3 | 7 | 9 | 13 | 17 | 21 | 26 | 31 | 36 => 1.0,
+        _ => 0.0,
+    });
+    let mut bytes: Vec<u8> = floats.iter().flat_map(|number| number.to_le_bytes()).collect();
+    bytes.extend([0; 12]);
+    bytes.extend([0, 1, 2]);
+    let hex: String = bytes.iter().map(|byte| format!("%{byte:02x}")).collect();
+    let view = |offset: usize, length: usize| format!(r#"{{"buffer":0,"byteOffset":{offset},"byteLength":{length}}}"#);
+    let views = [view(0, 36), view(36, 48), view(84, 64), view(148, 12), view(160, 3)].join(",");
+    let accessor = |view: usize, component: usize, count: usize, kind: &str| {
+        format!(r#"{{"bufferView":{view},"componentType":{component},"count":{count},"type":"{kind}"}}"#)
+    };
+    let accessors = [
+        accessor(0, 5126, 3, "VEC3"),
+        accessor(1, 5126, 3, "VEC4"),
+        accessor(3, 5121, 3, "VEC4"),
+        accessor(4, 5121, 3, "SCALAR"),
+        accessor(2, 5126, 1, "MAT4"),
+    ];
+    let attributes = r#"{"POSITION":0,"WEIGHTS_0":1,"JOINTS_0":2}"#;
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0,{roots}]}}],"nodes":[{{"name":"j"}},{nodes}],
+        "meshes":[{{"primitives":[{{"attributes":{attributes},"indices":3}}]}}],"skins":[{skins}],"accessors":[{}],
+        "bufferViews":[{views}],"buffers":[{{"byteLength":{},"uri":"data:application/octet-stream,{hex}"}}]}}"#,
+        accessors.join(","),
+        bytes.len()
+    )
+}
+
+#[test]
+fn skins_that_share_accessors_stay_within_their_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let skins = "skins.gltf";
+    fs::write(folder.path().join(skins), shared_accessors(30_000)).unwrap();
+    check(folder.path(), &[(&[skins], &["info", skins]), (&[skins], &["convert", skins, "out.glb"])]);
+    let size = |file: &str| fs::metadata(folder.path().join(file)).unwrap().len();
+    assert!(size("out.glb") < 2 * size(skins), "{} bytes of {}", size("out.glb"), size(skins));
+}
+
 /// Bytes of the sections of a kind in a program of 64 bits, low bytes first, as the ELF format numbers them.
 #[cfg(all(has_packed_relocations, target_arch = "x86_64"))]
 fn section_bytes(program: &[u8], kind: u32) -> u64 {

@@ -259,30 +259,42 @@ fn spread(
         (0..columns).map(|c| start.iter().map(|s| f32::from(u8::from(s.0 == c))).collect()).collect::<Vec<Vec<f32>>>()
     };
     let Some(factor) = Ldl::new(&matrix) else { return Ok(unsolved()) };
+    drop(matrix);
     if !progress(0.5) {
         return Err(FaceWeightsError::Cancelled);
     }
-    let blocks: Vec<Vec<Lane>> = (0..columns.div_ceil(LANES))
+    let blocks: Vec<Vec<Vec<f32>>> = (0..columns.div_ceil(LANES))
         .into_par_iter()
         .map(|block| {
-            let mut lanes: Vec<Lane> =
-                start.iter().map(|s| std::array::from_fn(|l| f64::from(u8::from(s.0 == block * LANES + l)))).collect();
+            let order = factor.order();
+            let row = |&at: &u32| {
+                let patch = start[at as usize].0;
+                std::array::from_fn(|l| f64::from(u8::from(patch == block * LANES + l)))
+            };
+            let mut lanes: Vec<Lane> = order.iter().map(row).collect();
             for _ in 0..2 {
-                for (i, lane) in lanes.iter_mut().enumerate() {
+                for (lane, &at) in lanes.iter_mut().zip(order) {
                     for value in lane.iter_mut() {
-                        *value *= areas[i];
+                        *value *= areas[at as usize];
                     }
                     if head / LANES == block {
-                        lane[head % LANES] += lost[i];
+                        lane[head % LANES] += lost[at as usize];
                     }
                 }
                 factor.solve(&mut lanes);
             }
-            lanes
+            // Single precision, column by column, takes half of the memory of the lanes.
+            let mut own = vec![vec![0f32; n]; LANES.min(columns - block * LANES)];
+            for (lane, &at) in lanes.iter().zip(order) {
+                for (column, value) in own.iter_mut().zip(lane) {
+                    column[at as usize] = *value as f32;
+                }
+            }
+            own
         })
         .collect();
     if !progress(0.9) {
         return Err(FaceWeightsError::Cancelled);
     }
-    Ok((0..columns).map(|c| blocks[c / LANES].iter().map(|lane| lane[c % LANES] as f32).collect()).collect())
+    Ok(blocks.into_iter().flatten().collect())
 }

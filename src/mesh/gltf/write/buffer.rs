@@ -1,6 +1,10 @@
-//! The binary buffer: accessors one after the other, each in a view of its own, aligned to four bytes.
+//! The binary buffer: accessors one after the other, each in a view of its own, aligned to four bytes. Accessors of the same
+//! content are written once: thousands of skins or meshes may share theirs.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    hash::{DefaultHasher, Hasher},
+};
 
 use glam::Vec3;
 use serde::Serialize;
@@ -11,6 +15,25 @@ pub(super) enum Target {
     Vertices,
     Indices,
     Other,
+}
+
+impl Target {
+    /// Code of the target in a file, which data of other kinds do not have.
+    fn code(self) -> Option<u32> {
+        match self {
+            Self::Vertices => Some(34962),
+            Self::Indices => Some(34963),
+            Self::Other => None,
+        }
+    }
+}
+
+/// Type of the elements of an accessor.
+#[derive(Clone, Copy)]
+struct Kind {
+    target: Target,
+    component: u32,
+    elements: &'static str,
 }
 
 /// View of the buffer. A file may have hundreds of thousands, which take little memory so.
@@ -69,27 +92,51 @@ pub(super) struct Bin {
     bytes: Vec<u8>,
     views: Vec<View>,
     accessors: Vec<Accessor>,
-    /// Accessors of key times already written: channels of a clip mostly share them.
-    times: BTreeMap<Vec<u8>, usize>,
+    /// First accessor of each hash of type and content, and the same for key times, which have bounds.
+    accessor_of_hash: BTreeMap<u64, usize>,
+    times_of_hash: BTreeMap<u64, usize>,
+    /// Accessors of positions in the mesh that is being written.
+    mesh_positions: BTreeSet<usize>,
 }
 
 impl Bin {
     /// Appends bytes as a view; returns its index.
     pub(super) fn view(&mut self, bytes: &[u8], target: Target) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let target = match target {
-            Target::Vertices => Some(34962),
-            Target::Indices => Some(34963),
-            Target::Other => None,
-        };
-        self.views.push(View { buffer: 0, byte_offset: self.bytes.len(), byte_length: bytes.len(), target });
+        let (byte_offset, byte_length, target) = (self.bytes.len(), bytes.len(), target.code());
+        self.views.push(View { buffer: 0, byte_offset, byte_length, target });
         self.bytes.extend_from_slice(bytes);
         self.views.len() - 1
     }
 
-    fn accessor(&mut self, bytes: &[u8], target: Target, component: u32, kind: &'static str, count: usize) -> usize {
-        let buffer_view = Some(self.view(bytes, target));
-        self.push(Accessor { buffer_view, component_type: component, count, kind, sparse: None, min: None, max: None })
+    /// Accessor of `count` elements: one that is written, or else a new one.
+    fn accessor(&mut self, bytes: &[u8], kind: Kind, count: usize) -> usize {
+        let key = content_hash(bytes, kind);
+        let known = self.accessor_of_hash.get(&key).copied();
+        if let Some(known) = known.filter(|known| self.holds(*known, bytes, kind)) {
+            return known;
+        }
+        let index = self.append(bytes, kind, count);
+        self.accessor_of_hash.entry(key).or_insert(index);
+        index
+    }
+
+    /// Appends bytes as an accessor with a view of its own.
+    fn append(&mut self, bytes: &[u8], kind: Kind, count: usize) -> usize {
+        let buffer_view = Some(self.view(bytes, kind.target));
+        let Kind { component: component_type, elements: kind, .. } = kind;
+        self.push(Accessor { buffer_view, component_type, count, kind, sparse: None, min: None, max: None })
+    }
+
+    /// Returns `true` for an accessor of a type and content.
+    fn holds(&self, index: usize, bytes: &[u8], kind: Kind) -> bool {
+        let accessor = &self.accessors[index];
+        let is_alike = accessor.component_type == kind.component && accessor.kind == kind.elements;
+        let view = accessor.buffer_view.map(|view| &self.views[view]).filter(|_| is_alike && accessor.sparse.is_none());
+        view.is_some_and(|view| {
+            let own = view.byte_offset..view.byte_offset + view.byte_length;
+            view.target == kind.target.code() && self.bytes[own] == *bytes
+        })
     }
 
     fn push(&mut self, accessor: Accessor) -> usize {
@@ -107,11 +154,33 @@ impl Bin {
             _ => "MAT4",
         };
         let bytes = little_endian(elements.as_flattened(), f32::to_le_bytes);
-        self.accessor(&bytes, target, 5126, kind, elements.len())
+        self.accessor(&bytes, Kind { target, component: 5126, elements: kind }, elements.len())
     }
 
-    /// Appends positions, with the bounds that glTF demands; returns the accessor.
-    pub(super) fn positions(&mut self, positions: &[Vec3]) -> usize {
+    /// Begins a mesh: its primitives have positions of their own, because a reader takes vertices with the same accessors for
+    /// the same.
+    pub(super) fn begin_mesh(&mut self) {
+        self.mesh_positions.clear();
+    }
+
+    /// Appends positions of a primitive, with the bounds that glTF demands; returns the accessor.
+    pub(super) fn vertices(&mut self, positions: &[Vec3]) -> usize {
+        let index = self.positions(positions);
+        if self.mesh_positions.insert(index) {
+            return index;
+        }
+        let elements: Vec<[f32; 3]> = positions.iter().map(Vec3::to_array).collect();
+        let bytes = little_endian(elements.as_flattened(), f32::to_le_bytes);
+        let kind = Kind { target: Target::Vertices, component: 5126, elements: "VEC3" };
+        let own = self.append(&bytes, kind, positions.len());
+        let (min, max) = (self.accessors[index].min.clone(), self.accessors[index].max.clone());
+        (self.accessors[own].min, self.accessors[own].max) = (min, max);
+        self.mesh_positions.insert(own);
+        own
+    }
+
+    /// Appends vectors with their bounds; returns the accessor.
+    fn positions(&mut self, positions: &[Vec3]) -> usize {
         let elements: Vec<[f32; 3]> = positions.iter().map(Vec3::to_array).collect();
         let index = self.floats(&elements, Target::Vertices);
         let low = positions.iter().fold(Vec3::INFINITY, |low, position| low.min(*position));
@@ -159,35 +228,34 @@ impl Bin {
     /// Appends key times, rising; equal times are written once.
     pub(super) fn times(&mut self, times: &[f32]) -> usize {
         let bytes = little_endian(times, f32::to_le_bytes);
-        if let Some(known) = self.times.get(&bytes) {
-            return *known;
+        let kind = Kind { target: Target::Other, component: 5126, elements: "SCALAR" };
+        let key = content_hash(&bytes, kind);
+        let known = self.times_of_hash.get(&key).copied();
+        if let Some(known) = known.filter(|known| self.holds(*known, &bytes, kind)) {
+            return known;
         }
-        let index = self.accessor(&bytes, Target::Other, 5126, "SCALAR", times.len());
+        let index = self.append(&bytes, kind, times.len());
         self.bounds(index, &times[..1], &times[times.len() - 1..]);
-        self.times.insert(bytes, index);
+        self.times_of_hash.entry(key).or_insert(index);
         index
     }
 
     /// Appends vertex indices below `vertices` in the smallest type; the largest value of each type is reserved.
     pub(super) fn indices(&mut self, indices: &[u32], vertices: usize) -> usize {
-        if vertices <= 65535 {
-            let bytes = little_endian(indices, |index| (index as u16).to_le_bytes());
-            self.accessor(&bytes, Target::Indices, 5123, "SCALAR", indices.len())
-        } else {
-            let bytes = little_endian(indices, u32::to_le_bytes);
-            self.accessor(&bytes, Target::Indices, 5125, "SCALAR", indices.len())
-        }
+        let (bytes, component) = match vertices <= 65535 {
+            true => (little_endian(indices, |index| (index as u16).to_le_bytes()), 5123),
+            false => (little_endian(indices, u32::to_le_bytes), 5125),
+        };
+        self.accessor(&bytes, Kind { target: Target::Indices, component, elements: "SCALAR" }, indices.len())
     }
 
     /// Appends joints of vertices, as bytes if the skin has few.
     pub(super) fn joints(&mut self, joints: &[[u16; 4]], of: usize) -> usize {
-        if of <= 256 {
-            let bytes = little_endian(joints.as_flattened(), |joint| [joint as u8]);
-            self.accessor(&bytes, Target::Vertices, 5121, "VEC4", joints.len())
-        } else {
-            let bytes = little_endian(joints.as_flattened(), u16::to_le_bytes);
-            self.accessor(&bytes, Target::Vertices, 5123, "VEC4", joints.len())
-        }
+        let (bytes, component) = match of <= 256 {
+            true => (little_endian(joints.as_flattened(), |joint| [joint as u8]), 5121),
+            false => (little_endian(joints.as_flattened(), u16::to_le_bytes), 5123),
+        };
+        self.accessor(&bytes, Kind { target: Target::Vertices, component, elements: "VEC4" }, joints.len())
     }
 
     fn bounds(&mut self, accessor: usize, low: &[f32], high: &[f32]) {
@@ -202,6 +270,15 @@ impl Bin {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         (self.accessors, self.views, self.bytes)
     }
+}
+
+fn content_hash(bytes: &[u8], kind: Kind) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    hasher.write_u32(kind.component);
+    hasher.write_u32(kind.target.code().unwrap_or_default());
+    hasher.write(kind.elements.as_bytes());
+    hasher.write(bytes);
+    hasher.finish()
 }
 
 fn little_endian<T: Copy, const N: usize>(values: &[T], bytes_of: impl Fn(T) -> [u8; N]) -> Vec<u8> {

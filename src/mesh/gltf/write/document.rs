@@ -101,7 +101,7 @@ impl Node<'_> {
 }
 
 /// Mesh, with its fields in the order of the file.
-#[derive(serde::Serialize)]
+#[derive(PartialEq, serde::Serialize)]
 pub(super) struct Mesh<'a> {
     #[serde(skip_serializing_if = "str::is_empty")]
     pub(super) name: &'a str,
@@ -114,7 +114,7 @@ pub(super) struct Mesh<'a> {
 }
 
 /// Primitive of a mesh, with its fields in the order of the file.
-#[derive(serde::Serialize)]
+#[derive(PartialEq, serde::Serialize)]
 pub(super) struct Primitive {
     pub(super) attributes: Attributes,
     pub(super) indices: usize,
@@ -125,12 +125,16 @@ pub(super) struct Primitive {
 }
 
 /// Accessors of a primitive, each with what it holds.
-#[derive(Default)]
+#[derive(Default, PartialEq)]
 pub(super) struct Attributes(Vec<(Attribute, usize)>);
 
 impl Attributes {
     pub(super) fn put(&mut self, attribute: Attribute, accessor: usize) {
         self.0.push((attribute, accessor));
+    }
+
+    pub(super) fn accessors(&self) -> impl Iterator<Item = usize> {
+        self.0.iter().map(|entry| entry.1)
     }
 }
 
@@ -141,7 +145,7 @@ impl Serialize for Attributes {
 }
 
 /// Content of an accessor of vertices; sets are counted from zero.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(super) enum Attribute {
     Position,
     Normal,
@@ -173,7 +177,7 @@ impl Serialize for Attribute {
 }
 
 /// Accessors of a morph target.
-#[derive(serde::Serialize)]
+#[derive(PartialEq, serde::Serialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub(super) struct MorphTarget {
     pub(super) position: usize,

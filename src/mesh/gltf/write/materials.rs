@@ -12,8 +12,7 @@ use crate::mesh::{
     CompanionSink,
     gltf::{
         geometry::MAX_UV_SETS,
-        json::whole,
-        materials::{OWN_FIELDS, declare, find_extensions, remap, sniff},
+        materials::{OWN_FIELDS, declare, find_extensions, remap, sniff, whole},
         uri::percent_encode,
     },
     model::{Image, MaterialSet},

@@ -1,6 +1,6 @@
 //! Meshes and nodes of objects and parts.
 
-use std::borrow::Cow;
+use std::{borrow::Cow, collections::BTreeMap};
 
 use glam::{DAffine3, Vec3, Vec4};
 use serde_json::{Map, Value};
@@ -36,7 +36,9 @@ pub(super) fn write<'a>(
     nodes: &mut Vec<Node<'a>>,
     scene_nodes: &mut Vec<usize>,
 ) -> Result<Meshes<'a>, GltfError> {
-    let mut meshes = Vec::new();
+    let mut meshes: Vec<Mesh> = Vec::new();
+    // The first mesh of each list of accessors: objects that are alike share one.
+    let mut mesh_of_accessors = BTreeMap::new();
     let mut node_of_object = vec![None; model.objects.len()];
     let mut parts_of = vec![Vec::new(); model.objects.len()];
     for part in model.parts.iter().filter(|part| !part.triangles.is_empty()) {
@@ -49,7 +51,7 @@ pub(super) fn write<'a>(
         }
         let at = nodes.len();
         node_of_object[index] = Some(at);
-        let mut node = Node { name: &object.name, mesh: Some(meshes.len()), ..Node::default() };
+        let mut node = Node { name: &object.name, ..Node::default() };
         let carrier = object.node.filter(|_| object.skin.is_none());
         let mut bake = Bake::none();
         match carrier {
@@ -67,12 +69,23 @@ pub(super) fn write<'a>(
                 scene_nodes.push(at);
             }
         }
-        nodes.push(node);
+        bin.begin_mesh();
         let mut primitives = Vec::with_capacity(parts.len());
         for part in parts {
             primitives.push(primitive(model, skeleton, object, part, &bake, bin)?);
         }
-        meshes.push(mesh(object, primitives));
+        let accessors: Vec<usize> =
+            primitives.iter().flat_map(|one| one.attributes.accessors().chain([one.indices])).collect();
+        let own = mesh(object, primitives);
+        let known = *mesh_of_accessors.entry(accessors).or_insert(meshes.len());
+        match meshes.get(known) == Some(&own) {
+            true => node.mesh = Some(known),
+            false => {
+                node.mesh = Some(meshes.len());
+                meshes.push(own);
+            }
+        }
+        nodes.push(node);
     }
     Ok(Meshes { meshes, node_of_object })
 }
@@ -141,7 +154,7 @@ fn primitive(
         return Err(GltfError::model(format!("object \"{}\" is too far away to be written", object.name)));
     }
     let mut attributes = Attributes::default();
-    attributes.put(Attribute::Position, bin.positions(&positions));
+    attributes.put(Attribute::Position, bin.vertices(&positions));
     let up = |normal: Vec3| if normal == Vec3::ZERO { Vec3::Y } else { normal };
     let normals: Vec<Vec3> = pick(&part.normals, &used).map(|normal| up(bake.normal(up(unit(normal))))).collect();
     if !normals.is_empty() {

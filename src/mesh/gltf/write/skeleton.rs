@@ -95,7 +95,7 @@ impl Skeleton {
     /// The chosen nodes as glTF objects.
     pub(super) fn nodes<'a>(&self, model: &'a Model) -> Vec<Node<'a>> {
         let mut children = vec![Vec::new(); self.node_of.iter().flatten().max().map_or(0, |last| last + 1)];
-        let mut nodes = Vec::new();
+        let mut nodes = Vec::with_capacity(children.len() + model.objects.len());
         if !self.joined.is_empty() {
             nodes.push(Node { name: COMMON_ROOT, ..Node::default() });
             children[0] = self.joined.iter().filter_map(|node| self.node_of[*node]).collect();
