@@ -6,6 +6,7 @@
 mod decimate;
 mod limbs;
 pub mod shapes;
+mod soles;
 mod true_joints;
 mod turns;
 mod variants;
