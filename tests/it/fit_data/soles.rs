@@ -35,8 +35,8 @@ fn place(fit: &FittedSkeleton, label: &str) -> Vec3 {
     fit.joints[joint].position
 }
 
-/// Ankle, ball and toes of a sole lie one before the other over the ground, and the ankle over the heel. Before there was a rule for
-/// soles, the ankle was where the hock of an animal that walks on its toes is.
+/// Ankle, ball and toes of a sole lie one before the other over the ground, at their shares of its length. By the proportions of an
+/// animal that walks on its toes, the ankle lies further back, and the ball over the heel.
 #[test]
 fn heels_of_soles_stand_on_the_ground() {
     let fit = animal(SOLE);
