@@ -125,6 +125,11 @@ impl TemplateLimbs {
         !self.is_upright() && self.count(LimbKind::Leg) >= 4
     }
 
+    /// True for a leg of an animal that walks on two with a hock below its knee, which the trunk hides.
+    pub(super) fn has_hidden_knee(&self, limb: &Limb) -> bool {
+        limb.kind == LimbKind::Leg && !self.is_upright() && !self.is_on_fours() && limb.joints.len() > 3
+    }
+
     /// Number of limbs of a kind.
     pub(super) fn count(&self, kind: LimbKind) -> usize {
         self.limbs.iter().filter(|l| l.kind == kind).count()

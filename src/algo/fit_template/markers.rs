@@ -56,6 +56,12 @@ fn socket(template: &TemplateLimbs, limb: &Limb) -> Option<(usize, usize)> {
     Some((*limb.joints.get(ball)?, *limb.joints.get(ball + 1)?))
 }
 
+/// The knee that the trunk hides and the hock below it, which bends where it can be seen: a knee that is wrong says nothing about it.
+fn hidden_hinge(template: &TemplateLimbs, limb: &Limb) -> Option<(usize, usize)> {
+    let joints = (*limb.joints.get(1)?, *limb.joints.get(2)?);
+    template.has_hidden_knee(limb).then_some(joints)
+}
+
 /// The part of a move from a place inside of the volume that goes at most half way to the surface.
 fn within(place: Vec3, way: Vec3, is_solid: &dyn Fn(Vec3) -> bool) -> Vec3 {
     if !is_solid(place) {
@@ -103,7 +109,8 @@ pub(super) fn warp(
             _ => usize::MAX,
         };
     }
-    let sockets: Vec<(usize, usize)> = template.limbs.iter().filter_map(|limb| socket(template, limb)).collect();
+    let of_limb = |limb: &Limb| socket(template, limb).into_iter().chain(hidden_hinge(template, limb));
+    let sockets: Vec<(usize, usize)> = template.limbs.iter().flat_map(of_limb).collect();
     let is_apart = |a: usize, b: usize| sockets.contains(&(a, b)) || sockets.contains(&(b, a));
     let mut sums = vec![(Vec3::ZERO, 0.0f32); places.len()];
     let mut is_carried = vec![false; places.len()];

@@ -1,5 +1,6 @@
 //! Placement: the template's joints on the centre lines of their branches and in the sections of the trunk.
 
+mod birds;
 mod legs;
 mod soles;
 mod trunk;
@@ -27,7 +28,7 @@ const BALL_OF_HIP: f32 = 1.1;
 const BENT: f32 = 0.04;
 
 /// Shoulder, elbow and wrist of a spread wing with feathers, as shares of the way from shoulder to feathers' end.
-const WING: [f32; 3] = [0.0, 0.17, 0.38];
+const WING: [f32; 3] = [0.0, 0.16, 0.37];
 
 /// Root of a wing, as a share of the way from the middle of the trunk to the place at which the wing leaves it.
 const WING_ROOT: f32 = 0.3;
@@ -220,6 +221,7 @@ impl Work<'_> {
             }
         } else {
             self.hide_knee(limb, line, &mut lengths);
+            self.keep_skull(limb, line, &mut lengths);
             for _ in 0..if self.template.is_on_fours() { ROUNDS } else { 1 } {
                 self.bend(limb, line, &mut lengths, root);
             }

@@ -12,8 +12,10 @@ use crate::algo::fit_template::{
 /// a joint takes there.
 const HIDDEN: f32 = 0.5;
 const SHAPED: f32 = 0.75;
-/// Place of a knee that the trunk hides, as a share of the way from where its leg leaves the trunk to the hip.
-const HIDDEN_KNEE: f32 = 0.5;
+/// Place of a knee that the trunk hides, as a share of the way from where its leg leaves the trunk to the hip, and the distance
+/// of that hip from the plane of symmetry, as a share of the knee's: thighs of birds lie nearly level, and lead outwards.
+const HIDDEN_KNEE: f32 = 0.75;
+const NARROW_HIP: f32 = 0.5;
 /// Share of a leg's free length at which its distance from the plane of symmetry is taken, the share by which its root
 /// follows it, and the cosine of its angle to up from which on it hangs straight down; an animal's leg that steps forward or
 /// back has that cosine to the plane of symmetry.
@@ -26,7 +28,7 @@ impl Work<'_> {
     /// Moves the knee of an animal on two legs into the trunk: the thighs of birds lie along the body, and what bends where it
     /// can be seen is the hock. The joints below it lie closer together or further apart.
     pub(super) fn hide_knee(&self, limb: &Limb, line: &CentreLine, lengths: &mut [f32]) {
-        if !self.has_hidden_knee(limb) {
+        if !self.template.has_hidden_knee(limb) {
             return;
         }
         let [hip, knee, hock, foot, ..] = lengths else { return };
@@ -37,19 +39,13 @@ impl Work<'_> {
         }
     }
 
-    /// True for a leg of an animal that walks on two with a hock below its knee.
-    fn has_hidden_knee(&self, limb: &Limb) -> bool {
-        let template = self.template;
-        limb.kind == LimbKind::Leg && !template.is_upright() && !template.is_on_fours() && limb.joints.len() > 3
-    }
-
     /// Draws the joints of an animal's leg that lie where the leg runs into the trunk to the shape that the template has
     /// between their neighbours: the flesh about a knee hides its bend.
     pub(super) fn hold_bends(&self, limb: &Limb, line: &CentreLine, lengths: &[f32], places: &mut [Option<Vec3>]) {
         if limb.kind != LimbKind::Leg || self.template.is_upright() {
             return;
         }
-        let has_hidden_knee = self.has_hidden_knee(limb);
+        let has_hidden_knee = self.template.has_hidden_knee(limb);
         for (joints, length) in limb.joints.windows(3).zip(lengths.iter().skip(1)) {
             let near = length / line.free.max(1e-9);
             let [before, here, after] = [joints[0], joints[1], joints[2]];
@@ -85,11 +81,13 @@ impl Work<'_> {
         if below.abs() < 1e-6 || !self.is_hanging(line, left, up) {
             return;
         }
+        let has_hidden_knee = self.template.has_hidden_knee(limb);
         let wide = (line.at(line.free * LEG) - attach).dot(left) / below;
         for (&joint, length) in limb.joints.iter().zip(lengths).filter(|(_, length)| **length > LEG * line.free) {
             let hidden = ((length / line.free - LEG) / (1.0 - LEG)).min(1.0);
             if let Some(place) = &mut places[joint] {
-                *place += left * (wide * of(joint) - (*place - attach).dot(left)) * hidden;
+                let share = if has_hidden_knee && joint == limb.joints[0] { NARROW_HIP } else { 1.0 };
+                *place += left * (share * wide * of(joint) - (*place - attach).dot(left)) * hidden;
             }
         }
     }
@@ -101,7 +99,9 @@ impl Work<'_> {
             return way.dot(up) > HANGS;
         }
         let aside = way.dot(left);
-        way.dot(up) > STEPS && aside * aside < 1.0 - HANGS * HANGS
+        // Toes of a bird are as long as its shank, and the line over both leads far forward.
+        let steps = if self.template.is_on_fours() { STEPS } else { 0.0 };
+        way.dot(up) > steps && aside * aside < 1.0 - HANGS * HANGS
     }
 
     /// The root of a leg that hangs straight down, as far from the plane of symmetry as the leg itself tells.

@@ -30,11 +30,29 @@ impl Work<'_> {
         let turn = self.hypothesis.alignment.rotation;
         let (left, up, forward) = (turn * Vec3::X, turn * Vec3::Y, turn * Vec3::Z);
         let arc_of = &self.tree.branches.arc_of;
-        let nodes = (0..self.graph.len()).filter(|&node| arc_of[node] as usize == leaf);
-        let leg: Vec<Vec3> = nodes.map(|node| self.graph.centres[node]).collect();
-        let ground = leg.iter().map(|place| place.dot(up)).fold(f32::INFINITY, f32::min) - 0.5 * self.graph.cell;
+        let centres = &self.graph.centres;
+        let leg: Vec<usize> = (0..self.graph.len()).filter(|&node| arc_of[node] as usize == leaf).collect();
+        let lowest = leg.iter().map(|&node| centres[node].dot(up)).fold(f32::INFINITY, f32::min);
+        let ground = lowest - 0.5 * self.graph.cell;
         let tall = attach.dot(up) - ground;
-        let foot: Vec<Vec3> = leg.iter().copied().filter(|place| place.dot(up) - ground < SOLE * tall).collect();
+        let is_low = |node: usize| centres[node].dot(up) - ground < SOLE * tall;
+        // A heel that juts out behind the leg is no part of its branch.
+        let is_of_other = |node: usize| {
+            let arc = arc_of[node] as usize;
+            arc != leaf && self.hypothesis.leaves.contains(&Some(arc))
+        };
+        let mut open: Vec<usize> = leg.into_iter().filter(|&node| is_low(node)).collect();
+        let mut is_foot = vec![false; centres.len()];
+        open.iter().for_each(|&node| is_foot[node] = true);
+        while let Some(node) = open.pop() {
+            for next in self.graph.neighbours(node as u32).iter().map(|link| link.0 as usize) {
+                if !is_foot[next] && is_low(next) && !is_of_other(next) {
+                    is_foot[next] = true;
+                    open.push(next);
+                }
+            }
+        }
+        let foot: Vec<Vec3> = centres.iter().zip(&is_foot).filter(|(_, is_foot)| **is_foot).map(|(p, _)| *p).collect();
         if foot.len() < CELLS {
             return;
         }
