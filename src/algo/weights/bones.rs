@@ -120,7 +120,7 @@ pub(crate) fn build(
         );
     }
     drop_repeats(&mut segments, &mut leaves, claims);
-    let homes = Homes::new(claims, slots, &segments, points, sight);
+    let homes = Homes::new(joints, (claims, slots), &segments, points, sight);
     grow_leaves(joints, &mut segments, &leaves, points, areas, (sight, &homes));
     let tree = BoneTree::new(&segments);
     let girths = girths(&segments, &tree, points, areas, sight);
