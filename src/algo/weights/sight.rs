@@ -110,6 +110,11 @@ impl Sight {
         self.whole.closest_point(place).map(|nearest| nearest.distance)
     }
 
+    /// The place of the surface that is nearest to a place; `None` without triangles.
+    pub fn nearest(&self, place: Vec3) -> Option<Vec3> {
+        self.whole.closest_point(place).map(|nearest| nearest.point)
+    }
+
     /// Distance from a place to a large island; infinite to others.
     pub fn distance(&self, island: usize, place: Vec3) -> f32 {
         let nearest = self.islands[island].as_ref().and_then(|island| island.closest_point(place));
