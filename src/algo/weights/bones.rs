@@ -63,7 +63,7 @@ pub(crate) fn build(
 ) -> Bones {
     /// Joints closer than this share a place.
     const SAME: f32 = 1e-6;
-    let joints = keypoints::set_back(joints, sight);
+    let joints = keypoints::set_into_flesh(keypoints::set_back(joints, sight), sight);
     let joints = &joints[..];
     let owners: Vec<Option<u32>> = owners(joints).into_iter().map(|o| o.filter(|&j| takes_part[j as usize])).collect();
     let children = parents_first(joints).1;
@@ -120,7 +120,7 @@ pub(crate) fn build(
         );
     }
     drop_repeats(&mut segments, &mut leaves, claims);
-    let homes = Homes::new(claims, slots, &segments, points, sight);
+    let homes = Homes::new(joints, (claims, slots), &segments, points, sight);
     grow_leaves(joints, &mut segments, &leaves, points, areas, (sight, &homes));
     let tree = BoneTree::new(&segments);
     let girths = girths(&segments, &tree, points, areas, sight);

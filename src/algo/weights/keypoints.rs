@@ -1,5 +1,7 @@
-//! Joints on the skin, as rigs of key points have them in faces: a bone that runs to the nose tells where the nose is, and not
-//! up to where the neck turns.
+//! Joints on the skin. Rigs of key points have them in faces: a bone that runs to the nose tells where the nose is, and not
+//! up to where the neck turns. Last joints of fingers that lie a little outside of the finger are set into it.
+
+use glam::Vec3;
 
 use super::{WeightJoint, roots::parents_first, sight::Sight};
 
@@ -11,6 +13,39 @@ const SAME: f32 = 1e-4;
 const ALIKE: f32 = 0.2;
 /// Share of a bone from the neck to the nose that lies in the neck.
 const IN_NECK: f32 = 0.45;
+
+/// A last joint outside of the surface is set into the flesh if it is no further from it than this share of the bone that leads
+/// there.
+const BESIDE: f32 = 0.15;
+/// A joint no further outside than this share of the thickness of the flesh is on the skin, as the ball of a baby's foot, and stays.
+const FLUSH: f32 = 0.06;
+
+/// The joints, with last ones that lie just outside of the surface in the middle of the flesh that is nearest to them. Beside
+/// the finger, the bone of a last joint would see one side of the flesh, and little of it.
+pub(super) fn set_into_flesh(mut joints: Vec<WeightJoint>, sight: &Sight) -> Vec<WeightJoint> {
+    let children = parents_first(&joints).1;
+    let inner = |index: usize| -> Option<Vec3> {
+        let WeightJoint { head, parent, tail, .. } = joints[index];
+        let length = joints[parent?].head.distance(head);
+        if tail.is_some() || !children[index].is_empty() {
+            return None;
+        }
+        let skin = sight.nearest(head)?;
+        let gap = skin.distance(head);
+        if gap <= SAME || gap > BESIDE * length || sight.encloses(head) {
+            return None;
+        }
+        let inward = (skin - head) / gap;
+        // A little below the skin, so that the first surface met is the one behind the flesh.
+        let thickness = sight.first(skin + inward * SAME, inward)?;
+        (gap > FLUSH * thickness).then(|| skin + inward * thickness * 0.5)
+    };
+    let places: Vec<Option<Vec3>> = (0..joints.len()).map(inner).collect();
+    for (joint, place) in joints.iter_mut().zip(places) {
+        joint.head = place.unwrap_or(joint.head);
+    }
+    joints
+}
 
 /// The joints as bones are to run between them: a pair that begins at one place on the skin, as the bones from the nose to
 /// both eyes, begins in the flesh before it. Otherwise the joint above would hold all that is around its long bone: of a neck

@@ -164,7 +164,13 @@ impl Homes {
     /// Looks where the bones of joints run. Joints for which `claims` is true and that are at home nowhere may hold all parts;
     /// those for which `slots` is true hold nothing of a part that others are at home in, nor of small ones: a sword is the
     /// slot's that it is around, the hand is not.
-    pub fn new(claims: &[bool], slots: &[bool], segments: &[BoneSegment], points: &[Vec3], sight: &Sight) -> Self {
+    pub fn new(
+        joints: &[WeightJoint],
+        (claims, slots): (&[bool], &[bool]),
+        segments: &[BoneSegment],
+        points: &[Vec3],
+        sight: &Sight,
+    ) -> Self {
         let mut parts = vec![Vec::new(); sight.islands()];
         for part in sight.parts() {
             let mut at_home = vec![false; claims.len()];
@@ -177,6 +183,7 @@ impl Homes {
             }
             parts[part] = if at_home.contains(&true) { at_home } else { Vec::new() };
         }
+        separate_limbs(&mut parts, joints, segments, sight);
         for joint in (0..claims.len()).filter(|&joint| claims[joint]) {
             if parts.iter().all(|part: &Vec<bool>| part.get(joint) != Some(&true)) {
                 parts.iter_mut().filter_map(|part| part.get_mut(joint)).for_each(|is_home| *is_home = true);
@@ -219,6 +226,71 @@ impl Homes {
     pub fn is_slot(&self, joint: u32) -> bool {
         self.slots.get(joint as usize).is_some_and(|is_slot| *is_slot)
     }
+}
+
+/// Takes the bones of limbs that are parts of their own from the parts of the trunk in which they begin, with all bones below. A
+/// limb is a part of its own if a part holds its first bone and not the joint above it, and if no part of the trunk runs along
+/// that bone, as sleeves and trouser legs do: around half of it at least, and with skin between it and its twin. A robe has no
+/// skin between the legs, and hangs from the hips.
+fn separate_limbs(parts: &mut [Vec<bool>], joints: &[WeightJoint], segments: &[BoneSegment], sight: &Sight) {
+    /// Share of a bone that a sleeve is around.
+    const SLEEVE: f32 = 0.5;
+    let mut bones: Vec<Vec<&BoneSegment>> = vec![Vec::new(); joints.len()];
+    for segment in segments.iter().filter(|segment| segment.head != segment.tail) {
+        bones[segment.joint as usize].push(segment);
+    }
+    let is_home = |parts: &[Vec<bool>], part: usize, joint: usize| parts[part].get(joint) == Some(&true);
+    let mut gone = vec![vec![false; joints.len()]; parts.len()];
+    for joint in parents_first(joints).0 {
+        let Some(parent) = joints[joint].parent else { continue };
+        let homes: Vec<usize> = (0..parts.len()).filter(|&part| is_home(parts, part, joint)).collect();
+        let (left, kept): (Vec<usize>, Vec<usize>) = homes.iter().copied().partition(|&part| gone[part][parent]);
+        if !left.is_empty() && !kept.is_empty() {
+            left.iter().for_each(|&part| gone[part][joint] = true);
+            continue;
+        }
+        let [bone] = bones[joint][..] else { continue };
+        let around = |part: usize| share(bone.head, bone.tail, |place| sight.is_within(part, place));
+        let (trunk, others): (Vec<usize>, Vec<usize>) =
+            homes.into_iter().partition(|&part| is_home(parts, part, parent));
+        if trunk.is_empty() || !others.iter().any(|&part| around(part) >= AT_HOME) {
+            continue;
+        }
+        let twins: Vec<&BoneSegment> = (0..joints.len())
+            .filter(|&other| are_twins(joints, &bones, joint, other))
+            .map(|other| bones[other][0])
+            .collect();
+        let is_sleeve = |part: usize| {
+            let skin_between = |twin: &&BoneSegment| {
+                (0..STATIONS).map(|i| (i as f32 + 0.5) / STATIONS as f32).any(|along| {
+                    let (from, to) = (bone.head.lerp(bone.tail, along), twin.head.lerp(twin.tail, along));
+                    sight.is_within(part, from) && sight.is_between(part, from, to)
+                })
+            };
+            around(part) >= SLEEVE && twins.iter().all(skin_between)
+        };
+        if !trunk.iter().any(|&part| is_sleeve(part)) {
+            trunk.iter().for_each(|&part| gone[part][joint] = true);
+        }
+    }
+    for (homes, gone) in parts.iter_mut().zip(gone) {
+        homes.iter_mut().zip(gone).for_each(|(is_home, gone)| *is_home &= !gone);
+    }
+}
+
+/// True if two joints have one bone each, of about the same length and direction, and hang on one joint or on joints that do.
+fn are_twins(joints: &[WeightJoint], bones: &[Vec<&BoneSegment>], joint: usize, other: usize) -> bool {
+    /// Lengths that differ by more than this share are not a pair's.
+    const ALIKE: f32 = 0.2;
+    let above = |joint: usize| joints[joint].parent;
+    let of_one = |a: Option<usize>, b: Option<usize>| a.is_some() && a == b;
+    let are_beside =
+        of_one(above(joint), above(other)) || of_one(above(joint).and_then(above), above(other).and_then(above));
+    let ([bone], [twin]) = (&bones[joint][..], &bones[other][..]) else { return false };
+    let (way, twin_way) = (bone.tail - bone.head, twin.tail - twin.head);
+    let (length, twin_length) = (way.length(), twin_way.length());
+    let is_alike = (length - twin_length).abs() <= ALIKE * length.max(twin_length);
+    joint != other && are_beside && is_alike && way.dot(twin_way) > 0.5 * length * twin_length
 }
 
 /// Gives parts that enclose no bone to the bones at home nowhere that run through their boxes: shells of plates and bars enclose

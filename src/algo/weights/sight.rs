@@ -93,6 +93,13 @@ impl Sight {
         self.islands[island].as_ref().is_none_or(|island| encloses(island, point))
     }
 
+    /// True if something of a large island lies between two places.
+    pub fn is_between(&self, island: usize, from: Vec3, to: Vec3) -> bool {
+        let length = from.distance(to);
+        let ray = Ray { origin: from, direction: (to - from) / length };
+        length > 0.0 && self.islands[island].as_ref().is_some_and(|island| island.crosses(&ray, 0.0, length))
+    }
+
     /// The large islands of a surface of several.
     pub fn parts(&self) -> impl Iterator<Item = usize> {
         (0..self.islands.len()).filter(|island| self.islands[*island].is_some())
@@ -101,6 +108,11 @@ impl Sight {
     /// Distance from a place to the surface; `None` without triangles.
     pub fn gap(&self, place: Vec3) -> Option<f32> {
         self.whole.closest_point(place).map(|nearest| nearest.distance)
+    }
+
+    /// The place of the surface that is nearest to a place; `None` without triangles.
+    pub fn nearest(&self, place: Vec3) -> Option<Vec3> {
+        self.whole.closest_point(place).map(|nearest| nearest.point)
     }
 
     /// Distance from a place to a large island; infinite to others.

@@ -299,3 +299,49 @@ fn rings_move_with_the_bone_inside_of_them() {
         assert_eq!(report.stiff, points.len() - first);
     }
 }
+
+/// Legs that are parts of their own below a robe, or that begin in a short trunk, leave it to the hips and the spine; shorts
+/// that are one piece with the trunk follow the thighs.
+#[test]
+fn robes_hang_from_the_hips_and_shorts_follow_the_thighs() {
+    let joints = [
+        joint([0.0, 2.5, 0.0], None),
+        joint([0.0, 3.2, 0.0], Some(0)),
+        joint([0.0, 3.9, 0.0], Some(1)),
+        joint([0.4, 2.1, 0.0], Some(0)),
+        joint([0.4, 1.0, 0.0], Some(3)),
+        joint([0.4, 0.2, 0.0], Some(4)),
+        joint([-0.4, 2.1, 0.0], Some(0)),
+        joint([-0.4, 1.0, 0.0], Some(6)),
+        joint([-0.4, 0.2, 0.0], Some(7)),
+    ];
+    let figure = |hem: f32| {
+        let (mut points, mut triangles) = (Vec::new(), Vec::new());
+        let mut add = |low: [f32; 3], high: [f32; 3]| add_box(&mut points, &mut triangles, low.into(), high.into());
+        let trunk = add([-0.9, hem, -0.5], [0.9, 4.0, 0.5]);
+        let legs = [add([0.25, 0.0, -0.2], [0.65, 2.2, 0.2]), add([-0.65, 0.0, -0.2], [-0.25, 2.2, 0.2])];
+        (points, triangles, trunk, legs)
+    };
+    let of_legs = |weights: &Weights, point: usize| (3..9).map(|joint| weight(weights, point, joint)).sum::<f32>();
+    // A robe over most of the thighs, and a trunk over a quarter of them.
+    for hem in [1.4, 1.8] {
+        let (points, triangles, mut trunk, legs) = figure(hem);
+        let weights = bind(&points, &triangles, &joints).0;
+        check_sound(&weights, points.len(), &joints, 8);
+        assert!(trunk.all(|point| of_legs(&weights, point) == 0.0), "a trunk down to {hem}");
+        for mut leg in legs {
+            assert!(leg.all(|point| of_legs(&weights, point) > 0.99), "legs below a trunk down to {hem}");
+        }
+    }
+    let (mut points, mut triangles, trunk, _) = figure(2.3);
+    for low in [0.1, -0.8] {
+        let short = add_box(&mut points, &mut triangles, Vec3::new(low, 1.2, -0.4), Vec3::new(low + 0.7, 2.25, 0.4));
+        // A strap makes one piece of the shorts and the trunk.
+        triangles.push([trunk.start, trunk.start + 1, short.start + 2].map(|point| point as u32));
+        let weights = bind(&points, &triangles, &joints).0;
+        check_sound(&weights, points.len(), &joints, 8);
+        let hem = short.filter(|point| points[*point].y < 1.5);
+        let held: Vec<f32> = hem.map(|point| of_legs(&weights, point)).collect();
+        assert!(held.len() == 4 && held.iter().all(|held| *held > 0.5), "{held:?} of the hem at {low}");
+    }
+}
