@@ -96,9 +96,9 @@ pub(super) fn check_named_files(input: &Path, read: &BTreeSet<PathBuf>) -> Resul
     let is_there = |path: &Path| RealDisk.entry(path, true).is_ok();
     for (output, in_place) in outputs.iter().filter(|(output, _)| is_there(output)) {
         let is_same = |other: &Path| is_same_file(&RealDisk, other, output);
-        // Whether the input itself may be replaced was asked before.
-        let may_replace =
-            |file: &Path| *in_place && FileKind::of(file).is_some_and(|kind| FileKind::of(output) == Some(kind));
+        // Whether the input itself may be replaced was asked before. Of what it names only parts are of a kind that a command
+        // writes whole: a buffer may be called like a model, and is none.
+        let may_replace = |file: &Path| *in_place && FileKind::of(file) == Some(FileKind::Template);
         if is_same(input) || !read.iter().any(|file| is_there(file) && is_same(file) && !may_replace(file)) {
             continue;
         }
