@@ -10,6 +10,7 @@ mod factor;
 mod moving_skin;
 mod pose_problem;
 mod samples;
+mod separation;
 mod targets;
 
 use std::{collections::BTreeMap, sync::OnceLock};
@@ -17,10 +18,10 @@ use std::{collections::BTreeMap, sync::OnceLock};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
+pub(super) use self::pose_problem::Repair;
 use self::{
     factor::{Factor, SparseMatrix},
     moving_skin::MovingSkin,
-    pose_problem::Repair,
     samples::{Mark, Sample},
     targets::UnitTargets,
 };
@@ -119,11 +120,11 @@ impl FittedFace {
             pairs: mirrored_pairs(bones, landmarks),
         };
         let Some(opening_lines) = face.opening_lines.clone() else { return face };
-        let (samples, apart) = samples::gather(points, mask, weights, bones, landmarks, &opening_lines);
+        let (samples, facing) = samples::gather(points, mask, weights, bones, landmarks, &opening_lines);
         face.samples = samples;
         face.factorise();
         face.jaw = face.jaw_movements(&opening_lines);
-        face.moving = MovingSkin::new(points, triangles, weights, bones, &apart);
+        face.moving = MovingSkin::new(points, triangles, weights, bones, &facing);
         face
     }
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     SLIVER,
-    samples::{FacingPoints, influences},
+    samples::{FacingPairs, FacingPoints, influences},
 };
 use crate::{
     algo::face::bones::FaceBone,
@@ -33,7 +33,7 @@ pub(super) struct MovingSkin {
     /// Triangles that each bone moves.
     of_bone: Vec<Vec<u32>>,
     /// Points of lips and lids that face each other.
-    pub apart: Vec<FacingPoints>,
+    pub facing: FacingPairs,
 }
 
 impl MovingSkin {
@@ -42,7 +42,7 @@ impl MovingSkin {
         triangles: &[[u32; 3]],
         weights: &Weights,
         bones: &[FaceBone],
-        apart: &[FacingPoints],
+        facing: &FacingPairs,
     ) -> Self {
         let mut skin = Self { of_bone: vec![Vec::new(); bones.len()], ..Self::default() };
         let moved: Vec<bool> =
@@ -85,10 +85,13 @@ impl MovingSkin {
             skin.numbers.push(triangle as u32);
             skin.normals.push(normal);
         }
-        for facing in apart {
-            let [above, below] = [facing.above, facing.below].map(|point| number(&mut skin, point));
-            skin.apart.push(FacingPoints { above, below, ..*facing });
-        }
+        let mut numbered = |pair: &FacingPoints| {
+            let [above, below] = [pair.above, pair.below].map(|point| number(&mut skin, point));
+            FacingPoints { above, below, ..*pair }
+        };
+        let apart = facing.apart.iter().map(&mut numbered).collect();
+        let rims = facing.rims.iter().map(&mut numbered).collect();
+        skin.facing = FacingPairs { apart, rims };
         skin
     }
 
@@ -153,7 +156,8 @@ impl<'a> PosedSkin<'a> {
                 }
             }
         }
-        for point in skin.apart.iter().flat_map(|facing| [facing.above, facing.below]) {
+        let pairs = skin.facing.apart.iter().chain(&skin.facing.rims);
+        for point in pairs.flat_map(|pair| [pair.above, pair.below]) {
             let point = point as usize;
             self.points[point] = skin_point(point, skin.points[point], &skin.weights, &self.matrices);
         }

@@ -53,8 +53,10 @@ impl PoseProblems {
 
 /// Outcome of the repair of a pose.
 pub(in crate::algo::face::expression) struct Repair {
-    /// Triangles that stay folded, in rising order.
+    /// Triangles that are folded before lips and lids are separated, in rising order: other weights may mend them.
     pub folded: Vec<u32>,
+    /// Number of triangles that stay folded.
+    pub folds: usize,
     /// Share of each unit's furthest movement that the repair took, on the left and on the right.
     pub taken: Vec<[f32; 2]>,
 }
@@ -62,7 +64,7 @@ pub(in crate::algo::face::expression) struct Repair {
 impl Repair {
     /// The outcome for a pose that needs none.
     pub(super) fn none(mix: &Mix) -> Self {
-        Self { folded: Vec::new(), taken: vec![[0.0; 2]; mix.strengths.len()] }
+        Self { folded: Vec::new(), folds: 0, taken: vec![[0.0; 2]; mix.strengths.len()] }
     }
 }
 
@@ -109,7 +111,7 @@ impl FittedFace {
         let solved: Vec<Vec3> = poses.iter().map(|pose| pose.translation).collect();
         let mut apart = vec![0.0; poses.len()];
         let mut repair = Repair::none(mix);
-        if self.moving.triangles.is_empty() && self.moving.apart.is_empty() {
+        if self.moving.triangles.is_empty() && self.moving.facing.apart.is_empty() {
             return repair;
         }
         let closed = self.closed_shares(mix);
@@ -159,10 +161,12 @@ impl FittedFace {
             }
             posed.update(self.matrices(poses));
         }
+        repair.folded = posed.folded_numbers();
+        self.separate(poses, &mut posed, is_alike);
+        repair.folds = posed.folded().count();
         if let Some(used) = used {
             used.charge(&taken, &mut repair.taken);
         }
-        repair.folded = posed.folded_numbers();
         repair
     }
 
@@ -200,7 +204,7 @@ impl FittedFace {
     }
 
     /// Matrices of neck, head and each bone.
-    fn matrices(&self, poses: &[BonePose]) -> Vec<Affine3A> {
+    pub(super) fn matrices(&self, poses: &[BonePose]) -> Vec<Affine3A> {
         let moved = poses.iter().zip(&self.bones).map(|(pose, bone)| pose.affine(bone.position));
         [Affine3A::IDENTITY; 2].into_iter().chain(moved).collect()
     }
@@ -231,7 +235,7 @@ impl FittedFace {
         let mut problems = PoseProblems { folded: posed.folded().collect(), ..PoseProblems::default() };
         let mut eyes = [Vec::new(), Vec::new()];
         let mut off = [0; 2];
-        for facing in &self.moving.apart {
+        for facing in &self.moving.facing.apart {
             let gap = |points: &[Vec3]| points[facing.above as usize].y - points[facing.below as usize].y;
             let (rest, now) = (gap(&self.moving.points), gap(&posed.points));
             // Lips and lids that touch at rest may keep touching.
@@ -264,7 +268,7 @@ impl FittedFace {
     }
 
     /// Shares of the bones of skin in the height of one facing point above the other; those of the lower one count `lower`.
-    fn shares(&self, facing: &FacingPoints, lower: f32) -> BTreeMap<usize, [f32; 2]> {
+    pub(super) fn shares(&self, facing: &FacingPoints, lower: f32) -> BTreeMap<usize, [f32; 2]> {
         let mut shares: BTreeMap<usize, [f32; 2]> = BTreeMap::new();
         for (point, sign, mobility) in [(facing.above, 1.0, 1.0), (facing.below, -1.0, lower)] {
             for (joint, weight) in influences(&self.moving.weights, point as usize) {

@@ -1,6 +1,6 @@
 //! Samples of the skin that should follow the field.
 
-use std::ops::RangeInclusive;
+use std::{collections::BTreeSet, ops::RangeInclusive};
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -28,6 +28,21 @@ const LIPS: usize = 3;
 
 /// Inner landmarks of the lips from corner to corner.
 const INNER_LIPS: [[usize; 2]; 5] = [[60, 60], [61, 67], [62, 66], [63, 65], [64, 64]];
+/// Inner landmarks of the upper and of the lower lip from corner to corner.
+const INNER_UPPER_LIP: [usize; 5] = [60, 61, 62, 63, 64];
+const INNER_LOWER_LIP: [usize; 5] = [60, 67, 66, 65, 64];
+/// Number of parts into which places along the rims of the lips divide them.
+const LIP_PARTS: usize = 32;
+/// Places of them at which the rims are kept apart: bones at the corners of the mouth move both lips.
+const LIP_PLACES: RangeInclusive<usize> = 7..=25;
+/// Places along the rims of lids, those of their landmarks, as shares of the way between the corners. Beside them the rims of a
+/// shut eye are so steep that points at different places would hold it open.
+const LID_PLACES: [f32; 2] = [1.0 / 3.0, 2.0 / 3.0];
+/// Points around a place of the rim of a lip that face those around the place of the other rim, the further the fewer, and the
+/// largest distance sideways of those that do, in eye distances.
+const AROUND_LIPS: (usize, f32) = (6, 0.01);
+/// The same for lids, whose landmarks are further from each other.
+const AROUND_LIDS: (usize, f32) = (9, 0.02);
 /// Landmarks of the upper and the lower lid from corner to corner, of the left and the right eye.
 const LIDS: [[[usize; 4]; 2]; 2] = [[[42, 43, 44, 45], [42, 47, 46, 45]], [[36, 37, 38, 39], [36, 41, 40, 39]]];
 /// Places along lips and lids at which the upper one stays above the lower one.
@@ -42,6 +57,15 @@ pub(super) struct FacingPoints {
     pub below: u32,
     /// The left (0) or the right eye (1), whose lids may be closed; `None` for lips.
     pub eye: Option<usize>,
+}
+
+/// Pairs of facing points of a face.
+#[derive(Default)]
+pub(super) struct FacingPairs {
+    /// Pairs at even places along lips and lids, which a repair keeps at their distances.
+    pub apart: Vec<FacingPoints>,
+    /// Many pairs along the rims of lips and at the landmarks of lids, which may touch.
+    pub rims: Vec<FacingPoints>,
 }
 
 /// A place at which the field is sampled.
@@ -116,7 +140,7 @@ pub(super) fn gather(
     bones: &[FaceBone],
     landmarks: &Landmarks,
     opening_lines: &OpeningLines,
-) -> (Vec<Sample>, Vec<FacingPoints>) {
+) -> (Vec<Sample>, FacingPairs) {
     let mut unknown_of = vec![u32::MAX; bones.len()];
     let skin_bones = (0..bones.len()).filter(|&bone| bones[bone].kind == FaceBoneKind::Skin);
     for (unknown, bone) in skin_bones.enumerate() {
@@ -180,7 +204,8 @@ pub(super) fn gather(
     }
     apart.extend(facing_lips(points, &candidates, &lower_share, landmarks));
     apart.extend([0, 1].into_iter().flat_map(|eye| facing_lids(points, &candidates, landmarks, eye)));
-    (samples, apart)
+    let rims = rims(points, &candidates, &lower_share, landmarks);
+    (samples, FacingPairs { apart, rims })
 }
 
 /// Points of the upper and the lower lip that face each other, at even places between the corners of the mouth.
@@ -210,6 +235,66 @@ fn facing_lids(points: &[Vec3], candidates: &[usize], landmarks: &Landmarks, eye
     (1..=STATIONS).filter_map(facing).collect()
 }
 
+/// Pairs of points along the rims of lips and lids, of which one is above the other.
+fn rims(points: &[Vec3], candidates: &[usize], lower_share: &[f32], landmarks: &Landmarks) -> Vec<FacingPoints> {
+    let places = |marks: &[usize]| -> Vec<Vec3> { marks.iter().map(|mark| landmarks.points[*mark]).collect() };
+    let lip_places: Vec<f32> = LIP_PLACES.map(|place| place as f32 / LIP_PARTS as f32).collect();
+    let mut rims: BTreeSet<(Option<usize>, u32, u32)> = BTreeSet::new();
+    let openings = [(None, INNER_UPPER_LIP.as_slice(), INNER_LOWER_LIP.as_slice())];
+    let lids = LIDS.iter().enumerate().map(|(eye, [upper, lower])| (Some(eye), upper.as_slice(), lower.as_slice()));
+    for (eye, upper, lower) in openings.into_iter().chain(lids) {
+        let [upper, lower] = [places(upper), places(lower)];
+        let near = near_line(points, candidates, &[upper.as_slice(), &lower].concat(), landmarks);
+        let is_lower = |point: usize| match eye {
+            None => lower_share[point] >= 0.5,
+            Some(_) => points[point].y < height_between(&upper, &lower, points[point].x),
+        };
+        let (below, above): (Vec<usize>, Vec<usize>) = near.into_iter().partition(|point| is_lower(*point));
+        let places = match eye {
+            None => lip_places.as_slice(),
+            Some(_) => &LID_PLACES,
+        };
+        let (count, reach) = if eye.is_none() { AROUND_LIPS } else { AROUND_LIDS };
+        let reach = reach * landmarks.eye_distance();
+        for share in places {
+            let [above, below] = [(&above, &upper), (&below, &lower)]
+                .map(|(of, line)| around(points, of, part_way(line, *share), count));
+            for (rank, above) in above.iter().enumerate() {
+                let below = below.iter().take(count - rank);
+                let facing = below.filter(|below| (points[*above].x - points[**below].x).abs() <= reach);
+                rims.extend(facing.map(|below| (eye, *above as u32, *below as u32)));
+            }
+        }
+    }
+    rims.into_iter().map(|(eye, above, below)| FacingPoints { above, below, eye }).collect()
+}
+
+/// Height halfway between two lines from corner to corner.
+fn height_between(upper: &[Vec3], lower: &[Vec3], x: f32) -> f32 {
+    0.5 * (height(upper, x) + height(lower, x))
+}
+
+/// Height of a line at a place; that of the nearest end beyond its ends.
+fn height(line: &[Vec3], x: f32) -> f32 {
+    let mut height = None;
+    for ends in line.windows(2) {
+        let [a, b] = [ends[0], ends[1]];
+        if (a.x <= x) != (b.x <= x) {
+            height = Some(a.y + (b.y - a.y) * ((x - a.x) / (b.x - a.x)));
+        }
+    }
+    let end = line.iter().min_by(|a, b| (a.x - x).abs().total_cmp(&(b.x - x).abs()));
+    height.or(end.map(|end| end.y)).unwrap_or_default()
+}
+
+/// The `count` points that are nearest to a place.
+fn around(points: &[Vec3], of: &[usize], place: Vec3, count: usize) -> Vec<usize> {
+    let mut near = of.to_vec();
+    near.sort_by(|a, b| points[*a].distance_squared(place).total_cmp(&points[*b].distance_squared(place)));
+    near.truncate(count);
+    near
+}
+
 /// Points near the corners of a line.
 fn near_line(points: &[Vec3], candidates: &[usize], line: &[Vec3], landmarks: &Landmarks) -> Vec<usize> {
     let near = 0.2 * landmarks.eye_distance();
@@ -225,7 +310,12 @@ fn nearest(points: &[Vec3], of: impl Iterator<Item = usize>, place: Vec3) -> Opt
 
 /// A place on a line, `station` of [`STATIONS`] between its ends.
 fn along(line: &[Vec3], station: usize) -> Vec3 {
-    let at = station as f32 * (line.len() - 1) as f32 / (STATIONS + 1) as f32;
+    part_way(line, station as f32 / (STATIONS + 1) as f32)
+}
+
+/// A place on a line, a share of the way between its ends.
+fn part_way(line: &[Vec3], share: f32) -> Vec3 {
+    let at = share * (line.len() - 1) as f32;
     let from = (at as usize).min(line.len() - 2);
     line[from].lerp(line[from + 1], at - from as f32)
 }
