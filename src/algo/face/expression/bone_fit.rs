@@ -18,10 +18,10 @@ use std::{collections::BTreeMap, sync::OnceLock};
 use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
-pub(super) use self::pose_problem::Repair;
 use self::{
     factor::{Factor, SparseMatrix},
     moving_skin::MovingSkin,
+    pose_problem::Repair,
     samples::{Mark, Sample},
     targets::UnitTargets,
 };
@@ -135,10 +135,12 @@ impl FittedFace {
     /// moved apart.
     /// Cost: points that bones move times rounds of repair, and for each unit once samples times moves of the field.
     pub fn pose(&self, mix: &Mix) -> Vec<BonePose> {
-        self.pose_and_repair(mix).0
+        let mut poses = self.pose_and_repair(mix).0;
+        self.separate(&mut poses, is_alike(mix));
+        poses
     }
 
-    /// The pose of each bone, and what its repair took and left.
+    /// The pose of each bone before lips and lids that still cross are separated, and what its repair took and left.
     pub(super) fn pose_and_repair(&self, mix: &Mix) -> (Vec<BonePose>, Repair) {
         let rest = || (vec![BonePose::REST; self.bones.len()], Repair::none(mix));
         let Some(opening_lines) = self.opening_lines.as_ref().filter(|_| !mix.is_rest()) else { return rest() };

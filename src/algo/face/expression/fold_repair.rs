@@ -7,11 +7,7 @@
 use glam::{Affine3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
-use super::{
-    ExpressionSet, FittedFace, Mix,
-    bone_fit::{Repair, SLIVER},
-    text::Expression,
-};
+use super::{ExpressionSet, FittedFace, Mix, bone_fit::SLIVER, text::Expression};
 use crate::{
     algo::face::{bones::FaceBone, landmarks::Landmarks, weights::Mirror},
     mesh::{adjacency::weld, influences::keep_strongest_alike, model::Weights},
@@ -52,7 +48,7 @@ pub fn repair_folds(
     }
     let six: Vec<&Expression> = set.six().collect();
     let mut surface: Option<Surface> = None;
-    let mut best: Option<BestWeights> = None;
+    let mut best: Option<(usize, Weights)> = None;
     let mirror = Mirror::new(points, bones, landmarks);
     let mut face =
         FittedFace::new(points, triangles, mask, weights, bones, landmarks, set.unit_set()).keeping_targets();
@@ -63,21 +59,20 @@ pub fn repair_folds(
         let posed = |expression: &&Expression| {
             let (poses, repair) = face.pose_and_repair(&Mix::of(&[(*expression, 1.0)], set.unit_set()));
             let moved = poses.into_iter().zip(bones).map(|(pose, bone)| pose.affine(bone.position));
-            ([Affine3A::IDENTITY; 2].into_iter().chain(moved).collect(), repair)
+            ([Affine3A::IDENTITY; 2].into_iter().chain(moved).collect(), repair.folded)
         };
-        let (poses, all): (Vec<Vec<Affine3A>>, Vec<Repair>) = six.par_iter().map(posed).unzip();
-        let sum = all.iter().map(|repair| repair.folded.len()).sum();
+        let (poses, all): (Vec<Vec<Affine3A>>, Vec<Vec<u32>>) = six.par_iter().map(posed).unzip();
+        let sum = all.iter().map(Vec::len).sum();
         // A pass that helped nothing is the last.
-        if best.as_ref().is_some_and(|best| sum >= best.mendable) {
+        if best.as_ref().is_some_and(|(least, _)| sum >= *least) {
             break;
         }
-        let folds = all.iter().map(|repair| repair.folds).sum();
-        best = Some(BestWeights { mendable: sum, folds, weights: weights.clone() });
+        best = Some((sum, weights.clone()));
         if sum == 0 || pass == PASSES {
             break;
         }
         let surface = surface.get_or_insert_with(|| Surface::new(points, triangles));
-        let mut folded: Vec<u32> = all.into_iter().flat_map(|repair| repair.folded).collect();
+        let mut folded = all.concat();
         sort(&mut folded);
         let mut averaged = AveragedWeights {
             surface,
@@ -95,18 +90,9 @@ pub fn repair_folds(
             mirror.apply(weights, most);
         }
     }
-    let Some(best) = best else { return 0 };
-    *weights = best.weights;
-    best.folds
-}
-
-/// The weights with the fewest folds so far.
-struct BestWeights {
-    /// Folds before lips and lids are separated, summed over the six.
-    mendable: usize,
-    /// Folds that are left, summed over the six.
-    folds: usize,
-    weights: Weights,
+    let Some((left, best)) = best else { return 0 };
+    *weights = best;
+    left
 }
 
 /// Sorts numbers and drops those that come again.

@@ -53,10 +53,8 @@ impl PoseProblems {
 
 /// Outcome of the repair of a pose.
 pub(in crate::algo::face::expression) struct Repair {
-    /// Triangles that are folded before lips and lids are separated, in rising order: other weights may mend them.
+    /// Triangles that stay folded, in rising order.
     pub folded: Vec<u32>,
-    /// Number of triangles that stay folded.
-    pub folds: usize,
     /// Share of each unit's furthest movement that the repair took, on the left and on the right.
     pub taken: Vec<[f32; 2]>,
 }
@@ -64,7 +62,7 @@ pub(in crate::algo::face::expression) struct Repair {
 impl Repair {
     /// The outcome for a pose that needs none.
     pub(super) fn none(mix: &Mix) -> Self {
-        Self { folded: Vec::new(), folds: 0, taken: vec![[0.0; 2]; mix.strengths.len()] }
+        Self { folded: Vec::new(), taken: vec![[0.0; 2]; mix.strengths.len()] }
     }
 }
 
@@ -161,12 +159,10 @@ impl FittedFace {
             }
             posed.update(self.matrices(poses));
         }
-        repair.folded = posed.folded_numbers();
-        self.separate(poses, &mut posed, is_alike);
-        repair.folds = posed.folded().count();
         if let Some(used) = used {
             used.charge(&taken, &mut repair.taken);
         }
+        repair.folded = posed.folded_numbers();
         repair
     }
 

@@ -3,14 +3,22 @@
 //! Each pair of facing points that cross is a linear inequality in the heights of bones: their distance in height is at least
 //! zero, or that at rest where they overlap at rest. The movement with the least sum of squares that meets all inequalities is
 //! found by Hildreth's method (a quadratic programming procedure, 1957): one inequality after the other, each with a multiplier
-//! that never falls below zero. Pairs that do not cross are inequalities, too, but move nothing by themselves.
+//! that never falls below zero. Pairs that do not cross are inequalities, too, but move nothing by themselves. A pose in which the
+//! movement would fold more skin keeps its crossing.
 
 use std::collections::BTreeMap;
 
 use glam::Vec3;
 
-use super::{FittedFace, moving_skin::PosedSkin, samples::FacingPoints};
-use crate::algo::face::expression::{BonePose, limited};
+use super::{
+    FittedFace,
+    moving_skin::{MovingSkin, PosedSkin},
+    samples::FacingPoints,
+};
+use crate::{
+    algo::face::expression::{BonePose, limited},
+    mesh::skinning::skin_point,
+};
 
 /// Distance that points which crossed keep, in eye distances.
 const MARGIN: f32 = 5e-5;
@@ -39,19 +47,22 @@ struct Inequality {
 }
 
 impl FittedFace {
-    /// Moves bones up or down until no facing points cross; alike on both sides if `is_alike`.
-    pub(super) fn separate(&self, poses: &mut [BonePose], posed: &mut PosedSkin, is_alike: bool) {
+    /// Moves bones up or down until no facing points cross, unless more skin would fold then; alike on both sides if `is_alike`.
+    pub(super) fn separate(&self, poses: &mut [BonePose], is_alike: bool) {
         let scale = self.landmarks.eye_distance();
-        let rims = &self.moving.facing.rims;
+        let MovingSkin { points, weights, facing, .. } = &self.moving;
+        let matrices = self.matrices(poses);
         let missing = |pair: &FacingPoints| {
-            let gap = |points: &[Vec3]| points[pair.above as usize].y - points[pair.below as usize].y;
-            gap(&self.moving.points).min(0.0) - gap(&posed.points)
+            let [above, below] = [pair.above as usize, pair.below as usize];
+            let height = |point: usize| skin_point(point, points[point], weights, &matrices).y;
+            (points[above].y - points[below].y).min(0.0) - (height(above) - height(below))
         };
         let is_near = |pair: &FacingPoints, missing: f32| {
             let deepest = if pair.eye.is_none() { DEEPEST_LIPS } else { DEEPEST_LIDS };
             missing > -ROOM * scale && missing < deepest * scale
         };
-        let pairs = rims.iter().map(|pair| (pair, missing(pair))).filter(|(pair, missing)| is_near(pair, *missing));
+        let pairs =
+            facing.rims.iter().map(|pair| (pair, missing(pair))).filter(|(pair, missing)| is_near(pair, *missing));
         let pairs: Vec<(&FacingPoints, f32)> = pairs.collect();
         if pairs.iter().all(|(_, missing)| *missing <= MARGIN * scale) {
             return;
@@ -73,13 +84,19 @@ impl FittedFace {
         let mut inequalities: Vec<Inequality> = pairs.into_iter().map(inequality).collect();
         inequalities.retain(|inequality| inequality.square >= LEAST_SQUARE);
         let heights = least_heights(&mut inequalities, poses.len(), PRECISION * scale);
-        for (bone, pose) in poses.iter_mut().enumerate() {
+        let mut separate = poses.to_vec();
+        for (bone, pose) in separate.iter_mut().enumerate() {
             let height = heights[unknown[bone]];
             if height != 0.0 {
                 pose.translation = limited(pose.translation + Vec3::Y * height, &self.landmarks);
             }
         }
-        posed.update(self.matrices(poses));
+        let mut posed = PosedSkin::new(&self.moving, matrices);
+        let folds = posed.folded().count();
+        posed.update(self.matrices(&separate));
+        if posed.folded().count() <= folds {
+            poses.copy_from_slice(&separate);
+        }
     }
 }
 
