@@ -189,7 +189,7 @@ fn rest_transform(at: &JsonObject, notes: &Notes, needed: bool) -> Result<(Trs, 
         if sheared && needed {
             notes.add("The shear of a node's matrix was not kept");
         }
-        if ["translation", "rotation", "scale"].iter().any(|key| at.map.contains_key(*key)) {
+        if ["translation", "rotation", "scale"].iter().any(|key| at.map.contains_key(key)) {
             notes.add("A node has a matrix and also translation, rotation or scale; the matrix was used");
         }
         return Ok((trs, DAffine3::from_mat4(matrix)));

@@ -136,6 +136,8 @@ fn rigged(hands: &Hands) {
 fn posed(hands: &Hands) {
     hands.key("p");
     hands.until("controls are posed", |report| report.mode == "Pose");
+    // The whole figure is small beside its controls.
+    hands.approach(1);
     let report = hands.report().expect("the window reports");
     let uid = &report.labels["hand_l"];
     let rest = report.places[uid];
@@ -181,8 +183,6 @@ fn updated(hands: &Hands, template: &Path) {
     hands.bring("Updater");
     hands.picture("updater");
 
-    // The whole figure is small beside a brush.
-    hands.approach(1);
     hands.select("upper_arm_l");
     hands.key("t");
     hands.bring("Weights");
