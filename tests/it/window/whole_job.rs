@@ -58,6 +58,9 @@ fn an_unseen_body_becomes_an_animated_character_by_hand_on_a_display_and_gpu() {
     let fitted =
         hands.until("a skeleton is fitted", |report| report.joints > 40 && report.mode == "Move" && !report.busy);
     assert_eq!(fitted.steps, ["Fit"]);
+    // The view makes room for the bar of the fit.
+    hands.rests();
+    let fitted = hands.report().expect("the window reports");
 
     // A joint is corrected in one gesture, though nothing is selected.
     let elbow = joint(&fitted, "forearm_l");

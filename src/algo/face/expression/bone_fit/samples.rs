@@ -41,7 +41,7 @@ const LID_PLACES: [f32; 2] = [1.0 / 3.0, 2.0 / 3.0];
 /// Points around a place of the rim of a lip that face those around the place of the other rim, the further the fewer, and the
 /// largest distance sideways of those that do, in eye distances.
 const AROUND_LIPS: (usize, f32) = (6, 0.01);
-/// The same for lids, whose landmarks are further from each other.
+/// Points and distance of lids, whose landmarks are further from each other.
 const AROUND_LIDS: (usize, f32) = (9, 0.02);
 /// Landmarks of the upper and the lower lid from corner to corner, of the left and the right eye.
 const LIDS: [[[usize; 4]; 2]; 2] = [[[42, 43, 44, 45], [42, 47, 46, 45]], [[36, 37, 38, 39], [36, 41, 40, 39]]];
