@@ -257,16 +257,13 @@ mod tests {
         for (row, &at) in solved.iter().zip(factor.order()) {
             block[at as usize] = *row;
         }
-        let mut most = 0.0_f64;
-        for row in 0..count {
+        let error_of = |(row, lane): (usize, usize)| {
             let range = matrix.starts[row] as usize..matrix.starts[row + 1] as usize;
-            for lane in 0..LANES {
-                let others = range.clone().map(|e| matrix.values[e] * block[matrix.columns[e] as usize][lane]);
-                let product = matrix.diagonal[row] * block[row][lane] + others.sum::<f64>();
-                most = most.max((product - side(row, lane)).abs());
-            }
-        }
-        most
+            let others: f64 = range.map(|e| matrix.values[e] * block[matrix.columns[e] as usize][lane]).sum();
+            (matrix.diagonal[row] * block[row][lane] + others - side(row, lane)).abs()
+        };
+        let places = (0..count).flat_map(|row| (0..LANES).map(move |lane| (row, lane)));
+        places.map(error_of).fold(0.0, f64::max)
     }
 
     /// Columns that have the same rows keep them once: in a factor without zeros those of the first column are all.
