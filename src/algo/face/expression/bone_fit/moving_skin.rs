@@ -156,8 +156,7 @@ impl<'a> PosedSkin<'a> {
                 }
             }
         }
-        let pairs = skin.facing.apart.iter().chain(&skin.facing.rims);
-        for point in pairs.flat_map(|pair| [pair.above, pair.below]) {
+        for point in skin.facing.apart.iter().flat_map(|pair| [pair.above, pair.below]) {
             let point = point as usize;
             self.points[point] = skin_point(point, skin.points[point], &skin.weights, &self.matrices);
         }
