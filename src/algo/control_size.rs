@@ -16,11 +16,8 @@ const SEEN: f32 = 0.5;
 /// Largest factor of a shape that would not be [`SEEN`] otherwise: about a short bone in wide plumage, for example.
 const MOST_UNSEEN: f32 = 8.0;
 
-/// Share of its length below which nobody finds a shape: about the thigh of a bird, which lies in the trunk.
-const LOST: f32 = 0.1;
-
-/// Share that a lost shape gets.
-const FOUND: f32 = 0.25;
+/// Share of its length below which a shape is lost in the flesh: about the thigh of a bird, for example, which lies in the trunk.
+const LOST: f32 = 0.3;
 
 /// Largest factor of a lost shape.
 const MOST_LOST: f32 = 10.0;
@@ -37,7 +34,8 @@ const DIRECTIONS: [Vec3; 3] = [
 
 /// Factor by which a shape has to grow about a point so that [`OUTSIDE`] of its length is outside of a closed mesh: 1 for a
 /// shape that is, up to [`MOST`]. Where no factor is enough, the one with the most length outside; where that is less than half,
-/// the first beyond with half outside, up to twice as large, and where that is less than a tenth the first with a quarter.
+/// the first beyond with half outside, up to twice as large, and where nothing of three tenths was found the first with those, up
+/// to two and a half times as large.
 ///
 /// `lines` are the shape's polylines at factor 1, in the space of the surface. A shape of `n` points costs `n` to `120 n` ray
 /// queries.
@@ -53,7 +51,7 @@ pub fn clear_factor(surface: &Surface, lines: &[Vec<Vec3>], about: Vec3) -> f32 
         }
         factor *= STEP;
     }
-    for (below, least, most) in [(SEEN, SEEN, MOST_UNSEEN), (LOST, FOUND, MOST_LOST)] {
+    for (below, least, most) in [(SEEN, SEEN, MOST_UNSEEN), (LOST, LOST, MOST_LOST)] {
         let mut larger = factor;
         while best.0 < below && larger <= most {
             if outside_share(surface, lines, about, larger) >= least {

@@ -220,7 +220,10 @@ pub fn take(kept: &ProjectCamera, orbit: &mut PanOrbitCamera, projection: &mut P
     }
 }
 
-/// Bounds in world space of a rig's surface and joints; a cube of one unit without either.
+/// Room about joints without a mesh, for controls and bones, as a part of the largest side of their bounds.
+const ROOM: f32 = 0.06;
+
+/// Bounds in world space of a rig's surface, or of its joints with some room for controls; a cube of one unit without either.
 fn everything(
     surface: Option<&RigSurface>,
     place: &GlobalTransform,
@@ -237,7 +240,9 @@ fn everything(
         return around(corners);
     }
     let joints = rig.walk().filter_map(|joint| places.get(entities.get(joint.data.uid)?).ok());
-    around(joints.map(GlobalTransform::translation))
+    let [low, high] = around(joints.map(GlobalTransform::translation));
+    let room = ROOM * (high - low).max_element();
+    [low - room, high + room]
 }
 
 fn around(points: impl Iterator<Item = Vec3>) -> [Vec3; 2] {
