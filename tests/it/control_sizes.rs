@@ -250,6 +250,18 @@ fn no_control_of_fitted_animals_lies_in_their_flesh() {
 }
 
 #[test]
+fn below_an_open_sheet_is_outside() {
+    let corners =
+        [Vec3::new(-9.0, 0.0, -9.0), Vec3::new(9.0, 0.0, -9.0), Vec3::new(9.0, 0.0, 9.0), Vec3::new(-9.0, 0.0, 9.0)];
+    for faces in [[[0, 1, 2], [0, 2, 3]], [[2, 1, 0], [3, 2, 0]]] {
+        let sheet = Surface::build(&corners, &faces);
+        for side in [-0.5, 0.5] {
+            assert!(!is_inside(&sheet, Vec3::new(0.1, side, 0.2)), "{side}");
+        }
+    }
+}
+
+#[test]
 fn a_written_size_stays_unless_it_lies_in_the_flesh() {
     let surface = flesh(1.0);
     for (size, grows) in [(0.5, true), (1.3, false), (1.6, false)] {
