@@ -117,8 +117,22 @@ impl BuildScope<'_> {
     }
 
     /// The bone that starts at a node: from it to the joint below, or to the middle of several that lie to one side. Of
-    /// a node at the end of a chain it is half the bone above, in the same direction; `None` of one that stands alone.
+    /// a node at the end of a chain it is half the bone above, in the same direction. A node on its parent's place, such as a
+    /// null, has the bone of the node that it was made for; `None` of one that stands alone.
     pub fn bone(&mut self, node: NodeId) -> Option<Vec3> {
+        let mut node = node;
+        loop {
+            if let Some(bone) = self.own_bone(node) {
+                return Some(bone);
+            }
+            let subject = self.origin(node)?.subject;
+            node = self.id(subject).filter(|subject| *subject != node)?;
+        }
+    }
+
+    fn own_bone(&mut self, node: NodeId) -> Option<Vec3> {
+        /// Part of the distance from the origin below which two nodes share a place, beyond rounding.
+        const SAME: f32 = 1e-4;
         let position = self.position(node);
         let ends: Vec<Vec3> =
             self.child_joints(node).into_iter().map(|child| self.position(child) - position).collect();
@@ -131,8 +145,8 @@ impl BuildScope<'_> {
             return ends.into_iter().find(|end| end.length() == longest);
         }
         let parent = self.parent(node)?;
-        let above = (position - self.position(parent)) * 0.5;
-        (above != Vec3::ZERO).then_some(above)
+        let above = position - self.position(parent);
+        (above.length() > SAME * position.length()).then_some(above * 0.5)
     }
 
     /// The length of the bone that starts at a node, in the rig's units. Of a node that stands alone it is a tenth of

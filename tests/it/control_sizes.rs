@@ -249,6 +249,23 @@ fn no_control_of_fitted_animals_lies_in_their_flesh() {
     }
 }
 
+/// A control at a null on its parent's place is as large as the bone that the null was made for asks.
+#[test]
+fn controls_of_hocks_are_as_large_as_feet_ask() {
+    for (name, toes) in [("quadruped", "toes_"), ("bird", "toe_middle_")] {
+        let rig = crate::bench::shipped(name);
+        let built = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
+        for side in ["l", "r"] {
+            let control = built.nodes.iter().find(|node| *node.name == *format!("hock_{side}")).unwrap();
+            let toe = rig.labelled(&format!("{toes}{side}")).unwrap();
+            let foot = rig.walk().find(|joint| joint.data.uid == toe).unwrap().parent.unwrap();
+            let bone = rig.position(foot).distance(rig.position(toe));
+            let size = control.control.as_ref().unwrap().size;
+            assert!((0.3..=1.0).contains(&(size / bone)), "{name}: hock_{side}: {size} at a foot of {bone}");
+        }
+    }
+}
+
 #[test]
 fn below_an_open_sheet_is_outside() {
     let corners =
