@@ -3,6 +3,7 @@
 pub(crate) mod desk;
 mod face;
 mod features;
+mod group_colors;
 mod groups;
 mod hierarchy;
 mod looks;
