@@ -10,6 +10,7 @@ mod looks;
 mod notices;
 mod posing;
 mod process;
+mod saved_forms;
 mod skinning;
 mod stepping;
 mod tag_lists;
