@@ -2,6 +2,7 @@
 
 pub(crate) mod desk;
 mod face;
+mod face_drag;
 mod features;
 mod group_colors;
 mod groups;
