@@ -9,6 +9,7 @@ mod groups;
 mod hierarchy;
 mod looks;
 mod notices;
+mod obstacles;
 mod posing;
 mod process;
 mod saved_forms;

@@ -17,6 +17,7 @@ use crate::{
     },
     instance::{RigSource, UpdateOffer},
     plugins::{
+        commands::Processor,
         document::Selection,
         stage::{RigStage, StageRequest},
     },
@@ -136,6 +137,14 @@ pub fn obstacle(world: &World, action: LibraryAction) -> Option<&'static str> {
     let selection: &[Uid] = world.get::<Selection>(entity).map_or(&[], |selection| &selection.0);
     let is_selected = selection.iter().any(|node| rig.joint(*node).is_some());
     let chosen = world.get_resource::<ChosenTemplate>().and_then(|chosen| chosen.0.as_ref());
+    if let Some(own) = action.stage().filter(|own| own.is_kept(stage, world.get::<Processor>(entity))) {
+        return Some(match own {
+            RigStage::Skeleton => "the skeleton is loaded",
+            RigStage::Edit => "the skeleton is being edited",
+            RigStage::Built => "the rig is built",
+            RigStage::Deleted => "the rig is deleted",
+        });
+    }
     match action {
         LibraryAction::Loader | LibraryAction::List | LibraryAction::Updater => None,
         LibraryAction::LoadSkeleton | LibraryAction::EditSkeleton | LibraryAction::BuildRig => {
