@@ -41,7 +41,7 @@ use crate::{
     rig::{
         EditError, Rig, RigEdit, Uid,
         operations::{Operation, TagOperation},
-        part::{Part, PartInstance},
+        part::{OccupiedJoint, Part, PartInstance, check_unoccupied},
         template::Template,
         update::{Take, Update, clip_edits, edits_between, pose_edits, update, with_identities},
     },
@@ -107,6 +107,8 @@ enum WorkError {
     Edit(#[from] EditError),
     #[error(transparent)]
     Addition(#[from] AdditionError),
+    #[error(transparent)]
+    Occupied(#[from] OccupiedJoint),
 }
 
 /// Requests that wait, and the one that is being worked on.
@@ -240,16 +242,24 @@ impl Snapshot {
             }
             LibraryAct::Drop { joint } => merging(template, Some(*joint)),
             LibraryAct::Merge { parent } => merging(template, *parent),
-            LibraryAct::Inject { joints } => Operation::Tags(TagOperation::Drop {
-                part: Arc::new(template.into()),
-                joints: joints.clone(),
-                bindings: default(),
-            }),
+            LibraryAct::Inject { joints } => {
+                let part = Part::from(template);
+                if part.rig.about().kind == "part" {
+                    check_unoccupied(&self.rig, self.instances(), &part, joints)?;
+                }
+                let (part, joints) = (Arc::new(part), joints.clone());
+                Operation::Tags(TagOperation::Drop { part, joints, bindings: default() })
+            }
             LibraryAct::Part { joints, options } => {
                 return Ok(self.part(&request.place, template, &site, joints, options)?);
             }
         };
         Ok(Ready::Operation(Box::new(operation), None))
+    }
+
+    /// Part instances that the rig has of the template that it follows.
+    fn instances(&self) -> &[PartInstance] {
+        self.followed.as_ref().map_or(&[][..], |(_, instances)| instances.as_slice())
     }
 
     fn part(
@@ -263,8 +273,7 @@ impl Snapshot {
         let name = place.part_name(self.beside.as_deref(), site);
         let part = (name, Part::from(template));
         let joints = (joints, self.stroke.as_slice());
-        let instances = self.followed.as_ref().map_or(&[][..], |(_, instances)| instances.as_slice());
-        let rig = (&self.rig, instances);
+        let rig = (&self.rig, self.instances());
         let PartAddition { operation, lonely } = added(rig, joints, part, options, self.both, &self.modules)?;
         let note = lonely.and_then(|joint| self.rig.joint(joint)).map(|joint| {
             let (part, joint) = (place.stem(), joint_name(&joint.data));

@@ -278,3 +278,71 @@ fn a_part_does_not_go_onto_joints_that_a_template_or_tags_gave_such_a_part() {
     assert!(studio.told("clavicle_l belongs to a part of this kind already"), "{:?}", studio.desk.told());
     assert_eq!(studio.text(), text);
 }
+
+/// The window, by both of its ways, and the command line refuse a second part of a kind on the same joints, with the same words.
+#[cfg(feature = "cli")]
+#[test]
+fn a_second_part_is_refused_with_the_same_words_everywhere() {
+    use rigsmith::rig::part::OccupiedJoint;
+
+    use crate::cli_outputs::json;
+
+    let mut studio = Studio::new(LoaderPanel::default());
+    let home = studio.folder.path().join("home");
+    let chain = |labels: [&str; 4]| {
+        let joint = |(number, label): (usize, &&str)| match number {
+            0 => format!("(label: \"{label}\", translation: (0.1, 1.4, 0))"),
+            _ => format!("(label: \"{label}\", parent: \"{}\", translation: (0.3, 0, 0))", labels[number - 1]),
+        };
+        let joints: Vec<String> = labels.iter().enumerate().map(joint).collect();
+        format!("(format: 2, name: \"chain\", joints: [{}])", joints.join(", "))
+    };
+    let arm_labels = ["clavicle_l", "upper_arm_l", "forearm_l", "hand_l"];
+    let parts = "parts: [(part: \"limb.rig.ron\", name: \"left arm\", onto: [\"arm_l\", \"elbow_l\"])],\n    joints: [";
+    let arm = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/templates/parts/arm.rig.ron");
+    for (name, text) in [
+        ("limb.rig.ron", LIMB.to_owned()),
+        ("arm.rig.ron", fs::read_to_string(arm).unwrap()),
+        ("armed.rig.ron", MAN.replacen("joints: [", parts, 1).replace("\"man\"", "\"armed\"")),
+        ("chain.rig.ron", chain(arm_labels)),
+    ] {
+        fs::write(home.join(name), text).unwrap();
+    }
+    let inject = |part: &str, rig: &str, joints: &str, output: &str| {
+        json(&home, &["inject", part, rig, "--joints", joints, "-o", output])
+    };
+    let (code, told) = inject("arm.rig.ron", "chain.rig.ron", &arm_labels.join(","), "injected.rig.ron");
+    assert_eq!(code, 0, "{told}");
+
+    for (part, rig, labels, name) in [
+        ("limb.rig.ron", "armed.rig.ron", &["arm_l", "elbow_l"][..], "the part \"left arm\""),
+        ("arm.rig.ron", "injected.rig.ron", &arm_labels[..], "a part of this kind"),
+    ] {
+        let words = OccupiedJoint { joint: labels[0].to_owned(), part: name.to_owned() }.to_string();
+        let (code, told) = inject(part, rig, &labels.join(","), "twice.rig.ron");
+        let error = &told["error"];
+        let said = format!("{}; {}", error["what"].as_str().unwrap(), error["do"].as_str().unwrap());
+        assert_eq!((code, said), (1, words.clone()), "{rig}: {told}");
+        assert!(!home.join("twice.rig.ron").exists(), "{rig}");
+
+        studio.open(OpenRequest::File(home.join(rig)));
+        studio.desk.until("the followed file", |desk| {
+            desk.app.world().get::<RigSource>(desk.rig).is_some_and(|source| source.base().is_some())
+        });
+        let joints: Vec<Uid> = labels.iter().map(|label| studio.joint(label)).collect();
+        let text = studio.text();
+        for act in [
+            LibraryAct::Part { joints: joints.clone(), options: Vec::new() },
+            LibraryAct::Inject { joints: joints.clone() },
+        ] {
+            let way = format!("{rig}: {act:?}");
+            studio.act(TemplatePlace::File(home.join(part)), act);
+            let told = studio.desk.told().pop().unwrap_or_default();
+            assert!(told.contains(&words), "{way}: {:?}", studio.desk.told());
+            assert_eq!(studio.text(), text, "{way}");
+        }
+    }
+    // Other joints take the part.
+    let (code, told) = inject("limb.rig.ron", "armed.rig.ron", "arm_r,elbow_r", "other.rig.ron");
+    assert_eq!(code, 0, "{told}");
+}
