@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ChosenTemplate, ListTemplates, TemplateDraft, TemplateLibrary,
+    ChosenTemplate, ListTemplates, TemplateDraft, TemplateLibrary, part_refusal,
     work::{LibraryAct, LibraryRequest, body},
 };
 use crate::{
@@ -163,7 +163,10 @@ pub fn obstacle(world: &World, action: LibraryAction) -> Option<&'static str> {
         LibraryAction::Part => {
             let listing = world.get_resource::<TemplateLibrary>().map(TemplateLibrary::listing);
             let is_part = chosen.and_then(|place| listing?.find(place)).is_some_and(|listed| listed.is_part());
-            (!is_part).then_some("the chosen template is no part")
+            if !is_part {
+                return Some("the chosen template is no part");
+            }
+            chosen.and_then(|place| part_refusal(world, place)).map(|refusal| refusal.short())
         }
         LibraryAction::Load | LibraryAction::Merge | LibraryAction::Inject => None,
     }

@@ -346,3 +346,54 @@ fn a_second_part_is_refused_with_the_same_words_everywhere() {
     let (code, told) = inject("limb.rig.ron", "armed.rig.ron", "arm_r,elbow_r", "other.rig.ron");
     assert_eq!(code, 0, "{told}");
 }
+
+/// Adding a part is greyed where the part would be refused: menus say why in a few words, the card in those of the refusal.
+#[test]
+fn adding_a_part_is_greyed_where_it_would_be_refused() {
+    use rigsmith::rig::part::OccupiedJoint;
+
+    let mut studio = Studio::new(LoaderPanel::default());
+    let [hips, arm_l, arm_r, elbow_r] = ["hips", "arm_l", "arm_r", "elbow_r"].map(|label| studio.joint(label));
+    let limb = studio.limb();
+    studio.settle();
+    let reason = |desk: &Desk| palette::obstacle(desk.app.world(), Action::Library(LibraryAction::Part));
+    studio.desk.select(&[arm_l]);
+    studio.settle();
+    studio.click("Part limb");
+    assert!(studio.desk.find("Add part").enabled && reason(&studio.desk).is_none(), "it fits");
+    studio.act(limb, LibraryAct::Part { joints: vec![arm_l], options: Vec::new() });
+    assert_eq!(studio.desk.rig().dropped_parts().len(), 1, "{:?}", studio.desk.told());
+    studio.desk.until("the reason", |desk| reason(desk).is_some());
+    assert_eq!(reason(&studio.desk), Some("the selected joints have such a part already"));
+    studio.desk.frames(2);
+    let button = studio.desk.find("Add part");
+    assert!(!button.enabled);
+    studio.desk.move_to(button.rect.center());
+    studio.desk.frames(60);
+    let words = OccupiedJoint { joint: "arm_l".to_owned(), part: "the part \"limb\"".to_owned() }.to_string();
+    assert!(studio.desk.says(&words), "{words}: {:?}", studio.desk.seen);
+    studio.desk.move_to(egui::pos2(3000.0, 3000.0));
+
+    for (joints, wanted) in [
+        (vec![arm_r], None),
+        (vec![hips, elbow_r], Some("the part does not fit the selected joints")),
+        (vec![arm_r, elbow_r], None),
+        (Vec::new(), Some("no joint is selected")),
+    ] {
+        studio.desk.select(&joints);
+        studio.settle();
+        assert_eq!(reason(&studio.desk), wanted, "{joints:?}");
+        assert_eq!(studio.desk.find("Add part").enabled, wanted.is_none(), "{joints:?}");
+        // What is greyed would be refused, and nothing else.
+        if !joints.is_empty() {
+            let (place, steps) = (studio.limb(), studio.desk.steps().1);
+            studio.act(place, LibraryAct::Part { joints: joints.clone(), options: Vec::new() });
+            assert_eq!(studio.desk.steps().1 > steps, wanted.is_none(), "{joints:?}: {:?}", studio.desk.told());
+            (steps..studio.desk.steps().1).for_each(|_| studio.change(Change::Undo));
+        }
+    }
+    studio.change(Change::Undo);
+    studio.desk.select(&[arm_l]);
+    studio.settle();
+    assert_eq!(reason(&studio.desk), None, "the part is gone");
+}
