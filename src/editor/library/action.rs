@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ChosenTemplate, ListTemplates, TemplateDraft, TemplateLibrary, part_refusal,
+    ChosenTemplate, ListTemplates, PartRefusal, TemplateDraft, TemplateLibrary, part_refusal,
     work::{LibraryAct, LibraryRequest, body},
 };
 use crate::{
@@ -183,7 +183,12 @@ pub(super) fn carry_out(mut actions: MessageReader<ActionRequest>, mut commands:
 
 fn act(world: &mut World, action: LibraryAction) {
     if let Some(reason) = obstacle(world, action) {
-        world.write_message(Notice::warning(format!("{}: {reason}.", action.name())));
+        let place = world.get_resource::<ChosenTemplate>().and_then(|chosen| chosen.0.as_ref());
+        let refusal = place.and_then(|place| part_refusal(world, place));
+        let refusal = refusal.filter(|refusal| refusal.short() == reason);
+        let told = refusal.as_ref().map_or(reason, PartRefusal::words);
+        let text = format!("{}: {told}.", action.name());
+        world.write_message(Notice::warning(text));
         return;
     }
     match action {

@@ -373,6 +373,9 @@ fn adding_a_part_is_greyed_where_it_would_be_refused() {
     let words = OccupiedJoint { joint: "arm_l".to_owned(), part: "the part \"limb\"".to_owned() }.to_string();
     assert!(studio.desk.says(&words), "{words}: {:?}", studio.desk.seen);
     studio.desk.move_to(egui::pos2(3000.0, 3000.0));
+    let steps = studio.desk.steps();
+    studio.send(ActionRequest(Action::Library(LibraryAction::Part)));
+    assert!(studio.told(&words) && studio.desk.steps() == steps, "{:?}", studio.desk.told());
 
     for (joints, wanted) in [
         (vec![arm_r], None),
