@@ -100,6 +100,7 @@ fn a_rig_is_not_brought_to_its_own_stage() {
     for joint in [a, b] {
         add_command(&mut desk, joint, "control", "()");
     }
+    desk.select(&[]);
     let go_to = |desk: &mut Desk, stage: RigStage| {
         desk.app.world_mut().write_message(StageRequest { rig: desk.rig, stage });
         desk.frames(4);
