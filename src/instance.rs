@@ -88,12 +88,12 @@ use crate::{
     plugins::{
         RigSystems,
         animation::ClipSystems,
-        commands::{BuildResult, RigModules},
+        commands::{BuildResult, NamedProgramError, RigModules},
         runtime::{ControlPose, InstanceMode, NodeOf, RigRuntime, RuntimePlugin},
     },
     processor::{ClipReport, PoseNote},
     rig::{PoseOffset, RestTransform, SourceError, Uid, update::Change},
-    solve::program::{ExposedNode, ProgramError},
+    solve::program::ExposedNode,
 };
 
 /// Plugin of instances. Add it after Bevy's [`AssetPlugin`] and [`RigPlugins`](crate::plugins::RigPlugins) where an app has
@@ -273,7 +273,7 @@ pub enum TemplateError {
         /// The file, if the template has one.
         file: Option<PathBuf>,
         /// The reason.
-        source: ProgramError,
+        source: NamedProgramError,
     },
     /// The file cannot be loaded.
     #[error("{0}")]

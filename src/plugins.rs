@@ -72,6 +72,7 @@
 //! | --- | --- | --- |
 //! | [`face::FaceJob`], [`skinning::SkinningJob`], [`fit::FitJob`] | a request | taking it off stops the task; its result is dropped |
 //! | [`face::FacePreparation`], [`mesh_reload::ReloadJob`], [`painting::WeightChangeJob`], [`painting::CanvasJob`] | a request, and changed files | taking it off drops the task and its result |
+//! | [`face::FacePosing`] | requests of expressions | taking it off stops the pose that is computed; expressions need it |
 //! | [`stage::Deletions`] | stages of a rig | other code leaves it alone |
 //! | [`controls::size::MeasuredShapes`] | the measurement of shapes on a mesh | taking it off ends the measurement |
 //! | `PlayedClip` | the playback of a clip | other code leaves it alone |

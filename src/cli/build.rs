@@ -28,7 +28,7 @@ use crate::{
         model::{Model, Trs},
     },
     plugins::{
-        commands::{BuildStep, Processor},
+        commands::{BuildStep, NamedProgramError, Processor},
         surface::RigMesh,
     },
     processor::{Builder, CommandState, RunReport},
@@ -109,7 +109,7 @@ fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure>
     }
     limits::check_time("building the rig")?;
     // Checked even if no file is written: a built rig that cannot run, such as one with a cycle of parents, is no rig.
-    RigProgram::check(&built).map_err(PoseError::CannotRun)?;
+    RigProgram::check(&built).map_err(|error| PoseError::CannotRun(NamedProgramError::new(error, &rig)))?;
     let Some(output) = &args.output else { return Ok(()) };
     let meta = args.vrm.meta(&rig, output)?;
     let is_plain = args.meshes.is_empty() && !has_commands && rig.pose().is_empty() && meta.is_none();

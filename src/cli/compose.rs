@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use super::{
     Failure, InPlaceArgs, Report, SEED, limits,
     report::counted,
-    update::{load, load_part},
+    update::{load, load_part, load_with_parts},
 };
 use crate::{
     files::{RealDisk, stem, store_rig, store_rig_over},
@@ -20,6 +20,7 @@ use crate::{
         extract::{self, Extraction},
         nearest::{did_you_mean, listed},
         operations::{Axis, Operation, TagOperation},
+        part::check_unoccupied,
     },
 };
 
@@ -171,8 +172,12 @@ fn orient(
 pub(super) fn inject(args: &InjectArgs) -> Result<Report, Failure> {
     args.in_place.check(&[&args.template, &args.rig], Some(&args.output), &[])?;
     let mut report = Report::default();
-    let (part, mut rig) = (load_part(&args.template, &mut report)?, load(&args.rig, &mut report)?);
+    let part = load_part(&args.template, &mut report)?;
+    let (mut rig, instances) = load_with_parts(&args.rig, &mut report)?;
     let joints = args.joints.iter().map(|label| joint(&rig, label)).collect::<Result<Vec<_>, _>>()?;
+    if part.rig.about().kind == "part" {
+        check_unoccupied(&rig, &instances, &part, &joints).map_err(|occupied| Failure::Input(Box::new(occupied)))?;
+    }
     let mut uids = uids_of(&[rig.clone(), part.rig.clone()]);
     if let Some(along) = args.orient {
         orient(&mut rig, joints.clone(), along, &mut uids, &mut report)?;

@@ -26,7 +26,7 @@ use crate::{
     processor::keep_poses,
     rig::{
         Rig,
-        part::Part,
+        part::{Part, PartInstance},
         template,
         update::{Change, Take, Update},
         version::VersionChange,
@@ -264,6 +264,14 @@ pub(super) fn load_part(path: &Path, report: &mut Report) -> Result<Part, Failur
     let mut template = limits::load_template(path)?;
     report.notes(std::mem::take(&mut template.notes));
     Ok(template.into())
+}
+
+/// The rig of a template's file, with the part instances that the file has.
+pub(super) fn load_with_parts(path: &Path, report: &mut Report) -> Result<(Rig, Vec<PartInstance>), Failure> {
+    check_kind(path)?;
+    let template = limits::load_template(path)?;
+    report.notes(template.notes);
+    Ok((template.rig, template.instances))
 }
 
 fn tell(report: &mut Report, changes: &[Change]) {

@@ -41,6 +41,7 @@ use crate::plugins::{
     display::{DisplayJob, DisplayPlugin},
     document::EditReport,
     drawing::DrawingPlugin,
+    face::{FacePosing, FacePreparation},
     fit::FitJob,
     limits::RigLimits,
     painting::{CanvasJob, WeightChangeJob},
@@ -233,13 +234,15 @@ struct RunningJobs<'w, 's> {
     skinning: Query<'w, 's, &'static SkinningJob>,
     fits: Query<'w, 's, &'static FitJob>,
     changes: Query<'w, 's, &'static WeightChangeJob>,
-    pictures: Query<'w, 's, (), Or<(With<DisplayJob>, With<CanvasJob>)>>,
+    pictures: Query<'w, 's, (), Or<(With<DisplayJob>, With<CanvasJob>, With<FacePreparation>)>>,
+    faces: Query<'w, 's, &'static FacePosing>,
 }
 
 impl RunningJobs<'_, '_> {
     /// True while something is computed. Results that wait for an undone step come with the event that brings it back.
     fn are_any(&self) -> bool {
         !self.pictures.is_empty()
+            || self.faces.iter().any(FacePosing::is_running)
             || self.skinning.iter().any(|job| !job.waits())
             || self.fits.iter().any(|job| !job.waits())
             || self.changes.iter().any(|job| !job.waits())

@@ -9,6 +9,7 @@ mod drop_target;
 mod follow;
 mod joints;
 mod listing;
+mod part_check;
 mod pictures;
 mod preview;
 mod save;
@@ -20,6 +21,7 @@ use bevy::prelude::*;
 pub use self::{
     action::{LibraryAction, obstacle},
     listing::{LibraryFolder, LibraryFolders, LibraryListing, ListTemplates, TemplateLibrary},
+    part_check::ReadPart,
     pictures::{LibraryPictures, PictureRequest, TemplatePicture},
     save::{SaveTemplate, TemplateContent, TemplateDraft, TemplateSave},
     sides::PartSides,
@@ -27,6 +29,7 @@ pub use self::{
 };
 pub(in crate::editor) use self::{
     drop_target::{attach, dropping, goes_onto_both},
+    part_check::{PartRefusal, part_refusal},
     save::{HEADER, header_step},
     sides::{partner, partners},
 };
@@ -60,11 +63,13 @@ impl Plugin for LibraryPlugin {
             .init_resource::<ChosenTemplate>()
             .init_resource::<TemplateDraft>()
             .init_resource::<PartSides>()
+            .init_resource::<part_check::ReadParts>()
             .init_resource::<follow::LoadSteps>()
             .init_resource::<TemplateSave>()
             .init_resource::<SaveJob>()
             .add_message::<ListTemplates>()
             .add_message::<PictureRequest>()
+            .add_message::<ReadPart>()
             .add_message::<LibraryRequest>()
             .add_message::<SaveTemplate>()
             .add_message::<ActionRequest>()
@@ -84,7 +89,7 @@ impl Plugin for LibraryPlugin {
             .add_systems(
                 Update,
                 (
-                    (action::carry_out, work::start, work::land, listing::list, pictures::draw)
+                    (action::carry_out, work::start, work::land, listing::list, part_check::read_parts, pictures::draw)
                         .chain()
                         .after(attend)
                         .before(RigSystems::Script),

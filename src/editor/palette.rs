@@ -131,7 +131,12 @@ pub fn obstacle(world: &World, action: Action) -> Option<&'static str> {
                 Action::MirrorPose if !selection.is_empty() => {
                     posed.other_side().is_empty().then_some("what is selected has no other side")
                 }
-                _ => is_at_rest.then_some("nothing is posed"),
+                _ if is_at_rest => Some("nothing is posed"),
+                Action::ResetPose if !selection.is_empty() => {
+                    let is_any = posed.meant().into_iter().any(|node| posed.is_posed(node));
+                    (!is_any).then_some("nothing of what is selected is posed")
+                }
+                _ => None,
             }
         }
         Action::FrameSelected | Action::FrameAll => {

@@ -12,7 +12,9 @@ pub use super::{held_values::HeldValue, posed_node::PosedNode};
 use crate::{
     mesh::model::Trs,
     plugins::{
-        commands::{BuildDone, BuildRequest, BuildResult, BuildStep, BuiltEntities, Processor, RunFailure},
+        commands::{
+            BuildDone, BuildRequest, BuildResult, BuildStep, BuiltEntities, NamedProgramError, Processor, RunFailure,
+        },
         controls::{SwitchError, SwitchRequest, number_of},
         document::JointEntities,
         runtime::{RigRuntime, is_near},
@@ -23,7 +25,6 @@ use crate::{
         AttributeKind, BuiltNode, BuiltRig, PoseOffset, RestTransform, Rig, RigEdit, Uid, nearest::listed,
         proportion::ProportionError,
     },
-    solve::program::ProgramError,
 };
 
 /// Value to write to an entity: `CONTROL.translate=(x,y,z)`, `.rotate=(x,y,z)` in degrees about X, Y and Z in that
@@ -99,7 +100,7 @@ pub enum PoseError {
     NotBuilt,
     /// The built rig cannot run.
     #[error("the built rig cannot run: {0}")]
-    CannotRun(ProgramError),
+    CannotRun(NamedProgramError),
     /// The built rig has no node with that name.
     #[error("no {what} is called \"{name}\"{nearest}")]
     NoNode {
@@ -243,7 +244,7 @@ impl Workbench {
     pub fn runtime(&self) -> Result<&RigRuntime, PoseError> {
         let world = self.app.world();
         if let Some(failure) = world.get::<RunFailure>(self.rig) {
-            return Err(PoseError::CannotRun(failure.0.clone()));
+            return Err(PoseError::CannotRun(NamedProgramError::new(failure.0.clone(), self.rig())));
         }
         world.get::<RigRuntime>(self.rig).ok_or(PoseError::NotBuilt)
     }

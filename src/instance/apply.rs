@@ -19,6 +19,7 @@ use super::{
 use crate::{
     plugins::{
         animation::{PlayedClip, RigClips},
+        commands::NamedProgramError,
         runtime::{ControlPose, InstanceMode, RigRuntime, despawn_nodes, furnish_instance, spawn_instance},
         schema::{Control, CreatedRole, Joint, NodeLabel, NodeLayer},
     },
@@ -180,7 +181,8 @@ pub(super) fn update_instances(world: &mut World) {
                 continue;
             }
         }
-        let program = program(built, *mode, exposed).unwrap_or_else(|source| {
+        let program = program(built, *mode, exposed).unwrap_or_else(|error| {
+            let source = NamedProgramError::new(error, &built.rig);
             failed.push((entity, TemplateError::CannotRun { file: None, source }));
             built.lean.clone()
         });

@@ -16,6 +16,7 @@ use bevy::{asset::AssetId, log::error};
 use super::{RigTemplate, TemplateError, exchange::NextVersion, template_file::TemplateFile};
 use crate::{
     files::{PartCache, PartFiles, RealDisk, TemplateWatch},
+    plugins::commands::NamedProgramError,
     processor::{BuildError, Builder, Modules, SourceText},
     rig::{
         BuiltRig, NodeType, Rig, Uid,
@@ -379,7 +380,9 @@ impl TemplateBuild {
         let programs: Result<_, ProgramError> = program(&CompileOptions::default()).and_then(|whole| {
             Ok((whole, program(&lean_options(vec![ExposedNode::Controls], &rig, &sockets, &built))?))
         });
-        let (whole, lean) = programs.map_err(|source| TemplateError::CannotRun { file: self.file.clone(), source })?;
+        let (whole, lean) = programs
+            .map_err(|error| NamedProgramError::new(error, &rig))
+            .map_err(|source| TemplateError::CannotRun { file: self.file.clone(), source })?;
         let (source, changes, ran) = (source.clone(), changes.into(), report.executed.into());
         // What instances expose is compiled here, and not in the frame that takes the template over.
         let before = self.good.as_ref().map(|good| good.some.lock().unwrap_or_else(PoisonError::into_inner).clone());

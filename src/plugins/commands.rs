@@ -16,7 +16,7 @@ use std::{collections::BTreeSet, sync::Arc};
 
 use bevy::{ecs::message::MessageUpdateSystems, prelude::*};
 
-pub use run::{Programs, RunFailure};
+pub use run::{NamedProgramError, Programs, RunFailure};
 
 use super::{
     RigSystems, configure_sets,

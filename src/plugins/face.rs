@@ -9,6 +9,7 @@ mod error;
 mod job;
 mod placed_bones;
 mod pose;
+mod posing;
 mod preparation;
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
@@ -31,6 +32,7 @@ pub use error::{ExpressError, PlaceFaceError};
 pub use job::FaceJob;
 pub use placed_bones::{FaceRig, PlacedBone};
 pub use pose::{expressed_points, mixed};
+pub use posing::FacePosing;
 pub use preparation::{FacePreparation, mended_shares};
 
 /// Plugin of automatic faces.
@@ -175,7 +177,8 @@ pub struct ExpressRequest {
     pub mesh: Entity,
     /// Strengths by name.
     pub strengths: BTreeMap<String, f32>,
-    /// Shows a preview without a step of the history if `true`, while a slider is dragged.
+    /// Shows a preview without a step of the history if `true`, while a slider is dragged. Its pose is computed in the
+    /// background ([`FacePosing`]); what is asked for meanwhile waits for it.
     pub preview: bool,
 }
 
@@ -194,7 +197,8 @@ pub struct ExpressionAnswer {
 /// The document holds them as values of attributes of the mesh, so undo, stored poses and projects bring them back.
 ///
 /// A game sets expressions by writing it: the face moves in the same frame, as an [`ExpressRequest`] would move it, and
-/// the answer is an [`ExpressionAnswer`] message. While the face is still prepared ([`FacePreparation`]), both wait for it. A
+/// the answer is an [`ExpressionAnswer`] message. While the face is still prepared ([`FacePreparation`]) or a preview is computed
+/// ([`FacePosing`]), both wait for it. A
 /// value equal to what is shown is no edit.
 ///
 /// On a [`RigInstance`](crate::instance::RigInstance) it poses the instance's facial joints by the stored poses of its template.

@@ -72,6 +72,19 @@ impl RigStage {
             Self::Deleted => "Deleted",
         }
     }
+
+    /// True if a request for this stage changes nothing: the rig is at it, and commands were not stepped since.
+    pub fn is_kept(self, now: Option<Self>, processor: Option<&Processor>) -> bool {
+        let are_in_effect =
+            |processor: &Processor| processor.follows() && processor.builder().cursor() == processor.builder().len();
+        let are_rolled_back = |processor: &Processor| !processor.follows() && processor.builder().cursor() == 0;
+        now == Some(self)
+            && match self {
+                Self::Skeleton | Self::Edit => processor.is_none_or(are_rolled_back),
+                Self::Built => processor.is_some_and(are_in_effect),
+                Self::Deleted => true,
+            }
+    }
 }
 
 /// Asks for a rig to be brought to a stage.

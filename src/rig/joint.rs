@@ -1,5 +1,7 @@
 //! Joints: the nodes of a skeleton.
 
+use std::borrow::Cow;
+
 use bevy::{math::Affine3, prelude::*};
 use serde::{Deserialize, Serialize};
 
@@ -151,6 +153,16 @@ pub struct JointData {
     /// Record of the placement as a facial bone; `None` for all other joints.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub face: Option<FacePlacement>,
+}
+
+impl JointData {
+    /// Name for people: the label, or the first digits of the uid.
+    pub fn name(&self) -> Cow<'_, str> {
+        match &self.label {
+            Some(label) => Cow::Borrowed(label),
+            None => Cow::Owned(format!("joint {:04x}", self.uid.0 >> 48)),
+        }
+    }
 }
 
 /// A joint in a [`crate::rig::Rig`]: its data and its place.

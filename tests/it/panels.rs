@@ -2,13 +2,17 @@
 
 pub(crate) mod desk;
 mod face;
+mod face_drag;
 mod features;
+mod group_colors;
 mod groups;
 mod hierarchy;
 mod looks;
 mod notices;
+mod obstacles;
 mod posing;
 mod process;
+mod saved_forms;
 mod skinning;
 mod stepping;
 mod tag_lists;

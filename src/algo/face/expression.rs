@@ -15,6 +15,7 @@ mod openings;
 mod set;
 mod text;
 mod vrm;
+mod work;
 
 use bevy::math::ops;
 use glam::{Affine3A, Quat, Vec3};
@@ -32,6 +33,7 @@ pub use self::{
     set::{ExpressionSet, UnitSet},
     text::{Expression, ExpressionError, Gaze, MAX_STRENGTH, MAX_TEXT, Part, Sides, Unit, UnitMove, UnitUse},
     vrm::vrm_mixes,
+    work::visited_points,
 };
 
 /// Largest distance that a bone is moved, in eye distances.
@@ -170,6 +172,7 @@ fn limited(movement: Vec3, landmarks: &Landmarks) -> Vec3 {
 /// `points` in head space; `weights` as [`face_weights`](super::weights) makes them: joint 0 is the neck and 1 the
 /// head, which stay at rest, 2 + i is `bones[i]`. Bones without a pose stay at rest. A point without weights stays.
 pub fn apply(points: &[Vec3], weights: &Weights, bones: &[FaceBone], poses: &[BonePose]) -> Vec<Vec3> {
+    work::visit(points.len());
     let mut matrices = vec![Affine3A::IDENTITY; 2];
     matrices.extend(
         bones

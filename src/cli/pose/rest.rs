@@ -12,7 +12,7 @@ use crate::{
         Workbench,
         posing::{PoseError, PosedNode},
     },
-    plugins::surface::RigMesh,
+    plugins::{commands::NamedProgramError, surface::RigMesh},
     processor::Builder,
     rig::{BuiltRig, Rig},
     solve::program::{CompileOptions, RigProgram, RigState},
@@ -64,7 +64,7 @@ fn built(rig: &Rig) -> Result<BuiltRig, Failure> {
 /// Tells the nodes of a rig at rest, and saves it if that is asked for.
 pub(super) fn pose(args: &PoseArgs, rig: Rig, report: &mut Report) -> Result<(), Failure> {
     let built = built(&rig)?;
-    tell(&built, report)?;
+    tell(&rig, &built, report)?;
     if let Some(output) = &args.output {
         report.notes(build::store_at_rest(output, &args.rig, rig, built, &args.export, false)?);
     }
@@ -72,8 +72,9 @@ pub(super) fn pose(args: &PoseArgs, rig: Rig, report: &mut Report) -> Result<(),
 }
 
 /// Tells the nodes of a built rig, as entities show them and as the program computes them.
-fn tell(built: &BuiltRig, report: &mut Report) -> Result<(), PoseError> {
-    let program = RigProgram::compile(built, &CompileOptions::default()).map_err(PoseError::CannotRun)?;
+fn tell(rig: &Rig, built: &BuiltRig, report: &mut Report) -> Result<(), PoseError> {
+    let program = RigProgram::compile(built, &CompileOptions::default())
+        .map_err(|error| PoseError::CannotRun(NamedProgramError::new(error, rig)))?;
     let mut state = RigState::new(Arc::new(program));
     state.evaluate(0.0);
     let mut shown: Vec<GlobalTransform> = Vec::with_capacity(built.nodes.len());

@@ -11,12 +11,13 @@ use super::{UpdateArgs, limits};
 use crate::{
     cli::{Failure, Report, report::counted},
     files::{FileKind, RealDisk, StagedFile, is_same_file, load_animation, stage_animation},
+    plugins::commands::NamedProgramError,
     processor::{BuildError, Builder, Modules, RigVersion, clips_between},
     rig::{
         BuiltRig, Rig,
         animation::{NodeNames, RigClip},
     },
-    solve::program::{CompileOptions, ProgramError, RigProgram},
+    solve::program::{CompileOptions, RigProgram},
 };
 
 /// Reason for which clips cannot be re-expressed.
@@ -40,7 +41,7 @@ enum ClipUpdateError {
         /// The rig, or the template.
         file: String,
         /// The reason.
-        source: ProgramError,
+        source: NamedProgramError,
     },
 }
 
@@ -167,6 +168,7 @@ fn built(rig: &Rig, file: &Path, modules: &Arc<Modules>) -> Result<(BuiltRig, Ar
     let file = || file.display().to_string();
     let built = Builder::build(rig, modules).map_err(|source| ClipUpdateError::NotBuilt { file: file(), source })?;
     let program = RigProgram::compile(&built, &CompileOptions::default())
+        .map_err(|error| NamedProgramError::new(error, rig))
         .map_err(|source| ClipUpdateError::CannotRun { file: file(), source })?;
     Ok((built, Arc::new(program)))
 }

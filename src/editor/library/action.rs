@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ChosenTemplate, ListTemplates, TemplateDraft, TemplateLibrary,
+    ChosenTemplate, ListTemplates, PartRefusal, TemplateDraft, TemplateLibrary, part_refusal,
     work::{LibraryAct, LibraryRequest, body},
 };
 use crate::{
@@ -17,6 +17,7 @@ use crate::{
     },
     instance::{RigSource, UpdateOffer},
     plugins::{
+        commands::Processor,
         document::Selection,
         stage::{RigStage, StageRequest},
     },
@@ -136,6 +137,14 @@ pub fn obstacle(world: &World, action: LibraryAction) -> Option<&'static str> {
     let selection: &[Uid] = world.get::<Selection>(entity).map_or(&[], |selection| &selection.0);
     let is_selected = selection.iter().any(|node| rig.joint(*node).is_some());
     let chosen = world.get_resource::<ChosenTemplate>().and_then(|chosen| chosen.0.as_ref());
+    if let Some(own) = action.stage().filter(|own| own.is_kept(stage, world.get::<Processor>(entity))) {
+        return Some(match own {
+            RigStage::Skeleton => "the skeleton is loaded",
+            RigStage::Edit => "the skeleton is being edited",
+            RigStage::Built => "the rig is built",
+            RigStage::Deleted => "the rig is deleted",
+        });
+    }
     match action {
         LibraryAction::Loader | LibraryAction::List | LibraryAction::Updater => None,
         LibraryAction::LoadSkeleton | LibraryAction::EditSkeleton | LibraryAction::BuildRig => {
@@ -154,7 +163,10 @@ pub fn obstacle(world: &World, action: LibraryAction) -> Option<&'static str> {
         LibraryAction::Part => {
             let listing = world.get_resource::<TemplateLibrary>().map(TemplateLibrary::listing);
             let is_part = chosen.and_then(|place| listing?.find(place)).is_some_and(|listed| listed.is_part());
-            (!is_part).then_some("the chosen template is no part")
+            if !is_part {
+                return Some("the chosen template is no part");
+            }
+            chosen.and_then(|place| part_refusal(world, place)).map(|refusal| refusal.short())
         }
         LibraryAction::Load | LibraryAction::Merge | LibraryAction::Inject => None,
     }
@@ -171,7 +183,12 @@ pub(super) fn carry_out(mut actions: MessageReader<ActionRequest>, mut commands:
 
 fn act(world: &mut World, action: LibraryAction) {
     if let Some(reason) = obstacle(world, action) {
-        world.write_message(Notice::warning(format!("{}: {reason}.", action.name())));
+        let place = world.get_resource::<ChosenTemplate>().and_then(|chosen| chosen.0.as_ref());
+        let refusal = place.and_then(|place| part_refusal(world, place));
+        let refusal = refusal.filter(|refusal| refusal.short() == reason);
+        let told = refusal.as_ref().map_or(reason, PartRefusal::words);
+        let text = format!("{}: {told}.", action.name());
+        world.write_message(Notice::warning(text));
         return;
     }
     match action {

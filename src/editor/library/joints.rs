@@ -1,7 +1,4 @@
 //! Joints that a part goes onto, and the operation that puts it there.
-//!
-//! A part goes onto joints once: two of a kind on the same joints drive them both, and the constraints of each wait for those of
-//! the other.
 
 use std::{
     collections::{HashMap, HashSet},
@@ -10,19 +7,15 @@ use std::{
 
 use super::sides::{partner, partners};
 use crate::{
-    editor::panels::joint_name,
     processor::Modules,
     rig::{
-        Rig, RigEdit, RigJoint, TagKind, Uid,
+        Rig, RigEdit, Uid,
         label::label_side,
         operations::{PartSide, TagOperation},
-        part::{Part, PartError, PartInstance},
+        part::{OccupiedJoint, Part, PartError, PartInstance, check_unoccupied},
         step::Step,
     },
 };
-
-/// Number of commands from which on the same ones on the same joints are those of the same part.
-const TELLING: usize = 4;
 
 /// An operation that adds a part.
 pub(super) struct PartAddition {
@@ -39,16 +32,8 @@ pub(super) enum AdditionError {
     #[error(transparent)]
     Part(#[from] PartError),
     /// The joints belong to a part of the same kind.
-    #[error(
-        "{joint} belongs to {part} already, and two of them cannot move the same joints; change that part, delete its tags \
-         first, or choose other joints"
-    )]
-    Occupied {
-        /// Name of the joint.
-        joint: String,
-        /// Name of the part, with its article.
-        part: String,
-    },
+    #[error(transparent)]
+    Occupied(#[from] OccupiedJoint),
 }
 
 /// The operation that puts a part onto the chosen joints of a rig, so that it stays a part: mirrored where these are on the
@@ -70,7 +55,7 @@ pub(super) fn added(
     part.sized_for(joints.len())?;
     let others = if both { partners(rig, &joints) } else { None };
     for joints in std::iter::once(&joints).chain(&others) {
-        check_free(rig, instances, &part, joints)?;
+        check_unoccupied(rig, instances, &part, joints)?;
     }
     let label = |joint: &Uid| rig.joint(*joint).and_then(|joint| joint.data.label.as_deref());
     let of_part = side(part.rig.walk().map(|joint| joint.data.label.as_deref()));
@@ -92,62 +77,6 @@ pub(super) fn added(
     let lonely = without.first().filter(|_| both && !with.is_empty()).copied();
     let PartSide { fitted, joints, mirror } = on(joints, mirror)?;
     Ok(PartAddition { operation: TagOperation::AddPart { part: name, fitted, joints, mirror }, lonely })
-}
-
-/// Refuses joints that have tags of an instance of the part, or the commands of such a part one by one.
-fn check_free(rig: &Rig, instances: &[PartInstance], part: &Part, joints: &[Uid]) -> Result<(), AdditionError> {
-    let dropped: Vec<PartInstance> =
-        rig.dropped_parts().iter().map(|dropped| dropped.instance_onto(Vec::new())).collect();
-    let own: Vec<Uid> = part.rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| tag.uid)).collect();
-    let mut brought: HashMap<Uid, &PartInstance> = HashMap::new();
-    for instance in dropped.iter().chain(instances) {
-        brought.extend(own.iter().map(|tag| (instance.uid_of(*tag), instance)));
-    }
-    let occupied =
-        |joint: &RigJoint, part: String| AdditionError::Occupied { joint: joint_name(&joint.data).into_owned(), part };
-    for joint in joints.iter().filter_map(|joint| rig.joint(*joint)) {
-        if let Some(instance) = joint.data.tags.iter().find_map(|tag| brought.get(&tag.uid)) {
-            let title = instance.title();
-            let name = title.rsplit(['/', '\\']).next().unwrap_or(title);
-            let name = name.strip_suffix(".rig.ron").unwrap_or(name);
-            return Err(occupied(joint, format!("the part \"{name}\"")));
-        }
-    }
-    // Tags that were injected or written by hand belong to no instance.
-    let pairs: Vec<(&RigJoint, Vec<&str>)> = part
-        .rig
-        .walk()
-        .zip(joints)
-        .filter_map(|(of_part, joint)| Some((rig.joint(*joint)?, modules_of(of_part))))
-        .filter(|(_, modules)| !modules.is_empty())
-        .collect();
-    let has_all = |(joint, wanted): &(&RigJoint, Vec<&str>)| {
-        let mut found = modules_of(joint);
-        wanted.iter().all(|module| match found.iter().position(|other| other == module) {
-            Some(place) => {
-                found.swap_remove(place);
-                true
-            }
-            None => false,
-        })
-    };
-    let count: usize = pairs.iter().map(|(_, modules)| modules.len()).sum();
-    match pairs.first() {
-        Some(&(joint, _)) if count >= TELLING && pairs.iter().all(has_all) => {
-            Err(occupied(joint, "a part of this kind".to_owned()))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Modules of the commands of a joint.
-fn modules_of(joint: &RigJoint) -> Vec<&str> {
-    let tags = joint.data.tags.iter();
-    tags.filter_map(|tag| match &tag.kind {
-        TagKind::Command { module, .. } => Some(module.as_str()),
-        TagKind::Feature { .. } => None,
-    })
-    .collect()
 }
 
 /// Side of the first label that names one: see [`label_side`].

@@ -41,7 +41,7 @@ use crate::{
     rig::{
         EditError, Rig, RigEdit, Uid,
         operations::{Operation, TagOperation},
-        part::{Part, PartInstance},
+        part::{OccupiedJoint, Part, PartInstance, check_unoccupied},
         template::Template,
         update::{Take, Update, clip_edits, edits_between, pose_edits, update, with_identities},
     },
@@ -107,6 +107,8 @@ enum WorkError {
     Edit(#[from] EditError),
     #[error(transparent)]
     Addition(#[from] AdditionError),
+    #[error(transparent)]
+    Occupied(#[from] OccupiedJoint),
 }
 
 /// Requests that wait, and the one that is being worked on.
@@ -165,15 +167,15 @@ impl LibraryJobs {
 }
 
 /// Snapshot of the open rig for the work.
-struct Snapshot {
-    rig: Rig,
-    modules: Arc<Modules>,
+pub(super) struct Snapshot {
+    pub rig: Rig,
+    pub modules: Arc<Modules>,
     folders: LibraryFolders,
     beside: Option<std::path::PathBuf>,
     /// Joints that the last step added.
-    stroke: Vec<Uid>,
+    pub stroke: Vec<Uid>,
     /// True to put parts onto both sides.
-    both: bool,
+    pub both: bool,
     /// The template that the rig follows, and the part instances that it has of that.
     followed: Option<(Uid, Vec<PartInstance>)>,
 }
@@ -207,20 +209,7 @@ fn begin(world: &mut World, request: LibraryRequest) {
         world.write_message(Notice::error(text).named());
         return;
     };
-    let (Some(data), Some(modules)) = (settled(world, rig), world.get_resource::<RigModules>()) else { return };
-    let Some(history) = world.get::<RigHistory>(rig) else { return };
-    let snapshot = Snapshot {
-        rig: data,
-        modules: modules.0.clone(),
-        folders: world.get_resource::<LibraryFolders>().cloned().unwrap_or_default(),
-        beside: world.get::<OpenDocument>(rig).and_then(own_folder),
-        stroke: added_by(history.last().map(Arc::as_ref)),
-        both: PartSides::are_both(world),
-        followed: world.get::<RigSource>(rig).and_then(|source| {
-            let template = source.base()?.uid();
-            Some((template, source.taken_over().parts.to_vec()))
-        }),
-    };
+    let (Some(snapshot), Some(history)) = (Snapshot::of(world, rig), world.get::<RigHistory>(rig)) else { return };
     let (landing, asked) = (Landing::asked(history), request.clone());
     let work = Work::Runs(AsyncComputeTaskPool::get().spawn(async move { snapshot.run(&asked) }));
     world.resource_mut::<LibraryJobs>().job = Some(Job { request, rig, landing, work });
@@ -228,6 +217,23 @@ fn begin(world: &mut World, request: LibraryRequest) {
 }
 
 impl Snapshot {
+    /// Snapshot of a rig; `None` if it is none.
+    pub(super) fn of(world: &World, rig: Entity) -> Option<Self> {
+        let history = world.get::<RigHistory>(rig)?;
+        Some(Self {
+            rig: settled(world, rig)?,
+            modules: world.get_resource::<RigModules>()?.0.clone(),
+            folders: world.get_resource::<LibraryFolders>().cloned().unwrap_or_default(),
+            beside: world.get::<OpenDocument>(rig).and_then(own_folder),
+            stroke: added_by(history.last().map(Arc::as_ref)),
+            both: PartSides::are_both(world),
+            followed: world.get::<RigSource>(rig).and_then(|source| {
+                let template = source.base()?.uid();
+                Some((template, source.taken_over().parts.to_vec()))
+            }),
+        })
+    }
+
     fn run(self, request: &LibraryRequest) -> Result<Ready, WorkError> {
         let site = self.folders.read()?;
         let template = read_listed(&RealDisk, &request.place, &site)?;
@@ -240,16 +246,24 @@ impl Snapshot {
             }
             LibraryAct::Drop { joint } => merging(template, Some(*joint)),
             LibraryAct::Merge { parent } => merging(template, *parent),
-            LibraryAct::Inject { joints } => Operation::Tags(TagOperation::Drop {
-                part: Arc::new(template.into()),
-                joints: joints.clone(),
-                bindings: default(),
-            }),
+            LibraryAct::Inject { joints } => {
+                let part = Part::from(template);
+                if part.rig.about().kind == "part" {
+                    check_unoccupied(&self.rig, self.instances(), &part, joints)?;
+                }
+                let (part, joints) = (Arc::new(part), joints.clone());
+                Operation::Tags(TagOperation::Drop { part, joints, bindings: default() })
+            }
             LibraryAct::Part { joints, options } => {
                 return Ok(self.part(&request.place, template, &site, joints, options)?);
             }
         };
         Ok(Ready::Operation(Box::new(operation), None))
+    }
+
+    /// Part instances that the rig has of the template that it follows.
+    pub(super) fn instances(&self) -> &[PartInstance] {
+        self.followed.as_ref().map_or(&[][..], |(_, instances)| instances.as_slice())
     }
 
     fn part(
@@ -263,8 +277,7 @@ impl Snapshot {
         let name = place.part_name(self.beside.as_deref(), site);
         let part = (name, Part::from(template));
         let joints = (joints, self.stroke.as_slice());
-        let instances = self.followed.as_ref().map_or(&[][..], |(_, instances)| instances.as_slice());
-        let rig = (&self.rig, instances);
+        let rig = (&self.rig, self.instances());
         let PartAddition { operation, lonely } = added(rig, joints, part, options, self.both, &self.modules)?;
         let note = lonely.and_then(|joint| self.rig.joint(joint)).map(|joint| {
             let (part, joint) = (place.stem(), joint_name(&joint.data));

@@ -9,6 +9,8 @@ use super::{
     features::Features,
     fields::{CommonValue, Look, NumberEdit, Numbers, labelled, named},
     list,
+    poses::PosedRig,
+    process::{AT_END, AT_START},
 };
 use crate::{
     editor::{
@@ -53,7 +55,10 @@ impl EditorPanel for ControlsPanel {
             ui.separator();
             let active = shown.selection.active().and_then(|active| built.node(active));
             match active.filter(|node| node.control.is_some() || !node.attributes.is_empty()) {
-                Some(node) => self.control(ui, node, runtime.state(), shown.entity, requests),
+                Some(node) => {
+                    let Some(posed) = PosedRig::of(world, shown.entity) else { return };
+                    self.control(ui, node, runtime.state(), &posed, requests);
+                }
                 None => {
                     ui.weak("Click a control in Select or Pose mode to see its values.");
                 }
@@ -72,19 +77,22 @@ fn build_state(ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut 
     let (place, total) = (processor.builder().cursor(), processor.builder().len());
     ui.horizontal_wrapped(|ui| {
         ui.label(built_commands(processor.builder()));
+        let no_back = (place == 0).then_some(AT_START);
+        let no_further = (place == total).then_some(AT_END);
         let buttons = [
-            ("Build", "Carry out all commands", BuildStep::All, place < total),
-            ("◀", "Take back the last command", BuildStep::Back, place > 0),
-            ("▶", "Carry out the next command", BuildStep::Forward, place < total),
-            ("Roll back", "Take back all commands", BuildStep::RollBack, place > 0),
+            ("Build", "Carry out all commands", BuildStep::All, no_further),
+            ("◀", "Take back the last command", BuildStep::Back, no_back),
+            ("▶", "Carry out the next command", BuildStep::Forward, no_further),
+            ("Roll back", "Take back all commands", BuildStep::RollBack, no_back),
         ];
-        for (name, what, step, is_on) in buttons {
-            let button = ui.add_enabled(is_on, egui::Button::new(name));
+        for (name, what, step, why_not) in buttons {
+            let button = ui.add_enabled(why_not.is_none(), egui::Button::new(name));
             if ["◀", "▶"].contains(&name) {
                 // A symbol says nothing to people who hear it.
                 named(ui, button.id, what);
             }
-            if button.on_hover_text(what).clicked() {
+            let button = button.on_hover_text(what);
+            if button.on_disabled_hover_text(why_not.unwrap_or_default()).clicked() {
                 requests.send(BuildRequest { rig: shown.entity, step });
             }
         }
@@ -116,7 +124,7 @@ enum Channel {
 }
 
 impl ControlsPanel {
-    fn control(&mut self, ui: &mut Ui, node: &BuiltNode, state: &RigState, rig: Entity, requests: &mut Requests) {
+    fn control(&mut self, ui: &mut Ui, node: &BuiltNode, state: &RigState, posed: &PosedRig, requests: &mut Requests) {
         ui.strong(&*node.name);
         let mut change = None;
         if let (Some(control), Some(slot)) = (&node.control, state.program().node(node.uid)) {
@@ -133,12 +141,14 @@ impl ControlsPanel {
                 change = Some(changed(edit, set));
             }
         }
-        if ui.button("Reset").on_hover_text("Pose and attributes of this control back to rest").clicked() {
-            change = Some(Change::Do(Operation::ResetPose(vec![node.uid])));
+        let reset = ui.add_enabled(posed.is_posed(node.uid), egui::Button::new("Reset"));
+        let reset = reset.on_hover_text("Pose and attributes of this control back to rest");
+        if reset.on_disabled_hover_text("This control is at rest").clicked() {
+            change = Some(Change::Do(posed.reset_of(node.uid)));
         }
         self.numbers.tell(requests);
         if let Some(change) = change {
-            requests.send(EditRequest { rig, change });
+            requests.send(EditRequest { rig: posed.entity, change });
         }
     }
 

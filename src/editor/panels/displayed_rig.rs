@@ -70,10 +70,7 @@ impl<'w> DisplayedRig<'w> {
 
 /// Name of a joint for people: its label, or the first digits of its uid.
 pub fn joint_name(joint: &JointData) -> Cow<'_, str> {
-    match &joint.label {
-        Some(label) => Cow::Borrowed(label),
-        None => Cow::Owned(unlabelled(joint.uid)),
-    }
+    joint.name()
 }
 
 /// Name of a node for people: of a joint, or the one that a command gave to what it made.

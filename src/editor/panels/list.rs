@@ -100,11 +100,21 @@ pub(super) fn nothing(ui: &mut Ui, text: &str) {
 
 /// Draws a small square button with a symbol.
 pub(super) fn symbol_button(ui: &mut Ui, text: &str, tip: &str) -> bool {
+    symbol_button_unless(ui, text, tip, None)
+}
+
+/// Draws a button with a symbol, greyed with the reason why it can do nothing, if there is one; returns `true` when it is clicked.
+pub(super) fn symbol_button_unless(ui: &mut Ui, text: &str, tip: &str, why_not: Option<&str>) -> bool {
     let side = ui.spacing().interact_size.y;
     let button = Button::new(text).min_size(Vec2::splat(side));
-    let response = ui.add(button).on_hover_text(tip);
-    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, true, tip));
-    response.clicked()
+    let can = why_not.is_none() && ui.is_enabled();
+    let response = ui.add_enabled(can, button).on_hover_text(tip);
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Button, can, tip));
+    let is_clicked = response.clicked();
+    if let Some(why_not) = why_not {
+        response.on_disabled_hover_text(why_not);
+    }
+    is_clicked
 }
 
 /// Draws a search field with the given buttons to its right, from right to left.

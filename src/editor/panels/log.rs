@@ -206,6 +206,9 @@ pub struct LogPanel {
     listed: MatchedEntries,
 }
 
+/// Reason why there is nothing to do.
+const EMPTY: &str = "The log is empty";
+
 /// Kinds of entries that are listed or left out, by a severity of each.
 const KINDS: [(Severity, &str); 3] =
     [(Severity::Info, "Show information"), (Severity::Warning, "Show warnings"), (Severity::Error, "Show errors")];
@@ -284,11 +287,15 @@ impl LogPanel {
 
     fn bar(&mut self, ui: &mut Ui, book: &LogBook, requests: &mut Requests) {
         let (mut copy, mut clear) = (false, false);
+        let is_any_listed = !self.listed.places.is_empty();
         let hidden = &mut self.hidden;
         let tip = "Entries with all of these words; error, warning, done and info stand for the kinds";
         list::search_bar(ui, "Search", tip, &mut self.search, |ui| {
-            clear = ui.button("Clear").on_hover_text("Forget all entries").clicked();
-            copy = ui.button("Copy").on_hover_text("Copy what is listed").clicked();
+            let is_empty = book.entries.is_empty();
+            let button = ui.add_enabled(!is_empty, egui::Button::new("Clear")).on_hover_text("Forget all entries");
+            clear = button.on_disabled_hover_text(EMPTY).clicked();
+            let button = ui.add_enabled(is_any_listed, egui::Button::new("Copy")).on_hover_text("Copy what is listed");
+            copy = button.on_disabled_hover_text(if is_empty { EMPTY } else { "No entry is listed" }).clicked();
             // From right to left.
             for ((severity, name), hidden) in KINDS.into_iter().zip(hidden).rev() {
                 kind_button(ui, severity, name, hidden);

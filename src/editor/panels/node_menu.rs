@@ -152,8 +152,7 @@ fn entries(ui: &mut Ui, world: &World, open: &OpenMenu, requests: &mut Requests)
     };
     let edit = |operation| EditRequest::operation(rig, operation);
     if let Some(posed) = PosedRig::of(world, rig) {
-        let is_posed = posed.shown.offsets.contains_key(&node) || posed.shown.values.contains_key(&node);
-        if entry(ui, "Reset pose", (!is_posed).then_some("it is not posed")) {
+        if entry(ui, "Reset pose", (!posed.is_posed(node)).then_some("it is not posed")) {
             requests.send(edit(posed.reset(false)));
         }
         let mirror = posed.mirror_selected();

@@ -143,8 +143,7 @@ fn current(ui: &mut Ui, posed: &PosedRig, shown: &DisplayedRig) -> Option<Operat
         more => format!("{} are posed", counted(more, "joint", "joints")),
     };
     ui.weak(text);
-    let is_posed = |node: &Uid| posed.shown.offsets.contains_key(node) || posed.shown.values.contains_key(node);
-    let selected = shown.selection.0.iter().any(is_posed);
+    let selected = shown.selection.0.iter().any(|node| posed.is_posed(*node));
     let is_any = count > 0 || !posed.shown.values.is_empty();
     let has_other_side = !posed.other_side().is_empty();
     let size = egui::vec2((ui.available_width() - ui.spacing().item_spacing.x) / 2.0, ui.spacing().interact_size.y);

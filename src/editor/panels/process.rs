@@ -30,6 +30,11 @@ use crate::{
 /// Least width with which stage and steps stand in one line, and the choices and the search in another.
 const TWO_LINES: f32 = 600.0;
 
+/// Reason why nothing can be taken back.
+pub(super) const AT_START: &str = "No command is carried out";
+/// Reason why nothing can be carried out.
+pub(super) const AT_END: &str = "All commands are carried out";
+
 /// The panel.
 #[derive(Default)]
 pub struct ProcessPanel {
@@ -85,7 +90,7 @@ impl EditorPanel for ProcessPanel {
         };
         let builder = processor.builder();
         self.refresh(&shown, processor.last_changed(), builder);
-        self.head(ui, &shown, (world.get::<RigStage>(shown.entity), processor.follows()), builder, requests);
+        self.head(ui, &shown, (world.get::<RigStage>(shown.entity).copied(), &*processor), requests);
         self.find();
         let reveal = self.news(builder.cursor()).and_then(|row| self.shown.iter().position(|shown| *shown >= row));
         let height = list::row_height(ui);
@@ -166,23 +171,17 @@ impl ProcessPanel {
     }
 
     /// Draws everything above the list: two lines where there is width, so that a low panel has room for commands.
-    fn head(
-        &mut self,
-        ui: &mut Ui,
-        shown: &DisplayedRig,
-        (stage, follows): (Option<&RigStage>, bool),
-        builder: &Builder,
-        requests: &mut Requests,
-    ) {
+    fn head(&mut self, ui: &mut Ui, shown: &DisplayedRig, of: (Option<RigStage>, &Processor), requests: &mut Requests) {
+        let (builder, follows) = (of.1.builder(), of.1.follows());
         let filter = ("Filter commands", "Words of joint, module and state");
         if ui.available_width() < TWO_LINES {
-            ui.horizontal(|ui| stages(ui, shown, stage, requests));
+            ui.horizontal(|ui| stages(ui, shown, of, requests));
             ui.horizontal_wrapped(|ui| self.steps(ui, shown, builder, requests));
             ui.horizontal_wrapped(|ui| self.choices(ui, shown, follows, requests));
             return list::search_bar(ui, filter.0, filter.1, &mut self.filter, |_| {});
         }
         ui.horizontal(|ui| {
-            stages(ui, shown, stage, requests);
+            stages(ui, shown, of, requests);
             ui.separator();
             self.steps(ui, shown, builder, requests);
         });
@@ -197,20 +196,20 @@ impl ProcessPanel {
         let (done, total) = (builder.cursor(), builder.len());
         let mut ask = |step: BuildStep| requests.send(BuildRequest { rig: shown.entity, step });
         ui.spacing_mut().item_spacing.x = 3.0;
+        let no_back = (done == 0).then_some(AT_START);
+        let no_further = (done == total).then_some(AT_END);
         let steps = [
-            ("⏮", "Roll all back", BuildStep::RollBack, done > 0),
-            ("⏪", "Roll the last joint back", BuildStep::JointBack, done > 0),
-            ("⏴", "Take the last command back", BuildStep::Back, done > 0),
-            ("⏵", "Carry out the next command", BuildStep::Forward, done < total),
-            ("⏩", "Carry out the next joint", BuildStep::JointForward, done < total),
-            ("⏭", "Run to the next breakpoint, or to the end", BuildStep::Run, done < total),
+            ("⏮", "Roll all back", BuildStep::RollBack, no_back),
+            ("⏪", "Roll the last joint back", BuildStep::JointBack, no_back),
+            ("⏴", "Take the last command back", BuildStep::Back, no_back),
+            ("⏵", "Carry out the next command", BuildStep::Forward, no_further),
+            ("⏩", "Carry out the next joint", BuildStep::JointForward, no_further),
+            ("⏭", "Run to the next breakpoint, or to the end", BuildStep::Run, no_further),
         ];
-        for (symbol, tip, step, enabled) in steps {
-            ui.add_enabled_ui(enabled, |ui| {
-                if list::symbol_button(ui, symbol, tip) {
-                    ask(step);
-                }
-            });
+        for (symbol, tip, step, why_not) in steps {
+            if list::symbol_button_unless(ui, symbol, tip, why_not) {
+                ask(step);
+            }
         }
         let counts = builder.counts();
         ui.label(format!("{} of {}", counts.built, counts.all))
@@ -249,7 +248,8 @@ impl ProcessPanel {
             self.in_range || !selected.is_empty(),
             egui::Checkbox::new(&mut self.in_range, "Selection only"),
         );
-        if field.on_hover_text(tip).clicked() {
+        let field = field.on_hover_text(tip).on_disabled_hover_text("Select the joints first");
+        if field.clicked() {
             ask(BuildStep::Range(match self.in_range {
                 true => BuildRange::Hierarchy(selected.iter().copied().collect()),
                 false => BuildRange::Rig,
@@ -351,9 +351,14 @@ fn made_by(world: &World, shown: &DisplayedRig, command: Uid) -> Vec<Uid> {
 }
 
 /// Stage of the rig, and the choice of another.
-fn stages(ui: &mut Ui, shown: &DisplayedRig, now: Option<&RigStage>, requests: &mut Requests) {
+fn stages(
+    ui: &mut Ui,
+    shown: &DisplayedRig,
+    (now, processor): (Option<RigStage>, &Processor),
+    requests: &mut Requests,
+) {
     let label = ui.label("Stage");
-    let name = now.map_or("not built", |stage| stage.name());
+    let name = now.map_or("not built", RigStage::name);
     let combo = egui::ComboBox::from_id_salt("stage").selected_text(name).show_ui(ui, |ui| {
         for stage in RigStage::ALL {
             let tip = match stage {
@@ -362,8 +367,9 @@ fn stages(ui: &mut Ui, shown: &DisplayedRig, now: Option<&RigStage>, requests: &
                 RigStage::Built => "All commands are in effect, and follow every edit",
                 RigStage::Deleted => "No joints; another stage, or Ctrl+Z, brings them back",
             };
-            let is_now = now == Some(&stage);
-            if ui.selectable_label(is_now, stage.name()).on_hover_text(tip).clicked() && !is_now {
+            let entry = egui::Button::selectable(now == Some(stage), stage.name());
+            let entry = ui.add_enabled(!stage.is_kept(now, Some(processor)), entry).on_hover_text(tip);
+            if entry.on_disabled_hover_text("The rig is at this stage").clicked() {
                 requests.send(StageRequest { rig: shown.entity, stage });
             }
         }

@@ -144,8 +144,12 @@ impl PropertiesPanel {
             None if mixed => MIXED,
             None => "None",
         };
-        let mut operation = None;
+        let mut change = None;
         let joints = self.values.joints.clone();
+        let recolored = |name: String, rgb: [u8; 3]| {
+            let color = Some(rgb.map(|byte| f32::from(byte) / 255.0));
+            Operation::Group { joints: joints.clone(), name, color }
+        };
         labelled(ui, "Group", |ui| {
             if let Some(group) = &group {
                 let stored = color(group.color);
@@ -153,26 +157,29 @@ impl PropertiesPanel {
                 let mut rgb = kept.unwrap_or([stored.r(), stored.g(), stored.b()]);
                 let field = ui.color_edit_button_srgb(&mut rgb).on_hover_text("Colour of the group");
                 named(ui, field.id, "Colour of the group");
+                let is_held = ui.input(|input| input.pointer.any_down());
                 if field.changed() {
                     self.color = Some((group.name.clone(), rgb));
+                    if is_held {
+                        change = Some(Change::Preview(recolored(group.name.clone(), rgb)));
+                    }
                 }
-                let holding = ui.input(|input| input.pointer.any_down()) || ui.ctx().egui_wants_keyboard_input();
+                let holding = is_held || ui.ctx().egui_wants_keyboard_input();
                 if let Some((name, rgb)) = self.color.take_if(|_| !holding) {
-                    let color = Some(rgb.map(|byte| f32::from(byte) / 255.0));
-                    operation = Some(Operation::Group { joints: joints.clone(), name, color });
+                    change = Some(Change::Do(recolored(name, rgb)));
                 }
             }
             let current = if mixed { None } else { Some(group.as_ref().map_or("", |group| group.name.as_str())) };
             let combo = ComboBox::from_id_salt("group").selected_text(text).truncate().width(ui.available_width());
             let combo = combo.close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside).show_ui(ui, |ui| {
                 if let Some(name) = groups::choose(ui, &shown.rig, current, &mut self.group) {
-                    operation = Some(Operation::Group { joints: joints.clone(), name, color: None });
+                    change = Some(Change::Do(Operation::Group { joints: joints.clone(), name, color: None }));
                 }
             });
             named(ui, combo.response.id, "Group");
         });
-        if let Some(operation) = operation {
-            self.send(operation, shown, requests);
+        if let Some(change) = change {
+            requests.send(EditRequest { rig: shown.entity, change });
         }
     }
 

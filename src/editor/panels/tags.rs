@@ -120,6 +120,7 @@ impl EditorPanel for TagsPanel {
             return list::nothing(ui, "Select a joint to see its tags: what the rig builds on it.");
         }
         let Some(modules) = world.get_resource::<RigModules>() else { return };
+        self.values.follow(&modules.0);
         self.header(ui, world, &modules.0, &shown, requests);
         ui.separator();
         let entries = std::mem::take(&mut self.stack.entries);

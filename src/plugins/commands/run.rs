@@ -56,6 +56,24 @@ impl RunFailure {
     }
 }
 
+/// A [`ProgramError`] of a rig, told as [`RunFailure::words`] does.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{words}")]
+pub struct NamedProgramError {
+    /// The error, which has uids in place of names.
+    pub error: ProgramError,
+    words: String,
+}
+
+impl NamedProgramError {
+    /// The error of a rig's program, in the names of that rig.
+    pub fn new(error: ProgramError, rig: &Rig) -> Self {
+        let failure = RunFailure(error);
+        let words = failure.words(rig);
+        Self { error: failure.0, words }
+    }
+}
+
 /// Name of a command for people: its module and its joint.
 fn tag_name(rig: &Rig, tag: Uid) -> Option<String> {
     let (joint, tag) = rig.find_tag(tag)?;

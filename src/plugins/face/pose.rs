@@ -7,6 +7,7 @@ use bevy::prelude::*;
 use super::{
     ExpressError, ExpressRequest, ExpressionAnswer, Expressions, Face, FaceExpressions,
     placed_bones::FaceRig,
+    posing::FacePosing,
     preparation::{FacePreparation, PreparedFace, PreparedParts},
 };
 use crate::{
@@ -108,18 +109,33 @@ fn strengths_of(rig: &Rig, mesh: Uid) -> BTreeMap<String, f32> {
     rig.attribute_values().get(&mesh).cloned().unwrap_or_default()
 }
 
+/// Poses faces as they are asked for. A preview is computed in the background, and so is what is asked for while one is
+/// computed; everything else shows in the same frame.
 pub(super) fn express(
     mut commands: Commands,
     mut requests: MessageReader<ExpressRequest>,
-    mut meshes: Query<(&RigMesh, &SkinOf, Option<&Face>, Option<&PreparedFace>, Option<&mut FacePreparation>)>,
+    mut meshes: Query<(
+        &RigMesh,
+        &SkinOf,
+        Option<&Face>,
+        Option<&PreparedFace>,
+        Option<&mut FacePreparation>,
+        Option<&mut FacePosing>,
+    )>,
     rigs: Query<(&Rig, Option<&RigHistory>)>,
     set: Res<FaceExpressions>,
     mut told: MessageWriter<ExpressionAnswer>,
 ) {
-    for request in requests.read() {
+    let mut asked: Vec<(ExpressRequest, bool)> = Vec::new();
+    for (.., posing) in &mut meshes {
+        let landed = posing.map(|mut posing| posing.bypass_change_detection().land()).unwrap_or_default();
+        asked.extend(landed.into_iter().map(|request| (request, true)));
+    }
+    asked.extend(requests.read().map(|request| (request.clone(), false)));
+    for (number, (request, has_waited)) in asked.iter().enumerate() {
         let ExpressRequest { mesh: entity, strengths, preview } = request;
-        let found = meshes.get_mut(*entity).ok().and_then(|(mesh, of, face, prepared, preparation)| {
-            Some((mesh, of.0, rigs.get(of.0).ok()?, face, prepared, preparation))
+        let found = meshes.get_mut(*entity).ok().and_then(|(mesh, of, face, prepared, preparation, posing)| {
+            Some((mesh, of.0, rigs.get(of.0).ok()?, face, prepared.zip(posing), preparation))
         });
         let Some((mesh, rig_entity, (rig, history), face, prepared, preparation)) = found else {
             told.write(ExpressionAnswer { mesh: *entity, result: Err(ExpressError::NoRig) });
@@ -135,10 +151,11 @@ pub(super) fn express(
                 continue;
             }
         };
-        let parts = face
-            .filter(|face| face.serves(&mesh.rest, &face.settings))
-            .and_then(|face| prepared?.parts(&face.analysis, &set.0, &known, skin));
-        let Some(parts) = parts else {
+        let ready = face.filter(|face| face.serves(&mesh.rest, &face.settings)).and_then(|face| {
+            let (prepared, posing) = prepared?;
+            Some((prepared.parts(&face.analysis, &set.0, &known, skin)?, posing))
+        });
+        let Some((parts, mut posing)) = ready else {
             // The request is repeated when the face is prepared; of several, the last one counts.
             match preparation {
                 Some(mut preparation) => preparation.wanted = Some(request.clone()),
@@ -150,7 +167,30 @@ pub(super) fn express(
             }
             continue;
         };
-        let mut edits = expression_edits(&settled, parts, &mix);
+        let posing = posing.bypass_change_detection();
+        // Steps of the history keep their order.
+        if posing.has_step() {
+            posing.wait(request.clone());
+            continue;
+        }
+        let is_replaced = *preview && asked[number + 1..].iter().any(|(later, _)| later.mesh == *entity);
+        let ends_where_it_began = !*preview && posing.is_running() && strengths_of(&settled, mesh.uid) == *strengths;
+        let mut edits = match posing.posed(parts, strengths) {
+            Some(poses) => expression_edits(&settled, parts, poses),
+            None if is_replaced => continue,
+            // A drag that ends where it began leaves the document as it is.
+            None if ends_where_it_began => Vec::new(),
+            None if posing.is_running() => {
+                posing.wait(request.clone());
+                continue;
+            }
+            None if *preview || *has_waited => {
+                posing.start(parts, mix, request.clone());
+                continue;
+            }
+            None => expression_edits(&settled, parts, &parts.fitted.pose(&mix)),
+        };
+        posing.stop();
         edits.extend(strength_edits(&settled, mesh.uid, strengths));
         // An expression that the face shows already adds no step to the history.
         let is_shown = edits.is_empty();
@@ -198,11 +238,10 @@ pub fn mixed(set: &ExpressionSet, strengths: &BTreeMap<String, f32>) -> Result<M
     Ok(Mix::of(&wanted, set.unit_set()))
 }
 
-/// The edits that pose the facial joints for a mix. Facial joints that are not moved are reset to rest.
-fn expression_edits(rig: &Rig, prepared: &PreparedParts, mix: &Mix) -> Vec<RigEdit> {
-    let PreparedParts { analysis, known, fitted, .. } = prepared;
-    let poses = fitted.pose(mix);
-    let poses = known.joint_poses(analysis, &poses);
+/// The edits that pose the facial joints by poses of all bones. Facial joints that are not moved are reset to rest.
+fn expression_edits(rig: &Rig, prepared: &PreparedParts, poses: &[BonePose]) -> Vec<RigEdit> {
+    let PreparedParts { analysis, known, .. } = prepared;
+    let poses = known.joint_poses(analysis, poses);
     let edits = known.bones.iter().zip(&poses).filter_map(|(bone, pose)| {
         let offset = Frame::of(rig, bone.uid, analysis).offset(pose);
         let offset = (!offset.is_rest(1e-7)).then_some(offset);

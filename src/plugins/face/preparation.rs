@@ -19,6 +19,7 @@ use super::{
     job::analysed,
     placed_bones::FaceRig,
     pose::{analysed_weights, facial_bones},
+    posing::FacePosing,
     with_cut,
 };
 use crate::{
@@ -41,6 +42,7 @@ pub struct FacePreparation {
 /// A mesh's face as expressions take it, kept from one expression to the next: a slider that is dragged only sums up
 /// movements that are solved already.
 #[derive(Component, Clone)]
+#[require(FacePosing)]
 pub(super) struct PreparedFace(Arc<PreparedParts>);
 
 pub(super) struct PreparedParts {
@@ -59,8 +61,8 @@ impl PreparedFace {
         set: &Arc<ExpressionSet>,
         known: &FaceRig,
         skin: &Arc<SkinData>,
-    ) -> Option<&PreparedParts> {
-        let parts = self.0.as_ref();
+    ) -> Option<&Arc<PreparedParts>> {
+        let parts = &self.0;
         let serves = Arc::ptr_eq(&parts.analysis, analysis)
             && Arc::ptr_eq(&parts.set, set)
             && Arc::ptr_eq(&parts.skin, skin)

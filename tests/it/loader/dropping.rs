@@ -278,3 +278,125 @@ fn a_part_does_not_go_onto_joints_that_a_template_or_tags_gave_such_a_part() {
     assert!(studio.told("clavicle_l belongs to a part of this kind already"), "{:?}", studio.desk.told());
     assert_eq!(studio.text(), text);
 }
+
+/// The window, by both of its ways, and the command line refuse a second part of a kind on the same joints, with the same words.
+#[cfg(feature = "cli")]
+#[test]
+fn a_second_part_is_refused_with_the_same_words_everywhere() {
+    use rigsmith::rig::part::OccupiedJoint;
+
+    use crate::cli_outputs::json;
+
+    let mut studio = Studio::new(LoaderPanel::default());
+    let home = studio.folder.path().join("home");
+    let chain = |labels: [&str; 4]| {
+        let joint = |(number, label): (usize, &&str)| match number {
+            0 => format!("(label: \"{label}\", translation: (0.1, 1.4, 0))"),
+            _ => format!("(label: \"{label}\", parent: \"{}\", translation: (0.3, 0, 0))", labels[number - 1]),
+        };
+        let joints: Vec<String> = labels.iter().enumerate().map(joint).collect();
+        format!("(format: 2, name: \"chain\", joints: [{}])", joints.join(", "))
+    };
+    let arm_labels = ["clavicle_l", "upper_arm_l", "forearm_l", "hand_l"];
+    let parts = "parts: [(part: \"limb.rig.ron\", name: \"left arm\", onto: [\"arm_l\", \"elbow_l\"])],\n    joints: [";
+    let arm = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/templates/parts/arm.rig.ron");
+    for (name, text) in [
+        ("limb.rig.ron", LIMB.to_owned()),
+        ("arm.rig.ron", fs::read_to_string(arm).unwrap()),
+        ("armed.rig.ron", MAN.replacen("joints: [", parts, 1).replace("\"man\"", "\"armed\"")),
+        ("chain.rig.ron", chain(arm_labels)),
+    ] {
+        fs::write(home.join(name), text).unwrap();
+    }
+    let inject = |part: &str, rig: &str, joints: &str, output: &str| {
+        json(&home, &["inject", part, rig, "--joints", joints, "-o", output])
+    };
+    let (code, told) = inject("arm.rig.ron", "chain.rig.ron", &arm_labels.join(","), "injected.rig.ron");
+    assert_eq!(code, 0, "{told}");
+
+    for (part, rig, labels, name) in [
+        ("limb.rig.ron", "armed.rig.ron", &["arm_l", "elbow_l"][..], "the part \"left arm\""),
+        ("arm.rig.ron", "injected.rig.ron", &arm_labels[..], "a part of this kind"),
+    ] {
+        let words = OccupiedJoint { joint: labels[0].to_owned(), part: name.to_owned() }.to_string();
+        let (code, told) = inject(part, rig, &labels.join(","), "twice.rig.ron");
+        let error = &told["error"];
+        let said = format!("{}; {}", error["what"].as_str().unwrap(), error["do"].as_str().unwrap());
+        assert_eq!((code, said), (1, words.clone()), "{rig}: {told}");
+        assert!(!home.join("twice.rig.ron").exists(), "{rig}");
+
+        studio.open(OpenRequest::File(home.join(rig)));
+        studio.desk.until("the followed file", |desk| {
+            desk.app.world().get::<RigSource>(desk.rig).is_some_and(|source| source.base().is_some())
+        });
+        let joints: Vec<Uid> = labels.iter().map(|label| studio.joint(label)).collect();
+        let text = studio.text();
+        for act in [
+            LibraryAct::Part { joints: joints.clone(), options: Vec::new() },
+            LibraryAct::Inject { joints: joints.clone() },
+        ] {
+            let way = format!("{rig}: {act:?}");
+            studio.act(TemplatePlace::File(home.join(part)), act);
+            let told = studio.desk.told().pop().unwrap_or_default();
+            assert!(told.contains(&words), "{way}: {:?}", studio.desk.told());
+            assert_eq!(studio.text(), text, "{way}");
+        }
+    }
+    // Other joints take the part.
+    let (code, told) = inject("limb.rig.ron", "armed.rig.ron", "arm_r,elbow_r", "other.rig.ron");
+    assert_eq!(code, 0, "{told}");
+}
+
+/// Adding a part is greyed where the part would be refused: menus say why in a few words, the card in those of the refusal.
+#[test]
+fn adding_a_part_is_greyed_where_it_would_be_refused() {
+    use rigsmith::rig::part::OccupiedJoint;
+
+    let mut studio = Studio::new(LoaderPanel::default());
+    let [hips, arm_l, arm_r, elbow_r] = ["hips", "arm_l", "arm_r", "elbow_r"].map(|label| studio.joint(label));
+    let limb = studio.limb();
+    studio.settle();
+    let reason = |desk: &Desk| palette::obstacle(desk.app.world(), Action::Library(LibraryAction::Part));
+    studio.desk.select(&[arm_l]);
+    studio.settle();
+    studio.click("Part limb");
+    assert!(studio.desk.find("Add part").enabled && reason(&studio.desk).is_none(), "it fits");
+    studio.act(limb, LibraryAct::Part { joints: vec![arm_l], options: Vec::new() });
+    assert_eq!(studio.desk.rig().dropped_parts().len(), 1, "{:?}", studio.desk.told());
+    studio.desk.until("the reason", |desk| reason(desk).is_some());
+    assert_eq!(reason(&studio.desk), Some("the selected joints have such a part already"));
+    studio.desk.frames(2);
+    let button = studio.desk.find("Add part");
+    assert!(!button.enabled);
+    studio.desk.move_to(button.rect.center());
+    studio.desk.frames(60);
+    let words = OccupiedJoint { joint: "arm_l".to_owned(), part: "the part \"limb\"".to_owned() }.to_string();
+    assert!(studio.desk.says(&words), "{words}: {:?}", studio.desk.seen);
+    studio.desk.move_to(egui::pos2(3000.0, 3000.0));
+    let steps = studio.desk.steps();
+    studio.send(ActionRequest(Action::Library(LibraryAction::Part)));
+    assert!(studio.told(&words) && studio.desk.steps() == steps, "{:?}", studio.desk.told());
+
+    for (joints, wanted) in [
+        (vec![arm_r], None),
+        (vec![hips, elbow_r], Some("the part does not fit the selected joints")),
+        (vec![arm_r, elbow_r], None),
+        (Vec::new(), Some("no joint is selected")),
+    ] {
+        studio.desk.select(&joints);
+        studio.settle();
+        assert_eq!(reason(&studio.desk), wanted, "{joints:?}");
+        assert_eq!(studio.desk.find("Add part").enabled, wanted.is_none(), "{joints:?}");
+        // What is greyed would be refused, and nothing else.
+        if !joints.is_empty() {
+            let (place, steps) = (studio.limb(), studio.desk.steps().1);
+            studio.act(place, LibraryAct::Part { joints: joints.clone(), options: Vec::new() });
+            assert_eq!(studio.desk.steps().1 > steps, wanted.is_none(), "{joints:?}: {:?}", studio.desk.told());
+            (steps..studio.desk.steps().1).for_each(|_| studio.change(Change::Undo));
+        }
+    }
+    studio.change(Change::Undo);
+    studio.desk.select(&[arm_l]);
+    studio.settle();
+    assert_eq!(reason(&studio.desk), None, "the part is gone");
+}

@@ -50,14 +50,29 @@ fn number(desk: &Desk) -> ShownWidget {
     desk.seen.iter().find(is_it).expect("its number").clone()
 }
 
+/// The rail of the slider of happiness, and the number beside it.
+pub(super) fn happiness(desk: &Desk) -> [egui::Rect; 2] {
+    let happiness = written(desk, "Happiness").expect("a slider for happiness");
+    let below = happiness.bottom()..happiness.bottom() + 30.0;
+    let number = desk
+        .seen
+        .iter()
+        .filter(|seen| below.contains(&seen.rect.center().y) && seen.value.parse::<f32>().is_ok())
+        .min_by(|a, b| a.rect.left().total_cmp(&b.rect.left()))
+        .expect("a number below the name")
+        .rect;
+    // The rail lies before the number that it sets.
+    [egui::Rect::from_x_y_ranges(happiness.left()..=number.left() - 8.0, number.y_range()), number]
+}
+
 /// Number of expressions of which the panel has drawn pictures.
-fn pictures(desk: &Desk) -> usize {
+pub(super) fn pictures(desk: &Desk) -> usize {
     let textures = desk.ctx.tex_manager();
     let textures = textures.read();
     textures.allocated().filter(|(_, texture)| texture.name.starts_with("face ")).count()
 }
 
-fn wait(desk: &mut Desk, mesh: Entity) {
+pub(super) fn wait(desk: &mut Desk, mesh: Entity) {
     desk.frame();
     crate::bench::wait(desk, "the face", Desk::frame, |desk| {
         desk.app.world().get::<FaceJob>(mesh).is_none() && desk.look("Cancel").is_none()
@@ -91,19 +106,10 @@ fn a_click_makes_a_face_that_sliders_pose() {
     assert_eq!(desk.selected().len(), count);
 
     // An expression is one step, however long its slider is dragged.
-    let happiness = written(&desk, "Happiness").expect("a slider for happiness");
-    let below = happiness.bottom()..happiness.bottom() + 30.0;
-    let number = desk
-        .seen
-        .iter()
-        .filter(|seen| below.contains(&seen.rect.center().y) && seen.value.parse::<f32>().is_ok())
-        .min_by(|a, b| a.rect.left().total_cmp(&b.rect.left()))
-        .expect("a number below the name")
-        .rect;
-    // The rail lies before the number that it sets.
-    let slider = egui::Rect::from_x_y_ranges(happiness.left()..=number.left() - 8.0, number.y_range());
+    let [slider, number] = happiness(&desk);
     let at = |share: f32| egui::pos2(slider.left() + share * slider.width(), slider.center().y);
     desk.drag(at(0.02), at(0.6));
+    desk.until("the step of the drag", |desk| desk.steps().0 == 2);
     desk.frames(4);
     let shown = desk.app.world().get::<Expressions>(mesh).cloned().unwrap_or_default();
     assert!(shown.0.get("happiness").is_some_and(|strength| *strength > 0.2), "{shown:?}");
@@ -131,8 +137,7 @@ fn a_click_makes_a_face_that_sliders_pose() {
     desk.press(at(0.02));
     desk.move_to(at(0.3));
     desk.move_to(at(0.6));
-    desk.frames(4);
-    assert!(!desk.rig().pose().is_empty(), "a drag is seen");
+    desk.until("a drag that is seen", |desk| !desk.rig().pose().is_empty());
     desk.key(egui::Key::Escape);
     desk.move_to(at(0.7));
     desk.release(at(0.7));

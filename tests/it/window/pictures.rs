@@ -33,6 +33,12 @@ impl Hands<'_> {
         self.rests();
     }
 
+    /// Shows the whole figure again after work near to it.
+    fn frame_all(&self) {
+        self.key("Home");
+        self.rests();
+    }
+
     /// Brings a panel of the dock forward by its tab.
     fn bring(&self, panel: &str) {
         self.press(&format!("Show {panel}"));
@@ -136,7 +142,7 @@ fn rigged(hands: &Hands) {
 fn posed(hands: &Hands) {
     hands.key("p");
     hands.until("controls are posed", |report| report.mode == "Pose");
-    // The whole figure is small beside its controls.
+    // In a view of the whole figure its hand is small beside the controls, and pulled by its joint only from near.
     hands.approach(1);
     let report = hands.report().expect("the window reports");
     let uid = &report.labels["hand_l"];
@@ -153,6 +159,7 @@ fn posed(hands: &Hands) {
         hands.press("Store");
         (0..12).for_each(|_| hands.key("period"));
     }
+    hands.frame_all();
     hands.picture("timeline");
     hands.bring("Sets");
     let of_sets = |report: &WindowReport| {
@@ -183,6 +190,8 @@ fn updated(hands: &Hands, template: &Path) {
     hands.bring("Updater");
     hands.picture("updater");
 
+    // The whole figure is small beside a brush.
+    hands.approach(1);
     hands.select("upper_arm_l");
     hands.key("t");
     hands.bring("Weights");

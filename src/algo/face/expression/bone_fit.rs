@@ -30,6 +30,7 @@ use super::{
     field::{Field, jaw_pivot},
     limited,
     openings::OpeningLines,
+    work::visit,
 };
 use crate::{
     algo::face::{
@@ -120,6 +121,7 @@ impl FittedFace {
             pairs: mirrored_pairs(bones, landmarks),
         };
         let Some(opening_lines) = face.opening_lines.clone() else { return face };
+        visit(points.len());
         let (samples, facing) = samples::gather(points, mask, weights, bones, landmarks, &opening_lines);
         face.samples = samples;
         face.factorise();
@@ -145,6 +147,7 @@ impl FittedFace {
         let rest = || (vec![BonePose::REST; self.bones.len()], Repair::none(mix));
         let Some(opening_lines) = self.opening_lines.as_ref().filter(|_| !mix.is_rest()) else { return rest() };
         let Some(field) = Field::new(mix, &self.units, &self.bones, &self.landmarks) else { return rest() };
+        visit(self.moving.points.len());
         let mut poses = self.solve(mix, &field, opening_lines);
         if self.landmarks.symmetric && is_alike(mix) {
             self.mirror(&mut poses);
@@ -222,6 +225,7 @@ impl FittedFace {
 
     /// Movements of the skin bones that bring each sample nearest to its target.
     fn movements_to(&self, targets: impl Iterator<Item = DVec3>) -> Vec<DVec3> {
+        visit(self.samples.len());
         let mut right = vec![DVec3::ZERO; self.skin.len()];
         for (sample, target) in self.samples.iter().zip(targets) {
             // The mean of the field over a bone's patch is a target, too.

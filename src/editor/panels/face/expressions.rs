@@ -14,7 +14,7 @@ use crate::{
     },
     plugins::{
         document::{Change, EditRequest},
-        face::{ExpressRequest, Expressions, Face, FacePreparation},
+        face::{ExpressRequest, Expressions, Face, FacePosing, FacePreparation},
         surface::RigMesh,
     },
     rig::{FaceBonePart, Rig},
@@ -42,7 +42,10 @@ pub(super) fn show(
     requests: &mut Requests,
 ) {
     let set = set(world);
-    let current = world.get::<Expressions>(entity).map(|shown| shown.0.clone()).unwrap_or_default();
+    let posing = world.get::<FacePosing>(entity);
+    // What was let go a moment ago may be computed yet.
+    let shown = posing.and_then(FacePosing::strengths).or_else(|| Some(&world.get::<Expressions>(entity)?.0));
+    let current = shown.cloned().unwrap_or_default();
     // While a slider is dragged, the last request may not be shown yet.
     let before = held.as_ref().map_or(current, |held| held.shown.clone());
     let mut next = before.clone();
@@ -109,8 +112,8 @@ pub(super) fn show(
     let dropped = held.take_if(|_| ui.input(|input| input.key_pressed(egui::Key::Escape)));
     if let Some(HeldStrengths { start, .. }) = dropped {
         requests.send(EditRequest { rig: rig.0, change: Change::CancelPreview });
-        // What waits for the face to be prepared would be shown yet.
-        if world.get::<FacePreparation>(entity).is_some() {
+        // What waits for the face to be prepared, or is being computed, would be shown yet.
+        if world.get::<FacePreparation>(entity).is_some() || posing.is_some_and(FacePosing::is_running) {
             requests.send(ExpressRequest { mesh: entity, strengths: start, preview: false });
         }
     } else if next != before || let_go {

@@ -10,7 +10,10 @@ use bevy_egui::egui::{
 use crate::{
     editor::{
         counts::counted,
-        library::{LibraryAct, LibraryAction, LibraryListing, LibraryRequest, PartSides, obstacle, partners},
+        library::{
+            LibraryAct, LibraryAction, LibraryListing, LibraryRequest, PartRefusal, PartSides, obstacle, part_refusal,
+            partners,
+        },
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
@@ -167,11 +170,13 @@ impl Card {
         ui.checkbox(&mut self.keep, "Keep poses and keys").on_hover_text(keep_tip);
         let keep = self.keep;
         let options = self.values();
+        let refusal = if listed.is_part() { part_refusal(world, &listed.place) } else { None };
         ui.horizontal_wrapped(|ui| {
             let mut button = |name: &str, tip: &str, action: LibraryAction, act: LibraryAct| {
                 let reason = obstacle(world, action);
                 let field = ui.add_enabled(reason.is_none(), Button::new(name)).on_hover_text(tip);
-                if field.on_disabled_hover_text(reason.unwrap_or_default()).clicked() {
+                let words = refusal.as_ref().filter(|refusal| reason == Some(refusal.short())).map(PartRefusal::words);
+                if field.on_disabled_hover_text(words.or(reason).unwrap_or_default()).clicked() {
                     requests.send(LibraryRequest { place: listed.place.clone(), act });
                 }
             };

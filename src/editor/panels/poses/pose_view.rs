@@ -53,6 +53,11 @@ impl<'w> PosedRig<'w> {
         })
     }
 
+    /// True if a node is posed, or an attribute of it has a value.
+    pub fn is_posed(&self, node: Uid) -> bool {
+        self.shown.offsets.contains_key(&node) || self.shown.values.contains_key(&node)
+    }
+
     /// The selected nodes and, with live mirroring, those on the other side.
     pub fn meant(&self) -> BTreeSet<Uid> {
         let mut nodes: BTreeSet<Uid> = self.selected.iter().copied().collect();
@@ -87,6 +92,15 @@ impl<'w> PosedRig<'w> {
                 let nodes = (!all).then(|| self.meant());
                 self.change_to(&WholePose::default(), nodes.as_ref(), "Reset pose")
             }
+        }
+    }
+
+    /// Operation that resets a node.
+    pub fn reset_of(&self, node: Uid) -> Operation {
+        if self.is_clip {
+            self.change_to(&WholePose::default(), Some(&BTreeSet::from([node])), "Reset pose")
+        } else {
+            Operation::ResetPose(vec![node])
         }
     }
 

@@ -1,12 +1,39 @@
 //! Forms of modules: those that they come with, or made of their parameters.
 
+use std::{collections::HashMap, sync::Arc};
+
 use crate::processor::{
-    ModuleInfo,
+    ModuleInfo, Modules,
     form::{Form, FormBinding, FormElement, read_module_form},
 };
 
+/// Forms of modules, each read when it is first needed.
+#[derive(Default)]
+pub(super) struct Forms {
+    /// Modules that the forms are of.
+    modules: Option<Arc<Modules>>,
+    read: HashMap<&'static str, Arc<Form>>,
+}
+
+impl Forms {
+    /// Drops the forms if these are other modules than before, as after a form was saved; returns true then.
+    pub fn follow(&mut self, modules: &Arc<Modules>) -> bool {
+        if self.modules.as_ref().is_some_and(|known| Arc::ptr_eq(known, modules)) {
+            return false;
+        }
+        self.modules = Some(modules.clone());
+        self.read.clear();
+        true
+    }
+
+    /// The form of a module.
+    pub fn of(&mut self, module: &ModuleInfo) -> Arc<Form> {
+        self.read.entry(module.name).or_insert_with(|| Arc::new(form_of(module))).clone()
+    }
+}
+
 /// The form of a module; one made of its parameters if it has none, or none that can be read.
-pub(super) fn form_of(module: &ModuleInfo) -> Form {
+fn form_of(module: &ModuleInfo) -> Form {
     let form = module.form.as_ref().and_then(|form| read_module_form(form.as_bytes(), module).ok());
     form.unwrap_or_else(|| made_form(module))
 }

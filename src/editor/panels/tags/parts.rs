@@ -2,7 +2,7 @@
 
 use bevy::prelude::World;
 use bevy_egui::egui::{
-    PopupCloseBehavior, Ui,
+    Button, PopupCloseBehavior, Ui,
     containers::menu::{MenuButton, MenuConfig},
     vec2,
 };
@@ -10,7 +10,7 @@ use bevy_egui::egui::{
 use crate::{
     editor::{
         actions::{Action, ActionRequest},
-        library::{LibraryAct, LibraryRequest, ListTemplates, TemplateLibrary},
+        library::{LibraryAct, LibraryRequest, ListTemplates, PartRefusal, ReadPart, TemplateLibrary, part_refusal},
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
@@ -72,7 +72,11 @@ impl PartMenu {
             about(ui, listed, header);
             self.card.of(&listed.place);
             self.card.options(ui, header, requests);
-            if ui.button("Add part").clicked() {
+            requests.send(ReadPart(listed.place.clone()));
+            let refusal = part_refusal(world, &listed.place);
+            let button = ui.add_enabled(refusal.is_none(), Button::new("Add part"));
+            let why_not = refusal.as_ref().map_or("", PartRefusal::words);
+            if button.on_disabled_hover_text(why_not).clicked() {
                 requests.send(adding(&listed.place, self.card.values()));
                 ui.close();
             }

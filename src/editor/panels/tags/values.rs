@@ -2,10 +2,7 @@
 
 mod list_field;
 
-use std::{
-    collections::{HashMap, HashSet},
-    sync::Arc,
-};
+use std::{collections::HashSet, sync::Arc};
 
 use bevy_egui::egui::{
     Checkbox, CollapsingHeader, ComboBox, Key, Rect, RichText, Sense, TextEdit, TextStyle, Ui, WidgetInfo, WidgetType,
@@ -17,7 +14,7 @@ use serde::Serialize;
 use super::{
     curve_field::{self, CurveDrag, CurveEdit},
     fault::Fault,
-    forms::form_of,
+    forms::Forms,
     parameter_text::{ValueError, read, typed_number},
     pick::Picking,
     read_values::{CommandValues, ReadValues},
@@ -34,10 +31,7 @@ use crate::{
             list,
         },
     },
-    processor::{
-        Builder, ModuleInfo,
-        form::{Form, FormElement},
-    },
+    processor::{Builder, ModuleInfo, Modules, form::FormElement},
     rig::{Uid, proportion::Quantity, ron_text},
 };
 
@@ -52,7 +46,7 @@ pub(super) struct Values {
     numbers: Numbers,
     draft: Option<Draft>,
     curve: Option<CurveDrag>,
-    forms: HashMap<&'static str, Form>,
+    forms: Forms,
     read: ReadValues,
     /// Parameter that waits for nodes.
     pub picking: Option<Picking>,
@@ -148,6 +142,13 @@ impl Subject<'_> {
 }
 
 impl Values {
+    /// Follows the modules, whose forms may have been saved since; values are read for a form.
+    pub fn follow(&mut self, modules: &Arc<Modules>) {
+        if self.forms.follow(modules) {
+            self.read = ReadValues::default();
+        }
+    }
+
     /// Sends a notice if a typed number was not taken.
     pub fn tell(&mut self, requests: &mut Requests) {
         self.numbers.tell(requests);
@@ -163,8 +164,8 @@ impl Values {
         entry: &Entry,
         fault: Option<&Fault>,
     ) -> Option<ValueEdit> {
-        let form = self.forms.remove(module.name).unwrap_or_else(|| form_of(module));
-        let edit = match self.read.of(module, &form, entry) {
+        let form = self.forms.of(module);
+        match self.read.of(module, &form, entry) {
             Ok(values) => {
                 let waits = self.picking.as_ref().filter(|picking| picking.tag == entry.first.uid);
                 let picking = waits.map(|picking| picking.path.clone());
@@ -180,9 +181,7 @@ impl Values {
                 ui.colored_label(ui.visuals().error_fg_color, reason);
                 self.source(ui, entry)
             }
-        };
-        self.forms.insert(module.name, form);
-        edit
+        }
     }
 
     /// Forgets the values of cards that are not open.

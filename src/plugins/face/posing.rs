@@ -1,0 +1,93 @@
+//! Poses of expressions that are computed in the background while a slider is dragged.
+//!
+//! Movements of bones are sums, but mending of folds looks at the skin that they move: its time grows with the mesh. A
+//! preview shows as soon as its pose is computed; of those that come meanwhile, the last one counts. What is to become a
+//! step of the history waits for its turn and is never left out.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Weak},
+};
+
+use bevy::{
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+};
+
+use super::{ExpressRequest, preparation::PreparedParts};
+use crate::algo::face::expression::{BonePose, Mix};
+
+/// Poses of a mesh's face for expressions: the last one that was computed, and the one that is being computed.
+#[derive(Component, Default)]
+pub struct FacePosing {
+    last: Option<LastPose>,
+    running: Option<RunningPose>,
+}
+
+struct LastPose {
+    parts: Weak<PreparedParts>,
+    strengths: BTreeMap<String, f32>,
+    poses: Vec<BonePose>,
+}
+
+struct RunningPose {
+    task: Task<Vec<BonePose>>,
+    parts: Weak<PreparedParts>,
+    request: ExpressRequest,
+    /// Requests that came meanwhile, in their order.
+    queue: Vec<ExpressRequest>,
+}
+
+impl FacePosing {
+    /// True while a pose is computed.
+    pub fn is_running(&self) -> bool {
+        self.running.is_some()
+    }
+
+    /// Strengths that the face is going to have; `None` unless a pose is computed.
+    pub fn strengths(&self) -> Option<&BTreeMap<String, f32>> {
+        let running = self.running.as_ref()?;
+        Some(&running.queue.last().unwrap_or(&running.request).strengths)
+    }
+
+    /// Pose for these strengths, if it was computed last.
+    pub(super) fn posed(&self, parts: &Arc<PreparedParts>, strengths: &BTreeMap<String, f32>) -> Option<&[BonePose]> {
+        let serves = |last: &&LastPose| last.parts.as_ptr() == Arc::as_ptr(parts) && last.strengths == *strengths;
+        self.last.as_ref().filter(serves).map(|last| last.poses.as_slice())
+    }
+
+    /// True if what is computed, or waits, becomes a step of the history.
+    pub(super) fn has_step(&self) -> bool {
+        let is_step = |request: &ExpressRequest| !request.preview;
+        self.running.as_ref().is_some_and(|running| is_step(&running.request) || running.queue.iter().any(is_step))
+    }
+
+    /// Starts to compute the pose of a request.
+    pub(super) fn start(&mut self, parts: &Arc<PreparedParts>, mix: Mix, request: ExpressRequest) {
+        let of_task = parts.clone();
+        let task = AsyncComputeTaskPool::get().spawn(async move { of_task.fitted.pose(&mix) });
+        self.running = Some(RunningPose { task, parts: Arc::downgrade(parts), request, queue: Vec::new() });
+    }
+
+    /// Lets a request wait for the pose that is being computed, in place of a preview that waits.
+    pub(super) fn wait(&mut self, request: ExpressRequest) {
+        let Some(running) = &mut self.running else { return };
+        running.queue.pop_if(|last| last.preview);
+        running.queue.push(request);
+    }
+
+    /// Drops a pose that is being computed, and what waits for it: another one is shown.
+    pub(super) fn stop(&mut self) {
+        self.running = None;
+    }
+
+    /// Takes over a pose that is computed. Returns its request and those that waited for it.
+    pub(super) fn land(&mut self) -> Vec<ExpressRequest> {
+        let Some(poses) = self.running.as_mut().and_then(|running| check_ready(&mut running.task)) else {
+            return Vec::new();
+        };
+        let Some(RunningPose { parts, request, queue, .. }) = self.running.take() else { return Vec::new() };
+        self.last = Some(LastPose { parts, strengths: request.strengths.clone(), poses });
+        std::iter::once(request).chain(queue).collect()
+    }
+}

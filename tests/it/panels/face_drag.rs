@@ -1,0 +1,108 @@
+//! Work of a drag in the Face panel: frames visit no points of the head, however many it has.
+
+use bevy::{ecs::schedule::SingleThreadedExecutor, prelude::*};
+use bevy_egui::egui;
+use rigsmith::{
+    algo::face::expression::visited_points,
+    editor::{
+        ActiveRig,
+        panels::{PanelsPlugin, face::FacePanel},
+    },
+    headless::headless_app,
+    mesh::model::{Faces, Model, Object, Part},
+    plugins::{
+        face::{Expressions, Face, FaceExpressions, FacePosing, expressed_points},
+        surface::{RigMesh, SkinOf},
+    },
+    prelude::*,
+    test_app::strict_app,
+};
+
+use super::{
+    desk::{Desk, Sheet},
+    face::{happiness, pictures, wait},
+};
+use crate::heads;
+
+fn model((points, triangles): heads::Mesh) -> Model {
+    let part = Part {
+        vertices: (0..points.len() as u32).collect(),
+        faces: Faces {
+            starts: (0..=triangles.len() as u32).map(|number| 3 * number).collect(),
+            corners: triangles.concat(),
+        },
+        triangles,
+        ..default()
+    };
+    Model { points, objects: vec![Object::default()], parts: vec![part], ..default() }
+}
+
+/// The Face panel with a placed face, in an app whose systems all run on this thread.
+fn with_face(model: Model) -> (Desk, Entity) {
+    let mut app = headless_app(1);
+    app.add_plugins(PanelsPlugin);
+    let mut app = strict_app(app);
+    for (_, schedule) in app.world_mut().resource_mut::<Schedules>().iter_mut() {
+        schedule.set_executor(SingleThreadedExecutor::new());
+    }
+    let rig = app.world_mut().spawn(Rig::new(Uid(1), "rig")).id();
+    app.insert_resource(ActiveRig(rig));
+    let mesh = app.world_mut().spawn((RigMesh::new(Uid(99), model, Vec::new()), SkinOf(rig))).id();
+    let sheet = Sheet::Panel(Box::new(FacePanel::default()));
+    let mut desk = Desk::of(app, rig, sheet, egui::vec2(320.0, 1400.0));
+    desk.frames(2);
+    desk.click("Place face");
+    wait(&mut desk, mesh);
+    // The pictures are drawn once, a frame each.
+    desk.until("the prepared face", |desk| desk.app.world().get::<FacePosing>(mesh).is_some() && pictures(desk) == 6);
+    (desk, mesh)
+}
+
+/// Points that frames visit while the slider of happiness is dragged and let go.
+fn visits_of_a_drag(head: heads::Mesh) -> u64 {
+    let count = head.0.len();
+    let (mut desk, mesh) = with_face(model(head));
+    let [slider, _] = happiness(&desk);
+    let at = |share: f32| egui::pos2(slider.left() + share * slider.width(), slider.center().y);
+    let strength = |desk: &Desk| {
+        let shown = desk.app.world().get::<Expressions>(mesh).and_then(|shown| shown.0.get("happiness").copied());
+        shown.unwrap_or_default()
+    };
+    let steps = desk.steps().0;
+    let before = visited_points();
+    desk.time += 1.0;
+    desk.press(at(0.05));
+    let mut last = 0.0;
+    for share in [0.2, 0.4, 0.6] {
+        desk.move_to(at(share));
+        desk.until("the pose", |desk| !desk.app.world().get::<FacePosing>(mesh).unwrap().is_running());
+        assert!(strength(&desk) > last + 0.1, "{count} points at {share}: {} after {last}", strength(&desk));
+        assert!(!desk.rig().pose().is_empty() && desk.steps().0 == steps, "{count} points: a preview");
+        last = strength(&desk);
+    }
+    // Let go while the last pose is computed: the step waits for it.
+    desk.move_to(at(0.8));
+    desk.release(at(0.8));
+    desk.until("the step", |desk| desk.steps().0 > steps);
+    desk.frames(4);
+    let visits = visited_points() - before;
+    assert!(strength(&desk) > last + 0.1 && desk.steps().0 == steps + 1, "{count} points: {}", strength(&desk));
+    // The count is one of this thread, and sees what is done here.
+    let world = desk.app.world();
+    let (mesh, face) = (world.get::<RigMesh>(mesh).unwrap(), world.get::<Face>(mesh).unwrap());
+    let set = world.resource::<FaceExpressions>().0.clone();
+    let before = visited_points();
+    let strengths = [("happiness".to_owned(), 1.0)].into();
+    expressed_points(desk.rig(), mesh, &face.analysis, &set, &strengths).unwrap();
+    let counted = visited_points() - before;
+    assert!(counted > face.analysis.points.len() as u64, "{count} points: {counted} are counted");
+    visits
+}
+
+#[test]
+fn frames_of_a_drag_visit_no_points() {
+    let head = heads::bundled();
+    let finer = heads::subdivided(&head);
+    assert!(finer.0.len() > 3 * head.0.len(), "{} and {} points", head.0.len(), finer.0.len());
+    assert_eq!([head, finer].map(visits_of_a_drag), [0, 0]);
+}
