@@ -21,6 +21,9 @@ const BEGINNING: u64 = 4096;
 /// Largest number of names in a folder that are searched for a hint.
 const MAX_NAMES: usize = 4096;
 const MAX_HINTS: usize = 3;
+/// Remedy for a symbolic link whose file is missing.
+const DANGLING: &str = "it is a symbolic link to a file that is not there; correct the link or remove it";
+
 /// Remedy for a missing file with a name unlike all others.
 pub(super) const UNLIKE: &str = "check the path";
 

@@ -118,6 +118,7 @@ fn document<'a>(
     check::check(model)?;
     let mut bin = Bin::default();
     let skeleton = Skeleton::new(model, settings)?;
+    check::check_places(model, &skeleton)?;
     let mut nodes = skeleton.nodes(model);
     let mut scene_nodes = skeleton.roots.clone();
     let meshes = meshes::write(model, &skeleton, &mut bin, &mut nodes, &mut scene_nodes)?;

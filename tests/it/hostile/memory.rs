@@ -227,6 +227,63 @@ fn skins_that_share_accessors_stay_within_their_memory() {
     assert!(size("out.glb") < 2 * size(skins), "{} bytes of {}", size("out.glb"), size(skins));
 }
 
+/// A mesh of one triangle, shown again and again by nodes that say nothing else.
+fn shown_again(count: usize) -> String {
+    let nodes = vec![r#"{"mesh":0}"#; count].join(",");
+    let roots = (0..count).map(|node| node.to_string()).collect::<Vec<String>>().join(",");
+    let hex: String = [0, 0, 0, 1, 0, 0, 0, 1, 0]
+        .iter()
+        .flat_map(|number| (*number as f32).to_le_bytes())
+        .map(|byte| format!("%{byte:02x}"))
+        .collect();
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[{roots}]}}],"nodes":[{nodes}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}}],
+        "buffers":[{{"byteLength":36,"uri":"data:application/octet-stream,{hex}"}}]}}"#
+    )
+}
+
+#[test]
+fn nodes_that_share_a_mesh_stay_within_their_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let nodes = "nodes.gltf";
+    fs::write(folder.path().join(nodes), shown_again(57_000)).unwrap();
+    check(
+        folder.path(),
+        &[
+            (&[nodes], &["info", nodes]),
+            (&[nodes], &["check", nodes]),
+            (&[nodes], &["convert", nodes, "out.glb"]),
+            (&[nodes], &["convert", nodes, "out.gltf"]),
+        ],
+    );
+}
+
+/// What a file may take counts what the command itself takes, too: a file is refused before both are over the bound.
+#[test]
+fn morph_targets_without_data_are_refused_within_the_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = |number: usize| format!(r#"{{"POSITION":{}}}"#, number + 1);
+    let targets: Vec<String> = (0..3_000).map(target).collect();
+    let accessors = vec![r#"{"componentType":5126,"count":3000,"type":"VEC3","min":[0,0,0],"max":[0,0,0]}"#; 3_001];
+    let text = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0}}],"accessors":[{}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"targets":[{}]}}]}}]}}"#,
+        accessors.join(","),
+        targets.join(",")
+    );
+    fs::write(folder.path().join("targets.gltf"), &text).unwrap();
+    for args in [&["info", "targets.gltf"][..], &["convert", "targets.gltf", "out.glb"]] {
+        let (ended, answer) = json_answer(folder.path(), args);
+        assert_eq!(ended.code, Some(1), "{answer}");
+        assert!(answer.to_string().contains("bytes of memory"), "{answer}");
+        let allowance = memory_allowance(text.len() as u64);
+        assert!(ended.memory <= allowance, "{args:?}: {} KiB of {}", ended.memory >> 10, allowance >> 10);
+    }
+}
+
 /// Bytes of the sections of a kind in a program of 64 bits, low bytes first, as the ELF format numbers them.
 #[cfg(all(has_packed_relocations, target_arch = "x86_64"))]
 fn section_bytes(program: &[u8], kind: u32) -> u64 {

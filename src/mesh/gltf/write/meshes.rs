@@ -103,7 +103,7 @@ fn mesh(object: &Object, primitives: Vec<Primitive>) -> Mesh<'_> {
 
 /// Rest transforms of all nodes to model space. Parents come first, so that one pass over them is enough, however deep
 /// they hang and however many objects they carry.
-fn node_worlds(model: &Model) -> Vec<DAffine3> {
+pub(super) fn node_worlds(model: &Model) -> Vec<DAffine3> {
     let mut worlds: Vec<DAffine3> = Vec::with_capacity(model.nodes.len());
     for node in &model.nodes {
         let own = matrix::affine(&node.rest);
