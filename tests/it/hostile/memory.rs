@@ -3,7 +3,7 @@
 
 use std::{f64::consts::PI, fmt::Write as _, fs, path::Path};
 
-use super::{json_answer, memory_allowance, skeleton};
+use super::{json_answer, memory_allowance, run, skeleton};
 
 /// A ball of quads: `count` rings of `count` points.
 fn ball(count: usize) -> String {
@@ -149,9 +149,11 @@ fn many_joints_are_bound_within_their_memory() {
 }
 
 /// Bytes of a joint beyond sixteen times its text, which `merge` takes over many short joints, and `pose` where frames pass or
-/// values are written: its app has entities, too. None was asked for.
+/// values are written: its app has entities, too. That of `watch` lives on while its character is written and read back. None
+/// was asked for.
 const DOCUMENT: u64 = 150;
 const ENTITIES: u64 = 1_400;
+const WATCH: u64 = 2_200;
 
 #[test]
 fn templates_of_bare_and_placed_joints_stay_within_their_memory() {
@@ -192,6 +194,11 @@ fn templates_of_bare_and_placed_joints_stay_within_their_memory() {
             println!("{args:?}: {} KiB of {}", ended.memory >> 10, allowance >> 10);
             assert!(ended.memory <= allowance, "{args:?}: {} KiB of {}", ended.memory >> 10, allowance >> 10);
         }
+        let ended = run(folder.path(), &["watch", file, "--count", "1", "-o", "w.glb"]);
+        let allowance = memory_allowance(text.len() as u64) + joints * WATCH;
+        println!("watch: {} KiB of {}", ended.memory >> 10, allowance >> 10);
+        assert_eq!(ended.code, Some(0), "{}", ended.err);
+        assert!(ended.memory <= allowance, "watch: {} KiB of {}", ended.memory >> 10, allowance >> 10);
     }
 }
 
