@@ -22,7 +22,7 @@ const BEGINNING: u64 = 4096;
 const MAX_NAMES: usize = 4096;
 const MAX_HINTS: usize = 3;
 /// Remedy for a symbolic link whose file is missing.
-const DANGLING: &str = "it is a symbolic link to a file that is not there; correct the link or remove it";
+const LINK_REMEDY: &str = "it is a symbolic link to a file that is not there; correct the link or remove it";
 
 /// Remedy for a missing file with a name unlike all others.
 pub(super) const UNLIKE: &str = "check the path";
@@ -196,7 +196,7 @@ fn regular(disk: &dyn Disk, path: &Path) -> Result<Entry, ReadError> {
 /// nowhere is told as one, because its own name is the most alike.
 fn hint(disk: &dyn Disk, path: &Path) -> String {
     let is_link = || disk.entry(path, false).is_ok_and(|entry| entry.kind == EntryKind::Link);
-    let of_link = || is_link().then(|| DANGLING.to_owned());
+    let of_link = || is_link().then(|| LINK_REMEDY.to_owned());
     let list = || disk.list(folder_of(path), MAX_NAMES).unwrap_or_default();
     no_folder(disk, path).or_else(of_link).unwrap_or_else(|| nearest_names(path, &list()))
 }
