@@ -22,7 +22,7 @@ use crate::{
     algo::fit_template::{FitNote, FitSymmetry},
     files::{
         BUNDLED_CHARACTERS, BUNDLED_PARTS, FileKind, LoadError, ReadError, RealDisk, TemplateOrigin,
-        bundled_characters, bundled_part, stage_file, stem, store_model, store_rig_from, store_rig_over,
+        bundled_characters, bundled_part, stage_file, stem, store_owned_model, store_rig_from, store_rig_over,
     },
     headless::Workbench,
     mesh::model::Model,
@@ -192,7 +192,7 @@ pub(super) fn run(args: &FitArgs) -> Result<Report, Failure> {
                 let draft = AvatarDraft::new(bench.rig(), bench.built(), &mut model);
                 draft.store(model, meta, &args.output, &settings, &mut report)?;
             }
-            None => report.notes(spinning("writing", || store_model(&RealDisk, &args.output, &model, &settings))?),
+            None => report.notes(spinning("writing", || store_owned_model(&RealDisk, &args.output, model, &settings))?),
         }
     }
     report.line(format!("wrote {}", args.output.display()));

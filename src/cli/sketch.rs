@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     files::{
-        FileKind, RealDisk, TemplateOrigin, bundled_characters, bundled_part, load_gestures, stem, store_model,
+        FileKind, RealDisk, TemplateOrigin, bundled_characters, bundled_part, load_gestures, stem, store_owned_model,
         store_rig,
     },
     headless::Workbench,
@@ -108,7 +108,7 @@ fn save(
         FileKind::RigText => report.notes(store_rig(&RealDisk, path, bench.rig())?),
         _ => {
             bind(bench, args.weights.settings(), &args.weights.claim, Vec::new(), report)?;
-            let write = || store_model(&RealDisk, path, &bench.character(), &args.export.settings());
+            let write = || store_owned_model(&RealDisk, path, bench.character(), &args.export.settings());
             report.notes(spinning("writing", write)?);
         }
     }

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     algo::transfer::{TransferMesh, TransferSettings, transfer_weights},
-    files::{FileKind, RealDisk, load_skin, stage_skin, stem, store_model},
+    files::{FileKind, RealDisk, load_skin, stage_skin, stem, store_owned_model},
     headless::Workbench,
     rig::{
         Rig, SkinData, Uid, UidSource,
@@ -98,7 +98,7 @@ pub(super) fn run(args: &SkinArgs) -> Result<Report, Failure> {
     }
     // The character first: where it cannot be written, weights beside an older one stay as they belong to that.
     if weights_file.is_none() {
-        let write = || store_model(&RealDisk, &args.output, &bench.character(), &args.export.settings());
+        let write = || store_owned_model(&RealDisk, &args.output, bench.character(), &args.export.settings());
         report.notes(spinning("writing", write)?);
         report.line(format!("wrote {}", args.output.display()));
     }

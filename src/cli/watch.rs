@@ -19,7 +19,7 @@ use super::{
     report::{counted, print, print_json},
 };
 use crate::{
-    files::{FileKind, LOOK, LoadError, ModelWatch, PartFiles, RealDisk, StoreError, TemplateWatch, store_model},
+    files::{FileKind, LOOK, LoadError, ModelWatch, PartFiles, RealDisk, StoreError, TemplateWatch, store_owned_model},
     headless::Workbench,
     mesh::model::Model,
     plugins::{commands::BuildStep, mesh_reload::ReloadReport},
@@ -44,8 +44,8 @@ pub(super) struct WatchArgs {
     #[arg(short, long)]
     output: PathBuf,
     /// End after so many builds; otherwise it goes on until it is interrupted
-    #[arg(long, value_name = "N")]
-    count: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    count: Option<u64>,
     #[command(flatten)]
     weights: WeightArgs,
     #[command(flatten)]
@@ -85,13 +85,12 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
         template: TemplateWatch::new(&args.template),
         mesh: args.mesh.as_deref().map(ModelWatch::new),
         bench: None,
-        file: None,
         model: None,
         bound: None,
         again: None,
     };
     let mut news = vec![News::Mesh, News::FirstTemplate];
-    let (mut builds, mut is_heard) = (0, true);
+    let (mut builds, mut is_heard) = (0_u64, true);
     // What is tried again fails for the same reason again and again.
     let mut last_error = None;
     loop {
@@ -136,11 +135,19 @@ enum News {
     Again,
 }
 
-/// Content of the template's file that was read last, for places of errors.
+/// Content of a template's file, for places of errors.
 struct TemplateFile {
     text: String,
-    rig: Rig,
     origins: BTreeMap<Uid, PartOrigin>,
+}
+
+impl TemplateFile {
+    /// An error of a command of the file's rig, at its place in the text.
+    fn placed(&self, path: &Path, rig: &Rig, error: &BuildError) -> Failure {
+        let explicit = template::explicit(&self.text);
+        let source = SourceText::new(&explicit).locate_with_parts(rig, error, &self.origins);
+        LoadError::Source { path: path.into(), text: self.text.clone(), source }.into()
+    }
 }
 
 /// A mesh that is bound to what is built.
@@ -158,7 +165,6 @@ struct Watch<'a> {
     mesh: Option<ModelWatch>,
     /// The rig of the last template that could be built; `None` until there is one.
     bench: Option<Workbench>,
-    file: Option<TemplateFile>,
     /// The mesh as it was read last; `None` until it can be read.
     model: Option<Model>,
     bound: Option<BoundMesh>,
@@ -207,7 +213,7 @@ impl Watch<'_> {
 
     /// Takes over a saved template. If it cannot be read or built, the rig stays as it was.
     fn take_template(&mut self, start: Instant, runs: &[(Uid, u32)], bytes: &[u8]) -> Result<Option<Value>, Failure> {
-        let rig = self.parsed(bytes)?;
+        let (rig, file) = self.parsed(bytes)?;
         let before = self.bench.as_ref().map(|bench| bench.rig().clone());
         match (&mut self.bench, &before) {
             (Some(bench), Some(before)) => change(bench, before, &rig)?,
@@ -215,6 +221,7 @@ impl Watch<'_> {
         }
         let Some(bench) = &mut self.bench else { return Ok(None) };
         if let Some(error) = bench.build(BuildStep::All).error {
+            let failure = file.placed(&self.args.template, bench.rig(), &error);
             match &before {
                 Some(before) => {
                     let now = bench.rig().clone();
@@ -223,8 +230,9 @@ impl Watch<'_> {
                 }
                 None => self.bench = None,
             }
-            return Err(self.placed(&error));
+            return Err(failure);
         }
+        drop((before, file));
         self.bound = None;
         self.write(start, start.elapsed(), runs, None)
     }
@@ -247,8 +255,8 @@ impl Watch<'_> {
         self.write(start, start.elapsed(), runs, reloaded)
     }
 
-    /// The rig of a template, whose parts are watched from now on.
-    fn parsed(&mut self, bytes: &[u8]) -> Result<Rig, Failure> {
+    /// The rig and the text of a template, whose parts are watched from now on.
+    fn parsed(&mut self, bytes: &[u8]) -> Result<(Rig, TemplateFile), Failure> {
         let path = &self.args.template;
         let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)).into_owned();
         let mut files = PartFiles::new(&RealDisk);
@@ -259,18 +267,7 @@ impl Watch<'_> {
             Err(source) => return Err(LoadError::Source { path: path.clone(), text, source }.into()),
         };
         limits::check_rig(path, &rig)?;
-        self.file = Some(TemplateFile { text, rig: rig.clone(), origins });
-        Ok(rig)
-    }
-
-    /// An error of a command at its place in the template's text.
-    fn placed(&self, error: &BuildError) -> Failure {
-        let Some(TemplateFile { text, rig, origins }) = &self.file else {
-            return Failure::Input(error.to_string().into());
-        };
-        let explicit = template::explicit(text);
-        let source = SourceText::new(&explicit).locate_with_parts(rig, error, origins);
-        LoadError::Source { path: self.args.template.clone(), text: text.clone(), source }.into()
+        Ok((rig, TemplateFile { text, origins }))
     }
 
     /// Number of runs of every command, in the order of the build list.
@@ -310,7 +307,8 @@ impl Watch<'_> {
             };
             posed_character(bench, own, &args.export)?
         };
-        let stored = store_model(&RealDisk, &args.output, &model, &settings);
+        // What is written is read back, which takes as much memory again.
+        let stored = store_owned_model(&RealDisk, &args.output, model, &settings);
         self.again = matches!(stored, Err(StoreError::Save(_))).then(|| Instant::now() + AGAIN);
         stored?;
         let runs: HashMap<Uid, u32> = runs.iter().copied().collect();

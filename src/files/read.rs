@@ -21,6 +21,9 @@ const BEGINNING: u64 = 4096;
 /// Largest number of names in a folder that are searched for a hint.
 const MAX_NAMES: usize = 4096;
 const MAX_HINTS: usize = 3;
+/// Remedy for a symbolic link whose file is missing.
+const LINK_REMEDY: &str = "it is a symbolic link to a file that is not there; correct the link or remove it";
+
 /// Remedy for a missing file with a name unlike all others.
 pub(super) const UNLIKE: &str = "check the path";
 
@@ -189,10 +192,13 @@ fn regular(disk: &dyn Disk, path: &Path) -> Result<Entry, ReadError> {
     }
 }
 
-/// Remedy for a missing file: names the first missing folder, or the names most like the given one.
+/// Remedy for a missing file: names the first missing folder, or the names most like the given one. A symbolic link that leads
+/// nowhere is told as one, because its own name is the most alike.
 fn hint(disk: &dyn Disk, path: &Path) -> String {
+    let is_link = || disk.entry(path, false).is_ok_and(|entry| entry.kind == EntryKind::Link);
+    let of_link = || is_link().then(|| LINK_REMEDY.to_owned());
     let list = || disk.list(folder_of(path), MAX_NAMES).unwrap_or_default();
-    no_folder(disk, path).unwrap_or_else(|| nearest_names(path, &list()))
+    no_folder(disk, path).or_else(of_link).unwrap_or_else(|| nearest_names(path, &list()))
 }
 
 /// Remedy for a missing file whose folder is missing as well, or is none.

@@ -109,7 +109,7 @@ fn faults_of_the_structure_hide_no_others() {
         (
             label: "a",
             group: "zz", // there is no local group "zz"
-            translation: (inf, 0, 0), // not finite
+            translation: (inf, 0, 0), // joint a has a transform that is not finite
             uid: "zz", // "zz" is no uid
             tags: [
                 control(at: "@joint qq"), // there is no joint "qq"

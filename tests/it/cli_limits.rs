@@ -178,6 +178,16 @@ fn what_is_told_has_limits() {
     assert!(code == 1 && said.len() < 100 && said.contains('…'), "{said}");
 }
 
+/// No build is nothing to wait for.
+#[test]
+fn a_watch_of_no_builds_is_refused() {
+    let folder = folder();
+    let (code, said) = rigsmith(folder.path(), &["watch", "tags.rig.ron", "-o", "out.glb", "--count", "0"]);
+    assert_eq!(code, 2, "{said}");
+    assert!(said.to_string().contains("--count"), "{said}");
+    assert!(!folder.path().join("out.glb").exists());
+}
+
 #[test]
 fn limits_are_listed_and_checked() {
     let folder = folder();

@@ -169,6 +169,23 @@ fn a_model_reaches_only_its_own_folder() {
     assert!(ModelFolder::of(&RealDisk, &at("nowhere/m.gltf")).is_err());
 }
 
+/// The name of a link that leads nowhere is the most like itself.
+#[cfg(unix)]
+#[test]
+fn a_link_that_leads_nowhere_is_told_as_one() {
+    let folder = fresh();
+    let link = folder.path().join("body.obj");
+    fs::write(folder.path().join("body_2.obj"), b"v 0 0 0").unwrap();
+    std::os::unix::fs::symlink("gone.obj", &link).unwrap();
+    for error in [
+        read_capped(&RealDisk, &link, 1 << 20).unwrap_err().to_string(),
+        open(&RealDisk, &link).map(|_| ()).unwrap_err().to_string(),
+    ] {
+        assert!(error.contains("a symbolic link to a file that is not there"), "{error}");
+        assert!(!error.contains("did you mean"), "{error}");
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn links_out_of_a_model_folder_are_refused() {

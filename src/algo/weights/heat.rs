@@ -22,6 +22,8 @@ pub(crate) const KEPT: usize = 12;
 const LEAST: f32 = 1e-4;
 /// Vertices handled at a time by one thread.
 const CHUNK: usize = 1024;
+/// Bytes of the blocks that are solved at the same time, however many threads there are.
+const BLOCK_BYTES: usize = 20 << 20;
 
 /// The weights of all vertices in `wanted`; the others, and components without any claim, stay empty. `smoothing`
 /// widens blends. Independent of the number of threads.
@@ -36,33 +38,29 @@ pub(crate) fn solve(graph: &Graph, claims: &[Claim], wanted: &[bool], smoothing:
     let mut rows: Vec<Vec<(u32, f32)>> = vec![Vec::new(); claims.len()];
     if let Some(factor) = factor {
         let floor = floor(graph);
-        let solved: Vec<Vec<(u32, u32, f32)>> = joints
-            .par_chunks(LANES)
-            .map(|group| {
-                let mut block = vec![[0f64; LANES]; claims.len()];
-                for (row, &v) in block.iter_mut().zip(factor.order()) {
-                    let v = v as usize;
-                    let claim = &claims[v];
-                    for &(joint, share) in claim.shares.iter().filter(|s| s.1 > 0.0) {
-                        if let Ok(lane) = group.binary_search(&joint) {
-                            row[lane] += warmth(graph, claims, v, smoothing, floor) * f64::from(share);
-                        }
+        let solve = |group: &[u32]| {
+            let mut block = vec![[0f64; LANES]; claims.len()];
+            for (row, &v) in block.iter_mut().zip(factor.order()) {
+                let v = v as usize;
+                let claim = &claims[v];
+                for &(joint, share) in claim.shares.iter().filter(|s| s.1 > 0.0) {
+                    if let Ok(lane) = group.binary_search(&joint) {
+                        row[lane] += warmth(graph, claims, v, smoothing, floor) * f64::from(share);
                     }
                 }
-                factor.solve(&mut block);
-                let mut found = Vec::new();
-                for (row, &v) in block.iter().zip(factor.order()) {
-                    for (&joint, &value) in group.iter().zip(row) {
-                        if wanted[v as usize] && value as f32 > LEAST {
-                            found.push((v, joint, value as f32));
-                        }
+            }
+            factor.solve(&mut block);
+            block.into_iter().map(|row| row.map(|value| value as f32)).collect::<Vec<[f32; LANES]>>()
+        };
+        for groups in joints.chunks(LANES * blocks_at_once(claims.len())) {
+            let blocks: Vec<Vec<[f32; LANES]>> = groups.par_chunks(LANES).map(solve).collect();
+            for (group, block) in groups.chunks(LANES).zip(blocks) {
+                for (values, &v) in block.iter().zip(factor.order()).filter(|(_, v)| wanted[**v as usize]) {
+                    for (&joint, &value) in group.iter().zip(values).filter(|(_, value)| **value > LEAST) {
+                        put(&mut rows[v as usize], joint, value);
                     }
                 }
-                found
-            })
-            .collect();
-        for (v, joint, value) in solved.into_iter().flatten() {
-            rows[v as usize].push((joint, value));
+            }
         }
     } else {
         let mut weights = Weights { starts: vec![0], ..Weights::default() };
@@ -82,6 +80,24 @@ pub(crate) fn solve(graph: &Graph, claims: &[Claim], wanted: &[bool], smoothing:
         weights.push(row);
     }
     weights
+}
+
+/// Blocks of so many vertices that are solved at the same time: each is there in double and in single precision.
+fn blocks_at_once(vertices: usize) -> usize {
+    (BLOCK_BYTES / (size_of::<[f64; LANES]>() + size_of::<[f32; LANES]>()) / vertices.max(1)).max(4)
+}
+
+/// Puts the value of a joint into the row of a vertex, which is in the order of [`keep_strongest`] and has no more than it will
+/// keep. Joints come in rising order.
+fn put(row: &mut Vec<(u32, f32)>, joint: u32, value: f32) {
+    let place = row.partition_point(|(_, other)| *other >= value);
+    if !value.is_finite() || place >= KEPT {
+        return;
+    }
+    if row.len() == KEPT {
+        row.pop();
+    }
+    row.insert(place, (joint, value));
 }
 
 fn matrix(graph: &Graph, claims: &[Claim], smoothing: f32) -> Symmetric {

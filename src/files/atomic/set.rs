@@ -97,10 +97,12 @@ impl FileSet {
 /// # Errors
 /// See [`SaveError`]; the only one after which the set is in place is [`SaveError::Unconfirmed`].
 pub fn save_set(disk: &dyn Disk, set: &FileSet) -> Result<(), SaveError> {
+    let place = Target::find(disk, &set.path)?.folder;
+    // On file systems without folder locks, two saves at the same instant may conflict; consecutive saves never do.
+    let _turn = disk.lock_folder(&place).ok().flatten();
+    // The main file that is replaced is the one of now: a save that had its turn before may have made it.
     let target = Target::find(disk, &set.path)?;
     let folder = target.folder.as_path();
-    // On file systems without folder locks, two saves at the same instant may conflict; consecutive saves never do.
-    let _turn = disk.lock_folder(folder).ok().flatten();
     // Left-over temporary files that cannot be removed are no reason not to save.
     let _ = remove_stale_in_turn(disk, folder);
     let mut missing = Vec::new();

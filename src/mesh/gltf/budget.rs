@@ -13,9 +13,12 @@ pub(super) struct Budget {
     used: Cell<u64>,
 }
 
+/// Bytes of memory of a command besides what it reads, which count as used from the start.
+const COMMAND: u64 = 12 << 20;
+
 impl Budget {
     pub(super) fn new(input: u64) -> Self {
-        Self { input: Cell::new(input), used: Cell::new(0) }
+        Self { input: Cell::new(input), used: Cell::new(COMMAND) }
     }
 
     /// Adds another file's bytes to the input.

@@ -51,9 +51,9 @@ fn shorten(path: &str) -> String {
 
 fn target(entry: &ChannelEntry, hierarchy: &Hierarchy, objects: &[Option<usize>]) -> Option<ChannelTarget> {
     match entry.path {
-        "translation" => hierarchy.kept[entry.node].map(ChannelTarget::Translation),
-        "rotation" => hierarchy.kept[entry.node].map(ChannelTarget::Rotation),
-        "scale" => hierarchy.kept[entry.node].map(ChannelTarget::Scale),
+        "translation" => hierarchy.kept.get(entry.node).map(ChannelTarget::Translation),
+        "rotation" => hierarchy.kept.get(entry.node).map(ChannelTarget::Rotation),
+        "scale" => hierarchy.kept.get(entry.node).map(ChannelTarget::Scale),
         "weights" => objects[entry.node].map(ChannelTarget::MorphWeights),
         _ => None,
     }

@@ -8,7 +8,7 @@ use super::{
     budget::{Budget, Notes},
     json::JsonObject,
     primitive::Mesh,
-    tree::Json,
+    tree::{Fields, Json},
     uri,
 };
 
@@ -37,14 +37,22 @@ impl Deref for BufferBytes<'_> {
     }
 }
 
-/// A node as declared; its transform is read where it is needed.
+/// A node as declared; its transform is read where it is needed. The place is written out only there: a file may have many
+/// nodes for its size.
 pub(super) struct NodeEntry<'a> {
-    pub(super) at: JsonObject<'a>,
+    pub(super) map: &'a Fields<'a>,
     pub(super) name: &'a str,
     pub(super) children: Vec<usize>,
     pub(super) mesh: Option<usize>,
     pub(super) skin: Option<usize>,
     pub(super) camera: bool,
+}
+
+impl<'a> NodeEntry<'a> {
+    /// The JSON object of the node, which is the one with the number `node`.
+    pub(super) fn at(&self, node: usize) -> JsonObject<'a> {
+        JsonObject { map: self.map, place: format!("/nodes/{node}") }
+    }
 }
 
 /// A skin as declared.
@@ -147,7 +155,7 @@ impl<'a> Document<'a> {
                 mesh: at.index("mesh", mesh_count, "mesh")?,
                 skin: at.index("skin", skin_count, "skin")?,
                 camera: at.index("camera", camera_count, "camera")?.is_some(),
-                at,
+                map: at.map,
             });
         }
         let mut skins = Vec::new();

@@ -42,16 +42,17 @@ pub(super) fn read_objects(
             (None, true) => notes.add("Joints and weights of a mesh without a skin were not kept"),
             _ => {}
         }
-        source.budget.take(mesh.targets, 2 * size_of::<String>(), &entry.at.place)?;
-        source.budget.take(1, size_of::<Object>() + entry.name.len() + mesh.name.len(), &entry.at.place)?;
-        let (morph_names, extras) = names_and_extras(mesh, source.budget, &entry.at.place)?;
+        let at = entry.at(node);
+        source.budget.take(mesh.targets, 2 * size_of::<String>(), &at.place)?;
+        source.budget.take(1, size_of::<Object>() + entry.name.len() + mesh.name.len(), &at.place)?;
+        let (morph_names, extras) = names_and_extras(mesh, source.budget, &at.place)?;
         let skin = entry.skin.filter(|_| has_joints);
         let object = Object {
             name: if entry.name.is_empty() { mesh.name } else { entry.name }.to_owned(),
             skin,
-            node: if skin.is_some() { None } else { hierarchy.carrier[node] },
+            node: if skin.is_some() { None } else { hierarchy.carrier.get(node) },
             morph_names,
-            morph_weights: morph_weights(&entry.at, mesh.targets)?.unwrap_or_else(|| mesh.weights.clone()),
+            morph_weights: morph_weights(&at, mesh.targets)?.unwrap_or_else(|| mesh.weights.clone()),
             extras,
         };
         let mut uses = BTreeMap::new();

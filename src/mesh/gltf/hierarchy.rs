@@ -14,19 +14,41 @@ use super::{
 };
 use crate::mesh::model::{Node, Trs};
 
+/// Index for each node of the file, or none: four bytes each, because a file may have many nodes for its size.
+pub(super) struct NodeIndices(Vec<u32>);
+
+impl NodeIndices {
+    /// Number that no index has: a node takes at least two bytes of a file of no more than 4 GiB.
+    const NONE: u32 = u32::MAX;
+
+    fn none(count: usize) -> Self {
+        Self(vec![Self::NONE; count])
+    }
+
+    /// Index for a node; `None` if it has none.
+    pub(super) fn get(&self, node: usize) -> Option<usize> {
+        Some(self.0[node]).filter(|index| *index != Self::NONE).map(|index| index as usize)
+    }
+
+    fn set(&mut self, node: usize, index: usize) {
+        self.0[node] = index as u32;
+    }
+}
+
 /// Properties of each node of the file.
 pub(super) struct Hierarchy {
-    parents: Vec<Option<usize>>,
+    parents: NodeIndices,
     /// Indices of the nodes, parents first.
-    order: Vec<usize>,
+    order: Vec<u32>,
     /// Marks nodes of the scene that is read.
     pub(super) visible: Vec<bool>,
     /// Marks nodes that a skin lists.
     joint: Vec<bool>,
     /// The nearest kept node at or above a node that a joint or clip moves.
-    pub(super) carrier: Vec<Option<usize>>,
+    pub(super) carrier: NodeIndices,
     /// Index in the model's nodes; `None` for a node that is not kept.
-    pub(super) kept: Vec<Option<usize>>,
+    pub(super) kept: NodeIndices,
+    /// Rest transforms of the nodes that are kept, in the order of the model's nodes.
     rest: Vec<Trs>,
     /// Transforms to model space at rest. Nodes that are not kept keep the shear that [`Trs`] cannot hold.
     pub(super) world: Vec<DAffine3>,
@@ -36,7 +58,7 @@ impl Hierarchy {
     pub(super) fn new(source: &Source, notes: &Notes) -> Result<Self, GltfError> {
         let document = source.document;
         let count = document.nodes.len();
-        source.budget.take(count, size_of::<Trs>() + size_of::<DAffine3>() + 80, "/nodes")?;
+        source.budget.take(count, size_of::<DAffine3>() + 40, "/nodes")?;
         let parents = parents(document)?;
         let scene = document.scene.as_deref().unwrap_or_default();
         let order = depth_first(document, &parents, scene)?;
@@ -54,41 +76,45 @@ impl Hierarchy {
         }
         let mut moves: Vec<bool> = joint.iter().zip(&animated).map(|(&joint, &animated)| joint || animated).collect();
         let mut needed = moves.clone();
-        for &node in order.iter().rev() {
-            if let (true, Some(parent)) = (needed[node], parents[node]) {
+        for node in order.iter().rev().map(|node| *node as usize) {
+            if let (true, Some(parent)) = (needed[node], parents.get(node)) {
                 needed[parent] = true;
             }
         }
         // A file of motion alone has a skeleton, of which some joints may be still.
         let is_motion_alone = document.skins.is_empty() && document.nodes.iter().all(|entry| entry.mesh.is_none());
-        let (mut kept, mut carrier) = (vec![None; count], vec![None; count]);
+        let (mut kept, mut carrier) = (NodeIndices::none(count), NodeIndices::none(count));
         let mut next = 0;
-        for &node in &order {
-            if let Some(parent) = parents[node] {
+        for node in order.iter().map(|node| *node as usize) {
+            if let Some(parent) = parents.get(node) {
                 visible[node] |= visible[parent];
                 moves[node] |= moves[parent];
                 needed[node] |= is_motion_alone && needed[parent] && !document.nodes[node].camera;
             }
             if needed[node] {
-                kept[node] = Some(next);
+                kept.set(node, next);
                 next += 1;
             }
-            if moves[node] {
-                carrier[node] = kept[node].or(parents[node].and_then(|parent| carrier[parent]));
+            let above = || parents.get(node).and_then(|parent| carrier.get(parent));
+            if let Some(index) = kept.get(node).or_else(above).filter(|_| moves[node]) {
+                carrier.set(node, index);
             }
         }
 
-        let mut rest = vec![Trs::IDENTITY; count];
+        source.budget.take(next, size_of::<Trs>(), "/nodes")?;
+        let mut rest = Vec::with_capacity(next);
         let mut world = vec![DAffine3::IDENTITY; count];
-        for &node in &order {
-            let entry = &document.nodes[node];
-            let (trs, exact) = rest_transform(&entry.at, notes, needed[node])?;
-            rest[node] = trs;
+        for node in order.iter().map(|node| *node as usize) {
+            let at = document.nodes[node].at(node);
+            let (trs, exact) = rest_transform(&at, notes, needed[node])?;
+            if needed[node] {
+                rest.push(trs);
+            }
             let local = if needed[node] { matrix::affine(&trs) } else { exact };
-            world[node] = parents[node].map_or(local, |parent| world[parent] * local);
+            world[node] = parents.get(node).map_or(local, |parent| world[parent] * local);
             // The `f32` matrix has to be finite, too: other code computes with it.
             if !world[node].as_affine3a().is_finite() {
-                return Err(GltfError::at(&*entry.at.place, "the transform in model space is not finite"));
+                return Err(GltfError::at(at.place, "the transform in model space is not finite"));
             }
         }
         let hierarchy = Self { parents, order, visible, joint, carrier, kept, rest, world };
@@ -99,17 +125,19 @@ impl Hierarchy {
     /// The model's nodes.
     pub(super) fn kept_nodes(&self, source: &Source) -> Result<Vec<Node>, GltfError> {
         let Source { document, budget, .. } = source;
-        let mut nodes = Vec::with_capacity(self.kept.iter().flatten().count());
-        for &node in self.order.iter().filter(|&&node| self.kept[node].is_some()) {
+        let mut nodes = Vec::with_capacity(self.rest.len());
+        let kept = self.order.iter().map(|node| *node as usize).filter(|node| self.kept.get(*node).is_some());
+        for (node, rest) in kept.zip(&self.rest) {
             let entry = &document.nodes[node];
-            let extras = entry.at.map.get("extras");
-            budget.take(1, size_of::<Node>() + entry.name.len(), &entry.at.place)?;
+            let at = entry.at(node);
+            let extras = at.map.get("extras");
+            budget.take(1, size_of::<Node>() + entry.name.len(), &at.place)?;
             nodes.push(Node {
                 name: entry.name.to_owned(),
-                parent: self.parents[node].and_then(|parent| self.kept[parent]),
-                rest: self.rest[node],
+                parent: self.parents.get(node).and_then(|parent| self.kept.get(parent)),
+                rest: *rest,
                 joint: self.joint[node],
-                extras: extras.map(|extras| copy(extras, budget, &entry.at.place)).transpose()?,
+                extras: extras.map(|extras| copy(extras, budget, &at.place)).transpose()?,
             });
         }
         Ok(nodes)
@@ -121,7 +149,7 @@ impl Hierarchy {
             document.nodes.iter().enumerate().filter(of_scene).filter(|(_, entry)| what(entry)).count()
         };
         let extension = |entry: &NodeEntry, name: &str| {
-            entry.at.map.get("extensions").is_some_and(|extensions| extensions.get(name).is_some())
+            entry.map.get("extensions").is_some_and(|extensions| extensions.get(name).is_some())
         };
         notes.add_times("A camera was not kept", count(&|entry| entry.camera));
         notes.add_times("A light was not kept", count(&|entry| extension(entry, "KHR_lights_punctual")));
@@ -130,21 +158,22 @@ impl Hierarchy {
         let carries =
             |entry: &NodeEntry| entry.mesh.is_some() || entry.camera || extension(entry, "KHR_lights_punctual");
         let plain = document.nodes.iter().enumerate().filter(of_scene);
-        let plain =
-            plain.filter(|(node, entry)| self.kept[*node].is_none() && !carries(entry) && entry.children.is_empty());
+        let plain = plain
+            .filter(|(node, entry)| self.kept.get(*node).is_none() && !carries(entry) && entry.children.is_empty());
         notes.add_times("A node without mesh, joint or animation was not kept", plain.count());
     }
 }
 
 /// The parent of each node; a node with two is an error.
-fn parents(document: &Document) -> Result<Vec<Option<usize>>, GltfError> {
-    let mut parents = vec![None; document.nodes.len()];
+fn parents(document: &Document) -> Result<NodeIndices, GltfError> {
+    let mut parents = NodeIndices::none(document.nodes.len());
     for (node, entry) in document.nodes.iter().enumerate() {
         for (i, &child) in entry.children.iter().enumerate() {
-            if let Some(other) = parents[child].replace(node) {
+            if let Some(other) = parents.get(child) {
                 let what = format!("node {child} is already a child of node {other}");
                 return Err(GltfError::at(format!("/nodes/{node}/children/{i}"), what));
             }
+            parents.set(child, node);
         }
     }
     Ok(parents)
@@ -152,11 +181,11 @@ fn parents(document: &Document) -> Result<Vec<Option<usize>>, GltfError> {
 
 /// Orders nodes depth first, each before its children: first the scene's roots, then other roots. A node below no root
 /// is in a cycle, which is an error.
-fn depth_first(document: &Document, parents: &[Option<usize>], scene: &[usize]) -> Result<Vec<usize>, GltfError> {
+fn depth_first(document: &Document, parents: &NodeIndices, scene: &[usize]) -> Result<Vec<u32>, GltfError> {
     let count = document.nodes.len();
     let mut order = Vec::with_capacity(count);
     let mut seen = vec![false; count];
-    let roots = scene.iter().copied().chain(0..count).filter(|&node| parents[node].is_none());
+    let roots = scene.iter().copied().chain(0..count).filter(|&node| parents.get(node).is_none());
     let mut stack = Vec::new();
     for root in roots {
         if std::mem::replace(&mut seen[root], true) {
@@ -165,7 +194,7 @@ fn depth_first(document: &Document, parents: &[Option<usize>], scene: &[usize]) 
         stack.push(root);
         while let Some(node) = stack.pop() {
             seen[node] = true;
-            order.push(node);
+            order.push(node as u32);
             stack.extend(document.nodes[node].children.iter().rev());
         }
     }

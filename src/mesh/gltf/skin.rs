@@ -39,7 +39,7 @@ pub(super) fn read_bindings(
     let mut bindings = Vec::new();
     for skin in &source.document.skins {
         source.budget.take(skin.joints.len(), size_of::<Mat4>() + size_of::<usize>(), &skin.place)?;
-        let joints: Vec<usize> = skin.joints.iter().filter_map(|&node| hierarchy.kept[node]).collect();
+        let joints: Vec<usize> = skin.joints.iter().filter_map(|&node| hierarchy.kept.get(node)).collect();
         let mut inverse_binds = match skin.inverse_binds {
             None => vec![Mat4::IDENTITY; joints.len()],
             Some(accessor) => source.matrices(accessor)?,

@@ -14,7 +14,7 @@ use serde_json::{Map, Value};
 use super::{GltfError, uri::percent_encode};
 use crate::mesh::{CompanionSink, model::Model, vrm::Avatar};
 use buffer::Bin;
-use document::{Document, Lists};
+use document::{Document, Lists, Scene};
 use skeleton::Skeleton;
 
 /// Settings of [`write_glb`] and [`write_gltf`].
@@ -63,30 +63,34 @@ pub fn write_vrm(model: &Model, avatar: &Avatar, settings: &GltfWriteSettings) -
     glb(document(model, settings, Some(avatar), None)?)
 }
 
-/// File of a document and its buffer. The document is let go before the buffer is copied behind its text.
+/// File of a document and its buffer. The buffer becomes the file: it moves up behind the text, so that it is held once.
 fn glb(document: Document<'_>) -> Result<Vec<u8>, GltfError> {
     const JSON: usize = 20;
-    let mut glb = vec![0_u8; JSON];
-    serde_json::to_writer(&mut glb, &document).map_err(|error| GltfError::model(error.to_string()))?;
-    glb.resize(glb.len().next_multiple_of(4), b' ');
-    let Document { root, lists, buffer, bytes: bin } = document;
-    drop((root, lists, buffer));
+    let mut head = vec![0_u8; JSON];
+    serde_json::to_writer(&mut head, &document).map_err(|error| GltfError::model(error.to_string()))?;
+    head.resize(head.len().next_multiple_of(4), b' ');
+    let Document { root, scene, lists, buffer, bytes: mut glb } = document;
+    drop((root, scene, lists, buffer));
+    let bin = glb.len();
     let word = |number: usize| {
         let number = u32::try_from(number).map_err(|_| GltfError::model("a GLB holds at most 4 GiB; write .gltf"))?;
         Ok::<_, GltfError>(number.to_le_bytes())
     };
-    let bin_chunk = if bin.is_empty() { 0 } else { 8 + bin.len() };
-    let (json, length) = (word(glb.len() - JSON)?, word(glb.len() + bin_chunk)?);
-    glb[..8].copy_from_slice(b"glTF\x02\0\0\0");
-    glb[8..12].copy_from_slice(&length);
-    glb[12..16].copy_from_slice(&json);
-    glb[16..JSON].copy_from_slice(b"JSON");
-    if !bin.is_empty() {
-        glb.reserve_exact(bin_chunk);
-        glb.extend_from_slice(&word(bin.len())?);
-        glb.extend_from_slice(b"BIN\0");
-        glb.extend_from_slice(&bin);
+    let bin_chunk = if bin == 0 { 0 } else { 8 + bin };
+    let (json, length) = (word(head.len() - JSON)?, word(head.len() + bin_chunk)?);
+    head[..8].copy_from_slice(b"glTF\x02\0\0\0");
+    head[8..12].copy_from_slice(&length);
+    head[12..16].copy_from_slice(&json);
+    head[16..JSON].copy_from_slice(b"JSON");
+    if bin == 0 {
+        return Ok(head);
     }
+    head.extend_from_slice(&word(bin)?);
+    head.extend_from_slice(b"BIN\0");
+    glb.reserve_exact(head.len());
+    glb.resize(head.len() + bin, 0);
+    glb.copy_within(..bin, head.len());
+    glb[..head.len()].copy_from_slice(&head);
     Ok(glb)
 }
 
@@ -114,6 +118,7 @@ fn document<'a>(
     check::check(model)?;
     let mut bin = Bin::default();
     let skeleton = Skeleton::new(model, settings)?;
+    check::check_places(model, &skeleton)?;
     let mut nodes = skeleton.nodes(model);
     let mut scene_nodes = skeleton.roots.clone();
     let meshes = meshes::write(model, &skeleton, &mut bin, &mut nodes, &mut scene_nodes)?;
@@ -135,9 +140,7 @@ fn document<'a>(
     if !settings.generator.is_empty() {
         asset.insert("generator".to_owned(), settings.generator.as_str().into());
     }
-    let mut scene = Map::new();
-    insert_name(&mut scene, &model.name);
-    insert_list(&mut scene, "nodes", scene_nodes);
+    let scene = (!scene_nodes.is_empty()).then_some(Scene { name: &model.name, nodes: scene_nodes });
     let (accessors, views, mut bytes) = bin.finish();
     let mut root = Map::new();
     root.insert("asset".to_owned(), asset.into());
@@ -145,11 +148,6 @@ fn document<'a>(
     insert_list(&mut root, "extensionsRequired", written.extensions_required);
     if !extensions.is_empty() {
         root.insert("extensions".to_owned(), extensions.into());
-    }
-    // The scene is left out if it has no nodes, because some readers refuse an empty one.
-    if scene.contains_key("nodes") {
-        root.insert("scene".to_owned(), 0.into());
-        root.insert("scenes".to_owned(), vec![Value::from(scene)].into());
     }
     let lists = Lists {
         nodes,
@@ -173,7 +171,7 @@ fn document<'a>(
         }
         declared = Some(Value::from(buffer));
     }
-    Ok(Document { root, lists, buffer: declared, bytes })
+    Ok(Document { root, scene, lists, buffer: declared, bytes })
 }
 
 /// Inserts a list unless it is empty, which glTF forbids.

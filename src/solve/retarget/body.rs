@@ -263,6 +263,8 @@ impl<'a> Body<'a> {
         let raw: Vec<Vec<Trs>> = frames.clone().map(|frame| self.pose(frame, 0.0, &free, has_twist)).collect();
         let feet = contacts.goals(self, &raw, rate);
         let drops = contacts.drops(self, &raw, &feet, rate);
+        // The list of the poses to come takes as much.
+        drop(raw);
         let goals = |frame: usize, hands: [Option<Reach>; 2]| {
             let feet = feet[frame].map(|place| place.map(|place| Reach { place, share: 1.0 }));
             LimbGoals { feet, hands }

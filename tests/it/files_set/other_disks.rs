@@ -1,12 +1,13 @@
-//! Sets of files on disks that lack hard links, or return other bytes than were written.
+//! Sets of files on disks that lack hard links, return other bytes than were written, or have other saves at the same time.
 
 use std::{
     ffi::OsString,
     fs, io,
     path::{Path, PathBuf},
+    sync::atomic::{AtomicBool, Ordering},
 };
 
-use rigsmith::files::{Disk, DiskFile, Entry, RealDisk, remove_stale_temps};
+use rigsmith::files::{Disk, DiskFile, Entry, Hold, RealDisk, remove_stale_temps};
 
 use super::{Kind, expected, furnished, names};
 use crate::disks::as_on_the_disk;
@@ -78,5 +79,40 @@ fn a_disk_that_returns_other_bytes_replaces_nothing() {
             kind.save(&PassThroughDisk { hard_links: true, decays: true }, folder.path(), 2).unwrap_err().to_string();
         assert!(error.contains("other bytes") && error.contains("unchanged"), "{error}");
         assert_eq!((kind.load(folder.path()), names(folder.path())), (Ok(1), before));
+    }
+}
+
+/// A disk on which another save of the same set, the first one, has its turn while a save waits for its own.
+struct CrowdedDisk<'f> {
+    kind: Kind,
+    folder: &'f Path,
+    is_first: AtomicBool,
+}
+
+impl Disk for CrowdedDisk<'_> {
+    as_on_the_disk!();
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
+        RealDisk.create(path)
+    }
+    fn hard_link(&self, existing: &Path, path: &Path) -> io::Result<()> {
+        RealDisk.hard_link(existing, path)
+    }
+    fn lock_folder(&self, folder: &Path) -> io::Result<Option<Hold>> {
+        if self.is_first.swap(false, Ordering::Relaxed) {
+            self.kind.save(&RealDisk, self.folder, 1).unwrap();
+        }
+        RealDisk.lock_folder(folder)
+    }
+}
+
+/// A main file that came while the save waited is replaced as any other: what it alone names goes with it.
+#[test]
+fn a_set_that_another_save_made_meanwhile_leaves_nothing() {
+    for kind in Kind::ALL {
+        let folder = furnished();
+        let disk = CrowdedDisk { kind, folder: folder.path(), is_first: AtomicBool::new(true) };
+        kind.save(&disk, folder.path(), 2).unwrap();
+        assert!(!disk.is_first.load(Ordering::Relaxed), "{kind:?} takes turns");
+        assert_eq!((kind.load(folder.path()), names(folder.path())), (Ok(2), expected(kind, 2)), "{kind:?}");
     }
 }

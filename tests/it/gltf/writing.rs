@@ -306,6 +306,10 @@ fn models_that_do_not_fit_together() {
     };
     check(&|model| model.nodes[1].parent = Some(1), "node 1 comes before its parent");
     check(&|model| model.nodes[1].rest.scale.x = f32::NAN, "rest transform of node 1");
+    check(
+        &|model| model.nodes.iter_mut().for_each(|node| node.rest.scale = Vec3::splat(1e30)),
+        "is at no finite place: its numbers and those of the joints above it",
+    );
     check(&|model| model.skins[0].joints[0] = 9, "skin 0 refers to a node");
     check(&|model| model.skins[0].joints[0] = 1, "skin 0 lists a node twice");
     check(&|model| model.skins[0].joints.truncate(2), "skin 0 has 2 joints, 3 matrices");

@@ -52,6 +52,34 @@ fn motion_of_many_frames_is_retargeted_within_its_memory() {
     check(folder.path(), &[(&[motion], &["animate", "biped", motion, "-o", "walk.anim.ron"])]);
 }
 
+/// Motion capture of a chain of joints called j0, j1 and so on.
+fn chain_motion(joints: usize, frames: usize) -> String {
+    let joint = |number: usize| {
+        let place = if number == 0 { "ROOT" } else { "JOINT" };
+        format!("{place} j{number}\n{{\nOFFSET 0 1 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n")
+    };
+    let opened: String = (0..joints).map(joint).collect();
+    let row = vec!["1"; 3 * joints].join(" ") + "\n";
+    format!(
+        "HIERARCHY\n{opened}End Site\n{{\nOFFSET 0 1 0\n}}\n{}MOTION\nFrames: {frames}\nFrame Time: 0.033333\n{}",
+        "}\n".repeat(joints),
+        row.repeat(frames)
+    )
+}
+
+/// Poses have all joints of a rig, however few of them the motion has.
+#[test]
+fn motion_of_few_joints_on_a_rig_of_many_stays_within_its_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let joints: Vec<String> =
+        (1..3_000).map(|number| format!("(label: \"j{number}\", parent: \"j0\", translation: (0, 0.1, 0))")).collect();
+    let rig = format!("(format: 2, name: \"star\", joints: [(label: \"j0\"), {}])", joints.join(", "));
+    fs::write(folder.path().join("star.rig.ron"), rig).unwrap();
+    fs::write(folder.path().join("chain.bvh"), chain_motion(100, 300)).unwrap();
+    let files = ["star.rig.ron", "chain.bvh"];
+    check(folder.path(), &[(&files[..], &["animate", files[0], files[1], "-o", "out.anim.ron"])]);
+}
+
 #[test]
 fn clips_of_many_frames_are_baked_within_their_memory() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,6 @@
 //! Validation of a model before it is written: the code after it may index freely.
 
+use super::{meshes::node_worlds, skeleton::Skeleton};
 use crate::mesh::{
     gltf::GltfError,
     model::{ChannelTarget, Interpolation, Model, Part, Weights},
@@ -98,6 +99,19 @@ pub(super) fn check(model: &Model) -> Result<(), GltfError> {
         return fail(fault.to_string());
     }
     check_clips(model)
+}
+
+/// Checks that the nodes that are written have finite places, as the reader does: factors and ways add up from node to node.
+pub(super) fn check_places(model: &Model, skeleton: &Skeleton) -> Result<(), GltfError> {
+    let is_written = |node: &usize| skeleton.node_of[*node].is_some();
+    let worlds = node_worlds(model);
+    let is_far = |node: &usize| !worlds[*node].as_affine3a().is_finite();
+    let Some(node) = (0..model.nodes.len()).filter(is_written).find(is_far) else { return Ok(()) };
+    let name = &model.nodes[node].name;
+    Err(GltfError::model(format!(
+        "joint \"{name}\" is at no finite place: its numbers and those of the joints above it add up to more than a number \
+         can hold; write smaller ones"
+    )))
 }
 
 fn check_part(model: &Model, part: &Part) -> Result<(), ModelFault> {

@@ -12,6 +12,8 @@ use crate::mesh::{gltf::matrix, model::Trs};
 pub(super) struct Document<'a> {
     /// Fields before the lists.
     pub(super) root: Map<String, Value>,
+    /// The one scene; `None` without nodes, because some readers refuse an empty one.
+    pub(super) scene: Option<Scene<'a>>,
     pub(super) lists: Lists<'a>,
     /// The one buffer, as it is declared.
     pub(super) buffer: Option<Value>,
@@ -38,6 +40,10 @@ impl Serialize for Document<'_> {
         for (key, value) in &self.root {
             map.serialize_entry(key, value)?;
         }
+        if let Some(scene) = &self.scene {
+            map.serialize_entry("scene", &0)?;
+            map.serialize_entry("scenes", &[scene])?;
+        }
         let lists = &self.lists;
         list(&mut map, "nodes", &lists.nodes)?;
         list(&mut map, "meshes", &lists.meshes)?;
@@ -59,6 +65,14 @@ impl Serialize for Document<'_> {
 /// Writes a list unless it is empty, which glTF forbids.
 fn list<M: SerializeMap, T: Serialize>(map: &mut M, key: &str, list: &[T]) -> Result<(), M::Error> {
     if list.is_empty() { Ok(()) } else { map.serialize_entry(key, list) }
+}
+
+/// Scene, with its fields in the order of the file.
+#[derive(serde::Serialize)]
+pub(super) struct Scene<'a> {
+    #[serde(skip_serializing_if = "str::is_empty")]
+    pub(super) name: &'a str,
+    pub(super) nodes: Vec<usize>,
 }
 
 /// Node, with its fields in the order of the file.

@@ -40,15 +40,12 @@ pub(super) fn write<'a>(
     // The first mesh of each list of accessors: objects that are alike share one.
     let mut mesh_of_accessors = BTreeMap::new();
     let mut node_of_object = vec![None; model.objects.len()];
-    let mut parts_of = vec![Vec::new(); model.objects.len()];
-    for part in model.parts.iter().filter(|part| !part.triangles.is_empty()) {
-        parts_of[part.object].push(part);
-    }
+    let mut parts: Vec<&Part> = model.parts.iter().filter(|part| !part.triangles.is_empty()).collect();
+    parts.sort_by_key(|part| part.object);
     let mut worlds = None;
-    for (index, (object, parts)) in model.objects.iter().zip(&parts_of).enumerate() {
-        if parts.is_empty() {
-            continue;
-        }
+    for parts in parts.chunk_by(|a, b| a.object == b.object) {
+        let index = parts[0].object;
+        let object = &model.objects[index];
         let at = nodes.len();
         node_of_object[index] = Some(at);
         let mut node = Node { name: &object.name, ..Node::default() };
@@ -106,7 +103,7 @@ fn mesh(object: &Object, primitives: Vec<Primitive>) -> Mesh<'_> {
 
 /// Rest transforms of all nodes to model space. Parents come first, so that one pass over them is enough, however deep
 /// they hang and however many objects they carry.
-fn node_worlds(model: &Model) -> Vec<DAffine3> {
+pub(super) fn node_worlds(model: &Model) -> Vec<DAffine3> {
     let mut worlds: Vec<DAffine3> = Vec::with_capacity(model.nodes.len());
     for node in &model.nodes {
         let own = matrix::affine(&node.rest);

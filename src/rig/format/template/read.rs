@@ -300,8 +300,9 @@ fn rest_of(joint: &JointFile, places: &Places, faults: &mut Vec<SourceError>) ->
         (true, false) => "scale",
         (true, true) => "rotation",
     };
+    let name = joint.label.clone().unwrap_or_else(|| uid.to_string());
     let message = format!(
-        "joint {uid} has a transform that is not finite or whose rotation is not of length 1; correct the numbers"
+        "joint {name} has a transform that is not finite or whose rotation is not of length 1; correct the numbers"
     );
     faults.push(places.error(uid, 0, wrong, message));
     RestTransform::default()
