@@ -72,6 +72,35 @@ impl PointTree {
         best
     }
 
+    /// Numbers of the points that lie at most that far from a place, in no order.
+    pub fn within(&self, place: Vec3, radius: f32) -> Vec<usize> {
+        let mut found = Vec::new();
+        let mut take = |(point, number): (Vec3, usize)| {
+            self.visits.set(self.visits.get() + 1);
+            if point.distance(place) <= radius {
+                found.push(number);
+            }
+        };
+        let mut open = vec![(0, self.points.len(), 0)];
+        while let Some((from, end, axis)) = open.pop() {
+            if end - from <= LEAF {
+                self.points[from..end].iter().for_each(|point| take(*point));
+                continue;
+            }
+            let middle = from + (end - from) / 2;
+            let across: f32 = place[axis] - self.points[middle].0[axis];
+            take(self.points[middle]);
+            let next = (axis + 1) % 3;
+            if across <= radius {
+                open.push((from, middle, next));
+            }
+            if -across <= radius {
+                open.push((middle + 1, end, next));
+            }
+        }
+        found
+    }
+
     /// Number of points that were looked at so far; for tests of growth.
     pub fn visits(&self) -> u64 {
         self.visits.get()
