@@ -142,6 +142,7 @@ mod glyphs;
 #[cfg(feature = "editor")]
 mod graph;
 mod growth;
+mod growth_bends;
 mod heads;
 #[cfg(feature = "cli")]
 mod hostile;
