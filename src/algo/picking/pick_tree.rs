@@ -89,7 +89,7 @@ impl PickTree {
     }
 
     fn places(&mut self) -> &PlaceTree {
-        self.places.get_or_insert_with(|| PlaceTree::new(self.joints.iter().copied()))
+        self.places.get_or_insert_with(|| PlaceTree::new(self.joints.iter().copied(), false))
     }
 
     /// Tree of the joints on a view plane; `None` where the view is seen for the first time and one look at all joints is
@@ -108,7 +108,7 @@ impl PickTree {
         let number = number.unwrap_or_else(|| self.remember(plane));
         let joints = &self.joints;
         let on_plane = |joint: &Vec3| plane.project(*joint).map_or(Vec3::NAN, |place| place.extend(0.0));
-        self.views[number].1.get_or_insert_with(|| PlaceTree::new(joints.iter().map(on_plane)))
+        self.views[number].1.get_or_insert_with(|| PlaceTree::new(joints.iter().map(on_plane), true))
     }
 
     /// Remembers a view, forgets the oldest one if there are many, and returns the view's place.
@@ -133,7 +133,8 @@ struct PlaceTree {
 }
 
 impl PlaceTree {
-    fn new(joints: impl Iterator<Item = Vec3>) -> Self {
+    /// Places of joints in space, or with one z if `is_flat`.
+    fn new(joints: impl Iterator<Item = Vec3>, is_flat: bool) -> Self {
         let mut numbers: HashMap<[u32; 3], usize> = HashMap::new();
         let (mut places, mut at): (Vec<Vec3>, Vec<Vec<usize>>) = (Vec::new(), Vec::new());
         for (joint, place) in joints.enumerate().filter(|(_, place)| place.is_finite()) {
@@ -146,7 +147,8 @@ impl PlaceTree {
             }
             at[number].push(joint);
         }
-        let tree = PointTree::new(places.iter().copied());
+        let points = places.iter().copied();
+        let tree = if is_flat { PointTree::flat(points) } else { PointTree::new(points) };
         Self { places, joints: at, tree }
     }
 
