@@ -218,6 +218,11 @@ impl Rig {
         self.read_labels(|labels| labels.bearers.contains_key(label))
     }
 
+    /// Number of joints that have that label.
+    pub(super) fn label_count(&self, label: &str) -> usize {
+        self.read_labels(|labels| labels.bearers.get(label).map_or(0, |bearers| bearers.count))
+    }
+
     /// The joint that [`find_label`](Self::find_label) finds, without a walk where one joint has the label, or where it was looked
     /// for before: for look-ups between edits.
     pub fn labelled(&self, label: &str) -> Option<Uid> {
