@@ -61,7 +61,9 @@ pub(super) fn carry_out(
     limits: &RigLimits,
 ) {
     for _ in 0..rig.len().max(LEAST) {
-        if !script.waiting.front().is_some_and(|gesture| is_selection(gesture) || gesture.is_setting()) {
+        let next = script.waiting.front();
+        let goes_on = next.is_some_and(|gesture| is_selection(gesture) || gesture.is_setting());
+        if !goes_on {
             break;
         }
         let Some(gesture) = script.begin_next(rig.len(), limits) else { continue };
