@@ -4,8 +4,13 @@
 //! small joints are easy to hit. Clicking the same spot again cycles through the next nearest joints, which that paper
 //! leaves to the future. If the ray misses the mesh, distances are measured on the view plane instead.
 
+mod pick_tree;
+
+use std::collections::HashSet;
+
 use glam::{Vec2, Vec3};
 
+pub use self::pick_tree::PickTree;
 use super::view::ViewPlane;
 use crate::mesh::surface::Surface;
 
@@ -50,13 +55,21 @@ pub fn in_box(plane: &ViewPlane, corners: [Vec2; 2], joints: &[Vec3]) -> Vec<usi
 
 /// Indices by rising distance up to the limit; equal distances by index.
 fn nearest(distances: impl Iterator<Item = f32>, reach: f32) -> Vec<usize> {
-    let mut order: Vec<(f32, usize)> =
-        distances.enumerate().map(|(i, d)| (d, i)).filter(|(d, _)| d.is_finite()).collect();
+    in_order(distances.enumerate().map(|(i, d)| (d, i)).filter(|(d, _)| d.is_finite()).collect(), reach)
+}
+
+/// Indices by rising distance up to the limit that follows from the least of them; equal distances by index.
+fn in_order(mut order: Vec<(f32, usize)>, reach: f32) -> Vec<usize> {
     order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let limit = order.first().map_or(0.0, |&(least, _)| 2.0 * least + reach.max(0.0));
+    let limit = order.first().map_or(0.0, |&(least, _)| limit(least, reach));
     // The second nearest is always included, so that a second click always has an effect.
     let near = order.partition_point(|&(d, _)| d <= limit).max(2).min(order.len());
     order.into_iter().take(near).map(|(_, i)| i).collect()
+}
+
+/// Furthest distance of a candidate where the nearest joint is so far.
+fn limit(least: f32, reach: f32) -> f32 {
+    2.0 * least + reach.max(0.0)
 }
 
 /// State of repeated clicks: a click at the same spot as the last one picks the next joint.
@@ -88,12 +101,17 @@ impl PickCycle {
         }
     }
 
+    /// True if a click at `point` is at the same spot as the last one.
+    pub fn is_at(&self, point: Vec2, same_spot: f32) -> bool {
+        self.last.as_ref().is_some_and(|(spot, ..)| spot.distance(point) <= same_spot)
+    }
+
     /// The index in the order of the last click that the next click picks; `None` if it is not at the same spot.
     fn next(&self, point: Vec2, same_spot: f32, candidates: &[usize]) -> Option<usize> {
-        let (spot, order, picked) = self.last.as_ref()?;
-        let same = spot.distance(point) <= same_spot
+        let (_, order, picked) = self.last.as_ref()?;
+        let same = self.is_at(point, same_spot)
             && order.len() == candidates.len()
-            && order.iter().all(|joint| candidates.contains(joint));
+            && (order == candidates || is_among(order, candidates));
         (same && !order.is_empty()).then(|| (picked + 1) % order.len())
     }
 
@@ -101,4 +119,10 @@ impl PickCycle {
     pub fn reset(&mut self) {
         self.last = None;
     }
+}
+
+/// True if all joints are among others.
+fn is_among(joints: &[usize], others: &[usize]) -> bool {
+    let others: HashSet<usize> = others.iter().copied().collect();
+    joints.iter().all(|joint| others.contains(joint))
 }

@@ -25,6 +25,7 @@ pub mod fill;
 mod finish;
 mod half;
 mod heat;
+mod hierarchy;
 mod islands;
 mod keypoints;
 pub(crate) mod laplacian;

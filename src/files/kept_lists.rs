@@ -40,9 +40,9 @@ pub(super) fn with_kept_lists(rig: &Rig, base: Option<&Rig>, text: &str) -> Opti
 
 /// The socket on the rig's joint that its label means in the file, or in the rig where a part brings the joint.
 fn on_joint(socket: &PartSocket, file: &Rig, rig: &Rig) -> Option<HeaderSocket> {
-    let joint = match file.find_label(&socket.label) {
+    let joint = match file.labelled(&socket.label) {
         Some(joint) => joint,
-        None => rig.find_label(&socket.label)?,
+        None => rig.labelled(&socket.label)?,
     };
     rig.joint(joint)?.data.label.as_ref()?;
     let (translation, rotation) = (socket.rest.translation, socket.angles);

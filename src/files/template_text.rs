@@ -315,7 +315,7 @@ fn has_remains(before: &Template, text: &str, (instance, part): &(PartInstance, 
     };
     let modules: HashSet<_> = part.walk().flat_map(|joint| &joint.data.tags).filter_map(module).collect();
     let is_like = |tag: &TagData| module(tag).is_some_and(|module| modules.contains(&module));
-    let onto: HashSet<Uid> = instance.onto.iter().filter_map(|label| before.rig.find_label(label)).collect();
+    let onto: HashSet<Uid> = instance.onto.iter().filter_map(|label| before.rig.labelled(label)).collect();
     let has_own = instance.onto.is_empty() || instance.adds;
     let is_own = after.rig.walk().any(|joint| {
         let is_new = has_own && before.rig.joint(joint.data.uid).is_none();

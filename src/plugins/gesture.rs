@@ -9,6 +9,7 @@ mod click_run;
 mod error;
 mod pick_run;
 mod script;
+mod selection_run;
 mod stroke_run;
 
 use bevy::prelude::*;
@@ -141,6 +142,11 @@ pub fn read_gestures(bytes: &[u8]) -> Result<Vec<Gesture>, SourceError> {
 }
 
 impl Gesture {
+    /// True for a gesture that changes the view or how joints are placed, and nothing else.
+    fn is_setting(&self) -> bool {
+        matches!(self, Self::View(_) | Self::Depth(_) | Self::Volume(_) | Self::Recentre(_) | Self::Reach(_))
+    }
+
     fn is_finite(&self) -> bool {
         let finite = |point: &(f32, f32)| point.0.is_finite() && point.1.is_finite();
         match self {

@@ -6,6 +6,8 @@
 //!
 //! Clicks wait while the surface is behind the pose; hovering does not.
 
+use std::collections::HashSet;
+
 use bevy::{
     ecs::entity::{EntityHashMap, EntityHashSet},
     math::Affine3A,
@@ -24,7 +26,7 @@ use super::{
 };
 use crate::{
     algo::{
-        picking::{self, PickCycle},
+        picking::{self, PickCycle, PickTree},
         view::ViewPlane,
     },
     rig::{Rig, Uid},
@@ -201,13 +203,18 @@ fn pick(
     waiting.extend(requests.read().map(|request| (request.clone(), None)));
     // Requests are answered in their order: a request after a waiting click waits, too.
     let mut busy: Vec<Entity> = Vec::new();
-    waiting.retain_mut(|(request, since)| {
+    // Joints stand still while requests of one frame are answered.
+    let mut trees: EntityHashMap<(PickTree, Vec<Uid>)> = EntityHashMap::default();
+    let mut selected: EntityHashMap<HashSet<Uid>> = EntityHashMap::default();
+    let mut open = std::mem::take(&mut *waiting).into_iter().peekable();
+    while let Some((request, mut since)) = open.next() {
         let (Ok(seen), Ok(mut selection)) = (rigs.get(request.rig), selections.get_mut(request.rig)) else {
-            return false;
+            continue;
         };
         let (rig, entities, place, surface, meshes, nodes, created) = seen;
         if busy.contains(&request.rig) {
-            return true;
+            waiting.push((request, since));
+            continue;
         }
         let found: Vec<Uid> = match &request.what {
             Pick::None => Vec::new(),
@@ -222,31 +229,84 @@ fn pick(
                 vec![control]
             }
             Pick::Click { plane, point, reach } => {
-                let Answer::Now(surface) = answer(since, meshes.is_some(), surface) else {
+                let Answer::Now(surface) = answer(&mut since, meshes.is_some(), surface) else {
                     busy.push(request.rig);
-                    return true;
+                    waiting.push((request, since));
+                    continue;
                 };
-                let posed = posed_joints(rig, entities, place, &joints);
-                let candidates = candidates(&posed, surface, plane, *point, *reach);
+                let hit = first_hit(surface, plane, *point);
+                let (tree, uids) =
+                    trees.entry(request.rig).or_insert_with(|| posed_tree(rig, entities, place, &joints));
                 last.look(request.rig, plane, *reach);
-                last.cycle.click(*point, *reach, &candidates).map(|number| posed[number].0).into_iter().collect()
+                let next = open.peek().map(|(next, _)| next);
+                // Clicks on controls leave the cycle as it is.
+                let is_single = !in_use.0
+                    && !last.cycle.is_at(*point, *reach)
+                    && next.is_some_and(|next| next.rig == request.rig && is_apart(&next.what, *point));
+                let number = if is_single {
+                    last.cycle.reset();
+                    tree.nearest_at(hit, plane, *point)
+                } else {
+                    last.cycle.click(*point, *reach, &tree.candidates_at(hit, plane, *point, *reach))
+                };
+                number.map(|number| uids[number]).into_iter().collect()
             }
             Pick::Box { plane, corners } => {
-                let posed = posed_joints(rig, entities, place, &joints);
-                let positions: Vec<Vec3> = posed.iter().map(|(_, position)| *position).collect();
-                picking::in_box(plane, *corners, &positions).into_iter().map(|number| posed[number].0).collect()
+                let (tree, uids) =
+                    trees.entry(request.rig).or_insert_with(|| posed_tree(rig, entities, place, &joints));
+                tree.in_box(plane, *corners).into_iter().map(|number| uids[number]).collect()
             }
         };
         if !matches!(request.what, Pick::Click { .. }) {
             *last = LastClick::default();
         }
-        let mut next = if request.add { selection.0.clone() } else { Vec::new() };
-        next.retain(|joint| !found.contains(joint));
-        next.extend(&found);
-        selection.set_if_neq(Selection(next));
+        if request.add {
+            let selected = selected.entry(request.rig).or_insert_with(|| selection.0.iter().copied().collect());
+            add_to(&mut selection, selected, &found);
+        } else {
+            selected.remove(&request.rig);
+            selection.set_if_neq(Selection(found.clone()));
+        }
         picked.write(PickAnswer { rig: request.rig, joints: found });
-        false
-    });
+    }
+}
+
+/// Joints of a rig as posed, for picks.
+fn posed_tree(
+    rig: &Rig,
+    entities: &JointEntities,
+    place: &GlobalTransform,
+    joints: &Query<&GlobalTransform>,
+) -> (PickTree, Vec<Uid>) {
+    let (uids, positions) = posed_joints(rig, entities, place, joints).into_iter().unzip();
+    (PickTree::new(positions), uids)
+}
+
+/// True if a request is no click near a point of the same view plane, which would go on with the cycle of a click there.
+fn is_apart(what: &Pick, point: Vec2) -> bool {
+    match what {
+        Pick::Click { point: other, reach, .. } => point.distance(*other) > *reach,
+        _ => true,
+    }
+}
+
+/// Adds joints at the end of a selection, of which `selected` has all joints.
+fn add_to(selection: &mut Mut<Selection>, selected: &mut HashSet<Uid>, found: &[Uid]) {
+    if found.iter().any(|joint| selected.contains(joint)) {
+        let mut next = selection.0.clone();
+        match found {
+            [only] => next.retain(|joint| joint != only),
+            _ => {
+                let found: HashSet<Uid> = found.iter().copied().collect();
+                next.retain(|joint| !found.contains(joint));
+            }
+        }
+        next.extend(found);
+        selection.set_if_neq(Selection(next));
+    } else if !found.is_empty() {
+        selection.0.extend(found);
+    }
+    selected.extend(found);
 }
 
 /// The control whose outline a click meets.
@@ -272,9 +332,14 @@ fn candidates(
     reach: f32,
 ) -> Vec<usize> {
     let positions: Vec<Vec3> = posed.iter().map(|(_, position)| *position).collect();
+    picking::candidates_at(first_hit(surface, plane, point), plane, point, &positions, reach)
+}
+
+/// Place where the ray of a click first meets the mesh.
+fn first_hit(surface: Option<&RigSurface>, plane: &ViewPlane, point: Vec2) -> Option<Vec3> {
     let ray = plane.ray(point);
-    let hit = surface.and_then(RigSurface::ready).and_then(|surface| surface.closest(&ray));
-    picking::candidates_at(hit.map(|hit| ray.at(hit.distance)), plane, point, &positions, reach)
+    let hit = surface.and_then(RigSurface::ready)?.closest(&ray)?;
+    Some(ray.at(hit.distance))
 }
 
 /// Updates [`HoveredNode`] to the joint that a click under the pointer would pick. Queries again only after a change.

@@ -5,7 +5,7 @@
 //! follows the same joints everywhere. For a built rig these are the built joints, including those that commands
 //! created (twist joints, joints between others); for any other rig, the document's joints at rest.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use bevy::math::{Affine3, Vec3};
 
@@ -76,20 +76,55 @@ impl DeformSkeleton {
     /// it is not built, the nearest joint above it, or the node that it was created for (or the nearest joint above
     /// that). `None` for deleted joints.
     pub fn holders(&self, rig: &Rig, skin: &SkinData) -> Vec<Option<usize>> {
-        skin.joints.iter().map(|joint| self.holder(rig, skin, *joint)).collect()
+        let mut holders: HashMap<Uid, Option<usize>> = HashMap::new();
+        let mut above: HashMap<Uid, Option<usize>> = HashMap::new();
+        skin.joints.iter().map(|joint| self.holder(rig, skin, *joint, (&mut holders, &mut above))).collect()
     }
 
-    fn holder(&self, rig: &Rig, skin: &SkinData, joint: Uid) -> Option<usize> {
-        let mut joint = joint;
+    /// Holder of a joint; `holders` are those that are found, and `above` the joints above others.
+    fn holder(
+        &self,
+        rig: &Rig,
+        skin: &SkinData,
+        joint: Uid,
+        (holders, above): (&mut HashMap<Uid, Option<usize>>, &mut HashMap<Uid, Option<usize>>),
+    ) -> Option<usize> {
         // A subject may itself be created; in a damaged file, subjects may form a cycle.
-        for _ in 0..=skin.subjects.len() {
-            let above = || rig.ancestors(joint).find_map(|ancestor| self.index(ancestor.data.uid));
-            if let Some(found) = self.index(joint).or_else(above) {
-                return Some(found);
+        let (mut next, mut way, mut found) = (Some(joint), Vec::new(), None);
+        while let Some(joint) = next {
+            if let Some(known) = holders.get(&joint) {
+                found = *known;
+                break;
             }
-            joint = *skin.subjects.get(&joint)?;
+            holders.insert(joint, None);
+            way.push(joint);
+            found = self.index(joint).or_else(|| self.above(rig, joint, above));
+            if found.is_some() {
+                break;
+            }
+            next = skin.subjects.get(&joint).copied();
         }
-        None
+        holders.extend(way.into_iter().map(|joint| (joint, found)));
+        found
+    }
+
+    /// The nearest joint of the skeleton above a joint of the document; `known` are those that are found.
+    fn above(&self, rig: &Rig, joint: Uid, known: &mut HashMap<Uid, Option<usize>>) -> Option<usize> {
+        let (mut way, mut found) = (vec![joint], None);
+        for ancestor in rig.ancestors(joint) {
+            let uid = ancestor.data.uid;
+            found = self.index(uid);
+            if found.is_some() {
+                break;
+            }
+            if let Some(known) = known.get(&uid) {
+                found = *known;
+                break;
+            }
+            way.push(uid);
+        }
+        known.extend(way.into_iter().map(|joint| (joint, found)));
+        found
     }
 
     /// Subjects of created joints (the nodes that they were made for), for [`SkinData::subjects`].
@@ -136,25 +171,30 @@ impl DeformSkeleton {
             let halves = half.and_then(|origin| self.index(origin.subject)).filter(|joint| self.joints[*joint].deforms);
             self.add(DeformJoint { uid: node.uid, parent, rest, deforms, subject, twist: None, halves });
         }
+        let mut children: Vec<Vec<usize>> = vec![Vec::new(); self.joints.len()];
+        for (number, joint) in self.joints.iter().enumerate() {
+            if let Some(parent) = joint.parent {
+                children[parent].push(number);
+            }
+        }
         for constraint in &built.constraints {
             if let Constraint::Twist { driven, .. } = &*constraint.constraint {
                 let driven = driven.iter().filter_map(|(joint, _)| self.index(*joint));
                 let driven: Vec<usize> = driven.filter(|joint| self.joints[*joint].deforms).collect();
-                self.note_twist(&driven);
+                self.note_twist(&driven, &children);
             }
         }
     }
 
     /// Sets the bone of joints that share one twist. A driven joint with descendants outside of this set is no twist
     /// joint but a bone of the limb itself.
-    fn note_twist(&mut self, driven: &[usize]) {
-        let set: HashSet<usize> = driven.iter().copied().collect();
+    fn note_twist(&mut self, driven: &[usize], children: &[Vec<usize>]) {
+        // Children come after their parents.
+        let set: BTreeSet<usize> = driven.iter().copied().collect();
         let mut carries = HashSet::new();
-        for (at, joint) in self.joints.iter().enumerate().rev() {
-            if let Some(parent) = joint.parent
-                && (!set.contains(&at) || carries.contains(&at))
-            {
-                carries.insert(parent);
+        for joint in set.iter().rev() {
+            if children[*joint].iter().any(|child| !set.contains(child) || carries.contains(child)) {
+                carries.insert(*joint);
             }
         }
         let twists: Vec<usize> = driven.iter().copied().filter(|joint| !carries.contains(joint)).collect();
@@ -163,7 +203,7 @@ impl DeformSkeleton {
         let owner = std::iter::successors(above(*first), |joint| above(*joint))
             .find(|joint| !set.contains(joint) && self.joints[*joint].deforms);
         let Some(owner) = owner else { return };
-        let Some(end) = self.bone_end(owner, &twists) else { return };
+        let Some(end) = self.bone_end(owner, &children[owner], &twists) else { return };
         for joint in twists {
             self.joints[joint].twist = Some(TwistSegment { joint: owner, end });
         }
@@ -171,7 +211,7 @@ impl DeformSkeleton {
 
     /// End (in the rig's space) of the bone of `owner` on which twist joints lie: the joint after them on the same
     /// line, or the position where the next of equally spaced joints would be. `None` if the bone has no length.
-    fn bone_end(&self, owner: usize, twists: &[usize]) -> Option<Vec3> {
+    fn bone_end(&self, owner: usize, children: &[usize], twists: &[usize]) -> Option<Vec3> {
         /// Least cosine of the angle between the bone and the line of its twist joints.
         const ALONG: f32 = 0.98;
         let place = |joint: usize| self.joints[joint].rest.translation;
@@ -179,9 +219,11 @@ impl DeformSkeleton {
         let mut line: Vec<Vec3> = twists.iter().map(|joint| place(*joint) - start).collect();
         line.sort_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
         let last = *line.last()?;
-        let ends = (0..self.joints.len())
-            .filter(|joint| self.joints[*joint].parent == Some(owner) && !twists.contains(joint))
-            .map(|joint| place(joint) - start)
+        let of_twist: HashSet<usize> = twists.iter().copied().collect();
+        let ends = children
+            .iter()
+            .filter(|joint| !of_twist.contains(*joint))
+            .map(|joint| place(*joint) - start)
             .filter(|end| end.length_squared() > 0.0);
         let direction = last.normalize_or_zero();
         let aligned = |end: &Vec3| end.normalize_or_zero().dot(direction);

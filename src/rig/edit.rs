@@ -459,6 +459,7 @@ impl Rig {
         let siblings = self.siblings_mut(parent)?;
         siblings.insert(index.min(siblings.len()), uid);
         self.joint_mut(uid)?.parent = parent;
+        self.label_index.reorder();
         Ok(RigEdit::SetParent { joint: uid, parent: old_parent, index: old_index })
     }
 }

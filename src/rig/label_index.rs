@@ -122,12 +122,16 @@ struct LabelBearers {
     count: usize,
     /// Exclusive or of their uids: the uid of the joint where there is one.
     uids: u64,
+    /// The first of them in the order of [`Rig::walk`] where it was looked for, behind the order of joints that it is of.
+    first: Option<(u64, Uid)>,
 }
 
 #[derive(Default)]
 struct Labels {
     bearers: HashMap<String, LabelBearers>,
     chains: HashMap<String, ChainNumbers>,
+    /// Number of the order of joints.
+    order: u64,
 }
 
 impl Labels {
@@ -135,6 +139,7 @@ impl Labels {
         let bearers = self.bearers.entry(label.to_owned()).or_default();
         bearers.count += 1;
         bearers.uids ^= joint.0;
+        bearers.first = None;
         if let Some((name, number, side)) = ChainPlace::of(label).and_then(|place| place.numbered()) {
             self.chains.entry(name.to_owned()).or_default().add(number, side);
         }
@@ -144,6 +149,7 @@ impl Labels {
         let Some(bearers) = self.bearers.get_mut(label) else { return };
         bearers.count = bearers.count.saturating_sub(1);
         bearers.uids ^= joint.0;
+        bearers.first = None;
         if bearers.count == 0 {
             self.bearers.remove(label);
         }
@@ -167,6 +173,13 @@ impl LabelIndex {
     /// Forgets all labels; they are read again when one is looked for.
     pub fn clear(&mut self) {
         *self.0.get_mut().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    /// Takes over that joints which were there have another order.
+    pub fn reorder(&mut self) {
+        if let Some(labels) = self.0.get_mut().unwrap_or_else(PoisonError::into_inner) {
+            labels.order += 1;
+        }
     }
 
     /// Takes over that the label of a joint changed; `None` stands for no label, and for no joint.
@@ -205,14 +218,30 @@ impl Rig {
         self.read_labels(|labels| labels.bearers.contains_key(label))
     }
 
-    /// The joint that [`find_label`](Self::find_label) finds, without a walk where one joint has the label: for look-ups between
-    /// edits.
+    /// Number of joints that have that label.
+    pub(super) fn label_count(&self, label: &str) -> usize {
+        self.read_labels(|labels| labels.bearers.get(label).map_or(0, |bearers| bearers.count))
+    }
+
+    /// The joint that [`find_label`](Self::find_label) finds, without a walk where one joint has the label, or where it was looked
+    /// for before: for look-ups between edits.
     pub fn labelled(&self, label: &str) -> Option<Uid> {
-        let bearers = self.read_labels(|labels| labels.bearers.get(label).map(|found| (found.count, found.uids)));
-        match bearers? {
-            (1, uid) => Some(Uid(uid)),
-            _ => self.find_label(label),
+        let known = self.read_labels(|labels| {
+            let bearers = labels.bearers.get(label)?;
+            let first = bearers.first.filter(|(order, _)| *order == labels.order);
+            Some(if bearers.count == 1 { Some(Uid(bearers.uids)) } else { first.map(|(_, first)| first) })
+        });
+        if let Some(joint) = known? {
+            return Some(joint);
         }
+        self.checkpoints.count(self.len());
+        let first = self.find_label(label)?;
+        self.read_labels(|labels| {
+            if let Some(bearers) = labels.bearers.get_mut(label) {
+                bearers.first = Some((labels.order, first));
+            }
+        });
+        Some(first)
     }
 
     /// Lowest number from 1 that no chain of that name has on some sides. `name` is one without digits at its end; a chain that
@@ -221,7 +250,7 @@ impl Rig {
         self.read_labels(|labels| labels.chains.get(name).map_or(1, |numbers| numbers.free[sides as usize]))
     }
 
-    fn read_labels<T>(&self, read: impl FnOnce(&Labels) -> T) -> T {
+    fn read_labels<T>(&self, read: impl FnOnce(&mut Labels) -> T) -> T {
         let mut index = self.label_index.0.lock().unwrap_or_else(PoisonError::into_inner);
         let labels = index.get_or_insert_with(|| {
             self.checkpoints.count(self.len());

@@ -142,6 +142,13 @@ impl Rig {
         product(joint, way.joints.iter().copied(), way.checkpoint.as_ref())
     }
 
+    /// Transform of a joint to the rig's space at rest, to the bit that of [`Rig::rest_globals`]; `None` for an unknown joint.
+    pub(super) fn global_from_root(&self, uid: Uid) -> Option<Affine3> {
+        let mut way = vec![self.joint(uid)?.data.rest.affine()];
+        way.extend(self.ancestors(uid).map(|above| above.data.rest.affine()));
+        Some(way.into_iter().rev().fold(Affine3::IDENTITY, |global, rest| global * rest))
+    }
+
     /// Number of joints that were visited to find transforms, depths and names of single joints, since the rig was made; for
     /// tests of growth.
     pub fn visits(&self) -> u64 {

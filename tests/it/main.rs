@@ -142,6 +142,8 @@ mod glyphs;
 #[cfg(feature = "editor")]
 mod graph;
 mod growth;
+mod growth_bends;
+mod growth_picks;
 mod heads;
 #[cfg(feature = "cli")]
 mod hostile;

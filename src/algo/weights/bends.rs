@@ -10,17 +10,19 @@
 mod blend;
 mod part;
 mod push;
+mod triangle_tree;
 
-use std::collections::BTreeMap;
+use std::{cell::Cell, collections::BTreeMap};
 
 use glam::Vec3;
 
 use self::{
     blend::Blend,
-    part::{Part, Pose},
+    part::{Marks, Part, Pose},
     push::push,
+    triangle_tree::TriangleTree,
 };
-use super::WeightJoint;
+use super::{WeightJoint, hierarchy::Hierarchy};
 use crate::mesh::{adjacency, influences::keep_strongest, model::Weights};
 
 /// Rounds in which lengths are fitted to the weights and weights to the lengths.
@@ -74,6 +76,9 @@ pub struct Flesh<'a> {
     /// True for places whose weights stay.
     fixed: Vec<bool>,
     neighbours: Vec<Vec<u32>>,
+    hierarchy: Hierarchy,
+    /// Number of triangles and places that were looked at.
+    visits: Cell<u64>,
 }
 
 impl<'a> Flesh<'a> {
@@ -94,6 +99,8 @@ impl<'a> Flesh<'a> {
             rows: vec![Vec::new(); count],
             fixed: vec![false; count],
             neighbours: vec![Vec::new(); count],
+            hierarchy: Hierarchy::new(joints),
+            visits: Cell::new(0),
             place,
         };
         for (point, &place) in flesh.place.iter().enumerate() {
@@ -118,24 +125,18 @@ impl<'a> Flesh<'a> {
     /// each bend the least length, within its limits, by which its half joint has to move outwards; `None` where the mesh
     /// has no section around the joint. The order of the bends does not matter.
     pub fn settle(&mut self, bends: &[Bend]) -> Vec<Option<f32>> {
-        let mut parts: Vec<Part> = bends.iter().map(|bend| Part::new(self, bend)).collect();
-        let sections: Vec<Option<f32>> = bends.iter().map(|bend| self.section(bend)).collect();
-        let pushes = |flesh: &Self, parts: &[Part]| -> Vec<Option<f32>> {
+        let (tree, mut marks) = (TriangleTree::new(&self.points, &self.triangles), Marks::new(self.rows.len()));
+        let mut parts: Vec<Part> = bends.iter().map(|bend| Part::new(self, &tree, &mut marks, bend)).collect();
+        let sections: Vec<Option<f32>> = bends.iter().map(|bend| self.section(&tree, bend)).collect();
+        let pushes = |parts: &[Part]| -> Vec<Option<f32>> {
             let all = bends.iter().zip(parts).zip(&sections);
-            all.map(|((bend, part), section)| push(flesh, bend, part, (*section)?)).collect()
+            all.map(|((bend, part), section)| push(bend, part, (*section)?)).collect()
         };
-        let sockets = bends.iter().zip(&parts).filter(|(bend, _)| bend.section > 0.0).map(|(_, part)| part);
-        let held = |part: &Part| {
-            let shares = part.shares.iter().zip(0..).filter(|([_, half], _)| *half > SOFT).map(|(_, place)| place);
-            shares.collect::<Vec<u32>>()
-        };
-        let mut region: Vec<u32> = sockets.flat_map(held).filter(|place| !self.fixed[*place as usize]).collect();
-        region.sort_unstable();
-        region.dedup();
+        let region = self.socket_flesh(bends);
         (0..SOFTEN).for_each(|_| self.smooth(&region));
-        parts.iter_mut().for_each(|part| part.read(self, &region));
+        parts.iter_mut().for_each(|part| part.read(self));
         for _ in 0..ROUNDS {
-            let lengths = pushes(self, &parts);
+            let lengths = pushes(&parts);
             // Each bend changes the weights that it found; where two change one place, the place gets the mean of both.
             let mut changes: BTreeMap<u32, Vec<Row>> = BTreeMap::new();
             for (((bend, part), section), length) in bends.iter().zip(&parts).zip(&sections).zip(&lengths) {
@@ -150,14 +151,49 @@ impl<'a> Flesh<'a> {
             if changes.is_empty() {
                 break;
             }
-            let places: Vec<u32> = changes.keys().copied().collect();
             for (place, rows) in changes {
                 let share = 1.0 / rows.len() as f32;
                 self.rows[place as usize] = mixed(rows.iter().map(|row| (row, share)));
             }
-            parts.iter_mut().for_each(|part| part.read(self, &places));
+            parts.iter_mut().for_each(|part| part.read(self));
         }
-        pushes(self, &parts)
+        pushes(&parts)
+    }
+
+    /// Number of triangles and places that were looked at to find what bends concern; for tests of growth.
+    pub fn visits(&self) -> u64 {
+        self.visits.get()
+    }
+
+    fn count(&self, looks: usize) {
+        self.visits.set(self.visits.get() + looks as u64);
+    }
+
+    /// Shares of the joints below a bend, and of its half joint, at a place.
+    fn shares(&self, bent: usize, half: u32, place: u32) -> [f32; 2] {
+        let mut shares = [0.0; 2];
+        for (joint, weight) in &self.rows[place as usize] {
+            if *joint == half {
+                shares[1] += weight;
+            } else if self.hierarchy.has(bent, *joint as usize) {
+                shares[0] += weight;
+            }
+        }
+        shares
+    }
+
+    /// Places, rising, that half joints of sockets hold, without those whose weights stay.
+    fn socket_flesh(&self, bends: &[Bend]) -> Vec<u32> {
+        let mut is_socket = vec![false; self.joints.len()];
+        bends.iter().filter(|bend| bend.section > 0.0).for_each(|bend| is_socket[bend.half] = true);
+        let is_held = |row: &Row| {
+            row.iter().any(|(half, _)| {
+                let held = row.iter().filter(|(joint, _)| is_socket[*half as usize] && joint == half);
+                held.map(|(_, weight)| *weight).sum::<f32>() > SOFT
+            })
+        };
+        let held = self.rows.iter().zip(0..).filter(|(row, _)| is_held(row)).map(|(_, place)| place);
+        held.filter(|place: &u32| !self.fixed[*place as usize]).collect()
     }
 
     /// The weights of all points of the mesh.
@@ -191,7 +227,7 @@ impl<'a> Flesh<'a> {
     }
 
     /// Volume of a section of the limb, as long as it is thick.
-    fn section(&self, bend: &Bend) -> Option<f32> {
+    fn section(&self, tree: &TriangleTree, bend: &Bend) -> Option<f32> {
         let at = self.joints[bend.joint].head + bend.below * bend.section;
         let along = bend.below.normalize_or_zero();
         let across = if bend.section > 0.0 { along } else { (bend.above + along).try_normalize()? };
@@ -199,7 +235,9 @@ impl<'a> Flesh<'a> {
         // Pieces of the border where the plane cuts triangles, by the edges that they end at.
         let mut cuts: Vec<[(u64, Vec3); 2]> = Vec::new();
         let reach = REACH * bend.below.length();
-        for corners in &self.triangles {
+        let near = tree.near(at, reach);
+        self.count(near.len());
+        for corners in near.into_iter().map(|number| &self.triangles[number]) {
             let mut ends = Vec::new();
             for (a, b) in [(0, 1), (1, 2), (2, 0)] {
                 let (a, b) = (corners[a], corners[b]);

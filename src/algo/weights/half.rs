@@ -5,7 +5,13 @@
 //! share, goes to that joint: so a point is never blended over more than half of the angle, and in the middle of the bend
 //! not at all.
 
-use super::{WeightJoint, odds};
+use std::collections::BTreeMap;
+
+use super::{
+    WeightJoint,
+    hierarchy::{Cores, Hierarchy},
+    odds,
+};
 
 /// Width of the blend across a hinge: the factor of the logarithm of the odds. Skin on the inside of a right
 /// angle folds unless the blend is at least as long as a quarter of a circle around the joint; without a half joint so
@@ -18,14 +24,21 @@ const HINGED: f32 = 0.8;
 
 /// The half joints of a skeleton.
 #[derive(Default)]
-pub(crate) struct Halves(Vec<Half>);
+pub(crate) struct Halves {
+    halves: Vec<Half>,
+    /// Places in `halves` of the half joints of each joint that bends, rising.
+    of_joint: BTreeMap<usize, Vec<usize>>,
+    /// Joint whose flesh each joint shares: that of a twist joint's bone, or itself. `None` for half joints.
+    owners: Vec<Option<usize>>,
+    hierarchy: Option<Hierarchy>,
+}
 
 struct Half {
     joint: u32,
+    /// Index of the joint that bends.
+    bent: usize,
     contrast: f32,
     is_hinge: bool,
-    /// Side of the bend on which each joint of the skeleton is.
-    sides: Vec<Option<Side>>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -39,29 +52,49 @@ enum Side {
 impl Halves {
     /// The half joints that take part.
     pub fn new(joints: &[WeightJoint], is_free: &[bool]) -> Self {
-        let side = |bent: usize, joint: usize| {
-            let owner = joints[joint].twist.map_or(joint, |twist| twist.joint);
-            let above = std::iter::successors(joints[bent].parent, |joint| joints[*joint].parent);
-            match owner == bent {
-                _ if joints[joint].halves.is_some() => None,
-                true => Some(Side::Lower),
-                false => above.take(joints.len()).any(|above| above == owner).then_some(Side::Upper),
-            }
-        };
-        let half = |(joint, data): (usize, &WeightJoint)| {
-            let bent = data.halves.filter(|_| is_free[joint])?;
-            let sides = (0..joints.len()).map(|joint| side(bent, joint)).collect();
-            let is_hinge = is_hinge(joints, bent);
+        let cores = Cores::new(joints);
+        let mut halves = Vec::new();
+        let mut of_joint: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (joint, data) in joints.iter().enumerate() {
+            let Some(bent) = data.halves.filter(|_| is_free[joint]) else { continue };
+            let is_hinge = is_hinge(joints, &cores, bent);
             let contrast = if is_hinge { HINGE } else { SOCKET };
-            Some(Half { joint: joint as u32, contrast, is_hinge, sides })
+            of_joint.entry(bent).or_default().push(halves.len());
+            halves.push(Half { joint: joint as u32, bent, contrast, is_hinge });
+        }
+        let owner = |(joint, data): (usize, &WeightJoint)| match data.halves {
+            Some(_) => None,
+            None => Some(data.twist.map_or(joint, |twist| twist.joint)),
         };
-        Self(joints.iter().enumerate().filter_map(half).collect())
+        let owners = joints.iter().enumerate().map(owner).collect();
+        let hierarchy = (!halves.is_empty()).then(|| Hierarchy::new(joints));
+        Self { halves, of_joint, owners, hierarchy }
+    }
+
+    /// Side of the bend of `bent` on which a joint is.
+    fn side(&self, bent: usize, joint: u32) -> Option<Side> {
+        let owner = self.owners[joint as usize]?;
+        if owner == bent {
+            return Some(Side::Lower);
+        }
+        self.hierarchy.as_ref()?.has(owner, bent).then_some(Side::Upper)
     }
 
     /// Gives half joints their shares of a point's weights; the sum stays.
     pub fn take(&self, row: &mut Vec<(u32, f32)>) {
-        for half in &self.0 {
-            let side = |joint: u32| half.sides[joint as usize];
+        if self.halves.is_empty() {
+            return;
+        }
+        // A half joint takes nothing where no joint below its bend holds the point.
+        let mut places: Vec<usize> = Vec::new();
+        for (joint, _) in row.iter() {
+            let halves = self.owners[*joint as usize].and_then(|owner| self.of_joint.get(&owner));
+            places.extend(halves.into_iter().flatten());
+        }
+        places.sort_unstable();
+        places.dedup();
+        for half in places.into_iter().map(|place| &self.halves[place]) {
+            let side = |joint: u32| self.side(half.bent, joint);
             let sum = |of: Side| row.iter().filter(|(joint, _)| side(*joint) == Some(of)).map(|(_, w)| w).sum::<f32>();
             let (upper, lower) = (sum(Side::Upper), sum(Side::Lower));
             let both = upper + lower;
@@ -93,16 +126,7 @@ impl Half {
 }
 
 /// True if a joint lies between two bones of about the same length.
-fn is_hinge(joints: &[WeightJoint], joint: usize) -> bool {
-    let is_core = |joint: usize| joints[joint].twist.is_none() && joints[joint].halves.is_none();
-    let parent = |joint: usize| {
-        std::iter::successors(joints[joint].parent, |above| joints[*above].parent)
-            .take(joints.len())
-            .find(|above| is_core(*above))
-    };
-    let length = |a: usize, b: usize| joints[a].head.distance(joints[b].head);
-    let Some(above) = parent(joint) else { return false };
-    let children = (0..joints.len()).filter(|child| is_core(*child) && parent(*child) == Some(joint));
-    let below = children.map(|child| length(child, joint)).fold(0.0, f32::max);
-    length(above, joint) >= HINGED * below
+fn is_hinge(joints: &[WeightJoint], cores: &Cores, joint: usize) -> bool {
+    cores.above[joint]
+        .is_some_and(|above| joints[above].head.distance(joints[joint].head) >= HINGED * cores.longest[joint])
 }

@@ -44,7 +44,7 @@ fn is_mirroring(world: &World) -> bool {
 pub(in crate::editor) fn partner(rig: &Rig, joint: Uid) -> Option<Uid> {
     let data = &rig.joint(joint)?.data;
     let paired = data.mirror.filter(|partner| rig.joint(*partner).is_some());
-    let labelled = || rig.find_label(&mirrored_label(data.label.as_deref()?)?);
+    let labelled = || rig.labelled(&mirrored_label(data.label.as_deref()?)?);
     paired.or_else(labelled).filter(|partner| *partner != joint)
 }
 

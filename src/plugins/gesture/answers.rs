@@ -5,6 +5,7 @@ use bevy::{ecs::system::SystemParam, prelude::*};
 use super::{
     error::GestureError,
     script::{GestureScript, ScriptedRig},
+    selection_run::told_selection,
 };
 use crate::{
     algo::{placement::Placement, stroke::StrokeNote},
@@ -38,11 +39,13 @@ impl Answers<'_, '_> {
     pub(super) fn collect(&mut self, scripts: &mut Query<ScriptedRig>) {
         for PickAnswer { rig: entity, joints } in self.picked.read() {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
-            match joints.as_slice() {
-                _ if !script.pending => continue,
-                [] => script.fail(&GestureError::NothingToPick),
-                [joint] => script.say(format!("selected {}", quoted_name(rig, *joint))),
-                joints => script.say(format!("selected {} joints", joints.len())),
+            if script.take_selection(joints, rig) || !script.pending {
+                continue;
+            }
+            if joints.is_empty() {
+                script.fail(&GestureError::NothingToPick);
+            } else {
+                script.say(told_selection(joints, rig));
             }
             script.pending = false;
         }

@@ -94,9 +94,7 @@ impl RunState {
     fn takes(self, gesture: &Gesture, next: Option<&Gesture>, can_pick: bool) -> bool {
         let picks = can_pick && self.strokes == 0 && self.has_changes;
         match gesture {
-            Gesture::View(_) | Gesture::Depth(_) | Gesture::Volume(_) | Gesture::Recentre(_) | Gesture::Reach(_) => {
-                true
-            }
+            setting if setting.is_setting() => true,
             Gesture::Group(..) | Gesture::Lock(_) => true,
             // The answer to a stroke names the joint that its chain hangs on.
             Gesture::Label(_) | Gesture::Undo | Gesture::Redo => self.strokes == 0,

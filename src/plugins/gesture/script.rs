@@ -9,6 +9,7 @@ use super::{
     answers::Answers,
     click_run::{self, RequestedChange, RunRig},
     error::GestureError,
+    selection_run::{self, RequestedSelections},
 };
 use crate::{
     algo::{
@@ -55,6 +56,9 @@ pub struct GestureScript {
     pub(super) requested: VecDeque<RequestedChange>,
     /// Number of refusals of changes of a run that are answered, and still to be read.
     pub(super) refused_changes: usize,
+    /// Selections that are requested.
+    #[reflect(ignore)]
+    pub(super) selections: RequestedSelections,
 }
 
 /// Answer to a gesture.
@@ -149,7 +153,7 @@ impl GestureScript {
     }
 
     /// A script of these gestures in an app without a window: clicks, strokes, labels, undone and redone steps that
-    /// follow one another are carried out in one frame. The result is that of [`GestureScript::new`].
+    /// follow one another are carried out in one frame, and so are selections. The result is that of [`GestureScript::new`].
     pub fn unwatched(gestures: impl IntoIterator<Item = Gesture>) -> Self {
         Self { is_unwatched: true, ..Self::new(gestures) }
     }
@@ -219,6 +223,10 @@ pub(super) fn run_scripts(
             if click_run::carry_out(&mut script, &run, &mut requests.edits, &limits) {
                 continue;
             }
+        }
+        if selection_run::is_due(&script) {
+            selection_run::carry_out(&mut script, (entity, rig, bounds), &mut requests.picks, &limits);
+            continue;
         }
         let Some(gesture) = script.begin_next(rig.len(), &limits) else { continue };
         let mesh = meshes.and_then(|meshes| meshes.iter().next());
@@ -307,7 +315,7 @@ impl GestureRun<'_, '_> {
                 pick = Some((Pick::Box { plane: self.plane(), corners: [a.into(), b.into()] }, false));
             }
             Gesture::SelectLabel(label) => {
-                let joint = self.rig.find_label(&label).ok_or(GestureError::NoLabel(label))?;
+                let joint = self.rig.labelled(&label).ok_or(GestureError::NoLabel(label))?;
                 pick = Some((Pick::Joints(vec![joint]), false));
             }
             Gesture::SelectAll => pick = Some((Pick::All, false)),

@@ -32,6 +32,8 @@ use crate::{
 
 /// Largest difference, as a share of the model's size, between the place of a joint in its chain and that of its entity.
 const MARGIN: f32 = 2e-5;
+/// Joints at one place, and equal bones, of which a stroke may meet all or none: two tell that there is no single one.
+const ALIKE: usize = 2;
 /// Furthest cell of the grid in which starts are looked for.
 const FURTHEST: f32 = 1e6;
 
@@ -226,19 +228,40 @@ impl RunJoints {
     }
 }
 
+/// Numbers of things that are equal in some numbers.
+struct AlikeCounts<const N: usize>(HashMap<[u32; N], usize>);
+
+impl<const N: usize> Default for AlikeCounts<N> {
+    fn default() -> Self {
+        Self(HashMap::new())
+    }
+}
+
+impl<const N: usize> AlikeCounts<N> {
+    /// Counts one with these numbers; true if it is among the first [`ALIKE`].
+    fn admits(&mut self, numbers: [f32; N]) -> bool {
+        let count = self.0.entry(numbers.map(f32::to_bits)).or_default();
+        *count += 1;
+        *count <= ALIKE
+    }
+}
+
 /// Bones by their length.
 #[derive(Default)]
 struct Bones {
     /// True if the bones that the rig had before the run are among them.
     is_listed: bool,
-    /// Ends of bones of about one length, by the exponent of that.
+    /// Ends of bones of about one length, by the exponent of that; of equal bones [`ALIKE`] at most.
     by_length: BTreeMap<u32, Vec<[Vec3; 2]>>,
+    alike: AlikeCounts<6>,
 }
 
 impl Bones {
     /// Bone from a joint to one below it; a joint without one above has none.
     fn add(&mut self, head: Option<Vec3>, foot: Vec3) {
-        if let Some(head) = head {
+        if let Some(head) = head
+            && self.alike.admits([head.x, head.y, head.z, foot.x, foot.y, foot.z])
+        {
             self.by_length.entry(exponent(head.distance(foot))).or_default().push([head, foot]);
         }
     }
@@ -305,7 +328,9 @@ struct JointGrid {
     plane: ViewPlane,
     /// Side of a cell, in model units.
     cell: f32,
+    /// Joints of each cell; of those at one place [`ALIKE`] at most.
     cells: HashMap<[i64; 2], Vec<(Vec2, usize)>>,
+    alike: AlikeCounts<2>,
     /// Number of joints that are in it.
     count: usize,
 }
@@ -314,13 +339,15 @@ impl JointGrid {
     /// Empty grid for circles of that radius on a model of that size.
     fn new(plane: ViewPlane, radius: f32, size: f32) -> Self {
         let cell = (2.0 * radius).max(1e-3 * size).max(f32::MIN_POSITIVE);
-        Self { plane, cell, cells: HashMap::new(), count: 0 }
+        Self { plane, cell, cells: HashMap::new(), alike: AlikeCounts::default(), count: 0 }
     }
 
     /// Takes over the joints that were added since the last call.
     fn follow(&mut self, joints: &[RunJoint]) {
         for (number, joint) in joints.iter().enumerate().skip(self.count) {
-            if let Some(place) = self.plane.project(joint.place.here) {
+            if let Some(place) = self.plane.project(joint.place.here)
+                && self.alike.admits(place.to_array())
+            {
                 let cell = self.cell_of(place);
                 self.cells.entry(cell).or_default().push((place, number));
             }

@@ -1,7 +1,7 @@
 //! Bends that are tried on a mesh while it is bound: which they are, and what becomes of what they show.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, HashMap},
     f32::consts::{FRAC_PI_2, FRAC_PI_4},
 };
 
@@ -17,7 +17,7 @@ use crate::{
     plugins::surface::RigMesh,
     processor::Modules,
     rig::{
-        BuiltRig, Constraint, Rig, RigEdit, Scalar, SkinData, TagKind, Uid,
+        BuiltRig, Constraint, Rig, RigEdit, Scalar, SkinData, TagKind, Target, Uid,
         deform::{DeformJoint, DeformSkeleton},
     },
 };
@@ -62,15 +62,29 @@ pub(super) fn tried_bends(
 ) -> Vec<TriedBend> {
     let joints = skeleton.joints();
     let is_core = |joint: usize| joints[joint].twist.is_none() && joints[joint].halves.is_none();
-    let above = |joint: usize| {
-        std::iter::successors(joints[joint].parent, |above| joints[*above].parent).find(|above| is_core(*above))
-    };
+    // The nearest of these joints above each joint, and the joints of which it is the nearest: parents come first.
+    let mut above: Vec<Option<usize>> = Vec::with_capacity(joints.len());
+    let mut children: Vec<Vec<usize>> = vec![Vec::new(); joints.len()];
+    for (number, joint) in joints.iter().enumerate() {
+        let core = joint.parent.and_then(|parent| if is_core(parent) { Some(parent) } else { above[parent] });
+        above.push(core);
+        if let Some(core) = core.filter(|_| is_core(number)) {
+            children[core].push(number);
+        }
+    }
     let at = |joint: usize| joints[joint].rest.translation;
+    let made = built.nodes.iter().rev().filter_map(|node| Some((node.uid, node.origin.as_ref()?.command)));
+    let commands: HashMap<Uid, Uid> = made.collect();
+    let turns = built.constraints.iter().rev().filter_map(|constraint| match &*constraint.constraint {
+        Constraint::Transform { driven, targets, .. } => Some((*driven, targets.as_slice())),
+        _ => None,
+    });
+    let turns: HashMap<Uid, &[Target]> = turns.collect();
     let tried = |(half, data): (usize, &DeformJoint)| {
         let joint = data.halves?;
-        let parent = above(joint)?;
-        let children = (0..joints.len()).filter(|child| is_core(*child) && above(*child) == Some(joint));
-        let below = children.map(|child| at(child) - at(joint)).max_by(|a, b| a.length().total_cmp(&b.length()))?;
+        let parent = above[joint]?;
+        let below = children[joint].iter().map(|child| at(*child) - at(joint));
+        let below = below.max_by(|a, b| a.length().total_cmp(&b.length()))?;
         let upper = at(joint) - at(parent);
         let (up, down) = (upper.try_normalize()?, below.try_normalize()?);
         let is_hinge = upper.length() >= HINGED * below.length();
@@ -85,13 +99,8 @@ pub(super) fn tried_bends(
         if angle < LEAST {
             return None;
         }
-        let node = built.nodes.iter().find(|node| node.uid == data.uid)?;
-        let command = node.origin.as_ref()?.command;
-        let turn = built.constraints.iter().find_map(|constraint| match &*constraint.constraint {
-            Constraint::Transform { driven, targets, .. } if *driven == data.uid => Some(targets),
-            _ => None,
-        })?;
-        let [from, to] = turn.as_slice() else { return None };
+        let command = *commands.get(&data.uid)?;
+        let [from, to] = *turns.get(&data.uid)? else { return None };
         let share = match (&from.weight, &to.weight) {
             (Scalar::Value(from), Scalar::Value(to)) => to / (from + to),
             _ => return None,
@@ -150,14 +159,14 @@ impl SkinningInput {
 /// joints of each command. Where another mesh of the rig hangs more on a half joint, as a body does under clothes, that mesh
 /// decides; commands that are gone and lengths that are as before make no edit.
 pub(super) fn push_edits(rig: &Rig, modules: &Modules, mesh: Uid, bound: &BoundSkin) -> Vec<RigEdit> {
-    let held = |skin: &SkinData, half: Uid| {
-        let place = skin.joints.iter().position(|joint| *joint == half).map(|place| place as u32);
-        skin.weights.joints.iter().filter(|joint| Some(**joint) == place).count()
-    };
-    let is_most = |half: Uid| {
-        let own = held(&bound.skin, half);
-        rig.skins().all(|(other, skin)| other == mesh || held(skin, half) <= own)
-    };
+    if bound.pushes.is_empty() {
+        return Vec::new();
+    }
+    let own = held_points(&bound.skin);
+    let others: Vec<HashMap<Uid, usize>> =
+        rig.skins().filter(|(other, _)| *other != mesh).map(|(_, skin)| held_points(skin)).collect();
+    let held = |skin: &HashMap<Uid, usize>, half: Uid| skin.get(&half).copied().unwrap_or_default();
+    let is_most = |half: Uid| others.iter().all(|other| held(other, half) <= held(&own, half));
     let mut by_command: BTreeMap<Uid, Vec<f32>> = BTreeMap::new();
     for fitted in bound.pushes.iter().filter(|fitted| is_most(fitted.half)) {
         by_command.entry(fitted.command).or_default().push(fitted.push);
@@ -177,4 +186,16 @@ pub(super) fn push_edits(rig: &Rig, modules: &Modules, mesh: Uid, bound: &BoundS
         Some(RigEdit::SetTag(joint.data.uid, Box::new(tag)))
     };
     by_command.into_iter().filter_map(edit).collect()
+}
+
+/// Number of influences of each joint.
+fn held_points(skin: &SkinData) -> HashMap<Uid, usize> {
+    let mut counts = vec![0; skin.joints.len()];
+    for joint in &skin.weights.joints {
+        if let Some(count) = counts.get_mut(*joint as usize) {
+            *count += 1;
+        }
+    }
+    // Of a joint that is listed twice, the first place counts.
+    skin.joints.iter().copied().zip(counts).rev().collect()
 }

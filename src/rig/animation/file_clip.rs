@@ -6,7 +6,7 @@
 //! that went out and in again are the same bits, and so is the file that is written from them. What channels cannot hold,
 //! such as markers, goes through the extras of the animation ([`ClipExtras`]).
 
-use std::sync::Arc;
+use std::{collections::HashMap, sync::Arc};
 
 use bevy::math::{DQuat, DVec3};
 
@@ -179,6 +179,10 @@ pub fn own_joints(model: &Model, rig: &Rig) -> Option<Vec<Option<Uid>>> {
     let is_node = |joint: &crate::rig::RigJoint, node: &crate::mesh::model::Node| {
         joint.data.label.as_deref().unwrap_or_default() == node.name && is_rest(&joint.data.rest.into(), &node.rest)
     };
+    let mut by_label: HashMap<&str, Vec<&crate::rig::RigJoint>> = HashMap::with_capacity(joints.len());
+    for joint in &joints {
+        by_label.entry(joint.data.label.as_deref().unwrap_or_default()).or_default().push(*joint);
+    }
     let places = |number: usize| -> Option<Uid> {
         let node = &model.nodes[number];
         // The skeleton of the file itself has its nodes in order, even those without names.
@@ -187,7 +191,8 @@ pub fn own_joints(model: &Model, rig: &Rig) -> Option<Vec<Option<Uid>>> {
         {
             return Some(joint.data.uid);
         }
-        let mut found = joints.iter().filter(|joint| !node.name.is_empty() && is_node(joint, node));
+        let alike = by_label.get(node.name.as_str()).filter(|_| !node.name.is_empty()).into_iter().flatten();
+        let mut found = alike.filter(|joint| is_node(joint, node));
         found.next().filter(|_| found.next().is_none()).map(|joint| joint.data.uid)
     };
     let found: Vec<Option<Uid>> = (0..model.nodes.len()).map(places).collect();

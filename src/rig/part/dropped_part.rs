@@ -27,8 +27,7 @@ impl DroppedPart {
     pub fn instance(&self, rig: &Rig) -> Option<PartInstance> {
         let label = |joint: &Uid| {
             let label = rig.joint(*joint)?.data.label.clone()?;
-            let bearers = rig.walk().filter(|other| other.data.label.as_ref() == Some(&label)).count();
-            (bearers == 1).then_some(label)
+            (rig.label_count(&label) == 1).then_some(label)
         };
         Some(self.instance_onto(self.joints.iter().map(label).collect::<Option<_>>()?))
     }

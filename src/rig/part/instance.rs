@@ -207,7 +207,7 @@ impl PartInstance {
         let here = |socket: &PartSocket| {
             let place = fitted.walk().position(|joint| Some(joint.data.uid) == socket.joint)?;
             let joint = match self.onto.get(place) {
-                Some(label) => rig.find_label(label)?,
+                Some(label) => rig.labelled(label)?,
                 None if self.onto.is_empty() || self.adds => self.uid_of(socket.joint?),
                 None => return None,
             };
@@ -392,10 +392,9 @@ impl PartInstance {
     ) -> Result<(), PartError> {
         let parent = self.parent.as_deref().map(|label| labelled(draft.rig(), label)).transpose()?;
         let parent = socket.and_then(|socket| socket.joint).or(parent);
-        let globals = if self.is_world { draft.rig().rest_globals() } else { Vec::new() };
-        let below = globals.into_iter().find(|(uid, _)| parent == Some(*uid));
+        let below = parent.filter(|_| self.is_world).and_then(|parent| draft.rig().global_from_root(parent));
         let place = match (below, socket) {
-            (Some((_, global)), _) => global.inverse() * self.rest.affine(),
+            (Some(global), _) => global.inverse() * self.rest.affine(),
             (None, Some(socket)) => socket.rest.affine() * self.rest.affine(),
             (None, None) => self.rest.affine(),
         };
@@ -480,7 +479,7 @@ pub fn have_same_fields(a: &[PartInstance], b: &[PartInstance]) -> bool {
 }
 
 fn labelled(rig: &Rig, label: &str) -> Result<Uid, PartError> {
-    rig.find_label(label).ok_or_else(|| {
+    rig.labelled(label).ok_or_else(|| {
         let known: Vec<&str> = rig.walk().filter_map(|joint| joint.data.label.as_deref()).collect();
         PartError::UnknownHostJoint { label: label.to_owned(), nearest: did_you_mean(label, known) }
     })

@@ -70,7 +70,7 @@ impl PartSocket {
     /// # Errors
     /// A joint that the rig does not have.
     pub fn in_rig(&self, rig: &Rig) -> Result<Self, SocketError> {
-        let found = self.joint.filter(|joint| rig.joint(*joint).is_some()).or_else(|| rig.find_label(&self.label));
+        let found = self.joint.filter(|joint| rig.joint(*joint).is_some()).or_else(|| rig.labelled(&self.label));
         let joint = found.ok_or_else(|| self.no_joint(rig.walk().filter_map(|joint| joint.data.label.as_deref())))?;
         Ok(Self { joint: Some(joint), ..self.clone() })
     }

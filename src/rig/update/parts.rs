@@ -4,7 +4,7 @@
 //! are with the fields that the instances have after the update: what is different between them then is no result of the fields.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
     sync::Arc,
 };
 
@@ -79,9 +79,10 @@ pub fn merge_parts(
 ) -> MergedParts {
     let mut merged = MergedParts::default();
     let names = NamesOfBoth::new(&now.rig, &file.rig);
+    let (in_file, in_base) = (file.instances(), base.map(TemplateWithParts::instances).unwrap_or_default());
     for instance in &now.template.parts {
-        let Some(theirs) = file.by_uids(instance.uid) else { continue };
-        let was = base.and_then(|base| base.by_uids(instance.uid));
+        let Some(theirs) = in_file.get(&instance.uid).map(|instance| by_uids(instance, &file.rig)) else { continue };
+        let was = base.zip(in_base.get(&instance.uid)).map(|(base, instance)| by_uids(instance, &base.rig));
         if base.is_some() && was.is_none() {
             // The base may have what the part brings as joints of its own: it tells nothing of the fields.
             continue;
@@ -98,7 +99,7 @@ pub fn merge_parts(
 
 /// An instance with the uids of the joints that it goes onto and hangs on, in place of their labels, and without its changes.
 fn by_uids(instance: &PartInstance, rig: &Rig) -> PartInstance {
-    let uid = |label: &String| rig.find_label(label).map_or_else(|| label.clone(), |uid| uid.to_string());
+    let uid = |label: &String| rig.labelled(label).map_or_else(|| label.clone(), |uid| uid.to_string());
     PartInstance {
         onto: instance.onto.iter().map(uid).collect(),
         parent: instance.parent.as_ref().map(uid),
@@ -261,10 +262,9 @@ fn take_named<T: Clone>(list: &mut Vec<(String, T)>, from: &[(String, T)], name:
 }
 
 impl TemplateWithParts {
-    /// The instance with that uid, with joints by their uids.
-    fn by_uids(&self, uid: Uid) -> Option<PartInstance> {
-        let instance = self.template.parts.iter().find(|part| part.uid == uid)?;
-        Some(by_uids(instance, &self.rig))
+    /// The instances by their uids.
+    fn instances(&self) -> HashMap<Uid, &PartInstance> {
+        self.template.parts.iter().map(|part| (part.uid, part)).collect()
     }
 
     /// The template with the fields of `merged` instances, before its parts are in the rig. What refers to something of a part
@@ -276,9 +276,10 @@ impl TemplateWithParts {
     ) -> Option<RefittedTemplate> {
         let mut template = self.template.clone();
         self.bind(&mut template);
+        let by_uid: HashMap<Uid, &PartInstance> = merged.iter().map(|to| (to.uid, to)).collect();
         for part in &mut template.parts {
             let own = by_uids(part, &self.rig);
-            let to = merged.iter().find(|to| to.uid == part.uid);
+            let to = by_uid.get(&part.uid).copied();
             // Joints that the other version alone has are no place in this one.
             let is_here = |name: &String| name.parse::<Uid>().is_ok_and(|uid| self.rig.joint(uid).is_some());
             let has_place = |to: &&PartInstance| to.onto.iter().chain(&to.parent).all(is_here);
@@ -327,7 +328,7 @@ impl TemplateWithParts {
             part.onto.iter_mut().chain(&mut part.parent).for_each(name);
         }
         for socket in &mut template.sockets {
-            if let Some(label) = self.rig.find_label(&socket.label).and_then(|uid| labels.get(&uid)) {
+            if let Some(label) = self.rig.labelled(&socket.label).and_then(|uid| labels.get(&uid)) {
                 socket.label.clone_from(label);
             }
         }
@@ -338,11 +339,13 @@ impl TemplateWithParts {
     fn rename_sockets(&self, parts: &mut [PartInstance]) {
         let titles = |of: &[PartInstance]| of.iter().map(|part| part.title().to_owned()).collect::<Vec<_>>();
         let (was, is) = (titles(&self.template.parts), titles(parts));
+        let places: HashMap<&str, usize> =
+            was.iter().enumerate().rev().map(|(place, title)| (title.as_str(), place)).collect();
+        let present: HashSet<&str> = is.iter().map(String::as_str).collect();
         for socket in parts.iter_mut().filter_map(|part| part.socket.as_mut()) {
             let Some((instance, name)) = socket.rsplit_once('.') else { continue };
             // A name that an instance has is no former one.
-            let place =
-                was.iter().position(|title| title == instance).filter(|_| !is.iter().any(|title| title == instance));
+            let place = places.get(instance).copied().filter(|_| !present.contains(instance));
             if let Some(title) = place.and_then(|place| is.get(place)) {
                 *socket = format!("{title}.{name}");
             }

@@ -41,6 +41,7 @@ pub(super) struct Blend<'a> {
     part: Part,
     /// Shares of the lower side and of the half joint as they were.
     before: Vec<[f32; 2]>,
+    /// Turns that changed, by the places of the part.
     changed: BTreeMap<u32, f32>,
 }
 
@@ -67,6 +68,11 @@ impl<'a> Blend<'a> {
         [to - 0.5 * half, half]
     }
 
+    /// True if the weights of a place stay.
+    fn is_fixed(&self, place: u32) -> bool {
+        self.flesh.fixed[self.part.places[place as usize] as usize]
+    }
+
     fn set(&mut self, place: u32, to: f32) {
         self.part.shares[place as usize] = self.shares(place, to);
         self.changed.insert(place, to);
@@ -86,9 +92,8 @@ impl<'a> Blend<'a> {
     /// Changes turns until no triangle folds in a pose.
     pub fn unfold(&mut self, pose: &Pose) {
         for _ in 0..LOOKS {
-            let is_closed = |corners: &[u32; 3]| {
-                self.part.openness(self.flesh, pose, corners).is_some_and(|openness| openness < OPEN)
-            };
+            let is_closed =
+                |corners: &[u32; 3]| self.part.openness(pose, corners).is_some_and(|openness| openness < OPEN);
             let folding: Vec<[u32; 3]> =
                 self.part.triangles.iter().filter(|corners| is_closed(corners)).copied().collect();
             if folding.is_empty() {
@@ -102,13 +107,12 @@ impl<'a> Blend<'a> {
 
     /// Changes the turns at the corners of a triangle that folds by as little as opens it.
     fn open(&mut self, pose: &Pose, corners: &[u32; 3]) {
-        let flesh = self.flesh;
-        let Some(openness) = self.part.openness(flesh, pose, corners).filter(|openness| *openness < OPEN) else {
+        let Some(openness) = self.part.openness(pose, corners).filter(|openness| *openness < OPEN) else {
             return;
         };
-        let slopes = corners.map(|place| match flesh.fixed[place as usize] {
+        let slopes = corners.map(|place| match self.is_fixed(place) {
             true => 0.0,
-            false => self.slope(place, 2e-3, |blend| blend.part.openness(flesh, pose, corners).unwrap_or(openness)),
+            false => self.slope(place, 2e-3, |blend| blend.part.openness(pose, corners).unwrap_or(openness)),
         });
         let size: f32 = slopes.iter().map(|slope| slope * slope).sum();
         if !(size.is_finite() && size > 1e-6) {
@@ -127,39 +131,45 @@ impl<'a> Blend<'a> {
         let flesh = self.flesh;
         let is_between = |place: &u32| {
             let turn = turn(self.before[*place as usize]);
-            turn > WHOLE && turn < 1.0 - WHOLE && !flesh.fixed[*place as usize]
+            turn > WHOLE && turn < 1.0 - WHOLE && !self.is_fixed(*place)
         };
         let mut places: Vec<u32> = self.part.triangles.iter().flatten().copied().filter(is_between).collect();
         places.sort_unstable();
         places.dedup();
+        // Neighbours of these places; those outside of the part stand behind its last place, where nothing changes.
+        let count = self.part.places.len();
+        let around = |place: &u32| {
+            let around = flesh.neighbours[self.part.places[*place as usize] as usize].iter();
+            around.map(|other| self.part.places.binary_search(other).unwrap_or(count)).collect::<Vec<usize>>()
+        };
+        let neighbours: Vec<Vec<usize>> = places.iter().map(around).collect();
         for _ in 0..FILLS {
-            let lost = self.part.lost(flesh, pose) / section;
+            let lost = self.part.lost(pose) / section;
             if !(lost.is_finite() && lost > LOSS) {
                 break;
             }
-            let (mut slopes, mut areas) = (vec![0.0_f32; flesh.rows.len()], vec![0.0_f32; flesh.rows.len()]);
+            let (mut slopes, mut areas) = (vec![0.0_f32; count], vec![0.0_f32; count]);
             for at in 0..self.part.triangles.len() {
                 let corners = self.part.triangles[at];
-                let ([a, b, c], ..) = self.part.corners(flesh, pose, &corners);
+                let ([a, b, c], ..) = self.part.corners(pose, &corners);
                 let area = (b - a).cross(c - a).length() / 6.0;
                 for place in corners {
                     areas[place as usize] += area;
-                    let of = |blend: &Self| volume(blend.part.corners(flesh, pose, &corners).1);
+                    let of = |blend: &Self| volume(blend.part.corners(pose, &corners).1);
                     slopes[place as usize] += self.slope(place, 5e-3, of);
                 }
             }
-            let mut changes = vec![0.0_f32; flesh.rows.len()];
+            let mut changes = vec![0.0_f32; count + 1];
             for place in places.iter().map(|place| *place as usize).filter(|place| areas[*place] > 0.0) {
                 let turn = turn(self.part.shares[place]);
                 changes[place] = slopes[place] / areas[place] * turn * (1.0 - turn);
             }
             for _ in 0..SMOOTH {
-                let smoothed = |place: &u32| {
-                    let around = &flesh.neighbours[*place as usize];
-                    let sum: f32 = around.iter().map(|other| changes[*other as usize]).sum();
+                let smoothed = |(place, around): (&u32, &Vec<usize>)| {
+                    let sum: f32 = around.iter().map(|other| changes[*other]).sum();
                     0.5 * (changes[*place as usize] + sum / around.len().max(1) as f32)
                 };
-                let smooth: Vec<f32> = places.iter().map(smoothed).collect();
+                let smooth: Vec<f32> = places.iter().zip(&neighbours).map(smoothed).collect();
                 places.iter().zip(smooth).for_each(|(place, change)| changes[*place as usize] = change);
             }
             let rate: f32 = places.iter().map(|place| slopes[*place as usize] * changes[*place as usize]).sum();
@@ -186,7 +196,7 @@ impl<'a> Blend<'a> {
             self.share_out(place, false, 1.0 - lower - half, &mut row);
             row.retain(|(_, weight)| *weight > LEAST);
             row.sort_by_key(|(joint, _)| *joint);
-            (place, row)
+            (self.part.places[place as usize], row)
         };
         self.changed.keys().map(|place| row(*place)).collect()
     }
@@ -196,11 +206,11 @@ impl<'a> Blend<'a> {
         if share <= LEAST {
             return;
         }
-        let Part { half, lower, .. } = &self.part;
-        let mut sources = vec![place];
+        let half = self.part.half;
+        let mut sources = vec![self.part.places[place as usize]];
         for _ in 0..NEAR {
             let mut found = mixed(sources.iter().map(|source| (&self.flesh.rows[*source as usize], 1.0)));
-            found.retain(|(joint, _)| joint != half && lower[*joint as usize] == is_lower);
+            found.retain(|(joint, _)| *joint != half && self.part.is_lower(self.flesh, *joint) == is_lower);
             let sum: f32 = found.iter().map(|(_, weight)| weight).sum();
             if sum > 0.0 {
                 row.extend(found.iter().map(|(joint, weight)| (*joint, share * weight / sum)));

@@ -1,6 +1,6 @@
 //! Lengths by which half joints leave a bend.
 
-use super::{Bend, Flesh, Part, Pose};
+use super::{Bend, Part, Pose};
 
 /// Loss of volume, as a share of a section, that is aimed at.
 const LOSS: f32 = 0.08;
@@ -10,11 +10,11 @@ const SWELL: f32 = 0.55;
 const ASIDE: f32 = 1.0;
 
 /// The least push of a bend with which a mesh loses little, in limits.
-pub(super) fn push(flesh: &Flesh, bend: &Bend, part: &Part, section: f32) -> Option<f32> {
-    let lost = |push: f32| part.lost(flesh, &Pose::new(bend, bend.axis, bend.angle, push)) / section;
+pub(super) fn push(bend: &Bend, part: &Part, section: f32) -> Option<f32> {
+    let lost = |push: f32| part.lost(&Pose::new(bend, bend.axis, bend.angle, push)) / section;
     let [least, mut most] = bend.push;
     for (axis, angle) in bend.aside.into_iter().flat_map(|axis| [(axis, ASIDE), (axis, -ASIDE)]) {
-        let gained = |push: f32| -part.lost(flesh, &Pose::new(bend, axis, angle, push)) / section;
+        let gained = |push: f32| -part.lost(&Pose::new(bend, axis, angle, push)) / section;
         let (low, high) = (gained(least), gained(most));
         let allowed = SWELL.max(low);
         if high > allowed {

@@ -171,7 +171,7 @@ pub(super) fn drop_instance(
 fn free_label(rig: &Rig, label: &str) -> String {
     let numbered = (2..).map(|number| format!("{label}_{number}"));
     let mut names = std::iter::once(label.to_owned()).chain(numbered);
-    names.find(|name| rig.find_label(name).is_none()).unwrap_or_default()
+    names.find(|name| !rig.has_label(name)).unwrap_or_default()
 }
 
 /// Notes that a part goes onto joints with commands of their own.

@@ -119,7 +119,7 @@ impl Overrides<'_, '_> {
         for (place, joint) in part.walk().enumerate() {
             let source = joint.data.uid;
             let here = match instance.onto.get(place) {
-                Some(label) => self.rigs.before.find_label(label),
+                Some(label) => self.rigs.before.labelled(label),
                 None => Some(instance.uid_of(source)),
             };
             let Some(here) = here else { continue };

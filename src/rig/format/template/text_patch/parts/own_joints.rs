@@ -207,7 +207,7 @@ pub(super) fn instance_labels(
     [before, now]: [&Rig; 2],
 ) {
     let renamed = |label: &str| {
-        let joint = now.joint(before.find_label(label)?)?;
+        let joint = now.joint(before.labelled(label)?)?;
         joint.data.label.clone().filter(|now| now != label)
     };
     if let Some(now) = instance.parent.as_deref().and_then(renamed) {
