@@ -31,7 +31,7 @@ use crate::{
         commands::{BuildStep, NamedProgramError, Processor},
         surface::RigMesh,
     },
-    processor::{Builder, CommandState, RunReport},
+    processor::{Builder, CommandState, RunReport, with_missing_name},
     rig::{
         BuiltRig, Rig, Uid,
         bake::baked,
@@ -94,12 +94,14 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
 
 /// Builds a rig, and writes what is built. An app, which takes several times the memory, is used for poses and meshes alone.
 fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure> {
-    let mut builder = Builder::new(Arc::new(limits::modules()));
+    let modules = Arc::new(limits::modules());
+    let mut builder = Builder::new(modules.clone());
     builder.sync(&rig);
-    let outcome = match args.until {
+    let mut outcome = match args.until {
         Some(count) => builder.run_to(count),
         None => builder.run_all(),
     };
+    outcome.error = outcome.error.map(|error| with_missing_name(&rig, &modules, error));
     let built = builder.built();
     describe(args, report, &rig, &builder, &built, outcome);
     let has_commands = !builder.is_empty();

@@ -94,6 +94,31 @@ fn the_command_line_tells_a_cycle_by_names() {
     assert_eq!(bench.runtime().map(drop).unwrap_err().to_string(), words);
 }
 
+/// A reference to two joints, of which the rig has the first alone, is blamed on the second.
+#[cfg(feature = "cli")]
+#[test]
+fn a_build_tells_the_name_that_is_missing() {
+    use std::fs;
+
+    use rigsmith::{headless::Workbench, plugins::commands::BuildStep};
+
+    use crate::cli_outputs::{json, rig};
+
+    let folder = tempfile::tempdir().unwrap();
+    let text = LOOP.replace("\"@joint b\"", "\"@joint b + @joint nope\"");
+    assert_ne!(text, LOOP);
+    fs::write(folder.path().join("loop.rig.ron"), text).unwrap();
+    let is_right = |told: &str| told.contains("there is no joint \"nope\"") && !told.contains("no joint \"b\"");
+    for args in [&["build", "loop.rig.ron"][..], &["pose", "loop.rig.ron", "--set", "a.translate=(1,0,0)"]] {
+        let (code, told) = json(folder.path(), args);
+        let what = told["error"]["what"].as_str().unwrap();
+        assert!(code == 1 && is_right(what), "{args:?}: {told}");
+    }
+    let mut bench = Workbench::with_rig(1, rig(folder.path(), "loop.rig.ron"));
+    let error = bench.build(BuildStep::All).error.unwrap().to_string();
+    assert!(is_right(&error), "{error}");
+}
+
 #[test]
 fn the_window_tells_a_cycle_by_names() {
     let mut app = headless_app(1);
