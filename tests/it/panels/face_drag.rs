@@ -1,12 +1,6 @@
 //! Work of a drag in the Face panel: frames visit no points of the head, however many it has.
 
-use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
-    time::Duration,
-};
+use std::{sync::Arc, time::Duration};
 
 use bevy::{
     ecs::schedule::SingleThreadedExecutor,
@@ -27,7 +21,6 @@ use rigsmith::{
         surface::{RigMesh, SkinOf},
     },
     prelude::*,
-    rig::RigEdit,
     test_app::strict_app,
 };
 
@@ -130,11 +123,11 @@ fn a_step_outlives_a_preview_for_other_weights() {
         preview,
     };
     // Nothing in the background is computed while every thread of it waits.
-    let (pool, is_over) = (AsyncComputeTaskPool::get(), Arc::new(AtomicBool::new(false)));
+    let (pool, held) = (AsyncComputeTaskPool::get(), Arc::new(()));
     let waits = |_| -> Task<()> {
-        let is_over = is_over.clone();
+        let held = Arc::downgrade(&held);
         pool.spawn(async move {
-            while !is_over.load(Ordering::Relaxed) {
+            while held.strong_count() > 0 {
                 std::thread::sleep(Duration::from_millis(1));
             }
         })
@@ -149,7 +142,7 @@ fn a_step_outlives_a_preview_for_other_weights() {
     let steps = desk.steps().1;
     desk.app.world_mut().write_message(request(1.0, false));
     desk.frames(2);
-    is_over.store(true, Ordering::Relaxed);
+    drop(held);
     desk.until("the face for the weights of now", |desk| {
         let world = desk.app.world();
         world.get::<FacePreparation>(mesh).is_none() && !world.get::<FacePosing>(mesh).unwrap().is_running()
