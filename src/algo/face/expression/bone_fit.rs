@@ -76,6 +76,8 @@ pub struct FittedFace {
     moving: MovingSkin,
     /// Bones of skin that mirror each other; one in the middle stands twice.
     pairs: Vec<[usize; 2]>,
+    /// Number of folds of a pose that people do not notice: a thousandth of the mask's triangles.
+    tolerated_folds: usize,
 }
 
 /// Movements of the skin bones that belong to the jaw's, which are linear in its rotation matrix and its shift.
@@ -118,6 +120,7 @@ impl FittedFace {
             jaw: JawMovements::default(),
             moving: MovingSkin::default(),
             pairs: mirrored_pairs(bones, landmarks),
+            tolerated_folds: 0,
         };
         let Some(opening_lines) = face.opening_lines.clone() else { return face };
         let (samples, facing) = samples::gather(points, mask, weights, bones, landmarks, &opening_lines);
@@ -125,6 +128,10 @@ impl FittedFace {
         face.factorise();
         face.jaw = face.jaw_movements(&opening_lines);
         face.moving = MovingSkin::new(points, triangles, weights, bones, &facing);
+        let is_facial = |corners: &&[u32; 3]| {
+            mask.is_empty() || corners.iter().all(|corner| mask.get(*corner as usize).copied().unwrap_or(false))
+        };
+        face.tolerated_folds = triangles.iter().filter(is_facial).count() / 1000;
         face
     }
 

@@ -4,7 +4,7 @@
 //! zero, or that at rest where they overlap at rest. The movement with the least sum of squares that meets all inequalities is
 //! found by Hildreth's method (a quadratic programming procedure, 1957): one inequality after the other, each with a multiplier
 //! that never falls below zero. Pairs that do not cross are inequalities, too, but move nothing by themselves. A pose in which the
-//! movement would fold more skin keeps its crossing.
+//! movement would fold more skin than a thousandth of the face, and a tenth more than before, keeps its crossing.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ use crate::{
 const MARGIN: f32 = 5e-5;
 /// Largest distance, in eye distances, by which points of lips and of lids pass each other and are separated. Points that pass
 /// further are not on the rims: the inside of a lip lies behind the other one.
-const DEEPEST_LIPS: f32 = 0.005;
+const DEEPEST_LIPS: f32 = 0.01;
 const DEEPEST_LIDS: f32 = 0.02;
 /// Distance, in eye distances, of points that need no inequality: no separation moves bones so far.
 const ROOM: f32 = 0.05;
@@ -47,7 +47,8 @@ struct Inequality {
 }
 
 impl FittedFace {
-    /// Moves bones up or down until no facing points cross, unless more skin would fold then; alike on both sides if `is_alike`.
+    /// Moves bones up or down until no facing points cross, unless so much more skin would fold then that people notice; alike on
+    /// both sides if `is_alike`.
     pub(super) fn separate(&self, poses: &mut [BonePose], is_alike: bool) {
         let scale = self.landmarks.eye_distance();
         let MovingSkin { points, weights, facing, .. } = &self.moving;
@@ -94,7 +95,9 @@ impl FittedFace {
         let mut posed = PosedSkin::new(&self.moving, matrices);
         let folds = posed.folded().count();
         posed.update(self.matrices(&separate));
-        if posed.folded().count() <= folds {
+        // A pose that folds more than people notice is a caricature, in which a tenth more makes no difference.
+        let most = if folds <= self.tolerated_folds { self.tolerated_folds } else { folds + folds / 10 };
+        if posed.folded().count() <= most {
             poses.copy_from_slice(&separate);
         }
     }
