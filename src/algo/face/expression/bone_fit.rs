@@ -143,7 +143,8 @@ impl FittedFace {
     /// Cost: points that bones move times rounds of repair, and for each unit once samples times moves of the field.
     pub fn pose(&self, mix: &Mix) -> Vec<BonePose> {
         let mut poses = self.pose_and_repair(mix).0;
-        self.separate(&mut poses, is_alike(mix));
+        let used = mix.strengths.iter().filter(|strengths| **strengths != [0.0; 2]).count();
+        self.separate(&mut poses, is_alike(mix), used > 1);
         poses
     }
 

@@ -43,8 +43,8 @@ const LID_PLACES: [f32; 2] = [1.0 / 3.0, 2.0 / 3.0];
 const AROUND_LIPS: (usize, f32) = (6, 0.01);
 /// Points of the other rim that face each point of a rim of a lip at most, and the largest distance of points that do, in eye
 /// distances, sideways and along the other axes. Places along the rims alone miss points between them.
-const OPPOSITE_LIPS: usize = 4;
-const OPPOSITE_REACH: [f32; 2] = [0.012, 0.02];
+const OPPOSITE_LIPS: usize = 1;
+const OPPOSITE_REACH: [f32; 2] = [0.009, 0.01];
 /// Distance, in eye distances, up to which a point is on the rim of its lip.
 const RIM: f32 = 0.05;
 /// Points and distance of lids, whose landmarks are further from each other.
