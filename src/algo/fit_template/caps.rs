@@ -185,3 +185,94 @@ fn rings(points: &[Vec3], triangles: &[[u32; 3]], rims: &BTreeMap<(u32, u32), u3
     }
     rings
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An octahedron, twice subdivided onto an ellipsoid.
+    fn ellipsoid() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let mut points = vec![Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+        let mut faces: Vec<[u32; 3]> = Vec::new();
+        for octant in 0..8u32 {
+            let [x, y, z] = [octant & 1, 2 + (octant >> 1 & 1), 4 + (octant >> 2)];
+            let is_even = octant.count_ones() % 2 == 0;
+            faces.push(if is_even { [x, y, z] } else { [x, z, y] });
+        }
+        for _ in 0..2 {
+            let mut middles = BTreeMap::new();
+            let mut finer = Vec::new();
+            for [a, b, c] in faces {
+                let mut middle = |a: u32, b: u32| {
+                    *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                        points.push(points[a as usize].midpoint(points[b as usize]).normalize());
+                        points.len() as u32 - 1
+                    })
+                };
+                let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+                finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+            }
+            faces = finer;
+        }
+        (points.into_iter().map(|point| point * Vec3::new(1.0, 0.7, 1.6)).collect(), faces)
+    }
+
+    /// Faces, each from its least corner on, in order.
+    fn in_order(faces: &[[u32; 3]]) -> Vec<[u32; 3]> {
+        let from_least = |&[a, b, c]: &[u32; 3]| match a.min(b).min(c) {
+            least if least == a => [a, b, c],
+            least if least == b => [b, c, a],
+            _ => [c, a, b],
+        };
+        let mut faces: Vec<[u32; 3]> = faces.iter().map(from_least).collect();
+        faces.sort_unstable();
+        faces
+    }
+
+    /// Closes the holes that missing faces leave, and compares the mesh with the whole one.
+    #[track_caller]
+    fn check_restored(missing: &[usize]) {
+        let (mut points, faces) = ellipsoid();
+        let count = points.len();
+        let left = faces.iter().enumerate().filter(|(number, _)| !missing.contains(number));
+        let mut left: Vec<[u32; 3]> = left.map(|(_, face)| *face).collect();
+        close_holes(&mut points, &mut left);
+        assert_eq!(points.len(), count, "{missing:?}");
+        assert_eq!(in_order(&left), in_order(&faces), "{missing:?}");
+    }
+
+    fn common_corners(a: [u32; 3], b: [u32; 3]) -> usize {
+        a.iter().filter(|corner| b.contains(corner)).count()
+    }
+
+    #[test]
+    fn strips_of_missing_faces_are_restored() {
+        let (_, faces) = ellipsoid();
+        let beside = |one: usize| (0..faces.len()).filter(move |&other| other != one);
+        for first in 0..faces.len() {
+            for second in beside(first).filter(|&other| common_corners(faces[first], faces[other]) == 2) {
+                check_restored(&[first, second]);
+                let third = beside(second).filter(|&other| common_corners(faces[second], faces[other]) == 2);
+                for third in third.filter(|third| *third != first) {
+                    check_restored(&[first, second, third]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn holes_that_touch_are_closed_apart() {
+        let (_, faces) = ellipsoid();
+        for first in 0..faces.len() {
+            for second in (0..first).filter(|&other| common_corners(faces[first], faces[other]) == 1) {
+                check_restored(&[first, second]);
+                let is_apart = |third: &usize| {
+                    [first, second].iter().all(|other| common_corners(faces[*third], faces[*other]) == 1)
+                };
+                for third in (0..second).filter(is_apart) {
+                    check_restored(&[first, second, third]);
+                }
+            }
+        }
+    }
+}

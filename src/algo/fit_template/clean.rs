@@ -102,9 +102,8 @@ pub(super) fn clean(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<CleanMesh
             *third += area * q.dot(axis).powi(3);
         }
     }
-    let sign = |i: usize| if thirds[i] < 0.0 { -axes[i] } else { axes[i] };
-    let (x, y) = (sign(0), sign(1));
-    let turn = DMat3::from_cols(x, y, x.cross(y)).transpose();
+    let [x, y, z] = signed(axes, moments, thirds);
+    let turn = DMat3::from_cols(x, y, z).transpose();
     let mut space = UnitSpace { centre, turn, scale: 1.0 };
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for point in triangles.iter().flat_map(corners) {
@@ -120,6 +119,22 @@ pub(super) fn clean(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<CleanMesh
     let unit: Vec<Vec3> = points.iter().map(|&p| (space.to_unit(p) / GRAIN).round() * GRAIN).collect();
     let (points, triangles) = sorted(&unit, &triangles);
     Some(CleanMesh { points, triangles, space, specks })
+}
+
+/// Axes that lead where the surface reaches furthest. Across a plane of symmetry rounding alone would tell: the axis along which
+/// the surface is the most even follows from the other two.
+fn signed(axes: [DVec3; 3], moments: [[f64; 3]; 3], thirds: [f64; 3]) -> [DVec3; 3] {
+    let skew = |i: usize| {
+        let variance: f64 = (0..3).map(|a| (0..3).map(|b| axes[i][a] * moments[a][b] * axes[i][b]).sum::<f64>()).sum();
+        thirds[i].abs() / (variance * variance.sqrt()).max(f64::MIN_POSITIVE)
+    };
+    let even = (0..3).min_by(|&a, &b| skew(a).total_cmp(&skew(b))).unwrap_or(2);
+    let mut signed = axes;
+    for i in (0..3).filter(|&i| i != even && thirds[i] < 0.0) {
+        signed[i] = -signed[i];
+    }
+    signed[even] = signed[(even + 1) % 3].cross(signed[(even + 2) % 3]);
+    signed
 }
 
 /// Welds points of equal position and sorts points and triangles; drops triangles without three finite corners.
