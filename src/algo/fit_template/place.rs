@@ -200,7 +200,7 @@ impl Work<'_> {
             let left = self.hypothesis.alignment.rotation * Vec3::X;
             let out = (line.at(line.free) - attach).dot(left) * WING_ROOT;
             root += left * (out - (root - attach).dot(left));
-            root = self.beside_spine(root, attach);
+            root = self.beside_spine(limb, root, attach);
         }
         let rest: Vec<f32> = limb.joints.iter().map(|&j| template.length(j, end) + limb.beyond).collect();
         let whole = rest[0];
@@ -347,8 +347,10 @@ impl Work<'_> {
                         (self.ball_place(limb.kind, line) + turn * away * balls).dot(along)
                     }
                     None if template.is_on_fours() => self.over_legs(limb, line, joint, place).dot(along),
-                    None if limb.kind == LimbKind::Wing => self.behind_wing(limb, line, joint).dot(along),
-                    None => line.at(line.free).dot(along),
+                    None => {
+                        let of_wing = (limb.kind == LimbKind::Wing).then(|| self.between_ends(joint)).flatten();
+                        of_wing.unwrap_or_else(|| line.at(line.free)).dot(along)
+                    }
                 };
                 sum += wanted - place.dot(along);
                 count += 1.0;

@@ -20,11 +20,6 @@ const GAP: f32 = 2.0;
 const OVER_FEET: f32 = 0.5;
 const BEFORE_LEGS: f32 = 0.25;
 
-/// Part of a wing next to the trunk that tells, in the mean, where its root lies along the trunk, as a share of its free length,
-/// and the number of places of which the mean is taken: the last one depends on where the wing runs into the trunk.
-const WING_BASE: f32 = 0.08;
-const WING_PLACES: usize = 9;
-
 impl Work<'_> {
     /// Directions of a bird's trunk: along it to the chest, left, and across it to the back; `None` for other templates.
     fn axes_of_bird(&self) -> Option<[Vec3; 3]> {
@@ -53,18 +48,28 @@ impl Work<'_> {
         trunk.map_or(place, |(low, high)| place + across * (low + SPINE * (high - low)))
     }
 
-    /// Place of the joint that carries a wing, as far along the trunk as the wing tells: its root lies before that joint as in the
-    /// template.
-    pub(super) fn behind_wing(&self, limb: &Limb, line: &CentreLine, joint: usize) -> Vec3 {
-        let shares = (0..WING_PLACES).map(|i| 1.0 - WING_BASE * i as f32 / (WING_PLACES - 1) as f32);
-        let sum: Vec3 = shares.map(|share| line.at(share * line.free)).sum();
-        let beside = self.template.positions[limb.joints[0]] - self.template.positions[joint];
-        sum / WING_PLACES as f32 - self.hypothesis.alignment.rotation * (beside * self.standing)
+    /// Place of a joint along a bird's trunk, as the template has it between where the tail and where the neck leave the trunk.
+    /// Where a wing leaves it depends on its pose and on its feathers. `None` for other templates.
+    pub(super) fn between_ends(&self, joint: usize) -> Option<Vec3> {
+        self.axes_of_bird()?;
+        let end = |kind: LimbKind| {
+            let mut own = self.template.limbs.iter().zip(&self.lines).filter(|(limb, _)| limb.kind == kind);
+            let (limb, line) = own.next()?;
+            let line = line.as_ref()?;
+            Some((self.template.positions[*limb.joints.first()?], line.at(line.free)))
+        };
+        let (tail, neck) = (end(LimbKind::Tail)?, end(LimbKind::Head)?);
+        let rest = neck.0 - tail.0;
+        let share = (self.template.positions[joint] - tail.0).dot(rest) / rest.length_squared().max(1e-12);
+        Some(tail.1.lerp(neck.1, share))
     }
 
-    /// The root of a bird's wing beside the joint that carries it: a bird's shoulders lie at the sides of its spine, not over it.
-    pub(super) fn beside_spine(&self, root: Vec3, attach: Vec3) -> Vec3 {
-        self.axes_of_bird().map_or(root, |[.., across]| root - across * (root - attach).dot(across))
+    /// The root of a bird's wing, as far along the trunk as the template has it and beside the joint that carries it: a bird's
+    /// shoulders lie at the sides of its spine, not over it.
+    pub(super) fn beside_spine(&self, limb: &Limb, root: Vec3, attach: Vec3) -> Vec3 {
+        let Some([along, _, across]) = self.axes_of_bird() else { return root };
+        let root = root - across * (root - attach).dot(across);
+        self.between_ends(limb.joints[0]).map_or(root, |place| root + along * (place - root).dot(along))
     }
 
     /// Moves the first joint of a bird's tail to where the spine leaves the trunk.
