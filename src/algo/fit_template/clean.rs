@@ -14,6 +14,9 @@ const SPECK_AREA: f64 = 2e-3;
 /// Share of the whole surface that all specks together may have; a soup of loose triangles is kept.
 const SPECKS_AREA: f64 = 0.06;
 
+/// Skewness of the surface along an axis below which it is even there.
+const EVEN: f64 = 5e-3;
+
 /// Grain of positions in unit space, a power of two.
 const GRAIN: f32 = 1.0 / 262_144.0;
 
@@ -102,7 +105,7 @@ pub(super) fn clean(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<CleanMesh
             *third += area * q.dot(axis).powi(3);
         }
     }
-    let [x, y, z] = signed(axes, moments, thirds);
+    let [x, y, z] = signed(axes, moments, thirds, total);
     let turn = DMat3::from_cols(x, y, z).transpose();
     let mut space = UnitSpace { centre, turn, scale: 1.0 };
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -121,14 +124,14 @@ pub(super) fn clean(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<CleanMesh
     Some(CleanMesh { points, triangles, space, specks })
 }
 
-/// Axes that lead where the surface reaches furthest. Across a plane of symmetry rounding alone would tell: the axis along which
-/// the surface is the most even follows from the other two.
-fn signed(axes: [DVec3; 3], moments: [[f64; 3]; 3], thirds: [f64; 3]) -> [DVec3; 3] {
-    let skew = |i: usize| {
+/// Axes that lead where the surface reaches furthest; one follows from the other two. That is the third one, or one across a plane
+/// of symmetry, whose sign rounding alone would tell. `area` is that of the surface, of which the moments are sums.
+fn signed(axes: [DVec3; 3], moments: [[f64; 3]; 3], thirds: [f64; 3], area: f64) -> [DVec3; 3] {
+    let is_even = |&i: &usize| {
         let variance: f64 = (0..3).map(|a| (0..3).map(|b| axes[i][a] * moments[a][b] * axes[i][b]).sum::<f64>()).sum();
-        thirds[i].abs() / (variance * variance.sqrt()).max(f64::MIN_POSITIVE)
+        thirds[i].abs() * area.sqrt() < EVEN * variance * variance.sqrt()
     };
-    let even = (0..3).min_by(|&a, &b| skew(a).total_cmp(&skew(b))).unwrap_or(2);
+    let even = [0, 1].into_iter().find(is_even).unwrap_or(2);
     let mut signed = axes;
     for i in (0..3).filter(|&i| i != even && thirds[i] < 0.0) {
         signed[i] = -signed[i];
