@@ -17,6 +17,9 @@ use crate::mesh::adjacency;
 const WIDEST: f64 = 9.0;
 /// Most edges of a ring whose triangulations are tried; the work grows with the cube of their number.
 const SHORT: usize = 12;
+/// Mean angle, in radians, by which the least bent triangulation of a ring bends along it, above which the ring is an opening that
+/// was made, such as a sleeve, and not what missing faces leave.
+const STEEP: f32 = 1.2;
 
 /// Closes the small holes of `triangles`, whose points are welded; adds points in the middle of long rings.
 pub(super) fn close_holes(points: &mut Vec<Vec3>, triangles: &mut Vec<[u32; 3]>) {
@@ -40,8 +43,11 @@ pub(super) fn close_holes(points: &mut Vec<Vec3>, triangles: &mut Vec<[u32; 3]>)
             continue;
         }
         if ring.len() <= SHORT {
-            caps.extend(flattest(points, triangles, &rims, &ring));
-            continue;
+            let (bend, least_bent) = flattest(points, triangles, &rims, &ring);
+            if ring.len() <= 4 || bend <= STEEP * length as f32 {
+                caps.extend(least_bent);
+                continue;
+            }
         }
         let middle = (0..ring.len()).map(at).sum::<DVec3>() / ring.len() as f64;
         let centre = points.len() as u32;
@@ -58,8 +64,13 @@ fn cross(points: &[Vec3], corners: [u32; 3]) -> DVec3 {
 }
 
 /// The triangulation of a short ring that bends least: the least sum of angles between triangles, times the lengths of the
-/// edges between them.
-fn flattest(points: &[Vec3], triangles: &[[u32; 3]], rims: &BTreeMap<(u32, u32), u32>, ring: &[u32]) -> Vec<[u32; 3]> {
+/// edges between them; with that sum.
+fn flattest(
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    rims: &BTreeMap<(u32, u32), u32>,
+    ring: &[u32],
+) -> (f32, Vec<[u32; 3]>) {
     let count = ring.len();
     let corners = |[i, m, k]: [usize; 3]| [ring[i], ring[m], ring[k]];
     let bend = |edge: [usize; 2], a: DVec3, b: DVec3| {
@@ -108,7 +119,7 @@ fn flattest(points: &[Vec3], triangles: &[[u32; 3]], rims: &BTreeMap<(u32, u32),
             open.extend([(first, middle), (middle, last)]);
         }
     }
-    caps
+    (best[count - 1].0, caps)
 }
 
 /// Edges that one triangle uses, against the direction of that triangle, with its number.
