@@ -71,6 +71,33 @@ fn bundled(density: usize) -> Head {
     rigged(mesh, shells, landmarks, marks, density)
 }
 
+/// The scan of the test data, whose lips touch, with bones at the landmarks that are found on it; `None` where there is none.
+/// Points of a lip face the other lip: without that the points nearest to two landmarks would lie on one lip both.
+#[track_caller]
+fn scan(density: usize) -> Option<Head> {
+    let folder = test_data()?;
+    let mesh = heads::mesh(&folder.join("heads/lee_perry_smith.obj"));
+    let shells = find_shells(&mesh.0, &mesh.1);
+    let landmarks = find_landmarks(&mesh.0, &mesh.1, &shells).unwrap();
+    let mut normals = vec![Vec3::ZERO; mesh.0.len()];
+    for corners in &mesh.1 {
+        let [a, b, c] = corners.map(|corner| mesh.0[corner as usize]);
+        corners.iter().for_each(|corner| normals[*corner as usize] += (b - a).cross(c - a));
+    }
+    let nearest = |(mark, place): (usize, &Vec3)| {
+        let faces_other_lip = |point: &usize| match mark {
+            61..=63 => normals[*point].y < 0.0,
+            65..=67 => normals[*point].y > 0.0,
+            _ => true,
+        };
+        let distance = |point: &usize| mesh.0[*point].distance_squared(*place);
+        let fitting = (0..mesh.0.len()).filter(faces_other_lip);
+        fitting.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
+    };
+    let marks = landmarks.points.iter().enumerate().map(nearest).collect();
+    Some(rigged(mesh, shells, landmarks, marks, density))
+}
+
 fn rigged(
     (points, triangles): heads::Mesh,
     shells: Shells,

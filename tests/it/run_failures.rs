@@ -50,48 +50,21 @@ fn a_cycle_names_tags_and_joints() {
     assert_eq!(gone.words(&rig), gone.0.to_string());
 }
 
-/// Two joints that follow each other.
-const LOOP: &str = r#"(
-    format: 2,
-    name: "loop",
-    joints: [
-        (label: "a", tags: [point(targets: "@joint b")]),
-        (label: "b", translation: (1, 0, 0), tags: [point(targets: "@joint a")]),
-    ],
-)
-"#;
-
 /// The command line, and apps without a window, tell a cycle of the program as the window does.
-#[cfg(feature = "cli")]
 #[test]
-fn the_command_line_tells_a_cycle_by_names() {
-    use std::{fs, sync::Arc};
+fn apps_without_a_window_tell_a_cycle_by_names() {
+    use rigsmith::{headless::Workbench, plugins::commands::BuildStep};
 
-    use rigsmith::{
-        headless::Workbench, modules, plugins::commands::BuildStep, processor::Builder, solve::program::RigProgram,
-    };
-
-    use crate::cli_outputs::{json, rig};
-
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("loop.rig.ron"), LOOP).unwrap();
-    let rig = rig(folder.path(), "loop.rig.ron");
-    let built = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
-    let error = RigProgram::check(&built).unwrap_err();
-    assert!(matches!(error, ProgramError::Cycle { .. }), "{error}");
-    let words = format!("the built rig cannot run: {}", RunFailure(error).words(&rig));
-    for part in ["\"point on a\"", "\"point on b\"", "wait for each other"] {
-        assert!(words.contains(part), "{words}");
-    }
-    for command in ["build", "pose"] {
-        let (code, told) = json(folder.path(), &[command, "loop.rig.ron"]);
-        let error = &told["error"];
-        let said = format!("{}; {}", error["what"].as_str().unwrap(), error["do"].as_str().unwrap());
-        assert_eq!((code, said), (1, words.clone()), "{command}: {told}");
-    }
-    let mut bench = Workbench::with_rig(1, rig);
+    let rig = shipped("biped");
+    let mut bench = Workbench::with_rig(1, rig.clone());
     bench.build(BuildStep::All);
-    assert_eq!(bench.runtime().map(drop).unwrap_err().to_string(), words);
+    assert!(bench.runtime().is_ok());
+    let failure = cycle(&rig, commands(&rig, "hand_l", "ik_fk_switch"));
+    let words = failure.words(&rig);
+    let entity = bench.rig_entity();
+    bench.app_mut().world_mut().entity_mut(entity).insert(failure);
+    let told = bench.runtime().map(drop).unwrap_err().to_string();
+    assert_eq!(told, format!("the built rig cannot run: {words}"));
 }
 
 /// A reference to two joints, of which the rig has the first alone, is blamed on the second.

@@ -2,6 +2,7 @@
 
 mod inputs;
 mod pieces;
+mod trunks;
 
 use std::ops::Range;
 

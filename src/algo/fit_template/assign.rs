@@ -6,7 +6,7 @@
 
 mod front;
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 
 use super::{
     align::{self, Similarity},
@@ -74,6 +74,8 @@ pub(super) struct Hypothesis {
     /// The leaf (an arc of the branches) of each limb of the template.
     pub(super) leaves: Vec<Option<usize>>,
     pub(super) alignment: Similarity,
+    /// Turn of a bird's trunk and legs, where tail and neck tell it.
+    pub(super) trunk: Option<Quat>,
     /// Pairs of template positions and places on centre lines that the alignment was made from.
     pub(super) pairs: Vec<(Vec3, Vec3, f32)>,
     /// Penalty; smaller is better.
@@ -157,9 +159,7 @@ pub(super) fn assign(
         }
     }
     for hypothesis in &mut kept {
-        if let Some(turn) = level::level(template, &trees[hypothesis.tree], hypothesis, directions) {
-            hypothesis.alignment = hypothesis.alignment.turned(turn, &hypothesis.pairs);
-        }
+        level::stand(template, &trees[hypothesis.tree], hypothesis, directions);
     }
     kept
 }
@@ -488,7 +488,7 @@ impl Search<'_> {
                 cost += 2.0 * (away - nearest);
             }
         }
-        let mut found = Hypothesis { tree: self.number, leaves, alignment, pairs, cost, rest, weight };
+        let mut found = Hypothesis { tree: self.number, leaves, alignment, trunk: None, pairs, cost, rest, weight };
         if !template.is_upright() {
             let turn = level::level(template, self.tree, &found, self.directions).unwrap_or(alignment.rotation);
             let up = turn * Vec3::Y;

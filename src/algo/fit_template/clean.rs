@@ -14,6 +14,9 @@ const SPECK_AREA: f64 = 2e-3;
 /// Share of the whole surface that all specks together may have; a soup of loose triangles is kept.
 const SPECKS_AREA: f64 = 0.06;
 
+/// Skewness of the surface along an axis below which it is even there.
+const EVEN: f64 = 5e-3;
+
 /// Grain of positions in unit space, a power of two.
 const GRAIN: f32 = 1.0 / 262_144.0;
 
@@ -102,9 +105,8 @@ pub(super) fn clean(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<CleanMesh
             *third += area * q.dot(axis).powi(3);
         }
     }
-    let sign = |i: usize| if thirds[i] < 0.0 { -axes[i] } else { axes[i] };
-    let (x, y) = (sign(0), sign(1));
-    let turn = DMat3::from_cols(x, y, x.cross(y)).transpose();
+    let [x, y, z] = signed(axes, moments, thirds, total);
+    let turn = DMat3::from_cols(x, y, z).transpose();
     let mut space = UnitSpace { centre, turn, scale: 1.0 };
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for point in triangles.iter().flat_map(corners) {
@@ -120,6 +122,22 @@ pub(super) fn clean(points: &[Vec3], triangles: &[[u32; 3]]) -> Option<CleanMesh
     let unit: Vec<Vec3> = points.iter().map(|&p| (space.to_unit(p) / GRAIN).round() * GRAIN).collect();
     let (points, triangles) = sorted(&unit, &triangles);
     Some(CleanMesh { points, triangles, space, specks })
+}
+
+/// Axes that lead where the surface reaches furthest; one follows from the other two. That is the third one, or one across a plane
+/// of symmetry, whose sign rounding alone would tell. `area` is that of the surface, of which the moments are sums.
+fn signed(axes: [DVec3; 3], moments: [[f64; 3]; 3], thirds: [f64; 3], area: f64) -> [DVec3; 3] {
+    let is_even = |&i: &usize| {
+        let variance: f64 = (0..3).map(|a| (0..3).map(|b| axes[i][a] * moments[a][b] * axes[i][b]).sum::<f64>()).sum();
+        thirds[i].abs() * area.sqrt() < EVEN * variance * variance.sqrt()
+    };
+    let even = [0, 1].into_iter().find(is_even).unwrap_or(2);
+    let mut signed = axes;
+    for i in (0..3).filter(|&i| i != even && thirds[i] < 0.0) {
+        signed[i] = -signed[i];
+    }
+    signed[even] = signed[(even + 1) % 3].cross(signed[(even + 2) % 3]);
+    signed
 }
 
 /// Welds points of equal position and sorts points and triangles; drops triangles without three finite corners.

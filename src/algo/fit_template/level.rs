@@ -1,4 +1,5 @@
-//! Level: how an animal on all fours stands, from its plane of symmetry and the ends of its legs.
+//! Level: how an animal on all fours stands, from its plane of symmetry and the ends of its legs, and how the trunk of a bird
+//! lies, from its tail and its neck.
 //!
 //! The alignment of a template's joints with centre lines tips to and fro with the proportions of legs, neck and tail. What
 //! stands on four feet shows its directions: left across the plane of symmetry, and the ground through the ends of its legs.
@@ -20,6 +21,14 @@ const STANDS: f32 = 0.8;
 /// ground.
 const APART: f32 = 0.4;
 
+/// Turns a hypothesis to how an animal stands, and tells how a bird's trunk lies.
+pub(super) fn stand(template: &TemplateLimbs, tree: &Tree, hypothesis: &mut Hypothesis, directions: &Directions) {
+    hypothesis.trunk = along_trunk(template, tree, hypothesis, directions);
+    if let Some(turn) = level(template, tree, hypothesis, directions) {
+        hypothesis.alignment = hypothesis.alignment.turned(turn, &hypothesis.pairs);
+    }
+}
+
 /// The turn of an animal on all fours; `None` for other templates, and where its legs are raised.
 pub(super) fn level(
     template: &TemplateLimbs,
@@ -35,16 +44,40 @@ pub(super) fn level(
     if way.length() < APART * hypothesis.alignment.scale * rest.length() {
         return None;
     }
+    // A ground that a person tells is level.
+    let way = directions.up.map_or(way, |up| way - up * way.dot(up));
+    turned_by(turn, rest, way, directions)
+}
+
+/// The turn of a bird, whose trunk lies between its tail and its neck as the template's does: wings and legs, which are posed,
+/// tip the alignment of all joints. `None` for other templates, without a tail or a neck, and where the two are far apart.
+fn along_trunk(
+    template: &TemplateLimbs,
+    tree: &Tree,
+    hypothesis: &Hypothesis,
+    directions: &Directions,
+) -> Option<Quat> {
+    if !template.has_hidden_knees() {
+        return None;
+    }
+    let end = |kind: LimbKind| {
+        let at = template.limbs.iter().position(|limb| limb.kind == kind)?;
+        let line = tree.lines[(*hypothesis.leaves.get(at)?)?].among(&tree.branches, &hypothesis.leaves);
+        Some((template.positions[*template.limbs[at].joints.first()?], line.at(line.free)))
+    };
+    let (tail, neck) = (end(LimbKind::Tail)?, end(LimbKind::Head)?);
+    turned_by(hypothesis.alignment.rotation, neck.0 - tail.0, neck.1 - tail.1, directions)
+}
+
+/// The turn that keeps left, across the plane of symmetry, and takes a way of the template to one of the mesh.
+fn turned_by(turn: Quat, rest: Vec3, way: Vec3, directions: &Directions) -> Option<Quat> {
     let left = turn * Vec3::X;
     let left = match directions.mirror {
         Some((_, normal)) if left.dot(normal).abs() > SAME_LEFT => normal * left.dot(normal).signum(),
         _ => left,
     };
     let without = |way: Vec3, axis: Vec3| way - axis * way.dot(axis);
-    let (left, way) = match directions.up {
-        Some(up) => (without(left, up).try_normalize()?, without(way, up)),
-        None => (left, way),
-    };
+    let left = directions.up.map_or(left, |up| without(left, up)).try_normalize()?;
     let along = without(way, left).try_normalize()?;
     let rest = without(rest, Vec3::X).try_normalize()?;
     let to = Mat3::from_cols(left, along, left.cross(along));

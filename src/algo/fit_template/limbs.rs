@@ -130,6 +130,11 @@ impl TemplateLimbs {
         limb.kind == LimbKind::Leg && !self.is_upright() && !self.is_on_fours() && limb.joints.len() > 3
     }
 
+    /// True if some leg has such a knee: the trunk of a bird, whose legs carry it before its hips.
+    pub(super) fn has_hidden_knees(&self) -> bool {
+        self.limbs.iter().any(|limb| self.has_hidden_knee(limb))
+    }
+
     /// Number of limbs of a kind.
     pub(super) fn count(&self, kind: LimbKind) -> usize {
         self.limbs.iter().filter(|l| l.kind == kind).count()

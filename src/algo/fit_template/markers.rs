@@ -62,6 +62,13 @@ fn hidden_hinge(template: &TemplateLimbs, limb: &Limb) -> Option<(usize, usize)>
     template.has_hidden_knee(limb).then_some(joints)
 }
 
+/// Hip and knee that the trunk hides: both are placed by where the leg leaves it, so one that lies too low or too far back tells
+/// it of the other. How far a knee sticks out tells nothing about the hip.
+fn hidden_thigh(template: &TemplateLimbs, limb: &Limb) -> Option<[usize; 2]> {
+    let joints = [*limb.joints.first()?, *limb.joints.get(1)?];
+    template.has_hidden_knee(limb).then_some(joints)
+}
+
 /// The part of a move from a place inside of the volume that goes at most half way to the surface.
 fn within(place: Vec3, way: Vec3, is_solid: &dyn Fn(Vec3) -> bool) -> Vec3 {
     if !is_solid(place) {
@@ -87,6 +94,7 @@ pub(super) fn warp(
         return;
     }
     let moves: Vec<Vec3> = markers.iter().map(|m| m.place - places[m.joint]).collect();
+    let starts = places.to_vec();
     let mut children = vec![Vec::new(); places.len()];
     for (joint, parent) in template.parents.iter().enumerate() {
         if let Some(parent) = parent {
@@ -126,6 +134,17 @@ pub(super) fn warp(
             let above = template.parents[joint];
             is_below[joint] = joint == marker.joint || above.is_some_and(|above| is_below[above]);
             is_carried[joint] |= is_below[joint];
+        }
+        for [hip, knee] in template.limbs.iter().filter_map(|limb| hidden_thigh(template, limb)) {
+            let other = match marker.joint {
+                joint if joint == hip => knee,
+                joint if joint == knee => hip,
+                _ => continue,
+            };
+            let image = template.mirror[other].map_or(Vec3::ZERO, |image| starts[other] - starts[image]);
+            let left = image.normalize_or_zero();
+            sums[other].0 += way - left * way.dot(left);
+            sums[other].1 += 1.0;
         }
         let mut open = vec![marker.joint];
         while let Some(joint) = open.pop() {

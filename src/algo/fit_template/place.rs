@@ -60,12 +60,17 @@ pub(super) struct Placement {
 
 /// Places all joints of a template by a hypothesis.
 pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, hypothesis: &Hypothesis) -> Placement {
+    let forward = hypothesis.alignment.rotation * Vec3::Z;
+    let posed = hypothesis.trunk.map(|turn| {
+        let alignment = hypothesis.alignment.turned(turn, &hypothesis.pairs);
+        Hypothesis { alignment, ..hypothesis.clone() }
+    });
+    let hypothesis = posed.as_ref().unwrap_or(hypothesis);
     let stretch = Stretch::fit(&hypothesis.pairs, &hypothesis.alignment);
     let count = template.positions.len();
     let mut reasons = vec![FitReason::Proportion; count];
     let mut strain = vec![0.0; count];
     let mut along_limb = vec![1.0; count];
-    let forward = hypothesis.alignment.rotation * Vec3::Z;
     let line = |(limb, leaf): (&Limb, &Option<usize>)| {
         let leaf = (*leaf)?;
         let line = tree.lines[leaf].among(&tree.branches, &hypothesis.leaves);
@@ -101,6 +106,8 @@ pub(super) fn place(template: &TemplateLimbs, tree: &Tree, graph: &VoxelGraph, h
         work.keep_over_foot(limb, line, &lengths, &mut places);
         work.stand_on_sole(limb, *leaf, &mut places);
     }
+    work.carry_by_legs(&mut places);
+    work.hang_tail(&mut places);
     Placement { places: follow(template, &stretch, &places), reasons, strain, along: along_limb }
 }
 
@@ -193,6 +200,7 @@ impl Work<'_> {
             let left = self.hypothesis.alignment.rotation * Vec3::X;
             let out = (line.at(line.free) - attach).dot(left) * WING_ROOT;
             root += left * (out - (root - attach).dot(left));
+            root = self.beside_spine(limb, root, attach);
         }
         let rest: Vec<f32> = limb.joints.iter().map(|&j| template.length(j, end) + limb.beyond).collect();
         let whole = rest[0];
@@ -320,7 +328,8 @@ impl Work<'_> {
             (Some(a), Some(b)) if trunk.len() > 1 => {
                 let way = *b - *a;
                 let up = turn * Vec3::Y;
-                (if upright { way } else { way - up * way.dot(up) }).normalize_or_zero()
+                let is_level = !upright && !template.has_hidden_knees();
+                (if is_level { way - up * way.dot(up) } else { way }).normalize_or_zero()
             }
             _ => return places,
         };
@@ -338,7 +347,10 @@ impl Work<'_> {
                         (self.ball_place(limb.kind, line) + turn * away * balls).dot(along)
                     }
                     None if template.is_on_fours() => self.over_legs(limb, line, joint, place).dot(along),
-                    None => line.at(line.free).dot(along),
+                    None => {
+                        let of_wing = (limb.kind == LimbKind::Wing).then(|| self.between_ends(joint)).flatten();
+                        of_wing.unwrap_or_else(|| line.at(line.free)).dot(along)
+                    }
                 };
                 sum += wanted - place.dot(along);
                 count += 1.0;
@@ -365,7 +377,8 @@ impl Work<'_> {
         if template.is_on_fours() {
             return self.under_back(&places, along, left, across);
         }
-        places.iter().map(|&place| self.in_section(place, along, left, across, upright)).collect()
+        let in_section = |place: &Vec3| self.in_trunk(self.in_section(*place, along, left, across, upright));
+        places.iter().map(in_section).collect()
     }
 
     /// Moves a place of the trunk across it, to where the spine is in its section.

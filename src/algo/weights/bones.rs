@@ -17,7 +17,7 @@ use super::{
 };
 
 /// Length of a last bone in the flesh beyond its joint, as a share of the reach of that flesh.
-const LEAF_REACH: f32 = 0.8;
+pub(super) const LEAF_REACH: f32 = 0.8;
 /// Approximate number of points that measure the girth of bones.
 const SAMPLES: usize = 8192;
 /// The share of the flesh around a bone that lies within its girth.
@@ -41,7 +41,7 @@ impl Bones {
     /// True if a bone may hold flesh of an island: the body parts that a bone runs through are its own. Parts that no
     /// bone runs through, as hats and capes, belong to the bones of the part that they lie on.
     pub fn may_hold(&self, bone: u32, island: usize) -> bool {
-        self.homes.is_at_home(self.segments[bone as usize].joint, island)
+        self.homes.may_hold(bone, self.segments[bone as usize].joint, island)
     }
 
     /// Bones without those of slots, for islands that are bound without regard to body parts.
@@ -123,7 +123,7 @@ pub(crate) fn build(
     let homes = Homes::new(joints, (claims, slots), &segments, points, sight);
     grow_leaves(joints, &mut segments, &leaves, points, areas, (sight, &homes));
     let tree = BoneTree::new(&segments);
-    let girths = girths(&segments, &tree, points, areas, sight);
+    let girths = girths(&segments, &tree, points, areas, (sight, &homes));
     Bones { segments, girths, tree, homes }
 }
 
@@ -256,7 +256,7 @@ fn grow_leaves(
                 let island = sight.island(index);
                 let cost = |b: u32| {
                     let segment = &segments[b as usize];
-                    let may_hold = homes.is_at_home(segment.joint, island);
+                    let may_hold = homes.may_hold(b, segment.joint, island);
                     if may_hold { closest_on(segment, point).distance(point) } else { f32::INFINITY }
                 };
                 tree.nearest(point, 1e-4, cost, &mut near);
@@ -306,7 +306,13 @@ fn incoming_direction(joints: &[WeightJoint], joint: usize) -> Option<Vec3> {
 
 /// Usual reach of the surface around each bone: a high quantile, by area, of the distances of the points that
 /// are nearest to the bone and see it.
-fn girths(segments: &[BoneSegment], tree: &BoneTree, points: &[Vec3], areas: &[f32], sight: &Sight) -> Vec<f32> {
+fn girths(
+    segments: &[BoneSegment],
+    tree: &BoneTree,
+    points: &[Vec3],
+    areas: &[f32],
+    (sight, homes): (&Sight, &Homes),
+) -> Vec<f32> {
     let stride = points.len().div_ceil(SAMPLES).max(1);
     let samples: Vec<usize> = (0..points.len()).step_by(stride).collect();
     let measured: Vec<Option<(u32, f32)>> = samples
@@ -314,9 +320,14 @@ fn girths(segments: &[BoneSegment], tree: &BoneTree, points: &[Vec3], areas: &[f
         .flat_map_iter(|chunk| {
             let mut near = Vec::new();
             chunk.iter().map(move |&p| {
-                let point = points[p];
-                tree.nearest(point, 0.0, |b| closest_on(&segments[b as usize], point).distance(point), &mut near);
-                let &(distance, bone) = near.first()?;
+                let (point, island) = (points[p], sight.island(p));
+                let cost = |b: u32| {
+                    let segment = &segments[b as usize];
+                    let may_hold = homes.may_hold(b, segment.joint, island);
+                    if may_hold { closest_on(segment, point).distance(point) } else { f32::INFINITY }
+                };
+                tree.nearest(point, 0.0, cost, &mut near);
+                let &(distance, bone) = near.first().filter(|nearest| nearest.0.is_finite())?;
                 sight.clear(p, point, closest_on(&segments[bone as usize], point)).then_some((bone, distance))
             })
         })

@@ -17,10 +17,11 @@ const IN_NECK: f32 = 0.45;
 /// A last joint outside of the surface is set into the flesh if it is no further from it than this share of the bone that leads
 /// there.
 const BESIDE: f32 = 0.15;
-/// A joint no further outside than this share of the thickness of the flesh is on the skin, as the ball of a baby's foot, and stays.
-const FLUSH: f32 = 0.06;
+/// A joint at least this share of the thickness of the flesh outside is set into the middle of it, and one that is nearer less
+/// deep. So a joint flush with the skin, as in the ball of a baby's foot, lies by the skin, whichever side of it the joint is on.
+const APART: f32 = 0.12;
 
-/// The joints, with last ones that lie just outside of the surface in the middle of the flesh that is nearest to them. Beside
+/// The joints, with last ones that lie just outside of the surface in the flesh that is nearest to them. Beside
 /// the finger, the bone of a last joint would see one side of the flesh, and little of it.
 pub(super) fn set_into_flesh(mut joints: Vec<WeightJoint>, sight: &Sight) -> Vec<WeightJoint> {
     let children = parents_first(&joints).1;
@@ -38,7 +39,8 @@ pub(super) fn set_into_flesh(mut joints: Vec<WeightJoint>, sight: &Sight) -> Vec
         let inward = (skin - head) / gap;
         // A little below the skin, so that the first surface met is the one behind the flesh.
         let thickness = sight.first(skin + inward * SAME, inward)?;
-        (gap > FLUSH * thickness).then(|| skin + inward * thickness * 0.5)
+        let depth = (gap / (APART * thickness)).min(1.0) * thickness * 0.5;
+        Some(skin + inward * depth.max(SAME))
     };
     let places: Vec<Option<Vec3>> = (0..joints.len()).map(inner).collect();
     for (joint, place) in joints.iter_mut().zip(places) {

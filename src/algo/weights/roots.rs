@@ -7,6 +7,7 @@ use super::{
     WeightJoint,
     bone::BoneSegment,
     bone_tree::{BoneTree, closest_on},
+    bones::LEAF_REACH,
     sight::Sight,
 };
 
@@ -155,6 +156,8 @@ pub(crate) struct Homes {
     parts: Vec<Vec<bool>>,
     /// Flag of each joint: whether it is a slot; empty if nothing else holds flesh.
     slots: Vec<bool>,
+    /// Bones that lead to limbs which are parts of their own, by the island that they hold nothing of; sorted.
+    links: Vec<(usize, u32)>,
 }
 
 /// Approximate number of points of a part without bones that look for the part that it lies on.
@@ -183,7 +186,7 @@ impl Homes {
             }
             parts[part] = if at_home.contains(&true) { at_home } else { Vec::new() };
         }
-        separate_limbs(&mut parts, joints, segments, sight);
+        let mut links = separate_limbs(&mut parts, joints, segments, points, sight);
         for joint in (0..claims.len()).filter(|&joint| claims[joint]) {
             if parts.iter().all(|part: &Vec<bool>| part.get(joint) != Some(&true)) {
                 parts.iter_mut().filter_map(|part| part.get_mut(joint)).for_each(|is_home| *is_home = true);
@@ -199,11 +202,16 @@ impl Homes {
             if parts[part].is_empty() {
                 let stride = members[part].len().div_ceil(SAMPLES).max(1);
                 let samples = members[part].iter().step_by(stride).map(|&point| points[point]);
-                parts[part] = parts[bearer(samples, &bearers, sight)].clone();
+                let bearer = bearer(samples, &bearers, sight);
+                parts[part] = parts[bearer].clone();
+                let of_bearer: Vec<u32> =
+                    links.iter().filter(|(island, _)| *island == bearer).map(|(_, bone)| *bone).collect();
+                links.extend(of_bearer.into_iter().map(|bone| (part, bone)));
             }
         }
+        links.sort_unstable();
         if segments.iter().all(|segment| slots[segment.joint as usize]) {
-            return Self { parts, slots: Vec::new() };
+            return Self { parts, slots: Vec::new(), links };
         }
         // Only now, so that what lies on such a part, as a book in a hand, may be a slot's.
         for part in bearers {
@@ -211,7 +219,12 @@ impl Homes {
                 parts[part].iter_mut().zip(slots).for_each(|(is_home, is_slot)| *is_home &= !is_slot);
             }
         }
-        Self { parts, slots: slots.to_vec() }
+        Self { parts, slots: slots.to_vec(), links }
+    }
+
+    /// True if a bone of a joint may hold flesh of an island.
+    pub fn may_hold(&self, bone: u32, joint: u32, island: usize) -> bool {
+        self.is_at_home(joint, island) && self.links.binary_search(&(island, bone)).is_err()
     }
 
     /// True if a joint may hold flesh of an island.
@@ -231,8 +244,18 @@ impl Homes {
 /// Takes the bones of limbs that are parts of their own from the parts of the trunk in which they begin, with all bones below. A
 /// limb is a part of its own if a part holds its first bone and not the joint above it, and if no part of the trunk runs along
 /// that bone, as sleeves and trouser legs do: around half of it at least, and with skin between it and its twin. A robe has no
-/// skin between the legs, and hangs from the hips.
-fn separate_limbs(parts: &mut [Vec<bool>], joints: &[WeightJoint], segments: &[BoneSegment], sight: &Sight) {
+/// skin between the legs, and hangs from the hips. A last joint has no bone yet: it runs on as far as the part that holds it alone,
+/// as that of a head which begins in a collar.
+///
+/// Returns the parts of trunks and the bones that lead to a pair of such limbs, sorted: these hold nothing there, as no flesh of
+/// the trunk leads to the limbs. Otherwise hips would hold all of a robe that lies beside the thighs.
+fn separate_limbs(
+    parts: &mut [Vec<bool>],
+    joints: &[WeightJoint],
+    segments: &[BoneSegment],
+    points: &[Vec3],
+    sight: &Sight,
+) -> Vec<(usize, u32)> {
     /// Share of a bone that a sleeve is around.
     const SLEEVE: f32 = 0.5;
     let mut bones: Vec<Vec<&BoneSegment>> = vec![Vec::new(); joints.len()];
@@ -241,7 +264,9 @@ fn separate_limbs(parts: &mut [Vec<bool>], joints: &[WeightJoint], segments: &[B
     }
     let is_home = |parts: &[Vec<bool>], part: usize, joint: usize| parts[part].get(joint) == Some(&true);
     let mut gone = vec![vec![false; joints.len()]; parts.len()];
-    for joint in parents_first(joints).0 {
+    let mut links = Vec::new();
+    let (order, children) = parents_first(joints);
+    for joint in order {
         let Some(parent) = joints[joint].parent else { continue };
         let homes: Vec<usize> = (0..parts.len()).filter(|&part| is_home(parts, part, joint)).collect();
         let (left, kept): (Vec<usize>, Vec<usize>) = homes.iter().copied().partition(|&part| gone[part][parent]);
@@ -249,11 +274,18 @@ fn separate_limbs(parts: &mut [Vec<bool>], joints: &[WeightJoint], segments: &[B
             left.iter().for_each(|&part| gone[part][joint] = true);
             continue;
         }
-        let [bone] = bones[joint][..] else { continue };
-        let around = |part: usize| share(bone.head, bone.tail, |place| sight.is_within(part, place));
         let (trunk, others): (Vec<usize>, Vec<usize>) =
             homes.into_iter().partition(|&part| is_home(parts, part, parent));
-        if trunk.is_empty() || !others.iter().any(|&part| around(part) >= AT_HOME) {
+        if trunk.is_empty() || others.is_empty() {
+            continue;
+        }
+        let bone = match bones[joint][..] {
+            [bone] => *bone,
+            [] if children[joint].is_empty() => last_bone(joint, parent, joints, &others, points, sight),
+            _ => continue,
+        };
+        let around = |part: usize| share(bone.head, bone.tail, |place| sight.is_within(part, place));
+        if bone.head == bone.tail || !others.iter().any(|&part| around(part) >= AT_HOME) {
             continue;
         }
         let twins: Vec<&BoneSegment> = (0..joints.len())
@@ -271,11 +303,39 @@ fn separate_limbs(parts: &mut [Vec<bool>], joints: &[WeightJoint], segments: &[B
         };
         if !trunk.iter().any(|&part| is_sleeve(part)) {
             trunk.iter().for_each(|&part| gone[part][joint] = true);
+            if !twins.is_empty() {
+                let ends = (joints[parent].head, joints[joint].head);
+                let leads = |bone: &usize| (segments[*bone].head, segments[*bone].tail) == ends;
+                let leading = (0..segments.len()).filter(leads);
+                links.extend(leading.flat_map(|bone| trunk.iter().map(move |&part| (part, bone as u32))));
+            }
         }
     }
     for (homes, gone) in parts.iter_mut().zip(gone) {
         homes.iter_mut().zip(gone).for_each(|(is_home, gone)| *is_home &= !gone);
     }
+    // A joint that leads to limbs alone holds the trunk by these bones.
+    links.sort_unstable();
+    let leads = |part: usize, bone: usize| links.binary_search(&(part, bone as u32)).is_ok();
+    let has_other =
+        |part: usize, joint: u32| (0..segments.len()).any(|bone| segments[bone].joint == joint && !leads(part, bone));
+    links.iter().copied().filter(|(part, bone)| has_other(*part, segments[*bone as usize].joint)).collect()
+}
+
+/// The bone of a last joint below `parent`, straight on and nearly as far as the farthest of some parts reaches.
+fn last_bone(
+    joint: usize,
+    parent: usize,
+    joints: &[WeightJoint],
+    parts: &[usize],
+    points: &[Vec3],
+    sight: &Sight,
+) -> BoneSegment {
+    let head = joints[joint].head;
+    let onwards = (head - joints[parent].head).normalize_or_zero();
+    let members = (0..points.len()).filter(|&point| parts.contains(&sight.island(point)));
+    let reach = members.map(|point| (points[point] - head).dot(onwards)).fold(0f32, f32::max);
+    BoneSegment { joint: joint as u32, head, tail: head + onwards * reach * LEAF_REACH }
 }
 
 /// True if two joints have one bone each, of about the same length and direction, and hang on one joint or on joints that do.

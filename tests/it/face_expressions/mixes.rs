@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use glam::{Vec3, vec3};
 use rigsmith::algo::face::expression::{ExpressionSet, FittedFace, MAX_STRENGTH, Mix, apply};
 
-use super::{Head, bundled, found, head};
+use super::{Head, bundled, found, head, scan};
 use crate::heads::HEADS;
 
 /// Upper and lower lids of an eye.
@@ -257,28 +257,60 @@ fn the_open_jaw_folds_no_more_than_it_did() {
     }
 }
 
+/// Adds the lips and lids that any expression crosses, at full strength or as a caricature.
+fn add_crossings(posable: &Posable, faults: &mut Faults) {
+    let Posable { name, head, .. } = posable;
+    let name = format!("{name} with {} bones", head.bones.len());
+    for expression in ExpressionSet::bundled().expressions() {
+        for strength in [1.0, MAX_STRENGTH] {
+            let moved = posable.moved(&expression.name, strength);
+            for [above, below] in APART {
+                let gap = |points: &[Vec3]| {
+                    let height = points[head.marks[above]].y - points[head.marks[below]].y;
+                    height / head.landmarks.eye_distance()
+                };
+                // Lips may overlap in the mesh itself.
+                let least = gap(&head.points).min(0.0) - 0.0001;
+                let told = format!("{name}, {} of {strength}: {above} above {below}", expression.name);
+                faults.check(&told, gap(&moved.points), least..=1.0);
+            }
+        }
+    }
+}
+
 /// Every expression, at full strength and as a caricature, keeps upper lips and lids above the lower ones.
 #[test]
 fn no_expression_crosses_lips_or_lids() {
     let mut faults = Faults::default();
     for posable in Posable::all().into_iter().chain(Posable::all_found()) {
-        let Posable { name, head, .. } = &posable;
-        let name = format!("{name} with {} bones", head.bones.len());
-        for expression in ExpressionSet::bundled().expressions() {
-            for strength in [1.0, MAX_STRENGTH] {
-                let moved = posable.moved(&expression.name, strength);
-                for [above, below] in APART {
-                    let gap = |points: &[Vec3]| {
-                        let height = points[head.marks[above]].y - points[head.marks[below]].y;
-                        height / head.landmarks.eye_distance()
-                    };
-                    // Lips may overlap in the mesh itself.
-                    let least = gap(&head.points).min(0.0) - 0.0001;
-                    let told = format!("{name}, {} of {strength}: {above} above {below}", expression.name);
-                    faults.check(&told, gap(&moved.points), least..=1.0);
-                }
-            }
-        }
+        add_crossings(&posable, &mut faults);
+    }
+    faults.assert_none();
+}
+
+/// Densities at which lips crossed whose points are between the places along the rims, or pass each other far.
+#[test]
+fn no_expression_crosses_lips_or_lids_at_other_densities() {
+    let mut faults = Faults::default();
+    let others = [
+        ("ict_neutral", 24),
+        ("ict_identity_1", 28),
+        ("ict_identity_1", 64),
+        ("ict_identity_1", 75),
+        ("ict_identity_3", 48),
+    ];
+    for posable in others.into_iter().filter_map(|(name, density)| Some(Posable::new(name, found(name, density)?))) {
+        add_crossings(&posable, &mut faults);
+    }
+    faults.assert_none();
+}
+
+/// A scan whose lips touch and whose eyes are shut.
+#[test]
+fn no_expression_crosses_lips_or_lids_of_a_scan() {
+    let mut faults = Faults::default();
+    for head in [20, 40, 80].into_iter().filter_map(scan) {
+        add_crossings(&Posable::new("lee_perry_smith", head), &mut faults);
     }
     faults.assert_none();
 }

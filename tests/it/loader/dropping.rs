@@ -379,7 +379,7 @@ fn adding_a_part_is_greyed_where_it_would_be_refused() {
 
     for (joints, wanted) in [
         (vec![arm_r], None),
-        (vec![hips, elbow_r], Some("the part does not fit the selected joints")),
+        (vec![hips, arm_r, elbow_r], Some("the part does not fit the selected joints")),
         (vec![arm_r, elbow_r], None),
         (Vec::new(), Some("no joint is selected")),
     ] {

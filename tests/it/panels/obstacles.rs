@@ -26,6 +26,9 @@ use super::{desk::Desk, tag_values::add_command};
 fn assert_greyed(desk: &mut Desk, label: &str, reason: &str) {
     let widget = desk.find(label);
     assert!(!widget.enabled, "{label} is not greyed");
+    // A widget that was clicked tells nothing until the pointer comes again.
+    desk.move_to(pos2(3000.0, 3000.0));
+    desk.frames(3);
     desk.move_to(widget.rect.center());
     desk.frames(60);
     assert!(desk.says(reason), "{label} does not say {reason:?}: {:?}", desk.seen);

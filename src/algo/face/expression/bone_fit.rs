@@ -77,6 +77,8 @@ pub struct FittedFace {
     moving: MovingSkin,
     /// Bones of skin that mirror each other; one in the middle stands twice.
     pairs: Vec<[usize; 2]>,
+    /// Number of folds of a pose that people do not notice: a thousandth of the mask's triangles.
+    tolerated_folds: usize,
 }
 
 /// Movements of the skin bones that belong to the jaw's, which are linear in its rotation matrix and its shift.
@@ -119,6 +121,7 @@ impl FittedFace {
             jaw: JawMovements::default(),
             moving: MovingSkin::default(),
             pairs: mirrored_pairs(bones, landmarks),
+            tolerated_folds: 0,
         };
         let Some(opening_lines) = face.opening_lines.clone() else { return face };
         visit(points.len());
@@ -127,6 +130,10 @@ impl FittedFace {
         face.factorise();
         face.jaw = face.jaw_movements(&opening_lines);
         face.moving = MovingSkin::new(points, triangles, weights, bones, &facing);
+        let is_facial = |corners: &&[u32; 3]| {
+            mask.is_empty() || corners.iter().all(|corner| mask.get(*corner as usize).copied().unwrap_or(false))
+        };
+        face.tolerated_folds = triangles.iter().filter(is_facial).count() / 1000;
         face
     }
 
@@ -138,7 +145,8 @@ impl FittedFace {
     /// Cost: points that bones move times rounds of repair, and for each unit once samples times moves of the field.
     pub fn pose(&self, mix: &Mix) -> Vec<BonePose> {
         let mut poses = self.pose_and_repair(mix).0;
-        self.separate(&mut poses, is_alike(mix));
+        let used = mix.strengths.iter().filter(|strengths| **strengths != [0.0; 2]).count();
+        self.separate(&mut poses, is_alike(mix), used > 1);
         poses
     }
 

@@ -1,5 +1,7 @@
 //! Evidence: what the mesh shows of single joints, whatever the proportions of the rest of the figure are.
 
+use std::ops::RangeInclusive;
+
 use bevy::math::ops;
 use glam::Vec3;
 
@@ -18,6 +20,10 @@ const TURNED: f32 = 0.17;
 const BENT: f32 = 0.44;
 /// Length of the bone below the chest against the template's below which the spine is crushed.
 const CRUSHED: f32 = 0.6;
+
+/// Length of a bird's thigh against that of its shank where both lie in a trunk that is the right one, below a hock in its place;
+/// femurs of birds are shorter than their tibiotarsi, and mostly longer than half of them.
+const THIGH: RangeInclusive<f32> = 0.5..=1.0;
 
 /// Evidence for the joints of a placement, by joint.
 pub(super) struct Evidence {
@@ -41,6 +47,14 @@ impl Evidence {
             for (at, &joint) in limb.joints.iter().enumerate() {
                 is_shown[joint] = bends.is_shown(limb, at, placement.reasons[joint]);
                 is_shared_out[joint] = shares_out;
+            }
+        }
+        for limb in template.limbs.iter().filter(|limb| template.has_hidden_knee(limb)) {
+            let [hip, knee, hock, foot, ..] = *limb.joints.as_slice() else { continue };
+            let share = places[hip].distance(places[knee]) / places[knee].distance(places[hock]).max(1e-9);
+            if is_shown[hock] && THIGH.contains(&share) {
+                let chest = template.trunk.last().copied();
+                [hip, knee, foot].into_iter().chain(chest).for_each(|joint| is_shown[joint] = true);
             }
         }
         Self { is_shown, is_shared_out, carried: carried(template, best.alignment.scale, places) }

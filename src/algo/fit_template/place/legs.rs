@@ -12,10 +12,12 @@ use crate::algo::fit_template::{
 /// a joint takes there.
 const HIDDEN: f32 = 0.5;
 const SHAPED: f32 = 0.75;
-/// Place of a knee that the trunk hides, as a share of the way from where its leg leaves the trunk to the hip, and the distance
-/// of that hip from the plane of symmetry, as a share of the knee's: thighs of birds lie nearly level, and lead outwards.
+/// Place of a knee that the trunk hides, as a share of the way from where its leg leaves the trunk to the hip, and the distances of
+/// that hip and that knee from the plane of symmetry, as shares of the leg's: thighs of birds lie nearly level, and lead outwards
+/// around the belly; the shank leads back in.
 const HIDDEN_KNEE: f32 = 0.75;
-const NARROW_HIP: f32 = 0.5;
+const NARROW_HIP: f32 = 0.4;
+const WIDE_KNEE: f32 = 1.2;
 /// Share of a leg's free length at which its distance from the plane of symmetry is taken, the share by which its root
 /// follows it, and the cosine of its angle to up from which on it hangs straight down; an animal's leg that steps forward or
 /// back has that cosine to the plane of symmetry.
@@ -86,14 +88,18 @@ impl Work<'_> {
         for (&joint, length) in limb.joints.iter().zip(lengths).filter(|(_, length)| **length > LEG * line.free) {
             let hidden = ((length / line.free - LEG) / (1.0 - LEG)).min(1.0);
             if let Some(place) = &mut places[joint] {
-                let share = if has_hidden_knee && joint == limb.joints[0] { NARROW_HIP } else { 1.0 };
+                let share = match limb.joints.iter().position(|own| *own == joint) {
+                    Some(0) if has_hidden_knee => NARROW_HIP,
+                    Some(1) if has_hidden_knee => WIDE_KNEE,
+                    _ => 1.0,
+                };
                 *place += left * (share * wide * of(joint) - (*place - attach).dot(left)) * hidden;
             }
         }
     }
 
     /// True for a leg that hangs straight down. An animal's may be on its way forward or back, but not out.
-    fn is_hanging(&self, line: &CentreLine, left: Vec3, up: Vec3) -> bool {
+    pub(super) fn is_hanging(&self, line: &CentreLine, left: Vec3, up: Vec3) -> bool {
         let way = (line.at(line.free * LEG) - line.at(line.free * (1.0 - LEG))).normalize_or_zero();
         if self.template.is_upright() {
             return way.dot(up) > HANGS;

@@ -41,6 +41,12 @@ const LID_PLACES: [f32; 2] = [1.0 / 3.0, 2.0 / 3.0];
 /// Points around a place of the rim of a lip that face those around the place of the other rim, the further the fewer, and the
 /// largest distance sideways of those that do, in eye distances.
 const AROUND_LIPS: (usize, f32) = (6, 0.01);
+/// Points of the other rim that face each point of a rim of a lip at most, and the largest distance of points that do, in eye
+/// distances, sideways and along the other axes. Places along the rims alone miss points between them.
+const OPPOSITE_LIPS: usize = 1;
+const OPPOSITE_REACH: [f32; 2] = [0.009, 0.01];
+/// Distance, in eye distances, up to which a point is on the rim of its lip.
+const RIM: f32 = 0.05;
 /// Points and distance of lids, whose landmarks are further from each other.
 const AROUND_LIDS: (usize, f32) = (9, 0.02);
 /// Landmarks of the upper and the lower lid from corner to corner, of the left and the right eye.
@@ -265,8 +271,41 @@ fn rims(points: &[Vec3], candidates: &[usize], lower_share: &[f32], landmarks: &
                 rims.extend(facing.map(|below| (eye, *above as u32, *below as u32)));
             }
         }
+        if eye.is_none() {
+            let [above, below] =
+                [(&above, &upper), (&below, &lower)].map(|(of, line)| on_rim(points, of, line, landmarks));
+            let facing = opposite(points, &above, &below, landmarks);
+            rims.extend(facing.into_iter().map(|[above, below]| (eye, above as u32, below as u32)));
+            let facing = opposite(points, &below, &above, landmarks);
+            rims.extend(facing.into_iter().map(|[below, above]| (eye, above as u32, below as u32)));
+        }
     }
     rims.into_iter().map(|(eye, above, below)| FacingPoints { above, below, eye }).collect()
+}
+
+/// Points on the rim of a lip, as far from the corners of the mouth as places of rims are.
+fn on_rim(points: &[Vec3], of: &[usize], line: &[Vec3], landmarks: &Landmarks) -> Vec<usize> {
+    let [from, to] =
+        [LIP_PLACES.start(), LIP_PLACES.end()].map(|place| part_way(line, *place as f32 / LIP_PARTS as f32).x);
+    let near = RIM * landmarks.eye_distance();
+    let is_on = |point: &usize| {
+        let Vec3 { x, y, .. } = points[*point];
+        (from.min(to)..=from.max(to)).contains(&x) && (height(line, x) - y).abs() < near
+    };
+    of.iter().copied().filter(is_on).collect()
+}
+
+/// Points of one rim, each with the nearest points of the other rim.
+fn opposite(points: &[Vec3], of: &[usize], other: &[usize], landmarks: &Landmarks) -> Vec<[usize; 2]> {
+    let [sideways, along] = OPPOSITE_REACH.map(|reach| reach * landmarks.eye_distance());
+    let reach = Vec3::new(sideways, along, along);
+    let nearest = |point: usize| {
+        let near = other.iter().copied().filter(|other| (points[point] - points[*other]).abs().cmple(reach).all());
+        around(points, &near.collect::<Vec<usize>>(), points[point], OPPOSITE_LIPS)
+            .into_iter()
+            .map(move |other| [point, other])
+    };
+    of.iter().copied().flat_map(nearest).collect()
 }
 
 /// Height halfway between two lines from corner to corner.

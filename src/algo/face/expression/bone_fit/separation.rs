@@ -4,7 +4,7 @@
 //! zero, or that at rest where they overlap at rest. The movement with the least sum of squares that meets all inequalities is
 //! found by Hildreth's method (a quadratic programming procedure, 1957): one inequality after the other, each with a multiplier
 //! that never falls below zero. Pairs that do not cross are inequalities, too, but move nothing by themselves. A pose in which the
-//! movement would fold more skin keeps its crossing.
+//! movement would fold more skin than a thousandth of the face, and a tenth more than before, keeps its crossing.
 
 use std::collections::BTreeMap;
 
@@ -25,6 +25,8 @@ const MARGIN: f32 = 5e-5;
 /// Largest distance, in eye distances, by which points of lips and of lids pass each other and are separated. Points that pass
 /// further are not on the rims: the inside of a lip lies behind the other one.
 const DEEPEST_LIPS: f32 = 0.005;
+/// The same for lips in a blend of units, which pass further.
+const DEEPEST_LIPS_OF_BLENDS: f32 = 0.01;
 const DEEPEST_LIDS: f32 = 0.02;
 /// Distance, in eye distances, of points that need no inequality: no separation moves bones so far.
 const ROOM: f32 = 0.05;
@@ -47,8 +49,9 @@ struct Inequality {
 }
 
 impl FittedFace {
-    /// Moves bones up or down until no facing points cross, unless more skin would fold then; alike on both sides if `is_alike`.
-    pub(super) fn separate(&self, poses: &mut [BonePose], is_alike: bool) {
+    /// Moves bones up or down until no facing points cross, unless so much more skin would fold then that people notice; alike on
+    /// both sides if `is_alike`. A unit alone, unlike a blend (`is_blend`), folds no more for it.
+    pub(super) fn separate(&self, poses: &mut [BonePose], is_alike: bool, is_blend: bool) {
         let scale = self.landmarks.eye_distance();
         let MovingSkin { points, weights, facing, .. } = &self.moving;
         let matrices = self.matrices(poses);
@@ -58,7 +61,11 @@ impl FittedFace {
             (points[above].y - points[below].y).min(0.0) - (height(above) - height(below))
         };
         let is_near = |pair: &FacingPoints, missing: f32| {
-            let deepest = if pair.eye.is_none() { DEEPEST_LIPS } else { DEEPEST_LIDS };
+            let deepest = match pair.eye {
+                Some(_) => DEEPEST_LIDS,
+                None if is_blend => DEEPEST_LIPS_OF_BLENDS,
+                None => DEEPEST_LIPS,
+            };
             missing > -ROOM * scale && missing < deepest * scale
         };
         let pairs =
@@ -94,7 +101,15 @@ impl FittedFace {
         let mut posed = PosedSkin::new(&self.moving, matrices);
         let folds = posed.folded().count();
         posed.update(self.matrices(&separate));
-        if posed.folded().count() <= folds {
+        // A pose that folds more than people notice is a caricature, in which a tenth more makes no difference.
+        let most = if !is_blend {
+            folds
+        } else if folds <= self.tolerated_folds {
+            self.tolerated_folds
+        } else {
+            folds + folds / 10
+        };
+        if posed.folded().count() <= most {
             poses.copy_from_slice(&separate);
         }
     }
