@@ -185,7 +185,7 @@ pub(super) fn store_built(
 
 /// Adds what a build came to. A command that stopped it is a fault of the input.
 fn describe(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, built: &BuiltRig, outcome: RunReport) {
-    trace(args, report, rig, builder, &outcome.executed);
+    trace(args, report, rig, builder, &outcome);
     let created = built.nodes.iter().filter(|node| node.origin.is_some()).count();
     report.line(format!(
         "{} of {}, {}, {}, {}",
@@ -207,11 +207,11 @@ fn describe(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder,
 }
 
 /// Adds the commands to the report: a line each for people who ask for them, and a list for programs.
-fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) {
+fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, outcome: &RunReport) {
     if !args.trace && !is_json() {
         return;
     }
-    let executed: HashSet<Uid> = executed.iter().copied().collect();
+    let executed: HashSet<Uid> = outcome.executed.iter().copied().collect();
     let mut lines = Vec::new();
     let told = builder.list().into_iter().filter_map(|entry| {
         let status = builder.status(entry.command)?;
@@ -223,6 +223,8 @@ fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, ex
         };
         let label = rig.joint(entry.joint).and_then(|joint| joint.data.label.clone());
         let skipped = status.skipped.as_ref().map(ToString::to_string);
+        let stop = outcome.error.as_ref().filter(|error| error.command == entry.command);
+        let error = stop.map(|error| &error.problem).or(status.error.as_ref());
         if args.trace {
             let name = label.clone().unwrap_or_else(|| entry.joint.to_string());
             let reason = skipped.as_ref().map_or_else(String::new, |reason| format!("  ({reason})"));
@@ -236,7 +238,7 @@ fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, ex
             "state": state,
             "micros": status.micros,
             "executed": executed.contains(&entry.command),
-            "error": status.error.as_ref().map(ToString::to_string),
+            "error": error.map(ToString::to_string),
             "skipped": skipped,
         }))
     });

@@ -92,6 +92,8 @@ fn a_build_tells_the_name_that_is_missing() {
         let (code, told) = json(folder.path(), args);
         let what = told["error"]["what"].as_str().unwrap();
         assert!(code == 1 && is_right(what), "{args:?}: {told}");
+        let of_command = told["commands"][0]["error"].as_str();
+        assert!(of_command.is_none_or(is_right), "{args:?}: {told}");
     }
     let mut bench = Workbench::with_rig(1, rig(folder.path(), "two.rig.ron"));
     let error = bench.build(BuildStep::All).error.unwrap().to_string();
