@@ -31,7 +31,7 @@ use crate::{
         commands::{BuildStep, NamedProgramError, Processor},
         surface::RigMesh,
     },
-    processor::{Builder, CommandState, RunReport},
+    processor::{Builder, CommandState, RunReport, with_missing_name},
     rig::{
         BuiltRig, Rig, Uid,
         bake::baked,
@@ -94,12 +94,14 @@ pub(super) fn run(args: &BuildArgs) -> Result<Report, Failure> {
 
 /// Builds a rig, and writes what is built. An app, which takes several times the memory, is used for poses and meshes alone.
 fn build(args: &BuildArgs, rig: Rig, report: &mut Report) -> Result<(), Failure> {
-    let mut builder = Builder::new(Arc::new(limits::modules()));
+    let modules = Arc::new(limits::modules());
+    let mut builder = Builder::new(modules.clone());
     builder.sync(&rig);
-    let outcome = match args.until {
+    let mut outcome = match args.until {
         Some(count) => builder.run_to(count),
         None => builder.run_all(),
     };
+    outcome.error = outcome.error.map(|error| with_missing_name(&rig, &modules, error));
     let built = builder.built();
     describe(args, report, &rig, &builder, &built, outcome);
     let has_commands = !builder.is_empty();
@@ -183,7 +185,7 @@ pub(super) fn store_built(
 
 /// Adds what a build came to. A command that stopped it is a fault of the input.
 fn describe(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, built: &BuiltRig, outcome: RunReport) {
-    trace(args, report, rig, builder, &outcome.executed);
+    trace(args, report, rig, builder, &outcome);
     let created = built.nodes.iter().filter(|node| node.origin.is_some()).count();
     report.line(format!(
         "{} of {}, {}, {}, {}",
@@ -205,11 +207,11 @@ fn describe(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder,
 }
 
 /// Adds the commands to the report: a line each for people who ask for them, and a list for programs.
-fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, executed: &[Uid]) {
+fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, outcome: &RunReport) {
     if !args.trace && !is_json() {
         return;
     }
-    let executed: HashSet<Uid> = executed.iter().copied().collect();
+    let executed: HashSet<Uid> = outcome.executed.iter().copied().collect();
     let mut lines = Vec::new();
     let told = builder.list().into_iter().filter_map(|entry| {
         let status = builder.status(entry.command)?;
@@ -221,6 +223,8 @@ fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, ex
         };
         let label = rig.joint(entry.joint).and_then(|joint| joint.data.label.clone());
         let skipped = status.skipped.as_ref().map(ToString::to_string);
+        let stop = outcome.error.as_ref().filter(|error| error.command == entry.command);
+        let error = stop.map(|error| &error.problem).or(status.error.as_ref());
         if args.trace {
             let name = label.clone().unwrap_or_else(|| entry.joint.to_string());
             let reason = skipped.as_ref().map_or_else(String::new, |reason| format!("  ({reason})"));
@@ -234,7 +238,7 @@ fn trace(args: &BuildArgs, report: &mut Report, rig: &Rig, builder: &Builder, ex
             "state": state,
             "micros": status.micros,
             "executed": executed.contains(&entry.command),
-            "error": status.error.as_ref().map(ToString::to_string),
+            "error": error.map(ToString::to_string),
             "skipped": skipped,
         }))
     });

@@ -1,7 +1,7 @@
 //! `rigsmith check`: problems in files.
 
 use std::{
-    collections::{BTreeMap, HashSet},
+    collections::{BTreeMap, HashMap, HashSet},
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -29,6 +29,7 @@ use crate::{
     rig::{
         JointData, Rig, RigJoint, SourceError, TagData, TagKind, Uid,
         feature::{FeatureKinds, undecided_choices},
+        nearest::listed,
         proportion,
         template::{self, PartOrigin, Template},
     },
@@ -139,7 +140,8 @@ fn check(path: &Path) -> Result<Findings, Failure> {
             let outside = project.notes.iter().find(|note| matches!(note, ProjectNote::MeshOutside(_)));
             let outside = outside.map(ToString::to_string);
             let beyond = limits::check_project(path, &project).err().map(|error| error.to_string());
-            let nowhere = project.rigs.iter().flat_map(faults_of_places).next().map(|(_, fault)| fault);
+            let faults = |rig| faults_of_places(rig).into_iter().chain(faults_of_mirrors(rig));
+            let nowhere = project.rigs.iter().flat_map(faults).next().map(|(_, fault)| fault);
             found.error = outside.or(beyond).or(nowhere);
         }),
         Some(FileKind::Skin) => load_skin(&RealDisk, path).map(drop),
@@ -232,8 +234,16 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
         .take(limits::most(Limit::Listed))
         .map(|(joint, fault)| places.locate_declared(joint, "translation", fault))
         .collect();
+    let rings = faults_of_mirrors(&rig);
+    let ring_count = rings.len();
+    let mirrors: Vec<SourceError> = rings
+        .into_iter()
+        .take(limits::most(Limit::Listed))
+        .map(|(joint, fault)| places.locate_declared(joint, "mirror", fault))
+        .collect();
     let told = [
         (nowhere_count, "joint is at no finite place", "joints are at no finite place"),
+        (ring_count, "ring of mirror partners", "rings of mirror partners"),
         (undecided_count, "choice is not decided", "choices are not decided"),
         (faults.len(), "fault of the structure", "faults of the structure"),
         (unknown_kinds, "kind of feature is not registered", "kinds of features are not registered"),
@@ -248,11 +258,14 @@ fn check_template(path: &Path, found: &mut Findings) -> Result<(), Failure> {
     found.remarks.extend(remarks_on_rig(&rig));
     let unlisted = problems - commands.len() + unknown_kinds - kinds.len() + undecided_count - choices.len()
         + nowhere_count
-        - lost.len();
+        - lost.len()
+        + ring_count
+        - mirrors.len();
     if unlisted > 0 {
         found.remarks.push(format!("{} not listed", counted(unlisted, "more problem is", "more problems are")));
     }
-    found.problems = faults.into_iter().chain(kinds).chain(choices).chain(lost).chain(commands).collect();
+    found.problems =
+        faults.into_iter().chain(kinds).chain(choices).chain(lost).chain(mirrors).chain(commands).collect();
     found.problems.sort_by_key(|problem| problem.offset);
     Ok(())
 }
@@ -365,6 +378,40 @@ fn faults_of_places(rig: &Rig) -> Vec<(Uid, String)> {
             (joint.data.uid, fault)
         })
         .collect()
+}
+
+/// Joints that name themselves as mirror partners, and rings of three and more: the first joint of each. Two joints are a pair;
+/// a joint whose partner has another one is no fault.
+fn faults_of_mirrors(rig: &Rig) -> Vec<(Uid, String)> {
+    let partner = |joint: &Uid| rig.joint(*joint).and_then(|joint| joint.data.mirror);
+    // First joint of the way on which each joint was reached.
+    let mut reached: HashMap<Uid, Uid> = HashMap::new();
+    let mut faults = Vec::new();
+    for start in rig.walk().map(|joint| joint.data.uid) {
+        let mut next = Some(start);
+        while let Some(joint) = next.filter(|joint| !reached.contains_key(joint)) {
+            reached.insert(joint, start);
+            next = partner(&joint);
+        }
+        let Some(first) = next.filter(|joint| reached.get(joint) == Some(&start)) else { continue };
+        let others = std::iter::successors(partner(&first), partner).take_while(|joint| *joint != first);
+        let ring: Vec<Uid> = std::iter::once(first).chain(others).collect();
+        let names: Vec<String> =
+            ring.iter().filter_map(|joint| rig.joint(*joint)).map(|joint| name_of(&joint.data)).collect();
+        let fault = match ring.len() {
+            1 => format!(
+                "joint {} is its own mirror partner; name the joint on its other side, or leave `mirror` out",
+                names.concat()
+            ),
+            2 => continue,
+            _ => format!(
+                "the mirror partners {} make a ring; let two joints name each other, or leave `mirror` out",
+                listed(&names, "and")
+            ),
+        };
+        faults.push((first, fault));
+    }
+    faults
 }
 
 fn name_of(joint: &JointData) -> String {

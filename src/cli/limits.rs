@@ -147,6 +147,7 @@ pub(super) fn load_packed_clips(path: &Path) -> Result<Model, Failure> {
 /// Reads a `.rig` text.
 pub(super) fn load_rig_text(path: &Path) -> Result<RigText, Failure> {
     let text = files::load_rig_text(&RealDisk, path)?;
+    text.check_ways().map_err(|source| LoadError::RigText { path: path.into(), source })?;
     chosen().check_rig_text(&path.display().to_string(), &text)?;
     Ok(text)
 }

@@ -302,6 +302,10 @@ fn request_open(world: &mut World, request: OpenRequest) {
         }
         if let Err(error) = open::recognise(path) {
             world.write_message(Notice::error(error.to_string()));
+            if active(world).is_none() && world.resource::<LoadJob>().name().is_none() {
+                // The first file that the window was to open.
+                open::start(world, OpenRequest::Empty);
+            }
             return;
         }
         if open::is_rig_file(path) && template::has_mesh(world) {

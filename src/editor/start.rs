@@ -1,7 +1,7 @@
 //! Start page: recent files, bundled meshes and templates as pictures, three jobs, and a tour.
 //!
-//! The page stands in front of an empty document when the window opens without a file. It closes with Escape and when
-//! something is opened, and asks nothing.
+//! The page stands in front of an empty document when the window opens without a file, or with one that cannot be opened. It
+//! closes with Escape and when something is opened, and asks nothing.
 
 mod bones;
 mod pictures;
@@ -37,7 +37,7 @@ use crate::{files::journal::Origin, plugins::RigSystems};
 /// Plugin of the start page and the tour; it opens the first document.
 #[derive(Debug, Clone, Default)]
 pub struct StartPlugin {
-    /// The file to open first; an empty document behind the start page without one.
+    /// The file to open first; an empty document behind the start page without one, and where it cannot be opened.
     pub file: Option<PathBuf>,
 }
 
@@ -45,7 +45,7 @@ impl Plugin for StartPlugin {
     fn build(&self, app: &mut App) {
         let first = self.file.clone().map_or(OpenRequest::Empty, OpenRequest::File);
         let is_shown = self.file.is_none();
-        app.insert_resource(StartPage { is_shown, waits: is_shown, job: None })
+        app.insert_resource(StartPage { is_shown, waits: true, job: None })
             .insert_resource(FirstDocument(first))
             .init_resource::<RecentFiles>()
             .init_resource::<StartPictures>()
@@ -80,7 +80,7 @@ struct FirstDocument(OpenRequest);
 #[derive(Resource, Debug, Clone, PartialEq, Eq, Default)]
 pub struct StartPage {
     is_shown: bool,
-    /// Marks that the empty document behind the page is still being opened.
+    /// Marks that the first document is still being opened.
     waits: bool,
     /// Job whose document is being opened.
     job: Option<Job>,
@@ -205,10 +205,11 @@ pub(super) fn toggle(mut actions: MessageReader<ActionRequest>, mut page: ResMut
     }
 }
 
-/// Closes the page once something is open, and goes on with the job for which it was opened.
+/// Closes the page once something is open, and goes on with the job for which it was opened. Shows it where the first file could
+/// not be opened, so that an empty document stands in its place.
 fn land(
     mut landed: MessageReader<DocumentLanded>,
-    active: Option<Res<ActiveRig>>,
+    (active, first): (Option<Res<ActiveRig>>, Res<FirstDocument>),
     mut page: ResMut<StartPage>,
     mut mode: ResMut<Mode>,
     mut tour: ResMut<Tour>,
@@ -217,6 +218,7 @@ fn land(
     let Some(DocumentLanded { origin }) = landed.read().last() else { return };
     let is_first = std::mem::take(&mut page.waits) && *origin == Origin::Empty;
     if is_first {
+        page.is_shown |= matches!(first.0, OpenRequest::File(_));
         return;
     }
     page.is_shown = false;

@@ -17,7 +17,7 @@ use super::{RigTemplate, TemplateError, exchange::NextVersion, template_file::Te
 use crate::{
     files::{PartCache, PartFiles, RealDisk, TemplateWatch},
     plugins::commands::NamedProgramError,
-    processor::{BuildError, Builder, Modules, SourceText},
+    processor::{BuildError, Builder, Modules, SourceText, with_missing_name},
     rig::{
         BuiltRig, NodeType, Rig, Uid,
         part::{PartInstance, PartSocket, have_same_fields},
@@ -370,7 +370,11 @@ impl TemplateBuild {
         if let Some(error) = report.error {
             // The file knows its places by its own uids.
             let of_file = if rig == *source { None } else { Builder::build(source, &self.modules).err() };
-            return Err(self.placed(template, &of_file.unwrap_or(error)));
+            let error = match of_file {
+                Some(error) => with_missing_name(source, &self.modules, error),
+                None => with_missing_name(&rig, &self.modules, error),
+            };
+            return Err(self.placed(template, &error));
         }
         let built = self.builder.shared_built();
         self.identities.extend(identities);

@@ -32,7 +32,7 @@ pub use super::{
 };
 use crate::{
     modules,
-    processor::{BuildError, BuildRange, Builder, CommandStatus, Modules, RigModule, RunReport},
+    processor::{BuildError, BuildRange, Builder, CommandStatus, Modules, RigModule, RunReport, with_missing_name},
     rig::{BuiltRig, Revision, Rig, RigEdit, Uid, step::Commit},
 };
 
@@ -233,7 +233,7 @@ fn build_rigs(
         if processor.follow {
             let goal = processor.goal.unwrap_or(usize::MAX);
             processor.builder.set_deadline(limits.deadline());
-            let report = processor.builder.run_to(goal);
+            let report = named(processor.builder.run_to(goal), rig, &modules);
             finish(&mut commands, entity, &mut processor.builder, (built, failed), report, &mut done);
         }
     }
@@ -266,7 +266,7 @@ fn build_rigs(
             }
         };
         processor.builder.set_deadline(limits.deadline());
-        let report = carry_out(processor, rig, step);
+        let report = named(carry_out(processor, rig, step), rig, &modules);
         finish(&mut commands, *entity, &mut processor.builder, (built, failed), report, &mut done);
         if is_fresh {
             let processor = std::mem::replace(processor, Processor::new(&modules));
@@ -309,6 +309,12 @@ fn carry_out(processor: &mut Processor, rig: &Rig, step: &BuildStep) -> RunRepor
         processor.goal = (report.cursor < builder.len()).then_some(report.cursor);
     }
     report
+}
+
+/// The report of a run whose error tells the name that the rig lacks.
+fn named(report: RunReport, rig: &Rig, modules: &RigModules) -> RunReport {
+    let error = report.error.map(|error| with_missing_name(rig, &modules.0, error));
+    RunReport { error, ..report }
 }
 
 /// Writes the built rig to the rig's entity if it differs from before, updates the error, and reports the run.

@@ -60,6 +60,22 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
     problems
 }
 
+/// The error of a build with the reference that finds nothing, where parameters cannot be read: a build reads names that have
+/// uids beside them, and tells the first name without one, whether a joint is called so or not.
+pub fn with_missing_name(rig: &Rig, modules: &Modules, error: BuildError) -> BuildError {
+    if !matches!(error.problem, BuildProblem::Parameters(_)) {
+        return error;
+    }
+    let Some((_, TagData { kind: TagKind::Command { module, params, .. }, .. })) = rig.find_tag(error.command) else {
+        return error;
+    };
+    let survey = survey_params(&RigNameIndex::new(rig), modules, module, params);
+    match survey.problems.into_iter().find(|problem| matches!(problem, BuildProblem::Parameters(_))) {
+        Some(problem) => BuildError { problem, ..error },
+        None => error,
+    }
+}
+
 /// True for more than all commands of a rig may make or do together.
 fn is_limit_of_rig(problem: &BuildProblem) -> bool {
     matches!(problem, BuildProblem::Module(ModuleError::TooMany { name: "nodes" | "work", .. }))

@@ -264,6 +264,45 @@ fn places_that_are_no_numbers_and_flat_scales_are_told() {
     assert!(remarks.contains("1 joint has a scale of nothing") && remarks.contains(": a;"), "{remarks}");
 }
 
+/// Mirror partners are pairs: a joint that names itself, and a ring of three, are told, and open all the same.
+#[test]
+fn mirror_partners_in_rings_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = r#"(
+    format: 2,
+    name: "rings",
+    joints: [
+        (label: "a", mirror: "a"), // joint a is its own mirror partner; name the joint on its other side
+        (label: "b", mirror: "c"), // the mirror partners "b", "c" and "d" make a ring; let two joints name each other
+        (label: "c", mirror: "d"),
+        (label: "d", mirror: "b"),
+        (label: "e", mirror: "f"),
+        (label: "f", mirror: "e"),
+        (label: "g", mirror: "f"),
+        (label: "h", mirror: "c"),
+    ],
+)"#;
+    tells_what_it_says(folder.path(), "rings.rig.ron", text);
+    let built = rigsmith(folder.path(), &["build", "rings.rig.ron", "-o", "rings.glb"]);
+    assert!(built.code == 0 && folder.path().join("rings.glb").exists(), "{}", built.err);
+}
+
+/// A joint without a label is told by its number, where the way from the joint above it is more than a number can hold.
+#[test]
+fn joints_of_a_text_that_are_too_far_apart_are_told_by_number_and_label() {
+    let folder = tempfile::tempdir().unwrap();
+    for (label, name) in [("", "joint 1 is"), (" tip", "joint 1 \"tip\" is")] {
+        let text = format!("rig 1\njoint 0 -1 3e38 0 0\njoint 1 0 -3e38 0 0{label}\n");
+        fs::write(folder.path().join("far.rig"), text).unwrap();
+        for args in [["check", "far.rig"], ["info", "far.rig"], ["build", "far.rig"]] {
+            let answer = rigsmith(folder.path(), &args);
+            let said = answer.out + &answer.err;
+            assert_eq!(answer.code, 1, "{args:?}: {said}");
+            assert!(said.contains(name) && said.contains("write smaller coordinates"), "{args:?}: {said}");
+        }
+    }
+}
+
 /// Each of many joints with one label is told at its own place.
 #[test]
 fn joints_with_one_label_are_told_each() {

@@ -67,6 +67,39 @@ fn apps_without_a_window_tell_a_cycle_by_names() {
     assert_eq!(told, format!("the built rig cannot run: {words}"));
 }
 
+/// A reference to two joints, of which the rig has the first alone, is blamed on the second.
+#[cfg(feature = "cli")]
+#[test]
+fn a_build_tells_the_name_that_is_missing() {
+    use std::fs;
+
+    use rigsmith::{headless::Workbench, plugins::commands::BuildStep};
+
+    use crate::cli_outputs::{json, rig};
+
+    let folder = tempfile::tempdir().unwrap();
+    let text = r#"(
+        format: 2,
+        name: "two",
+        joints: [
+            (label: "a", tags: [point(targets: "@joint b + @joint nope")]),
+            (label: "b", translation: (1, 0, 0), tags: [control()]),
+        ],
+    )"#;
+    fs::write(folder.path().join("two.rig.ron"), text).unwrap();
+    let is_right = |told: &str| told.contains("there is no joint \"nope\"") && !told.contains("no joint \"b\"");
+    for args in [&["build", "two.rig.ron"][..], &["pose", "two.rig.ron", "--set", "b.translate=(1,0,0)"]] {
+        let (code, told) = json(folder.path(), args);
+        let what = told["error"]["what"].as_str().unwrap();
+        assert!(code == 1 && is_right(what), "{args:?}: {told}");
+        let of_command = told["commands"][0]["error"].as_str();
+        assert!(of_command.is_none_or(is_right), "{args:?}: {told}");
+    }
+    let mut bench = Workbench::with_rig(1, rig(folder.path(), "two.rig.ron"));
+    let error = bench.build(BuildStep::All).error.unwrap().to_string();
+    assert!(is_right(&error), "{error}");
+}
+
 #[test]
 fn the_window_tells_a_cycle_by_names() {
     let mut app = headless_app(1);

@@ -215,6 +215,23 @@ fn the_page_appears_without_a_file_and_not_with_one() {
     assert!(!with_file.is_shown(), "an empty project is something that was asked for");
 }
 
+/// The notice about a first file that cannot be opened goes in a while; the page says how to go on.
+#[test]
+fn the_page_appears_where_the_first_file_cannot_be_opened() {
+    let folder = folder();
+    fs::write(folder.path().join("damaged.rig.ron"), "(format: 2, joints: [").unwrap();
+    fs::write(folder.path().join("notes.txt"), "no rig").unwrap();
+    for name in ["gone.obj", "damaged.rig.ron", "notes.txt"] {
+        let mut page = Page::open(folder.path(), Some(&folder.path().join(name)));
+        assert!(page.is_shown() && page.desk.look("Mesh hand").is_some(), "{name}: {:?}", page.desk.seen);
+        assert_eq!(title(page.world()), "untitled - Rigsmith", "{name}");
+        assert!(page.desk.told().iter().any(|told| told.contains(name)), "{name}: {:?}", page.desk.told());
+        page.send(ActionRequest(Action::Cancel));
+        assert!(!page.is_shown(), "{name}: Escape closes it");
+        page.quit();
+    }
+}
+
 #[test]
 fn each_job_leads_where_it_says_without_a_question() {
     let folder = folder();

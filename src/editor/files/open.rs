@@ -26,7 +26,7 @@ use crate::{
         settings::EditorSettings,
     },
     files::{
-        Disk, FileKind, LoadedMesh, MeshState, MeshToSave, ProjectNote, RealDisk, TemplateBase,
+        Disk, FileKind, LoadError, LoadedMesh, MeshState, MeshToSave, ProjectNote, RealDisk, TemplateBase,
         journal::{
             Journal, JournalStart, Origin, PendingJournal, RecoveredJournal, RestoredRig, ResumedJournal, file_hash,
             journal_beside, pending_journal,
@@ -247,6 +247,7 @@ fn file(path: &Path, uids: &mut UidSource) -> Result<LoadedFile, OpenError> {
         }
         Some(FileKind::RigText) => {
             let text = load_rig_text(&RealDisk, path)?;
+            text.check_ways().map_err(|source| LoadError::RigText { path: path.into(), source })?;
             let (path, hash) = origin_of(path);
             let mut opened = LoadedDocument::named(stem(&path), Rig::new(uids.next_uid(), stem(&path)));
             for edit in &import_rig_text(&text, uids).0 {

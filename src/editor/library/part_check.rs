@@ -1,7 +1,7 @@
 //! Parts that are read ahead, so that menus and cards tell where one would be refused before it is asked for.
 //!
 //! A part is put onto a copy of the rig. That is done where a menu asks for it, and again only after a change of the rig's
-//! joints and tags, of the selection, or of the sides.
+//! joints and tags, of the template that it follows, of the selection, or of the sides. A preview changes nothing of that.
 
 use std::{
     collections::BTreeMap,
@@ -22,6 +22,7 @@ use super::{
 use crate::{
     editor::ActiveRig,
     files::{RealDisk, TemplatePlace, read_listed},
+    instance::RigSource,
     plugins::{document::Selection, history::RigHistory},
     rig::{Revision, Rig, Uid, UidSource, operations::Operation, part::Part, step::Step},
 };
@@ -75,6 +76,8 @@ enum PartState {
 struct Verdict {
     rig: Entity,
     revision: Revision,
+    /// Version of the template that the rig follows, whose part instances it has.
+    base: Option<Arc<Rig>>,
     joints: Vec<Uid>,
     are_both: bool,
     /// The last step, whose joints are a stroke.
@@ -130,10 +133,12 @@ pub(in crate::editor) fn part_refusal(world: &World, place: &TemplatePlace) -> O
         return None;
     }
     let (are_both, last) = (PartSides::are_both(world), history.last());
+    let base = world.get::<RigSource>(entity).and_then(RigSource::base);
     let mut verdicts = parts.verdicts.lock().unwrap_or_else(PoisonError::into_inner);
     let is_same = |known: &&Verdict| {
         (known.rig, &known.joints, known.are_both) == (entity, joints, are_both)
-            && known.revision.is_same(rig.revision())
+            && (history.is_previewing() || known.revision.is_same(rig.revision()))
+            && known.base.as_ref().map(Arc::as_ptr) == base.map(Arc::as_ptr)
             && known.last.as_ref().map(Arc::as_ptr) == last.map(Arc::as_ptr)
     };
     if let Some(known) = verdicts.get(place).filter(is_same) {
@@ -142,7 +147,9 @@ pub(in crate::editor) fn part_refusal(world: &World, place: &TemplatePlace) -> O
     let (snapshot, uids) = (Snapshot::of(world, entity)?, world.get_resource::<UidSource>()?.clone());
     let refusal = refusal_of(snapshot, (place.stem(), Part::clone(part)), joints, uids);
     let (revision, joints, last) = (rig.revision().clone(), joints.clone(), last.cloned());
-    verdicts.insert(place.clone(), Verdict { rig: entity, revision, joints, are_both, last, refusal: refusal.clone() });
+    let verdict =
+        Verdict { rig: entity, revision, base: base.cloned(), joints, are_both, last, refusal: refusal.clone() };
+    verdicts.insert(place.clone(), verdict);
     refusal
 }
 

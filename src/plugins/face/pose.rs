@@ -137,10 +137,17 @@ pub(super) fn express(
         let found = meshes.get_mut(*entity).ok().and_then(|(mesh, of, face, prepared, preparation, posing)| {
             Some((mesh, of.0, rigs.get(of.0).ok()?, face, prepared.zip(posing), preparation))
         });
-        let Some((mesh, rig_entity, (rig, history), face, prepared, preparation)) = found else {
+        let Some((mesh, rig_entity, (rig, history), face, mut prepared, preparation)) = found else {
             told.write(ExpressionAnswer { mesh: *entity, result: Err(ExpressError::NoRig) });
             continue;
         };
+        // Steps of the history keep their order, also where bones or weights change while one of them is computed.
+        if let Some((_, posing)) = &mut prepared
+            && posing.bypass_change_detection().has_step()
+        {
+            posing.bypass_change_detection().wait(request.clone());
+            continue;
+        }
         // A preview is undone before the next preview or edit.
         let settled = history.map_or(Cow::Borrowed(rig), |history| history.settled(rig));
         let checked = mixed(&set.0, strengths).and_then(|mix| Ok((mix, facial_bones(&settled, mesh)?)));
@@ -151,11 +158,14 @@ pub(super) fn express(
                 continue;
             }
         };
-        let ready = face.filter(|face| face.serves(&mesh.rest, &face.settings)).and_then(|face| {
-            let (prepared, posing) = prepared?;
-            Some((prepared.parts(&face.analysis, &set.0, &known, skin)?, posing))
-        });
-        let Some((parts, mut posing)) = ready else {
+        let face_of_now = face.filter(|face| face.serves(&mesh.rest, &face.settings));
+        let kept = prepared.as_ref().map(|(kept, _)| *kept);
+        let parts = face_of_now.zip(kept).and_then(|(face, kept)| kept.parts(&face.analysis, &set.0, &known, skin));
+        let Some((parts, (_, posing))) = parts.zip(prepared.as_mut()) else {
+            // A preview of other bones or weights would come back in place of this request.
+            if let Some((_, posing)) = &mut prepared {
+                posing.bypass_change_detection().stop();
+            }
             // The request is repeated when the face is prepared; of several, the last one counts.
             match preparation {
                 Some(mut preparation) => preparation.wanted = Some(request.clone()),
@@ -168,11 +178,6 @@ pub(super) fn express(
             continue;
         };
         let posing = posing.bypass_change_detection();
-        // Steps of the history keep their order.
-        if posing.has_step() {
-            posing.wait(request.clone());
-            continue;
-        }
         let is_replaced = *preview && asked[number + 1..].iter().any(|(later, _)| later.mesh == *entity);
         let ends_where_it_began = !*preview && posing.is_running() && strengths_of(&settled, mesh.uid) == *strengths;
         let mut edits = match posing.posed(parts, strengths) {

@@ -35,6 +35,24 @@ pub struct RigText {
     pub joints: Vec<RigTextJoint>,
 }
 
+impl RigText {
+    /// Checks that joints are no further from those above them than a number can hold: a rig has these ways, while the text has
+    /// places alone.
+    ///
+    /// # Errors
+    /// [`RigTextError::FarFromParent`] with the first joint that is.
+    pub fn check_ways(&self) -> Result<(), RigTextError> {
+        let is_far = |joint: &RigTextJoint| {
+            let parent = joint.parent.and_then(|parent| self.joints.get(parent));
+            parent.is_some_and(|parent| !(joint.position - parent.position).is_finite())
+        };
+        match self.joints.iter().position(is_far) {
+            Some(joint) => Err(RigTextError::FarFromParent { joint, label: self.joints[joint].label.clone() }),
+            None => Ok(()),
+        }
+    }
+}
+
 /// Joint of a [`RigText`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct RigTextJoint {

@@ -310,6 +310,13 @@ fn models_that_do_not_fit_together() {
         &|model| model.nodes.iter_mut().for_each(|node| node.rest.scale = Vec3::splat(1e30)),
         "is at no finite place: its numbers and those of the joints above it",
     );
+    let unnamed = |model: &mut Model| {
+        for node in &mut model.nodes {
+            node.rest.scale = Vec3::splat(1e30);
+            node.name.clear();
+        }
+    };
+    check(&unnamed, "joint 1 is at no finite place");
     check(&|model| model.skins[0].joints[0] = 9, "skin 0 refers to a node");
     check(&|model| model.skins[0].joints[0] = 1, "skin 0 lists a node twice");
     check(&|model| model.skins[0].joints.truncate(2), "skin 0 has 2 joints, 3 matrices");

@@ -400,3 +400,30 @@ fn adding_a_part_is_greyed_where_it_would_be_refused() {
     studio.settle();
     assert_eq!(reason(&studio.desk), None, "the part is gone");
 }
+
+/// The parts that a rig has of its template are known once the template is read, without a change of the rig.
+#[test]
+fn a_part_is_refused_by_the_parts_of_the_template_that_the_rig_follows_now() {
+    let mut studio = Studio::new(LoaderPanel::default());
+    let parts =
+        "parts: [(part: \"limbs/limb.rig.ron\", name: \"left arm\", onto: [\"arm_l\", \"elbow_l\"])],\n    joints: [";
+    let armed = studio.site.join("armed.rig.ron");
+    fs::write(&armed, MAN.replacen("joints: [", parts, 1).replace("\"man\"", "\"armed\"")).unwrap();
+    studio.open(OpenRequest::File(armed));
+    studio.desk.until("the followed file", |desk| {
+        desk.app.world().get::<RigSource>(desk.rig).is_some_and(|source| source.base().is_some())
+    });
+    let reason = |desk: &Desk| palette::obstacle(desk.app.world(), Action::Library(LibraryAction::Part));
+    let arm = studio.joint("arm_l");
+    studio.desk.select(&[arm]);
+    studio.settle();
+    studio.click("Part limb");
+    studio.desk.until("the reason", |desk| reason(desk).is_some());
+    assert_eq!(reason(&studio.desk), Some("the selected joints have such a part already"));
+    // Without the template nothing tells the joints of the part.
+    let rig = studio.desk.rig;
+    let source = studio.desk.app.world_mut().entity_mut(rig).take::<RigSource>().unwrap();
+    assert_ne!(reason(&studio.desk), Some("the selected joints have such a part already"));
+    studio.desk.app.world_mut().entity_mut(rig).insert(source);
+    assert_eq!(reason(&studio.desk), Some("the selected joints have such a part already"));
+}

@@ -1,6 +1,12 @@
 //! Work of a drag in the Face panel: frames visit no points of the head, however many it has.
 
-use bevy::{ecs::schedule::SingleThreadedExecutor, prelude::*};
+use std::{sync::Arc, time::Duration};
+
+use bevy::{
+    ecs::schedule::SingleThreadedExecutor,
+    prelude::*,
+    tasks::{AsyncComputeTaskPool, Task},
+};
 use bevy_egui::egui;
 use rigsmith::{
     algo::face::expression::visited_points,
@@ -11,7 +17,7 @@ use rigsmith::{
     headless::headless_app,
     mesh::model::{Faces, Model, Object, Part},
     plugins::{
-        face::{Expressions, Face, FaceExpressions, FacePosing, expressed_points},
+        face::{ExpressRequest, Expressions, Face, FaceExpressions, FacePosing, FacePreparation, expressed_points},
         surface::{RigMesh, SkinOf},
     },
     prelude::*,
@@ -105,4 +111,45 @@ fn frames_of_a_drag_visit_no_points() {
     let finer = heads::subdivided(&head);
     assert!(finer.0.len() > 3 * head.0.len(), "{} and {} points", head.0.len(), finer.0.len());
     assert_eq!([head, finer].map(visits_of_a_drag), [0, 0]);
+}
+
+/// A preview that is computed for weights of before does not come back in place of a step.
+#[test]
+fn a_step_outlives_a_preview_for_other_weights() {
+    let (mut desk, mesh) = with_face(model(heads::bundled()));
+    let request = |strength: f32, preview: bool| ExpressRequest {
+        mesh,
+        strengths: [("happiness".to_owned(), strength)].into(),
+        preview,
+    };
+    // Nothing in the background is computed while every thread of it waits.
+    let (pool, held) = (AsyncComputeTaskPool::get(), Arc::new(()));
+    let waits = |_| -> Task<()> {
+        let held = Arc::downgrade(&held);
+        pool.spawn(async move {
+            while held.strong_count() > 0 {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        })
+    };
+    let threads: Vec<Task<()>> = (0..pool.thread_num()).map(waits).collect();
+    desk.app.world_mut().write_message(request(0.5, true));
+    desk.frame();
+    let skin = desk.rig().skin(Uid(99)).expect("the weights of the face").clone();
+    let edits = vec![RigEdit::SetSkin(Uid(99), Some(Arc::new((*skin).clone())))];
+    desk.edit(Operation::Named { name: "Bind", edits });
+    assert!(!desk.rig().skin(Uid(99)).is_some_and(|now| Arc::ptr_eq(now, &skin)));
+    let steps = desk.steps().1;
+    desk.app.world_mut().write_message(request(1.0, false));
+    desk.frames(2);
+    drop(held);
+    desk.until("the face for the weights of now", |desk| {
+        let world = desk.app.world();
+        world.get::<FacePreparation>(mesh).is_none() && !world.get::<FacePosing>(mesh).unwrap().is_running()
+    });
+    desk.frames(4);
+    drop(threads);
+    let shown = desk.app.world().get::<Expressions>(mesh).cloned().unwrap_or_default();
+    assert_eq!(shown.0.get("happiness"), Some(&1.0), "{shown:?}");
+    assert_eq!(desk.steps().1, steps + 1, "{shown:?}");
 }

@@ -107,9 +107,12 @@ pub(super) fn check_places(model: &Model, skeleton: &Skeleton) -> Result<(), Glt
     let worlds = node_worlds(model);
     let is_far = |node: &usize| !worlds[*node].as_affine3a().is_finite();
     let Some(node) = (0..model.nodes.len()).filter(is_written).find(is_far) else { return Ok(()) };
-    let name = &model.nodes[node].name;
+    let name = match model.nodes[node].name.as_str() {
+        "" => format!("joint {node}"),
+        name => format!("joint \"{name}\""),
+    };
     Err(GltfError::model(format!(
-        "joint \"{name}\" is at no finite place: its numbers and those of the joints above it add up to more than a number \
+        "{name} is at no finite place: its numbers and those of the joints above it add up to more than a number \
          can hold; write smaller ones"
     )))
 }

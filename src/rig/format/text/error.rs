@@ -183,6 +183,14 @@ pub enum RigTextError {
         /// The joints by number, each followed by its parent.
         joints: String,
     },
+    /// A joint that is further from the joint above it than a number can hold.
+    #[error("joint {joint}{} is further from its parent than a number can hold; write smaller coordinates", in_quotes(label.as_deref()))]
+    FarFromParent {
+        /// The joint, by its position in the list.
+        joint: usize,
+        /// Label of the joint.
+        label: Option<String>,
+    },
     /// A skeleton to be written has a parent that does not exist.
     #[error("joint {joint} has the parent {parent}, and there is no such joint; the rig was not written")]
     WriteParent {
@@ -209,7 +217,11 @@ impl RigTextError {
     /// Line of the error, counted from 1; `None` if the error has no line.
     pub fn line(&self) -> Option<usize> {
         match *self {
-            Self::Empty | Self::WriteParent { .. } | Self::WriteCycle { .. } | Self::WriteNotFinite { .. } => None,
+            Self::Empty
+            | Self::FarFromParent { .. }
+            | Self::WriteParent { .. }
+            | Self::WriteCycle { .. }
+            | Self::WriteNotFinite { .. } => None,
             Self::Utf16 => Some(1),
             Self::NotUtf8 { line }
             | Self::NoHeader { line, .. }
@@ -229,6 +241,11 @@ impl RigTextError {
             | Self::Cycle { line, .. } => Some(line),
         }
     }
+}
+
+/// A label behind the number of its joint, for messages.
+fn in_quotes(label: Option<&str>) -> String {
+    label.map_or_else(String::new, |label| format!(" \"{}\"", quoted(label)))
 }
 
 /// A field for messages: short, and without characters that would move a terminal's cursor.
