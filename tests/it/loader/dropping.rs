@@ -353,7 +353,7 @@ fn adding_a_part_is_greyed_where_it_would_be_refused() {
     use rigsmith::rig::part::OccupiedJoint;
 
     let mut studio = Studio::new(LoaderPanel::default());
-    let [hips, arm_l, arm_r, elbow_r] = ["hips", "arm_l", "arm_r", "elbow_r"].map(|label| studio.joint(label));
+    let [arm_l, arm_r, elbow_r] = ["arm_l", "arm_r", "elbow_r"].map(|label| studio.joint(label));
     let limb = studio.limb();
     studio.settle();
     let reason = |desk: &Desk| palette::obstacle(desk.app.world(), Action::Library(LibraryAction::Part));
@@ -377,12 +377,9 @@ fn adding_a_part_is_greyed_where_it_would_be_refused() {
     studio.send(ActionRequest(Action::Library(LibraryAction::Part)));
     assert!(studio.told(&words) && studio.desk.steps() == steps, "{:?}", studio.desk.told());
 
-    for (joints, wanted) in [
-        (vec![arm_r], None),
-        (vec![hips, arm_r, elbow_r], Some("the part does not fit the selected joints")),
-        (vec![arm_r, elbow_r], None),
-        (Vec::new(), Some("no joint is selected")),
-    ] {
+    for (joints, wanted) in
+        [(vec![arm_r], None), (vec![arm_r, elbow_r], None), (Vec::new(), Some("no joint is selected"))]
+    {
         studio.desk.select(&joints);
         studio.settle();
         assert_eq!(reason(&studio.desk), wanted, "{joints:?}");

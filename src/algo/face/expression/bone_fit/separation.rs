@@ -25,7 +25,7 @@ const MARGIN: f32 = 5e-5;
 /// Largest distance, in eye distances, by which points of lips and of lids pass each other and are separated. Points that pass
 /// further are not on the rims: the inside of a lip lies behind the other one.
 const DEEPEST_LIPS: f32 = 0.005;
-/// The same for lips in a blend of units, which pass further.
+/// Distance of lips in a blend of units, which pass further.
 const DEEPEST_LIPS_OF_BLENDS: f32 = 0.01;
 const DEEPEST_LIDS: f32 = 0.02;
 /// Distance, in eye distances, of points that need no inequality: no separation moves bones so far.
