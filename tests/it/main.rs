@@ -143,6 +143,7 @@ mod glyphs;
 mod graph;
 mod growth;
 mod growth_bends;
+mod growth_clips;
 mod growth_fit;
 mod growth_picks;
 mod heads;
