@@ -19,16 +19,12 @@ use rigsmith::{
     },
 };
 
-/// A chain of joints, of which the last one is scaled.
+/// A chain of joints.
 fn chain(count: usize) -> (Rig, Vec<BakedNode>) {
     let node = |number: usize| Node {
         name: format!("joint {number}"),
         parent: number.checked_sub(1),
-        rest: Trs {
-            translation: Vec3::Y * 0.1,
-            scale: if number + 1 == count { Vec3::new(0.5, 2.0, 1.25) } else { Vec3::ONE },
-            ..Trs::default()
-        },
+        rest: Trs { translation: Vec3::Y * 0.1, ..Trs::default() },
         joint: true,
         extras: None,
     };

@@ -27,11 +27,19 @@ pub(super) fn on_selection(gesture: &Gesture, plane: &ViewPlane) -> Option<Selec
 /// their number.
 pub(super) fn is_on_selection(gesture: &Gesture) -> bool {
     use Gesture::{Delete, DeleteHierarchy, Insert, Move, MoveTo, Orient, Parent, Rotate, Scale, Unparent};
-    match gesture {
-        Move(_) | MoveTo(_) | Rotate(_) | Scale(_) | Insert(_) | Orient(_) => true,
-        Delete | DeleteHierarchy | Parent | Unparent => true,
-        _ => false,
-    }
+    matches!(
+        gesture,
+        Move(_)
+            | MoveTo(_)
+            | Rotate(_)
+            | Scale(_)
+            | Insert(_)
+            | Orient(_)
+            | Delete
+            | DeleteHierarchy
+            | Parent
+            | Unparent
+    )
 }
 
 fn turn(axis: Vec3, degrees: f32) -> Quat {
