@@ -185,7 +185,8 @@ impl EditReport {
 }
 
 /// Answer to a [`Change::Place`], [`Change::Draw`], [`Change::LabelActive`], [`Change::GroupSelected`],
-/// [`Change::LockSelected`], [`Change::OperateSelected`], [`Change::Pick`], [`Change::Undo`] or [`Change::Redo`], in the order of the requests.
+/// [`Change::LockSelected`], [`Change::OperateSelected`], [`Change::Pick`], [`Change::Undo`] or [`Change::Redo`], in the order
+/// of the requests.
 #[derive(Message, Debug, Clone)]
 pub struct ChangeReport {
     /// The rig.

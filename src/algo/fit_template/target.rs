@@ -10,7 +10,7 @@ const SAMPLES: usize = 2200;
 /// Distance from the surface at which its two sides are looked at, in cells.
 const LOOK: f32 = 1.3;
 
-/// Every so many samples one from which the nearest point of the surface is looked for on trial.
+/// Step of the samples from which the nearest point of the surface is looked for on trial.
 const TRIALS: usize = 8;
 /// Mean number of leaves of the surface's hierarchy that a trial looks at from which on a surface is crowded. Bodies have three.
 const CROWDED: usize = 24;
