@@ -37,7 +37,7 @@ use crate::{
         skeleton_preset::{SkeletonPreset, apply_preset},
     },
     solve::{
-        bake_clip::{BakeSettings, BakedNode, bake_clip},
+        bake_clip::{BakePlan, BakeSettings, BakedNode},
         retarget::{MotionTarget, RetargetError},
     },
 };
@@ -394,6 +394,7 @@ fn exported(
     let built = bench.built().ok_or(PoseError::NotBuilt)?;
     let program = bench.runtime()?.state().program();
     let nodes = baked_nodes(bench.rig(), built, model);
+    let plan = BakePlan::new(program, &nodes);
     let tolerance = tolerance(args, size_of(model.rest_globals().iter().map(|at| at.translation)));
     let mut baked = Vec::new();
     let mut facts = Vec::new();
@@ -401,7 +402,8 @@ fn exported(
     for clip in clips {
         limits::check_time("baking the clips")?;
         let rate = args.fps.unwrap_or(clip.frame_rate);
-        let done = bake_clip(program, clip, &nodes, &bake_settings(rate, tolerance))
+        let done = plan
+            .bake(clip, &bake_settings(rate, tolerance))
             .map_err(|error| Failure::Input(format!("clip \"{}\": {error}", clip.name).into()))?;
         let keys: usize = done.channels.iter().map(|channel| channel.times.len()).sum();
         report.line(format!(

@@ -188,10 +188,20 @@ impl Surface {
     /// The point of the surface closest to `point`; `None` if the surface is empty or `point` is not finite. Of
     /// several triangles equally close, the one with the lowest index.
     pub fn closest_point(&self, point: Vec3) -> Option<SurfacePoint> {
-        let (squared, slot, barycentric) = if usable(point) { self.tree.nearest_point(point) } else { None }?;
-        let (triangle, corners) = self.tree.slot(slot);
-        let closest = closest::at(barycentric, corners);
-        Some(SurfacePoint { point: closest, triangle, barycentric, distance: squared.sqrt() })
+        self.closest_point_within(point, usize::MAX).0
+    }
+
+    /// A point of the surface near to `point`, and the number of leaves of the hierarchy (of up to eight triangles each) that
+    /// were looked at for it: the answer of [`Surface::closest_point`] if these are fewer than `most`, and the best one of
+    /// `most` leaves otherwise, so that the time is bounded where thousands of triangles are equally close, too.
+    pub fn closest_point_within(&self, point: Vec3, most: usize) -> (Option<SurfacePoint>, usize) {
+        let (found, leaves) = if usable(point) { self.tree.nearest_point(point, most) } else { (None, 0) };
+        let found = found.map(|(squared, slot, barycentric)| {
+            let (triangle, corners) = self.tree.slot(slot);
+            let closest = closest::at(barycentric, corners);
+            SurfacePoint { point: closest, triangle, barycentric, distance: squared.sqrt() }
+        });
+        (found, leaves)
     }
 
     /// The lowest and highest coordinates; `None` if the surface is empty.

@@ -13,6 +13,7 @@ mod error;
 pub(in crate::plugins) mod follow;
 mod follow_groups;
 pub(in crate::plugins) mod refusals;
+mod selection_operation;
 
 use std::{borrow::Cow, sync::Arc};
 
@@ -22,6 +23,7 @@ pub use self::{
     added_chains::ChainParent,
     entities::{GroupEntities, JointEntities, TagEntities},
     error::{ChangeError, EntityWrite, EntityWriteError},
+    selection_operation::SelectionOperation,
 };
 use super::{
     RigSystems,
@@ -125,6 +127,8 @@ pub enum Change {
     /// Locks the weights of the joints that are selected when the request is carried out, or unlocks them; answered by a
     /// [`ChangeReport`], too.
     LockSelected(bool),
+    /// Runs an operation on the joints that are selected when the request is carried out; answered by a [`ChangeReport`], too.
+    OperateSelected(SelectionOperation),
     /// Selects one joint. It is no edit: undo passes over it. Answered by a [`ChangeReport`].
     Pick(JointPick),
     /// Selects the listed joints, the active one last. It is no edit: nothing answers, and undo passes over it.
@@ -181,7 +185,8 @@ impl EditReport {
 }
 
 /// Answer to a [`Change::Place`], [`Change::Draw`], [`Change::LabelActive`], [`Change::GroupSelected`],
-/// [`Change::LockSelected`], [`Change::Pick`], [`Change::Undo`] or [`Change::Redo`], in the order of the requests.
+/// [`Change::LockSelected`], [`Change::OperateSelected`], [`Change::Pick`], [`Change::Undo`] or [`Change::Redo`], in the order
+/// of the requests.
 #[derive(Message, Debug, Clone)]
 pub struct ChangeReport {
     /// The rig.
@@ -253,7 +258,7 @@ fn apply_edits(
                 let parent = added.parent(rig, &document, *parent, selection.active());
                 Some(Operation::Chain { positions: positions.clone(), parent })
             }
-            _ => on_selection(requested, &selection),
+            _ => on_selection(requested, &document, &selection),
         };
         let change = match bound {
             Some(bound) => {
@@ -324,9 +329,10 @@ fn apply_edits(
                     .map(previewed)
                     .map_err(ChangeError::from)
             }
-            Change::LabelActive(_) | Change::GroupSelected { .. } | Change::LockSelected(_) => {
-                Err(ChangeError::NoActive)
-            }
+            Change::LabelActive(_)
+            | Change::GroupSelected { .. }
+            | Change::LockSelected(_)
+            | Change::OperateSelected(_) => Err(ChangeError::NoActive),
             // Joints to place or draw have become an operation, and joints to select are selected.
             Change::Place(_) | Change::Draw { .. } | Change::Select(_) | Change::Pick(_) => continue,
             Change::Commit | Change::CancelPreview if !history.is_previewing() => continue,
@@ -379,6 +385,7 @@ fn has_report(change: &Change) -> bool {
             | Change::LabelActive(_)
             | Change::GroupSelected { .. }
             | Change::LockSelected(_)
+            | Change::OperateSelected(_)
             | Change::Undo
             | Change::Redo
     )
@@ -386,7 +393,7 @@ fn has_report(change: &Change) -> bool {
 
 /// Operation of a change that is about the active joint or the selected ones; `None` for all other changes, and where it needs
 /// a selected joint and there is none.
-fn on_selection(change: &Change, selection: &Selection) -> Option<Operation> {
+fn on_selection(change: &Change, rig: &Rig, selection: &Selection) -> Option<Operation> {
     let active = selection.active();
     let selected = || active.map(|_| selection.0.clone());
     match change {
@@ -396,6 +403,7 @@ fn on_selection(change: &Change, selection: &Selection) -> Option<Operation> {
             Some(Operation::Group { joints: selected()?, name: name.clone(), color: *color })
         }
         Change::LockSelected(locked) => Some(Operation::Lock(selected()?, *locked)),
+        Change::OperateSelected(operation) => operation.on(rig, selection),
         _ => None,
     }
 }

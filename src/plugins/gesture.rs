@@ -1,12 +1,13 @@
 //! Lists of gestures: clicks and strokes as data.
 //!
 //! A [`GestureScript`] on a rig drives the same requests that a window sends, one gesture a frame, and keeps an answer
-//! for each. Clicks, strokes, labels, groups, picks and undone steps that nobody watches come several a frame. The command line, tests and
-//! tutorials use it; a script can do nothing that a person could not.
+//! for each. Clicks, strokes, labels, groups, picks, operations on selected joints and undone steps that nobody watches come several
+//! a frame. The command line, tests and tutorials use it; a script can do nothing that a person could not.
 
 mod answers;
 mod click_run;
 mod error;
+mod operation;
 mod pick_run;
 mod script;
 mod selection_run;

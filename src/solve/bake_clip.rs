@@ -2,7 +2,13 @@
 
 mod blocks;
 
-use std::sync::Arc;
+use std::{
+    collections::HashMap,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+};
 
 use super::program::{RigProgram, RigState};
 use crate::{
@@ -19,6 +25,9 @@ use crate::{
 };
 
 pub(super) use blocks::{JoinedKeys, PlayedClip, reduced_keys};
+
+/// Properties of a node, in the order of its channels.
+static PROPERTIES: [Property; 3] = [Property::Translation, Property::Rotation, Property::Scale];
 
 /// Most frames of a baked clip.
 const MOST_FRAMES: u64 = 1_000_000;
@@ -146,41 +155,117 @@ pub fn bake_clip(
     nodes: &[BakedNode],
     settings: &BakeSettings,
 ) -> Result<Clip, BakeError> {
-    let times = frame_times(clip, nodes.len(), settings)?;
-    let properties = [Property::Translation, Property::Rotation, Property::Scale];
-    let channel = |at: usize, property: &Property| {
-        let base = plain_base(program, nodes, at)?;
-        let (node, target) = (nodes[at].uid, channel_target(at, property));
-        let track = TrackTarget { node, property: property.clone() };
-        if clip.layers.iter().any(|layer| layer.tracks.contains_key(&track)) {
-            return channel_of(clip, node, property, &base, target);
-        }
-        Some(constant_channel(target, &part_of(&base, property)[..property.width()]))
-    };
-    let mut direct: Vec<[Option<Channel>; 3]> =
-        (0..nodes.len()).map(|at| std::array::from_fn(|part| channel(at, &properties[part]))).collect();
-    let fixed: Vec<[bool; 3]> = direct.iter().map(|parts| std::array::from_fn(|part| parts[part].is_some())).collect();
-    // Nothing is played where all parts have their keys already.
-    let keys: Vec<[JoinedKeys; 3]> = if fixed.as_flattened().iter().all(|is_fixed| *is_fixed) {
-        vec![Default::default(); nodes.len()]
-    } else {
-        reduced_keys(PlayedClip::new(program, clip, nodes, &times), &fixed, &settings.tolerance)
-    };
-    let extras = Some(ClipExtras::of(clip, settings.rate).written());
-    let mut baked = Clip { name: clip.name.clone(), extras, ..Clip::default() };
-    for (at, (node, mut keys)) in nodes.iter().zip(keys).enumerate() {
-        for (part, property) in properties.iter().enumerate() {
-            let kept = direct[at][part].take();
-            let channel = kept.unwrap_or_else(|| {
-                std::mem::take(&mut keys[part]).channel(channel_target(at, property), property.width())
-            });
-            if !is_at_rest(&channel, &part_of(&node.rest, property)) {
-                baked.channels.push(channel);
-            }
+    BakePlan::new(program, nodes).bake(clip, settings)
+}
+
+/// Nodes of a file and the program that moves them, for the baking of any number of clips: a clip takes work for the nodes that it
+/// moves.
+#[derive(Debug)]
+pub struct BakePlan<'a> {
+    program: &'a Arc<RigProgram>,
+    nodes: &'a [BakedNode],
+    /// Place of each node.
+    places: HashMap<Uid, usize>,
+    /// Rest transforms of the nodes that nothing but their own keys moves.
+    bases: Vec<Option<Trs>>,
+    /// Nodes that have a channel without any keys, as their transform in the program is not their rest in the file.
+    elsewhere: Vec<usize>,
+    /// True if nothing but their own keys moves the nodes.
+    is_plain: bool,
+    /// Number of nodes that clips looked at.
+    visits: AtomicU64,
+}
+
+impl<'a> BakePlan<'a> {
+    /// Takes the nodes and the program.
+    pub fn new(program: &'a Arc<RigProgram>, nodes: &'a [BakedNode]) -> Self {
+        let bases: Vec<Option<Trs>> = (0..nodes.len()).map(|at| plain_base(program, nodes, at)).collect();
+        let is_elsewhere = |at: &usize| {
+            let (base, rest) = (bases[*at], &nodes[*at].rest);
+            base.is_some_and(|base| {
+                PROPERTIES.iter().any(|property| {
+                    let (base, rest) = (part_of(&base, property), part_of(rest, property));
+                    !is_near(&base[..property.width()], &rest)
+                })
+            })
+        };
+        Self {
+            program,
+            nodes,
+            places: nodes.iter().enumerate().map(|(at, node)| (node.uid, at)).collect(),
+            elsewhere: (0..nodes.len()).filter(is_elsewhere).collect(),
+            is_plain: bases.iter().all(Option::is_some),
+            bases,
+            visits: AtomicU64::new(0),
         }
     }
-    keep_length(&mut baked, clip.duration());
-    Ok(baked)
+
+    /// Number of nodes that clips looked at so far: a count of work for tests.
+    pub fn visits(&self) -> u64 {
+        self.visits.load(Ordering::Relaxed)
+    }
+
+    /// Bakes a clip, as [`bake_clip`] does.
+    ///
+    /// # Errors
+    /// As for [`bake_clip`].
+    pub fn bake(&self, clip: &RigClip, settings: &BakeSettings) -> Result<Clip, BakeError> {
+        let (program, nodes) = (self.program, self.nodes);
+        let times = frame_times(clip, nodes.len(), settings)?;
+        let mut chosen = self.own_nodes(clip);
+        let mut direct = self.direct(clip, &chosen);
+        let is_whole = |direct: &[[Option<Channel>; 3]]| direct.as_flattened().iter().all(Option::is_some);
+        // Where all parts of the nodes with keys have their channels already, nothing is played, and the others stay at rest.
+        let keys: Vec<[JoinedKeys; 3]> = if self.is_plain && is_whole(&direct) {
+            vec![Default::default(); chosen.len()]
+        } else {
+            chosen = (0..nodes.len()).collect();
+            direct = self.direct(clip, &chosen);
+            let fixed: Vec<[bool; 3]> =
+                direct.iter().map(|parts| std::array::from_fn(|part| parts[part].is_some())).collect();
+            reduced_keys(PlayedClip::new(program, clip, nodes, &times), &fixed, &settings.tolerance)
+        };
+        let extras = Some(ClipExtras::of(clip, settings.rate).written());
+        let mut baked = Clip { name: clip.name.clone(), extras, ..Clip::default() };
+        for ((at, mut kept), mut keys) in chosen.into_iter().zip(direct).zip(keys) {
+            for (part, property) in PROPERTIES.iter().enumerate() {
+                let channel = kept[part].take().unwrap_or_else(|| {
+                    std::mem::take(&mut keys[part]).channel(channel_target(at, property), property.width())
+                });
+                if !is_at_rest(&channel, &part_of(&nodes[at].rest, property)) {
+                    baked.channels.push(channel);
+                }
+            }
+        }
+        keep_length(&mut baked, clip.duration());
+        Ok(baked)
+    }
+
+    /// Places of the nodes that have a channel of their own: those with keys, and those that stand elsewhere in the file.
+    fn own_nodes(&self, clip: &RigClip) -> Vec<usize> {
+        let keyed = clip.layers.iter().flat_map(|layer| layer.tracks.keys());
+        let mut own: Vec<usize> = keyed.filter_map(|track| self.places.get(&track.node).copied()).collect();
+        own.extend(&self.elsewhere);
+        own.sort_unstable();
+        own.dedup();
+        own
+    }
+
+    /// Channels of some nodes that need no playing: keys as they are, and one key for what has none; `None` where other things
+    /// than its keys move a node, or where its keys cannot stay as they are.
+    fn direct(&self, clip: &RigClip, chosen: &[usize]) -> Vec<[Option<Channel>; 3]> {
+        self.visits.fetch_add(chosen.len() as u64, Ordering::Relaxed);
+        let channel = |at: usize, property: &Property| {
+            let base = self.bases[at]?;
+            let (node, target) = (self.nodes[at].uid, channel_target(at, property));
+            let track = TrackTarget { node, property: property.clone() };
+            if clip.layers.iter().any(|layer| layer.tracks.contains_key(&track)) {
+                return channel_of(clip, node, property, &base, target);
+            }
+            Some(constant_channel(target, &part_of(&base, property)[..property.width()]))
+        };
+        chosen.iter().map(|&at| std::array::from_fn(|part| channel(at, &PROPERTIES[part]))).collect()
+    }
 }
 
 /// Seconds of the frames of a clip from its start.
@@ -237,9 +322,12 @@ fn plain_base(program: &RigProgram, nodes: &[BakedNode], at: usize) -> Option<Tr
 
 /// True if a channel has one key, which is the node's rest.
 fn is_at_rest(channel: &Channel, rest: &[f32; 4]) -> bool {
-    channel.times.len() == 1
-        && channel.interpolation != Interpolation::CubicSpline
-        && channel.values.iter().zip(rest).all(|(a, b)| (a - b).abs() < 1e-6)
+    channel.times.len() == 1 && channel.interpolation != Interpolation::CubicSpline && is_near(&channel.values, rest)
+}
+
+/// True if the numbers of a transform's part are those of another one.
+fn is_near(values: &[f32], others: &[f32]) -> bool {
+    values.iter().zip(others).all(|(a, b)| (a - b).abs() < 1e-6)
 }
 
 /// Adds keys to the first channel where no channel has one at the start or the end, so that the clip is as long in a file.

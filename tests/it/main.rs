@@ -143,6 +143,8 @@ mod glyphs;
 mod graph;
 mod growth;
 mod growth_bends;
+mod growth_clips;
+mod growth_fit;
 mod growth_picks;
 mod heads;
 #[cfg(feature = "cli")]
@@ -180,6 +182,7 @@ mod new_templates;
 mod obj;
 mod obj_materials;
 mod obj_torture;
+mod operation_runs;
 mod packed_clips;
 #[cfg(feature = "editor")]
 mod panels;

@@ -112,6 +112,11 @@ impl MeshAnalysis {
         Ok(Self { mesh, voxels, surface, target, graph, trees, mirror, seam, grounds, sheets })
     }
 
+    /// True if thousands of triangles lie over each other, so that the nearest points of the surface are looked for roughly.
+    pub fn is_crowded(&self) -> bool {
+        self.target.most_leaves < usize::MAX
+    }
+
     /// Number of the solid cells in which the mesh is analysed.
     pub fn cells(&self) -> usize {
         self.voxels.len()
@@ -245,10 +250,11 @@ impl Look {
         let voxels = voxels(resolution(coarse.len(), fine as usize)).map_err(|_| FitError::NoSurface)?;
         step(0.4)?;
         let origin = mesh.space.to_unit(Vec3::ZERO);
-        let (surface, (graph, target)) = rayon::join(
+        let (surface, (graph, mut target)) = rayon::join(
             || Surface::build(&mesh.points, &mesh.triangles),
             || (volume::graph(&voxels, origin), target::Target::new(&mesh, &voxels)),
         );
+        target.bound_looks(&surface, &voxels);
         Ok(Self { mesh, voxels, surface, target, graph })
     }
 }

@@ -69,27 +69,28 @@ impl Branches {
         if a == b {
             return 0;
         }
-        let mut above = Vec::new();
-        let mut arc = Some(a);
-        while let Some(i) = arc {
-            above.push(i);
-            arc = self.arcs[i].parent;
-        }
-        let mut arc = Some(b);
+        // Children come before the arcs that bear them, so of two arcs the one with the lower number goes on.
+        let (mut low, mut high) = (a.min(b), a.max(b));
         let mut join = 0;
-        while let Some(i) = arc {
-            if above.contains(&i) {
-                join = self.arcs[i].far;
+        while let Some(parent) = self.arcs[low].parent {
+            if parent == high {
+                join = self.arcs[high].far;
                 break;
             }
-            arc = self.arcs[i].parent;
+            (low, high) = (parent.min(high), parent.max(high));
         }
         (self.arcs[a].far.saturating_sub(join)) + (self.arcs[b].far.saturating_sub(join))
     }
 
     /// True if one of two arcs lies on the way from the other to the centre.
     pub(super) fn on_one_way(&self, a: usize, b: usize) -> bool {
-        self.path(a).contains(&b) || self.path(b).contains(&a)
+        // Children come before the arcs that bear them.
+        let (mut arc, end) = (a.min(b), a.max(b));
+        while arc < end {
+            let Some(parent) = self.arcs[arc].parent else { return false };
+            arc = parent;
+        }
+        arc == end
     }
 
     /// Arcs from a leaf to the centre.

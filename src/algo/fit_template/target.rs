@@ -3,12 +3,19 @@
 use glam::Vec3;
 
 use super::clean::CleanMesh;
-use crate::mesh::voxels::Voxels;
+use crate::mesh::{surface::Surface, voxels::Voxels};
 
 /// Samples of the whole surface.
 const SAMPLES: usize = 2200;
 /// Distance from the surface at which its two sides are looked at, in cells.
 const LOOK: f32 = 1.3;
+
+/// Step of the samples from which the nearest point of the surface is looked for on trial.
+const TRIALS: usize = 8;
+/// Mean number of leaves of the surface's hierarchy that a trial looks at from which on a surface is crowded. Bodies have three.
+const CROWDED: usize = 24;
+/// Leaves that a look for the nearest point of a crowded surface takes.
+const MOST_LEAVES: usize = 32;
 
 /// Sides of a triangle: inside or outside of the volume.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,6 +45,8 @@ pub(super) struct Target {
     /// Normal of each triangle that points out, and whether the triangle is a thin sheet; zero for inner walls.
     pub(super) normals: Vec<(Vec3, bool)>,
     areas: Vec<f64>,
+    /// Leaves of the surface's hierarchy that a look for the nearest point takes; all but for a crowded surface.
+    pub(super) most_leaves: usize,
 }
 
 impl Target {
@@ -64,9 +73,25 @@ impl Target {
                 Facing::Inner => (Vec3::ZERO, false),
             });
         }
-        let mut target = Self { samples: Vec::new(), normals, areas };
+        let mut target = Self { samples: Vec::new(), normals, areas, most_leaves: usize::MAX };
         target.samples = target.sampled(mesh, SAMPLES, |_| true);
         target
+    }
+
+    /// Bounds the looks for the nearest point where thousands of triangles lie over each other, as those that share one edge or
+    /// corner do: no figure is to be seen there, and an exact answer would take time in proportion to the triangles.
+    pub(super) fn bound_looks(&mut self, surface: &Surface, voxels: &Voxels) {
+        let reach = LOOK * voxels.cell() as f32;
+        let (mut leaves, mut looks) = (0, 0);
+        for sample in self.samples.iter().step_by(TRIALS) {
+            for side in [-reach, reach] {
+                leaves += surface.closest_point_within(sample.point + sample.normal * side, 8 * CROWDED).1;
+                looks += 1;
+            }
+        }
+        if leaves > CROWDED * looks {
+            self.most_leaves = MOST_LEAVES;
+        }
     }
 
     /// Samples spread evenly over the outer triangles that `wanted` takes (by a corner).

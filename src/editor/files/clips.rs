@@ -15,7 +15,7 @@ use crate::{
         operations::KeyTolerance,
     },
     solve::{
-        bake_clip::{BakeSettings, BakedNode, bake_clip},
+        bake_clip::{BakePlan, BakeSettings, BakedNode},
         packed_clip::{PackedSkeleton, pack_clip},
         program::{CompileOptions, RigProgram},
     },
@@ -46,7 +46,8 @@ pub(super) fn put_clips(
     let nodes: Vec<BakedNode> = uids.into_iter().zip(&model.nodes).map(node).collect();
     // The tolerance is for humans in metres.
     let tolerance = KeyTolerance::default().for_height(size_of(model));
-    let bake = |clip: &RigClip| bake_clip(&program, clip, &nodes, &BakeSettings::new(clip.frame_rate, tolerance));
+    let plan = BakePlan::new(&program, &nodes);
+    let bake = |clip: &RigClip| plan.bake(clip, &BakeSettings::new(clip.frame_rate, tolerance));
     let mut clips: Vec<Clip> = rig.clips().iter().map(bake).collect::<Result<_, _>>()?;
     for mut clip in std::mem::take(&mut model.clips) {
         clip.channels.retain(|channel| matches!(channel.target, ChannelTarget::MorphWeights(_)));

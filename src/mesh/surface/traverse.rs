@@ -231,8 +231,10 @@ impl Tree {
         (packet.triangle(lane), packet.corners(lane))
     }
 
-    /// The point of the surface nearest to `point`: squared distance, slot and barycentric coordinates.
-    pub fn nearest_point(&self, point: Vec3) -> Option<(f32, u32, Vec3)> {
+    /// The point of the surface nearest to `point` in the first `most` leaves that may have it, nearer ones first: squared
+    /// distance, slot and barycentric coordinates. The second value is the number of leaves that were looked at.
+    pub fn nearest_point(&self, point: Vec3, most: usize) -> (Option<(f32, u32, Vec3)>, usize) {
+        let mut leaves = 0;
         let mut best: Option<(f32, u32, u32, Vec3)> = None;
         let reach = self.bounds.low.abs().max(self.bounds.high.abs()).max(point.abs()).max_element();
         let mut waiting = ChildStack::new(self);
@@ -250,7 +252,9 @@ impl Tree {
                         waiting.push(start, bounds[i / 4][i % 4], node.child(i));
                     }
                 }
+                Target::Leaf(..) if leaves >= most => break,
                 Target::Leaf(index, two) => {
+                    leaves += 1;
                     for index in index..=index + usize::from(two) {
                         let packet = &self.packets[index];
                         for lane in bits(packet.lanes()) {
@@ -265,6 +269,6 @@ impl Tree {
                 }
             }
         }
-        best.map(|(distance, _, slot, weights)| (distance, slot, weights))
+        (best.map(|(distance, _, slot, weights)| (distance, slot, weights)), leaves)
     }
 }

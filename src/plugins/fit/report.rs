@@ -77,6 +77,14 @@ pub enum FitFailure {
         /// Nearest labels, as the rest of a sentence.
         nearest: String,
     },
+    /// A marker names a joint that none of the templates has that the fit may choose.
+    #[error("no joint of any template is called \"{label}\"{nearest}")]
+    NoJointOfAny {
+        /// Requested label.
+        label: String,
+        /// Nearest labels, as the rest of a sentence.
+        nearest: String,
+    },
     /// Two markers are given for one joint.
     #[error("there are two markers for \"{label}\"; give one place for each joint")]
     TwoMarkers {

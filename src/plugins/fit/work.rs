@@ -1,7 +1,7 @@
 //! Work of a fit in its task: the choice of a template, the fit, and the report.
 
 use std::{
-    collections::{BTreeMap, HashSet},
+    collections::{BTreeMap, BTreeSet, HashSet},
     sync::Arc,
     time::Instant,
 };
@@ -51,6 +51,7 @@ pub(super) struct Work {
 }
 
 /// Joints that may be fitted.
+#[derive(Clone)]
 struct Candidate {
     /// The joints as a rig of their own, before the fit.
     template: Arc<Rig>,
@@ -149,6 +150,28 @@ impl Work {
         sides(&part, &self.from, None, &self.modules).into_iter().map(Candidate::skeleton).collect()
     }
 
+    /// Refuses a marker of a joint that no candidate has, before any work is done for the mesh.
+    fn check_markers(&self, candidates: &[Candidate]) -> Result<(), FitFailure> {
+        let markers = &self.request.markers;
+        if markers.is_empty() || candidates.is_empty() {
+            return Ok(());
+        }
+        let variants = candidates.iter().flat_map(|candidate| self.either_side(candidate.clone()));
+        let mut names = BTreeSet::new();
+        let mut labels = BTreeSet::new();
+        for variant in variants {
+            let joints = variant.template.walk().filter(|joint| joint.data.kind == NodeKind::Joint);
+            labels.extend(joints.map(|joint| joint.data.label.clone().unwrap_or_default()));
+            names.insert(variant.template.about().name.clone());
+        }
+        let Some((label, _)) = markers.iter().find(|(label, _)| !labels.contains(label)) else { return Ok(()) };
+        let (label, nearest) = (label.clone(), did_you_mean(label, &labels));
+        match names.pop_first().filter(|_| names.is_empty()) {
+            Some(template) => Err(FitFailure::NoJoint { template, label, nearest }),
+            None => Err(FitFailure::NoJointOfAny { label, nearest }),
+        }
+    }
+
     pub(super) fn run(self, progress: &(dyn Fn(f32) -> bool + Sync)) -> Result<FinishedFit, FitFailure> {
         let begin = Instant::now();
         let (region, gear) = self.request.region.triangles(&self.mesh, &self.from);
@@ -186,6 +209,7 @@ impl Work {
         progress: &(dyn Fn(f32) -> bool + Sync),
     ) -> Result<FinishedFit, FitFailure> {
         let mut candidates = self.candidates()?;
+        self.check_markers(&candidates)?;
         let points = &self.mesh.rest.points;
         let analysis =
             MeshAnalysis::new(points, &self.mesh.triangles, region.as_deref(), &|part| progress(0.5 * part))?;

@@ -1,5 +1,5 @@
-//! Runs of clicks: clicks, strokes, names, groups, locks, picks and undone steps that follow one another, carried out in one
-//! frame.
+//! Runs of clicks: clicks, strokes, names, groups, locks, operations on selected joints, picks and undone steps that follow one
+//! another, carried out in one frame.
 //!
 //! Nobody watches the gestures of a command. Between two clicks on a mesh at rest nothing happens that the second one
 //! depends on but the joint of the first, so that entities have to follow the document once for all of them; names, groups and
@@ -13,13 +13,14 @@ use super::{
     Gesture, GestureScript,
     answers::{told_chain, told_step},
     error::GestureError,
+    operation::{is_on_selection, on_selection},
     pick_run::RunPicks,
     stroke_run::RunJoints,
 };
 use crate::{
     algo::{stroke::StrokeNote, view::ViewPlane},
     plugins::{
-        document::{Change, ChangeError, EditRequest, JointPick, ReportedStep, Selection},
+        document::{Change, ChangeError, EditRequest, JointPick, ReportedStep, Selection, SelectionOperation},
         limits::RigLimits,
         placement::joint_at,
         stroke::has_few_triangles,
@@ -79,14 +80,20 @@ struct RunState {
     has_changes: bool,
     /// True if the last change is one of the rig, and not a pick.
     is_edited: bool,
-    /// True after an undone or redone step, which may pose or bind the mesh.
+    /// True after an undone or redone step, which may pose or bind the mesh, or an operation, which may move joints.
     has_steps: bool,
+    /// True after an undone or redone step, which may bring joints back with their tags.
+    has_undone: bool,
     /// True after a joint was added.
     has_joints: bool,
     /// True after a joint was picked.
     has_picks: bool,
     /// Number of strokes.
     strokes: usize,
+    /// Number of joints that are selected, at most.
+    selected: usize,
+    /// Number of joints that operations were about.
+    operated: usize,
 }
 
 impl RunState {
@@ -96,6 +103,8 @@ impl RunState {
         match gesture {
             setting if setting.is_setting() => true,
             Gesture::Group(..) | Gesture::Lock(_) => true,
+            // On a rig without commands and skins, an operation depends on nothing but its joints and the selection.
+            operation if is_on_selection(operation) => can_pick && self.strokes == 0 && !self.has_undone,
             // The answer to a stroke names the joint that its chain hangs on.
             Gesture::Label(_) | Gesture::Undo | Gesture::Redo => self.strokes == 0,
             Gesture::Click(_) => !self.has_steps,
@@ -117,19 +126,27 @@ impl RunState {
     fn note(&mut self, change: &Change) {
         let is_edit = match change {
             Change::Place(_) | Change::Draw { .. } => {
-                (self.has_joints, self.has_active) = (true, true);
+                (self.has_joints, self.has_active, self.selected) = (true, true, 1);
                 true
             }
             Change::Undo | Change::Redo => {
-                self.has_steps = true;
+                (self.has_steps, self.has_undone) = (true, true);
                 true
             }
+            // Joints are elsewhere then, and clicks and strokes start anew.
+            Change::OperateSelected(operation) => {
+                let is_edit = self.has_active;
+                self.has_steps = true;
+                self.operated += self.selected.max(1);
+                self.has_active &= !matches!(operation, SelectionOperation::Delete { .. });
+                is_edit
+            }
             Change::Select(joints) => {
-                self.has_active = !joints.is_empty();
+                (self.has_active, self.selected) = (!joints.is_empty(), joints.len());
                 false
             }
             Change::Pick(_) => {
-                (self.has_picks, self.has_active) = (true, true);
+                (self.has_picks, self.has_active, self.selected) = (true, true, 1);
                 false
             }
             _ => self.has_active,
@@ -142,7 +159,7 @@ impl RunState {
 /// True if the next gestures of a script make a run: the rig is at rest, and no joint of it moves the mesh.
 pub(super) fn is_due(script: &GestureScript, rig: &Rig, surface: Option<&RigSurface>) -> bool {
     script.is_unwatched
-        && script.waiting.front().is_some_and(|gesture| RunState::default().takes(gesture, None, false))
+        && script.waiting.front().is_some_and(|gesture| RunState::default().takes(gesture, None, true))
         && rig.pose().is_empty()
         && rig.skins().next().is_none()
         && surface.is_none_or(|surface| !surface.is_stale())
@@ -157,10 +174,16 @@ pub(super) fn carry_out(
 ) -> bool {
     let (mut joints, mut picks) = (RunJoints::new(run), RunPicks::default());
     let mut has_begun = false;
-    let mut state = RunState { has_active: run.selection.active().is_some(), ..RunState::default() };
-    for _ in 0..run.rig.len().max(run.rig.groups().len()).max(LEAST) {
+    let selected = run.selection.0.len();
+    let mut state = RunState { has_active: run.selection.active().is_some(), selected, ..RunState::default() };
+    let most = run.rig.len().max(run.rig.groups().len()).max(LEAST);
+    for _ in 0..most {
         let (gesture, next) = (script.waiting.front(), script.waiting.get(1));
         let Some(gesture) = gesture.filter(|gesture| state.takes(gesture, next, run.can_pick)) else { break };
+        // The time that a command has is looked at between frames.
+        if is_on_selection(gesture) && state.operated > 0 && state.operated + state.selected > most {
+            break;
+        }
         let mut pick = None;
         if let Gesture::Select(point) = gesture {
             let Some(found) = picks.picked(run, &script.state.plane(run.bounds), (*point).into()) else { break };
@@ -225,8 +248,11 @@ impl GestureScript {
             Gesture::Deselect => Some(Change::Select(Vec::new())),
             Gesture::Undo => Some(Change::Undo),
             Gesture::Redo => Some(Change::Redo),
-            setting => {
-                self.state.take_setting(&setting);
+            other => {
+                if let Some(operation) = on_selection(&other, &self.state.plane(run.bounds)) {
+                    return Some(Change::OperateSelected(operation));
+                }
+                self.state.take_setting(&other);
                 None
             }
         }

@@ -9,6 +9,7 @@ use super::{
     answers::Answers,
     click_run::{self, RequestedChange, RunRig},
     error::GestureError,
+    operation::on_selection,
     selection_run::{self, RequestedSelections},
 };
 use crate::{
@@ -361,16 +362,11 @@ impl GestureRun<'_, '_> {
 
     /// The operation of a gesture on the selected joints.
     fn operation(&self, gesture: Gesture) -> Result<Operation, GestureError> {
-        let plane = self.plane();
         let active = self.active()?;
+        if let Some(operation) = on_selection(&gesture, &self.plane()) {
+            return operation.on(self.rig, self.selection).ok_or(GestureError::NoSelection);
+        }
         let joints = self.selected()?;
-        let here = self.rig.position(active);
-        // A drag in an orthographic view keeps the depth.
-        let at_depth_of_active = |at: (f32, f32)| {
-            let from = plane.project(here).unwrap_or_default();
-            let delta = Vec2::from(at) - from;
-            here + plane.right * delta.x + plane.up * delta.y
-        };
         Ok(match gesture {
             Gesture::Label(label) => Operation::Labels(vec![(active, label)]),
             Gesture::Labels(labels) => {
@@ -383,42 +379,9 @@ impl GestureRun<'_, '_> {
                 }
                 Operation::Labels(chain.into_iter().rev().zip(labels).collect())
             }
-            Gesture::Move(at) => Operation::Move { to: vec![(active, at_depth_of_active(at))], with_children: false },
-            Gesture::MoveTo(to) => {
-                Operation::Move { to: vec![(active, <[f32; 3]>::from(to).into())], with_children: false }
-            }
-            Gesture::Rotate(degrees) => Operation::Rotate {
-                joints,
-                rotation: turn(plane.towards(), degrees),
-                pivot: Some(here),
-                with_children: true,
-            },
-            Gesture::Scale(factor) => Operation::Scale {
-                joints,
-                scale: Vec3::splat(factor),
-                axes: Quat::IDENTITY,
-                pivot: Some(here),
-                with_children: true,
-            },
-            Gesture::Insert(at) => Operation::Insert { child: active, position: at_depth_of_active(at) },
-            Gesture::Delete => Operation::Delete { joints, keep_children: true },
-            Gesture::DeleteHierarchy => Operation::Delete { joints, keep_children: false },
-            Gesture::Parent => {
-                let joints = joints.into_iter().filter(|joint| *joint != active).collect();
-                Operation::Reparent { joints, parent: Some(active) }
-            }
-            Gesture::Unparent => Operation::Reparent { joints, parent: None },
-            Gesture::Orient(along) => Operation::Orient { joints, along },
-            Gesture::MirrorSelected => Operation::Mirror { joints },
             Gesture::Group(name, color) => Operation::Group { joints, name, color: color.map(<[f32; 3]>::from) },
             Gesture::Lock(locked) => Operation::Lock(joints, locked),
             _ => return Err(GestureError::NoOperation),
         })
     }
-}
-
-fn turn(axis: Vec3, degrees: f32) -> Quat {
-    let half = 0.5 * degrees.to_radians();
-    let [x, y, z] = (axis * bevy::math::ops::sin(half)).to_array();
-    Quat::from_xyzw(x, y, z, bevy::math::ops::cos(half)).normalize()
 }

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     algo::fit_template::target::{Sample, Target},
-    mesh::surface::Surface,
+    mesh::surface::{Surface, SurfacePoint},
 };
 
 /// Points handled at a time by one thread.
@@ -31,6 +31,12 @@ pub(in super::super) struct Anchor {
 pub(super) struct Goal<'a> {
     pub(super) surface: &'a Surface,
     pub(super) target: &'a Target,
+}
+
+impl Goal<'_> {
+    fn closest_point(&self, place: Vec3) -> Option<SurfacePoint> {
+        self.surface.closest_point_within(place, self.target.most_leaves).0
+    }
 }
 
 /// Holds for a stage.
@@ -155,7 +161,7 @@ fn to_surface(model: &HumanModel, posed: &PosedModel, goal: &Goal, reach: f32) -
     let one = |i: usize| {
         let (place, normal) = (posed.points[i], posed.normals[i]);
         let mut row = Row { place: Place::Point(i), direction: normal, distance: 0.0, weight: 0.0 };
-        let Some(hit) = goal.surface.closest_point(place) else { return row };
+        let Some(hit) = goal.closest_point(place) else { return row };
         let (mut outward, thin) = goal.target.normals[hit.triangle as usize];
         if thin && outward.dot(normal) < 0.0 {
             outward = -outward;
@@ -211,7 +217,7 @@ pub(super) fn residual(model: &HumanModel, state: &State, goal: &Goal, samples: 
     let posed = state.posed(model);
     let whole: f32 = model.points.iter().map(|p| p.importance).sum();
     let distance = |i: usize| {
-        let hit = goal.surface.closest_point(posed.points[i]);
+        let hit = goal.closest_point(posed.points[i]);
         hit.map_or(most, |hit| {
             let (outward, thin) = goal.target.normals[hit.triangle as usize];
             let facing = outward.dot(posed.normals[i]);
@@ -253,7 +259,7 @@ pub(super) fn agreement(model: &HumanModel, state: &State, goal: &Goal, samples:
         .par_iter()
         .zip(&posed.normals)
         .map(|(&place, &normal)| {
-            let Some(hit) = goal.surface.closest_point(place) else { return MOST };
+            let Some(hit) = goal.closest_point(place) else { return MOST };
             let (outward, thin) = goal.target.normals[hit.triangle as usize];
             let facing = outward.dot(normal);
             let facing = if thin { facing.abs() } else { facing };

@@ -1,0 +1,49 @@
+//! Gestures that are operations on the selected joints.
+
+use bevy::prelude::*;
+
+use super::Gesture;
+use crate::{algo::view::ViewPlane, plugins::document::SelectionOperation};
+
+/// The operation of a gesture on the selected joints; `None` for all other gestures.
+pub(super) fn on_selection(gesture: &Gesture, plane: &ViewPlane) -> Option<SelectionOperation> {
+    Some(match gesture {
+        Gesture::Move(at) => SelectionOperation::MoveAlong(*plane, (*at).into()),
+        Gesture::MoveTo(to) => SelectionOperation::MoveTo(<[f32; 3]>::from(*to).into()),
+        Gesture::Rotate(degrees) => SelectionOperation::Rotate(turn(plane.towards(), *degrees)),
+        Gesture::Scale(factor) => SelectionOperation::Scale(*factor),
+        Gesture::Insert(at) => SelectionOperation::Insert(*plane, (*at).into()),
+        Gesture::Delete => SelectionOperation::Delete { keep_children: true },
+        Gesture::DeleteHierarchy => SelectionOperation::Delete { keep_children: false },
+        Gesture::Parent => SelectionOperation::Parent,
+        Gesture::Unparent => SelectionOperation::Unparent,
+        Gesture::Orient(along) => SelectionOperation::Orient(*along),
+        Gesture::MirrorSelected => SelectionOperation::Mirror,
+        _ => return None,
+    })
+}
+
+/// True for a gesture that is an operation on the selected joints, of which a run may have many: its work is in proportion to
+/// their number.
+pub(super) fn is_on_selection(gesture: &Gesture) -> bool {
+    use Gesture::{Delete, DeleteHierarchy, Insert, Move, MoveTo, Orient, Parent, Rotate, Scale, Unparent};
+    matches!(
+        gesture,
+        Move(_)
+            | MoveTo(_)
+            | Rotate(_)
+            | Scale(_)
+            | Insert(_)
+            | Orient(_)
+            | Delete
+            | DeleteHierarchy
+            | Parent
+            | Unparent
+    )
+}
+
+fn turn(axis: Vec3, degrees: f32) -> Quat {
+    let half = 0.5 * degrees.to_radians();
+    let [x, y, z] = (axis * bevy::math::ops::sin(half)).to_array();
+    Quat::from_xyzw(x, y, z, bevy::math::ops::cos(half)).normalize()
+}

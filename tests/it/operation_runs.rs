@@ -1,0 +1,130 @@
+//! Operations on selected joints in lists that nobody watches: the same result as one a frame, and frames in proportion to the
+//! length of the list.
+
+use bevy::prelude::*;
+use rigsmith::{
+    headless::Workbench,
+    plugins::{
+        gesture::{Gesture, GestureAnswer, GestureScript, read_gestures},
+        history::RigHistory,
+    },
+    prelude::Selection,
+    rig::{Rig, Uid, operations::Axis},
+};
+
+use crate::gestures::boxes;
+
+/// Largest growth for twice the length.
+const GROWTH: f64 = 2.3;
+
+fn bench() -> Workbench {
+    let mut bench = Workbench::new(7, "test");
+    bench.open(boxes(&[[[-1.0, 0.0, -0.5], [1.0, 2.0, 0.5]]]), false).unwrap();
+    bench
+}
+
+/// Carries out gestures one a frame, as in a window.
+fn watched(bench: &mut Workbench, gestures: Vec<Gesture>) -> Vec<GestureAnswer> {
+    let rig = bench.rig_entity();
+    let app = bench.app_mut();
+    app.world_mut().entity_mut(rig).insert(GestureScript::new(gestures));
+    for _ in 0..10_000 {
+        app.update();
+        let script = app.world().get::<GestureScript>(rig).unwrap();
+        if script.is_done() {
+            return script.answers.clone();
+        }
+    }
+    panic!("the gestures do not end");
+}
+
+fn steps(bench: &mut Workbench) -> (Vec<String>, usize, Vec<Uid>) {
+    let rig = bench.rig_entity();
+    let world = bench.app_mut().world();
+    let (names, done) = world.get::<RigHistory>(rig).unwrap().steps();
+    let names = names.into_iter().map(str::to_owned).collect();
+    (names, done, world.get::<Selection>(rig).unwrap().0.clone())
+}
+
+#[track_caller]
+fn check(script: &str) -> Vec<GestureAnswer> {
+    let gestures = read_gestures(script.as_bytes()).unwrap();
+    let (mut one, mut many) = (bench(), bench());
+    let answers = watched(&mut one, gestures.clone());
+    assert_eq!(many.gestures(gestures), answers);
+    assert_eq!(many.rig(), one.rig());
+    assert_eq!(steps(&mut many), steps(&mut one));
+    for bench in [&mut one, &mut many] {
+        let count = bench.rig().len();
+        let world = bench.app_mut().world_mut();
+        assert_eq!(world.query::<&rigsmith::plugins::document::Joint>().iter(world).count(), count);
+    }
+    answers
+}
+
+#[test]
+fn runs_of_operations_give_what_operations_one_a_frame_give() {
+    let clicks = "Click((0.0, 0.2)), Label(\"a\"), Click((0.0, 0.6)), Label(\"b\"), Click((0.3, 0.9)), Label(\"c\"), \
+                  Click((-0.4, 1.5)), Label(\"d\")";
+    for operations in [
+        "Move((0.1, 1.2)), Move((0.1, 1.2)), MoveTo((0.2, 1.1, 0.3)), Rotate(10.0), Rotate(-30.0), Scale(2.0), Undo, \
+         Rotate(5.0), View(Left), Move((0.1, 1.0)), Insert((0.1, 0.9)), Label(\"e\"), Orient(X), Orient(Y), Undo, Undo",
+        "SelectLabel(\"b\"), Delete, Delete, SelectLabel(\"c\"), Rotate(20.0), Delete, Label(\"none\"), \
+         SelectLabel(\"missing\"), Move((0.0, 0.0)), SelectLabel(\"a\"), Insert((0.0, 0.1)), DeleteHierarchy, Undo",
+        "SelectLabel(\"b\"), Unparent, SelectLabel(\"c\"), Parent, Add((0.0, 0.2)), Parent, Unparent, Lock(true), \
+         SelectAll, Rotate(15.0), Orient(Z), Group(\"g\", None), Unparent, Delete, Rotate(3.0), Click((0.1, 0.4))",
+        "Mirror(true), Click((0.5, 1.0)), Rotate(10.0), Move((0.6, 1.1)), Orient(X), Delete, SelectLabel(\"c\"), \
+         MirrorSelected, Rotate(4.0), Deselect, Move((0.2, 0.2)), Select((0.0, 0.2)), Move((0.1, 0.3)), \
+         Select((0.1, 0.3)), Move((0.1, 0.3)), Select((0.1, 0.3)), Delete",
+    ] {
+        let answers = check(&format!("[{clicks}, {operations}]"));
+        assert!(answers.iter().filter(|answer| answer.done).count() > 8, "{answers:?}");
+    }
+    let answers = check("[Rotate(1.0), Delete, Click((0.0, 0.2)), Delete, Delete]");
+    assert_eq!(answers[0].message, "no joint is selected; select one first");
+    assert_eq!(answers.iter().map(|answer| answer.done).collect::<Vec<_>>(), [false, false, true, true, false]);
+}
+
+/// Joints of the rigs that entities had to follow, over all frames.
+#[derive(Resource, Default)]
+struct FollowedJoints(u64);
+
+fn count_followed(mut followed: ResMut<FollowedJoints>, rigs: Query<&Rig, Changed<Rig>>) {
+    followed.0 += rigs.iter().map(|rig| rig.len() as u64).sum::<u64>();
+}
+
+/// Joints that entities follow while a rig of so many joints, each with a name, is operated on so many times.
+fn followed(count: usize, operations: impl Fn(usize) -> Vec<Gesture>) -> u64 {
+    let mut bench = bench();
+    bench.app_mut().init_resource::<FollowedJoints>().add_systems(Last, count_followed);
+    let place = |number: usize| {
+        let at = (-0.95 + 0.03 * (number % 60) as f32, 0.05 + 0.03 * (number / 60) as f32);
+        [Gesture::Click(at), Gesture::Label(format!("joint{number}"))]
+    };
+    bench.gestures((0..count).flat_map(place).collect());
+    assert_eq!(bench.rig().len(), count);
+    bench.app_mut().world_mut().resource_mut::<FollowedJoints>().0 = 0;
+    let answers = bench.gestures((0..count).flat_map(operations).collect());
+    assert!(answers.iter().all(|answer| answer.done), "{:?}", answers.iter().find(|answer| !answer.done));
+    bench.app_mut().world().resource::<FollowedJoints>().0
+}
+
+#[test]
+fn operations_are_followed_in_proportion_to_their_number() {
+    let place = |number: usize| (0.5, 1.0 + 0.0005 * number as f32);
+    let named = |number: usize| Gesture::SelectLabel(format!("joint{number}"));
+    let lists: [(&str, &dyn Fn(usize) -> Vec<Gesture>); 6] = [
+        ("moves", &|number| vec![Gesture::Move(place(number))]),
+        ("turns", &|_| vec![Gesture::Rotate(1.0)]),
+        ("inserted joints", &|number| vec![Gesture::Insert(place(number))]),
+        ("axes", &|_| vec![Gesture::Orient(Axis::X)]),
+        ("roots", &|number| vec![named(number), Gesture::Unparent]),
+        ("deleted joints", &|number| vec![named(number), Gesture::Delete]),
+    ];
+    for (name, list) in lists {
+        let works = [400, 800, 1600].map(|count| followed(count, list));
+        for pair in works.windows(2) {
+            assert!(pair[0] > 0 && pair[1] as f64 <= GROWTH * pair[0] as f64, "{name}: {works:?}");
+        }
+    }
+}
