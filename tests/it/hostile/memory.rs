@@ -153,7 +153,7 @@ fn many_joints_are_bound_within_their_memory() {
 /// was asked for.
 const AT_REST: u64 = 400;
 const DOCUMENT: u64 = 150;
-const ENTITIES: u64 = 1_400;
+const ENTITIES: u64 = 1_700;
 const WATCH: u64 = 2_200;
 
 #[test]
