@@ -117,20 +117,9 @@ impl BuildScope<'_> {
     }
 
     /// The bone that starts at a node: from it to the joint below, or to the middle of several that lie to one side. Of
-    /// a node at the end of a chain it is half the bone above, in the same direction. A node on its parent's place, such as a
-    /// null, has the bone of the node that it was made for; `None` of one that stands alone.
+    /// a node at the end of a chain it is half the bone above, in the same direction; `None` of one that stands alone, or on its
+    /// parent's place.
     pub fn bone(&mut self, node: NodeId) -> Option<Vec3> {
-        let mut node = node;
-        loop {
-            if let Some(bone) = self.own_bone(node) {
-                return Some(bone);
-            }
-            let subject = self.origin(node)?.subject;
-            node = self.id(subject).filter(|subject| *subject != node)?;
-        }
-    }
-
-    fn own_bone(&mut self, node: NodeId) -> Option<Vec3> {
         /// Part of the distance from the origin below which two nodes share a place, beyond rounding.
         const SAME: f32 = 1e-4;
         let position = self.position(node);
@@ -149,11 +138,17 @@ impl BuildScope<'_> {
         (above.length() > SAME * position.length()).then_some(above * 0.5)
     }
 
-    /// The length of the bone that starts at a node, in the rig's units. Of a node that stands alone it is a tenth of
-    /// its distance from the rig's origin, and 1 on the origin.
+    /// The length of the bone that starts at a node, in the rig's units. A node on its parent's place, such as a null, has that of
+    /// the node that it was made for. Of a node that stands alone it is a tenth of its distance from the rig's origin, and 1 on the
+    /// origin.
     pub fn bone_length(&mut self, node: NodeId) -> f32 {
-        if let Some(bone) = self.bone(node) {
-            return bone.length();
+        let mut at = Some(node);
+        while let Some(place) = at {
+            if let Some(bone) = self.bone(place) {
+                return bone.length();
+            }
+            let origin = self.parent(place).and_then(|_| self.origin(place));
+            at = origin.and_then(|origin| self.id(origin.subject)).filter(|subject| *subject != place);
         }
         match self.position(node).length() {
             0.0 => 1.0,

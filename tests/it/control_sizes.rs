@@ -266,6 +266,27 @@ fn controls_of_hocks_are_as_large_as_feet_ask() {
     }
 }
 
+/// The control of the whole figure lies flat, also where the hips lead sideways: it stands at a null of its own.
+#[test]
+fn the_root_lies_flat_wherever_the_hips_lead() {
+    let text = r#"(format: 2, name: "root", joints: [
+        (label: "hips", translation: (0, 1, 0), tags: [
+            null(world: true, orient: false, translate: (0, -1, 0), creation: (name: "origin")),
+            control(at: "@command null/origin", parent: "@command null/origin", follow: false, shape: "four_arrows",
+                size: 0.5, creation: (name: "root")),
+        ]),
+        (label: "spine", parent: "hips", translation: (0, 0.1, 0)),
+        (label: "thigh_l", parent: "hips", translation: (0.3, -0.05, 0)),
+        (label: "thigh_r", parent: "hips", translation: (-0.3, -0.05, 0)),
+    ])"#;
+    let rig = rigsmith::rig::template::read_template(text.as_bytes()).unwrap().rig;
+    let built = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
+    let root = built.nodes.iter().find(|node| *node.name == *"root").unwrap();
+    let lines = lines_of(root.control.as_ref().unwrap(), bevy::math::Affine3A::IDENTITY);
+    assert!(lines.iter().flatten().count() > 10);
+    assert!(lines.iter().flatten().all(|point| point.y.abs() < 1e-4), "{lines:?}");
+}
+
 #[test]
 fn below_an_open_sheet_is_outside() {
     let corners =
