@@ -247,8 +247,8 @@ impl Homes {
 /// skin between the legs, and hangs from the hips. A last joint has no bone yet: it runs on as far as the part that holds it alone,
 /// as that of a head which begins in a collar.
 ///
-/// Returns the parts of trunks and the bones that lead to a pair of such limbs, or outside of the trunk to one, sorted: these hold
-/// nothing there, as no flesh of the trunk leads to the limbs. Otherwise hips would hold all of a robe that lies beside the thighs.
+/// Returns the parts of trunks and the bones that lead to a pair of such limbs, sorted: these hold nothing there, as no flesh of
+/// the trunk leads to the limbs. Otherwise hips would hold all of a robe that lies beside the thighs.
 fn separate_limbs(
     parts: &mut [Vec<bool>],
     joints: &[WeightJoint],
@@ -303,9 +303,8 @@ fn separate_limbs(
         };
         if !trunk.iter().any(|&part| is_sleeve(part)) {
             trunk.iter().for_each(|&part| gone[part][joint] = true);
-            let ends = (joints[parent].head, joints[joint].head);
-            let runs_within = |part: &usize| share(ends.0, ends.1, |place| sight.is_within(*part, place)) >= SLEEVE;
-            if !twins.is_empty() || !trunk.iter().any(runs_within) {
+            if !twins.is_empty() {
+                let ends = (joints[parent].head, joints[joint].head);
                 let leads = |bone: &usize| (segments[*bone].head, segments[*bone].tail) == ends;
                 let leading = (0..segments.len()).filter(leads);
                 links.extend(leading.flat_map(|bone| trunk.iter().map(move |&part| (part, bone as u32))));
