@@ -24,8 +24,13 @@ const GROWTH: f64 = 2.3;
 const BOXES: [[[f32; 3]; 2]; 2] = [[[-1.0, 0.0, -0.5], [1.0, 2.0, 0.5]], [[-1.0, 0.0, 1.0], [1.0, 1.0, 2.0]]];
 
 fn bench() -> Workbench {
+    bench_on(&BOXES)
+}
+
+/// A bench with a mesh of boxes.
+pub fn bench_on(mesh: &[[[f32; 3]; 2]]) -> Workbench {
     let mut bench = Workbench::new(7, "test");
-    bench.open(boxes(&BOXES), false).unwrap();
+    bench.open(boxes(mesh), false).unwrap();
     bench
 }
 
@@ -54,8 +59,14 @@ fn steps(bench: &mut Workbench) -> (Vec<String>, usize, Vec<Uid>) {
 
 #[track_caller]
 fn check(script: &str, prepare: impl Fn(&mut Workbench)) -> Vec<GestureAnswer> {
+    check_on(&BOXES, script, prepare)
+}
+
+/// Asserts that a list that nobody watches gives what its gestures give one a frame, and returns its answers.
+#[track_caller]
+pub fn check_on(mesh: &[[[f32; 3]; 2]], script: &str, prepare: impl Fn(&mut Workbench)) -> Vec<GestureAnswer> {
     let gestures = read_gestures(script.as_bytes()).unwrap();
-    let (mut one, mut many) = (bench(), bench());
+    let (mut one, mut many) = (bench_on(mesh), bench_on(mesh));
     prepare(&mut one);
     prepare(&mut many);
     let answers = watched(&mut one, gestures.clone());

@@ -3,64 +3,16 @@
 
 use bevy::prelude::*;
 use rigsmith::{
-    headless::Workbench,
-    plugins::{
-        gesture::{Gesture, GestureAnswer, GestureScript, read_gestures},
-        history::RigHistory,
-    },
-    prelude::Selection,
-    rig::{Rig, Uid, operations::Axis},
+    plugins::gesture::Gesture,
+    rig::{Rig, operations::Axis},
 };
 
-use crate::gestures::boxes;
+use crate::click_runs::{bench_on, check_on};
 
 /// Largest growth for twice the length.
 const GROWTH: f64 = 2.3;
 
-fn bench() -> Workbench {
-    let mut bench = Workbench::new(7, "test");
-    bench.open(boxes(&[[[-1.0, 0.0, -0.5], [1.0, 2.0, 0.5]]]), false).unwrap();
-    bench
-}
-
-/// Carries out gestures one a frame, as in a window.
-fn watched(bench: &mut Workbench, gestures: Vec<Gesture>) -> Vec<GestureAnswer> {
-    let rig = bench.rig_entity();
-    let app = bench.app_mut();
-    app.world_mut().entity_mut(rig).insert(GestureScript::new(gestures));
-    for _ in 0..10_000 {
-        app.update();
-        let script = app.world().get::<GestureScript>(rig).unwrap();
-        if script.is_done() {
-            return script.answers.clone();
-        }
-    }
-    panic!("the gestures do not end");
-}
-
-fn steps(bench: &mut Workbench) -> (Vec<String>, usize, Vec<Uid>) {
-    let rig = bench.rig_entity();
-    let world = bench.app_mut().world();
-    let (names, done) = world.get::<RigHistory>(rig).unwrap().steps();
-    let names = names.into_iter().map(str::to_owned).collect();
-    (names, done, world.get::<Selection>(rig).unwrap().0.clone())
-}
-
-#[track_caller]
-fn check(script: &str) -> Vec<GestureAnswer> {
-    let gestures = read_gestures(script.as_bytes()).unwrap();
-    let (mut one, mut many) = (bench(), bench());
-    let answers = watched(&mut one, gestures.clone());
-    assert_eq!(many.gestures(gestures), answers);
-    assert_eq!(many.rig(), one.rig());
-    assert_eq!(steps(&mut many), steps(&mut one));
-    for bench in [&mut one, &mut many] {
-        let count = bench.rig().len();
-        let world = bench.app_mut().world_mut();
-        assert_eq!(world.query::<&rigsmith::plugins::document::Joint>().iter(world).count(), count);
-    }
-    answers
-}
+const BOX: [[[f32; 3]; 2]; 1] = [[[-1.0, 0.0, -0.5], [1.0, 2.0, 0.5]]];
 
 #[test]
 fn runs_of_operations_give_what_operations_one_a_frame_give() {
@@ -77,10 +29,10 @@ fn runs_of_operations_give_what_operations_one_a_frame_give() {
          MirrorSelected, Rotate(4.0), Deselect, Move((0.2, 0.2)), Select((0.0, 0.2)), Move((0.1, 0.3)), \
          Select((0.1, 0.3)), Move((0.1, 0.3)), Select((0.1, 0.3)), Delete",
     ] {
-        let answers = check(&format!("[{clicks}, {operations}]"));
+        let answers = check_on(&BOX, &format!("[{clicks}, {operations}]"), |_| ());
         assert!(answers.iter().filter(|answer| answer.done).count() > 8, "{answers:?}");
     }
-    let answers = check("[Rotate(1.0), Delete, Click((0.0, 0.2)), Delete, Delete]");
+    let answers = check_on(&BOX, "[Rotate(1.0), Delete, Click((0.0, 0.2)), Delete, Delete]", |_| ());
     assert_eq!(answers[0].message, "no joint is selected; select one first");
     assert_eq!(answers.iter().map(|answer| answer.done).collect::<Vec<_>>(), [false, false, true, true, false]);
 }
@@ -95,7 +47,7 @@ fn count_followed(mut followed: ResMut<FollowedJoints>, rigs: Query<&Rig, Change
 
 /// Joints that entities follow while a rig of so many joints, each with a name, is operated on so many times.
 fn followed(count: usize, operations: impl Fn(usize) -> Vec<Gesture>) -> u64 {
-    let mut bench = bench();
+    let mut bench = bench_on(&BOX);
     bench.app_mut().init_resource::<FollowedJoints>().add_systems(Last, count_followed);
     let place = |number: usize| {
         let at = (-0.95 + 0.03 * (number % 60) as f32, 0.05 + 0.03 * (number / 60) as f32);

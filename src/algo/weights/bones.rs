@@ -321,6 +321,9 @@ fn girths(
             let mut near = Vec::new();
             chunk.iter().map(move |&p| {
                 let (point, island) = (points[p], sight.island(p));
+                if homes.lies_on_others(island) {
+                    return None;
+                }
                 let cost = |b: u32| {
                     let segment = &segments[b as usize];
                     let may_hold = homes.may_hold(b, segment.joint, island);

@@ -158,6 +158,8 @@ pub(crate) struct Homes {
     slots: Vec<bool>,
     /// Bones that lead to limbs which are parts of their own, by the island that they hold nothing of; sorted.
     links: Vec<(usize, u32)>,
+    /// Flag of each island: whether no bone runs through it while others have some.
+    lying: Vec<bool>,
 }
 
 /// Approximate number of points of a part without bones that look for the part that it lies on.
@@ -194,6 +196,8 @@ impl Homes {
         }
         adopt(&mut parts, slots, segments, points, sight);
         let bearers: Vec<usize> = (0..parts.len()).filter(|&part| !parts[part].is_empty()).collect();
+        let mut lying = vec![false; parts.len()];
+        sight.parts().filter(|_| !bearers.is_empty()).for_each(|part| lying[part] = parts[part].is_empty());
         let mut members = vec![Vec::new(); parts.len()];
         for point in 0..points.len() {
             members[sight.island(point)].push(point);
@@ -211,7 +215,7 @@ impl Homes {
         }
         links.sort_unstable();
         if segments.iter().all(|segment| slots[segment.joint as usize]) {
-            return Self { parts, slots: Vec::new(), links };
+            return Self { parts, slots: Vec::new(), links, lying };
         }
         // Only now, so that what lies on such a part, as a book in a hand, may be a slot's.
         for part in bearers {
@@ -219,12 +223,17 @@ impl Homes {
                 parts[part].iter_mut().zip(slots).for_each(|(is_home, is_slot)| *is_home &= !is_slot);
             }
         }
-        Self { parts, slots: slots.to_vec(), links }
+        Self { parts, slots: slots.to_vec(), links, lying }
     }
 
     /// True if a bone of a joint may hold flesh of an island.
     pub fn may_hold(&self, bone: u32, joint: u32, island: usize) -> bool {
         self.is_at_home(joint, island) && self.links.binary_search(&(island, bone)).is_err()
+    }
+
+    /// True if an island lies on others, as a hat or a buckle does: it is no flesh about a bone.
+    pub fn lies_on_others(&self, island: usize) -> bool {
+        self.lying.get(island) == Some(&true)
     }
 
     /// True if a joint may hold flesh of an island.
