@@ -305,7 +305,8 @@ fn incoming_direction(joints: &[WeightJoint], joint: usize) -> Option<Vec3> {
 }
 
 /// Usual reach of the surface around each bone: a high quantile, by area, of the distances of the points that
-/// are nearest to the bone and see it.
+/// are nearest to the bone and see it. Points of parts that lie on others count for bones that are nearest to no other points,
+/// as for the bone of a hat.
 fn girths(
     segments: &[BoneSegment],
     tree: &BoneTree,
@@ -321,9 +322,6 @@ fn girths(
             let mut near = Vec::new();
             chunk.iter().map(move |&p| {
                 let (point, island) = (points[p], sight.island(p));
-                if homes.lies_on_others(island) {
-                    return None;
-                }
                 let cost = |b: u32| {
                     let segment = &segments[b as usize];
                     let may_hold = homes.may_hold(b, segment.joint, island);
@@ -335,14 +333,17 @@ fn girths(
             })
         })
         .collect();
-    let mut around: Vec<Vec<(f32, f32)>> = vec![Vec::new(); segments.len()];
+    let mut around: Vec<[Vec<(f32, f32)>; 2]> = vec![Default::default(); segments.len()];
     for (&p, measure) in samples.iter().zip(measured) {
         if let Some((bone, distance)) = measure {
-            around[bone as usize].push((distance, areas[p]));
+            let lies = homes.lies_on_others(sight.island(p));
+            around[bone as usize][usize::from(lies)].push((distance, areas[p]));
         }
     }
-    let mut girths: Vec<Option<f32>> =
-        around.iter_mut().map(|list| if list.len() < FEW { None } else { quantile(list) }).collect();
+    let girth = |lists: &mut [Vec<(f32, f32)>; 2]| {
+        lists.iter_mut().find(|list| list.len() >= FEW).and_then(|list| quantile(list))
+    };
+    let mut girths: Vec<Option<f32>> = around.iter_mut().map(girth).collect();
     let mut known: Vec<f32> = girths.iter().flatten().copied().collect();
     known.sort_by(f32::total_cmp);
     // Without a single measure no bone has a girth, and plain distance decides.
