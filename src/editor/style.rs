@@ -188,6 +188,8 @@ fn color(visuals: &mut Visuals, look: Look) {
     visuals.warn_fg_color = palette.obstacle;
     visuals.error_fg_color = palette.error;
     visuals.weak_text_color = Some(palette.quiet);
+    // A caret that blinks asks for frames for as long as a text field has the focus.
+    visuals.text_cursor.blink = false;
     visuals.widgets.inactive.weak_bg_fill = palette.raised;
     visuals.widgets.inactive.bg_fill = palette.raised;
     for widget in [

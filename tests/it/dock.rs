@@ -1,5 +1,7 @@
 //! The dock of the window: every panel's tab lies in the bar of its place and is reached with one click.
 
+use std::time::Duration;
+
 use bevy::prelude::*;
 use bevy_egui::{
     EguiContext, EguiPrimaryContextPass, PrimaryEguiContext,
@@ -17,6 +19,7 @@ use rigsmith::{
     },
     headless::headless_app,
     prelude::*,
+    rig::JointData,
     test_app::strict_app,
 };
 
@@ -34,6 +37,8 @@ pub struct Frames {
     events: Vec<Event>,
     /// Words of the last frame: where they are, and the part of the window in which they are seen.
     words: Vec<(String, Rect, Rect)>,
+    /// Time after which the last frame asked for another one; the window draws on at once for any.
+    wakes_in: Duration,
     _state: tempfile::TempDir,
 }
 
@@ -49,7 +54,16 @@ impl Frames {
         let entity = app.world_mut().spawn(PrimaryEguiContext).id();
         let ctx = app.world_mut().get_mut::<EguiContext>(entity).unwrap().get_mut().clone();
         let size = egui::vec2(width, height);
-        let mut frames = Self { app, ctx, size, time: 0.0, events: Vec::new(), words: Vec::new(), _state: state };
+        let mut frames = Self {
+            app,
+            ctx,
+            size,
+            time: 0.0,
+            events: Vec::new(),
+            words: Vec::new(),
+            wakes_in: Duration::MAX,
+            _state: state,
+        };
         (0..4).for_each(|_| frames.frame());
         frames
     }
@@ -64,6 +78,7 @@ impl Frames {
         });
         self.app.world_mut().run_schedule(EguiPrimaryContextPass);
         let mut output = self.ctx.end_pass();
+        self.wakes_in = output.viewport_output.values().map(|view| view.repaint_delay).min().unwrap_or(Duration::MAX);
         // Nothing is drawn, so no texture has to be made.
         output.textures_delta.clear();
         self.words.clear();
@@ -219,6 +234,24 @@ fn menus_and_the_toolbar_say_why_an_action_can_do_nothing() {
 }
 
 /// The bar of the viewport's tab is none of its picture.
+/// A field that waits for a key asks for no frame, as a caret that blinks would.
+#[test]
+fn a_text_field_with_the_focus_asks_for_no_frame() {
+    let mut frames = Frames::new(USUAL);
+    let mut rig = Rig::new(Uid(1), "rig");
+    let joint = JointData { uid: Uid(2), ..default() };
+    rig.apply(&RigEdit::AddJoint { joint: Box::new(joint), parent: None, index: 0 }).unwrap();
+    let rig = frames.app.world_mut().spawn(rig).id();
+    frames.app.insert_resource(ActiveRig(rig));
+    (0..4).for_each(|_| frames.frame());
+    let field = frames.find("Filter").expect("the hierarchy has a field").center();
+    frames.click(field, PointerButton::Primary);
+    frames.events.push(Event::PointerMoved(Pos2::new(640.0, 300.0)));
+    (0..20).for_each(|_| frames.frame());
+    assert!(frames.ctx.text_edit_focused(), "the field has the focus");
+    assert_eq!(frames.wakes_in, Duration::MAX);
+}
+
 #[test]
 fn the_viewport_has_two_fifths_of_a_large_window() {
     for size in [[1920.0, 1080.0], [3840.0, 2160.0]] {
