@@ -131,7 +131,7 @@ pub struct FoundPart {
 /// templates share.
 pub struct PartFiles<'a> {
     source: Source<'a>,
-    modules: Modules,
+    modules: Arc<Modules>,
     /// Paths at which the reader looked for parts, with the content of the files that it could read. The search for a part
     /// ends at the first file that exists.
     pub asked: BTreeMap<PathBuf, Option<Vec<u8>>>,
@@ -156,27 +156,27 @@ impl<'a> PartFiles<'a> {
     }
 
     /// A reader that mirrors the parameters of these modules.
-    pub fn with_modules(disk: &'a dyn Disk, modules: Modules) -> Self {
-        Self::of(Source::Disk(disk), modules)
+    pub fn with_modules(disk: &'a dyn Disk, modules: impl Into<Arc<Modules>>) -> Self {
+        Self::of(Source::Disk(disk), modules.into())
     }
 
     /// Reader that takes the contents of parts from a list, and bundled parts where the list has none. Files that the list
     /// lacks are [`missing`](Self::missing).
     pub fn given(files: &'a BTreeMap<PathBuf, Option<Vec<u8>>>) -> Self {
-        Self::of(Source::Contents(files), modules::all())
+        Self::of(Source::Contents(files), modules::all().into())
     }
 
     /// Reader of the parts that another reader has [found](Self::found), and of bundled parts.
-    pub fn known(found: &'a BTreeMap<PathBuf, FoundPart>, modules: Modules) -> Self {
-        Self::of(Source::Found(found), modules)
+    pub fn known(found: &'a BTreeMap<PathBuf, FoundPart>, modules: impl Into<Arc<Modules>>) -> Self {
+        Self::of(Source::Found(found), modules.into())
     }
 
     /// The modules whose parameters are mirrored.
-    pub fn modules(&self) -> &Modules {
+    pub fn modules(&self) -> &Arc<Modules> {
         &self.modules
     }
 
-    fn of(source: Source<'a>, modules: Modules) -> Self {
+    fn of(source: Source<'a>, modules: Arc<Modules>) -> Self {
         Self {
             source,
             modules,

@@ -9,6 +9,7 @@ mod template_base;
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use super::{
@@ -46,7 +47,7 @@ pub struct TemplateVersion {
     /// Files of the parts, by the places beside the template.
     found: BTreeMap<PathBuf, FoundPart>,
     /// Modules whose parameters are mirrored.
-    modules: Modules,
+    modules: Arc<Modules>,
     notes: Vec<String>,
 }
 
@@ -68,7 +69,7 @@ impl TemplateVersion {
         path: &Path,
         content: &[u8],
         found: &BTreeMap<PathBuf, FoundPart>,
-        modules: &Modules,
+        modules: &Arc<Modules>,
     ) -> Result<Self, SourceError> {
         Self::put_together(PartFiles::known(found, modules.clone()), path.to_owned(), content)
     }

@@ -52,7 +52,7 @@ struct TemplateParts {
     /// The template's own file.
     path: PathBuf,
     found: BTreeMap<PathBuf, FoundPart>,
-    modules: Modules,
+    modules: Arc<Modules>,
 }
 
 impl TemplateParts {
@@ -64,7 +64,7 @@ impl TemplateParts {
 impl RigTemplate {
     /// A template of a rig.
     pub fn new(rig: Rig) -> Self {
-        let parts = TemplateParts { path: PathBuf::new(), found: BTreeMap::new(), modules: modules::all() };
+        let parts = TemplateParts { path: PathBuf::new(), found: BTreeMap::new(), modules: modules::all().into() };
         Self {
             rig: Arc::new(rig),
             sockets: Arc::from([]),

@@ -310,7 +310,7 @@ impl TemplateBuild {
     /// Reads and builds a content of the file. An error leaves everything as it is; it is told by the caller.
     fn content(&mut self, id: Id, content: &[u8]) -> Result<Outcome, TemplateError> {
         let parts = std::mem::take(&mut self.parts);
-        let mut files = PartFiles::with_modules(&RealDisk, (*self.modules).clone()).with_cache(parts);
+        let mut files = PartFiles::with_modules(&RealDisk, self.modules.clone()).with_cache(parts);
         let read = match &self.file {
             Some(file) => RigTemplate::read_with_parts(content, file, &mut files),
             None => RigTemplate::read(content),

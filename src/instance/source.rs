@@ -226,6 +226,8 @@ pub(super) fn follow_steps(
                 let Some((built, after)) = source.pending.take() else { continue };
                 let before = source.base.take();
                 source.base = Some(after.clone());
+                // Steps that the history dropped are neither undone nor redone.
+                source.steps.retain(|known| Arc::strong_count(&known.step) > 1);
                 source.steps.push(AcceptedUpdate { step: step.clone(), before, after });
                 source.trial = Some(built);
             }

@@ -373,7 +373,7 @@ fn renew(world: &mut World, params: UpdateParams) -> Result<StartedCall, CallErr
     };
     let content = read_capped(&RealDisk, &path, MAX_BYTES as u64)?;
     let modules = world.resource::<RigModules>().0.clone();
-    let mut files = PartFiles::with_modules(&RealDisk, (*modules).clone());
+    let mut files = PartFiles::with_modules(&RealDisk, modules.clone());
     let read = RigTemplate::read_with_parts(&content, &path, &mut files);
     let file = read.map_err(|source| TemplateError::Source { file: Some(path), source })?;
     if params.dry_run {
