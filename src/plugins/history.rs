@@ -15,7 +15,7 @@ use crate::rig::{
 };
 
 /// Number of steps that a history holds at least; it drops older ones a tenth of that at a time.
-pub const MOST_STEPS: usize = 10_000;
+pub const MOST_STEPS: usize = 2_000;
 
 /// Bytes of weights that the steps of a history hold at most, besides those of the last step.
 pub const MOST_WEIGHT_BYTES: usize = 1 << 30;
