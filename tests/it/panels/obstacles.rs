@@ -8,7 +8,7 @@ use rigsmith::{
         library::LibraryAction,
         notice::Notice,
         palette::obstacle,
-        panels::{controls::ControlsPanel, log::LogPanel, process::ProcessPanel},
+        panels::{controls::ControlsPanel, loader::LoaderPanel, log::LogPanel, process::ProcessPanel},
     },
     plugins::{
         commands::{BuildRequest, BuildResult, BuildStep, Processor},
@@ -161,6 +161,43 @@ fn a_rig_is_not_brought_to_its_own_stage() {
             assert_eq!(why_not(&desk, action), wanted, "{action:?} at {stage:?}");
         }
     }
+}
+
+#[test]
+fn stages_of_the_loader_are_greyed_where_they_change_nothing() {
+    let mut desk = Desk::new(LoaderPanel::default());
+    desk.frames(2);
+    let stages = [
+        (RigStage::Edit, "Edit skeleton"),
+        (RigStage::Skeleton, "Load skeleton"),
+        (RigStage::Deleted, "Delete rig"),
+        (RigStage::Built, "Build rig"),
+    ];
+    for (_, label) in stages {
+        assert_greyed(&mut desk, label, "There are no joints: load a template first");
+    }
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    for joint in [a, b] {
+        add_command(&mut desk, joint, "control", "()");
+    }
+    desk.select(&[]);
+    for (stage, own) in stages {
+        desk.app.world_mut().write_message(StageRequest { rig: desk.rig, stage });
+        desk.frames(4);
+        assert_eq!(desk.find(own).on, Some(true), "{own}");
+        assert_greyed(&mut desk, own, "The rig is at this stage");
+        for (_, other) in stages.into_iter().filter(|(_, other)| *other != own) {
+            assert!(desk.find(other).enabled, "{other} is greyed at {stage:?}");
+        }
+    }
+    // Commands that were taken back since are carried out again.
+    let place = |desk: &Desk| desk.app.world().get::<Processor>(desk.rig).unwrap().builder().cursor();
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::RollBack });
+    desk.frames(3);
+    assert_eq!(place(&desk), 0);
+    desk.click("Build rig");
+    desk.frames(4);
+    assert_eq!(place(&desk), 2, "{:?}", desk.told());
 }
 
 #[test]

@@ -16,7 +16,7 @@ use crate::{
             displayed_rig::DisplayedRig,
             loader::{
                 card::{Card, about, both_sides},
-                tiles::{Tiles, TilesShown},
+                tiles::{PartTiles, Tiles, TilesShown},
             },
         },
         tools::stroke::{StrokeState, StrokeTool},
@@ -82,7 +82,9 @@ impl PartMenu {
             }
             ui.separator();
         }
-        let wanted = TilesShown { parts_only: true, height, chosen: chosen.as_ref() };
+        let is_selected = shown.selection.0.iter().any(|joint| shown.rig.joint(*joint).is_some());
+        let parts = PartTiles { is_selected, adds: !self.options_first };
+        let wanted = TilesShown { parts: Some(parts), height, chosen: chosen.as_ref() };
         if let Some(listed) = self.tiles.show(ui, world, wanted, requests) {
             if self.options_first {
                 self.chosen = Some(listed.place.clone());
