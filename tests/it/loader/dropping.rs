@@ -439,6 +439,11 @@ fn pictures_of_parts_are_greyed_where_the_part_would_be_refused() {
     // An arm takes more joints than there are.
     let is_greyed = |desk: &Desk, tile: &str| desk.look(tile).is_some_and(|tile| !tile.enabled);
     studio.desk.until("the reason of the arm", |desk| is_greyed(desk, "Part arm"));
+    // An open menu asks for nothing more.
+    studio.desk.move_to(egui::pos2(3000.0, 3000.0));
+    studio.settle();
+    studio.desk.frames(120);
+    assert!(!studio.desk.asks && studio.desk.wakes_in == Duration::MAX, "{:?}", studio.desk.wakes_in);
     assert!(!is_greyed(&studio.desk, "Part limb"), "it fits");
     let steps = studio.desk.steps();
     studio.click("Part arm");

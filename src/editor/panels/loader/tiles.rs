@@ -13,7 +13,7 @@ use crate::{
     editor::{
         library::{
             DraggedTemplate, LibraryListing, LibraryPictures, ListTemplates, PartRefusal, PictureRequest, ReadPart,
-            TemplateLibrary, TemplatePicture, part_refusal,
+            TemplateLibrary, TemplatePicture, is_part_known, part_refusal,
         },
         panel::Requests,
         panels::list,
@@ -100,7 +100,7 @@ impl Tiles {
         }
         let columns = ((ui.available_width() + 4.0) / (TILE + 4.0)).floor().max(1.0) as usize;
         let rows = self.found.len().div_ceil(columns);
-        let (mut clicked, mut missing, mut seen) = (None, Vec::new(), Vec::new());
+        let (mut clicked, mut missing, mut unread) = (None, Vec::new(), Vec::new());
         let pictures = world.get_resource::<LibraryPictures>();
         // A menu gives no more room than it took before, when the list was still being made.
         let least = if wanted.parts.is_some() { wanted.height } else { 64.0 };
@@ -117,8 +117,9 @@ impl Tiles {
                 }
                 let why_not = wanted.parts.and_then(|parts| refusal(world, parts, &listed.place));
                 let takes_clicks = why_not.is_none() || wanted.parts.is_none_or(|parts| !parts.adds);
-                if wanted.parts.is_some() {
-                    seen.push(listed.place.clone());
+                // A request has the window draw on, so there is one for each part.
+                if wanted.parts.is_some() && !is_part_known(world, &listed.place) {
+                    unread.push(listed.place.clone());
                 }
                 let is_chosen = wanted.chosen == Some(&listed.place);
                 let names = TileNames { difference: difference.as_deref(), height: foot };
@@ -139,7 +140,7 @@ impl Tiles {
         if !missing.is_empty() {
             requests.send(PictureRequest(missing));
         }
-        seen.into_iter().for_each(|place| requests.send(ReadPart(place)));
+        unread.into_iter().for_each(|place| requests.send(ReadPart(place)));
         clicked
     }
 

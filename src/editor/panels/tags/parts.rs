@@ -10,7 +10,10 @@ use bevy_egui::egui::{
 use crate::{
     editor::{
         actions::{Action, ActionRequest},
-        library::{LibraryAct, LibraryRequest, ListTemplates, PartRefusal, ReadPart, TemplateLibrary, part_refusal},
+        library::{
+            LibraryAct, LibraryRequest, ListTemplates, PartRefusal, ReadPart, TemplateLibrary, is_part_known,
+            part_refusal,
+        },
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
@@ -72,7 +75,9 @@ impl PartMenu {
             about(ui, listed, header);
             self.card.of(&listed.place);
             self.card.options(ui, header, requests);
-            requests.send(ReadPart(listed.place.clone()));
+            if !is_part_known(world, &listed.place) {
+                requests.send(ReadPart(listed.place.clone()));
+            }
             let refusal = part_refusal(world, &listed.place);
             let button = ui.add_enabled(refusal.is_none(), Button::new("Add part"));
             let why_not = refusal.as_ref().map_or("", PartRefusal::words);

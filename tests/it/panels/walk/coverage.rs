@@ -69,5 +69,23 @@ fn no_panel_asks_for_frames_while_nothing_happens() {
         walk.desk.frames(120);
         let wakes_in = walk.desk.wakes_in;
         assert_eq!(wakes_in, Duration::MAX, "{title} asks for a frame, with nothing to show in it");
+        assert!(!walk.desk.asks, "{title} sends requests, with nothing that happens");
+    }
+}
+
+/// The pointer that rests on a panel brings a tip and a light, and no more frames.
+#[test]
+fn no_panel_asks_for_frames_while_the_pointer_rests_on_it() {
+    for (title, panel, size) in panels() {
+        let mut walk = Walk::new(panel, size);
+        walk.ready();
+        walk.rest();
+        let places = walk.names().into_iter().map(|(_, at)| at);
+        for at in places.step_by(7).take(4).chain([Pos2::new(0.5 * size.x, 0.5 * size.y)]).collect::<Vec<_>>() {
+            walk.desk.move_to(at);
+            walk.desk.frames(120);
+            assert_eq!(walk.desk.wakes_in, Duration::MAX, "{title} asks for a frame, with the pointer at {at:?}");
+            assert!(!walk.desk.asks, "{title} sends requests, with the pointer at {at:?}");
+        }
     }
 }
