@@ -89,3 +89,22 @@ fn no_panel_asks_for_frames_while_the_pointer_rests_on_it() {
         }
     }
 }
+
+/// What lies over the window waits for a person without a frame.
+#[test]
+fn no_overlay_asks_for_frames_while_nothing_happens() {
+    for action in [Action::Palette, Action::Help, Action::StartPage, Action::Open] {
+        let mut walk = Walk::with(Sheet::Window, egui::vec2(1280.0, 720.0));
+        let drawn = walk.desk.shapes;
+        walk.desk.app.world_mut().write_message(ActionRequest(action));
+        walk.desk.frames(10);
+        assert_ne!(walk.desk.shapes, drawn, "{action:?} shows something");
+        walk.desk.move_to(Pos2::new(-10.0, -10.0));
+        let rests = |desk: &Desk| desk.wakes_in == Duration::MAX && !desk.asks;
+        walk.desk.until("a rest", rests);
+        for _ in 0..60 {
+            walk.desk.frame();
+            assert!(rests(&walk.desk), "{action:?} asks for a frame after {:?}", walk.desk.wakes_in);
+        }
+    }
+}
