@@ -8,7 +8,10 @@ use rigsmith::{
         library::LibraryAction,
         notice::Notice,
         palette::obstacle,
-        panels::{controls::ControlsPanel, loader::LoaderPanel, log::LogPanel, process::ProcessPanel},
+        panels::{
+            controls::ControlsPanel, history::HistoryPanel, loader::LoaderPanel, log::LogPanel, process::ProcessPanel,
+            tags::TagsPanel,
+        },
     },
     plugins::{
         commands::{BuildRequest, BuildResult, BuildStep, Processor},
@@ -216,4 +219,23 @@ fn build_buttons_of_the_controls_say_why_they_are_greyed() {
     for button in ["Roll back", "Take back the last command"] {
         assert_greyed(&mut desk, button, "No command is carried out");
     }
+}
+
+#[test]
+fn greyed_buttons_of_the_history_and_the_tags_say_why() {
+    let mut desk = Desk::new(HistoryPanel::default());
+    desk.frames(2);
+    assert_greyed(&mut desk, "⮪ Undo", "There is no step to undo");
+    assert_greyed(&mut desk, "⮫ Redo", "Nothing was undone");
+    desk.chain(&["a", "b"]);
+    assert!(desk.find("⮪ Undo").enabled);
+    desk.click("⮪ Undo");
+    desk.frames(3);
+    assert!(desk.find("⮫ Redo").enabled, "{:?}", desk.told());
+
+    let mut desk = Desk::new(TagsPanel::default());
+    let [a, _] = desk.chain(&["a", "b"])[..] else { panic!() };
+    desk.select(&[a]);
+    desk.frames(2);
+    assert_greyed(&mut desk, "Paste", "Copy or cut tags first");
 }
