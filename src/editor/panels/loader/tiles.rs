@@ -12,8 +12,8 @@ use super::namesakes::differences;
 use crate::{
     editor::{
         library::{
-            DraggedTemplate, LibraryListing, LibraryPictures, ListTemplates, PartRefusal, PictureRequest, ReadPart,
-            TemplateLibrary, TemplatePicture, is_part_known, part_refusal,
+            DraggedTemplate, LibraryListing, LibraryPictures, ListTemplates, PictureRequest, ReadPart, TemplateLibrary,
+            TemplatePicture, is_part_known, part_refusal,
         },
         panel::Requests,
         panels::list,
@@ -60,8 +60,6 @@ struct TileState {
 /// Pictures of a menu that puts parts onto joints.
 #[derive(Clone, Copy)]
 pub(in crate::editor::panels) struct PartTiles {
-    /// True if there are joints for a part.
-    pub is_selected: bool,
     /// True where a click adds the part at once: a picture that would be refused takes none then.
     pub adds: bool,
 }
@@ -115,7 +113,8 @@ impl Tiles {
                 if picture.is_none() && pictures.is_some_and(|pictures| !pictures.is_wanted(&listed)) {
                     missing.push(listed.clone());
                 }
-                let why_not = wanted.parts.and_then(|parts| refusal(world, parts, &listed.place));
+                let refusal = wanted.parts.and_then(|_| part_refusal(world, &listed.place));
+                let why_not = refusal.as_ref().map(|refusal| refusal.words().to_owned());
                 let takes_clicks = why_not.is_none() || wanted.parts.is_none_or(|parts| !parts.adds);
                 // A request has the window draw on, so there is one for each part.
                 if wanted.parts.is_some() && !is_part_known(world, &listed.place) {
@@ -279,14 +278,6 @@ impl Tiles {
             None => {}
         }
     }
-}
-
-/// Reason why a part would be refused on the selected joints, in a sentence.
-fn refusal(world: &World, parts: PartTiles, place: &TemplatePlace) -> Option<String> {
-    if !parts.is_selected {
-        return Some("Select the joints first, or draw them".to_owned());
-    }
-    part_refusal(world, place).as_ref().map(PartRefusal::words).map(str::to_owned)
 }
 
 /// Draws a line of text below a picture, in its middle, and cut where it is wider.

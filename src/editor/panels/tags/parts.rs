@@ -87,8 +87,7 @@ impl PartMenu {
             }
             ui.separator();
         }
-        let is_selected = shown.selection.0.iter().any(|joint| shown.rig.joint(*joint).is_some());
-        let parts = PartTiles { is_selected, adds: !self.options_first };
+        let parts = PartTiles { adds: !self.options_first };
         let wanted = TilesShown { parts: Some(parts), height, chosen: chosen.as_ref() };
         if let Some(listed) = self.tiles.show(ui, world, wanted, requests) {
             if self.options_first {

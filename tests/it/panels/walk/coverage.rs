@@ -5,6 +5,7 @@ use std::time::Duration;
 use rigsmith::editor::{
     panel::PanelTitles,
     panels::{graph::GraphAction, timeline::TimelineAction},
+    style::{self, Look},
     tools::paint::brush::BrushAction,
 };
 use serde::de::DeserializeOwned;
@@ -95,6 +96,9 @@ fn no_panel_asks_for_frames_while_the_pointer_rests_on_it() {
 fn no_overlay_asks_for_frames_while_nothing_happens() {
     for action in [Action::Palette, Action::Help, Action::StartPage, Action::Open] {
         let mut walk = Walk::with(Sheet::Window, egui::vec2(1280.0, 720.0));
+        // The caret of a field blinks in no look of the window.
+        style::apply(&walk.desk.ctx, Look::default());
+        walk.desk.frames(3);
         let drawn = walk.desk.shapes;
         walk.desk.app.world_mut().write_message(ActionRequest(action));
         walk.desk.frames(10);
