@@ -29,7 +29,7 @@ pub use self::{
 };
 pub(in crate::editor) use self::{
     drop_target::{attach, dropping, goes_onto_both},
-    part_check::{PartRefusal, part_refusal},
+    part_check::{PartRefusal, is_part_known, part_refusal},
     save::{HEADER, header_step},
     sides::{partner, partners},
 };

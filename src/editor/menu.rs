@@ -160,7 +160,7 @@ fn show_recent(ui: &mut egui::Ui, world: &World) -> Option<PathBuf> {
     let list = world.get_resource::<EditorSettings>().map(|settings| settings.recent.clone()).unwrap_or_default();
     let mut chosen = None;
     ui.add_enabled_ui(!list.is_empty(), |ui| {
-        ui.menu_button("Open recent", |ui| {
+        let menu = ui.menu_button("Open recent", |ui| {
             for path in &list {
                 let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
                 if ui.button(name).on_hover_text(path.display().to_string()).clicked() {
@@ -169,6 +169,7 @@ fn show_recent(ui: &mut egui::Ui, world: &World) -> Option<PathBuf> {
                 }
             }
         });
+        menu.response.on_disabled_hover_text("No file was opened or saved yet");
     });
     chosen
 }

@@ -7,6 +7,7 @@
 
 mod added_chains;
 mod adopt;
+pub(in crate::plugins) mod awaited_steps;
 mod carry;
 pub(in crate::plugins) mod entities;
 mod error;
@@ -64,6 +65,7 @@ impl Plugin for DocumentPlugin {
             .init_resource::<FeatureKinds>()
             .init_resource::<entities::EntityIndex>()
             .init_resource::<adopt::EntityEdits>()
+            .init_resource::<awaited_steps::AwaitedSteps>()
             .add_message::<EditRequest>()
             .add_message::<EditReport>()
             .add_message::<EditRefusal>()
@@ -230,7 +232,8 @@ pub struct EditRefusal {
 
 /// Applies the edits that writes to entities made, then requests in the order in which they came.
 fn apply_edits(
-    mut requests: MessageReader<EditRequest>,
+    (mut requests, mut held): (MessageReader<EditRequest>, Local<awaited_steps::HeldRequests>),
+    awaited: Res<awaited_steps::AwaitedSteps>,
     mut entity_edits: ResMut<adopt::EntityEdits>,
     mut rigs: Query<(&mut Rig, &mut Selection, &mut RigHistory, &Symmetry, Option<&AutoKey>, Option<&BuildResult>)>,
     (mut uids, modules): (ResMut<UidSource>, Option<Res<RigModules>>),
@@ -243,7 +246,8 @@ fn apply_edits(
         let operation = Operation::Named { name: "Edit entities", edits };
         (EditRequest { rig, change: Change::Do(operation) }, true)
     });
-    for (request, is_of_entities) in of_entities.chain(requests.read().map(|request| (request.clone(), false))) {
+    let asked = held.due(requests.read().cloned(), &awaited, |rig| rigs.contains(rig));
+    for (request, is_of_entities) in of_entities.chain(asked.into_iter().map(|request| (request, false))) {
         let EditRequest { rig, change: requested } = &request;
         let rig = *rig;
         let Ok((mut document, mut selection, mut history, symmetry, auto_key, built)) = rigs.get_mut(rig) else {

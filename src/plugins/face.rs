@@ -16,7 +16,7 @@ use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use bevy::prelude::*;
 
-use super::{RigSystems, configure_sets, limits::RigLimits};
+use super::{RigSystems, configure_sets, document::awaited_steps::AwaitedSteps, limits::RigLimits};
 use crate::{
     algo::face::{
         auto::{AutoSettings, FaceAnalysis},
@@ -44,6 +44,7 @@ impl Plugin for FacePlugin {
         app.init_resource::<FaceExpressions>()
             .init_resource::<preparation::PreparedSkins>()
             .init_resource::<RigLimits>()
+            .init_resource::<AwaitedSteps>()
             .add_observer(preparation::forget)
             .add_message::<FaceRequest>()
             .add_message::<FacePlaced>()
@@ -53,7 +54,7 @@ impl Plugin for FacePlugin {
             .add_systems(
                 Update,
                 (
-                    (preparation::keep, pose::adopt, pose::express)
+                    (preparation::keep, pose::adopt, pose::express, pose::await_steps)
                         .chain()
                         .after(RigSystems::Gesture)
                         .before(RigSystems::Edits),
@@ -198,7 +199,7 @@ pub struct ExpressionAnswer {
 ///
 /// A game sets expressions by writing it: the face moves in the same frame, as an [`ExpressRequest`] would move it, and
 /// the answer is an [`ExpressionAnswer`] message. While the face is still prepared ([`FacePreparation`]) or a preview is computed
-/// ([`FacePosing`]), both wait for it. A
+/// ([`FacePosing`]), both wait for it, and so do undo and redo. A
 /// value equal to what is shown is no edit.
 ///
 /// On a [`RigInstance`](crate::instance::RigInstance) it poses the instance's facial joints by the stored poses of its template.

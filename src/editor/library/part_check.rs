@@ -122,6 +122,11 @@ pub(super) fn read_parts(
     }
 }
 
+/// True if a part was read, or is being read, since the templates were listed last.
+pub(in crate::editor) fn is_part_known(world: &World, place: &TemplatePlace) -> bool {
+    world.get_resource::<ReadParts>().is_some_and(|parts| parts.parts.contains_key(place))
+}
+
 /// Reason why a part would be refused on the selected joints; `None` if it would not, if there are none, and before it is read.
 pub(in crate::editor) fn part_refusal(world: &World, place: &TemplatePlace) -> Option<PartRefusal> {
     let parts = world.get_resource::<ReadParts>()?;

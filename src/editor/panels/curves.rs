@@ -182,7 +182,8 @@ impl CurvesPanel {
             ui.set_clip_rect(rect.intersect(ui.clip_rect()));
             let is_chosen = self.values.is_some();
             let fit = ui.add_enabled(is_chosen, bevy_egui::egui::Button::new("Fit values").truncate());
-            if fit.on_hover_text("Shows all values of the curves; the wheel zooms them").clicked() {
+            let fit = fit.on_hover_text("Shows all values of the curves; the wheel zooms them");
+            if fit.on_disabled_hover_text("All values are shown; the wheel zooms them").clicked() {
                 self.values = None;
             }
             let height = list::row_height(ui);

@@ -14,6 +14,7 @@ use crate::{
         help::describe,
         keys::KeyBindings,
         onion::{ONION_COUNTS, OnionSkin, OnionStep},
+        palette::obstacle,
         panel::{EditorPanel, Requests},
         screen::HiddenMeshes,
         settings::{EditorSettings, UI_SCALES},
@@ -210,7 +211,8 @@ fn window(ui: &mut Ui, world: &World, requests: &mut Requests) {
             let button = ui.add_enabled(is_free, egui::Button::new(text)).on_hover_text(describe(action));
             let said = describe(action);
             button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, is_free, &said));
-            if button.clicked() {
+            let why_not = obstacle(world, action).unwrap_or_default();
+            if button.on_disabled_hover_text(why_not).clicked() {
                 requests.send(ActionRequest(action));
             }
         };

@@ -49,10 +49,13 @@ impl EditorPanel for HistoryPanel {
         ui.horizontal(|ui| {
             let width = (ui.available_width() - ui.spacing().item_spacing.x) / 2.0;
             let size = egui::vec2(width.max(40.0), ui.spacing().interact_size.y);
-            for (text, change, enabled) in
-                [("⮪ Undo", Change::Undo, self.done > 0), ("⮫ Redo", Change::Redo, self.done < self.steps.len())]
-            {
-                if ui.add_enabled(enabled, Button::new(text).min_size(size)).clicked() {
+            let (can_undo, can_redo) = (self.done > 0, self.done < self.steps.len());
+            for (text, change, enabled, why_not) in [
+                ("⮪ Undo", Change::Undo, can_undo, "There is no step to undo"),
+                ("⮫ Redo", Change::Redo, can_redo, "Nothing was undone"),
+            ] {
+                let button = ui.add_enabled(enabled, Button::new(text).min_size(size));
+                if button.on_disabled_hover_text(why_not).clicked() {
                     requests.send(EditRequest { rig: shown.entity, change });
                 }
             }

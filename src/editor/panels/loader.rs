@@ -11,12 +11,9 @@ use bevy::prelude::*;
 use bevy_egui::egui::{CollapsingHeader, ScrollArea, Ui};
 
 use super::{displayed_rig::DisplayedRig, features::Features, list};
-use crate::{
-    editor::{
-        library::{ChosenTemplate, LibraryJobs, ListTemplates, TemplateDraft, TemplateLibrary},
-        panel::{EditorPanel, Requests},
-    },
-    plugins::stage::RigStage,
+use crate::editor::{
+    library::{ChosenTemplate, LibraryJobs, ListTemplates, TemplateDraft, TemplateLibrary},
+    panel::{EditorPanel, Requests},
 };
 use tiles::{Tiles, TilesShown};
 
@@ -42,14 +39,14 @@ impl EditorPanel for LoaderPanel {
         ScrollArea::vertical().id_salt("loader").auto_shrink(false).show(ui, |ui| {
             let shown = DisplayedRig::of(world);
             if let Some(shown) = &shown {
-                stages::show(ui, shown, world.get::<RigStage>(shown.entity).copied(), requests);
+                stages::show(ui, world, shown, requests);
                 self.features.show(ui, shown, requests);
                 stages::groups(ui, shown, requests);
                 ui.separator();
             }
             ui.strong("Library");
             let chosen = world.get_resource::<ChosenTemplate>().and_then(|chosen| chosen.0.clone());
-            let wanted = TilesShown { parts_only: false, height: 250.0, chosen: chosen.as_ref() };
+            let wanted = TilesShown { parts: None, height: 250.0, chosen: chosen.as_ref() };
             if let Some(listed) = self.tiles.show(ui, world, wanted, requests) {
                 requests.set(ChosenTemplate(Some(listed.place.clone())));
             }

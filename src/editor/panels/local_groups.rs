@@ -299,8 +299,9 @@ impl GroupsPanel {
 
 fn menu(ui: &mut Ui, group: &GroupData, shown: &DisplayedRig, selected: &[Uid], joints: &[Uid]) -> Option<RowRequest> {
     let mut chosen = None;
-    let mut item = |ui: &mut Ui, name: &str, enabled: bool, request: &dyn Fn() -> RowRequest| {
-        if ui.add_enabled(enabled, egui::Button::new(name)).clicked() {
+    let mut item = |ui: &mut Ui, name: &str, why_not: Option<&str>, request: &dyn Fn() -> RowRequest| {
+        let entry = ui.add_enabled(why_not.is_none(), egui::Button::new(name));
+        if entry.on_disabled_hover_text(why_not.unwrap_or_default()).clicked() {
             chosen = Some(request());
             ui.close();
         }
@@ -310,23 +311,27 @@ fn menu(ui: &mut Ui, group: &GroupData, shown: &DisplayedRig, selected: &[Uid], 
     };
     let below = || TagScope::Hierarchy(selected.to_vec()).joints(&shown.rig).unwrap_or_default();
     let all = || TagScope::Rig.joints(&shown.rig).unwrap_or_default();
-    let any = !selected.is_empty();
-    item(ui, "Assign selected", any, &|| put(selected.to_vec(), &group.name));
-    item(ui, "Assign selected and below", any, &|| put(below(), &group.name));
-    item(ui, "Assign all joints", !shown.rig.is_empty(), &|| put(all(), &group.name));
+    let unselected = selected.is_empty().then_some("Select the joints first");
+    let jointless = shown.rig.is_empty().then_some("There are no joints");
+    let is_clear = joints.is_empty().then_some("The group has no joints");
+    item(ui, "Assign selected", unselected, &|| put(selected.to_vec(), &group.name));
+    item(ui, "Assign selected and below", unselected, &|| put(below(), &group.name));
+    item(ui, "Assign all joints", jointless, &|| put(all(), &group.name));
     ui.separator();
-    item(ui, "Take selected out", any, &|| put(selected.iter().copied().filter(|j| joints.contains(j)).collect(), ""));
-    item(ui, "Clear", !joints.is_empty(), &|| put(joints.to_vec(), ""));
+    item(ui, "Take selected out", unselected, &|| {
+        put(selected.iter().copied().filter(|j| joints.contains(j)).collect(), "")
+    });
+    item(ui, "Clear", is_clear, &|| put(joints.to_vec(), ""));
     ui.menu_button("Merge into", |ui| {
         for other in shown.rig.groups().iter().filter(|other| other.uid != group.uid) {
-            item(ui, &other.name, true, &|| {
+            item(ui, &other.name, None, &|| {
                 let edits = merged_groups(&shown.rig, group.uid, other.uid);
                 RowRequest::Operation(Operation::Named { name: "Merge groups", edits })
             });
         }
     });
     ui.separator();
-    item(ui, "Remove", true, &|| {
+    item(ui, "Remove", None, &|| {
         let mut edits: Vec<RigEdit> = joints.iter().map(|joint| RigEdit::SetGroup(*joint, None)).collect();
         edits.push(RigEdit::RemoveLocalGroup(group.uid));
         RowRequest::Edits(edits)

@@ -35,6 +35,9 @@ pub(super) const AT_START: &str = "No command is carried out";
 /// Reason why nothing can be carried out.
 pub(super) const AT_END: &str = "All commands are carried out";
 
+/// Reason why the rig is not brought to a stage.
+pub(super) const AT_STAGE: &str = "The rig is at this stage";
+
 /// The panel.
 #[derive(Default)]
 pub struct ProcessPanel {
@@ -369,7 +372,7 @@ fn stages(
             };
             let entry = egui::Button::selectable(now == Some(stage), stage.name());
             let entry = ui.add_enabled(!stage.is_kept(now, Some(processor)), entry).on_hover_text(tip);
-            if entry.on_disabled_hover_text("The rig is at this stage").clicked() {
+            if entry.on_disabled_hover_text(AT_STAGE).clicked() {
                 requests.send(StageRequest { rig: shown.entity, stage });
             }
         }

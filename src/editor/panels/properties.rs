@@ -260,7 +260,7 @@ impl PropertiesPanel {
         self.numbers.tell(requests);
         if posing {
             let reset = ui.add_enabled(self.values.posed, egui::Button::new("Reset pose of the selection"));
-            if reset.clicked() {
+            if reset.on_disabled_hover_text("Nothing of the selection is posed").clicked() {
                 self.send(Operation::ResetPose(self.values.joints.clone()), shown, requests);
             }
         }

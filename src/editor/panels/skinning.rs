@@ -295,6 +295,7 @@ fn title(ui: &mut Ui, (entity, mesh): (Entity, &RigMesh), can_skin: Option<bool>
         ui.strong(name);
         let button = ui.add_enabled(can, Button::new("Skin it alone").small());
         let button = button.on_hover_text("Compute the weights of this mesh; the others keep theirs");
+        let button = button.on_disabled_hover_text("There are no joints, or weights are being computed");
         let said = format!("Skin {name} alone");
         button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, can, &said));
         if button.clicked() {

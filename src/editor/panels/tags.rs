@@ -425,7 +425,8 @@ fn card_menu(ui: &mut Ui, shown: &DisplayedRig, entries: &[Entry], number: usize
     let entry = entries.get(number)?;
     let mut chosen = None;
     let mut item = |ui: &mut Ui, name: &str, enabled: bool, request: &dyn Fn() -> Option<CardRequest>| {
-        if ui.add_enabled(enabled, egui::Button::new(name)).clicked() {
+        let entry = ui.add_enabled(enabled, egui::Button::new(name));
+        if entry.on_disabled_hover_text("The tag is at this end of the stack").clicked() {
             chosen = request();
             ui.close();
         }

@@ -86,6 +86,8 @@ struct Toast {
     times: u32,
     /// Expiry in egui's time.
     until: f64,
+    /// True while the pointer rests on it: it stays then, though the window may sleep for longer than its time.
+    is_read: bool,
 }
 
 impl Toasts {
@@ -103,7 +105,7 @@ impl Toasts {
             // An entry stands for several notices in a row, some of which may have been counted.
             let fresh = u32::try_from(entry.number + 1 - self.next).unwrap_or(u32::MAX).min(entry.times);
             let times = times.saturating_add(fresh);
-            self.shown.push(Toast { id, notice: entry.notice.clone(), times, until });
+            self.shown.push(Toast { id, notice: entry.notice.clone(), times, until, is_read: false });
         }
         self.next = book.next_number();
         while self.shown.len() > Self::MOST {
@@ -135,7 +137,7 @@ impl EditorOverlay for Toasts {
         let Some(book) = world.get_resource::<LogBook>() else { return };
         let now = ctx.input(|input| input.time);
         self.follow(book, now);
-        self.shown.retain(|toast| toast.until > now);
+        self.shown.retain(|toast| toast.is_read || toast.until > now);
         let window = ctx.content_rect();
         let (areas, width) = room(ctx, world, window);
         let mut taken = self.windows(ctx);
@@ -164,14 +166,16 @@ impl EditorOverlay for Toasts {
                 requests.send(ShowPanel(panel.unwrap_or("Log")));
             }
             let rect: Rect = shown.response.rect;
-            // A toast under the pointer stays.
-            let read = ctx.input(|input| input.pointer.hover_pos()).is_some_and(|pointer| rect.contains(pointer));
-            if read && toast.until < now + 1.0 {
-                toast.until = now + 2.0;
+            // A toast under the pointer stays, and a little longer.
+            let is_read = ctx.input(|input| input.pointer.hover_pos()).is_some_and(|pointer| rect.contains(pointer));
+            if is_read || toast.is_read {
+                toast.until = toast.until.max(now + 2.0);
             }
+            toast.is_read = is_read;
             taken.push(rect);
         }
-        let next = self.shown.iter().map(|toast| toast.until).min_by(f64::total_cmp);
+        let expiring = self.shown.iter().filter(|toast| !toast.is_read);
+        let next = expiring.map(|toast| toast.until).min_by(f64::total_cmp);
         if world.get_resource::<NextToast>().is_some_and(|known| known.0 != next) {
             requests.set(NextToast(next));
         }

@@ -17,7 +17,7 @@ use crate::{
     },
     mesh::model::Weights,
     plugins::{
-        document::{Change, EditRequest},
+        document::{Change, EditRequest, awaited_steps::AwaitedSteps},
         history::RigHistory,
         surface::{RigMesh, SkinOf},
     },
@@ -125,7 +125,9 @@ pub(super) fn express(
     rigs: Query<(&Rig, Option<&RigHistory>)>,
     set: Res<FaceExpressions>,
     mut told: MessageWriter<ExpressionAnswer>,
+    mut awaited: ResMut<AwaitedSteps>,
 ) {
+    awaited.landed.clear();
     let mut asked: Vec<(ExpressRequest, bool)> = Vec::new();
     for (.., posing) in &mut meshes {
         let landed = posing.map(|mut posing| posing.bypass_change_detection().land()).unwrap_or_default();
@@ -205,6 +207,7 @@ pub(super) fn express(
         } else {
             commands.write_message(EditRequest { rig: rig_entity, change: Change::CancelPreview });
             if !is_shown {
+                awaited.landed.insert(rig_entity);
                 commands.write_message(EditRequest { rig: rig_entity, change: Change::Do(operation) });
             }
         }
@@ -212,6 +215,21 @@ pub(super) fn express(
         commands.entity(*entity).insert((Expressions(strengths.clone()), OwnStrengths(strengths.clone())));
         told.write(ExpressionAnswer { mesh: *entity, result: Ok(()) });
     }
+}
+
+/// Notes the rigs that get a step once it is computed, so that undo and redo wait for it.
+pub(super) fn await_steps(
+    faces: Query<
+        (&SkinOf, Option<&FacePosing>, Option<&FacePreparation>),
+        Or<(With<FacePosing>, With<FacePreparation>)>,
+    >,
+    mut awaited: ResMut<AwaitedSteps>,
+) {
+    let has_step = |posing: Option<&FacePosing>, preparation: Option<&FacePreparation>| {
+        posing.is_some_and(FacePosing::has_step) || preparation.is_some_and(FacePreparation::has_step)
+    };
+    let rigs = faces.iter().filter(|(_, posing, preparation)| has_step(*posing, *preparation)).map(|(of, ..)| of.0);
+    awaited.computed = rigs.collect();
 }
 
 /// The facial bones of a rig, and the skin of a mesh that is bound to them.

@@ -79,6 +79,11 @@ pub fn mended_shares(world: &World, mesh: Entity) -> BTreeMap<String, f32> {
 }
 
 impl FacePreparation {
+    /// True if the request that waits becomes a step of the history.
+    pub(super) fn has_step(&self) -> bool {
+        self.wanted.as_ref().is_some_and(|request| !request.preview)
+    }
+
     /// Starts to prepare a face; a mesh whose analysis is not `ready` is analysed first, with the cut of the document.
     pub(super) fn start(
         mesh: &RigMesh,

@@ -424,3 +424,48 @@ fn a_part_is_refused_by_the_parts_of_the_template_that_the_rig_follows_now() {
     studio.desk.app.world_mut().entity_mut(rig).insert(source);
     assert_eq!(reason(&studio.desk), Some("the selected joints have such a part already"));
 }
+
+/// Pictures of the Part menu are greyed where a click would be refused, and say why.
+#[test]
+fn pictures_of_parts_are_greyed_where_the_part_would_be_refused() {
+    use rigsmith::rig::part::OccupiedJoint;
+
+    let mut studio = Studio::new(TagsPanel::default());
+    let arm_l = studio.joint("arm_l");
+    studio.desk.select(&[arm_l]);
+    studio.settle();
+    studio.click("Part");
+    studio.desk.until("the parts", |desk| desk.look("Part limb").is_some());
+    // An arm takes more joints than there are.
+    let is_greyed = |desk: &Desk, tile: &str| desk.look(tile).is_some_and(|tile| !tile.enabled);
+    studio.desk.until("the reason of the arm", |desk| is_greyed(desk, "Part arm"));
+    // An open menu asks for nothing more.
+    studio.desk.move_to(egui::pos2(3000.0, 3000.0));
+    studio.settle();
+    studio.desk.frames(120);
+    assert!(!studio.desk.asks && studio.desk.wakes_in == Duration::MAX, "{:?}", studio.desk.wakes_in);
+    assert!(!is_greyed(&studio.desk, "Part limb"), "it fits");
+    let steps = studio.desk.steps();
+    studio.click("Part arm");
+    assert!(studio.desk.steps() == steps && studio.desk.look("Part arm").is_some(), "the menu stays open");
+    studio.click("Part limb");
+    assert_eq!((studio.desk.rig().dropped_parts().len(), studio.desk.steps().1), (1, steps.1 + 1));
+
+    studio.desk.select(&[arm_l]);
+    studio.settle();
+    studio.click("Part");
+    studio.desk.until("the reason of the limb", |desk| is_greyed(desk, "Part limb"));
+    let limb = studio.desk.find("Part limb").rect.center();
+    studio.desk.move_to(limb);
+    studio.desk.frames(60);
+    let words = OccupiedJoint { joint: "arm_l".to_owned(), part: "the part \"limb\"".to_owned() }.to_string();
+    assert!(studio.desk.says(&words), "{words}: {:?}", studio.desk.seen);
+
+    // With the options first a click only shows them.
+    studio.click("Options first");
+    assert!(!is_greyed(&studio.desk, "Part limb"));
+    studio.click("Part limb");
+    assert!(!studio.desk.find("Add part").enabled && studio.desk.look("Option size").is_some());
+    studio.click("Options first");
+    assert!(is_greyed(&studio.desk, "Part limb"));
+}

@@ -43,6 +43,8 @@ pub struct Desk {
     pub deaf: bool,
     /// True if the last frame asked for another one at once.
     pub awake: bool,
+    /// True if the last frame sent requests, for which the window draws another one.
+    pub asks: bool,
     /// Time after which the last frame asked for another one.
     pub wakes_in: std::time::Duration,
 }
@@ -119,6 +121,7 @@ impl Desk {
             texts: Vec::new(),
             deaf: false,
             awake: false,
+            asks: false,
             wakes_in: std::time::Duration::MAX,
         };
         desk.frame();
@@ -166,6 +169,7 @@ impl Desk {
         if let Some(update) = output.platform_output.accesskit_update {
             self.seen = update.nodes.iter().filter_map(|(_, node)| shown_widget(node)).collect();
         }
+        self.asks = !requests.is_empty();
         if !self.deaf {
             requests.carry_out(self.app.world_mut());
         }

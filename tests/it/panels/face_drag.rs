@@ -113,16 +113,8 @@ fn frames_of_a_drag_visit_no_points() {
     assert_eq!([head, finer].map(visits_of_a_drag), [0, 0]);
 }
 
-/// A preview that is computed for weights of before does not come back in place of a step.
-#[test]
-fn a_step_outlives_a_preview_for_other_weights() {
-    let (mut desk, mesh) = with_face(model(heads::bundled()));
-    let request = |strength: f32, preview: bool| ExpressRequest {
-        mesh,
-        strengths: [("happiness".to_owned(), strength)].into(),
-        preview,
-    };
-    // Nothing in the background is computed while every thread of it waits.
+/// Tasks that keep every thread of the background busy, so that nothing else is computed there, until what they wait for is dropped.
+fn busy_threads() -> (Arc<()>, Vec<Task<()>>) {
     let (pool, held) = (AsyncComputeTaskPool::get(), Arc::new(()));
     let waits = |_| -> Task<()> {
         let held = Arc::downgrade(&held);
@@ -133,6 +125,82 @@ fn a_step_outlives_a_preview_for_other_weights() {
         })
     };
     let threads: Vec<Task<()>> = (0..pool.thread_num()).map(waits).collect();
+    (held, threads)
+}
+
+/// An undo that comes while the step of a slider is computed is about that step.
+#[test]
+fn undo_waits_for_the_step_of_a_slider() {
+    let (mut desk, mesh) = with_face(model(heads::bundled()));
+    let express = |desk: &mut Desk, name: &str, strength: f32, preview: bool| {
+        let strengths = [(name.to_owned(), strength)].into();
+        desk.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview });
+        desk.frame();
+    };
+    let change = |desk: &mut Desk, change: Change| {
+        desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change });
+    };
+    let shown =
+        |desk: &Desk| desk.app.world().get::<Expressions>(mesh).map(|shown| shown.0.clone()).unwrap_or_default();
+    let posing = |desk: &Desk| desk.app.world().get::<FacePosing>(mesh).unwrap().is_running();
+    express(&mut desk, "anger", 0.5, false);
+    desk.frames(2);
+    let (before, anger, steps) = (desk.rig().clone(), shown(&desk), desk.steps());
+    assert_eq!(anger.get("anger"), Some(&0.5));
+
+    let (held, threads) = busy_threads();
+    express(&mut desk, "happiness", 0.4, true);
+    express(&mut desk, "happiness", 0.8, false);
+    change(&mut desk, Change::Undo);
+    desk.frames(2);
+    assert!(posing(&desk));
+    assert_eq!((desk.steps(), shown(&desk)), (steps, anger.clone()), "nothing is undone before the step is there");
+    change(&mut desk, Change::Do(Operation::StorePose("after".to_owned())));
+    desk.frames(2);
+    assert_eq!((desk.steps(), shown(&desk)), ((steps.0 + 1, steps.1 + 1), anger.clone()));
+    drop(held);
+    desk.until("the step", |desk| !posing(desk));
+    desk.frames(4);
+    drop(threads);
+    // The slider is back, and the step before it is as it was.
+    assert_eq!((desk.steps(), shown(&desk)), ((steps.0 + 2, steps.1 + 1), anger.clone()));
+    assert_eq!(desk.rig().stored_poses().len(), before.stored_poses().len() + 1);
+    desk.undo(1);
+    assert_eq!(*desk.rig(), before);
+
+    // A redo of the step that was awaited brings it back.
+    let (held, threads) = busy_threads();
+    express(&mut desk, "happiness", 0.4, true);
+    express(&mut desk, "happiness", 0.8, false);
+    change(&mut desk, Change::Undo);
+    desk.frame();
+    drop(held);
+    desk.until("the step", |desk| !posing(desk));
+    desk.frames(4);
+    drop(threads);
+    assert_eq!((desk.steps(), shown(&desk)), ((steps.0 + 1, steps.1), anger));
+    change(&mut desk, Change::Redo);
+    desk.frames(3);
+    assert_eq!(shown(&desk).get("happiness"), Some(&0.8));
+
+    // Also in the frame in which the step is made.
+    let strengths = [("sadness".to_owned(), 0.7)].into();
+    change(&mut desk, Change::Undo);
+    desk.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview: false });
+    desk.frames(3);
+    assert_eq!(shown(&desk).get("happiness"), Some(&0.8), "sadness is undone: {:?}", shown(&desk));
+}
+
+/// A preview that is computed for weights of before does not come back in place of a step.
+#[test]
+fn a_step_outlives_a_preview_for_other_weights() {
+    let (mut desk, mesh) = with_face(model(heads::bundled()));
+    let request = |strength: f32, preview: bool| ExpressRequest {
+        mesh,
+        strengths: [("happiness".to_owned(), strength)].into(),
+        preview,
+    };
+    let (held, threads) = busy_threads();
     desk.app.world_mut().write_message(request(0.5, true));
     desk.frame();
     let skin = desk.rig().skin(Uid(99)).expect("the weights of the face").clone();

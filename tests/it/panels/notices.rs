@@ -125,6 +125,30 @@ fn a_toast_leads_to_the_panel_that_it_is_about() {
     }
 }
 
+/// A window that sleeps while the pointer rests on a toast wakes up for another reason later: the toast is there yet.
+#[test]
+fn a_toast_under_the_pointer_stays_without_frames() {
+    let mut desk = Desk::with(Sheet::Overlay(Box::new(Toasts::default())), egui::vec2(1280.0, 720.0));
+    desk.app.world_mut().write_message(Notice::info("It began."));
+    desk.frames(3);
+    let toast = |desk: &Desk| desk.look("Show in the log").map(|toast| toast.rect.center());
+    let at = toast(&desk).expect("the toast");
+    desk.move_to(at);
+    desk.frames(60);
+    assert!(!desk.asks && desk.wakes_in == std::time::Duration::MAX, "it rests");
+    desk.time += 600.0;
+    desk.frames(60);
+    assert!(toast(&desk).is_some(), "{:?}", desk.seen);
+    assert!(!desk.asks && desk.wakes_in == std::time::Duration::MAX, "it rests again");
+    desk.move_to(egui::pos2(5.0, 5.0));
+    desk.time += 1.0;
+    desk.frames(3);
+    assert!(toast(&desk).is_some(), "it stays a little longer");
+    desk.time += 5.0;
+    desk.frames(3);
+    assert!(toast(&desk).is_none());
+}
+
 #[test]
 fn equal_toasts_are_counted() {
     let size = egui::vec2(1280.0, 720.0);

@@ -8,7 +8,10 @@ use rigsmith::{
         library::LibraryAction,
         notice::Notice,
         palette::obstacle,
-        panels::{controls::ControlsPanel, log::LogPanel, process::ProcessPanel},
+        panels::{
+            controls::ControlsPanel, history::HistoryPanel, loader::LoaderPanel, log::LogPanel, process::ProcessPanel,
+            tags::TagsPanel,
+        },
     },
     plugins::{
         commands::{BuildRequest, BuildResult, BuildStep, Processor},
@@ -164,6 +167,43 @@ fn a_rig_is_not_brought_to_its_own_stage() {
 }
 
 #[test]
+fn stages_of_the_loader_are_greyed_where_they_change_nothing() {
+    let mut desk = Desk::new(LoaderPanel::default());
+    desk.frames(2);
+    let stages = [
+        (RigStage::Edit, "Edit skeleton"),
+        (RigStage::Skeleton, "Load skeleton"),
+        (RigStage::Deleted, "Delete rig"),
+        (RigStage::Built, "Build rig"),
+    ];
+    for (_, label) in stages {
+        assert_greyed(&mut desk, label, "There are no joints: load a template first");
+    }
+    let [a, b] = desk.chain(&["a", "b"])[..] else { panic!() };
+    for joint in [a, b] {
+        add_command(&mut desk, joint, "control", "()");
+    }
+    desk.select(&[]);
+    for (stage, own) in stages {
+        desk.app.world_mut().write_message(StageRequest { rig: desk.rig, stage });
+        desk.frames(4);
+        assert_eq!(desk.find(own).on, Some(true), "{own}");
+        assert_greyed(&mut desk, own, "The rig is at this stage");
+        for (_, other) in stages.into_iter().filter(|(_, other)| *other != own) {
+            assert!(desk.find(other).enabled, "{other} is greyed at {stage:?}");
+        }
+    }
+    // Commands that were taken back since are carried out again.
+    let place = |desk: &Desk| desk.app.world().get::<Processor>(desk.rig).unwrap().builder().cursor();
+    desk.app.world_mut().write_message(BuildRequest { rig: desk.rig, step: BuildStep::RollBack });
+    desk.frames(3);
+    assert_eq!(place(&desk), 0);
+    desk.click("Build rig");
+    desk.frames(4);
+    assert_eq!(place(&desk), 2, "{:?}", desk.told());
+}
+
+#[test]
 fn build_buttons_of_the_controls_say_why_they_are_greyed() {
     let mut desk = Desk::new(ControlsPanel::default());
     desk.resize(400.0, 600.0);
@@ -179,4 +219,23 @@ fn build_buttons_of_the_controls_say_why_they_are_greyed() {
     for button in ["Roll back", "Take back the last command"] {
         assert_greyed(&mut desk, button, "No command is carried out");
     }
+}
+
+#[test]
+fn greyed_buttons_of_the_history_and_the_tags_say_why() {
+    let mut desk = Desk::new(HistoryPanel::default());
+    desk.frames(2);
+    assert_greyed(&mut desk, "⮪ Undo", "There is no step to undo");
+    assert_greyed(&mut desk, "⮫ Redo", "Nothing was undone");
+    desk.chain(&["a", "b"]);
+    assert!(desk.find("⮪ Undo").enabled);
+    desk.click("⮪ Undo");
+    desk.frames(3);
+    assert!(desk.find("⮫ Redo").enabled, "{:?}", desk.told());
+
+    let mut desk = Desk::new(TagsPanel::default());
+    let [a, _] = desk.chain(&["a", "b"])[..] else { panic!() };
+    desk.select(&[a]);
+    desk.frames(2);
+    assert_greyed(&mut desk, "Paste", "Copy or cut tags first");
 }

@@ -181,6 +181,28 @@ fn a_module_is_dragged_onto_a_joint() {
 }
 
 #[test]
+fn modules_are_found_by_words_and_enter_adds_the_first() {
+    let mut desk = Desk::new(TagsPanel::default());
+    desk.resize(400.0, 900.0);
+    let [a, _] = desk.chain(&["a", "b"])[..] else { panic!() };
+    desk.select(&[a]);
+    desk.click("+ Add");
+    desk.frames(3);
+    assert!(desk.look("null").is_some() && desk.look("control").is_some(), "{:?}", desk.seen);
+    desk.type_text("no such module");
+    desk.frames(3);
+    assert!(desk.says("No module is called so.") && desk.look("control").is_none(), "{:?}", desk.seen);
+    desk.hold(egui::Modifiers::COMMAND);
+    desk.key(egui::Key::A);
+    desk.hold(egui::Modifiers::NONE);
+    desk.type_text("null");
+    desk.frames(3);
+    desk.key(egui::Key::Enter);
+    desk.frames(3);
+    assert_eq!(desk.modules(a), ["null"], "{:?}", desk.told());
+}
+
+#[test]
 fn a_card_is_dragged_into_a_feature_and_its_switch() {
     let sheet = Both::sheet(ControlsPanel::default(), TagsPanel::default());
     let mut desk = Desk::with(sheet, egui::vec2(900.0, 900.0));

@@ -141,13 +141,18 @@ impl Walk {
 
     /// The app with an empty document.
     fn empty(panel: Box<dyn EditorPanel>, size: egui::Vec2) -> Self {
+        Self::with(Sheet::Panel(panel), size)
+    }
+
+    /// The app with an empty document, and what of it is drawn.
+    fn with(sheet: Sheet, size: egui::Vec2) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let time = TimeUpdateStrategy::ManualDuration(Duration::ZERO);
         let mut app = docked_app(folder.path().join("state"), Vec::new(), time);
         app.add_plugins((ToolsPlugin, FittingPlugin));
         app.finish();
         app.cleanup();
-        let desk = Desk::of(app, Entity::PLACEHOLDER, Sheet::Panel(panel), size);
+        let desk = Desk::of(app, Entity::PLACEHOLDER, sheet, size);
         let mut walk = Self { desk, size, wrong: Vec::new(), made: BTreeSet::new(), shelf: None, folder };
         walk.desk.until("a document", |desk| desk.app.world().contains_resource::<ActiveRig>());
         walk.desk.app.world_mut().write_message(OpenRequest::Empty);

@@ -56,7 +56,8 @@ pub(super) fn show(
     ui.horizontal(|ui| {
         ui.strong("Expressions");
         let posed = next.values().any(|strength| *strength > 0.0);
-        if ui.add_enabled(posed, egui::Button::new("Reset").small()).clicked() {
+        let reset = ui.add_enabled(posed, egui::Button::new("Reset").small());
+        if reset.on_disabled_hover_text("The face is at rest").clicked() {
             next.clear();
             let_go = true;
         }

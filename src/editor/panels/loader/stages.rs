@@ -1,18 +1,28 @@
 //! Stages of the rig, and its groups.
 
+use bevy::prelude::World;
 use bevy_egui::egui::{Button, Checkbox, Ui, WidgetInfo, WidgetType};
 
 use crate::{
-    editor::{panel::Requests, panels::displayed_rig::DisplayedRig},
+    editor::{
+        panel::Requests,
+        panels::{displayed_rig::DisplayedRig, process::AT_STAGE},
+    },
     plugins::{
+        commands::Processor,
         document::EditRequest,
         stage::{RigStage, StageRequest},
     },
     rig::operations::{Operation, TagOperation},
 };
 
+/// Reason why the rig is not brought to any stage.
+const NO_JOINTS: &str = "There are no joints: load a template first";
+
 /// Draws the four stages; a click brings the rig there.
-pub(super) fn show(ui: &mut Ui, shown: &DisplayedRig, stage: Option<RigStage>, requests: &mut Requests) {
+pub(super) fn show(ui: &mut Ui, world: &World, shown: &DisplayedRig, requests: &mut Requests) {
+    let stage = world.get::<RigStage>(shown.entity).copied();
+    let processor = world.get::<Processor>(shown.entity);
     let is_deleted = stage == Some(RigStage::Deleted);
     let name = &shown.rig.about().name;
     ui.strong(if name.is_empty() { "Rig" } else { name });
@@ -20,12 +30,17 @@ pub(super) fn show(ui: &mut Ui, shown: &DisplayedRig, stage: Option<RigStage>, r
         ui.spacing_mut().item_spacing.x = 3.0;
         for choice in RigStage::ALL {
             let is_on = stage == Some(choice);
-            let can = !shown.rig.is_empty() || is_deleted;
+            let why_not = if choice.is_kept(stage, processor) {
+                Some(AT_STAGE)
+            } else {
+                (shown.rig.is_empty() && !is_deleted).then_some(NO_JOINTS)
+            };
+            let can = why_not.is_none();
             let (said, tip) = purpose(choice);
             let button = ui.add_enabled(can, Button::selectable(is_on, choice.name()));
             button.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, can, is_on, said));
-            let button = button.on_hover_text(tip).on_disabled_hover_text("There are no joints: load a template first");
-            if button.clicked() && !is_on {
+            let button = button.on_hover_text(tip).on_disabled_hover_text(why_not.unwrap_or_default());
+            if button.clicked() {
                 requests.send(StageRequest { rig: shown.entity, stage: choice });
             }
         }

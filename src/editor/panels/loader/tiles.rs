@@ -12,8 +12,8 @@ use super::namesakes::differences;
 use crate::{
     editor::{
         library::{
-            DraggedTemplate, LibraryListing, LibraryPictures, ListTemplates, PictureRequest, TemplateLibrary,
-            TemplatePicture,
+            DraggedTemplate, LibraryListing, LibraryPictures, ListTemplates, PictureRequest, ReadPart, TemplateLibrary,
+            TemplatePicture, is_part_known, part_refusal,
         },
         panel::Requests,
         panels::list,
@@ -48,10 +48,26 @@ struct TileNames<'a> {
     height: f32,
 }
 
+/// State of a picture.
+struct TileState {
+    is_chosen: bool,
+    /// Reason why the part would be refused, which greys it.
+    why_not: Option<String>,
+    /// True if a click has an effect.
+    takes_clicks: bool,
+}
+
+/// Pictures of a menu that puts parts onto joints.
+#[derive(Clone, Copy)]
+pub(in crate::editor::panels) struct PartTiles {
+    /// True where a click adds the part at once: a picture that would be refused takes none then.
+    pub adds: bool,
+}
+
 /// Choice of what is shown.
 pub(in crate::editor::panels) struct TilesShown<'a> {
-    /// True to leave out what is no part.
-    pub parts_only: bool,
+    /// Leaves out what is no part, and greys parts that would be refused.
+    pub parts: Option<PartTiles>,
     /// Largest height of the pictures.
     pub height: f32,
     /// The chosen template.
@@ -69,8 +85,8 @@ impl Tiles {
     ) -> Option<Arc<ListedTemplate>> {
         let library = world.get_resource::<TemplateLibrary>()?;
         let listing = library.listing().clone();
-        self.bar(ui, &listing, wanted.parts_only, requests);
-        self.refresh(&listing, wanted.parts_only);
+        self.bar(ui, &listing, wanted.parts.is_some(), requests);
+        self.refresh(&listing, wanted.parts.is_some());
         for problem in self.problems(&listing) {
             ui.colored_label(style::obstacle(ui.visuals()), problem);
         }
@@ -82,10 +98,10 @@ impl Tiles {
         }
         let columns = ((ui.available_width() + 4.0) / (TILE + 4.0)).floor().max(1.0) as usize;
         let rows = self.found.len().div_ceil(columns);
-        let (mut clicked, mut missing) = (None, Vec::new());
+        let (mut clicked, mut missing, mut unread) = (None, Vec::new(), Vec::new());
         let pictures = world.get_resource::<LibraryPictures>();
         // A menu gives no more room than it took before, when the list was still being made.
-        let least = if wanted.parts_only { wanted.height } else { 64.0 };
+        let least = if wanted.parts.is_some() { wanted.height } else { 64.0 };
         let area = ScrollArea::vertical().id_salt("templates").max_height(wanted.height).min_scrolled_height(least);
         let area = area.auto_shrink([false, true]);
         let has_namesakes = self.found.iter().any(|(_, difference)| difference.is_some());
@@ -97,9 +113,17 @@ impl Tiles {
                 if picture.is_none() && pictures.is_some_and(|pictures| !pictures.is_wanted(&listed)) {
                     missing.push(listed.clone());
                 }
+                let refusal = wanted.parts.and_then(|_| part_refusal(world, &listed.place));
+                let why_not = refusal.as_ref().map(|refusal| refusal.words().to_owned());
+                let takes_clicks = why_not.is_none() || wanted.parts.is_none_or(|parts| !parts.adds);
+                // A request has the window draw on, so there is one for each part.
+                if wanted.parts.is_some() && !is_part_known(world, &listed.place) {
+                    unread.push(listed.place.clone());
+                }
                 let is_chosen = wanted.chosen == Some(&listed.place);
                 let names = TileNames { difference: difference.as_deref(), height: foot };
-                if self.tile(ui, &listed, names, picture, is_chosen).clicked() {
+                let state = TileState { is_chosen, why_not, takes_clicks };
+                if self.tile(ui, &listed, names, picture, state).clicked() {
                     clicked = Some(listed);
                 }
             }
@@ -115,6 +139,7 @@ impl Tiles {
         if !missing.is_empty() {
             requests.send(PictureRequest(missing));
         }
+        unread.into_iter().for_each(|place| requests.send(ReadPart(place)));
         clicked
     }
 
@@ -174,20 +199,26 @@ impl Tiles {
         listed: &Arc<ListedTemplate>,
         names: TileNames,
         picture: Option<&TemplatePicture>,
-        is_chosen: bool,
+        TileState { is_chosen, why_not, takes_clicks }: TileState,
     ) -> Response {
-        let (rect, response) = ui.allocate_exact_size(vec2(TILE, TILE + names.height), Sense::click_and_drag());
+        // A part that the selected joints refuse may be dragged onto others.
+        let sense = if takes_clicks { Sense::click_and_drag() } else { Sense::drag() };
+        let (rect, response) = ui.allocate_exact_size(vec2(TILE, TILE + names.height), sense);
         let name = listed.name().replace('_', " ");
         let kind = if listed.is_part() { "Part" } else { "Template" };
         let said = match names.difference {
             Some(difference) if !difference.eq_ignore_ascii_case(kind) => format!("{kind} {name}, {difference}"),
             _ => format!("{kind} {name}"),
         };
-        response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, true, is_chosen, &said));
+        response.widget_info(|| WidgetInfo::selected(WidgetType::SelectableLabel, takes_clicks, is_chosen, &said));
         if listed.header.is_ok() {
             response.dnd_set_drag_payload(DraggedTemplate { place: listed.place.clone(), name: name.clone() });
         }
         let square = Rect::from_min_size(rect.min, vec2(TILE, TILE));
+        let opacity = ui.opacity();
+        if why_not.is_some() {
+            ui.multiply_opacity(ui.visuals().disabled_alpha());
+        }
         let visuals = ui.visuals();
         let line = match (is_chosen, response.hovered() || response.has_focus()) {
             (true, _) => Stroke::new(2.0, style::accent(visuals)),
@@ -202,12 +233,19 @@ impl Tiles {
         if let Some(difference) = names.difference {
             line_below(ui, square, NAME - 1.0, difference, 10.0, style::quiet(ui.visuals()));
         }
+        ui.set_opacity(opacity);
         let tip = match &listed.header {
             Ok(header) if header.description.is_empty() => listed.place.to_string(),
             Ok(header) => format!("{}\n{}", header.description, listed.place),
             Err(error) => format!("{}: {error}", listed.place),
         };
-        response.on_hover_text(tip)
+        match why_not {
+            Some(why_not) => response.on_hover_ui(|ui| {
+                ui.label(why_not);
+                ui.weak(tip);
+            }),
+            None => response.on_hover_text(tip),
+        }
     }
 
     fn paint(&mut self, ui: &Ui, square: Rect, listed: &ListedTemplate, picture: Option<&TemplatePicture>) {

@@ -43,7 +43,7 @@ impl TagsPanel {
             ui.menu_button("Copy", |ui| self.copy(ui, shown, requests));
             // Not in `add_enabled_ui`: what is within another `Ui` does not go on in the next row.
             let Some(clipboard) = self.clipboard.clone() else {
-                ui.add_enabled(false, Button::new("Paste"));
+                ui.add_enabled(false, Button::new("Paste")).on_disabled_hover_text("Copy or cut tags first");
                 return;
             };
             ui.menu_button("Paste", |ui| self.paste(ui, modules, shown, &clipboard, requests));

@@ -10,13 +10,16 @@ use bevy_egui::egui::{
 use crate::{
     editor::{
         actions::{Action, ActionRequest},
-        library::{LibraryAct, LibraryRequest, ListTemplates, PartRefusal, ReadPart, TemplateLibrary, part_refusal},
+        library::{
+            LibraryAct, LibraryRequest, ListTemplates, PartRefusal, ReadPart, TemplateLibrary, is_part_known,
+            part_refusal,
+        },
         panel::Requests,
         panels::{
             displayed_rig::DisplayedRig,
             loader::{
                 card::{Card, about, both_sides},
-                tiles::{Tiles, TilesShown},
+                tiles::{PartTiles, Tiles, TilesShown},
             },
         },
         tools::stroke::{StrokeState, StrokeTool},
@@ -72,7 +75,9 @@ impl PartMenu {
             about(ui, listed, header);
             self.card.of(&listed.place);
             self.card.options(ui, header, requests);
-            requests.send(ReadPart(listed.place.clone()));
+            if !is_part_known(world, &listed.place) {
+                requests.send(ReadPart(listed.place.clone()));
+            }
             let refusal = part_refusal(world, &listed.place);
             let button = ui.add_enabled(refusal.is_none(), Button::new("Add part"));
             let why_not = refusal.as_ref().map_or("", PartRefusal::words);
@@ -82,7 +87,8 @@ impl PartMenu {
             }
             ui.separator();
         }
-        let wanted = TilesShown { parts_only: true, height, chosen: chosen.as_ref() };
+        let parts = PartTiles { adds: !self.options_first };
+        let wanted = TilesShown { parts: Some(parts), height, chosen: chosen.as_ref() };
         if let Some(listed) = self.tiles.show(ui, world, wanted, requests) {
             if self.options_first {
                 self.chosen = Some(listed.place.clone());

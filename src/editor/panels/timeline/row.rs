@@ -317,10 +317,11 @@ fn menu(
         let count = open.clip.layers.len();
         let operate = |operation: ClipOperation| EditRequest::operation(open.entity, Operation::Clips(operation));
         let (clip, uid) = (open.clip.uid, layer.uid);
-        for (text, enabled, index) in
-            [("Move up", number + 1 < count, number + 1), ("Move down", number > 0, number.saturating_sub(1))]
-        {
-            if ui.add_enabled(enabled, Button::new(text)).clicked() {
+        for (text, enabled, index, why_not) in [
+            ("Move up", number + 1 < count, number + 1, "It is the highest layer"),
+            ("Move down", number > 0, number.saturating_sub(1), "It is the lowest layer"),
+        ] {
+            if ui.add_enabled(enabled, Button::new(text)).on_disabled_hover_text(why_not).clicked() {
                 requests.send(operate(ClipOperation::MoveLayer { clip, layer: uid, index }));
                 ui.close();
             }
@@ -330,7 +331,8 @@ fn menu(
             requests.send(operate(ClipOperation::SetLayer { clip, layer: uid, about }));
         }
         entry(ui, context.world, super::TimelineAction::NewLayer, requests);
-        if ui.add_enabled(count > 1, Button::new("Delete layer")).clicked() {
+        let delete = ui.add_enabled(count > 1, Button::new("Delete layer"));
+        if delete.on_disabled_hover_text("A clip has one layer at least").clicked() {
             requests.send(operate(ClipOperation::DeleteLayer { clip, layer: uid }));
             ui.close();
         }

@@ -5,6 +5,7 @@ use std::time::Duration;
 use rigsmith::editor::{
     panel::PanelTitles,
     panels::{graph::GraphAction, timeline::TimelineAction},
+    style::{self, Look},
     tools::paint::brush::BrushAction,
 };
 use serde::de::DeserializeOwned;
@@ -69,5 +70,45 @@ fn no_panel_asks_for_frames_while_nothing_happens() {
         walk.desk.frames(120);
         let wakes_in = walk.desk.wakes_in;
         assert_eq!(wakes_in, Duration::MAX, "{title} asks for a frame, with nothing to show in it");
+        assert!(!walk.desk.asks, "{title} sends requests, with nothing that happens");
+    }
+}
+
+/// The pointer that rests on a panel brings a tip and a light, and no more frames.
+#[test]
+fn no_panel_asks_for_frames_while_the_pointer_rests_on_it() {
+    for (title, panel, size) in panels() {
+        let mut walk = Walk::new(panel, size);
+        walk.ready();
+        walk.rest();
+        let places = walk.names().into_iter().map(|(_, at)| at);
+        for at in places.step_by(7).take(4).chain([Pos2::new(0.5 * size.x, 0.5 * size.y)]).collect::<Vec<_>>() {
+            walk.desk.move_to(at);
+            walk.desk.frames(120);
+            assert_eq!(walk.desk.wakes_in, Duration::MAX, "{title} asks for a frame, with the pointer at {at:?}");
+            assert!(!walk.desk.asks, "{title} sends requests, with the pointer at {at:?}");
+        }
+    }
+}
+
+/// What lies over the window waits for a person without a frame.
+#[test]
+fn no_overlay_asks_for_frames_while_nothing_happens() {
+    for action in [Action::Palette, Action::Help, Action::StartPage, Action::Open] {
+        let mut walk = Walk::with(Sheet::Window, egui::vec2(1280.0, 720.0));
+        // The caret of a field blinks in no look of the window.
+        style::apply(&walk.desk.ctx, Look::default());
+        walk.desk.frames(3);
+        let drawn = walk.desk.shapes;
+        walk.desk.app.world_mut().write_message(ActionRequest(action));
+        walk.desk.frames(10);
+        assert_ne!(walk.desk.shapes, drawn, "{action:?} shows something");
+        walk.desk.move_to(Pos2::new(-10.0, -10.0));
+        let rests = |desk: &Desk| desk.wakes_in == Duration::MAX && !desk.asks;
+        walk.desk.until("a rest", rests);
+        for _ in 0..60 {
+            walk.desk.frame();
+            assert!(rests(&walk.desk), "{action:?} asks for a frame after {:?}", walk.desk.wakes_in);
+        }
     }
 }

@@ -113,10 +113,11 @@ fn order_buttons(ui: &mut Ui, label: &str, number: usize, ends: [bool; 2]) -> Op
     if list::symbol_button(ui, "✖", &format!("Remove {number} of {label}")) {
         edit = Some(RowEdit::Remove);
     }
-    for (sign, side, is_end, moved) in [("⏷", "down", is_last, RowEdit::Down), ("⏶", "up", is_first, RowEdit::Up)] {
+    let last = is_last.then_some("It is the last one");
+    let first = is_first.then_some("It is the first one");
+    for (sign, side, why_not, moved) in [("⏷", "down", last, RowEdit::Down), ("⏶", "up", first, RowEdit::Up)] {
         let said = format!("Move {number} of {label} {side}");
-        let is_clicked = ui.add_enabled_ui(!is_end, |ui| list::symbol_button(ui, sign, &said)).inner;
-        if is_clicked && !is_end {
+        if list::symbol_button_unless(ui, sign, &said, why_not) {
             edit = Some(moved);
         }
     }
