@@ -221,7 +221,8 @@ impl Work<'_> {
             _ if limb.kind == LimbKind::Tail => (line.free / whole, line.at(line.free)),
             _ => ((line.free + line.at(line.free).distance(root)) / whole, root),
         };
-        let ratio = measured.clamp(0.4 * scale, 2.5 * scale);
+        // Tails of feathers are as long as they like, and all of what leaves the trunk is one.
+        let ratio = if limb.kind == LimbKind::Tail { measured } else { measured.clamp(0.4 * scale, 2.5 * scale) };
         let mut lengths: Vec<f32> = rest.iter().map(|l| l * ratio).collect();
         if limb.kind == LimbKind::Wing && limb.joints.len() > WING.len() {
             for (length, share) in lengths.iter_mut().zip(WING) {
