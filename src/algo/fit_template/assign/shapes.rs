@@ -55,7 +55,7 @@ impl Search<'_> {
             return 0.0;
         }
         let penalty = |kind: LimbKind, leaf: usize| {
-            let flatness = self.tree.lines[self.leaves[leaf]].flatness(self.graph.cell).max(1e-6);
+            let flatness = self.tree.lines[self.leaves[leaf]].flatness(self.graph.cell).max(1.0);
             match kind {
                 LimbKind::Head => FLAT_HEAD * bevy::math::ops::ln(flatness / ROUND).max(0.0),
                 LimbKind::Tail => ROUND_TAIL * bevy::math::ops::ln(FLAT / flatness).max(0.0),
