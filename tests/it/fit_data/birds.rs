@@ -40,8 +40,8 @@ fn moved(fit: &FittedSkeleton, whole: &FittedSkeleton) -> f32 {
     pairs.map(|(a, b)| 100.0 * a.position.distance(b.position) / whole.height).fold(0.0, f32::max)
 }
 
-/// A tenth of the faces missing, six times. Where all holes are closed as they were, nothing moves. 0.3 was asked for; feathers
-/// move by 13.5 in one of the other two.
+/// A tenth of the faces missing, six times. Where all holes are closed as they were, nothing moves. 0.3 was asked for; shoulders
+/// move by 5.6 in one of the other two. Feathers moved by 13.5 in it while they turned with the bone before theirs.
 #[test]
 fn a_bird_with_a_tenth_of_its_faces_missing() {
     let Some(FittedFigure { figure, fit }) = eagle() else { return };
@@ -54,7 +54,7 @@ fn a_bird_with_a_tenth_of_its_faces_missing() {
     };
     let most: Vec<f32> = [77, 1, 2, 3, 4, 5].into_iter().map(missed).collect();
     assert!(most.iter().filter(|moved| **moved <= 0.3).count() >= 4, "{most:?}");
-    assert!(most.iter().all(|moved| *moved <= 15.0), "{most:?}");
+    assert!(most.iter().all(|moved| *moved <= 6.2), "{most:?}");
 }
 
 /// Mean distance of joints from their true places, in hundredths of the height, for the labels that are asked for.
