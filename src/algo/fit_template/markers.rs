@@ -176,8 +176,8 @@ pub(super) fn warp(
     let mut is_carried = vec![false; places.len()];
     for (marker, &way) in markers.iter().zip(&moves) {
         let reach = 0.6 * limb_length(marker.joint);
-        let axial = axial_part(template, &starts, marker.joint, way);
         let limb_alone = limb_alone || marker.is_alone();
+        let axial = if marker.is_alone() { Vec3::ZERO } else { axial_part(template, &starts, marker.joint, way) };
         // Distances along the skeleton from the marker.
         let mut distance = vec![f32::INFINITY; places.len()];
         distance[marker.joint] = 0.0;
