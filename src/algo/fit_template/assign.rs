@@ -5,6 +5,7 @@
 //! chooses sides and the front. The best few assignments are kept as hypotheses.
 
 mod front;
+mod shapes;
 
 use glam::{Quat, Vec3};
 
@@ -52,13 +53,6 @@ const SIDED: f32 = 1.2;
 pub(super) const POSED: f32 = 0.8;
 /// Penalty of a centre of branches other than the middle of the volume, for animals.
 const OTHER_CENTRE: f32 = 0.1;
-/// Penalties of an arm or a wing, and of a tail, that is thicker than the head, for a factor of e.
-const THICKER: f32 = 0.12;
-const THICKER_TAIL: f32 = 0.3;
-/// Thickness that the trunk may have, as a factor of the head's.
-const STOUT: f32 = 1.8;
-/// Thickness that another branch may have, as a factor of the head's.
-const LOOSELY: f32 = 1.3;
 /// Penalty of an up direction far from all axes of the file, and of one that is not usual.
 const ODD_UP: f32 = 0.12;
 const UNUSUAL_UP: f32 = 0.06;
@@ -76,6 +70,8 @@ pub(super) struct Hypothesis {
     pub(super) alignment: Similarity,
     /// Turn of a bird's trunk and legs, where tail and neck tell it.
     pub(super) trunk: Option<Quat>,
+    /// A point and the normal of the mesh's plane of symmetry, where it lies between left and right of the figure.
+    pub(super) middle: Option<(Vec3, Vec3)>,
     /// Pairs of template positions and places on centre lines that the alignment was made from.
     pub(super) pairs: Vec<(Vec3, Vec3, f32)>,
     /// Penalty; smaller is better.
@@ -292,31 +288,7 @@ impl Search<'_> {
             cost += share * UNUSED * self.arc_length(leaf) / self.tree.branches.reach.max(1) as f32;
         }
         cost += BEYOND * self.beyond_trunk(chosen);
-        let thickness = |leaf: usize| self.tree.lines[self.leaves[leaf]].thickness();
-        let heads = limbs.iter().zip(chosen).filter(|(l, _)| l.kind == LimbKind::Head);
-        if let Some(head) = heads.filter_map(|(_, c)| *c).next() {
-            // The thickest of all branches that do not belong to the head.
-            let others = (0..self.leaves.len())
-                .filter(|&o| !self.tree.branches.on_one_way(self.leaves[o], self.leaves[head]))
-                .map(|o| thickness(o) / if chosen.contains(&Some(o)) { 1.0 } else { LOOSELY });
-            let thicker = bevy::math::ops::ln(others.fold(0.0, f32::max).max(1.0) / (LOOSELY * thickness(head)));
-            cost += THICKER * thicker.max(0.0);
-            // Where the centre of the branches lies in a large head, no branch is the head.
-            let thicker = bevy::math::ops::ln(self.tree.trunk_thickness / (STOUT * thickness(head)));
-            cost += THICKER * thicker.max(0.0);
-            for (limb, leaf) in limbs.iter().zip(chosen) {
-                let weight = match limb.kind {
-                    LimbKind::Tail => THICKER_TAIL,
-                    LimbKind::Arm | LimbKind::Wing => THICKER,
-                    _ => continue,
-                };
-                if let Some(leaf) = *leaf {
-                    let thicker = bevy::math::ops::ln(thickness(leaf) / thickness(head));
-                    cost += weight * thicker.max(0.0);
-                }
-            }
-        }
-        cost
+        cost + self.unlike_shapes(chosen)
     }
 
     /// Length over which arms and legs run together on their way to the centre of the branches, without the head, as a share of the
@@ -488,7 +460,8 @@ impl Search<'_> {
                 cost += 2.0 * (away - nearest);
             }
         }
-        let mut found = Hypothesis { tree: self.number, leaves, alignment, trunk: None, pairs, cost, rest, weight };
+        let (tree, trunk, middle) = (self.number, None, None);
+        let mut found = Hypothesis { tree, leaves, alignment, trunk, middle, pairs, cost, rest, weight };
         if !template.is_upright() {
             let turn = level::level(template, self.tree, &found, self.directions).unwrap_or(alignment.rotation);
             let up = turn * Vec3::Y;

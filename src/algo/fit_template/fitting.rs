@@ -229,8 +229,11 @@ impl<'a> Fit<'a> {
         step(0.95)?;
         let (plane, is_forced) = self.make_symmetric(&mut places);
         let pulls = self.pulls(before, plane);
-        markers::warp(&self.template, &mut places, &pulls, body.is_some(), &|place| analysis.is_solid(place));
         let (up, forward) = self.directions(best, body.as_ref());
+        let is_solid = |place| analysis.is_solid(place);
+        let level = analysis.mesh.space.direction_to_unit(forward);
+        markers::shift_wings(&self.template, &mut places, &pulls, level, &is_solid);
+        markers::warp(&self.template, &mut places, &pulls, body.is_some(), &is_solid);
         self.bend_as_template(best, (up, forward), &pulls, &mut places);
         let near: Vec<Option<f32>> = match (&body, &roles) {
             (Some(body), Some(roles)) => roles.iter().map(|r| r.map(|r| body.place(r).1)).collect(),

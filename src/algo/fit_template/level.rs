@@ -21,9 +21,11 @@ const STANDS: f32 = 0.8;
 /// ground.
 const APART: f32 = 0.4;
 
-/// Turns a hypothesis to how an animal stands, and tells how a bird's trunk lies.
+/// Turns a hypothesis to how an animal stands, and tells how a bird's trunk lies and where its middle is.
 pub(super) fn stand(template: &TemplateLimbs, tree: &Tree, hypothesis: &mut Hypothesis, directions: &Directions) {
     hypothesis.trunk = along_trunk(template, tree, hypothesis, directions);
+    let left = hypothesis.alignment.rotation * Vec3::X;
+    hypothesis.middle = directions.mirror.filter(|(_, normal)| left.dot(*normal).abs() > SAME_LEFT);
     if let Some(turn) = level(template, tree, hypothesis, directions) {
         hypothesis.alignment = hypothesis.alignment.turned(turn, &hypothesis.pairs);
     }

@@ -112,6 +112,14 @@ impl CentreLine {
         self.depths[..self.free_count].iter().fold(1.0, |most, &d| most.max(d))
     }
 
+    /// Radius of the middle of the free part against its depth under the surface: one for what is round, more for what is flat.
+    pub(super) fn flatness(&self, cell: f32) -> f32 {
+        let (from, to) = (self.free_count / 5, (self.free_count * 4 / 5).max(self.free_count / 5 + 1));
+        let part = &self.depths[from.min(self.depths.len() - 1)..to.min(self.depths.len()).max(1)];
+        let depth = part.iter().map(|depth| depth.max(1.0)).sum::<f32>() / part.len().max(1) as f32;
+        self.mean_radius() / (depth * cell).max(1e-9)
+    }
+
     /// Distance from a position to the free part.
     pub(super) fn distance(&self, position: Vec3) -> f32 {
         self.nearest(position).1

@@ -26,10 +26,15 @@ impl Marker {
 
 /// Joints of a front leg up to which it has no shoulder blade.
 const WITHOUT_BLADE: usize = 5;
+/// Share of a move along the trunk in which other joints follow: nothing in the mesh shows where on its line a joint of the trunk is,
+/// so each rig has it elsewhere, and others are not wrong by as much.
+const AXIAL: f32 = 0.3;
 /// Steps in which the room of a joint that follows is measured.
 const STEPS: usize = 16;
 /// Distance to the surface, as a factor of the move, up to which a joint that follows has all the room it needs.
 const ROOM: f32 = 2.0;
+/// Distance between two markers on a wing, as a share of the template's size, below which both tell as much of the joints about them.
+const NEAR: f32 = 0.01;
 
 /// Markers with those that they mean for the other side of a figure that is symmetric about a plane: a partner that a person
 /// has not placed goes where the image of the marker is.
@@ -52,7 +57,10 @@ pub(super) fn with_partners(
 fn socket(template: &TemplateLimbs, limb: &Limb) -> Option<(usize, usize)> {
     let is_front = limb.kind == LimbKind::Leg && template.trunk.first() != Some(&limb.attach);
     let has_blade = is_front && limb.joints.len() > WITHOUT_BLADE;
-    let ball = template.ball_joint(limb)? + usize::from(has_blade);
+    let ball = match limb.kind {
+        LimbKind::Wing => 0,
+        _ => template.ball_joint(limb)? + usize::from(has_blade),
+    };
     Some((*limb.joints.get(ball)?, *limb.joints.get(ball + 1)?))
 }
 
@@ -69,6 +77,14 @@ fn hidden_thigh(template: &TemplateLimbs, limb: &Limb) -> Option<[usize; 2]> {
     template.has_hidden_knee(limb).then_some(joints)
 }
 
+/// The part of a move of a joint of a trunk that lies across its legs that leads along it; zero for all other joints. A trunk that
+/// stands hangs between shoulders and hips, and is too short or too long as a whole.
+fn axial_part(template: &TemplateLimbs, places: &[Vec3], joint: usize, way: Vec3) -> Vec3 {
+    let (Some(&first), Some(&last)) = (template.trunk.first(), template.trunk.last()) else { return Vec3::ZERO };
+    let along = (places[last] - places[first]).normalize_or_zero();
+    if template.trunk.contains(&joint) && !template.is_upright() { along * way.dot(along) } else { Vec3::ZERO }
+}
+
 /// The part of a move from a place inside of the volume that goes at most half way to the surface.
 fn within(place: Vec3, way: Vec3, is_solid: &dyn Fn(Vec3) -> bool) -> Vec3 {
     if !is_solid(place) {
@@ -77,6 +93,50 @@ fn within(place: Vec3, way: Vec3, is_solid: &dyn Fn(Vec3) -> bool) -> Vec3 {
     let step = way * (ROOM / STEPS as f32);
     let room = (1..=STEPS).take_while(|number| is_solid(place + step * *number as f32)).count();
     way * (room as f32 / STEPS as f32)
+}
+
+/// Moves wings along `forward` as a whole, as markers on them ask: the bones of a wing lie at one depth behind its leading edge, so
+/// one that lies too far forward tells it of all others. Between two markers each joint takes more of the nearer one's.
+pub(super) fn shift_wings(
+    template: &TemplateLimbs,
+    places: &mut [Vec3],
+    markers: &[Marker],
+    forward: Vec3,
+    is_solid: &dyn Fn(Vec3) -> bool,
+) {
+    let limb_of = limbs_of_joints(template);
+    let starts = places.to_vec();
+    for (number, _) in template.limbs.iter().enumerate().filter(|(_, limb)| limb.kind == LimbKind::Wing) {
+        let own = markers.iter().filter(|marker| limb_of[marker.joint] == Some(number) && !marker.is_alone());
+        let own: Vec<(Vec3, f32)> = own
+            .map(|marker| (template.positions[marker.joint], (marker.place - starts[marker.joint]).dot(forward)))
+            .collect();
+        for joint in (0..places.len()).filter(|&joint| limb_of[joint] == Some(number)) {
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for (place, way) in &own {
+                let near = 1.0 / (template.positions[joint].distance(*place) + NEAR * template.size);
+                sum += way * near;
+                weight += near;
+            }
+            if weight > 0.0 {
+                places[joint] += within(starts[joint], forward * (sum / weight), is_solid);
+            }
+        }
+    }
+}
+
+/// The limb that each joint belongs to, with all that hangs on it; `None` for the trunk.
+fn limbs_of_joints(template: &TemplateLimbs) -> Vec<Option<usize>> {
+    let mut limb_of = vec![None; template.positions.len()];
+    for &joint in &template.order {
+        let own = template.limbs.iter().position(|limb| limb.joints.contains(&joint));
+        limb_of[joint] = match (own, template.parents[joint]) {
+            (Some(limb), _) => Some(limb),
+            (None, Some(parent)) if !template.trunk.contains(&joint) => limb_of[parent],
+            _ => None,
+        };
+    }
+    limb_of
 }
 
 /// Moves joints so that each marker's joint is at its place; the rest of its limb follows inside of the volume, less with the
@@ -107,16 +167,8 @@ pub(super) fn warp(
             template.length(l.attach, l.joints[l.joints.len() - 1]).max(0.05 * template.size)
         })
     };
-    // The limb that each joint belongs to, with all that hangs on it; the trunk is one, too.
-    let mut limb_of = vec![usize::MAX; places.len()];
-    for &joint in &template.order {
-        let own = template.limbs.iter().position(|l| l.joints.contains(&joint));
-        limb_of[joint] = match (own, template.parents[joint]) {
-            (Some(limb), _) => limb,
-            (None, Some(parent)) if !template.trunk.contains(&joint) => limb_of[parent],
-            _ => usize::MAX,
-        };
-    }
+    // The trunk is one, too.
+    let limb_of = limbs_of_joints(template);
     let of_limb = |limb: &Limb| socket(template, limb).into_iter().chain(hidden_hinge(template, limb));
     let sockets: Vec<(usize, usize)> = template.limbs.iter().flat_map(of_limb).collect();
     let is_apart = |a: usize, b: usize| sockets.contains(&(a, b)) || sockets.contains(&(b, a));
@@ -125,6 +177,7 @@ pub(super) fn warp(
     for (marker, &way) in markers.iter().zip(&moves) {
         let reach = 0.6 * limb_length(marker.joint);
         let limb_alone = limb_alone || marker.is_alone();
+        let axial = if marker.is_alone() { Vec3::ZERO } else { axial_part(template, &starts, marker.joint, way) };
         // Distances along the skeleton from the marker.
         let mut distance = vec![f32::INFINITY; places.len()];
         distance[marker.joint] = 0.0;
@@ -162,7 +215,7 @@ pub(super) fn warp(
         for (sum, &distance) in sums.iter_mut().zip(&distance) {
             if distance < reach {
                 let near = 1.0 - distance / reach;
-                sum.0 += way * near * near;
+                sum.0 += (way - axial * (1.0 - AXIAL)) * near * near;
                 sum.1 += near;
             }
         }

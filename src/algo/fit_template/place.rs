@@ -221,7 +221,8 @@ impl Work<'_> {
             _ if limb.kind == LimbKind::Tail => (line.free / whole, line.at(line.free)),
             _ => ((line.free + line.at(line.free).distance(root)) / whole, root),
         };
-        let ratio = measured.clamp(0.4 * scale, 2.5 * scale);
+        // Tails of feathers are as long as they like, and all of what leaves the trunk is one.
+        let ratio = if limb.kind == LimbKind::Tail { measured } else { measured.clamp(0.4 * scale, 2.5 * scale) };
         let mut lengths: Vec<f32> = rest.iter().map(|l| l * ratio).collect();
         if limb.kind == LimbKind::Wing && limb.joints.len() > WING.len() {
             for (length, share) in lengths.iter_mut().zip(WING) {
@@ -422,10 +423,15 @@ impl Work<'_> {
     }
 }
 
-/// Places the joints that are still open relative to their parents, turned as their parents' bones are.
+/// Places the joints that are still open relative to their parents, turned as the bone is on which they lie: the one that begins at
+/// their parent, or the one that ends there at the end of a limb and on the trunk.
 pub(super) fn follow(template: &TemplateLimbs, stretch: &Stretch, places: &[Option<Vec3>]) -> Vec<Vec3> {
     let mut done = vec![Vec3::ZERO; places.len()];
     let mut turns = vec![Quat::IDENTITY; places.len()];
+    let mut next = vec![None; places.len()];
+    for pair in template.limbs.iter().flat_map(|limb| limb.joints.windows(2)) {
+        next[pair[0]] = Some(pair[1]);
+    }
     for &joint in &template.order {
         let Some(parent) = template.parents[joint] else {
             done[joint] = places[joint].unwrap_or_else(|| stretch.apply(template.positions[joint]));
@@ -435,7 +441,13 @@ pub(super) fn follow(template: &TemplateLimbs, stretch: &Stretch, places: &[Opti
         match places[joint] {
             Some(place) => {
                 done[joint] = place;
-                let now = place - done[parent];
+                let after = next[joint].and_then(|next: usize| Some((next, places[next]?)));
+                let (rest, now) = match after {
+                    Some((next, there)) => {
+                        (stretch.turn(template.positions[next] - template.positions[joint]), there - place)
+                    }
+                    None => (rest, place - done[parent]),
+                };
                 turns[joint] = if rest.length_squared() > 1e-16 && now.length_squared() > 1e-16 {
                     Quat::from_rotation_arc(rest.normalize(), now.normalize())
                 } else {

@@ -1,8 +1,15 @@
-//! Birds: a trunk that hides hips and thighs, and faces that are missing.
+//! Birds: a trunk that hides hips and thighs, wings of other lengths and poses, drags, and faces that are missing.
 
-use rigsmith::algo::fit_template::FittedSkeleton;
+use bevy::math::Vec3;
+use rigsmith::{
+    algo::fit_template::{FitSettings, FittedSkeleton, MeshAnalysis, refit_template},
+    files::bundled_characters,
+};
 
-use super::{FittedFigure, all, fitted};
+use super::{
+    FittedFigure, all, fitted, labels, mean,
+    true_joints::{Figure, template_joints},
+};
 use crate::random::Random;
 
 const EAGLE: &str = "creatures/bird-eagle.glb";
@@ -33,8 +40,8 @@ fn moved(fit: &FittedSkeleton, whole: &FittedSkeleton) -> f32 {
     pairs.map(|(a, b)| 100.0 * a.position.distance(b.position) / whole.height).fold(0.0, f32::max)
 }
 
-/// A tenth of the faces missing, six times. Where all holes are closed as they were, nothing moves. 0.3 was asked for; feathers
-/// move by 13.5 in one of the other two.
+/// A tenth of the faces missing, six times. Where all holes are closed as they were, nothing moves. 0.3 was asked for; shoulders
+/// move by 5.6 in one of the other two. Feathers moved by 13.5 in it while they turned with the bone before theirs.
 #[test]
 fn a_bird_with_a_tenth_of_its_faces_missing() {
     let Some(FittedFigure { figure, fit }) = eagle() else { return };
@@ -47,5 +54,110 @@ fn a_bird_with_a_tenth_of_its_faces_missing() {
     };
     let most: Vec<f32> = [77, 1, 2, 3, 4, 5].into_iter().map(missed).collect();
     assert!(most.iter().filter(|moved| **moved <= 0.3).count() >= 4, "{most:?}");
-    assert!(most.iter().all(|moved| *moved <= 15.0), "{most:?}");
+    assert!(most.iter().all(|moved| *moved <= 6.2), "{most:?}");
+}
+
+/// Mean distance of joints from their true places, in hundredths of the height, for the labels that are asked for.
+fn mean_off(figure: &FittedFigure, fit: &FittedSkeleton, is_asked: &dyn Fn(&str) -> bool) -> f32 {
+    let labels = labels(figure.figure.template);
+    let off = |(label, place): &(String, Vec3)| {
+        let at = labels.iter().position(|known| known == label).filter(|_| is_asked(label))?;
+        Some(100.0 * fit.joints[at].position.distance(*place) / fit.height)
+    };
+    mean(figure.figure.truth.iter().filter_map(off))
+}
+
+/// Fit after a joint with the label is dragged to its true place.
+fn dragged(figure: &FittedFigure, label: &str) -> FittedSkeleton {
+    let FittedFigure { figure, fit } = figure;
+    let rig = bundled_characters().into_iter().find(|rig| rig.about().name == figure.template).unwrap();
+    let analysis = MeshAnalysis::new(&figure.points, &figure.triangles, None, &|_| true).unwrap();
+    let at = labels(figure.template).iter().position(|known| known == label).unwrap();
+    let place = figure.truth.iter().find(|(known, _)| known == label).unwrap().1;
+    let settings = FitSettings { markers: vec![(at, place)], ..FitSettings::default() };
+    refit_template(&analysis, &template_joints(&rig), &settings, fit).unwrap()
+}
+
+/// A drag of a shoulder or a wrist halves the error of its wing, as was asked for: the depth of the bones behind the leading edge is
+/// one for all of them. While each joint followed by its distance alone, 58 and 62 % of the error were left.
+#[test]
+fn a_drag_of_one_joint_mends_its_wing() {
+    let Some(eagle) = eagle() else { return };
+    for label in ["wing_1_l", "wing_3_l"] {
+        let again = dragged(eagle, label);
+        let is_wing = |other: &str| other.starts_with("wing") && other.ends_with("_l");
+        let (before, after) = (mean_off(eagle, &eagle.fit, &is_wing), mean_off(eagle, &again, &is_wing));
+        println!("{label}: the wing is off by {after:.2}, before by {before:.2}");
+        assert!(after < 0.5 * before, "{label}: {before} to {after}");
+        // The other wing follows.
+        let is_other = |other: &str| other.starts_with("wing") && other.ends_with("_r");
+        let (before, after) = (mean_off(eagle, &eagle.fit, &is_other), mean_off(eagle, &again, &is_other));
+        assert!(after < 0.5 * before, "{label}, the other wing: {before} to {after}");
+    }
+}
+
+/// A drag along a trunk that lies tells little of the joints about it: hips that are put right leave 26 % of the error of their
+/// neighbours in a dog and 62 % in an eagle, where 56 and 81 % were left while neighbours went along with them.
+#[test]
+fn a_drag_along_the_trunk_moves_the_hips_alone() {
+    let Some(all) = all() else { return };
+    let mut count = 0;
+    for (name, most) in [("creatures/fox-dog.glb", 0.3), (EAGLE, 0.68)] {
+        let Some(figure) = all.iter().find(|fitted| fitted.figure.name == name) else { continue };
+        let again = dragged(figure, "hips");
+        let is_near = |label: &str| {
+            label == "hips"
+                || label.starts_with("thigh")
+                || if name == EAGLE {
+                    label == "chest" || label == "tail"
+                } else {
+                    label == "spine_1" || label == "tail_1"
+                }
+        };
+        let (before, after) = (mean_off(figure, &figure.fit, &is_near), mean_off(figure, &again, &is_near));
+        println!("{name}: hips put right, their neighbours are off by {after:.2}, before by {before:.2}");
+        assert!(after < most * before, "{name}: {before} to {after}");
+        count += 1;
+    }
+    assert_eq!(count, 2);
+}
+
+/// Map of the points of a mesh.
+type Map<'a> = &'a dyn Fn(Vec3) -> Vec3;
+
+/// Eagles with shorter wings, a longer trunk, or wings that are swept back, by a map of points and true joints. The first two
+/// had their heads in the tail's feathers, off by 67 and 71; the others were off by 8.3, 6.5 and 9.8.
+#[test]
+fn birds_of_other_shapes_face_forward() {
+    let Some(eagle) = eagle() else { return };
+    let beyond = |x: f32| (x.abs() - 0.25).max(0.0);
+    let short = |place: Vec3, share: f32| {
+        let x = place.x.abs() - (1.0 - share) * beyond(place.x);
+        Vec3::new(x.copysign(place.x), place.y, place.z)
+    };
+    let cases: [(&str, Map<'_>, f32, f32); 5] = [
+        ("very short wings", &|place| short(place, 0.35), 9.8, 14.4),
+        ("short wings", &|place| short(place, 0.45), 7.6, 3.6),
+        ("shorter wings", &|place| short(place, 0.6), 6.9, 3.6),
+        ("a long trunk", &|place| Vec3::new(place.x, place.y, 1.35 * place.z), 6.1, 5.3),
+        ("swept wings", &|place| place - Vec3::Z * 0.4 * beyond(place.x), 8.6, 9.5),
+    ];
+    for (name, map, most, most_of_tail) in cases {
+        let Figure { points, triangles, truth, .. } = &eagle.figure;
+        let figure = Figure {
+            name: name.to_owned(),
+            points: points.iter().map(|point| map(*point)).collect(),
+            triangles: triangles.clone(),
+            template: eagle.figure.template,
+            truth: truth.iter().map(|(label, place)| (label.clone(), map(*place))).collect(),
+        };
+        let fit = fitted(&figure.points, &figure.triangles, figure.template).unwrap();
+        let other = FittedFigure { figure, fit };
+        let (body, tail) =
+            (mean_off(&other, &other.fit, &|_| true), mean_off(&other, &other.fit, &|label| label == "tail"));
+        println!("{name}: off by {body:.2}, the root of the tail by {tail:.2}");
+        assert!(other.fit.forward.z > 0.9, "{name}: {}", other.fit.forward);
+        assert!(body <= most, "{name}: {body}");
+        assert!(tail <= most_of_tail, "{name}: {tail}");
+    }
 }

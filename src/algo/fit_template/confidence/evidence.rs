@@ -49,12 +49,16 @@ impl Evidence {
                 is_shared_out[joint] = shares_out;
             }
         }
+        // The tail of a bird begins where it leaves the trunk, on the plane of symmetry.
+        let tails = template.limbs.iter().filter(|limb| limb.kind == LimbKind::Tail && template.has_hidden_knees());
+        for first in tails.map(|limb| limb.joints[0]) {
+            is_shown[first] = placement.reasons[first] == FitReason::CentreLine;
+        }
         for limb in template.limbs.iter().filter(|limb| template.has_hidden_knee(limb)) {
             let [hip, knee, hock, foot, ..] = *limb.joints.as_slice() else { continue };
             let share = places[hip].distance(places[knee]) / places[knee].distance(places[hock]).max(1e-9);
             if is_shown[hock] && THIGH.contains(&share) {
-                let chest = template.trunk.last().copied();
-                [hip, knee, foot].into_iter().chain(chest).for_each(|joint| is_shown[joint] = true);
+                [hip, knee, foot].into_iter().for_each(|joint| is_shown[joint] = true);
             }
         }
         Self { is_shown, is_shared_out, carried: carried(template, best.alignment.scale, places) }

@@ -35,6 +35,10 @@ impl Work<'_> {
     pub(super) fn in_trunk(&self, place: Vec3) -> Vec3 {
         let Some([along, left, across]) = self.axes_of_bird() else { return place };
         let cell = self.graph.cell;
+        let place = match self.hypothesis.middle {
+            Some((point, normal)) => place - normal * (place - point).dot(normal),
+            None => place,
+        };
         let is_near = |away: &Vec3| away.dot(along).abs() < SECTION * cell && away.dot(left).abs() < MIDDLE * cell;
         let nodes = self.graph.centres.iter().zip(&self.graph.body).filter(|(_, is_body)| **is_body);
         let mut heights: Vec<f32> =
