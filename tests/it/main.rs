@@ -34,6 +34,7 @@ mod cli_outputs;
 #[cfg(feature = "cli")]
 mod cli_pose;
 #[cfg(feature = "cli")]
+mod cli_process;
 mod cli_saved_parts;
 #[cfg(feature = "cli")]
 mod cli_site;
