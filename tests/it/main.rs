@@ -35,6 +35,7 @@ mod cli_outputs;
 mod cli_pose;
 #[cfg(feature = "cli")]
 mod cli_process;
+#[cfg(feature = "cli")]
 mod cli_saved_parts;
 #[cfg(feature = "cli")]
 mod cli_site;
