@@ -1,9 +1,12 @@
 //! Operations on selected joints in lists that nobody watches: the same result as one a frame, and frames in proportion to the
 //! length of the list.
 
+use std::time::Duration;
+
 use bevy::prelude::*;
 use rigsmith::{
     plugins::gesture::Gesture,
+    processor::BuildLimits,
     rig::{Rig, operations::Axis},
 };
 
@@ -35,6 +38,29 @@ fn runs_of_operations_give_what_operations_one_a_frame_give() {
     let answers = check_on(&BOX, "[Rotate(1.0), Delete, Click((0.0, 0.2)), Delete, Delete]", |_| ());
     assert_eq!(answers[0].message, "no joint is selected; select one first");
     assert_eq!(answers.iter().map(|answer| answer.done).collect::<Vec<_>>(), [false, false, true, true, false]);
+}
+
+/// Gestures of a run that is requested when the time is over are answered as what they did, and the next one is given up.
+#[test]
+fn a_run_that_the_time_ends_answers_for_what_it_did() {
+    let clicks = |count: usize| -> Vec<Gesture> {
+        (0..count).map(|number| Gesture::Click((0.3, 0.1 + 0.01 * number as f32))).collect()
+    };
+    let mut bench = bench_on(&BOX);
+    assert!(bench.gestures(clicks(1))[0].done);
+    bench.set_limits(BuildLimits::default(), Duration::ZERO);
+    let answers = bench.gestures(clicks(100));
+    let (last, done) = answers.split_last().unwrap();
+    assert!(done.len() >= 2 && done.iter().all(|answer| answer.done && answer.joints_added == 1), "{answers:?}");
+    assert_eq!(bench.rig().len(), done.len() + 1);
+    assert!(last.out_of_time && !last.done && last.message.contains("`seconds`"), "{last:?}");
+    assert_eq!((last.number, last.gesture.as_str()), (done.len() + 1, "Click"));
+    // What the last run of a list has done is done.
+    let answers = bench.gestures(vec![Gesture::Undo, Gesture::Undo]);
+    assert!(
+        answers.len() == 2 && answers.iter().all(|answer| answer.done && !answer.message.is_empty()),
+        "{answers:?}"
+    );
 }
 
 /// Joints of the rigs that entities had to follow, over all frames.

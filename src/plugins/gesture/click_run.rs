@@ -59,7 +59,7 @@ impl RunRig<'_> {
 /// Change of a run that is requested.
 pub(super) struct RequestedChange {
     /// Index of the answer that it completes.
-    answer: usize,
+    pub answer: usize,
     /// Chain of a stroke.
     chain: Option<ChainAnswer>,
 }
