@@ -31,6 +31,10 @@ fn runs_of_operations_give_what_operations_one_a_frame_give() {
         "Mirror(true), Click((0.5, 1.0)), Rotate(10.0), Move((0.6, 1.1)), Orient(X), Delete, SelectLabel(\"c\"), \
          MirrorSelected, Rotate(4.0), Deselect, Move((0.2, 0.2)), Select((0.0, 0.2)), Move((0.1, 0.3)), \
          Select((0.1, 0.3)), Move((0.1, 0.3)), Select((0.1, 0.3)), Delete",
+        "MirrorSelected, MirrorSelected, Labels([\"p\", \"q\"]), Labels([]), SelectLabel(\"q\"), MirrorSelected, \
+         Labels([\"x\", \"y\", \"z\", \"v\", \"w\", \"u\", \"t\"]), Rotate(4.0), Labels([\"r\"]), Undo, Labels([\"s\"]), \
+         Deselect, MirrorSelected, Labels([\"none\"]), SelectLabel(\"s\"), MirrorSelected, Delete, Click((0.3, 0.4)), \
+         Labels([\"new\"]), MirrorSelected",
     ] {
         let answers = check_on(&BOX, &format!("[{clicks}, {operations}]"), |_| ());
         assert!(answers.iter().filter(|answer| answer.done).count() > 8, "{answers:?}");
@@ -85,6 +89,20 @@ fn followed(count: usize, operations: impl Fn(usize) -> Vec<Gesture>) -> u64 {
     let answers = bench.gestures((0..count).flat_map(operations).collect());
     assert!(answers.iter().all(|answer| answer.done), "{:?}", answers.iter().find(|answer| !answer.done));
     bench.app_mut().world().resource::<FollowedJoints>().0
+}
+
+#[test]
+fn mirrored_and_named_chains_are_followed_in_proportion_to_their_number() {
+    let lists: [(&str, &dyn Fn(usize) -> Vec<Gesture>); 2] = [
+        ("mirrored joints", &|number| vec![Gesture::SelectLabel(format!("joint{number}")), Gesture::MirrorSelected]),
+        ("names of chains", &|number| vec![Gesture::Labels(vec![format!("a{number}"), format!("b{number}")])]),
+    ];
+    for (name, list) in lists {
+        let works = [100, 200, 400].map(|count| followed(count, list));
+        for pair in works.windows(2) {
+            assert!(pair[0] > 0 && pair[1] as f64 <= GROWTH * pair[0] as f64, "{name}: {works:?}");
+        }
+    }
 }
 
 #[test]

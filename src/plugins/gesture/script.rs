@@ -20,7 +20,7 @@ use crate::{
     },
     plugins::{
         commands::BuildResult,
-        document::{Change, EditRequest, Selection, Symmetry},
+        document::{Change, EditRequest, Selection, Symmetry, chain_labels},
         fit::{FitMarkers, FitPart, FitRequest, FitTemplate, FittedRig},
         limits::{Limit, RigLimits},
         picking::{Pick, PickRequest},
@@ -401,16 +401,7 @@ impl GestureRun<'_, '_> {
         let joints = self.selected()?;
         Ok(match gesture {
             Gesture::Label(label) => Operation::Labels(vec![(active, label)]),
-            Gesture::Labels(labels) => {
-                let chain: Vec<Uid> = std::iter::once(active)
-                    .chain(self.rig.ancestors(active).map(|joint| joint.data.uid))
-                    .take(labels.len())
-                    .collect();
-                if chain.len() < labels.len() {
-                    return Err(GestureError::LongChain { names: labels.len(), joints: chain.len() });
-                }
-                Operation::Labels(chain.into_iter().rev().zip(labels).collect())
-            }
+            Gesture::Labels(labels) => chain_labels(self.rig, active, &labels)?,
             Gesture::Group(name, color) => Operation::Group { joints, name, color: color.map(<[f32; 3]>::from) },
             Gesture::Lock(locked) => Operation::Lock(joints, locked),
             _ => return Err(GestureError::NoOperation),
