@@ -160,7 +160,7 @@ const WATCH: u64 = 2_200;
 fn bare_joints_are_checked_without_a_build_of_them() {
     let folder = tempfile::tempdir().unwrap();
     let file = "bare.rig.ron";
-    fs::write(folder.path().join(file), bare_joints(80_000)).unwrap();
+    fs::write(folder.path().join(file), bare_joints(60_000)).unwrap();
     check(folder.path(), &[(&[file], &["check", file])]);
 }
 
