@@ -25,6 +25,7 @@ mod modules;
 mod new;
 mod outputs;
 mod pose;
+mod process_limits;
 mod progress;
 mod project_meshes;
 #[cfg(feature = "remote")]
@@ -259,6 +260,9 @@ fn positive(text: &str) -> Result<f32, ArgumentError> {
 /// The seed of uids, so that the same command writes the same bytes.
 const SEED: u64 = 0x5249_4753_4D49_5448;
 
+/// Subject of a command without a file.
+const COMMAND_LINE: &str = "command line";
+
 /// A file to write.
 type Output = PathBuf;
 
@@ -268,6 +272,9 @@ pub enum WindowError {
     /// The program was built without the window.
     #[error("this build has no editor; build with the feature `editor`")]
     NoEditor,
+    /// The stack of the main thread, which the window runs on, is too small.
+    #[error("the window needs a larger stack; raise the limit (`ulimit -s`)")]
+    SmallStack,
     /// The window cannot be opened.
     #[error(transparent)]
     Window(Box<dyn std::error::Error + Send + Sync>),
@@ -290,6 +297,19 @@ pub type OpenWindow<'a> = &'a dyn Fn(WindowRequest) -> Result<ExitCode, WindowEr
 
 /// Runs the command line of this process. `window` opens the editor, which this module does not depend on.
 pub fn main(window: OpenWindow) -> ExitCode {
+    if !process_limits::has_small_stack() {
+        return run(window);
+    }
+    let own_stack = process_limits::on_own_stack(|| run(&|_| Err(WindowError::SmallStack)));
+    own_stack.unwrap_or_else(|error| {
+        let json = std::env::args_os().any(|argument| argument == "--json");
+        report::finish(Err(Failure::Input(Box::new(error))), json, COMMAND_LINE)
+    })
+}
+
+/// Runs the command line on this thread. It is a function of its own, so that [`main`] itself needs little of a small stack.
+#[inline(never)]
+fn run(window: OpenWindow) -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         // Help and version are results; only wrong usage is reported as JSON. Names of files may be no Unicode.
@@ -305,6 +325,10 @@ pub fn main(window: OpenWindow) -> ExitCode {
     limits::choose(&cli.limit);
     report::choose_json(cli.json);
     let subject = cli.command.as_ref().and_then(Command::subject).map(|path| path.display().to_string());
+    if let Err(error) = process_limits::prepare() {
+        let failure = Failure::Input(Box::new(error));
+        return report::finish(Err(failure), cli.json, subject.as_deref().unwrap_or(COMMAND_LINE));
+    }
     let result = match cli.command {
         None if cli.json => demo::run(None),
         None => match window(WindowRequest { limits: limits::chosen(), ..WindowRequest::default() }) {
@@ -339,5 +363,5 @@ pub fn main(window: OpenWindow) -> ExitCode {
         #[cfg(feature = "render")]
         Some(Command::Render(args)) => render::run(&args),
     };
-    report::finish(result, cli.json, subject.as_deref().unwrap_or("command line"))
+    report::finish(result, cli.json, subject.as_deref().unwrap_or(COMMAND_LINE))
 }

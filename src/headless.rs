@@ -224,13 +224,18 @@ impl Workbench {
                 return script.answers.clone();
             }
             if let Err(error) = self.check_time("the gesture") {
-                let mut answers = script.answers.clone();
-                let number = answers.len() + 1;
-                answers.push(GestureAnswer { number, message: error.to_string(), out_of_time: true, ..default() });
-                self.app.world_mut().entity_mut(self.rig).remove::<GestureScript>();
-                return answers;
+                return self.cut_gestures(&error);
             }
         }
+    }
+
+    /// Gives up gestures: those that were carried out in the last frame are answered in one more.
+    fn cut_gestures(&mut self, reason: &WorkbenchError) -> Vec<GestureAnswer> {
+        let script = self.app.world_mut().get_mut::<GestureScript>(self.rig);
+        let next = script.and_then(|mut script| script.give_up());
+        self.app.update();
+        let script = self.app.world_mut().entity_mut(self.rig).take::<GestureScript>();
+        script.map_or_else(Vec::new, |script| script.cut(next.as_ref(), reason))
     }
 
     /// Sets the result of the rig's commands, so that meshes are bound to the built joints and exported with them.

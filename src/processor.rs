@@ -60,7 +60,7 @@ pub use listed_nodes::ListedNodes;
 pub use mirror::{mirrored_angles, mirrored_direction, mirrored_limits, mirrored_line, opposite};
 pub use module::{BuildLimits, DynModule, FormError, ModuleInfo, Modules, Parameter, Resize, RigModule};
 pub use resolve::ResolveError;
-pub use review::{SourceText, review, with_missing_name};
+pub use review::{SourceText, review, review_with, with_missing_name};
 pub use scope::{BuildScope, Side};
 pub use values::{ParameterValues, differing_params};
 pub use world::{Aspect, NodeId, Value};

@@ -23,7 +23,10 @@ use crate::{
         store_rig,
     },
     headless::Workbench,
-    plugins::fit::{FitParts, FitTemplates},
+    plugins::{
+        fit::{FitParts, FitTemplates},
+        gesture::GestureAnswer,
+    },
     rig::Rig,
 };
 
@@ -62,8 +65,8 @@ pub(super) fn run(args: &SketchArgs) -> Result<Report, Failure> {
     bench.offer_parts(FitParts(Arc::new(bundled_part)));
     let answers = spinning("sketching", || bench.gestures(gestures));
     if let Some(last) = answers.last().filter(|last| last.out_of_time) {
-        let (file, number) = (args.gestures.display(), last.number);
-        return Err(Failure::Input(format!("`{file}`: gesture {number}: {}", last.message).into()));
+        let (file, GestureAnswer { number, gesture, message, .. }) = (args.gestures.display(), last);
+        return Err(Failure::Input(format!("`{file}`: gesture {number} ({gesture}): {message}").into()));
     }
     let missed = answers.iter().filter(|answer| !answer.done).count();
     for answer in &answers {

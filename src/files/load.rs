@@ -3,6 +3,7 @@
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
 };
 
 use super::{
@@ -234,16 +235,20 @@ pub fn load_model(disk: &dyn Disk, path: &Path) -> Result<Model, LoadError> {
     }
 }
 
-/// Runs a reader on a thread of its own, so that a panic in a dependency becomes an error.
+/// Runs a reader on a thread of its own, so that a panic in a dependency becomes an error; on this one where no other can be started.
 pub(super) fn surviving<T: Send>(
     path: &Path,
     read: impl FnOnce() -> Result<T, LoadError> + Send,
 ) -> Result<T, LoadError> {
+    // A thread that does not start lets go of its work.
+    let work = Mutex::new(Some(read));
+    let take = || work.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let broken = || Err(LoadError::Broken { path: path.into() });
     std::thread::scope(|scope| {
-        let worker = std::thread::Builder::new().stack_size(16 << 20).spawn_scoped(scope, read);
-        match worker {
-            Ok(worker) => worker.join().unwrap_or_else(|_| Err(LoadError::Broken { path: path.into() })),
-            Err(error) => Err(ReadError::Io { path: path.into(), source: error.into() }.into()),
+        let run = || take().map_or_else(broken, |read| read());
+        match std::thread::Builder::new().stack_size(16 << 20).spawn_scoped(scope, run) {
+            Ok(worker) => worker.join().unwrap_or_else(|_| broken()),
+            Err(_) => surviving_here(path, run),
         }
     })
 }

@@ -232,7 +232,7 @@ pub fn read_obj(reader: impl Read + Send, arrays: &mut ObjArrays, settings: &Obj
 ///   textures by safe paths ([`safe_relative_path`]). What it does not find is left out with a note.
 ///
 /// Time and memory are linear in the arrays but for large concave polygons, whose triangulation takes `n log n` as a
-/// rule and is cut short at a few seconds for all of them.
+/// rule. Polygons that cross themselves are cut short in proportion to their corners, and all of them after a second or so.
 ///
 /// # Errors
 /// [`ObjError::Inconsistent`] if the arrays are not as a successful read leaves them.

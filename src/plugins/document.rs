@@ -20,6 +20,7 @@ use std::{borrow::Cow, sync::Arc};
 
 use bevy::prelude::*;
 
+pub(in crate::plugins) use self::selection_operation::chain_labels;
 pub use self::{
     added_chains::ChainParent,
     entities::{GroupEntities, JointEntities, TagEntities},
@@ -118,6 +119,9 @@ pub enum Change {
     },
     /// Names the joint that is active when the request is carried out; answered by a [`ChangeReport`], too.
     LabelActive(String),
+    /// Names the joints of the chain that ends at the joint that is active when the request is carried out, first to last; answered
+    /// by a [`ChangeReport`], too.
+    LabelChain(Vec<String>),
     /// Puts the joints that are selected when the request is carried out into a local group, with a colour if one is given;
     /// answered by a [`ChangeReport`], too.
     GroupSelected {
@@ -186,7 +190,7 @@ impl EditReport {
     }
 }
 
-/// Answer to a [`Change::Place`], [`Change::Draw`], [`Change::LabelActive`], [`Change::GroupSelected`],
+/// Answer to a [`Change::Place`], [`Change::Draw`], [`Change::LabelActive`], [`Change::LabelChain`], [`Change::GroupSelected`],
 /// [`Change::LockSelected`], [`Change::OperateSelected`], [`Change::Pick`], [`Change::Undo`] or [`Change::Redo`], in the order
 /// of the requests.
 #[derive(Message, Debug, Clone)]
@@ -333,6 +337,10 @@ fn apply_edits(
                     .map(previewed)
                     .map_err(ChangeError::from)
             }
+            Change::LabelChain(names) => Err(match selection.active() {
+                Some(active) => chain_labels(&document, active, names).err().unwrap_or(ChangeError::NoActive),
+                None => ChangeError::NoActive,
+            }),
             Change::LabelActive(_)
             | Change::GroupSelected { .. }
             | Change::LockSelected(_)
@@ -387,6 +395,7 @@ fn has_report(change: &Change) -> bool {
         Change::Place(_)
             | Change::Draw { .. }
             | Change::LabelActive(_)
+            | Change::LabelChain(_)
             | Change::GroupSelected { .. }
             | Change::LockSelected(_)
             | Change::OperateSelected(_)
@@ -403,6 +412,7 @@ fn on_selection(change: &Change, rig: &Rig, selection: &Selection) -> Option<Ope
     match change {
         Change::Place(position) => Some(Operation::Place { position: *position, parent: active }),
         Change::LabelActive(label) => Some(Operation::Labels(vec![(active?, label.clone())])),
+        Change::LabelChain(names) => chain_labels(rig, active?, names).ok(),
         Change::GroupSelected { name, color } => {
             Some(Operation::Group { joints: selected()?, name: name.clone(), color: *color })
         }

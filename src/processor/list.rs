@@ -71,6 +71,18 @@ impl Switches {
     }
 }
 
+/// Exclusion of a command of a joint, without a look at other joints.
+pub(super) fn command_exclusion(rig: &Rig, joint: &JointData, tag: &TagData) -> Option<Exclusion> {
+    let TagKind::Command { feature, .. } = &tag.kind else { return None };
+    let feature = feature.and_then(|feature| rig.find_tag(feature)).filter(|(_, feature)| !feature.enabled);
+    let group = joint.group.and_then(|group| rig.group(group)).filter(|group| !group.enabled);
+    let switches = Switches {
+        features: feature.and_then(|(_, feature)| Some((feature.uid, feature_name(feature)?))).into_iter().collect(),
+        groups: group.map(|group| (group.uid, group.name.as_str().into())).into_iter().collect(),
+    };
+    switches.command(joint, tag)
+}
+
 fn joint_name(joint: &JointData) -> String {
     joint.label.clone().unwrap_or_else(|| joint.uid.to_string())
 }

@@ -26,14 +26,18 @@ const MOST: usize = 200;
 /// parameters cannot be read, name what is not there, or are out of range. Behind a command that goes over a limit of the
 /// whole rig no more is looked for.
 pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
+    review_with(rig, modules, &mut Builder::new(modules.clone()))
+}
+
+/// Problems of [`review`], found with a builder that knows the same modules and keeps count of the work.
+pub fn review_with(rig: &Rig, modules: &Modules, builder: &mut Builder) -> Vec<BuildError> {
     let (mut problems, mut repaired) = problems_before_run(rig, modules);
     let order: Vec<Uid> = rig.walk().flat_map(|joint| joint.data.tags.iter().map(|tag| tag.uid)).collect();
     let mut running = rig.clone();
     running.disable_tags(&problems.iter().map(|error| error.command).collect());
-    let mut builder = Builder::new(modules.clone());
+    builder.sync(&running);
     let mut is_full = false;
     for _ in 0..MOST {
-        builder.sync(&running);
         let Some(error) = builder.run_all().error else { break };
         if matches!(error.problem, BuildProblem::OutOfTime(_)) {
             return vec![error];
@@ -42,7 +46,7 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
             break;
         }
         is_full = is_limit_of_rig(&error.problem);
-        running.disable_tags(&HashSet::from([error.command]));
+        switch_off(&mut running, builder, error.command);
         repaired.extend(repaired_by_default(rig, &error));
         problems.push(error);
         // All commands behind it fail for the same reason.
@@ -51,8 +55,8 @@ pub fn review(rig: &Rig, modules: &Arc<Modules>) -> Vec<BuildError> {
         }
     }
     if !is_full {
-        problems.extend(further_problems(rig, &running, &mut builder, &mut repaired));
-        problems.extend(problems_behind(rig, &problems, &repaired, &mut builder));
+        problems.extend(further_problems(rig, &mut running, builder, &mut repaired));
+        problems.extend(problems_behind(rig, &problems, &repaired, builder));
     }
     let places: HashMap<Uid, usize> = order.into_iter().enumerate().map(|(place, tag)| (tag, place)).collect();
     problems.sort_by_key(|error| places.get(&error.command).copied());
@@ -141,16 +145,18 @@ fn repaired_by_default(rig: &Rig, error: &BuildError) -> Option<Repair> {
 }
 
 /// Problems of commands that are found when these run without the parameters whose faults are known, which are left out of
-/// `repaired`. `running` is the rig without all commands that fail.
-fn further_problems(rig: &Rig, running: &Rig, builder: &mut Builder, repaired: &mut [Repair]) -> Vec<BuildError> {
+/// `repaired`. `running` is the rig without all commands that fail, which `builder` follows.
+fn further_problems(rig: &Rig, running: &mut Rig, builder: &mut Builder, repaired: &mut [Repair]) -> Vec<BuildError> {
     let mut found = Vec::new();
     let mut runs = 0;
     for next in repaired {
+        let mut before = None;
         while runs < MOST
-            && let Some(trial) = with_params(rig, running, next)
+            && let Some(edit) = repair(rig, next)
         {
             runs += 1;
-            builder.sync(&trial);
+            let Some(inverse) = change(running, builder, &edit) else { break };
+            before.get_or_insert(inverse);
             let Some(error) = builder.run_all().error.filter(|error| error.command == next.command) else { break };
             let left = match value_at_fault(&error.problem, &next.params) {
                 Some(field) => without_field(&next.params, field),
@@ -166,6 +172,9 @@ fn further_problems(rig: &Rig, running: &Rig, builder: &mut Builder, repaired: &
             let Some(params) = left else { break };
             next.params = params;
         }
+        if let Some(before) = before {
+            change(running, builder, &before);
+        }
     }
     found
 }
@@ -179,17 +188,18 @@ fn problems_behind(rig: &Rig, known: &[BuildError], repaired: &[Repair], builder
     }
     let mut trial = rig.clone();
     trial.disable_tags(&failing);
-    for next in repaired {
-        trial = with_params(rig, &trial, next).unwrap_or(trial);
+    for edit in repaired.iter().filter_map(|next| repair(rig, next)) {
+        // A repair that the rig refuses leaves the command off.
+        let _ = trial.apply(&edit);
     }
+    builder.sync(&trial);
     let mut found = Vec::new();
     for _ in 0..MOST {
-        builder.sync(&trial);
         let Some(error) = builder.run_all().error else { break };
         let Some((_, tag)) = trial.find_tag(error.command) else { break };
         let TagKind::Command { params, .. } = &tag.kind else { break };
         let is_new = !failing.contains(&error.command) && value_at_fault(&error.problem, params).is_some();
-        trial.disable_tags(&HashSet::from([error.command]));
+        switch_off(&mut trial, builder, error.command);
         found.extend(is_new.then_some(error));
     }
     found
@@ -207,14 +217,30 @@ fn value_at_fault<'p>(problem: &'p BuildProblem, params: &str) -> Option<&'p str
     (!params[field.value..field.end].contains("\"@")).then_some(name)
 }
 
-/// The running rig together with a repaired command; `None` if that command is not there.
-fn with_params(rig: &Rig, running: &Rig, repaired: &Repair) -> Option<Rig> {
+/// Edit that puts a repaired command in the place of one that is off; `None` if that command is not there.
+fn repair(rig: &Rig, repaired: &Repair) -> Option<RigEdit> {
     let (joint, tag) = rig.find_tag(repaired.command)?;
     let TagKind::Command { module, feature, .. } = &tag.kind else { return None };
     let kind = TagKind::Command { module: module.clone(), params: repaired.params.clone(), feature: *feature };
-    let mut trial = running.clone();
-    trial.apply(&RigEdit::SetTag(joint.data.uid, Box::new(TagData { kind, ..tag.clone() }))).ok()?;
-    Some(trial)
+    Some(RigEdit::SetTag(joint.data.uid, Box::new(TagData { kind, ..tag.clone() })))
+}
+
+/// Changes a rig that a builder follows, and returns the way back; `None` if the rig refuses the edit.
+fn change(running: &mut Rig, builder: &mut Builder, edit: &RigEdit) -> Option<RigEdit> {
+    let inverse = running.apply(edit).ok()?;
+    builder.touch(running, edit);
+    Some(inverse)
+}
+
+/// Switches a command of a rig off that a builder follows.
+fn switch_off(running: &mut Rig, builder: &mut Builder, command: Uid) {
+    let found = running.find_tag(command);
+    let edit =
+        found.map(|(joint, tag)| RigEdit::SetTag(joint.data.uid, Box::new(TagData { enabled: false, ..tag.clone() })));
+    if edit.is_none_or(|edit| change(running, builder, &edit).is_none()) {
+        running.disable_tags(&HashSet::from([command]));
+        builder.sync(running);
+    }
 }
 
 /// Problems of a command that are found without running it: in its module, its parameters, or the groups that these name.

@@ -229,6 +229,8 @@ pub(super) struct World {
     pub global_reads: usize,
     /// Number of nodes that were visited to find readers of transforms, and circles.
     pub visited: u64,
+    /// Number of joints that were compared with those of the document.
+    pub followed: u64,
     /// Number of values that commands have read and written.
     pub work: u64,
     /// Work before the current run.

@@ -389,7 +389,7 @@ fn gestures_are_given_up_when_the_time_is_over() {
     bench.set_limits(BuildLimits::default(), Duration::ZERO);
     let done = bench.gestures(vec![Gesture::Recentre(true)]);
     assert!(done.len() == 1 && done[0].done && !done[0].out_of_time, "{done:?}");
-    // Settings are taken together, and so is what picks; undo takes a frame each.
+    // Settings are taken together, and so is what picks; undone steps come in the frame after it.
     let cut = bench.gestures(vec![Gesture::Deselect, Gesture::Undo, Gesture::Undo]);
     assert!(cut.len() == 2 && cut[0].done && !cut[0].out_of_time, "{cut:?}");
     assert!(!cut[1].done && cut[1].out_of_time && cut[1].message.contains("`seconds`"), "{cut:?}");

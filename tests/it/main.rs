@@ -34,6 +34,8 @@ mod cli_outputs;
 #[cfg(feature = "cli")]
 mod cli_pose;
 #[cfg(feature = "cli")]
+mod cli_process;
+#[cfg(feature = "cli")]
 mod cli_saved_parts;
 #[cfg(feature = "cli")]
 mod cli_site;
@@ -181,6 +183,7 @@ mod mutate;
 mod new_templates;
 mod obj;
 mod obj_materials;
+mod obj_tangled;
 mod obj_torture;
 mod operation_runs;
 mod packed_clips;
@@ -211,9 +214,10 @@ mod remote;
 #[cfg(feature = "render")]
 mod render;
 mod retarget;
+#[cfg(feature = "editor")]
+mod review_growth;
 mod rig_limits;
 mod rig_text;
-#[cfg(feature = "editor")]
 mod run_failures;
 mod runtime;
 mod same_parts;

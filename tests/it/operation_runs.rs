@@ -1,9 +1,12 @@
 //! Operations on selected joints in lists that nobody watches: the same result as one a frame, and frames in proportion to the
 //! length of the list.
 
+use std::time::Duration;
+
 use bevy::prelude::*;
 use rigsmith::{
     plugins::gesture::Gesture,
+    processor::BuildLimits,
     rig::{Rig, operations::Axis},
 };
 
@@ -28,6 +31,10 @@ fn runs_of_operations_give_what_operations_one_a_frame_give() {
         "Mirror(true), Click((0.5, 1.0)), Rotate(10.0), Move((0.6, 1.1)), Orient(X), Delete, SelectLabel(\"c\"), \
          MirrorSelected, Rotate(4.0), Deselect, Move((0.2, 0.2)), Select((0.0, 0.2)), Move((0.1, 0.3)), \
          Select((0.1, 0.3)), Move((0.1, 0.3)), Select((0.1, 0.3)), Delete",
+        "MirrorSelected, MirrorSelected, Labels([\"p\", \"q\"]), Labels([]), SelectLabel(\"q\"), MirrorSelected, \
+         Labels([\"x\", \"y\", \"z\", \"v\", \"w\", \"u\", \"t\"]), Rotate(4.0), Labels([\"r\"]), Undo, Labels([\"s\"]), \
+         Deselect, MirrorSelected, Labels([\"none\"]), SelectLabel(\"s\"), MirrorSelected, Delete, Click((0.3, 0.4)), \
+         Labels([\"new\"]), MirrorSelected",
     ] {
         let answers = check_on(&BOX, &format!("[{clicks}, {operations}]"), |_| ());
         assert!(answers.iter().filter(|answer| answer.done).count() > 8, "{answers:?}");
@@ -35,6 +42,29 @@ fn runs_of_operations_give_what_operations_one_a_frame_give() {
     let answers = check_on(&BOX, "[Rotate(1.0), Delete, Click((0.0, 0.2)), Delete, Delete]", |_| ());
     assert_eq!(answers[0].message, "no joint is selected; select one first");
     assert_eq!(answers.iter().map(|answer| answer.done).collect::<Vec<_>>(), [false, false, true, true, false]);
+}
+
+/// Gestures of a run that is requested when the time is over are answered as what they did, and the next one is given up.
+#[test]
+fn a_run_that_the_time_ends_answers_for_what_it_did() {
+    let clicks = |count: usize| -> Vec<Gesture> {
+        (0..count).map(|number| Gesture::Click((0.3, 0.1 + 0.01 * number as f32))).collect()
+    };
+    let mut bench = bench_on(&BOX);
+    assert!(bench.gestures(clicks(1))[0].done);
+    bench.set_limits(BuildLimits::default(), Duration::ZERO);
+    let answers = bench.gestures(clicks(100));
+    let (last, done) = answers.split_last().unwrap();
+    assert!(done.len() >= 2 && done.iter().all(|answer| answer.done && answer.joints_added == 1), "{answers:?}");
+    assert_eq!(bench.rig().len(), done.len() + 1);
+    assert!(last.out_of_time && !last.done && last.message.contains("`seconds`"), "{last:?}");
+    assert_eq!((last.number, last.gesture.as_str()), (done.len() + 1, "Click"));
+    // What the last run of a list has done is done.
+    let answers = bench.gestures(vec![Gesture::Undo, Gesture::Undo]);
+    assert!(
+        answers.len() == 2 && answers.iter().all(|answer| answer.done && !answer.message.is_empty()),
+        "{answers:?}"
+    );
 }
 
 /// Joints of the rigs that entities had to follow, over all frames.
@@ -59,6 +89,20 @@ fn followed(count: usize, operations: impl Fn(usize) -> Vec<Gesture>) -> u64 {
     let answers = bench.gestures((0..count).flat_map(operations).collect());
     assert!(answers.iter().all(|answer| answer.done), "{:?}", answers.iter().find(|answer| !answer.done));
     bench.app_mut().world().resource::<FollowedJoints>().0
+}
+
+#[test]
+fn mirrored_and_named_chains_are_followed_in_proportion_to_their_number() {
+    let lists: [(&str, &dyn Fn(usize) -> Vec<Gesture>); 2] = [
+        ("mirrored joints", &|number| vec![Gesture::SelectLabel(format!("joint{number}")), Gesture::MirrorSelected]),
+        ("names of chains", &|number| vec![Gesture::Labels(vec![format!("a{number}"), format!("b{number}")])]),
+    ];
+    for (name, list) in lists {
+        let works = [100, 200, 400].map(|count| followed(count, list));
+        for pair in works.windows(2) {
+            assert!(pair[0] > 0 && pair[1] as f64 <= GROWTH * pair[0] as f64, "{name}: {works:?}");
+        }
+    }
 }
 
 #[test]

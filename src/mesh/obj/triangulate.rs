@@ -19,15 +19,19 @@ pub(super) struct Triangulator {
     /// Marks corners that may lie in an ear: not cut off yet, and reflex or straight.
     inner: Vec<bool>,
     grid: Grid,
-    /// Number of comparisons on all polygons so far.
+    /// Number of comparisons and cells of the grid on all polygons so far.
     work: u64,
+    /// Work up to which ears of the polygon at hand are looked for.
+    most_work: u64,
     /// Number of polygons that were too tangled for ear clipping within the limit of work.
     pub fans: usize,
 }
 
-/// Number of comparisons after which large polygons are cut into fans: about a second, and far more than real meshes
-/// need.
+/// Work after which large polygons are cut into fans: about a second, and far more than real meshes need.
 const MOST_WORK: u64 = 1 << 26;
+/// Work on a polygon, for each of its corners, after which its remaining corners are cut off without a look at the others:
+/// polygons that cross themselves would take work with the square of their corners.
+const WORK_OF_CORNER: u64 = 1 << 12;
 
 /// A vector at right angles to a polygon, as long as twice its area (Newell's method): the normal of the best-fitting
 /// plane.
@@ -115,9 +119,10 @@ impl Triangulator {
         // ears; then all, for a polygon that crosses itself.
         let mut looked = 0;
         let mut lenience = Lenience::Strict;
+        self.most_work = MOST_WORK.min(self.work + WORK_OF_CORNER * count as u64);
         while left > 3 {
             self.work += 1;
-            if self.work > MOST_WORK {
+            if self.work > self.most_work {
                 lenience = Lenience::Anything;
             }
             if self.is_ear(corner, lenience) {
@@ -144,7 +149,7 @@ impl Triangulator {
             }
         }
         triangles.push([self.previous[corner], corner as u32, self.next[corner]]);
-        self.fans += usize::from(self.work > MOST_WORK);
+        self.fans += usize::from(self.work > self.most_work);
     }
 
     /// Twice the area of the triangle at a corner; positive if it turns left.
@@ -166,9 +171,9 @@ impl Triangulator {
         }
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         let Self { flat, previous, next, inner, grid, work, .. } = self;
-        !grid.any(low, high, |other| {
-            *work += 1;
-            if !inner[other as usize] || ids.contains(&other) {
+        let is_inner = |other: u32| inner[other as usize];
+        !grid.any(low, high, work, is_inner, |other| {
+            if ids.contains(&other) {
                 return false;
             }
             let point = flat[other as usize];
@@ -233,6 +238,8 @@ struct Grid {
     scale: DVec2,
     side: usize,
     starts: Vec<u32>,
+    /// Number of points of each cell that may still be wanted.
+    counts: Vec<u32>,
     members: Vec<u32>,
 }
 
@@ -267,6 +274,8 @@ impl Grid {
             }
             self.members[slot] = id as u32;
         }
+        self.counts.clear();
+        self.counts.extend(self.starts.windows(2).map(|pair| pair[1] - pair[0]));
     }
 
     fn coordinates(&self, point: DVec2) -> [usize; 2] {
@@ -279,14 +288,37 @@ impl Grid {
         y * self.side + x
     }
 
-    /// Returns `true` if `test` holds for any point in the cells that the box touches.
-    fn any(&self, low: DVec2, high: DVec2, mut test: impl FnMut(u32) -> bool) -> bool {
+    /// Returns `true` if `test` holds for any wanted point in the cells that the box touches. Points that are not wanted any
+    /// more leave their cells. Cells and points are added to `work`.
+    fn any(
+        &mut self,
+        low: DVec2,
+        high: DVec2,
+        work: &mut u64,
+        wanted: impl Fn(u32) -> bool,
+        mut test: impl FnMut(u32) -> bool,
+    ) -> bool {
         let ([left, bottom], [right, top]) = (self.coordinates(low), self.coordinates(high));
-        (bottom..=top).any(|row| {
-            let start = self.starts[row * self.side + left] as usize;
-            let end = self.starts[row * self.side + right + 1] as usize;
-            self.members[start..end].iter().any(|id| test(*id))
-        })
+        for row in bottom..=top {
+            for cell in row * self.side + left..=row * self.side + right {
+                *work += 1;
+                let start = self.starts[cell] as usize;
+                let mut place = start;
+                while place < start + self.counts[cell] as usize {
+                    *work += 1;
+                    let id = self.members[place];
+                    if !wanted(id) {
+                        self.counts[cell] -= 1;
+                        self.members.swap(place, start + self.counts[cell] as usize);
+                    } else if test(id) {
+                        return true;
+                    } else {
+                        place += 1;
+                    }
+                }
+            }
+        }
+        false
     }
 }
 
@@ -354,6 +386,25 @@ mod tests {
                     assert!((covered - wanted).abs() < 1e-9 * wanted, "{name}: covers {covered}, not {wanted}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn work_on_tangled_polygons_grows_with_their_corners() {
+        let works = [1000, 2000, 4000].map(|count| {
+            let mut state = 1_u32;
+            let mut random = move || {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                f64::from(state >> 8)
+            };
+            let points: Vec<DVec3> = (0..count).map(|_| DVec3::new(random(), random(), 0.0)).collect();
+            let (mut triangulator, mut triangles) = (Triangulator::default(), Vec::new());
+            triangulator.polygon(&points, &mut triangles);
+            assert_eq!((triangles.len(), triangulator.fans), (count - 2, 1));
+            triangulator.work
+        });
+        for pair in works.windows(2) {
+            assert!(pair[0] > 0 && pair[1] as f64 <= 2.3 * pair[0] as f64, "{works:?}");
         }
     }
 

@@ -25,6 +25,14 @@ pub enum ChangeError {
     /// No joint has the label.
     #[error("no joint has the label \"{0}\"")]
     NoLabel(String),
+    /// The list of labels is longer than the chain.
+    #[error("there are {names} names for a chain of {joints} joints")]
+    LongChain {
+        /// Number of names.
+        names: usize,
+        /// Number of joints.
+        joints: usize,
+    },
     /// The rig refuses the operation.
     #[error(transparent)]
     Operation(#[from] OperationError),

@@ -2,11 +2,11 @@
 
 use bevy::prelude::*;
 
-use super::Selection;
+use super::{ChangeError, Selection};
 use crate::{
     algo::view::ViewPlane,
     rig::{
-        Rig,
+        Rig, Uid,
         operations::{Axis, Operation},
     },
 };
@@ -76,4 +76,17 @@ impl SelectionOperation {
             Self::Mirror => Operation::Mirror { joints },
         })
     }
+}
+
+/// Operation that names the joints of the chain that ends at a joint, first to last.
+///
+/// # Errors
+/// [`ChangeError::LongChain`] for more names than the chain has joints.
+pub(in crate::plugins) fn chain_labels(rig: &Rig, end: Uid, names: &[String]) -> Result<Operation, ChangeError> {
+    let upwards = std::iter::once(end).chain(rig.ancestors(end).map(|joint| joint.data.uid));
+    let chain: Vec<Uid> = upwards.take(names.len()).collect();
+    if chain.len() < names.len() {
+        return Err(ChangeError::LongChain { names: names.len(), joints: chain.len() });
+    }
+    Ok(Operation::Labels(chain.into_iter().rev().zip(names.iter().cloned()).collect()))
 }

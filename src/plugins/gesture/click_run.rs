@@ -32,6 +32,9 @@ use crate::{
 /// Number of gestures that a run may have on a rig of fewer joints and groups.
 const LEAST: usize = 64;
 
+/// Number of joints at which the mirrored operations of one run may look: each of them looks at all joints of the rig.
+const MOST_LOOKS: usize = 1 << 20;
+
 /// Rig on which a run is carried out.
 pub(super) struct RunRig<'a> {
     pub entity: Entity,
@@ -59,7 +62,7 @@ impl RunRig<'_> {
 /// Change of a run that is requested.
 pub(super) struct RequestedChange {
     /// Index of the answer that it completes.
-    answer: usize,
+    pub answer: usize,
     /// Chain of a stroke.
     chain: Option<ChainAnswer>,
 }
@@ -94,6 +97,8 @@ struct RunState {
     selected: usize,
     /// Number of joints that operations were about.
     operated: usize,
+    /// Number of mirrored operations.
+    mirrored: usize,
 }
 
 impl RunState {
@@ -106,7 +111,7 @@ impl RunState {
             // On a rig without commands and skins, an operation depends on nothing but its joints and the selection.
             operation if is_on_selection(operation) => can_pick && self.strokes == 0 && !self.has_undone,
             // The answer to a stroke names the joint that its chain hangs on.
-            Gesture::Label(_) | Gesture::Undo | Gesture::Redo => self.strokes == 0,
+            Gesture::Label(_) | Gesture::Labels(_) | Gesture::Undo | Gesture::Redo => self.strokes == 0,
             Gesture::Click(_) => !self.has_steps,
             Gesture::Stroke { .. } => !self.has_steps && !self.has_picks,
             // A selection that is cleared at once is a pick, which ends the cycle of clicks at one spot, as edits do.
@@ -138,6 +143,7 @@ impl RunState {
                 let is_edit = self.has_active;
                 self.has_steps = true;
                 self.operated += self.selected.max(1);
+                self.mirrored += usize::from(matches!(operation, SelectionOperation::Mirror));
                 self.has_active &= !matches!(operation, SelectionOperation::Delete { .. });
                 is_edit
             }
@@ -182,6 +188,9 @@ pub(super) fn carry_out(
         let Some(gesture) = gesture.filter(|gesture| state.takes(gesture, next, run.can_pick)) else { break };
         // The time that a command has is looked at between frames.
         if is_on_selection(gesture) && state.operated > 0 && state.operated + state.selected > most {
+            break;
+        }
+        if matches!(gesture, Gesture::MirrorSelected) && state.mirrored.saturating_mul(run.rig.len()) > MOST_LOOKS {
             break;
         }
         let mut pick = None;
@@ -242,6 +251,7 @@ impl GestureScript {
                 placed.rest.map(Change::Place)
             }
             Gesture::Label(label) => Some(Change::LabelActive(label)),
+            Gesture::Labels(names) => Some(Change::LabelChain(names)),
             Gesture::Group(name, color) => Some(Change::GroupSelected { name, color: color.map(<[f32; 3]>::from) }),
             Gesture::Lock(locked) => Some(Change::LockSelected(locked)),
             Gesture::SelectLabel(label) => Some(Change::Pick(JointPick::Label(label))),

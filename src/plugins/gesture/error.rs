@@ -22,14 +22,6 @@ pub(super) enum GestureError {
     /// No joint has the label.
     #[error("no joint has the label \"{0}\"")]
     NoLabel(String),
-    /// The list of labels is longer than the chain.
-    #[error("there are {names} names for a chain of {joints} joints")]
-    LongChain {
-        /// Number of names.
-        names: usize,
-        /// Number of joints.
-        joints: usize,
-    },
     /// The rig has no mesh.
     #[error("there is no mesh to fit a template into; open one first")]
     NoMesh,

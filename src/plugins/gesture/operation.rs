@@ -23,10 +23,11 @@ pub(super) fn on_selection(gesture: &Gesture, plane: &ViewPlane) -> Option<Selec
     })
 }
 
-/// True for a gesture that is an operation on the selected joints, of which a run may have many: its work is in proportion to
-/// their number.
+/// True for a gesture that is an operation on the selected joints.
 pub(super) fn is_on_selection(gesture: &Gesture) -> bool {
-    use Gesture::{Delete, DeleteHierarchy, Insert, Move, MoveTo, Orient, Parent, Rotate, Scale, Unparent};
+    use Gesture::{
+        Delete, DeleteHierarchy, Insert, MirrorSelected, Move, MoveTo, Orient, Parent, Rotate, Scale, Unparent,
+    };
     matches!(
         gesture,
         Move(_)
@@ -37,6 +38,7 @@ pub(super) fn is_on_selection(gesture: &Gesture) -> bool {
             | Orient(_)
             | Delete
             | DeleteHierarchy
+            | MirrorSelected
             | Parent
             | Unparent
     )

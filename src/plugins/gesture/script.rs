@@ -20,7 +20,7 @@ use crate::{
     },
     plugins::{
         commands::BuildResult,
-        document::{Change, EditRequest, Selection, Symmetry},
+        document::{Change, EditRequest, Selection, Symmetry, chain_labels},
         fit::{FitMarkers, FitPart, FitRequest, FitTemplate, FittedRig},
         limits::{Limit, RigLimits},
         picking::{Pick, PickRequest},
@@ -168,6 +168,34 @@ impl GestureScript {
     pub fn is_done(&self) -> bool {
         self.waiting.is_empty() && !self.pending
     }
+
+    /// Lets go of the gestures that are not begun, and returns the first of them.
+    pub(crate) fn give_up(&mut self) -> Option<Gesture> {
+        let next = self.waiting.pop_front();
+        self.waiting.clear();
+        next
+    }
+
+    /// Answers of the gestures that were carried out before the time was over. The last one tells that for the first gesture that
+    /// was begun and not finished, or else for the next one.
+    pub(crate) fn cut(mut self, next: Option<&Gesture>, reason: &dyn std::error::Error) -> Vec<GestureAnswer> {
+        let cut = match self.first_open() {
+            Some(open) => self.answers.drain(open..).next().map(|answer| answer.gesture),
+            None => next.map(name_of),
+        };
+        if let Some(gesture) = cut {
+            let (number, message) = (self.answers.len() + 1, reason.to_string());
+            self.answers.push(GestureAnswer { number, gesture, message, out_of_time: true, ..Default::default() });
+        }
+        self.answers
+    }
+
+    /// Index of the first answer that is not complete.
+    fn first_open(&self) -> Option<usize> {
+        let of_runs = [self.requested.front().map(|change| change.answer), self.selections.first_open()];
+        let first = of_runs.into_iter().flatten().min();
+        first.or_else(|| self.answers.len().checked_sub(1).filter(|_| self.pending))
+    }
 }
 
 /// Writers of the requests that gestures become.
@@ -247,9 +275,7 @@ impl GestureScript {
         self.state.joints_before = joints;
         let gesture = self.waiting.pop_front()?;
         let number = self.answers.len() + 1;
-        let name = format!("{gesture:?}");
-        let name = name.split(['(', ' ', '{']).next().unwrap_or_default().to_owned();
-        self.answers.push(GestureAnswer { number, gesture: name, done: true, ..Default::default() });
+        self.answers.push(GestureAnswer { number, gesture: name_of(&gesture), done: true, ..Default::default() });
         if let Err(error) = limits.check(Limit::Gestures, number, LIST, "the list") {
             // What is behind it is too much as well.
             self.waiting.clear();
@@ -262,6 +288,12 @@ impl GestureScript {
         }
         Some(gesture)
     }
+}
+
+/// Name of a gesture in answers.
+fn name_of(gesture: &Gesture) -> String {
+    let text = format!("{gesture:?}");
+    text.split(['(', ' ', '{']).next().unwrap_or_default().to_owned()
 }
 
 /// Execution of one gesture.
@@ -369,16 +401,7 @@ impl GestureRun<'_, '_> {
         let joints = self.selected()?;
         Ok(match gesture {
             Gesture::Label(label) => Operation::Labels(vec![(active, label)]),
-            Gesture::Labels(labels) => {
-                let chain: Vec<Uid> = std::iter::once(active)
-                    .chain(self.rig.ancestors(active).map(|joint| joint.data.uid))
-                    .take(labels.len())
-                    .collect();
-                if chain.len() < labels.len() {
-                    return Err(GestureError::LongChain { names: labels.len(), joints: chain.len() });
-                }
-                Operation::Labels(chain.into_iter().rev().zip(labels).collect())
-            }
+            Gesture::Labels(labels) => chain_labels(self.rig, active, &labels)?,
             Gesture::Group(name, color) => Operation::Group { joints, name, color: color.map(<[f32; 3]>::from) },
             Gesture::Lock(locked) => Operation::Lock(joints, locked),
             _ => return Err(GestureError::NoOperation),

@@ -34,6 +34,11 @@ impl RequestedSelections {
         self.answers.push_back(answer);
     }
 
+    /// Index of the first answer that is to be completed.
+    pub(super) fn first_open(&self) -> Option<usize> {
+        self.answers.iter().flatten().next().copied()
+    }
+
     /// The answer that the next selection completes; the outer `None` where none is requested.
     fn pop(&mut self) -> Option<Option<usize>> {
         let answer = self.answers.pop_front()?;

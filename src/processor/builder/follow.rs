@@ -8,12 +8,12 @@ use super::{Builder, Command, DueWork};
 use crate::{
     mesh::model::Trs,
     processor::{
-        exclusion::{CommandExclusion, Gap, JointExclusion, SkipReason},
-        list::{Switches, joints_in},
+        exclusion::{CommandExclusion, Exclusion, Gap, JointExclusion, SkipReason},
+        list::{Switches, command_exclusion, joints_in},
         scope::Trace,
         world::{Aspect, Birth, NOWHERE, NodeId, Value, same},
     },
-    rig::{NodeKind, NodeType, Rig, RigEdit, TagKind, Uid},
+    rig::{NodeKind, NodeType, Rig, RigEdit, RigJoint, TagData, TagKind, Uid},
 };
 
 impl Builder {
@@ -21,6 +21,7 @@ impl Builder {
     pub fn sync(&mut self, rig: &Rig) {
         self.rig = rig.uid();
         let switches = Switches::of(rig);
+        self.world.followed += rig.len() as u64;
         self.sync_joints(rig, &switches);
         self.sync_inputs(rig);
         self.spread_moves(None);
@@ -30,7 +31,7 @@ impl Builder {
     }
 
     /// Takes over one edit that was applied to the document since the last [`Builder::sync`]. What concerns one tag or
-    /// one transform takes no look at anything else.
+    /// one transform takes no look at anything else, and so does a command's own switch.
     pub fn touch(&mut self, rig: &Rig, edit: &RigEdit) {
         if !self.touch_one(rig, edit) {
             self.sync(rig);
@@ -40,30 +41,56 @@ impl Builder {
     /// True if that was all there is to do.
     fn touch_one(&mut self, rig: &Rig, edit: &RigEdit) -> bool {
         match edit {
-            RigEdit::SetTag(joint, tag) => {
-                let TagKind::Command { module, params, .. } = &tag.kind else { return false };
-                let Some((bearer, tag)) = rig.find_tag(tag.uid) else { return false };
-                if bearer.data.uid != *joint {
-                    return false;
-                }
-                let Some(number) = self.world.creator_of(tag.uid) else { return false };
-                let TagKind::Command { feature, .. } = &tag.kind else { return false };
-                let command = &mut self.commands[number as usize];
-                // The switches of its feature and of its joint's group have not changed.
-                let is_switched_alike = tag.enabled == command.enabled && *feature == command.feature;
-                if !is_switched_alike || **module != *command.module {
-                    return false;
-                }
-                if *params != *command.params {
-                    command.params = params.as_str().into();
-                    command.loaded = None;
-                    self.mark(number, DueWork::Run);
-                }
-                true
-            }
+            RigEdit::SetTag(joint, tag) => rig
+                .find_tag(tag.uid)
+                .is_some_and(|(bearer, tag)| bearer.data.uid == *joint && self.touch_tag(rig, bearer, tag)),
             RigEdit::SetOffset(..) | RigEdit::SetAttributeValue(..) => true,
             RigEdit::SetSkin(..) | RigEdit::SetWeights(..) => true,
             _ => false,
+        }
+    }
+
+    /// Takes over the parameters and the own switch of a command; false if more than these has changed.
+    fn touch_tag(&mut self, rig: &Rig, bearer: &RigJoint, tag: &TagData) -> bool {
+        let TagKind::Command { module, params, feature } = &tag.kind else { return false };
+        let Some(number) = self.world.creator_of(tag.uid) else { return false };
+        let command = &self.commands[number as usize];
+        let is_alike = *feature == command.feature && **module == *command.module && command.joint == bearer.data.uid;
+        let is_switched = tag.enabled != command.enabled;
+        if !is_alike || (is_switched && self.world.places[number as usize] == NOWHERE) {
+            return false;
+        }
+        if is_switched {
+            self.switch_command(number, bearer.data.uid, module, command_exclusion(rig, &bearer.data, tag));
+        }
+        let command = &mut self.commands[number as usize];
+        let was_active = command.active;
+        if is_switched {
+            command.enabled = tag.enabled;
+            command.active = !self.world.off.commands.get(&number).is_some_and(CommandExclusion::is_own);
+        }
+        let reads_anew = *params != *command.params;
+        if reads_anew {
+            command.params = params.as_str().into();
+            command.loaded = None;
+        }
+        if reads_anew || command.active != was_active {
+            self.mark(number, DueWork::Run);
+        }
+        if is_switched {
+            self.spread_structure();
+        }
+        true
+    }
+
+    /// Notes that the document passes over a command of a joint, or does not.
+    fn switch_command(&mut self, number: u32, joint: Uid, module: &str, off: Option<Exclusion>) {
+        if let Some(off) = off {
+            let above = self.world.off.joint(joint).and_then(|gap| gap.above);
+            let off = CommandExclusion { module: module.into(), reason: SkipReason::Own(off), above };
+            self.set_command_off(number, Some(off));
+        } else if self.world.off.commands.get(&number).is_some_and(CommandExclusion::is_own) {
+            self.set_command_off(number, None);
         }
     }
 
@@ -206,13 +233,7 @@ impl Builder {
                 let off = switches.command(&joint.data, tag);
                 let active = off.is_none();
                 self.world.bearers[number as usize] = uid;
-                if let Some(off) = off {
-                    let above = self.world.off.joint(uid).and_then(|gap| gap.above);
-                    let off = CommandExclusion { module: module.as_str().into(), reason: SkipReason::Own(off), above };
-                    self.set_command_off(number, Some(off));
-                } else if self.world.off.commands.get(&number).is_some_and(CommandExclusion::is_own) {
-                    self.set_command_off(number, None);
-                }
+                self.switch_command(number, uid, module, off);
                 if number as usize == self.commands.len() {
                     self.commands.push(Command {
                         joint: uid,

@@ -108,6 +108,12 @@ impl Builder {
         self.world.visited
     }
 
+    /// Number of joints that were compared with those of the document since the builder was made: a measure of work that is the
+    /// same on every machine.
+    pub fn followed(&self) -> u64 {
+        self.world.followed
+    }
+
     /// Number of values that commands have read and written since the builder was made: a measure of work that is the
     /// same on every machine.
     pub fn work(&self) -> u64 {

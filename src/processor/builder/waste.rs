@@ -37,6 +37,7 @@ impl Builder {
         }
         // Carrying out again what was in effect is no news.
         fresh.world.visited = self.world.visited;
+        fresh.world.followed = self.world.followed;
         (fresh.world.work, fresh.world.work_before) = (self.world.work, self.world.work_before);
         fresh.next_count = FEW.max(2 * fresh.kept());
         *self = fresh;

@@ -37,6 +37,7 @@ pub(super) struct Player {
     attributes: Vec<(usize, usize)>,
     /// Settings of the switches at which joints are looked at: as they are, and all the other way round.
     modes: Vec<Vec<(usize, f32)>>,
+    /// Joints that tracks may move: those with tracks, those that commands drive, and all below them.
     joints: Vec<usize>,
 }
 
@@ -63,8 +64,13 @@ impl Player {
             switches.iter().filter_map(|(node, name, value)| Some((program.attribute(*node, name)?, *value))).collect();
         let other = found.iter().map(|(slot, value)| (*slot, 1.0 - value)).collect();
         let modes = if found.is_empty() { vec![found] } else { vec![found, other] };
-        let is_joint = |slot: &usize| program.nodes()[*slot].kind == NodeType::Joint;
-        let joints = (0..program.nodes().len()).filter(is_joint).collect();
+        let mut is_moved = vec![false; program.nodes().len()];
+        for (slot, node) in program.nodes().iter().enumerate() {
+            let follows = node.parent.is_some_and(|parent| parent >= slot || is_moved[parent]);
+            is_moved[slot] = follows || !node.is_plain() || nodes.contains_key(&slot);
+        }
+        let is_seen = |slot: &usize| is_moved[*slot] && program.nodes()[*slot].kind == NodeType::Joint;
+        let joints = (0..program.nodes().len()).filter(is_seen).collect();
         Self { program: program.clone(), nodes: nodes.into_iter().collect(), attributes, modes, joints }
     }
 
@@ -175,5 +181,38 @@ fn tried(property: &Property, value: [f32; 4], length: f32) -> Vec<([f32; 4], f3
             };
             [Vec3::X, Vec3::Y, Vec3::Z].map(turned).to_vec()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{modules, processor::Builder, rig::template::read_template, solve::program::CompileOptions};
+
+    /// A motion of one arm on a rig of many joints takes memory for the joints of the arm.
+    #[test]
+    fn joints_that_no_track_moves_are_not_looked_at() {
+        let others: String = (0..100).map(|number| format!("(label: \"o{number}\", parent: \"top\"), ")).collect();
+        let text = format!(
+            "(format: 2, name: \"n\", joints: [(label: \"top\"), {others}(label: \"arm\", parent: \"top\"), \
+             (label: \"hand\", parent: \"arm\", translation: (0, 1, 0))])"
+        );
+        let rig = read_template(text.as_bytes()).unwrap().rig;
+        let built = Builder::build(&rig, &Arc::new(modules::all())).unwrap();
+        let program = Arc::new(RigProgram::compile(&built, &CompileOptions::default()).unwrap());
+        let target =
+            |label: &str| vec![TrackTarget { node: rig.labelled(label).unwrap(), property: Property::Rotation }];
+        assert_eq!(Player::new(&program, &target("arm"), &[]).joints.len(), 2);
+        assert_eq!(Player::new(&program, &target("top"), &[]).joints.len(), 103);
+        let turned = Quat::from_xyzw(0.6, 0.0, 0.0, 0.8);
+        let player = Player::new(&program, &target("arm"), &[]);
+        let places = player.each(
+            2,
+            |_, frame| if frame == 0 { [0.0, 0.0, 0.0, 1.0] } else { turned.to_array() },
+            1,
+            |_, places| places,
+        );
+        assert_eq!((places[0].len(), places[1].len()), (2, 2));
+        assert!(places[0][1].0.distance(places[1][1].0) > 0.4, "{places:?}");
     }
 }

@@ -157,6 +157,14 @@ const ENTITIES: u64 = 1_700;
 const WATCH: u64 = 2_200;
 
 #[test]
+fn bare_joints_are_checked_without_a_build_of_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = "bare.rig.ron";
+    fs::write(folder.path().join(file), bare_joints(60_000)).unwrap();
+    check(folder.path(), &[(&[file], &["check", file])]);
+}
+
+#[test]
 fn templates_of_bare_and_placed_joints_stay_within_their_memory() {
     let folder = tempfile::tempdir().unwrap();
     let one = "one.rig.ron";
