@@ -183,7 +183,7 @@ mod mutate;
 mod new_templates;
 mod obj;
 mod obj_materials;
-mod obj_tangled;
+mod obj_tangles;
 mod obj_torture;
 mod operation_runs;
 mod packed_clips;

@@ -1,8 +1,9 @@
 //! Completeness of the walks: an action or a panel that is added and not walked over is told here.
 
-use std::time::Duration;
+use std::{path::Path, time::Duration};
 
 use rigsmith::editor::{
+    dock::Layout,
     panel::PanelTitles,
     panels::{graph::GraphAction, timeline::TimelineAction},
     style::{self, Look},
@@ -57,6 +58,22 @@ fn no_panel_is_left_out() {
     }
 }
 
+/// Rows of pictures in the README name the panels that they show.
+#[test]
+fn every_panel_has_a_picture_in_the_readme() {
+    let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
+    let text = std::fs::read_to_string(readme).unwrap();
+    let captions: Vec<&str> = text
+        .lines()
+        .filter(|line| line.starts_with("| ![") && line.contains("](docs/"))
+        .flat_map(|line| line.split('|').filter_map(|cell| cell.split_once(".png)")).map(|(_, caption)| caption))
+        .collect();
+    let names = |caption: &&str, title: &str| caption.split(|c: char| !c.is_alphanumeric()).any(|word| word == title);
+    for title in panels().into_iter().map(|(title, ..)| title).chain([OF_LIBRARY]) {
+        assert!(captions.iter().any(|caption| names(caption, title)), "{title}: {captions:?}");
+    }
+}
+
 #[test]
 fn no_panel_asks_for_frames_while_nothing_happens() {
     let loader: Box<dyn EditorPanel> = Box::new(LoaderPanel::default());
@@ -79,6 +96,8 @@ fn no_panel_asks_for_frames_while_nothing_happens() {
 fn no_panel_asks_for_frames_while_the_pointer_rests_on_it() {
     for (title, panel, size) in panels() {
         let mut walk = Walk::new(panel, size);
+        // A panel that the pointer is over is in front of others.
+        walk.desk.app.world_mut().resource_mut::<Layout>().bring_forward(title);
         walk.ready();
         walk.rest();
         let places = walk.names().into_iter().map(|(_, at)| at);
@@ -91,7 +110,7 @@ fn no_panel_asks_for_frames_while_the_pointer_rests_on_it() {
     }
 }
 
-/// What lies over the window waits for a person without a frame.
+/// Overlays of the window wait for a person without a frame.
 #[test]
 fn no_overlay_asks_for_frames_while_nothing_happens() {
     for action in [Action::Palette, Action::Help, Action::StartPage, Action::Open] {
