@@ -4,8 +4,6 @@
 //! reaches up to both collarbones. Where a chain ends there is no child: the bone then runs through the flesh beyond
 //! the last joint.
 
-use std::collections::BTreeMap;
-
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -28,8 +26,6 @@ const GIRTH: f32 = 0.9;
 const CHUNK: usize = 256;
 /// A bone with fewer measured points than this takes the typical girth.
 const FEW: usize = 4;
-/// Bend of a chain from which on it is a fold: one minus the cosine of the angle, here 60 degrees.
-const FOLDED: f32 = 0.5;
 
 /// Bones, their girths, and a tree over them.
 #[derive(Debug, Clone, Default)]
@@ -37,9 +33,6 @@ pub(crate) struct Bones {
     pub segments: Vec<BoneSegment>,
     /// Usual reach of the flesh around each bone.
     pub girths: Vec<f32>,
-    /// Strength of the stronger fold at the ends of each bone: 0 where the chain is straight, 1 where it is bent by 60 degrees
-    /// or more. On the inside of a fold, flesh of both bones lies in one place.
-    pub folds: Vec<f32>,
     pub tree: BoneTree,
     homes: Homes,
 }
@@ -131,8 +124,7 @@ pub(crate) fn build(
     grow_leaves(joints, &mut segments, &leaves, points, areas, (sight, &homes));
     let tree = BoneTree::new(&segments);
     let girths = girths(&segments, &tree, points, areas, (sight, &homes));
-    let folds = folds(&segments);
-    Bones { segments, girths, folds, tree, homes }
+    Bones { segments, girths, tree, homes }
 }
 
 /// True if the bone to `joint` turns back along the bone by which the chain arrived at its parent: an ear that hangs on
@@ -360,26 +352,6 @@ fn girths(
         *girth = girth.filter(|&g| g > 0.05 * typical || typical == f32::INFINITY).or(Some(typical));
     }
     girths.into_iter().map(|g| g.unwrap_or(typical)).collect()
-}
-
-/// Strengths of the folds at the ends of bones, where a bone ends at which exactly one other begins. Where several begin, as in
-/// a chest, the flesh is no tube around any of them.
-fn folds(segments: &[BoneSegment]) -> Vec<f32> {
-    let key = |place: Vec3| place.to_array().map(|c| (c + 0.0).to_bits());
-    let is_long = |segment: &BoneSegment| segment.head != segment.tail;
-    let mut starts: BTreeMap<[u32; 3], Vec<usize>> = BTreeMap::new();
-    for (bone, segment) in segments.iter().enumerate().filter(|(_, segment)| is_long(segment)) {
-        starts.entry(key(segment.head)).or_default().push(bone);
-    }
-    let along = |bone: usize| (segments[bone].tail - segments[bone].head).normalize_or_zero();
-    let mut folds = vec![0.0f32; segments.len()];
-    for (bone, segment) in segments.iter().enumerate().filter(|(_, segment)| is_long(segment)) {
-        let Some(&[next]) = starts.get(&key(segment.tail)).map(Vec::as_slice) else { continue };
-        let fold = ((1.0 - along(bone).dot(along(next))) / FOLDED).min(1.0);
-        folds[bone] = folds[bone].max(fold);
-        folds[next] = folds[next].max(fold);
-    }
-    folds
 }
 
 /// The distance within which [`GIRTH`] of the area lies.

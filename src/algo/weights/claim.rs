@@ -14,9 +14,6 @@ const HEAT: f32 = 12.0;
 const BAND: f32 = 0.1;
 /// A patch that its joint sees less of than this is not its own.
 const SEEN: f32 = 0.25;
-/// Share by which the reach of a bone at a fold grows where the skin lies along the way to the bone rather than across: in a
-/// fist, the skin of the palm below the fingers is as near to them as to the palm, and faces away from the palm alone.
-const ASIDE: f32 = 1.0;
 /// Points handled at a time by one thread.
 const CHUNK: usize = 256;
 
@@ -39,23 +36,14 @@ pub(crate) struct Claim {
 /// misjudges faces, where nostrils and the mouth lie between skin and skull, so sight is asked of whole patches: a bone
 /// loses a patch of which it sees little, as a finger loses the thigh beside it, and that patch takes its warmth from
 /// the skin around.
-pub(crate) fn claims(
-    points: &[Vec3],
-    triangles: &[[u32; 3]],
-    bones: &Bones,
-    graph: &Graph,
-    sight: &Sight,
-) -> Vec<Claim> {
-    let normals = normals(points, triangles);
+pub(crate) fn claims(points: &[Vec3], bones: &Bones, graph: &Graph, sight: &Sight) -> Vec<Claim> {
     let mut claims: Vec<Claim> = points
         .par_chunks(CHUNK)
         .enumerate()
         .flat_map_iter(|(number, chunk)| {
             let mut near = Vec::new();
             let first = number * CHUNK;
-            let normals = &normals[first..];
-            let at = chunk.iter().zip(normals).enumerate();
-            at.map(move |(at, (&point, &normal))| claim(first + at, (point, normal), bones, sight, &mut near))
+            chunk.iter().enumerate().map(move |(at, &point)| claim(first + at, point, bones, sight, &mut near))
         })
         .collect();
     for leak in leaks(&claims, graph) {
@@ -126,38 +114,15 @@ fn reach(distance: f32, girth: f32) -> f32 {
     distance * (distance / girth).max(1.0)
 }
 
-/// Mean normal of the triangles around each point by area: of length 1 where the surface is flat, shorter where it turns.
-fn normals(points: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
-    let mut sums = vec![(Vec3::ZERO, 0.0f32); points.len()];
-    for corners in triangles {
-        let [a, b, c] = corners.map(|corner| points[corner as usize]);
-        let normal = (b - a).cross(c - a);
-        for &corner in corners {
-            let sum = &mut sums[corner as usize];
-            *sum = (sum.0 + normal, sum.1 + normal.length());
-        }
-    }
-    sums.into_iter().map(|(normal, area)| if area > 0.0 { normal / area } else { Vec3::ZERO }).collect()
-}
-
 /// The claim on the point of an index; `near` is scratch space.
-fn claim(
-    index: usize,
-    (point, normal): (Vec3, Vec3),
-    bones: &Bones,
-    sight: &Sight,
-    near: &mut Vec<(f32, u32)>,
-) -> Claim {
+fn claim(index: usize, point: Vec3, bones: &Bones, sight: &Sight, near: &mut Vec<(f32, u32)>) -> Claim {
     let mut result = Claim::default();
     let island = sight.island(index);
     let cost = |bone: u32| {
         if !bones.may_hold(bone, island) {
             return f32::INFINITY;
         }
-        let from = point - closest_on(&bones.segments[bone as usize], point);
-        let distance = from.length();
-        let aside = (normal.length() - normal.dot(from.normalize_or_zero()).abs()).max(0.0);
-        reach(distance, bones.girths[bone as usize]) * (1.0 + ASIDE * bones.folds[bone as usize] * aside)
+        reach(closest_on(&bones.segments[bone as usize], point).distance(point), bones.girths[bone as usize])
     };
     bones.tree.nearest(point, BAND, cost, near);
     let Some(&(best, first)) = near.first() else { return result };
