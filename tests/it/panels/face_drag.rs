@@ -59,7 +59,6 @@ fn with_face(model: Model) -> (Desk, Entity) {
     desk.frames(2);
     desk.click("Place face");
     wait(&mut desk, mesh);
-    // The pictures are drawn once, a frame each.
     desk.until("the prepared face", |desk| desk.app.world().get::<FacePosing>(mesh).is_some() && pictures(desk) == 6);
     (desk, mesh)
 }
@@ -111,6 +110,29 @@ fn frames_of_a_drag_visit_no_points() {
     let finer = heads::subdivided(&head);
     assert!(finer.0.len() > 3 * head.0.len(), "{} and {} points", head.0.len(), finer.0.len());
     assert_eq!([head, finer].map(visits_of_a_drag), [0, 0]);
+}
+
+/// Points that frames visit while the pictures are drawn again after a change of weights.
+fn visits_of_new_pictures(head: heads::Mesh) -> u64 {
+    let (mut desk, _) = with_face(model(head));
+    let skin = desk.rig().skin(Uid(99)).expect("the weights of the face").clone();
+    let before = visited_points();
+    let edits = vec![RigEdit::SetSkin(Uid(99), Some(Arc::new((*skin).clone())))];
+    let (held, threads) = busy_threads();
+    desk.edit(Operation::Named { name: "Bind", edits });
+    desk.frames(2);
+    assert_eq!(pictures(&desk), 0, "pictures of former weights are dropped");
+    drop(held);
+    desk.until("the pictures", |desk| pictures(desk) == 6);
+    drop(threads);
+    visited_points() - before
+}
+
+#[test]
+fn frames_that_renew_pictures_visit_no_points() {
+    let head = heads::bundled();
+    let finer = heads::subdivided(&head);
+    assert_eq!([head, finer].map(visits_of_new_pictures), [0, 0]);
 }
 
 /// Tasks that keep every thread of the background busy, so that nothing else is computed there, until what they wait for is dropped.

@@ -437,7 +437,10 @@ impl Booth {
             last = Some(output);
             self.app.update();
             frames += 1;
-            if was_busy || self.is_busy() || is_whole && self.is_starting() {
+            // The causes are those of the frame before, which is one of the last frames, too.
+            let causes = own.as_ref().unwrap_or(&self.canvas).ctx.repaint_causes();
+            let is_drawing = causes.iter().any(|cause| cause.file.ends_with("thumbnail.rs"));
+            if was_busy || is_drawing || self.is_busy() || is_whole && self.is_starting() {
                 // What the frame asked for is not there yet: lists and pictures of files.
                 assert!(started.elapsed() < HANG, "something never ends");
                 std::thread::sleep(Duration::from_millis(20));

@@ -2,7 +2,10 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use bevy::math::Vec3;
+use bevy::{
+    math::Vec3,
+    tasks::{AsyncComputeTaskPool, Task, futures::check_ready},
+};
 use bevy_egui::egui::{self, ColorImage, TextureHandle, TextureOptions};
 
 use crate::{
@@ -18,12 +21,14 @@ use crate::{
 /// Pixels along a side.
 const PIXELS: usize = 112;
 
-/// Thumbnails of one face.
+/// Thumbnails of one face, drawn in the background.
 #[derive(Default)]
 pub(super) struct Pictures {
     textures: BTreeMap<String, TextureHandle>,
-    /// Analysis and weights that they were drawn from.
+    /// Analysis and weights that they are drawn from.
     of: Option<(Arc<FaceAnalysis>, Arc<SkinData>)>,
+    /// Pictures that are being drawn, by the names of their expressions.
+    task: Option<Task<Vec<(String, ColorImage)>>>,
 }
 
 impl Pictures {
@@ -32,8 +37,15 @@ impl Pictures {
         self.textures.get(name)
     }
 
-    /// Draws one of the missing thumbnails, or all again after a change of bones or weights.
-    pub fn renew(&mut self, ctx: &egui::Context, rig: &Rig, mesh: &RigMesh, face: Option<&Face>, set: &ExpressionSet) {
+    /// Takes over the thumbnails that are drawn, and starts to draw them again after a change of bones or weights.
+    pub fn renew(
+        &mut self,
+        ctx: &egui::Context,
+        rig: &Rig,
+        mesh: &RigMesh,
+        face: Option<&Face>,
+        set: &Arc<ExpressionSet>,
+    ) {
         let (Some(face), Some(skin)) = (face, rig.skin(mesh.uid)) else { return };
         let same = |(analysis, bound): &(Arc<FaceAnalysis>, Arc<SkinData>)| {
             Arc::ptr_eq(analysis, &face.analysis) && Arc::ptr_eq(bound, skin)
@@ -41,18 +53,32 @@ impl Pictures {
         if !self.of.as_ref().is_some_and(same) {
             self.textures.clear();
             self.of = Some((face.analysis.clone(), skin.clone()));
+            let (rig, mesh, analysis, set) = (rig.clone(), mesh.clone(), face.analysis.clone(), set.clone());
+            // The task of another state is dropped with its pictures.
+            let work = async move { images(&rig, &mesh, &analysis, &set) };
+            self.task = Some(AsyncComputeTaskPool::get().spawn(work));
         }
-        let Some(expression) = set.six().find(|expression| !self.textures.contains_key(&expression.name)) else {
+        let Some(task) = &mut self.task else { return };
+        let Some(images) = check_ready(task) else {
+            ctx.request_repaint();
             return;
         };
-        let strengths = [(expression.name.clone(), 1.0)].into();
-        let Ok(points) = expressed_points(rig, mesh, &face.analysis, set, &strengths) else { return };
-        let image = draw(&points, &face.analysis);
-        let texture = ctx.load_texture(format!("face {}", expression.name), image, TextureOptions::LINEAR);
-        self.textures.insert(expression.name.clone(), texture);
-        // The next one is drawn in the next frame, so that no frame is long.
-        ctx.request_repaint();
+        self.task = None;
+        for (name, image) in images {
+            let texture = ctx.load_texture(format!("face {name}"), image, TextureOptions::LINEAR);
+            self.textures.insert(name, texture);
+        }
     }
+}
+
+/// Pictures of the six expressions, by name. Cost: a fit of the face for each.
+fn images(rig: &Rig, mesh: &RigMesh, analysis: &FaceAnalysis, set: &ExpressionSet) -> Vec<(String, ColorImage)> {
+    let drawn = set.six().filter_map(|expression| {
+        let strengths = [(expression.name.clone(), 1.0)].into();
+        let points = expressed_points(rig, mesh, analysis, set, &strengths).ok()?;
+        Some((expression.name.clone(), draw(&points, analysis)))
+    });
+    drawn.collect()
 }
 
 /// The face from the front: nearest triangle at each pixel, lit from above the camera.
