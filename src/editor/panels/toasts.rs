@@ -169,7 +169,8 @@ impl EditorOverlay for Toasts {
             // A toast under the pointer stays, and a little longer.
             let is_over = ctx.input(|input| input.pointer.hover_pos()).is_some_and(|pointer| rect.contains(pointer));
             // One that comes where the pointer rests is read only once the pointer moves.
-            let is_moved = ctx.input(|input| input.pointer.delta() != egui::Vec2::ZERO);
+            let is_move = |event: &egui::Event| matches!(event, egui::Event::PointerMoved(_));
+            let is_moved = ctx.input(|input| input.events.iter().any(is_move));
             let is_read = is_over && (toast.is_read || is_moved);
             if is_read || toast.is_read {
                 toast.until = toast.until.max(now + 2.0);
