@@ -17,6 +17,10 @@ const LEAST_STACK: u64 = 1 << 20;
 const OWN_STACK: usize = 16 << 20;
 /// Least address space, in MiB, in which the program, its threads and their heaps find room.
 const LEAST_SPACE: u64 = 512;
+/// Address space, in MiB, of the program and of what it reads.
+const SPACE_OF_PROGRAM: u64 = 256;
+/// Address space, in MiB, that a thread takes, however little it needs: the system sets a heap aside for each.
+const SPACE_OF_THREAD: u64 = 64;
 /// Threads that a person may ask for on a machine of few cores.
 const FEW_THREADS: usize = 64;
 /// Largest number of threads that compute.
@@ -62,8 +66,14 @@ pub(super) fn on_own_stack(run: fn() -> ExitCode) -> Result<ExitCode, ProcessErr
     Ok(thread.map_err(ProcessError::Thread)?.join().unwrap_or(ExitCode::FAILURE))
 }
 
+/// Largest number of threads that leave room for the program in an address space of so many MiB.
+fn threads_in(space: u64) -> usize {
+    let threads = space.saturating_sub(SPACE_OF_PROGRAM) / SPACE_OF_THREAD;
+    usize::try_from(threads).unwrap_or(MOST_THREADS).max(1)
+}
+
 /// Checks the limits of this process, and starts the threads that compute: as many as there are cores, or as RAYON_NUM_THREADS asks
-/// for, within reason.
+/// for, within reason and within the address space.
 pub(super) fn prepare() -> Result<(), ProcessError> {
     let space = limit("Max address space").map(|bytes| bytes >> 20);
     if let Some(space) = space.filter(|space| *space < LEAST_SPACE) {
@@ -75,5 +85,6 @@ pub(super) fn prepare() -> Result<(), ProcessError> {
         Some(asked @ 1..) => asked.min(cores.max(FEW_THREADS)),
         _ => cores,
     };
-    Ok(ThreadPoolBuilder::new().num_threads(threads.min(MOST_THREADS)).build_global()?)
+    let most = space.map_or(MOST_THREADS, threads_in).min(MOST_THREADS);
+    Ok(ThreadPoolBuilder::new().num_threads(threads.min(most)).build_global()?)
 }

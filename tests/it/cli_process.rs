@@ -57,3 +57,13 @@ fn threads_are_as_many_as_make_sense() {
         assert_eq!(output.status.code(), Some(0), "{threads}: {told}");
     }
 }
+
+/// Sixteen threads take a gigabyte for their heaps, and leave nothing of it for the command.
+#[test]
+fn threads_leave_room_for_the_command() {
+    for space in [512, 1024] {
+        let output = limited(&format!("-v {}", space << 10), Some("16"), &["info", "assets/models/biped.obj"]);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{space} MiB: {told}");
+    }
+}

@@ -233,7 +233,6 @@ fn menus_and_the_toolbar_say_why_an_action_can_do_nothing() {
     assert!(!is_asked(&frames, "Store pose") && !is_asked(&frames, "There is no mesh"));
 }
 
-/// The bar of the viewport's tab is none of its picture.
 /// A field that waits for a key asks for no frame, as a caret that blinks would.
 #[test]
 fn a_text_field_with_the_focus_asks_for_no_frame() {
@@ -252,6 +251,7 @@ fn a_text_field_with_the_focus_asks_for_no_frame() {
     assert_eq!(frames.wakes_in, Duration::MAX);
 }
 
+/// The bar of the viewport's tab is none of its picture.
 #[test]
 fn the_viewport_has_two_fifths_of_a_large_window() {
     for size in [[1920.0, 1080.0], [3840.0, 2160.0]] {

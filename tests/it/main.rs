@@ -214,10 +214,10 @@ mod remote;
 #[cfg(feature = "render")]
 mod render;
 mod retarget;
-#[cfg(feature = "editor")]
 mod review_growth;
 mod rig_limits;
 mod rig_text;
+#[cfg(feature = "editor")]
 mod run_failures;
 mod runtime;
 mod same_parts;

@@ -23,7 +23,8 @@ pub(in crate::plugins) struct AwaitedSteps {
 pub(super) struct HeldRequests(Vec<EditRequest>);
 
 impl HeldRequests {
-    /// Requests to carry out in this frame, in their order: an undo and a redo come after the steps that were awaited.
+    /// Requests to carry out in this frame, in their order: an undo and a redo come after the steps that were awaited, and after
+    /// those that waited.
     pub(super) fn due(
         &mut self,
         asked: impl Iterator<Item = EditRequest>,
@@ -35,14 +36,34 @@ impl HeldRequests {
         let (mut held, mut late): (Vec<_>, Vec<_>) = held.partition(waits);
         let mut due = Vec::new();
         for request in asked {
+            let comes_late =
+                || awaited.landed.contains(&request.rig) || late.iter().any(|before| before.rig == request.rig);
             match request.change {
                 Change::Undo | Change::Redo if waits(&request) => held.push(request),
-                Change::Undo | Change::Redo if awaited.landed.contains(&request.rig) => late.push(request),
+                Change::Undo | Change::Redo if comes_late() => late.push(request),
                 _ => due.push(request),
             }
         }
         self.0 = held;
         due.extend(late);
         due
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_redo_does_not_overtake_an_undo_that_waited() {
+        let rig = Entity::PLACEHOLDER;
+        let ask = |change| EditRequest { rig, change };
+        let computed = AwaitedSteps { computed: [rig].into_iter().collect(), ..AwaitedSteps::default() };
+        let mut held = HeldRequests::default();
+        assert!(held.due([ask(Change::Undo)].into_iter(), &computed, |_| true).is_empty());
+        // The step comes to nothing, as when its mesh is removed.
+        let due = held.due([ask(Change::Redo)].into_iter(), &AwaitedSteps::default(), |_| true);
+        let changes: Vec<Change> = due.into_iter().map(|request| request.change).collect();
+        assert!(matches!(changes.as_slice(), [Change::Undo, Change::Redo]), "{changes:?}");
     }
 }
