@@ -63,6 +63,21 @@ fn parts_belong_to_the_bones_inside_of_them() {
     }
 }
 
+/// A hat on a trunk, to which alone the last bone is nearest: the girth of that bone is the hat's, and the trunk below is held by its
+/// own bone up to its rim.
+#[test]
+fn bones_of_hats_hold_nothing_of_the_trunk_below() {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    let trunk = add_box(&mut points, &mut triangles, Vec3::new(-0.2, 0.0, -0.2), Vec3::new(0.2, 1.0, 0.2));
+    let hat = add_box(&mut points, &mut triangles, Vec3::new(-0.1, 1.05, -0.1), Vec3::new(0.1, 1.2, 0.1));
+    let joints = [joint([0.0; 3], None), joint([0.0, 1.0, 0.0], Some(0))];
+    let weights = bind(&points, &triangles, &joints).0;
+    let held =
+        |points: Range<usize>, joint: u32| points.map(|point| weight(&weights, point, joint)).fold(1.0, f32::min);
+    assert!(held(trunk.clone(), 0) > 0.99, "{}", held(trunk, 0));
+    assert!(held(hat.clone(), 1) > 0.5, "{}", held(hat, 1));
+}
+
 /// A pouch that floats beside the second bone is told with its joint, and a joint that hangs far outside with its distance.
 #[test]
 fn stiff_pieces_and_idle_joints_are_told() {
