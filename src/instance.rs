@@ -316,6 +316,11 @@ impl RigTemplates {
         self.built.len()
     }
 
+    /// Sets a function that lets an app which sleeps run a frame. The thread that builds templates calls it after each result.
+    pub fn set_wake(&self, wake: impl Fn() + Send + 'static) {
+        self.builds.send(Work::Wake(Box::new(wake)));
+    }
+
     /// Forgets a template, and ends the watch of its file.
     fn forget(&mut self, id: AssetId<RigTemplate>) {
         self.own.remove(&id);

@@ -9,7 +9,7 @@ use bevy::{
     prelude::*,
     render::{RenderPlugin, renderer::RenderAdapterInfo, settings::RenderCreation},
     window::{ExitCondition, RequestRedraw, WindowEvent, WindowResolution},
-    winit::{UpdateMode, WinitSettings},
+    winit::{EventLoopProxyWrapper, UpdateMode, WinitSettings, WinitUserEvent},
 };
 use bevy_egui::{
     EguiGlobalSettings, EguiInput, EguiPlugin, EguiPreUpdateSet, PrimaryEguiContext,
@@ -35,6 +35,7 @@ use super::{
     settings::SettingsPlugin,
     start::StartPlugin,
 };
+use crate::instance::RigTemplates;
 use crate::plugins::{
     RigPlugins,
     controls::size::MeasuredShapes,
@@ -157,7 +158,7 @@ impl Plugin for EditorPlugin {
         .init_resource::<Mode>()
         .init_resource::<StatusLine>()
         .add_message::<Notice>()
-        .add_systems(Startup, (spawn_interface, say_adapter))
+        .add_systems(Startup, (spawn_interface, say_adapter, wake_for_templates))
         .add_systems(
             PreUpdate,
             drop_old_modifiers.after(EguiPreUpdateSet::ProcessInput).before(super::clicks::hold_back),
@@ -190,14 +191,24 @@ fn spawn_interface(mut commands: Commands, mut settings: ResMut<EguiGlobalSettin
     ));
 }
 
-/// Lets calls of remote control wake the window, which sleeps while nothing happens.
-#[cfg(feature = "remote")]
-fn wake_for_calls(server: Res<crate::remote::RemoteServer>, proxy: Res<bevy::winit::EventLoopProxyWrapper>) {
+/// Function that wakes the window, which sleeps while nothing happens.
+fn waker(proxy: &EventLoopProxyWrapper) -> impl Fn() + Send + Sync + 'static {
     let proxy = (**proxy).clone();
-    server.set_wake(move || {
+    move || {
         // The window may have been closed.
-        let _ = proxy.send_event(bevy::winit::WinitUserEvent::WakeUp);
-    });
+        let _ = proxy.send_event(WinitUserEvent::WakeUp);
+    }
+}
+
+/// Lets calls of remote control wake the window.
+#[cfg(feature = "remote")]
+fn wake_for_calls(server: Res<crate::remote::RemoteServer>, proxy: Res<EventLoopProxyWrapper>) {
+    server.set_wake(waker(&proxy));
+}
+
+/// Lets files of templates that have changed wake the window.
+fn wake_for_templates(templates: Res<RigTemplates>, proxy: Res<EventLoopProxyWrapper>) {
+    templates.set_wake(waker(&proxy));
 }
 
 /// Sends a notice if a software renderer draws instead of a graphics card.

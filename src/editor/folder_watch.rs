@@ -1,5 +1,5 @@
 //! Folders of the window: forms and expressions that are saved in the folder of the document, or in those of the site, are in use
-//! at once.
+//! with the next frame. A window at rest stays at rest; the first movement of the mouse brings a frame.
 
 use bevy::prelude::*;
 

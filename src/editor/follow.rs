@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use bevy::{prelude::*, winit::WinitSettings};
+use bevy::prelude::*;
 
 use super::{
     ActiveRig,
@@ -19,9 +19,8 @@ use crate::{
     },
 };
 
-/// Time between two looks at the file, and between two frames of a window that follows one.
+/// Time between two looks at the file.
 const LOOK: Duration = Duration::from_millis(250);
-const FRAME: Duration = Duration::from_secs(1);
 
 /// Plugin that follows the template of the open document.
 pub struct FollowPlugin;
@@ -31,10 +30,7 @@ impl Plugin for FollowPlugin {
         app.add_plugins(RigInstancePlugin { live: true, look: LOOK, ..default() })
             .add_message::<OfferAnswer>()
             .add_message::<Notice>()
-            .add_systems(
-                Update,
-                (follow, answer, tell_offer, wake.run_if(resource_exists::<WinitSettings>)).chain().after(attend),
-            )
+            .add_systems(Update, (follow, answer, tell_offer).chain().after(attend))
             .add_observer(tell_update)
             .add_observer(tell_failure);
     }
@@ -136,23 +132,6 @@ pub(super) fn counts(offer: &UpdateOffer) -> String {
 /// The open rig's offer, if its template's file has changed.
 pub(super) fn offer(world: &World) -> Option<&UpdateOffer> {
     world.get::<UpdateOffer>(world.get_resource::<ActiveRig>()?.0)
-}
-
-/// Draws a frame now and then while a file is followed: its changes arrive in frames.
-fn wake(
-    sources: Query<(), With<RigSource>>,
-    mut settings: ResMut<WinitSettings>,
-    mut asleep: Local<Option<WinitSettings>>,
-) {
-    if sources.is_empty() {
-        if let Some(before) = asleep.take() {
-            *settings = before;
-        }
-    } else if asleep.is_none() {
-        *asleep = Some(settings.clone());
-        let mode = bevy::winit::UpdateMode::reactive_low_power(FRAME);
-        *settings = WinitSettings { focused_mode: mode, unfocused_mode: mode };
-    }
 }
 
 fn tell_update(updated: On<RigUpdated>, documents: Query<&OpenDocument>, mut notices: MessageWriter<Notice>) {

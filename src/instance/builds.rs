@@ -135,7 +135,12 @@ pub(super) enum Work {
     Content { id: Id, content: Vec<u8>, modules: Arc<Modules> },
     /// Forgets a template.
     Forget { id: Id },
+    /// Takes the function that lets an app which sleeps run a frame.
+    Wake(Wake),
 }
+
+/// Function that is called after each result.
+pub(super) type Wake = Box<dyn Fn() + Send>;
 
 /// Result of some work.
 pub(super) struct Outcome {
@@ -155,7 +160,8 @@ impl Builds {
     pub fn start(look: Duration, patience: Duration) -> Self {
         let (work, received) = channel();
         let (told, outcomes) = channel();
-        let mut thread = BuildThread { templates: BTreeMap::new(), told, look, patience };
+        let answers = Answers { told, wake: None };
+        let mut thread = BuildThread { templates: BTreeMap::new(), answers, look, patience };
         if let Err(error) = thread::Builder::new().name("rig templates".to_owned()).spawn(move || thread.run(&received))
         {
             error!("templates cannot be built, because no thread can be started: {error}");
@@ -174,9 +180,25 @@ impl Builds {
     }
 }
 
+/// Way of results to the app.
+struct Answers {
+    told: Sender<Outcome>,
+    wake: Option<Wake>,
+}
+
+impl Answers {
+    fn tell(&self, outcome: Outcome) {
+        // Nobody hears it once the app has ended.
+        let _ = self.told.send(outcome);
+        if let Some(wake) = &self.wake {
+            wake();
+        }
+    }
+}
+
 struct BuildThread {
     templates: BTreeMap<Id, TemplateBuild>,
-    told: Sender<Outcome>,
+    answers: Answers,
     look: Duration,
     patience: Duration,
 }
@@ -220,7 +242,7 @@ impl BuildThread {
             let patience = self.patience;
             for (id, kept) in &mut self.templates {
                 if let Some(outcome) = kept.look(*id, patience) {
-                    let _ = self.told.send(outcome);
+                    self.answers.tell(outcome);
                 }
             }
         }
@@ -254,9 +276,13 @@ impl BuildThread {
                 self.templates.remove(&id);
                 None
             }
+            Work::Wake(wake) => {
+                self.answers.wake = Some(wake);
+                None
+            }
         };
         if let Some(outcome) = outcome {
-            let _ = self.told.send(outcome);
+            self.answers.tell(outcome);
         }
     }
 

@@ -18,14 +18,14 @@ use rigsmith::{
         follow::{FollowPlugin, OfferAnswer},
         notice::Severity,
     },
-    instance::{RigSource, UpdateOffer},
+    instance::{RigSource, RigTemplates, UpdateOffer},
     plugins::document::{Change, EditRequest},
     prelude::*,
     rig::{RestTransform, RigEdit, operations::Operation, update::Take},
 };
 
 use super::{
-    bench::{AppBench, save_whole, wait_with},
+    bench::{AppBench, HANG, save_whole, wait_with},
     part_fields::PART,
     window_app::Notices,
 };
@@ -160,6 +160,22 @@ fn a_changed_template_is_offered_and_taken_over_as_one_step() {
     window.save("0.4, 0)", "0.6, 0)");
     window.until("the next offer", |window| window.offer().is_some());
     assert_eq!(window.offer().map(|offer| offer.changes.len()), Some(2));
+}
+
+/// A window that sleeps runs no frames until the file has changed, and the offer is there with those that follow.
+#[test]
+fn a_changed_template_wakes_a_window_that_sleeps() {
+    let mut window = Window::new();
+    let (wakes, woken) = std::sync::mpsc::channel();
+    window.base.app.world().resource::<RigTemplates>().set_wake(move || {
+        let _ = wakes.send(());
+    });
+    window.save("0.3, 0)", "0.5, 0)");
+    woken.recv_timeout(HANG).expect("the window is woken");
+    (0..4).for_each(|_| window.frame());
+    assert!(window.offer().is_some(), "{:?}", window.notices.list);
+    window.settle();
+    assert!(woken.try_recv().is_err(), "it sleeps on while the file stays as it is");
 }
 
 #[test]
