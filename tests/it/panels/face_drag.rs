@@ -1,6 +1,12 @@
 //! Work of a drag in the Face panel: frames visit no points of the head, however many it has.
 
-use std::{sync::Arc, time::Duration};
+use std::{
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::Duration,
+};
 
 use bevy::{
     ecs::schedule::SingleThreadedExecutor,
@@ -135,19 +141,28 @@ fn frames_that_renew_pictures_visit_no_points() {
     assert_eq!([head, finer].map(visits_of_new_pictures), [0, 0]);
 }
 
-/// Tasks that keep every thread of the background busy, so that nothing else is computed there, until what they wait for is dropped.
-fn busy_threads() -> (Arc<()>, Vec<Task<()>>) {
+/// Threads of the background, all kept busy until `held` is dropped, so that nothing else is computed there.
+/// One test at a time keeps them: two that had half of them each would wait for each other.
+fn busy_threads() -> (Arc<()>, (Vec<Task<()>>, MutexGuard<'static, ()>)) {
+    static KEPT: Mutex<()> = Mutex::new(());
+    let one = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     let (pool, held) = (AsyncComputeTaskPool::get(), Arc::new(()));
+    let busy = Arc::new(AtomicUsize::new(0));
     let waits = |_| -> Task<()> {
-        let held = Arc::downgrade(&held);
+        let (held, busy) = (Arc::downgrade(&held), busy.clone());
         pool.spawn(async move {
+            busy.fetch_add(1, Ordering::SeqCst);
             while held.strong_count() > 0 {
                 std::thread::sleep(Duration::from_millis(1));
             }
         })
     };
     let threads: Vec<Task<()>> = (0..pool.thread_num()).map(waits).collect();
-    (held, threads)
+    // A task that is only queued holds no thread: what is spawned later may overtake it.
+    while busy.load(Ordering::SeqCst) < pool.thread_num() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    (held, (threads, one))
 }
 
 /// An undo that comes while the step of a slider is computed is about that step.
