@@ -69,9 +69,12 @@ fn read_explicit(explicit: &ExplicitText, first_line: usize) -> Result<Template,
     let (text, mut notes) = (&*explicit.text, Vec::new());
     let fields = scan::fields(text);
     let known = TEMPLATE.readable(text, &fields, first_line, &mut notes)?;
+    let places = Places::new(text, &fields, &[]);
+    // Fields make room for what is read.
+    drop(fields);
     let file = ron_options().from_str(&known).map_err(|error| SourceError::from_ron(text, &error))?;
     let mut faults = Vec::new();
-    let template = build(&Places::new(text, &fields, &[]), file, notes, &mut faults);
+    let template = build(&places, file, notes, &mut faults);
     match faults.into_iter().next() {
         Some(fault) => Err(fault),
         None => Ok(in_text(explicit, template).with_unbound_told()),

@@ -79,14 +79,17 @@ pub(super) fn chains(
 /// Places in the text of the elements of a list of the file.
 fn elements<'p>(places: &'p Places, list: &'static str) -> impl Iterator<Item = usize> + 'p {
     let is_name = move |field: &&Field| {
-        let parent = field.parent.map(|parent| places.fields[parent].name);
+        let parent = field.parent.map(|parent| places.fields()[parent].name);
         field.depth == 3 && field.name == "name" && parent == Some(list) && !places.is_inside_left_out(field)
     };
-    places.fields.iter().filter(is_name).map(|field| field.start)
+    places.fields().iter().filter(is_name).map(|field| field.start)
 }
 
 /// Sockets of a file, without their joints.
 pub(super) fn sockets(places: &Places, files: Vec<SocketFile>, faults: &mut Vec<SourceError>) -> Vec<PartSocket> {
+    if files.is_empty() {
+        return Vec::new();
+    }
     let mut offsets = elements(places, "sockets");
     let mut found: Vec<PartSocket> = Vec::with_capacity(files.len());
     let mut names: HashSet<String> = HashSet::with_capacity(files.len());
@@ -125,6 +128,9 @@ pub(super) fn place_sockets(rig: &Rig, sockets: &mut Vec<PartSocket>, text: &str
 
 /// Options of a file.
 pub(super) fn options(places: &Places, files: Vec<OptionFile>, faults: &mut Vec<SourceError>) -> Vec<PartOption> {
+    if files.is_empty() {
+        return Vec::new();
+    }
     let mut offsets = elements(places, "options");
     let mut found: Vec<PartOption> = Vec::with_capacity(files.len());
     let mut names: HashSet<String> = HashSet::with_capacity(files.len());
@@ -149,11 +155,14 @@ pub(super) fn options(places: &Places, files: Vec<OptionFile>, faults: &mut Vec<
 
 /// The part instances of a file, with their places in the text.
 pub(super) fn instances(places: &Places, parts: Vec<PartFile>, faults: &mut Vec<SourceError>) -> Vec<PartInstance> {
+    if parts.is_empty() {
+        return Vec::new();
+    }
     let is_part = |field: &&Field| {
-        let parent = field.parent.map(|parent| places.fields[parent].name);
+        let parent = field.parent.map(|parent| places.fields()[parent].name);
         field.depth == 3 && field.name == "part" && parent == Some("parts") && !places.is_inside_left_out(field)
     };
-    let mut offsets = places.fields.iter().filter(is_part).map(|field| field.start);
+    let mut offsets = places.fields().iter().filter(is_part).map(|field| field.start);
     let mut seen = HashSet::new();
     let mut found = Vec::with_capacity(parts.len());
     for file in parts {

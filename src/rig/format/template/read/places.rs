@@ -9,7 +9,10 @@ use std::{
 use super::super::file::known_names;
 use crate::rig::{
     SourceError, Uid,
-    format::{scan::Field, source::TextLines},
+    format::{
+        scan::{self, Field},
+        source::TextLines,
+    },
 };
 
 /// Length of a uid as text.
@@ -22,7 +25,9 @@ type UidText = [u8; DIGITS];
 /// proportion to the text.
 pub(super) struct Places<'a> {
     pub(super) text: &'a str,
-    pub(super) fields: &'a [Field<'a>],
+    has_parts: bool,
+    /// Fields of the text, which take several times its memory: they are scanned again for the first fault.
+    fields: OnceCell<Vec<Field<'a>>>,
     /// Elements of lists that are not read, because they are at fault, in their order and apart from one another.
     left_out: Vec<Range<usize>>,
     lines: OnceCell<TextLines<'a>>,
@@ -43,7 +48,7 @@ struct DeclaredUids {
 
 impl<'a> Places<'a> {
     /// Finder in a text with these fields, of which elements of lists are not read.
-    pub(super) fn new(text: &'a str, fields: &'a [Field<'a>], left_out: &[Range<usize>]) -> Self {
+    pub(super) fn new(text: &'a str, fields: &[Field], left_out: &[Range<usize>]) -> Self {
         let mut sorted = left_out.to_vec();
         sorted.sort_unstable_by_key(|range| (range.start, range.end));
         let mut apart: Vec<Range<usize>> = Vec::with_capacity(sorted.len());
@@ -53,9 +58,14 @@ impl<'a> Places<'a> {
                 None => apart.push(range),
             }
         }
+        let is_of_part = |field: &Field| {
+            let list = field.parent.map(|parent| &fields[parent]);
+            field.depth == 3 && list.is_some_and(|list| list.depth == 1 && list.name == "parts")
+        };
         Self {
             text,
-            fields,
+            has_parts: fields.iter().any(is_of_part),
+            fields: OnceCell::new(),
             left_out: apart,
             lines: OnceCell::new(),
             declared: OnceCell::new(),
@@ -70,8 +80,8 @@ impl<'a> Places<'a> {
             return false;
         }
         let listed = || {
-            self.count(self.fields.len());
-            let left_out = self.fields.iter().filter(|field| field.name == "uid" && self.is_inside_left_out(field));
+            self.count(self.fields().len());
+            let left_out = self.fields().iter().filter(|field| field.name == "uid" && self.is_inside_left_out(field));
             left_out
                 .filter_map(|field| first_digits(self.value(field).trim_start_matches([' ', '"'])))
                 .collect::<HashSet<_>>()
@@ -81,11 +91,12 @@ impl<'a> Places<'a> {
 
     /// True if the template uses parts.
     pub(super) fn has_parts(&self) -> bool {
-        let is_of_part = |field: &Field| {
-            let list = field.parent.map(|parent| &self.fields[parent]);
-            field.depth == 3 && list.is_some_and(|list| list.depth == 1 && list.name == "parts")
-        };
-        self.fields.iter().any(is_of_part)
+        self.has_parts
+    }
+
+    /// Fields of the text.
+    pub(super) fn fields(&self) -> &[Field<'a>] {
+        self.fields.get_or_init(|| scan::fields(self.text))
     }
 
     /// True for a field in an element that is not read.
@@ -102,9 +113,9 @@ impl<'a> Places<'a> {
     pub(super) fn error(&self, uid: Uid, nth: usize, name: &str, message: String) -> SourceError {
         let declared = self.declared.get_or_init(|| self.declarations());
         let things = first_digits(&uid.to_string()).and_then(|digits| declared.by_uid.get(&digits));
-        let thing = things.and_then(|things| things.get(nth).or(things.first())).map(|thing| &self.fields[*thing]);
+        let thing = things.and_then(|things| things.get(nth).or(things.first())).map(|thing| &self.fields()[*thing]);
         let of_struct = thing.and_then(|thing| declared.by_bracket.get(&thing.bracket));
-        let mut fields = of_struct.into_iter().flatten().map(|field| &self.fields[*field]);
+        let mut fields = of_struct.into_iter().flatten().map(|field| &self.fields()[*field]);
         let field = fields.find(|field| {
             self.count(1);
             field.name == name
@@ -118,10 +129,10 @@ impl<'a> Places<'a> {
     }
 
     fn declarations(&self) -> DeclaredUids {
-        self.count(2 * self.fields.len());
+        self.count(2 * self.fields().len());
         let mut declared = DeclaredUids::default();
-        for (number, field) in self.fields.iter().enumerate() {
-            if field.depth <= 1 || field.name != "uid" || known_names(self.fields, field).is_none() {
+        for (number, field) in self.fields().iter().enumerate() {
+            if field.depth <= 1 || field.name != "uid" || known_names(self.fields(), field).is_none() {
                 continue;
             }
             let Some(mut digits) = first_digits(self.value(field).trim_start().trim_start_matches('"')) else {
@@ -131,7 +142,7 @@ impl<'a> Places<'a> {
             declared.by_uid.entry(digits).or_default().push(number);
             declared.by_bracket.entry(field.bracket).or_default();
         }
-        for (number, field) in self.fields.iter().enumerate() {
+        for (number, field) in self.fields().iter().enumerate() {
             if let Some(fields) = declared.by_bracket.get_mut(&field.bracket) {
                 fields.push(number);
             }
@@ -156,7 +167,6 @@ fn first_digits(text: &str) -> Option<UidText> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::format::scan;
 
     #[test]
     fn faults_of_all_declarations_look_at_each_field_a_few_times() {

@@ -72,6 +72,10 @@ fn survey(source: &str) -> Result<(Template, Vec<SourceError>), Vec<SourceError>
     survey.blank.extend(unknown.iter().map(|field| field.start..field.end));
     let Some(file) = survey.read(&readable, &mut faults) else { return Err(in_source(&explicit, faults)) };
     let places = Places::new(text, &fields, &survey.left_out);
+    // The first fault scans the fields again.
+    drop(survey);
+    drop(unknown);
+    drop(fields);
     let template = build(&places, file, notes, &mut faults);
     Ok((in_text(&explicit, template), in_source(&explicit, faults)))
 }
