@@ -216,7 +216,7 @@ fn with_fields_of_parts(
     choices: &Choices,
 ) -> FieldUpdate {
     let sides = Sides::of(base, now, file);
-    let merged = merge_parts(sides.base.as_ref(), &now.content, &sides.file, choices);
+    let merged = merge_parts(sides.base.as_deref(), &now.content, &sides.file, choices);
     let refitted =
         if merged.differs { with_merged_fields(disk, base, now, file, (&sides, merged), choices) } else { None };
     refitted.unwrap_or_else(|| FieldUpdate {

@@ -10,8 +10,8 @@ use bevy::{math::Affine3, prelude::*};
 use crate::{
     mesh::model::Weights,
     rig::{
-        AttributeValues, FaceCut, GroupData, JointData, PoseOffset, RestTransform, Revision, RigInput, RigJoint,
-        SelectionSet, StoredPose, Uid,
+        AttributeValues, FaceCut, GroupData, PoseOffset, RestTransform, Revision, RigInput, RigJoint, SelectionSet,
+        StoredPose, Uid,
         animation::RigClip,
         group_members::GroupMembers,
         label_index::LabelIndex,
@@ -292,17 +292,14 @@ impl Rig {
         RestTransform::from_affine(if local.is_finite() { &local } else { global })
     }
 
-    /// Replaces all joints: by uid the data and the parent. `order` gives the order of children of a joint, or of the
-    /// roots; those that it does not name come last. A joint without its parent is a root, and of joints that stand below
-    /// each other the first by uid becomes one.
-    pub(super) fn set_joints(
-        &mut self,
-        joints: BTreeMap<Uid, (JointData, Option<Uid>)>,
-        order: impl Fn(Option<Uid>) -> Vec<Uid>,
-    ) {
+    /// Replaces all joints: by uid those with their data and their parents, whatever their children. `order` gives the order
+    /// of children of a joint, or of the roots; those that it does not name come last. A joint without its parent is a root,
+    /// and of joints that stand below each other the first by uid becomes one. Joints whose place stays as it is in another
+    /// rig stay shared with that.
+    pub(super) fn set_joints(&mut self, joints: BTreeMap<Uid, Arc<RigJoint>>, order: impl Fn(Option<Uid>) -> Vec<Uid>) {
         let mut parents: BTreeMap<Uid, Option<Uid>> = joints
             .iter()
-            .map(|(uid, (_, parent))| (*uid, parent.filter(|parent| joints.contains_key(parent))))
+            .map(|(uid, joint)| (*uid, joint.parent.filter(|parent| joints.contains_key(parent))))
             .collect();
         for circle in circles(&parents) {
             parents.insert(circle[0], None);
@@ -322,11 +319,15 @@ impl Rig {
         self.tags.clear();
         self.joints.clear();
         self.roots = children.remove(&None).unwrap_or_default();
-        for (uid, (data, _)) in joints {
-            self.tags.extend(data.tags.iter().map(|tag| (tag.uid, uid)));
+        for (uid, mut joint) in joints {
+            self.tags.extend(joint.data.tags.iter().map(|tag| (tag.uid, uid)));
             let below = children.remove(&Some(uid)).unwrap_or_default();
             let parent = parents.get(&uid).copied().flatten();
-            self.joints.insert(uid, Arc::new(RigJoint { data, parent, children: below }));
+            if joint.parent != parent || joint.children != below {
+                let own = Arc::make_mut(&mut joint);
+                (own.parent, own.children) = (parent, below);
+            }
+            self.joints.insert(uid, joint);
         }
     }
 

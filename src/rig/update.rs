@@ -19,16 +19,19 @@ mod same_parts;
 mod shown_values;
 mod tags;
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::{
+    collections::{BTreeMap, HashMap, HashSet},
+    sync::Arc,
+};
 
 use super::{
-    GroupData, JointData, Rig, RigInput, StoredPose, TagData, Uid, document::circles, template_copy::TemplateCopy,
+    GroupData, Rig, RigInput, RigJoint, StoredPose, TagData, Uid, document::circles, template_copy::TemplateCopy,
 };
 use copies::{PlacedCopy, is_host};
 use fields::{Field, about_fields, group_fields, input_fields, joint_fields, joint_title, pose_fields};
-use order::merged_order;
+use order::{all, merged_order};
 use shown_values::{NamesOfBoth, shown_values};
-use tags::TagsByUid;
+use tags::{TagsByUid, set_tags};
 
 pub use change::{Change, ChangeKind};
 pub use choices::{Choices, Take};
@@ -238,61 +241,67 @@ impl Merge<'_> {
         let walked = |rig: Option<&Rig>| uids(rig.into_iter().flat_map(Rig::walk), |joint| joint.data.uid);
         let lists = [walked(base), walked(Some(now)), walked(Some(file))];
         let groups: HashSet<Uid> = self.rig.groups.iter().map(|group| group.uid).collect();
-        let mut joints: BTreeMap<Uid, (JointData, Option<Uid>)> = BTreeMap::new();
+        let mut joints: BTreeMap<Uid, Arc<RigJoint>> = BTreeMap::new();
         let mut removed = Vec::new();
         for uid in all(&lists) {
             let label = [now, file].into_iter().find_map(|rig| rig.joint(uid)?.data.label.clone());
             let title = label.unwrap_or_else(|| uid.to_string());
             let named = ChangeSubject { uid, joint: Some(&title), tag: None, prefix: "" };
-            let whole = |rig: &Rig| rig.joint(uid).map(|joint| (joint.data.clone(), joint.parent));
-            let (was, is, theirs) = (base.and_then(whole), whole(now), whole(file));
-            let fields = joint_fields(now, file);
-            match self.fate(&fields, (was.as_ref(), is.as_ref(), theirs.as_ref()), &named) {
+            let was = base.and_then(|base| base.joints.get(&uid));
+            let sides = (was, now.joints.get(&uid), file.joints.get(&uid));
+            match self.fate(&joint_fields(now, file), sides, &named) {
                 Fate::Absent => {}
                 Fate::Removed => removed.push(uid),
-                Fate::Added((mut data, parent)) => {
+                Fate::Added(mut joint) => {
                     // Tags that are on another joint now come from there, with what was changed of them.
-                    for tag in std::mem::take(&mut data.tags) {
+                    let mut tags = Vec::with_capacity(joint.data.tags.len());
+                    for tag in &joint.data.tags {
                         if now.tags.contains_key(&tag.uid) {
-                            data.tags.extend(self.tag(uid, &title, tag.uid));
+                            tags.extend(self.tag(uid, &title, tag.uid));
                         } else if self.placed.insert(tag.uid) {
-                            data.tags.push(tag);
+                            tags.push(tag.clone());
                         }
                     }
-                    joints.insert(uid, (data, parent));
+                    set_tags(&mut joint, tags);
+                    joints.insert(uid, joint);
                 }
-                Fate::Kept((mut data, parent)) => {
-                    data.tags = self.tags(uid, &title);
-                    joints.insert(uid, (data, parent));
+                Fate::Kept(mut joint) => {
+                    set_tags(&mut joint, self.tags(uid, &title));
+                    joints.insert(uid, joint);
                 }
             }
         }
         // Whoever is removed stays as long as something of somebody else hangs on it.
         let mut needed: HashSet<Uid> = HashSet::new();
-        for (_, parent) in joints.values() {
-            let mut above = *parent;
+        for joint in joints.values() {
+            let mut above = joint.parent;
             while let Some(uid) = above.filter(|uid| !joints.contains_key(uid) && needed.insert(*uid)) {
                 above = now.joint(uid).and_then(|joint| joint.parent);
             }
         }
         let mut stays = HashSet::new();
         for uid in removed.into_iter().filter(|uid| needed.contains(uid)) {
-            if let Some(joint) = now.joint(uid) {
-                let mut data = joint.data.clone();
-                data.tags.retain(|tag| self.placed.insert(tag.uid));
-                joints.insert(uid, (data, joint.parent));
+            if let Some(mut joint) = now.joints.get(&uid).cloned() {
+                let tags = joint.data.tags.iter().filter(|tag| self.placed.insert(tag.uid)).cloned().collect();
+                set_tags(&mut joint, tags);
+                joints.insert(uid, joint);
                 stays.insert(uid);
             }
         }
         let is_removal = |change: &Change| change.kind == ChangeKind::Removed && !change.conflict;
         self.changes.retain(|change| !(is_removal(change) && stays.contains(&change.uid)));
-        for (data, parent) in joints.values_mut() {
-            data.group = data.group.filter(|group| groups.contains(group));
-            *parent = parent.filter(|parent| *parent != data.uid);
+        for joint in joints.values_mut() {
+            if joint.data.group.is_some_and(|group| !groups.contains(&group)) {
+                Arc::make_mut(joint).data.group = None;
+            }
+            if joint.parent == Some(joint.data.uid) {
+                Arc::make_mut(joint).parent = None;
+            }
         }
         joints.retain(|uid, _| !self.is_other_kind(*uid, file.joint(*uid).is_some()));
-        for (data, _) in joints.values_mut() {
-            data.tags.retain(|tag| !self.is_other_kind(tag.uid, file.tags.contains_key(&tag.uid)));
+        let is_kept = |tag: &TagData| !self.is_other_kind(tag.uid, file.tags.contains_key(&tag.uid));
+        for joint in joints.values_mut().filter(|joint| !joint.data.tags.iter().all(is_kept)) {
+            Arc::make_mut(joint).data.tags.retain(is_kept);
         }
         self.untangle(&mut joints);
         self.rig.set_joints(joints, |parent| {
@@ -307,17 +316,17 @@ impl Merge<'_> {
 
     /// Parents that each side may have, and both together may not, because a joint would hang below itself: a conflict of
     /// every joint of the circle.
-    fn untangle(&mut self, joints: &mut BTreeMap<Uid, (JointData, Option<Uid>)>) {
+    fn untangle(&mut self, joints: &mut BTreeMap<Uid, Arc<RigJoint>>) {
         let (now, file) = (self.now, self.file);
         let of = |rig: &Rig, uid: Uid| rig.joint(uid).map(|joint| joint.parent);
         // One side's parents are no circle; those that people choose joint by joint may be.
         let mut is_chosen = true;
         loop {
-            let parents = joints.iter().map(|(uid, (_, parent))| (*uid, *parent)).collect();
+            let parents = joints.iter().map(|(uid, joint)| (*uid, joint.parent)).collect();
             let circles: Vec<Uid> = circles(&parents).into_iter().flatten().collect();
             let mut is_changed = false;
             for uid in circles {
-                let (Some(mine), Some(theirs), Some((_, parent))) = (of(now, uid), of(file, uid), joints.get_mut(&uid))
+                let (Some(mine), Some(theirs), Some(joint)) = (of(now, uid), of(file, uid), joints.get_mut(&uid))
                 else {
                     continue;
                 };
@@ -327,7 +336,10 @@ impl Merge<'_> {
                 self.parent_conflict(uid, mine, theirs);
                 let take = if is_chosen { self.choices.of(uid, Some("parent")) } else { self.choices.take };
                 let taken = if take == Take::Theirs { theirs } else { mine };
-                is_changed |= std::mem::replace(parent, taken) != taken;
+                if joint.parent != taken {
+                    Arc::make_mut(joint).parent = taken;
+                    is_changed = true;
+                }
             }
             if !is_changed && !std::mem::take(&mut is_chosen) {
                 return;
@@ -483,10 +495,4 @@ impl ChangeSubject<'_> {
 
 fn uids<'a, T: 'a>(list: impl IntoIterator<Item = &'a T>, uid: impl Fn(&T) -> Uid) -> Vec<Uid> {
     list.into_iter().map(uid).collect()
-}
-
-/// Uids of the lists, without repeats: those of the file first, then of the rig now, then of the base.
-fn all([base, now, file]: &[Vec<Uid>; 3]) -> Vec<Uid> {
-    let mut seen = HashSet::new();
-    file.iter().chain(now).chain(base).copied().filter(|uid| seen.insert(*uid)).collect()
 }

@@ -2,7 +2,10 @@
 //!
 //! A part is called by its way from the template. So one file has two names in two folders, and one name is two files.
 
-use std::path::{Path, PathBuf};
+use std::{
+    borrow::Cow,
+    path::{Path, PathBuf},
+};
 
 use super::{Disk, FoundPart, TemplateVersion};
 use crate::{
@@ -11,15 +14,15 @@ use crate::{
 };
 
 /// Versions that are compared with a template, with the parts called as that would call them.
-pub(super) struct Sides {
-    pub base: Option<TemplateWithParts>,
-    pub file: TemplateWithParts,
+pub(super) struct Sides<'v> {
+    pub base: Option<Cow<'v, TemplateWithParts>>,
+    pub file: Cow<'v, TemplateWithParts>,
 }
 
-impl Sides {
-    pub(super) fn of(base: Option<&TemplateVersion>, now: &TemplateVersion, file: &TemplateVersion) -> Self {
+impl<'v> Sides<'v> {
+    pub(super) fn of(base: Option<&'v TemplateVersion>, now: &TemplateVersion, file: &'v TemplateVersion) -> Self {
         let base = base.map(|base| (base, base.called_in(now, None)));
-        let called = file.called_in(now, base.as_ref().map(|(base, called)| (*base, called)));
+        let called = file.called_in(now, base.as_ref().map(|(base, called)| (*base, &**called)));
         Self { base: base.map(|(_, called)| called), file: called }
     }
 }
@@ -36,7 +39,10 @@ impl TemplateVersion {
 
     /// The content with the parts called as `now` calls them, or would call them. What is the same as in the `base`, which is
     /// given with its content as `now` would call it, is called the same.
-    fn called_in(&self, now: &Self, base: Option<(&Self, &TemplateWithParts)>) -> TemplateWithParts {
+    fn called_in<'v>(&'v self, now: &Self, base: Option<(&Self, &TemplateWithParts)>) -> Cow<'v, TemplateWithParts> {
+        if self.parts().is_empty() {
+            return Cow::Borrowed(&self.content);
+        }
         let mut content = self.content.clone();
         for part in &mut content.template.parts {
             let same = |parts: &[PartInstance]| parts.iter().position(|other| other.uid == part.uid);
@@ -51,7 +57,7 @@ impl TemplateVersion {
                 .and_then(|(_, _, content)| Some(content.template.parts[same(&content.template.parts)?].part.clone()));
             part.part = called.unwrap_or_else(|| self.name_from(now, &part.part));
         }
-        content
+        Cow::Owned(content)
     }
 
     /// True if a part of this version is in the file that a part of another version is in.

@@ -1,9 +1,12 @@
 //! Versions of a template as they stand in a rig that has copies of it.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::{
+    collections::{BTreeMap, HashMap, HashSet},
+    sync::Arc,
+};
 
 use crate::rig::{
-    GroupData, JointData, Rig, RigInput, TagKind, Uid,
+    GroupData, JointData, Rig, RigInput, RigJoint, TagKind, Uid,
     reference::{RigNameIndex, refresh_names},
     remap::Remap,
     template_copy::TemplateCopy,
@@ -163,7 +166,7 @@ impl NamesHere<'_> {
 /// Joints of a placed version.
 #[derive(Default)]
 struct PlacedJoints {
-    joints: BTreeMap<Uid, (JointData, Option<Uid>)>,
+    joints: BTreeMap<Uid, Arc<RigJoint>>,
     children: HashMap<Option<Uid>, Vec<Uid>>,
 }
 
@@ -171,7 +174,7 @@ impl PlacedJoints {
     /// Adds a joint of the version. It takes the place of one that is there as what another one hangs on.
     fn add(&mut self, data: JointData, parent: Option<Uid>) {
         let uid = data.uid;
-        if self.joints.insert(uid, (data, parent)).is_none() {
+        if self.joints.insert(uid, Arc::new(RigJoint { data, parent, children: Vec::new() })).is_none() {
             self.children.entry(parent).or_default().push(uid);
         }
     }

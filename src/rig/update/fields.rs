@@ -1,9 +1,9 @@
 //! Fields of what an update compares: how each is written, and how it is taken over.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, sync::Arc};
 
 use crate::rig::{
-    GroupData, JointData, Rig, RigAbout, RigInput, StoredPose, TagData, TagKind, Uid,
+    GroupData, JointData, Rig, RigAbout, RigInput, RigJoint, StoredPose, TagData, TagKind, Uid,
     format::{
         template::{option_text, quaternion, quoted, socket_text, vector},
         tree::Tree,
@@ -119,40 +119,50 @@ pub(super) fn joint_title(now: &Rig, file: &Rig, uid: Uid) -> String {
 }
 
 /// Fields of a joint and its parent. Others are told by their names in the rig now, else in the file.
-pub(super) fn joint_fields<'a>(now: &'a Rig, file: &'a Rig) -> Vec<Field<'a, (JointData, Option<Uid>)>> {
-    type Joint = (JointData, Option<Uid>);
-    let joint = move |uid: Uid| joint_title(now, file, uid);
+pub(super) fn joint_fields<'a>(now: &'a Rig, file: &'a Rig) -> Vec<Field<'a, Arc<RigJoint>>> {
+    type Joint = Arc<RigJoint>;
+    let titled = move |uid: Uid| joint_title(now, file, uid);
     let group = move |uid: Uid| {
         let name = [now, file].into_iter().find_map(|rig| Some(rig.group(uid)?.name.clone()));
         format!("{}#{uid}", name.unwrap_or_default())
     };
-    let face = |(data, _): &Joint| data.face.as_ref().map(|face| format!("{face:?}"));
-    let rotation = |(data, _): &Joint| Some(quaternion(data.rest.rotation));
+    let face = |a: &Joint| a.data.face.as_ref().map(|face| format!("{face:?}"));
+    let parent = |a: &mut Joint, b: &Joint| Arc::make_mut(a).parent = b.parent;
     vec![
-        field("label", |(a, _): &Joint| a.label.as_deref().map(quoted), |(a, _), (b, _)| a.label.clone_from(&b.label)),
-        field("parent", move |(_, parent): &Joint| parent.map(joint), |(_, a), (_, b)| *a = *b),
-        field("group", move |(a, _): &Joint| a.group.map(group), |(a, _), (b, _)| a.group = b.group),
-        field("mirror", move |(a, _): &Joint| a.mirror.map(joint), |(a, _), (b, _)| a.mirror = b.mirror),
-        field("kind", |(a, _): &Joint| Some(format!("{:?}", a.kind)), |(a, _), (b, _)| a.kind = b.kind),
-        field("locked", |(a, _): &Joint| Some(a.locked.to_string()), |(a, _), (b, _)| a.locked = b.locked),
+        field("label", |a: &Joint| a.data.label.as_deref().map(quoted), |a, b| own(a).label.clone_from(&b.data.label)),
+        field("parent", move |a: &Joint| a.parent.map(titled), parent),
+        field("group", move |a: &Joint| a.data.group.map(group), |a, b| own(a).group = b.data.group),
+        field("mirror", move |a: &Joint| a.data.mirror.map(titled), |a, b| own(a).mirror = b.data.mirror),
+        field("kind", |a: &Joint| Some(format!("{:?}", a.data.kind)), |a, b| own(a).kind = b.data.kind),
+        field("locked", |a: &Joint| Some(a.data.locked.to_string()), |a, b| own(a).locked = b.data.locked),
         rounded(
             field(
                 "translation",
-                |(a, _): &Joint| Some(vector(a.rest.translation)),
-                |(a, _), (b, _)| a.rest.translation = b.rest.translation,
+                |a: &Joint| Some(vector(a.data.rest.translation)),
+                |a, b| own(a).rest.translation = b.data.rest.translation,
             ),
-            |(a, _): &Joint| a.rest.translation.to_array().to_vec(),
+            |a: &Joint| a.data.rest.translation.to_array().to_vec(),
         ),
-        rounded(field("rotation", rotation, |(a, _), (b, _)| a.rest.rotation = b.rest.rotation), |(a, _): &Joint| {
-            a.rest.rotation.to_array().to_vec()
-        }),
         rounded(
-            field("scale", |(a, _): &Joint| Some(vector(a.rest.scale)), |(a, _), (b, _)| a.rest.scale = b.rest.scale),
-            |(a, _): &Joint| a.rest.scale.to_array().to_vec(),
+            field(
+                "rotation",
+                |a: &Joint| Some(quaternion(a.data.rest.rotation)),
+                |a, b| own(a).rest.rotation = b.data.rest.rotation,
+            ),
+            |a: &Joint| a.data.rest.rotation.to_array().to_vec(),
         ),
-        field("face", face, |(a, _), (b, _)| a.face.clone_from(&b.face)),
-        Field { is_own: false, ..field("tags", |(a, _): &Joint| Some(format!("{:?}", a.tags)), |_, _| {}) },
+        rounded(
+            field("scale", |a: &Joint| Some(vector(a.data.rest.scale)), |a, b| own(a).rest.scale = b.data.rest.scale),
+            |a: &Joint| a.data.rest.scale.to_array().to_vec(),
+        ),
+        field("face", face, |a, b| own(a).face.clone_from(&b.data.face)),
+        Field { is_own: false, ..field("tags", |a: &Joint| Some(format!("{:?}", a.data.tags)), |_, _| {}) },
     ]
+}
+
+/// Data of a joint that gets values of its own; another rig may share it until then.
+fn own(joint: &mut Arc<RigJoint>) -> &mut JointData {
+    &mut Arc::make_mut(joint).data
 }
 
 /// Module or kind of feature, and the name that the tag gives.

@@ -39,6 +39,12 @@ pub(super) fn merged_order(base: Option<&Vec<Uid>>, now: &[Uid], file: &[Uid]) -
     merged
 }
 
+/// Uids of the lists, without repeats: those of the file first, then of the rig now, then of the base.
+pub(super) fn all([base, now, file]: &[Vec<Uid>; 3]) -> Vec<Uid> {
+    let mut seen = HashSet::new();
+    file.iter().chain(now).chain(base).copied().filter(|uid| seen.insert(*uid)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,7 +3,10 @@
 //! What is gone is known by all that its counterpart has in common with it, so that time grows with the number of things that
 //! are renamed, not with that of their pairs.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::{
+    collections::{BTreeSet, HashMap, HashSet},
+    sync::Arc,
+};
 
 use super::{Change, ChangeKind, fields::tag_title};
 use crate::rig::{
@@ -386,7 +389,10 @@ pub(super) fn with_uids(rig: &Rig, uids: HashMap<Uid, Uid>) -> Rig {
     let before: HashMap<Uid, Uid> = uids.iter().map(|(from, to)| (*to, *from)).collect();
     let remap = Remap { uids, ..Remap::default() };
     let get = |uid: Uid| remap.get(uid).unwrap_or(uid);
-    let joints = rig.walk().map(|joint| (get(joint.data.uid), (remap.joint(&joint.data), joint.parent.map(get))));
+    let joints = rig.walk().map(|joint| {
+        let (data, parent) = (remap.joint(&joint.data), joint.parent.map(get));
+        (get(joint.data.uid), Arc::new(RigJoint { data, parent, children: Vec::new() }))
+    });
     let mut out = rig.clone();
     out.groups.change_each(|group| group.uid = get(group.uid));
     out.inputs.change_each(|input| input.uid = get(input.uid));

@@ -1,6 +1,6 @@
 //! Tags in an update: their content, and the joints that they are on.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, sync::Arc};
 
 use super::{
     Change, ChangeKind, ChangeSubject, Fate, Merge,
@@ -8,7 +8,7 @@ use super::{
     fields::{joint_title, tag_fields, tag_title},
     shown_values::shown_values,
 };
-use crate::rig::{Rig, TagData, Uid};
+use crate::rig::{Rig, RigJoint, TagData, Uid};
 
 /// Tags of a rig with their joints. A joint may have thousands, of which [`Rig::find_tag`] looks at one after the other.
 pub(super) struct TagsByUid<'a>(HashMap<Uid, (Uid, &'a TagData)>);
@@ -56,6 +56,13 @@ impl Merge<'_> {
             Fate::Kept(tag) | Fate::Added(tag) => self.placed.insert(uid).then_some(tag),
             Fate::Absent | Fate::Removed => None,
         }
+    }
+}
+
+/// Gives a joint its tags. One that has them stays shared with its rig.
+pub(super) fn set_tags(joint: &mut Arc<RigJoint>, tags: Vec<TagData>) {
+    if joint.data.tags != tags {
+        Arc::make_mut(joint).data.tags = tags;
     }
 }
 

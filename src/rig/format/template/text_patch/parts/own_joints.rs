@@ -3,6 +3,7 @@
 use std::{
     borrow::Cow,
     collections::{BTreeSet, HashMap, HashSet},
+    sync::Arc,
 };
 
 use super::{
@@ -124,7 +125,7 @@ impl<'r> OwnThings<'r> {
             if let Some(own) = self.rigs.own.joint(data.uid).filter(|_| set_by_changes.contains(&data.uid)) {
                 (data.rest, data.label, data.locked) = (own.data.rest, own.data.label.clone(), own.data.locked);
             }
-            (data.uid, (data, joint.parent))
+            (data.uid, Arc::new(RigJoint { data, parent: joint.parent, children: Vec::new() }))
         };
         let joints = rig.walk().filter(|joint| is_own(joint.data.uid)).map(data).collect();
         let mut out = rig.clone();
