@@ -1,5 +1,6 @@
 //! Rigs at rest: where nothing is written to a rig without commands, its nodes are told and saved without an app, whose
-//! entities take several times the memory. Where frames pass, the rig is built before its app begins.
+//! entities take several times the memory. Frames move nothing of such a rig. One in a pose, or with uneven scales, is built
+//! before its app begins.
 
 use std::sync::Arc;
 
@@ -18,11 +19,11 @@ use crate::{
     solve::program::{CompileOptions, RigProgram, RigState},
 };
 
-/// True if the command asks for nothing but the rig, without meshes, and the rig has neither commands nor a pose. Unevenly
-/// scaled joints are left to an app, which corrects how Bevy shears what is below them.
+/// True if the command writes no values and binds no meshes, and the rig has neither commands nor a pose: whatever frames
+/// pass then, nothing moves. Unevenly scaled joints are left to an app, which corrects how Bevy shears what is below them.
 pub(super) fn is_at_rest(args: &PoseArgs, own: &[RigMesh], rig: &Rig) -> bool {
     let steps = &args.steps;
-    let is_plain = steps.set.is_empty() && steps.switches.is_empty() && steps.frames == 0;
+    let is_plain = steps.set.is_empty() && steps.switches.is_empty();
     let is_bare = !rig.has_tags() && rig.pose().is_empty();
     let is_even = |scale: Vec3| scale == Vec3::splat(scale.x);
     is_plain

@@ -36,18 +36,26 @@ const UNEVEN: &str = r#"(
 fn rigs_at_rest_are_told_and_saved_as_by_an_app() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in [("limbs", LIMBS), ("uneven", UNEVEN)] {
-        let rig = format!("{name}.rig.ron");
+        let [rig, tagged] = ["", "_tagged"].map(|which| format!("{name}{which}.rig.ron"));
         fs::write(folder.path().join(&rig), text).unwrap();
+        // A rig with a command, which does nothing here, is posed in an app.
+        let with_tag =
+            text.replacen("translation", "tags: [Command(module: \"control\", enabled: false)], translation", 1);
+        assert_ne!(with_tag, text);
+        fs::write(folder.path().join(&tagged), with_tag).unwrap();
         for ending in ["glb", "rig.ron"] {
-            let [rest, app] = ["rest", "app"].map(|which| format!("{name}_{which}.{ending}"));
-            let told = pose(folder.path(), &rig, &["-o", &rest]);
-            // Frames pass in an app alone.
-            let shown = pose(folder.path(), &rig, &["-o", &app, "--frames", "1"]);
-            assert!(told["nodes"].as_array().is_some_and(|nodes| nodes.len() >= 3), "{told}");
-            assert_eq!(told["nodes"], shown["nodes"], "{name}");
-            assert_eq!(told["error"], shown["error"], "{name}");
-            let [saved, wanted] = [rest, app].map(|file| fs::read(folder.path().join(file)).unwrap());
-            assert!(saved == wanted, "{name}.{ending}: other bytes");
+            let app = format!("{name}_app.{ending}");
+            let shown = pose(folder.path(), &tagged, &["-o", &app, "--frames", "1"]);
+            let wanted = fs::read(folder.path().join(app)).unwrap();
+            for frames in ["0", "1", "30"] {
+                let rest = format!("{name}_{frames}.{ending}");
+                let told = pose(folder.path(), &rig, &["-o", &rest, "--frames", frames]);
+                assert!(told["nodes"].as_array().is_some_and(|nodes| nodes.len() >= 3), "{told}");
+                assert_eq!(told["nodes"], shown["nodes"], "{name}");
+                assert_eq!(told["error"], shown["error"], "{name}");
+                let saved = fs::read(folder.path().join(rest)).unwrap();
+                assert!(saved == wanted, "{name}.{ending}: other bytes");
+            }
         }
     }
 }
