@@ -178,7 +178,7 @@ pub(super) fn inject(args: &InjectArgs) -> Result<Report, Failure> {
     if part.rig.about().kind == "part" {
         check_unoccupied(&rig, &instances, &part, &joints).map_err(|occupied| Failure::Input(Box::new(occupied)))?;
     }
-    let mut uids = uids_of(&[rig.clone(), part.rig.clone()]);
+    let mut uids = uids_of([&rig, &part.rig]);
     if let Some(along) = args.orient {
         orient(&mut rig, joints.clone(), along, &mut uids, &mut report)?;
     }
@@ -190,6 +190,7 @@ pub(super) fn inject(args: &InjectArgs) -> Result<Report, Failure> {
     limits::check_time("injecting the template")?;
     run(&mut rig, &operation, &mut uids, &mut report)?;
     limits::check_time("injecting the template")?;
+    drop(operation);
     let tags = count(&rig) - before;
     write(&args.output, rig, &[&args.rig], &mut report)?;
     report.line(format!("{} injected", counted(tags, "tag", "tags")));
@@ -207,7 +208,7 @@ pub(super) fn extract(args: &ExtractArgs) -> Result<Report, Failure> {
         joints = joints.iter().flat_map(|top| rig.hierarchy(*top).map(|joint| joint.data.uid)).collect();
     }
     limits::check_time("extracting the joints")?;
-    let mut uids = uids_of(std::slice::from_ref(&rig));
+    let mut uids = uids_of([&rig]);
     let name = stem(&args.output);
     let extracted = extract::extract(&rig, &joints, &name, args.new_uids.then_some(&mut uids));
     let Extraction { rig: mut out, left } = extracted.map_err(|error| Failure::Input(Box::new(error)))?;
@@ -229,9 +230,11 @@ pub(super) fn extract(args: &ExtractArgs) -> Result<Report, Failure> {
     Ok(report)
 }
 
+/// Carries out an operation on a rig, which is empty after a refusal.
 fn run(rig: &mut Rig, operation: &Operation, uids: &mut UidSource, report: &mut Report) -> Result<(), Failure> {
-    let outcome = operation.run(rig, uids, None).map_err(|error| Failure::Input(Box::new(error)))?;
-    report.notes(outcome.notes);
+    let changed = operation.run_on(std::mem::take(rig), uids).map_err(|error| Failure::Input(Box::new(error)))?;
+    *rig = changed.0;
+    report.notes(changed.1);
     Ok(())
 }
 
@@ -245,8 +248,8 @@ fn write(output: &Path, rig: Rig, sources: &[&Path], report: &mut Report) -> Res
 }
 
 /// A source of uids that follows from the rigs: the same for the same.
-fn uids_of(rigs: &[Rig]) -> UidSource {
-    let all = rigs.iter().flat_map(|rig| std::iter::once(rig.uid()).chain(rig.walk().map(|joint| joint.data.uid)));
+fn uids_of<'r>(rigs: impl IntoIterator<Item = &'r Rig>) -> UidSource {
+    let all = rigs.into_iter().flat_map(|rig| std::iter::once(rig.uid()).chain(rig.walk().map(|joint| joint.data.uid)));
     UidSource::seeded(all.fold(SEED, |seed, uid| seed.rotate_left(1) ^ uid.0))
 }
 

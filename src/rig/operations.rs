@@ -303,6 +303,15 @@ impl Operation {
         }
     }
 
+    /// The rig as [`run`](Self::run) changes it without live mirroring, and the notes. No edits are kept, which take more memory
+    /// than what they add; a rig that refuses the operation is dropped.
+    pub(crate) fn run_on(&self, mut rig: Rig, uids: &mut UidSource) -> Result<(Rig, Vec<String>), OperationError> {
+        let mut draft = Draft::without_record(&mut rig, uids);
+        self.run_in(&mut draft)?;
+        let notes = draft.finish().notes;
+        Ok((rig, notes))
+    }
+
     fn run_in(&self, draft: &mut Draft) -> Result<(), OperationError> {
         match self {
             Self::Place { position, parent } => place::chain(draft, std::slice::from_ref(position), *parent),

@@ -10,6 +10,8 @@ pub struct Draft<'a> {
     rig: &'a mut Rig,
     uids: &'a mut UidSource,
     symmetry: Option<MirrorPlane>,
+    /// False for a draft that is never taken back.
+    is_recorded: bool,
     done: Vec<RigEdit>,
     inverses: Vec<RigEdit>,
     selected: Option<Vec<Uid>>,
@@ -32,7 +34,21 @@ pub struct Outcome {
 impl<'a> Draft<'a> {
     /// Begins a draft on a rig; uids of added objects come from `uids`.
     pub fn new(rig: &'a mut Rig, uids: &'a mut UidSource, symmetry: Option<MirrorPlane>) -> Self {
-        Self { rig, uids, symmetry, done: Vec::new(), inverses: Vec::new(), selected: None, notes: Vec::new() }
+        Self {
+            rig,
+            uids,
+            symmetry,
+            is_recorded: true,
+            done: Vec::new(),
+            inverses: Vec::new(),
+            selected: None,
+            notes: Vec::new(),
+        }
+    }
+
+    /// A draft without a record of its edits, which take more memory than what they add. It cannot be taken back.
+    pub(super) fn without_record(rig: &'a mut Rig, uids: &'a mut UidSource) -> Self {
+        Self { is_recorded: false, ..Self::new(rig, uids, None) }
     }
 
     /// The rig in its current state.
@@ -58,8 +74,10 @@ impl<'a> Draft<'a> {
     /// Applies one edit.
     pub fn apply(&mut self, edit: RigEdit) -> Result<(), EditError> {
         let inverse = self.rig.apply(&edit)?;
-        self.done.push(edit);
-        self.inverses.push(inverse);
+        if self.is_recorded {
+            self.done.push(edit);
+            self.inverses.push(inverse);
+        }
         Ok(())
     }
 
