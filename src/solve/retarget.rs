@@ -18,6 +18,7 @@ mod joints;
 mod limbs;
 mod measure;
 mod player;
+mod pose;
 mod touches;
 mod tracks;
 

@@ -1,6 +1,6 @@
 //! Source frames in the target's space, and the target's poses that follow from them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use bevy::math::{Quat, Vec3};
 
@@ -8,6 +8,7 @@ use super::{
     contacts::Contacts,
     figure::Figure,
     limbs::{Limb, LimbKind, Reach},
+    pose::Pose,
     touches::Touches,
 };
 use crate::{
@@ -49,6 +50,8 @@ pub(super) struct Body<'a> {
     turned: BTreeMap<usize, TurnedJoint>,
     /// Further joints that turn alike.
     pairs: Vec<(usize, usize)>,
+    /// Joints of the target whose places anything asks for, sorted.
+    pose_joints: Vec<usize>,
     pub limbs: Vec<Limb>,
     /// Height of the ankles above the ground in the source's frames.
     pub source_ankle: f32,
@@ -103,6 +106,7 @@ impl<'a> Body<'a> {
             up,
             turned: BTreeMap::new(),
             pairs: map.pairs.clone(),
+            pose_joints: Vec::new(),
             limbs: Vec::new(),
             source_ankle: 0.0,
             source_ball: 0.0,
@@ -123,7 +127,18 @@ impl<'a> Body<'a> {
             }
         }
         body.turned = body.find_turned(map);
+        body.pose_joints = body.find_pose_joints();
         body
+    }
+
+    /// Joints that the motion moves, with their parents, and those of bones, at which contacts look.
+    fn find_pose_joints(&self) -> Vec<usize> {
+        let joints = &self.target.joints;
+        let moved = (0..joints.len()).filter(|joint| self.is_moved(*joint));
+        let mut found: BTreeSet<usize> =
+            moved.flat_map(|joint| [Some(joint), joints[joint].parent]).flatten().collect();
+        found.extend(self.target.bones.values().flatten());
+        found.into_iter().collect()
     }
 
     /// Joints that turn, but for those of limbs.
@@ -256,11 +271,11 @@ impl<'a> Body<'a> {
         Some((to, level + self.up * (self.lifted(middle.dot(self.up)) - drop) - turned * carried))
     }
 
-    /// Transforms of the target's joints in the rig's space, frame by frame.
-    pub fn poses(&self, contacts: &Contacts, touches: &Touches, rate: f32, has_twist: bool) -> Vec<Vec<Trs>> {
+    /// Poses of the target in the rig's space, frame by frame.
+    pub fn poses(&self, contacts: &Contacts, touches: &Touches, rate: f32, has_twist: bool) -> Vec<Pose<'_>> {
         let frames = 0..self.frames.len();
         let free = LimbGoals::default();
-        let raw: Vec<Vec<Trs>> = frames.clone().map(|frame| self.pose(frame, 0.0, &free, has_twist)).collect();
+        let raw: Vec<Pose> = frames.clone().map(|frame| self.pose(frame, 0.0, &free, has_twist)).collect();
         let feet = contacts.goals(self, &raw, rate);
         let drops = contacts.drops(self, &raw, &feet, rate);
         // The list of the poses to come takes as much.
@@ -270,7 +285,7 @@ impl<'a> Body<'a> {
             LimbGoals { feet, hands }
         };
         let standing = |frame: usize| self.pose(frame, drops[frame], &goals(frame, [None; 2]), has_twist);
-        let mut poses: Vec<Vec<Trs>> = frames.map(standing).collect();
+        let mut poses: Vec<Pose> = frames.map(standing).collect();
         if touches.is_empty() {
             return poses;
         }
@@ -282,8 +297,8 @@ impl<'a> Body<'a> {
         poses
     }
 
-    /// Transforms of the target's joints at a frame.
-    fn pose(&self, frame: usize, drop: f32, goals: &LimbGoals, has_twist: bool) -> Vec<Trs> {
+    /// Pose of the target at a frame.
+    fn pose(&self, frame: usize, drop: f32, goals: &LimbGoals, has_twist: bool) -> Pose<'_> {
         let hips = self.hips_place(frame, drop);
         let mut globals: Vec<Trs> = Vec::with_capacity(self.target.joints.len());
         let mut solved: BTreeMap<usize, Quat> = BTreeMap::new();
@@ -312,7 +327,7 @@ impl<'a> Body<'a> {
             }
             globals.push(global);
         }
-        globals
+        Pose::new(self.target, &self.pose_joints, &globals)
     }
 }
 

@@ -6,11 +6,9 @@ use serde::Serialize;
 use super::{
     body::Body,
     limbs::{Limb, LimbKind, STRETCHED, smooth},
+    pose::Pose,
 };
-use crate::{
-    mesh::model::Trs,
-    rig::animation::humanoid::{BodySide, LimbBone},
-};
+use crate::rig::animation::humanoid::{BodySide, LimbBone};
 
 /// Speeds in lengths of a leg a second below which a low foot, and one at any height, stands.
 const SLOW: f32 = 0.9;
@@ -159,7 +157,7 @@ impl Contacts {
     }
 
     /// Places of the ankles, frame by frame; `raw` are poses without any.
-    pub fn goals(&self, body: &Body, raw: &[Vec<Trs>], rate: f32) -> Vec<[Option<Vec3>; 2]> {
+    pub fn goals(&self, body: &Body, raw: &[Pose], rate: f32) -> Vec<[Option<Vec3>; 2]> {
         let mut goals = vec![[None; 2]; raw.len()];
         for limb in body.limbs.iter().filter(|limb| limb.kind == LimbKind::Leg) {
             let foot = Foot::of(body, limb, raw);
@@ -199,7 +197,7 @@ impl Contacts {
     }
 
     /// Distances by which the hips are lowered, frame by frame, so that standing feet reach the ground.
-    pub fn drops(&self, body: &Body, raw: &[Vec<Trs>], goals: &[[Option<Vec3>; 2]], rate: f32) -> Vec<f32> {
+    pub fn drops(&self, body: &Body, raw: &[Pose], goals: &[[Option<Vec3>; 2]], rate: f32) -> Vec<f32> {
         let mut needed = vec![0.0_f32; raw.len()];
         for limb in body.limbs.iter().filter(|limb| limb.kind == LimbKind::Leg) {
             let reach = 0.998 * STRETCHED * (limb.lengths[0] + limb.lengths[1]);
@@ -254,15 +252,15 @@ struct Foot {
 }
 
 impl Foot {
-    fn of(body: &Body, limb: &Limb, raw: &[Vec<Trs>]) -> Self {
+    fn of(body: &Body, limb: &Limb, raw: &[Pose]) -> Self {
         let [hip, _, ankle] = limb.source;
-        let goal = |(at, pose): (usize, &Vec<Trs>)| {
+        let goal = |(at, pose): (usize, &Pose)| {
             let places = &body.frames[at].places;
             let goal = pose[limb.target[0]].translation + places[ankle] - places[hip];
             goal + body.up * (body.lifted(places[ankle].dot(body.up)) - goal.dot(body.up))
         };
         let toes = body.target.limb(limb.side, LimbBone::Toes);
-        let ball = |pose: &Vec<Trs>| toes.map(|toes| pose[toes].translation - pose[limb.target[2]].translation);
+        let ball = |pose: &Pose| toes.map(|toes| pose[toes].translation - pose[limb.target[2]].translation);
         let at_rest = |joint: usize| body.target.joints[joint].rest.translation.dot(body.up);
         Self {
             ankles: raw.iter().enumerate().map(goal).collect(),

@@ -10,7 +10,7 @@ use std::{collections::BTreeSet, sync::Arc};
 use bevy::math::{Quat, Vec3};
 use rayon::prelude::*;
 
-use super::{RetargetError, body::Body, limbs::LimbKind, tracks::KeyedTracks};
+use super::{RetargetError, body::Body, limbs::LimbKind, pose::Pose, tracks::KeyedTracks};
 use crate::{
     mesh::model::Trs,
     rig::{
@@ -79,7 +79,7 @@ pub(super) fn keyed(
     built: &BuiltRig,
     program: &Arc<RigProgram>,
     body: &Body,
-    poses: &[Vec<Trs>],
+    poses: &[Pose],
     hands: [bool; 2],
     has_root_motion: bool,
 ) -> Result<(KeyedTracks, Vec<String>), RetargetError> {
@@ -99,7 +99,7 @@ pub(super) fn keyed(
     if let Some(travel) = travel {
         steps.insert(0, Step::Travel(travel));
     }
-    let blocks: Vec<&[Vec<Trs>]> = poses.chunks(BLOCK).collect();
+    let blocks: Vec<&[Pose]> = poses.chunks(BLOCK).collect();
     let dials: Vec<usize> =
         steps.iter().filter_map(|step| if let Step::Dial(dial) = step { Some(dial.attribute) } else { None }).collect();
     let posed: Vec<Result<Vec<PosedFrame>, RetargetError>> = blocks
@@ -324,7 +324,7 @@ impl Moves {
 }
 
 /// Poses the controls.
-fn strike(built: &BuiltRig, mut state: RigState, steps: &[Step], pose: &[Trs]) -> Result<RigState, RetargetError> {
+fn strike(built: &BuiltRig, mut state: RigState, steps: &[Step], pose: &Pose) -> Result<RigState, RetargetError> {
     for step in steps {
         match step {
             Step::Travel(travel) => travel.place(&mut state, &pose[travel.hips]),

@@ -8,11 +8,9 @@ use super::{
     body::Body,
     contacts::{fade, runs},
     limbs::{Limb, LimbKind, Reach},
+    pose::Pose,
 };
-use crate::{
-    mesh::model::Trs,
-    rig::animation::humanoid::{BodySide, HumanBone, LimbBone},
-};
+use crate::rig::animation::humanoid::{BodySide, HumanBone, LimbBone};
 
 /// Speed in lengths of a leg a second below which a wrist keeps its place.
 const STILL: f32 = 0.12;
@@ -162,7 +160,7 @@ impl Touches {
     }
 
     /// Places of the wrists, left and right, frame by frame; `poses` are those of free hands.
-    pub fn goals(&self, body: &Body, poses: &[Vec<Trs>], rate: f32) -> Vec<[Option<Reach>; 2]> {
+    pub fn goals(&self, body: &Body, poses: &[Pose], rate: f32) -> Vec<[Option<Reach>; 2]> {
         let mut goals = vec![[None; 2]; poses.len()];
         for arm in arms(body) {
             let own: Vec<&Hold> = self.0.iter().filter(|hold| hold.side == arm.side).collect();
@@ -279,7 +277,7 @@ impl Wrists<'_> {
 
 impl Hold {
     /// Sets the movement of the wrist, frame by frame, with which it keeps its place.
-    fn set(&self, body: &Body, arm: &Limb, poses: &[Vec<Trs>], corrections: &mut [Vec3]) {
+    fn set(&self, body: &Body, arm: &Limb, poses: &[Pose], corrections: &mut [Vec3]) {
         let wrist = |at: usize| poses[at][arm.target[2]].translation;
         let frames = self.from..=self.to;
         match self.thing {
