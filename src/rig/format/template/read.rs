@@ -223,7 +223,7 @@ fn sorted(mut features: Vec<FeatureSummary>) -> Vec<FeatureSummary> {
 fn add_joints(
     rig: &mut Rig,
     format: u32,
-    joints: Vec<JointFile>,
+    mut joints: Vec<JointFile>,
     places: &Places,
     seen: &mut HashSet<Uid>,
     mut hung: Option<&mut Vec<HungJoint>>,
@@ -235,7 +235,12 @@ fn add_joints(
     let known: HashSet<Uid> = joints.iter().map(|joint| joint.uid).collect();
     let features: HashSet<Uid> = joints.iter().flat_map(|joint| &joint.tags).filter_map(feature_uid).collect();
     let mut order = Vec::with_capacity(joints.len());
-    for mut joint in joints {
+    // Taken from the end, so that the list of the file makes room for the joints of the rig.
+    joints.reverse();
+    while let Some(mut joint) = joints.pop() {
+        if joints.len() < joints.capacity() / 4 * 3 {
+            joints.shrink_to_fit();
+        }
         let uid = joint.uid;
         if !seen.insert(uid) {
             faults.push(places.used_twice(uid));

@@ -7,6 +7,7 @@ mod lists;
 mod order;
 mod parts;
 pub(super) mod patch;
+mod plain_rig;
 mod shared_joints;
 
 use std::{collections::HashMap, sync::Arc};
@@ -37,6 +38,7 @@ pub(crate) use parts::{
     write_changes_over, write_own_over,
 };
 use patch::Patch;
+use plain_rig::says_plain_rig;
 use shared_joints::share_equal_joints;
 
 /// The text of a rig's template, as changes of a text of the same rig. `None` if `source` is no template of this rig, or
@@ -74,6 +76,9 @@ pub(crate) fn write_short_template(rig: &Rig) -> Option<String> {
 
 /// The text, or the text in the rig's order, if that says what the rig is.
 fn said(rig: &Rig, text: String) -> Option<String> {
+    if says_plain_rig(rig, &text) {
+        return Some(text);
+    }
     let mut wanted = comparable(read_text(&write_template(rig), 1).ok()?.rig);
     share_equal_joints(&mut wanted, rig);
     let is_right = |text: &str| read_text(text, 1).is_ok_and(|read| comparable(read.rig) == wanted);

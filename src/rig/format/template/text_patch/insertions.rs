@@ -182,6 +182,8 @@ fn laid_out_joints(text: &str, before: &Declarations, known: &HashSet<Uid>) -> O
             changes.push((declared.tree.node(joint.node).range.clone(), text));
         }
     }
+    // The tree, which is larger than the text, is gone before the text with the changes comes.
+    drop(declared);
     Some(with_changes(text, changes))
 }
 
