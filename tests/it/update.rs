@@ -64,6 +64,18 @@ fn what_each_side_changed_is_there_afterwards() {
     assert_eq!(changes(Some(&file), &updated.rig, &file), Vec::<String>::new());
 }
 
+/// A rig of thousands of joints takes little more memory through an update that changes few of them.
+#[test]
+fn joints_that_stay_are_held_once() {
+    let now = read(CHAIN);
+    let file = read(&CHAIN.replace("(0, 1, 0)", "(0, 1.5, 0)"));
+    let updated = update(Some(&now), &now, &file, Take::Mine).rig;
+    for joint in now.walk() {
+        let is_shared = std::ptr::eq(joint, updated.joint(joint.data.uid).unwrap());
+        assert_eq!(is_shared, joint.data.label.as_deref() != Some("tail_1"), "{:?}", joint.data.label);
+    }
+}
+
 #[test]
 fn the_same_field_on_both_sides_is_a_choice() {
     let base = read(CHAIN);
