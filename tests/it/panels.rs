@@ -2,14 +2,14 @@
 
 pub(crate) mod desk;
 mod face;
-mod face_drag;
+pub(crate) mod face_drag;
 mod features;
 mod group_colors;
 mod groups;
 mod hierarchy;
 mod looks;
 mod notices;
-mod obstacles;
+pub(crate) mod obstacles;
 mod posing;
 mod process;
 mod saved_forms;

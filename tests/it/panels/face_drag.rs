@@ -143,7 +143,7 @@ fn frames_that_renew_pictures_visit_no_points() {
 
 /// Threads of the background, all kept busy until `held` is dropped, so that nothing else is computed there.
 /// One test at a time keeps them: two that had half of them each would wait for each other.
-fn busy_threads() -> (Arc<()>, (Vec<Task<()>>, MutexGuard<'static, ()>)) {
+pub(crate) fn busy_threads() -> (Arc<()>, (Vec<Task<()>>, MutexGuard<'static, ()>)) {
     static KEPT: Mutex<()> = Mutex::new(());
     let one = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     let (pool, held) = (AsyncComputeTaskPool::get(), Arc::new(()));

@@ -26,7 +26,7 @@ use super::{desk::Desk, tag_values::add_command};
 
 /// Asserts that a widget is greyed, and its reason.
 #[track_caller]
-fn assert_greyed(desk: &mut Desk, label: &str, reason: &str) {
+pub(crate) fn assert_greyed(desk: &mut Desk, label: &str, reason: &str) {
     let widget = desk.find(label);
     assert!(!widget.enabled, "{label} is not greyed");
     // A widget that was clicked tells nothing until the pointer comes again.

@@ -12,6 +12,7 @@ use super::{
     parts::{accept, captured, captured_of},
     *,
 };
+use crate::panels::{face_drag::busy_threads, obstacles::assert_greyed};
 
 fn draft(desk: &Desk) -> Option<MapDraft> {
     desk.app.world().resource::<ClipImport>().draft().cloned()
@@ -118,4 +119,19 @@ fn the_map_of_joints_is_saved_and_read_again() {
     send(&mut desk, MapRequest::Save(folder.path().join("gone/step.map.ron")));
     assert!(desk.told().iter().any(|told| told.contains("Could not save the map of joints to step.map.ron")));
     assert!(draft(&desk).is_some());
+}
+
+/// The table takes nothing while the motion is being put onto the rig, and says so.
+#[test]
+fn a_table_that_is_accepted_says_why_it_is_greyed() {
+    let (mut desk, _folder) = captured();
+    let (held, threads) = busy_threads();
+    desk.click("Import motion");
+    desk.frames(2);
+    for label in ["Import motion", "Load map…", "Save map…", "Cancel import", "Travel", "Joint for LeftLeg"] {
+        assert_greyed(&mut desk, label, "The motion is being put onto the rig");
+    }
+    drop(held);
+    desk.until("the clip", |desk| !desk.rig().clips().is_empty());
+    drop(threads);
 }

@@ -23,6 +23,10 @@ use crate::{
 
 /// Choice of no joint.
 const NOTHING: &str = "nothing";
+/// Obstacle of everything in the table while the motion is being put onto the rig.
+const IS_BUSY: &str = "The motion is being put onto the rig";
+/// Obstacle of what takes a pair of joints.
+const NO_PAIR: &str = "No joint of the motion moves one of the rig";
 
 /// Draws the table with its buttons. `is_busy` while the motion is being put onto the rig.
 pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy: bool, requests: &mut Requests) {
@@ -33,20 +37,22 @@ pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy:
     ui.horizontal_wrapped(|ui| {
         let can_import = mapped > 0 && !is_busy;
         let import = ui.add_enabled(can_import, Button::new("Import motion"));
-        let why_not =
-            if is_busy { "it is being put onto the rig" } else { "no joint of the motion moves one of the rig" };
+        let why_not = if is_busy { IS_BUSY } else { NO_PAIR };
         if import.on_disabled_hover_text(why_not).clicked() {
             requests.send(MapRequest::Accept);
         }
         let load = ui.add_enabled(!is_busy, Button::new("Load map…"));
-        if load.on_hover_text("Takes pairs of joints from a map file, as --map of the command does").clicked() {
+        let load = load.on_hover_text("Takes pairs of joints from a map file, as --map of the command does");
+        if load.on_disabled_hover_text(IS_BUSY).clicked() {
             requests.send(MapRequest::AskFile);
         }
         let save = ui.add_enabled(mapped > 0 && !is_busy, Button::new("Save map…"));
-        if save.on_hover_text("Writes the pairs of joints to a map file, as --map-out of the command does").clicked() {
+        let save = save.on_hover_text("Writes the pairs of joints to a map file, as --map-out of the command does");
+        if save.on_disabled_hover_text(why_not).clicked() {
             requests.send(MapRequest::AskSave);
         }
-        is_cancelled |= ui.add_enabled(!is_busy, Button::new("Cancel import")).clicked();
+        let cancel = ui.add_enabled(!is_busy, Button::new("Cancel import"));
+        is_cancelled |= cancel.on_disabled_hover_text(IS_BUSY).clicked();
         let found = match draft.found_by {
             Some(FoundBy::Names) => "guessed from names",
             Some(FoundBy::Shape) => "guessed from the shape",
@@ -65,7 +71,9 @@ pub(super) fn show(ui: &mut Ui, draft: &MapDraft, shown: &DisplayedRig, is_busy:
         ));
     });
     let onto = target_of(&shown.rig);
-    let (options, is_left) = ui.add_enabled_ui(!is_busy, |ui| choices(ui, draft.options, onto, requests)).inner;
+    let chosen = ui.add_enabled_ui(!is_busy, |ui| choices(ui, draft.options, onto, requests));
+    chosen.response.on_disabled_hover_text(IS_BUSY);
+    let (options, is_left) = chosen.inner;
     // A field that is being typed into takes Escape for itself, too.
     is_cancelled |= is_escaped && !is_left;
     if options != draft.options {
@@ -122,6 +130,7 @@ fn row(
             });
             let said = format!("Joint for {name}");
             ui.ctx().accesskit_node_builder(response.response.id, |node| node.set_label(said.as_str()));
+            response.response.on_disabled_hover_text(IS_BUSY);
         });
         if chosen != target {
             requests.send(MapRequest::Set(number, chosen));
