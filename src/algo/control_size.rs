@@ -4,14 +4,14 @@ use bevy::math::Vec3;
 
 use crate::mesh::{ray::Ray, surface::Surface};
 
-/// Share of a shape's length that has to be outside of the mesh.
+/// Share of its length that is outside of a shape that stands clear of the mesh.
 pub const OUTSIDE: f32 = 0.75;
 
 /// Largest factor.
 pub const MOST: f32 = 4.0;
 
 /// Share of its length that is outside of a shape that people find and hit.
-const SEEN: f32 = 0.5;
+pub const SEEN: f32 = 0.5;
 
 /// Largest factor of a shape that would not be [`SEEN`] otherwise: about a short bone in wide plumage, for example.
 const MOST_UNSEEN: f32 = 8.0;
@@ -32,18 +32,18 @@ const DIRECTIONS: [Vec3; 3] = [
     Vec3::new(0.333_333, -0.666_667, 0.666_667),
 ];
 
-/// Factor by which a shape has to grow about a point so that [`OUTSIDE`] of its length is outside of a closed mesh: 1 for a
-/// shape that is, up to [`MOST`]. Where no factor is enough, the one with the most length outside; where that is less than half,
-/// the first beyond with half outside, up to twice as large, and where nothing of three tenths was found the first with those, up
-/// to two and a half times as large.
+/// Factor by which a shape has to grow about a point so that the `wanted` share of its length is outside of a closed mesh: 1
+/// for a shape that is, up to [`MOST`]. Where no factor is enough, the one with the most length outside; where that is less than
+/// half, the first beyond with half outside, up to twice as large, and where nothing of three tenths was found the first with
+/// those, up to two and a half times as large.
 ///
 /// `lines` are the shape's polylines at factor 1, in the space of the surface. A shape of `n` points costs `3 n` to `240 n` ray
 /// queries.
-pub fn clear_factor(surface: &Surface, lines: &[Vec<Vec3>], about: Vec3) -> f32 {
+pub fn clear_factor(surface: &Surface, lines: &[Vec<Vec3>], about: Vec3, wanted: f32) -> f32 {
     let (mut factor, mut best) = (1.0, (0.0, 1.0));
     while factor <= MOST {
         let share = outside_share(surface, lines, about, factor);
-        if share >= OUTSIDE {
+        if share >= wanted {
             return factor;
         }
         if share > best.0 {

@@ -2,9 +2,15 @@
 
 use std::{path::Path, sync::Arc};
 
-use bevy::{app::App, math::Vec3};
+use bevy::{
+    app::App,
+    math::{Affine3A, Vec3},
+};
 use rigsmith::{
-    algo::control_size::{OUTSIDE, clear_factor, is_inside, outside_share},
+    algo::{
+        control_size::{OUTSIDE, SEEN, clear_factor, is_inside, outside_share},
+        face::auto::AutoSettings,
+    },
     files::{RealDisk, load_model},
     headless::Workbench,
     mesh::surface::Surface,
@@ -45,12 +51,50 @@ fn a_ring_grows_until_it_is_around_the_flesh() {
     let surface = flesh(1.0);
     assert!(is_inside(&surface, Vec3::new(0.3, -0.2, 0.9)) && !is_inside(&surface, Vec3::new(0.3, -0.2, 1.1)));
     assert_eq!(outside_share(&surface, &ring(0.5), Vec3::ZERO, 1.0), 0.0);
-    let factor = clear_factor(&surface, &ring(0.5), Vec3::ZERO);
+    let factor = clear_factor(&surface, &ring(0.5), Vec3::ZERO, OUTSIDE);
     // Corners of the box stick out of the ring that is just large enough.
     assert!((2.0..3.0).contains(&factor), "{factor}");
     assert!(outside_share(&surface, &ring(0.5), Vec3::ZERO, factor) >= OUTSIDE);
-    assert_eq!(clear_factor(&surface, &ring(1.5), Vec3::ZERO), 1.0, "one that is large enough stays");
-    assert_eq!(clear_factor(&surface, &[], Vec3::ZERO), 1.0, "without lines");
+    assert_eq!(clear_factor(&surface, &ring(1.5), Vec3::ZERO, OUTSIDE), 1.0, "one that is large enough stays");
+    assert_eq!(clear_factor(&surface, &[], Vec3::ZERO, OUTSIDE), 1.0, "without lines");
+}
+
+/// A shape with a size of its own is no larger than it has to be: half of it is seen.
+#[test]
+fn a_ring_that_is_to_be_seen_grows_less_than_one_that_is_to_be_clear() {
+    let surface = flesh(1.0);
+    let factors = [SEEN, OUTSIDE].map(|wanted| clear_factor(&surface, &ring(0.5), Vec3::ZERO, wanted));
+    assert!(factors[0] > 1.0 && factors[0] * 1.05 < factors[1], "{factors:?}");
+    assert!(outside_share(&surface, &ring(0.5), Vec3::ZERO, factors[0]) >= SEEN);
+}
+
+/// Controls of eyes lie half in the head. They have a size of their own, and larger ones would cross over the nose.
+#[test]
+fn controls_of_eyes_stay_beside_the_nose() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/head.obj");
+    let mut bench = Workbench::new(1, "face");
+    bench.open(load_model(&RealDisk, &path).unwrap(), false).unwrap();
+    bench.face(AutoSettings { bones: 40, ..AutoSettings::default() }, None, &mut |_, _| {}).unwrap();
+    assert!(bench.build(BuildStep::All).error.is_none());
+    measured(&mut bench);
+    let rig = bench.rig_entity();
+    let world = bench.app_mut().world();
+    let entities = world.get::<BuiltEntities>(rig).unwrap();
+    let built = &world.get::<BuildResult>(rig).unwrap().0;
+    let mut eyes = 0;
+    for (at, node) in built.nodes.iter().enumerate().filter(|(_, node)| node.name.starts_with("eye_")) {
+        let Some(control) = &node.control else { continue };
+        let factor = entities.get(node.uid).and_then(|entity| world.get::<ShapeFactor>(entity));
+        let factor = factor.map_or(1.0, |factor| factor.0);
+        let place = place_of(built, at);
+        let about = (place * control.offset.affine()).translation.x;
+        let points = lines_of(control, place).into_iter().flatten();
+        let nearest =
+            points.map(|point| (about + (point.x - about) * factor) * about.signum()).fold(f32::MAX, f32::min);
+        assert!(nearest > 0.0, "{} reaches {nearest} beyond the nose, enlarged by {factor}", node.name);
+        eyes += 1;
+    }
+    assert_eq!(eyes, 2);
 }
 
 #[test]
@@ -58,11 +102,11 @@ fn a_ring_in_wide_flesh_grows_further_until_half_of_it_is_seen() {
     let surface = flesh(1.0);
     let small = ring(0.16);
     assert_eq!(outside_share(&surface, &small, Vec3::ZERO, 4.0), 0.0);
-    let factor = clear_factor(&surface, &small, Vec3::ZERO);
+    let factor = clear_factor(&surface, &small, Vec3::ZERO, OUTSIDE);
     assert!((6.0..=8.0).contains(&factor), "{factor}");
     let share = outside_share(&surface, &small, Vec3::ZERO, factor);
     assert!((0.5..0.9).contains(&share), "no larger than it has to be: {share}");
-    assert_eq!(clear_factor(&surface, &ring(0.1), Vec3::ZERO), 1.0, "one that nothing helps stays");
+    assert_eq!(clear_factor(&surface, &ring(0.1), Vec3::ZERO, OUTSIDE), 1.0, "one that nothing helps stays");
 }
 
 /// Runs frames until the shapes of the rig's controls are measured.
@@ -88,16 +132,22 @@ fn shares(bench: &mut Workbench, surface: &Surface) -> Vec<(String, f32, f32)> {
     })
 }
 
+/// Place of a node at rest, in the rig's space.
+fn place_of(built: &BuiltRig, at: usize) -> Affine3A {
+    let mut place = built.nodes[at].base.affine();
+    let mut above = built.nodes[at].parent;
+    while let Some(parent) = above {
+        place = built.nodes[parent].base.affine() * place;
+        above = built.nodes[parent].parent;
+    }
+    place
+}
+
 fn shares_of(built: &BuiltRig, surface: &Surface, factor: &dyn Fn(Uid) -> f32) -> Vec<(String, f32, f32)> {
     let mut found = Vec::new();
     for (at, node) in built.nodes.iter().enumerate() {
         let Some(control) = &node.control else { continue };
-        let mut place = node.base.affine();
-        let mut above = built.nodes[at].parent;
-        while let Some(parent) = above {
-            place = built.nodes[parent].base.affine() * place;
-            above = built.nodes[parent].parent;
-        }
+        let place = place_of(built, at);
         let factor = factor(node.uid);
         let about = (place * control.offset.affine()).translation.into();
         let share = outside_share(surface, &lines_of(control, place), about, factor);

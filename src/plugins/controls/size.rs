@@ -13,7 +13,7 @@ use bevy::{
 
 use super::outline::lines_of;
 use crate::{
-    algo::control_size::{clear_factor, outside_share},
+    algo::control_size::{OUTSIDE, SEEN, clear_factor},
     mesh::{model::Model, surface::Surface},
     plugins::{
         commands::{BuildResult, BuiltEntities},
@@ -21,9 +21,6 @@ use crate::{
     },
     rig::{BuiltRig, Uid},
 };
-
-/// Share of the length of a shape with a size of its own that has to be outside of the mesh.
-const SEEN: f32 = 0.5;
 
 /// Factor by which the shape of a control is enlarged so that it does not lie in the flesh; on controls whose shape is, or was.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
@@ -142,7 +139,8 @@ fn surface_of(models: &[Arc<Model>]) -> Surface {
 }
 
 /// Factors above 1 of the controls of a built rig whose shapes would lie inside of a surface, in the order of the nodes. Shapes
-/// with a size of their own stay as their author made them, unless most of such a shape lies inside.
+/// with a size of their own stay as their author made them, unless most of such a shape lies inside: then they grow until half
+/// of them is seen.
 pub fn shape_factors(built: &BuiltRig, surface: &Surface) -> Vec<(Uid, f32)> {
     let mut globals: Vec<Affine3A> = Vec::with_capacity(built.nodes.len());
     let mut found = Vec::new();
@@ -153,10 +151,7 @@ pub fn shape_factors(built: &BuiltRig, surface: &Surface) -> Vec<(Uid, f32)> {
         let Some(control) = node.control.as_ref() else { continue };
         let about = (place * control.offset.affine()).translation.into();
         let lines = lines_of(control, place);
-        if !control.fits && outside_share(surface, &lines, about, 1.0) >= SEEN {
-            continue;
-        }
-        let factor = clear_factor(surface, &lines, about);
+        let factor = clear_factor(surface, &lines, about, if control.fits { OUTSIDE } else { SEEN });
         if factor > 1.0 {
             found.push((node.uid, factor));
         }
