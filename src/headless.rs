@@ -33,7 +33,7 @@ use crate::{
         commands::{BuildResult, RigModules, SuppliedBuild},
         document::{ChangeError, EditRefusal, EditRequest},
         face::{
-            ExpressError, ExpressRequest, ExpressionAnswer, Face, FaceExpressions, FaceJob, FacePlaced,
+            ExpressError, ExpressRequest, ExpressionAnswer, Face, FaceExpressions, FaceJob, FacePlaced, FacePosing,
             FacePreparation, FaceReport, FaceRequest, FaceShape, PlaceFaceError, arkit_shapes, mended_shares,
             unit_shapes,
         },
@@ -342,11 +342,14 @@ impl Workbench {
         self.forget_refusals();
         self.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview: false });
         let pause = Pause::new();
+        let mut answer = None;
         loop {
             self.app.update();
-            let told = self.app.world_mut().resource_mut::<Messages<ExpressionAnswer>>().drain().last();
-            if told.is_some() || self.app.world().get::<FacePreparation>(mesh).is_none() {
-                told.map_or(Ok(()), |told| told.result)?;
+            let world = self.app.world_mut();
+            answer = world.resource_mut::<Messages<ExpressionAnswer>>().drain().last().or(answer);
+            let is_posing = world.get::<FacePosing>(mesh).is_some_and(FacePosing::is_running);
+            if !is_posing && (answer.is_some() || world.get::<FacePreparation>(mesh).is_none()) {
+                answer.map_or(Ok(()), |answer| answer.result)?;
                 return self.refused().map_or(Ok(()), Err);
             }
             pause.rest();

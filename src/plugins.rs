@@ -32,7 +32,7 @@
 //! | [`surface::RigMesh`], [`surface::SkinOf`] | whoever loads a mesh | the mesh is bound, shown and found by rays anew |
 //! | [`selection::Selection`] | picking, gestures, edits, undo | stands until one of them writes it |
 //! | label, group, rest and parent of a created node, and the node itself | the build | put back and told: change the command instead |
-//! | [`face::Expressions`] of a mesh | an [`face::ExpressRequest`] | becomes one, an edit of the pose in the same frame; what is shown already is none; unknown names are told by [`face::ExpressionAnswer`] |
+//! | [`face::Expressions`] of a mesh | an [`face::ExpressRequest`] | becomes one, an edit of the pose in the same frame, or once its pose is computed ([`face::BackgroundPosing`]); what is shown already is none; unknown names are told by [`face::ExpressionAnswer`] |
 //! | [`face::Expressions`] of a game's instance | games | poses the joints by the stored poses of the template in the same frame; what cannot be shown is told by [`ExpressFailed`](crate::instance::ExpressFailed) |
 //! | [`animation::ClipPlayer`] | a person or a game; its time by the playback | plays from there |
 //! | `Name` of rigs, joints and groups | the name or label | an edit of the name or label; a rig takes over the one that it is spawned with; one that is removed comes back; of a created node it is put back and told |

@@ -32,7 +32,7 @@ pub use error::{ExpressError, PlaceFaceError};
 pub use job::FaceJob;
 pub use placed_bones::{FaceRig, PlacedBone};
 pub use pose::{expressed_points, mixed};
-pub use posing::FacePosing;
+pub use posing::{BackgroundPosing, FacePosing};
 pub use preparation::{FacePreparation, mended_shares};
 
 /// Plugin of automatic faces.
@@ -179,7 +179,8 @@ pub struct ExpressRequest {
     /// Strengths by name.
     pub strengths: BTreeMap<String, f32>,
     /// Shows a preview without a step of the history if `true`, while a slider is dragged. Its pose is computed in the
-    /// background ([`FacePosing`]); what is asked for meanwhile waits for it.
+    /// background ([`FacePosing`]); what is asked for meanwhile waits for it. All others are computed there, too, in apps with
+    /// [`BackgroundPosing`].
     pub preview: bool,
 }
 
@@ -199,8 +200,8 @@ pub struct ExpressionAnswer {
 ///
 /// A game sets expressions by writing it: the face moves in the same frame, as an [`ExpressRequest`] would move it, and
 /// the answer is an [`ExpressionAnswer`] message. While the face is still prepared ([`FacePreparation`]) or a preview is computed
-/// ([`FacePosing`]), both wait for it, and so do undo and redo. A
-/// value equal to what is shown is no edit.
+/// ([`FacePosing`]), both wait for it, and so do undo and redo. In apps with [`BackgroundPosing`] the face moves as soon as its
+/// pose is computed. A value equal to what is shown is no edit.
 ///
 /// On a [`RigInstance`](crate::instance::RigInstance) it poses the instance's facial joints by the stored poses of its template.
 #[derive(Component, Reflect, Debug, Clone, PartialEq, Default)]

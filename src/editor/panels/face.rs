@@ -31,8 +31,8 @@ use crate::{
         RigSystems,
         document::EditRequest,
         face::{
-            ExpressionAnswer, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport, FaceRequest, FaceRig,
-            PlaceFaceError, cut_of, with_cut,
+            BackgroundPosing, ExpressionAnswer, Face, FaceExpressions, FaceJob, FacePlaced, FaceReport, FaceRequest,
+            FaceRig, PlaceFaceError, cut_of, with_cut,
         },
         picking::{Pick, PickRequest},
         surface::{RigMesh, RigMeshes},
@@ -40,12 +40,13 @@ use crate::{
     rig::{FaceCut, RigEdit, Uid, operations::Operation},
 };
 
-/// Plugin of the face panel: reports results of face jobs, and cancels jobs.
+/// Plugin of the face panel: reports results of face jobs, and cancels jobs. Poses of expressions are computed in the background.
 pub struct FacePanelPlugin;
 
 impl Plugin for FacePanelPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<FaceResults>()
+            .init_resource::<BackgroundPosing>()
             .add_message::<CancelFace>()
             .add_message::<FacePlaced>()
             .add_message::<ExpressionAnswer>()

@@ -1,7 +1,7 @@
 //! Steps that are still computed, and the undo and redo that come after them.
 //!
-//! A person who lets go of a slider has made a step, though its pose may be computed for some frames yet. An undo that comes
-//! meanwhile is about that step, and waits for it.
+//! A person who lets go of a slider, or types a strength, has made a step, though its pose may be computed for some frames
+//! yet. An undo that comes meanwhile is about that step, and waits for it.
 
 use std::mem;
 

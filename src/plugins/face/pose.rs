@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use super::{
     ExpressError, ExpressRequest, ExpressionAnswer, Expressions, Face, FaceExpressions,
     placed_bones::FaceRig,
-    posing::FacePosing,
+    posing::{BackgroundPosing, FacePosing},
     preparation::{FacePreparation, PreparedFace, PreparedParts},
 };
 use crate::{
@@ -110,7 +110,7 @@ fn strengths_of(rig: &Rig, mesh: Uid) -> BTreeMap<String, f32> {
 }
 
 /// Poses faces as they are asked for. A preview is computed in the background, and so is what is asked for while one is
-/// computed; everything else shows in the same frame.
+/// computed; with [`BackgroundPosing`], everything is. Without it everything else shows in the same frame.
 pub(super) fn express(
     mut commands: Commands,
     mut requests: MessageReader<ExpressRequest>,
@@ -123,7 +123,7 @@ pub(super) fn express(
         Option<&mut FacePosing>,
     )>,
     rigs: Query<(&Rig, Option<&RigHistory>)>,
-    set: Res<FaceExpressions>,
+    (set, background): (Res<FaceExpressions>, Option<Res<BackgroundPosing>>),
     mut told: MessageWriter<ExpressionAnswer>,
     mut awaited: ResMut<AwaitedSteps>,
 ) {
@@ -181,8 +181,12 @@ pub(super) fn express(
         };
         let posing = posing.bypass_change_detection();
         let is_replaced = *preview && asked[number + 1..].iter().any(|(later, _)| later.mesh == *entity);
-        let ends_where_it_began = !*preview && posing.is_running() && strengths_of(&settled, mesh.uid) == *strengths;
-        let mut edits = match posing.posed(parts, strengths) {
+        // A step of this frame is not in the document yet: what follows it is worked out when it is.
+        let follows_step = awaited.landed.contains(&rig_entity);
+        let may_end_here = !*preview && !follows_step && posing.is_running();
+        let ends_where_it_began = may_end_here && strengths_of(&settled, mesh.uid) == *strengths;
+        let is_computed_apart = *preview || *has_waited || follows_step || background.is_some();
+        let mut edits = match posing.posed(parts, strengths).filter(|_| !follows_step) {
             Some(poses) => expression_edits(&settled, parts, poses),
             None if is_replaced => continue,
             // A drag that ends where it began leaves the document as it is.
@@ -191,7 +195,7 @@ pub(super) fn express(
                 posing.wait(request.clone());
                 continue;
             }
-            None if *preview || *has_waited => {
+            None if is_computed_apart => {
                 posing.start(parts, mix, request.clone());
                 continue;
             }

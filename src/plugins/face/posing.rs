@@ -1,4 +1,5 @@
-//! Poses of expressions that are computed in the background while a slider is dragged.
+//! Poses of expressions that are computed in the background: those of a slider that is dragged in every app, and all others where
+//! [`BackgroundPosing`] says so.
 //!
 //! Movements of bones are sums, but mending of folds looks at the skin that they move: its time grows with the mesh. A
 //! preview shows as soon as its pose is computed; of those that come meanwhile, the last one counts. What is to become a
@@ -16,6 +17,14 @@ use bevy::{
 
 use super::{ExpressRequest, preparation::PreparedParts};
 use crate::algo::face::expression::{BonePose, Mix};
+
+/// Mark of an app whose frames compute no poses of expressions, as that of a window: each is computed in the background, and its
+/// step of the history is made when it is there. Undo and redo wait for it.
+///
+/// Without it an expression that is no preview shows in the frame in which it is asked for, so that the results of an app that
+/// waits for nothing do not depend on time.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct BackgroundPosing;
 
 /// Poses of a mesh's face for expressions: the last one that was computed, and the one that is being computed.
 #[derive(Component, Default)]

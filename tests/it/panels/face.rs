@@ -128,6 +128,7 @@ fn a_click_makes_a_face_that_sliders_pose() {
     let (reopened, head) = opened(Some(desk.rig().clone()));
     assert_eq!(reopened.app.world().get::<Expressions>(head), Some(&shown), "an opened face has its strengths");
     desk.click("Reset");
+    desk.until("the step of the reset", |desk| desk.steps().1 == 3);
     desk.frames(4);
     assert!(desk.rig().pose().is_empty(), "back at rest");
 
@@ -160,6 +161,8 @@ fn a_click_makes_a_face_that_sliders_pose() {
         assert_eq!(desk.steps(), steps, "{text}");
     }
     type_in(&mut desk, "0.75");
+    desk.until("the step of the number", |desk| desk.steps().0 > steps.0);
+    desk.frames(4);
     assert_eq!(strengths(&desk).0.get("happiness"), Some(&0.75));
     assert_eq!(desk.steps(), (steps.0 + 1, steps.1 + 1));
 }

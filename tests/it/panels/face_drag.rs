@@ -1,5 +1,7 @@
 //! Work of a drag in the Face panel: frames visit no points of the head, however many it has.
 
+mod requests;
+
 use std::{
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
@@ -181,6 +183,7 @@ fn undo_waits_for_the_step_of_a_slider() {
         |desk: &Desk| desk.app.world().get::<Expressions>(mesh).map(|shown| shown.0.clone()).unwrap_or_default();
     let posing = |desk: &Desk| desk.app.world().get::<FacePosing>(mesh).unwrap().is_running();
     express(&mut desk, "anger", 0.5, false);
+    desk.until("anger", |desk| !posing(desk));
     desk.frames(2);
     let (before, anger, steps) = (desk.rig().clone(), shown(&desk), desk.steps());
     assert_eq!(anger.get("anger"), Some(&0.5));
@@ -220,12 +223,22 @@ fn undo_waits_for_the_step_of_a_slider() {
     desk.frames(3);
     assert_eq!(shown(&desk).get("happiness"), Some(&0.8));
 
-    // Also in the frame in which the step is made.
-    let strengths = [("sadness".to_owned(), 0.7)].into();
+    // Also one that came before the request of its step.
+    let steps = desk.steps();
     change(&mut desk, Change::Undo);
-    desk.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview: false });
+    express(&mut desk, "sadness", 0.7, false);
+    desk.until("sadness", |desk| !posing(desk));
     desk.frames(3);
     assert_eq!(shown(&desk).get("happiness"), Some(&0.8), "sadness is undone: {:?}", shown(&desk));
+    assert_eq!(desk.steps(), (steps.0 + 1, steps.1));
+
+    // Also in the frame in which the step is made: the pose of sadness was computed last.
+    change(&mut desk, Change::Undo);
+    express(&mut desk, "sadness", 0.7, false);
+    assert!(!posing(&desk));
+    desk.frames(3);
+    assert_eq!(shown(&desk).get("happiness"), Some(&0.8), "sadness is undone: {:?}", shown(&desk));
+    assert_eq!(desk.steps(), (steps.0 + 1, steps.1));
 }
 
 /// A preview that is computed for weights of before does not come back in place of a step.
