@@ -4,7 +4,7 @@ use bevy::math::Vec3;
 
 use crate::mesh::{ray::Ray, surface::Surface};
 
-/// Share of its length that is outside of a shape that stands clear of the mesh.
+/// Share of a shape's length that has to be outside of the mesh.
 pub const OUTSIDE: f32 = 0.75;
 
 /// Largest factor.
@@ -32,35 +32,53 @@ const DIRECTIONS: [Vec3; 3] = [
     Vec3::new(0.333_333, -0.666_667, 0.666_667),
 ];
 
-/// Factor by which a shape has to grow about a point so that the `wanted` share of its length is outside of a closed mesh: 1
-/// for a shape that is, up to [`MOST`]. Where no factor is enough, the one with the most length outside; where that is less than
-/// half, the first beyond with half outside, up to twice as large, and where nothing of three tenths was found the first with
-/// those, up to two and a half times as large.
+/// Factor by which a shape has to grow about a point so that [`OUTSIDE`] of its length is outside of a closed mesh: 1 for a
+/// shape that is, up to [`MOST`]. Where no factor is enough, the one with the most length outside; where that is less than half,
+/// the first beyond with half outside, up to twice as large, and where nothing of three tenths was found the first with those, up
+/// to two and a half times as large.
 ///
 /// `lines` are the shape's polylines at factor 1, in the space of the surface. A shape of `n` points costs `3 n` to `240 n` ray
 /// queries.
-pub fn clear_factor(surface: &Surface, lines: &[Vec<Vec3>], about: Vec3, wanted: f32) -> f32 {
-    let (mut factor, mut best) = (1.0, (0.0, 1.0));
-    while factor <= MOST {
-        let share = outside_share(surface, lines, about, factor);
-        if share >= wanted {
-            return factor;
-        }
-        if share > best.0 {
-            best = (share, factor);
-        }
-        factor *= STEP;
-    }
-    for (below, least, most) in [(SEEN, SEEN, MOST_UNSEEN), (LOST, LOST, MOST_LOST)] {
-        let mut larger = factor;
-        while best.0 < below && larger <= most {
-            if outside_share(surface, lines, about, larger) >= least {
+pub fn clear_factor(surface: &Surface, lines: &[Vec<Vec3>], about: Vec3) -> f32 {
+    let (best, next) = grown(surface, lines, about, OUTSIDE);
+    for (below, most) in [(SEEN, MOST_UNSEEN), (LOST, MOST_LOST)] {
+        let mut larger = next;
+        while best.share < below && larger <= most {
+            if outside_share(surface, lines, about, larger) >= below {
                 return larger;
             }
             larger *= STEP;
         }
     }
-    best.1
+    best.factor
+}
+
+/// Factor by which a shape with a size of its own has to grow about a point so that half of its length is outside of a closed
+/// mesh: 1 for a shape that is, up to [`MOST`]. Where no factor is enough, the one with the most length outside.
+///
+/// `lines` are as for [`clear_factor`].
+pub fn seen_factor(surface: &Surface, lines: &[Vec<Vec3>], about: Vec3) -> f32 {
+    grown(surface, lines, about, SEEN).0.factor
+}
+
+/// Size of a shape, and the share of its length that is outside then.
+struct Growth {
+    share: f32,
+    factor: f32,
+}
+
+/// The first factor up to [`MOST`] with a share of the length outside, or the one with the most; and the next one to try.
+fn grown(surface: &Surface, lines: &[Vec<Vec3>], about: Vec3, wanted: f32) -> (Growth, f32) {
+    let mut best = Growth { share: 0.0, factor: 1.0 };
+    let mut factor = 1.0;
+    while factor <= MOST && best.share < wanted {
+        let share = outside_share(surface, lines, about, factor);
+        if share > best.share {
+            best = Growth { share, factor };
+        }
+        factor *= STEP;
+    }
+    (best, factor)
 }
 
 /// Share of a shape's length that is outside of a closed mesh, with the shape enlarged about a point by a factor; 1 for a

@@ -13,7 +13,7 @@ use bevy::{
 
 use super::outline::lines_of;
 use crate::{
-    algo::control_size::{OUTSIDE, SEEN, clear_factor},
+    algo::control_size::{clear_factor, seen_factor},
     mesh::{model::Model, surface::Surface},
     plugins::{
         commands::{BuildResult, BuiltEntities},
@@ -151,7 +151,7 @@ pub fn shape_factors(built: &BuiltRig, surface: &Surface) -> Vec<(Uid, f32)> {
         let Some(control) = node.control.as_ref() else { continue };
         let about = (place * control.offset.affine()).translation.into();
         let lines = lines_of(control, place);
-        let factor = clear_factor(surface, &lines, about, if control.fits { OUTSIDE } else { SEEN });
+        let factor = if control.fits { clear_factor } else { seen_factor }(surface, &lines, about);
         if factor > 1.0 {
             found.push((node.uid, factor));
         }

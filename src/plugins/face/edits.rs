@@ -190,12 +190,15 @@ fn comment(bone: &FaceBone) -> String {
     format!("{part} bone {}", bone.label)
 }
 
+/// Share of the distance of the eyes' outer corners by which the control of an eye stands before its center: before the lids.
+const BEFORE_EYE: f32 = 0.22;
+
 /// A bone's control: its shape, and limits within which skin moves as on a face.
 fn control(bone: &FaceBone, eye: f32) -> ControlModule {
     let (shape, size) = match bone.kind {
         FaceBoneKind::Skin => ("sphere", 0.035),
         FaceBoneKind::Jaw => ("half_circle", 0.3),
-        FaceBoneKind::Eye => ("eye", 0.12),
+        FaceBoneKind::Eye => ("eye", 0.18),
         FaceBoneKind::Tongue => ("sphere", 0.06),
     };
     let range = |(low, high): (f32, f32), unit: f32| (Some(rounded(low * unit)), Some(rounded(high * unit)));
@@ -203,6 +206,10 @@ fn control(bone: &FaceBone, eye: f32) -> ControlModule {
     ControlModule {
         shape: shape.to_owned(),
         size: Some(rounded(size * eye)),
+        shape_translate: match bone.kind {
+            FaceBoneKind::Eye => Vec3::new(0.0, 0.0, rounded(BEFORE_EYE * eye)),
+            _ => Vec3::ZERO,
+        },
         shape_axes: ShapeAxes::Control,
         offset_group: false,
         keep_pose: true,

@@ -164,7 +164,7 @@ fn bare_joints_are_checked_without_a_build_of_them() {
     check(folder.path(), &[(&[file], &["check", file])]);
 }
 
-/// What differs is told, and what came is written, without copies of the joints that stay as they are.
+/// Differences are told, and joints that came are written, without copies of the joints that stay as they are.
 #[test]
 fn bare_joints_are_compared_and_written_within_their_memory() {
     let folder = tempfile::tempdir().unwrap();
