@@ -172,7 +172,7 @@ fn bare_joints_are_compared_and_written_within_their_memory() {
     let write = |name: &str, text: String| fs::write(folder.path().join(name), text).unwrap();
     write(one, template());
     write(large, bare_joints(60_000));
-    write(file, bare_joints(55_000));
+    write(file, bare_joints(50_000));
     check(
         folder.path(),
         &[
