@@ -193,8 +193,10 @@ fn kill_once(display: &Display, round: u64, folder: &Path) -> Outcome {
     hands.until("the work is back", |report| report.joints == rig.len() && !report.asked && !report.busy);
     hands.rests();
     let before = fs::metadata(&project).and_then(|entry| entry.modified()).ok();
-    hands.key("ctrl+shift+s");
-    hands.answer_with("work");
+    hands.key("ctrl+s");
+    if !saves {
+        hands.answer_with("work");
+    }
     let start = Instant::now();
     while fs::metadata(&project).and_then(|entry| entry.modified()).ok() == before {
         assert!(start.elapsed() < PATIENCE, "round {round}: nothing was saved");
