@@ -1,10 +1,10 @@
-//! Killing a window while somebody clicks joints into a body, at any moment: the next window offers what was done, but for the
-//! last blink, and its save leaves no unfinished file.
+//! Killing a window while somebody clicks joints into a body, at any moment: the next window offers what was done, but for
+//! the last blink, and its save leaves no unfinished file.
 //!
-//! A joint counts as seen from the time at which the window's report with it was written, in the frame that placed it. In every
-//! other round the work is a project, and saved again and again while it is edited. `RIGSMITH_KILLS` sets the number of kills,
-//! 2 otherwise, on a machine that does nothing else: no lost joint may then have been seen for longer than a quarter of a
-//! second.
+//! A joint counts as seen from the time at which the window's report with it was written, in the frame that placed it. In
+//! every other round the work is a project, and saved again and again while it is edited. `RIGSMITH_KILLS` sets the number
+//! of kills, 2 otherwise, on a machine that does nothing else: no lost joint may then have been seen for longer than a
+//! quarter of a second.
 
 use std::{
     collections::BTreeSet,
