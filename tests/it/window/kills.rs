@@ -73,13 +73,17 @@ fn clicking(hands: &Hands, viewport: [f32; 4], saves: bool, random: &mut Random)
 /// Edits until some joints are there, kills the window at any moment after that, and returns all that was seen before.
 fn edit_until_killed(hands: &mut Hands, saves: bool, random: &mut Random) -> (Vec<Sighting>, SystemTime) {
     let placing = hands.until("joints are placed", |report| report.mode == "Place");
-    let joints = 3 + random.below(8);
+    let joints = 3 + random.below(6);
     let rest = Duration::from_millis(random.below(1500) as u64);
     let mut hand = clicking(hands, placing.viewport, saves, random);
     let mut seen: Vec<Sighting> = Vec::new();
     let (start, mut enough) = (Instant::now(), None::<Instant>);
     while enough.is_none_or(|since| since.elapsed() < rest) {
-        assert!(start.elapsed() < PATIENCE, "the window has {:?} joints", seen.last().map(|last| last.joints.len()));
+        assert!(
+            start.elapsed() < 2 * PATIENCE,
+            "the window has {:?} joints",
+            seen.last().map(|last| last.joints.len())
+        );
         if hand.try_wait().unwrap().is_some() {
             hand = clicking(hands, placing.viewport, saves, random);
         }
