@@ -155,11 +155,15 @@ pub(super) fn store_at_rest(
     if FileKind::of(output) == Some(FileKind::Template) {
         return store_built(output, source, skeleton, has_commands);
     }
+    let (model, settings) = model_of_skeleton(skeleton, export);
+    store_owned_model(&RealDisk, output, model, &settings)
+}
+
+/// A skeleton at rest as a model without a mesh, and the settings for writing it.
+pub(super) fn model_of_skeleton(skeleton: Rig, export: &ExportArgs) -> (Model, GltfWriteSettings) {
     let mut model = skeleton_model(&skeleton);
     mark_joints(&mut model, &skeleton);
-    drop(skeleton);
-    let settings = GltfWriteSettings { all_joints: true, ..export.settings() };
-    store_owned_model(&RealDisk, output, model, &settings)
+    (model, GltfWriteSettings { all_joints: true, ..export.settings() })
 }
 
 /// Note about a template whose parts a skeleton cannot have.
@@ -404,11 +408,9 @@ pub(super) fn skeleton_in_pose(
 ) -> (Model, GltfWriteSettings) {
     let skeleton = baked(rig, built);
     let joints: Vec<Uid> = skeleton.walk().map(|joint| joint.data.uid).collect();
-    let mut model = skeleton_model(&skeleton);
-    mark_joints(&mut model, &skeleton);
-    drop(skeleton);
+    let (mut model, settings) = model_of_skeleton(skeleton, export);
     pose(&mut model, &joints, built, posed);
-    (model, GltfWriteSettings { all_joints: true, ..export.settings() })
+    (model, settings)
 }
 
 /// Moves the nodes of an exported model to the pose; bind poses stay.

@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+pub(super) use self::rest::{built_with, is_still};
+
 use super::{
     ExportArgs, Failure, InPlaceArgs, Output, Report, SEED, WeightArgs,
     build::{self, MeshSource},

@@ -12,24 +12,30 @@ use serde_json::{Value, json};
 
 use super::{
     ExportArgs, Failure, InPlaceArgs, Report, WeightArgs,
-    build::{MeshSource, bound_meshes, posed_character, posed_skeleton},
+    build::{MeshSource, bound_meshes, model_of_skeleton, posed_character, posed_skeleton},
     explanation::Explanation,
     limits,
     outputs::check_named_files,
+    pose::{built_with, is_still},
     report::{counted, print, print_json},
 };
 use crate::{
     files::{FileKind, LOOK, LoadError, ModelWatch, PartFiles, RealDisk, StoreError, TemplateWatch, store_owned_model},
-    headless::Workbench,
-    mesh::model::Model,
-    plugins::{commands::BuildStep, mesh_reload::ReloadReport},
+    headless::{Workbench, posing::PoseError},
+    mesh::{gltf::GltfWriteSettings, model::Model},
+    plugins::{
+        commands::{BuildStep, NamedProgramError},
+        mesh_reload::ReloadReport,
+    },
     processor::{BuildError, SourceText},
     rig::{
         Rig, RigEdit, TagKind, Uid,
+        bake::baked,
         operations::Operation,
         template::{self, PartOrigin, Template},
         update::edits_between,
     },
+    solve::program::RigProgram,
 };
 
 /// Arguments of `rigsmith watch`.
@@ -85,6 +91,7 @@ pub(super) fn run(args: &WatchArgs, is_json: bool) -> Result<Report, Failure> {
         template: TemplateWatch::new(&args.template),
         mesh: args.mesh.as_deref().map(ModelWatch::new),
         bench: None,
+        still: None,
         model: None,
         bound: None,
         again: None,
@@ -163,8 +170,11 @@ struct Watch<'a> {
     is_json: bool,
     template: TemplateWatch,
     mesh: Option<ModelWatch>,
-    /// The rig of the last template that could be built; `None` until there is one.
+    /// The rig of the last template that could be built; `None` until there is one, and while [`Watch::still`] has its text.
     bench: Option<Workbench>,
+    /// Text of the last template, if nothing moves its rig and no mesh is bound to it. The rig is written without an app, whose
+    /// entities take several times its memory, and is not kept meanwhile.
+    still: Option<Vec<u8>>,
     /// The mesh as it was read last; `None` until it can be read.
     model: Option<Model>,
     bound: Option<BoundMesh>,
@@ -207,13 +217,26 @@ impl Watch<'_> {
             }
             News::Template(bytes) => self.take_template(start, &runs, &bytes),
             News::Mesh => self.take_mesh(start, &runs),
-            News::Again => self.write(start, start.elapsed(), &runs, None),
+            News::Again => match self.still.clone() {
+                Some(bytes) => {
+                    // A part of the template may not be there for a while, too.
+                    self.again = Some(Instant::now() + AGAIN);
+                    let rig = self.parsed(&bytes)?.0;
+                    self.write_still(start, rig)
+                }
+                None => self.write(start, start.elapsed(), &runs, None),
+            },
         }
     }
 
     /// Takes over a saved template. If it cannot be read or built, the rig stays as it was.
     fn take_template(&mut self, start: Instant, runs: &[(Uid, u32)], bytes: &[u8]) -> Result<Option<Value>, Failure> {
         let (rig, file) = self.parsed(bytes)?;
+        if self.mesh.is_none() && is_still(&rig) {
+            (self.bench, self.still) = (None, Some(bytes.to_vec()));
+            drop(file);
+            return self.write_still(start, rig);
+        }
         let before = self.bench.as_ref().map(|bench| bench.rig().clone());
         match (&mut self.bench, &before) {
             (Some(bench), Some(before)) => change(bench, before, &rig)?,
@@ -233,7 +256,7 @@ impl Watch<'_> {
             return Err(failure);
         }
         drop((before, file));
-        self.bound = None;
+        (self.bound, self.still) = (None, None);
         self.write(start, start.elapsed(), runs, None)
     }
 
@@ -307,10 +330,30 @@ impl Watch<'_> {
             };
             posed_character(bench, own, &args.export)?
         };
+        self.store(model, &settings)?;
+        Ok(Some(self.answer(start, built_in, runs, reloaded)))
+    }
+
+    /// Writes a rig that nothing moves, and says so as [`Watch::write`] does.
+    fn write_still(&mut self, start: Instant, rig: Rig) -> Result<Option<Value>, Failure> {
+        self.again = None;
+        let (model, settings) = still_skeleton(rig, &self.args.export)?;
+        let built_in = start.elapsed();
+        self.store(model, &settings)?;
+        Ok(Some(self.answer(start, built_in, &[], None)))
+    }
+
+    /// Saves the character; where that fails, it is tried again after a while.
+    fn store(&mut self, model: Model, settings: &GltfWriteSettings) -> Result<(), Failure> {
         // What is written is read back, which takes as much memory again.
-        let stored = store_owned_model(&RealDisk, &args.output, model, &settings);
+        let stored = store_owned_model(&RealDisk, &self.args.output, model, settings);
         self.again = matches!(stored, Err(StoreError::Save(_))).then(|| Instant::now() + AGAIN);
         stored?;
+        Ok(())
+    }
+
+    /// Answer for programs about what happened since a time.
+    fn answer(&self, start: Instant, built_in: Duration, runs: &[(Uid, u32)], reloaded: Option<ReloadReport>) -> Value {
         let runs: HashMap<Uid, u32> = runs.iter().copied().collect();
         let is_newer = |(tag, count): &(Uid, u32)| *count > runs.get(tag).copied().unwrap_or_default();
         let now = self.runs();
@@ -325,7 +368,7 @@ impl Watch<'_> {
             "commands": now.len(),
             "build_ms": milliseconds(built_in),
             "total_ms": milliseconds(start.elapsed()),
-            "output": args.output.display().to_string(),
+            "output": self.args.output.display().to_string(),
         });
         if let Some(ReloadReport { points, moved, weights }) = reloaded {
             told["mesh"] = json!({
@@ -337,7 +380,7 @@ impl Watch<'_> {
                 })),
             });
         }
-        Ok(Some(told))
+        told
     }
 
     /// Says at once what happened; `false` if nobody can read it any more.
@@ -368,6 +411,18 @@ fn said_of_mesh(mesh: &Value) -> String {
     let weights = if mesh["weights"].is_null() { "" } else { ", weights transferred" };
     let moved = mesh["moved"].as_f64().unwrap_or_default();
     format!("mesh read again: {points}points moved by {moved:.4} at most{weights}; ")
+}
+
+/// Built skeleton of a rig that nothing moves, and the settings for writing it.
+fn still_skeleton(rig: Rig, export: &ExportArgs) -> Result<(Model, GltfWriteSettings), Failure> {
+    let mut modules = limits::modules();
+    // A watch goes on for longer than the time of a command.
+    modules.deadline = None;
+    let built = built_with(&rig, modules)?;
+    RigProgram::check(&built).map_err(|error| PoseError::CannotRun(NamedProgramError::new(error, &rig)))?;
+    let skeleton = baked(&rig, &built);
+    drop((rig, built));
+    Ok(model_of_skeleton(skeleton, export))
 }
 
 fn change(bench: &mut Workbench, from: &Rig, to: &Rig) -> Result<(), Failure> {

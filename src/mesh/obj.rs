@@ -12,6 +12,7 @@
 mod block;
 mod collect;
 mod color;
+mod corner_grid;
 mod corner_table;
 mod error;
 mod materials;

@@ -256,6 +256,52 @@ fn a_watched_template_is_built_at_every_save_and_no_broken_one_is_taken_over() {
     assert!(watch.ended());
 }
 
+/// A template of joints alone is written as `build` writes it; commands come to it and leave it while it is watched.
+#[test]
+fn a_watched_template_gets_its_first_commands_and_loses_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let joints = "(format: 2, name: \"n\", joints: [(label: \"a\", translation: (0, 1, 0)), \
+                  (label: \"b\", parent: \"a\", rotation: (0, 0, 0.6, 0.8), translation: (0, 1, 0))])";
+    fs::write(at("a.rig.ron"), joints).unwrap();
+    assert_eq!(rigsmith(folder.path(), &["build", "a.rig.ron", "-o", "built.glb"]).0, 0);
+    assert_eq!(rigsmith(folder.path(), &["new", "chain", "-o", "chain.rig.ron"]).0, 0);
+    let chain = fs::read_to_string(at("chain.rig.ron")).unwrap();
+    let mut watch = Watch::start(folder.path(), "a.glb", "3");
+    let none = |told: &Value| {
+        assert!(told["ok"] == true && told["commands"] == 0 && told["ran"] == serde_json::json!([]), "{told}");
+        assert!(fs::read(at("a.glb")).unwrap() == fs::read(at("built.glb")).unwrap());
+    };
+    none(&watch.next());
+    // A first version with commands that cannot be built changes nothing.
+    let written = fs::read(at("a.glb")).unwrap();
+    save_whole(&at("a.rig.ron"), chain.replace("square", "no such shape"));
+    let told = watch.next();
+    assert!(told["ok"] == false && told["error"]["where"].as_str().unwrap().starts_with("a.rig.ron:"), "{told}");
+    assert_eq!(fs::read(at("a.glb")).unwrap(), written);
+    save_whole(&at("a.rig.ron"), &chain);
+    let told = watch.next();
+    assert_eq!((told["ran"].as_array().unwrap().len(), told["commands"].as_u64()), (3, Some(3)), "{told}");
+    save_whole(&at("a.rig.ron"), joints);
+    none(&watch.next());
+    assert!(watch.ended());
+}
+
+/// A template of joints alone is written again, too, once that can be.
+#[test]
+fn joints_that_could_not_be_written_are_written_as_soon_as_they_can_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("a.rig.ron"), "(format: 2, name: \"n\", joints: [(label: \"a\")])").unwrap();
+    let mut watch = Watch::start(folder.path(), "out/a.glb", "1");
+    let told = watch.next();
+    assert!(crate::cli::explained(&told).contains("create it or choose another"), "{told}");
+    fs::create_dir(at("out")).unwrap();
+    let told = watch.next();
+    assert!(told["ok"] == true && at("out/a.glb").exists(), "{told}");
+    assert!(watch.ended());
+}
+
 #[test]
 fn a_character_that_could_not_be_written_is_written_as_soon_as_it_can_be() {
     let folder = tempfile::tempdir().unwrap();

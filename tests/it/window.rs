@@ -4,6 +4,7 @@
 //! where `RIGSMITH_REQUIRE_GPU=1`. `RIGSMITH_SHOTS` names a folder for pictures of the window on the way.
 
 mod display;
+mod kills;
 mod mouse;
 mod pictures;
 mod whole_job;

@@ -14,7 +14,7 @@ use crate::{
         posing::{PoseError, PosedNode},
     },
     plugins::{commands::NamedProgramError, surface::RigMesh},
-    processor::Builder,
+    processor::{Builder, Modules},
     rig::{BuiltRig, Rig},
     solve::program::{CompileOptions, RigProgram, RigState},
 };
@@ -24,13 +24,13 @@ use crate::{
 pub(super) fn is_at_rest(args: &PoseArgs, own: &[RigMesh], rig: &Rig) -> bool {
     let steps = &args.steps;
     let is_plain = steps.set.is_empty() && steps.switches.is_empty();
-    let is_bare = !rig.has_tags() && rig.pose().is_empty();
+    is_plain && args.meshes.is_empty() && own.is_empty() && is_still(rig)
+}
+
+/// True if a rig has neither commands nor a pose, and no joint is scaled unevenly: its entities are where its joints rest.
+pub(in crate::cli) fn is_still(rig: &Rig) -> bool {
     let is_even = |scale: Vec3| scale == Vec3::splat(scale.x);
-    is_plain
-        && args.meshes.is_empty()
-        && own.is_empty()
-        && is_bare
-        && rig.walk().all(|joint| is_even(joint.data.rest.scale))
+    !rig.has_tags() && rig.pose().is_empty() && rig.walk().all(|joint| is_even(joint.data.rest.scale))
 }
 
 /// True if the command asks for no node by its name, for no mesh and no picture, and the rig has no commands: nothing then asks
@@ -50,16 +50,19 @@ pub(super) fn built_bench(rig: Rig) -> Result<Workbench, Failure> {
 
 /// Result of the commands of a rig, without an app.
 fn built(rig: &Rig) -> Result<BuiltRig, Failure> {
-    let mut builder = Builder::new(Arc::new(limits::modules()));
+    let built = built_with(rig, limits::modules())?;
+    limits::check_time("building the rig")?;
+    Ok(built)
+}
+
+/// Result of the commands of a rig with these modules, without an app.
+pub(in crate::cli) fn built_with(rig: &Rig, modules: Modules) -> Result<BuiltRig, Failure> {
+    let mut builder = Builder::new(Arc::new(modules));
     builder.sync(rig);
     let outcome = builder.run_all();
     let built = builder.built();
     drop(builder);
-    if let Some(error) = outcome.error {
-        return Err(Failure::Input(Box::new(error)));
-    }
-    limits::check_time("building the rig")?;
-    Ok(built)
+    outcome.error.map_or(Ok(built), |error| Err(Failure::Input(Box::new(error))))
 }
 
 /// Tells the nodes of a rig at rest, and saves it if that is asked for.

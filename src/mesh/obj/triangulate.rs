@@ -8,7 +8,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::NONE;
+use super::corner_grid::CornerGrid;
 
 /// Buffers of the triangulation, reused from polygon to polygon.
 #[derive(Debug, Default)]
@@ -18,7 +18,7 @@ pub(super) struct Triangulator {
     next: Vec<u32>,
     /// Marks corners that may lie in an ear: not cut off yet, and reflex or straight.
     inner: Vec<bool>,
-    grid: Grid,
+    grid: CornerGrid,
     /// Number of comparisons and cells of the grid on all polygons so far.
     work: u64,
     /// Work up to which ears of the polygon at hand are looked for.
@@ -169,10 +169,9 @@ impl Triangulator {
             Lenience::Anything => return true,
             _ => {}
         }
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         let Self { flat, previous, next, inner, grid, work, .. } = self;
         let is_inner = |other: u32| inner[other as usize];
-        !grid.any(low, high, work, is_inner, |other| {
+        !grid.any([a, b, c], work, is_inner, |other| {
             if ids.contains(&other) {
                 return false;
             }
@@ -227,98 +226,6 @@ fn quad(points: &[DVec3]) -> [[u32; 3]; 2] {
         [[0, 1, 2], [0, 2, 3]]
     } else {
         [[0, 1, 3], [1, 2, 3]]
-    }
-}
-
-/// Points sorted into square cells.
-#[derive(Debug, Default)]
-struct Grid {
-    low: DVec2,
-    /// Number of cells per unit.
-    scale: DVec2,
-    side: usize,
-    starts: Vec<u32>,
-    /// Number of points of each cell that may still be wanted.
-    counts: Vec<u32>,
-    members: Vec<u32>,
-}
-
-impl Grid {
-    fn build(&mut self, points: &[DVec2], wanted: &[bool]) {
-        let inside = || points.iter().zip(wanted).filter(|(_, wanted)| **wanted).map(|(point, _)| *point);
-        let count = inside().count();
-        // The number of cells in a row doubles until a cell holds four points or fewer on average (at most 1024 cells).
-        self.side = 1;
-        while self.side * self.side * 4 < count && self.side < 1024 {
-            self.side *= 2;
-        }
-        self.low = inside().fold(DVec2::INFINITY, DVec2::min);
-        let extent = inside().fold(DVec2::NEG_INFINITY, DVec2::max) - self.low;
-        let cells = |extent: f64| if extent > 0.0 && extent.is_finite() { self.side as f64 / extent } else { 0.0 };
-        self.scale = DVec2::new(cells(extent.x), cells(extent.y));
-        self.starts.clear();
-        self.starts.resize(self.side * self.side + 1, 0);
-        for point in inside() {
-            let cell = self.cell(point);
-            self.starts[cell + 1] += 1;
-        }
-        for cell in 1..self.starts.len() {
-            self.starts[cell] += self.starts[cell - 1];
-        }
-        self.members.clear();
-        self.members.resize(count, NONE);
-        for (id, (point, _)) in points.iter().zip(wanted).enumerate().filter(|(_, (_, wanted))| **wanted) {
-            let mut slot = self.starts[self.cell(*point)] as usize;
-            while self.members[slot] != NONE {
-                slot += 1;
-            }
-            self.members[slot] = id as u32;
-        }
-        self.counts.clear();
-        self.counts.extend(self.starts.windows(2).map(|pair| pair[1] - pair[0]));
-    }
-
-    fn coordinates(&self, point: DVec2) -> [usize; 2] {
-        let place = (point - self.low) * self.scale;
-        [place.x, place.y].map(|place| (place.max(0.0) as usize).min(self.side - 1))
-    }
-
-    fn cell(&self, point: DVec2) -> usize {
-        let [x, y] = self.coordinates(point);
-        y * self.side + x
-    }
-
-    /// Returns `true` if `test` holds for any wanted point in the cells that the box touches. Points that are not wanted any
-    /// more leave their cells. Cells and points are added to `work`.
-    fn any(
-        &mut self,
-        low: DVec2,
-        high: DVec2,
-        work: &mut u64,
-        wanted: impl Fn(u32) -> bool,
-        mut test: impl FnMut(u32) -> bool,
-    ) -> bool {
-        let ([left, bottom], [right, top]) = (self.coordinates(low), self.coordinates(high));
-        for row in bottom..=top {
-            for cell in row * self.side + left..=row * self.side + right {
-                *work += 1;
-                let start = self.starts[cell] as usize;
-                let mut place = start;
-                while place < start + self.counts[cell] as usize {
-                    *work += 1;
-                    let id = self.members[place];
-                    if !wanted(id) {
-                        self.counts[cell] -= 1;
-                        self.members.swap(place, start + self.counts[cell] as usize);
-                    } else if test(id) {
-                        return true;
-                    } else {
-                        place += 1;
-                    }
-                }
-            }
-        }
-        false
     }
 }
 
@@ -386,6 +293,32 @@ mod tests {
                     assert!((covered - wanted).abs() < 1e-9 * wanted, "{name}: covers {covered}, not {wanted}");
                 }
             }
+        }
+    }
+
+    /// A comb of long teeth that all lean to one side: the box of each holds the roots of many others.
+    #[test]
+    fn leaning_teeth_take_no_work_for_all_others() {
+        for count in [500, 4000] {
+            let lean = f64::from(count / 2);
+            let tooth = |number: i32| {
+                let x = f64::from(number);
+                [[x, 0.1 * f64::from(7 * number % 5)], [x + 0.5 + lean, lean]]
+            };
+            let end = f64::from(count);
+            let mut comb: Vec<[f64; 2]> = (0..count).flat_map(tooth).collect();
+            comb.extend([[end, 0.0], [end, -5.0], [0.0, -5.0]]);
+            comb.reverse();
+            let points = flat(&comb);
+            let (mut triangulator, mut triangles) = (Triangulator::default(), Vec::new());
+            triangulator.polygon(&points, &mut triangles);
+            assert_eq!((triangles.len(), triangulator.fans), (comb.len() - 2, 0));
+            assert!(triangulator.work < 200 * comb.len() as u64, "{} for {}", triangulator.work, comb.len());
+            let next = |at: usize| DVec2::from(comb[(at + 1) % comb.len()]);
+            let wanted = (0..comb.len()).map(|at| DVec2::from(comb[at]).perp_dot(next(at))).sum::<f64>().abs();
+            let (_, sum, covered) = areas(&points);
+            assert!((sum.abs() - wanted).abs() < 1e-9 * wanted, "{count}: {sum}, not {wanted}");
+            assert!((covered - wanted).abs() < 1e-9 * wanted, "{count}: covers {covered}, not {wanted}");
         }
     }
 

@@ -88,9 +88,9 @@ impl Answers<'_, '_> {
         let follows =
             |edited: &EditReport| edited.name == FIT_AROUND && matches!(edited.committed, Some(Commit::Done(_)));
         let own = |edited: &&EditReport| !edited.preview && !follows(edited);
-        for EditReport { rig: entity, name, .. } in self.edited.read().filter(own) {
+        for EditReport { rig: entity, name, committed, .. } in self.edited.read().filter(own) {
             let Ok((_, mut script, rig, ..)) = scripts.get_mut(*entity) else { continue };
-            if script.pending {
+            if script.pending && script.is_answered_by(committed.as_ref()) {
                 script.note_added(rig);
                 script.say(told_step(name, rig.len()));
                 script.pending = false;

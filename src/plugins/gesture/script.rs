@@ -20,7 +20,7 @@ use crate::{
     },
     plugins::{
         commands::BuildResult,
-        document::{Change, EditRequest, Selection, Symmetry, chain_labels},
+        document::{Change, EditRequest, Selection, Symmetry, awaited_steps::AwaitedSteps, chain_labels},
         fit::{FitMarkers, FitPart, FitRequest, FitTemplate, FittedRig},
         limits::{Limit, RigLimits},
         picking::{Pick, PickRequest},
@@ -31,6 +31,7 @@ use crate::{
     rig::{
         Rig, Uid,
         operations::{MirrorPlane, Operation},
+        step::Commit,
     },
 };
 
@@ -50,6 +51,9 @@ pub struct GestureScript {
     #[reflect(ignore)]
     pub(super) state: UserState,
     pub(super) pending: bool,
+    /// Move through the history of the gesture whose answer is pending.
+    #[reflect(ignore)]
+    history_move: Option<HistoryMove>,
     /// True if gestures that follow one another are carried out in one frame where they can be.
     pub(super) is_unwatched: bool,
     /// Changes of a run that are requested, and complete its answers.
@@ -60,6 +64,24 @@ pub struct GestureScript {
     /// Selections that are requested.
     #[reflect(ignore)]
     pub(super) selections: RequestedSelections,
+}
+
+/// Move through the history.
+#[derive(Clone, Copy)]
+enum HistoryMove {
+    Undo,
+    Redo,
+}
+
+impl HistoryMove {
+    /// Move that a gesture is; `None` for any other gesture.
+    fn of(gesture: &Gesture) -> Option<Self> {
+        match gesture {
+            Gesture::Undo => Some(Self::Undo),
+            Gesture::Redo => Some(Self::Redo),
+            _ => None,
+        }
+    }
 }
 
 /// Answer to a gesture.
@@ -169,6 +191,17 @@ impl GestureScript {
         self.waiting.is_empty() && !self.pending
     }
 
+    /// Returns `true` if an edit may answer the last gesture. An undo or a redo that waits for a step that is computed is
+    /// answered by no other step, and the changes of a run have answers of their own.
+    pub(super) fn is_answered_by(&self, committed: Option<&Commit>) -> bool {
+        match self.history_move {
+            _ if !self.requested.is_empty() => false,
+            Some(HistoryMove::Undo) => matches!(committed, Some(Commit::Undone(_))),
+            Some(HistoryMove::Redo) => matches!(committed, Some(Commit::Redone(_))),
+            None => !matches!(committed, Some(Commit::Undone(_) | Commit::Redone(_))),
+        }
+    }
+
     /// Lets go of the gestures that are not begun, and returns the first of them.
     pub(crate) fn give_up(&mut self) -> Option<Gesture> {
         let next = self.waiting.pop_front();
@@ -227,13 +260,19 @@ pub(super) fn run_scripts(
     mut requests: Requests,
     mut answers: Answers,
     limits: Res<RigLimits>,
+    awaited: Option<Res<AwaitedSteps>>,
 ) {
     answers.collect(&mut scripts);
+    let awaits = |rig: &Entity| {
+        awaited.as_ref().is_some_and(|awaited| awaited.computed.contains(rig) || awaited.landed.contains(rig))
+    };
     for (entity, mut script, rig, selection, mut symmetry, surface, meshes, is_fitted, (is_built, has_tips)) in
         &mut scripts
     {
+        // A gesture comes after a step that is computed, whose words are no answer to it.
         if script.pending
             || script.waiting.is_empty()
+            || awaits(&entity)
             || (meshes.is_some() && surface.and_then(RigSurface::ready).is_none())
         {
             continue;
@@ -258,6 +297,7 @@ pub(super) fn run_scripts(
             continue;
         }
         let Some(gesture) = script.begin_next(rig.len(), &limits) else { continue };
+        script.history_move = HistoryMove::of(&gesture);
         let mesh = meshes.and_then(|meshes| meshes.iter().next());
         let (state, symmetry) = (&mut script.state, &mut symmetry);
         let mut act = GestureRun { entity, mesh, rig, selection, bounds, state, symmetry };

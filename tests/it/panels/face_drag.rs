@@ -241,6 +241,66 @@ fn undo_waits_for_the_step_of_a_slider() {
     assert_eq!(desk.steps(), (steps.0 + 1, steps.1));
 }
 
+/// Gestures come after a step that is computed, and an undo that waits for one is not answered with the words of another.
+#[test]
+fn gestures_wait_for_the_step_of_a_slider() {
+    let (mut desk, mesh) = with_face(model(heads::bundled()));
+    let ask = |desk: &mut Desk, name: &str, strength: f32, preview: bool| {
+        let strengths = [(name.to_owned(), strength)].into();
+        desk.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview });
+    };
+    let store = |desk: &mut Desk, name: &str| {
+        let change = Change::Do(Operation::StorePose(name.to_owned()));
+        desk.app.world_mut().write_message(EditRequest { rig: desk.rig, change });
+    };
+    let play = |desk: &mut Desk, gesture: Gesture| {
+        let rig = desk.rig;
+        desk.app.world_mut().entity_mut(rig).insert(GestureScript::new([gesture]));
+    };
+    let script = |desk: &Desk| {
+        let script = desk.app.world().get::<GestureScript>(desk.rig).expect("the script");
+        (script.is_done(), script.answers.clone())
+    };
+    let posing = |desk: &Desk| desk.app.world().get::<FacePosing>(mesh).unwrap().is_running();
+    let shown =
+        |desk: &Desk| desk.app.world().get::<Expressions>(mesh).map(|shown| shown.0.clone()).unwrap_or_default();
+    ask(&mut desk, "anger", 0.5, false);
+    desk.frame();
+    desk.until("anger", |desk| !posing(desk));
+    desk.frames(2);
+    let (anger, steps) = (shown(&desk), desk.steps().0);
+    assert_eq!(anger.get("anger"), Some(&0.5));
+
+    // The gesture comes while the step is computed, and in the frame in which it begins to be.
+    for (number, is_before) in [(1, false), (2, true)] {
+        let name = format!("between {number}");
+        let (held, threads) = busy_threads();
+        ask(&mut desk, "happiness", 0.4, true);
+        desk.frame();
+        if is_before {
+            play(&mut desk, Gesture::Undo);
+        }
+        ask(&mut desk, "happiness", 0.8, false);
+        desk.frames(2);
+        if !is_before {
+            play(&mut desk, Gesture::Undo);
+        }
+        store(&mut desk, &name);
+        desk.frames(3);
+        assert!(posing(&desk) && !script(&desk).0, "{name}: {:?}", script(&desk).1);
+        drop(held);
+        desk.until("the step", |desk| !posing(desk));
+        desk.until("the answer", |desk| script(desk).0);
+        drop(threads);
+        let answers = script(&desk).1;
+        assert!(answers.len() == 1 && answers[0].done && !answers[0].message.contains(&name), "{answers:?}");
+        // The slider is back, and the stored pose stays.
+        assert_eq!(shown(&desk), anger, "{name}");
+        assert_eq!(desk.rig().stored_poses().len(), number, "{name}");
+        assert_eq!(desk.steps().0, steps + 1 + number, "{name}");
+    }
+}
+
 /// A preview that is computed for weights of before does not come back in place of a step.
 #[test]
 fn a_step_outlives_a_preview_for_other_weights() {
