@@ -272,7 +272,8 @@ fn gestures_wait_for_the_step_of_a_slider() {
     assert_eq!(anger.get("anger"), Some(&0.5));
 
     // The gesture comes while the step is computed, and in the frame in which it begins to be.
-    for (number, is_before) in [(1, false), (2, true)] {
+    // The last pose is kept, so each has another one.
+    for (number, strength, is_before) in [(1, 0.8, false), (2, 0.7, true)] {
         let name = format!("between {number}");
         let (held, threads) = busy_threads();
         ask(&mut desk, "happiness", 0.4, true);
@@ -280,7 +281,7 @@ fn gestures_wait_for_the_step_of_a_slider() {
         if is_before {
             play(&mut desk, Gesture::Undo);
         }
-        ask(&mut desk, "happiness", 0.8, false);
+        ask(&mut desk, "happiness", strength, false);
         desk.frames(2);
         if !is_before {
             play(&mut desk, Gesture::Undo);
