@@ -40,21 +40,34 @@ fn moved(fit: &FittedSkeleton, whole: &FittedSkeleton) -> f32 {
     pairs.map(|(a, b)| 100.0 * a.position.distance(b.position) / whole.height).fold(0.0, f32::max)
 }
 
-/// A tenth of the faces missing, six times. Where all holes are closed as they were, nothing moves. 0.3 was asked for; shoulders
-/// move by 5.6 in one of the other two. Feathers moved by 13.5 in it while they turned with the bone before theirs.
-#[test]
-fn a_bird_with_a_tenth_of_its_faces_missing() {
-    let Some(FittedFigure { figure, fit }) = eagle() else { return };
-    let missed = |seed: u64| {
-        let mut random = Random(seed);
+/// The furthest that a joint of a figure moves where a tenth of its faces are missing, for each seed.
+fn moved_by_missing(name: &str, seeds: &[u64]) -> Option<Vec<f32>> {
+    let FittedFigure { figure, fit } = all()?.iter().find(|fitted| fitted.figure.name == name)?;
+    let missed = |seed: &u64| {
+        let mut random = Random(*seed);
         let left: Vec<[u32; 3]> = figure.triangles.iter().copied().filter(|_| random.unit() > 0.1).collect();
         let moved = moved(&fitted(&figure.points, &left, figure.template).unwrap(), fit);
-        println!("{seed}: {} of {} faces, joints move by {moved:.2}", left.len(), figure.triangles.len());
+        println!("{name}, {seed}: {} of {} faces, joints move by {moved:.2}", left.len(), figure.triangles.len());
         moved
     };
-    let most: Vec<f32> = [77, 1, 2, 3, 4, 5].into_iter().map(missed).collect();
-    assert!(most.iter().filter(|moved| **moved <= 0.3).count() >= 4, "{most:?}");
-    assert!(most.iter().all(|moved| *moved <= 6.2), "{most:?}");
+    Some(seeds.iter().map(missed).collect())
+}
+
+/// A tenth of the faces missing, six times: nothing moves, and 0.3 was asked for. While the faces on the other side did not tell
+/// which ones are missing, shoulders moved by 5.6 and by 2.1 in two of the six, where a hole was closed along its other diagonal.
+#[test]
+fn a_bird_with_a_tenth_of_its_faces_missing() {
+    let Some(most) = moved_by_missing(EAGLE, &[77, 1, 2, 3, 4, 5]) else { return };
+    assert!(most.iter().all(|moved| *moved <= 0.05), "{most:?}");
+}
+
+/// Of sixteen such foxes one lacks the same face on both sides, and moves by 1.46; ten did while one side told nothing of the other.
+#[test]
+fn a_fox_with_a_tenth_of_its_faces_missing() {
+    let seeds: Vec<u64> = (1..=15).chain([77]).collect();
+    let Some(most) = moved_by_missing("creatures/fox-fox.glb", &seeds) else { return };
+    assert!(most.iter().filter(|moved| **moved <= 0.05).count() >= 15, "{most:?}");
+    assert!(most.iter().all(|moved| *moved <= 1.6), "{most:?}");
 }
 
 /// Mean distance of joints from their true places, in hundredths of the height, for the labels that are asked for.

@@ -1,0 +1,103 @@
+//! Images: the point that lies across the plane of symmetry from each point of a mesh.
+//!
+//! A mesh that was modelled on one side and mirrored tells on the other side which faces are missing from the first. Points
+//! stay where faces are missing, so their principal axes tell the plane. Turned files hold images with rounding.
+
+use glam::{DVec3, Vec3};
+
+use super::clean::principal_axes;
+
+/// Share of the points that have an image where the mesh has a plane of symmetry.
+const SYMMETRIC: f64 = 0.8;
+/// Largest distances from an image, as shares of the mesh's size, in the rounds in which the plane is moved to the middle between
+/// points and their images.
+const ROUNDS: [f64; 2] = [5e-3, 5e-4];
+/// Points that are looked at in those rounds, about.
+const SAMPLES: usize = 600;
+/// Largest distance of a point from the image that it is.
+const EXACT: f64 = 5e-5;
+
+/// The plane between points and their images, and the points along a direction in it.
+struct Mirror<'a> {
+    points: &'a [Vec3],
+    middle: DVec3,
+    normal: DVec3,
+    along: DVec3,
+    /// Points with how far they lie along the plane, in that order.
+    order: Vec<(f64, u32)>,
+}
+
+impl<'a> Mirror<'a> {
+    fn new(points: &'a [Vec3], middle: DVec3, normal: DVec3, across: DVec3) -> Self {
+        let along = (across - normal * across.dot(normal)).normalize_or_zero();
+        let mut order: Vec<(f64, u32)> =
+            points.iter().zip(0..).map(|(point, number)| (point.as_dvec3().dot(along), number)).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        Self { points, middle, normal, along, order }
+    }
+
+    /// The point that is nearest to the image of another one, within a distance.
+    fn image(&self, point: Vec3, within: f64) -> Option<u32> {
+        let point = point.as_dvec3();
+        let image = point - self.normal * (2.0 * (point - self.middle).dot(self.normal));
+        let at = image.dot(self.along);
+        let first = self.order.partition_point(|(along, _)| *along < at - within);
+        let near = self.order[first..].iter().take_while(|(along, _)| *along <= at + within);
+        let away = |number: u32| self.points[number as usize].as_dvec3().distance_squared(image);
+        let nearest = near.map(|&(_, number)| (away(number), number)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        (nearest.0 <= within * within).then_some(nearest.1)
+    }
+}
+
+/// The number of the image of each point, `u32::MAX` for points without one; `None` if the mesh has no plane of symmetry. Work:
+/// sorting the points a few times.
+pub(super) fn images(points: &[Vec3]) -> Option<Vec<u32>> {
+    let count = points.len() as f64;
+    let middle = points.iter().map(|point| point.as_dvec3()).sum::<DVec3>() / count.max(1.0);
+    let size = points.iter().map(|point| point.as_dvec3().distance(middle)).fold(0.0, f64::max);
+    if size.is_nan() || size <= 0.0 {
+        return None;
+    }
+    let mut moments = [[0.0f64; 3]; 3];
+    for point in points {
+        let away = ((point.as_dvec3() - middle) / size).to_array();
+        for (row, a) in moments.iter_mut().zip(away) {
+            row.iter_mut().zip(away).for_each(|(moment, b)| *moment += a * b);
+        }
+    }
+    let axes = principal_axes(moments);
+    let every = (points.len() / SAMPLES).max(1);
+    (0..3).find_map(|axis| {
+        let (mut middle, mut normal) = (middle, axes[axis]);
+        let across = axes[(axis + 1) % 3];
+        for within in ROUNDS {
+            let mirror = Mirror::new(points, middle, normal, across);
+            let (mut sum, mut way, mut met, mut all) = (DVec3::ZERO, DVec3::ZERO, 0.0, 0.0);
+            for point in points.iter().step_by(every) {
+                all += 1.0;
+                if let Some(image) = mirror.image(*point, within * size) {
+                    let (point, image) = (point.as_dvec3(), points[image as usize].as_dvec3());
+                    let apart = point - image;
+                    way += apart * apart.dot(normal).signum();
+                    sum += (point + image) * 0.5;
+                    met += 1.0;
+                }
+            }
+            if met < SYMMETRIC * all {
+                return None;
+            }
+            (middle, normal) = (sum / met, way.try_normalize()?);
+        }
+        let mirror = Mirror::new(points, middle, normal, across);
+        let mut images: Vec<u32> =
+            points.iter().map(|point| mirror.image(*point, EXACT * size).unwrap_or(u32::MAX)).collect();
+        let back = images.clone();
+        for (image, point) in images.iter_mut().zip(0..) {
+            if back.get(*image as usize) != Some(&point) {
+                *image = u32::MAX;
+            }
+        }
+        let found = images.iter().filter(|image| **image != u32::MAX).count() as f64;
+        (found >= SYMMETRIC * count).then_some(images)
+    })
+}
