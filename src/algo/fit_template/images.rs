@@ -4,6 +4,7 @@
 //! stay where faces are missing, so their principal axes tell the plane. Turned files hold images with rounding.
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use super::clean::principal_axes;
 
@@ -17,25 +18,17 @@ const SAMPLES: usize = 600;
 /// Largest distance of a point from the image that it is.
 const EXACT: f64 = 5e-5;
 
-/// The plane between points and their images, and the points along a direction in it.
+/// The plane between points and their images, and the points along a direction.
 struct Mirror<'a> {
     points: &'a [Vec3],
     middle: DVec3,
     normal: DVec3,
     along: DVec3,
-    /// Points with how far they lie along the plane, in that order.
-    order: Vec<(f64, u32)>,
+    /// Points with how far they lie along a direction that is about one of the plane's, in that order.
+    order: &'a [(f64, u32)],
 }
 
-impl<'a> Mirror<'a> {
-    fn new(points: &'a [Vec3], middle: DVec3, normal: DVec3, across: DVec3) -> Self {
-        let along = (across - normal * across.dot(normal)).normalize_or_zero();
-        let mut order: Vec<(f64, u32)> =
-            points.iter().zip(0..).map(|(point, number)| (point.as_dvec3().dot(along), number)).collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        Self { points, middle, normal, along, order }
-    }
-
+impl Mirror<'_> {
     /// The point that is nearest to the image of another one, within a distance.
     fn image(&self, point: Vec3, within: f64) -> Option<u32> {
         let point = point.as_dvec3();
@@ -47,6 +40,14 @@ impl<'a> Mirror<'a> {
         let nearest = near.map(|&(_, number)| (away(number), number)).min_by(|a, b| a.0.total_cmp(&b.0))?;
         (nearest.0 <= within * within).then_some(nearest.1)
     }
+}
+
+/// Points with how far they lie along a direction, in that order.
+fn in_order(points: &[Vec3], along: DVec3) -> Vec<(f64, u32)> {
+    let places = points.iter().map(|point| point.as_dvec3().dot(along));
+    let mut order: Vec<(f64, u32)> = places.zip(0..).collect();
+    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    order
 }
 
 /// The number of the image of each point, `u32::MAX` for points without one; `None` if the mesh has no plane of symmetry. Work:
@@ -69,9 +70,10 @@ pub(super) fn images(points: &[Vec3]) -> Option<Vec<u32>> {
     let every = (points.len() / SAMPLES).max(1);
     (0..3).find_map(|axis| {
         let (mut middle, mut normal) = (middle, axes[axis]);
-        let across = axes[(axis + 1) % 3];
+        let along = axes[(axis + 1) % 3];
+        let order = in_order(points, along);
         for within in ROUNDS {
-            let mirror = Mirror::new(points, middle, normal, across);
+            let mirror = Mirror { points, middle, normal, along, order: &order };
             let (mut sum, mut way, mut met, mut all) = (DVec3::ZERO, DVec3::ZERO, 0.0, 0.0);
             for point in points.iter().step_by(every) {
                 all += 1.0;
@@ -88,9 +90,9 @@ pub(super) fn images(points: &[Vec3]) -> Option<Vec<u32>> {
             }
             (middle, normal) = (sum / met, way.try_normalize()?);
         }
-        let mirror = Mirror::new(points, middle, normal, across);
+        let mirror = Mirror { points, middle, normal, along, order: &order };
         let mut images: Vec<u32> =
-            points.iter().map(|point| mirror.image(*point, EXACT * size).unwrap_or(u32::MAX)).collect();
+            points.par_iter().map(|point| mirror.image(*point, EXACT * size).unwrap_or(u32::MAX)).collect();
         let back = images.clone();
         for (image, point) in images.iter_mut().zip(0..) {
             if back.get(*image as usize) != Some(&point) {
