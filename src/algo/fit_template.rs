@@ -24,6 +24,7 @@ mod confidence;
 mod eigen;
 mod fitting;
 mod human;
+mod images;
 mod level;
 mod limbs;
 mod line;

@@ -3,13 +3,15 @@
 //! A hole is a ring of edges that one triangle uses each. It is closed where it is small beside the island that it lies in;
 //! the rim of a sheet (a cape, a feather, a loose triangle) stays open. A short ring is what a few missing faces leave: of all
 //! its triangulations the one is taken that bends least against the faces around it (Liepa 2003, "Filling holes in meshes"),
-//! which for most rings restores those faces.
+//! which for most rings restores those faces. A mesh that is the same on both sides of a plane tells more: faces whose images
+//! lie across a hole's image come before all others.
 
 use std::collections::BTreeMap;
 
 use bevy::math::ops;
 use glam::{DVec3, Vec3};
 
+use super::images;
 use crate::mesh::adjacency;
 
 /// Square of a hole's length above which it stays open, in areas of its island. A flat or rolled sheet has at least 12.6
@@ -28,6 +30,7 @@ pub(super) fn close_holes(points: &mut Vec<Vec3>, triangles: &mut Vec<[u32; 3]>)
         return;
     }
     let rings = rings(points, triangles, &rims);
+    let opposite = Opposite::of(points, triangles, &rings);
     let (islands, count) = adjacency::islands(triangles, points.len());
     let mut areas = vec![0.0f64; count];
     for t in triangles.iter() {
@@ -43,9 +46,9 @@ pub(super) fn close_holes(points: &mut Vec<Vec3>, triangles: &mut Vec<[u32; 3]>)
             continue;
         }
         if ring.len() <= SHORT {
-            let (bend, least_bent) = flattest(points, triangles, &rims, &ring);
-            if ring.len() <= 4 || bend <= STEEP * length as f32 {
-                caps.extend(least_bent);
+            let Cap { odd, bend, faces } = flattest(points, triangles, &rims, &opposite, &ring);
+            if ring.len() <= 4 || odd == 0 || bend <= STEEP * length as f32 {
+                caps.extend(faces);
                 continue;
             }
         }
@@ -63,14 +66,62 @@ fn cross(points: &[Vec3], corners: [u32; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// The triangulation of a short ring that bends least: the least sum of angles between triangles, times the lengths of the
-/// edges between them; with that sum.
+/// The faces of a mesh that has a plane of symmetry.
+#[derive(Default)]
+struct Opposite {
+    /// Image of each point; none without a plane of symmetry.
+    images: Vec<u32>,
+    /// Faces, each from its least corner on, in order.
+    faces: Vec<[u32; 3]>,
+}
+
+impl Opposite {
+    /// The faces of a mesh that has rings which may be closed in more than one way.
+    fn of(points: &[Vec3], triangles: &[[u32; 3]], rings: &[Vec<u32>]) -> Self {
+        if !rings.iter().any(|ring| (4..=SHORT).contains(&ring.len())) {
+            return Self::default();
+        }
+        let Some(images) = images::images(points) else { return Self::default() };
+        let mut faces: Vec<[u32; 3]> = triangles.iter().map(|face| from_least(*face)).collect();
+        faces.sort_unstable();
+        Self { images, faces }
+    }
+
+    /// True if the image of a triangle is a face.
+    fn has(&self, corners: [u32; 3]) -> bool {
+        let image = |corner: u32| self.images.get(corner as usize).copied().unwrap_or(u32::MAX);
+        let [a, b, c] = corners.map(image);
+        !self.images.is_empty() && self.faces.binary_search(&from_least([a, c, b])).is_ok()
+    }
+}
+
+/// A face from its least corner on.
+fn from_least([a, b, c]: [u32; 3]) -> [u32; 3] {
+    match a.min(b).min(c) {
+        least if least == a => [a, b, c],
+        least if least == b => [b, c, a],
+        _ => [c, a, b],
+    }
+}
+
+/// Triangulation of a ring.
+struct Cap {
+    /// Number of its triangles whose images are no faces.
+    odd: u32,
+    /// Sum of the angles along its edges, times their lengths.
+    bend: f32,
+    faces: Vec<[u32; 3]>,
+}
+
+/// The triangulation of a short ring that bends least of those with the most triangles whose images are faces: the least sum of
+/// angles between triangles, times the lengths of the edges between them.
 fn flattest(
     points: &[Vec3],
     triangles: &[[u32; 3]],
     rims: &BTreeMap<(u32, u32), u32>,
+    opposite: &Opposite,
     ring: &[u32],
-) -> (f32, Vec<[u32; 3]>) {
+) -> Cap {
     let count = ring.len();
     let corners = |[i, m, k]: [usize; 3]| [ring[i], ring[m], ring[k]];
     let bend = |edge: [usize; 2], a: DVec3, b: DVec3| {
@@ -83,43 +134,48 @@ fn flattest(
         let triangle = rims.get(&(ring[from], ring[to])).and_then(|triangle| triangles.get(*triangle as usize));
         triangle.map_or(DVec3::ZERO, |triangle| cross(points, *triangle))
     };
-    // For the part of the ring from one place to another: the least sum, and the place that forms a triangle with both.
-    let mut best = vec![(0.0f32, 0usize); count * count];
+    // For the part of the ring from one place to another: the fewest triangles without an image, the least sum, and the place that
+    // forms a triangle with both.
+    let mut best = vec![(0u32, 0.0f32, 0usize); count * count];
     for span in 2..count {
         for first in 0..count - span {
             let last = first + span;
-            let mut least = (f32::INFINITY, first + 1);
+            let mut least = (u32::MAX, f32::INFINITY, first + 1);
             for middle in first + 1..last {
-                let normal = cross(points, corners([first, middle, last]));
+                let face = corners([first, middle, last]);
+                let normal = cross(points, face);
                 let over = |from: usize, to: usize| {
-                    let (sum, apex) = best[from * count + to];
+                    let (odd, sum, apex) = best[from * count + to];
                     let other = match to - from {
                         1 => beyond(from, to),
                         _ => cross(points, corners([from, apex, to])),
                     };
-                    sum + bend([from, to], normal, other)
+                    (odd, sum + bend([from, to], normal, other))
                 };
-                let mut sum = over(first, middle) + over(middle, last);
+                let (before, after) = (over(first, middle), over(middle, last));
+                let odd = before.0 + after.0 + u32::from(!opposite.has(face));
+                let mut sum = before.1 + after.1;
                 if span == count - 1 {
                     sum += bend([last, first], normal, beyond(last, first));
                 }
-                if sum < least.0 {
-                    least = (sum, middle);
+                if odd < least.0 || odd == least.0 && sum < least.1 {
+                    least = (odd, sum, middle);
                 }
             }
             best[first * count + last] = least;
         }
     }
-    let mut caps = Vec::with_capacity(count.saturating_sub(2));
+    let mut faces = Vec::with_capacity(count.saturating_sub(2));
     let mut open = vec![(0, count - 1)];
     while let Some((first, last)) = open.pop() {
         if last > first + 1 {
-            let middle = best[first * count + last].1;
-            caps.push(corners([first, middle, last]));
+            let middle = best[first * count + last].2;
+            faces.push(corners([first, middle, last]));
             open.extend([(first, middle), (middle, last)]);
         }
     }
-    (best[count - 1].0, caps)
+    let (odd, bend, _) = best[count - 1];
+    Cap { odd, bend, faces }
 }
 
 /// Edges that one triangle uses, against the direction of that triangle, with its number.
@@ -230,26 +286,60 @@ mod tests {
 
     /// Faces, each from its least corner on, in order.
     fn in_order(faces: &[[u32; 3]]) -> Vec<[u32; 3]> {
-        let from_least = |&[a, b, c]: &[u32; 3]| match a.min(b).min(c) {
-            least if least == a => [a, b, c],
-            least if least == b => [b, c, a],
-            _ => [c, a, b],
-        };
-        let mut faces: Vec<[u32; 3]> = faces.iter().map(from_least).collect();
+        let mut faces: Vec<[u32; 3]> = faces.iter().map(|face| from_least(*face)).collect();
         faces.sort_unstable();
         faces
+    }
+
+    /// The ellipsoid with one side dented, so that no plane of symmetry tells what is missing.
+    fn dented() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let (points, faces) = ellipsoid();
+        let dent = |point: Vec3| point - Vec3::new(1.0, 0.7, 0.4) * (2e-3 * (point.dot(Vec3::ONE)).max(0.0));
+        (points.into_iter().map(dent).collect(), faces)
     }
 
     /// Closes the holes that missing faces leave, and compares the mesh with the whole one.
     #[track_caller]
     fn check_restored(missing: &[usize]) {
-        let (mut points, faces) = ellipsoid();
-        let count = points.len();
-        let left = faces.iter().enumerate().filter(|(number, _)| !missing.contains(number));
-        let mut left: Vec<[u32; 3]> = left.map(|(_, face)| *face).collect();
-        close_holes(&mut points, &mut left);
-        assert_eq!(points.len(), count, "{missing:?}");
-        assert_eq!(in_order(&left), in_order(&faces), "{missing:?}");
+        for (mut points, faces) in [ellipsoid(), dented()] {
+            let count = points.len();
+            let left = faces.iter().enumerate().filter(|(number, _)| !missing.contains(number));
+            let mut left: Vec<[u32; 3]> = left.map(|(_, face)| *face).collect();
+            close_holes(&mut points, &mut left);
+            assert_eq!(points.len(), count, "{missing:?}");
+            assert_eq!(in_order(&left), in_order(&faces), "{missing:?}");
+        }
+    }
+
+    /// Two faces on each side share the more bent one of their diagonals: those of one side are restored by those of the other.
+    #[test]
+    fn faces_on_the_other_side_tell_what_is_missing() {
+        let (points, mut faces) = ellipsoid();
+        let images = images::images(&points).unwrap();
+        let is_apart = |face: &&[u32; 3]| face.iter().all(|corner| points[*corner as usize].min_element() > 0.1);
+        let [a, b, c] = *faces.iter().find(is_apart).unwrap();
+        let opposite = [a, b, c].map(|corner| images[corner as usize]);
+        let beyond = |from: u32, to: u32, inner: u32| {
+            let own = faces.iter().find(|face| face.contains(&from) && face.contains(&to) && !face.contains(&inner));
+            *own.unwrap().iter().find(|corner| **corner != from && **corner != to).unwrap()
+        };
+        let d = beyond(a, b, c);
+        let image = images[d as usize];
+        assert!(opposite.iter().all(|corner| ![a, b, c, d].contains(corner)) && image != d);
+        faces.retain(|face| ![a, b].iter().all(|corner| face.contains(corner)));
+        faces.retain(|face| !opposite[..2].iter().all(|corner| face.contains(corner)));
+        let [e, f, g] = opposite;
+        faces.extend([[e, g, image], [image, g, f]]);
+        let whole: Vec<[u32; 3]> = faces.iter().copied().chain([[a, d, c], [d, b, c]]).collect();
+        let closed = |mut points: Vec<Vec3>| {
+            let mut left = faces.clone();
+            close_holes(&mut points, &mut left);
+            in_order(&left)
+        };
+        assert_eq!(closed(points.clone()), in_order(&whole));
+        let (dented, _) = dented();
+        assert!(images::images(&dented).is_none());
+        assert_ne!(closed(dented), in_order(&whole));
     }
 
     fn common_corners(a: [u32; 3], b: [u32; 3]) -> usize {

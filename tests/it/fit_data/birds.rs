@@ -40,21 +40,34 @@ fn moved(fit: &FittedSkeleton, whole: &FittedSkeleton) -> f32 {
     pairs.map(|(a, b)| 100.0 * a.position.distance(b.position) / whole.height).fold(0.0, f32::max)
 }
 
-/// A tenth of the faces missing, six times. Where all holes are closed as they were, nothing moves. 0.3 was asked for; shoulders
-/// move by 5.6 in one of the other two. Feathers moved by 13.5 in it while they turned with the bone before theirs.
-#[test]
-fn a_bird_with_a_tenth_of_its_faces_missing() {
-    let Some(FittedFigure { figure, fit }) = eagle() else { return };
-    let missed = |seed: u64| {
-        let mut random = Random(seed);
+/// The furthest that a joint of a figure moves where a tenth of its faces are missing, for each seed.
+fn moved_by_missing(name: &str, seeds: &[u64]) -> Option<Vec<f32>> {
+    let FittedFigure { figure, fit } = all()?.iter().find(|fitted| fitted.figure.name == name)?;
+    let missed = |seed: &u64| {
+        let mut random = Random(*seed);
         let left: Vec<[u32; 3]> = figure.triangles.iter().copied().filter(|_| random.unit() > 0.1).collect();
         let moved = moved(&fitted(&figure.points, &left, figure.template).unwrap(), fit);
-        println!("{seed}: {} of {} faces, joints move by {moved:.2}", left.len(), figure.triangles.len());
+        println!("{name}, {seed}: {} of {} faces, joints move by {moved:.2}", left.len(), figure.triangles.len());
         moved
     };
-    let most: Vec<f32> = [77, 1, 2, 3, 4, 5].into_iter().map(missed).collect();
-    assert!(most.iter().filter(|moved| **moved <= 0.3).count() >= 4, "{most:?}");
-    assert!(most.iter().all(|moved| *moved <= 6.2), "{most:?}");
+    Some(seeds.iter().map(missed).collect())
+}
+
+/// A tenth of the faces missing, six times: nothing moves, and 0.3 was asked for. While the faces on the other side did not tell
+/// which ones are missing, shoulders moved by 5.6 and by 2.1 in two of the six, where a hole was closed along its other diagonal.
+#[test]
+fn a_bird_with_a_tenth_of_its_faces_missing() {
+    let Some(most) = moved_by_missing(EAGLE, &[77, 1, 2, 3, 4, 5]) else { return };
+    assert!(most.iter().all(|moved| *moved <= 0.05), "{most:?}");
+}
+
+/// Of sixteen such foxes one lacks the same face on both sides, and moves by 1.46; ten did while one side told nothing of the other.
+#[test]
+fn a_fox_with_a_tenth_of_its_faces_missing() {
+    let seeds: Vec<u64> = (1..=15).chain([77]).collect();
+    let Some(most) = moved_by_missing("creatures/fox-fox.glb", &seeds) else { return };
+    assert!(most.iter().filter(|moved| **moved <= 0.05).count() >= 15, "{most:?}");
+    assert!(most.iter().all(|moved| *moved <= 1.6), "{most:?}");
 }
 
 /// Mean distance of joints from their true places, in hundredths of the height, for the labels that are asked for.
@@ -125,34 +138,47 @@ fn a_drag_along_the_trunk_moves_the_hips_alone() {
 /// Map of the points of a mesh.
 type Map<'a> = &'a dyn Fn(Vec3) -> Vec3;
 
+/// The eagle with its points and true joints where a map has them, fitted.
+fn mapped(eagle: &FittedFigure, name: &str, map: Map<'_>) -> FittedFigure {
+    let Figure { points, triangles, truth, .. } = &eagle.figure;
+    let figure = Figure {
+        name: name.to_owned(),
+        points: points.iter().map(|point| map(*point)).collect(),
+        triangles: triangles.clone(),
+        template: eagle.figure.template,
+        truth: truth.iter().map(|(label, place)| (label.clone(), map(*place))).collect(),
+    };
+    let fit = fitted(&figure.points, &figure.triangles, figure.template).unwrap();
+    FittedFigure { figure, fit }
+}
+
+/// The place with the part of an eagle that is below its belly higher or lower by a factor.
+fn with_legs(place: Vec3, share: f32) -> Vec3 {
+    let below = (place.y - 0.42).min(0.0);
+    Vec3::new(place.x, place.y - (1.0 - share) * below, place.z)
+}
+
+/// The place with the part of an eagle's wings beyond its trunk longer or shorter by a factor.
+fn with_wings(place: Vec3, share: f32) -> Vec3 {
+    let x = place.x.abs() - (1.0 - share) * (place.x.abs() - 0.25).max(0.0);
+    Vec3::new(x.copysign(place.x), place.y, place.z)
+}
+
 /// Eagles with shorter wings, a longer trunk, or wings that are swept back, by a map of points and true joints. The first two
 /// had their heads in the tail's feathers, off by 67 and 71; the others were off by 8.3, 6.5 and 9.8.
 #[test]
 fn birds_of_other_shapes_face_forward() {
     let Some(eagle) = eagle() else { return };
     let beyond = |x: f32| (x.abs() - 0.25).max(0.0);
-    let short = |place: Vec3, share: f32| {
-        let x = place.x.abs() - (1.0 - share) * beyond(place.x);
-        Vec3::new(x.copysign(place.x), place.y, place.z)
-    };
     let cases: [(&str, Map<'_>, f32, f32); 5] = [
-        ("very short wings", &|place| short(place, 0.35), 9.8, 14.4),
-        ("short wings", &|place| short(place, 0.45), 7.6, 3.6),
-        ("shorter wings", &|place| short(place, 0.6), 6.9, 3.6),
+        ("very short wings", &|place| with_wings(place, 0.35), 9.8, 14.4),
+        ("short wings", &|place| with_wings(place, 0.45), 7.6, 3.6),
+        ("shorter wings", &|place| with_wings(place, 0.6), 6.9, 3.6),
         ("a long trunk", &|place| Vec3::new(place.x, place.y, 1.35 * place.z), 6.1, 5.3),
         ("swept wings", &|place| place - Vec3::Z * 0.4 * beyond(place.x), 8.6, 9.5),
     ];
     for (name, map, most, most_of_tail) in cases {
-        let Figure { points, triangles, truth, .. } = &eagle.figure;
-        let figure = Figure {
-            name: name.to_owned(),
-            points: points.iter().map(|point| map(*point)).collect(),
-            triangles: triangles.clone(),
-            template: eagle.figure.template,
-            truth: truth.iter().map(|(label, place)| (label.clone(), map(*place))).collect(),
-        };
-        let fit = fitted(&figure.points, &figure.triangles, figure.template).unwrap();
-        let other = FittedFigure { figure, fit };
+        let other = mapped(eagle, name, map);
         let (body, tail) =
             (mean_off(&other, &other.fit, &|_| true), mean_off(&other, &other.fit, &|label| label == "tail"));
         println!("{name}: off by {body:.2}, the root of the tail by {tail:.2}");
@@ -160,4 +186,39 @@ fn birds_of_other_shapes_face_forward() {
         assert!(body <= most, "{name}: {body}");
         assert!(tail <= most_of_tail, "{name}: {tail}");
     }
+}
+
+/// Of joints of birds of other shapes that are wrong by more than 5 nine in ten are doubtful (89 of 92 as measured), and of doubtful
+/// ones half are wrong. In low legs flesh hides the hock, too, and hips and hocks that are off by 5.5 and 5.9 were not doubted.
+#[test]
+fn doubt_is_honest_in_birds_of_other_shapes() {
+    let Some(eagle) = eagle() else { return };
+    let cases: [(&str, Map<'_>); 11] = [
+        ("very short wings", &|place| with_wings(place, 0.35)),
+        ("short wings", &|place| with_wings(place, 0.45)),
+        ("shorter wings", &|place| with_wings(place, 0.6)),
+        ("a long trunk", &|place| Vec3::new(place.x, place.y, 1.35 * place.z)),
+        ("a longer trunk", &|place| Vec3::new(place.x, place.y, 1.15 * place.z)),
+        ("swept wings", &|place| place - Vec3::Z * 0.4 * (place.x.abs() - 0.25).max(0.0)),
+        ("a stout trunk", &|place| place * Vec3::new(0.8, 1.15, 0.75)),
+        ("low legs", &|place| with_legs(place, 0.6)),
+        ("lower legs", &|place| with_legs(place, 0.8)),
+        ("longer legs", &|place| with_legs(place, 1.4)),
+        ("long legs", &|place| with_legs(place, 2.0)),
+    ];
+    let (mut wrong, mut told, mut doubtful) = (0, 0, 0);
+    for (name, map) in cases {
+        let other = mapped(eagle, name, map);
+        for (at, label, off) in other.off() {
+            let confidence = other.fit.joints[at].confidence;
+            wrong += usize::from(off > 5.0);
+            told += usize::from(off > 5.0 && confidence < 0.5);
+            doubtful += usize::from(confidence < 0.5);
+            let is_leg = label.starts_with("thigh") || label.starts_with("metatarsus");
+            assert!(name != "low legs" || !is_leg || confidence < 0.5, "{label} is off by {off}, {confidence}");
+        }
+    }
+    println!("of {wrong} wrong joints {told} are doubtful; of {doubtful} doubtful ones {told} are wrong");
+    assert!(told as f32 >= 0.93 * wrong as f32, "{told} of {wrong}");
+    assert!(told as f32 >= 0.5 * doubtful as f32, "{told} of {doubtful}");
 }

@@ -22,8 +22,12 @@ const BENT: f32 = 0.44;
 const CRUSHED: f32 = 0.6;
 
 /// Length of a bird's thigh against that of its shank where both lie in a trunk that is the right one, below a hock in its place;
-/// femurs of birds are shorter than their tibiotarsi, and mostly longer than half of them.
-const THIGH: RangeInclusive<f32> = 0.5..=1.0;
+/// femurs of birds are shorter than their tibiotarsi, and mostly longer than half of them. A longer thigh is that of a bird which
+/// crouches, or whose legs are low: flesh covers the hock, too, and the one that is found lies above it.
+const THIGH: RangeInclusive<f32> = 0.5..=0.65;
+/// Likeness of the angle between pelvis and thigh to the template's below which a hip that the trunk hides is not where it should
+/// be: the thigh then leads straight on from the pelvis.
+const LED: f32 = 0.5;
 
 /// Evidence for the joints of a placement, by joint.
 pub(super) struct Evidence {
@@ -57,9 +61,11 @@ impl Evidence {
         for limb in template.limbs.iter().filter(|limb| template.has_hidden_knee(limb)) {
             let [hip, knee, hock, foot, ..] = *limb.joints.as_slice() else { continue };
             let share = places[hip].distance(places[knee]) / places[knee].distance(places[hock]).max(1e-9);
-            if is_shown[hock] && THIGH.contains(&share) {
-                [hip, knee, foot].into_iter().for_each(|joint| is_shown[joint] = true);
-            }
+            // A hock that bends stands over its foot, whatever flesh hides above it.
+            is_shown[foot] |= is_shown[hock];
+            is_shown[hock] &= share <= *THIGH.end();
+            let has_thigh = is_shown[hock] && THIGH.contains(&share) && bends.likeness(limb, 0, TURNED) >= LED;
+            [hip, knee].into_iter().for_each(|joint| is_shown[joint] |= has_thigh);
         }
         Self { is_shown, is_shared_out, carried: carried(template, best.alignment.scale, places) }
     }
@@ -121,8 +127,14 @@ impl Bends<'_> {
 
     /// True if a limb of a template that bends by `least` radians or more at one of the limb's joints bends so in the mesh.
     fn bends_alike(&self, limb: &Limb, at: usize, least: f32) -> bool {
-        let (Some(&joint), Some(&after)) = (limb.joints.get(at), limb.joints.get(at + 1)) else { return false };
-        let Some(before) = self.template.parents[joint] else { return false };
+        self.likeness(limb, at, least) >= ALIKE
+    }
+
+    /// Share of the larger of the angles of template and mesh, at one of a limb's joints, that the other one has; zero where the
+    /// template bends by less than `least` radians.
+    fn likeness(&self, limb: &Limb, at: usize, least: f32) -> f32 {
+        let (Some(&joint), Some(&after)) = (limb.joints.get(at), limb.joints.get(at + 1)) else { return 0.0 };
+        let Some(before) = self.template.parents[joint] else { return 0.0 };
         let angle = |place: &dyn Fn(usize) -> Vec3| {
             let [from, here, to] = [before, joint, after].map(place);
             let cosine = (here - from).normalize_or_zero().dot((to - here).normalize_or_zero());
@@ -130,6 +142,6 @@ impl Bends<'_> {
         };
         let mesh = angle(&|joint| self.places[joint]);
         let rest = angle(&|joint| self.stretch.apply(self.template.positions[joint]));
-        rest >= least && mesh.min(rest) >= ALIKE * mesh.max(rest)
+        if rest >= least { mesh.min(rest) / mesh.max(rest) } else { 0.0 }
     }
 }
