@@ -278,8 +278,8 @@ fn one_drag_mends_a_limb() {
 #[test]
 fn the_same_figure_given_otherwise() {
     let Some(all) = all() else { return };
-    // What was asked for is 0.3, and 1 for odd turns; the second figure has few faces and misses some of it, but for missing ones,
-    // which the other side tells.
+    // What was asked for is 0.3, and 1 for odd turns; the second figure has few faces and misses some of it. Missing faces are told
+    // by those of the other side.
     let bounds = [("male_child_tpose", 0.3, 0.3, 0.6), ("gltf_skinned/CesiumMan.glb", 0.6, 0.6, 4.0)];
     for (name, still, odd, coarse) in bounds {
         let FittedFigure { figure, fit: base } = all.iter().find(|fitted| fitted.figure.name == name).unwrap();
