@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use bevy::prelude::*;
+use bevy::{prelude::*, window::RequestRedraw};
 
 use super::{
     ActiveRig,
@@ -30,7 +30,9 @@ impl Plugin for FollowPlugin {
         app.add_plugins(RigInstancePlugin { live: true, look: LOOK, ..default() })
             .add_message::<OfferAnswer>()
             .add_message::<Notice>()
+            .add_message::<RequestRedraw>()
             .add_systems(Update, (follow, answer, tell_offer).chain().after(attend))
+            .add_systems(Last, draw_on)
             .add_observer(tell_update)
             .add_observer(tell_failure);
     }
@@ -132,6 +134,14 @@ pub(super) fn counts(offer: &UpdateOffer) -> String {
 /// The open rig's offer, if its template's file has changed.
 pub(super) fn offer(world: &World) -> Option<&UpdateOffer> {
     world.get::<UpdateOffer>(world.get_resource::<ActiveRig>()?.0)
+}
+
+/// Asks for another frame after one in which a template brought something: an offer is told, and an update carried out, in the
+/// next frame, and a window that sleeps draws one frame when it is woken.
+fn draw_on(sources: Query<(), Changed<RigSource>>, mut commands: Commands) {
+    if !sources.is_empty() {
+        commands.write_message(RequestRedraw);
+    }
 }
 
 fn tell_update(updated: On<RigUpdated>, documents: Query<&OpenDocument>, mut notices: MessageWriter<Notice>) {

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bevy::prelude::*;
+use bevy::{prelude::*, window::RequestRedraw};
 use rigsmith::{
     editor::{
         ActiveRig,
@@ -176,6 +176,35 @@ fn a_changed_template_wakes_a_window_that_sleeps() {
     assert!(window.offer().is_some(), "{:?}", window.notices.list);
     window.settle();
     assert!(woken.try_recv().is_err(), "it sleeps on while the file stays as it is");
+}
+
+/// A window that sleeps draws one frame when it is woken, and those that this one and the next ones ask for.
+#[test]
+fn a_woken_window_draws_until_the_change_is_told() {
+    for is_live in [false, true] {
+        let mut window = Window::new();
+        if is_live {
+            window.send(OfferAnswer::Live(true));
+            window.settle();
+        }
+        let (wakes, woken) = std::sync::mpsc::channel();
+        window.base.app.world().resource::<RigTemplates>().set_wake(move || {
+            let _ = wakes.send(());
+        });
+        window.save("0.3, 0)", "0.5, 0)");
+        woken.recv_timeout(HANG).expect("the window is woken");
+        window.base.messages::<RequestRedraw>();
+        window.frame();
+        let mut frames = 1;
+        while !window.base.messages::<RequestRedraw>().is_empty() {
+            window.frame();
+            frames += 1;
+            assert!(frames < 20, "the window never sleeps");
+        }
+        let told = if is_live { "1 change taken over" } else { "The template's file has changed" };
+        assert!(window.notices.list.iter().any(|notice| notice.text.contains(told)), "{:?}", window.notices.list);
+        assert_eq!(window.height("b"), if is_live { 0.5 } else { 0.3 });
+    }
 }
 
 #[test]
