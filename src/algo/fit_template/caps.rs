@@ -46,8 +46,8 @@ pub(super) fn close_holes(points: &mut Vec<Vec3>, triangles: &mut Vec<[u32; 3]>)
             continue;
         }
         if ring.len() <= SHORT {
-            let Cap { odd, bend, faces } = flattest(points, triangles, &rims, &opposite, &ring);
-            if ring.len() <= 4 || odd == 0 || bend <= STEEP * length as f32 {
+            let Cap { unmatched, bend, faces } = flattest(points, triangles, &rims, &opposite, &ring);
+            if ring.len() <= 4 || unmatched == 0 || bend <= STEEP * length as f32 {
                 caps.extend(faces);
                 continue;
             }
@@ -107,7 +107,7 @@ fn from_least([a, b, c]: [u32; 3]) -> [u32; 3] {
 /// Triangulation of a ring.
 struct Cap {
     /// Number of its triangles whose images are no faces.
-    odd: u32,
+    unmatched: u32,
     /// Sum of the angles along its edges, times their lengths.
     bend: f32,
     faces: Vec<[u32; 3]>,
@@ -145,21 +145,21 @@ fn flattest(
                 let face = corners([first, middle, last]);
                 let normal = cross(points, face);
                 let over = |from: usize, to: usize| {
-                    let (odd, sum, apex) = best[from * count + to];
+                    let (unmatched, sum, apex) = best[from * count + to];
                     let other = match to - from {
                         1 => beyond(from, to),
                         _ => cross(points, corners([from, apex, to])),
                     };
-                    (odd, sum + bend([from, to], normal, other))
+                    (unmatched, sum + bend([from, to], normal, other))
                 };
                 let (before, after) = (over(first, middle), over(middle, last));
-                let odd = before.0 + after.0 + u32::from(!opposite.has(face));
+                let unmatched = before.0 + after.0 + u32::from(!opposite.has(face));
                 let mut sum = before.1 + after.1;
                 if span == count - 1 {
                     sum += bend([last, first], normal, beyond(last, first));
                 }
-                if odd < least.0 || odd == least.0 && sum < least.1 {
-                    least = (odd, sum, middle);
+                if unmatched < least.0 || unmatched == least.0 && sum < least.1 {
+                    least = (unmatched, sum, middle);
                 }
             }
             best[first * count + last] = least;
@@ -174,8 +174,8 @@ fn flattest(
             open.extend([(first, middle), (middle, last)]);
         }
     }
-    let (odd, bend, _) = best[count - 1];
-    Cap { odd, bend, faces }
+    let (unmatched, bend, _) = best[count - 1];
+    Cap { unmatched, bend, faces }
 }
 
 /// Edges that one triangle uses, against the direction of that triangle, with its number.
