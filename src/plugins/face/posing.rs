@@ -26,6 +26,10 @@ use crate::algo::face::expression::{BonePose, Mix};
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct BackgroundPosing;
 
+/// Most requests that wait for a pose. A person makes a few; code that asks for another expression in each frame gets those that
+/// can be computed, and the last one.
+const MOST_WAITING: usize = 32;
+
 /// Poses of a mesh's face for expressions: the last one that was computed, and the one that is being computed.
 #[derive(Component, Default)]
 pub struct FacePosing {
@@ -78,10 +82,12 @@ impl FacePosing {
         self.running = Some(RunningPose { task, parts: Arc::downgrade(parts), request, queue: Vec::new() });
     }
 
-    /// Lets a request wait for the pose that is being computed, in place of a preview that waits.
+    /// Lets a request wait for the pose that is being computed, in place of a preview that waits, or of the last request where
+    /// [`MOST_WAITING`] do.
     pub(super) fn wait(&mut self, request: ExpressRequest) {
         let Some(running) = &mut self.running else { return };
-        running.queue.pop_if(|last| last.preview);
+        let is_full = running.queue.len() >= MOST_WAITING;
+        running.queue.pop_if(|last| last.preview || is_full);
         running.queue.push(request);
     }
 

@@ -179,3 +179,24 @@ fn expressions_of_one_frame_do_not_mix() {
     assert!(!other.rig().pose().is_empty());
     assert_eq!(bench.rig().pose(), other.rig().pose());
 }
+
+/// Code that asks for another expression in each frame gets some of them, and the last one, however long one takes.
+#[test]
+fn requests_that_wait_are_bounded_and_end_with_the_last() {
+    let (mut desk, mesh) = with_face(model(heads::bundled()));
+    let steps = desk.steps().0;
+    let (held, threads) = busy_threads();
+    for number in 1..=200 {
+        let strengths = strength("anger", number as f32 / 200.0);
+        desk.app.world_mut().write_message(ExpressRequest { mesh, strengths, preview: false });
+        desk.frame();
+    }
+    drop(held);
+    desk.until("the last one", |desk| {
+        !is_posing(desk.app.world(), mesh) && shown(desk.app.world(), mesh) == strength("anger", 1.0)
+    });
+    drop(threads);
+    desk.frames(4);
+    let made = desk.steps().0 - steps;
+    assert!((2..=40).contains(&made), "{made} steps");
+}
