@@ -33,7 +33,8 @@ impl Search<'_> {
         TOES * feet.max(0.0) + DISORDER * self.disorder(leaves, forward, scale)
     }
 
-    /// Lack of the ends of legs in leading forward as the template's do, in the mean: toes and paws tell the front.
+    /// Lack of the ends of legs in leading forward as the template's do, in the mean: toes and paws tell the front. A bird's toes
+    /// are splayed, and the longest of them may lead out more than forward; what counts is along the plane of symmetry.
     fn backward_feet(&self, leaves: &[Option<usize>], forward: Vec3) -> f32 {
         let template = self.template;
         let (mut sum, mut count) = (0.0, 0.0);
@@ -43,7 +44,11 @@ impl Search<'_> {
             };
             let rest = FOOT * (template.length(limb.attach, limb.joints[limb.joints.len() - 1]) + limb.beyond);
             let wanted = (template.tip(limb) - template.place_on(limb, rest)).normalize_or_zero().z;
-            let found = (line.at(0.0) - line.at(FOOT * line.free)).normalize_or_zero().dot(forward);
+            let mut way = line.at(0.0) - line.at(FOOT * line.free);
+            if let Some((_, normal)) = self.directions.mirror.filter(|_| template.has_hidden_knee(limb)) {
+                way -= normal * way.dot(normal);
+            }
+            let found = way.normalize_or_zero().dot(forward);
             sum += (wanted - found).max(0.0);
             count += 1.0;
         }
