@@ -305,6 +305,7 @@ impl Operation {
 
     /// The rig as [`run`](Self::run) changes it without live mirroring, and the notes. No edits are kept, which take more memory
     /// than what they add; a rig that refuses the operation is dropped.
+    #[cfg(feature = "cli")]
     pub(crate) fn run_on(&self, mut rig: Rig, uids: &mut UidSource) -> Result<(Rig, Vec<String>), OperationError> {
         let mut draft = Draft::without_record(&mut rig, uids);
         self.run_in(&mut draft)?;

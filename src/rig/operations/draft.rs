@@ -47,6 +47,7 @@ impl<'a> Draft<'a> {
     }
 
     /// A draft without a record of its edits, which take more memory than what they add. It cannot be taken back.
+    #[cfg(feature = "cli")]
     pub(super) fn without_record(rig: &'a mut Rig, uids: &'a mut UidSource) -> Self {
         Self { is_recorded: false, ..Self::new(rig, uids, None) }
     }
