@@ -242,9 +242,12 @@ fn templates_of_bare_and_placed_joints_stay_within_their_memory() {
                 (&[file], &["inject", one, file, "--joints", "j7", "-o", "h.rig.ron"]),
             ],
         );
-        for (args, beyond) in
-            [(&["merge", one, file, "-o", "d.rig.ron"][..], DOCUMENT), (&["pose", file, "-o", "f.glb"], AT_REST)]
-        {
+        for (args, beyond) in [
+            (&["merge", one, file, "-o", "d.rig.ron"][..], DOCUMENT),
+            (&["pose", file, "-o", "f.glb"], AT_REST),
+            (&["pose", file, "-o", "f.rig.ron"], AT_REST),
+            (&["pose", file, "--frames", "1", "-o", "g.glb"], AT_REST),
+        ] {
             let allowance = memory_allowance(text.len() as u64) + joints * beyond;
             let (ended, answer) = json_answer(folder.path(), args);
             assert_eq!(ended.code, Some(0), "{args:?}: {answer:.600}");
