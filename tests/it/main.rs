@@ -49,6 +49,8 @@ mod cli_template_answers;
 mod cli_templates;
 #[cfg(feature = "cli")]
 mod cli_update_clips;
+#[cfg(feature = "cli")]
+mod cli_watch;
 mod click_runs;
 #[cfg(feature = "editor")]
 mod clicks;
