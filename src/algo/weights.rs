@@ -23,8 +23,10 @@ mod claim;
 mod coarse;
 pub mod fill;
 mod finish;
+mod grips;
 mod half;
 mod heat;
+mod held_pieces;
 mod hierarchy;
 mod islands;
 mod keypoints;
@@ -47,6 +49,7 @@ use bind::{BoundSurface, Source};
 use finish::Shaping;
 use twist::Limbs;
 pub use {
+    held_pieces::held_pieces,
     report::{IdleJoint, IdleReason, StiffPiece, WeightReport},
     twist::late_shares,
 };
@@ -287,7 +290,15 @@ pub fn skin_weights(
     }
     report.stiff_pieces = stiff.pieces(&place, &shaping, &limbs);
     report.stiff = report.stiff_pieces.iter().map(|piece| piece.points).sum();
-    let result = finish(&|point| limbs.spread(points[point], weights.of(place[point] as usize)));
+    let middles = stiff.middles(points, &place);
+    let result = finish(&|point| {
+        let place = place[point];
+        let influences = weights.of(place as usize);
+        match stiff.of.get(place as usize).and_then(|piece| middles[*piece as usize]) {
+            Some(middle) => limbs.hold(middle, influences),
+            None => limbs.spread(points[point], influences),
+        }
+    });
     let outside = |joint: usize| limbs.index(joint).and_then(|core| gaps.outside(core));
     report.idle_joints = report::idle_joints(joints, &result, is_locked, &slots, is_given, outside);
     step(1.0)?;

@@ -104,7 +104,7 @@ fn half_joints_take_alike_along_a_chain() {
     let count = 600;
     let (joints, (points, _)) = (joints(count), tube(count));
     let is_late: Vec<bool> = joints.iter().map(|joint| joint.halves.is_some()).collect();
-    let shared = late_shares(&points, &joints, &is_late, &weights(&points, count, false), |_| false, 8);
+    let shared = late_shares(&points, &joints, &is_late, &weights(&points, count, false), &[], |_| false, 8);
     // Points around the second joint, and as many around each further one.
     let around = RINGS * SIDES;
     let row = |point: usize, back: usize| -> Vec<(u32, f32)> {

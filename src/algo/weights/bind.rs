@@ -85,8 +85,13 @@ pub(crate) fn bind(
     if settings.stiff_parts {
         let bending = settings.bending.iter().cloned().flatten();
         let bending: Vec<u32> = bending.filter_map(|point| place.get(point as usize).copied()).collect();
-        (weights, stiff) =
-            Islands::new(&places, &triangles).stiffened((&places, &triangles), &weights, slots, &bending, &bones);
+        (weights, stiff) = Islands::new(&places, &triangles).stiffened(
+            (&places, &triangles),
+            &weights,
+            slots,
+            &bending,
+            (&joints, &bones),
+        );
     }
     Ok(BoundSurface { place, weights, sources, stiff, gaps: Gaps { sight, joints, scale } })
 }

@@ -41,6 +41,12 @@ impl Hierarchy {
         let [first, end] = self.ranges[top];
         (first..end).contains(&self.ranges[joint][0])
     }
+
+    /// Number of joints from `top` down, itself included.
+    pub fn count(&self, top: usize) -> usize {
+        let [first, end] = self.ranges[top];
+        end - first
+    }
 }
 
 /// Joints without twist and half joints: the bones that others share. Each has the nearest such joint above it.

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use glam::Vec3;
 
 use super::{
-    Method, bone::BoneSegment, claim::Claim, laplacian::Graph, report::Stiffness, rings, sight::is_surrounded,
+    Method, WeightJoint, bone::BoneSegment, claim::Claim, grips::Grips, laplacian::Graph, report::Stiffness, rings,
+    sight::is_surrounded,
 };
 use crate::mesh::{adjacency, model::Weights, surface::Surface};
 
@@ -15,12 +16,12 @@ const SEEN: f32 = 0.15;
 const SPECK: f32 = 0.2;
 
 /// A part moves with one joint if that joint holds at least this share of it.
-const HELD: f32 = 0.8;
+pub(super) const HELD: f32 = 0.8;
 /// A part moves with a slot if the slot holds at least this share of it: slots hold no flesh, so it is a thing that they carry.
 const CARRIED: f32 = 0.5;
 
-/// Approximate number of places of a small part that look for the part that it lies on.
-const SAMPLES: usize = 32;
+/// Approximate number of places of a part that look for the part that it lies on, or for the limb that carries it.
+pub(super) const SAMPLES: usize = 32;
 
 /// The connected pieces of a surface.
 pub(crate) struct Islands {
@@ -69,20 +70,19 @@ impl Islands {
     /// Weights with which parts stay as stiff as they are: a part that one joint holds in nearly its whole size (helmet,
     /// eye, sword) moves with that joint, and each small part moves as one. The holder of a small part is the joint with
     /// the largest share. A part of which a slot beside flesh, as `slots` flags joints, holds the most is what it carries. A
-    /// ring moves with the one of `bones` that runs through it. A surface in one piece stays as it is, and so do the parts
-    /// that have one of the `bending` places.
+    /// ring moves with the one of `bones` that runs through it, and what fingers hold with the hand. A surface in one piece stays as it is, and so do the parts that have one of the `bending` places.
     pub fn stiffened(
         &self,
         (places, triangles): (&[Vec3], &[[u32; 3]]),
         weights: &Weights,
         slots: &[bool],
         bending: &[u32],
-        bones: &[BoneSegment],
+        (joints, bones): (&[WeightJoint], &[BoneSegment]),
     ) -> (Weights, Stiffness) {
         let mut sums: Vec<BTreeMap<u32, f32>> = vec![BTreeMap::new(); self.extents.len()];
-        let mut counts = vec![0usize; self.extents.len()];
+        let mut members: Vec<Vec<Vec3>> = vec![Vec::new(); self.extents.len()];
         for (place, &island) in self.of.iter().enumerate() {
-            counts[island as usize] += 1;
+            members[island as usize].push(places[place]);
             for (joint, weight) in weights.of(place) {
                 *sums[island as usize].entry(joint).or_default() += weight;
             }
@@ -92,23 +92,28 @@ impl Islands {
         // Where nothing else holds flesh slots do.
         let has_flesh = sums.iter().flat_map(BTreeMap::keys).any(|joint| !slots[*joint as usize]);
         let is_carrier = |joint: u32| has_flesh && slots[joint as usize];
-        let is_part = counts.iter().filter(|count| **count > 2).count() > 1;
-        let rings = rings::bearers(&self.of, counts.len(), places, bones);
-        let mut rows: Vec<Option<Vec<(u32, f32)>>> = (sums.iter().zip(&counts).enumerate())
-            .map(|(island, (sums, count))| {
-                if !is_part || *count < 3 || bends[island] {
+        let is_part = members.iter().filter(|members| members.len() > 2).count() > 1;
+        let grips = Grips::new(joints, bones);
+        let mut rows: Vec<Option<Vec<(u32, f32)>>> = (sums.iter().zip(&members).enumerate())
+            .map(|(island, (sums, members))| {
+                if !is_part || members.len() < 3 || bends[island] {
                     return None;
                 }
                 let whole: f32 = sums.values().sum();
                 let first = sums.iter().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)))?;
                 let is_carried = is_carrier(*first.0) && *first.1 >= CARRIED * whole;
-                match rings[island] {
-                    Some(joint) if !is_carried => Some(vec![(joint, 1.0)]),
-                    _ if is_carried || *first.1 >= HELD * whole => Some(vec![(*first.0, 1.0)]),
-                    _ if self.are_small(island) => {
-                        Some(sums.iter().map(|(joint, sum)| (*joint, sum / whole)).collect())
-                    }
-                    _ => None,
+                let alone = |joint: u32| Some(vec![(joint, 1.0)]);
+                if is_carried {
+                    return alone(*first.0);
+                }
+                let carrier = || (!self.are_small(island)).then(|| grips.carrier(sums, members)).flatten();
+                if let Some(joint) = rings::bearer(members, bones).or_else(carrier) {
+                    return alone(joint);
+                }
+                match self.are_small(island) {
+                    _ if *first.1 >= HELD * whole => alone(*first.0),
+                    true => Some(sums.iter().map(|(joint, sum)| (*joint, sum / whole)).collect()),
+                    false => None,
                 }
             })
             .collect();

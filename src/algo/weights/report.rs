@@ -1,5 +1,7 @@
 //! Report of a binding: where weights come from, which pieces of the surface move as one, and which joints hold nothing.
 
+use glam::Vec3;
+
 use super::{WeightJoint, finish::Shaping, twist::Limbs};
 use crate::mesh::model::Weights;
 
@@ -83,6 +85,19 @@ impl Stiffness {
     fn at(&self, place: u32) -> Option<(u32, (u32, f32))> {
         let piece = *self.of.get(place as usize)?;
         self.holders[piece as usize].map(|holder| (piece, holder))
+    }
+
+    /// Middle of each piece of a mesh whose points lie at the given places; `None` for pieces that bend.
+    pub fn middles(&self, points: &[Vec3], place: &[u32]) -> Vec<Option<Vec3>> {
+        let mut sums = vec![(Vec3::ZERO, 0.0); self.holders.len()];
+        for (point, place) in points.iter().zip(place) {
+            if let Some(&piece) = self.of.get(*place as usize) {
+                let (sum, count) = &mut sums[piece as usize];
+                (*sum, *count) = (*sum + *point, *count + 1.0);
+            }
+        }
+        let middle = |((sum, count), holder): ((Vec3, f32), &Option<_>)| holder.map(|_| sum / count);
+        sums.into_iter().zip(&self.holders).map(middle).collect()
     }
 
     /// The stiff pieces of a mesh whose points lie at the given places; points with given weights belong to none.

@@ -8,6 +8,7 @@ use super::{
     bone::BoneSegment,
     bone_tree::{BoneTree, closest_on},
     bones::LEAF_REACH,
+    rings,
     sight::Sight,
 };
 
@@ -188,6 +189,14 @@ impl Homes {
             }
             parts[part] = if at_home.contains(&true) { at_home } else { Vec::new() };
         }
+        let mut members = vec![Vec::new(); parts.len()];
+        for point in 0..points.len() {
+            members[sight.island(point)].push(point);
+        }
+        let places = |part: usize| -> Vec<Vec3> { members[part].iter().map(|&point| points[point]).collect() };
+        let is_ring = |part: &usize| !parts[*part].is_empty() && rings::bearer(&places(*part), segments).is_some();
+        let rings: Vec<usize> = sight.parts().filter(is_ring).collect();
+        leave_rings(&mut parts, &rings);
         let mut links = separate_limbs(&mut parts, joints, segments, points, sight);
         for joint in (0..claims.len()).filter(|&joint| claims[joint]) {
             if parts.iter().all(|part: &Vec<bool>| part.get(joint) != Some(&true)) {
@@ -198,10 +207,6 @@ impl Homes {
         let bearers: Vec<usize> = (0..parts.len()).filter(|&part| !parts[part].is_empty()).collect();
         let mut lying = vec![false; parts.len()];
         sight.parts().filter(|_| !bearers.is_empty()).for_each(|part| lying[part] = parts[part].is_empty());
-        let mut members = vec![Vec::new(); parts.len()];
-        for point in 0..points.len() {
-            members[sight.island(point)].push(point);
-        }
         for part in sight.parts().filter(|_| !bearers.is_empty()) {
             if parts[part].is_empty() {
                 let stride = members[part].len().div_ceil(SAMPLES).max(1);
@@ -247,6 +252,21 @@ impl Homes {
     /// True if a joint is a slot beside joints that hold flesh.
     pub fn is_slot(&self, joint: u32) -> bool {
         self.slots.get(joint as usize).is_some_and(|is_slot| *is_slot)
+    }
+}
+
+/// Takes the joints from rings that are at home in what a ring is around: a belt lies on the hips, whether more of it is seen from
+/// one thigh or from the other.
+fn leave_rings(parts: &mut [Vec<bool>], rings: &[usize]) {
+    for &ring in rings {
+        let others = (0..parts.len()).filter(|part| rings.binary_search(part).is_err());
+        let others: Vec<usize> = others.filter(|&part| !parts[part].is_empty()).collect();
+        for joint in 0..parts[ring].len() {
+            parts[ring][joint] &= !others.iter().any(|&part| parts[part][joint]);
+        }
+        if !parts[ring].contains(&true) {
+            parts[ring] = Vec::new();
+        }
     }
 }
 

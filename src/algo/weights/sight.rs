@@ -88,9 +88,10 @@ impl Sight {
         self.parts().next().is_some() && evenly_spread().filter(meets).count() * 8 > DIRECTIONS * 5
     }
 
-    /// True if a large island is around `point`; of a surface of one island, always.
+    /// True if a large island is around `point`; of a surface of one island, always. A sheet beside it is not around it, however
+    /// wide it is.
     pub fn is_within(&self, island: usize, point: Vec3) -> bool {
-        self.islands[island].as_ref().is_none_or(|island| encloses(island, point))
+        self.islands[island].as_ref().is_none_or(|island| encloses(island, point) && !stands_aside(island, point))
     }
 
     /// True if something of a large island lies between two places.
@@ -152,6 +153,18 @@ fn encloses(surface: &Surface, point: Vec3) -> bool {
 pub(super) fn is_surrounded(surface: &Surface, place: Vec3) -> bool {
     let misses = |direction: &Vec3| surface.closest(&Ray { origin: place, direction: *direction }).is_none();
     evenly_spread().filter(misses).nth(DIRECTIONS / 8).is_none()
+}
+
+/// True if a surface stands on one side of `place`, as a cape behind a back: of the rays that meet it, most meet nothing the other
+/// way. A wide sheet has a winding number of nearly a half beside it.
+fn stands_aside(surface: &Surface, place: Vec3) -> bool {
+    let meets = |direction: &Vec3| surface.closest(&Ray { origin: place, direction: *direction }).is_some();
+    let (mut met, mut met_twice) = (0, 0);
+    for direction in evenly_spread().filter(meets) {
+        met += 1;
+        met_twice += usize::from(meets(&-direction));
+    }
+    4 * met_twice < met
 }
 
 /// Unit vectors on a spherical Fibonacci lattice. The golden angle is turned by repeated complex multiplication, so no

@@ -101,9 +101,7 @@ impl Limbs {
     pub fn spread(&self, point: Vec3, influences: impl Iterator<Item = (u32, f32)>) -> Vec<(u32, f32)> {
         let mut row = Vec::new();
         for (joint, weight) in influences {
-            let bones = self.bones[joint as usize].iter();
-            let nearest = bones.min_by(|a, b| a.distance(point).total_cmp(&b.distance(point)));
-            match nearest {
+            match nearest(&self.bones[joint as usize], point) {
                 Some(bone) => row.extend(bone.shares(point).map(|(joint, share)| (joint, weight * share))),
                 None => row.push((self.places[joint as usize], weight)),
             }
@@ -111,16 +109,32 @@ impl Limbs {
         self.halves.take(&mut row);
         row
     }
+
+    /// Influences of the bound joints over a piece of the mesh that moves as one as influences of all joints: one joint of each
+    /// bone, the one that holds the most in the piece's middle. A greave that follows a part of the shin's twist here and a part
+    /// there would shear.
+    pub fn hold(&self, middle: Vec3, influences: impl Iterator<Item = (u32, f32)>) -> Vec<(u32, f32)> {
+        let mut row: Vec<(u32, f32)> = influences
+            .map(|(joint, weight)| {
+                let nearest = nearest(&self.bones[joint as usize], middle);
+                (nearest.map_or(self.places[joint as usize], |bone| bone.holder(middle)), weight)
+            })
+            .collect();
+        self.halves.take(&mut row);
+        row
+    }
 }
 
 /// Shares of joints that were built after a mesh was bound: of `weights`, twist joints take theirs from the joints of their bone,
 /// and half joints from both sides of their bend, as if they had been there. `is_late` marks those joints. Influences of points
-/// for which `is_fixed` is true stay, and so do those of all other bones; no point gets more influences than `most`.
+/// for which `is_fixed` is true stay, and so do those of all other bones; no point gets more influences than `most`. `middles` has
+/// the middle of each point's piece where that moves as one: all of it goes to one joint.
 pub fn late_shares(
     points: &[Vec3],
     joints: &[WeightJoint],
     is_late: &[bool],
     weights: &Weights,
+    middles: &[Option<Vec3>],
     is_fixed: impl Fn(usize) -> bool,
     most: usize,
 ) -> Weights {
@@ -153,8 +167,9 @@ pub fn late_shares(
             }
         }
         for (owner, weight) in held {
-            let nearest = limbs[&owner].iter().min_by(|a, b| a.distance(*place).total_cmp(&b.distance(*place)));
-            match nearest {
+            let middle = middles.get(point).copied().flatten();
+            match nearest(&limbs[&owner], middle.unwrap_or(*place)) {
+                Some(bone) if let Some(middle) = middle => row.push((bone.holder(middle), weight)),
                 Some(bone) => row.extend(bone.shares(*place).map(|(joint, share)| (joint, weight * share))),
                 None => row.push((owner, weight)),
             }
@@ -198,6 +213,11 @@ fn bones(joints: &[WeightJoint], owner: u32, twists: &[u32], is_free: &[bool]) -
     bones.into_iter().map(complete).collect()
 }
 
+/// The bone that is nearest to a point.
+fn nearest(bones: &[Bone], point: Vec3) -> Option<&Bone> {
+    bones.iter().min_by(|a, b| a.distance(point).total_cmp(&b.distance(point)))
+}
+
 /// Position of a point along a bone, 0 at the start and 1 at the end.
 fn place(point: Vec3, along: Vec3) -> f32 {
     // Divided first: squares of small or large units leave the range of numbers.
@@ -209,6 +229,12 @@ fn place(point: Vec3, along: Vec3) -> f32 {
 impl Bone {
     fn distance(&self, point: Vec3) -> f32 {
         point.distance(self.start + self.along * place(point - self.start, self.along))
+    }
+
+    /// The joint that holds the most of the flesh at a point.
+    fn holder(&self, point: Vec3) -> u32 {
+        let nearest = self.shares(point).max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+        nearest.map_or(self.stations[0].1, |(joint, _)| joint)
     }
 
     /// The joints that share the flesh at a point, with shares that sum to one.

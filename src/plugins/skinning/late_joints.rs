@@ -7,7 +7,7 @@ use bevy::{prelude::*, tasks::AsyncComputeTaskPool};
 
 use super::{BoundSkin, SkinningInput, SkinningJob, SkinningReport, held_objects, parts::object_points};
 use crate::{
-    algo::weights::{WeightReport, WeightSettings, late_shares},
+    algo::weights::{WeightReport, WeightSettings, held_pieces, late_shares},
     plugins::{
         commands::{BuildResult, RigModules},
         document::EditReport,
@@ -121,7 +121,8 @@ impl SkinningInput {
         }
         let existing = self.existing.clone().unwrap_or_default();
         let most = (0..existing.len()).map(|point| existing.of(point).len()).fold(MOST, usize::max);
-        let weights = late_shares(points, &self.joints, &is_late, &existing, |point| is_fixed[point], most);
+        let middles = held_pieces(points, &mesh.triangles, &existing, &self.bending);
+        let weights = late_shares(points, &self.joints, &is_late, &existing, &middles, |point| is_fixed[point], most);
         let settings = WeightSettings { max_influences: most, prune: 0.0, ..WeightSettings::default() };
         let is_rigid = |point: usize| is_fixed[point];
         let (weights, pushes) = self.try_bends(mesh, weights, &settings, &is_rigid, &|bend| is_late[bend.half]);

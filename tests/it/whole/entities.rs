@@ -262,7 +262,7 @@ impl LiveRig {
             // Squares of far places are beyond single precision.
             let off = at.translation().as_dvec3().distance(wanted.translation.as_dvec3()) / f64::from(far);
             // Numbers that no float holds are compared with none.
-            assert!(!far.is_finite() || off <= f64::from(NEAR), "{} is {off} off", node.name);
+            assert!(!far.is_finite() || off <= f64::from(NEAR), "{} is {off} off: {at:?}, {wanted:?}", node.name);
         }
     }
 }
