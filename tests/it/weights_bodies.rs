@@ -486,7 +486,7 @@ fn characters_and_creatures_are_bound_as_well_as_they_were() {
     for (file, measured) in [
         ("gltf_skinned/CesiumMan.glb", 0.089),
         ("gltf_skinned/cesium_man.gltf", 0.089),
-        ("gltf_skinned/RobotExpressive.glb", 0.150),
+        ("gltf_skinned/RobotExpressive.glb", 0.134),
         ("gltf_skinned/Fox.glb", 0.228),
         ("creatures/fox-fox.glb", 0.184),
         ("creatures/fox-dog.glb", 0.192),
