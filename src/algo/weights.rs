@@ -9,7 +9,8 @@
 //! last joints are found from the surface; a bone has a girth, and claims skin beyond it only reluctantly; sight is
 //! asked of patches of skin rather than of single points, and of each large piece of the surface alone; a piece belongs
 //! to the bones inside of it, and joints that stand off from the body (roots, targets, poles) hold nothing; skin whose
-//! bone lies across the air is left to its neighbours; arms, legs and necks share flesh as painted bodies do; pieces that
+//! bone lies across the air is left to its neighbours; skin on the inside of a chain that is folded at rest belongs to the
+//! bone that it faces away from; arms, legs and necks share flesh as painted bodies do; pieces that
 //! one joint holds stay stiff, and so do rings around a bone; large meshes are solved on a coarser surface.
 
 mod anatomy;
@@ -23,6 +24,7 @@ mod claim;
 mod coarse;
 pub mod fill;
 mod finish;
+mod folds;
 mod grips;
 mod half;
 mod heat;

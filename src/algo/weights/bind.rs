@@ -150,7 +150,7 @@ impl Job<'_> {
         let mut sources = vec![Source::None; places.len()];
         let mut claims = Vec::new();
         if method != Method::Voxel {
-            claims = claim::claims(places, &bones, graph, &sight);
+            claims = claim::claims(places, triangles, &bones, graph, &sight);
             self.step(0.5)?;
             let trusted = islands.trusted(graph, &claims, method);
             if trusted.contains(&true) {

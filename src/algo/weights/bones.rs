@@ -11,6 +11,7 @@ use super::{
     WeightJoint,
     bone::BoneSegment,
     bone_tree::{BoneTree, closest_on},
+    folds::{Fold, folds},
     keypoints,
     roots::{Homes, Roots, parents_first},
     sight::Sight,
@@ -33,6 +34,8 @@ pub(crate) struct Bones {
     pub segments: Vec<BoneSegment>,
     /// Usual reach of the flesh around each bone.
     pub girths: Vec<f32>,
+    /// Folds at which each bone may lose skin to another.
+    pub folds: Vec<Vec<Fold>>,
     pub tree: BoneTree,
     homes: Homes,
 }
@@ -124,7 +127,10 @@ pub(crate) fn build(
     grow_leaves(joints, &mut segments, &leaves, points, areas, (sight, &homes));
     let tree = BoneTree::new(&segments);
     let girths = girths(&segments, &tree, points, areas, (sight, &homes));
-    Bones { segments, girths, tree, homes }
+    let mut is_guess = vec![false; segments.len()];
+    leaves.iter().for_each(|(segment, _)| is_guess[*segment] = true);
+    let folds = folds(&segments, &is_guess);
+    Bones { segments, girths, folds, tree, homes }
 }
 
 /// True if the bone to `joint` turns back along the bone by which the chain arrived at its parent: an ear that hangs on

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{bone_tree::closest_on, bones::Bones, laplacian::Graph, sight::Sight};
+use super::{bone_tree::closest_on, bones::Bones, folds::normals, laplacian::Graph, sight::Sight};
 
 /// Largest number of joints that share a point before the heat spreads.
 pub(crate) const SHARES: usize = 4;
@@ -14,6 +14,12 @@ const HEAT: f32 = 12.0;
 const BAND: f32 = 0.1;
 /// A patch that its joint sees less of than this is not its own.
 const SEEN: f32 = 0.25;
+/// Share by which the reach that a bone needs grows where the skin lies along the way to the bone rather than across it: such
+/// skin is likelier another bone's, from which it faces away.
+const ASIDE: f32 = 0.1;
+/// Share by which it grows besides at the strongest folds, when the two bones of a fold are compared; and twice as much where
+/// the skin faces towards the bone, as the palm of a fist faces the fingers.
+const FOLD: f32 = 1.25;
 /// Points handled at a time by one thread.
 const CHUNK: usize = 256;
 
@@ -36,14 +42,22 @@ pub(crate) struct Claim {
 /// misjudges faces, where nostrils and the mouth lie between skin and skull, so sight is asked of whole patches: a bone
 /// loses a patch of which it sees little, as a finger loses the thigh beside it, and that patch takes its warmth from
 /// the skin around.
-pub(crate) fn claims(points: &[Vec3], bones: &Bones, graph: &Graph, sight: &Sight) -> Vec<Claim> {
+pub(crate) fn claims(
+    points: &[Vec3],
+    triangles: &[[u32; 3]],
+    bones: &Bones,
+    graph: &Graph,
+    sight: &Sight,
+) -> Vec<Claim> {
+    let normals = normals(points, triangles, sight);
     let mut claims: Vec<Claim> = points
         .par_chunks(CHUNK)
         .enumerate()
         .flat_map_iter(|(number, chunk)| {
             let mut near = Vec::new();
             let first = number * CHUNK;
-            chunk.iter().enumerate().map(move |(at, &point)| claim(first + at, point, bones, sight, &mut near))
+            let skin = chunk.iter().zip(&normals[first..]).map(|(&point, &normal)| Skin { point, normal });
+            skin.enumerate().map(move |(at, skin)| claim(first + at, skin, bones, sight, &mut near))
         })
         .collect();
     for leak in leaks(&claims, graph) {
@@ -114,17 +128,74 @@ fn reach(distance: f32, girth: f32) -> f32 {
     distance * (distance / girth).max(1.0)
 }
 
-/// The claim on the point of an index; `near` is scratch space.
-fn claim(index: usize, point: Vec3, bones: &Bones, sight: &Sight, near: &mut Vec<(f32, u32)>) -> Claim {
-    let mut result = Claim::default();
-    let island = sight.island(index);
-    let cost = |bone: u32| {
-        if !bones.may_hold(bone, island) {
-            return f32::INFINITY;
+/// Point of the skin.
+#[derive(Debug, Clone, Copy)]
+struct Skin {
+    point: Vec3,
+    /// Outward normal, shorter where the skin turns.
+    normal: Vec3,
+}
+
+impl Skin {
+    /// Reach that a bone needs for this point, and cosine of the angle between the normal and the way from the bone.
+    fn reach(self, bones: &Bones, bone: u32) -> (f32, f32) {
+        let way = self.point - closest_on(&bones.segments[bone as usize], self.point);
+        (reach(way.length(), bones.girths[bone as usize]), self.normal.dot(way.normalize_or_zero()))
+    }
+
+    /// The reach that a bone needs with regard to the slope of the skin, whichever side of it the bone is on.
+    fn sloped_reach(self, bones: &Bones, bone: u32) -> f32 {
+        let (reach, cosine) = self.reach(bones, bone);
+        reach * (1.0 + ASIDE * (self.normal.length() - cosine.abs()).max(0.0))
+    }
+
+    /// The reach by which the bones of a fold of a given strength are compared.
+    fn folded_reach(self, bones: &Bones, bone: u32, strength: f32) -> f32 {
+        let (reach, cosine) = self.reach(bones, bone);
+        reach * (1.0 + (ASIDE + FOLD * strength) * (self.normal.length() - cosine).max(0.0))
+    }
+
+    /// Shares the claims of folded bones, cheapest first, with the bones beyond the fold: the better one of the two takes the
+    /// place of the one that is nearer, and the other one follows by as much as it is worse.
+    fn share_folds(self, bones: &Bones, may_hold: impl Fn(u32) -> bool, near: &mut Vec<(f32, u32)>) {
+        if near.iter().all(|(_, bone)| bones.folds[*bone as usize].is_empty()) {
+            return;
         }
-        reach(closest_on(&bones.segments[bone as usize], point).distance(point), bones.girths[bone as usize])
-    };
+        let mut shared: Vec<(f32, u32)> = Vec::with_capacity(2 * near.len());
+        for &(cost, bone) in near.iter() {
+            let folds = bones.folds[bone as usize].iter().filter(|fold| may_hold(fold.other));
+            let pairs = folds.map(|fold| {
+                let reach = |bone: u32| self.folded_reach(bones, bone, fold.strength);
+                (reach(bone), reach(fold.other), fold.other)
+            });
+            // Of two folds, that with the better other bone.
+            match pairs.min_by(|a, b| (a.1 * b.0).total_cmp(&(b.1 * a.0))) {
+                Some((own, others, other)) => {
+                    let least = own.min(others).max(f32::MIN_POSITIVE);
+                    shared.extend([(cost * (own / least), bone), (cost * (others / least), other)]);
+                }
+                None => shared.push((cost, bone)),
+            }
+        }
+        shared.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let limit = shared.first().map_or(0.0, |(least, _)| least * (1.0 + BAND));
+        near.clear();
+        for (cost, bone) in shared {
+            if cost <= limit && near.iter().all(|(_, other)| *other != bone) {
+                near.push((cost, bone));
+            }
+        }
+    }
+}
+
+/// The claim on the point of an index; `near` is scratch space.
+fn claim(index: usize, skin: Skin, bones: &Bones, sight: &Sight, near: &mut Vec<(f32, u32)>) -> Claim {
+    let mut result = Claim::default();
+    let (point, island) = (skin.point, sight.island(index));
+    let may_hold = |bone: u32| bones.may_hold(bone, island);
+    let cost = |bone: u32| if may_hold(bone) { skin.sloped_reach(bones, bone) } else { f32::INFINITY };
     bones.tree.nearest(point, BAND, cost, near);
+    skin.share_folds(bones, may_hold, near);
     let Some(&(best, first)) = near.first() else { return result };
     let target = closest_on(&bones.segments[first as usize], point);
     // Points on a bone are held firmly, not infinitely so; surfaces have unit size here.
