@@ -134,6 +134,7 @@ mod fuzz_skin;
 mod fuzz_template;
 mod fuzz_whole;
 mod generate;
+mod gesture_answers;
 #[cfg(feature = "editor")]
 mod gesture_counts;
 mod gestures;
