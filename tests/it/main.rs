@@ -98,6 +98,7 @@ mod face_landmarks;
 mod face_symmetry;
 mod face_teeth;
 mod face_units;
+mod failed_saves;
 mod files;
 mod files_faults;
 mod files_kill;
