@@ -213,7 +213,7 @@ pub(super) fn carry_out(
             start = Some(found);
         }
         has_begun = true;
-        let Some(gesture) = script.begin_next(run.rig.len(), limits) else { continue };
+        let Some(gesture) = script.begin_next(run.rig.len(), run.surface, limits) else { continue };
         let (change, chain) = match (start, gesture) {
             (_, Gesture::Select(_)) => {
                 let Some(joint) = pick else { continue };

@@ -12,7 +12,7 @@ use super::{
     answers::Answers,
     click_run::{self, RequestedChange, RunRig},
     error::GestureError,
-    operation::on_selection,
+    operation::{check_proportion, on_selection},
     selection_run::{self, RequestedSelections},
 };
 use crate::{
@@ -289,7 +289,7 @@ pub(super) fn run_scripts(
             selection_run::carry_out(&mut script, (entity, rig, bounds), &mut requests.picks, &limits);
             continue;
         }
-        let Some(gesture) = script.begin_next(rig.len(), &limits) else { continue };
+        let Some(gesture) = script.begin_next(rig.len(), surface, &limits) else { continue };
         let mesh = meshes.and_then(|meshes| meshes.iter().next());
         let (state, symmetry) = (&mut script.state, &mut symmetry);
         let mut act = GestureRun { entity, mesh, rig, selection, bounds, state, symmetry };
@@ -301,9 +301,14 @@ pub(super) fn run_scripts(
 }
 
 impl GestureScript {
-    /// Takes the next gesture of the script of a rig with so many joints, and begins its answer; `None` where the list or
-    /// the gesture is too long.
-    pub(super) fn begin_next(&mut self, joints: usize, limits: &RigLimits) -> Option<Gesture> {
+    /// Takes the next gesture of the script of a rig with so many joints and this surface, and begins its answer; `None` where
+    /// the list or the gesture is too long, or its numbers are out of all proportion.
+    pub(super) fn begin_next(
+        &mut self,
+        joints: usize,
+        surface: Option<&RigSurface>,
+        limits: &RigLimits,
+    ) -> Option<Gesture> {
         self.state.joints_before = joints;
         let gesture = self.waiting.pop_front()?;
         let number = self.answers.len() + 1;
@@ -315,6 +320,10 @@ impl GestureScript {
             return None;
         }
         if let Err(error) = limits.check_gesture(LIST, number, &gesture) {
+            self.fail(&error.into());
+            return None;
+        }
+        if let Err(error) = check_proportion(&gesture, surface) {
             self.fail(&error.into());
             return None;
         }

@@ -73,7 +73,7 @@ pub(super) fn carry_out(
         if !goes_on {
             break;
         }
-        let Some(gesture) = script.begin_next(rig.len(), limits) else { continue };
+        let Some(gesture) = script.begin_next(rig.len(), None, limits) else { continue };
         if script.state.take_setting(&gesture) {
             continue;
         }
